@@ -3,38 +3,88 @@
 
 use std::path::{Path, PathBuf};
 
+/// The result of a function of this library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
+/// Why a function of this library failed. The message is for people; the variant says what a
+/// program can do about it.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A file that does not follow its format.
     #[error("{}: {place}: {message}", file.display())]
-    Input { file: PathBuf, place: String, message: String, hint: Option<String> },
+    Input {
+        /// The file.
+        file: PathBuf,
+        /// The place in the file: a line, an element, a byte.
+        place: String,
+        /// What was found there and what was expected.
+        message: String,
+        /// What the user can do about it.
+        hint: Option<String>,
+    },
 
     /// A file, or a value stated in it, that exceeds the [`Limits`](crate::input::Limits).
     #[error("{}: {what} is {found}, over the limit of {limit}", file.display())]
-    Limit { file: PathBuf, what: String, kind: LimitKind, found: u64, limit: u64 },
+    Limit {
+        /// The file.
+        file: PathBuf,
+        /// The quantity that exceeds the limit.
+        what: String,
+        /// The limit that is exceeded.
+        kind: LimitKind,
+        /// The value of the quantity, in the unit of the limit.
+        found: u64,
+        /// The limit.
+        limit: u64,
+    },
 
     /// The operating system could not open, read or write a file.
     #[error("{}: cannot {action}: {source}", file.display())]
-    File { file: PathBuf, action: &'static str, source: std::io::Error },
+    File {
+        /// The file.
+        file: PathBuf,
+        /// What was tried, such as “open”.
+        action: &'static str,
+        /// The system's error.
+        source: std::io::Error,
+    },
 
     /// The operating system could not write a result. A file that was there before is unchanged.
     #[error("{}: cannot be written: {source}", file.display())]
-    Output { file: PathBuf, source: std::io::Error },
+    Output {
+        /// The file that was to be written.
+        file: PathBuf,
+        /// The system's error.
+        source: std::io::Error,
+    },
 
     /// An argument from which no picture can be made (a size of 0, a kernel of no width, …).
     #[error("{0}")]
     Argument(String),
 
+    /// A transfer function that cannot be used, or that does not fit the values of its item.
+    #[error("{0}")]
+    Transfer(String),
+
     /// Work on an input took longer than its [`Deadline`](crate::Deadline) allows.
     #[error("{what} takes longer than the limit of {limit} s")]
-    Timeout { what: String, limit: u64 },
+    Timeout {
+        /// The work that was stopped.
+        what: String,
+        /// The limit in seconds.
+        limit: u64,
+    },
 
     /// The operating system refused memory. It was requested before the work began, so nothing is
     /// half done.
     #[error("{what} needs {bytes} bytes of memory, which the system refused")]
-    Memory { what: String, bytes: u64 },
+    Memory {
+        /// The work that needs the memory.
+        what: String,
+        /// The number of bytes that were requested.
+        bytes: u64,
+    },
 
     /// The scene contains nothing visible.
     #[error("nothing to draw: {0}")]
@@ -44,9 +94,36 @@ pub enum Error {
     #[error("no usable GPU: {0}")]
     NoAdapter(String),
 
-    /// The device ran out of memory or rejected an operation. It can still be used.
+    /// The driver reported an error, ran out of memory or did not answer in time. Unless the error
+    /// repeats, the device can still be used.
     #[error("GPU: {0}")]
-    Gpu(String),
+    Driver(String),
+
+    /// One sheet of a picture has more entries, pairs of a splat and a tile, than a depth pass may
+    /// have ([`Budget::entries`](crate::gpu::Budget::entries)).
+    #[error(
+        "GPU: one sheet of the picture needs more than the budget of {budget} entries; raise the \
+         budget"
+    )]
+    EntriesExhausted {
+        /// The entries that a depth pass may have.
+        budget: u32,
+    },
+
+    /// The scene needs more memory, in bytes, than it may take on this adapter
+    /// ([`Gpu::with_memory`](crate::gpu::Gpu::with_memory)).
+    #[error(
+        "GPU: the scene needs at least {} MiB of memory on {adapter}, of which {} MiB may be taken",
+        needed.div_ceil(1 << 20), limit.div_ceil(1 << 20)
+    )]
+    MemoryBound {
+        /// The name of the adapter.
+        adapter: String,
+        /// The bytes that the scene needs at least.
+        needed: u64,
+        /// The bytes that it may take.
+        limit: u64,
+    },
 
     /// The device is lost, with all its resources
     /// ([`Gpu::reopened`](crate::gpu::Gpu::reopened)).
@@ -57,10 +134,15 @@ pub enum Error {
 /// Which of the [`Limits`](crate::input::Limits) was met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LimitKind {
+    /// Vertices, points or faces of a file.
     Points,
+    /// Bytes of an input and of everything made from it.
     Bytes,
+    /// Nesting of scene nodes and of XML elements.
     Depth,
+    /// Pixels of one picture.
     Texels,
+    /// Seconds of reading.
     Seconds,
 }
 

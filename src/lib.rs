@@ -1,8 +1,76 @@
 //! splatkit draws volumes and surfaces as elliptic splats, on a GPU or on the processor.
 //!
-//! The way of the data: a file → [`input`] (opened, guarded) → [`formats`] (what it says) → [`volume`] / [`scattered`] / [`surface`] (what it means) → splats
-//! ([`splat`]) in a [`Scene`](scene::Scene) → a [`Renderer`], which draws with the [`gpu`] on wgpu (one pass, one Rust file, one
-//! shader) or with that for processors ([`cpu`]) → a [`Picture`](picture::Picture).
+//! Data flows through these modules:
+//!
+//! - [`input`] opens a file and guards against damaged ones; [`formats`] decodes it.
+//! - [`volume`], [`scattered`] and [`surface`] interpret its content. Meshes, points and scattered
+//!   samples become splats ([`splat`]).
+//! - A [`Scene`](scene::Scene) holds splats, hierarchies and volumes, and the transfer functions
+//!   that show them.
+//! - A [`Renderer`] draws the scene into a [`Picture`](picture::Picture), with the GPU engine
+//!   ([`gpu`], on wgpu: each pass is one Rust file and one shader) or the CPU engine ([`cpu`]).
+//!
+//! # An example
+//!
+//! A mesh becomes surfels, a volume gets a transfer function, and both are drawn in one picture:
+//!
+//! ```
+//! use glam::DVec3;
+//! use splatkit::{
+//!     Device, Renderer,
+//!     math::{Camera, Kernel},
+//!     scene::{Scene, Settings},
+//!     surface::{Mesh, SurfelOptions},
+//!     volume::{TransferFunction, phantoms::Phantom},
+//! };
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // `formats::load_volume` and `formats::load_mesh` read files.
+//! let volume = Phantom::Specimen.sample_bytes([24; 3])?;
+//! let transfer = TransferFunction::automatic(&volume);
+//! let surfels = Mesh::sphere(2).surfels(&SurfelOptions::default())?;
+//! let scene =
+//!     Scene::new().with_volume(volume, Kernel::default(), transfer).with_splats(surfels);
+//!
+//! // `Device::automatic` takes a GPU if there is one.
+//! let mut renderer = Renderer::new(&Device::Cpu, &scene)?;
+//! let mut camera = Camera::framing(&scene.bounds(), DVec3::NEG_Z, DVec3::Y, 4.0 / 3.0);
+//! camera.azimuth(40.0);
+//! let (picture, stats) = renderer.render(&camera, &Settings::new([64, 48]))?;
+//! assert!(stats.splats > 0 && picture.color.iter().any(|pixel| pixel[3] > 0.9));
+//! // `picture.save` writes PNG or JPEG.
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A renderer keeps its scene prepared. The camera, the settings and the transfer function may
+//! change from picture to picture.
+//!
+//! # What is where
+//!
+//! | task | module |
+//! |---|---|
+//! | read a file of any known format, or bytes in memory | [`formats`] |
+//! | limit what a file may take: memory, points, time | [`input::Limits`] |
+//! | work with meshes, volumes and samples | [`surface`], [`volume`], [`scattered`] |
+//! | draw data larger than memory | [`hierarchy`], [`bricks`] |
+//! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |
+//! | use the device of a host application | [`gpu::Gpu::from_wgpu`] |
+//! | compare pictures | [`compare`] |
+//! | look up what a picture is, exactly | [`mod@reference`] |
+//!
+//! # Units and frames
+//!
+//! World coordinates are in the unit of the files, right-handed. Positions are 32-bit and relative
+//! to an origin in 64 bits, so that geo-referenced data keep their precision. In view space x is
+//! right, y down and z forward. Colours are display colours from 0 to 1 (not linear light). They
+//! are mixed and composited as they are.
+//!
+//! # Errors
+//!
+//! Functions that may fail return [`Error`]. Its message names the file, the place in it, what was
+//! found and what was expected. A few functions know no file or place; they return a message as a
+//! string. A damaged or hostile file is an error, never a panic.
 
 // The scenes of the integration tests, which unit tests share, call the crate by its name.
 #[cfg(test)]

@@ -6,7 +6,9 @@ use std::path::Path;
 /// A rendered picture, with rows from the top.
 #[derive(Debug, Clone)]
 pub struct Picture {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
     /// Red, green and blue multiplied by opacity, then opacity; 0 … 1, as displayed (not linear
     /// light).
@@ -146,7 +148,9 @@ impl Picture {
 /// The format of a picture file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureFormat {
+    /// PNG: lossless, with opacity.
     Png,
+    /// JPEG: lossy, without opacity.
     Jpeg,
 }
 

@@ -1,4 +1,4 @@
-//! One renderer over both engines: the GPU's and the processor's.
+//! One renderer for both engines, the GPU engine and the CPU engine.
 
 use crate::{
     Error, Result,
@@ -11,22 +11,24 @@ use crate::{
     volume::TransferFunction,
 };
 
-/// What draws.
+/// The device that draws.
 #[derive(Debug, Clone)]
 pub enum Device {
-    /// The engine on wgpu, with the room of its passes.
+    /// The GPU engine on wgpu, with the capacity of its passes.
     Gpu(Gpu, Budget),
-    /// The engine for processors. It needs no driver.
+    /// The CPU engine. It needs no driver.
     Cpu,
 }
 
 impl Device {
-    /// The fastest adapter that is hardware, else the processor: its own engine is faster than a driver that runs there.
+    /// Returns the fastest hardware adapter, or the CPU if there is none. The CPU engine is faster
+    /// than a GPU driver that runs on the processor. `WGPU_ADAPTER_NAME` can name another adapter
+    /// ([`Gpu::hardware`]).
     pub fn automatic() -> Self {
         Gpu::hardware().map_or(Self::Cpu, |gpu| Self::Gpu(gpu, Budget::default()))
     }
 
-    /// The adapter's name, or “CPU”.
+    /// Returns the adapter's name, or “CPU”.
     pub fn name(&self) -> &str {
         match self {
             Self::Gpu(gpu, _) => &gpu.info.name,
@@ -35,7 +37,29 @@ impl Device {
     }
 }
 
-/// A scene on a device. Cameras, settings and the transfer function may change from picture to picture.
+/// Draws one scene on one device. The camera, the settings and the transfer function may change
+/// from picture to picture.
+///
+/// The CPU engine draws everywhere; [`Device::automatic`] takes a GPU if there is one:
+///
+/// ```
+/// use glam::DVec3;
+/// use splatkit::{
+///     Device, Renderer,
+///     math::Camera,
+///     scene::{Scene, Settings},
+///     surface::{Mesh, SurfelOptions},
+/// };
+///
+/// let ball = Mesh::sphere(3).surfels(&SurfelOptions::default())?;
+/// let scene = Scene::new().with_splats(ball);
+/// let mut renderer = Renderer::new(&Device::Cpu, &scene)?;
+/// let camera = Camera::framing(&scene.bounds(), DVec3::NEG_Z, DVec3::Y, 1.0);
+/// let (picture, stats) = renderer.render(&camera, &Settings::new([32, 32]))?;
+/// // Red, green, blue and opacity of the pixel in the middle.
+/// assert!(picture.color[16 * 32 + 16][3] > 0.99 && stats.splats > 0);
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Renderer {
     scene: Scene,
@@ -67,7 +91,8 @@ impl Renderer {
     /// Prepares a scene on a device.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a scene that [`Scene::validate`] refuses; [`Error::Gpu`] for one that does not fit the device.
+    /// [`Error::Argument`] if [`Scene::validate`] or the engine refuses the scene; [`Error::Driver`]
+    /// if it does not fit the device.
     pub fn new(device: &Device, scene: &Scene) -> Result<Self> {
         Ok(Self {
             scene: scene.clone(),
@@ -76,12 +101,12 @@ impl Renderer {
         })
     }
 
-    /// What draws.
+    /// Returns the device that draws.
     pub fn device(&self) -> &Device {
         &self.device
     }
 
-    /// Draws a picture. Where the device is lost, it is opened anew, once.
+    /// Draws a picture. If the device is lost, it is reopened once and the picture is drawn again.
     ///
     /// # Errors
     /// Those of [`gpu::Renderer::render`] and [`CpuRenderer::render`].
@@ -92,7 +117,7 @@ impl Renderer {
     ) -> Result<(Picture, FrameStats)> {
         match self.render_once(camera, settings) {
             Err(Error::DeviceLost(reason)) => {
-                tracing::warn!("{reason}; drawing again on a device opened anew");
+                tracing::warn!("{reason}; reopening the device and drawing the picture again");
                 self.reopen()?;
                 self.render_once(camera, settings)
             }
@@ -111,10 +136,11 @@ impl Renderer {
         }
     }
 
-    /// Draws a picture and leaves it where it was drawn: a frame's time without the way back from a GPU.
+    /// Draws a picture and leaves it on the device. A frame's time then excludes reading it back
+    /// from a GPU.
     ///
     /// # Errors
-    /// As of [`render`](Self::render), and [`Error::DeviceLost`].
+    /// Those of [`render`](Self::render). A lost device is not reopened: [`Error::DeviceLost`].
     pub fn draw(&mut self, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
         match &mut self.drawer {
             Drawer::Gpu(renderer, prepared) => renderer.draw(prepared, camera, settings),
@@ -122,10 +148,10 @@ impl Renderer {
         }
     }
 
-    /// As [`draw`](Self::draw), but the statistics hold the time of each step.
+    /// Like [`draw`](Self::draw), but the statistics contain the time of each step.
     ///
     /// # Errors
-    /// As of [`draw`](Self::draw).
+    /// Those of [`draw`](Self::draw).
     pub fn profile(&mut self, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
         match &mut self.drawer {
             Drawer::Gpu(renderer, prepared) => renderer.profile(prepared, camera, settings),
@@ -133,10 +159,11 @@ impl Renderer {
         }
     }
 
-    /// Shows the scene's volume or sample set by another transfer function.
+    /// Sets the transfer function of the scene's volume or sample set.
     ///
     /// # Errors
-    /// [`Error::Argument`] for one that [`new`](Self::new) would refuse; the scene is then shown as before.
+    /// [`Error::Argument`] if [`new`](Self::new) would refuse the function; the scene then keeps
+    /// its old one.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
         self.scene = self.scene.shown_by(transfer)?;
         match &mut self.drawer {
@@ -145,10 +172,10 @@ impl Renderer {
         }
     }
 
-    /// Opens a lost device anew and prepares the scene on it.
+    /// Reopens a lost device and prepares the scene on it.
     ///
     /// # Errors
-    /// As of [`Gpu::reopened`] and [`new`](Self::new).
+    /// Those of [`Gpu::reopened`] and [`new`](Self::new).
     pub fn reopen(&mut self) -> Result<()> {
         if let Device::Gpu(gpu, budget) = &self.device {
             self.device = Device::Gpu(gpu.reopened()?, *budget);

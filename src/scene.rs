@@ -1,4 +1,4 @@
-//! What is drawn and how: a scene of splat sets and volumes, and the settings of a picture.
+//! The scene (splats, hierarchies and volumes) and the settings of a picture.
 
 mod numbers;
 
@@ -16,37 +16,60 @@ use crate::{
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
-/// A lattice is gathered in sheets of up to this many of its least steps; thicker ones hold more than a parabola tells.
+/// Maximum thickness of sheets in which a lattice is gathered, in smallest sample spacings. In
+/// thicker sheets a parabola misses details of the field.
 pub(crate) const MOST_GATHERED: f64 = 2.2;
 
-/// One thing in a scene.
+/// An item of a scene.
 #[derive(Debug, Clone)]
 pub enum Item {
-    /// Surfels, 3D Gaussians: splats that carry their own colour and optical depth.
+    /// Surfels or 3D Gaussians: splats that carry their own colour and optical depth.
     Radiance(Arc<SplatSet>),
-    /// A hierarchy of such splats, of which a picture shows a cut ([`Settings::detail`]).
+    /// A hierarchy of these splats. A picture shows a cut of it ([`Settings::detail`]).
     Hierarchy(Arc<Hierarchy>),
     /// Scattered samples: splats that carry a value, shown by a transfer function.
     Scalar(Arc<SplatSet>, TransferFunction),
     /// Samples on a lattice, each the centre of one kernel, shown by a transfer function.
     Volume(Arc<Volume>, Kernel, TransferFunction),
-    /// A volume beyond memory, of which a picture shows the bricks that it needs ([`Settings::detail`],
-    /// [`Settings::page_memory`]).
+    /// A volume that may be larger than memory. A picture shows the bricks that it needs
+    /// ([`Settings::detail`], [`Settings::page_memory`]).
     Bricks(Arc<Bricks>, Kernel, TransferFunction),
 }
 
-/// The items of a picture. All are drawn together by the same sheets.
+/// The items of a picture. All are drawn together, in the same sheets.
+///
+/// A volume and a mesh in one picture:
+///
+/// ```
+/// use splatkit::{
+///     math::Kernel,
+///     scene::Scene,
+///     surface::{Mesh, SurfelOptions},
+///     volume::{TransferFunction, phantoms::Phantom},
+/// };
+///
+/// let volume = Phantom::Ball.sample_bytes([16; 3])?;
+/// let transfer = TransferFunction::automatic(&volume);
+/// let scene = Scene::new()
+///     .with_volume(volume, Kernel::default(), transfer)
+///     .with_splats(Mesh::sphere(2).surfels(&SurfelOptions::default())?);
+/// assert_eq!(scene.items.len(), 2);
+/// assert!(scene.bounds().diagonal() > 3.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
+    /// The items, in any order.
     pub items: Vec<Item>,
 }
 
 impl Scene {
+    /// Creates a scene without items.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds splats that carry radiance.
+    /// Adds splats that carry their own colour and optical depth.
     #[must_use]
     pub fn with_splats(mut self, set: impl Into<Arc<SplatSet>>) -> Self {
         self.items.push(Item::Radiance(set.into()));
@@ -95,10 +118,10 @@ impl Scene {
         self
     }
 
-    /// The same scene with another transfer function for its volume or sample set.
+    /// Returns the same scene with another transfer function for its volume or sample set.
     ///
     /// # Errors
-    /// [`Error::Argument`] for one that [`validate`](Self::validate) would refuse.
+    /// [`Error::Argument`] if [`validate`](Self::validate) would refuse the function.
     pub(crate) fn shown_by(&self, transfer: &TransferFunction) -> Result<Self> {
         let mut scene = self.clone();
         for (number, item) in scene.items.iter_mut().enumerate() {
@@ -112,7 +135,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The function along the axes of a lattice, where a kernel of the scene is a product of them. The GPU engine draws none.
+    /// Returns the scene's kernel if it is a tensor product: the function along each axis of the
+    /// lattice. The GPU engine does not draw tensor products.
     pub fn tensor(&self) -> Option<Tensor> {
         self.items.iter().find_map(|item| match item {
             Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) => kernel.as_tensor(),
@@ -120,18 +144,19 @@ impl Scene {
         })
     }
 
-    /// The box around everything that can be seen, footprints included.
+    /// Returns the box around everything that can be seen, footprints included.
     pub fn bounds(&self) -> Bounds {
         self.items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds()))
     }
 
-    /// Whether it holds explicit splats, which are widened by [`FOOTPRINT_BLUR`] and have edges: surfaces and scattered samples.
+    /// Whether the scene contains explicit splats (surfaces or scattered samples). These are
+    /// widened by [`FOOTPRINT_BLUR`] and have edges.
     pub fn has_splats(&self) -> bool {
         self.items.iter().any(|item| !matches!(item, Item::Volume(..) | Item::Bricks(..)))
     }
 
-    /// Whether any part can become so opaque that it hides what lies behind it: surfaces can, a field only where a line
-    /// through its box takes nearly all light.
+    /// Whether any part can become opaque enough to hide what lies behind it. Surfaces can. A field
+    /// can if it has isosurfaces, or if a line through its box can absorb nearly all light.
     pub(crate) fn can_hide(&self) -> bool {
         const OPTICAL_DEPTH: f64 = 7.0;
         self.items.iter().any(|item| match item {
@@ -146,9 +171,12 @@ impl Scene {
         })
     }
 
-    /// Checks that the scene can be drawn with the settings, beyond [`validate`](Self::validate): numbers and clips that are
-    /// some, and
-    /// combinations that mean something.
+    /// Checks that the scene can be drawn with these settings, in addition to
+    /// [`validate`](Self::validate): finite numbers, non-empty clips, and options that can be
+    /// combined.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the reason.
     pub fn validate_settings(&self, settings: &Settings) -> Result<()> {
         let wrong = |message: String| Err(Error::Argument(message));
         numbers::check_settings(settings)?;
@@ -161,7 +189,7 @@ impl Scene {
         }
         if settings.clips.len() > Settings::MAX_CLIPS {
             return wrong(format!(
-                "{} clips are more than {}",
+                "there are {} clips; at most {} are allowed",
                 settings.clips.len(),
                 Settings::MAX_CLIPS
             ));
@@ -171,8 +199,8 @@ impl Scene {
                 ClipShape::HalfSpace { normal, offset } => {
                     if !((1e-150..=1e150).contains(&normal.length()) && offset.is_finite()) {
                         return wrong(format!(
-                            "a clip plane needs a direction of a length from 1e-150 to 1e150 and a finite offset, \
-                             found {normal} and {offset}"
+                            "a clip plane needs a normal of a length from 1e-150 to 1e150 and a \
+                             finite offset, found {normal} and {offset}"
                         ));
                     }
                 }
@@ -189,12 +217,14 @@ impl Scene {
         }
         let before = settings.classifies_samples();
         for (number, item) in self.items.iter().enumerate() {
-            // It may have been changed since the scene was looked at as a whole.
+            // The transfer function may have changed since the scene was validated.
             numbers::check_transfer(item).map_err(numbers::of_item(number))?;
             match item {
                 Item::Radiance(_) | Item::Hierarchy(_) if settings.optics == Optics::Maximum => {
                     return wrong(
-                        "a maximum intensity picture takes a volume or samples alone, without surfaces".into(),
+                        "a maximum intensity picture takes a volume or samples alone, without \
+                         surfaces"
+                            .into(),
                     );
                 }
                 Item::Radiance(_) | Item::Hierarchy(_) => {}
@@ -208,13 +238,17 @@ impl Scene {
                         && !before
                     {
                         return wrong(
-                            "a rectilinear volume takes a Gaussian kernel, unless it is classified before".into(),
+                            "a rectilinear volume takes a Gaussian kernel, unless it is classified \
+                             before"
+                                .into(),
                         );
                     }
                     if let Some(coefficients) = &volume.coefficients {
                         if before {
                             return wrong(
-                                "a sharp volume is classified after interpolation, in image-aligned sheets".into(),
+                                "a sharp volume must be classified after interpolation, in \
+                                 image-aligned sheets"
+                                    .into(),
                             );
                         }
                         if coefficients.kernel != *kernel {
@@ -228,7 +262,9 @@ impl Scene {
                     }
                     if before {
                         return wrong(
-                            "a volume in bricks is classified after interpolation, in image-aligned sheets".into(),
+                            "a volume in bricks must be classified after interpolation, in \
+                             image-aligned sheets"
+                                .into(),
                         );
                     }
                 }
@@ -239,12 +275,15 @@ impl Scene {
             {
                 if settings.optics == Optics::Maximum {
                     return wrong(
-                        "the maximum of a field needs image-aligned sheets, classified after interpolation".into(),
+                        "the maximum of a field needs image-aligned sheets, classified after \
+                         interpolation"
+                            .into(),
                     );
                 }
                 if !(transfer.isosurfaces.is_empty() && transfer.gradient.is_empty()) {
                     return wrong(
-                        "isosurfaces and gradient opacity need image-aligned sheets, classified after interpolation"
+                        "isosurfaces and gradient opacity need image-aligned sheets, classified \
+                         after interpolation"
                             .into(),
                     );
                 }
@@ -253,9 +292,13 @@ impl Scene {
         Ok(())
     }
 
-    /// Checks that the engine can draw the scene: payloads that fit their items, numbers that are finite (it names the item
-    /// and the splat), and one scalar field at most (the densities of two fields under two transfer functions cannot be added
-    /// in one sheet).
+    /// Checks that the engines can draw the scene: payloads that match their items, finite numbers
+    /// (the error names the item and the splat), and at most one scalar field. The densities of two
+    /// fields under two transfer functions cannot be added in one sheet.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the reason; [`Error::NothingToDraw`] for a scene without splats and
+    /// samples.
     pub fn validate(&self) -> Result<()> {
         let mut fields = 0;
         for item in &self.items {
@@ -288,16 +331,17 @@ impl Scene {
         }
         if fields > 1 {
             return Err(Error::Argument(format!(
-                "a picture takes one volume or sample set, the scene has {fields}"
+                "a picture can show one volume or sample set; the scene has {fields}"
             )));
         }
         if self.bounds().is_empty() {
-            return Err(Error::NothingToDraw("the scene holds no splats".into()));
+            return Err(Error::NothingToDraw("the scene contains no splats".into()));
         }
         Ok(())
     }
 
-    /// How far from its centre a splat of the scene can reach, in the standard deviations that widening adds; 0 without any.
+    /// Returns how far a splat of the scene can reach from its centre, in the standard deviations
+    /// that widening adds. Returns 0 if there are no explicit splats.
     fn widest_reach(&self) -> f64 {
         let reaches = self.items.iter().map(|item| match item {
             Item::Radiance(set) => f64::from(set.extent) + STEP_BACK,
@@ -308,16 +352,23 @@ impl Scene {
         reaches.fold(0.0, f64::max)
     }
 
-    /// The sheets of a picture of this scene: 4/3 of a sample's spacing for volumes (a kernel of extent 2 meets at most four),
-    /// half of that where they pass through the samples, half a spacing where the kernel is linear, a few pixels for surfaces, the finer of both where the scene holds both. Of a volume
-    /// in bricks the spacing is that of the levels drawn, between two of them in between.
+    /// Returns the sheets of a picture of this scene. Unless [`Settings::sheet_thickness`] is set,
+    /// their thickness follows from the items:
+    ///
+    /// - Volumes: 4/3 of the sample spacing, and at most 2/3 of the kernel's extent. A kernel of
+    ///   extent 2 meets at most four sheets. Sheets are half as thick if the field passes through
+    ///   the samples, and half a spacing thick if the kernel is linear.
+    /// - Surfaces: a few pixels.
+    /// - Both: the finer of the two.
+    /// - Volumes in bricks: as for volumes, with the spacing of the drawn levels. Between two
+    ///   levels it is interpolated.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
         let bounds = self.bounds();
         let choice = self.choice(view, settings, settings.detail, usize::MAX, &bounds);
         self.sheets_of(view, settings, choice.as_ref(), &bounds)
     }
 
-    /// The sheets where it is known which bricks are drawn, and the scene's bounds.
+    /// Returns the sheets for a known choice of bricks and the scene's known bounds.
     pub(crate) fn sheets_of(
         &self,
         view: &View,
@@ -329,12 +380,12 @@ impl Scene {
             return self.axis_sheets(view, settings, bounds);
         }
         let [mut near, mut far] = view.distances(bounds);
-        // Widened footprints, which may have stepped back, reach beyond the bounds: a flat surface seen from the front would
-        // lie in sheets far thinner than itself.
+        // Widened footprints, which may have stepped back, reach beyond the bounds. Without this
+        // margin, a flat surface seen from the front would lie in sheets far thinner than itself.
         let reach = FOOTPRINT_BLUR * self.widest_reach() / view.scale;
         if view.perspective {
             (near, far) = (near * (1.0 - reach), far * (1.0 + reach));
-            // Growing from 0, sheets would never get anywhere; and 32 bits tell nothing nearer apart.
+            // Geometric sheets cannot start at 0, and 32 bits do not distinguish smaller distances.
             let size = bounds.diagonal();
             near = near.max(settings.near.unwrap_or(1e-3 * size).max(1e-6 * size));
         } else {
@@ -345,9 +396,10 @@ impl Scene {
         for item in &self.items {
             match item {
                 Item::Volume(volume, kernel, _) if settings.sheet_thickness.is_none() => {
-                    // Fields turn within few samples, whatever the kernel's extent; sharp ones within fewer.
+                    // A field can bend within a few samples, whatever the kernel's extent; a sharp
+                    // field within fewer.
                     let most: f64 = match kernel.as_tensor() {
-                        // A kink at every plane of samples.
+                        // The field has a kink at every plane of samples.
                         Some(Tensor::Linear) => 0.5,
                         Some(Tensor::CatmullRom) => 2.0 / 3.0,
                         _ if volume.coefficients.is_some() => 2.0 / 3.0,
@@ -355,12 +407,13 @@ impl Scene {
                     };
                     let step =
                         most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
-                    // Sheets of lattices with steps of very different lengths stay thin enough to be gathered.
+                    // If the lattice's steps differ much in length, sheets stay thin enough to be
+                    // gathered.
                     let step = step.min(MOST_GATHERED * volume.lattice.least_kernel_spacing());
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Bricks(bricks, kernel, _) if settings.sheet_thickness.is_none() => {
-                    // It follows λ without steps, as the shares of the levels do.
+                    // The thickness follows λ continuously, as the weights of the levels do.
                     let level = choice.map_or(0.0, |choice| choice.lambda);
                     let spacing = level.exp2() * bricks.header().lattice.kernel_spacing();
                     let step = (4.0f64 / 3.0).min(2.0 / 3.0 * kernel.extent) * spacing;
@@ -368,7 +421,7 @@ impl Scene {
                 }
                 Item::Volume(..) | Item::Bricks(..) => {}
                 Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => {
-                    pixels = Some(settings.sheet_pixels)
+                    pixels = Some(settings.sheet_pixels);
                 }
             }
         }
@@ -376,8 +429,8 @@ impl Scene {
     }
 }
 
-/// Says in words why a tensor product cannot be the kernel of a lattice's samples, where these are classified `before` they are
-/// interpolated or after.
+/// Returns an error if a tensor product cannot be the kernel of a lattice's samples. `before` says
+/// whether samples are classified before they are interpolated.
 fn check_tensor(tensor: Tensor, lattice: &Lattice, before: bool) -> Result<(), String> {
     let name = tensor.name();
     if lattice.arrangement != Arrangement::Cartesian {
@@ -393,14 +446,15 @@ fn check_tensor(tensor: Tensor, lattice: &Lattice, before: bool) -> Result<(), S
     Ok(())
 }
 
-/// The width of a sample's footprint at half its height, in steps between samples: that of a B-spline is 1.8, of the usual
-/// Gaussian 1.65.
+/// Width of a sample's footprint at half its height, in sample spacings. The exact width is 1.8 for
+/// a B-spline and 1.65 for the usual Gaussian.
 const SAMPLE_WIDTH: f64 = 2.0;
 
 /// Volumes in bricks.
 impl Scene {
-    /// Which bricks of the scene's volume a view shows, within the settings' memory; none without such a volume. A detail
-    /// that counts splats bounds the bricks by as many samples; there are no more than `most` bricks. `bounds` are the scene's.
+    /// Returns the bricks of the scene's volume that a view shows, within the settings' memory.
+    /// Returns `None` if the scene has no volume in bricks. A detail in splats also limits the
+    /// bricks to that number of samples. There are at most `most` bricks. `bounds` are the scene's.
     pub(crate) fn choice(
         &self,
         view: &View,
@@ -423,7 +477,8 @@ impl Scene {
                 let choose = |shown: &[u16; 256]| {
                     bricks::choice(bricks, view, kernel.extent, pixels / SAMPLE_WIDTH, shown, most)
                 };
-                // Where kernels reach further than ranges hold for, these tell nothing.
+                // If kernels reach further than the ranges of blocks cover, the ranges cannot
+                // exclude bricks.
                 if kernel.extent > bricks::REACH as f64 {
                     return Some(choose(&EVERYTHING));
                 }
@@ -441,11 +496,13 @@ impl Scene {
     }
 }
 
-/// What sheets mix.
+/// The samples that a sheet mixes.
 impl Scene {
-    /// Whether sheets are thicker than kernels reach, so that samples count of whose neighbourhood nothing shows: they change the
-    /// mean of a sheet beside what shows. Sheets of the usual thickness are thicker than that along the shortest steps of uneven
-    /// lattices alone, where it is not seen: there the typical step counts.
+    /// Whether sheets are thicker than kernels reach. If so, no sample may be left out: a sheet
+    /// then mixes visible samples with samples whose whole neighbourhood is invisible, and these
+    /// change its mean. Sheets of the default thickness exceed the reach only along the shortest
+    /// steps of uneven lattices, where that cannot be seen. So the typical step is compared for
+    /// them.
     pub(crate) fn mixes_afar(
         &self,
         settings: &Settings,
@@ -469,10 +526,11 @@ impl Scene {
     }
 }
 
-/// The planes of axis-aligned sheets.
+/// Axis-aligned sheets.
 impl Scene {
-    /// Axis-aligned sheets: slices of the data, each in the middle of a sheet; without a lattice, as thick as sheets of the
-    /// picture would be in the middle of the scene. Distances are counted along their normal.
+    /// Returns axis-aligned sheets, one for each slice of the data, with the slice in the middle.
+    /// Without a lattice, they are as thick as the sheets of a picture would be in the middle of
+    /// the scene. Distances are measured along the sheets' normal.
     fn axis_sheets(&self, view: &View, settings: &Settings, bounds: &Bounds) -> Sheets {
         let normal = self.sheet_normal(view);
         let keys = bounds.corners().map(|corner| normal.dot(view.to_view(corner)));
@@ -481,12 +539,12 @@ impl Scene {
                 [low.min(key), high.max(key)]
             });
         if view.perspective {
-            // Both sides of the eye count from it.
+            // Distances are measured from the eye, on both of its sides.
             (near, far) = (near.max(-far).max(0.0), far.max(-near));
         }
         let slices = self.lattice().map(|lattice| {
             let along = |step: DVec3| normal.dot(view.rotation * (lattice.axes * step)).abs();
-            // The axis that is not in the sheets.
+            // The step along the axis that does not lie in the sheets.
             let distance =
                 [DVec3::X, DVec3::Y, DVec3::Z].map(along).into_iter().fold(0.0, f64::max);
             let share = match &lattice.arrangement {
@@ -506,7 +564,7 @@ impl Scene {
         Sheets::new(view, [start + (first + 0.5) * thickness, far], Some(thickness), None)
     }
 
-    /// The lattice of the scene's volume.
+    /// Returns the lattice of the scene's volume.
     fn lattice(&self) -> Option<&Lattice> {
         self.items.iter().find_map(|item| match item {
             Item::Volume(volume, ..) => Some(&volume.lattice),
@@ -515,8 +573,9 @@ impl Scene {
         })
     }
 
-    /// The normal of axis-aligned sheets in view space, away from the eye: of the planes of two axes of the data (of the
-    /// world, without a lattice) that face the view most.
+    /// Returns the normal of axis-aligned sheets in view space, pointing away from the eye. The
+    /// sheets are parallel to two axes of the data, or of the world without a lattice: those whose
+    /// plane faces the view most.
     pub(crate) fn sheet_normal(&self, view: &View) -> DVec3 {
         let axes = self.lattice().map_or(DMat3::IDENTITY, |lattice| lattice.axes);
         let normals = (view.rotation * axes).inverse().transpose();
@@ -528,27 +587,28 @@ impl Scene {
 }
 
 impl Item {
-    /// Checks that this can be drawn by itself, as [`Scene::validate`] does for all items.
+    /// Checks that the item can be drawn by itself, as [`Scene::validate`] does for all items.
     ///
     /// # Errors
-    /// [`Error::Argument`] for numbers that are none, or beyond what 32 bits hold.
+    /// [`Error::Argument`] for numbers that are not finite, or do not fit 32 bits.
     pub fn validate(&self) -> Result<()> {
-        numbers::check_item(self).map_err(Error::Argument)
+        numbers::check_item(self)
     }
 
-    /// The box around the item, footprints included.
+    /// Returns the box around the item, footprints included.
     pub fn bounds(&self) -> Bounds {
         match self {
             Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
             Self::Hierarchy(hierarchy) => hierarchy.bounds(),
             Self::Volume(volume, kernel, _) => reached(&volume.lattice, kernel),
-            // What coarser levels reach beyond it lies outside of the field's box.
+            // Kernels of coarser levels reach further, but nothing is drawn outside the field's
+            // box.
             Self::Bricks(bricks, kernel, _) => reached(&bricks.header().lattice, kernel),
         }
     }
 }
 
-/// The box of what the kernels of a lattice reach.
+/// Returns the box that the kernels of a lattice reach.
 fn reached(lattice: &Lattice, kernel: &Kernel) -> Bounds {
     let axes = lattice.axes * DMat3::from_diagonal(lattice.largest_unit());
     let reach = kernel.extent
@@ -557,42 +617,47 @@ fn reached(lattice: &Lattice, kernel: &Kernel) -> Bounds {
     Bounds { min: low - reach, max: high + reach }
 }
 
-/// What is composited.
+/// The layers that are composited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Mode {
-    /// Image-aligned sheets (Mueller & Crawfis 1998): sheets parallel to the picture cut every kernel into sections.
+    /// Image-aligned sheets (Mueller & Crawfis 1998): sheets parallel to the picture cut every
+    /// kernel into sections.
     #[default]
     Sheets,
-    /// Axis-aligned sheets (Westover 1990): whole kernels are added in the slice of the data that their centre lies in, of
-    /// the data's axis nearest to the view. Samples are classified before they are added.
+    /// Axis-aligned sheets (Westover 1990): slices of the data across the data's axis nearest to
+    /// the view direction. Each kernel is added whole to the slice that contains its centre.
+    /// Samples are classified before they are added.
     AxisSheets,
-    /// Every splat on its own (Westover 1989), whole, in the order of the distances of their centres. Samples are
-    /// classified before.
+    /// Single splats (Westover 1989): each is composited whole, in the order of the distances of
+    /// their centres. Samples are classified first.
     Splats(Order),
 }
 
-/// The order in which single splats are composited; the picture is the same.
+/// The order in which single splats are composited. Both orders give the same picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Order {
+    /// The nearest splat first.
     #[default]
     FrontToBack,
+    /// The farthest splat first.
     BackToFront,
 }
 
-/// When a field's values become colour and opacity.
+/// When the values of a field are mapped to colour and opacity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Classification {
-    /// Everywhere along the ray inside a sheet: the values at its two faces and its mean make a parabola, and the transfer
-    /// function is integrated over it. Thin shells keep their look in thick sheets.
+    /// Everywhere along the ray inside a sheet. The values at its two faces and its mean define a
+    /// parabola, over which the transfer function is integrated. Thin shells keep their look in
+    /// thick sheets.
     #[default]
     PreIntegrated,
-    /// Once per sheet, its mean (Mueller, Möller & Crawfis 1999).
+    /// Once per sheet, for its mean (Mueller, Möller & Crawfis 1999).
     Post,
     /// Once per sample, before interpolation (Westover 1990). Blurs edges; for comparison.
     Pre,
 }
 
-/// What a ray makes of a field.
+/// How a ray through a field becomes the colour of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Optics {
     /// Emission and absorption (Max 1995).
@@ -600,15 +665,16 @@ pub enum Optics {
     EmissionAbsorption,
     /// The colour and opacity of the largest value on the ray.
     Maximum,
-    /// The light that the field absorbs, in white: opacity alone, without light or colour.
+    /// The light that the field absorbs, in white: opacity only, without colour and lighting.
     XRay,
 }
 
-/// A part of space that a scene is cut to.
+/// A shape that cuts the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip {
+    /// The shape that bounds the part.
     pub shape: ClipShape,
-    /// Keeps what is inside the shape; else what is outside.
+    /// Whether to keep what is inside the shape (`true`) or outside it (`false`).
     pub inside: bool,
 }
 
@@ -617,30 +683,35 @@ pub struct Clip {
 pub enum ClipShape {
     /// The points x with normal·x ≤ offset are inside.
     HalfSpace {
+        /// The direction out of the half-space, in world coordinates; it need not have unit length.
         normal: DVec3,
+        /// The distance of its face from the world's origin, times the length of `normal`.
         offset: f64,
     },
+    /// A box along the world's axes.
     Box(Bounds),
 }
 
-/// How the gradient across the picture is found.
+/// How the gradient across the picture is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Gradient {
-    /// Derivative of the kernels.
+    /// From the derivative of the kernels.
     #[default]
     Analytic,
-    /// Differences of neighbouring pixels of a sheet (Mueller, Möller & Crawfis 1999, and the GPU sheet buffers after it).
+    /// From differences of neighbouring pixels of a sheet (Mueller, Möller & Crawfis 1999, and the
+    /// GPU sheet buffers after it).
     Central,
 }
 
-/// How a sheet of a lattice's field is filled. The pictures agree.
+/// How the field of a lattice is evaluated in a sheet. The pictures agree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Evaluate {
-    /// Gathers what can be gathered, and scatters the rest.
+    /// Gathers a volume if possible, and scatters everything else.
     #[default]
     Auto,
-    /// Each pixel adds up the kernels that reach its ray. Takes one volume, of the GPU engine one on a Cartesian lattice with a
-    /// Gaussian kernel, and whatever surfaces are in the same scene; other scenes are an error. It is the faster way.
+    /// Each pixel adds up the kernels that reach its ray, which is the faster way. The scene must
+    /// have exactly one volume, and may have surfaces too. On the GPU engine, the volume needs a
+    /// Cartesian lattice and a Gaussian kernel. Other scenes are an error.
     Gather,
     /// Each splat is added to the pixels that it covers.
     Scatter,
@@ -651,44 +722,51 @@ pub enum Evaluate {
 pub struct Settings {
     /// Width and height in pixels.
     pub size: [u32; 2],
+    /// How splats are gathered into layers.
     pub mode: Mode,
+    /// When a field's values become colour and opacity.
     pub classification: Classification,
+    /// How the values along a ray become one colour.
     pub optics: Optics,
-    /// All of them cut, at most [`Settings::MAX_CLIPS`].
+    /// Clips that cut the scene, at most [`Settings::MAX_CLIPS`].
     pub clips: Vec<Clip>,
+    /// How the gradients of fields are found, for light and for `gradient` of transfer functions.
     pub gradient: Gradient,
-    /// How a sheet of a lattice's field is filled.
+    /// How the field of a lattice is evaluated in a sheet.
     pub evaluate: Evaluate,
-    /// Light on volumes, instead of the transfer function's own; `Some(None)` for none.
+    /// Lighting of volumes, instead of the transfer function's own. `Some(None)` turns it off.
     pub volume_shade: Option<Option<Shade>>,
-    /// Light on splats with normals; `None` draws their colours as they are.
+    /// Lighting of splats with normals. `None` draws their colours unlit.
     pub surface_shade: Option<Shade>,
-    /// Largest thickness of a sheet in world units; chosen from the scene where `None`.
+    /// Maximum thickness of a sheet in world units. `None` derives it from the scene.
     pub sheet_thickness: Option<f64>,
-    /// Largest thickness of a sheet in pixels, where the scene holds explicit splats.
+    /// Maximum thickness of a sheet in pixels, if the scene contains explicit splats.
     pub sheet_pixels: f64,
-    /// Whether what lies behind opaque parts is left out. The picture is the same but for what less than
-    /// 0.0005 of the light shows; off, a frame's cost can be compared.
+    /// Whether splats behind opaque parts are left out. The picture differs only where less than
+    /// 0.0005 of the light passes. Turn it off to compare the cost of a frame.
     pub occlusion: bool,
-    /// How fine hierarchies and volumes in bricks are drawn. A sample of the latter counts as two steps wide.
+    /// Level of detail of hierarchies and volumes in bricks. A sample of a volume counts as two
+    /// sample spacings wide.
     pub detail: Detail,
-    /// Whether nodes of hierarchies that face away from the eye are left out: a saving where the front hides them, a loss
-    /// where it does not. `None`: where the source was solid, is seen from outside its bounds, and nothing is cut away.
+    /// Whether nodes of hierarchies that face away from the eye are left out. This saves time where
+    /// the front hides them, and loses parts of the picture where it does not. `None` leaves them
+    /// out if the source was solid, is seen from outside its bounds, and is not clipped.
     pub cull_backfaces: Option<bool>,
-    /// GPU memory that each hierarchy's pages, or a volume's bricks, may take, in bytes; without what frames make of bricks.
+    /// GPU memory, in bytes, for the pages of each hierarchy and for the bricks of a volume. The
+    /// lists that frames make from bricks take more.
     pub page_memory: u64,
-    /// Perspective views show nothing nearer than this (world units), nor than a millionth of the scene; a thousandth of it where
-    /// `None`.
+    /// Nearest distance that perspective views show, in world units; at least a millionth of the
+    /// scene's size. `None` is a thousandth of that size.
     pub near: Option<f64>,
 }
 
 impl Settings {
-    /// The most clips of one picture.
+    /// Maximum number of clips in a picture.
     pub const MAX_CLIPS: usize = 8;
-    /// Pixels of the largest picture: each takes 20 bytes of memory.
+    /// Maximum number of pixels in a picture. Each takes 20 bytes of memory.
     pub const MAX_PIXELS: u64 = 1 << 29;
 
-    /// The defaults for a picture of `size` pixels (width, height).
+    /// Returns the defaults for a picture of `size` pixels (width, height).
     pub fn new(size: [u32; 2]) -> Self {
         Self {
             size,
@@ -710,24 +788,27 @@ impl Settings {
         }
     }
 
-    /// Whether samples are classified before they are added: asked for, or because whole splats are composited.
+    /// Whether samples are classified before they are added: on request, or because whole splats
+    /// are composited.
     pub fn classifies_samples(&self) -> bool {
         self.mode != Mode::Sheets || self.classification == Classification::Pre
     }
 
-    /// Whether what is nearer may hide what is farther: not where all values count alike, or the farthest comes first.
+    /// Whether nearer parts may hide farther ones. They do not if all values on a ray count alike,
+    /// nor if the farthest comes first.
     pub fn hides(&self) -> bool {
         self.optics != Optics::Maximum && self.mode != Mode::Splats(Order::BackToFront)
     }
 
-    /// Whether nodes that face away are left out of a hierarchy that bounds a solid, or does not, within some bounds.
+    /// Whether nodes that face away are left out of a hierarchy with these bounds. `closed` says
+    /// whether the hierarchy bounds a solid.
     pub(crate) fn culls(&self, closed: bool, bounds: &Bounds, view: &View) -> bool {
         let is_outside =
             || !view.perspective || view.distances(bounds)[0] > self.near.unwrap_or(0.0);
         self.cull_backfaces.unwrap_or_else(|| closed && self.clips.is_empty() && is_outside())
     }
 
-    /// The light on a volume that `transfer` shows.
+    /// Returns the lighting of a volume that `transfer` shows.
     pub fn shade_of(&self, transfer: &TransferFunction) -> Option<Shade> {
         self.volume_shade.unwrap_or(transfer.shade)
     }

@@ -81,7 +81,9 @@ pub enum Payload {
 pub struct SplatSet {
     /// World position that the centres are relative to.
     pub origin: DVec3,
+    /// What all of the splats carry.
     pub payload: Payload,
+    /// The splats, in any order.
     pub splats: Vec<Splat>,
     /// Footprints end this many standard deviations from the centre.
     pub extent: f32,

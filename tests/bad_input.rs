@@ -87,7 +87,7 @@ fn every_cut_of_every_format_is_told() {
                     assert!(
                         may_load || name == "a.png" && at + 16 >= bytes.len(),
                         "{context}: loads as {told}"
-                    )
+                    );
                 }
             }
         }
@@ -259,14 +259,12 @@ fn places_beyond_what_32_bits_count_are_found() {
             .expect("room");
     }
     let layout = RawLayout { header, ..RAW };
-    let read = |name: &str, limits: &Limits| match load_volume(
-        &folder.0.join(name),
-        limits,
-        Some(&layout),
-    ) {
-        Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
-        Err(error) => error.to_string().replace(&format!("{}/", folder.0.display()), ""),
-    };
+    let read =
+        |name: &str, limits: &Limits| match load_volume(folder.0.join(name), limits, Some(&layout))
+        {
+            Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
+            Err(error) => error.to_string().replace(&format!("{}/", folder.0.display()), ""),
+        };
     assert_eq!(read("far.raw", &Limits::default()), "[0.0, 63.0] 63");
     assert_eq!(
         read("far_cut.raw", &Limits::default()),
@@ -328,101 +326,125 @@ fn equal_pages_are_read_within_limits() {
     assert_eq!(hierarchy.read_page(0).expect("a page").nodes.len(), 4089);
 }
 
+/// A file name and its bytes.
+type Input = (&'static str, Vec<u8>);
+
+const MIB: usize = 1 << 20;
+
 /// Small files that expand to many times their size.
-fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
-    let mib = 1usize << 20;
-    let nodes = vec![r#"{"mesh":0}"#; 100_000].join(",");
-    let all: Vec<String> = (0..100_000).map(|node| node.to_string()).collect();
-    let instances = gltf_with("none", &nodes)
-        .replace(r#"{"nodes":[0]}"#, &format!(r#"{{"nodes":[{}]}}"#, all.join(",")));
-    let (data, big) = ("data:;base64,", "A".repeat(mib));
-    let instances = instances
-        .replace("none", &format!("{data}{big}"))
-        .replace(r#""count":3,"type":"VEC3""#, r#""count":60000,"type":"VEC3""#)
-        .replace(r#""byteLength":36"#, r#""byteLength":720000"#);
-    let block = zlib(&vec![0; 200 * mib]);
-    let counts: Vec<u8> =
-        [1, 200 * mib as u32, 0, block.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
-    let vti = "<VTKFile type='ImageData' byte_order='LittleEndian' \
-         compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'><Piece \
-         Extent='0 1023 0 1023 0 199'><PointData><DataArray type='UInt8' Name='v' \
-         format='appended' offset='0'/></PointData></Piece></ImageData><AppendedData \
-         encoding='raw'>_";
-    let vti = [vti.as_bytes(), &counts, &block, b"</AppendedData></VTKFile>"].concat();
-    let wide = format!("{}\n{}", vec!["1"; 4096].join(" "), "1\n".repeat(mib));
-    let polygon = format!("{}\n", vec!["0"; 2 * mib].join(" "));
-    let list = ply(
-        &format!(
-            "element vertex 1\n{FLOATS}element face 1\nproperty list uint int vertex_indices\n"
-        ),
-        &format!("0 0 0\n{} {polygon}", 2 * mib),
-    );
-    vec![
-        ("lines.xyz", "1 2 3\n".repeat(mib).into()),
-        ("short.csv", "1\n".repeat(2 * mib).into()),
-        ("wide.txt", wide.into()),
-        ("faces.obj", format!("v 0 0 0\n{}", "f 1 1 1\n".repeat(mib / 2)).into()),
-        ("corners.obj", format!("v 0 0 0\nf {polygon}").replace(" 0", " 1").into()),
-        ("numbers.obj", format!("v {polygon}").replace(" 0", " 1").into()),
-        ("vertices.obj", "v 0 0 0\n".repeat(mib).into()),
-        ("polygon.ply", list),
-        ("lines.ply", ply(&format!("element vertex {mib}\n{FLOATS}"), &"0 0 0\n".repeat(mib))),
-        (
-            "corners.stl",
-            format!(
-                "solid\n{}",
-                "facet\nouter loop\nvertex 0 0 0\nvertex 0 0 0\nvertex 0 0 0\nendloop\nendfacet\n"
-                    .repeat(mib / 24)
-            )
-            .into(),
-        ),
-        (
-            "numbers.pcd",
-            pcd(&mib.to_string(), format!("DATA ascii\n{}", "1 2 3\n".repeat(mib)).as_bytes()),
-        ),
-        (
-            "objects.gltf",
-            format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{}]}}"#, vec!["{}"; mib].join(","))
-                .into(),
-        ),
-        (
-            "numbers.gltf",
-            format!(
-                r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"children":[{}]}}]}}"#,
-                vec!["9"; 2 * mib].join(",")
-            )
-            .into(),
-        ),
-        ("instances.gltf", instances.into()),
-        ("bomb.nrrd", nrrd("1024 1024 200", "encoding: gzip", &gzip(&vec![0; 200 * mib]))),
-        (
-            "keys.nrrd",
-            nrrd("1 1 1", &(0..200_000).map(|i| format!("{i}:=\n")).collect::<String>(), b""),
-        ),
-        ("bomb.vti", vti),
-        ("pieces.vti", vtk_xml("ImageData", "", &"<Piece/>".repeat(mib / 4)).into()),
-        (
-            "attributes.vti",
-            vtk_xml("ImageData", "", &"<Piece a='' b='' c='' d=''/>".repeat(mib / 8)).into(),
-        ),
-        (
-            "attribute.vti",
-            vtk_xml(
-                "ImageData",
-                &(0..mib / 8).map(|i| format!(" a{i}=''")).collect::<String>(),
-                "",
-            )
-            .into(),
-        ),
-        ("shared.vti", shared_pieces(20_000, mib)),
-        ("deep.vti", vtk_xml("ImageData", "", &"<a>".repeat(mib)).into()),
-        ("nested.gltf", "[".repeat(4 * mib).into()),
-        ("nested.json", "[".repeat(mib).into()),
+fn worst_inputs() -> Vec<Input> {
+    let mut inputs = worst_tables_and_meshes();
+    inputs.extend(worst_trees());
+    inputs.extend(worst_volumes());
+    inputs.extend([
         ("bomb.png", png(8000, 8000)),
         ("large.png", png(2000, 2000)),
         ("bomb.splk", crafted::page_of_zeros(1 << 30)),
         ("equal.splk", crafted::pages_of_one_node(100)),
         ("bomb.splv", crafted::brick_of_zeros(1 << 30)),
         ("equal.splv", crafted::bricks_of_one_value([4096, 4096, 64])),
+    ]);
+    inputs
+}
+
+fn worst_tables_and_meshes() -> Vec<Input> {
+    let wide = format!("{}\n{}", vec!["1"; 4096].join(" "), "1\n".repeat(MIB));
+    let polygon = format!("{}\n", vec!["0"; 2 * MIB].join(" "));
+    let list = ply(
+        &format!(
+            "element vertex 1\n{FLOATS}element face 1\nproperty list uint int vertex_indices\n"
+        ),
+        &format!("0 0 0\n{} {polygon}", 2 * MIB),
+    );
+    vec![
+        ("lines.xyz", "1 2 3\n".repeat(MIB).into()),
+        ("short.csv", "1\n".repeat(2 * MIB).into()),
+        ("wide.txt", wide.into()),
+        ("faces.obj", format!("v 0 0 0\n{}", "f 1 1 1\n".repeat(MIB / 2)).into()),
+        ("corners.obj", format!("v 0 0 0\nf {polygon}").replace(" 0", " 1").into()),
+        ("numbers.obj", format!("v {polygon}").replace(" 0", " 1").into()),
+        ("vertices.obj", "v 0 0 0\n".repeat(MIB).into()),
+        ("polygon.ply", list),
+        ("lines.ply", ply(&format!("element vertex {MIB}\n{FLOATS}"), &"0 0 0\n".repeat(MIB))),
+        (
+            "corners.stl",
+            format!(
+                "solid\n{}",
+                "facet\nouter loop\nvertex 0 0 0\nvertex 0 0 0\nvertex 0 0 0\nendloop\nendfacet\n"
+                    .repeat(MIB / 24)
+            )
+            .into(),
+        ),
+        (
+            "numbers.pcd",
+            pcd(&MIB.to_string(), format!("DATA ascii\n{}", "1 2 3\n".repeat(MIB)).as_bytes()),
+        ),
+    ]
+}
+
+/// JSON, of glTF and others.
+fn worst_trees() -> Vec<Input> {
+    let nodes = vec![r#"{"mesh":0}"#; 100_000].join(",");
+    let all: Vec<String> = (0..100_000).map(|node| node.to_string()).collect();
+    let instances = gltf_with("none", &nodes)
+        .replace(r#"{"nodes":[0]}"#, &format!(r#"{{"nodes":[{}]}}"#, all.join(",")));
+    let (data, big) = ("data:;base64,", "A".repeat(MIB));
+    let instances = instances
+        .replace("none", &format!("{data}{big}"))
+        .replace(r#""count":3,"type":"VEC3""#, r#""count":60000,"type":"VEC3""#)
+        .replace(r#""byteLength":36"#, r#""byteLength":720000"#);
+    vec![
+        (
+            "objects.gltf",
+            format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{}]}}"#, vec!["{}"; MIB].join(","))
+                .into(),
+        ),
+        (
+            "numbers.gltf",
+            format!(
+                r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"children":[{}]}}]}}"#,
+                vec!["9"; 2 * MIB].join(",")
+            )
+            .into(),
+        ),
+        ("instances.gltf", instances.into()),
+        ("nested.gltf", "[".repeat(4 * MIB).into()),
+        ("nested.json", "[".repeat(MIB).into()),
+    ]
+}
+
+fn worst_volumes() -> Vec<Input> {
+    let block = zlib(&vec![0; 200 * MIB]);
+    let counts: Vec<u8> =
+        [1, 200 * MIB as u32, 0, block.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
+    let vti = "<VTKFile type='ImageData' byte_order='LittleEndian' \
+         compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'><Piece \
+         Extent='0 1023 0 1023 0 199'><PointData><DataArray type='UInt8' Name='v' \
+         format='appended' offset='0'/></PointData></Piece></ImageData><AppendedData \
+         encoding='raw'>_";
+    let vti = [vti.as_bytes(), &counts, &block, b"</AppendedData></VTKFile>"].concat();
+    vec![
+        ("bomb.nrrd", nrrd("1024 1024 200", "encoding: gzip", &gzip(&vec![0; 200 * MIB]))),
+        (
+            "keys.nrrd",
+            nrrd("1 1 1", &(0..200_000).map(|i| format!("{i}:=\n")).collect::<String>(), b""),
+        ),
+        ("bomb.vti", vti),
+        ("pieces.vti", vtk_xml("ImageData", "", &"<Piece/>".repeat(MIB / 4)).into()),
+        (
+            "attributes.vti",
+            vtk_xml("ImageData", "", &"<Piece a='' b='' c='' d=''/>".repeat(MIB / 8)).into(),
+        ),
+        (
+            "attribute.vti",
+            vtk_xml(
+                "ImageData",
+                &(0..MIB / 8).map(|i| format!(" a{i}=''")).collect::<String>(),
+                "",
+            )
+            .into(),
+        ),
+        ("shared.vti", shared_pieces(20_000, MIB)),
+        ("deep.vti", vtk_xml("ImageData", "", &"<a>".repeat(MIB)).into()),
     ]
 }

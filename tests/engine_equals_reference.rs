@@ -629,7 +629,7 @@ fn the_gpus_way_is_the_same() {
         device_type: wgpu::DeviceType::DiscreteGpu,
         ..wgpu::AdapterInfo::clone(&own.info)
     };
-    let gpu = Gpu::from_wgpu(own.device.clone(), own.queue.clone(), info);
+    let gpu = Gpu::from_wgpu(own.device.clone(), own.queue, info);
     let mut renderer = Renderer::new(&gpu);
     for case in cases {
         let mut prepared = renderer.prepare(&case.scene).expect(case.name);

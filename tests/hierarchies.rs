@@ -528,8 +528,7 @@ fn optical_depths_beyond_what_can_be_drawn_are_refused() {
     let built = |set: &SplatSet| Tree::build(set, &BuildOptions::default(), &|_, _| ());
     set.splats[7].strength = Splat::MOST_OPTICAL_DEPTH;
     let tree = built(&set).expect("a tree");
-    let scene =
-        Scene::new().with_hierarchy(Hierarchy::from_tree(tree.clone()).expect("a hierarchy"));
+    let scene = Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("a hierarchy"));
     let picture =
         reference::render(&scene, &camera(&scene.bounds(), 0.9), &settings(0.0)).expect("draws");
     assert!(picture.color.iter().flatten().all(|value| value.is_finite()));

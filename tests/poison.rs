@@ -283,7 +283,7 @@ fn volumes_that_are_not_finite_are_named() {
         let mut values = vec![0.5f32; 125];
         values[POISONED] = poison;
         let error = Volume::new(lattice(), Samples::F32(values.clone())).unwrap_err();
-        assert!(error.contains("sample 17"), "{error}");
+        assert!(error.to_string().contains("sample 17"), "{error}");
         let poisoned = Volume { samples: Samples::F32(values), ..volume() };
         assert_refused(&with_volume(poisoned), &camera(), &settings(), &["item 0", "sample 17"]);
         let poison = f64::from(poison);
@@ -370,7 +370,7 @@ fn scattered_samples_are_drawn_or_refused() {
         refused(with(&|points| points.values[POISONED] = poison), "sample 17");
         refused(
             with(&|points| {
-                points.radii = [vec![0.1; POISONED], vec![poison; 64 - POISONED]].concat()
+                points.radii = [vec![0.1; POISONED], vec![poison; 64 - POISONED]].concat();
             }),
             "sample 17",
         );
@@ -383,7 +383,7 @@ fn scattered_samples_are_drawn_or_refused() {
             (
                 "radius",
                 with(&|points| {
-                    points.radii = [vec![0.3; POISONED], vec![odd; 64 - POISONED]].concat()
+                    points.radii = [vec![0.3; POISONED], vec![odd; 64 - POISONED]].concat();
                 }),
             ),
         ] {
@@ -393,7 +393,7 @@ fn scattered_samples_are_drawn_or_refused() {
                     faults.look(&what, &scene_of(set), &camera(), &settings());
                 }
                 Err(error) => {
-                    assert!(matches!(error, Error::Argument(_)), "{what} {odd:e}: {error}")
+                    assert!(matches!(error, Error::Argument(_)), "{what} {odd:e}: {error}");
                 }
             }
         }
@@ -409,7 +409,7 @@ fn transfer_functions_are_named() {
         change(&mut poisoned);
         for scene in [
             Scene::new().with_volume(volume(), Kernel::default(), poisoned.clone()),
-            Scene::new().with_samples(samples(), poisoned.clone()),
+            Scene::new().with_samples(samples(), poisoned),
         ] {
             assert_refused(&scene, &camera(), &settings(), &["item 0", "transfer function", word]);
         }

@@ -62,9 +62,9 @@ impl Row {
 }
 
 fn bytes_on(lattice: Lattice) -> Result<Volume> {
-    let volume = Phantom::Ball.sample_on(lattice).map_err(Error::Argument)?;
+    let volume = Phantom::Ball.sample_on(lattice)?;
     let bytes = (0..volume.len()).map(|i| (255.0 * volume.value(i)).round() as u8).collect();
-    Volume::new(volume.lattice, Samples::U8(bytes)).map_err(Error::Argument)
+    Volume::new(volume.lattice, Samples::U8(bytes))
 }
 
 /// A lattice in the cube from −1 to 1, with `layers` samples along z.
@@ -128,7 +128,7 @@ fn sharp(lattice: Lattice, kernel: Result<Kernel>) -> Result<Scene> {
 fn of_type(samples: fn(&Volume) -> Samples) -> Result<Scene> {
     let volume = bytes_on(cartesian(SIDE))?;
     let samples = samples(&volume);
-    let volume = Volume::new(volume.lattice, samples).map_err(Error::Argument)?;
+    let volume = Volume::new(volume.lattice, samples)?;
     Ok(Scene::new().with_volume(volume, Kernel::default(), transfer()))
 }
 
@@ -173,29 +173,20 @@ fn hierarchy() -> Result<Hierarchy> {
 
 /// The features that a picture may need, one per row of the table.
 fn rows() -> Vec<Row> {
-    let gaussian = || Ok(Kernel::default());
-    let tensor = |tensor| Ok(Kernel::tensor(tensor));
-    let table = || Kernel::table((0..=32).map(|i| 1.0 - f64::from(i) / 32.0).collect(), 2.0);
-    let light = || TransferFunction { shade: Some(Shade::default()), ..transfer() };
-    let isosurface = || TransferFunction {
-        isosurfaces: vec![Isosurface { value: 100.0, color: [0.9, 0.8, 0.7], opacity: 0.7 }],
-        ..transfer()
-    };
-    let gradient = || TransferFunction { gradient: vec![(0.0, 0.0), (300.0, 1.0)], ..transfer() };
-    let lit = |transfer| shown(cartesian(SIDE), Ok(Kernel::default()), transfer);
-    let thick = |samples: f64| {
-        move |settings: &mut Settings| settings.sheet_thickness = Some(samples * 2.0 / 11.0)
-    };
-    let clip =
-        |shape| move |settings: &mut Settings| settings.clips = vec![Clip { shape, inside: true }];
-    let cube = Bounds { min: DVec3::splat(-0.5), max: DVec3::splat(0.6) };
+    [rows_of_items(), rows_of_kernels(), rows_of_transfers(), rows_of_settings()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+fn rows_of_items() -> Vec<Row> {
     vec![
         row("a Cartesian lattice", usual()),
         row("slices 5 times as far apart", on(cartesian(3))),
         row("a sheared lattice", on(sheared())),
         row("a body-centred lattice", on(body_centred())),
         row("a rectilinear lattice", on(rectilinear())),
-        row("a volume in bricks", bricks(Scene::new(), gaussian())),
+        row("a volume in bricks", bricks(Scene::new(), Ok(Kernel::default()))),
         row(
             "samples of 16 bits",
             of_type(|v| Samples::U16((0..v.len()).map(|i| v.value(i) as u16).collect())),
@@ -214,9 +205,17 @@ fn rows() -> Vec<Row> {
         ),
         row(
             "surfels and a volume in bricks",
-            surface().and_then(|scene| bricks(scene, gaussian())),
+            surface().and_then(|scene| bricks(scene, Ok(Kernel::default()))),
         ),
         row("surfels and scattered samples", surface().and_then(samples)),
+    ]
+}
+
+fn rows_of_kernels() -> Vec<Row> {
+    let gaussian = || Ok(Kernel::default());
+    let tensor = |tensor| Ok(Kernel::tensor(tensor));
+    let table = || Kernel::table((0..=32).map(|i| 1.0 - f64::from(i) / 32.0).collect(), 2.0);
+    vec![
         row("kernel: a Gaussian that reaches 3 samples", by(Kernel::gaussian(0.6, 3.0))),
         row("kernel: a Gaussian that reaches 1.5", by(Kernel::gaussian(0.6, 1.5))),
         row("kernel: a Gaussian of σ 0.9", by(Kernel::gaussian(0.9, 3.0))),
@@ -241,11 +240,34 @@ fn rows() -> Vec<Row> {
         row("sharp: cubic-b-spline", sharp(cartesian(SIDE), tensor(Tensor::CubicBSpline))),
         row("sharp, on a body-centred lattice", sharp(body_centred(), gaussian())),
         row("sharp, on a rectilinear lattice", sharp(rectilinear(), gaussian())),
+    ]
+}
+
+fn rows_of_transfers() -> Vec<Row> {
+    let light = || TransferFunction { shade: Some(Shade::default()), ..transfer() };
+    let isosurface = || TransferFunction {
+        isosurfaces: vec![Isosurface { value: 100.0, color: [0.9, 0.8, 0.7], opacity: 0.7 }],
+        ..transfer()
+    };
+    let gradient = || TransferFunction { gradient: vec![(0.0, 0.0), (300.0, 1.0)], ..transfer() };
+    let lit = |transfer| shown(cartesian(SIDE), Ok(Kernel::default()), transfer);
+    vec![
         row("light", lit(light())),
         row("light by --gradient central", lit(light()))
             .with(|own| own.gradient = Gradient::Central),
         row("an isosurface", lit(isosurface())),
         row("opacity by the gradient", lit(gradient())),
+    ]
+}
+
+fn rows_of_settings() -> Vec<Row> {
+    let thick = |samples: f64| {
+        move |settings: &mut Settings| settings.sheet_thickness = Some(samples * 2.0 / 11.0)
+    };
+    let clip =
+        |shape| move |settings: &mut Settings| settings.clips = vec![Clip { shape, inside: true }];
+    let cube = Bounds { min: DVec3::splat(-0.5), max: DVec3::splat(0.6) };
+    vec![
         row("a clip plane", usual())
             .with(clip(ClipShape::HalfSpace { normal: DVec3::X, offset: 0.2 })),
         row("a clip box", usual()).with(clip(ClipShape::Box(cube))),
@@ -261,7 +283,7 @@ fn rows() -> Vec<Row> {
         row("--mode splats", usual()).with(|own| own.mode = Mode::Splats(Order::FrontToBack)),
         row("--mode splats of surfels", surface())
             .with(|own| own.mode = Mode::Splats(Order::BackToFront)),
-        row("--classify pre by linear", by(tensor(Tensor::Linear)))
+        row("--classify pre by linear", by(Ok(Kernel::tensor(Tensor::Linear))))
             .with(|own| own.classification = Classification::Pre),
         row("--optics maximum", usual()).with(|own| own.optics = Optics::Maximum),
         row("--optics maximum of scattered samples", samples(Scene::new()))

@@ -10,7 +10,7 @@ const FINISHED: u32 = 0xffffffffu;
 const UNFINISHED: u32 = 0u;
 const STOPS: u32 = 1u;
 const SLOTS: u32 = 2u;
-// Words of bits for the slots; mirrors engine/frame.rs.
+// Words of bits for the slots; mirrors src/gpu/targets.rs.
 const SLOT_WORDS: u32 = 32u;
 const LISTED: u32 = SLOTS + SLOT_WORDS;
 

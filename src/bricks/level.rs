@@ -110,9 +110,7 @@ mod tests {
         assert!(refusal(&bcc).unwrap_err().contains("body-centred"));
         let places = Arrangement::Rectilinear([vec![0.0], vec![0.0], vec![0.0]].into());
         assert!(
-            refusal(&Lattice { arrangement: places, ..bcc.clone() })
-                .unwrap_err()
-                .contains("rectilinear")
+            refusal(&Lattice { arrangement: places, ..bcc }).unwrap_err().contains("rectilinear")
         );
         let huge = Lattice::with_spacing([1 << 21; 3], DVec3::ONE);
         assert!(refusal(&huge).unwrap_err().contains("32 bits"));

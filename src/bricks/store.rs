@@ -26,6 +26,7 @@ use std::{
 pub struct Header {
     /// The lattice of level 0, which is Cartesian.
     pub lattice: Lattice,
+    /// The type of the samples of level 0.
     pub scalar: Scalar,
     /// The smallest and the largest value of level 0. Coarser levels lie within.
     pub range: [f64; 2],
@@ -39,7 +40,7 @@ impl Header {
     /// Checks that a volume with this header can be cut into bricks, in memory or in a file. The
     /// error is a message.
     pub(super) fn validate(&self) -> Result<(), String> {
-        self.lattice.validate()?;
+        self.lattice.check()?;
         level::refusal(&self.lattice)?;
         let [low, high] = self.range;
         if !(low <= high && (high - low).is_finite()) {
@@ -52,6 +53,21 @@ impl Header {
 }
 
 /// A volume in levels and bricks. Any number of threads may read from it.
+///
+/// A volume of 48³ samples has two levels:
+///
+/// ```
+/// use splatkit::{bricks::Bricks, volume::phantoms::Phantom};
+/// use std::sync::Arc;
+///
+/// let volume = Phantom::Ball.sample_bytes([48; 3])?;
+/// let bricks = Bricks::from_volume(Arc::new(volume))?;
+/// let dims: Vec<_> = bricks.levels().iter().map(|level| level.dims).collect();
+/// assert_eq!(dims, [[48; 3], [24; 3]]);
+/// // The first of the 2 × 2 × 2 bricks of the finest level, one byte for each of its 32³ samples.
+/// assert_eq!(bricks.read(0, 0)?.samples.len(), 32 * 32 * 32);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Bricks {
     path: PathBuf,
     header: Header,
@@ -132,7 +148,8 @@ impl Bricks {
     /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files
     /// that are truncated or have data after their end. [`Error::Limit`] and [`Error::File`] as for
     /// every input.
-    pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
+    pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
         Self::new(path, Bytes::Mapped(Source::map(path, limits)?), limits)
     }
 
@@ -140,8 +157,8 @@ impl Bricks {
     ///
     /// # Errors
     /// [`Error::Input`] as for [`open`](Self::open).
-    pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Result<Self> {
-        Self::new(name, Bytes::Held(bytes), &Limits::default())
+    pub fn from_bytes(bytes: Vec<u8>, name: impl AsRef<Path>) -> Result<Self> {
+        Self::new(name.as_ref(), Bytes::Held(bytes), &Limits::default())
     }
 
     fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
@@ -284,7 +301,7 @@ impl Bricks {
             },
         )?;
         let samples = Samples::from_bytes(scalar, &bytes);
-        let mut volume = Volume::new(self.lattice(level), samples)
+        let mut volume = Volume::checked(self.lattice(level), samples)
             .map_err(|message| damaged(&self.path, "samples", message))?;
         volume.range = self.header.range;
         Ok(volume)

@@ -384,7 +384,7 @@ fn wrong_contents_are_found() {
     let folder = Folder::new();
     let right = volume(Scalar::I16, [70, 40, 33]);
     let codes = |bytes: Vec<u8>| {
-        let report = check(&folder.write("a.splv", bytes), &Limits::default(), &|_, _| ());
+        let report = check(folder.write("a.splv", bytes), &Limits::default(), &|_, _| ());
         report
             .findings
             .iter()

@@ -15,6 +15,7 @@ pub struct Finding {
     /// The name of this kind of finding, the same in every release: `sphere`, `cone`, `size`,
     /// `order`, …
     pub code: &'static str,
+    /// How bad it is.
     pub severity: Severity,
     /// The place: a block and a node, a page, or the header.
     pub place: String,
@@ -23,6 +24,7 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// Creates a finding of severity [`Severity::Error`].
     pub fn error(code: &'static str, place: impl Into<String>, message: impl Into<String>) -> Self {
         Self { code, severity: Severity::Error, place: place.into(), message: message.into() }
     }
@@ -69,6 +71,7 @@ pub struct Report {
 }
 
 impl Report {
+    /// Returns whether the check found nothing.
     pub fn is_sound(&self) -> bool {
         self.findings.is_empty()
     }

@@ -1,5 +1,5 @@
-//! What the files of hierarchies (`.splk`) and of volumes in bricks (`.splv`) share: numbers in
-//! bytes, pages that wait until the directory before them is known, and the findings of a check.
+//! Code that the files of hierarchies (`.splk`) and of volumes in bricks (`.splv`) share: numbers
+//! as bytes, pages that wait until the directory before them is known, and the findings of a check.
 
 mod bytes;
 mod findings;

@@ -2,7 +2,7 @@
 //! from the ray.
 
 use super::{
-    blend::{MOST_TAPS, Sums},
+    kernel_sums::{MOST_TAPS, Sums},
     vector::{Lanes, dot, exp2, three},
 };
 use fearless_simd::{Simd, prelude::*};

@@ -5,6 +5,7 @@
 
 use super::{
     bells,
+    kernel_sums::{MOST_TAPS, Point, Sums, reach},
     radial::Radial,
     rectilinear::Axes,
     vector::{Lanes, each, three},
@@ -12,16 +13,13 @@ use super::{
 };
 use crate::{
     math::{Kernel, Profile},
-    plan::weighting::{LEAST_DEVIATION, LEAST_WEIGHT, Weighting, weighting},
+    plan::weighting::{LEAST_DEVIATION, Weighting, weighting},
     volume::{
         Arrangement, Lattice, Samples, Volume, overshoot::Overshoot, reach::neighbourhood_ranges,
     },
 };
 use fearless_simd::{Simd, i32x8, prelude::*};
 use glam::{DMat3, DVec3};
-
-/// Maximum number of samples along an axis that a place reads.
-pub const MOST_TAPS: usize = 12;
 /// The same for kernels that are no products, whose samples need a weight each.
 const MOST_RADIAL_TAPS: usize = 8;
 /// Minimum extent of a kernel, in samples: the fields of narrower kernels change in steps.
@@ -95,37 +93,9 @@ fn rounded(taps: usize) -> usize {
     }
 }
 
-/// Returns how far a kernel reaches, in samples. A Gaussian does not end along the rays; it reaches
-/// as far as it has weight.
-pub fn reach(kernel: &Kernel) -> f64 {
-    match kernel.profile {
-        Profile::Gaussian(sigma) => sigma * (-2.0 * LEAST_WEIGHT.ln()).sqrt(),
-        _ => kernel.extent,
-    }
-}
-
 /// Whether a kernel is a Gaussian that has no weight left where it ends: a product along the axes.
 fn is_whole(kernel: &Kernel) -> bool {
     matches!(kernel.profile, Profile::Gaussian(_)) && reach(kernel) <= kernel.extent
-}
-
-/// Sums of the kernels at a place: weights and weighted values, and their changes per step along
-/// the axes.
-#[derive(Clone, Copy)]
-pub struct Sums<S: Simd> {
-    pub weight: Lanes<S>,
-    pub value: Lanes<S>,
-    pub weight_slopes: [Lanes<S>; 3],
-    pub value_slopes: [Lanes<S>; 3],
-}
-
-/// The field at a place: its value and its change per step along each axis. `weight` is the excess
-/// over the minimum sum of kernels; if it is not above 0, there is no field.
-#[derive(Clone, Copy)]
-pub struct Point<S: Simd> {
-    pub value: Lanes<S>,
-    pub slopes: [Lanes<S>; 3],
-    pub weight: Lanes<S>,
 }
 
 /// The values of a volume's samples.
@@ -158,29 +128,6 @@ impl<'a> Blended<'a> {
     #[inline(always)]
     pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
         self.blend.at(simd, self.samples, self.zero, place, way)
-    }
-}
-
-impl<S: Simd> Sums<S> {
-    #[inline(always)]
-    fn plus(&self, other: &Self) -> Self {
-        Self {
-            weight: self.weight + other.weight,
-            value: self.value + other.value,
-            weight_slopes: three!(I => self.weight_slopes[I] + other.weight_slopes[I]),
-            value_slopes: three!(I => self.value_slopes[I] + other.value_slopes[I]),
-        }
-    }
-
-    /// Returns the field. `scale` is the factor from the slopes of the sums to those of the field.
-    #[inline(always)]
-    fn quotient(&self, simd: S, scale: f32) -> Point<S> {
-        // Where kernels of both signs nearly cancel, and far outside, the result does not matter.
-        let inverse = Lanes::splat(simd, 1.0) / self.weight.max(Lanes::splat(simd, 1e-20));
-        let value = self.value * inverse;
-        let inverse = inverse * scale;
-        let slopes = three!(I => (self.value_slopes[I] - value * self.weight_slopes[I]) * inverse);
-        Point { value, slopes, weight: self.weight }
     }
 }
 

@@ -1,5 +1,5 @@
-//! The footprint of a splat: the pixels and sheets that it covers (shaders/shared/footprint.wgsl), and the
-//! record that tiles read.
+//! The footprint of a splat: the pixels and sheets that it covers (shaders/shared/footprint.wgsl),
+//! and the record that tiles read.
 
 use super::plan::Plan;
 use crate::{

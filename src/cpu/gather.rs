@@ -2,14 +2,15 @@
 //! planes.
 
 use super::{
-    blend::{MOST_TAPS, Point, Way},
+    blend::Way,
     brick_cache::Grid,
     close::{Face, Layer, OPAQUE, Visible},
     field::{BEYOND, Typed},
-    march::is_marked,
+    kernel_sums::{MOST_TAPS, Point},
     plan::Plan,
     rays::Rays,
     scatter::normal_cdf,
+    skip::is_marked,
     vector::{Lanes, dot, each, three},
 };
 use crate::{math::Kernel, plan::shown::Shown, scene::Optics, volume::Volume};

@@ -7,6 +7,7 @@ use super::{
     page_cache::PageCache,
     plan::Plan,
     project::Projector,
+    spare::{Spare, spare_for},
     vector::lanes,
 };
 use crate::{
@@ -115,7 +116,7 @@ impl Prepared {
                 let source = Source::of_splats(view, drawn, false);
                 let own = |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
                 Ok(batches(&drawn.splats, spare, |batch, records| {
-                    records.extend(batch.iter().filter_map(own))
+                    records.extend(batch.iter().filter_map(own));
                 }))
             }
             Self::Hierarchy(pages) => {
@@ -132,7 +133,7 @@ impl Prepared {
                 let lattice = LatticeSource::new(plan, volume, kernel);
                 let own = |index: &u32| lattice.record(plan, *index as usize);
                 Ok(batches(list, spare, |batch, records| {
-                    records.extend(batch.iter().filter_map(own))
+                    records.extend(batch.iter().filter_map(own));
                 }))
             }
             Self::Bricks(cache) => {
@@ -154,23 +155,6 @@ fn batches<T: Sync>(
         .zip(candidates.par_chunks(BATCH))
         .for_each(|(records, batch)| add(batch, records));
     records
-}
-
-/// Records of the last picture, whose memory is reused: allocating it anew takes as long as filling
-/// it.
-pub type Spare = Vec<Vec<Record>>;
-
-/// Takes memory for a number of batches of records.
-pub fn spare_for(spare: &mut Spare, batches: usize) -> Vec<Vec<Record>> {
-    let mut own = spare.split_off(spare.len().saturating_sub(batches));
-    for records in &mut own {
-        if records.capacity() / 4 > records.len() {
-            records.shrink_to(2 * records.len());
-        }
-        records.clear();
-    }
-    own.resize_with(batches, Vec::new);
-    own
 }
 
 /// Returns the visible samples, block by block.

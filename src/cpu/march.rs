@@ -9,6 +9,7 @@ use super::{
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
     scatter::{Packet, Window, add},
+    skip::is_marked,
     sums::{Sums, WINDOW, differences},
     vector::{each, three},
 };
@@ -281,11 +282,6 @@ impl March<'_> {
 fn record_of(records: &[Vec<Record>], number: u32) -> &Record {
     let (batch, own) = super::bins::place_of(number);
     &records[batch][own]
-}
-
-pub fn is_marked(marks: &[u64], sheet: usize) -> bool {
-    let bit = sheet - 1;
-    marks.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 != 0)
 }
 
 /// Returns the first marked sheet at or after `sheet`.

@@ -32,6 +32,7 @@ mod field;
 mod footprint;
 mod gather;
 mod items;
+mod kernel_sums;
 mod march;
 mod nodes;
 mod page_cache;
@@ -42,6 +43,7 @@ mod rays;
 mod rectilinear;
 mod scatter;
 mod skip;
+mod spare;
 mod sums;
 mod vector;
 mod window;
@@ -73,10 +75,11 @@ use fearless_simd::Level;
 use field::Typed;
 use footprint::Record;
 use gather::Gather;
-use items::{Prepared, Spare};
+use items::Prepared;
 use march::{EMPTY, March, Tile};
 use plan::Plan;
 use rayon::prelude::*;
+use spare::Spare;
 use std::{
     sync::atomic::{AtomicU64, Ordering::Relaxed},
     time::Instant,

@@ -2,10 +2,10 @@
 
 use super::{
     footprint::Record,
-    items::{Spare, spare_for},
     nodes::{Drawn, Nodes},
     plan::Plan,
     project::Projector,
+    spare::{Spare, spare_for},
     vector::lanes,
 };
 use crate::{

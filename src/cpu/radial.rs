@@ -2,7 +2,7 @@
 //! their sums over the samples in reach.
 
 use super::{
-    blend::Sums,
+    kernel_sums::Sums,
     vector::{Lanes, each, three},
     window::pairs,
 };

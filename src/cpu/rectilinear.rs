@@ -4,7 +4,7 @@
 //! value; the other adds the slopes of the samples around.
 
 use super::{
-    blend::{MOST_TAPS, Sums, reach},
+    kernel_sums::{MOST_TAPS, Sums, reach},
     vector::{Lanes, each, exp2, three},
     window::columns,
 };

@@ -1,6 +1,6 @@
 //! Adds splats to the pixels of a tile: their sections in a window of sheets, and their kernels on
-//! the planes between these sheets. shaders/shared/kernels.wgsl does the same; docs/engine.md explains the
-//! mathematics.
+//! the planes between these sheets. shaders/shared/kernels.wgsl does the same; docs/engine.md
+//! explains the mathematics.
 
 use super::{
     close::Pixels,
@@ -21,7 +21,7 @@ const FAR: f32 = 12.0;
 /// Smaller optical depths are not added: even thousands of them are invisible.
 const LEAST_ADDED: f32 = 1e-7;
 /// Number of table entries along the kernel's radius, and of cells along each side of the table of
-/// its sections (engine/tables.rs).
+/// its sections (src/plan/tables.rs).
 const RADII: usize = crate::plan::tables::RADII;
 const SECTIONS: usize = crate::plan::tables::SECTIONS;
 

@@ -57,3 +57,10 @@ impl Shown {
         shows.simd_eq(1).to_bitmask()
     }
 }
+
+/// Returns whether `sheet`, counted from 1, is marked in the words of a tile
+/// ([`Shown::sheets_of_tiles`]).
+pub fn is_marked(marks: &[u64], sheet: usize) -> bool {
+    let bit = sheet - 1;
+    marks.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 != 0)
+}

@@ -62,7 +62,7 @@ fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
                 match done {
                     // Nothing is lost if the folder could not be synced.
                     Ok(()) => {
-                        assert!(step == Step::SyncFolder && found.as_ref() == Some(&new), "{told}")
+                        assert!(step == Step::SyncFolder && found.as_ref() == Some(&new), "{told}");
                     }
                     Err(error) => {
                         assert_eq!(found.as_deref(), old, "{told}");

@@ -12,9 +12,12 @@ use crate::{
     input::{Source, growing::Growing, isolate::isolated},
     surface::Mesh,
 };
-use ::e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordName};
+use ::e57::{CartesianCoordinate, E57Reader, Point, PointCloud, RecordDataType, RecordName};
 use glam::DVec3;
-use std::io::Cursor;
+use std::{
+    io::{Cursor, Read, Seek},
+    ops::Range,
+};
 
 /// Points that are read between two checks of the time limit.
 const POINTS: u64 = 1 << 16;
@@ -33,80 +36,124 @@ const POINTS: u64 = 1 << 16;
 /// than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     // The crate asserts on numbers of the file and clamps by them, which may panic.
-    let cloud = isolated(source, "scans", || {
-        let unreadable =
-            |error: ::e57::Error| source.error("file", format!("cannot be read as E57: {error}"));
-        let xml = E57Reader::raw_xml(Cursor::new(source.bytes())).map_err(unreadable)?;
-        description::check(source, &xml)?;
-        let mut file = E57Reader::new(Cursor::new(source.bytes())).map_err(unreadable)?;
-        let scans = file.pointclouds();
-        let claimed = scans.iter().fold(0u64, |sum, scan| sum.saturating_add(scan.records));
-        source.check_points("the number of points", claimed)?;
-        let mut positions = Growing::new(source, "the positions");
-        let mut colors = Growing::new(source, "the colours");
-        let mut intensities = Growing::new(source, "the intensities");
-        let mut sensors = Vec::new();
-        let mut has_colors = false;
-        for (number, scan) in scans.iter().enumerate() {
-            let wrong = |message: String| source.error(format!("scan {number}"), message);
-            check(scan).map_err(|message| wrong(message.into()))?;
-            streams::check(source, scan, number, streams::MOST_WAITING)?;
-            let start = positions.len();
-            let mut points =
-                file.pointcloud_simple(scan).map_err(|error| wrong(error.to_string()))?;
-            points.intensity_to_color(false);
-            points.normalize_intensity(false);
-            let mut index = 0u64;
-            for point in points {
-                let point = match point {
-                    Ok(point) => point,
-                    // The crate returns this for a packet that completes no point, such as an index
-                    // packet. The next call reads on, and reaches the end of the file at the
-                    // latest.
-                    Err(::e57::Error::Internal { .. }) => {
-                        source.check_time()?;
-                        continue;
-                    }
-                    Err(error) => return Err(wrong(format!("ends after {index} points: {error}"))),
-                };
-                index += 1;
-                // Points without a position are not kept, but take time.
-                if index.is_multiple_of(POINTS) {
+    let cloud = isolated(source, "scans", || read_scans(source))?;
+    cloud.into_mesh(source, |point| format!("point {point}"))
+}
+
+/// Reads the points of all scans.
+fn read_scans(source: &Source) -> Result<Cloud> {
+    let unreadable =
+        |error: ::e57::Error| source.error("file", format!("cannot be read as E57: {error}"));
+    let xml = E57Reader::raw_xml(Cursor::new(source.bytes())).map_err(unreadable)?;
+    description::check(source, &xml)?;
+    let mut file = E57Reader::new(Cursor::new(source.bytes())).map_err(unreadable)?;
+    let scans = file.pointclouds();
+    let claimed = scans.iter().fold(0u64, |sum, scan| sum.saturating_add(scan.records));
+    source.check_points("the number of points", claimed)?;
+    let mut points = Points::new(source);
+    for (number, scan) in scans.iter().enumerate() {
+        points.add_scan(&mut file, scan, number)?;
+    }
+    let left_out = claimed.saturating_sub(points.positions.len() as u64);
+    if left_out > 0 {
+        tracing::info!(points = left_out, "points without a valid position are left out");
+    }
+    points.into_cloud()
+}
+
+/// The points of the scans that are read so far.
+struct Points<'a> {
+    source: &'a Source<'a>,
+    positions: Growing<'a, DVec3>,
+    /// White for points without a colour.
+    colors: Growing<'a, [u8; 4]>,
+    has_colors: bool,
+    /// NaN for points without an intensity.
+    intensities: Growing<'a, f32>,
+    sensors: Vec<(DVec3, Range<usize>)>,
+}
+
+impl<'a> Points<'a> {
+    fn new(source: &'a Source<'a>) -> Self {
+        Self {
+            source,
+            positions: Growing::new(source, "the positions"),
+            colors: Growing::new(source, "the colours"),
+            has_colors: false,
+            intensities: Growing::new(source, "the intensities"),
+            sensors: Vec::new(),
+        }
+    }
+
+    /// Adds the points of a scan, and its scanner.
+    fn add_scan(
+        &mut self,
+        file: &mut E57Reader<impl Read + Seek>,
+        scan: &PointCloud,
+        number: usize,
+    ) -> Result<()> {
+        let source = self.source;
+        let wrong = |message: String| source.error(format!("scan {number}"), message);
+        check(scan).map_err(|message| wrong(message.into()))?;
+        streams::check(source, scan, number, streams::MOST_WAITING)?;
+        let start = self.positions.len();
+        let mut points = file.pointcloud_simple(scan).map_err(|error| wrong(error.to_string()))?;
+        points.intensity_to_color(false);
+        points.normalize_intensity(false);
+        let mut index = 0u64;
+        for point in points {
+            let point = match point {
+                Ok(point) => point,
+                // The crate returns this for a packet that completes no point, such as an index
+                // packet. The next call reads on, and reaches the end of the file at the latest.
+                Err(::e57::Error::Internal { .. }) => {
                     source.check_time()?;
-                }
-                let CartesianCoordinate::Valid { x, y, z } = point.cartesian else { continue };
-                let position = DVec3::new(x, y, z);
-                if !position.is_finite() {
                     continue;
                 }
-                positions.push(position)?;
-                let color = point.color.as_ref().map(|color| [color.red, color.green, color.blue]);
-                has_colors |= color.is_some();
-                // Points without a colour are white if others have colours.
-                let [r, g, b] = color.unwrap_or([1.0; 3]).map(|part| (part * 255.0).round() as u8);
-                colors.push([r, g, b, 255])?;
-                intensities.push(point.intensity.unwrap_or(f32::NAN))?;
+                Err(error) => return Err(wrong(format!("ends after {index} points: {error}"))),
+            };
+            index += 1;
+            // Points without a position are not kept, but take time.
+            if index.is_multiple_of(POINTS) {
+                source.check_time()?;
             }
-            if let Some(sensor) = sensor(scan) {
-                sensors.push((sensor, start..positions.len()));
-            }
+            self.add(&point)?;
         }
-        let left_out = claimed.saturating_sub(positions.len() as u64);
-        if left_out > 0 {
-            tracing::info!(points = left_out, "points without a valid position are left out");
+        if let Some(sensor) = sensor(scan) {
+            self.sensors.push((sensor, start..self.positions.len()));
         }
+        Ok(())
+    }
+
+    /// Adds a point if it has a valid position.
+    fn add(&mut self, point: &Point) -> Result<()> {
+        let CartesianCoordinate::Valid { x, y, z } = point.cartesian else { return Ok(()) };
+        let position = DVec3::new(x, y, z);
+        if !position.is_finite() {
+            return Ok(());
+        }
+        self.positions.push(position)?;
+        let color = point.color.as_ref().map(|color| [color.red, color.green, color.blue]);
+        self.has_colors |= color.is_some();
+        // Points without a colour are white if others have colours.
+        let [r, g, b] = color.unwrap_or([1.0; 3]).map(|part| (part * 255.0).round() as u8);
+        self.colors.push([r, g, b, 255])?;
+        self.intensities.push(point.intensity.unwrap_or(f32::NAN))
+    }
+
+    fn into_cloud(self) -> Result<Cloud> {
         // `greys` sorts a copy of the intensities.
-        source.room::<f32>("the intensities", intensities.len())?;
-        let colors = if has_colors { colors.into_inner() } else { greys(&intensities) };
+        self.source.room::<f32>("the intensities", self.intensities.len())?;
+        let colors =
+            if self.has_colors { self.colors.into_inner() } else { greys(&self.intensities) };
         Ok(Cloud {
-            positions: positions.into_inner(),
+            positions: self.positions.into_inner(),
             colors,
-            sensors,
+            sensors: self.sensors,
             z_is_up: true,
             ..Cloud::default()
         })
-    })?;
-    cloud.into_mesh(source, |point| format!("point {point}"))
+    }
 }
 
 /// Returns an error for a scan whose values all take zero bits: nothing would end the crate's

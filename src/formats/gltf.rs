@@ -19,8 +19,8 @@ use crate::{
 use ::gltf::json::{self, mesh::Mode, mesh::Semantic, validation::Checked};
 use buffers::Buffers;
 use glam::{DMat3, DMat4, DVec3, Mat2, Vec2, Vec3};
-use materials::Alpha;
-use std::{collections::HashMap, sync::Arc};
+use materials::{Alpha, Base};
+use std::{collections::HashMap, ops::Range, sync::Arc};
 
 /// Extensions that a file may require, by prefix: those that are read (among them
 /// `KHR_materials_pbrSpecularGlossiness`), and those that only change the look of a material in
@@ -98,6 +98,36 @@ fn tree_bytes(text: &[u8]) -> u64 {
 const VERTEX: u64 = 160;
 const CORNER: u64 = 40;
 
+/// A primitive in its place in the scene, and the indices of its vertices.
+struct Part<'a> {
+    primitive: &'a json::mesh::Primitive,
+    /// Names the primitive in errors.
+    place: &'a str,
+    transform: DMat4,
+    vertices: Range<usize>,
+}
+
+impl Part<'_> {
+    /// Returns whether the transform mirrors the primitive.
+    fn mirrors(&self) -> bool {
+        self.transform.determinant() < 0.0
+    }
+
+    /// Returns an error if an attribute has another number of values than there are vertices.
+    fn check(&self, source: &Source, what: &str, found: usize) -> Result<()> {
+        let count = self.vertices.len();
+        if found == count {
+            return Ok(());
+        }
+        Err(source.error(self.place, format!("has {count} positions but {found} {what}")))
+    }
+}
+
+/// Returns the index of the accessor of an attribute.
+fn attribute(primitive: &json::mesh::Primitive, semantic: Semantic) -> Option<usize> {
+    primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value())
+}
+
 /// The mesh while it is being built.
 struct Builder<'a> {
     source: &'a Source<'a>,
@@ -173,98 +203,115 @@ impl Builder<'_> {
             tracing::warn!("{}: {place}: lines are not drawn", self.source.path.display());
             return Ok(());
         }
-        let attribute = |semantic| {
-            primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value())
-        };
-        let Some(position) = attribute(Semantic::Positions) else { return Ok(()) };
-        let points: Vec<[f32; 3]> = self.buffers.floats(position, place, false)?;
-        let base = self.positions.len();
+        let Some(position) = attribute(primitive, Semantic::Positions) else { return Ok(()) };
+        let vertices = self.add_positions(transform, position, place)?;
+        let base = self.base(primitive.material.map(|index| index.value()), place)?;
+        let part = Part { primitive, place, transform, vertices };
+        self.add_normals(&part)?;
+        self.add_colors(&part, &base)?;
+        self.add_uvs(&part, &base)?;
+        if mode != Mode::Points {
+            self.add_triangles(&part, mode, &base)?;
+        }
+        Ok(())
+    }
+
+    /// Adds the vertices of a primitive. Returns their indices.
+    fn add_positions(
+        &mut self,
+        transform: DMat4,
+        accessor: usize,
+        place: &str,
+    ) -> Result<Range<usize>> {
+        let points: Vec<[f32; 3]> = self.buffers.floats(accessor, place, false)?;
+        let start = self.positions.len();
         let total =
-            self.source.check_points("the number of vertices", (base + points.len()) as u64)?;
+            self.source.check_points("the number of vertices", (start + points.len()) as u64)?;
         if u32::try_from(total).is_err() {
-            return Err(self.source.error(
-                place,
-                "has more vertices than 32-bit indices can \
-                                                 address",
-            ));
+            return Err(self
+                .source
+                .error(place, "has more vertices than 32-bit indices can address"));
         }
         self.positions.extend(
             points.iter().map(|p| transform.transform_point3(Vec3::from_array(*p).as_dvec3())),
         );
-        let count = points.len();
-        drop(points);
-        let material = primitive.material.map(|index| index.value());
-        let base_color = self.base(material, place)?;
-        let mirrors = transform.determinant() < 0.0;
-        let check = |what: &str, found: usize| {
-            if found == count {
-                return Ok(());
-            }
-            Err(self.source.error(place, format!("has {count} positions but {found} {what}")))
-        };
+        Ok(start..total)
+    }
 
-        if let Some(accessor) = attribute(Semantic::Normals) {
-            let normals: Vec<[f32; 3]> = self.buffers.floats(accessor, place, false)?;
-            check("normals", normals.len())?;
-            // The cofactor matrix transforms normals like the inverse transpose, and also exists
-            // for a flat transform. It carries the determinant as a factor, and so its sign.
-            let [x, y, z] = DMat3::from_mat4(transform).to_cols_array_2d().map(DVec3::from_array);
-            let sign = if mirrors { -1.0 } else { 1.0 };
-            let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
-            let turned = normals
-                .iter()
-                .map(|n| positions::unit((turn * Vec3::from_array(*n).as_dvec3()).as_vec3()));
-            self.mesh.normals.resize(base, Vec3::ZERO);
-            self.mesh.normals.extend(turned);
-        }
-        if let Some(accessor) = attribute(Semantic::Colors(0)) {
-            let colors = self.buffers.colors(accessor, place)?;
-            check("colours", colors.len())?;
-            self.mesh.colors.resize(base, [255; 4]);
-            self.mesh.colors.extend(colors.iter().map(|&color| {
-                let [r, g, b, a] = displayed(color).map(|v| (v * 255.0).round() as u8);
-                [r, g, b, base_color.alpha.apply(a)]
-            }));
-        }
-        if let Some(info) = base_color.texture {
-            let shift = info
-                .extensions
-                .as_ref()
-                .and_then(|extensions| extensions.texture_transform.as_ref());
-            let set = shift.and_then(|shift| shift.tex_coord).unwrap_or(info.tex_coord);
-            if let Some(accessor) = attribute(Semantic::TexCoords(set)) {
-                let mut uvs: Vec<[f32; 2]> = self.buffers.floats(accessor, place, false)?;
-                check("texture coordinates", uvs.len())?;
-                if let Some(shift) = shift {
-                    let turn = Mat2::from_angle(-shift.rotation.0);
-                    for uv in &mut uvs {
-                        let scaled = Vec2::from_array(*uv) * Vec2::from_array(shift.scale.0);
-                        *uv = (turn * scaled + Vec2::from_array(shift.offset.0)).to_array();
-                    }
-                }
-                if let Some(vertex) = uvs.iter().position(|uv| !Vec2::from_array(*uv).is_finite()) {
-                    let place = format!("{place}: vertex {vertex}");
-                    return Err(super::uv_error(self.source, place, Vec2::from_array(uvs[vertex])));
-                }
-                self.mesh.uvs.resize(base, Vec2::ZERO);
-                self.mesh.uvs.extend(uvs.iter().map(|&uv| Vec2::from_array(uv)));
+    /// Adds the normals of a primitive's vertices, if there are any.
+    fn add_normals(&mut self, part: &Part) -> Result<()> {
+        let Some(accessor) = attribute(part.primitive, Semantic::Normals) else { return Ok(()) };
+        let normals: Vec<[f32; 3]> = self.buffers.floats(accessor, part.place, false)?;
+        part.check(self.source, "normals", normals.len())?;
+        // The cofactor matrix transforms normals like the inverse transpose, and also exists for a
+        // flat transform. It carries the determinant as a factor, and so its sign.
+        let [x, y, z] = DMat3::from_mat4(part.transform).to_cols_array_2d().map(DVec3::from_array);
+        let sign = if part.mirrors() { -1.0 } else { 1.0 };
+        let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
+        let turned = normals
+            .iter()
+            .map(|n| positions::unit((turn * Vec3::from_array(*n).as_dvec3()).as_vec3()));
+        self.mesh.normals.resize(part.vertices.start, Vec3::ZERO);
+        self.mesh.normals.extend(turned);
+        Ok(())
+    }
+
+    /// Adds the colours of a primitive's vertices, if there are any.
+    fn add_colors(&mut self, part: &Part, base: &Base) -> Result<()> {
+        let Some(accessor) = attribute(part.primitive, Semantic::Colors(0)) else { return Ok(()) };
+        let colors = self.buffers.colors(accessor, part.place)?;
+        part.check(self.source, "colours", colors.len())?;
+        self.mesh.colors.resize(part.vertices.start, [255; 4]);
+        self.mesh.colors.extend(colors.iter().map(|&color| {
+            let [r, g, b, a] = displayed(color).map(|v| (v * 255.0).round() as u8);
+            [r, g, b, base.alpha.apply(a)]
+        }));
+        Ok(())
+    }
+
+    /// Adds the texture coordinates of a primitive's vertices, if its material has a picture.
+    fn add_uvs(&mut self, part: &Part, base: &Base) -> Result<()> {
+        let Some(info) = base.texture else { return Ok(()) };
+        let shift =
+            info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
+        let set = shift.and_then(|shift| shift.tex_coord).unwrap_or(info.tex_coord);
+        let Some(accessor) = attribute(part.primitive, Semantic::TexCoords(set)) else {
+            return Ok(());
+        };
+        let mut uvs: Vec<[f32; 2]> = self.buffers.floats(accessor, part.place, false)?;
+        part.check(self.source, "texture coordinates", uvs.len())?;
+        if let Some(shift) = shift {
+            let turn = Mat2::from_angle(-shift.rotation.0);
+            for uv in &mut uvs {
+                let scaled = Vec2::from_array(*uv) * Vec2::from_array(shift.scale.0);
+                *uv = (turn * scaled + Vec2::from_array(shift.offset.0)).to_array();
             }
         }
-        if mode != Mode::Points {
-            let corners = match primitive.indices {
-                Some(index) => self.buffers.indices(index.value(), place, count)?,
-                None => (0..count as u32).collect(),
-            };
-            let material = self.material(material, &base_color)?;
-            let mesh = &mut self.mesh;
-            triangles(mode, &corners, |[a, b, c]| {
-                let [a, b, c] = [a, b, c].map(|corner| corner + base as u32);
-                mesh.triangles.push(if mirrors { [a, c, b] } else { [a, b, c] });
-            });
-            self.source
-                .check_points("the number of triangles", self.mesh.triangles.len() as u64)?;
-            self.mesh.triangle_materials.resize(self.mesh.triangles.len(), material);
+        if let Some(vertex) = uvs.iter().position(|uv| !Vec2::from_array(*uv).is_finite()) {
+            let place = format!("{}: vertex {vertex}", part.place);
+            return Err(super::uv_error(self.source, place, Vec2::from_array(uvs[vertex])));
         }
+        self.mesh.uvs.resize(part.vertices.start, Vec2::ZERO);
+        self.mesh.uvs.extend(uvs.iter().map(|&uv| Vec2::from_array(uv)));
+        Ok(())
+    }
+
+    /// Adds the triangles of a primitive, and its material.
+    fn add_triangles(&mut self, part: &Part, mode: Mode, base: &Base) -> Result<()> {
+        let Part { primitive, place, .. } = *part;
+        let (start, count) = (part.vertices.start as u32, part.vertices.len());
+        let corners = match primitive.indices {
+            Some(index) => self.buffers.indices(index.value(), place, count)?,
+            None => (0..count as u32).collect(),
+        };
+        let material = self.material(primitive.material.map(|index| index.value()), base)?;
+        let (mesh, mirrors) = (&mut self.mesh, part.mirrors());
+        triangles(mode, &corners, |[a, b, c]| {
+            let [a, b, c] = [a, b, c].map(|corner| corner + start);
+            mesh.triangles.push(if mirrors { [a, c, b] } else { [a, b, c] });
+        });
+        self.source.check_points("the number of triangles", self.mesh.triangles.len() as u64)?;
+        self.mesh.triangle_materials.resize(self.mesh.triangles.len(), material);
         Ok(())
     }
 

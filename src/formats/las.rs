@@ -103,69 +103,76 @@ impl Header {
     fn read(source: &Source) -> Result<Self> {
         let bytes = source.bytes();
         let wrong = |message: String| source.error("header", message);
-        if !bytes.starts_with(b"LASF") {
-            return Err(wrong("does not begin with “LASF”".into()));
+        let (header, points) =
+            Self::parse(&Fields { bytes, place: "the header" }).map_err(wrong)?;
+        header.check(bytes.len()).map_err(wrong)?;
+        Ok(Self { points: source.check_points("the number of points", points)?, ..header })
+    }
+
+    /// Returns the header, still without points, and the number of points that it claims.
+    fn parse(field: &Fields) -> Result<(Self, u64), String> {
+        if !field.bytes.starts_with(b"LASF") {
+            return Err("does not begin with “LASF”".into());
         }
-        let field = Fields { bytes, place: "the header" };
-        let header_size = usize::from(u16::from_le_bytes(field.at(94).map_err(wrong)?));
-        let start = u32::from_le_bytes(field.at(96).map_err(wrong)?) as usize;
-        let record_count = u32::from_le_bytes(field.at(100).map_err(wrong)?);
-        let [format] = field.at(104).map_err(wrong)?;
-        let size = usize::from(u16::from_le_bytes(field.at(105).map_err(wrong)?));
-        let mut points = u64::from(u32::from_le_bytes(field.at(107).map_err(wrong)?));
-        let double = |at: usize| field.at(at).map(f64::from_le_bytes).map_err(wrong);
-        let three = |at: usize| Ok(DVec3::new(double(at)?, double(at + 8)?, double(at + 16)?));
-        let (scale, offset): (DVec3, DVec3) = (three(131)?, three(155)?);
-        let [major, minor] = field.at(24).map_err(wrong)?;
+        let header_size = usize::from(u16::from_le_bytes(field.at(94)?));
+        let start = u32::from_le_bytes(field.at(96)?) as usize;
+        let record_count = u32::from_le_bytes(field.at(100)?);
+        let [format] = field.at(104)?;
+        let size = usize::from(u16::from_le_bytes(field.at(105)?));
+        let mut points = u64::from(u32::from_le_bytes(field.at(107)?));
+        let double = |at: usize| field.at(at).map(f64::from_le_bytes);
+        let three = |at: usize| -> Result<DVec3, String> {
+            Ok(DVec3::new(double(at)?, double(at + 8)?, double(at + 16)?))
+        };
+        let (scale, offset) = (three(131)?, three(155)?);
+        let [major, minor] = field.at(24)?;
         if major != 1 {
-            return Err(wrong(format!(
-                "has version {major}.{minor}, but only 1.0 to 1.4 can be read"
-            )));
+            return Err(format!("has version {major}.{minor}, but only 1.0 to 1.4 can be read"));
         }
         // Version 1.4 has a wider count. Writers still fill in the older one if it suffices.
         if minor >= 4 && header_size >= 255 {
-            let wide = u64::from_le_bytes(field.at(247).map_err(wrong)?);
+            let wide = u64::from_le_bytes(field.at(247)?);
             points = if wide > 0 { wide } else { points };
         }
         let packed = format & 0xc0 != 0;
         let format = format & 0x3f;
+        let color_at = match format {
+            2 => Some(20),
+            3 | 5 => Some(28),
+            7 | 8 | 10 => Some(30),
+            _ => None,
+        };
+        let records = (header_size, record_count);
+        let header =
+            Self { start, points: 0, size, format, packed, scale, offset, color_at, records };
+        Ok((header, points))
+    }
+
+    /// Returns an error if points cannot be read as the header of a file of `length` bytes
+    /// describes them.
+    fn check(&self, length: usize) -> Result<(), String> {
+        let Self { start, size, format, scale, offset, .. } = *self;
         let Some(&least) = SIZES.get(usize::from(format)) else {
-            return Err(wrong(format!(
-                "has points of format {format}, but only 0 to 10 can be read"
-            )));
+            return Err(format!("has points of format {format}, but only 0 to 10 can be read"));
         };
         if size < least {
-            return Err(wrong(format!(
+            return Err(format!(
                 "has points of {size} bytes, but those of format {format} need {least}"
-            )));
+            ));
         }
         if !scale.is_finite() || !offset.is_finite() || scale.min_element() <= 0.0 {
-            return Err(wrong(format!(
-                "has the scale {scale} and the offset {offset}; both must be \
-                                      finite, and the scale above 0"
-            )));
+            return Err(format!(
+                "has the scale {scale} and the offset {offset}; both must be finite, and the \
+                 scale above 0"
+            ));
         }
-        if start < header_size || start > bytes.len() {
-            let message =
-                format!("puts the points at byte {start}, but the file has {} bytes", bytes.len());
-            return Err(wrong(message));
+        let (header_size, _) = self.records;
+        if start < header_size || start > length {
+            return Err(format!(
+                "puts the points at byte {start}, but the file has {length} bytes"
+            ));
         }
-        Ok(Self {
-            start,
-            points: source.check_points("the number of points", points)?,
-            size,
-            format,
-            packed,
-            scale,
-            offset,
-            color_at: match format {
-                2 => Some(20),
-                3 | 5 => Some(28),
-                7 | 8 | 10 => Some(30),
-                _ => None,
-            },
-            records: (header_size, record_count),
-        })
+        Ok(())
     }
 
     /// Returns a point from its bytes; `None` if it is withheld.

@@ -24,41 +24,7 @@ pub fn read(source: &Source) -> Result<Points> {
     let (header, start) = header(bytes).ok_or_else(|| {
         source.error("header", "is cut off, is longer than 1 MiB, or is not a NumPy header")
     })?;
-    let wrong = |message: String| source.error("header", message);
-    let field = |name: &str| field(&header, name).ok_or_else(|| wrong(format!("has no “{name}”")));
-    let descr = field("descr")?;
-    let (kind, endian) = match descr {
-        "'<f4'" => (SampleType::F32, Endian::Little),
-        "'>f4'" => (SampleType::F32, Endian::Big),
-        "'<f8'" => (SampleType::F64, Endian::Little),
-        "'>f8'" => (SampleType::F64, Endian::Big),
-        other => {
-            return Err(wrong(format!("has the type {other}, but samples are floats, f4 or f8")));
-        }
-    };
-    if field("fortran_order")? != "False" {
-        return Err(wrong("is in Fortran order".into()).hint("write the array in C order"));
-    }
-    let shape = field("shape")?;
-    let sizes = || -> Option<Vec<u64>> {
-        let inside = shape.strip_prefix('(')?.strip_suffix(')')?.trim_end_matches([',', ' ']);
-        inside.split(',').map(|size| size.trim().parse().ok()).collect()
-    };
-    let (rows, width) = match sizes().as_deref() {
-        Some(&[rows, width @ (4 | 5 | 10)]) => {
-            (source.check_points("the number of rows", rows)?, width as usize)
-        }
-        _ => {
-            return Err(wrong(format!(
-                "has the shape {shape}, but (n, 4), (n, 5) or (n, 10) was \
-                                      expected"
-            ))
-            .hint(
-                "a sample is a row of x, y, z, value and then nothing, a radius, or xx, xy, \
-                       xz, yy, yz, zz",
-            ));
-        }
-    };
+    let Array { kind, endian, rows, width } = Array::of(source, &header)?;
     let size = kind.bytes_of([rows, width, 1]).unwrap_or(u64::MAX);
     let data = &bytes[start..];
     if data.len() as u64 != size {
@@ -89,6 +55,55 @@ pub fn read(source: &Source) -> Result<Points> {
         |index| format!("row {index}"),
         columns,
     )
+}
+
+/// The type and shape of the array, from the header.
+struct Array {
+    kind: SampleType,
+    endian: Endian,
+    rows: usize,
+    /// Numbers per row: 4, 5 or 10.
+    width: usize,
+}
+
+impl Array {
+    fn of(source: &Source, header: &str) -> Result<Self> {
+        let wrong = |message: String| source.error("header", message);
+        let field =
+            |name: &str| field(header, name).ok_or_else(|| wrong(format!("has no “{name}”")));
+        let (kind, endian) = match field("descr")? {
+            "'<f4'" => (SampleType::F32, Endian::Little),
+            "'>f4'" => (SampleType::F32, Endian::Big),
+            "'<f8'" => (SampleType::F64, Endian::Little),
+            "'>f8'" => (SampleType::F64, Endian::Big),
+            other => {
+                return Err(wrong(format!(
+                    "has the type {other}, but samples are floats, f4 or f8"
+                )));
+            }
+        };
+        if field("fortran_order")? != "False" {
+            return Err(wrong("is in Fortran order".into()).hint("write the array in C order"));
+        }
+        let shape = field("shape")?;
+        let Some(&[rows, width @ (4 | 5 | 10)]) = sizes(shape).as_deref() else {
+            return Err(wrong(format!(
+                "has the shape {shape}, but (n, 4), (n, 5) or (n, 10) was expected"
+            ))
+            .hint(
+                "a sample is a row of x, y, z, value and then nothing, a radius, or xx, xy, xz, \
+                 yy, yz, zz",
+            ));
+        };
+        let rows = source.check_points("the number of rows", rows)?;
+        Ok(Self { kind, endian, rows, width: width as usize })
+    }
+}
+
+/// Returns the numbers of a Python tuple.
+fn sizes(shape: &str) -> Option<Vec<u64>> {
+    let inside = shape.strip_prefix('(')?.strip_suffix(')')?.trim_end_matches([',', ' ']);
+    inside.split(',').map(|size| size.trim().parse().ok()).collect()
 }
 
 /// Returns the header's text, and the offset of the data.

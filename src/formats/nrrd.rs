@@ -59,7 +59,7 @@ pub fn read(source: &Source) -> Result<Volume> {
     source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
     let Some(field) = header.data_file() else {
         let (bytes, endian) = header.bytes(source, rest, kind, size)?;
-        return Volume::new(lattice, kind.decode(bytes, endian))
+        return Volume::checked(lattice, kind.decode(bytes, endian))
             .map_err(|message| source.error("samples", message));
     };
     let names = files::names(source, field, rest, dims)?;
@@ -68,7 +68,7 @@ pub fn read(source: &Source) -> Result<Volume> {
         let path = source.neighbour("data file", name)?;
         let data = source.open_beside(&path)?;
         let volume = header.bytes(&data, data.bytes(), kind, size).and_then(|(bytes, endian)| {
-            Volume::new(lattice, kind.decode(bytes, endian))
+            Volume::checked(lattice, kind.decode(bytes, endian))
                 .map_err(|message| data.error("samples", message))
         });
         return data.unless_changed(volume);
@@ -84,7 +84,7 @@ pub fn read(source: &Source) -> Result<Volume> {
         order = endian;
         data.intact()?;
     }
-    Volume::new(lattice, kind.decode(all.into(), order))
+    Volume::checked(lattice, kind.decode(all.into(), order))
         .map_err(|message| source.error("samples", message))
 }
 
@@ -150,19 +150,18 @@ impl<'a> Header<'a> {
         if !(bytes.starts_with(b"NRRD000") && matches!(bytes.get(7), Some(b'1'..=b'5'))) {
             return Err(source.error("line 1", "does not begin with NRRD0001 … NRRD0005"));
         }
-        let mut fields = HashMap::new();
-        let mut keys = HashMap::new();
+        let mut header = Self { source, fields: HashMap::new(), keys: HashMap::new() };
         // The line number of each field, by its name without spaces.
-        let mut lines: HashMap<String, usize> = HashMap::new();
+        let mut lines = HashMap::new();
         let mut at = 0;
         // One byte over the maximum shows that the header is too long.
         let window = &bytes[..bytes.len().min(LONGEST + 1)];
-        for (number, line) in window.split_inclusive(|&b| b == b'\n').enumerate() {
+        for (line, number) in window.split_inclusive(|&b| b == b'\n').zip(1..) {
             at += line.len();
             if at > LONGEST {
                 return Err(source
                     .error(
-                        format!("line {}", number + 1),
+                        format!("line {number}"),
                         format!("the header is longer than {LONGEST} bytes"),
                     )
                     .hint("an empty line must stand between the header and the data"));
@@ -175,47 +174,61 @@ impl<'a> Header<'a> {
             }
             source.spend("the size of the header in bytes", ENTRY + 2 * line.len() as u64)?;
             match text.split_once(':') {
-                _ if number == 0 || text.starts_with('#') => {}
+                _ if number == 1 || text.starts_with('#') => {}
                 // “key:=value”
                 Some((key, value)) if value.starts_with('=') => {
-                    let key = key.trim();
-                    let is_read = key == "lattice" || key.starts_with("axis positions ");
-                    if keys.insert(key.to_owned(), value[1..].trim().to_owned()).is_some()
-                        && is_read
-                    {
-                        let message =
-                            format!("the key “{}” is given twice; give it once", shown(key));
-                        return Err(source.error(format!("line {}", number + 1), message));
-                    }
+                    header.add_key(key.trim(), value[1..].trim(), number)?;
                 }
                 Some((name, value)) => {
-                    let (name, value) = (name.trim().to_ascii_lowercase(), value.trim());
-                    let spelling = match name.replace(' ', "").as_str() {
-                        "centerings" => "centers".to_owned(),
-                        other => other.to_owned(),
-                    };
-                    let is_list = spelling == "datafile" && files::is_list(value);
-                    if let Some(before) = lines.insert(spelling, number + 1) {
-                        let message = format!(
-                            "the field “{}” is given twice, in line {before} too; give it once",
-                            shown(&name)
-                        );
-                        return Err(source.error(format!("line {}", number + 1), message));
-                    }
-                    fields.insert(name, value.to_owned());
-                    // File names follow, up to the end.
-                    if is_list {
+                    // File names follow a list, up to the end.
+                    if header.add_field(name.trim(), value.trim(), number, &mut lines)? {
                         break;
                     }
                 }
                 None => {
                     let message = "is neither a field, a key and value, a comment, nor the empty \
                                    line before the data";
-                    return Err(source.error(format!("line {}", number + 1), message));
+                    return Err(source.error(format!("line {number}"), message));
                 }
             }
         }
-        Ok((Self { source, fields, keys }, at))
+        Ok((header, at))
+    }
+
+    /// Adds a key with its value. Only keys that are read must be unique.
+    fn add_key(&mut self, key: &str, value: &str, line: usize) -> Result<()> {
+        let is_read = key == "lattice" || key.starts_with("axis positions ");
+        if self.keys.insert(key.to_owned(), value.to_owned()).is_some() && is_read {
+            let message = format!("the key “{}” is given twice; give it once", shown(key));
+            return Err(self.source.error(format!("line {line}"), message));
+        }
+        Ok(())
+    }
+
+    /// Adds a field, unless one of `lines` has it already. Returns whether it announces a list of
+    /// file names.
+    fn add_field(
+        &mut self,
+        name: &str,
+        value: &str,
+        line: usize,
+        lines: &mut HashMap<String, usize>,
+    ) -> Result<bool> {
+        let name = name.to_ascii_lowercase();
+        let spelling = match name.replace(' ', "").as_str() {
+            "centerings" => "centers".to_owned(),
+            other => other.to_owned(),
+        };
+        let is_list = spelling == "datafile" && files::is_list(value);
+        if let Some(before) = lines.insert(spelling, line) {
+            let message = format!(
+                "the field “{}” is given twice, in line {before} too; give it once",
+                shown(&name)
+            );
+            return Err(self.source.error(format!("line {line}"), message));
+        }
+        self.fields.insert(name, value.to_owned());
+        Ok(is_list)
     }
 
     /// Returns a field by any of its spellings.
@@ -318,7 +331,7 @@ impl<'a> Header<'a> {
                 ));
             }
         };
-        lattice.validate().map_err(|message| self.source.error("header", message))?;
+        lattice.check().map_err(|message| self.source.error("header", message))?;
         Ok(lattice)
     }
 
@@ -449,21 +462,7 @@ impl<'a> Header<'a> {
         size: usize,
     ) -> Result<(Cow<'d, [u8]>, Endian)> {
         let place = "data";
-        let skip = |names: &[&str]| match self.get(names) {
-            Some(text) => self.numbers::<1, i64>(names[0], text).map(|[n]| n),
-            None => Ok(0),
-        };
-        let lines = skip(&["line skip", "lineskip"])?;
-        let skipped: usize = data
-            .split_inclusive(|&b| b == b'\n')
-            .take(lines.max(0) as usize)
-            .map(<[u8]>::len)
-            .sum();
-        let data = &data[skipped..];
-        let skip = skip(&["byte skip", "byteskip"])?;
-        if lines < 0 || skip < -1 {
-            return Err(self.source.error("header", "skips a negative number of lines or bytes"));
-        }
+        let (data, skip) = self.skip_lines(data)?;
         let encoding = self.need("encoding")?.to_ascii_lowercase();
         let from_end = skip == -1;
         if from_end && encoding != "raw" {
@@ -474,13 +473,7 @@ impl<'a> Header<'a> {
         let skip = skip.max(0) as usize;
         let after_skip = || {
             data.get(skip..).ok_or_else(|| {
-                file.error(
-                    place,
-                    format!(
-                        "have fewer than the {skip} bytes to \
-                                                          skip"
-                    ),
-                )
+                file.error(place, format!("have fewer than the {skip} bytes to skip"))
             })
         };
         let text = || {
@@ -490,17 +483,8 @@ impl<'a> Header<'a> {
         };
         Ok(match encoding.as_str() {
             "raw" => {
-                let start = if from_end { data.len().checked_sub(size) } else { Some(skip) };
-                if !from_end && self.data_file().is_some() {
-                    refuse_more(file.path, data.len().saturating_sub(skip) as u64, size as u64)?;
-                }
-                let found =
-                    start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
-                let found = found.ok_or_else(|| {
-                    let there = data.len().saturating_sub(skip);
-                    file.error(place, format!("there are {there} bytes where {size} were expected"))
-                })?;
-                (found.into(), self.endian(kind)?)
+                let skip = (!from_end).then_some(skip);
+                (self.raw(file, data, skip, size)?.into(), self.endian(kind)?)
             }
             // Skipped lines precede the compressed stream; skipped bytes are inside it.
             "gzip" | "gz" => {
@@ -528,6 +512,45 @@ impl<'a> Header<'a> {
                     .error("encoding", format!("“{encoding}” is not supported"))
                     .hint("write the file with raw or gzip encoding"));
             }
+        })
+    }
+
+    /// Skips the lines before the data. Also returns the number of bytes to skip; −1 takes the last
+    /// bytes.
+    fn skip_lines<'d>(&self, data: &'d [u8]) -> Result<(&'d [u8], i64)> {
+        let skip = |names: &[&str]| match self.get(names) {
+            Some(text) => self.numbers::<1, i64>(names[0], text).map(|[n]| n),
+            None => Ok(0),
+        };
+        let lines = skip(&["line skip", "lineskip"])?;
+        let skipped: usize = data
+            .split_inclusive(|&b| b == b'\n')
+            .take(lines.max(0) as usize)
+            .map(<[u8]>::len)
+            .sum();
+        let bytes = skip(&["byte skip", "byteskip"])?;
+        if lines < 0 || bytes < -1 {
+            return Err(self.source.error("header", "skips a negative number of lines or bytes"));
+        }
+        Ok((&data[skipped..], bytes))
+    }
+
+    /// Returns the `size` bytes of raw samples after `skip` bytes; without `skip`, the last ones.
+    fn raw<'d>(
+        &self,
+        file: &Source,
+        data: &'d [u8],
+        skip: Option<usize>,
+        size: usize,
+    ) -> Result<&'d [u8]> {
+        let there = data.len().saturating_sub(skip.unwrap_or(0));
+        if skip.is_some() && self.data_file().is_some() {
+            refuse_more(file.path, there as u64, size as u64)?;
+        }
+        let start = skip.or_else(|| data.len().checked_sub(size));
+        let found = start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
+        found.ok_or_else(|| {
+            file.error("data", format!("there are {there} bytes where {size} were expected"))
         })
     }
 }
@@ -620,14 +643,15 @@ mod tests {
         }
     }
 
+    /// Reads the lattice of two samples from a header with these fields.
+    fn lattice(fields: &str) -> Result<Lattice> {
+        let folder = Folder::new();
+        let content = file(&format!("type: uint8\nsizes: 2 1 1\nencoding: raw\n{fields}"), &[1, 2]);
+        read_with(&folder.write("volume.nrrd", &content), read).map(|volume| volume.lattice)
+    }
+
     #[test]
     fn lattices() {
-        let folder = Folder::new();
-        let lattice = |fields: &str| {
-            let content =
-                file(&format!("type: uint8\nsizes: 2 1 1\nencoding: raw\n{fields}"), &[1, 2]);
-            read_with(&folder.write("volume.nrrd", &content), read).map(|volume| volume.lattice)
-        };
         let turned = lattice(
             "space: RAS\nspace directions: (0, 0.5,0) (-2,0,0)(0,0,3)\nspace origin: (10,20,-30.5)",
         )
@@ -669,6 +693,10 @@ mod tests {
             lattice("units:=mm:=lattice:=bcc\ncontent: lattice:=bcc").unwrap(),
             Lattice::with_spacing([2, 1, 1], DVec3::ONE)
         );
+    }
+
+    #[test]
+    fn lattices_that_cannot_be_read() {
         for (fields, word) in [
             ("space directions: none (1,0,0) (0,1,0)", "space directions"),
             ("space directions: (1,0) (0,1)", "space directions"),

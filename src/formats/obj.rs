@@ -36,40 +36,11 @@ pub fn read(source: &Source) -> Result<Mesh> {
     if survey.faces == 0 {
         return read_cloud(source, &text, &survey);
     }
-    let library = RefCell::new(material::Library::new(source));
-    let failure: RefCell<Option<Error>> = RefCell::new(None);
-    let mut feed = survey.feed(&text);
-    // tobj would triangulate by fans, which also cover area outside a concave polygon.
-    let options =
-        tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
-    let load = |path: &Path| {
-        let loaded = library.borrow_mut().load(&path.to_string_lossy());
-        loaded.map(|(materials, index_of)| (materials, index_of.into_iter().collect())).map_err(
-            |error| {
-                failure.borrow_mut().get_or_insert(error);
-                tobj::LoadError::OpenFileFailed
-            },
-        )
-    };
-    // tobj does unchecked arithmetic on numbers of the file.
-    let loaded =
-        isolated(source, "statements", || Ok(tobj::load_obj_buf(&mut feed, &options, load)))?;
-    let line = feed.line();
-    if let Some(error) = failure.into_inner() {
-        return Err(error);
-    }
-    let (models, materials) =
-        loaded.map_err(|error| source.error(format!("line {line}"), error.to_string()))?;
-    let mut library = library.into_inner();
-    let materials = materials.unwrap_or_default();
-    let mut mesh = Mesh::default();
-    let mut corners = Corners::default();
+    let (models, materials) = statements(source, &text, &survey)?;
     let has_materials = !materials.is_empty();
-    for material in &materials {
-        mesh.materials.push(library.finish(material)?);
-    }
-    let textured: Vec<bool> =
-        mesh.materials.iter().map(|material| material.texture.is_some()).collect();
+    let textured: Vec<bool> = materials.iter().map(|material| material.texture.is_some()).collect();
+    let mut mesh = Mesh { materials, ..Mesh::default() };
+    let mut corners = Corners::default();
     for model in models {
         let id = model.mesh.material_id;
         let with_uv = id.is_some_and(|id| textured.get(id) == Some(&true));
@@ -99,6 +70,42 @@ pub fn read(source: &Source) -> Result<Mesh> {
     mesh.colors = to_bytes(&corners.colors);
     mesh.triangles = corners.triangles;
     Ok(mesh)
+}
+
+/// Parses the statements. Returns the models, and the materials with their pictures.
+fn statements(
+    source: &Source,
+    text: &str,
+    survey: &Survey,
+) -> Result<(Vec<tobj::Model>, Vec<Material>)> {
+    let library = RefCell::new(material::Library::new(source));
+    let failure: RefCell<Option<Error>> = RefCell::new(None);
+    let mut feed = survey.feed(text);
+    // tobj would triangulate by fans, which also cover area outside a concave polygon.
+    let options =
+        tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
+    let load = |path: &Path| {
+        let loaded = library.borrow_mut().load(&path.to_string_lossy());
+        loaded.map(|(materials, index_of)| (materials, index_of.into_iter().collect())).map_err(
+            |error| {
+                failure.borrow_mut().get_or_insert(error);
+                tobj::LoadError::OpenFileFailed
+            },
+        )
+    };
+    // tobj does unchecked arithmetic on numbers of the file.
+    let loaded =
+        isolated(source, "statements", || Ok(tobj::load_obj_buf(&mut feed, &options, load)))?;
+    let line = feed.line();
+    if let Some(error) = failure.into_inner() {
+        return Err(error);
+    }
+    let (models, materials) =
+        loaded.map_err(|error| source.error(format!("line {line}"), error.to_string()))?;
+    let mut library = library.into_inner();
+    let materials = materials.unwrap_or_default();
+    let materials = materials.iter().map(|material| library.finish(material));
+    Ok((models, materials.collect::<Result<_>>()?))
 }
 
 /// The material of faces that name no existing material.

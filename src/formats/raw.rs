@@ -2,7 +2,7 @@
 
 use super::{Endian, SampleType, volume_stream::Plain};
 use crate::{
-    Error, Result,
+    Result,
     input::Source,
     volume::{Lattice, Volume},
 };
@@ -15,9 +15,11 @@ use std::borrow::Cow;
 pub struct RawLayout {
     /// Samples along each axis. The first axis varies fastest in the file.
     pub dims: [usize; 3],
+    /// The type of one sample.
     pub sample_type: SampleType,
     /// World units between samples along each axis.
     pub spacing: DVec3,
+    /// The byte order of samples of more than one byte.
     pub endian: Endian,
     /// Bytes before the first sample, of the uncompressed file if it is compressed.
     pub header: u64,
@@ -26,8 +28,9 @@ pub struct RawLayout {
 /// Reads a raw file, which may be compressed by gzip. Sample (0, 0, 0) is at the world's origin.
 ///
 /// # Errors
-/// [`Error::Input`] if the file's size is not exactly that of header and samples, with a guess at
-/// the layout it fits; [`Error::Limit`] for a layout over the limits.
+/// [`Error::Input`](crate::Error::Input) if the file's size is not exactly that of header and
+/// samples, with a guess at the layout it fits; [`Error::Limit`](crate::Error::Limit) for a layout
+/// over the limits.
 pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
     let (lattice, wanted) = whole(source, layout)?;
     let bytes = source.bytes();
@@ -59,7 +62,7 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
         Cow::Owned(bytes) => drop(bytes.drain(..header)),
     }
     let samples = layout.sample_type.decode(unpacked, layout.endian);
-    Volume::new(lattice, samples).map_err(|message| source.error("samples", message))
+    Volume::checked(lattice, samples).map_err(|message| source.error("samples", message))
 }
 
 /// Returns where the samples are in a file that contains exactly the header and the samples; `None`
@@ -83,7 +86,7 @@ pub(super) fn plain(source: &Source, layout: &RawLayout) -> Result<Option<Plain>
 /// Returns the lattice of a layout, and the number of bytes of header and samples.
 fn whole(source: &Source, layout: &RawLayout) -> Result<(Lattice, usize)> {
     let lattice = Lattice::with_spacing(layout.dims, layout.spacing);
-    lattice.validate().map_err(Error::Argument)?;
+    lattice.validate()?;
     let samples =
         layout.sample_type.bytes_of(layout.dims).and_then(|bytes| bytes.checked_add(layout.header));
     let wanted = source
@@ -136,7 +139,7 @@ fn guess(size: u64, layout: &RawLayout) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{input::testing::*, volume::Samples};
+    use crate::{Error, input::testing::*, volume::Samples};
     use flate2::{Compression, write::GzEncoder};
     use std::io::Write;
 
@@ -252,7 +255,7 @@ mod tests {
         let layout = layout([nrrd.len(), 1, 1], SampleType::U8);
         let load = |name: &str, raw| {
             crate::formats::load_volume(
-                &folder.write(name, nrrd),
+                folder.write(name, nrrd),
                 &crate::input::Limits::default(),
                 raw,
             )

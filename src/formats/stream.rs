@@ -1,7 +1,11 @@
 //! Reads the points and triangles of a file in pieces, as often as needed, for callers that cannot
 //! hold all of them.
 
-use super::{las, ply};
+use super::{
+    FORMATS,
+    format::{InPieces, by_extension},
+    las, ply,
+};
 use crate::{
     Result,
     input::{Limits, Source, positions},
@@ -14,7 +18,9 @@ use std::path::Path;
 /// The counts in a file's header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
+    /// The number of points, or of vertices of a mesh.
     pub points: u64,
+    /// The number of triangles; 0 for a point cloud.
     pub triangles: u64,
 }
 
@@ -54,7 +60,8 @@ pub struct Stream<'a> {
     bounds: [Vec3; 2],
 }
 
-enum Form {
+/// What the pieces of a file are, by format.
+pub(super) enum Form {
     Ply(ply::Pieces),
     Las(las::Pieces),
 }
@@ -67,8 +74,8 @@ impl<'a> Stream<'a> {
     /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a malformed header and
     /// for a file that ends before its last point; [`Error::Limit`](crate::Error::Limit) for more
     /// points than the limits allow.
-    pub fn open(path: &'a Path, limits: &'a Limits) -> Result<Option<Self>> {
-        Self::of(Source::open(path, limits)?)
+    pub fn open(path: &'a (impl AsRef<Path> + ?Sized), limits: &'a Limits) -> Result<Option<Self>> {
+        Self::of(Source::open(path.as_ref(), limits)?)
     }
 
     /// As [`open`](Self::open), but takes an open source, which may be in memory
@@ -77,14 +84,11 @@ impl<'a> Stream<'a> {
     /// # Errors
     /// Those of [`open`](Self::open), except those of opening the file.
     pub fn of(source: Source<'a>) -> Result<Option<Self>> {
-        let extension =
-            source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-        let form = match extension.as_str() {
-            "ply" => ply::Pieces::find(&source).map(|pieces| pieces.map(Form::Ply)),
-            "las" | "laz" => las::Pieces::find(&source).map(|pieces| pieces.map(Form::Las)),
-            _ => Ok(None),
+        let format = by_extension(FORMATS, source.path, |_| true);
+        let form = match format.map(|format| format.pieces) {
+            Some(InPieces::Points { find, .. }) => source.unless_changed(find(&source))?,
+            _ => source.unless_changed(Ok(None))?,
         };
-        let form = source.unless_changed(form)?;
         let (origin, bounds) = (DVec3::ZERO, [Vec3::ZERO; 2]);
         Ok(form.map(|form| Self { source, form, points: 0, origin, bounds }))
     }

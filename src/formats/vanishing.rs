@@ -1,7 +1,9 @@
 //! Files that are truncated while they are read, by every way of reading.
 
 use super::{
-    Endian, RawLayout, SampleType, Stream, VolumeStream, load_mesh, load_samples, ply, volume_of,
+    Endian, FORMATS, RawLayout, SampleType, Stream, VolumeStream,
+    load::{mesh_of, samples_of, volume_of},
+    ply,
 };
 use crate::{
     Error, Result,
@@ -90,7 +92,7 @@ fn meshes_and_clouds() {
         ("a.xyz", points.into_bytes()),
     ];
     for (name, bytes) in files {
-        cut_when_open(name, bytes, load_mesh::read);
+        cut_when_open(name, bytes, |source| mesh_of(FORMATS, source));
     }
 }
 
@@ -112,15 +114,15 @@ fn volumes_and_samples() {
     let nrrd =
         [&b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 30 30 30\nencoding: raw\n\n"[..], &samples]
             .concat();
-    cut_when_open("a.vti", vti, |source| volume_of(source, None));
-    cut_when_open("a.vtk", vtk, |source| volume_of(source, None));
-    cut_when_open("a.nrrd", nrrd, |source| volume_of(source, None));
+    cut_when_open("a.vti", vti, |source| volume_of(FORMATS, source, None));
+    cut_when_open("a.vtk", vtk, |source| volume_of(FORMATS, source, None));
+    cut_when_open("a.nrrd", nrrd, |source| volume_of(FORMATS, source, None));
     let (sample_type, spacing) = (SampleType::from_name("u8").unwrap(), DVec3::ONE);
     let layout =
         RawLayout { dims: [30; 3], sample_type, spacing, endian: Endian::Little, header: 0 };
-    cut_when_open("a.raw", &samples, |source| volume_of(source, Some(&layout)));
+    cut_when_open("a.raw", &samples, |source| volume_of(FORMATS, source, Some(&layout)));
     let table = lines(3000, |i| format!("{},{},{},{}\n", i % 60, i / 60, i % 7, i % 11));
-    cut_when_open("a.csv", table, |source| load_samples::read(source, None));
+    cut_when_open("a.csv", table, |source| samples_of(FORMATS, source, None));
     let folder = Folder::new();
     let path = folder.write("b.raw", &samples);
     let stream = VolumeStream::open(&path, &Limits::default(), Some(&layout)).unwrap().unwrap();

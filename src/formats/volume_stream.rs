@@ -1,6 +1,9 @@
 //! Reads a volume slice by slice, for callers that cannot hold all of it.
 
-use super::{Endian, RawLayout, SampleType, nrrd, raw};
+use super::{
+    Endian, FORMATS, RawLayout, SampleType,
+    format::{InPieces, find_volume},
+};
 use crate::{
     Error, Result,
     input::{Limits, Mapping, Source, intact},
@@ -44,14 +47,17 @@ impl VolumeStream {
     /// # Errors
     /// Those of opening the file, [`Error::Input`] for a malformed header, and [`Error::Limit`] for
     /// sizes over the limits.
-    pub fn open(path: &Path, limits: &Limits, raw: Option<&RawLayout>) -> Result<Option<Self>> {
+    pub fn open(
+        path: impl AsRef<Path>,
+        limits: &Limits,
+        raw: Option<&RawLayout>,
+    ) -> Result<Option<Self>> {
+        let path = path.as_ref();
         let source = Source::open(path, limits)?;
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        let plain = match (extension.as_deref(), raw) {
-            (Some("vti" | "vtr" | "vtk"), _) => None,
-            (Some("nrrd" | "nhdr"), _) => nrrd::plain(&source)?,
-            (_, Some(layout)) => raw::plain(&source, layout)?,
-            _ if source.bytes().starts_with(b"NRRD") => nrrd::plain(&source)?,
+        let format = find_volume(FORMATS, &source, raw.is_some());
+        let plain = match (format.map(|format| format.pieces), raw) {
+            (Some(InPieces::Volume { find, .. }), _) => find(&source)?,
+            (Some(InPieces::Described { find, .. }), Some(layout)) => find(&source, layout)?,
             _ => None,
         };
         let Some(plain) = plain else { return Ok(None) };

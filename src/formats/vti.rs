@@ -26,7 +26,7 @@ pub fn read(source: &Source) -> Result<Volume> {
     let part = samples(source, &document, whole)?;
     source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
     let samples = part.kind.decode(part.bytes, part.endian);
-    Volume::new(lattice, samples).map_err(|message| source.error("samples", message))
+    Volume::checked(lattice, samples).map_err(|message| source.error("samples", message))
 }
 
 /// Returns the extent of all pieces together.
@@ -54,7 +54,7 @@ fn lattice(source: &Source, document: &Document, whole: Extent) -> Result<Lattic
         vector("Origin", DVec3::ZERO)? + axes * first,
         axes,
     );
-    lattice.validate().map_err(|message| source.error("ImageData", message))?;
+    lattice.check().map_err(|message| source.error("ImageData", message))?;
     Ok(lattice)
 }
 

@@ -82,7 +82,7 @@ pub fn read_volume(source: &Source) -> Result<Volume> {
         vtr::volume(data.places, samples)
     } else {
         let dims = data.dims.map(|count| count as usize);
-        Volume::new(
+        Volume::checked(
             Lattice::cartesian(dims, data.origin, DMat3::from_diagonal(data.spacing)),
             samples,
         )
@@ -139,133 +139,182 @@ impl<'a> DataSet<'a> {
         let (mut parser, kind) = Parser::open(source)?;
         let mut data = Self { kind, spacing: DVec3::ONE, ..Self::default() };
         // The data that attributes belong to: none yet, points (`false`) or cells (`true`).
-        let mut attributes: Option<bool> = None;
-        while let Some((place, line)) = parser.line()? {
+        let mut of_cells: Option<bool> = None;
+        while let Some((place, text)) = parser.line()? {
             // No keyword is followed by more words.
-            let words: Vec<&str> = line.split_ascii_whitespace().take(MOST_WORDS).collect();
-            let wrong = |message: String| source.error(place.clone(), message);
+            let words: Vec<&str> = text.split_ascii_whitespace().take(MOST_WORDS).collect();
             source.check_time()?;
             let keyword = words[0].to_ascii_uppercase();
-            match (keyword.as_str(), &words[1..]) {
-                ("DIMENSIONS", sizes) => data.dims = parser.three(&place, sizes)?,
-                ("ORIGIN", numbers) => {
-                    data.origin = DVec3::from_array(parser.three(&place, numbers)?)
-                }
-                ("SPACING" | "ASPECT_RATIO", numbers) => {
-                    data.spacing = DVec3::from_array(parser.three(&place, numbers)?);
-                }
-                ("X_COORDINATES" | "Y_COORDINATES" | "Z_COORDINATES", [count, kind]) => {
-                    let axis = usize::from(keyword.as_bytes()[0] - b'X');
-                    data.places[axis] = parser
-                        .array(&place, parser.count(&place, count)?, kind)?
-                        .doubles(source)?;
-                }
-                // Cells that were already read refer to the points that were present then.
-                ("POINTS", _)
-                    if !(data.cells.points.is_empty() && data.cells.corners.is_empty()) =>
-                {
-                    return Err(wrong("POINTS are given twice, or after the cells".into()));
-                }
-                ("POINTS", [count, kind]) => {
-                    let count = parser.count(&place, count)?;
-                    let numbers =
-                        parser.array(&place, count.saturating_mul(3), kind)?.doubles(source)?;
-                    source.room::<DVec3>("the points", count)?;
-                    data.cells.points = numbers.chunks_exact(3).map(DVec3::from_slice).collect();
-                }
-                (
-                    "CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS",
-                    [count, size],
-                ) => {
-                    let (count, size) = (parser.count(&place, count)?, parser.count(&place, size)?);
-                    let (corners, ends) = parser.cells(&place, count, size)?;
-                    data.cells.room(source, corners.len(), ends.len())?;
-                    data.cells.add(&corners, &ends, 0).map_err(wrong)?;
-                }
-                ("CELL_TYPES", [count]) => {
-                    drop(parser.array(&place, parser.count(&place, count)?, "int")?)
-                }
+            let line = Line { place, keyword, words: &words[1..], text: &text };
+            match (line.keyword.as_str(), line.words) {
                 ("POINT_DATA", [count]) => {
-                    data.points.count = parser.count(&place, count)?;
-                    attributes = Some(false);
+                    data.points.count = parser.count(&line.place, count)?;
+                    of_cells = Some(false);
                 }
                 ("CELL_DATA", [count]) => {
-                    data.of_cells.count = parser.count(&place, count)?;
-                    attributes = Some(true);
+                    data.of_cells.count = parser.count(&line.place, count)?;
+                    of_cells = Some(true);
                 }
                 ("METADATA", _) => parser.skip_to_blank()?,
-                ("LOOKUP_TABLE", [_, count]) => {
-                    parser.skip_colors(&place, parser.count(&place, count)?, 4)?
-                }
-                ("FIELD", [_, arrays]) => {
-                    for _ in 0..parser.count(&place, arrays)? {
-                        let (name, components, part) = parser.field()?;
-                        if let Some(attributes) = data.attributes(attributes)
-                            && components == 1
-                            && part.len() == attributes.count
-                        {
-                            attributes.arrays.push((name, part));
-                        }
-                    }
-                }
-                (_, [name, rest @ ..]) => {
-                    let Some(attributes) = data.attributes(attributes) else {
-                        return Err(wrong(format!(
-                            "“{keyword}” is not a known keyword before POINT_DATA or CELL_DATA"
-                        )));
-                    };
-                    let count = attributes.count;
-                    let (components, kind) = match (keyword.as_str(), rest) {
-                        ("SCALARS", [kind]) => (1, *kind),
-                        ("SCALARS", [kind, components]) => {
-                            (parser.count(&place, components)?, *kind)
-                        }
-                        ("VECTORS" | "NORMALS", [kind]) => (3, *kind),
-                        ("TENSORS", [kind]) => (9, *kind),
-                        ("TENSORS6", [kind]) => (6, *kind),
-                        ("TEXTURE_COORDINATES", [components, kind]) => {
-                            (parser.count(&place, components)?, *kind)
-                        }
-                        ("GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS", [kind]) => (1, *kind),
-                        ("COLOR_SCALARS", [components]) => {
-                            parser.skip_colors(&place, count, parser.count(&place, components)?)?;
-                            continue;
-                        }
-                        _ => return Err(wrong(format!("“{keyword}” is not a known keyword"))),
-                    };
-                    if keyword == "SCALARS" {
-                        parser.expect("LOOKUP_TABLE")?;
-                    }
-                    let part = parser.array(&place, count.saturating_mul(components), kind)?;
-                    if components == 1 && keyword == "SCALARS" {
-                        attributes.arrays.push((parser::unescaped(name), part));
-                    }
-                }
-                _ => {
-                    return Err(wrong(format!(
-                        "“{}” is not a known keyword",
-                        line.chars().take(40).collect::<String>()
-                    )));
-                }
+                _ if data.geometry(source, &mut parser, &line)? => {}
+                _ => data.attribute(source, &mut parser, &line, of_cells)?,
             }
         }
-        let points = if data.cells.points.is_empty() {
-            data.dims
-                .iter()
-                .try_fold(1u64, |product, &n| product.checked_mul(n))
-                .unwrap_or(u64::MAX)
+        data.check_count(source)?;
+        Ok(data)
+    }
+
+    /// Reads the lattice, the points or the cells after their keyword. Returns whether the line is
+    /// one of these.
+    fn geometry(
+        &mut self,
+        source: &'a Source,
+        parser: &mut Parser<'a>,
+        line: &Line,
+    ) -> Result<bool> {
+        let place = &line.place;
+        match (line.keyword.as_str(), line.words) {
+            ("DIMENSIONS", sizes) => self.dims = parser.three(place, sizes)?,
+            ("ORIGIN", numbers) => {
+                self.origin = DVec3::from_array(parser.three(place, numbers)?);
+            }
+            ("SPACING" | "ASPECT_RATIO", numbers) => {
+                self.spacing = DVec3::from_array(parser.three(place, numbers)?);
+            }
+            ("X_COORDINATES" | "Y_COORDINATES" | "Z_COORDINATES", [count, kind]) => {
+                let axis = usize::from(line.keyword.as_bytes()[0] - b'X');
+                self.places[axis] =
+                    parser.array(place, parser.count(place, count)?, kind)?.doubles(source)?;
+            }
+            // Cells that were already read refer to the points that were present then.
+            ("POINTS", _) if !(self.cells.points.is_empty() && self.cells.corners.is_empty()) => {
+                return Err(source.error(place, "POINTS are given twice, or after the cells"));
+            }
+            ("POINTS", [count, kind]) => {
+                let count = parser.count(place, count)?;
+                let numbers =
+                    parser.array(place, count.saturating_mul(3), kind)?.doubles(source)?;
+                source.room::<DVec3>("the points", count)?;
+                self.cells.points = numbers.chunks_exact(3).map(DVec3::from_slice).collect();
+            }
+            ("CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS", [count, size]) => {
+                let (count, size) = (parser.count(place, count)?, parser.count(place, size)?);
+                let (corners, ends) = parser.cells(place, count, size)?;
+                self.cells.room(source, corners.len(), ends.len())?;
+                let added = self.cells.add(&corners, &ends, 0);
+                added.map_err(|message| source.error(place, message))?;
+            }
+            ("CELL_TYPES", [count]) => {
+                drop(parser.array(place, parser.count(place, count)?, "int")?);
+            }
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Reads an attribute after its keyword. Keeps arrays of one component.
+    fn attribute(
+        &mut self,
+        source: &'a Source,
+        parser: &mut Parser<'a>,
+        line: &Line,
+        of_cells: Option<bool>,
+    ) -> Result<()> {
+        let place = &line.place;
+        match (line.keyword.as_str(), line.words) {
+            ("LOOKUP_TABLE", [_, count]) => {
+                parser.skip_colors(place, parser.count(place, count)?, 4)
+            }
+            ("FIELD", [_, arrays]) => {
+                for _ in 0..parser.count(place, arrays)? {
+                    let (name, components, part) = parser.field()?;
+                    if let Some(attributes) = self.attributes(of_cells)
+                        && components == 1
+                        && part.len() == attributes.count
+                    {
+                        attributes.arrays.push((name, part));
+                    }
+                }
+                Ok(())
+            }
+            (keyword, [name, rest @ ..]) => {
+                let Some(attributes) = self.attributes(of_cells) else {
+                    let message = format!(
+                        "“{keyword}” is not a known keyword before POINT_DATA or CELL_DATA"
+                    );
+                    return Err(source.error(place, message));
+                };
+                let count = attributes.count;
+                if let ("COLOR_SCALARS", [components]) = (keyword, rest) {
+                    return parser.skip_colors(place, count, parser.count(place, components)?);
+                }
+                let (components, kind) = layout(source, parser, line, rest)?;
+                if keyword == "SCALARS" {
+                    parser.expect("LOOKUP_TABLE")?;
+                }
+                let part = parser.array(place, count.saturating_mul(components), kind)?;
+                if components == 1 && keyword == "SCALARS" {
+                    attributes.arrays.push((parser::unescaped(name), part));
+                }
+                Ok(())
+            }
+            _ => {
+                let shown: String = line.text.chars().take(40).collect();
+                Err(source.error(place, format!("“{shown}” is not a known keyword")))
+            }
+        }
+    }
+
+    /// Returns an error if the scalars of the points have another number than the points.
+    fn check_count(&self, source: &Source) -> Result<()> {
+        let points = if self.cells.points.is_empty() {
+            let product = self.dims.iter().try_fold(1u64, |product, &n| product.checked_mul(n));
+            product.unwrap_or(u64::MAX)
         } else {
-            data.cells.points.len() as u64
+            self.cells.points.len() as u64
         };
-        if !data.points.arrays.is_empty() && points != data.points.count as u64 {
+        if !self.points.arrays.is_empty() && points != self.points.count as u64 {
             let message =
-                format!("claims {} points, but the data set has {points}", data.points.count);
+                format!("claims {} points, but the data set has {points}", self.points.count);
             return Err(source.error("POINT_DATA", message));
         }
-        Ok(data)
+        Ok(())
     }
 
     fn attributes(&mut self, of_cells: Option<bool>) -> Option<&mut Attributes<'a>> {
         of_cells.map(|of_cells| if of_cells { &mut self.of_cells } else { &mut self.points })
     }
+}
+
+/// A line with a keyword.
+struct Line<'a> {
+    place: String,
+    /// In capitals.
+    keyword: String,
+    /// The words after the keyword.
+    words: &'a [&'a str],
+    text: &'a str,
+}
+
+/// Returns the number of components of an attribute, and the type of its numbers, from the words
+/// after its name.
+fn layout<'a>(
+    source: &Source,
+    parser: &Parser,
+    line: &Line,
+    rest: &[&'a str],
+) -> Result<(usize, &'a str)> {
+    Ok(match (line.keyword.as_str(), rest) {
+        ("SCALARS" | "GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS", [kind]) => (1, *kind),
+        ("SCALARS", [kind, components]) | ("TEXTURE_COORDINATES", [components, kind]) => {
+            (parser.count(&line.place, components)?, *kind)
+        }
+        ("VECTORS" | "NORMALS", [kind]) => (3, *kind),
+        ("TENSORS", [kind]) => (9, *kind),
+        ("TENSORS6", [kind]) => (6, *kind),
+        (keyword, _) => {
+            let message = format!("“{keyword}” is not a known keyword");
+            return Err(source.error(&line.place, message));
+        }
+    })
 }

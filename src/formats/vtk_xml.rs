@@ -57,6 +57,14 @@ pub struct Array<'a> {
     text: Cow<'a, str>,
 }
 
+/// The section that is being read, and the array in it with the number of open elements inside the
+/// array.
+#[derive(Default)]
+struct Open<'a> {
+    section: Option<Section<'a>>,
+    array: Option<(Array<'a>, usize)>,
+}
+
 /// The numbers of an array, as bytes.
 pub struct Part<'a> {
     pub kind: SampleType,
@@ -113,10 +121,7 @@ impl<'a> Document<'a> {
         let mut reader = Reader::from_str(xml);
         reader.config_mut().expand_empty_elements = true;
         let mut depth = 0;
-        // The current section, and the current array in it with the number of open elements inside
-        // the array.
-        let mut section: Option<Section> = None;
-        let mut array: Option<(Array, usize)> = None;
+        let mut open = Open::default();
         loop {
             let at = reader.buffer_position();
             let event = reader.read_event();
@@ -133,49 +138,54 @@ impl<'a> Document<'a> {
             match event
                 .map_err(|e| source.error(format!("byte {at}"), format!("is not valid XML: {e}")))?
             {
-                Event::Start(tag) => match (&mut array, &section) {
-                    (Some((_, depth)), _) => *depth += 1,
-                    (None, inside) => {
-                        let attributes = attributes(source, at, &tag)?;
-                        let name = tag.name();
-                        if name.as_ref() == "DataArray" {
-                            if let Some(offset) = attributes.get("offset") {
-                                self.offsets.push(number(source, "offset", offset)?);
-                            }
-                            array = Some((Array { attributes, text: Cow::Borrowed("") }, 0));
-                        } else if inside.is_none()
-                            && !self.element(name.as_ref(), kind, &attributes)?
-                        {
-                            section = Some(Section {
-                                name: name.as_ref().into(),
-                                attributes,
-                                arrays: Vec::new(),
-                            });
-                        }
-                    }
-                },
-                Event::End(tag) => match array.take() {
-                    Some((array, 0)) => {
-                        if let Some(section) = &mut section {
-                            section.arrays.push(array);
-                        }
-                    }
-                    Some((inner, depth)) => array = Some((inner, depth - 1)),
-                    None => {
-                        let ended = section.take_if(|section| section.name == tag.name().as_ref());
-                        if let (Some(section), Some(piece)) = (ended, self.pieces.last_mut()) {
-                            piece.sections.push(section);
-                        }
-                    }
-                },
+                Event::Start(tag) => self.start(&mut open, &tag, at, kind)?,
+                Event::End(tag) => self.end(&mut open, tag.name().as_ref()),
                 // Elements inside an array (its statistics) have text of their own.
-                Event::Text(text) => match &mut array {
+                Event::Text(text) => match &mut open.array {
                     Some((array, 0)) if array.text.is_empty() => array.text = text.into_inner(),
                     Some((array, 0)) => array.text.to_mut().push_str(&text),
                     _ => {}
                 },
                 Event::Eof => return Ok(()),
                 _ => {}
+            }
+        }
+    }
+
+    /// Opens an element: an array, a section, or one of the document.
+    fn start(&mut self, open: &mut Open<'a>, tag: &BytesStart, at: u64, kind: &str) -> Result<()> {
+        if let Some((_, depth)) = &mut open.array {
+            *depth += 1;
+            return Ok(());
+        }
+        let attributes = attributes(self.source, at, tag)?;
+        let name = tag.name();
+        if name.as_ref() == "DataArray" {
+            if let Some(offset) = attributes.get("offset") {
+                self.offsets.push(number(self.source, "offset", offset)?);
+            }
+            open.array = Some((Array { attributes, text: Cow::Borrowed("") }, 0));
+        } else if open.section.is_none() && !self.element(name.as_ref(), kind, &attributes)? {
+            open.section =
+                Some(Section { name: name.as_ref().into(), attributes, arrays: Vec::new() });
+        }
+        Ok(())
+    }
+
+    /// Closes an element. Stores it if it is an array or a section.
+    fn end(&mut self, open: &mut Open<'a>, name: &str) {
+        match open.array.take() {
+            Some((array, 0)) => {
+                if let Some(section) = &mut open.section {
+                    section.arrays.push(array);
+                }
+            }
+            Some((array, depth)) => open.array = Some((array, depth - 1)),
+            None => {
+                let ended = open.section.take_if(|section| section.name == name);
+                if let (Some(section), Some(piece)) = (ended, self.pieces.last_mut()) {
+                    piece.sections.push(section);
+                }
             }
         }
     }

@@ -37,7 +37,10 @@ pub(super) fn volume(
 ) -> Result<Volume, String> {
     let dims = places.each_ref().map(Vec::len);
     let arrangement = Arrangement::Rectilinear(Arc::new(places));
-    Volume::new(Lattice { dims, origin: DVec3::ZERO, axes: DMat3::IDENTITY, arrangement }, samples)
+    Volume::checked(
+        Lattice { dims, origin: DVec3::ZERO, axes: DMat3::IDENTITY, arrangement },
+        samples,
+    )
 }
 
 /// Returns the coordinates along each axis, joined from all pieces.

@@ -12,7 +12,7 @@ use crate::{
     },
     surface::Mesh,
 };
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Bytes per point if it has every attribute.
 const POINT: u64 = 24 + 12 + 8;
@@ -51,34 +51,15 @@ pub fn read(source: &Source) -> Result<Mesh> {
         Some(count) => counts.push((number, count)).map(|()| true),
         None => Ok(false),
     })?;
-    let counted = counts.iter().fold(0u64, |sum, &(_, count)| sum.saturating_add(count));
-    if let Some(&(line, _)) = counts.first().filter(|_| counted != text.len() as u64) {
-        return Err(source
-            .error(
-                format!("line {line}"),
-                format!("counts {counted} points, but there are {}", text.len()),
-            )
-            .hint("the file is cut, or a line has a single number"));
-    }
+    check_counts(source, &counts, text.len())?;
     let mut layout = match &text.names {
         Some(names) => Layout::named(source, text.first, names)?,
         None => Layout::plain(source, text.first, text.width)?,
     };
-    let table = text.numbers(source, |column| layout.uses(column))?;
-    let value = |row: usize, column: usize| table[row * text.width + column];
-    let rows = || 0..text.len();
-    let three = |row: usize, columns: [usize; 3]| {
-        DVec3::from_array(columns.map(|column| value(row, column)))
-    };
-    // Without names, the values decide whether columns are a normal.
-    let is_normal = |columns: [usize; 3]| {
-        let mut all = rows().map(|row| three(row, columns));
-        let unit = rows().all(|row| (three(row, columns).length() - 1.0).abs() < 0.02);
-        let signed = rows().any(|row| three(row, columns).min_element() < 0.0);
-        all.all(|v| v.abs().max_element() <= 1.0) && (unit || signed)
-    };
-    for columns in layout.untold.clone() {
-        let slot = if is_normal(columns) { &mut layout.normal } else { &mut layout.color };
+    let numbers = text.numbers(source, |column| layout.uses(column))?;
+    let table = Table { numbers, width: text.width, rows: text.len() };
+    for columns in std::mem::take(&mut layout.untold) {
+        let slot = if table.is_normal(columns) { &mut layout.normal } else { &mut layout.color };
         if slot.replace(columns).is_some() {
             return Err(source
                 .error(
@@ -89,13 +70,61 @@ pub fn read(source: &Source) -> Result<Mesh> {
         }
     }
     source.spend("the size of the points in bytes", POINT * text.len() as u64)?;
-    let positions = rows().map(|row| three(row, layout.position)).collect();
+    let positions = table.triples(layout.position).collect();
     let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
     if let Some(columns) = layout.normal {
-        cloud.normals = rows().map(|row| three(row, columns).as_vec3()).collect::<Vec<Vec3>>();
+        cloud.normals = table.triples(columns).map(|normal| normal.as_vec3()).collect();
     }
     if let Some(columns) = layout.color {
-        let largest = rows().map(|row| three(row, columns).max_element()).fold(0.0, f64::max);
+        cloud.colors = table.colors(columns);
+    } else if let Some(column) = layout.intensity {
+        let intensities = (0..table.rows).map(|row| table.value(row, column) as f32);
+        cloud.colors = greys(&intensities.collect::<Vec<f32>>());
+    }
+    cloud.into_mesh(source, |row| text.place(row))
+}
+
+/// Returns an error if the file counts its points, with the line of each count, and has another
+/// number.
+fn check_counts(source: &Source, counts: &[(usize, u64)], there: usize) -> Result<()> {
+    let Some(&(line, _)) = counts.first() else { return Ok(()) };
+    let counted = counts.iter().fold(0u64, |sum, &(_, count)| sum.saturating_add(count));
+    if counted == there as u64 {
+        return Ok(());
+    }
+    Err(source
+        .error(format!("line {line}"), format!("counts {counted} points, but there are {there}"))
+        .hint("the file is cut, or a line has a single number"))
+}
+
+/// The numbers of the file, row by row.
+struct Table {
+    numbers: Vec<f64>,
+    width: usize,
+    rows: usize,
+}
+
+impl Table {
+    fn value(&self, row: usize, column: usize) -> f64 {
+        self.numbers[row * self.width + column]
+    }
+
+    /// Returns the numbers of three columns in each row.
+    fn triples(&self, columns: [usize; 3]) -> impl Iterator<Item = DVec3> {
+        (0..self.rows)
+            .map(move |row| DVec3::from_array(columns.map(|column| self.value(row, column))))
+    }
+
+    /// Returns whether columns without a name are a normal, which their values decide.
+    fn is_normal(&self, columns: [usize; 3]) -> bool {
+        let unit = self.triples(columns).all(|v| (v.length() - 1.0).abs() < 0.02);
+        let signed = self.triples(columns).any(|v| v.min_element() < 0.0);
+        self.triples(columns).all(|v| v.abs().max_element() <= 1.0) && (unit || signed)
+    }
+
+    /// Returns the colours in three columns. The largest number decides their scale.
+    fn colors(&self, columns: [usize; 3]) -> Vec<[u8; 4]> {
+        let largest = self.triples(columns).map(|color| color.max_element()).fold(0.0, f64::max);
         let scale = if largest > 255.0 {
             255.0 / 65535.0
         } else if largest > 1.0 {
@@ -103,12 +132,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
         } else {
             255.0
         };
-        let color = |row| (three(row, columns) * scale).to_array().map(|part| part.round() as u8);
-        cloud.colors = rows().map(color).map(|[r, g, b]| [r, g, b, 255]).collect();
-    } else if let Some(column) = layout.intensity {
-        cloud.colors = greys(&rows().map(|row| value(row, column) as f32).collect::<Vec<f32>>());
+        let bytes = |color: DVec3| (color * scale).to_array().map(|part| part.round() as u8);
+        self.triples(columns).map(bytes).map(|[r, g, b]| [r, g, b, 255]).collect()
     }
-    cloud.into_mesh(source, |row| text.place(row))
 }
 
 /// Returns whether a table is a point cloud rather than samples. It is one if its first line names
@@ -205,6 +231,7 @@ mod tests {
         formats::{Kind, load_mesh},
         input::{Limits, testing::*},
     };
+    use glam::Vec3;
 
     fn load(text: &str) -> Result<Mesh> {
         let folder = Folder::new();

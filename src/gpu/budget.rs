@@ -1,19 +1,20 @@
-//! How much a pass of the GPU engine may hold.
+//! The capacity of a depth pass of the GPU engine.
 
 use crate::gpu::device::Gpu;
 
-/// How much room a pass has. A frame that needs more is drawn in several passes.
+/// The capacity of a depth pass. A frame that needs more is drawn in several passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Budget {
-    /// (splat, tile, window) triples of a pass: 4 bytes each.
+    /// (splat, tile, window) triples of a pass, of 4 bytes each.
     pub entries: u32,
-    /// Record words of a pass: an isotropic lattice sample takes one, any other splat four; 28 bytes each.
+    /// Record words of a pass, of 28 bytes each. An isotropic lattice sample takes one, any other
+    /// splat four.
     pub record_words: u32,
-    /// Entries that a pass takes at least, where it might end earlier to see what is hidden behind it. `None`: as many as
-    /// another pass is worth.
+    /// Minimum number of entries in a pass that could end earlier to find out which splats it
+    /// hides. `None`: as many as make another pass worthwhile.
     pub least_share: Option<u32>,
-    /// Entries of a tile that one dispatch of march adds up; a tile with more goes on in another. `None`: as many as the
-    /// adapter's driver bears.
+    /// Entries of a tile that one dispatch of march adds up. A tile with more continues in another
+    /// dispatch. `None`: as many as the adapter's driver allows.
     pub tile_entries: Option<u32>,
 }
 
@@ -24,10 +25,10 @@ impl Default for Budget {
 }
 
 impl Budget {
-    /// Records are numbered with 22 bits in an entry.
+    /// An entry has 22 bits for the number of a record.
     const MOST_WORDS: u32 = 1 << 22;
 
-    /// The budget within what a binding of this device holds.
+    /// Returns the budget, limited to what a binding of this device can hold.
     pub(crate) fn within(self, gpu: &Gpu) -> Self {
         let room = u32::try_from(gpu.binding_size() / 16).unwrap_or(u32::MAX);
         Self {

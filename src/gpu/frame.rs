@@ -16,7 +16,7 @@ use crate::gpu::{
     targets::Targets,
 };
 
-/// The pipelines of a variant: those that scatter splats, and that which gathers a lattice.
+/// The pipelines of a variant: those that scatter splats, and the one that gathers a lattice.
 #[derive(Debug)]
 pub struct Pipelines {
     scatter: Option<Scatter>,
@@ -61,10 +61,10 @@ impl Scatter {
     }
 }
 
-/// One step of a frame, for profiles.
+/// A step of a frame, with its name for profiles.
 pub type Step<'a> = (&'static str, Box<dyn Fn(&mut wgpu::CommandEncoder) + 'a>);
 
-/// What the steps of a frame work with.
+/// The resources that the steps of a frame use.
 #[derive(Clone, Copy)]
 pub struct Work<'a> {
     pub gpu: &'a Gpu,
@@ -79,7 +79,8 @@ pub struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    /// The steps before the first pass: the cuts of hierarchies, then measure and plan.
+    /// Returns the steps before the first depth pass: the cuts of hierarchies, then measure and
+    /// plan. If a lattice is gathered, the picture is cleared first.
     pub fn opening(self) -> Vec<Step<'a>> {
         let Self { gpu, cut, scan, pipelines, targets, prepared, .. } = self;
         let mut steps: Vec<Step<'a>> = Vec::new();
@@ -113,7 +114,7 @@ impl<'a> Work<'a> {
         steps
     }
 
-    /// The steps of the next depth pass; they do nothing where the frame is done.
+    /// Returns the steps of the next depth pass. They do nothing if the frame is done.
     pub fn depth_pass(self) -> Vec<Step<'a>> {
         let Self { gpu, scan, clear, resume, tiles, pipelines, targets, prepared, .. } = self;
         let Some(scatter) = &pipelines.scatter else { return Vec::new() };
@@ -159,9 +160,9 @@ impl<'a> Work<'a> {
         steps
     }
 
-    /// The steps that go on with a pass at which the frame stopped.
+    /// Returns the steps that continue a pass at which the frame stopped.
     pub fn resumed(self) -> Vec<Step<'a>> {
-        // Each march that finds nothing left is empty.
+        // A march that finds nothing left does nothing.
         const MARCHES: usize = 8;
         let Self { gpu, resume, pipelines, targets, .. } = self;
         let Some(scatter) = &pipelines.scatter else { return Vec::new() };
@@ -180,7 +181,7 @@ impl<'a> Work<'a> {
         [march].into_iter().chain(self.occlusion()).collect()
     }
 
-    /// The step that gathers what is left of a lattice's field.
+    /// Returns the step that gathers the rest of a lattice's field.
     pub fn gathered(self) -> Vec<Step<'a>> {
         let Self { gpu, pipelines, targets, .. } = self;
         let Some(gather) = &pipelines.gather else { return Vec::new() };

@@ -1,26 +1,40 @@
-//! The engine: draws a scene of splats by sheets, on the GPU.
+//! The GPU engine: draws a scene, sheet by sheet, on wgpu.
 //!
-//! A frame runs through these passes, each one Rust file here and one shader of the same name in shaders/:
+//! A frame runs through these passes. Each has a Rust file in `passes` (`select` and
+//! `select_bricks` in `scene`, `scan` in `pipeline`) and a shader of the same name in
+//! shaders/passes/:
 //!
-//! | pass | does |
+//! | pass | purpose |
 //! |---|---|
 //! | `select` | which samples of a volume the transfer function can show (only when it changes) |
-//! | `select_bricks` | the same for a volume in bricks (only when other bricks are drawn, too) |
-//! | `cut` | which nodes of a hierarchy stand for it in this view |
-//! | `measure` | what each splat meets of the picture, and how much room it will need |
-//! | `plan` | cuts the frame into depth passes that fit the buffers |
+//! | `select_bricks` | the same for a volume in bricks (also when other bricks are drawn) |
+//! | `cut` | which nodes of a hierarchy are drawn in this view |
+//! | `measure` | the tiles and sheets that each splat meets, and the capacity that it needs |
+//! | `plan` | divides the frame into depth passes that fit the buffers |
 //! | `cull` | per depth pass: which splats it draws, and which are hidden |
-//! | `project` | the records of these |
-//! | `clear`, `bin`, `scan` | entries (splat, tile, window of four sheets) into bins |
+//! | `project` | the records of the drawn splats |
+//! | `clear`, `bin`, `scan` | sorts entries (splat, tile, window of four sheets) into bins |
 //! | `large` | the same for splats that meet many bins, each spread over a workgroup |
 //! | `tiles` | which tiles have entries |
-//! | `order` | sorts each bin, for the same bytes each time |
+//! | `order` | sorts each bin, so that the bytes of the picture are the same every time |
 //! | `march` | per tile: adds up sections, closes sheets, composites front to back |
-//! | `resume` | goes on with tiles that march has stopped |
+//! | `resume` | continues tiles that march has stopped |
 //! | `gather` | the field of a lattice that is not scattered, pixel by pixel |
 //! | `occlusion` | which tiles have become opaque |
 //!
-//! docs/engine.md tells the mathematics.
+//! The other modules:
+//!
+//! | module | purpose |
+//! |---|---|
+//! | `device` | adapters and their limits, errors of a device, buffers and timestamps |
+//! | `pipeline` | shader files, pipelines with their bindings and constants, prefix sums |
+//! | `scene` | the data of a scene on the GPU |
+//! | `targets`, `budget` | the buffers of a frame, and the capacity of a depth pass |
+//! | `variant` | which features of the shaders a picture needs |
+//! | `frame` | the order of the passes |
+//! | `renderer` | plans frames and draws them |
+//!
+//! docs/engine.md explains the mathematics.
 
 pub(crate) mod budget;
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! The renderer: pipelines and buffers kept from frame to frame.
+//! The renderer of the GPU engine: plans frames and draws them. It keeps pipelines and buffers from
+//! frame to frame.
 
 use crate::{
     Error, Result,
@@ -53,17 +54,17 @@ pub struct Renderer {
     passes: u32,
 }
 
-/// Passes that are submitted together at most: each takes some dozens of bind groups.
+/// Maximum number of depth passes submitted together. Each takes some dozens of bind groups.
 const MOST_PASSES: u32 = 16;
 
-/// What is drawn of a scene in a picture, found before it is drawn.
+/// The plan of a frame, made before anything is drawn.
 #[derive(Debug)]
 struct Outline {
-    /// The cut of hierarchies.
+    /// The cut of hierarchies, in pixels.
     cut_pixels: f64,
     /// The bricks of a volume.
     choice: Option<Choice>,
-    /// Those of them that were read for it.
+    /// The number of these bricks that were read for the picture.
     read_bricks: u64,
     sheets: Sheets,
     /// Whether the field is gathered.
@@ -71,11 +72,12 @@ struct Outline {
 }
 
 impl Renderer {
+    /// Creates a renderer on this GPU with the default [`Budget`].
     pub fn new(gpu: &Gpu) -> Self {
         Self::with_budget(gpu, Budget::default())
     }
 
-    /// A renderer whose passes have a given room.
+    /// Returns a renderer whose depth passes have the given capacity.
     pub fn with_budget(gpu: &Gpu, budget: Budget) -> Self {
         gpu.watch_later(|| Self {
             gpu: gpu.clone(),
@@ -94,7 +96,7 @@ impl Renderer {
         })
     }
 
-    /// A renderer with the same budget on another device.
+    /// Returns a renderer with the same budget on another device.
     pub fn on(&self, gpu: &Gpu) -> Self {
         Self::with_budget(gpu, self.budget)
     }
@@ -102,17 +104,21 @@ impl Renderer {
     /// Uploads a scene.
     ///
     /// # Errors
-    /// A scene that [`Scene::validate`] refuses, or one that does not fit the device.
+    /// [`Error::Argument`] if [`Scene::validate`] refuses the scene, or if its kernel is a tensor
+    /// product. [`Error::Driver`] or [`Error::Argument`] if the scene does not fit the device.
     pub fn prepare(&self, scene: &Scene) -> Result<PreparedScene> {
         self.gpu.watch(|| PreparedScene::new(&self.gpu, scene))?
     }
 
-    /// Draws a picture and reads it back. Pictures larger than a binding holds are drawn in strips, one below the other.
+    /// Draws a picture and reads it back. A picture larger than a binding is drawn in strips, one
+    /// below the other.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a camera or settings that make no picture of this scene, or a scene prepared on another device; [`Error::Gpu`] where the device's memory
-    /// runs out or a driver's limits are met: a smaller picture may do; [`Error::DeviceLost`]: see [`Gpu::reopened`]; those of
-    /// reading, for scenes that are read as they are drawn.
+    /// [`Error::Argument`] if the camera or the settings do not suit this scene, or if the scene
+    /// was prepared on another device. [`Error::Driver`] if the device's memory runs out or a limit of
+    /// the driver is reached; a smaller picture may succeed. [`Error::DeviceLost`]: see
+    /// [`Gpu::reopened`]. Scenes that are read while they are drawn also return the errors of
+    /// reading.
     pub fn render(
         &mut self,
         prepared: &mut PreparedScene,
@@ -128,7 +134,10 @@ impl Renderer {
         Ok((picture, stats))
     }
 
-    /// Draws a picture and leaves it on the GPU: a frame's time without the way back.
+    /// Draws a picture and leaves it on the GPU. A frame's time then excludes reading it back.
+    ///
+    /// # Errors
+    /// Those of [`Self::render`].
     pub fn draw(
         &mut self,
         prepared: &mut PreparedScene,
@@ -138,7 +147,11 @@ impl Renderer {
         self.draw_strips(prepared, camera, settings, false, |_, _, _| Ok(()))
     }
 
-    /// As [`Self::draw`], but tells the time of each step: by the GPU's clock, or by waiting for each where it has none.
+    /// Like [`Self::draw`], but the statistics contain the time of each step: by the GPU's clock,
+    /// or, without a clock, by waiting for each step.
+    ///
+    /// # Errors
+    /// Those of [`Self::render`].
     pub fn profile(
         &mut self,
         prepared: &mut PreparedScene,
@@ -148,7 +161,8 @@ impl Renderer {
         self.draw_strips(prepared, camera, settings, true, |_, _, _| Ok(()))
     }
 
-    /// Does some work with a scene. Where the device complains, what lies there is not trusted: the next picture begins anew.
+    /// Does some work with a scene. After an error, the data on the device is not trusted: buffers
+    /// and pipelines are dropped, and the next picture uploads the scene again.
     fn guarded<T>(
         &mut self,
         prepared: &mut PreparedScene,
@@ -168,7 +182,8 @@ impl Renderer {
         done?
     }
 
-    /// Draws a picture strip by strip; `done` takes each. How fine it is is found once, from the whole picture.
+    /// Draws a picture strip by strip and passes each strip to `done`. The level of detail is
+    /// chosen once, for the whole picture.
     fn draw_strips(
         &mut self,
         prepared: &mut PreparedScene,
@@ -187,7 +202,7 @@ impl Renderer {
             let strips = renderer.strips(&view, &outline.sheets);
             for strip in &strips {
                 if strips.len() > 1 {
-                    // The pages of the whole may be more than there is room for.
+                    // The memory may not hold the pages of the whole picture at once.
                     prepared.update_forests(&renderer.gpu, strip, settings, outline.cut_pixels)?;
                 }
                 let (targets, own) =
@@ -200,7 +215,7 @@ impl Renderer {
         })
     }
 
-    /// What is drawn of a scene in a view.
+    /// Plans the frame of a view, and brings the data that it needs to the GPU.
     fn outline(
         &mut self,
         prepared: &mut PreparedScene,
@@ -232,7 +247,7 @@ impl Renderer {
         Ok(Outline { cut_pixels, choice, read_bricks: reads(prepared) - before, sheets, gather })
     }
 
-    /// Whether a scene's field is gathered.
+    /// Whether a scene's field is gathered. Returns an error if it should be but can't.
     fn gathers(
         &self,
         prepared: &PreparedScene,
@@ -250,7 +265,7 @@ impl Renderer {
         }
     }
 
-    /// A detail asked for in milliseconds, in pixels; others as they are.
+    /// Converts a detail in milliseconds to pixels. Returns other details unchanged.
     fn paced(&mut self, view: &View, detail: Detail) -> Detail {
         match detail {
             Detail::Milliseconds(_) => Detail::Pixels(self.pace.next(view)),
@@ -258,15 +273,15 @@ impl Renderer {
         }
     }
 
-    /// Takes note of a picture's time.
+    /// Records the time of a picture.
     fn note(&mut self, start: Instant, detail: Detail) {
         if let Detail::Milliseconds(wanted) = detail {
             self.pace.took(start.elapsed().as_secs_f64() * 1e3, wanted);
         }
     }
 
-    /// Chooses the bricks of a view, and brings them to the GPU. Where they show more samples than a picture takes, coarser ones
-    /// are taken.
+    /// Chooses the bricks of a view and brings them to the GPU. If they show more samples than a
+    /// picture can have, coarser bricks are chosen.
     fn bring_bricks(
         &self,
         prepared: &mut PreparedScene,
@@ -278,7 +293,7 @@ impl Renderer {
             prepared.scene.choice(view, settings, detail, most, &prepared.bounds)
         };
         let Some(shelf) = &prepared.shelf else { return Ok(None) };
-        // Half of the memory is for what they show.
+        // The other half of the memory is for the lists of visible samples.
         let room = prepared.room_to_read(&self.gpu);
         let bytes = settings.page_memory.min(room / 2);
         let held = usize::try_from(bytes / slot_bytes(&shelf.bricks)).unwrap_or(usize::MAX);
@@ -286,12 +301,13 @@ impl Renderer {
         let most_runs =
             u64::from(targets::most_runs(&self.gpu)).saturating_sub(prepared.other_runs());
         let most_runs = most_runs.min((room - bytes) / list_bytes(u64::from(RUN)));
-        // A view that rests is not searched again.
+        // For a resting view, the number found last time is used.
         let mut most = prepared.shelf.as_ref().and_then(|shelf| shelf.fitting(&wanted, most_runs));
         loop {
             let choice =
                 most.and_then(|most| choose(prepared, most)).unwrap_or_else(|| wanted.clone());
-            // Of the coarsest all is listed, and refused where even that is too much memory.
+            // The single coarsest brick is always listed. If even its list takes too much memory,
+            // that is an error.
             let runs = if choice.bricks.len() > 1 { most_runs } else { u64::MAX };
             let room = Room { bytes, runs };
             let Listed::TooMany { runs, most: fit } = prepared.update_bricks(
@@ -308,15 +324,16 @@ impl Renderer {
                 }
                 return Ok(Some(choice));
             };
-            // As many as show so much, if others show as much as these do; and those that fit if all of them shows.
+            // `alike` bricks show few enough samples if each shows as many as the average here;
+            // `certain` bricks do so even if all their samples show.
             let alike = (choice.bricks.len() as f64 * (fit as f64 / runs as f64)) as usize;
             let certain = fit * u64::from(RUN) / u64::from(SLOT_SAMPLES);
             most = Some(alike.max(certain as usize).clamp(1, choice.bricks.len() - 1));
         }
     }
 
-    /// The view cut in strips of whole rows whose colours (16 bytes a pixel) fit a binding, and whose tiles have bins enough for
-    /// all sheets.
+    /// Returns the view in strips of whole rows. The colours of a strip (16 bytes a pixel) fit a
+    /// binding, and its tiles have enough bins for all sheets.
     fn strips(&self, view: &View, sheets: &Sheets) -> Vec<View> {
         let [width, height] = view.size;
         let colors = self.gpu.binding_size() - targets::most_slot_bytes(&self.gpu);
@@ -390,7 +407,7 @@ impl Renderer {
         let mut state = State::default();
         let mut steps = work.opening();
         if variant.scatters() {
-            // As many passes as the last frame took; what is too many does nothing.
+            // Encode as many passes as the last frame took. Superfluous passes do nothing.
             let passes = if profile { 1 } else { self.passes };
             state = draw_passes(
                 work,
@@ -410,7 +427,7 @@ impl Renderer {
             }
         }
         drop(steps);
-        // The last pass finds that there is nothing left.
+        // One more pass finds that nothing is left.
         if variant.scatters() {
             self.passes = (state.passes + 1).min(MOST_PASSES);
         }
@@ -425,7 +442,7 @@ impl Renderer {
             missing_pages: prepared.forests.iter().map(|forest| forest.missing as u64).sum(),
             lambda: choice.map_or(0.0, |choice| choice.lambda),
             bricks: choice.map_or(0, |choice| choice.bricks.len() as u64),
-            // Those of the whole picture are counted already.
+            // Already counted for the whole picture.
             read_bricks: 0,
             brick_bytes: prepared.shelf.as_ref().map_or(0, |shelf| shelf.bytes()),
             steps: times,
@@ -433,7 +450,8 @@ impl Renderer {
         Ok((targets, stats))
     }
 
-    /// The finest cut, in pixels, that draws no more than `most` nodes of those for which there is room.
+    /// Returns the finest cut, in pixels, that draws at most `most` of the nodes that fit in
+    /// memory.
     fn finest_cut(
         &self,
         prepared: &mut PreparedScene,
@@ -441,7 +459,7 @@ impl Renderer {
         settings: &Settings,
         most: u64,
     ) -> Result<f64> {
-        // The pages of a cut hold several times what it draws.
+        // The pages of a cut contain several times as many nodes as it draws.
         let nodes = most.saturating_mul(8).max(1 << 16);
         let finest = |forest: &Forest| forest.finest_within(view, settings, nodes);
         let pixels = prepared.forests.iter().map(finest).fold(0.0, f64::max);
@@ -485,7 +503,7 @@ impl Renderer {
             bytemuck::pod_collect_to_vec(&self.gpu.read(&targets.depths, 0, 4 * pixels as u64)?);
         let width = view.size[0] as usize;
         picture.depth.extend((0..pixels).map(|i| {
-            // The largest value has no place of its own.
+            // The maximum of a ray has no depth.
             if color[i][3] < 0.5 || settings.optics == Optics::Maximum {
                 return f32::INFINITY;
             }
@@ -498,11 +516,12 @@ impl Renderer {
 }
 
 fn did_nothing(gpu: &Gpu) -> Error {
-    // The caller puts in place of this what the device complains of.
-    Error::Gpu(format!("{} did nothing of what it was asked to", gpu.info.name))
+    // If the device reported an error, the caller returns that error instead.
+    Error::Driver(format!("{} did not do the work that was submitted", gpu.info.name))
 }
 
-/// Scatters: submits `passes` depth passes at a time, behind the steps that open the frame, until all is drawn.
+/// Scatters: submits `passes` depth passes at a time, after the steps that open the frame, until
+/// the frame is done.
 fn draw_passes<'a>(
     work: Work<'a>,
     mut steps: Vec<Step<'a>>,
@@ -526,17 +545,13 @@ fn draw_passes<'a>(
             return Err(did_nothing(gpu));
         }
         if state.overflow != 0 {
-            return Err(Error::Gpu(format!(
-                "the scene needs more room in one sheet of the picture than the budget of {} entries gives; \
-                 raise the budget",
-                budget.entries
-            )));
+            return Err(Error::EntriesExhausted { budget: budget.entries });
         }
         if is_done {
             return Ok(state);
         }
         if start.elapsed() >= gpu.patience {
-            return Err(Error::Gpu(format!(
+            return Err(Error::Driver(format!(
                 "{} did not finish the picture within {} s",
                 gpu.info.name,
                 gpu.patience.as_secs_f64()
@@ -548,7 +563,8 @@ fn draw_passes<'a>(
     }
 }
 
-/// Runs steps, all in one submission. Where times are wanted, by the GPU's clock, or if it has none each step on its own.
+/// Runs steps in one submission. If `times` are wanted, the GPU's clock measures the steps. Without
+/// a clock, each step is submitted and waited for on its own.
 fn submit<'a>(
     gpu: &Gpu,
     steps: impl IntoIterator<Item = Step<'a>>,

@@ -1,4 +1,4 @@
-//! The buffers of a frame: what the passes write for each other, and the picture.
+//! The buffers of a frame: the data that passes write for later passes, and the picture.
 
 use crate::{
     Error, Result,
@@ -22,28 +22,29 @@ use crate::{
 };
 use wgpu::BufferUsages as Usage;
 
-/// Bytes of a run's span, and of what it needs.
+/// Bytes of the span of a batch of candidates; its needs take as many.
 const RUN_BYTES: u64 = 8;
 
-/// Runs of candidates that a picture takes at most.
+/// Returns the maximum number of batches of candidates in a picture.
 pub fn most_runs(gpu: &Gpu) -> u32 {
     // One place stays free for their sum.
     (gpu.binding_size() / RUN_BYTES).min(u64::from(SCAN_CAPACITY)) as u32 - 1
 }
 
-/// Columns and rows of tiles that a span tells apart (10 bits each in spans.wgsl).
+/// Columns and rows of tiles that a span distinguishes (10 bits each in spans.wgsl).
 const SPAN_TILES: u32 = 1 << 10;
 
-/// Rows of tiles that a box tells apart (14 bits in bins.wgsl).
+/// Rows of tiles that a box distinguishes (14 bits in bins.wgsl).
 const BOX_ROWS: u64 = 1 << 14;
 
-/// Groups of 2 to the power `shift` sheets that a pass through all of them has: one more than they fill, as it starts a sheet
-/// early and counts from there.
+/// Returns the number of groups of 2 to the power `shift` sheets in a pass through all sheets. That
+/// is one more than they fill, because the pass starts a sheet early and counts from there.
 fn groups(sheets: usize, shift: u32) -> u64 {
     ((sheets as u64 + 2) >> shift) + 1
 }
 
-/// Rows of pixels that have bins enough for so many sheets, whatever is drawn, and whose tiles' rows a box tells apart.
+/// Returns the maximum rows of pixels that have enough bins for this number of sheets, whatever is
+/// drawn, and whose rows of tiles a box distinguishes.
 pub fn most_rows(width: u32, sheets: usize) -> u64 {
     // A tile without the edge that it may share with its neighbours.
     const STEP: u32 = 6;
@@ -51,18 +52,20 @@ pub fn most_rows(width: u32, sheets: usize) -> u64 {
     u64::from(STEP) * (u64::from(MOST_BINS) / bins).min(BOX_ROWS)
 }
 
-/// Tiles that march may stop in one pass with their sums kept (`SLOT_WORDS` in progress.wgsl has a bit for each).
+/// Tiles that march may stop in one pass with their sums saved (`SLOT_WORDS` words in progress.wgsl
+/// have a bit for each).
 const SLOTS: u64 = 1024;
 
-/// Bytes of a tile's sums (`SAVED_VECTORS` in saved.wgsl).
+/// Bytes of a tile's saved sums (`SAVED_VECTORS` in saved.wgsl).
 const SLOT_BYTES: u64 = 64 * 17 * 16;
 
-/// Bytes that slots take at most behind the colours of a picture, which they share a binding with.
+/// Returns the maximum bytes of the slots. They lie behind the colours of a picture, in the same
+/// binding.
 pub fn most_slot_bytes(gpu: &Gpu) -> u64 {
     SLOTS.min(gpu.binding_size() / 2 / SLOT_BYTES) * SLOT_BYTES
 }
 
-/// The buffers of a frame: what the passes write for each other, and the picture.
+/// The buffers of a frame: the data that passes write for later passes, and the picture.
 #[derive(Debug)]
 pub struct Targets {
     pub frame: wgpu::Buffer,
@@ -92,14 +95,14 @@ pub struct Targets {
     pub progress: wgpu::Buffer,
     pub colors: wgpu::Buffer,
     pub depths: wgpu::Buffer,
-    /// What is gathered.
+    /// The lattice that is gathered, if any.
     pub gathered: Option<Gathered>,
     pub run_total: u32,
     pub tiles: [u32; 2],
 }
 
 impl Targets {
-    /// Bytes of GPU memory.
+    /// Returns the bytes of GPU memory.
     pub fn bytes(&self) -> u64 {
         let Self {
             frame,
@@ -149,11 +152,8 @@ impl Pool {
     }
 }
 
-/// Makes (or takes from the pool) everything a frame needs.
-#[allow(
-    clippy::too_many_arguments,
-    reason = "each is a different thing that the renderer holds apart"
-)]
+/// Creates everything that a frame needs, or takes it from the pool.
+#[allow(clippy::too_many_arguments, reason = "each is a separate part of the renderer")]
 pub fn targets(
     gpu: &Gpu,
     pool: &mut Pool,
@@ -168,7 +168,8 @@ pub fn targets(
     let [width, height] = view.size;
     let pixels = u64::from(width) * u64::from(height);
     if pixels * 16 > gpu.binding_size() {
-        // The renderer cuts pictures in strips of whole rows; only a single row can be too long.
+        // The renderer divides pictures into strips of whole rows. Only a single row can be too
+        // long.
         return Err(Error::Argument(format!(
             "a picture {width} pixels wide is too wide for {}",
             gpu.info.name
@@ -177,8 +178,9 @@ pub fn targets(
     let most_runs = most_runs(gpu);
     if prepared.runs > most_runs {
         return Err(Error::Argument(format!(
-            "the scene has more than {} splats and samples that may show, more than one picture takes on {}; \
-             convert it, and draw it by a coarser --cut, or let a transfer function show less",
+            "the scene has more than {} splats and visible samples, too many for one picture on \
+             {}; convert it and draw it with a coarser --cut, or use a transfer function that \
+             shows less",
             u64::from(most_runs) * u64::from(RUN),
             gpu.info.name
         )));
@@ -192,13 +194,14 @@ pub fn targets(
     let groups = |shift: u32| groups(sheets.count(), shift);
     if groups(MOST_GROUP_SHIFT) * u64::from(tile_count) > u64::from(MOST_BINS) {
         return Err(Error::Argument(format!(
-            "a picture of {width}x{height} with {} sheets is too large; draw it smaller or with thicker sheets",
+            "a picture of {width}x{height} with {} sheets is too large; draw it smaller or with \
+             thicker sheets",
             sheets.count()
         )));
     }
     let slots = (u64::from(tile_count) * SLOT_BYTES).min(most_slot_bytes(gpu));
     let slots = if variant.can_stop() { room(slots) } else { 0 };
-    // The number of entries stands behind the last bin.
+    // The number of entries is stored behind the last bin.
     let bin_count = room((groups(0) * u64::from(tile_count)).min(u64::from(MOST_BINS)) + 1);
     let most_tiles = tiles[0].max(tiles[1]);
 
@@ -216,7 +219,7 @@ pub fn targets(
         prepared.bytes += prepared.field.as_ref().map_or(0, |field| field.bytes()) - before;
     }
 
-    // The sheet before the first reaches back, the one after the last forward, without end.
+    // The sheet before the first extends backward without end, the sheet after the last forward.
     let mut planes = vec![-3e38f32];
     planes.extend(sheets.planes.iter().map(|&s| s as f32));
     planes.extend([3e38; 4]);
@@ -262,12 +265,12 @@ pub fn targets(
     })
 }
 
-/// The word of `progress` that counts tiles that gather has drawn (progress.wgsl).
+/// Returns the word of `progress` that counts the tiles that gather has drawn (progress.wgsl).
 pub fn gathered_word(tiles: u32) -> u64 {
     2 * u64::from(tiles) + SLOTS / 32 + 3
 }
 
-/// The tables of the scene's field; a frame without one gets some of no meaning.
+/// Returns the tables of the scene's field, or unused placeholders if it has no field.
 fn tables_of(
     prepared: &PreparedScene,
     view: &View,
@@ -288,13 +291,14 @@ fn tables_of(
     tables.entries
 }
 
-/// Bytes of the census for a number of sheets: 6 counts for each of 16 bands and for all together, also for the sheet before
-/// the first and the one behind the last.
+/// Returns the bytes of the counts by sheet and band (census.wgsl) for a number of sheets: 6 counts
+/// for each of 16 bands and for all bands together, also for the sheet before the first and the one
+/// behind the last.
 pub fn census_bytes(sheets: usize) -> u64 {
     (sheets as u64 + 2) * 17 * 6 * 4
 }
 
-/// Bytes of the map of so many tiles.
+/// Returns the bytes of the map of opaque tiles, for these columns and rows of tiles.
 pub fn map_bytes([columns, rows]: [u32; 2]) -> u64 {
     let (columns, rows) = (u64::from(columns), u64::from(rows));
     4 * ((columns + 1) * (rows + 1) + columns * rows)

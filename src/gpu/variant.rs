@@ -1,4 +1,5 @@
-//! The variant of a picture: which of the shaders' parts its scene, view and settings need.
+//! Chooses the variant of a picture: the features of the shaders that its scene, view and settings
+//! need.
 
 use crate::{
     bricks::Choice,
@@ -12,7 +13,7 @@ use crate::{
     volume::{Arrangement, Lattice},
 };
 
-/// What the variant of a picture depends on.
+/// The things on which the variant of a picture depends.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
     pub scene: &'a Scene,
@@ -27,7 +28,7 @@ pub struct Request<'a> {
     pub is_software: bool,
 }
 
-/// Which light and which sources a picture has decides what is compiled.
+/// Returns the variant of a picture. Its lighting and its sources decide what is compiled.
 pub fn variant(request: &Request<'_>) -> Variant {
     let &Request { scene, view, settings, budget, choice, gathered, is_software } = request;
     let gather = gathered.is_some();
@@ -57,7 +58,8 @@ pub fn variant(request: &Request<'_>) -> Variant {
         clips: 0,
         holes: 0,
         central: false,
-        // A software adapter runs eight invocations at once: eight columns of eight pixels fill a tile.
+        // A software adapter runs eight invocations at once: eight columns of eight pixels fill a
+        // tile.
         rows: if is_software { 8 } else { 1 },
         most_entries: budget.tile_entries.unwrap_or(if is_software {
             SOFTWARE_ENTRIES
@@ -67,7 +69,7 @@ pub fn variant(request: &Request<'_>) -> Variant {
     };
     [variant.clips, variant.holes] = uniforms::clip_counts(settings);
     let classified = settings.classifies_samples();
-    // Light is seen in emission alone.
+    // Lighting is visible only with emission and absorption.
     let is_lit = settings.optics == Optics::EmissionAbsorption;
     for item in &scene.items {
         let transfer = match item {
@@ -94,7 +96,7 @@ pub fn variant(request: &Request<'_>) -> Variant {
         variant.beyond = match item {
             Item::Volume(volume, ..) => tables::leaves_out(transfer, volume.range),
             Item::Bricks(bricks, ..) => tables::leaves_out(transfer, bricks.header().range),
-            // To find their range takes longer.
+            // Finding the range of scattered samples would take longer.
             _ => true,
         };
         if let Item::Volume(volume, kernel, _) = item {
@@ -114,33 +116,38 @@ pub fn variant(request: &Request<'_>) -> Variant {
             variant.isotropic = choice.levels.iter().all(flat);
         }
     }
-    // Where a pass ends, march meets splats again and closes sheets twice: of a field that costs more than of a surface.
+    // At the end of a pass, march meets splats again and closes sheets twice. That costs more for a
+    // field than for a surface.
     variant.least_share =
         budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
     variant.central = variant.gradients() && settings.gradient == Gradient::Central;
     if gather && variant.rows > 1 {
-        // Each pixel looks at the samples around its own ray, so pixels of an invocation would share nothing.
+        // Each pixel evaluates the samples around its own ray, so the pixels of an invocation would
+        // share nothing.
         variant.rows = GATHERED_ROWS;
         variant.most_entries = variant.most_entries.min(GATHERED_ENTRIES);
     }
     variant
 }
 
-/// Mesa's software driver ends all loops of an invocation after 65,535 iterations together. In march an entry takes up to
-/// six: its own, and those that find its sheet and close the sheets before it.
+/// Mesa's software driver ends all loops of an invocation after 65,535 iterations in total. In
+/// march an entry takes up to six: its own, and those that find its sheet and close the sheets
+/// before it.
 const SOFTWARE_ENTRIES: u32 = 10_000;
 
-/// The same beside a field that is gathered: all sheets may lie between two entries.
+/// The same beside a gathered field, where all sheets may lie between two entries.
 const GATHERED_ENTRIES: u32 = 5_000;
 
-/// Pixels of an invocation of march on such a driver, beside a field that is gathered.
+/// Pixels of an invocation of march on a software driver, beside a gathered field.
 const GATHERED_ROWS: u32 = 1;
 
-/// Beyond this many footprint radii the sections of an isotropic kernel count as the same for all pixels. The error is at
-/// most a hundredth of the radius, at the footprint's rim; tests/engine_equals_reference.rs bounds the picture's.
+/// Distance, in footprint radii, beyond which the sections of an isotropic kernel count as the same
+/// for all pixels. The error is at most a hundredth of the radius, at the footprint's rim;
+/// tests/engine_equals_reference.rs bounds the error of the picture.
 const ISOTROPIC_DISTANCE: f64 = 50.0;
 
-/// Whether the kernels of a lattice are round, and so far away that their sections are the same for all pixels.
+/// Whether the kernels of a lattice are round, and so far away that their sections are the same for
+/// all pixels.
 fn are_flat(lattice: &Lattice, kernel: &Kernel, view: &View, item: &Item) -> bool {
     let near = view.distances(&item.bounds())[0];
     // The sections of a kernel shift by ρ²σ²/2|c| between its centre and radius ρσ.
@@ -148,7 +155,7 @@ fn are_flat(lattice: &Lattice, kernel: &Kernel, view: &View, item: &Item) -> boo
     (!view.perspective || near > ISOTROPIC_DISTANCE * reach) && is_isotropic(lattice.axes)
 }
 
-/// Steps of equal length at right angles.
+/// Whether the steps have equal length and are at right angles.
 fn is_isotropic(axes: glam::DMat3) -> bool {
     let product = axes.transpose() * axes;
     let size = product.x_axis.x;

@@ -22,17 +22,23 @@ use std::{
 /// Trades the time of building against the quality of the tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
+    /// Compares each splat with the fewest neighbours before it is paired.
     Fastest,
+    /// Compares with few neighbours.
     Fast,
+    /// Compares with some more neighbours; the default.
     #[default]
     Balanced,
+    /// Compares with many neighbours.
     Slow,
+    /// Compares with the most neighbours; the best tree, and the slowest to build.
     Best,
 }
 
 /// Options for building a tree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BuildOptions {
+    /// How much time to spend on the tree's quality.
     pub preset: Preset,
     /// See [`Tree::closed`].
     pub closed: bool,
@@ -112,7 +118,7 @@ impl Tree {
 /// file.
 pub fn build_file(
     set: &SplatSet,
-    path: &Path,
+    path: impl AsRef<Path>,
     build: &BuildOptions,
     write: &WriteOptions,
     watch: Watch<'_>,
@@ -121,8 +127,13 @@ pub fn build_file(
     check_splats(set)?;
     memory::room(WORK, order_bytes(set) + at_work(build.block_splats))?;
     let parts = partition::blocks(&set.splats, build.block_splats.max(64));
-    let mut builder =
-        Builder::new(path, set.extent, enclosing(&set.splats, set.extent), build.preset, write)?;
+    let mut builder = Builder::new(
+        path.as_ref(),
+        set.extent,
+        enclosing(&set.splats, set.extent),
+        build.preset,
+        write,
+    )?;
     let mut built = 0;
     for parts in parts.chunks(2 * rayon::current_num_threads()) {
         let block = |part: &Vec<u32>| {
@@ -299,7 +310,7 @@ mod tests {
             Tree::build(&set, &options, &|_, _| ()).map(drop),
             build_file(
                 &set,
-                &Folder::new().path().join("a.splk"),
+                Folder::new().path().join("a.splk"),
                 &options,
                 &WriteOptions::default(),
                 &|_, _| (),

@@ -15,6 +15,7 @@ pub struct Node {
     /// Bounding sphere of the footprints of all leaves below. A child's sphere lies inside its
     /// parent's.
     pub center: [f32; 3],
+    /// The radius of that sphere, in world units.
     pub radius: f32,
     /// The apparent width of the splat: the full width at half maximum of its footprint along its
     /// longest axis (2.355 σ), and never less than a child's. A cut projects this width from the
@@ -30,10 +31,12 @@ pub struct Node {
 }
 
 impl Node {
+    /// Returns whether the node has no children.
     pub fn is_leaf(&self) -> bool {
         self.children == 0
     }
 
+    /// Returns the centre of the bounding sphere, relative to the tree's origin.
     pub fn center(&self) -> Vec3 {
         Vec3::from(self.center)
     }
@@ -43,6 +46,7 @@ impl Node {
 /// their parents.
 #[derive(Debug, Clone, Default)]
 pub struct Block {
+    /// The nodes; node 0 is the root.
     pub nodes: Vec<Node>,
     /// The leaf of block 0 that this block's root replaces; `None` for block 0 itself.
     pub portal: Option<u32>,
@@ -51,6 +55,26 @@ pub struct Block {
 /// A hierarchy of splats in memory. A large one consists of several blocks, each built on its own.
 /// Block 0 joins the others, and its leaves are portals to them. If there is only one block, it has
 /// ordinary leaves.
+///
+/// A small picture takes few of the splats:
+///
+/// ```
+/// use glam::DVec3;
+/// use splatkit::{
+///     hierarchy::{BuildOptions, Detail, Tree, validate},
+///     math::Camera,
+///     surface::{Mesh, SurfelOptions},
+/// };
+///
+/// let ball = Mesh::sphere(4).surfels(&SurfelOptions::default())?;
+/// let tree = Tree::build(&ball, &BuildOptions::default(), &|_, _| ())?;
+/// assert!(validate(&tree).is_empty());
+/// // From afar, few splats stand for the whole.
+/// let camera = Camera::framing(&tree.bounds, DVec3::NEG_Z, DVec3::Y, 1.0);
+/// let cut = tree.cut(&camera.view([64, 64])?, Detail::Pixels(8.0), None)?;
+/// assert!(cut.splats.len() < ball.splats.len() / 4);
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Tree {
     /// World position of the origin of all positions.
@@ -65,6 +89,7 @@ pub struct Tree {
     pub bounds: Bounds,
     /// Points in the source: vertices or samples.
     pub source_points: u64,
+    /// The blocks. If there are several, block 0 joins the others.
     pub blocks: Vec<Block>,
 }
 

@@ -166,7 +166,7 @@ pub fn check_portals(
             Some(at) if !taken[at] => taken[at] = true,
             Some(at) => portal(format!("two blocks have the portal {at}")),
             None => {
-                portal(format!("block {} has the portal {portal_of:?}, not a leaf", number + 1))
+                portal(format!("block {} has the portal {portal_of:?}, not a leaf", number + 1));
             }
         }
     }

@@ -25,7 +25,9 @@ enum Content<'a> {
 
 /// An opened input: its path, its bytes (mapped) and the limits that apply to it.
 pub struct Source<'a> {
+    /// The path of the file; for bytes in memory, the name that errors give.
     pub path: &'a Path,
+    /// What reading this input may take.
     pub limits: &'a Limits,
     content: Content<'a>,
     /// Text of the file that a reader borrows from, as a copy.

@@ -11,7 +11,9 @@ use glam::{DMat3, DVec2, DVec3};
 /// A box along the world's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
+    /// The smallest coordinates.
     pub min: DVec3,
+    /// The largest coordinates.
     pub max: DVec3,
 }
 
@@ -19,15 +21,18 @@ impl Bounds {
     /// The box of no points. Its union with a point is that point.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
+    /// Returns whether the box contains no point. A NaN makes it empty.
     pub fn is_empty(&self) -> bool {
         !(self.min.cmple(self.max)).all()
     }
 
+    /// Returns the smallest box that contains both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// Returns the centre of the box.
     pub fn center(&self) -> DVec3 {
         0.5 * (self.min + self.max)
     }
@@ -37,6 +42,7 @@ impl Bounds {
         (self.max - self.min).length()
     }
 
+    /// Returns the corners: x varies fastest, then y, then z.
     pub fn corners(&self) -> [DVec3; 8] {
         std::array::from_fn(|i| {
             DVec3::new(
@@ -58,18 +64,46 @@ impl Bounds {
 /// How points are projected onto the picture plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Projection {
-    /// Full vertical view angle in degrees.
-    Perspective { view_angle: f64 },
-    /// World height that the picture's height shows.
-    Orthographic { height: f64 },
+    /// Rays start at the eye.
+    Perspective {
+        /// Full vertical view angle in degrees.
+        view_angle: f64,
+    },
+    /// Rays are parallel.
+    Orthographic {
+        /// World height that the picture's height shows.
+        height: f64,
+    },
 }
 
 /// Where the picture is taken from, in world units.
+///
+/// The usual camera looks at the whole of a scene, and is turned around it:
+///
+/// ```
+/// use glam::DVec3;
+/// use splatkit::math::{Bounds, Camera};
+///
+/// let bounds = Bounds { min: DVec3::splat(-1.0), max: DVec3::ONE };
+/// // Looks along −z at the whole box, with +y upwards.
+/// let mut camera = Camera::framing(&bounds, DVec3::NEG_Z, DVec3::Y, 640.0 / 480.0);
+/// camera.azimuth(30.0);
+/// let view = camera.view([640, 480])?;
+/// // In view space x is right, y down and z forward.
+/// let center = view.to_view(bounds.center());
+/// assert!(center.x.abs() < 1e-9 && center.y.abs() < 1e-9 && center.z > 1.0);
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
+    /// The position of the eye.
     pub position: DVec3,
+    /// The point that the camera looks at. It is in the middle of the picture.
     pub focal_point: DVec3,
+    /// The direction that points up in the picture. It need not be perpendicular to the view, nor of
+    /// unit length.
     pub view_up: DVec3,
+    /// How far the view reaches sideways.
     pub projection: Projection,
 }
 
@@ -236,11 +270,13 @@ pub struct View {
     pub position: DVec3,
     /// Rotates world directions to view space.
     pub rotation: DMat3,
+    /// Whether rays start at the eye; otherwise they are parallel.
     pub perspective: bool,
     /// Perspective: focal length in pixels. Orthographic: pixels per world unit.
     pub scale: f64,
     /// Pixel coordinates of the optical axis.
     pub center: DVec2,
+    /// Width and height of the picture in pixels.
     pub size: [u32; 2],
 }
 

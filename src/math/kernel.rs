@@ -25,6 +25,7 @@ pub enum Profile {
 /// A kernel that ends at `extent`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kernel {
+    /// The shape of the kernel.
     pub profile: Profile,
     /// Radius of the footprint, in sample spacings; for a tensor product, half its width along each
     /// axis.
@@ -233,6 +234,7 @@ pub enum Tensor {
 }
 
 impl Tensor {
+    /// Every tensor-product kernel.
     pub const ALL: [Self; 3] = [Self::Linear, Self::CatmullRom, Self::CubicBSpline];
 
     /// Returns the name, as the command spells it.

@@ -14,6 +14,7 @@ use super::View;
 /// of pixels, for surfaces in perspective. From there on all are `step` thick, for lattices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheets {
+    /// The boundaries, in world units along the ray from the view's origin.
     pub planes: Vec<f64>,
     /// Growth of the geometric part; 1 if there is none.
     pub ratio: f64,

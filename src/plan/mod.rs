@@ -1,5 +1,5 @@
-//! The plan of a frame, shared by both engines: its numbers, its tables, and the pace of resting and
-//! moving views.
+//! The plan of a frame, which both engines share: its numbers and tables, the weights and visible
+//! parts of a lattice, and the pace of resting and moving views.
 
 pub(crate) mod gathering;
 pub(crate) mod pace;

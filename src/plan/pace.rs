@@ -1,19 +1,22 @@
-//! How fine hierarchies may be drawn to keep a frame time: finer after a frame that took less, coarser after one that took
-//! more (Funkhouser & Séquin 1993 call it reactive), and finer frame by frame while the view rests, down to the leaves.
+//! Chooses how fine hierarchies are drawn, to keep a frame time: finer after a frame that took
+//! less, coarser after one that took more (reactive, in the terms of Funkhouser & Séquin 1993).
+//! While the view rests, it becomes finer frame by frame, down to the leaves.
 
 use crate::math::View;
 
-/// The finest and the coarsest cut while the view moves, in pixels.
+/// The finest cut while the view moves, in pixels.
 const FINEST: f64 = 0.5;
 
+/// The coarsest cut while the view moves, in pixels.
 const COARSEST: f64 = 64.0;
 
-/// A resting view's cut from frame to frame (QSplat's factor); below the least it is the leaves.
+/// Factor on a resting view's cut from frame to frame (as in QSplat).
 const RESTING: f64 = 0.7;
 
+/// The smallest cut of a resting view, in pixels. Below it, the leaves are drawn.
 const LEAST: f64 = 0.25;
 
-/// What the last frames took.
+/// The cuts and the view of the last frames.
 #[derive(Debug, Default)]
 pub struct Pace {
     /// The cut of the last frame while the view moved, in pixels.
@@ -24,7 +27,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// The cut of the next frame, in pixels.
+    /// Returns the cut of the next frame, in pixels.
     pub fn next(&mut self, view: &View) -> f64 {
         let rests = self.view.as_ref() == Some(view);
         self.view = Some(view.clone());
@@ -37,11 +40,11 @@ impl Pace {
         self.last
     }
 
-    /// Takes note of what a frame took, of the milliseconds that were wanted.
+    /// Records the time of a frame, and the time that was wanted, in milliseconds.
     pub fn took(&mut self, milliseconds: f64, wanted: f64) {
         let Some(moving) = &mut self.moving else { return };
         if self.last == *moving {
-            // Splats are as many as one over the square of their size.
+            // The number of splats is proportional to 1 over the square of their size.
             let factor = (milliseconds / wanted.max(1e-3)).sqrt().clamp(0.6, 1.7);
             *moving = (*moving * factor).clamp(FINEST, COARSEST);
         }

@@ -1,37 +1,42 @@
-//! What a frame took.
+//! Statistics of a frame.
 
-/// What a frame took.
+/// Statistics of a frame.
 #[derive(Debug, Clone, Default)]
 pub struct FrameStats {
-    /// Splats that meet the picture. Samples of a lattice that is gathered are none.
+    /// Splats that meet the picture. The samples of a gathered lattice do not count.
     pub splats: u64,
-    /// Those of them that were left out because what lies before them is opaque.
+    /// The number of these that were left out because opaque parts lie in front of them.
     pub hidden: u64,
     /// (splat, tile, window) triples that were drawn.
     pub entries: u64,
-    /// Depth passes; none where nothing is scattered.
+    /// Depth passes; 0 if nothing is scattered.
     pub passes: u32,
-    /// A lattice that is gathered: (tile, sheet) pairs in which it may show something, so that rays look for it there.
+    /// For a gathered lattice: (tile, sheet) pairs in which it may be visible, so that rays
+    /// evaluate it there.
     pub gathered: u64,
-    /// Memory of the device that draws, or of the CPU engine, held by the scene and by the frame.
+    /// Memory that the scene and the frame hold, in bytes: that of the device, or that of the CPU
+    /// engine.
     pub gpu_bytes: u64,
-    /// Hierarchies: the cut, in pixels.
+    /// For hierarchies: the cut, in pixels.
     pub cut_pixels: f64,
-    /// Pages of hierarchies that the view needed and that had no room; the nodes above them were drawn.
+    /// Pages of hierarchies that the view needed but that did not fit in memory. The nodes above
+    /// them were drawn.
     pub missing_pages: u64,
-    /// Volumes in bricks: how coarse the picture is, a real number of levels.
+    /// For volumes in bricks: the level of detail, a real number of levels. Higher is coarser.
     pub lambda: f64,
-    /// Bricks that the view needed, and those of them that were read for it.
+    /// Bricks that the view needed.
     pub bricks: u64,
+    /// Bricks that were read for this view.
     pub read_bricks: u64,
-    /// GPU memory of the slots that bricks lie in.
+    /// GPU memory of the slots that hold bricks, in bytes.
     pub brick_bytes: u64,
-    /// Milliseconds of each step, in order; only from [`Renderer::profile`].
+    /// Milliseconds of each step, in order; only from
+    /// [`Renderer::profile`](crate::Renderer::profile).
     pub steps: Vec<(&'static str, f64)>,
 }
 
 impl FrameStats {
-    /// Adds what another strip of the same picture took.
+    /// Adds the statistics of another strip of the same picture.
     pub(crate) fn add(&mut self, other: Self) {
         self.splats = self.splats.max(other.splats);
         self.hidden = self.hidden.max(other.hidden);

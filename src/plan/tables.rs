@@ -1,27 +1,30 @@
-//! Functions of one value, tabulated for march (shaders/shared/tables.wgsl): the transfer function, its integral, the gradient's
-//! factor, the kernel and its sections. All lie in one buffer.
+//! The tables that march looks values up in (shaders/shared/tables.wgsl): the transfer function,
+//! its integral, the gradient's factor, the kernel and its sections. All lie in one buffer.
 
 use crate::{
     math::{Kernel, Profile},
     volume::TransferFunction,
 };
 
-/// Entries of the transfer function at least, over the values between which it changes.
+/// Minimum number of entries of the transfer function, over the values between which it changes.
 const VALUES: usize = 4096;
 
-/// The most of them: integrals of more are sums in which 32 bits lose single entries.
+/// Maximum number of entries of the transfer function. Integrals of more are sums in which 32 bits
+/// lose single entries.
 const MOST_VALUES: usize = 4 * VALUES;
 
-/// Entries of the shortest part in which the function changes, where there are enough of them.
+/// Entries of the shortest part in which the function changes, as far as the maximum allows.
 const PART: f64 = 256.0;
 
-/// Entries before the first value that the function changes at, and behind the last one.
+/// Entries before the first value at which the function changes, and behind the last one.
 const BESIDE: f64 = 2.0;
 
-/// Values of a field may leave the range of its samples by this part of it, where kernels have negative parts.
+/// Share of the samples' range by which the values of a field may leave it. They do if kernels have
+/// negative parts.
 const OVERSHOOT: f64 = 0.25;
 
-/// The part of the samples' range in which a step is looked up at least. Smaller ones are lost in the sums of a sheet.
+/// Smallest share of the samples' range in which a step is looked up. Smaller ones are lost in the
+/// sums of a sheet.
 const LEAST_PART: f64 = 1.0 / 1048576.0;
 
 /// Entries of the gradient's factor.
@@ -30,10 +33,10 @@ const GRADIENTS: usize = 1024;
 /// Entries of the kernel along its radius.
 pub const RADII: usize = 1024;
 
-/// Cells of the sections' table along each side.
+/// Cells along each side of the table of sections.
 pub const SECTIONS: usize = 128;
 
-/// The constants that tables.wgsl reads them by.
+/// Returns the constants by which tables.wgsl reads the tables.
 pub fn constants() -> String {
     format!(
         "const GRADIENT_ENTRIES: u32 = {GRADIENTS}u;\nconst RADIAL_ENTRIES: u32 = {RADII}u;\n\
@@ -41,27 +44,32 @@ pub fn constants() -> String {
     )
 }
 
-/// The tables of a picture, and what they are looked up by.
+/// The tables of a picture, and the numbers by which values are looked up in them.
 #[derive(Debug)]
 pub struct Tables {
     pub entries: Vec<[f32; 4]>,
-    /// Where the parts start behind the transfer function: its integrals, the gradient's factors, the kernel, its sections.
+    /// Where the parts behind the transfer function start: its integrals, the gradient's factors,
+    /// the kernel, its sections.
     pub starts: [u32; 4],
-    /// The value that is counted as 0, which fits 32 bits; entries per value; the last entry; where the value lies among them.
+    /// The value that counts as 0, which 32 bits represent exactly; entries per value; the last
+    /// entry; the place among the entries of the value that counts as 0.
     pub values: [f64; 4],
-    /// The gradient's magnitude at the first of its factors, and factors per magnitude; value per world length.
+    /// The gradient's magnitude at the first factor, and factors per magnitude. Magnitudes are
+    /// values per world length.
     pub gradients: [f64; 2],
-    /// Extinction times colour, and extinction, of all values before the first entry and of all behind the last one.
+    /// Extinction times colour, and extinction, of all values before the first entry and of all
+    /// behind the last one.
     pub beyond: [[f32; 4]; 2],
 }
 
 impl Tables {
-    /// Of a transfer function and the range of the samples. Only a kernel without closed form gets tables.
+    /// Makes the tables of a transfer function for samples in `range`, and those of the kernel if
+    /// it has no closed form.
     pub fn new(transfer: &TransferFunction, range: [f64; 2], kernel: Option<&Kernel>) -> Self {
         let Window { ends: [low, high], entries: count } = window(transfer, range);
         let last = (count - 1) as f64;
         let mut entries = transfer.table([low, high], count);
-        // One more than the last, for interpolation at the upper end.
+        // The last entry again, for interpolation at the upper end.
         entries.push(entries[count - 1]);
         let mut starts = [entries.len() as u32; 4];
         entries.extend(integrals(transfer, [low, high], count));
@@ -86,24 +94,25 @@ impl Tables {
     }
 }
 
-/// Extinction times colour, and extinction.
+/// Returns extinction times colour, and extinction.
 fn shown(transfer: &TransferFunction, value: f64) -> [f64; 4] {
     let extinction = transfer.extinction(value);
     let [red, green, blue] = transfer.color(value);
     [red, green, blue, 1.0].map(|part| part * extinction)
 }
 
-/// The values that get entries, and how many of these.
+/// The values that get entries, and the number of entries.
 #[derive(Debug, Clone, Copy)]
 struct Window {
     ends: [f64; 2],
     entries: usize,
 }
 
-/// The values between which the function changes, as far as a field with samples in `range` has them. So a function of a few
-/// values has its corners where they are, however wide the data's range is and wherever its other points are.
+/// Returns the values between which the function changes, as far as a field with samples in `range`
+/// has them. So a function of a few values has its corners in the right places, however wide the
+/// data's range is and wherever the function's other points are.
 fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Window {
-    // No samples have no range.
+    // Without samples there is no range.
     let [low, high] = if low <= high { [low, high] } else { [0.0; 2] };
     let reach = OVERSHOOT * (high - low);
     let within =
@@ -113,11 +122,12 @@ fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Window {
     let changing = changes
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], part| [a.min(part[0]), b.max(part[1])]);
-    // To look values up that have no entries costs a little more.
+    // Looking up values without entries costs a little more.
     if changing[1] - changing[0] < 0.25 * (last - first) {
         [first, last] = if changing[0] <= changing[1] { changing } else { [first; 2] };
     }
-    // A single step, or a function that does not change there: as wide as values of 32 bits are apart, or more.
+    // For a single step, or a function that does not change here, the window is at least as wide as
+    // the distance between values of 32 bits.
     let least = (first.abs() * 2f64.powi(-22))
         .max(LEAST_PART * (high - low))
         .max(f64::from(f32::MIN_POSITIVE) * VALUES as f64);
@@ -129,26 +139,27 @@ fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Window {
         .fold(f64::INFINITY, f64::min);
     let wanted = PART * (last - first).max(least) / shortest;
     let entries = (wanted.min(MOST_VALUES as f64) as usize).next_power_of_two().max(VALUES);
-    // Where it begins or ends by a step, both sides of that have entries.
+    // If the function begins or ends with a step, both sides of the step get entries.
     let beside = (last - first).max(least) * BESIDE / (entries - 1) as f64;
     Window { ends: [first - lack / 2.0 - beside, last + lack / 2.0 + beside], entries }
 }
 
-/// The value that is counted as 0: that of the samples which is nearest to it. Where all samples around have it, as beside what was
-/// scanned, sums of it are exact, and there is no slope that light could be seen on.
+/// Returns the value that counts as 0: the value nearest to it in the samples' range. If all
+/// samples around have that value, as beside a scanned object, their sums are exact, and there is
+/// no false slope to be lit.
 fn zero([low, high]: [f64; 2]) -> f64 {
-    // No samples have no range.
+    // Without samples there is no range.
     if low <= high { f64::from(0.0f64.clamp(low, high) as f32) } else { 0.0 }
 }
 
-/// The parts between two points of the function in which what it shows changes.
+/// Returns the parts between two points of the function in which what it shows changes.
 fn changes(transfer: &TransferFunction) -> Vec<[f64; 2]> {
     let opacity = transfer
         .opacity
         .windows(2)
         .filter(|pair| pair[0].1 != pair[1].1)
         .map(|pair| [pair[0].0, pair[1].0]);
-    // Colours count where there is opacity.
+    // Colours count only where there is opacity.
     let shown = transfer.opacity.windows(2).filter(|pair| pair[0].1 > 0.0 || pair[1].1 > 0.0);
     let ends = |points: &[(f64, f64)]| {
         [(points[0], f64::NEG_INFINITY), (points[points.len() - 1], f64::INFINITY)]
@@ -165,8 +176,9 @@ fn changes(transfer: &TransferFunction) -> Vec<[f64; 2]> {
     opacity.chain(color.filter(|part| part[0] <= part[1])).collect()
 }
 
-/// Running integrals of extinction times colour, and of extinction, in entries. Each step is a mean over points inside it, so
-/// that a jump of the function between two entries counts where it is.
+/// Returns the running integrals of extinction times colour, and of extinction, in entries. Each
+/// step is a mean over points inside it, so that a jump of the function between two entries counts
+/// at its place.
 fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2], count: usize) -> Vec<[f32; 4]> {
     const INSIDE: usize = 4;
     let last = (count - 1) as f64;
@@ -185,15 +197,15 @@ fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2], count: usize) -
     all
 }
 
-/// Adds the gradient's factors at the magnitudes between which they change; tells the first of these, and factors per
-/// magnitude.
+/// Adds the gradient's factors at the magnitudes between which they change. Returns the first of
+/// these magnitudes, and factors per magnitude.
 fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> (f64, f64) {
     let changing = transfer.gradient.windows(2).filter(|pair| pair[0].1 != pair[1].1);
     let [first, last] = changing.fold([f64::INFINITY, 0.0], |[low, high], pair| {
         [f64::min(low, pair[0].0), f64::max(high, pair[1].0)]
     });
     let first = if first <= last { first } else { 0.0 };
-    // A step has both its sides within two entries.
+    // Both sides of a step lie within two entries.
     let width = (last - first)
         .max(first * 2f64.powi(-12))
         .max(f64::from(f32::MIN_POSITIVE) * GRADIENTS as f64);
@@ -204,11 +216,12 @@ fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> (f64, f6
     (start, 1.0 / step)
 }
 
-/// Value and −h′(r)/r at each radius, beside those at the next.
+/// Returns value and −h′(r)/r at each radius, beside those at the next.
 fn radial(kernel: &Kernel) -> Vec<[f32; 4]> {
     let step = kernel.extent / (RADII - 1) as f64;
     let at = |i: usize| {
-        // h′ by central differences; at the centre h′/r has a limit, which a radius beside it nearly has.
+        // h′ by central differences. At the centre h′/r has a limit, and a small radius nearly
+        // reaches it.
         let r = (i as f64 * step).max(0.5 * step);
         let d = 0.25 * step;
         let slope = (kernel.value((r + d).min(kernel.extent)) - kernel.value(r - d))
@@ -224,10 +237,11 @@ fn radial(kernel: &Kernel) -> Vec<[f32; 4]> {
         .collect()
 }
 
-/// The integral from the closest approach to t along a line at distance ρ from the centre (Westover's footprint table of 1990
-/// with one more axis), for cells of ρ and t: its four corners, (ρ, t), (ρ, t+), (ρ+, t), (ρ+, t+).
+/// Returns integrals along lines at distance ρ from the centre, from the closest approach to t, for
+/// cells of ρ and t (Westover's footprint table of 1990 with one more axis). A cell has its four
+/// corners: (ρ, t), (ρ, t+), (ρ+, t), (ρ+, t+).
 fn sections(kernel: &Kernel) -> Vec<[f32; 4]> {
-    // Steps of the integration inside a cell.
+    // Integration steps in a cell.
     const INSIDE: usize = 8;
     let cell = kernel.extent / SECTIONS as f64;
     let row = |i: usize| {
@@ -254,7 +268,7 @@ fn sections(kernel: &Kernel) -> Vec<[f32; 4]> {
         .collect()
 }
 
-/// Whether samples in a range have values that get no entries.
+/// Whether samples in a range have values without entries.
 pub fn leaves_out(transfer: &TransferFunction, range: [f64; 2]) -> bool {
     let [low, high] = window(transfer, range).ends;
     range[0] < low || high < range[1]
@@ -302,7 +316,8 @@ mod tests {
             };
             window(&transfer, range).ends
         };
-        // Of 16-bit data a few hundred values; of a function far wider than the data what these can have.
+        // A few hundred values of 16-bit data, and a function far wider than the data's values can
+        // be.
         let near = |found: [f64; 2], expected: [f64; 2]| {
             let beside = (expected[1] - expected[0]) * 2.0 / 4095.0;
             let is_near = found[0] < expected[0] && expected[1] < found[1];
@@ -319,7 +334,7 @@ mod tests {
                 .iter()
                 .all(|v| v.is_finite())
         );
-        // A step, at 0 too, and values that are all one.
+        // A step, also at 0, and data of a single value.
         for (value, range) in [(80.0, [0.0, 255.0]), (0.0, [-1.0, 1e30]), (7.0, [7.0, 7.0])] {
             let [low, high] = over(&[(value, 0.0), (value, 1.0)], range);
             assert!(
@@ -332,7 +347,7 @@ mod tests {
         }
     }
 
-    /// Steps at the first and at the last point have both their sides.
+    /// Both sides of a step at the first or the last point are kept.
     #[test]
     fn values_before_and_behind_are_those_of_the_function() {
         let with = |opacity: &[(f64, f64)]| {
@@ -361,7 +376,8 @@ mod tests {
     fn sections_add_up_to_the_kernel() {
         let kernel = Kernel::b_spline(2.0).unwrap();
         let cells = sections(&kernel);
-        // Twice the integrals at all ρ, over the rings around the axis, are the integral over space.
+        // Twice the integrals at all ρ, summed over the rings around the axis, are the integral
+        // over space.
         let cell = kernel.extent / SECTIONS as f64;
         let ring = |i: usize| {
             let [_, inner, _, outer] = cells[i * SECTIONS + SECTIONS - 1].map(f64::from);

@@ -1,4 +1,5 @@
-//! The structures that Rust writes and shaders read, field by field as in shaders/shared/frame.wgsl.
+//! The numbers of a frame and of its chunks, as structures that shaders read: field by field as in
+//! shaders/shared/frame.wgsl. The CPU engine uses the same frame.
 
 use crate::{
     bricks::Choice,
@@ -124,13 +125,13 @@ impl Source {
         [self.covariance_a, self.covariance_b]
     }
 
-    /// A chunk of explicit splats.
+    /// Returns the source of a chunk of explicit splats.
     pub fn of_splats(view: &View, set: &SplatSet, radiance: bool) -> Self {
         let flags = if radiance { RADIANCE } else { 0 };
         Self { flags, ..Self::of_radiance(view, set.origin, set.extent) }
     }
 
-    /// A chunk of radiance splats around an origin in the world.
+    /// Returns the source of a chunk of radiance splats around an origin in the world.
     pub fn of_radiance(view: &View, origin: DVec3, extent: f32) -> Self {
         let [axis_x, axis_y, axis_z] = columns(view.rotation);
         Self {
@@ -144,7 +145,8 @@ impl Source {
         }
     }
 
-    /// A chunk of a lattice whose samples have a kernel. Rectilinear coordinates count from the first sample.
+    /// Returns the source of a chunk of a lattice whose samples have this kernel. Rectilinear
+    /// coordinates are relative to the first sample.
     pub fn of_lattice(view: &View, lattice: &Lattice, kernel: &Kernel, isotropic: bool) -> Self {
         let axes = view.rotation * lattice.axes;
         let own = axes * DMat3::from_diagonal(lattice.unit([0; 3]) * kernel.unit());
@@ -165,7 +167,7 @@ impl Source {
     }
 }
 
-/// Smallest cosine between a ray of the picture and the optical axis.
+/// Returns the smallest cosine between a ray of the picture and the optical axis.
 fn smallest_cosine(view: &View) -> f64 {
     let size = DVec2::new(f64::from(view.size[0]), f64::from(view.size[1]));
     [DVec2::ZERO, DVec2::new(size.x, 0.0), DVec2::new(0.0, size.y), size]
@@ -183,7 +185,7 @@ impl Frame {
         [self.before, self.behind]
     }
 
-    /// Everything but the tiles, the capacities and the tables.
+    /// Fills everything except the tiles, the capacities and the tables.
     pub fn new(
         scene: &Scene,
         view: &View,
@@ -204,7 +206,7 @@ impl Frame {
                 0.0
             },
             step_inverse: (1.0 / sheets.step) as f32,
-            // Axis-aligned sheets may begin behind an eye among them.
+            // Axis-aligned sheets may begin behind an eye that lies among them.
             z_near: (sheets.planes[0] * smallest_cosine(view)).max(1e-6 * sheets.step) as f32,
             surface_shade: shade(settings.surface_shade),
             levels: [1.0, 1.0, 0.0, 0.0],
@@ -228,7 +230,7 @@ impl Frame {
                 }
                 Item::Bricks(bricks, kernel, transfer) => {
                     let levels = choice.map_or(&[][..], |choice| &choice.levels);
-                    // The field fills the same box whatever is drawn.
+                    // The field fills the same box, whichever levels are drawn.
                     frame.set_field(view, &bricks.header().lattice);
                     frame.set_kernel(
                         &bricks.lattice(levels.first().map_or(0, |(level, _)| *level)),
@@ -250,7 +252,7 @@ impl Frame {
         frame
     }
 
-    /// How values are looked up. Gradients count over the thickness of a sheet.
+    /// Sets how values are looked up in the tables. Gradients are per thickness of a sheet.
     pub fn set_tables(
         &mut self,
         tables: &Tables,
@@ -262,7 +264,8 @@ impl Frame {
         self.transfer = tables.values.map(|v| v as f32);
         let [first, per_magnitude] = tables.gradients;
         let (to_own, length) = (per_value * sheets.step, sheets.step);
-        // Of factors that do not change, or by one step, there may be more than 32 bits hold.
+        // If the factors are constant or change in one step, their number per magnitude may exceed
+        // 32 bits.
         let per_own = (per_magnitude / to_own).min(1e30);
         self.gradients = [first * to_own, per_own, length, view.scale * length].map(|v| v as f32);
         self.table_starts = tables.starts;
@@ -283,10 +286,10 @@ impl Frame {
         let inverse = (view.rotation * lattice.axes).inverse();
         let rows = inverse.transpose();
         [self.field_axis_x, self.field_axis_y, self.field_axis_z] = columns(rows);
-        // Counted from the first sample, as far as 32-bit numbers go.
+        // Relative to the first sample, for the precision of 32-bit numbers.
         let [low, high] = lattice.step_range();
         self.field_origin = wide(-(inverse * view.to_view(lattice.position(low))), 0.0);
-        // A lattice of one sample across still fills its cell.
+        // An axis with a single sample still fills that sample's cell.
         let unit = lattice.unit([0; 3]);
         let margin = DVec3::select((high - low).cmpgt(DVec3::ZERO), DVec3::ZERO, 0.5 * unit);
         self.field_low = wide(-margin, 0.0);
@@ -308,14 +311,15 @@ impl Frame {
         self.kernel = [length, 1.0 / length, 1.0 / overlap, 0.0].map(|v| v as f32);
     }
 
-    /// The clips around the eye, along the world's axes: half-spaces and boxes that are kept, boxes that are cut out.
+    /// Sets the clips, relative to the eye and along the world's axes: half-spaces and boxes that
+    /// are kept, and boxes that are cut out.
     fn set_clips(&mut self, view: &View, settings: &Settings) {
         [self.world_x, self.world_y, self.world_z] = columns(view.rotation.transpose());
         let (mut clips, mut holes) = (self.clips.iter_mut(), self.holes.iter_mut());
         for clip in &settings.clips {
             let (slot, [low, high]) = match clip.shape {
                 ClipShape::HalfSpace { normal, offset } => {
-                    // The complement of a half-space is another one.
+                    // The complement of a half-space is a half-space.
                     let size = if clip.inside { normal.length() } else { -normal.length() };
                     let offset = (offset - normal.dot(view.position)) / size;
                     (clips.next(), [wide(normal / size, 0.0), [offset as f32, 0.0, 0.0, 0.0]])
@@ -332,7 +336,7 @@ impl Frame {
     }
 }
 
-/// How many convex parts clips keep, and how many boxes they cut out.
+/// Returns how many convex parts the clips keep, and how many boxes they cut out.
 pub fn clip_counts(settings: &Settings) -> [u32; 2] {
     let is_hole = |clip: &&Clip| !clip.inside && matches!(clip.shape, ClipShape::Box(_));
     let holes = settings.clips.iter().filter(is_hole).count();

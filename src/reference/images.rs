@@ -2,7 +2,7 @@
 
 use super::{
     Frame, LEAST_DEPTH, clip,
-    composite::{Composite, Medium},
+    composite::{Composite, Medium, Step},
     face::Face,
     field::{Field, Layer},
     kernel::{Kernel, Load},
@@ -59,7 +59,7 @@ impl Frame<'_> {
                     }
                     Load::Radiance(_) => {}
                     Load::Sample(sample) => {
-                        sheet.mean.add(sample, kernel.center, &crossing, ray, part)
+                        sheet.mean.add(sample, kernel.center, &crossing, ray, part);
                     }
                 }
             }
@@ -99,28 +99,10 @@ impl Frame<'_> {
         let allowed = clip::allowed(ray, &self.view, &self.clips);
         let sheets = self.sheets(ray, kernels, &allowed);
         let Some(field) = &self.field else {
-            let mut composite = Composite::EMPTY;
-            sheets
-                .iter()
-                .enumerate()
-                .for_each(|(k, sheet)| composite.pass(self.surface(sheet, ray), self.span(k)));
-            return composite;
+            return self.composite(&sheets, ray, |_| None);
         };
         let faces = self.faces(ray, kernels);
-        let gradients: Vec<Option<DVec3>> = faces
-            .iter()
-            .zip(&self.planes)
-            .enumerate()
-            .map(|(i, (face, &plane))| match &around {
-                Some(around) => face.central_gradient(
-                    self.least_sum,
-                    ray,
-                    plane,
-                    around.each_ref().map(|values| values[i]),
-                ),
-                None => face.gradient(self.least_sum),
-            })
-            .collect();
+        let gradients = self.gradients(ray, &faces, around);
         let held = match field.lattice {
             Some(lattice) => {
                 clip::intersection(&allowed, clip::sample_box(ray, &self.view, lattice))
@@ -153,21 +135,46 @@ impl Frame<'_> {
                 .reduce(f64::max)
                 .map_or(Composite::EMPTY, |value| self.largest(field, value));
         }
+        self.composite(&sheets, ray, |k| {
+            let (layer, pieces) = layer(k)?;
+            let (mut medium, steps) = layer.shine(field, ray.direction, &pieces);
+            if self.optics == Optics::XRay {
+                medium.color = DVec3::ONE;
+            }
+            Some((medium, steps))
+        })
+    }
+
+    /// Returns the gradients at the faces of a ray's sheets.
+    fn gradients(&self, ray: &Ray, faces: &[Face], around: Option<Around>) -> Vec<Option<DVec3>> {
+        let Some(around) = around else {
+            return faces.iter().map(|face| face.gradient(self.least_sum)).collect();
+        };
+        let places = faces.iter().zip(&self.planes).enumerate();
+        places
+            .map(|(i, (face, &plane))| {
+                let beside = around.each_ref().map(|values| values[i]);
+                face.central_gradient(self.least_sum, ray, plane, beside)
+            })
+            .collect()
+    }
+
+    /// Composites the sheets of a ray, front to back: the radiance in each, and the medium of the
+    /// field with its steps of optical depth.
+    fn composite(
+        &self,
+        sheets: &[Sheet],
+        ray: &Ray,
+        medium: impl Fn(usize) -> Option<(Medium, Vec<Step>)>,
+    ) -> Composite {
         let mut composite = Composite::EMPTY;
         for (k, sheet) in sheets.iter().enumerate() {
             let surface = self.surface(sheet, ray);
-            match layer(k) {
-                Some((layer, pieces)) => {
-                    let (mut medium, steps) = layer.shine(field, ray.direction, &pieces);
-                    if self.optics == Optics::XRay {
-                        medium.color = DVec3::ONE;
-                    }
-                    if surface.depth > 0.0 {
-                        composite.pass(surface.with(medium), self.span(k));
-                    } else {
-                        composite.pass_in_steps(medium, &steps);
-                    }
+            match medium(k) {
+                Some((medium, _)) if surface.depth > 0.0 => {
+                    composite.pass(surface.with(medium), self.span(k));
                 }
+                Some((medium, steps)) => composite.pass_in_steps(medium, &steps),
                 None => composite.pass(surface, self.span(k)),
             }
         }

@@ -21,10 +21,29 @@ use rayon::prelude::*;
 /// Points with one value each, in the file's own unit, relative to `origin`, so that doubles far
 /// from zero keep their precision in 32 bits. `radii` and `covariances` are either empty or as long
 /// as `positions`.
+///
+/// Samples are drawn as splats that carry values:
+///
+/// ```
+/// use glam::Vec3;
+/// use splatkit::scattered::{Points, SampleOptions};
+///
+/// let grid = (0..64).map(|i| Vec3::new((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32));
+/// let positions: Vec<Vec3> = grid.collect();
+/// let values = positions.iter().map(|position| position.z).collect();
+/// let points = Points { positions, values, ..Points::default() };
+/// assert_eq!(points.range(), [0.0, 3.0]);
+/// let splats = points.to_splats(&SampleOptions::default())?;
+/// assert_eq!(splats.splats.len(), 64);
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
+    /// World position that the positions are relative to.
     pub origin: DVec3,
+    /// The positions of the samples, relative to `origin`.
     pub positions: Vec<Vec3>,
+    /// The value of each sample.
     pub values: Vec<f32>,
     /// The reach of each sample, in world units: two standard deviations of its kernel, or as many
     /// as [`SampleOptions::deviations`] sets.
@@ -40,14 +59,24 @@ impl Points {
         self.positions.len()
     }
 
+    /// Returns whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// Checks that the points are usable. The message names the first one that is wrong. Causes are
-    /// lists of different lengths, no points or more than 2³², numbers that are not finite, radii
-    /// not above 0, and covariances that are not positive definite.
-    pub fn validate(&self) -> Result<(), String> {
+    /// Checks that the points are usable.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument), which names the first point that is wrong.
+    /// Causes are lists of different lengths, no points or more than 2³², numbers that are not
+    /// finite, radii not above 0, and covariances that are not positive definite.
+    pub fn validate(&self) -> crate::Result<()> {
+        self.check().map_err(crate::Error::Argument)
+    }
+
+    /// Like [`validate`](Self::validate). The error is a message, to which the caller adds the
+    /// place.
+    pub(crate) fn check(&self) -> Result<(), String> {
         let count = self.len();
         if count == 0 {
             return Err("there are no samples".into());

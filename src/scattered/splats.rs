@@ -91,7 +91,7 @@ impl Points {
     /// - [`Error::Timeout`] after the deadline.
     /// - [`Error::Memory`] if there is too little.
     pub fn to_splats(&self, options: &SampleOptions) -> Result<SplatSet> {
-        self.validate().map_err(Error::Argument)?;
+        self.validate()?;
         options.validate()?;
         memory::room("making splats of samples", OF_SAMPLE.saturating_mul(self.len() as u64))?;
         let (places, place_of) = places(self, options.neighbours, options.deadline)?;

@@ -1,5 +1,6 @@
-//! Numbers that make no picture: not finite, or beyond what 32 bits hold. One of them in one splat would spread, through sums
-//! and bounds, to pixels that have nothing to do with it; so a scene that holds one is refused, with its place.
+//! Checks for numbers that cannot be drawn: not finite, or too large for 32 bits. One of these in
+//! one splat would spread, through sums and bounds, to unrelated pixels. So a scene that contains
+//! one is refused, and the error names its place.
 
 use super::{Item, Settings};
 use crate::{
@@ -11,29 +12,35 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// The most values that a transfer function tells apart over the range of its data: beside one value, sums of 32 bits lose
-/// others that are much smaller than this part of it.
+/// Number of values that a transfer function can distinguish over the range of its data. In a sum
+/// of 32 bits, a value much smaller than 1/`VALUES` of another is lost.
 const VALUES: f64 = 1048576.0;
 
-/// An error of the item of this number.
-pub(super) fn of_item(number: usize) -> impl Fn(String) -> Error {
-    move |message| Error::Argument(format!("item {number} of the scene: {message}"))
+/// Returns a function that names item `number` in an error.
+pub(super) fn of_item(number: usize) -> impl Fn(Error) -> Error {
+    let placed = move |message: String| format!("item {number} of the scene: {message}");
+    move |error| match error {
+        Error::Argument(message) => Error::Argument(placed(message)),
+        Error::Transfer(message) => Error::Transfer(placed(message)),
+        other => other,
+    }
 }
 
-/// Checks the transfer function of an item that has one.
-pub(super) fn check_transfer(item: &Item) -> Result<(), String> {
+/// Checks the transfer function of an item, if it has one.
+pub(super) fn check_transfer(item: &Item) -> Result<()> {
     match item {
         Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
             transfer
                 .validate_numbers()
-                .map_err(|message| format!("the transfer function: {message}"))
+                .map_err(|message| Error::Transfer(format!("the transfer function: {message}")))
         }
         Item::Radiance(_) | Item::Hierarchy(_) => Ok(()),
     }
 }
 
-/// Checks the transfer function of an item that has one, also against the range of its values.
-pub(super) fn check_field(item: &Item) -> Result<(), String> {
+/// Checks the transfer function of an item, if it has one, also against the range of the item's
+/// values.
+pub(super) fn check_field(item: &Item) -> Result<()> {
     check_transfer(item)?;
     let (transfer, [low, high]) = match item {
         Item::Scalar(set, transfer) => (transfer, set.value_range()),
@@ -41,35 +48,37 @@ pub(super) fn check_field(item: &Item) -> Result<(), String> {
         Item::Bricks(bricks, _, transfer) => (transfer, bricks.header().range),
         Item::Radiance(_) | Item::Hierarchy(_) => return Ok(()),
     };
-    // One value far off, such as that of a broken sensor, would leave all others one colour.
+    // A single outlier, such as from a broken sensor, would give all other values one colour.
     let [first, last] = transfer.span();
     if last > first && last - first < (high - low) / VALUES {
-        return Err(format!(
-            "the transfer function changes from {first} to {last}, too close together for values from {low} to {high}: \
-             remove values that are far off, or choose another function"
-        ));
+        return Err(Error::Transfer(format!(
+            "the transfer function changes from {first} to {last}, too close together for values \
+             from {low} to {high}: remove values that are far off, or choose another function"
+        )));
     }
     Ok(())
 }
 
 /// Checks the numbers of an item.
-pub(super) fn check_item(item: &Item) -> Result<(), String> {
+pub(super) fn check_item(item: &Item) -> Result<()> {
     if let Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) = item {
-        kernel.validate().map_err(|error| error.to_string())?;
+        kernel.validate()?;
     }
     match item {
-        Item::Radiance(set) | Item::Scalar(set, _) => check_set(set)?,
-        Item::Volume(volume, ..) => volume.validate()?,
+        Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(Error::Argument)?,
+        Item::Volume(volume, ..) => volume.validate().map_err(Error::Argument)?,
         Item::Hierarchy(_) | Item::Bricks(..) => {}
     }
     check_field(item)?;
     let Bounds { min, max } = item.bounds();
     let holds = |v: f64| v.abs() <= f64::from(f32::MAX);
-    // Nothing at all has bounds of its own, which are not finite.
+    // The bounds of an empty set are not finite. That is no error.
     let is_none =
         matches!(item, Item::Radiance(set) | Item::Scalar(set, _) if set.splats.is_empty());
     if !is_none && ![min, max, max - min].iter().all(|v| v.to_array().into_iter().all(holds)) {
-        return Err(format!("it reaches from {min} to {max}, beyond what 32-bit numbers hold"));
+        return Err(Error::Argument(format!(
+            "it reaches from {min} to {max}, beyond what 32-bit numbers hold"
+        )));
     }
     Ok(())
 }
@@ -78,7 +87,7 @@ fn check_set(set: &SplatSet) -> Result<(), String> {
     if !set.origin.is_finite() {
         return Err(format!("the origin {} is not finite", set.origin));
     }
-    // The inverse of what is smaller than normal numbers is not finite.
+    // The inverse of a subnormal number is not finite.
     if !(set.overlap > 0.0 && set.overlap.is_normal()) {
         return Err(format!("the overlap is {}; a positive number is needed", set.overlap));
     }
@@ -89,7 +98,7 @@ fn check_set(set: &SplatSet) -> Result<(), String> {
     }
 }
 
-/// What is wrong with the numbers of a splat.
+/// Returns what is wrong with the numbers of a splat, if anything.
 fn fault(splat: &Splat, payload: Payload) -> Option<String> {
     let Splat { center, strength, factor, .. } = splat;
     let not_finite = |values: &[f32]| !values.iter().all(|v| v.is_finite());
@@ -106,7 +115,7 @@ fn fault(splat: &Splat, payload: Payload) -> Option<String> {
                 Splat::MOST_OPTICAL_DEPTH
             ))
         }
-        // A field's kernel needs a volume; radiance is widened to a pixel.
+        // A kernel of a field needs a volume. Radiance may be flat, because the picture widens it.
         Payload::Scalar if [factor[0], factor[2], factor[5]].contains(&0.0) => {
             Some(format!("the factor {factor:?} is that of a flat kernel"))
         }
@@ -136,14 +145,16 @@ pub(super) fn check_settings(settings: &Settings) -> Result<()> {
         ));
     }
     if let Some(near) = settings.near.filter(|v| !(*v >= 0.0 && v.is_finite())) {
-        return wrong(format!("the nearest distance is {near}; a number from 0 on is needed"));
+        return wrong(format!(
+            "the nearest distance is {near}; a finite number of at least 0 is needed"
+        ));
     }
     match settings.detail {
         Detail::Pixels(value) | Detail::Milliseconds(value)
             if !(value >= 0.0 && value.is_finite()) =>
         {
             return wrong(format!(
-                "the detail is {:?}; a number from 0 on is needed",
+                "the detail is {:?}; a finite number of at least 0 is needed",
                 settings.detail
             ));
         }

@@ -65,6 +65,18 @@ pub(super) struct Found {
     pub cross: [Eight; 3],
 }
 
+/// Sums over the triangles of eight vertices.
+struct Sums<S: Simd> {
+    /// Whether all triangles have an area and are nearly parallel to the first.
+    is_made: mask32x8<S>,
+    /// The square of the longest edge, in units.
+    longest: Lanes<S>,
+    area: Lanes<S>,
+    /// The sum of the normals times the areas, and times the angles at the vertex.
+    cross: Triple<S>,
+    own: Triple<S>,
+}
+
 impl Fans {
     /// Forgets the previous vertices.
     pub fn clear(&mut self) {
@@ -98,42 +110,11 @@ impl Fans {
     pub fn surfels<S: Simd>(&mut self, simd: S, common: &Common, found: &mut Found) {
         let number = |value: f32| Lanes::splat(simd, value);
         let none = number(0.0);
-        let counts: Lanes<S> = self.counts.simd_into(simd);
         let here = load(simd, &self.here);
+        let counts: Lanes<S> = self.counts.simd_into(simd);
         let per_unit = number(1.0 / common.unit);
-        let mut is_made = counts.simd_gt(0.0);
-        let (mut longest, mut area, mut cross, mut own) = (none, none, [none; 3], [none; 3]);
-        let mut first = [none; 3];
-        for at in 0..self.most {
-            let corner = &mut self.corners[at];
-            let has = counts.simd_gt(at as f32);
-            let a = scaled(difference(load(simd, &corner.next), here), per_unit);
-            let b = scaled(difference(load(simd, &corner.last), here), per_unit);
-            let across = product(a, b);
-            let (square, longer) = (dot(across, across), dot(a, a).max(dot(b, b)));
-            let is_line =
-                square.simd_le((longer * longer * LEAST_RATIO_SQUARED).max(number(LEAST_SQUARE)));
-            let is_triangle = !is_line & square.simd_lt(f32::INFINITY);
-            is_made &= is_triangle | !has;
-            let has = has & is_triangle;
-            longest = has.select(longest.max(longer), longest);
-            let twice_area = square.sqrt();
-            let per_area = number(1.0) / twice_area;
-            let normal = chosen(has, scaled(across, per_area), [none; 3]);
-            let own_area = has.select(twice_area * 0.5, none);
-            let own_angle = has.select(angle(simd, twice_area, dot(a, b)), none);
-            if at == 0 {
-                first = normal;
-            } else {
-                is_made &= dot(first, normal).simd_ge(common.flat) | !has;
-            }
-            area += own_area;
-            cross = sum(cross, scaled(normal, own_area));
-            own = sum(own, scaled(normal, own_angle));
-            store(normal, &mut corner.normal);
-            corner.area = own_area.into();
-            corner.angle = own_angle.into();
-        }
+        let Sums { mut is_made, longest, area, cross, own } =
+            self.measure(simd, counts, per_unit, common.flat);
         let recip = number(1.0) / dot(own, own).sqrt();
         is_made &= recip.simd_gt(0.0) & recip.simd_lt(f32::INFINITY);
         let normal = scaled(own, recip);
@@ -167,6 +148,55 @@ impl Fans {
         store(cross, &mut found.cross);
         let made: Eight = is_made.select(number(1.0), none).into();
         found.is_made = made.map(|made| made > 0.0);
+    }
+
+    /// Sets the normals, areas and angles of all triangles, and returns their sums. Edges are
+    /// measured in units.
+    #[inline(always)]
+    fn measure<S: Simd>(
+        &mut self,
+        simd: S,
+        counts: Lanes<S>,
+        per_unit: Lanes<S>,
+        flat: f32,
+    ) -> Sums<S> {
+        let number = |value: f32| Lanes::splat(simd, value);
+        let none = number(0.0);
+        let here = load(simd, &self.here);
+        let mut is_made = counts.simd_gt(0.0);
+        let (mut longest, mut area, mut cross, mut own) = (none, none, [none; 3], [none; 3]);
+        let mut first = [none; 3];
+        for at in 0..self.most {
+            let corner = &mut self.corners[at];
+            let has = counts.simd_gt(at as f32);
+            let a = scaled(difference(load(simd, &corner.next), here), per_unit);
+            let b = scaled(difference(load(simd, &corner.last), here), per_unit);
+            let across = product(a, b);
+            let (square, longer) = (dot(across, across), dot(a, a).max(dot(b, b)));
+            let is_line =
+                square.simd_le((longer * longer * LEAST_RATIO_SQUARED).max(number(LEAST_SQUARE)));
+            let is_triangle = !is_line & square.simd_lt(f32::INFINITY);
+            is_made &= is_triangle | !has;
+            let has = has & is_triangle;
+            longest = has.select(longest.max(longer), longest);
+            let twice_area = square.sqrt();
+            let per_area = number(1.0) / twice_area;
+            let normal = chosen(has, scaled(across, per_area), [none; 3]);
+            let own_area = has.select(twice_area * 0.5, none);
+            let own_angle = has.select(angle(simd, twice_area, dot(a, b)), none);
+            if at == 0 {
+                first = normal;
+            } else {
+                is_made &= dot(first, normal).simd_ge(flat) | !has;
+            }
+            area += own_area;
+            cross = sum(cross, scaled(normal, own_area));
+            own = sum(own, scaled(normal, own_angle));
+            store(normal, &mut corner.normal);
+            corner.area = own_area.into();
+            corner.angle = own_angle.into();
+        }
+        Sums { is_made, longest, area, cross, own }
     }
 
     /// Projects the edges onto the plane of the first two axes. Returns the sum of the heights over

@@ -7,20 +7,41 @@ use std::{ops::Range, sync::Arc};
 ///
 /// Positions are in the file's own unit, relative to `origin`, so that geo-referenced doubles keep
 /// their precision in 32 bits. Optional attributes are either empty or as long as `positions`.
+///
+/// A mesh is drawn as surfels, elliptic discs that overlap without holes:
+///
+/// ```
+/// use glam::Vec3;
+/// use splatkit::surface::{Mesh, SurfelOptions};
+///
+/// let square = Mesh {
+///     positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+///     triangles: vec![[0, 1, 2], [0, 2, 3]],
+///     ..Mesh::default()
+/// };
+/// let surfels = square.surfels(&SurfelOptions::default())?;
+/// assert!(surfels.splats.len() >= 4);
+/// assert!(!square.is_solid() && Mesh::sphere(2).is_solid());
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
+    /// World position that the vertices are relative to.
     pub origin: DVec3,
+    /// The positions of the vertices, relative to `origin`.
     pub positions: Vec<Vec3>,
     /// Unit normals from the file; empty if it has none. Normals shorter than half a unit, or not
     /// finite, count as missing.
     pub normals: Vec<Vec3>,
     /// Linear copies of the file's display colours, 8 bits per channel: red, green, blue, opacity.
     pub colors: Vec<[u8; 4]>,
+    /// Texture coordinates; (0, 0) is the top left corner of the texture.
     pub uvs: Vec<Vec2>,
     /// Vertex indices, counter-clockwise from outside. Polygons are already split into triangles.
     pub triangles: Vec<[u32; 3]>,
     /// The material of each triangle, an index into `materials`; empty if there are none.
     pub triangle_materials: Vec<u32>,
+    /// The materials that `triangle_materials` refers to.
     pub materials: Vec<Material>,
     /// Positions of scanners, in the order of the points that they saw; empty if the file has none.
     /// The normals of those points face the scanner.
@@ -67,16 +88,21 @@ pub struct Sensor {
 /// A base colour, and a texture that is multiplied with it.
 #[derive(Debug, Clone)]
 pub struct Material {
+    /// The name in the file; may be empty.
     pub name: String,
     /// Red, green, blue, opacity in 0 … 1, as displayed (not linear light).
     pub color: [f32; 4],
+    /// The texture; `None` if the base colour is all.
     pub texture: Option<Arc<Texture>>,
 }
 
 /// A decoded picture, rows from the top; `uv` (0, 0) is its top left corner.
 #[derive(Debug, Clone)]
 pub struct Texture {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
+    /// Red, green, blue and opacity of each pixel, as displayed (not linear light).
     pub texels: Vec<[u8; 4]>,
 }

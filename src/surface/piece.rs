@@ -7,7 +7,7 @@ use super::{
     cloud,
     fan::Sums,
     refine::{Expected, STRETCH, affordable, count_once_cut, pieces, stretch},
-    surfels::{largest_edge, of_part},
+    surfels::{Whole, largest_edge, of_part},
     survey::{edge, edge_of_places},
 };
 use crate::{Deadline, Result, splat::Splat};
@@ -105,12 +105,7 @@ impl Triangles {
 /// How the surfels of all parts of a mesh are made, so that they equal those of the whole.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MeshPieces {
-    is_split: bool,
-    /// The length that edges are measured in; and `outward`, −1 if the mesh is inside out.
-    unit: f32,
-    outward: f32,
-    /// Whether any edge is cut.
-    is_coarse: bool,
+    whole: Whole,
     /// The longest edge that is not cut, unless its triangle is narrow.
     pub length: f32,
     pub closing: Option<PiecesClosing>,
@@ -166,19 +161,14 @@ impl MeshPieces {
             is_closed.then_some(PiecesClosing::Places)
         };
         let outward = if seen.sums.side(1.0) < 0 { -1.0 } else { 1.0 };
-        let is_coarse = seen.excess > 1.0;
         let closing = closing.filter(|_| triangles > 0);
-        Ok((
-            Self {
-                is_coarse,
-                is_split: may_be_split(has_uvs, points, triangles),
-                unit,
-                outward,
-                length,
-                closing,
-            },
-            seen,
-        ))
+        let whole = Whole {
+            is_split: may_be_split(has_uvs, points, triangles),
+            is_coarse: seen.excess > 1.0,
+            unit,
+            outward,
+        };
+        Ok((Self { whole, length, closing }, seen))
     }
 
     /// The longest edge after cutting.
@@ -199,15 +189,7 @@ impl MeshPieces {
         part.check(options)?;
         let is_wanted = |vertex: usize| owned.get(vertex).is_none_or(|&owned| owned);
         let cut = is_long.then_some(self.length);
-        of_part(
-            part,
-            self.is_split,
-            options,
-            [self.unit, self.outward],
-            self.is_coarse,
-            cut,
-            is_wanted,
-        )
+        of_part(part, self.whole, options, cut, is_wanted)
     }
 }
 
@@ -261,7 +243,12 @@ mod tests {
             look,
         )
         .unwrap();
-        assert!(pieces.unit < 0.1 && told.cut > counts[1] / 20, "{} and {}", pieces.unit, told.cut);
+        assert!(
+            pieces.whole.unit < 0.1 && told.cut > counts[1] / 20,
+            "{} and {}",
+            pieces.whole.unit,
+            told.cut
+        );
         assert!(looks < 8, "{looks} visits");
         let fine = mesh.triangles_once_cut(&options, usize::MAX).unwrap();
         assert_eq!(fine, counts[1] - told.long.len() + told.cut);
@@ -303,7 +290,7 @@ mod tests {
                 let count = mesh.triangles.len() - told.long.len() + told.cut;
                 let whole = count_of_refined(
                     &mesh,
-                    pieces_of_all.unit,
+                    pieces_of_all.whole.unit,
                     most_triangles,
                     usize::MAX,
                     Deadline::NEVER,

@@ -493,6 +493,30 @@ fn slice_needles(
     settled: usize,
     most: usize,
 ) -> std::result::Result<(), Stop> {
+    let needles = needles(mesh, wanted, settled)?;
+    if needles.is_empty() {
+        return Ok(());
+    }
+    let mut chains = Chains::of(&needles)?;
+    let slabs = |needle: &Needle| {
+        let [tip, a, b] = needle.corners;
+        [a, b].map(|corner| u64::from(chains.edges[chains.rank(tip, corner)].1) - 1)
+    };
+    let more = needles.iter().flat_map(slabs).sum::<u64>();
+    if mesh.triangles.len() as u64 + more > most as u64 {
+        return Err(Stop::TooMany(most));
+    }
+    let new = chains.place(mesh.positions.len())?;
+    memory::reserve(&mut mesh.triangles, more as usize, WORK)?;
+    memory::reserve(&mut mesh.triangle_materials, more as usize, WORK)?;
+    let Some(new) = new else { return Ok(()) };
+    add_vertices(mesh, &new)?;
+    needles.iter().for_each(|needle| chains.slice(mesh, needle));
+    Ok(())
+}
+
+/// Returns the triangles from `settled` on that have two long edges and a short one.
+fn needles(mesh: &Mesh, wanted: &Wanted, settled: usize) -> Result<Vec<Needle>> {
     let needle = |(index, &t): (usize, &[u32; 3])| {
         let triangle = settled + index;
         let source = mesh.triangle_materials[triangle] as usize;
@@ -513,61 +537,67 @@ fn slice_needles(
     // One list per task and one joint list; then the edges of each needle.
     let open = (mesh.triangles.len() - settled) as u64;
     memory::room(WORK, open.saturating_mul(2 * size_of::<Needle>() as u64))?;
-    let needles: Vec<Needle> =
-        mesh.triangles[settled..].par_iter().enumerate().filter_map(needle).collect();
-    if needles.is_empty() {
-        return Ok(());
+    Ok(mesh.triangles[settled..].par_iter().enumerate().filter_map(needle).collect())
+}
+
+/// The long edges of needles, each a chain of vertices.
+struct Chains {
+    /// Each edge, ascending, with the number of parts that the more demanding neighbour needs.
+    edges: Vec<((u32, u32), u32)>,
+    /// The first new vertex of each edge.
+    starts: Vec<u32>,
+}
+
+impl Chains {
+    fn of(needles: &[Needle]) -> Result<Self> {
+        memory::room(WORK, needles.len() as u64 * 4 * size_of::<((u32, u32), u32)>() as u64)?;
+        let mut edges: Vec<((u32, u32), u32)> = needles
+            .iter()
+            .flat_map(|n| [1, 2].map(|i| (sorted((n.corners[0], n.corners[i])), n.parts)))
+            .collect();
+        edges.par_sort_unstable_by_key(|&(edge, parts)| (edge, std::cmp::Reverse(parts)));
+        edges.dedup_by_key(|&mut (edge, _)| edge);
+        Ok(Self { edges, starts: Vec::new() })
     }
-    // The long edges with the number of parts that the more demanding neighbour needs, and the
-    // first new vertex of each.
-    memory::room(WORK, needles.len() as u64 * 4 * size_of::<((u32, u32), u32)>() as u64)?;
-    let mut edges: Vec<((u32, u32), u32)> = needles
-        .iter()
-        .flat_map(|n| [1, 2].map(|i| (sorted((n.corners[0], n.corners[i])), n.parts)))
-        .collect();
-    edges.par_sort_unstable_by_key(|&(edge, parts)| (edge, std::cmp::Reverse(parts)));
-    edges.dedup_by_key(|&mut (edge, _)| edge);
-    let rank = |edge: (u32, u32)| edges.binary_search_by_key(&edge, |&(edge, _)| edge).unwrap_or(0);
-    let slabs = |needle: &Needle| {
-        let [tip, a, b] = needle.corners;
-        [a, b].map(|corner| u64::from(edges[rank(sorted((tip, corner)))].1) - 1).iter().sum::<u64>()
-    };
-    let more = needles.iter().map(slabs).sum::<u64>();
-    if mesh.triangles.len() as u64 + more > most as u64 {
-        return Err(Stop::TooMany(most));
+
+    fn rank(&self, a: u32, b: u32) -> usize {
+        let edge = sorted((a, b));
+        self.edges.binary_search_by_key(&edge, |&(edge, _)| edge).unwrap_or(0)
     }
-    let mut next = mesh.positions.len() as u64;
-    let added = edges.iter().map(|&(_, parts)| u64::from(parts) - 1).sum::<u64>() as usize;
-    let (mut starts, mut new) = (Vec::new(), Vec::new());
-    memory::reserve(&mut starts, edges.len(), WORK)?;
-    memory::reserve(&mut new, added, WORK)?;
-    memory::reserve(&mut mesh.triangles, more as usize, WORK)?;
-    memory::reserve(&mut mesh.triangle_materials, more as usize, WORK)?;
-    for &((a, b), parts) in &edges {
-        starts.push(next as u32);
-        next += u64::from(parts) - 1;
-        new.extend((1..parts).map(|i| (a, b, i as f32 / parts as f32)));
+
+    /// Numbers the new vertices, from `next` on. Returns where each lies on its edge; `None` if
+    /// 32 bits cannot number them.
+    fn place(&mut self, next: usize) -> Result<Option<Vec<(u32, u32, f32)>>> {
+        let mut next = next as u64;
+        let added = self.edges.iter().map(|&(_, parts)| u64::from(parts) - 1).sum::<u64>();
+        let mut new = Vec::new();
+        memory::reserve(&mut self.starts, self.edges.len(), WORK)?;
+        memory::reserve(&mut new, added as usize, WORK)?;
+        for &((a, b), parts) in &self.edges {
+            self.starts.push(next as u32);
+            next += u64::from(parts) - 1;
+            new.extend((1..parts).map(|i| (a, b, i as f32 / parts as f32)));
+        }
+        Ok((next <= u64::from(u32::MAX)).then_some(new))
     }
-    if next > u64::from(u32::MAX) {
-        return Ok(());
-    }
-    add_vertices(mesh, &new)?;
-    // Vertex `i` of `parts` from `from` to `to`, and `parts`.
-    let chain = |from: u32, to: u32| {
-        let edge = sorted((from, to));
-        let rank = rank(edge);
-        let (parts, start) = (edges[rank].1, starts[rank]);
+
+    /// Returns the number of parts of an edge, and its vertices, which count from `from`.
+    fn chain(&self, from: u32, to: u32) -> (u32, impl Fn(u32) -> u32 + use<>) {
+        let rank = self.rank(from, to);
+        let (((low, _), parts), start) = (self.edges[rank], self.starts[rank]);
         let vertex = move |i: u32| match i {
             0 => from,
             _ if i == parts => to,
-            _ if edge.0 == from => start + i - 1,
+            _ if low == from => start + i - 1,
             _ => start + parts - i - 1,
         };
         (parts, vertex)
-    };
-    for needle in &needles {
+    }
+
+    /// Cuts a needle into slabs. The first one takes its place in the mesh.
+    fn slice(&self, mesh: &mut Mesh, needle: &Needle) {
         let [tip, a, b] = needle.corners;
-        let ((left, left_at), (right, right_at)) = (chain(tip, a), chain(tip, b));
+        let ((left, left_at), (right, right_at)) = (self.chain(tip, a), self.chain(tip, b));
         let source = mesh.triangle_materials[needle.triangle];
         mesh.triangles[needle.triangle] = [tip, left_at(1), right_at(1)];
         let (mut i, mut j) = (1, 1);
@@ -586,7 +616,6 @@ fn slice_needles(
             mesh.triangle_materials.push(source);
         }
     }
-    Ok(())
 }
 
 /// Returns every edge (smaller index first) that is too long for one of its triangles, possibly

@@ -369,36 +369,39 @@ fn origin_of<'a>(mesh: &'a Mesh, sources: Vec<u32>, options: &SurfelOptions) -> 
     Origin::new(mesh, sources, options.crease_angle_degrees, options.deadline)
 }
 
-/// Makes the surfels of the wanted vertices of a part of a mesh, as they are in the whole.
-/// `largest` is the length that edges are measured in, and `outward` is −1 if the mesh is inside
-/// out. If `is_coarse`, edges of the whole are cut, and normals are interpolated everywhere. With
+/// Properties of a whole mesh on which the surfels of its parts depend.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Whole {
+    pub is_split: bool,
+    /// Whether edges are cut. Then normals are interpolated everywhere.
+    pub is_coarse: bool,
+    /// The length that edges are measured in.
+    pub unit: f32,
+    /// −1 if the mesh is inside out, 1 otherwise.
+    pub outward: f32,
+}
+
+/// Makes the surfels of the wanted vertices of a part of a mesh, as they are in the whole. With
 /// `cut`, edges of the part longer than that are cut, and the vertices added by this are wanted
 /// too.
 pub(super) fn of_part(
     part: &Mesh,
-    is_split: bool,
+    whole: Whole,
     options: &SurfelOptions,
-    [largest, outward]: [f32; 2],
-    is_coarse: bool,
     cut: Option<f32>,
     is_wanted: impl Fn(usize) -> bool + Sync,
 ) -> Result<Vec<Splat>> {
+    let Whole { is_split, is_coarse, unit, outward } = whole;
+    let measures = [unit, outward];
     let Some(length) = cut else {
         let sources = (0..part.triangles.len() as u32).collect();
         let origin = is_coarse.then(|| origin_of(part, sources, options)).transpose()?;
-        return joined(make(
-            part,
-            origin.as_ref(),
-            is_split,
-            options,
-            [largest, outward],
-            is_wanted,
-        )?);
+        return joined(make(part, origin.as_ref(), is_split, options, measures, is_wanted)?);
     };
     // The caller chose a length that keeps to the budget.
     let fine = refine(part, length, usize::MAX >> 1, options.deadline)?;
     let origin = fine.sources.map(|sources| origin_of(part, sources, options)).transpose()?;
-    joined(make(&fine.mesh, origin.as_ref(), is_split, options, [largest, outward], is_wanted)?)
+    joined(make(&fine.mesh, origin.as_ref(), is_split, options, measures, is_wanted)?)
 }
 
 /// Makes the surfels of all wanted vertices, in chunks.

@@ -191,7 +191,7 @@ impl Response {
     pub fn divide(&self, values: &mut [f64]) {
         cosine::filter(values, self.grid.dims, |place, spectrum| {
             self.row(place, |responses| {
-                spectrum.iter_mut().zip(responses).for_each(|(value, part)| *value /= part)
+                spectrum.iter_mut().zip(responses).for_each(|(value, part)| *value /= part);
             });
         });
     }

@@ -1,5 +1,6 @@
 //! Where the samples of a volume lie.
 
+use crate::Error;
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
@@ -30,6 +31,7 @@ pub struct Lattice {
     /// units. Body-centred: the edges of the cubic cell, which is two layers high along the third
     /// axis. Rectilinear: one unit of the coordinates along each axis.
     pub axes: DMat3,
+    /// How the samples are arranged in the cells.
     pub arrangement: Arrangement,
 }
 
@@ -56,6 +58,7 @@ impl Lattice {
         self.dims.iter().fold(1, |all, &n| all.saturating_mul(n))
     }
 
+    /// Returns whether the lattice has no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -235,9 +238,18 @@ impl Lattice {
         })
     }
 
-    /// Checks that samples can lie on this lattice. The message names the cause: no samples, more
-    /// than memory could index, or steps that are not finite or do not span space.
-    pub fn validate(&self) -> Result<(), String> {
+    /// Checks that samples can lie on this lattice.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for no samples, more than memory could index, or steps that are not
+    /// finite or do not span space.
+    pub fn validate(&self) -> crate::Result<()> {
+        self.check().map_err(Error::Argument)
+    }
+
+    /// Like [`validate`](Self::validate). The error is a message, to which the caller adds the
+    /// place.
+    pub(crate) fn check(&self) -> Result<(), String> {
         let [nx, ny, nz] = self.dims;
         if self.dims.contains(&0) {
             return Err(format!("a volume of {nx} × {ny} × {nz} samples holds none"));
@@ -320,7 +332,7 @@ mod tests {
         good.validate().unwrap();
         // Axes with distant coordinates do not count as flat.
         let far = std::array::from_fn(|_| vec![0.0, 1e6]);
-        Lattice { arrangement: Arrangement::Rectilinear(Arc::new(far)), ..good.clone() }
+        Lattice { arrangement: Arrangement::Rectilinear(Arc::new(far)), ..good }
             .validate()
             .unwrap();
         let flat = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::X + DVec3::Y);
@@ -330,9 +342,9 @@ mod tests {
             (Lattice { dims: [usize::MAX, 1, 1], ..good.clone() }, "memory"),
             (Lattice { origin: DVec3::NAN, ..good.clone() }, "finite"),
             (Lattice::with_spacing([2, 2, 2], DVec3::new(1.0, 0.0, 1.0)), "spacing"),
-            (Lattice { axes: flat, ..good.clone() }, "plane"),
+            (Lattice { axes: flat, ..good }, "plane"),
         ] {
-            assert!(bad.validate().unwrap_err().contains(word), "{bad:?}");
+            assert!(bad.check().unwrap_err().contains(word), "{bad:?}");
         }
     }
 }

@@ -2,7 +2,7 @@
 //! position, sampled over the cube from −1 to 1. Most have values in 0 … 1.
 
 use super::{Lattice, Samples, Volume, head::head};
-use crate::memory;
+use crate::{Error, Result, memory};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -58,8 +58,9 @@ impl Phantom {
     /// at −1 and 1 in world space; the sample of an axis of one is at 0.
     ///
     /// # Errors
-    /// A message, for a dimension of 0 or more samples than memory can hold ([`memory::most`]).
-    pub fn sample(self, dims: [usize; 3]) -> Result<Volume, String> {
+    /// [`Error::Argument`] for a dimension of 0 or more samples than memory can hold
+    /// ([`memory::most`]).
+    pub fn sample(self, dims: [usize; 3]) -> Result<Volume> {
         self.sample_on(lattice(dims)?)
     }
 
@@ -67,9 +68,9 @@ impl Phantom {
     /// function's value there.
     ///
     /// # Errors
-    /// A message, for an invalid lattice ([`Lattice::validate`]) or more samples than memory can
-    /// hold.
-    pub fn sample_on(self, lattice: Lattice) -> Result<Volume, String> {
+    /// [`Error::Argument`] for an invalid lattice ([`Lattice::validate`]) or more samples than
+    /// memory can hold.
+    pub fn sample_on(self, lattice: Lattice) -> Result<Volume> {
         lattice.validate()?;
         let values = self.fill(&lattice, |value| value as f32)?;
         Volume::new(lattice, Samples::F32(values))
@@ -79,7 +80,7 @@ impl Phantom {
     ///
     /// # Errors
     /// As [`sample`](Self::sample).
-    pub fn sample_bytes(self, dims: [usize; 3]) -> Result<Volume, String> {
+    pub fn sample_bytes(self, dims: [usize; 3]) -> Result<Volume> {
         let lattice = lattice(dims)?;
         let values = self.fill(&lattice, byte)?;
         Volume::new(lattice, Samples::U8(values))
@@ -89,22 +90,20 @@ impl Phantom {
     /// do not fit in memory.
     ///
     /// # Errors
-    /// A message, for a dimension of 0 or a slice that memory cannot hold.
-    pub fn byte_slices(self, dims: [usize; 3]) -> Result<ByteSlices, String> {
+    /// [`Error::Argument`] for a dimension of 0 or a slice that memory cannot hold.
+    pub fn byte_slices(self, dims: [usize; 3]) -> Result<ByteSlices> {
         let [nx, ny, _] = dims;
         let lattice = lattice(dims)?;
-        memory::check(&format!("a slice of {nx} × {ny} samples"), (nx * ny) as u64)?;
+        memory::check(&format!("a slice of {nx} × {ny} samples"), (nx * ny) as u64)
+            .map_err(Error::Argument)?;
         Ok(ByteSlices { phantom: self, lattice })
     }
 
-    fn fill<T: Send>(
-        self,
-        lattice: &Lattice,
-        turn: impl Fn(f64) -> T + Sync,
-    ) -> Result<Vec<T>, String> {
+    fn fill<T: Send>(self, lattice: &Lattice, turn: impl Fn(f64) -> T + Sync) -> Result<Vec<T>> {
         let [nx, ny, nz] = lattice.dims;
         let bytes = (lattice.len() as u64).saturating_mul(size_of::<T>() as u64);
-        memory::check(&format!("a volume of {nx} × {ny} × {nz} samples"), bytes)?;
+        memory::check(&format!("a volume of {nx} × {ny} × {nz} samples"), bytes)
+            .map_err(Error::Argument)?;
         let value = |index: usize| turn(self.value(lattice.sample_position(index)));
         Ok((0..lattice.len()).into_par_iter().map(value).collect())
     }
@@ -137,7 +136,7 @@ fn byte(value: f64) -> u8 {
     (value * 255.0).round() as u8
 }
 
-fn lattice(dims: [usize; 3]) -> Result<Lattice, String> {
+fn lattice(dims: [usize; 3]) -> Result<Lattice> {
     let step = dims.map(|n| if n > 1 { 2.0 / (n - 1) as f64 } else { 2.0 });
     let origin = dims.map(|n| if n > 1 { -1.0 } else { 0.0 });
     let axes = DMat3::from_diagonal(DVec3::from_array(step));
@@ -234,12 +233,18 @@ mod tests {
         assert!(Phantom::Ball.sample([0, 2, 2]).is_err());
         for dims in [[1 << 20; 3], [1 << 21; 3], [usize::MAX, 1, 1]] {
             let told = [Phantom::Ball.sample(dims), Phantom::Ball.sample_bytes(dims)]
-                .map(|volume| volume.unwrap_err());
+                .map(|volume| volume.unwrap_err().to_string());
             assert!(told.iter().all(|message| message.contains("memory")), "{told:?}");
         }
         let lattice = Lattice::body_centred([usize::MAX, 1, 1], DVec3::ZERO, DMat3::IDENTITY);
-        assert!(Phantom::Ball.sample_on(lattice).unwrap_err().contains("memory"));
-        assert!(Phantom::Ball.byte_slices([1 << 25, 1 << 25, 4]).unwrap_err().contains("memory"));
+        assert!(Phantom::Ball.sample_on(lattice).unwrap_err().to_string().contains("memory"));
+        assert!(
+            Phantom::Ball
+                .byte_slices([1 << 25, 1 << 25, 4])
+                .unwrap_err()
+                .to_string()
+                .contains("memory")
+        );
         assert!(Phantom::Ball.byte_slices([8, 8, 1 << 40]).is_ok());
         let slices = Phantom::Ball.byte_slices([5, 3, 4]).unwrap();
         let whole = Phantom::Ball.sample_bytes([5, 3, 4]).unwrap();
@@ -253,7 +258,7 @@ mod tests {
         let volume = Phantom::Ball.sample_on(lattice).unwrap();
         // The first sample of the middle layer is displaced by half an edge: to the ball's centre.
         assert_eq!((volume.value(4), volume.len()), (1.0, 12));
-        assert_eq!(volume.value(0), Phantom::Ball.value(DVec3::splat(-0.5)) as f32 as f64);
+        assert_eq!(volume.value(0), f64::from(Phantom::Ball.value(DVec3::splat(-0.5)) as f32));
         assert!(
             Phantom::Ball
                 .sample_on(Lattice::body_centred([0, 1, 1], DVec3::ZERO, DMat3::IDENTITY))

@@ -11,10 +11,15 @@ use std::{borrow::Cow, sync::Arc};
 /// Samples in the type of their file, first axis fastest.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Samples {
+    /// 8 bits, unsigned.
     U8(Vec<u8>),
+    /// 16 bits, unsigned.
     U16(Vec<u16>),
+    /// 16 bits, signed.
     I16(Vec<i16>),
+    /// 32 bits, signed.
     I32(Vec<i32>),
+    /// 32 bits, floating point.
     F32(Vec<f32>),
 }
 
@@ -41,6 +46,7 @@ impl Samples {
         each_type!(self, values => values.len())
     }
 
+    /// Returns whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -128,10 +134,28 @@ impl Samples {
 
 /// A volume: a lattice and one scalar per sample. Values are finite; `range` holds the smallest and
 /// the largest.
+///
+/// A volume of 2 × 3 × 4 bytes, whose slices are 2.5 units apart:
+///
+/// ```
+/// use glam::DVec3;
+/// use splatkit::volume::{Lattice, Samples, Volume};
+///
+/// let lattice = Lattice::with_spacing([2, 3, 4], DVec3::new(1.0, 1.0, 2.5));
+/// let volume = Volume::new(lattice, Samples::U8((0..24).collect()))?;
+/// assert_eq!(volume.range, [0.0, 23.0]);
+/// // The first axis is the fastest in memory.
+/// assert_eq!(volume.value(1 + 2 * 2 + 3 * 6), 23.0);
+/// assert_eq!(volume.bounds(), [DVec3::ZERO, DVec3::new(1.0, 2.0, 7.5)]);
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Volume {
+    /// The places of the samples.
     pub lattice: Lattice,
+    /// The samples, in the lattice's memory order.
     pub samples: Samples,
+    /// The smallest and the largest sample.
     pub range: [f64; 2],
     /// If set, kernels carry these values instead of the samples, so that their sum passes through
     /// the samples ([`Volume::sharpened`]).
@@ -164,11 +188,16 @@ impl Volume {
     /// Puts samples on a lattice and measures their range (in parallel).
     ///
     /// # Errors
-    /// A message to which the caller adds the place. The causes are an invalid lattice
-    /// ([`Lattice::validate`]), a number of samples that does not match the lattice, and NaN or
-    /// infinite samples (the message gives their number and the first).
-    pub fn new(lattice: Lattice, samples: Samples) -> Result<Self, String> {
-        lattice.validate()?;
+    /// [`Error::Argument`](crate::Error::Argument) for an invalid lattice ([`Lattice::validate`]),
+    /// a number of samples that does not match the lattice, and NaN or infinite samples (the
+    /// message gives their number and the first).
+    pub fn new(lattice: Lattice, samples: Samples) -> crate::Result<Self> {
+        Self::checked(lattice, samples).map_err(crate::Error::Argument)
+    }
+
+    /// Like [`new`](Self::new). The error is a message, to which the caller adds the place.
+    pub(crate) fn checked(lattice: Lattice, samples: Samples) -> Result<Self, String> {
+        lattice.check()?;
         if samples.len() != lattice.len() {
             let [nx, ny, nz] = lattice.dims;
             return Err(format!(
@@ -184,7 +213,7 @@ impl Volume {
     /// in every function that takes a volume, because the volume may have been built by hand. The
     /// error is a message.
     pub(crate) fn validate(&self) -> Result<(), String> {
-        self.lattice.validate()?;
+        self.lattice.check()?;
         if self.samples.len() != self.lattice.len() {
             return Err(format!(
                 "{} samples do not fill a lattice of {}",
@@ -209,6 +238,7 @@ impl Volume {
         self.samples.len()
     }
 
+    /// Returns whether the volume has no samples.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
@@ -334,7 +364,7 @@ mod tests {
     use glam::DVec3;
 
     fn volume(dims: [usize; 3], samples: Samples) -> Result<Volume, String> {
-        Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples)
+        Volume::checked(Lattice::with_spacing(dims, DVec3::ONE), samples)
     }
 
     #[test]

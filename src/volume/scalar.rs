@@ -3,14 +3,20 @@
 /// The type of a volume's samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scalar {
+    /// 8 bits, unsigned.
     U8,
+    /// 16 bits, unsigned.
     U16,
+    /// 16 bits, signed.
     I16,
+    /// 32 bits, signed.
     I32,
+    /// 32 bits, floating point.
     F32,
 }
 
 impl Scalar {
+    /// Every type.
     pub const ALL: [Self; 5] = [Self::U8, Self::U16, Self::I16, Self::I32, Self::F32];
 
     /// Returns the name, as the command spells it.

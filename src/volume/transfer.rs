@@ -19,6 +19,21 @@ use std::path::Path;
 /// 1.0, "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}`. Without `unit`
 /// it is 1; without `shade` the volume is not lit. Optional: `"gradient": [[magnitude, factor], …]`
 /// and `"isosurfaces": [{"value": 80, "color": [1, 1, 1], "opacity": 1}, …]`.
+///
+/// Values below 200 are invisible here:
+///
+/// ```
+/// use splatkit::volume::TransferFunction;
+///
+/// let bone = TransferFunction::from_json(
+///     r#"{"color": [[0, 0.8, 0.5, 0.4], [1000, 1, 1, 0.9]],
+///         "opacity": [[200, 0], [700, 0.5]], "unit": 2.0}"#,
+/// )?;
+/// assert_eq!(bone.opacity(450.0), 0.25);
+/// assert_eq!(bone.opacity(3000.0), 0.5);
+/// assert!(!bone.visible([-1000.0, 200.0]));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
     /// Value, and red, green, blue in 0 … 1. Values ascend.
@@ -40,6 +55,7 @@ pub struct TransferFunction {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Isosurface {
+    /// The value of the field on the surface.
     pub value: f64,
     /// Red, green, blue, 0 … 1.
     pub color: [f64; 3],
@@ -65,9 +81,13 @@ impl Default for TransferFunction {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shade {
+    /// Light that reaches every surface, whatever its direction.
     pub ambient: f64,
+    /// Light that depends on the angle between the surface's normal and the light.
     pub diffuse: f64,
+    /// The highlight's brightness.
     pub specular: f64,
+    /// How small the highlight is. Larger powers make smaller highlights.
     pub power: f64,
 }
 
@@ -115,8 +135,15 @@ impl TransferFunction {
     /// Reads the JSON form.
     ///
     /// # Errors
-    /// A message: invalid JSON (with line and column), or what [`validate`](Self::validate) finds.
-    pub fn from_json(text: &str) -> Result<Self, String> {
+    /// [`Error::Transfer`] for invalid JSON (with line and column), and those of
+    /// [`validate`](Self::validate).
+    pub fn from_json(text: &str) -> Result<Self> {
+        Self::parse(text).map_err(Error::Transfer)
+    }
+
+    /// Like [`from_json`](Self::from_json). The error is a message, to which the caller adds the
+    /// place.
+    fn parse(text: &str) -> Result<Self, String> {
         let document: Document = serde_json::from_str(text).map_err(|e| e.to_string())?;
         let transfer = Self {
             color: document.color.iter().map(|&[value, r, g, b]| (value, [r, g, b])).collect(),
@@ -130,7 +157,7 @@ impl TransferFunction {
                 .collect(),
             isosurfaces: document.isosurfaces,
         };
-        transfer.validate()?;
+        transfer.check()?;
         Ok(transfer)
     }
 
@@ -158,7 +185,7 @@ impl TransferFunction {
     /// a transfer function.
     pub fn read(path: &Path, limits: &Limits) -> Result<Self> {
         let text = Source::open(path, limits)?.small_text("a transfer function", MOST_BYTES)?;
-        Self::from_json(&text).map_err(|message| {
+        Self::parse(&text).map_err(|message| {
             Error::input(path, "transfer function", message).hint(
                 "the form is {\"color\": [[value, r, g, b], …], \
                      \"opacity\": [[value, opacity], …]}, all but values in 0 … 1",
@@ -172,8 +199,14 @@ impl TransferFunction {
     /// shade are finite and not negative.
     ///
     /// # Errors
-    /// A message that names the first point that is wrong.
-    pub fn validate(&self) -> Result<(), String> {
+    /// [`Error::Transfer`], which names the first point that is wrong.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(Error::Transfer)
+    }
+
+    /// Like [`validate`](Self::validate). The error is a message, to which the caller adds the
+    /// place.
+    fn check(&self) -> Result<(), String> {
         self.validate_numbers()?;
         if self.opacity.iter().all(|p| p.1 == 0.0) && self.isosurfaces.is_empty() {
             return Err(
@@ -499,11 +532,11 @@ mod tests {
                 "shade",
             ),
         ] {
-            assert!(message.contains(word), "{message}");
+            assert!(message.to_string().contains(word), "{message}");
         }
         let mut t = TransferFunction::from_json(EXAMPLE).unwrap();
         t.opacity[2].0 = f64::NAN;
-        assert!(t.validate().unwrap_err().contains("opacity point 2 is NaN"));
+        assert!(t.validate().unwrap_err().to_string().contains("opacity point 2 is NaN"));
         t.color.clear();
         assert_eq!(t.color(1.0), [0.0; 3]);
     }

@@ -230,7 +230,7 @@ fn las_points() -> Vec<[u8; 20]> {
     let point = |i: i32| {
         let mut point = [0; 20];
         (0..3).for_each(|axis| {
-            point[4 * axis..][..4].copy_from_slice(&(i * (axis as i32 + 1)).to_le_bytes())
+            point[4 * axis..][..4].copy_from_slice(&(i * (axis as i32 + 1)).to_le_bytes());
         });
         point[14] = 0b1001;
         point
@@ -390,34 +390,111 @@ pub const MTL: &str = "newmtl m\nKd 0.5 0.5 0.5\nmap_Kd a.png\n";
 /// A file name, its bytes, and whether the file may load if it is cut before a given byte.
 pub type Format = (&'static str, Vec<u8>, fn(&[u8], usize) -> bool);
 
+fn never(_: &[u8], _: usize) -> bool {
+    false
+}
+
+fn anywhere(_: &[u8], _: usize) -> bool {
+    true
+}
+
+fn but_for_spaces(bytes: &[u8], at: usize) -> bool {
+    bytes[at..].iter().all(u8::is_ascii_whitespace)
+}
+
+/// The last number may be cut to a shorter number.
+fn last_number(bytes: &[u8], at: usize) -> bool {
+    bytes[at..].trim_ascii_end().iter().all(|&b| b.is_ascii_digit() || b == b'.')
+}
+
 /// A file of every format: its name, its bytes, and whether it may load if it is cut before byte
 /// `at`. Text without counts or an end mark reads as fewer values if it is cut. All other readers
 /// must notice, unless only the last line break is lost.
 pub fn every_format(folder: &Folder) -> Vec<Format> {
-    fn never(_: &[u8], _: usize) -> bool {
-        false
-    }
-    fn anywhere(_: &[u8], _: usize) -> bool {
-        true
-    }
-    fn but_for_spaces(bytes: &[u8], at: usize) -> bool {
-        bytes[at..].iter().all(u8::is_ascii_whitespace)
-    }
-    // The last number may be cut to a shorter number.
-    fn last_number(bytes: &[u8], at: usize) -> bool {
-        bytes[at..].trim_ascii_end().iter().all(|&b| b.is_ascii_digit() || b == b'.')
-    }
-    let raw: Vec<u8> = (0..64).collect();
-    let triangle = "3 0 1 2\n";
+    folder.write("beside.bin", triangle_bytes());
+    folder.write("beside.raw", [1, 2, 3, 4]);
+    folder.write("a.mtl", MTL);
+    folder.write("a.png", png(2, 2));
+    let mut formats = formats_of_meshes();
+    formats.extend(formats_of_points());
+    formats.extend(formats_of_volumes());
+    formats.extend(formats_of_vtk());
+    formats.extend(formats_of_splatkit(folder));
+    formats
+}
+
+/// Hierarchies, bricks and transfer functions.
+fn formats_of_splatkit(folder: &Folder) -> Vec<Format> {
+    vec![
+        ("lossless.splk", splk(true), never),
+        ("lossy.splk", splk(false), never),
+        ("a.splv", splv(folder), never),
+        ("a.json", TRANSFER.into(), never),
+    ]
+}
+
+/// The corners of a triangle, as text.
+const TRIANGLE: &str = "0 0 0\n1 0 0\n0 1 0\n";
+
+fn formats_of_meshes() -> Vec<Format> {
     let face = format!(
         "element vertex 3\n{FLOATS}element face 1\nproperty list uchar int vertex_indices\n"
     );
+    vec![
+        ("ascii.ply", ply(&face, &format!("{TRIANGLE}3 0 1 2\n")), last_number),
+        ("little.ply", binary_ply(false), never),
+        ("big.ply", binary_ply(true), never),
+        ("a.obj", OBJ.into(), |bytes, at| {
+            bytes[..at].ends_with(b"\n") || bytes[..at].windows(2).any(|w| w == b"f ")
+        }),
+        ("binary.stl", stl(), never),
+        ("text.stl", STL_TEXT.into(), |bytes, at| at >= bytes.len() - 3),
+        ("a.gltf", gltf().into(), never),
+        ("beside.gltf", gltf_with("beside.bin", r#"{"mesh":0}"#).into(), never),
+        ("a.glb", glb(), never),
+    ]
+}
+
+fn formats_of_points() -> Vec<Format> {
     let floats: Vec<u8> =
         [1f32, 2.0, 3.0, 4.0, 5.0, 6.0].iter().flat_map(|v| v.to_le_bytes()).collect();
     // LZF: 24 literal bytes. Fields are stored one after the other.
     let lzf = [&[23u8][..], &floats].concat();
     let packed = [&(lzf.len() as u32).to_le_bytes()[..], &24u32.to_le_bytes(), &lzf].concat();
-    let text = "0 0 0\n1 0 0\n0 1 0\n";
+    vec![
+        ("a.las", las(), never),
+        ("a.laz", laz(), never),
+        ("a.e57", e57(|xml| xml), never),
+        ("a.xyz", TRIANGLE.into(), anywhere),
+        ("a.pts", format!("3\n{TRIANGLE}").into(), last_number),
+        ("a.csv", "x,y,z,value\n1,2,3,4\n5,6,7,85\n".into(), anywhere),
+        ("ascii.pcd", pcd("2", b"DATA ascii\n1 2 3\n4 5 6\n"), last_number),
+        ("binary.pcd", pcd("2", &[b"DATA binary\n", &floats[..]].concat()), never),
+        ("packed.pcd", pcd("2", &[b"DATA binary_compressed\n", &packed[..]].concat()), never),
+        ("a.npy", npy("(1, 4)", &[1.0, 2.0, 3.0, 4.0]), never),
+    ]
+}
+
+fn formats_of_volumes() -> Vec<Format> {
+    let raw: Vec<u8> = (0..64).collect();
+    vec![
+        ("raw.nrrd", nrrd("4 4 4", "encoding: raw", &raw), never),
+        ("gzip.nrrd", nrrd("4 4 4", "encoding: gzip", &gzip(&raw)), never),
+        ("ascii.nrrd", nrrd("2 2 1", "encoding: ascii", b"1 2 3 44\n"), last_number),
+        ("hex.nrrd", nrrd("2 2 1", "encoding: hex", b"01020304\n"), but_for_spaces),
+        // The name of the data file may be cut to one that does not exist; the empty line is not
+        // needed.
+        (
+            "detached.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: beside.raw", b""),
+            but_for_spaces,
+        ),
+        ("a.raw", raw.clone(), never),
+        ("a.gz", gzip(&raw), never),
+    ]
+}
+
+fn formats_of_vtk() -> Vec<Format> {
     let of_vti =
         |attributes: &str, array: &str| vtk_xml("ImageData", attributes, &vti_piece(array));
     let mut counted = 4u32.to_le_bytes().to_vec();
@@ -434,47 +511,7 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
         places("0 2"),
         places("0")
     );
-    folder.write("beside.bin", triangle_bytes());
-    folder.write("beside.raw", [1, 2, 3, 4]);
-    folder.write("a.mtl", MTL);
-    folder.write("a.png", png(2, 2));
     vec![
-        (
-            "ascii.ply",
-            ply(&face, &format!("{text}{triangle}")),
-            last_number as fn(&[u8], usize) -> bool,
-        ),
-        ("little.ply", binary_ply(false), never),
-        ("big.ply", binary_ply(true), never),
-        ("a.obj", OBJ.into(), |bytes, at| {
-            bytes[..at].ends_with(b"\n") || bytes[..at].windows(2).any(|w| w == b"f ")
-        }),
-        ("binary.stl", stl(), never),
-        ("text.stl", STL_TEXT.into(), |bytes, at| at >= bytes.len() - 3),
-        ("a.gltf", gltf().into(), never),
-        ("beside.gltf", gltf_with("beside.bin", r#"{"mesh":0}"#).into(), never),
-        ("a.glb", glb(), never),
-        ("a.las", las(), never),
-        ("a.laz", laz(), never),
-        ("a.e57", e57(|xml| xml), never),
-        ("a.xyz", text.into(), anywhere),
-        ("a.pts", format!("3\n{text}").into(), last_number),
-        ("a.csv", "x,y,z,value\n1,2,3,4\n5,6,7,85\n".into(), anywhere),
-        ("ascii.pcd", pcd("2", b"DATA ascii\n1 2 3\n4 5 6\n"), last_number),
-        ("binary.pcd", pcd("2", &[b"DATA binary\n", &floats[..]].concat()), never),
-        ("packed.pcd", pcd("2", &[b"DATA binary_compressed\n", &packed[..]].concat()), never),
-        ("a.npy", npy("(1, 4)", &[1.0, 2.0, 3.0, 4.0]), never),
-        ("raw.nrrd", nrrd("4 4 4", "encoding: raw", &raw), never),
-        ("gzip.nrrd", nrrd("4 4 4", "encoding: gzip", &gzip(&raw)), never),
-        ("ascii.nrrd", nrrd("2 2 1", "encoding: ascii", b"1 2 3 44\n"), last_number),
-        ("hex.nrrd", nrrd("2 2 1", "encoding: hex", b"01020304\n"), but_for_spaces),
-        // The name of the data file may be cut to one that does not exist; the empty line is not
-        // needed.
-        (
-            "detached.nhdr",
-            nrrd("2 2 1", "encoding: raw\ndata file: beside.raw", b""),
-            but_for_spaces,
-        ),
         ("ascii.vti", of_vti("", &array("format='ascii'", "1 2 3 4")).into(), never),
         ("binary.vti", of_vti("", &array("format='binary'", &base64(&counted))).into(), never),
         (
@@ -506,11 +543,5 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
         ("a.vtr", vtk_xml("RectilinearGrid", "", &vtr_piece).into(), never),
         ("a.vtu", vtu("0 1 2").into(), never),
         ("a.vtk", vtk().into(), last_number),
-        ("a.raw", raw.clone(), never),
-        ("a.gz", gzip(&raw), never),
-        ("lossless.splk", splk(true), never),
-        ("lossy.splk", splk(false), never),
-        ("a.splv", splv(folder), never),
-        ("a.json", TRANSFER.into(), never),
     ]
 }

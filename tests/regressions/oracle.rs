@@ -384,10 +384,10 @@ pub fn any(bytes: &[u8]) {
     for kind in [kind(false), kind(true)] {
         match kind {
             Some(Kind::Mesh) => {
-                read("input", bytes, formats::read_mesh).iter().for_each(sound_mesh)
+                read("input", bytes, formats::read_mesh).iter().for_each(sound_mesh);
             }
             Some(Kind::Volume) => {
-                volume("input", bytes, |source| formats::read_volume(source, None))
+                volume("input", bytes, |source| formats::read_volume(source, None));
             }
             Some(Kind::Samples) => samples("input", bytes, formats::read_samples),
             Some(Kind::Hierarchy) => splk(bytes),
@@ -507,7 +507,9 @@ pub fn transfer(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let transfer = match TransferFunction::from_json(text) {
         Ok(transfer) => transfer,
-        Err(message) => return assert!(!message.is_empty(), "an error without a message"),
+        Err(message) => {
+            return assert!(!message.to_string().is_empty(), "an error without a message");
+        }
     };
     let again =
         TransferFunction::from_json(&transfer.to_json()).expect("what was written can be read");

@@ -9,13 +9,13 @@ use crate::{
     progress::Progress,
     render::milliseconds,
     samples::Samples,
-    scene::SceneFlags,
+    scene::{Loaded, SceneFlags},
     suite::{SuiteFlags, effort::EffortFlags},
     sweep::SweepFlags,
     timing::{self, Times},
 };
 use clap::Args;
-use splatkit::{Error, Renderer};
+use splatkit::{Error, FrameStats, Renderer, math::Camera, scene::Settings};
 use std::time::Instant;
 
 /// Degrees between frames, as in VTK's benchmark of the same view.
@@ -96,41 +96,61 @@ impl Bench {
         progress.stage("Measuring the passes");
         let profile = renderer.profile(&camera(0), &settings)?;
         progress.clear();
-
-        let Times { min, median, max } = Times::of(times);
-        let [width, height] = self.engine.size;
-        let is_gathered = stats.gathered > 0;
-        // Gathered samples are neither drawn as splats nor culled.
-        let culled = if is_gathered { 0 } else { loaded.count.saturating_sub(stats.splats) };
+        let measured = Measured {
+            adapter: device.name(),
+            frames,
+            upload_ms,
+            first_ms,
+            times: Times::of(times),
+            stats,
+            profile,
+        };
         if self.json {
-            return output::json(&serde_json::json!({
-                "scene": self.scene.name(),
-                "adapter": device.name(),
-                "width": width,
-                "height": height,
-                "frames": frames,
-                "frame_ms": { "min": min, "median": median, "max": max },
-                "first_ms": first_ms,
-                "load_ms": loaded.load_ms,
-                "upload_ms": upload_ms,
-                "passes": timing::steps(&profile.steps),
-                "depth_passes": stats.passes,
-                "splats": stats.splats,
-                "hidden": stats.hidden,
-                "bricks": describe::bricks(&stats),
-                "entries": stats.entries,
-                "gathered": stats.gathered,
-                "culled": culled,
-                "gpu_bytes": stats.gpu_bytes,
-                "camera": crate::camera::to_json(&camera(0)),
-                "settings": describe::settings(&loaded.scene, &settings),
-            }));
+            return output::json(&self.to_json(&loaded, &settings, &camera(0), &measured));
         }
-        output::line(format_args!(
-            "{} at {width}x{height} on {}",
-            self.scene.name(),
-            device.name()
-        ))?;
+        self.print(&loaded, &measured)
+    }
+
+    /// Returns the results as JSON.
+    fn to_json(
+        &self,
+        loaded: &Loaded,
+        settings: &Settings,
+        camera: &Camera,
+        measured: &Measured,
+    ) -> serde_json::Value {
+        let Measured { times: Times { min, median, max }, stats, .. } = measured;
+        let [width, height] = self.engine.size;
+        serde_json::json!({
+            "scene": self.scene.name(),
+            "adapter": measured.adapter,
+            "width": width,
+            "height": height,
+            "frames": measured.frames,
+            "frame_ms": { "min": min, "median": median, "max": max },
+            "first_ms": measured.first_ms,
+            "load_ms": loaded.load_ms,
+            "upload_ms": measured.upload_ms,
+            "passes": timing::steps(&measured.profile.steps),
+            "depth_passes": stats.passes,
+            "splats": stats.splats,
+            "hidden": stats.hidden,
+            "bricks": describe::bricks(stats),
+            "entries": stats.entries,
+            "gathered": stats.gathered,
+            "culled": measured.culled(loaded),
+            "gpu_bytes": stats.gpu_bytes,
+            "camera": crate::camera::to_json(camera),
+            "settings": describe::settings(&loaded.scene, settings),
+        })
+    }
+
+    /// Prints the results as text.
+    fn print(&self, loaded: &Loaded, measured: &Measured) -> Result<(), Failure> {
+        let Measured { adapter, frames, upload_ms, first_ms, stats, profile, .. } = measured;
+        let Times { min, median, max } = measured.times;
+        let [width, height] = self.engine.size;
+        output::line(format_args!("{} at {width}x{height} on {adapter}", self.scene.name()))?;
         output::line(format_args!("load      {:10.1} ms", loaded.load_ms))?;
         output::line(format_args!("upload    {upload_ms:10.1} ms"))?;
         output::line(format_args!("first     {first_ms:10.1} ms"))?;
@@ -141,14 +161,15 @@ impl Bench {
             output::line(format_args!("  {name:<10}{ms:8.1} ms"))?;
         }
         output::line(format_args!(
-            "{} splats drawn, {} hidden, {culled} culled, {} entries in {} passes, {} MiB held",
+            "{} splats drawn, {} hidden, {} culled, {} entries in {} passes, {} MiB held",
             stats.splats - stats.hidden.min(stats.splats),
             stats.hidden,
+            measured.culled(loaded),
             stats.entries,
             stats.passes,
             stats.gpu_bytes >> 20
         ))?;
-        if is_gathered {
+        if stats.gathered > 0 {
             output::line(format_args!(
                 "gathered in {} pairs of a tile and a sheet",
                 stats.gathered
@@ -162,5 +183,26 @@ impl Bench {
             ))?;
         }
         Ok(())
+    }
+}
+
+/// The measured frames of a scene.
+struct Measured<'a> {
+    adapter: &'a str,
+    frames: u32,
+    upload_ms: f64,
+    first_ms: f64,
+    times: Times,
+    /// Of the first frame.
+    stats: FrameStats,
+    /// Of the frame whose passes were measured.
+    profile: FrameStats,
+}
+
+impl Measured<'_> {
+    /// Returns the number of culled splats. Gathered samples are neither drawn as splats nor
+    /// culled.
+    fn culled(&self, loaded: &Loaded) -> u64 {
+        if self.stats.gathered > 0 { 0 } else { loaded.count.saturating_sub(self.stats.splats) }
     }
 }

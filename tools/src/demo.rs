@@ -118,8 +118,8 @@ impl Demo {
         let mut mesh = Mesh::knot(1200, 72);
         // Scaled so that the knot winds through the specimen.
         mesh.positions.iter_mut().for_each(|p| *p *= KNOT_SCALE);
-        let specimen = Phantom::Specimen.sample([128; 3]).map_err(Error::Argument)?;
-        formats::ply::write(&mesh, &self.folder.join(MESH))?;
+        let specimen = Phantom::Specimen.sample([128; 3])?;
+        formats::ply::write(&mesh, self.folder.join(MESH))?;
         progress.stage("Building a hierarchy");
         let build = BuildOptions {
             closed: mesh.is_solid(),
@@ -128,8 +128,8 @@ impl Demo {
         };
         let write = WriteOptions { source: MESH.into(), ..WriteOptions::default() };
         let splats = mesh.surfels(&SurfelOptions::default())?;
-        build_file(&splats, &self.folder.join(TREE), &build, &write, &|_, _| ())?;
-        formats::nrrd::write(&specimen, &self.folder.join(VOLUME))?;
+        build_file(&splats, self.folder.join(TREE), &build, &write, &|_, _| ())?;
+        formats::nrrd::write(&specimen, self.folder.join(VOLUME))?;
         Ok(disk::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())?)
     }
 

@@ -49,9 +49,14 @@ impl Failure {
             | Self::Library(Error::Output { .. })
             | Self::Incomplete { .. }
             | Self::Threads(_) => 1,
-            Self::Usage(_) | Self::Library(Error::Argument(_)) => 2,
+            Self::Usage(_) | Self::Library(Error::Argument(_) | Error::Transfer(_)) => 2,
             Self::Library(
-                Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_) | Error::Memory { .. },
+                Error::NoAdapter(_)
+                | Error::Driver(_)
+                | Error::EntriesExhausted { .. }
+                | Error::MemoryBound { .. }
+                | Error::DeviceLost(_)
+                | Error::Memory { .. },
             ) => 4,
             Self::Library(
                 Error::Input { .. }
@@ -60,6 +65,8 @@ impl Failure {
                 | Error::File { .. }
                 | Error::NothingToDraw(_),
             ) => 3,
+            // An error that this command does not know yet.
+            Self::Library(_) => 1,
             Self::Damaged { .. } => 3,
             Self::Comparison(_) => 5,
         }
@@ -80,15 +87,14 @@ impl Failure {
             Self::Library(Error::NoAdapter(_)) => {
                 Some("`splatkit gpus` lists the adapters; --engine cpu and --reference need no GPU")
             }
-            // The flag that sets this budget.
-            Self::Library(Error::Gpu(message)) if message.ends_with("raise the budget") => {
+            Self::Library(Error::EntriesExhausted { .. }) => {
                 Some("raise --pass-entries, or draw a smaller --size")
             }
-            Self::Library(Error::Gpu(message)) if message.ends_with("may be taken") => Some(
+            Self::Library(Error::MemoryBound { .. }) => Some(
                 "raise --gpu-memory, or convert the input to .splk or .splv (`splatkit convert`) \
                  and draw less of it with --cut or --budget",
             ),
-            Self::Library(Error::Gpu(_)) => Some(
+            Self::Library(Error::Driver(_)) => Some(
                 "try a smaller --size, another --gpu (such as `software`), or a longer \
                  --gpu-timeout",
             ),
@@ -100,10 +106,10 @@ impl Failure {
                 "`splatkit info` prints what a file contains; --transfer, --range, --clip and the \
                  camera decide what is visible",
             ),
-            Self::Library(Error::Argument(_)) | Self::Usage(_) => {
+            Self::Library(Error::Argument(_) | Error::Transfer(_)) | Self::Usage(_) => {
                 Some("`splatkit help` lists the options")
             }
-            Self::Library(Error::File { .. }) | Self::Comparison(_) => None,
+            Self::Library(_) | Self::Comparison(_) => None,
             Self::Damaged { .. } => Some("make it again from its source, or download it again"),
             Self::Threads(_) => {
                 Some("end other programs, raise `ulimit -u`, or set RAYON_NUM_THREADS=1")
@@ -131,7 +137,7 @@ impl Failure {
     /// Whether the message comes from the GPU's driver or library, whose messages have several
     /// lines. Other messages have one line, and a line break in them comes from a file's text.
     fn has_lines(&self) -> bool {
-        matches!(self, Self::Library(Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_)))
+        matches!(self, Self::Library(Error::NoAdapter(_) | Error::Driver(_) | Error::DeviceLost(_)))
     }
 }
 

@@ -122,7 +122,7 @@ impl Generate {
                 disk::write_with(&self.output, |out| rectilinear(phantom, self.dims, out))?;
             }
             (What::Phantom(phantom), ..) if self.sample_type == Type::U8 => {
-                self.bytes(phantom, progress)?
+                self.bytes(phantom, progress)?;
             }
             (What::Phantom(phantom), ..) => {
                 let [x, ..] = self.dims;
@@ -130,7 +130,7 @@ impl Generate {
                     if matches!(self.lattice, Places::Bcc) { [x; 3] } else { self.dims },
                     AS_NUMBERS,
                 )?;
-                let volume = self.volume(phantom).map_err(Error::Argument)?;
+                let volume = self.volume(phantom)?;
                 formats::nrrd::write(&volume, &self.output)?;
             }
         }
@@ -147,7 +147,7 @@ impl Generate {
         // Only one slice is in memory at a time.
         let [x, y, z] = self.dims;
         check_dims([x, y, z.min(1)], AS_BYTES)?;
-        let slices = phantom.byte_slices(self.dims).map_err(Error::Argument)?;
+        let slices = phantom.byte_slices(self.dims)?;
         let bar = progress.bar("Making slices", self.dims[2] as u64);
         formats::nrrd::write_bytes(slices.lattice(), &self.output, |k| {
             bar.set(k as u64);
@@ -156,7 +156,7 @@ impl Generate {
         Ok(())
     }
 
-    fn volume(&self, phantom: Phantom) -> Result<Volume, String> {
+    fn volume(&self, phantom: Phantom) -> splatkit::Result<Volume> {
         match self.lattice {
             Places::Cartesian => phantom.sample(self.dims),
             Places::Bcc => phantom.sample_on(body_centred(self.dims[0])),

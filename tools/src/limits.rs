@@ -1,7 +1,7 @@
 //! The flags that limit what reading an input may take.
 
 use clap::Args;
-use splatkit::{error::LimitKind, input::Limits};
+use splatkit::{error::LimitKind, formats::Format, input::Limits};
 use std::path::Path;
 
 /// Limits for what a file claims, and for the memory and time that reading it takes.
@@ -81,10 +81,8 @@ pub fn hint(file: &Path, kind: LimitKind, found: u64) -> String {
 
 /// Returns the file's size if that is far too small for what the file claims.
 fn too_few_bytes(file: &Path, kind: LimitKind, found: u64) -> Option<u64> {
-    // The data of these formats may be in other files.
-    let refers = file
-        .extension()
-        .is_some_and(|e| ["gltf", "nrrd", "nhdr", "obj"].iter().any(|o| e.eq_ignore_ascii_case(o)));
+    // The data may be in other files.
+    let refers = Format::of_path(file).is_some_and(|format| format.refers);
     // A packed point takes a fraction of a byte or more. A byte unpacks to at most a thousand
     // bytes, each of which may take several hundred bytes of memory.
     let most = if kind == LimitKind::Points { 64 } else { 1 << 20 };

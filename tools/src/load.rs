@@ -6,7 +6,7 @@ use glam::DVec3;
 use splatkit::{
     Deadline, Error,
     bricks::Bricks,
-    formats::{self, Endian, Kind, RawLayout, SampleType, VolumeStream},
+    formats::{self, Content, Endian, FORMATS, Format, Kind, RawLayout, SampleType, VolumeStream},
     hierarchy::Hierarchy,
     input::{Limits, Source},
     memory,
@@ -160,12 +160,24 @@ impl LoadFlags {
     }
 }
 
+/// Returns the error for a file in no known format, with a hint that lists the known ones.
 fn unknown(path: &Path) -> Error {
-    Error::input(path, "file", "is in no format that can be read").hint(
-        "hierarchies: .splk; volumes in bricks: .splv; meshes: .ply, .obj, .gltf, .glb, .stl; \
-         point clouds: .ply, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, and .csv and .txt whose \
-         columns are a position, a colour or a normal; volumes: .vti, .vtr, .vtk, .nrrd, .nhdr, \
-         and raw samples (also packed by gzip) with --dims and --type; scattered samples: .vtu, \
-         .vtp, .vtk, .npy, .csv, .txt, .xyzv, and .ply and tables of points with --scalar",
-    )
+    let lists = Content::ALL.map(|content| {
+        let holds =
+            |format: &&Format| format.holds.iter().any(|holding| holding.content == content);
+        let extensions: Vec<String> = FORMATS
+            .iter()
+            .filter(holds)
+            .flat_map(|format| format.extensions)
+            .map(|extension| format!(".{extension}"))
+            .collect();
+        let raw = match content {
+            Content::Volume => ", and raw samples (also packed by gzip) with --dims and --type",
+            _ => "",
+        };
+        format!("{}: {}{raw}", content.plural(), extensions.join(", "))
+    });
+    let lists = lists.join("; ");
+    Error::input(path, "file", "is in no format that can be read")
+        .hint(format!("{lists}; `splatkit formats` says which file holds what"))
 }

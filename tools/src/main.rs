@@ -8,12 +8,14 @@ mod camera;
 mod check;
 mod clip;
 mod compare;
+mod completions;
 mod convert;
 mod demo;
 mod describe;
 mod engine;
 mod failure;
 mod figures;
+mod formats;
 mod generate;
 mod gpus;
 mod info;
@@ -21,6 +23,7 @@ mod interrupt;
 mod kernel;
 mod limits;
 mod load;
+mod man;
 mod method;
 mod output;
 mod parse;
@@ -37,7 +40,7 @@ mod terminal;
 mod threads;
 mod timing;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use failure::Failure;
 use progress::Progress;
 use std::{
@@ -98,6 +101,12 @@ enum Task {
     Figures(figures::Figures),
     /// List the adapters that can draw, and their limits.
     Gpus(gpus::Gpus),
+    /// List the formats of files: what they hold, and whether they are read in pieces and written.
+    Formats(formats::Formats),
+    /// Print a script that completes tasks and flags in a shell.
+    Completions(completions::Completions),
+    /// Write these help texts as manual pages.
+    Man(man::Pages),
 }
 
 fn main() -> ExitCode {
@@ -123,6 +132,9 @@ fn main() -> ExitCode {
         Task::Generate(task) => task.run(&progress),
         Task::Figures(task) => task.run(&progress),
         Task::Gpus(task) => task.run(),
+        Task::Formats(task) => task.run(),
+        Task::Completions(task) => task.run(Command::command()),
+        Task::Man(task) => task.run(Command::command()),
     };
     progress.clear();
     match result {

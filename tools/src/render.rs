@@ -100,6 +100,13 @@ impl Drawer {
     }
 }
 
+/// The last frame, and the median time of all.
+struct Drawn {
+    stats: FrameStats,
+    camera: Camera,
+    frame_ms: f64,
+}
+
 impl Render {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         let frames = self.turntable.unwrap_or(1);
@@ -109,40 +116,15 @@ impl Render {
         let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
         files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
         let settings = self.engine.settings(&loaded, self.samples)?;
-        let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
             false => Drawer::engine(&self.engine, &loaded, progress)?,
         };
         let upload_ms = milliseconds(start);
-        let mut times = Vec::new();
-        let mut last = (FrameStats::default(), self.camera.camera(&loaded.subject, settings.size)?);
-        for (frame, target) in (0..frames).zip(&targets) {
-            progress.stage(format!("Drawing {}", target.name()));
-            let camera = match self.turntable {
-                Some(_) => {
-                    let turn = 360.0 * f64::from(frame) / f64::from(frames);
-                    self.camera.turned(&loaded.subject, settings.size, turn)
-                }
-                None => last.1,
-            };
-            let start = Instant::now();
-            let (picture, stats) = drawer.draw(&loaded, &camera, &settings)?;
-            times.push(milliseconds(start));
-            self.engine.require_content(&picture)?;
-            let picture = if factor > 1 { picture.reduced(factor)? } else { picture };
-            progress.stage(format!("Writing {}", target.name()));
-            target.write(&picture.encode(target.format(), self.background.0)?)?;
-            if let Some(depth) = &self.depth {
-                disk::write(depth, &picture.encode_depth()?)?;
-            }
-            last = (stats, camera);
-        }
+        let drawn = self.draw_frames(&mut drawer, &loaded, &settings, &targets, progress)?;
         progress.clear();
-        let (stats, camera) = last;
-        times.sort_by(f64::total_cmp);
-        let frame_ms = times[times.len() / 2];
+        let Drawn { stats, camera, frame_ms } = drawn;
         tracing::info!(
             splats = stats.splats,
             hidden = stats.hidden,
@@ -173,6 +155,44 @@ impl Render {
             }))?;
         }
         Ok(())
+    }
+
+    /// Draws and writes one frame for each target.
+    fn draw_frames(
+        &self,
+        drawer: &mut Drawer,
+        loaded: &Loaded,
+        settings: &Settings,
+        targets: &[Target],
+        progress: &Progress,
+    ) -> Result<Drawn, Failure> {
+        let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
+        let mut times = Vec::new();
+        let mut last = (FrameStats::default(), self.camera.camera(&loaded.subject, settings.size)?);
+        for (frame, target) in targets.iter().enumerate() {
+            progress.stage(format!("Drawing {}", target.name()));
+            let camera = match self.turntable {
+                Some(frames) => {
+                    let turn = 360.0 * frame as f64 / f64::from(frames);
+                    self.camera.turned(&loaded.subject, settings.size, turn)
+                }
+                None => last.1,
+            };
+            let start = Instant::now();
+            let (picture, stats) = drawer.draw(loaded, &camera, settings)?;
+            times.push(milliseconds(start));
+            self.engine.require_content(&picture)?;
+            let picture = if factor > 1 { picture.reduced(factor)? } else { picture };
+            progress.stage(format!("Writing {}", target.name()));
+            target.write(&picture.encode(target.format(), self.background.0)?)?;
+            if let Some(depth) = &self.depth {
+                disk::write(depth, &picture.encode_depth()?)?;
+            }
+            last = (stats, camera);
+        }
+        times.sort_by(f64::total_cmp);
+        let (stats, camera) = last;
+        Ok(Drawn { stats, camera, frame_ms: times[times.len() / 2] })
     }
 
     /// Returns one target per frame. Fails if one of the files exists and may not be replaced, or

@@ -5,22 +5,24 @@ use crate::{
     failure::Failure,
     load::{Input, LoadFlags},
     progress::Progress,
-    show::ShowFlags,
+    show::{Show, ShowFlags},
 };
 use clap::Args;
 use glam::DVec3;
 use splatkit::{
-    Error,
+    Deadline, Error,
     bricks::{Bricks, Level},
-    hierarchy::file::UpAxis,
+    hierarchy::{Hierarchy, file::UpAxis},
     math::Bounds,
     memory,
+    scattered::Points,
     scene::Scene,
-    surface::SurfelOptions,
-    volume::TransferFunction,
+    surface::{Mesh, SurfelOptions},
+    volume::{TransferFunction, Volume},
 };
 use std::{
     path::{Path, PathBuf},
+    sync::Arc,
     time::Instant,
 };
 
@@ -55,85 +57,28 @@ impl SceneFlags {
     pub fn load(&self, progress: &Progress) -> Result<Loaded, Failure> {
         let start = Instant::now();
         let show = self.show.open(&self.load.limits())?;
-        let mut loaded = Loaded {
+        let loaded = Loaded {
             scene: Scene::new(),
             subject: Subject { bounds: Bounds::EMPTY, up: DVec3::Z },
             count: 0,
             load_ms: 0.0,
             read: self.show.files(),
         };
+        let mut adding = Adding { flags: self, show, progress, loaded };
         let (mut is_scaled, mut unscaled) = (false, None);
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
             // One deadline covers reading the input and making its splats.
             let deadline = self.load.limits().deadline();
-            match self.load.open_within(path, memory::most(), &mut loaded.read)? {
-                Input::Mesh(mesh) => {
-                    is_scaled = true;
-                    progress.stage(format!("Making surfels of {}", path.display()));
-                    let mut options = SurfelOptions { deadline, ..SurfelOptions::default() };
-                    options.radius_scale *= self.show.radius_scale.unwrap_or(1.0);
-                    let splats = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
-                    let bounds =
-                        mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
-                    loaded.add(bounds, splats.splats.len());
-                    loaded.scene = loaded.scene.with_splats(splats);
-                    if !mesh.z_is_up {
-                        loaded.subject.up = DVec3::Y;
-                    }
-                }
-                Input::Hierarchy(hierarchy) => {
-                    unscaled = Some(path);
-                    let header = hierarchy.header();
-                    loaded.add(header.bounds, header.leaves as usize);
-                    loaded.subject.up = match header.up {
-                        Some(UpAxis::X) => DVec3::X,
-                        Some(UpAxis::Z) => DVec3::Z,
-                        Some(UpAxis::Y) | None => DVec3::Y,
-                    };
-                    loaded.scene = loaded.scene.with_hierarchy(hierarchy);
-                }
-                Input::Bricks(bricks) => {
-                    if show.sharp {
-                        let error =
-                            Error::input(path, "content", "a volume in bricks cannot be sharpened");
-                        return Err(error
-                            .hint("leave out --sharp, or draw the original volume")
-                            .into());
-                    }
-                    let overview = bricks.volume(overview(&bricks))?;
-                    let range = bricks.header().range;
-                    let transfer =
-                        show.transfer(path, range, || TransferFunction::automatic(&overview))?;
-                    loaded.add(bricks.bounds(), bricks.level(0).dims.iter().product());
-                    loaded.scene = loaded.scene.with_bricks(bricks, show.kernel.clone(), transfer);
-                }
-                Input::Volume(volume) => {
-                    let transfer =
-                        show.transfer(path, volume.range, || TransferFunction::automatic(&volume))?;
-                    let [min, max] = volume.bounds();
-                    loaded.add(Bounds { min, max }, volume.len());
-                    let volume = if show.sharp {
-                        progress.stage(format!("Sharpening {}", path.display()));
-                        volume.sharpened(&show.kernel)?
-                    } else {
-                        volume
-                    };
-                    loaded.scene = loaded.scene.with_volume(volume, show.kernel.clone(), transfer);
-                }
-                Input::Samples(points) => {
-                    let automatic = || points.automatic_transfer();
-                    let transfer = show.transfer(path, points.range(), automatic)?;
-                    progress.stage(format!("Making splats of {}", path.display()));
-                    let splats = points
-                        .to_splats(&self.load.sample_options(deadline))
-                        .map_err(|e| in_file(path, e))?;
-                    let [min, max] = points.bounds();
-                    loaded.add(Bounds { min, max }.union(splats.bounds()), points.len());
-                    loaded.scene = loaded.scene.with_samples(splats, transfer);
-                }
+            let input = self.load.open_within(path, memory::most(), &mut adding.loaded.read)?;
+            match &input {
+                Input::Mesh(_) => is_scaled = true,
+                Input::Hierarchy(_) => unscaled = Some(path),
+                _ => {}
             }
+            adding.add(path, input, deadline)?;
         }
+        let mut loaded = adding.loaded;
         if let (Some(_), Some(path), false) = (self.show.radius_scale, unscaled, is_scaled) {
             return Err(Failure::Usage(format!(
                 "--radius-scale does not apply to {}: a hierarchy keeps the radii that it was \
@@ -141,30 +86,7 @@ impl SceneFlags {
                 path.display()
             )));
         }
-        // If an item cannot be drawn by itself, its file is at fault, or the flags that say how it
-        // is shown.
-        let at_fault = |error: Error| -> Failure {
-            let items = self.inputs.iter().zip(&loaded.scene.items);
-            let found =
-                items.into_iter().find_map(|(path, item)| Some((path, item.validate().err()?)));
-            match (found, self.show.transfer_text()) {
-                (None, _) => error.into(),
-                (Some((path, Error::Argument(what))), Some(flags))
-                    if what.starts_with("the transfer function") =>
-                {
-                    if let Some(file) = self.show.own_transfer() {
-                        let message = format!("{what}; the values are those of {}", path.display());
-                        return Error::input(file, "content", message).into();
-                    }
-                    Failure::Usage(format!(
-                        "{flags}: {what}; the values are those of {}",
-                        path.display()
-                    ))
-                }
-                (Some((path, own)), _) => in_file(path, own).into(),
-            }
-        };
-        loaded.scene.validate().map_err(at_fault)?;
+        loaded.scene.validate().map_err(|error| self.at_fault(&loaded.scene, error))?;
         // Points that all lie at one place have no extent, but their splats have one.
         if is_one_place(&loaded.subject.bounds) {
             loaded.subject.bounds = loaded.scene.bounds();
@@ -173,14 +95,134 @@ impl SceneFlags {
         Ok(loaded)
     }
 
+    /// Returns the error for a scene that cannot be drawn. If an item cannot be drawn by itself,
+    /// its file is at fault, or the flags that say how it is shown.
+    fn at_fault(&self, scene: &Scene, error: Error) -> Failure {
+        let items = self.inputs.iter().zip(&scene.items);
+        let found = items.into_iter().find_map(|(path, item)| Some((path, item.validate().err()?)));
+        match (found, self.show.transfer_text()) {
+            (None, _) => error.into(),
+            (Some((path, Error::Transfer(what))), Some(flags)) => {
+                if let Some(file) = self.show.own_transfer() {
+                    let message = format!("{what}; the values are those of {}", path.display());
+                    return Error::input(file, "content", message).into();
+                }
+                Failure::Usage(format!(
+                    "{flags}: {what}; the values are those of {}",
+                    path.display()
+                ))
+            }
+            (Some((path, own)), _) => in_file(path, own).into(),
+        }
+    }
+
     /// Returns the inputs as a line of text.
     pub fn name(&self) -> String {
         self.inputs.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
     }
 }
 
+/// A scene to which inputs are added.
+struct Adding<'a> {
+    flags: &'a SceneFlags,
+    show: Show<'a>,
+    progress: &'a Progress,
+    loaded: Loaded,
+}
+
+impl Adding<'_> {
+    /// Adds an input to the scene. Its splats must be made by the deadline.
+    fn add(&mut self, path: &Path, input: Input, deadline: Deadline) -> Result<(), Failure> {
+        match input {
+            Input::Mesh(mesh) => self.add_mesh(path, &mesh, deadline),
+            Input::Hierarchy(hierarchy) => {
+                self.add_hierarchy(hierarchy);
+                Ok(())
+            }
+            Input::Bricks(bricks) => self.add_bricks(path, bricks),
+            Input::Volume(volume) => self.add_volume(path, volume),
+            Input::Samples(points) => self.add_samples(path, &points, deadline),
+        }
+    }
+
+    fn add_mesh(&mut self, path: &Path, mesh: &Mesh, deadline: Deadline) -> Result<(), Failure> {
+        self.progress.stage(format!("Making surfels of {}", path.display()));
+        let mut options = SurfelOptions { deadline, ..SurfelOptions::default() };
+        options.radius_scale *= self.flags.show.radius_scale.unwrap_or(1.0);
+        let splats = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
+        let bounds = mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
+        self.loaded.count_in(bounds, splats.splats.len());
+        self.change(|scene| scene.with_splats(splats));
+        if !mesh.z_is_up {
+            self.loaded.subject.up = DVec3::Y;
+        }
+        Ok(())
+    }
+
+    fn add_hierarchy(&mut self, hierarchy: Arc<Hierarchy>) {
+        let header = hierarchy.header();
+        self.loaded.count_in(header.bounds, header.leaves as usize);
+        self.loaded.subject.up = match header.up {
+            Some(UpAxis::X) => DVec3::X,
+            Some(UpAxis::Z) => DVec3::Z,
+            Some(UpAxis::Y) | None => DVec3::Y,
+        };
+        self.change(|scene| scene.with_hierarchy(hierarchy));
+    }
+
+    fn add_bricks(&mut self, path: &Path, bricks: Arc<Bricks>) -> Result<(), Failure> {
+        if self.show.sharp {
+            let error = Error::input(path, "content", "a volume in bricks cannot be sharpened");
+            return Err(error.hint("leave out --sharp, or draw the original volume").into());
+        }
+        let overview = bricks.volume(overview(&bricks))?;
+        let automatic = || TransferFunction::automatic(&overview);
+        let transfer = self.show.transfer(path, bricks.header().range, automatic)?;
+        self.loaded.count_in(bricks.bounds(), bricks.level(0).dims.iter().product());
+        let kernel = self.show.kernel.clone();
+        self.change(|scene| scene.with_bricks(bricks, kernel, transfer));
+        Ok(())
+    }
+
+    fn add_volume(&mut self, path: &Path, mut volume: Volume) -> Result<(), Failure> {
+        let automatic = || TransferFunction::automatic(&volume);
+        let transfer = self.show.transfer(path, volume.range, automatic)?;
+        let [min, max] = volume.bounds();
+        self.loaded.count_in(Bounds { min, max }, volume.len());
+        let kernel = self.show.kernel.clone();
+        if self.show.sharp {
+            self.progress.stage(format!("Sharpening {}", path.display()));
+            volume = volume.sharpened(&kernel)?;
+        }
+        self.change(|scene| scene.with_volume(volume, kernel, transfer));
+        Ok(())
+    }
+
+    fn add_samples(
+        &mut self,
+        path: &Path,
+        points: &Points,
+        deadline: Deadline,
+    ) -> Result<(), Failure> {
+        let automatic = || points.automatic_transfer();
+        let transfer = self.show.transfer(path, points.range(), automatic)?;
+        self.progress.stage(format!("Making splats of {}", path.display()));
+        let options = self.flags.load.sample_options(deadline);
+        let splats = points.to_splats(&options).map_err(|e| in_file(path, e))?;
+        let [min, max] = points.bounds();
+        self.loaded.count_in(Bounds { min, max }.union(splats.bounds()), points.len());
+        self.change(|scene| scene.with_samples(splats, transfer));
+        Ok(())
+    }
+
+    fn change(&mut self, change: impl FnOnce(Scene) -> Scene) {
+        self.loaded.scene = change(std::mem::take(&mut self.loaded.scene));
+    }
+}
+
 impl Loaded {
-    fn add(&mut self, bounds: Bounds, count: usize) {
+    /// Adds the bounds and the number of splats or samples of an input.
+    fn count_in(&mut self, bounds: Bounds, count: usize) {
         self.subject.bounds = self.subject.bounds.union(bounds);
         self.count += count as u64;
     }

@@ -239,7 +239,7 @@ impl Factors {
         // The library checks the points.
         let whole =
             TransferFunction { opacity: vec![(0.0, 1.0)], gradient, ..TransferFunction::default() };
-        whole.validate()?;
+        whole.validate().map_err(|error| error.to_string())?;
         Ok(Self(whole.gradient))
     }
 }

@@ -134,9 +134,9 @@ impl Line<'_> {
 impl Visit for Line<'_> {
     fn record_str(&mut self, field: &Field, value: &str) {
         if field.name() == "message" {
-            self.add(field, value)
+            self.add(field, value);
         } else {
-            self.record_debug(field, &value)
+            self.record_debug(field, &value);
         }
     }
 

@@ -107,10 +107,7 @@ fn what_cannot_be_cut_in_bricks_is_told() {
         (0..4096).flat_map(|i| (if i == 7 { f32::NAN } else { 1.0 }).to_le_bytes()).collect();
     folder.put("nan.nrrd", nrrd("float", &nan));
     folder.run("convert nan.nrrd -o a.splv").fails(3, &["nan.nrrd", "slices 0 to 7", "not finite"]);
-    let mut names: Vec<_> =
-        std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-    names.sort();
-    assert_eq!(names, ["a.nrrd", "a.ply", "a.raw", "bcc.nrrd", "nan.nrrd"]);
+    assert_eq!(folder.names(), ["a.nrrd", "a.ply", "a.raw", "bcc.nrrd", "nan.nrrd"]);
 }
 
 #[test]

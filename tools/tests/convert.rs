@@ -11,7 +11,7 @@ use splatkit::{
 };
 
 fn volume(folder: &Folder, name: &str) -> Volume {
-    formats::load_volume(&folder.path(name), &Limits::default(), None).unwrap()
+    formats::load_volume(folder.path(name), &Limits::default(), None).unwrap()
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn a_hierarchy_of_a_hierarchy_keeps_what_is_told_of_it() {
     folder.put("a.ply", PLY);
     folder.run("convert a.ply -o a.splk --up x --unit mm --lossless").ok();
     folder.run("convert a.splk -o b.splk --radius-scale 2 --lossless").ok();
-    let open = |name: &str| Hierarchy::open(&folder.path(name), &Limits::default()).unwrap();
+    let open = |name: &str| Hierarchy::open(folder.path(name), &Limits::default()).unwrap();
     let (a, b) = (open("a.splk"), open("b.splk"));
     assert_eq!((b.header().up, b.header().unit.as_str()), (a.header().up, "mm"));
     let widths = |hierarchy: &Hierarchy| {
@@ -121,6 +121,15 @@ fn what_cannot_be_converted_is_told() {
         );
     }
     std::fs::remove_file(folder.path("a.splv")).unwrap();
+    // No unfinished file is left.
+    assert_eq!(folder.names(), ["a.nrrd", "a.ply"]);
+}
+
+#[test]
+fn flags_are_for_some_formats() {
+    let folder = Folder::new("flags");
+    folder.put("a.nrrd", nrrd("uint8", &ball()));
+    folder.put("a.ply", PLY);
     for (arguments, flag) in [
         ("a.ply -o b.ply --lossless", "--lossless is for .splk files"),
         ("a.ply -o b.ply --preset best", "--preset is for .splk files"),
@@ -132,6 +141,12 @@ fn what_cannot_be_converted_is_told() {
     }
     folder.run("convert a.nrrd -o b.nrrd --lattice fcc").fails(2, &["fcc", "bcc"]);
     folder.run("convert a.nrrd").fails(2, &["--output"]);
+    assert_eq!(folder.names(), ["a.nrrd", "a.ply"]);
+}
+
+#[test]
+fn lattices_that_cannot_be_converted() {
+    let folder = Folder::new("lattices");
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 1\nencoding: raw\n\n";
     folder.put("flat.nrrd", [header.as_bytes(), &[1; 16]].concat());
     folder.run("convert flat.nrrd -o b.nrrd --lattice bcc").fails(2, &["4 × 4 × 1", "2 or more"]);
@@ -140,7 +155,12 @@ fn what_cannot_be_converted_is_told() {
         [header.replace("raw", "raw\nlattice:=fcc").as_bytes(), &[1; 16]].concat(),
     );
     folder.run("convert odd.nrrd -o b.nrrd").fails(3, &["odd.nrrd", "lattice", "fcc"]);
-    // A file that an input refers to may not be replaced either.
+    assert_eq!(folder.names(), ["flat.nrrd", "odd.nrrd"]);
+}
+
+#[test]
+fn files_that_an_input_refers_to_are_not_replaced() {
+    let folder = Folder::new("away");
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: raw\n\
         data file: data.nrrd\n";
     folder.put("away.nhdr", header);
@@ -178,9 +198,5 @@ fn what_cannot_be_converted_is_told() {
             std::fs::remove_file(folder.path(name)).unwrap();
         }
     }
-    // No unfinished file is left.
-    let mut names: Vec<_> =
-        std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-    names.sort();
-    assert_eq!(names, ["a.nrrd", "a.ply", "flat.nrrd", "odd.nrrd"]);
+    assert_eq!(folder.names(), [""; 0]);
 }

@@ -36,10 +36,7 @@ fn what_can_only_be_read_as_a_whole_is_told() {
     folder
         .run("convert lost.ply -o a.splk --memory 1MiB")
         .fails(3, &["lost.ply", "refers to vertex"]);
-    let mut names: Vec<_> =
-        std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-    names.sort();
-    assert_eq!(names, ["a.obj", "cut.ply", "lost.ply"]);
+    assert_eq!(folder.names(), ["a.obj", "cut.ply", "lost.ply"]);
 }
 
 /// Returns `count` large triangles, one above the other, as PLY and as OBJ.

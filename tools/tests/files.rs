@@ -293,3 +293,48 @@ fn names_that_are_no_text_are_told() {
         .ok();
     assert!(folder.0.join(OsStr::from_bytes(b"t\xff_0001.png")).exists());
 }
+
+#[test]
+fn formats_are_listed() {
+    let folder = Folder::new("formats");
+    let list = folder.json("formats --json");
+    let text = folder.run("formats").stdout();
+    let named = |name: &str| {
+        let found = list.as_array().unwrap().iter().find(|format| format["name"] == name);
+        found.unwrap_or_else(|| panic!("no {name}")).clone()
+    };
+    assert_eq!(named("LAS")["extensions"], serde_json::json!(["las", "laz"]));
+    assert_eq!(
+        named("PLY")["holds"],
+        serde_json::json!([
+            {"content": "mesh", "when": "with faces"},
+            {"content": "point cloud", "when": "without faces"},
+            {"content": "scattered samples", "when": "without faces, if a scalar is named"},
+        ])
+    );
+    for (name, in_pieces, written) in
+        [("PLY", true, true), ("LAS", true, false), ("VTI", false, false), ("NRRD", true, true)]
+    {
+        let format = named(name);
+        assert_eq!(
+            (format["read_in_pieces"].as_bool(), format["written"].as_bool()),
+            (Some(in_pieces), Some(written)),
+            "{name}"
+        );
+    }
+    for format in list.as_array().unwrap() {
+        assert!(text.contains(format["name"].as_str().unwrap()), "{format}");
+    }
+    assert!(text.contains("\nLAS  .las .laz\n   point cloud\n   read in pieces, not written\n"));
+    // A file in none of them: the message lists all extensions.
+    folder.put("a.bin", "hello");
+    folder.run("info a.bin").fails(
+        3,
+        &[
+            "a.bin: file: is in no format that can be read",
+            "hierarchies: .splk; volumes in bricks: .splv; meshes: .ply, .obj, .gltf, .glb, .stl;",
+            "volumes: .vtr, .vti, .vtk, .nrrd, .nhdr, and raw samples",
+            "--dims and --type; scattered samples: .ply, .xyz,",
+        ],
+    );
+}

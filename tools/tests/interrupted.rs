@@ -137,7 +137,7 @@ fn who_is_killed_leaves_the_old_file_or_the_new_one() {
 #[test]
 fn who_is_interrupted_leaves_nothing() {
     let interrupt = |moment: u32, child: &mut Child| {
-        signal(child, ["INT", "TERM", "INT", "HUP"][moment as usize % 4])
+        signal(child, ["INT", "TERM", "INT", "HUP"][moment as usize % 4]);
     };
     let sent = [2, 15, 1].map(Some);
     let [stopped, _] = stop("interrupted", 12, interrupt, |status, left, _, file| {
@@ -229,12 +229,12 @@ fn who_finds_no_memory_says_so_or_ends() {
         println!("{mebibytes} MiB: {code:?} {}", told.lines().last().unwrap_or_default());
         match code {
             Some(0) => {
-                assert!(picture.as_ref() == Some(&whole), "{mebibytes} MiB: another picture")
+                assert!(picture.as_ref() == Some(&whole), "{mebibytes} MiB: another picture");
             }
             // The shell reports a signal as 128 plus its number; 124 is a process that did not end
             // in time.
             Some(3 | 4 | 134 | 135 | 139) | None => {
-                assert!(picture.is_none(), "{mebibytes} MiB: {code:?}, with a picture")
+                assert!(picture.is_none(), "{mebibytes} MiB: {code:?}, with a picture");
             }
             _ => panic!("{mebibytes} MiB: {code:?}: {told}"),
         }

@@ -4,7 +4,15 @@
 
 use flate2::{Compression, write::GzEncoder};
 use glam::{DVec3, Vec2, Vec3};
-use splatkit::{hierarchy::{BuildOptions, Tree, file::{WriteOptions, to_bytes}}, formats, surface::Mesh, volume::{Lattice, Samples, Volume}, bricks};
+use splatkit::{
+    bricks, formats,
+    hierarchy::{
+        BuildOptions, Tree,
+        file::{WriteOptions, to_bytes},
+    },
+    surface::Mesh,
+    volume::{Lattice, Samples, Volume},
+};
 use std::{
     error::Error,
     fs,

@@ -17,7 +17,7 @@ use std::path::Path;
 /// and the number in all.
 ///
 /// Never returns an error: a file that cannot be opened is a finding.
-pub fn check(path: &Path, limits: &Limits, watch: &(dyn Fn(u64, u64) + Sync)) -> Report {
+pub fn check(path: impl AsRef<Path>, limits: &Limits, watch: &(dyn Fn(u64, u64) + Sync)) -> Report {
     let mut findings = Findings::default();
     match Bricks::open(path, limits) {
         Ok(bricks) => return bricks.check(watch),

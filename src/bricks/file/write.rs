@@ -52,7 +52,13 @@ pub fn memory_of(dims: [usize; 3], scalar: Scalar) -> u64 {
 /// # Errors
 /// [`Error::Argument`] for a lattice that is not Cartesian, and for a volume that was built by hand
 /// and is inconsistent; [`Error::Output`] if the file cannot be written.
-pub fn write(volume: &Volume, path: &Path, options: &WriteOptions, watch: Watch) -> Result<()> {
+pub fn write(
+    volume: &Volume,
+    path: impl AsRef<Path>,
+    options: &WriteOptions,
+    watch: Watch,
+) -> Result<()> {
+    let path = path.as_ref();
     volume.validate().map_err(Error::Argument)?;
     let spill = || Spill::beside(path);
     all(
@@ -75,10 +81,11 @@ pub fn write(volume: &Volume, path: &Path, options: &WriteOptions, watch: Watch)
 pub fn convert(
     stream: &VolumeStream,
     range: [f64; 2],
-    path: &Path,
+    path: impl AsRef<Path>,
     options: &WriteOptions,
     watch: Watch,
 ) -> Result<()> {
+    let path = path.as_ref();
     let WriteOptions { unit, source } = options.clone();
     let header =
         Header { lattice: stream.lattice().clone(), scalar: stream.scalar(), range, unit, source };

@@ -2,7 +2,7 @@
 
 use super::shown;
 use crate::{
-    Result,
+    Error, Result,
     input::{Source, copy},
 };
 
@@ -20,60 +20,19 @@ pub fn are_several(field: &str) -> bool {
 /// parts of the samples, in order along the last axis. The caller has checked that this number of
 /// samples fits into memory.
 pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Result<Vec<String>> {
-    const PLACE: &str = "data file";
-    let wrong = |message: String| source.error(PLACE, message);
-    let (names, parts) = if is_list(field) {
-        let mut words = field.split_ascii_whitespace().skip(1);
-        let (parts, None) = (words.next(), words.next()) else {
-            return Err(wrong(format!(
-                "“{}” is not “LIST” followed by the number of axes in a \
-                                      file",
-                shown(field)
-            )));
-        };
-        if rest.len() > super::LONGEST {
-            return Err(wrong(format!(
-                "the list of files is longer than {} bytes",
-                super::LONGEST
-            )));
-        }
-        source.spend("the size of the file names in bytes", 5 * rest.len() as u64)?;
-        let text = copy::text(rest)
-            .map_err(|at| wrong(format!("byte {at} of the list of files is not text")))?;
-        let names = text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned);
-        (names.collect(), parts)
+    let (names, axes) = if is_list(field) {
+        listed(source, field, rest)?
     } else if let Some(pattern) = Pattern::of(field) {
-        let count = pattern.count().ok_or_else(|| {
-            wrong(format!(
-                "“{}” names no files: its step does not \
-                                                         lead from the first number to the \
-                                                         last",
-                shown(field)
-            ))
-        })?;
-        // Each file contains at least one sample.
-        if count > dims.iter().product::<usize>() as u64 {
-            return Err(wrong(format!(
-                "“{}” counts {count} files, more than there are samples",
-                shown(field)
-            )));
-        }
-        source.spend(
-            "the size of the file names in bytes",
-            count.saturating_mul(256 + field.len() as u64),
-        )?;
-        ((0..count).map(|index| pattern.name(index)).collect::<Vec<_>>(), pattern.parts)
+        numbered(source, field, &pattern, dims)?
     } else {
         return Ok(vec![field.to_owned()]);
     };
-    let axes = match parts.map(str::parse::<usize>) {
+    let axes = match axes.map(str::parse::<usize>) {
         None => 2,
         Some(Ok(axes @ 1..=3)) => axes,
         Some(_) => {
-            return Err(wrong(format!(
-                "“{}” must end with 1, 2 or 3, the number of axes in a file",
-                shown(field)
-            )));
+            let message = "must end with 1, 2 or 3, the number of axes in a file";
+            return Err(wrong(source, format!("“{}” {message}", shown(field))));
         }
     };
     let wanted: usize = dims[axes..].iter().product();
@@ -84,12 +43,63 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
     };
     if !fits {
         let wanted = if axes == 3 { format!("divide {}", dims[2]) } else { format!("be {wanted}") };
-        return Err(wrong(format!(
-            "there are {} files, but their number must {wanted}",
-            names.len()
-        )));
+        return Err(wrong(
+            source,
+            format!("there are {} files, but their number must {wanted}", names.len()),
+        ));
     }
     Ok(names)
+}
+
+fn wrong(source: &Source, message: String) -> Error {
+    source.error("data file", message)
+}
+
+/// Returns the names in a list, and the field's word for the number of axes in a file.
+fn listed<'a>(
+    source: &Source,
+    field: &'a str,
+    rest: &[u8],
+) -> Result<(Vec<String>, Option<&'a str>)> {
+    let mut words = field.split_ascii_whitespace().skip(1);
+    let (axes, None) = (words.next(), words.next()) else {
+        let message = "is not “LIST” followed by the number of axes in a file";
+        return Err(wrong(source, format!("“{}” {message}", shown(field))));
+    };
+    if rest.len() > super::LONGEST {
+        let message = format!("the list of files is longer than {} bytes", super::LONGEST);
+        return Err(wrong(source, message));
+    }
+    source.spend("the size of the file names in bytes", 5 * rest.len() as u64)?;
+    let text = copy::text(rest)
+        .map_err(|at| wrong(source, format!("byte {at} of the list of files is not text")))?;
+    let names = text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned);
+    Ok((names.collect(), axes))
+}
+
+/// Returns the names that a pattern makes, and the field's word for the number of axes in a file.
+fn numbered<'a>(
+    source: &Source,
+    field: &str,
+    pattern: &Pattern<'a>,
+    dims: [usize; 3],
+) -> Result<(Vec<String>, Option<&'a str>)> {
+    let count = pattern.count().ok_or_else(|| {
+        let message = "names no files: its step does not lead from the first number to the last";
+        wrong(source, format!("“{}” {message}", shown(field)))
+    })?;
+    // Each file contains at least one sample.
+    if count > dims.iter().product::<usize>() as u64 {
+        return Err(wrong(
+            source,
+            format!("“{}” counts {count} files, more than there are samples", shown(field)),
+        ));
+    }
+    source.spend(
+        "the size of the file names in bytes",
+        count.saturating_mul(256 + field.len() as u64),
+    )?;
+    Ok(((0..count).map(|index| pattern.name(index)).collect(), pattern.axes))
 }
 
 /// A pattern of file names with a number, as printf formats it: `slice%03d.raw`, then the first
@@ -102,7 +112,8 @@ struct Pattern<'a> {
     first: i64,
     last: i64,
     step: i64,
-    parts: Option<&'a str>,
+    /// The word for the number of axes in a file.
+    axes: Option<&'a str>,
 }
 
 impl<'a> Pattern<'a> {
@@ -112,7 +123,7 @@ impl<'a> Pattern<'a> {
         let (before, number) = words.next()?.split_once('%')?;
         let [first, last, step] =
             [words.next()?, words.next()?, words.next()?].map(|word| word.parse().ok());
-        let parts = words.next();
+        let axes = words.next();
         if words.next().is_some() {
             return None;
         }
@@ -132,7 +143,7 @@ impl<'a> Pattern<'a> {
             first: first?,
             last: last?,
             step: step?,
-            parts,
+            axes,
         })
     }
 

@@ -17,9 +17,9 @@ use std::{
 /// # Errors
 /// [`Error::Argument`] for a volume that was built by hand and contradicts itself;
 /// [`Error::Output`] if the file cannot be written.
-pub fn write(volume: &Volume, path: &Path) -> Result<()> {
+pub fn write(volume: &Volume, path: impl AsRef<Path>) -> Result<()> {
     volume.validate().map_err(Error::Argument)?;
-    disk::write_with(path, |out| write_to(volume, out))
+    disk::write_with(path.as_ref(), |out| write_to(volume, out))
 }
 
 /// Writes a volume of bytes slice by slice, uncompressed, so that it can also be read slice by
@@ -32,13 +32,13 @@ pub fn write(volume: &Volume, path: &Path) -> Result<()> {
 /// both cases no file is left behind.
 pub fn write_bytes(
     lattice: &Lattice,
-    path: &Path,
+    path: impl AsRef<Path>,
     mut slice: impl FnMut(usize) -> Vec<u8>,
 ) -> Result<()> {
-    lattice.validate().map_err(Error::Argument)?;
+    lattice.validate()?;
     let [nx, ny, nz] = lattice.dims;
     let mut wrong = None;
-    let written = disk::write_with(path, |out| {
+    let written = disk::write_with(path.as_ref(), |out| {
         write_header(lattice, Scalar::U8, "raw", out)?;
         for k in 0..nz {
             let samples = slice(k);
@@ -115,7 +115,7 @@ mod tests {
         let lattice = Lattice::cartesian([2, 3, 1], DVec3::new(-1.5, 0.0, 1e9), axes);
         let places = [vec![-0.1, 1.0 / 3.0], vec![1e-300, 2.0, 1e9], vec![7.5]];
         let rectilinear =
-            Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..lattice.clone() };
+            Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..lattice };
         let samples = [
             Samples::U8(vec![0, 1, 2, 3, 4, 255]),
             Samples::U16(vec![0, 1, 2, 3, 4, 65535]),
@@ -123,7 +123,7 @@ mod tests {
             Samples::I32(vec![0, 1, 2, 3, 4, i32::MIN]),
             Samples::F32(vec![0.0, 1e-30, -2.5, 3.0, 4.0, 1e30]),
         ];
-        let body_centred = Lattice { arrangement: Arrangement::BodyCentred, ..lattice.clone() };
+        let body_centred = Lattice { arrangement: Arrangement::BodyCentred, ..lattice };
         for samples in samples {
             for lattice in [&lattice, &body_centred, &rectilinear] {
                 let path = folder.write("volume.nrrd", b"");
@@ -139,8 +139,8 @@ mod tests {
         let cartesian = Lattice::with_spacing([2, 3, 3], DVec3::ONE);
         let places = [vec![0.0, 5.0], vec![1.0, 2.0, 7.5], vec![0.0, 1.0, 9.0]];
         let rectilinear =
-            Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..cartesian.clone() };
-        let body_centred = Lattice { arrangement: Arrangement::BodyCentred, ..cartesian.clone() };
+            Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..cartesian };
+        let body_centred = Lattice { arrangement: Arrangement::BodyCentred, ..cartesian };
         for lattice in [cartesian, rectilinear, body_centred] {
             let path = folder.write("bytes.nrrd", b"");
             write_bytes(&lattice, &path, |k| (0..6).map(|at| (6 * k + at) as u8).collect())
@@ -172,7 +172,7 @@ mod tests {
             "not finite",
         );
         let places = Arrangement::Rectilinear([vec![0.0], vec![], vec![0.0, 1.0]].into());
-        let uneven = Lattice { arrangement: places, ..lattice.clone() };
+        let uneven = Lattice { arrangement: places, ..lattice };
         refused(write(&Volume { lattice: uneven.clone(), ..good }, &path), "1 coordinates along x");
         refused(write_bytes(&uneven, &path, |_| vec![0; 4]), "1 coordinates along x");
         refused(

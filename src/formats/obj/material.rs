@@ -71,7 +71,7 @@ impl<'a, 'b> Library<'a, 'b> {
                 },
                 "d" => {
                     material.dissolve =
-                        rest.split_whitespace().last().and_then(|word| word.parse().ok())
+                        rest.split_whitespace().last().and_then(|word| word.parse().ok());
                 }
                 // Only `d` is part of the format. Some programs use `Tr` like `d`, and write 1 for
                 // opaque. A fully transparent material is unlikely, so `Tr` 1 is read as opaque.
@@ -83,7 +83,8 @@ impl<'a, 'b> Library<'a, 'b> {
                         .filter(|&opacity| opacity > 0.0);
                 }
                 "map_Kd" => {
-                    material.diffuse_texture = Some(file_name(rest)).filter(|name| !name.is_empty())
+                    material.diffuse_texture =
+                        Some(file_name(rest)).filter(|name| !name.is_empty());
                 }
                 _ => {}
             }

@@ -35,108 +35,27 @@ pub(super) struct Survey {
 
 impl Survey {
     pub fn of(source: &Source, text: &str) -> Result<Self> {
-        let mut survey = Self { colors: true, normals: true, ..Self::default() };
-        // The number of positions, texture coordinates and normals so far, and the largest index
-        // used of each with its line.
-        let mut counts = [0i64; 3];
-        let mut largest = [(0i64, 0usize); 3];
-        // The first line that refers to a later statement, and a line with a negative index, which
-        // counts back from its own place.
-        let mut ahead = None;
-        let mut back = None;
+        let mut scan = Scan {
+            survey: Self { colors: true, normals: true, ..Self::default() },
+            ..Scan::default()
+        };
         for (line, number) in text.lines().zip(1usize..) {
             if number.is_multiple_of(LINES) {
                 source.check_time()?;
             }
-            let place = || format!("line {number}");
             let mut words = line.split_whitespace();
             match words.next() {
-                Some("v") => {
-                    counts[0] += 1;
-                    let mut values = 0;
-                    for word in words {
-                        values += 1;
-                        let plain = |b: u8| {
-                            b.is_ascii_digit() || matches!(b, b'.' | b'+' | b'-' | b'e' | b'E')
-                        };
-                        if values <= 3 && !word.bytes().all(plain) {
-                            let first =
-                                word.trim_start_matches(['-', '+']).bytes().next().unwrap_or(b'?');
-                            if matches!(first, b'n' | b'N' | b'i' | b'I') {
-                                return Err(source.error(
-                                    place(),
-                                    format!("the position “{word}” is not finite"),
-                                ));
-                            }
-                            let shown: String = word.chars().take(40).collect();
-                            return Err(source
-                                .error(place(), format!("“{shown}” is not a number"))
-                                .hint("write numbers with a decimal point, not a comma"));
-                        }
-                    }
-                    survey.colors &= values >= 6;
-                }
-                Some("vt") => counts[1] += 1,
-                Some("vn") => counts[2] += 1,
-                Some("f") => {
-                    survey.faces += 1;
-                    let corners = survey.corners;
-                    for word in words {
-                        survey.corners += 1;
-                        let mut has_normal = false;
-                        for (kind, part) in word.split('/').enumerate() {
-                            if kind > 2 || (part.is_empty() && kind == 0) {
-                                return Err(
-                                    source.error(place(), format!("“{word}” is not a face corner"))
-                                );
-                            }
-                            if part.is_empty() {
-                                continue;
-                            }
-                            has_normal |= kind == 2;
-                            let index: i64 = part
-                                .parse::<i32>()
-                                .map_err(|_| {
-                                    source.error(place(), format!("“{word}” is not a face corner"))
-                                })?
-                                .into();
-                            if index == 0 || -index > counts[kind] {
-                                return Err(source.error(place(), wrong(index, kind, counts[kind])));
-                            }
-                            if index > counts[kind] {
-                                ahead.get_or_insert((number, index, kind));
-                            } else if index < 0 {
-                                back = Some(number);
-                            }
-                            if index > largest[kind].0 {
-                                largest[kind] = (index, number);
-                            }
-                        }
-                        survey.normals &= has_normal;
-                    }
-                    if survey.corners == corners {
-                        return Err(source.error(place(), "a face has no corners"));
-                    }
-                }
+                Some("v") => scan.vertex(source, number, words)?,
+                Some("vt") => scan.counts[1] += 1,
+                Some("vn") => scan.counts[2] += 1,
+                Some("f") => scan
+                    .face(number, words)
+                    .map_err(|message| source.error(format!("line {number}"), message))?,
                 _ => {}
             }
         }
-        for kind in 0..3 {
-            let (index, line) = largest[kind];
-            if index > counts[kind] {
-                return Err(source.error(format!("line {line}"), wrong(index, kind, counts[kind])));
-            }
-        }
-        if let (Some((line, index, kind)), Some(back)) = (ahead, back) {
-            let message = format!(
-                "a face refers to {} {index}, which comes after it, but a face in line {back} uses \
-                 negative indices; one file cannot have both",
-                WHAT[kind]
-            );
-            return Err(source
-                .error(format!("line {line}"), message)
-                .hint("move the faces after everything that they refer to"));
-        }
+        scan.check(source)?;
+        let Scan { mut survey, counts, ahead, .. } = scan;
         survey.ahead = ahead.is_some();
         survey.vertices = counts[0] as u64;
         survey.others = (counts[1] + counts[2]) as u64;
@@ -165,6 +84,119 @@ impl Survey {
             colors: self.colors,
             normals: self.normals,
         }
+    }
+}
+
+/// The survey of the lines so far. Arrays have an entry each for positions, texture coordinates and
+/// normals.
+#[derive(Default)]
+struct Scan {
+    survey: Survey,
+    counts: [i64; 3],
+    /// The largest index used, and its line.
+    largest: [(i64, usize); 3],
+    /// The first reference to a later statement: its line, its index and what it refers to.
+    ahead: Option<(usize, i64, usize)>,
+    /// A line with a negative index, which counts back from its own place.
+    back: Option<usize>,
+}
+
+impl Scan {
+    /// Adds a vertex. Its coordinates must be finite numbers.
+    fn vertex<'a>(
+        &mut self,
+        source: &Source,
+        line: usize,
+        words: impl Iterator<Item = &'a str>,
+    ) -> Result<()> {
+        self.counts[0] += 1;
+        let mut values = 0;
+        for word in words {
+            values += 1;
+            let plain = |b: u8| b.is_ascii_digit() || matches!(b, b'.' | b'+' | b'-' | b'e' | b'E');
+            if values > 3 || word.bytes().all(plain) {
+                continue;
+            }
+            let place = format!("line {line}");
+            let first = word.trim_start_matches(['-', '+']).bytes().next().unwrap_or(b'?');
+            if matches!(first, b'n' | b'N' | b'i' | b'I') {
+                return Err(source.error(place, format!("the position “{word}” is not finite")));
+            }
+            let shown: String = word.chars().take(40).collect();
+            return Err(source
+                .error(place, format!("“{shown}” is not a number"))
+                .hint("write numbers with a decimal point, not a comma"));
+        }
+        self.survey.colors &= values >= 6;
+        Ok(())
+    }
+
+    /// Adds a face. Each of its words is a corner.
+    fn face<'a>(
+        &mut self,
+        line: usize,
+        words: impl Iterator<Item = &'a str>,
+    ) -> Result<(), String> {
+        self.survey.faces += 1;
+        let corners = self.survey.corners;
+        for word in words {
+            self.survey.corners += 1;
+            let not_a_corner = || format!("“{word}” is not a face corner");
+            let mut has_normal = false;
+            for (kind, part) in word.split('/').enumerate() {
+                if kind > 2 || (part.is_empty() && kind == 0) {
+                    return Err(not_a_corner());
+                }
+                if part.is_empty() {
+                    continue;
+                }
+                has_normal |= kind == 2;
+                let index: i32 = part.parse().map_err(|_| not_a_corner())?;
+                self.reference(line, index.into(), kind)?;
+            }
+            self.survey.normals &= has_normal;
+        }
+        if self.survey.corners == corners { Err("a face has no corners".into()) } else { Ok(()) }
+    }
+
+    /// Adds an index of a corner.
+    fn reference(&mut self, line: usize, index: i64, kind: usize) -> Result<(), String> {
+        let count = self.counts[kind];
+        if index == 0 || -index > count {
+            return Err(wrong(index, kind, count));
+        }
+        if index > count {
+            self.ahead.get_or_insert((line, index, kind));
+        } else if index < 0 {
+            self.back = Some(line);
+        }
+        if index > self.largest[kind].0 {
+            self.largest[kind] = (index, line);
+        }
+        Ok(())
+    }
+
+    /// Returns an error if an index has no statement in the whole file, or if the file has both
+    /// references to later statements and negative indices.
+    fn check(&self, source: &Source) -> Result<()> {
+        for kind in 0..3 {
+            let (index, line) = self.largest[kind];
+            if index > self.counts[kind] {
+                let message = wrong(index, kind, self.counts[kind]);
+                return Err(source.error(format!("line {line}"), message));
+            }
+        }
+        let (Some((line, index, kind)), Some(back)) = (self.ahead, self.back) else {
+            return Ok(());
+        };
+        let message = format!(
+            "a face refers to {} {index}, which comes after it, but a face in line {back} uses \
+             negative indices; one file cannot have both",
+            WHAT[kind]
+        );
+        Err(source
+            .error(format!("line {line}"), message)
+            .hint("move the faces after everything that they refer to"))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The header of a PCD file: lines of text. The last one is `DATA`.
 
 use crate::{
-    Result,
+    Error, Result,
     input::{Source, copy},
 };
 use glam::DVec3;
@@ -110,7 +110,7 @@ pub fn read(source: &Source) -> Result<Header> {
         };
         words[entry] = parts.map(str::to_owned).collect();
         if entry == DATA {
-            return finish(source, &words, at, number);
+            return Entries { source, words: &words }.header(at, number);
         }
     }
     unreachable!("a file has an end")
@@ -138,75 +138,111 @@ const VIEWPOINT: usize = 7;
 const POINTS: usize = 8;
 const DATA: usize = 9;
 
-fn finish(
-    source: &Source,
-    words: &[Vec<String>; ENTRIES.len()],
-    end: usize,
-    lines: usize,
-) -> Result<Header> {
-    let wrong = |entry: usize, message: &str| {
-        source.error("header", format!("“{} {}” {message}", ENTRIES[entry], words[entry].join(" ")))
-    };
-    let number = |entry: usize| match words[entry].as_slice() {
-        [] => Ok(None),
-        [word] => word.parse::<u64>().map(Some).map_err(|_| wrong(entry, "is not a count")),
-        _ => Err(wrong(entry, "is not a count")),
-    };
-    let data = match words[DATA].iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["ascii"] => Data::Text,
-        ["binary"] => Data::Binary,
-        ["binary_compressed"] => Data::Packed,
-        _ => return Err(wrong(DATA, "is not ascii, binary or binary_compressed")),
-    };
-    let (width, height) = (number(WIDTH)?, number(HEIGHT)?);
-    let product = width.map(|width| width.saturating_mul(height.unwrap_or(1)));
-    let points = match (number(POINTS)?, product) {
-        (Some(points), Some(product)) if points != product => {
-            return Err(source.error(
-                "header",
-                format!("“POINTS” claims {points} points, but “WIDTH” × “HEIGHT” is {product}"),
-            ));
-        }
-        (points, product) => points.or(product).ok_or_else(|| wrong(POINTS, "is missing"))?,
-    };
-    let names = &words[FIELDS];
-    for entry in [SIZE, TYPE, COUNT] {
-        if words[entry].len() != names.len() && !(entry == COUNT && words[entry].is_empty()) {
-            return Err(wrong(entry, &format!("does not fit the {} fields", names.len())));
+/// The words of each entry.
+struct Entries<'a> {
+    source: &'a Source<'a>,
+    words: &'a [Vec<String>; ENTRIES.len()],
+}
+
+impl Entries<'_> {
+    /// Returns the header, which ends at this byte and has this number of lines.
+    fn header(&self, end: usize, lines: usize) -> Result<Header> {
+        let data = match self.words[DATA].iter().map(String::as_str).collect::<Vec<_>>()[..] {
+            ["ascii"] => Data::Text,
+            ["binary"] => Data::Binary,
+            ["binary_compressed"] => Data::Packed,
+            _ => return Err(self.wrong(DATA, "is not ascii, binary or binary_compressed")),
+        };
+        let (points, height) = self.points()?;
+        let (fields, viewpoint) = (self.fields()?, self.viewpoint());
+        Ok(Header { fields, points, height, viewpoint, data, end, lines })
+    }
+
+    fn wrong(&self, entry: usize, message: &str) -> Error {
+        let line = format!("“{} {}”", ENTRIES[entry], self.words[entry].join(" "));
+        self.source.error("header", format!("{line} {message}"))
+    }
+
+    /// Returns the count of an entry; `None` if the header has no such entry.
+    fn number(&self, entry: usize) -> Result<Option<u64>> {
+        match self.words[entry].as_slice() {
+            [] => Ok(None),
+            [word] => word.parse().map(Some).map_err(|_| self.wrong(entry, "is not a count")),
+            _ => Err(self.wrong(entry, "is not a count")),
         }
     }
-    let (mut offset, mut word) = (0usize, 0usize);
-    let mut fields = Vec::new();
-    for (index, name) in names.iter().enumerate() {
-        let kind = match words[TYPE][index].as_str() {
+
+    /// Returns the number of points, and of rows.
+    fn points(&self) -> Result<(u64, u64)> {
+        let (width, height) = (self.number(WIDTH)?, self.number(HEIGHT)?);
+        let height = height.unwrap_or(1);
+        let product = width.map(|width| width.saturating_mul(height));
+        let points = match (self.number(POINTS)?, product) {
+            (Some(points), Some(product)) if points != product => {
+                return Err(self.source.error(
+                    "header",
+                    format!("“POINTS” claims {points} points, but “WIDTH” × “HEIGHT” is {product}"),
+                ));
+            }
+            (points, product) => points.or(product),
+        };
+        Ok((points.ok_or_else(|| self.wrong(POINTS, "is missing"))?, height))
+    }
+
+    /// Returns the fields of a point.
+    fn fields(&self) -> Result<Vec<Field>> {
+        let names = &self.words[FIELDS];
+        for entry in [SIZE, TYPE, COUNT] {
+            let found = self.words[entry].len();
+            if found != names.len() && !(entry == COUNT && found == 0) {
+                let message = format!("does not fit the {} fields", names.len());
+                return Err(self.wrong(entry, &message));
+            }
+        }
+        let (mut offset, mut word) = (0usize, 0usize);
+        let mut fields = Vec::new();
+        for (index, name) in names.iter().enumerate() {
+            let (kind, size) = self.number_type(index)?;
+            let count = self.words[COUNT].get(index);
+            let count = count.map_or(Some(1), |count| count.parse::<usize>().ok());
+            let fits =
+                |count: &usize| word.checked_add(*count).is_some_and(|words| words <= MOST_FIELDS);
+            let count = count.filter(|count| fits(count) && index < MOST_FIELDS);
+            let count = count.ok_or_else(|| self.wrong(COUNT, "has an invalid count"))?;
+            if count > 0 {
+                fields.push(Field { name: name.clone(), kind, size, count, offset, word });
+            }
+            offset += size * count;
+            word += count;
+        }
+        Ok(fields)
+    }
+
+    /// Returns the type of a field's numbers, and the bytes of each.
+    fn number_type(&self, index: usize) -> Result<(NumberKind, usize)> {
+        let kind = match self.words[TYPE][index].as_str() {
             "F" => NumberKind::Float,
             "U" => NumberKind::Unsigned,
             "I" => NumberKind::Signed,
-            _ => return Err(wrong(TYPE, "has a type other than F, U and I")),
+            _ => return Err(self.wrong(TYPE, "has a type other than F, U and I")),
         };
-        let size = match (words[SIZE][index].as_str(), kind) {
+        let size = match (self.words[SIZE][index].as_str(), kind) {
             ("4", _) => 4,
             ("8", _) => 8,
             ("1", NumberKind::Signed | NumberKind::Unsigned) => 1,
             ("2", NumberKind::Signed | NumberKind::Unsigned) => 2,
-            _ => return Err(wrong(SIZE, "has a size that its type cannot have")),
+            _ => return Err(self.wrong(SIZE, "has a size that its type cannot have")),
         };
-        let count = words[COUNT].get(index).map_or(Some(1), |count| count.parse::<usize>().ok());
-        let fits =
-            |count: &usize| word.checked_add(*count).is_some_and(|words| words <= MOST_FIELDS);
-        let count = count.filter(|count| fits(count) && index < MOST_FIELDS);
-        let count = count.ok_or_else(|| wrong(COUNT, "has an invalid count"))?;
-        if count > 0 {
-            fields.push(Field { name: name.clone(), kind, size, count, offset, word });
-        }
-        offset += size * count;
-        word += count;
+        Ok((kind, size))
     }
-    let viewpoint: Option<Vec<f64>> =
-        words[VIEWPOINT].iter().map(|word| word.parse().ok()).collect();
-    let viewpoint = match viewpoint.as_deref() {
-        Some(&[x, y, z, ..]) => Some(DVec3::new(x, y, z)).filter(|place| place.is_finite()),
-        _ => None,
-    };
-    Ok(Header { fields, points, height: height.unwrap_or(1), viewpoint, data, end, lines })
+
+    /// Returns the position of the scanner, if it is given and finite.
+    fn viewpoint(&self) -> Option<DVec3> {
+        let numbers: Option<Vec<f64>> =
+            self.words[VIEWPOINT].iter().map(|word| word.parse().ok()).collect();
+        match numbers.as_deref() {
+            Some(&[x, y, z, ..]) => Some(DVec3::new(x, y, z)).filter(|place| place.is_finite()),
+            _ => None,
+        }
+    }
 }

@@ -6,7 +6,7 @@ use super::{
     rows::Rows,
 };
 use crate::{
-    Result,
+    Error, Result,
     formats::shared::polygon,
     input::{Source, growing::Growing},
     surface::Mesh,
@@ -70,13 +70,11 @@ pub(super) fn read(
     let uvs = element.column(&["texcoord"]).filter(|column| pictures > 0 && is_list(column));
     let picture = element.column(&["texnumber"]).filter(|column| uvs.is_some() && !is_list(column));
     let columns = Columns { indices, uvs, picture };
+    let table = Table { source, element, rows, columns, positions, pictures };
     let chunks = element.count.div_ceil(CHUNK);
     let parts: Vec<Faces> = (0..chunks)
         .into_par_iter()
-        .map(|chunk| {
-            let rows_of_chunk = chunk * CHUNK..((chunk + 1) * CHUNK).min(element.count);
-            read_rows(source, element, rows, &columns, rows_of_chunk, (positions, pictures))
-        })
+        .map(|chunk| table.faces(chunk * CHUNK..((chunk + 1) * CHUNK).min(element.count)))
         .collect::<Result<_>>()?;
     let count = parts.iter().map(|part| part.triangles.len()).sum();
     source.room::<[[u32; 3]; 2]>("the triangles", count)?;
@@ -85,99 +83,135 @@ pub(super) fn read(
     Ok(all)
 }
 
-fn read_rows(
-    source: &Source,
-    element: &Element,
-    rows: &Rows,
-    columns: &Columns,
-    range: std::ops::Range<usize>,
-    (positions, pictures): (&[Vec3], usize),
-) -> Result<Faces> {
-    let vertices = positions.len();
-    let mut wanted = vec![false; element.columns.len()];
-    [Some(columns.indices), columns.uvs, columns.picture]
-        .into_iter()
-        .flatten()
-        .for_each(|column| wanted[column] = true);
-    let are_strips = element.name == "tristrips";
-    let mut triangles = Growing::new(source, "the triangles");
-    let mut uvs = Growing::new(source, "the texture coordinates");
-    let mut shown = Growing::new(source, "the pictures of the triangles");
-    let (mut corners, mut own_uvs, mut picture) = (Vec::<u32>::new(), Vec::<f64>::new(), 0.0);
-    // The corners of a face, by their index in its list.
-    let mut order = Vec::new();
-    for row in range {
+/// The rows of an element, what is read of them, and what they refer to.
+struct Table<'a> {
+    source: &'a Source<'a>,
+    element: &'a Element,
+    rows: &'a Rows<'a>,
+    columns: Columns,
+    positions: &'a [Vec3],
+    pictures: usize,
+}
+
+/// A row of faces: a polygon or strips.
+#[derive(Default)]
+struct Row {
+    corners: Vec<u32>,
+    /// u and v of each corner; empty if the row has none.
+    uvs: Vec<f64>,
+    picture: f64,
+}
+
+impl Table<'_> {
+    /// Reads the faces of a range of rows.
+    fn faces(&self, range: std::ops::Range<usize>) -> Result<Faces> {
+        let mut wanted = vec![false; self.element.columns.len()];
+        [Some(self.columns.indices), self.columns.uvs, self.columns.picture]
+            .into_iter()
+            .flatten()
+            .for_each(|column| wanted[column] = true);
+        let mut triangles = Growing::new(self.source, "the triangles");
+        let mut uvs = Growing::new(self.source, "the texture coordinates");
+        let mut pictures = Growing::new(self.source, "the pictures of the triangles");
+        let mut row = Row::default();
+        // The corners of a face, by their index in its list.
+        let mut order = Vec::new();
+        for index in range {
+            self.read_row(index, &wanted, &mut row)?;
+            if self.are_strips() {
+                strips(&row.corners, &mut triangles)?;
+                continue;
+            }
+            let picture = self.check(index, &row)?;
+            let place = |vertex: u32| self.positions[vertex as usize].as_dvec3();
+            if self.columns.uvs.is_none() {
+                polygon::triangles(&row.corners, place, |triangle| triangles.push(triangle))?;
+                continue;
+            }
+            order.clear();
+            order.extend(0..row.corners.len() as u32);
+            let vertex = |corner: u32| row.corners[corner as usize];
+            polygon::triangles(
+                &order,
+                |corner| place(vertex(corner)),
+                |cut| {
+                    triangles.push(cut.map(vertex))?;
+                    uvs.push(cut.map(|corner| row.uv(corner)))?;
+                    pictures.push(picture)
+                },
+            )?;
+        }
+        Ok(Faces {
+            triangles: triangles.into_inner(),
+            uvs: uvs.into_inner(),
+            pictures: pictures.into_inner(),
+        })
+    }
+
+    fn are_strips(&self) -> bool {
+        self.element.name == "tristrips"
+    }
+
+    fn wrong(&self, row: usize, message: String) -> Error {
+        self.source.error(self.rows.place(self.source, self.element, row), message)
+    }
+
+    /// Reads a row. Its corners must be vertices.
+    fn read_row(&self, index: usize, wanted: &[bool], row: &mut Row) -> Result<()> {
+        let (columns, vertices) = (&self.columns, self.positions.len());
         let mut stray = None;
-        rows.visit(source, element, row, &wanted, |at, value, list| {
+        self.rows.visit(self.source, self.element, index, wanted, |at, value, list| {
             if let Some(list) = list.filter(|_| at == columns.indices) {
-                corners.clear();
-                corners.extend(list.iter().map(|&value| match vertex(value, vertices) {
-                    None if are_strips && value == -1.0 => MARK,
+                row.corners.clear();
+                row.corners.extend(list.iter().map(|&value| match vertex(value, vertices) {
+                    None if self.are_strips() && value == -1.0 => MARK,
                     None => *stray.get_or_insert(value) as u32,
                     Some(index) => index,
                 }));
             } else if let Some(list) = list.filter(|_| Some(at) == columns.uvs) {
-                own_uvs.clear();
-                own_uvs.extend_from_slice(list);
+                row.uvs.clear();
+                row.uvs.extend_from_slice(list);
             } else if Some(at) == columns.picture {
-                picture = value;
+                row.picture = value;
             }
         })?;
-        let wrong = |message: String| Err(source.error(rows.place(source, element, row), message));
-        if let Some(index) = stray {
-            let last = vertices.saturating_sub(1);
-            return wrong(format!(
-                "refers to vertex {index}, but there are {vertices} (0 … {last})"
-            ));
-        }
-        if are_strips {
-            strips(&corners, &mut triangles)?;
-            continue;
-        }
-        if corners.len() > FEW {
-            source.spend("the size of a polygon in bytes", OF_CORNER * corners.len() as u64)?;
+        let Some(stray) = stray else { return Ok(()) };
+        let last = vertices.saturating_sub(1);
+        let message = format!("refers to vertex {stray}, but there are {vertices} (0 … {last})");
+        Err(self.wrong(index, message))
+    }
+
+    /// Checks a polygon: its memory, its texture coordinates and its picture, which is returned.
+    fn check(&self, index: usize, row: &Row) -> Result<u32> {
+        let corners = row.corners.len();
+        if corners > FEW {
+            self.source.spend("the size of a polygon in bytes", OF_CORNER * corners as u64)?;
         }
         // Faces without coordinates may occur among faces that have them.
-        let has_uvs = columns.uvs.is_some() && !own_uvs.is_empty();
-        if has_uvs && own_uvs.len() != 2 * corners.len() {
-            let (found, corners) = (own_uvs.len(), corners.len());
-            return wrong(format!(
+        let found = row.uvs.len();
+        if self.columns.uvs.is_some() && found != 0 && found != 2 * corners {
+            let message = format!(
                 "has {found} texture coordinates for {corners} corners, which need {}",
                 2 * corners
-            ));
+            );
+            return Err(self.wrong(index, message));
         }
-        let Some(picture) = vertex(picture, pictures.max(1)) else {
-            return wrong(format!(
-                "shows picture {picture}, but “comment TextureFile” names {pictures}"
-            ));
-        };
-        let place = |index: u32| positions[index as usize].as_dvec3();
-        if columns.uvs.is_none() {
-            polygon::triangles(&corners, place, |triangle| triangles.push(triangle))?;
-            continue;
-        }
-        order.clear();
-        order.extend(0..corners.len() as u32);
-        let index = |corner: u32| corners[corner as usize];
-        polygon::triangles(
-            &order,
-            |corner| place(index(corner)),
-            |cut| {
-                let uv = |corner: u32| {
-                    let at = 2 * corner as usize;
-                    Vec2::new(own_uvs[at] as f32, own_uvs[at + 1] as f32)
-                };
-                triangles.push(cut.map(index))?;
-                uvs.push(if has_uvs { cut.map(uv) } else { [Vec2::ZERO; 3] })?;
-                shown.push(picture)
-            },
-        )?;
+        let Row { picture, .. } = *row;
+        vertex(picture, self.pictures.max(1)).ok_or_else(|| {
+            let named = self.pictures;
+            let message =
+                format!("shows picture {picture}, but “comment TextureFile” names {named}");
+            self.wrong(index, message)
+        })
     }
-    Ok(Faces {
-        triangles: triangles.into_inner(),
-        uvs: uvs.into_inner(),
-        pictures: shown.into_inner(),
-    })
+}
+
+impl Row {
+    /// Returns the texture coordinates of a corner; zero if the row has none.
+    fn uv(&self, corner: u32) -> Vec2 {
+        let at = 2 * corner as usize;
+        self.uvs.get(at..at + 2).map_or(Vec2::ZERO, |uv| Vec2::new(uv[0] as f32, uv[1] as f32))
+    }
 }
 
 /// The common case: binary rows with one list of three 32-bit indices. Returns `None` in other

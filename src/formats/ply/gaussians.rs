@@ -26,13 +26,13 @@ const PROPERTIES: [&str; 17] = [
 /// # Errors
 /// [`Error::Argument`] for scalar splats, which have no colours; [`Error::Output`] if the file
 /// cannot be written.
-pub fn write_gaussians(set: &SplatSet, path: &Path) -> Result<()> {
+pub fn write_gaussians(set: &SplatSet, path: impl AsRef<Path>) -> Result<()> {
     if set.payload != Payload::Radiance {
         return Err(Error::Argument(
             "samples of a volume have no colours to write as Gaussians".into(),
         ));
     }
-    disk::write_with(path, |out| {
+    disk::write_with(path.as_ref(), |out| {
         writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", set.splats.len())?;
         PROPERTIES.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
         writeln!(out, "end_header")?;

@@ -80,80 +80,30 @@ pub(super) fn width(scalar: &ScalarType) -> usize {
 /// Reads the header of a file.
 pub(super) fn read(source: &Source) -> Result<Header> {
     let bytes = source.bytes();
-    let mut clean = String::new();
-    let mut names: Vec<(String, Vec<String>)> = Vec::new();
-    let mut textures = Vec::new();
-    let (mut at, mut number, mut columns) = (0, 0, 0);
-    loop {
-        number += 1;
-        let place = || format!("header line {number}");
+    let mut clean = Clean::default();
+    let mut at = 0;
+    for number in 1.. {
+        let wrong = |message: String| source.error(format!("header line {number}"), message);
         let rest = bytes.get(at..).unwrap_or(&[]);
-        let window = &rest[..rest.len().min(LONGEST.saturating_sub(at))];
-        let Some(end) = window.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
-            if window.len() < rest.len() {
-                let message = format!(
-                    "the header is longer than {LONGEST} bytes and has no “end_header” line"
-                );
-                return Err(source.error(place(), message));
-            }
-            return Err(source.error(
-                place(),
-                "the header has no “end_header” line; the file is cut off or is not PLY",
-            ));
-        };
+        let end = line_end(rest, LONGEST.saturating_sub(at)).map_err(wrong)?;
         let line = copy::lossy(&rest[..end]);
         // A lone carriage return ends a line too (old Macintosh files).
         at += end + if rest[end..].starts_with(b"\r\n") { 2 } else { 1 };
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words.as_slice() {
-            [] => clean.push_str("comment\n"),
-            ["comment", "TextureFile", ..] => {
-                textures
-                    .extend(line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned()));
-                clean.push_str("comment\n");
-            }
-            ["comment" | "obj_info", ..] => clean.push_str("comment\n"),
-            ["element", name, count] => {
-                if count.parse::<usize>().is_err() {
-                    let shown: String = count.chars().take(40).collect();
-                    return Err(source.error(place(), format!("“{shown}” is not a row count")));
-                }
-                clean.push_str(&format!("element e{} {count}\n", names.len()));
-                names.push(((*name).to_owned(), Vec::new()));
-                columns += 1;
-            }
-            ["property", kind @ .., name] => {
-                let Some((_, properties)) = names.last_mut() else {
-                    return Err(source.error(
-                        place(),
-                        format!("the property “{name}” comes before any element"),
-                    ));
-                };
-                clean.push_str(&format!("property {} p{}\n", kind.join(" "), properties.len()));
-                properties.push((*name).to_owned());
-                columns += 1;
-            }
-            other => {
-                clean.push_str(&other.join(" "));
-                clean.push('\n');
-            }
-        }
-        if columns > MOST_COLUMNS {
-            return Err(
-                source.error(place(), format!("more than {MOST_COLUMNS} elements and properties"))
-            );
-        }
-        if words == ["end_header"] {
+        clean.add(&line).map_err(wrong)?;
+        if line.split_whitespace().eq(["end_header"]) {
             break;
         }
     }
-    let parsed =
-        Parser::<DefaultElement>::new().read_ply_header(&mut clean.as_bytes()).map_err(|e| {
+    let parsed = Parser::<DefaultElement>::new()
+        .read_ply_header(&mut clean.text.as_bytes())
+        .map_err(|e| {
             let place = e.line().map_or("header".into(), |line| format!("header line {line}"));
             source.error(place, e.to_string().replace(['\n', '\t'], " "))
         })?;
     let mut elements = Vec::new();
-    for ((name, properties), definition) in names.into_iter().zip(parsed.elements.into_values()) {
+    for ((name, properties), definition) in
+        clean.names.into_iter().zip(parsed.elements.into_values())
+    {
         let columns = properties
             .into_iter()
             .zip(definition.properties.into_values())
@@ -161,5 +111,70 @@ pub(super) fn read(source: &Source) -> Result<Header> {
             .collect();
         elements.push(Element { name, count: definition.count, columns });
     }
-    Ok(Header { encoding: parsed.encoding, elements, textures, payload: at })
+    Ok(Header { encoding: parsed.encoding, elements, textures: clean.textures, payload: at })
+}
+
+/// Returns the length of the first line, which must end within `most` bytes.
+fn line_end(rest: &[u8], most: usize) -> Result<usize, String> {
+    let window = &rest[..rest.len().min(most)];
+    window.iter().position(|b| matches!(b, b'\n' | b'\r')).ok_or_else(|| {
+        if window.len() < rest.len() {
+            format!("the header is longer than {LONGEST} bytes and has no “end_header” line")
+        } else {
+            "the header has no “end_header” line; the file is cut off or is not PLY".into()
+        }
+    })
+}
+
+/// A header with plain, unique names, and what it leaves out.
+#[derive(Default)]
+struct Clean {
+    text: String,
+    /// The original names of the elements and their properties.
+    names: Vec<(String, Vec<String>)>,
+    textures: Vec<String>,
+    /// Number of elements and properties.
+    columns: usize,
+}
+
+impl Clean {
+    /// Adds a line of the header.
+    fn add(&mut self, line: &str) -> Result<(), String> {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words.as_slice() {
+            [] => self.text.push_str("comment\n"),
+            ["comment", "TextureFile", ..] => {
+                let name = line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned());
+                self.textures.extend(name);
+                self.text.push_str("comment\n");
+            }
+            ["comment" | "obj_info", ..] => self.text.push_str("comment\n"),
+            ["element", name, count] => {
+                if count.parse::<usize>().is_err() {
+                    let shown: String = count.chars().take(40).collect();
+                    return Err(format!("“{shown}” is not a row count"));
+                }
+                self.text.push_str(&format!("element e{} {count}\n", self.names.len()));
+                self.names.push(((*name).to_owned(), Vec::new()));
+                self.columns += 1;
+            }
+            ["property", kind @ .., name] => {
+                let Some((_, properties)) = self.names.last_mut() else {
+                    return Err(format!("the property “{name}” comes before any element"));
+                };
+                let number = properties.len();
+                self.text.push_str(&format!("property {} p{number}\n", kind.join(" ")));
+                properties.push((*name).to_owned());
+                self.columns += 1;
+            }
+            other => {
+                self.text.push_str(&other.join(" "));
+                self.text.push('\n');
+            }
+        }
+        if self.columns > MOST_COLUMNS {
+            return Err(format!("more than {MOST_COLUMNS} elements and properties"));
+        }
+        Ok(())
+    }
 }

@@ -4,7 +4,7 @@
 use super::{
     super::stream::Found,
     COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale, gaussians,
-    header::{self, Element, width},
+    header::{self, Element, Header, width},
     rows::{cut, list_place, number, triangle_stride},
 };
 use crate::{
@@ -62,39 +62,9 @@ impl Pieces {
             Encoding::BinaryBigEndian => true,
             Encoding::BinaryLittleEndian => false,
         };
-        let (mut vertices, mut faces) = (None, None);
-        let mut at = header.payload;
-        for element in &header.elements {
-            let is_face = element.name == "face";
-            let stride = if is_face { triangle_stride(element) } else { element.stride() };
-            let Some(stride) = stride.filter(|_| element.name != "tristrips") else {
-                return Ok(None);
-            };
-            let left = source.bytes().len() - at;
-            if is_face && element.count > 0 {
-                let rows = Rows { at, count: element.count.min(left / stride), stride, big };
-                let (None, Some(found)) = (&faces, Faces::find(element, rows)) else {
-                    return Ok(None);
-                };
-                if !found.are_triangles(source) {
-                    return Ok(None);
-                }
-                faces = Some(found);
-            }
-            let size = element.count.checked_mul(stride).filter(|&size| size <= left);
-            let Some(size) = size else { return Err(cut(source, element, left / stride)) };
-            let rows = Rows { at, count: element.count, stride, big };
-            at += size;
-            if is_face || element.name == "vertex" {
-                source.check_points(
-                    &format!("the count of element “{}”", element.name),
-                    element.count as u64,
-                )?;
-            }
-            if element.name == "vertex" && vertices.is_none() {
-                vertices = Some((element, rows));
-            }
-        }
+        let Some(Located { vertices, faces }) = locate(source, &header, big)? else {
+            return Ok(None);
+        };
         let Some((element, rows)) = vertices.filter(|(element, _)| element.count > 0) else {
             return Ok(None);
         };
@@ -106,16 +76,10 @@ impl Pieces {
         if !has(POSITION, 3) || (has_uvs && !header.textures.is_empty() && faces.is_some()) {
             return Ok(None);
         }
-        let field = |column: usize| {
-            let offset: Option<usize> =
-                element.columns[..column].iter().map(|before| before.width()).sum();
-            let PropertyType::Scalar(kind) = &element.columns[column].kind else { return None };
-            Some((offset?, kind.clone()))
-        };
         let (has_normals, has_colors) = (has(NORMAL, 3), has(COLOR, 3));
         let are_gaussians = gaussians::are_gaussians(element);
         let color_kind = color_kind(element, &columns);
-        let fields = columns.map(|column| column.and_then(field));
+        let fields = columns.map(|column| column.and_then(|column| field(element, column)));
         let vertices = Vertices { rows, fields, color_kind, color_scale: [None; 4] };
         Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs, are_gaussians }))
     }
@@ -223,6 +187,60 @@ impl Pieces {
         let rows = piece * ROWS..((piece + 1) * ROWS).min(count);
         Ok((rows.start, rows.map(triangle).collect::<Result<_>>()?))
     }
+}
+
+/// Where the elements that matter are in a file.
+#[derive(Default)]
+struct Located<'h> {
+    /// The first element “vertex”.
+    vertices: Option<(&'h Element, Rows)>,
+    faces: Option<Faces>,
+}
+
+/// Locates the elements. Returns `None` for rows of different lengths, and for faces that are not
+/// triangles.
+fn locate<'h>(source: &Source, header: &'h Header, big: bool) -> Result<Option<Located<'h>>> {
+    let mut located = Located::default();
+    let mut at = header.payload;
+    for element in &header.elements {
+        let is_face = element.name == "face";
+        let stride = if is_face { triangle_stride(element) } else { element.stride() };
+        let Some(stride) = stride.filter(|_| element.name != "tristrips") else {
+            return Ok(None);
+        };
+        let left = source.bytes().len() - at;
+        if is_face && element.count > 0 {
+            let rows = Rows { at, count: element.count.min(left / stride), stride, big };
+            let (None, Some(found)) = (&located.faces, Faces::find(element, rows)) else {
+                return Ok(None);
+            };
+            if !found.are_triangles(source) {
+                return Ok(None);
+            }
+            located.faces = Some(found);
+        }
+        let size = element.count.checked_mul(stride).filter(|&size| size <= left);
+        let Some(size) = size else { return Err(cut(source, element, left / stride)) };
+        let rows = Rows { at, count: element.count, stride, big };
+        at += size;
+        if is_face || element.name == "vertex" {
+            source.check_points(
+                &format!("the count of element “{}”", element.name),
+                element.count as u64,
+            )?;
+        }
+        if element.name == "vertex" && located.vertices.is_none() {
+            located.vertices = Some((element, rows));
+        }
+    }
+    Ok(Some(located))
+}
+
+/// Returns the offset of a column of numbers in its row, and their type.
+fn field(element: &Element, column: usize) -> Option<(usize, ScalarType)> {
+    let offset: Option<usize> = element.columns[..column].iter().map(|before| before.width()).sum();
+    let PropertyType::Scalar(kind) = &element.columns[column].kind else { return None };
+    Some((offset?, kind.clone()))
 }
 
 impl Faces {

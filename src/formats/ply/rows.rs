@@ -18,7 +18,7 @@ pub(super) fn number(bytes: &[u8], kind: &ScalarType, big: bool) -> f64 {
         ($t:ty) => {{
             let mut raw = [0; size_of::<$t>()];
             raw.copy_from_slice(&bytes[..size_of::<$t>()]);
-            if big { <$t>::from_be_bytes(raw) as f64 } else { <$t>::from_le_bytes(raw) as f64 }
+            f64::from(if big { <$t>::from_be_bytes(raw) } else { <$t>::from_le_bytes(raw) })
         }};
     }
     match kind {
@@ -149,69 +149,17 @@ impl<'a> Rows<'a> {
         element: &Element,
         row: usize,
         wanted: &[bool],
-        mut visit: impl FnMut(usize, f64, Option<&List>),
+        visit: impl FnMut(usize, f64, Option<&List>),
     ) -> Result<()> {
-        let mut list = Vec::new();
         match self {
             Rows::Fixed { data, stride, big } => {
-                let row = &data[row * stride..][..*stride];
-                walk(row, element, *big, wanted, &mut list, &mut visit);
+                walk(&data[row * stride..][..*stride], element, *big, wanted, visit);
             }
             Rows::Loose { data, starts, big } => {
-                walk(&data[starts[row]..], element, *big, wanted, &mut list, &mut visit)
+                walk(&data[starts[row]..], element, *big, wanted, visit);
             }
             Rows::Text { lines } => {
-                let mut words =
-                    lines[row].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-                let mut next = |column: usize, parse: bool| -> Result<f64> {
-                    let name = &element.columns[column].name;
-                    let place = || text_place(source, element, row, lines[row]);
-                    let word = words.next().ok_or_else(|| {
-                        source.error(place(), format!("the line ends before the value of “{name}”"))
-                    })?;
-                    if !parse {
-                        return Ok(0.0);
-                    }
-                    copy::number(word).ok_or_else(|| {
-                        let word = copy::excerpt(word);
-                        source.error(place(), format!("“{word}” is not a number (for “{name}”)"))
-                    })
-                };
-                for (index, column) in element.columns.iter().enumerate() {
-                    match column.kind {
-                        PropertyType::Scalar(_) => {
-                            let value = next(index, wanted[index])?;
-                            visit(index, value, None);
-                        }
-                        PropertyType::List(..) => {
-                            let length = next(index, true)?;
-                            // A line cannot contain more values than bytes, so a longer list ends
-                            // in the error above.
-                            if !(length >= 0.0 && length.fract() == 0.0) {
-                                return Err(source.error(
-                                    text_place(source, element, row, lines[row]),
-                                    format!(
-                                        "the list “{}” has the impossible length {length}",
-                                        column.name
-                                    ),
-                                ));
-                            }
-                            list.clear();
-                            let mut left = length;
-                            while left > 0.0 {
-                                list.push(next(index, wanted[index])?);
-                                left -= 1.0;
-                            }
-                            visit(index, length, Some(&list));
-                        }
-                    }
-                }
-                if words.next().is_some() {
-                    return Err(source.error(
-                        text_place(source, element, row, lines[row]),
-                        "the line has more values than the header names",
-                    ));
-                }
+                visit_line(source, element, row, lines[row], wanted, visit)?;
             }
         }
         Ok(())
@@ -274,9 +222,9 @@ fn walk(
     element: &Element,
     big: bool,
     wanted: &[bool],
-    list: &mut Vec<f64>,
-    visit: &mut impl FnMut(usize, f64, Option<&List>),
+    mut visit: impl FnMut(usize, f64, Option<&List>),
 ) {
+    let mut list = Vec::new();
     let mut rest = row;
     let mut take = |size: usize| {
         let (part, behind) = rest.split_at_checked(size)?;
@@ -302,11 +250,62 @@ fn walk(
                     list.extend(
                         bytes.chunks_exact(width(item)).map(|bytes| number(bytes, item, big)),
                     );
-                    visit(index, length, Some(list));
+                    visit(index, length, Some(&list));
                 }
             }
         }
     }
+}
+
+/// Visits a row of text, as [`Rows::visit`] does.
+fn visit_line(
+    source: &Source,
+    element: &Element,
+    row: usize,
+    line: &[u8],
+    wanted: &[bool],
+    mut visit: impl FnMut(usize, f64, Option<&List>),
+) -> Result<()> {
+    let wrong = |message: String| source.error(text_place(source, element, row, line), message);
+    let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let mut next = |column: usize, parse: bool| -> Result<f64> {
+        let name = &element.columns[column].name;
+        let word = words
+            .next()
+            .ok_or_else(|| wrong(format!("the line ends before the value of “{name}”")))?;
+        if !parse {
+            return Ok(0.0);
+        }
+        copy::number(word).ok_or_else(|| {
+            wrong(format!("“{}” is not a number (for “{name}”)", copy::excerpt(word)))
+        })
+    };
+    let mut list = Vec::new();
+    for (index, column) in element.columns.iter().enumerate() {
+        let length = match column.kind {
+            PropertyType::Scalar(_) => {
+                visit(index, next(index, wanted[index])?, None);
+                continue;
+            }
+            PropertyType::List(..) => next(index, true)?,
+        };
+        // A line cannot contain more values than bytes, so a longer list ends in the error above.
+        if !(length >= 0.0 && length.fract() == 0.0) {
+            let name = &column.name;
+            return Err(wrong(format!("the list “{name}” has the impossible length {length}")));
+        }
+        list.clear();
+        let mut left = length;
+        while left > 0.0 {
+            list.push(next(index, wanted[index])?);
+            left -= 1.0;
+        }
+        visit(index, length, Some(&list));
+    }
+    if words.next().is_some() {
+        return Err(wrong("the line has more values than the header names".into()));
+    }
+    Ok(())
 }
 
 /// Returns the bytes per row if its only list has three values.

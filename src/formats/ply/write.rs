@@ -9,7 +9,7 @@ use std::{io::Write, path::Path};
 /// # Errors
 /// [`Error::Output`] if the file cannot be written; [`Error::Argument`] for attributes whose number
 /// does not match the positions.
-pub fn write(mesh: &Mesh, path: &Path) -> Result<()> {
+pub fn write(mesh: &Mesh, path: impl AsRef<Path>) -> Result<()> {
     let count = mesh.positions.len();
     for (name, length) in [("normals", mesh.normals.len()), ("colors", mesh.colors.len())] {
         if length != 0 && length != count {
@@ -18,7 +18,7 @@ pub fn write(mesh: &Mesh, path: &Path) -> Result<()> {
             )));
         }
     }
-    disk::write_with(path, |out| write_to(mesh, out))
+    disk::write_with(path.as_ref(), |out| write_to(mesh, out))
 }
 
 fn write_to(mesh: &Mesh, out: &mut impl Write) -> std::io::Result<()> {

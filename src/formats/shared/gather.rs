@@ -49,7 +49,7 @@ pub(crate) fn gather(
         radii: columns.radii,
         covariances: columns.covariances,
     };
-    points.validate().map_err(|message| source.error("samples", message))?;
+    points.check().map_err(|message| source.error("samples", message))?;
     Ok(points)
 }
 

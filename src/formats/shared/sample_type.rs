@@ -7,23 +7,35 @@ use std::borrow::Cow;
 /// The type of a sample in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SampleType {
+    /// 8 bits, unsigned.
     U8,
+    /// 8 bits, signed.
     I8,
+    /// 16 bits, unsigned.
     U16,
+    /// 16 bits, signed.
     I16,
+    /// 32 bits, unsigned.
     U32,
+    /// 32 bits, signed.
     I32,
+    /// 64 bits, unsigned.
     U64,
+    /// 64 bits, signed.
     I64,
+    /// 32 bits, floating point.
     F32,
+    /// 64 bits, floating point.
     F64,
 }
 
 /// The byte order of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Endian {
+    /// The lowest byte comes first.
     #[default]
     Little,
+    /// The highest byte comes first.
     Big,
 }
 

@@ -69,7 +69,7 @@ impl<'a> Parser<'a> {
                     }
                 }
                 [keyword, ..] if keyword.eq_ignore_ascii_case("METADATA") => {
-                    parser.skip_to_blank()?
+                    parser.skip_to_blank()?;
                 }
                 _ => {
                     return Err(source.error(place, "the line “DATASET …” was expected here"));

@@ -1,8 +1,9 @@
-//! Making buffers.
+//! Creates buffers.
 
 use crate::gpu::device::Gpu;
 
-/// An empty buffer; its size is rounded up to what every binding takes.
+/// Returns an empty buffer. Its size is rounded up to a multiple of 16 bytes, which suits every
+/// binding.
 pub fn buffer(gpu: &Gpu, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
@@ -12,7 +13,8 @@ pub fn buffer(gpu: &Gpu, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> 
     })
 }
 
-/// A buffer that holds some bytes, padded with zeros to what every binding takes.
+/// Returns a buffer that contains these bytes, padded with zeros to a size that suits every
+/// binding.
 pub fn filled_buffer(
     gpu: &Gpu,
     label: &str,
@@ -25,7 +27,8 @@ pub fn filled_buffer(
         usage,
         mapped_at_creation: true,
     });
-    // Without memory for it there is nothing to fill; the device has told so (see fault.rs).
+    // If there is no memory for the buffer, there is nothing to fill, and the device has reported
+    // the error (see fault.rs).
     if let Ok(mut mapped) = buffer.get_mapped_range_mut(..) {
         mapped.slice(..bytes.len()).copy_from_slice(bytes);
         drop(mapped);
@@ -34,7 +37,7 @@ pub fn filled_buffer(
     buffer
 }
 
-/// A read-only storage buffer of some bytes.
+/// Returns a read-only storage buffer that contains these bytes.
 pub fn upload(gpu: &Gpu, label: &str, bytes: &[u8]) -> wgpu::Buffer {
     filled_buffer(gpu, label, bytes, wgpu::BufferUsages::STORAGE)
 }

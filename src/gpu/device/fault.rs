@@ -1,5 +1,5 @@
-//! What can go wrong with a device at any time, made into errors: it is lost, it does not answer, its memory runs out. What was
-//! drawn meanwhile is never given out as a picture.
+//! Turns faults that a device can have at any time into errors: it is lost, it does not answer, or
+//! its memory runs out. A picture drawn during a fault is never returned.
 
 use crate::{Error, Result, gpu::device::Gpu};
 use std::{
@@ -8,25 +8,25 @@ use std::{
     time::Duration,
 };
 
-/// The longest between the end of the device's work and the call that tells of it.
+/// Maximum time between the end of the device's work and the callback that reports it.
 const CALL_BACK: Duration = Duration::from_secs(10);
 
-/// What a device has told of itself.
+/// The faults that a device has reported.
 #[derive(Debug, Default)]
 pub(crate) struct Condition {
-    /// Why it is lost, once it is.
+    /// Why the device was lost, if it was.
     lost: OnceLock<String>,
-    /// The first error outside of what is watched, since the last time.
+    /// The first error since the last check that was reported outside of watched work.
     stray: Mutex<Option<String>>,
 }
 
 impl Condition {
-    /// Listens to a device of our own.
+    /// Registers the callbacks of a device that the engine has opened.
     pub fn listen(self: &Arc<Self>, device: &wgpu::Device) {
         let own = self.clone();
         device.set_device_lost_callback(move |_, reason| own.lose(reason));
         let own = self.clone();
-        // Without a handler wgpu ends the program where memory runs out.
+        // Without a handler, wgpu ends the program if memory runs out.
         device
             .on_uncaptured_error(Arc::new(move |error: wgpu::Error| own.note(&error.to_string())));
     }
@@ -45,12 +45,12 @@ impl Condition {
 }
 
 impl Gpu {
-    /// Does some work and gives what came of it, or else what the device complained of meanwhile.
+    /// Does some work and returns its result, or the error that the device reported meanwhile.
     pub(crate) fn watch<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<Result<T>> {
         self.sound()?;
         let (done, complaint) = self.hear(work);
         if complaint.is_some() {
-            // Whatever is made on a lost device is not valid; that it is lost shows when it is asked.
+            // What is made on a lost device is invalid. Polling shows whether the device is lost.
             drop(catch_unwind(AssertUnwindSafe(|| self.device.poll(wgpu::PollType::Poll))));
         }
         if complaint.is_some() || done.is_ok() {
@@ -59,7 +59,8 @@ impl Gpu {
         complaint.map_or(Ok(done), Err)
     }
 
-    /// As [`Self::watch`], for what gives no errors: whoever asks next is told what the device complained of.
+    /// Like [`Self::watch`], for work that returns no errors. The next check returns what the
+    /// device reported.
     pub(crate) fn watch_later<T>(&self, work: impl FnOnce() -> T) -> T {
         let (done, complaint) = self.hear(work);
         if let Some(complaint) = complaint {
@@ -76,11 +77,12 @@ impl Gpu {
         ];
         let scopes = filters.map(|filter| self.device.push_error_scope(filter));
         let done = work();
-        // The last that was opened is closed first. Memory that ran out is the reason of what else went wrong.
+        // The scope opened last is closed first. If memory ran out, the other errors follow from
+        // that.
         let complaints = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
         let complaint = complaints.reduce(Option::or).flatten().map(|complaint| {
             let (name, reason) = (&self.info.name, complaint.to_string());
-            Error::Gpu(match complaint {
+            Error::Driver(match complaint {
                 wgpu::Error::OutOfMemory { .. } => {
                     format!("the memory of {name} ran out: {reason}")
                 }
@@ -90,48 +92,51 @@ impl Gpu {
         (done, complaint)
     }
 
-    /// Waits until the device has done all that was submitted.
+    /// Waits until the device has done all submitted work.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`] where it is lost; [`Error::Gpu`] where it does not answer in time ([`Self::with_patience`]), which
-    /// loses it, or reported an error since the last time.
+    /// [`Error::DeviceLost`] if the device is lost. [`Error::Driver`] if it does not answer in time
+    /// ([`Self::with_patience`]), which loses it, or if it has reported an error since the last
+    /// check.
     pub fn wait(&self) -> Result<()> {
         if self.condition.lost.get().is_some() {
             return self.sound();
         }
         let poll = wgpu::PollType::Wait { submission_index: None, timeout: Some(self.patience) };
-        // wgpu panics where a device is lost while it is waited for.
+        // wgpu panics if a device is lost during a wait.
         match catch_unwind(AssertUnwindSafe(|| self.device.poll(poll))) {
             Ok(Ok(_)) => {}
             Ok(Err(wgpu::PollError::Timeout)) => {
                 let seconds = self.patience.as_secs_f64();
                 self.condition.lose(format!("it did not answer within {seconds} s"));
-                // Letting go of a device waits for it. This one may never be done, so its memory stays where it is.
+                // Dropping a device waits for it. This one may never finish, so its memory is
+                // leaked.
                 std::mem::forget(self.clone());
-                // The device opened anew would take as long again: this is not told as a loss that can be mended.
-                return Err(Error::Gpu(format!(
+                // A reopened device would take as long again, so this is not reported as a loss
+                // that reopening repairs.
+                return Err(Error::Driver(format!(
                     "{} did not answer within {seconds} s",
                     self.info.name
                 )));
             }
             Ok(Err(error)) => self.condition.lose(error.to_string()),
-            Err(_) => self.condition.lose("it was gone when it was waited for"),
+            Err(_) => self.condition.lose("it disappeared during a wait"),
         }
         self.sound()
     }
 
-    /// Whether nothing went wrong since the last time.
+    /// Returns an error if the device is lost, or has reported an error since the last check.
     fn sound(&self) -> Result<()> {
         if let Some(reason) = self.condition.lost.get() {
             return Err(Error::DeviceLost(format!("{} was lost: {reason}", self.info.name)));
         }
         match self.condition.stray.lock().unwrap_or_else(PoisonError::into_inner).take() {
             None => Ok(()),
-            Some(stray) => Err(Error::Gpu(stray)),
+            Some(stray) => Err(Error::Driver(stray)),
         }
     }
 
-    /// Reads a part of a buffer back, when the device has done all before.
+    /// Reads a part of a buffer back, after all earlier work.
     pub(crate) fn read(&self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<Vec<u8>> {
         let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("read back"),
@@ -147,17 +152,18 @@ impl Gpu {
         // The receiver outlives the callback: it is waited for below.
         staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
         self.wait()?;
-        // Another thread that waits for the same device may be about to call back; one that is lost may forget to.
+        // Another thread that waits for the same device may be about to call back. A lost device
+        // may never call back.
         match receiver.recv_timeout(self.patience.min(CALL_BACK)) {
             Ok(Ok(())) => {}
             _ => {
                 return Err(Error::DeviceLost(format!(
-                    "{} did not give back what was drawn",
+                    "{} did not return the requested data",
                     self.info.name
                 )));
             }
         }
-        let view = staging.get_mapped_range(..).map_err(|e| Error::Gpu(e.to_string()))?;
+        let view = staging.get_mapped_range(..).map_err(|e| Error::Driver(e.to_string()))?;
         Ok(view.to_vec())
     }
 }

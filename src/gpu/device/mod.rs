@@ -1,4 +1,5 @@
-//! The device: adapters and their limits.
+//! The GPU device: which adapters can run the engine, how a device is opened, and its limits. The
+//! submodules create buffers, turn a device's faults into errors, and read its clock.
 
 pub(crate) mod buffers;
 pub(crate) mod fault;
@@ -8,35 +9,39 @@ use crate::{Error, Result, memory};
 use fault::Condition;
 use std::{sync::Arc, time::Duration};
 
-/// Storage buffers that march binds beside a lattice that is gathered. WebGPU promises eight.
+/// Storage buffers that march binds if a lattice is gathered among surfaces. WebGPU promises eight.
 pub const MOST_BUFFERS: u32 = 9;
 
-/// How long a picture may take by default: a large scene takes minutes on a processor.
+/// Default time limit of a picture: a large scene takes minutes on a processor.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 /// A wgpu device and queue, with the adapter's description.
 #[derive(Debug, Clone)]
 pub struct Gpu {
+    /// The wgpu device that draws.
     pub device: wgpu::Device,
+    /// The queue of the device.
     pub queue: wgpu::Queue,
+    /// The adapter's name, type, backend and driver.
     pub info: Arc<wgpu::AdapterInfo>,
     pub(crate) condition: Arc<Condition>,
     pub(crate) patience: Duration,
-    /// The most bytes of memory that a scene may take.
+    /// Maximum bytes of memory that a scene may take.
     memory: u64,
-    /// How it was found; a host's device was not.
+    /// How the adapter was chosen; `None` for the device of a host application.
     choice: Option<AdapterChoice>,
 }
 
-/// Which adapter to take.
+/// Which adapter to use.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
-    /// The environment's `WGPU_ADAPTER_NAME` if set, else the fastest: discrete, integrated, virtual, then software.
+    /// The adapter named by the environment variable `WGPU_ADAPTER_NAME`, if that is set; otherwise
+    /// the fastest: discrete, integrated, virtual, then software.
     #[default]
     Automatic,
-    /// By its place in [`Gpu::adapters`].
+    /// By its index in [`Gpu::adapters`].
     Index(usize),
-    /// By a part of its name, in any case.
+    /// By a part of its name, ignoring case.
     Name(String),
     /// A software adapter.
     Software,
@@ -54,18 +59,19 @@ impl std::str::FromStr for AdapterChoice {
     }
 }
 
-/// What the user can do where no adapter is found.
-const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, the CPU engine draws the same pictures, and Mesa's \
-    software driver serves too (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)";
+/// What the user can do if no adapter is found.
+const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, use the CPU engine, which \
+    draws the same pictures, or Mesa's software driver (Debian and Ubuntu: apt-get install \
+    mesa-vulkan-drivers libvulkan1)";
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-    // The debug layers that wgpu turns on in debug builds are a developer's choice, not a default.
+    // wgpu turns its debug layers on in debug builds; environment variables override that.
     descriptor.flags = wgpu::InstanceFlags::from_env_or_default();
     wgpu::Instance::new(descriptor)
 }
 
-/// Fastest first; software last.
+/// Returns the rank of an adapter: fastest first, software last.
 fn rank(info: &wgpu::AdapterInfo) -> u8 {
     match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -78,7 +84,8 @@ fn rank(info: &wgpu::AdapterInfo) -> u8 {
 
 fn usable_adapters() -> Vec<wgpu::Adapter> {
     let mut adapters = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::all()));
-    // One that lacks compute shaders, or storage buffers in them, cannot run the engine.
+    // An adapter without compute shaders, or with fewer than eight storage buffers in them, cannot
+    // run the engine.
     adapters.retain(|a| {
         let flags = a.get_downlevel_capabilities().flags;
         flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
@@ -89,13 +96,14 @@ fn usable_adapters() -> Vec<wgpu::Adapter> {
 }
 
 impl Gpu {
-    /// The adapters that can run the engine, fastest first, with their limits.
+    /// Returns the adapters that can run the engine, fastest first, with their limits.
     pub fn adapters() -> Vec<(wgpu::AdapterInfo, wgpu::Limits)> {
         usable_adapters().iter().map(|a| (a.get_info(), a.limits())).collect()
     }
 
-    /// Opens the fastest adapter that does not run on the processor, or the one that the environment's `WGPU_ADAPTER_NAME`
-    /// names; none where there is none or it cannot be opened.
+    /// Opens the fastest adapter that does not run on the processor, or the adapter named by the
+    /// environment variable `WGPU_ADAPTER_NAME`. Returns `None` if there is none or it cannot be
+    /// opened.
     pub fn hardware() -> Option<Self> {
         let is_named = std::env::var("WGPU_ADAPTER_NAME").is_ok_and(|name| !name.is_empty());
         let gpu = Self::headless(&AdapterChoice::Automatic).ok()?;
@@ -105,7 +113,8 @@ impl Gpu {
     /// Opens a device without a window.
     ///
     /// # Errors
-    /// [`Error::NoAdapter`] where there is none (or none of that name), with what to install.
+    /// [`Error::NoAdapter`] if there is no adapter, or none that matches `choice`. The message says
+    /// what to install.
     pub fn headless(choice: &AdapterChoice) -> Result<Self> {
         let mut adapters = usable_adapters();
         let names = || adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
@@ -130,7 +139,7 @@ impl Gpu {
             AdapterChoice::Software => {
                 let found =
                     adapters.iter().position(|a| a.get_info().device_type == wgpu::DeviceType::Cpu);
-                (found, format!("in software; {NO_ADAPTER_HELP}"))
+                (found, format!("that runs in software; {NO_ADAPTER_HELP}"))
             }
         };
         let Some(index) = wanted.0 else {
@@ -145,55 +154,58 @@ impl Gpu {
         Ok(Self { choice: Some(choice.clone()), ..gpu })
     }
 
-    /// Opens a device as this one was opened: what to do where it was lost ([`Error::DeviceLost`]). Renderers and scenes are
-    /// prepared anew on it.
+    /// Opens a device in the way that this one was opened, after it was lost
+    /// ([`Error::DeviceLost`]). Renderers and scenes must be prepared again on the new device.
     ///
     /// # Errors
-    /// As of [`Self::headless`]; [`Error::Argument`] for the device of a host application, which is the host's to open.
+    /// Those of [`Self::headless`]; [`Error::Argument`] for the device of a host application, which
+    /// only the host can reopen.
     pub fn reopened(&self) -> Result<Self> {
         let Some(choice) = &self.choice else {
             return Err(Error::Argument(
-                "the device is the host's; it has to be opened there".into(),
+                "the device belongs to the host application, which must reopen it".into(),
             ));
         };
         Ok(Self { patience: self.patience, memory: self.memory, ..Self::headless(choice)? })
     }
 
-    /// The same device with a time limit, ten minutes by default. A picture that takes longer is an error. A device that does not
-    /// finish one submission in that time counts as lost.
+    /// Returns the same device with a time limit. The default is ten minutes. A picture that takes
+    /// longer is an error. A device that does not finish one submission in that time counts as
+    /// lost.
     #[must_use]
     pub fn with_patience(self, patience: Duration) -> Self {
         Self { patience, ..self }
     }
 
-    /// The same device, on which a scene and the lists made of it may take so many bytes of memory: what takes more is refused
-    /// before it is there. By default what [`memory::most`] tells where the adapter runs on the processor, whose memory is the
-    /// machine's; elsewhere the device itself says what is too much.
+    /// Returns the same device with a limit, in bytes, on the memory of a scene and the lists made
+    /// from it. What exceeds the limit is refused before it is allocated. If the adapter runs on
+    /// the processor, it uses the machine's memory, and the default limit is [`memory::most`].
+    /// Other adapters have no default limit: the device itself reports that memory ran out.
     #[must_use]
     pub fn with_memory(self, memory: u64) -> Self {
         Self { memory, ..self }
     }
 
-    /// How much more may be taken where so many bytes are.
+    /// Returns how many more bytes may be taken if `taken` bytes are.
     pub(crate) fn memory_left(&self, taken: u64) -> u64 {
         self.memory.saturating_sub(taken)
     }
 
-    /// Refuses what would take more memory than there is to take.
+    /// Returns an error if `bytes` exceed the memory limit.
     pub(crate) fn check_memory(&self, bytes: u64) -> Result<()> {
         if bytes <= self.memory {
             return Ok(());
         }
-        let [wanted, most] = [bytes, self.memory].map(|bytes| bytes.div_ceil(1 << 20));
-        Err(Error::Gpu(format!(
-            "the scene takes {wanted} MiB of memory or more on {}, of which {most} MiB may be taken",
-            self.info.name
-        )))
+        Err(Error::MemoryBound {
+            adapter: self.info.name.clone(),
+            needed: bytes,
+            limit: self.memory,
+        })
     }
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self> {
-        // WebGPU's defaults are what the engine is built for; larger bindings only save passes, and with two more of them a volume
-        // among surfaces can be gathered.
+        // The engine is built for WebGPU's default limits. Larger bindings only save passes. With a
+        // ninth storage buffer, a volume among surfaces can be gathered.
         let buffers = adapter.limits().max_storage_buffers_per_shader_stage.clamp(8, MOST_BUFFERS);
         let limits = wgpu::Limits {
             max_storage_buffers_per_shader_stage: buffers,
@@ -215,8 +227,10 @@ impl Gpu {
         Ok(Self::from_wgpu(device, queue, adapter.get_info()))
     }
 
-    /// Takes the device of a host application, once: what is made with one `Gpu` goes with it and its clones. It must keep WebGPU's default limits. What goes wrong while the engine works is
-    /// the engine's error; what the host hears of is its own.
+    /// Uses a device that the host application owns. It must keep WebGPU's default limits. Call
+    /// this once per device: resources created through this `Gpu` or its clones can't be used with
+    /// another `Gpu`. Errors caused by the engine are returned by the engine; the host's own error
+    /// scopes and callbacks still see the host's errors only.
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
         let on_processor = info.device_type == wgpu::DeviceType::Cpu;
         let memory = memory::most().filter(|_| on_processor).unwrap_or(u64::MAX);
@@ -231,22 +245,24 @@ impl Gpu {
         }
     }
 
-    /// Whether the other is a clone of this one. What wgpu compares devices by may be the same in two instances of it.
+    /// Whether the other is a clone of this one. wgpu's own comparison may find devices of two
+    /// instances equal.
     pub(crate) fn is(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.condition, &other.condition)
     }
 
-    /// Whether the adapter runs on the processor. Tiles are then walked by fewer, wider invocations.
+    /// Whether the adapter runs on the processor. If so, fewer and wider invocations draw a tile.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Whether the times of [`Renderer::profile`](crate::gpu::Renderer::profile) are the GPU's own.
+    /// Whether the times of [`Renderer::profile`](crate::gpu::Renderer::profile) come from the
+    /// GPU's own clock.
     pub fn has_clock(&self) -> bool {
         self.device.features().contains(timestamps::FEATURES)
     }
 
-    /// The most bytes that one storage binding holds, as a multiple of 256.
+    /// Returns the maximum size of a storage binding in bytes, as a multiple of 256.
     pub fn binding_size(&self) -> u64 {
         let limits = self.device.limits();
         (limits.max_storage_buffer_binding_size).min(limits.max_buffer_size) / 256 * 256

@@ -5,18 +5,19 @@ use crate::{
     gpu::device::{Gpu, buffers::buffer},
 };
 
-/// What a device must be able to do.
+/// The features that a device needs for this clock.
 pub const FEATURES: wgpu::Features =
     wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
-/// Marks in time, one before the first step of a submission and one after each.
+/// Timestamps in a submission, one before the first step and one after each.
 pub struct Timestamps {
     marks: wgpu::QuerySet,
     count: u32,
 }
 
 impl Timestamps {
-    /// Room for the marks around so many steps; none on devices without such a clock.
+    /// Allocates the timestamps around this number of steps. Returns `None` on devices without a
+    /// clock.
     pub fn new(gpu: &Gpu, steps: usize) -> Option<Self> {
         if !gpu.has_clock() {
             return None;
@@ -30,12 +31,13 @@ impl Timestamps {
         Some(Self { marks, count })
     }
 
-    /// Writes mark number `index`.
+    /// Writes timestamp number `index`.
     pub fn mark(&self, encoder: &mut wgpu::CommandEncoder, index: u32) {
         encoder.write_timestamp(&self.marks, index);
     }
 
-    /// Submits what was encoded, and waits for it; gives the milliseconds between each mark and the next.
+    /// Submits the encoded work and waits for it. Returns the milliseconds between each timestamp
+    /// and the next.
     pub fn finish(self, gpu: &Gpu, mut encoder: wgpu::CommandEncoder) -> Result<Vec<f64>> {
         let bytes = u64::from(self.count) * u64::from(wgpu::QUERY_SIZE);
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
@@ -44,7 +46,7 @@ impl Timestamps {
         gpu.queue.submit([encoder.finish()]);
         let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&gpu.read(&resolved, 0, bytes)?);
         let period = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
-        // Clocks of some drivers step back where a device changes its speed.
+        // The clocks of some drivers step back when a device changes its speed.
         Ok(ticks.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * period).collect())
     }
 }

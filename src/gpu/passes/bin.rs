@@ -1,4 +1,4 @@
-//! Bin: the entries of a pass, each into its bin (shaders/passes/bin.wgsl).
+//! Bin: writes the entries of a pass, each into its bin (shaders/passes/bin.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -11,7 +11,8 @@ use crate::gpu::{
     targets::Targets,
 };
 
-/// The pass: as many workgroups as it has records, which only the GPU knows.
+/// The pass. The number of its workgroups follows from the number of records, which only the GPU
+/// knows.
 #[derive(Debug)]
 pub struct Bin {
     prepare: Stage,
@@ -56,7 +57,8 @@ impl Bin {
         .map(|b| b.as_entire_buffer_binding())
     }
 
-    /// Finds the sizes of the bins, but for what large splats add, and lists these.
+    /// Counts the sizes of the bins, without the entries of large splats, and lists the large
+    /// splats.
     pub fn encode_count(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         let buffers = Self::buffers(targets);
         let arguments =

@@ -1,4 +1,5 @@
-//! Clear: empties the bins of a pass, as many as it has (shaders/passes/clear.wgsl).
+//! Clear: empties the bins that a pass uses, and the progress of its tiles
+//! (shaders/passes/clear.wgsl).
 
 use crate::gpu::{
     device::Gpu,

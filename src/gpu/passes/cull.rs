@@ -1,4 +1,5 @@
-//! Cull: which candidates a pass draws, and which are hidden by the passes before it (shaders/passes/cull.wgsl).
+//! Cull: finds the candidates that a pass draws, except those hidden by earlier passes
+//! (shaders/passes/cull.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -12,7 +13,7 @@ use crate::gpu::{
     targets::Targets,
 };
 
-/// To how many hands workgroups are dealt (`HANDS` in frame.wgsl).
+/// Number of lanes to which workgroups are dealt (`HANDS` in frame.wgsl).
 const HANDS: u32 = 16;
 
 /// The pass.
@@ -55,7 +56,8 @@ impl Cull {
         targets: &Targets,
         chunks: &[Chunk],
     ) {
-        // Runs behind a hierarchy's last drawn node, and the element after the last run, count nothing.
+        // Batches behind a hierarchy's last drawn node, and the element after the last batch, count
+        // as 0.
         encoder.clear_buffer(&targets.runs, 0, None);
         encoder.clear_buffer(&targets.active, 0, None);
         for chunk in chunks {
@@ -69,7 +71,7 @@ impl Cull {
                 &targets.runs,
                 &targets.state,
             ];
-            // Only of nodes the number is unknown here; others have nothing to bind in its place but their data.
+            // Only the number of nodes is unknown here. Other chunks bind their data in its place.
             let numbers = match &chunk.origin {
                 Origin::Nodes { slots, .. } => &slots.selected,
                 _ => &chunk.data,

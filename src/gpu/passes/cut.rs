@@ -1,5 +1,5 @@
-//! Cut: which nodes of a hierarchy are drawn (shaders/passes/cut.wgsl), and how many each possible cut would draw
-//! (shaders/passes/tally.wgsl).
+//! Cut: lists the nodes of a hierarchy that are drawn (shaders/passes/cut.wgsl), and counts how
+//! many nodes each possible cut would draw (shaders/passes/tally.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -12,10 +12,11 @@ use crate::gpu::{
     scene::nodes::{NodeChunk, OWN_NODES, RUN_NODES, SLOT_NODES, counts_of},
 };
 
-// A workgroup of tally looks at the nodes of a slot, as many of cut do together.
+// A workgroup of tally visits the nodes of one slot, and a whole number of workgroups of cut do so
+// together.
 const _: () = assert!(SLOT_NODES == 64 * RUN_NODES && SLOT_NODES.is_multiple_of(64 * OWN_NODES));
 
-/// Counters of a tally, eight an octave, the first for a cut of 2⁻⁸ pixels (tally.wgsl).
+/// Counters of a tally: eight per octave, the first for a cut of 2⁻⁸ pixels (tally.wgsl).
 const TALLY_COUNT: usize = 256;
 
 const TALLY_STEPS: f64 = 8.0;
@@ -55,7 +56,7 @@ impl Cut {
         ]
     }
 
-    /// Encodes the making of a chunk's list.
+    /// Encodes the commands that list a chunk's drawn nodes.
     pub fn encode(
         &self,
         gpu: &Gpu,
@@ -73,7 +74,7 @@ impl Cut {
         self.write.dispatch(encoder, &[&bound[0], &bound[1]], groups);
     }
 
-    /// Encodes the counting of a chunk's nodes into `counters` ([`tally_bytes`] of them).
+    /// Encodes the commands that count a chunk's nodes into `counters`, of [`tally_bytes`] bytes.
     pub fn encode_tally(
         &self,
         gpu: &Gpu,
@@ -90,7 +91,7 @@ pub const fn tally_bytes() -> u64 {
     4 * TALLY_COUNT as u64
 }
 
-/// The finest cut, in pixels, that draws no more than `most` splats.
+/// Returns the finest cut, in pixels, that draws at most `most` splats.
 pub fn finest_within(tally: &[i32], most: u64) -> f64 {
     let mut drawn = 0i64;
     let counts = tally.iter().map(|difference| {
@@ -98,7 +99,8 @@ pub fn finest_within(tally: &[i32], most: u64) -> f64 {
         drawn
     });
     let counts: Vec<i64> = counts.collect();
-    // Not all nodes of a cut get coarser together: the last that is too much decides.
+    // Nodes do not all become coarser at the same cut, so the count may rise again. The last cut
+    // with too many splats decides.
     let step = counts
         .iter()
         .rposition(|&count| u64::try_from(count).is_ok_and(|count| count > most))

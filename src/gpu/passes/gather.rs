@@ -1,5 +1,6 @@
-//! Gather: draws the field of a lattice without splats (shaders/passes/gather.wgsl and field_lattice.wgsl). The splats of other items
-//! in the scene are scattered as ever; march then looks for the field itself, sheet by sheet.
+//! Gather: draws the field of a lattice without splats (shaders/passes/gather.wgsl and
+//! shaders/shared/field_lattice.wgsl). The splats of other items in the scene are scattered as
+//! usual; march then evaluates the field itself, sheet by sheet.
 
 use crate::gpu::{
     device::Gpu,
@@ -12,7 +13,7 @@ use crate::gpu::{
     targets::Targets,
 };
 
-/// Tiles are dealt to this many hands (`HANDS` in frame.wgsl).
+/// Number of lanes to which tiles are dealt (`HANDS` in frame.wgsl).
 const HANDS: u32 = 16;
 
 /// The pass.
@@ -26,7 +27,7 @@ impl Gather {
 
     pub fn recipe(variant: &Variant) -> Recipe {
         use Binding::{Read, Uniform, Write};
-        // An invocation draws one pixel, and looks at nothing but the field.
+        // An invocation draws one pixel, and only the field.
         let own = Variant { rows: 1, radiance: false, surface_shaded: false, ..*variant };
         let sources = [
             &own.constants(),

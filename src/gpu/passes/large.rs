@@ -1,4 +1,4 @@
-//! Large: the entries of splats that meet many bins (shaders/passes/large.wgsl).
+//! Large: writes the entries of splats that meet many bins (shaders/passes/large.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -11,7 +11,8 @@ use crate::gpu::{
     targets::Targets,
 };
 
-/// The pass: its first half before the bins are scanned, its second after they are filled otherwise.
+/// The pass. Its first half runs before the bins are scanned, its second half after bin has filled
+/// them.
 #[derive(Debug)]
 pub struct Large {
     prepare: Stage,

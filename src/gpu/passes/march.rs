@@ -1,4 +1,5 @@
-//! March: walks each tile's entries front to back and composites its sheets (shaders/passes/march.wgsl).
+//! March: processes each tile's entries front to back and composites its sheets
+//! (shaders/passes/march.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -48,7 +49,8 @@ impl March {
         Recipe::new("march", &sources, "march", &[&[bindings.as_slice()], texture].concat())
     }
 
-    /// `arguments`: where in the pass's the dispatch stands.
+    /// Encodes the pass. `arguments` is the byte offset of its dispatch in the buffer of indirect
+    /// dispatches.
     pub fn encode(
         &self,
         gpu: &Gpu,

@@ -1,4 +1,5 @@
-//! Measure: which sheets each candidate meets, and what its run of candidates will need (shaders/passes/measure.wgsl).
+//! Measure: finds the tiles and sheets that each candidate meets, and the capacity that its batch
+//! of candidates needs (shaders/passes/measure.wgsl).
 
 use crate::gpu::{
     device::Gpu,

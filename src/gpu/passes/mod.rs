@@ -1,4 +1,5 @@
-//! The passes of a frame: one file here and one shader of the same name in shaders/passes/ each.
+//! The passes of a frame. Each has a file here and a shader of the same name in shaders/passes/.
+//! `sources` contains what passes over candidates share.
 
 pub(crate) mod bin;
 pub(crate) mod clear;

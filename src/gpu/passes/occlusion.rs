@@ -1,4 +1,4 @@
-//! Occlusion: the map of what is opaque so far, for culling (shaders/passes/occlusion.wgsl).
+//! Occlusion: maps the tiles that are opaque so far, for culling (shaders/passes/occlusion.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -48,7 +48,8 @@ impl Occlusion {
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         let buffers = [&targets.frame, &targets.colors, &targets.progress, &targets.map];
         let buffers = buffers.map(|b| b.as_entire_buffer_binding());
-        // A workgroup looks at 64 tiles where march takes one, so most of these have nothing to do.
+        // A workgroup checks 64 tiles, and march has a workgroup for each tile. So most workgroups
+        // of this dispatch have nothing to do.
         let group = self.look.bind(gpu, 0, &buffers);
         self.look.dispatch_indirect(encoder, &[&group], (&targets.arguments, MARCH_ARGUMENTS));
         let [columns, rows] = targets.tiles;

@@ -1,4 +1,5 @@
-//! Order: sorts the entries of each bin, so that every run adds them up alike (shaders/passes/order.wgsl).
+//! Order: sorts the entries of each bin, so that they are added in the same order every time
+//! (shaders/passes/order.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -12,7 +13,7 @@ use crate::gpu::{
     targets::Targets,
 };
 
-/// The pass: short bins by one invocation each, long ones by a workgroup each.
+/// The pass. One invocation sorts a short bin, one workgroup a long bin.
 #[derive(Debug)]
 pub struct Order {
     short: Stage,

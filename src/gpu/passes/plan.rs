@@ -1,4 +1,5 @@
-//! Plan: cuts a frame into depth passes that fit the buffers (shaders/passes/survey.wgsl and plan.wgsl).
+//! Plan: divides a frame into depth passes that fit the buffers (shaders/passes/survey.wgsl and
+//! plan.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -11,7 +12,7 @@ use crate::gpu::{
     targets::Targets,
 };
 
-/// The passes: once a frame, and `advance` before each depth pass.
+/// The stages of the pass. `advance` runs before each depth pass, the others once per frame.
 #[derive(Debug)]
 pub struct Plan {
     total: Stage,
@@ -59,7 +60,7 @@ impl Plan {
         .map(|b| b.as_entire_buffer_binding())
     }
 
-    /// Sums up what measure found.
+    /// Sums the results of measure.
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         let buffers = Self::buffers(targets);
         self.total.dispatch(encoder, &[&self.total.bind(gpu, 0, &buffers)], 1);
@@ -76,7 +77,7 @@ impl Plan {
         self.accumulate.dispatch(encoder, &[&self.accumulate.bind(gpu, 0, &buffers)], 1);
     }
 
-    /// Decides how far the next pass reaches.
+    /// Decides how far the next depth pass reaches.
     pub fn encode_advance(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         self.advance.dispatch(encoder, &[&self.advance.bind(gpu, 0, &Self::buffers(targets))], 1);
     }

@@ -1,4 +1,4 @@
-//! Project: the records of a pass's splats (shaders/passes/project.wgsl).
+//! Project: writes the records of a pass's splats (shaders/passes/project.wgsl).
 
 use crate::gpu::{
     device::Gpu,

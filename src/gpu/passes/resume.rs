@@ -1,4 +1,4 @@
-//! Resume: goes on with tiles that march has stopped (shaders/passes/resume.wgsl).
+//! Resume: continues tiles that march has stopped (shaders/passes/resume.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -44,17 +44,17 @@ impl Resume {
         stage.dispatch(encoder, &[&group], 1);
     }
 
-    /// Prepares another march over the tiles where some are unfinished.
+    /// Prepares another march if any tiles are unfinished.
     pub fn encode_again(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         Self::encode(&self.again, gpu, encoder, targets);
     }
 
-    /// Stops the frame where tiles are still unfinished.
+    /// Stops the frame if tiles are still unfinished.
     pub fn encode_hold(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         Self::encode(&self.hold, gpu, encoder, targets);
     }
 
-    /// Takes up the pass at which the frame stopped.
+    /// Continues the pass at which the frame stopped.
     pub fn encode_resume(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         Self::encode(&self.resume, gpu, encoder, targets);
     }

@@ -1,6 +1,6 @@
-//! Passes that read candidates come in four kinds, one per source of candidates: explicit splats
-//! (shaders/sources/splats.wgsl), hierarchies (shaders/sources/nodes.wgsl), lattices (shaders/sources/lattice.wgsl) and volumes in
-//! bricks (shaders/sources/bricks.wgsl).
+//! The sources of candidates. A pass that reads candidates has a stage for each of the four kinds:
+//! explicit splats (shaders/sources/splats.wgsl), hierarchies (shaders/sources/nodes.wgsl),
+//! lattices (shaders/sources/lattice.wgsl) and volumes in bricks (shaders/sources/bricks.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -12,7 +12,7 @@ use crate::gpu::{
     scene::chunk::{Chunk, Origin, WORKGROUP_CANDIDATES},
 };
 
-/// One thing per kind of source.
+/// One value per kind of source.
 #[derive(Debug)]
 pub struct Sources<T> {
     splats: T,
@@ -70,9 +70,9 @@ impl Sources<Stage> {
         buffers: &[wgpu::BufferBinding<'_>],
     ) {
         match &chunk.origin {
-            // The number of drawn nodes is known on the GPU alone.
+            // Only the GPU knows the number of drawn nodes.
             Origin::Nodes { slots, .. } => {
-                self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments)
+                self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments);
             }
             _ => {
                 let (stage, groups) = self.bound(gpu, chunk, buffers);
@@ -82,7 +82,7 @@ impl Sources<Stage> {
         }
     }
 
-    /// The same over as many workgroups as a buffer says.
+    /// The same, with the number of workgroups in a buffer.
     pub fn dispatch_indirect(
         &self,
         gpu: &Gpu,

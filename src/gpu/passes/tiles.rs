@@ -1,4 +1,4 @@
-//! Tiles: which tiles of the picture have entries in a pass (shaders/passes/tiles.wgsl).
+//! Tiles: lists the tiles of the picture that have entries in a pass (shaders/passes/tiles.wgsl).
 
 use crate::gpu::{
     device::Gpu,

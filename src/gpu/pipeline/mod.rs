@@ -1,5 +1,5 @@
-//! How a compute pipeline is made: the shader files, the constants of a variant before them, the
-//! bindings, and the prefix sum that several passes share.
+//! Compute pipelines: the shader files, the constants of a variant that precede them, the bindings,
+//! the state of a frame that shaders update, and the prefix sum that several passes share.
 
 pub(crate) mod recipe;
 pub(crate) mod scan;

@@ -12,13 +12,13 @@ use crate::gpu::{
     },
 };
 
-/// The most numbers that one scan takes.
+/// Maximum number of elements of one scan.
 pub const SCAN_CAPACITY: u32 = 1 << 24;
 
 /// Numbers per invocation (`SEGMENT` in scan.wgsl).
 const SEGMENT: u32 = 64;
 
-/// The pass, with room for the sums of its segments.
+/// The pass, with a buffer for the sums of its segments.
 #[derive(Debug)]
 pub struct Scan {
     sum: Stage,
@@ -55,8 +55,8 @@ impl Scan {
         ]
     }
 
-    /// Replaces numbers by the sum of those before each; `size` holds how many there are, and the indirect dispatch their
-    /// segments.
+    /// Replaces each number with the sum of those before it. `size` contains the number of
+    /// elements, and the indirect dispatch `arguments` covers their segments.
     pub fn encode_indirect(
         &self,
         gpu: &Gpu,
@@ -71,7 +71,7 @@ impl Scan {
         self.spread.dispatch_indirect(encoder, &[&self.spread.bind(gpu, 0, &buffers)], arguments);
     }
 
-    /// Replaces each of the first `count` numbers by the sum of those before it.
+    /// Replaces each of the first `count` numbers with the sum of those before it.
     pub fn encode(
         &self,
         gpu: &Gpu,

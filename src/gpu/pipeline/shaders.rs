@@ -1,5 +1,5 @@
-//! The shader files. `passes/` holds one file per pass, `sources/` one per source of candidates, and
-//! `shared/` the declarations that they are joined with.
+//! The shader files. `passes/` contains one file per pass, `sources/` one per source of candidates,
+//! and `shared/` the declarations that they are joined with.
 
 pub const SELECT: &str = include_str!("../../../shaders/passes/select.wgsl");
 pub const SELECT_BRICKS: &str = include_str!("../../../shaders/passes/select_bricks.wgsl");

@@ -9,7 +9,8 @@ pub struct Stage {
     label: String,
     pipeline: wgpu::ComputePipeline,
     layouts: Vec<wgpu::BindGroupLayout>,
-    /// Workgroups along one dimension of a dispatch, which the shaders know as `MOST_WORKGROUPS`.
+    /// Maximum number of workgroups along one dimension of a dispatch. Shaders know it as
+    /// `MOST_WORKGROUPS`.
     most_workgroups: u32,
 }
 
@@ -26,16 +27,19 @@ impl Stage {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(recipe.source(most_workgroups).into()),
         };
-        // Loop counters and clamped indices keep the driver from unrolling the loops over an invocation's pixels, whose sums
-        // then live in memory instead of registers: march took 5 times as long with them (Mesa 22.3 software Vulkan).
+        // Loop counters and clamped indices keep the driver from unrolling the loops over an
+        // invocation's pixels. The sums of the pixels then live in memory instead of registers:
+        // march took 5 times as long with them (Mesa 22.3 software Vulkan).
         let checks = wgpu::ShaderRuntimeChecks {
             force_loop_bounding: false,
             bounds_checks: false,
             ..wgpu::ShaderRuntimeChecks::checked()
         };
-        // SAFETY: the shaders are this crate's own files. Every loop in them counts towards a constant, a number of tiles,
-        // sheets or entries of the frame, or the length of a list. Indices come from counts that the CPU sized the buffers
-        // by, or are compared with the buffers' capacities before use (records and entries); none comes from a file.
+        // SAFETY: the shaders are this crate's own files. Every loop in them counts towards a
+        // constant, a number of tiles, sheets or entries of the frame, or the length of a list.
+        // Indices come from counts that determined the sizes of the buffers on the CPU, or are
+        // compared with the buffers' capacities before use (records and entries). None comes from a
+        // file.
         #[expect(unsafe_code, reason = "shaders without the checks that untrusted ones need")]
         let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
         let layouts: Vec<_> =
@@ -50,7 +54,7 @@ impl Stage {
             layout: Some(&pipeline_layout),
             module: &module,
             entry_point: Some(recipe.entry),
-            // Nothing reads workgroup memory before it is written.
+            // No shader reads workgroup memory before it writes it.
             compilation_options: wgpu::PipelineCompilationOptions {
                 zero_initialize_workgroup_memory: false,
                 ..Default::default()
@@ -60,7 +64,7 @@ impl Stage {
         Self { label: label.to_owned(), pipeline, layouts, most_workgroups }
     }
 
-    /// Binds buffers (whole, or parts) to group `group`, in the order of their binding numbers.
+    /// Binds buffers, or parts of them, to group `group`, in the order of their binding numbers.
     pub fn bind(
         &self,
         gpu: &Gpu,
@@ -81,7 +85,7 @@ impl Stage {
         })
     }
 
-    /// Binds a texture as the only one of group `group`.
+    /// Binds a texture as the only binding of group `group`.
     pub fn bind_texture(
         &self,
         gpu: &Gpu,
@@ -98,8 +102,9 @@ impl Stage {
         })
     }
 
-    /// Encodes a dispatch of a fixed number of workgroups. More than fit one dimension go on in the second, so that
-    /// workgroup (x, y) is number x + y · `MOST_WORKGROUPS`, and a few of the last row may be too many.
+    /// Encodes a dispatch of a fixed number of workgroups. Workgroups that do not fit one dimension
+    /// continue in the second: workgroup (x, y) is number x + y · `MOST_WORKGROUPS`. The last row
+    /// may contain a few too many.
     pub fn dispatch(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -116,7 +121,7 @@ impl Stage {
         }
     }
 
-    /// Encodes a dispatch whose number of workgroups lies in `arguments` at a byte offset.
+    /// Encodes a dispatch whose number of workgroups is stored in `arguments`, at a byte offset.
     pub fn dispatch_indirect(
         &self,
         encoder: &mut wgpu::CommandEncoder,

@@ -1,12 +1,12 @@
-//! The state of a frame on the GPU, field by field as in shaders/shared/state.wgsl, and the indirect
-//! dispatches of a depth pass.
+//! The state of a frame on the GPU, field by field as in shaders/shared/state.wgsl, and the
+//! indirect dispatches of a depth pass.
 
 use bytemuck::{Pod, Zeroable};
 
 /// Bytes of `Pass` in frame.wgsl.
 pub const PASS_BYTES: u64 = 32;
 
-/// How far a frame has come: the words of state.wgsl.
+/// The progress of a frame: the words of state.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 pub struct State {

@@ -1,83 +1,87 @@
-//! The variant of a picture, and the constants that it puts before the shaders.
+//! The variant of a picture, and the constants that precede its shaders.
 
 use crate::{
     plan::tables,
     scene::{Classification, Mode, Optics, Order},
 };
 
-/// Bins of a pass at most; groups of sheets are made so large that they suffice.
+/// Maximum number of bins in a pass. Groups of sheets are made large enough to need no more.
 pub const MOST_BINS: u32 = 1 << 21;
 
-/// Groups hold at most 2 to this power sheets (7 bits in an entry).
+/// A group contains at most 2 to this power sheets (7 bits in an entry).
 pub const MOST_GROUP_SHIFT: u32 = 7;
 
-/// What a picture needs of the shaders. Each combination is compiled when it first occurs; what it does not need (the
-/// sums of a payload that the scene lacks, say) the compiler then leaves out.
+/// The features of the shaders that a picture needs. Each combination is compiled when it first
+/// occurs. The compiler leaves out the rest, such as the sums of a payload that the scene lacks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Variant {
     pub perspective: bool,
     pub mode: Mode,
     pub classification: Classification,
     pub optics: Optics,
-    /// The scene holds scalars, classified after interpolation (or before).
+    /// The scene has scalars that are classified after interpolation (`classified`: before).
     pub scalar: bool,
     pub classified: bool,
-    /// Where the scalars come from: a lattice, of one of these kinds, or scattered samples.
+    /// The scalars lie on a lattice, possibly of one of the two kinds below; otherwise they are
+    /// scattered samples.
     pub lattice: bool,
     pub body_centred: bool,
     pub rectilinear: bool,
-    /// The lattice is gathered; else its samples are scattered as splats are.
+    /// The lattice is gathered; otherwise its samples are scattered as splats are.
     pub gather: bool,
-    /// The type of a gathered lattice's samples (sample.wgsl).
+    /// The layout of a gathered lattice's samples (value.wgsl).
     pub sample_kind: u32,
-    /// Two levels of a volume in bricks are drawn together, each with its share.
+    /// Two levels of a volume in bricks are drawn together, each with its weight.
     pub two_levels: bool,
     pub radiance: bool,
     /// Lattice samples are drawn with sections that do not depend on the pixel.
     pub isotropic: bool,
     /// The field's kernel has no closed form.
     pub table_kernel: bool,
-    /// Samples may have values before or behind those that the transfer function's table holds.
+    /// Samples may have values outside the range of the transfer function's table.
     pub beyond: bool,
     pub volume_shaded: bool,
     pub surface_shaded: bool,
     pub gradient_opacity: bool,
     pub isosurfaces: u32,
-    /// Convex parts that the scene is cut to, and boxes that are cut out.
+    /// Convex parts that the clips keep.
     pub clips: u32,
+    /// Boxes that the clips cut out.
     pub holes: u32,
-    /// What lies before a splat may hide it.
+    /// Opaque parts may hide the splats behind them.
     pub occlusion: bool,
-    /// Entries that a pass takes at least before it looks what it hides.
+    /// Minimum number of entries in a pass before it checks what it hides.
     pub least_share: u32,
     /// Gradients from neighbouring pixels.
     pub central: bool,
     /// Pixels per invocation of march, one below the other: 1, 2, 4 or 8.
     pub rows: u32,
-    /// Entries after which march stops a tile, to go on in another dispatch.
+    /// Entries after which march stops a tile and continues in another dispatch.
     pub most_entries: u32,
 }
 
-/// Parts of a sheet in which the transfer function is integrated. Figures are in docs/engine.md.
+/// Parts of a sheet in which the transfer function is integrated. docs/engine.md has measurements.
 const PARTS: u32 = 3;
 
-/// Iterations that an entry takes at most.
+/// Maximum number of loop iterations of an entry.
 const ENTRY_ITERATIONS: u32 = 6;
 
 impl Variant {
-    /// Pixels that a tile is wide and high, without the edge that it shares with its neighbours.
+    /// Returns the width and height of a tile in pixels, without the edge that it shares with its
+    /// neighbours.
     pub fn tile_step(&self) -> u32 {
         8 - 2 * u32::from(self.central)
     }
 
-    /// Whether a field's gradient is looked at.
+    /// Whether a field's gradient is used.
     pub fn gradients(&self) -> bool {
         self.scalar && (self.volume_shaded || self.gradient_opacity)
     }
 
-    /// Sheets that one dispatch of gather draws: as many as a driver's bound on iterations allows.
+    /// Returns the number of sheets that one dispatch of gather draws: as many as a driver's limit
+    /// on iterations allows.
     pub fn gathered_sheets(&self) -> u32 {
-        // Those that find the sheet and look at its planes, and those that close it.
+        // Iterations that close a sheet; six more find it and evaluate its planes.
         let pieces = PARTS * (1 + self.isosurfaces) * (1 + self.holes)
             + (1 + self.holes) * self.holes * self.holes;
         let most = self.most_entries.saturating_mul(ENTRY_ITERATIONS);
@@ -94,7 +98,7 @@ impl Variant {
         self.most_entries < u32::MAX
     }
 
-    /// The constants, as WGSL.
+    /// Returns the constants, as WGSL.
     pub fn constants(&self) -> String {
         let whole = self.mode != Mode::Sheets;
         let single = matches!(self.mode, Mode::Splats(_));
@@ -139,7 +143,8 @@ impl Variant {
             ("XRAY", self.optics == Optics::XRay),
             ("CAN_STOP", self.can_stop()),
         ];
-        // What closing a sheet takes of the iterations that a driver allows, in entries (see docs/engine.md).
+        // The cost of closing a sheet, in entries, against the driver's limit on iterations (see
+        // docs/engine.md).
         let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes))
             .div_ceil(ENTRY_ITERATIONS);
         let closing = closing + u32::from(self.gather);

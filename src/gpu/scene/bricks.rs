@@ -1,9 +1,11 @@
-//! Volumes in bricks on the GPU: the bricks that a view needs, in slots, within the room that there is.
+//! Volumes in bricks on the GPU: a cache of the bricks that a view needs, within the available
+//! memory.
 //!
-//! Slots lie in chunks. Any slot takes a brick of any level; a picture draws one level or two, and each chunk of slots is drawn
-//! once for either ([`Slab`]). Bricks that are not at hand are read in parallel and take the slots whose bricks no view needed
-//! for longest. Which samples show something is found by blocks (shaders/passes/select_bricks.wgsl), when other bricks are drawn or
-//! under another transfer function.
+//! Slots lie in chunks. Any slot can hold a brick of any level. A picture draws one level or two,
+//! and each chunk of slots is drawn once for each of them ([`Slab`]). Absent bricks are read in
+//! parallel. They take the slots whose bricks have been unused for longest.
+//! shaders/passes/select_bricks.wgsl finds the visible samples by blocks, whenever other bricks are
+//! drawn or the transfer function changes.
 
 use crate::{
     Result,
@@ -18,34 +20,35 @@ use wgpu::BufferUsages as Usage;
 /// Samples of a slot.
 pub const SLOT_SAMPLES: u32 = (SIDE * SIDE * SIDE) as u32;
 
-/// Slots of a chunk at most (`slots` in sources/bricks.wgsl): the spans of all their samples fit a binding of 128 MiB.
+/// Maximum number of slots in a chunk (`slots` in sources/bricks.wgsl): the spans of all their
+/// samples fit a binding of 128 MiB.
 const MOST_SLOTS: usize = 512;
 
-/// Bricks read before they are sent.
+/// Bricks read before they are uploaded.
 const BATCH: usize = 64;
 
 /// A brick's level and number.
 type Key = (usize, u32);
 
-/// The content of some slots.
+/// The content of a chunk of slots.
 #[derive(Debug)]
 pub struct Slots {
     /// The samples of each slot's brick.
     pub data: wgpu::Buffer,
-    /// The ranges of its blocks.
+    /// The ranges of the blocks of each brick.
     pub ranges: wgpu::Buffer,
     first: usize,
     count: usize,
 }
 
 impl Slots {
-    /// Samples that they hold.
+    /// Returns the number of samples that fit the slots.
     pub fn capacity(&self) -> u32 {
         self.count as u32 * SLOT_SAMPLES
     }
 }
 
-/// Some slots as one of the drawn levels sees them.
+/// A chunk of slots, for one of the drawn levels.
 #[derive(Debug)]
 pub struct Slab {
     pub(super) ranges: wgpu::Buffer,
@@ -55,8 +58,9 @@ pub struct Slab {
     pub part: usize,
     /// Where the brick of each slot lies in the level.
     pub slots: wgpu::Buffer,
-    /// The selected samples, block by block, and their number.
+    /// The selected samples, block by block.
     pub selected: wgpu::Buffer,
+    /// The number of selected samples.
     pub count: u32,
 }
 
@@ -73,7 +77,7 @@ impl Slab {
         }
     }
 
-    /// Bytes of its own buffers.
+    /// Returns the bytes of its own buffers.
     pub fn bytes(&self) -> u64 {
         self.slots.size() + self.selected.size()
     }
@@ -83,42 +87,44 @@ impl Slab {
     }
 }
 
-/// What the bricks of a picture may take.
+/// The capacity for the bricks of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Room {
     /// Bytes of their slots.
     pub bytes: u64,
-    /// Runs of candidates that they show.
+    /// Batches of visible candidates.
     pub runs: u64,
 }
 
-/// Whether what bricks show was listed.
+/// Whether the visible samples of bricks were listed.
 #[derive(Debug, Clone, Copy)]
 pub enum Listed {
     All,
-    /// Nothing was: they show so many runs of candidates, of which there is room for `most`.
+    /// Nothing was listed: there are `runs` batches of visible candidates, and capacity for `most`.
     TooMany {
         runs: u64,
         most: u64,
     },
 }
 
-/// The bricks of a volume that are at hand.
+/// The brick cache of a volume.
 #[derive(Debug)]
 pub struct Shelf {
     pub bricks: Arc<Bricks>,
     pub kernel: Kernel,
     /// Bricks read so far.
     pub reads: u64,
-    /// What is drawn; none where that is not certain.
+    /// What the lists on the GPU show; `None` if that is not certain.
     drawn: Option<Drawn>,
-    /// What was last too much for a picture of so many runs of candidates, and the number of bricks that was not.
+    /// The last choice that exceeded a picture, the picture's limit in batches of candidates, and
+    /// the number of bricks that kept to it.
     fitting: Option<(Drawn, u64, usize)>,
-    /// The brick in each slot, and the last update that needed it.
+    /// For each slot, its brick and the last update that needed it.
     slots: Vec<Option<(Key, u64)>>,
     slot_of: HashMap<Key, usize>,
-    /// Samples, ranges and first slot of each chunk, and those that the caller has not taken yet.
+    /// Samples, ranges and first slot of each chunk.
     chunks: Vec<(wgpu::Buffer, wgpu::Buffer, usize)>,
+    /// The added chunks that the caller has not taken yet.
     grown: Vec<Slots>,
     update: u64,
 }
@@ -139,38 +145,40 @@ impl Shelf {
         }
     }
 
-    /// Bytes of GPU memory of all slots.
+    /// Returns the bytes of GPU memory of all slots.
     pub fn bytes(&self) -> u64 {
         self.chunks.iter().map(|(data, ranges, _)| data.size() + ranges.size()).sum()
     }
 
-    /// Whether the bricks of a choice are those that are drawn, and show the same.
+    /// Whether the lists on the GPU are those of this choice.
     pub fn draws(&self, choice: &Choice) -> bool {
         self.drawn.as_ref() == Some(&Drawn::of(choice))
     }
 
-    /// Takes note that the bricks of a choice are drawn.
+    /// Records that the lists on the GPU are those of this choice.
     pub fn set_drawn(&mut self, choice: &Choice) {
         self.drawn = Some(Drawn::of(choice));
     }
 
-    /// The most bricks of a choice that show no more than so many runs of candidates, where that was found for it.
+    /// Returns the maximum number of bricks of a choice that show at most `runs` batches of
+    /// candidates, if it was found before.
     pub fn fitting(&self, choice: &Choice, runs: u64) -> Option<usize> {
         let (drawn, within, most) = self.fitting.as_ref()?;
         (*within == runs && *drawn == Drawn::of(choice)).then_some(*most)
     }
 
-    /// Takes note of that number.
+    /// Records that number.
     pub fn set_fitting(&mut self, choice: &Choice, runs: u64, most: usize) {
         self.fitting = Some((Drawn::of(choice), runs, most));
     }
 
-    /// Brings the bricks of a choice to the GPU, within `room` bytes. Gives the slots that were added for them.
+    /// Brings the bricks of a choice to the GPU, within `room` bytes. Returns the slots that were
+    /// added for them.
     pub fn update(&mut self, gpu: &Gpu, choice: &Choice, room: u64) -> Result<Vec<Slots>> {
         self.drawn = None;
         self.update += 1;
         let mut absent = Vec::new();
-        // The nearest are read first.
+        // The nearest bricks are read first.
         for &key in &choice.bricks {
             match self.slot_of.get(&key) {
                 Some(&slot) => self.slots[slot] = Some((key, self.update)),
@@ -190,12 +198,13 @@ impl Shelf {
         Ok(std::mem::take(&mut self.grown))
     }
 
-    /// Adds slots for about `wanted` more bricks, so that there are no more than `most`; tells how many.
+    /// Adds slots for about `wanted` more bricks, at most `most` in total. Returns how many were
+    /// added.
     fn grow(&mut self, gpu: &Gpu, wanted: usize, most: usize) -> usize {
         let bytes = self.bricks.brick_bytes();
         let fit = usize::try_from(gpu.binding_size() / (8 * u64::from(SLOT_SAMPLES)))
             .unwrap_or(usize::MAX);
-        // A view's neighbours need some more; a small volume has no more.
+        // Nearby views need a few more bricks. A small volume has no more.
         let all: usize = self.bricks.levels().iter().map(|level| level.bricks()).sum();
         let room = most.min(all).saturating_sub(self.slots.len()).max(1);
         let count = (wanted + wanted / 4 + 1).min(room).min(MOST_SLOTS).min(fit.max(1));
@@ -208,7 +217,7 @@ impl Shelf {
         count
     }
 
-    /// Reads bricks and puts them in slots that are free, or whose bricks were not needed for longest.
+    /// Reads bricks into free slots, or into the slots whose bricks have been unused for longest.
     fn load(&mut self, gpu: &Gpu, absent: &[Key]) -> Result<()> {
         let last_needed = |slot: &usize| self.slots[*slot].map_or(0, |(_, update)| update);
         let mut places: Vec<usize> =
@@ -234,13 +243,13 @@ impl Shelf {
                 let own = bytemuck::cast_slice(brick.blocks.as_slice());
                 gpu.queue.write_buffer(ranges, (at * 2 * BRICK_BLOCKS) as u64, own);
             }
-            // What is written waits in staging memory until something is submitted.
+            // Writes wait in staging memory until the next submission.
             gpu.queue.submit([]);
         }
         Ok(())
     }
 
-    /// Tells the GPU which slots hold bricks of a level that are drawn, and where they lie.
+    /// Uploads which slots contain drawn bricks of a level, and where these lie.
     pub fn describe(&self, gpu: &Gpu, slab: &Slab, level: Option<usize>) {
         let place = |slot: &Option<(Key, u64)>| match slot {
             Some(((own, brick), update)) if Some(*own) == level && *update == self.update => {
@@ -255,7 +264,8 @@ impl Shelf {
     }
 }
 
-/// Bricks in order, the levels that are drawn, and what of them shows: what the lists are made from.
+/// What the lists are made from: the bricks in order, the drawn levels, and the visible ranges of
+/// values.
 #[derive(Debug, PartialEq)]
 struct Drawn {
     bricks: Vec<Key>,

@@ -1,4 +1,4 @@
-//! Chunks: the parts of a scene that fit a binding.
+//! Chunks: parts of a scene's items, each of which fits a binding.
 
 use crate::{
     bricks::Bricks,
@@ -18,32 +18,33 @@ use crate::{
 };
 use std::sync::Arc;
 
-/// Candidates that one invocation handles (`RUN` in frame.wgsl) and those of its workgroup of 64.
+/// Candidates of a batch, which one invocation handles (`RUN` in frame.wgsl).
 pub const RUN: u32 = 16;
 
+/// Candidates of a workgroup of 64 invocations.
 pub const WORKGROUP_CANDIDATES: u32 = 64 * RUN;
 
-/// What the candidates of a chunk are made from.
+/// The source of a chunk's candidates.
 #[derive(Debug)]
 pub enum Origin {
     Splats {
         set: Arc<SplatSet>,
         radiance: bool,
-        /// The number of their item in the scene.
+        /// The index of the item in the scene.
         item: usize,
     },
-    /// Slots for pages of the hierarchy of this number.
+    /// Slots for pages of the hierarchy with this number.
     Nodes { forest: usize, slots: Box<Slots> },
     Lattice {
         volume: Arc<Volume>,
         kernel: Kernel,
-        /// First slice of the chunk; first and last slice that its data hold.
+        /// First slice of the chunk; first and last slice in its data.
         slices: [u32; 3],
         selection: Box<Selection>,
         /// Coordinates along the axes (`places` in sources/lattice.wgsl).
         places: wgpu::Buffer,
     },
-    /// Those bricks of one level that lie in some slots.
+    /// The bricks of one level that lie in a chunk of slots.
     Bricks { bricks: Arc<Bricks>, kernel: Kernel, slab: Box<Slab>, level: usize },
 }
 
@@ -54,24 +55,25 @@ pub struct Chunk {
     /// Splats (48 bytes each) or samples in their own type.
     pub data: wgpu::Buffer,
     pub uniform: wgpu::Buffer,
-    /// What every candidate meets of the picture (8 bytes each, see spans.wgsl).
+    /// The span of every candidate: the tiles and sheets that it meets (8 bytes each, see
+    /// spans.wgsl).
     pub spans: wgpu::Buffer,
-    /// The dispatch over the runs of which a pass draws something.
+    /// The dispatch over the batches with at least one candidate that a pass draws.
     pub active_arguments: wgpu::Buffer,
-    /// Splats, or room for nodes, or samples of the lattice.
+    /// Splats, or capacity for nodes, or samples of the lattice.
     pub count: u32,
-    /// Those of them that may be drawn: of a lattice the selected ones.
+    /// The number of these that may be drawn: of a lattice, the selected ones.
     pub candidates: u32,
     pub first_run: u32,
 }
 
 impl Chunk {
-    /// Bytes of its splats or samples, and of what these meet.
+    /// Returns the bytes of the splats or samples, and of their spans.
     pub(super) fn bytes(&self) -> u64 {
         self.data.size() + self.spans.size()
     }
 
-    /// Bytes of what lists its candidates, and of what these meet.
+    /// Returns the bytes of the lists of candidates, and of their spans.
     pub(super) fn list_bytes(&self) -> u64 {
         let selected = match &self.origin {
             Origin::Lattice { selection, .. } => selection.selected.size(),
@@ -82,7 +84,7 @@ impl Chunk {
         selected + self.spans.size()
     }
 
-    /// The chunk's uniform for a view.
+    /// Returns the chunk's uniform for a view.
     pub fn source(&self, view: &View, isotropic: bool, forests: &[Forest]) -> Source {
         let source = match &self.origin {
             Origin::Nodes { forest, .. } => {
@@ -124,15 +126,16 @@ pub(super) fn spans(gpu: &Gpu, candidates: u32) -> wgpu::Buffer {
     buffer(gpu, "spans", SPAN_BYTES * u64::from(candidates), wgpu::BufferUsages::STORAGE)
 }
 
-/// Bytes of a list of samples: their numbers and spans.
+/// Returns the bytes of a list of samples: their numbers and spans.
 pub fn list_bytes(count: u64) -> u64 {
     count * (4 + SPAN_BYTES)
 }
 
-/// Bytes of what a candidate meets of the picture.
+/// Bytes of a candidate's span.
 pub(super) const SPAN_BYTES: u64 = 8;
 
-/// Runs of so many candidates of a chunk, with the number that stays free before them.
+/// Returns the batches of a chunk with this number of candidates, and the number that stays free
+/// before them.
 pub fn runs_of(candidates: u32) -> u32 {
     1 + candidates.div_ceil(RUN)
 }

@@ -1,4 +1,4 @@
-//! The field of a lattice that is gathered: its samples as a texture, and what of it may show.
+//! The field of a gathered lattice: its samples as a texture, and where it may be visible.
 
 use crate::{
     gpu::{
@@ -22,17 +22,17 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
-/// The most bytes that samples take which are laid out a word each.
+/// Maximum bytes of samples that are laid out one word each.
 const MOST_FOURS: u64 = 512 << 20;
 
-/// Their type (value.wgsl).
+/// The number of that layout (`SAMPLE_FOUR` in value.wgsl).
 pub const FOUR: u32 = 5;
 
-/// Room behind the samples' bits: of every sheet and tile that a picture may have (`MOST_BINS` in frame.rs) a bit, and the
-/// tables.
+/// Capacity behind the samples' bits: a bit for every sheet and tile of a picture (`MOST_BINS` in
+/// pipeline/variant.rs), and the tables.
 const TAIL_BYTES: u64 = 64 << 20;
 
-/// Why the engine cannot gather a volume, whatever the settings.
+/// Returns why the engine can't gather a volume, whatever the settings.
 pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
     if volume.lattice.arrangement != Arrangement::Cartesian {
         return Some("body-centred and rectilinear lattices");
@@ -43,7 +43,8 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
     unsuited_kernel(kernel)
 }
 
-/// The volume that is gathered, or why no device can gather a scene's field in these settings.
+/// Returns the volume that is gathered, or why no device can gather a scene's field with these
+/// settings.
 pub fn gathered_volume<'a>(
     scene: &'a Scene,
     settings: &Settings,
@@ -63,7 +64,7 @@ pub fn gathered_volume<'a>(
     volume.map(Arc::as_ref).ok_or("volumes in bricks")
 }
 
-/// Why the engine cannot gather a scene's field in these settings; none where it can.
+/// Returns why the engine can't gather a scene's field with these settings, or `None` if it can.
 pub fn obstacle(
     scene: &Scene,
     settings: &Settings,
@@ -81,7 +82,7 @@ pub fn obstacle(
     {
         return Some("a volume with more samples along an axis than the device's textures have");
     }
-    // A bit for each sample, and what tiles and the transfer function add.
+    // A bit for each sample, and the data of tiles and of the transfer function.
     if volume.lattice.len() as u64 / 8 + TAIL_BYTES > gpu.binding_size() {
         return Some("a volume larger than the device's bindings allow");
     }
@@ -91,7 +92,7 @@ pub fn obstacle(
     None
 }
 
-/// The type of samples as sample.wgsl numbers it.
+/// Returns the type of samples as value.wgsl numbers it.
 pub fn kind_of(scalar: Scalar) -> u32 {
     match scalar {
         Scalar::U8 => 0,
@@ -102,7 +103,8 @@ pub fn kind_of(scalar: Scalar) -> u32 {
     }
 }
 
-/// Texels along the axes: rows of samples packed in words, with what the taps of a row may read behind its end.
+/// Returns the number of texels along the axes. Rows of samples are packed in words, with the words
+/// that the taps of a row may read behind its end.
 fn texture_size(volume: &Volume, kind: u32) -> [usize; 3] {
     let [width, height, depth] = volume.lattice.dims;
     let words = match kind {
@@ -114,8 +116,9 @@ fn texture_size(volume: &Volume, kind: u32) -> [usize; 3] {
     [words, height, depth]
 }
 
-/// How the samples of a volume are laid out: in their own type, or bytes four a word, for each sample those behind it, so that
-/// one word holds a row of a kernel. Mesa's software driver takes a third less time with these.
+/// Returns how the samples of a volume are laid out. Usually that is their own type. Bytes may take
+/// a word each, with the three bytes behind them, so that one word contains a row of a kernel.
+/// Mesa's software driver takes a third less time with that layout.
 fn layout(gpu: &Gpu, volume: &Volume) -> u32 {
     let kind = kind_of(volume.samples.scalar());
     let most = gpu.device.limits().max_texture_dimension_3d as usize;
@@ -123,7 +126,7 @@ fn layout(gpu: &Gpu, volume: &Volume) -> u32 {
     if kind == 0 && gpu.is_software() && fits { FOUR } else { kind }
 }
 
-/// Bytes that the samples of a volume take.
+/// Returns the bytes of a volume's samples.
 pub fn texture_bytes(gpu: &Gpu, volume: &Volume) -> u64 {
     texture_size(volume, layout(gpu, volume)).iter().fold(4, |bytes, side| bytes * *side as u64)
 }
@@ -141,7 +144,7 @@ fn write_row(from: &[u8], kind: u32, to: &mut [u8]) {
 }
 
 fn texture(gpu: &Gpu, volume: &Volume, kind: u32) -> wgpu::Texture {
-    /// Bytes that are copied at once, about.
+    /// Approximate bytes of one copy.
     const COPIED: usize = 16 << 20;
     let [words, rows, slices] = texture_size(volume, kind);
     let [width, height, depth] = [words, rows, slices].map(|side| side as u32);
@@ -186,42 +189,42 @@ fn texture(gpu: &Gpu, volume: &Volume, kind: u32) -> wgpu::Texture {
     texture
 }
 
-/// What the engine keeps of a lattice to gather it.
+/// The data that the engine keeps to gather a lattice.
 #[derive(Debug)]
 pub struct Field {
     volume: Arc<Volume>,
     /// The kernel's standard deviation in steps.
     sigma: f64,
-    /// The extremes around each sample.
+    /// The smallest and the largest value around each sample.
     ranges: Vec<[u8; 2]>,
     /// The samples, rows packed in words.
     samples: wgpu::Texture,
     texture_bytes: u64,
-    /// How they are laid out (`SAMPLE_KIND` in field_lattice.wgsl).
+    /// The layout of the samples (`SAMPLE_KIND` in field_lattice.wgsl).
     pub kind: u32,
-    /// What may show, for the transfer function's table of that.
+    /// Where the field may be visible, and the table of visible ranges that this holds for.
     shown: Option<([u16; 256], Shown)>,
     /// `shown` of field_lattice.wgsl.
     buffer: wgpu::Buffer,
-    /// Whether the bits of the samples lie in it.
+    /// Whether the buffer contains the samples' bits.
     has_bits: bool,
 }
 
-/// What a picture's passes need of it.
+/// The data that the passes of a picture need.
 #[derive(Debug)]
 pub struct Gathered {
     pub samples: wgpu::TextureView,
     pub shown: wgpu::Buffer,
     /// The sheets of each dispatch of gather (`Pass` in frame.wgsl).
     pub windows: Vec<wgpu::Buffer>,
-    /// Tiles in which something may show.
+    /// Tiles in which the field may be visible.
     pub tiles: u32,
-    /// (tile, sheet) pairs in which something may show.
+    /// (tile, sheet) pairs in which the field may be visible.
     pub pairs: u64,
 }
 
 impl Gathered {
-    /// Workgroups of all dispatches that have a tile.
+    /// Returns the number of workgroups, in all dispatches, that have a tile.
     pub fn workgroups(&self) -> u32 {
         self.tiles * self.windows.len() as u32
     }
@@ -243,13 +246,13 @@ impl Field {
         }
     }
 
-    /// Bytes of GPU memory.
+    /// Returns the bytes of GPU memory.
     pub fn bytes(&self) -> u64 {
         self.texture_bytes + self.buffer.size()
     }
 
-    /// Finds what the transfer function may show; `first` as of
-    /// [`first_visible`](crate::volume::reach::first_visible).
+    /// Finds the samples around which the transfer function may show something. `first` is the
+    /// result of [`first_visible`](crate::volume::reach::first_visible).
     pub fn show(&mut self, first: &[u16; 256]) {
         if self.shown.as_ref().is_none_or(|(own, _)| own != first) {
             self.shown = Some((*first, Shown::new(self.volume.lattice.dims, &self.ranges, first)));
@@ -257,7 +260,8 @@ impl Field {
         }
     }
 
-    /// Lists what a picture has to look at, and tells its shaders where that lies.
+    /// Lists the tiles and sheets that a picture must evaluate, and sets in `frame` where the lists
+    /// lie.
     pub fn list(
         &mut self,
         gpu: &Gpu,
@@ -315,7 +319,8 @@ impl Field {
     }
 }
 
-/// For each entry of the transfer function's table, and one behind the last, how many before it show something.
+/// Returns, for each entry of the transfer function's table and for one behind the last, how many
+/// entries before it show something.
 fn visible_before(variant: &Variant, table: &[[f32; 4]], frame: &Frame) -> Vec<u32> {
     let [_, _, last, place] = frame.transfer;
     let mut shows: Vec<bool> = table[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
@@ -331,7 +336,7 @@ fn visible_before(variant: &Variant, table: &[[f32; 4]], frame: &Frame) -> Vec<u
     std::iter::once(0).chain(sums).collect()
 }
 
-/// Bits that count from 0, as words in which they count from 1.
+/// Returns bits numbered from 0 as words in which they are numbered from 1.
 fn numbered_from_one(words: &[u64]) -> impl Iterator<Item = u32> {
     let halves = words.iter().flat_map(|word| [*word as u32, (*word >> 32) as u32]).chain([0]);
     halves.scan(0, |carried, half| {

@@ -1,4 +1,7 @@
-//! A scene on the GPU: every item cut into chunks that fit a binding.
+//! The data of a scene on the GPU. `prepared` holds a scene, divided into the chunks of `chunk`,
+//! each of which fits a binding. `nodes` and `bricks` cache the pages of hierarchies and the bricks
+//! of volumes, `field` holds a gathered lattice, and `select` and `select_bricks` list visible
+//! samples.
 
 pub(crate) mod bricks;
 pub(crate) mod chunk;

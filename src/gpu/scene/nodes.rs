@@ -1,8 +1,9 @@
-//! Hierarchies on the GPU: their pages in slots, as many as a view needs and the room allows.
+//! Hierarchies on the GPU: a cache of the pages that a view needs, as far as memory allows.
 //!
-//! Slots lie in chunks, each as large as a binding holds. Before a frame the pages that the view may need are found by
-//! their bounds, the coarse ones first; those not at hand are read and take free slots, or the slots of pages that no
-//! recent view needed. Where there is no room for more, the nodes above them are drawn instead.
+//! Pages lie in slots, and slots in chunks, each as large as a binding. Before a frame, the pages
+//! that the view may need are found by their bounds, coarse pages first. Absent pages are read.
+//! They take free slots, or the slots of pages that no recent view needed. If there is no capacity
+//! for more pages, the nodes above them are drawn instead.
 
 use crate::{
     Result,
@@ -23,22 +24,22 @@ use std::sync::{
 };
 use wgpu::BufferUsages as Usage;
 
-/// Nodes of a run (`SELECT_RUN` in nodes.wgsl).
+/// Nodes of a batch (`SELECT_RUN` in nodes.wgsl).
 pub const RUN_NODES: u32 = 64;
 
-/// Invocations that share a run (`SHARERS` in cut.wgsl).
+/// Invocations that share a batch (`SHARERS` in cut.wgsl).
 const SHARERS: u32 = 8;
 
-/// Nodes of a run for each of them.
+/// Nodes of a batch for each of these invocations.
 pub const OWN_NODES: u32 = RUN_NODES / SHARERS;
 
-/// Nodes of a slot (`SLOT_NODES` in nodes.wgsl): the most of a page.
+/// Nodes of a slot (`SLOT_NODES` in nodes.wgsl), as many as the largest page has.
 pub const SLOT_NODES: u32 = PAGE_NODES as u32;
 
-/// Slots of a chunk at most: a node's number has 22 bits in cut.wgsl's list.
+/// Maximum number of slots in a chunk: the number of a node has 22 bits in cut.wgsl's list.
 const MOST_SLOTS: u64 = (1 << 22) / SLOT_NODES as u64;
 
-/// Pages read before they are sent.
+/// Pages read before they are uploaded.
 const BATCH: usize = 64;
 
 /// `Node` in nodes.wgsl.
@@ -67,13 +68,13 @@ pub struct GpuBounds {
     pub unused: [f32; 3],
 }
 
-/// Bytes of the bounds of a slot's runs.
+/// Bytes of the bounds of a slot's batches.
 const SLOT_BOUNDS: u64 = (SLOT_NODES / RUN_NODES) as u64 * size_of::<GpuBounds>() as u64;
 
-/// Bytes of a slot's nodes, and of their splats.
+/// Bytes of a slot's nodes; their splats take as many.
 const SLOT_HALF: u64 = SLOT_NODES as u64 * size_of::<GpuNode>() as u64;
 
-/// Bytes that a slot takes: these, what the cut makes of them, and their spans.
+/// Bytes of a slot: nodes, splats and bounds, the lists that the cut makes, and the spans.
 const SLOT_BYTES: u64 =
     2 * SLOT_HALF + SLOT_BOUNDS + 4 * (4 * SLOT_NODES + counts_of(SLOT_NODES)) as u64;
 
@@ -91,7 +92,7 @@ pub struct GpuCut {
     pub unused: [f32; 2],
 }
 
-/// The buffers of one chunk of slots, beside its splats.
+/// The buffers of one chunk of slots, apart from its splats.
 #[derive(Debug)]
 pub struct Slots {
     nodes: wgpu::Buffer,
@@ -108,7 +109,7 @@ pub struct Slots {
     active: AtomicU32,
 }
 
-/// A chunk of slots, with its splats and how they lie in the view.
+/// A chunk of slots, with its splats and the uniform that places them in the view.
 pub struct NodeChunk<'a> {
     pub source: &'a wgpu::Buffer,
     pub splats: &'a wgpu::Buffer,
@@ -116,14 +117,14 @@ pub struct NodeChunk<'a> {
 }
 
 impl NodeChunk<'_> {
-    /// What nodes.wgsl binds.
+    /// Returns the bindings of nodes.wgsl.
     pub fn nodes(&self) -> [wgpu::BufferBinding<'_>; 6] {
         let Slots { cut, nodes, slots, resident, .. } = self.slots;
         [self.source, cut, nodes, self.splats, slots, resident]
             .map(|b| b.as_entire_buffer_binding())
     }
 
-    /// What cut.wgsl binds besides.
+    /// Returns the other bindings of cut.wgsl.
     pub fn list(&self) -> [wgpu::BufferBinding<'_>; 5] {
         let Slots { bounds, counts, found, selected, arguments, .. } = self.slots;
         [bounds, counts, found, selected, arguments].map(|b| b.as_entire_buffer_binding())
@@ -139,19 +140,19 @@ impl Slots {
         NodeChunk { source, splats, slots: self }
     }
 
-    /// Bytes of its own buffers.
+    /// Returns the bytes of the chunk's own buffers.
     pub fn bytes(&self) -> u64 {
         let own = [&self.nodes, &self.bounds, &self.counts, &self.found, &self.selected];
         own.map(wgpu::Buffer::size).iter().sum()
     }
 
-    /// How many slots take part in the frame.
+    /// Returns the number of slots that take part in the frame.
     pub fn active(&self) -> u32 {
         self.active.load(Relaxed)
     }
 }
 
-/// A chunk that a hierarchy has grown by, for the caller to keep with the others.
+/// A chunk that was added to a hierarchy. The caller keeps it with the others.
 #[derive(Debug)]
 pub struct Growth {
     pub slots: Slots,
@@ -159,7 +160,7 @@ pub struct Growth {
     pub capacity: u32,
 }
 
-/// The pages of one hierarchy that are at hand.
+/// The page cache of one hierarchy.
 #[derive(Debug)]
 pub struct Forest {
     pub hierarchy: Arc<Hierarchy>,
@@ -171,7 +172,7 @@ pub struct Forest {
     slot_of: Vec<Option<u32>>,
     needed: Needed,
     frame: u64,
-    /// Pages that the last view needed and that found no room.
+    /// Pages that the last view needed but that found no slot.
     pub missing: usize,
 }
 
@@ -190,24 +191,24 @@ impl Forest {
         }
     }
 
-    /// The cut of this hierarchy in a view.
+    /// Returns the cut of this hierarchy in a view.
     pub fn cut(&self, view: &View, settings: &Settings, pixels: f64) -> hierarchy::Cut {
         let header = self.hierarchy.header();
         let culls = settings.culls(header.closed, &header.bounds, view);
         hierarchy::Cut::new(view, header.origin, pixels, culls)
     }
 
-    /// The pages that a cut may need, the coarse ones first, with all pages above them.
+    /// Returns the pages that a cut may need, coarse pages first, with all pages above them.
     pub fn needed(&self, cut: &hierarchy::Cut) -> Vec<u32> {
         self.needed.of(&self.hierarchy, cut)
     }
 
-    /// The finest cut, in pixels, whose pages hold no more than `most` nodes.
+    /// Returns the finest cut, in pixels, whose pages contain at most `most` nodes.
     pub fn finest_within(&self, view: &View, settings: &Settings, most: u64) -> f64 {
         self.needed.finest_within(&self.hierarchy, most, |pixels| self.cut(view, settings, pixels))
     }
 
-    /// Sets the cut without changing what is at hand.
+    /// Sets the cut without loading pages.
     pub fn set_cut(&self, gpu: &Gpu, cut: &hierarchy::Cut) {
         let (sin_margin, cos_margin) = hierarchy::cone_margin();
         let uniform = GpuCut {
@@ -223,8 +224,8 @@ impl Forest {
         gpu.queue.write_buffer(&self.cut, 0, bytemuck::bytes_of(&uniform));
     }
 
-    /// Brings the pages that a cut needs to the GPU, within `room` bytes. `chunks` are this hierarchy's, in order, each with
-    /// its splats; those that it grows by are returned.
+    /// Brings the pages that a cut needs to the GPU, within `room` bytes. `chunks` are the chunks
+    /// of this hierarchy in order, each with its splats. Returns the chunks that were added.
     pub fn update(
         &mut self,
         gpu: &Gpu,
@@ -258,7 +259,7 @@ impl Forest {
             .chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats)))
             .collect();
         if let Err(error) = self.load(gpu, &absent, &all) {
-            // The buffers that it grew by go, and what was put in them.
+            // Drop the added chunks and the pages in them.
             for (page, _) in self.slots.drain(held..).flatten() {
                 self.slot_of[page as usize] = None;
             }
@@ -268,10 +269,11 @@ impl Forest {
         Ok(grown)
     }
 
-    /// A chunk with room for about `wanted` more pages, and no more than `most`.
+    /// Returns a chunk with slots for about `wanted` more pages, and at most `most`.
     fn grow(&mut self, gpu: &Gpu, wanted: usize, most: usize) -> Growth {
         let most = most.min((gpu.binding_size() / SLOT_HALF).min(MOST_SLOTS) as usize);
-        // A view's neighbours need some more; the last chunk of a small file need not be larger than it.
+        // Nearby views need a few more pages. The last chunk of a small file need not be larger
+        // than the file.
         let left = self.slot_of.len() - self.slots.len().min(self.slot_of.len());
         let count = (wanted + wanted / 4 + 1).min(left.max(1)).max(wanted).min(most);
         let capacity = count as u32 * SLOT_NODES;
@@ -294,7 +296,7 @@ impl Forest {
         Growth { slots, splats: buffer(gpu, "node splats", half, Usage::STORAGE), capacity }
     }
 
-    /// Reads pages and puts them in slots that are free or whose pages were not needed for longest.
+    /// Reads pages into free slots, or into the slots whose pages have been unused for longest.
     fn load(
         &mut self,
         gpu: &Gpu,
@@ -344,16 +346,16 @@ impl Forest {
                 );
                 gpu.queue.write_buffer(splats, place * SLOT_HALF, bytemuck::cast_slice(&own));
             }
-            // What is written waits in staging memory until something is submitted.
+            // Writes wait in staging memory until the next submission.
             gpu.queue.submit([]);
         }
         Ok(())
     }
 
-    /// Tells the GPU which pages take part in this frame, and which are at hand.
+    /// Uploads which pages take part in this frame, and which are loaded.
     fn describe(&self, gpu: &Gpu, chunks: &[(&Slots, &wgpu::Buffer)]) {
         let mut bits = vec![0u32; self.slot_of.len().div_ceil(32)];
-        // Pages at hand that the view does not need, or that are beyond its room, count as not at hand.
+        // Loaded pages that the view does not need, or that exceed its capacity, count as absent.
         for (page, _) in self.slots.iter().flatten().filter(|(_, frame)| *frame == self.frame) {
             bits[*page as usize / 32] |= 1 << (page % 32);
         }
@@ -367,7 +369,7 @@ impl Forest {
             });
             let mut active: Vec<[u32; 2]> = taking_part.collect();
             if active.is_empty() {
-                // An empty list has to be made, too.
+                // An empty list must be made as well.
                 active.push([0, 0]);
             }
             slots.active.store(active.len() as u32, Relaxed);
@@ -380,7 +382,7 @@ fn grown_slots(grown: &[Growth]) -> usize {
     grown.iter().map(|growth| growth.slots.count).sum()
 }
 
-/// What bounds the parents of a run of nodes, as the shader reads it.
+/// Returns the bounds of the parents of a batch of nodes, as the shader reads them.
 fn run_bounds(page: &Page, first: usize) -> GpuBounds {
     match parents_around(page, first, RUN_NODES as usize) {
         None => GpuBounds { size: -1.0, ..GpuBounds::default() },
@@ -394,7 +396,7 @@ fn gpu_node(page: &Page, index: usize) -> GpuNode {
     let node = &page.nodes[index];
     let parent = page.parents.get(page.parent[index] as usize).copied();
     let child_page = page.child_pages[index];
-    // A portal gives way to its block wherever that is at hand.
+    // A portal is replaced by its block whenever that is loaded.
     let size = if page.is_portal(index) { f32::MAX } else { node.size };
     let CutSphere { center, radius, size: parent_size } =
         parent.unwrap_or(CutSphere { center: [0.0; 3], radius: 0.0, size: -1.0 });
@@ -410,7 +412,8 @@ fn gpu_node(page: &Page, index: usize) -> GpuNode {
     }
 }
 
-/// Numbers that the cut of so many nodes counts: one an invocation, and one behind them.
+/// Returns how many counts the cut of this number of nodes makes: one per invocation, and one
+/// behind the last.
 pub const fn counts_of(nodes: u32) -> u32 {
     nodes.div_ceil(OWN_NODES) + 1
 }

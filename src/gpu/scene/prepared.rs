@@ -1,4 +1,5 @@
-//! A scene on the GPU: every item cut into chunks that fit a binding.
+//! A prepared scene: its items are divided into chunks that fit a binding, uploaded, and updated
+//! for each view.
 
 use super::chunk::{Chunk, Origin, SPAN_BYTES, list_bytes, runs_of, spans};
 use crate::{
@@ -32,49 +33,52 @@ use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 use std::{borrow::Cow, sync::Arc};
 
-/// Voxels of a chunk at most, besides those of its neighbours, so that the spans of all of them fit a binding of 128 MiB.
+/// Maximum number of voxels in a chunk, apart from those of its neighbours. The spans of all its
+/// voxels then fit a binding of 128 MiB.
 const CHUNK_VOXELS: u64 = 1 << 24;
 
-/// Slices of the neighbouring chunks that a chunk's data hold, for gradients: layers of one kind of a body-centred lattice
-/// lie two apart.
+/// Slices of the neighbouring chunks that a chunk also contains, for gradients. On a body-centred
+/// lattice, layers of the same kind are two slices apart.
 const NEIGHBOURS: usize = 2;
 
-/// Coordinates of a rectilinear lattice: what fits the smallest uniform binding that WebGPU promises.
+/// Maximum number of coordinates of a rectilinear lattice: those that fit the smallest uniform
+/// binding that WebGPU promises.
 const MOST_PLACES: usize = 8192;
 
-/// A set of splats with levels of detail, of which the GPU holds what the last view showed.
+/// A set of splats with levels of detail. The GPU holds the splats that the last view showed.
 #[derive(Debug)]
 struct LevelledSet {
     item: usize,
     levels: Levels,
     /// The cut of the last view.
     cut: Option<Cut>,
-    /// What lies on the GPU.
+    /// The splats on the GPU.
     set: Option<Arc<SplatSet>>,
 }
 
-/// A scene whose splats and samples lie on the GPU. Cameras, settings and transfer functions may change between frames.
+/// A scene whose splats and samples lie on the GPU. Cameras, settings and transfer functions may
+/// change between frames.
 #[derive(Debug)]
 pub struct PreparedScene {
     pub(crate) scene: Scene,
     pub(crate) chunks: Vec<Chunk>,
-    /// The splats that pictures may show by levels of detail.
+    /// The sets that pictures may show in levels of detail.
     levels: Vec<LevelledSet>,
     /// The hierarchies, in the scene's order.
     pub(crate) forests: Vec<Forest>,
-    /// The bricks at hand of the scene's volume in bricks.
+    /// The brick cache of the scene's volume in bricks.
     pub(crate) shelf: Option<Shelf>,
-    /// What it takes to gather the scene's volume, from the first picture on that does.
+    /// The data to gather the scene's volume. It is made for the first picture that gathers.
     pub(crate) field: Option<Field>,
-    /// Runs of candidates in all chunks.
+    /// Batches of candidates in all chunks.
     pub(crate) runs: u32,
     /// Bytes of GPU memory that the scene holds.
     pub(crate) bytes: u64,
-    /// What lies on the GPU cannot be trusted: something went wrong there.
+    /// The data on the GPU cannot be trusted, because an error occurred there.
     pub(crate) broken: bool,
     /// The box around everything, which does not change.
     pub(crate) bounds: Bounds,
-    /// Where all of it lies.
+    /// The device that holds the data.
     gpu: Gpu,
 }
 
@@ -113,31 +117,32 @@ impl PreparedScene {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true, number),
                 Item::Hierarchy(hierarchy) => prepared.forests.push(Forest::new(gpu, hierarchy)),
                 Item::Scalar(set, _) => prepared.add_splats(gpu, set, false, number),
-                // Others go the one way or the other when they are drawn.
+                // Other volumes are uploaded when a picture first gathers or scatters them.
                 Item::Volume(volume, kernel, _) if unsuited(volume, kernel).is_some() => {
                     prepared.add_volume(gpu, volume, kernel.clone())?;
                 }
                 Item::Volume(..) => {}
                 Item::Bricks(bricks, kernel, _) => {
-                    prepared.shelf = Some(Shelf::new(bricks, kernel))
+                    prepared.shelf = Some(Shelf::new(bricks, kernel));
                 }
             }
         }
         Ok(prepared)
     }
 
-    /// Refuses what lies on another device.
+    /// Returns an error if the scene was prepared on another device.
     pub(crate) fn check_device(&self, gpu: &Gpu) -> Result<()> {
         if self.gpu.is(gpu) {
             return Ok(());
         }
         let name = &gpu.info.name;
         Err(Error::Argument(format!(
-            "the scene was prepared on another device than the renderer's ({name}); prepare it by this renderer"
+            "the scene was prepared on another device than the renderer's ({name}); prepare it \
+             with this renderer"
         )))
     }
 
-    /// Uploads the scene anew where it is broken.
+    /// Uploads the scene again if it is broken.
     pub(crate) fn mend(&mut self, gpu: &Gpu) -> Result<()> {
         if self.broken {
             *self = Self::new(gpu, &self.scene)?;
@@ -145,17 +150,18 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Shows the scene's volume or sample set by another transfer function. Nothing is rebuilt on the CPU.
+    /// Sets the transfer function of the scene's volume or sample set. Nothing is rebuilt on the
+    /// CPU.
     ///
     /// # Errors
-    /// [`Error::Argument`] for one that [`Renderer::prepare`](crate::gpu::Renderer::prepare) would refuse; the scene is then shown as
-    /// before.
+    /// [`Error::Argument`] if [`Renderer::prepare`](crate::gpu::Renderer::prepare) would refuse the
+    /// function; the scene then keeps its old one.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
         self.scene = self.scene.shown_by(transfer)?;
         Ok(())
     }
 
-    /// Makes the scene's volume ready to be gathered, and takes its samples from those that are scattered.
+    /// Prepares the scene's volume to be gathered, and drops the lists of its samples to scatter.
     pub(crate) fn update_field(&mut self, gpu: &Gpu, settings: &Settings) -> Result<()> {
         let volume = self.scene.items.iter().find_map(|item| match item {
             Item::Volume(volume, kernel, transfer) => Some((volume, kernel, transfer)),
@@ -189,7 +195,7 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Brings the samples of a volume that is scattered for the first time.
+    /// Uploads the samples of a volume that is scattered for the first time.
     fn bring_lattice(&mut self, gpu: &Gpu) -> Result<()> {
         if self.chunks.iter().any(|chunk| matches!(chunk.origin, Origin::Lattice { .. })) {
             return Ok(());
@@ -204,7 +210,8 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Sums depend on the order of the splats, which must not depend on the views before.
+    /// Sorts the chunks. Sums depend on the order of the splats, which must not depend on earlier
+    /// views.
     fn order_chunks(&mut self) {
         self.chunks.sort_by_key(|chunk| match &chunk.origin {
             Origin::Splats { item, .. } => *item,
@@ -213,7 +220,8 @@ impl PreparedScene {
         });
     }
 
-    /// Lists the samples of lattices anew where others show something than did, or all of them are asked for.
+    /// Lists the visible samples of lattices again if others have become visible. `all` lists all
+    /// samples.
     pub(crate) fn update_selections(
         &mut self,
         gpu: &Gpu,
@@ -248,7 +256,8 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Brings the bricks of a choice to the GPU and lists what they show, unless that is more than there is room for; tells which.
+    /// Brings the bricks of a choice to the GPU and lists their visible samples, unless these
+    /// exceed `room`. Returns whether they were listed.
     pub(crate) fn update_bricks(
         &mut self,
         gpu: &Gpu,
@@ -274,22 +283,23 @@ impl PreparedScene {
                 let origin = Origin::Bricks { bricks, kernel, slab, level: 0 };
                 self.push_chunk(gpu, origin, data, samples.capacity());
             }
-            // Counted twice.
+            // Both chunks have counted the samples, but neither the ranges.
             self.bytes += samples.ranges.size();
             self.bytes -= samples.data.size();
         }
         self.select_bricks(gpu, select, scan, view, choice, room.runs)
     }
 
-    /// Runs of candidates in bricks.
+    /// Returns the batches of candidates in bricks.
     fn brick_runs(&self) -> u64 {
         let bricks =
             self.chunks.iter().filter(|chunk| matches!(chunk.origin, Origin::Bricks { .. }));
         bricks.map(|chunk| u64::from(runs_of(chunk.candidates))).sum()
     }
 
-    /// The bytes that each hierarchy, and the volume in bricks, may take with all lists: equal parts of what the device has for
-    /// what is read as it is drawn. So none depends on what another was first to take.
+    /// Returns the bytes that each hierarchy, and the volume in bricks, may take with all its
+    /// lists. The memory that the device has for data read on demand is divided into equal parts,
+    /// so that no part depends on which item was loaded first.
     pub(crate) fn room_to_read(&self, gpu: &Gpu) -> u64 {
         let held = self.chunks.iter().map(|chunk| match &chunk.origin {
             Origin::Nodes { .. } => chunk.data.size() + chunk.list_bytes(),
@@ -302,12 +312,12 @@ impl PreparedScene {
             / readers.max(1) as u64
     }
 
-    /// Runs of candidates in all that does not lie in bricks.
+    /// Returns the batches of candidates outside bricks.
     pub(crate) fn other_runs(&self) -> u64 {
         u64::from(self.runs) - self.brick_runs()
     }
 
-    /// Lists the samples of all slots in use that can add to the picture.
+    /// Lists the samples of all used slots that can add to the picture.
     fn select_bricks(
         &mut self,
         gpu: &Gpu,
@@ -349,7 +359,8 @@ impl PreparedScene {
         Ok(Listed::All)
     }
 
-    /// Numbers the runs of candidates through all chunks; before each chunk's one number stays free (active.wgsl).
+    /// Numbers the batches of candidates through all chunks. One number stays free before the
+    /// batches of each chunk (active.wgsl).
     fn number_runs(&mut self) {
         self.runs = 0;
         for chunk in &mut self.chunks {
@@ -358,7 +369,8 @@ impl PreparedScene {
         }
     }
 
-    /// Brings what a view shows of the sets with levels of detail to the GPU; `pixels` as of [`Detail::Pixels`].
+    /// Uploads the splats that a view shows of the sets with levels of detail. `pixels` is as in
+    /// `Detail::Pixels`.
     pub(crate) fn update_levels(&mut self, gpu: &Gpu, view: &View, pixels: f64) -> Result<()> {
         let mut levels = std::mem::take(&mut self.levels);
         let done = levels.iter_mut().try_for_each(|own| self.update_level(gpu, own, view, pixels));
@@ -384,7 +396,12 @@ impl PreparedScene {
         if own.set.as_ref().is_some_and(|shown| Arc::ptr_eq(shown, &set)) {
             return Ok(());
         }
-        let is_old = |chunk: &Chunk| matches!(&chunk.origin, Origin::Splats { item, .. } if *item == own.item);
+        let is_old = |chunk: &Chunk| {
+            matches!(
+                &chunk.origin,
+                Origin::Splats { item, .. } if *item == own.item
+            )
+        };
         self.bytes -=
             self.chunks.iter().filter(|chunk| is_old(chunk)).map(Chunk::bytes).sum::<u64>();
         self.chunks.retain(|chunk| !is_old(chunk));
@@ -410,13 +427,13 @@ impl PreparedScene {
         let bytes =
             volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
         let held = gpu.binding_size() / bytes / slice;
-        // Of its own samples it also holds spans, where all of them show.
+        // If all samples of a chunk are visible, it also holds a span for each.
         let own = CHUNK_VOXELS.min(gpu.binding_size() / SPAN_BYTES) / slice;
         let slices = held.saturating_sub(2 * NEIGHBOURS as u64).min(own) as usize;
         if slices == 0 {
             return Err(Error::Argument(format!(
-                "a slice of the volume holds {slice} samples, of which {} are too many for {}; convert the volume to bricks \
-                 (.splv), which are drawn whatever its size",
+                "a slice of the volume has {slice} samples, and {} slices are too large for {}; \
+                 convert the volume to bricks (.splv), which can be drawn at any size",
                 2 * NEIGHBOURS + 1,
                 gpu.info.name
             )));
@@ -459,7 +476,7 @@ impl PreparedScene {
         self.push_chunk(gpu, origin, data, count);
     }
 
-    /// Brings what the cuts of all hierarchies need to the GPU, as far as there is room for it.
+    /// Brings the pages that the cuts of all hierarchies need to the GPU, as far as memory allows.
     pub(crate) fn update_forests(
         &mut self,
         gpu: &Gpu,
@@ -497,7 +514,7 @@ impl PreparedScene {
     fn push_chunk(&mut self, gpu: &Gpu, origin: Origin, data: wgpu::Buffer, count: u32) {
         let uniform =
             buffer(gpu, "source", size_of::<Source>() as u64, wgpu::BufferUsages::UNIFORM);
-        // Those of samples are not known yet.
+        // Which samples are visible is not known yet.
         let candidates = if matches!(origin, Origin::Lattice { .. } | Origin::Bricks { .. }) {
             0
         } else {
@@ -521,8 +538,9 @@ impl PreparedScene {
     }
 }
 
-/// Splats so that neighbours in the list are neighbours in space, along the curve of Morton (1966). Runs of them then meet the
-/// same tiles and sheets, and hide together. Few of them are left as they are.
+/// Sorts splats along the curve of Morton (1966), so that neighbours in the list are neighbours in
+/// space. The splats of a batch then meet the same tiles and sheets, and are hidden together. Short
+/// lists keep their order.
 fn in_space_order(splats: &[Splat]) -> Cow<'_, [Splat]> {
     const FEW: usize = 1 << 15;
     if splats.len() <= FEW {
@@ -545,15 +563,16 @@ fn in_space_order(splats: &[Splat]) -> Cow<'_, [Splat]> {
     Cow::Owned(order.into_par_iter().map(|(_, index)| splats[index as usize]).collect())
 }
 
-/// The coordinate and the unit of every sample along x, then y, then z, from the first sample; nothing but on rectilinear
-/// lattices.
+/// Returns the coordinate and the unit of every sample along x, then y, then z, relative to the
+/// first sample. The buffer contains zeros unless the lattice is rectilinear.
 fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
     let mut places = vec![[0.0f32; 2]; MOST_PLACES];
     if let Arrangement::Rectilinear(coordinates) = &lattice.arrangement {
         let count: usize = lattice.dims.iter().sum();
         if count > MOST_PLACES {
             return Err(Error::Argument(format!(
-                "the rectilinear volume has {count} coordinates along its axes, more than {MOST_PLACES}"
+                "the rectilinear volume has {count} coordinates along its axes; the GPU engine \
+                 allows {MOST_PLACES}"
             )));
         }
         let each = (0..3).flat_map(|axis| (0..lattice.dims[axis]).map(move |at| (axis, at)));
@@ -567,8 +586,8 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
     Ok(filled_buffer(gpu, "places", bytemuck::cast_slice(&places), wgpu::BufferUsages::UNIFORM))
 }
 
-/// Bytes of an item's splats or samples on the GPU, with what is known of each beforehand: its span, or the range around it. What
-/// is read as it is drawn takes none yet.
+/// Returns the bytes that an item's splats or samples take on the GPU before it is drawn, each with
+/// its span or the range around it. Items that are read on demand take none yet.
 fn bytes_of(item: &Item) -> u64 {
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => splat_bytes(set),
@@ -581,7 +600,7 @@ fn bytes_of(item: &Item) -> u64 {
     }
 }
 
-/// Bytes of a set's splats on the GPU, and of what these meet.
+/// Returns the bytes of a set's splats on the GPU, and of their spans.
 fn splat_bytes(set: &SplatSet) -> u64 {
     set.splats.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES)
 }

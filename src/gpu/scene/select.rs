@@ -1,5 +1,6 @@
-//! Select: which samples of a lattice can add to the picture under the current transfer function (shaders/passes/select.wgsl).
-//! Runs when what shows changes, by the transfer function. Explicit splats have no such list: all of them are candidates.
+//! Select: lists the samples of a lattice that can add to the picture under the current transfer
+//! function (shaders/passes/select.wgsl). Runs when the transfer function makes other samples
+//! visible. Explicit splats have no such list: all are candidates.
 
 use crate::{
     Result,
@@ -18,7 +19,7 @@ use crate::{
 };
 use wgpu::BufferUsages as Usage;
 
-/// Samples along each side of a block (`SIDE` in select.wgsl), which an invocation handles.
+/// Samples along each side of the block that an invocation handles (`SIDE` in select.wgsl).
 const SIDE: u32 = 4;
 
 /// The selected samples of one chunk of a lattice.
@@ -29,15 +30,15 @@ pub struct Selection {
     block_count: u32,
     /// Indices within the chunk, block by block.
     pub selected: wgpu::Buffer,
-    /// Their number.
+    /// The number of selected samples.
     pub count: u32,
-    /// What the list was made for; none before there is one.
+    /// The visible ranges that the list was made for; `None` if there is no list.
     shown: Option<[u16; 256]>,
 }
 
 impl Selection {
-    /// `dims`: the chunk's samples along the axes. `ranges`: smallest and largest value around each, quantised over the
-    /// volume's range.
+    /// `dims` is the number of the chunk's samples along each axis. `ranges` contains the smallest
+    /// and the largest value around each sample, quantised over the volume's range.
     pub fn new(gpu: &Gpu, dims: [u32; 3], ranges: &[[u8; 2]]) -> Self {
         let block_count = dims.map(|n| n.div_ceil(SIDE)).iter().product::<u32>();
         debug_assert!(block_count < SCAN_CAPACITY);
@@ -52,12 +53,12 @@ impl Selection {
         }
     }
 
-    /// Whether it lists the samples of which something shows.
+    /// Whether the list was made for these visible ranges.
     pub fn is_for(&self, shown: &[u16; 256]) -> bool {
         self.shown.as_ref() == Some(shown)
     }
 
-    /// Lets go of the list; tells whether there was one.
+    /// Drops the list. Returns whether there was one.
     pub fn forget(&mut self, gpu: &Gpu) -> bool {
         if self.shown.take().is_none() {
             return false;
@@ -95,8 +96,9 @@ impl Select {
         ]
     }
 
-    /// Makes a chunk's list, in a buffer of its size, unless `check` refuses as many samples. `uniform` is the chunk's source;
-    /// `shown` tells which ranges show something ([`first_visible`](crate::volume::reach::first_visible)).
+    /// Makes the list of a chunk, in a buffer of its size, unless `check` refuses the number of
+    /// samples. `uniform` is the chunk's source. `shown` contains the visible ranges
+    /// ([`first_visible`](crate::volume::reach::first_visible)).
     pub fn update(
         &self,
         gpu: &Gpu,
@@ -118,7 +120,7 @@ impl Select {
         };
         let (blocks, groups) = (selection.block_count, selection.block_count.div_ceil(64));
         let mut counting = encoder();
-        // Behind the last block stands their sum after the scan.
+        // After the scan, the element behind the last block is their sum.
         counting.clear_buffer(&selection.blocks, 0, None);
         self.count.dispatch(&mut counting, &[&bind(&self.count, selection)], groups);
         scan.encode(gpu, &mut counting, &selection.blocks, blocks + 1);

@@ -1,4 +1,4 @@
-//! Select bricks: which samples of the bricks at hand can add to the picture
+//! Select bricks: lists the samples of the loaded bricks that can add to the picture
 //! (shaders/passes/select_bricks.wgsl).
 
 use super::bricks::Slab;
@@ -43,8 +43,9 @@ impl SelectBricks {
         ]
     }
 
-    /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes, unless `check` refuses as many samples,
-    /// or they are more than `most_runs` runs of candidates; tells how many those are. `shown` is that of [`Choice`].
+    /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes. Makes none
+    /// if `check` refuses the number of samples, or if they make more than `most_runs` batches of
+    /// candidates. Returns the number of batches. `shown` is that of `Choice`.
     pub fn update(
         &self,
         gpu: &Gpu,
@@ -55,7 +56,8 @@ impl SelectBricks {
         check: impl Fn(u64) -> Result<()>,
     ) -> Result<u64> {
         let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
-        // All slabs count in the same place, one after the other; so they count again before they write.
+        // All slabs count in the same buffer, one after the other. So they count again before they
+        // write.
         let most = slabs.iter().map(|(slab, _)| slab.blocks()).max().unwrap_or(0);
         let blocks = buffer(
             gpu,
@@ -69,7 +71,7 @@ impl SelectBricks {
             stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
         };
         let count = |encoder: &mut wgpu::CommandEncoder, slab: &Slab, uniform: &wgpu::Buffer| {
-            // Behind the last block stands their sum after the scan.
+            // After the scan, the element behind the last block is their sum.
             encoder.clear_buffer(&blocks, 0, None);
             self.count.dispatch(
                 encoder,

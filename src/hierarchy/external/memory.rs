@@ -1,6 +1,6 @@
 //! Memory needed by conversions.
 
-use super::{ExternalOptions, Stage, StageWatch, survey::look};
+use super::{ExternalOptions, Stage, StageWatch, triangles::look};
 use crate::{
     Error, Result,
     formats::{Counts, Stream},

@@ -17,6 +17,7 @@ mod memory;
 mod regions;
 mod solid;
 mod survey;
+mod triangles;
 
 use super::{Preset, build::Builder, file::WriteOptions, sphere::Sphere};
 use crate::{
@@ -56,19 +57,24 @@ pub struct ExternalOptions {
     /// The approximate memory to use, in bytes. Regions are made as small as this requires, down to
     /// a thousand points. A few hundred million bytes are used in any case.
     pub memory: u64,
+    /// How much time to spend on the quality of each block's tree.
     pub preset: Preset,
     /// Splats in a block.
     pub block_splats: usize,
+    /// How points and triangles become splats.
     pub surfels: SurfelOptions,
 }
 
 /// The result of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Converted {
+    /// Points in the source: vertices or samples.
     pub points: u64,
+    /// Splats at the finest level.
     pub splats: u64,
     /// See [`Tree::closed`](super::Tree::closed).
     pub closed: bool,
+    /// The number of regions that the input was split into.
     pub regions: usize,
 }
 
@@ -101,12 +107,13 @@ const FEWEST_POINTS: u64 = 1 << 10;
 pub fn convert(
     files: &[PathBuf],
     limits: &Limits,
-    path: &Path,
+    path: impl AsRef<Path>,
     options: &ExternalOptions,
     write: &WriteOptions,
     watch: StageWatch<'_>,
 ) -> Result<Converted> {
     let _span = tracing::info_span!("convert").entered();
+    let path = path.as_ref();
     let most = (options.memory / OF_POINT).clamp(FEWEST_POINTS, MOST_POINTS);
     let mut inputs = Vec::new();
     for file in files {

@@ -226,7 +226,7 @@ impl Larger {
         let count = |level: u32| {
             let mut counts = vec![0; 1 << (3 * level)];
             cells.iter().for_each(|cell| {
-                counts[(cell.start >> (3 * (FINE_BITS - level))) as usize] += cell.count
+                counts[(cell.start >> (3 * (FINE_BITS - level))) as usize] += cell.count;
             });
             counts
         };

@@ -10,11 +10,7 @@ use super::{
     regions::Regions,
     solid::is_solid,
 };
-use crate::{
-    Result,
-    formats::Stream,
-    surface::{MeshPieces, SurfelOptions, Triangles},
-};
+use crate::{Result, formats::Stream, surface::MeshPieces};
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 
@@ -89,45 +85,6 @@ pub fn survey<'a>(
         if counted.triangles > 0 { Some(triangulated(&stream, options, watch)?) } else { None };
     let center = sum / stream.point_count().max(1) as f64;
     Ok(Surveyed { core: extremes.core(), stream, regions, center, mesh })
-}
-
-/// Visits the triangles until it is known which are subdivided, and into how many. Stops early if
-/// there are more than `room` triangles after subdivision.
-pub fn look(
-    stream: &Stream,
-    options: &SurfelOptions,
-    room: usize,
-    watch: StageWatch<'_>,
-) -> Result<(MeshPieces, Triangles)> {
-    let counts = stream.counts();
-    let look = |length: f32| {
-        let mut seen = Triangles::default();
-        let mut done = 0;
-        stream.triangles(
-            |_, triangles| {
-                let mut seen = Triangles::default();
-                for &triangle in triangles {
-                    seen.add(triangle, triangle.map(|vertex| stream.position(vertex)), length);
-                }
-                (seen, triangles.len() as u64)
-            },
-            |(more, count)| {
-                seen.join(more);
-                done += count;
-                watch(Stage::Reading, done, counts.triangles);
-                Ok(())
-            },
-        )?;
-        Ok(seen)
-    };
-    MeshPieces::new(
-        [counts.points as usize, counts.triangles as usize],
-        [stream.has_normals(), stream.has_uvs()],
-        stream.bounds(),
-        options,
-        room,
-        look,
-    )
 }
 
 fn triangulated(

@@ -2,8 +2,8 @@
 //! decoded values.
 
 use super::{
+    cones::{cosine_below, joint_cosine},
     direction::unpacked,
-    page::{cosine_below, joint_cosine},
     pages::reach,
     quantise::{FULL_WIDTH, PARTS, Shape, inner_sigma, logarithm, power, sigma_of_inner},
 };

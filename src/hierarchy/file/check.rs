@@ -2,9 +2,9 @@
 
 use super::{
     directory::{NO_PORTAL, PageEntry},
-    pages::{Around, in_order, pages},
+    pages::{Around, in_order, pages, parents},
     read::{Hierarchy, hash_start},
-    write::{arounds, parents},
+    write::arounds,
 };
 use crate::{
     Error,
@@ -23,7 +23,7 @@ use std::path::Path;
 /// ([`validate`](crate::hierarchy::validate())) block by block. One block is in memory at a time.
 ///
 /// This never fails: a file that cannot be opened is a finding.
-pub fn check(path: &Path, limits: &Limits) -> Report {
+pub fn check(path: impl AsRef<Path>, limits: &Limits) -> Report {
     let mut findings = Findings::default();
     match Hierarchy::open(path, limits) {
         Ok(hierarchy) => return hierarchy.check(),

@@ -4,8 +4,7 @@
 use super::{
     HASH, PAGE_NODES,
     header::Stored,
-    pages::{Around, Run},
-    write::parents,
+    pages::{Around, Run, parents},
 };
 use crate::container::{Cursor, Put};
 use crate::hierarchy::Node;
@@ -31,6 +30,7 @@ pub struct PageEntry {
     /// A sphere around the spheres of all the parents, relative to the tree's origin. Its radius is
     /// infinite for the root's page.
     pub parents_center: [f32; 3],
+    /// The radius of that sphere, in world units.
     pub parents_radius: f32,
     /// The largest size of a parent; infinite for the root's page. If a node of this sphere and
     /// size would not be refined, the page is not needed.

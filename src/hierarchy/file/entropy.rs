@@ -352,7 +352,7 @@ mod tests {
         let columns: Vec<Vec<u8>> = (1..30)
             .map(|column| {
                 (0..column * 39)
-                    .map(|_| (random.next().powi(3) * column as f64 * 4.0) as u8)
+                    .map(|_| (random.next().powi(3) * f64::from(column) * 4.0) as u8)
                     .collect()
             })
             .collect();

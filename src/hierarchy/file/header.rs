@@ -12,8 +12,11 @@ use glam::DVec3;
 /// Which axis of the source points up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UpAxis {
+    /// The positive x axis.
     X,
+    /// The positive y axis.
     Y,
+    /// The positive z axis.
     Z,
 }
 

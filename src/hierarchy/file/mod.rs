@@ -9,6 +9,7 @@
 mod bounds;
 mod check;
 mod column;
+mod cones;
 mod direction;
 mod directory;
 mod entropy;
@@ -42,7 +43,7 @@ const VERSION: u32 = 1;
 /// Bytes of the BLAKE3 hash at the end of a file.
 const HASH: usize = 32;
 
+pub(in crate::hierarchy) use cones::joint_angle;
 #[cfg(test)]
 pub(in crate::hierarchy) use page::enclose;
-pub(in crate::hierarchy) use page::joint_angle;
 pub(in crate::hierarchy) use pages::{in_order, reach};

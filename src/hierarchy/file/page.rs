@@ -1,17 +1,16 @@
 //! Encodes a block as pages, and chooses the code of each.
 
 use super::{
-    bounds, lossless, lossy,
+    bounds,
+    cones::{cosine_below, joint_angle},
+    lossless, lossy,
     pages::{Run, levels, pages, reach, round_up},
     quantise::Shape,
 };
-use crate::{
-    hierarchy::{
-        MOST_CHILDREN, Node,
-        merge::{WIDTH, deviation},
-        validate::fault,
-    },
-    splat::decode_normal,
+use crate::hierarchy::{
+    MOST_CHILDREN, Node,
+    merge::{WIDTH, deviation},
+    validate::fault,
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -241,44 +240,4 @@ fn enclose_children(node: &mut Node, children: &[Node]) {
         .iter()
         .map(|child| cosine_below(joint_angle(node, child)))
         .fold(node.cone, f32::min);
-}
-
-/// Returns the cosine of [`joint_angle`].
-pub fn joint_cosine(node: &Node, child: &Node) -> f64 {
-    let normals = (decode_normal(node.splat.normal), decode_normal(child.splat.normal));
-    let (Some(own), Some(its)) = normals else { return -1.0 };
-    if child.cone <= -1.0 {
-        return -1.0;
-    }
-    let (own, its) = (own.as_dvec3(), its.as_dvec3());
-    let (dot, cross) = (own.dot(its), own.cross(its).length());
-    let length = (dot * dot + cross * cross).sqrt();
-    let (cosine, sine) = (dot / length, cross / length);
-    let cone = f64::from(child.cone).min(1.0);
-    let side = (1.0 - cone * cone).sqrt();
-    if sine * cone + cosine * side < 0.0 { -1.0 } else { cosine * cone - sine * side }
-}
-
-/// Returns the half-angle of the cone around a node's normal that contains a child's cone; π if
-/// there is none.
-pub fn joint_angle(node: &Node, child: &Node) -> f64 {
-    let normals = (decode_normal(node.splat.normal), decode_normal(child.splat.normal));
-    let (Some(own), Some(its)) = normals else { return std::f64::consts::PI };
-    if child.cone <= -1.0 {
-        return std::f64::consts::PI;
-    }
-    let (own, its) = (own.as_dvec3(), its.as_dvec3());
-    let cone = if child.cone < 1.0 { libm::acos(f64::from(child.cone)) } else { 0.0 };
-    let between = libm::atan2(own.cross(its).length(), own.dot(its));
-    (between + cone).min(std::f64::consts::PI)
-}
-
-/// Returns the cosine of a half-angle, rounded down.
-pub fn cosine_below(angle: f64) -> f32 {
-    if angle >= std::f64::consts::PI {
-        return -1.0;
-    }
-    let cosine = libm::cos(angle) - 1e-9;
-    let near = cosine as f32;
-    if f64::from(near) > cosine { near.next_down() } else { near }
 }

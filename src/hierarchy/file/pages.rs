@@ -126,3 +126,12 @@ pub fn round_up(value: f64) -> f32 {
     let near = value as f32;
     if f64::from(near) < value { near.next_up() } else { near }
 }
+
+/// Returns the parent of each node of a block; `None` for the root.
+pub(super) fn parents(nodes: &[Node]) -> Vec<Option<u32>> {
+    let mut parents = vec![None];
+    for (index, node) in nodes.iter().enumerate() {
+        parents.extend(std::iter::repeat_n(Some(index as u32), node.children as usize));
+    }
+    parents
+}

@@ -33,12 +33,16 @@ pub const NO_PAGE: u32 = u32::MAX;
 /// relative to the tree's origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CutSphere {
+    /// The centre of the node's bounding sphere.
     pub center: [f32; 3],
+    /// The radius of that sphere.
     pub radius: f32,
+    /// The apparent width of the node's splat ([`Node::size`]).
     pub size: f32,
 }
 
 impl CutSphere {
+    /// Returns the bounds of a node.
     pub fn of(node: &Node) -> Self {
         Self { center: node.center, radius: node.radius, size: node.size }
     }
@@ -69,6 +73,25 @@ impl Page {
 }
 
 /// A hierarchy opened from a file, from bytes, or from a tree in memory.
+///
+/// The same as a file on disk, in memory:
+///
+/// ```
+/// use splatkit::{
+///     hierarchy::{BuildOptions, Hierarchy, Tree, file},
+///     input::Limits,
+///     surface::{Mesh, SurfelOptions},
+/// };
+///
+/// let ball = Mesh::sphere(3).surfels(&SurfelOptions::default())?;
+/// let tree = Tree::build(&ball, &BuildOptions::default(), &|_, _| ())?;
+/// let bytes = file::to_bytes(&tree, &file::WriteOptions::default())?;
+/// let name = "ball.splk".as_ref();
+/// let hierarchy = Hierarchy::from_bytes(bytes, name, &Limits::default())?;
+/// assert_eq!(hierarchy.header().leaves, ball.splats.len() as u64);
+/// assert_eq!(hierarchy.leaves()?.splats.len(), ball.splats.len());
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 pub struct Hierarchy {
     path: PathBuf,
     store: Store,
@@ -101,7 +124,8 @@ impl Hierarchy {
     /// # Errors
     /// [`Error::Input`] for other kinds of files, other versions, damaged headers and directories,
     /// and incomplete files; [`Error::Limit`] and [`Error::File`] as for every input.
-    pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
+    pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
         let map = Source::map(path, limits)?;
         Self::new(path, Store::Mapped(map), limits, false)
     }
@@ -111,7 +135,8 @@ impl Hierarchy {
     ///
     /// # Errors
     /// Those of [`open`](Self::open), if the header or the directory is not complete.
-    pub fn open_prefix(path: &Path, limits: &Limits) -> Result<Self> {
+    pub fn open_prefix(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
         let map = Source::map(path, limits)?;
         Self::new(path, Store::Mapped(map), limits, true)
     }
@@ -120,8 +145,8 @@ impl Hierarchy {
     ///
     /// # Errors
     /// Those of [`open`](Self::open).
-    pub fn from_bytes(bytes: Vec<u8>, name: &Path, limits: &Limits) -> Result<Self> {
-        Self::new(name, Store::Bytes(bytes), limits, false)
+    pub fn from_bytes(bytes: Vec<u8>, name: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        Self::new(name.as_ref(), Store::Bytes(bytes), limits, false)
     }
 
     fn new(path: &Path, store: Store, limits: &Limits, may_be_cut: bool) -> Result<Self> {
@@ -138,46 +163,14 @@ impl Hierarchy {
     /// blocks do not match portals, or if values cannot be drawn. Those are the values that
     /// [`validate`](crate::hierarchy::validate()) rejects in a single node.
     pub fn from_tree(tree: Tree) -> Result<Self> {
-        let mut directory = Directory::default();
-        let mut portals = Vec::new();
-        let Some(top) = tree.blocks.first() else {
+        if tree.blocks.is_empty() {
             return Err(Error::Argument("the hierarchy has no blocks".into()));
-        };
+        }
         let fault = fault_of_box(tree.origin, &tree.bounds).map(str::to_owned);
         if let Some(fault) = fault.or_else(|| fault_of_extent(tree.extent)) {
             return Err(Error::Argument(format!("the hierarchy: {fault}")));
         }
-        for (number, block) in tree.blocks.iter().enumerate() {
-            let refuse =
-                |message| Error::Argument(format!("block {number} of the hierarchy: {message}"));
-            in_order(&block.nodes).and_then(|()| check_nodes(&block.nodes)).map_err(refuse)?;
-            let runs = pages(&block.nodes);
-            directory.push_block(
-                &runs,
-                &arounds(&block.nodes, &runs),
-                &vec![Place::default(); runs.len()],
-            );
-            match (number, block.portal) {
-                (0, None) => {}
-                (1.., Some(portal))
-                    if top.nodes.get(portal as usize).is_some_and(Node::is_leaf) =>
-                {
-                    portals.push(portal)
-                }
-                (_, portal) => return Err(refuse(format!("its portal is {portal:?}"))),
-            }
-        }
-        let leaves = top.nodes.iter().filter(|node| node.is_leaf()).count();
-        directory.hang(&top.nodes, &portals);
-        let mut sorted = portals.clone();
-        sorted.sort_unstable();
-        sorted.dedup();
-        if tree.is_joined() && (sorted.len() != leaves || portals.len() != leaves) {
-            let message =
-                format!("the hierarchy has {} blocks below {leaves} portals", portals.len());
-            return Err(Error::Argument(message));
-        }
-        directory.link();
+        let directory = directory_of(&tree)?;
         let header = Header {
             origin: tree.origin,
             bounds: tree.bounds,
@@ -221,6 +214,7 @@ impl Hierarchy {
         }
     }
 
+    /// Returns the properties of the whole hierarchy.
     pub fn header(&self) -> &Header {
         &self.header
     }
@@ -458,6 +452,39 @@ impl Hierarchy {
     fn torn(&self, page: u32) -> Error {
         damaged(&self.path, format!("page {page}"), "its nodes are not the children of those above")
     }
+}
+
+/// Returns the directory of a tree in memory, whose pages have no places in a file.
+fn directory_of(tree: &Tree) -> Result<Directory> {
+    let top = &tree.blocks[0].nodes;
+    let mut directory = Directory::default();
+    let mut portals = Vec::new();
+    for (number, block) in tree.blocks.iter().enumerate() {
+        let refuse =
+            |message| Error::Argument(format!("block {number} of the hierarchy: {message}"));
+        in_order(&block.nodes).and_then(|()| check_nodes(&block.nodes)).map_err(refuse)?;
+        let runs = pages(&block.nodes);
+        let places = vec![Place::default(); runs.len()];
+        directory.push_block(&runs, &arounds(&block.nodes, &runs), &places);
+        match (number, block.portal) {
+            (0, None) => {}
+            (1.., Some(portal)) if top.get(portal as usize).is_some_and(Node::is_leaf) => {
+                portals.push(portal);
+            }
+            (_, portal) => return Err(refuse(format!("its portal is {portal:?}"))),
+        }
+    }
+    let leaves = top.iter().filter(|node| node.is_leaf()).count();
+    directory.hang(top, &portals);
+    let mut sorted = portals.clone();
+    sorted.sort_unstable();
+    sorted.dedup();
+    if tree.is_joined() && (sorted.len() != leaves || portals.len() != leaves) {
+        let message = format!("the hierarchy has {} blocks below {leaves} portals", portals.len());
+        return Err(Error::Argument(message));
+    }
+    directory.link();
+    Ok(directory)
 }
 
 /// Reads and checks the beginning of a file.

@@ -71,7 +71,7 @@ fn lossless_keeps_every_bit() {
 fn pages_tell_their_parents(hierarchy: &Hierarchy) {
     let tree = hierarchy.read_tree().unwrap();
     let parents: Vec<Vec<Option<u32>>> =
-        tree.blocks.iter().map(|block| write::parents(&block.nodes)).collect();
+        tree.blocks.iter().map(|block| pages::parents(&block.nodes)).collect();
     for (number, entry) in hierarchy.pages().iter().enumerate() {
         let page = hierarchy.read_page(number as u32).unwrap();
         assert_eq!(page.nodes.len(), entry.nodes as usize);
@@ -144,7 +144,7 @@ fn a_file_is_written_whole_and_is_sound() {
             );
         }
     }
-    drop(Writer::new(&folder.path().join("other.splk"), 3.0, &options(false)).unwrap());
+    drop(Writer::new(folder.path().join("other.splk"), 3.0, &options(false)).unwrap());
     assert_eq!(
         std::fs::read_dir(folder.path()).unwrap().count(),
         1,
@@ -290,7 +290,7 @@ fn lies_are_told_though_checksums_fit() {
     let future = forged(&bytes, |bytes| bytes[8] = 9);
     match try_all(future) {
         Err(crate::Error::Input { message, .. }) => {
-            assert!(message.contains("version 9"), "{message}")
+            assert!(message.contains("version 9"), "{message}");
         }
         other => panic!("{other:?}"),
     }
@@ -342,7 +342,7 @@ fn bounds_hold_exactly_for_what_is_read() {
                         pages::reach(node.center().as_dvec3(), child) <= f64::from(node.radius)
                     );
                     assert!(child.size <= node.size);
-                    let cone = libm::cos(page::joint_angle(node, child));
+                    let cone = libm::cos(cones::joint_angle(node, child));
                     assert!(node.cone == -1.0 || f64::from(node.cone) <= cone);
                 }
             }

@@ -44,7 +44,9 @@ pub struct Whole {
     pub origin: DVec3,
     /// The box around all footprints, in world coordinates.
     pub bounds: Bounds,
+    /// Whether the source is solid ([`Tree::closed`]).
     pub closed: bool,
+    /// Points in the source: vertices or samples.
     pub source_points: u64,
 }
 
@@ -77,7 +79,8 @@ impl Writer {
     /// # Errors
     /// [`Error::Output`] if nothing can be written beside `path`; [`Error::Argument`] if the extent
     /// is not a positive number, or above [`MAX_EXTENT`](crate::splat::SplatSet::MAX_EXTENT).
-    pub fn new(path: &Path, extent: f32, options: &WriteOptions) -> Result<Self> {
+    pub fn new(path: impl AsRef<Path>, extent: f32, options: &WriteOptions) -> Result<Self> {
+        let path = path.as_ref();
         Self::begin(Some(path.to_owned()), extent, options, || Spill::beside(path))
     }
 
@@ -311,21 +314,13 @@ pub(super) fn arounds(nodes: &[Node], runs: &[Run]) -> Vec<Around> {
     runs.par_iter().map(around).collect()
 }
 
-/// Returns the parent of each node of a block; `None` for the root.
-pub(super) fn parents(nodes: &[Node]) -> Vec<Option<u32>> {
-    let mut parents = vec![None];
-    for (index, node) in nodes.iter().enumerate() {
-        parents.extend(std::iter::repeat_n(Some(index as u32), node.children as usize));
-    }
-    parents
-}
-
 /// Writes a whole hierarchy to a temporary file beside `path`, which is renamed once it is
 /// complete.
 ///
 /// # Errors
 /// Those of [`Writer`]; also [`Error::Argument`] if a block of a joined tree has no portal.
-pub fn write(tree: &Tree, path: &Path, options: &WriteOptions) -> Result<()> {
+pub fn write(tree: &Tree, path: impl AsRef<Path>, options: &WriteOptions) -> Result<()> {
+    let path = path.as_ref();
     all(tree, Writer::new(path, tree.extent, options)?, || Target::at(path)).map(|_| ())
 }
 

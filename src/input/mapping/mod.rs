@@ -137,7 +137,7 @@ mod tests {
                 for part in 0..4 {
                     let mapping = &mapping;
                     scope.spawn(move || {
-                        assert!(mapping[part * 25_000..][..25_000].iter().all(|&byte| byte == 0))
+                        assert!(mapping[part * 25_000..][..25_000].iter().all(|&byte| byte == 0));
                     });
                 }
             });

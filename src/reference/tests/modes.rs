@@ -49,7 +49,7 @@ fn classified_before_a_constant_field_is_as_dense_as_it_is() {
                 let opacity = 1.0 - (-0.8_f64 * length).exp();
                 close(picture.color[0][3], opacity, tolerance);
                 (0..3).for_each(|c| {
-                    close(picture.color[0][c], f64::from(picture.color[0][3]) * color[c], 1e-6)
+                    close(picture.color[0][c], f64::from(picture.color[0][3]) * color[c], 1e-6);
                 });
                 assert!(picture.depth[0] > 4.0 - 0.5 && picture.depth[0] < 5.0);
             }

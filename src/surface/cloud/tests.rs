@@ -104,7 +104,7 @@ fn lone_points_are_small_and_change_no_others() {
     let plain = cloud(sheet(0.0));
     let options = SurfelOptions::default();
     let before = all_surfels(&plain, &options);
-    let mut mesh = plain.clone();
+    let mut mesh = plain;
     // One just above the sheet, one far away, and a pair.
     mesh.positions.extend(
         [[25.5, 25.5, 12.0], [1e5, 0.0, 0.0], [-300.0, 0.0, 7.0], [-300.0, 0.0, 8.0]]

@@ -8,7 +8,7 @@ use splatkit::{
     formats::Stream,
     hierarchy::{
         BuildOptions,
-        external::{BLOCKS, ExternalOptions, Stage, check, convert},
+        external::{BLOCKS, Converted, ExternalOptions, Stage, check, convert},
         file::UpAxis,
     },
 };
@@ -51,20 +51,10 @@ impl Convert {
         };
         let limits = self.load.limits();
         if self.dry_run {
-            // The blocks being built take this much in any case.
-            let taken = most.max(BLOCKS);
             check(&self.files, &limits, &options, &watch)?;
             drop(stages);
             progress.clear();
-            if self.json {
-                return output::line(
-                    json!({"expected_memory": need.bytes, "memory": taken, "in_regions": true}),
-                );
-            }
-            return output::line(format_args!(
-                "memory          about {wanted} MiB as a whole; region by region in {} MiB",
-                taken >> 20
-            ));
+            return self.print_need(need.bytes, most);
         }
         let first =
             self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
@@ -74,6 +64,27 @@ impl Convert {
         let done = convert(&self.files, &limits, &self.output, &options, &write, &watch)?;
         drop(stages);
         progress.clear();
+        self.print_converted(&done, milliseconds(start))
+    }
+
+    /// Prints the memory that converting region by region takes.
+    fn print_need(&self, as_a_whole: u64, most: u64) -> Result<(), Failure> {
+        // The blocks being built take this much in any case.
+        let taken = most.max(BLOCKS);
+        if self.json {
+            return output::line(
+                json!({"expected_memory": as_a_whole, "memory": taken, "in_regions": true}),
+            );
+        }
+        output::line(format_args!(
+            "memory          about {} MiB as a whole; region by region in {} MiB",
+            as_a_whole >> 20,
+            taken >> 20
+        ))
+    }
+
+    /// Prints the counts and the size of the file.
+    fn print_converted(&self, done: &Converted, total_ms: f64) -> Result<(), Failure> {
         let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
         let per_point = bytes as f64 / done.points as f64;
         if self.json {
@@ -85,12 +96,12 @@ impl Convert {
                 "regions": done.regions,
                 "bytes": bytes,
                 "bytes_per_point": per_point,
-                "total_ms": milliseconds(start),
+                "total_ms": total_ms,
             }));
         }
         output::line(format_args!("points          {}", done.points))?;
         output::line(format_args!("splats          {} in {} regions", done.splats, done.regions))?;
         output::line(format_args!("bytes           {bytes} ({per_point:.2} a point)"))?;
-        output::line(format_args!("time            {:.2} s", milliseconds(start) / 1e3))
+        output::line(format_args!("time            {:.2} s", total_ms / 1e3))
     }
 }

@@ -41,6 +41,9 @@ pub struct Convert {
     load: LoadFlags,
 }
 
+/// The extensions of outputs; `run` has an arm for each.
+const WRITTEN: [&str; 4] = ["splk", "ply", "nrrd", "splv"];
+
 impl Convert {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         let extension = self
@@ -48,7 +51,7 @@ impl Convert {
             .extension()
             .map(|extension| extension.to_string_lossy().to_ascii_lowercase());
         let extension = extension.unwrap_or_default();
-        if !["splk", "ply", "nrrd", "splv"].contains(&extension.as_str()) {
+        if !WRITTEN.contains(&extension.as_str()) {
             let file = self.output.display();
             return Err(Failure::Usage(format!(
                 "{file}: only .splk, .ply, .nrrd and .splv files can be written"
@@ -74,5 +77,17 @@ impl Convert {
     /// Returns the bytes of memory that a conversion may use.
     fn most_memory(&self) -> u64 {
         self.surface.memory.or_else(splatkit::memory::most).unwrap_or(u64::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::WRITTEN;
+    use splatkit::formats::FORMATS;
+
+    #[test]
+    fn every_format_with_a_writer_is_written() {
+        let written: Vec<&str> = FORMATS.iter().filter_map(|format| format.written).collect();
+        assert_eq!(written, WRITTEN);
     }
 }

@@ -66,7 +66,7 @@ fn scene() -> Result<Scene, Failure> {
         unit: SPACING,
         ..TransferFunction::default()
     };
-    let slabs = Phantom::Slabs.sample([SIDE; 3]).map_err(splatkit::Error::Argument)?;
+    let slabs = Phantom::Slabs.sample([SIDE; 3])?;
     Ok(Scene::new().with_volume(slabs, Kernel::default(), transfer))
 }
 

@@ -44,8 +44,7 @@ impl Case {
 
 /// Returns volumes with and without steep edges, in all ways to reconstruct them.
 pub fn generated() -> Result<Vec<Case>, Failure> {
-    let told = splatkit::Error::Argument;
-    let specimen = Phantom::Specimen.sample_bytes([48; 3]).map_err(told)?;
+    let specimen = Phantom::Specimen.sample_bytes([48; 3])?;
     let narrow = Kernel::gaussian(0.7, 3.0)?;
     // A shell of a tenth of the ball's radius.
     let shell = TransferFunction {
@@ -54,11 +53,11 @@ pub fn generated() -> Result<Vec<Case>, Failure> {
         unit: 0.02,
         ..TransferFunction::default()
     };
-    let ball = Phantom::Ball.sample([32; 3]).map_err(told)?;
-    let head = Phantom::Head.sample([48; 3]).map_err(told)?;
+    let ball = Phantom::Ball.sample([32; 3])?;
+    let head = Phantom::Head.sample([48; 3])?;
     let bone = TransferFunction { unit: 0.01, ..TransferFunction::named("ct-bone", head.range)? };
     let sharp = specimen.clone().sharpened(&narrow)?;
-    let body_centred = Phantom::Specimen.sample_on(generate::body_centred(48)).map_err(told)?;
+    let body_centred = Phantom::Specimen.sample_on(generate::body_centred(48))?;
     Ok(vec![
         Case::automatic("specimen, 48³", specimen),
         Case { kernel: narrow, ..Case::automatic("specimen, 48³, sharp", sharp) },

@@ -12,6 +12,7 @@ use crate::{
 };
 use splatkit::{
     Error,
+    gpu::PreparedScene,
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
     math::Camera,
     scene::{Scene, Settings},
@@ -97,21 +98,45 @@ pub fn tables(
     for source in sources {
         progress.stage(format!("Reading {}", source.path.display()));
         let hierarchy = hierarchy(source, open(&source.path)?)?;
-        let leaves = hierarchy.header().leaves as f64;
-        let mut scene = stage.prepare(&Scene::new().with_hierarchy(hierarchy.clone()))?;
-        let mut cells = vec![Cell::Number(leaves, 0)];
+        let scene = stage.prepare(&Scene::new().with_hierarchy(hierarchy.clone()))?;
+        let mut model = Model { source, hierarchy, scene };
+        cost.row(source.name(), model.costs(stage, progress)?);
+        let [cut, leaves] = [
+            model.largest_change(stage, CUT, progress)?,
+            model.largest_change(stage, 0.0, progress)?,
+        ];
+        sweep.row(
+            source.name(),
+            [cut, leaves, cut / leaves].map(|value| Cell::Number(value, 3)).into(),
+        );
+    }
+    Ok([cost, sweep])
+}
+
+/// A hierarchy with its prepared scene.
+struct Model<'a> {
+    source: &'a Source,
+    hierarchy: Arc<Hierarchy>,
+    scene: PreparedScene,
+}
+
+impl Model<'_> {
+    /// Returns a row of the costs: the number of leaves, the splats and times from near and far,
+    /// and the memory.
+    fn costs(&mut self, stage: &mut Stage, progress: &Progress) -> Result<Vec<Cell>, Failure> {
+        let mut cells = vec![Cell::Number(self.hierarchy.header().leaves as f64, 0)];
         let mut settings = Settings::new([PIXELS; 2]);
         settings.detail = Detail::Pixels(CUT);
         let mut memory = 0;
         for farther in [1.0, 4.0, 16.0] {
-            progress.stage(format!("Timing {}, {farther} times as far", source.name()));
-            let camera = camera(&hierarchy, source, settings.size, farther)?;
-            stage.renderer.draw(&mut scene, &camera, &settings)?;
+            progress.stage(format!("Timing {}, {farther} times as far", self.source.name()));
+            let camera = camera(&self.hierarchy, self.source, settings.size, farther)?;
+            stage.renderer.draw(&mut self.scene, &camera, &settings)?;
             let mut times = Vec::new();
             let mut splats = 0;
             for _ in 0..FRAMES {
                 let start = Instant::now();
-                let stats = stage.renderer.draw(&mut scene, &camera, &settings)?;
+                let stats = stage.renderer.draw(&mut self.scene, &camera, &settings)?;
                 times.push(milliseconds(start));
                 (splats, memory) = (stats.splats, stats.gpu_bytes);
             }
@@ -119,31 +144,32 @@ pub fn tables(
             cells.extend([Cell::Number(splats as f64, 0), Cell::Number(times[FRAMES / 2], 1)]);
         }
         cells.push(Cell::Number((memory >> 20) as f64, 0));
-        cost.row(source.name(), cells);
-
-        settings.size = [SWEEP_PIXELS; 2];
-        let mut changes = Vec::new();
-        for detail in [CUT, 0.0] {
-            settings.detail = Detail::Pixels(detail);
-            let mut last = None;
-            let mut largest: f64 = 0.0;
-            for frame in 0..SWEEP {
-                progress.stage(format!("Zooming {}, picture {frame} of {SWEEP}", source.name()));
-                let farther = FARTHEST.powf(f64::from(frame) / f64::from(SWEEP - 1));
-                let camera = camera(&hierarchy, source, settings.size, farther)?;
-                let picture = stage.draw(&mut scene, &camera, &settings)?;
-                if let Some(last) = &last {
-                    largest = largest.max(255.0 * change(last, &picture)[1]);
-                }
-                last = Some(picture);
-            }
-            changes.push(largest);
-        }
-        let ratio = changes[0] / changes[1];
-        sweep.row(
-            source.name(),
-            [(changes[0], 3), (changes[1], 3), (ratio, 3)].map(|(v, n)| Cell::Number(v, n)).into(),
-        );
+        Ok(cells)
     }
-    Ok([cost, sweep])
+
+    /// Returns the largest change from one picture of the sweep to the next, for a cut of this many
+    /// pixels.
+    fn largest_change(
+        &mut self,
+        stage: &mut Stage,
+        pixels: f64,
+        progress: &Progress,
+    ) -> Result<f64, Failure> {
+        let mut settings = Settings::new([SWEEP_PIXELS; 2]);
+        settings.detail = Detail::Pixels(pixels);
+        let name = self.source.name();
+        let mut last = None;
+        let mut largest: f64 = 0.0;
+        for frame in 0..SWEEP {
+            progress.stage(format!("Zooming {name}, picture {frame} of {SWEEP}"));
+            let farther = FARTHEST.powf(f64::from(frame) / f64::from(SWEEP - 1));
+            let camera = camera(&self.hierarchy, self.source, settings.size, farther)?;
+            let picture = stage.draw(&mut self.scene, &camera, &settings)?;
+            if let Some(last) = &last {
+                largest = largest.max(255.0 * change(last, &picture)[1]);
+            }
+            last = Some(picture);
+        }
+        Ok(largest)
+    }
 }

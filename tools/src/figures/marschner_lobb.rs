@@ -47,7 +47,7 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
     let sides = [40, 64];
     let mut cartesian = Vec::new();
     for side in sides {
-        cartesian.push(SIGNAL.sample([side; 3]).map_err(splatkit::Error::Argument)?);
+        cartesian.push(SIGNAL.sample([side; 3])?);
     }
     for (name, interpolation) in
         [("trilinear", linear_weights as fn(f64) -> [f64; 4]), ("Catmull–Rom", cubic_weights)]
@@ -69,9 +69,7 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
         for (side, volume) in sides.into_iter().zip(&cartesian) {
             progress.stage(format!("Marschner–Lobb, {name}, {side}³"));
             let volume = match body_centred {
-                true => SIGNAL
-                    .sample_on(generate::body_centred(side))
-                    .map_err(splatkit::Error::Argument)?,
+                true => SIGNAL.sample_on(generate::body_centred(side))?,
                 false => volume.clone(),
             };
             let volume = if sharp { volume.sharpened(shape)? } else { volume };

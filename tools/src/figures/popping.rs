@@ -40,7 +40,7 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
             "ratio",
         ],
     );
-    let specimen = Phantom::Specimen.sample_bytes([SIDE; 3]).map_err(splatkit::Error::Argument)?;
+    let specimen = Phantom::Specimen.sample_bytes([SIDE; 3])?;
     let [min, max] = specimen.bounds();
     let transfer = TransferFunction::automatic(&specimen);
     let mut scene =

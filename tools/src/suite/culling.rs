@@ -8,7 +8,7 @@ use super::{
 use crate::camera::Subject;
 use glam::DVec3;
 use splatkit::{
-    Error, Result,
+    Result,
     scene::{Scene, Settings},
     surface::Mesh,
     volume::{Shade, TransferFunction, phantoms::Phantom},
@@ -80,7 +80,7 @@ fn clear_volume(effort: Effort) -> Result<Case> {
 }
 
 fn volume(effort: Effort, opacity: f64) -> Result<Case> {
-    let volume = Phantom::Specimen.sample_bytes([effort.side(SIDE); 3]).map_err(Error::Argument)?;
+    let volume = Phantom::Specimen.sample_bytes([effort.side(SIDE); 3])?;
     let [min, max] = volume.bounds();
     let transfer = TransferFunction {
         color: vec![(20.0, [0.7, 0.3, 0.2]), (255.0, [1.0, 0.9, 0.7])],

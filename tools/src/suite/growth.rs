@@ -9,7 +9,7 @@ use super::{
 use crate::camera::Subject;
 use glam::DVec3;
 use splatkit::{
-    Error, Result,
+    Result,
     bricks::Bricks,
     math::{Bounds, Kernel},
     scene::{Scene, Settings},
@@ -55,11 +55,11 @@ pub fn plans(effort: Effort) -> Vec<Plan> {
 }
 
 fn volume(side: usize, size: u32) -> Result<Case> {
-    let volume = Phantom::Specimen.sample_bytes([side; 3]).map_err(Error::Argument)?;
+    let volume = Phantom::Specimen.sample_bytes([side; 3])?;
     let [min, max] = volume.bounds();
     // One transfer function for all sizes: the range of values is the same, and opacity holds for a
     // length.
-    let shown = Phantom::Specimen.sample_bytes([64; 3]).map_err(Error::Argument)?;
+    let shown = Phantom::Specimen.sample_bytes([64; 3])?;
     let (kernel, transfer) = (Kernel::default(), TransferFunction::automatic(&shown));
     let effective = case::effective(&volume, &kernel, &transfer);
     let samples = volume.len() as f64;

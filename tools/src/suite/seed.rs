@@ -141,7 +141,7 @@ impl Row {
                 (if self.centred { body_centred(&volume)? } else { volume }, name)
             }
             None => {
-                let volume = self.generated(effort).map_err(Error::Argument)?;
+                let volume = self.generated(effort)?;
                 (volume, format!("generated: {}", name_of(self.phantom)))
             }
         };
@@ -160,7 +160,7 @@ impl Row {
     }
 
     /// Samples the phantom in bytes, as the table's volumes were, on a lattice with equal steps.
-    fn generated(self, effort: Effort) -> std::result::Result<Volume, String> {
+    fn generated(self, effort: Effort) -> splatkit::Result<Volume> {
         let dims = self.dims.map(|side| effort.side(side));
         // Body-centred lattices count layers of both kinds along z: two per step.
         let layers = if self.centred { 2.0 } else { 1.0 };

@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn places_on_rays_are_counted() {
         let near = |found: f64, wanted: f64| {
-            assert!((found / wanted - 1.0).abs() < 0.05, "{found} {wanted}")
+            assert!((found / wanted - 1.0).abs() < 0.05, "{found} {wanted}");
         };
         // 40 × 40 pixels of 10 samples each.
         near(field().on_rays(&view(), None), 16_000.0);

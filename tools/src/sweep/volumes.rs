@@ -9,7 +9,7 @@ use super::{
 };
 use glam::{DMat3, DVec3};
 use splatkit::{
-    Error, Result,
+    Result,
     bricks::Bricks,
     math::{Bounds, Camera, Kernel, Tensor},
     scene::{Scene, Settings},
@@ -36,9 +36,9 @@ fn cube(side: usize) -> Result<Arc<Volume>> {
 
 /// Samples the specimen in bytes.
 fn volume(lattice: Lattice) -> Result<Arc<Volume>> {
-    let volume = Phantom::Specimen.sample_on(lattice).map_err(Error::Argument)?;
+    let volume = Phantom::Specimen.sample_on(lattice)?;
     let bytes = (0..volume.len()).map(|i| (SCALE * volume.value(i)).round() as u8).collect();
-    Ok(Arc::new(Volume::new(volume.lattice, Samples::U8(bytes)).map_err(Error::Argument)?))
+    Ok(Arc::new(Volume::new(volume.lattice, Samples::U8(bytes))?))
 }
 
 /// Returns a Cartesian lattice that fills the box from `-half` to `half`.

@@ -23,6 +23,15 @@ impl Folder {
         self.0.join(name)
     }
 
+    /// Returns the names of all files in the folder, sorted.
+    pub fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.0).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
     /// Writes an input and returns its name.
     pub fn put<'a>(&self, name: &'a str, bytes: impl AsRef<[u8]>) -> &'a str {
         std::fs::write(self.path(name), bytes).unwrap();

@@ -1,0 +1,404 @@
+//! What a row of the table of formats says, and how the row of a file is found.
+
+use super::{Kind, RawLayout, stream::Form, volume_stream::Plain};
+use crate::{Result, input::Source, scattered::Points, surface::Mesh, volume::Volume};
+use std::{fmt, path::Path};
+
+/// A file format: a row of [`FORMATS`](super::FORMATS).
+#[derive(Debug, Clone, Copy)]
+pub struct Format {
+    /// The name by which users know it.
+    pub name: &'static str,
+    /// In lower case, without the dot. Empty if any file may be in this format.
+    pub extensions: &'static [&'static str],
+    /// What its files hold.
+    pub holds: &'static [Holding],
+    /// The extension of the files that splatkit writes in this format.
+    pub written: Option<&'static str>,
+    /// Whether a file may refer to other files with a part of its data.
+    pub refers: bool,
+    /// The cargo feature that the format belongs to.
+    pub feature: &'static str,
+    pub(super) magic: Magic,
+    pub(super) kind: Which,
+    pub(super) mesh: Option<fn(&Source) -> Result<Mesh>>,
+    pub(super) volume: Option<VolumeReader>,
+    pub(super) samples: Option<SamplesReader>,
+    pub(super) pieces: InPieces,
+}
+
+/// Reads scattered samples. The second argument names the values to read if a file has several.
+pub(super) type SamplesReader = fn(&Source, Option<&str>) -> Result<Points>;
+
+/// What a file may hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Content {
+    /// Triangles.
+    Mesh,
+    /// Points without triangles, which become surfels.
+    PointCloud,
+    /// Samples on a lattice.
+    Volume,
+    /// Samples at any positions.
+    Samples,
+    /// A hierarchy of splats.
+    Hierarchy,
+    /// A volume in bricks.
+    Bricks,
+}
+
+/// What files of a format hold, and when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Holding {
+    /// The kind of data.
+    pub content: Content,
+    /// Which of the files hold it (“without faces”); empty for all of them.
+    pub when: &'static str,
+}
+
+/// How the first bytes of a file show its format.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Magic {
+    /// They do not.
+    None,
+    Prefix(&'static [u8]),
+    /// A function of the file's bytes, which looks at the first of them only.
+    Rule(fn(&[u8]) -> bool),
+}
+
+/// Which kind of data a file of a format contains.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Which {
+    Always(Kind),
+    /// A function of the file, and of whether the caller asks for a scalar.
+    Rule(fn(&Source, bool) -> Result<Kind>),
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) enum VolumeReader {
+    Plain(fn(&Source) -> Result<Volume>),
+    /// For files that do not describe themselves: the caller gives the layout.
+    Described(fn(&Source, &RawLayout) -> Result<Volume>),
+}
+
+/// How a format is read in pieces. `of` says which of its files are (“binary files”); it is empty
+/// if all are.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum InPieces {
+    No,
+    /// By [`Stream`](super::Stream).
+    Points {
+        of: &'static str,
+        find: fn(&Source) -> Result<Option<Form>>,
+    },
+    /// By [`VolumeStream`](super::VolumeStream).
+    Volume {
+        of: &'static str,
+        find: fn(&Source) -> Result<Option<Plain>>,
+    },
+    /// As `Volume`, for files that do not describe themselves.
+    Described {
+        of: &'static str,
+        find: fn(&Source, &RawLayout) -> Result<Option<Plain>>,
+    },
+    /// By the type that opens these files.
+    Opened,
+}
+
+impl Format {
+    /// A row to fill in: no files, no readers.
+    pub(super) const ROW: Self = Self {
+        name: "",
+        extensions: &[],
+        holds: &[],
+        written: None,
+        refers: false,
+        feature: "",
+        magic: Magic::None,
+        kind: Which::Always(Kind::Mesh),
+        mesh: None,
+        volume: None,
+        samples: None,
+        pieces: InPieces::No,
+    };
+
+    /// Returns the format that the extension of a path names.
+    pub fn of_path(path: impl AsRef<Path>) -> Option<&'static Self> {
+        by_extension(super::FORMATS, path.as_ref(), |_| true)
+    }
+
+    /// Returns which of the files are read in pieces (“binary files”). The text is empty if all
+    /// are. Returns `None` if all are read as a whole.
+    pub fn in_pieces(&self) -> Option<&'static str> {
+        match self.pieces {
+            InPieces::No => None,
+            InPieces::Opened => Some(""),
+            InPieces::Points { of, .. }
+            | InPieces::Volume { of, .. }
+            | InPieces::Described { of, .. } => Some(of),
+        }
+    }
+
+    fn is_for(&self, path: &Path) -> bool {
+        let named = path.extension();
+        named.is_some_and(|named| self.extensions.iter().any(|own| named.eq_ignore_ascii_case(own)))
+    }
+}
+
+impl Content {
+    /// Every content, in the order of messages.
+    pub const ALL: [Self; 6] =
+        [Self::Hierarchy, Self::Bricks, Self::Mesh, Self::PointCloud, Self::Volume, Self::Samples];
+
+    /// Returns its name for one file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mesh => "mesh",
+            Self::PointCloud => "point cloud",
+            Self::Volume => "volume",
+            Self::Samples => "scattered samples",
+            Self::Hierarchy => "hierarchy",
+            Self::Bricks => "volume in bricks",
+        }
+    }
+
+    /// Returns its name for several files.
+    pub fn plural(self) -> &'static str {
+        match self {
+            Self::Mesh => "meshes",
+            Self::PointCloud => "point clouds",
+            Self::Volume => "volumes",
+            Self::Samples => "scattered samples",
+            Self::Hierarchy => "hierarchies",
+            Self::Bricks => "volumes in bricks",
+        }
+    }
+
+    /// Returns the kind of files that hold it.
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::Mesh | Self::PointCloud => Kind::Mesh,
+            Self::Volume => Kind::Volume,
+            Self::Samples => Kind::Samples,
+            Self::Hierarchy => Kind::Hierarchy,
+            Self::Bricks => Kind::Bricks,
+        }
+    }
+}
+
+impl fmt::Display for Holding {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        out.write_str(self.content.name())?;
+        if self.when.is_empty() { Ok(()) } else { write!(out, " ({})", self.when) }
+    }
+}
+
+impl Which {
+    pub fn of(self, source: &Source, with_scalar: bool) -> Result<Kind> {
+        match self {
+            Self::Always(kind) => Ok(kind),
+            Self::Rule(decide) => decide(source, with_scalar),
+        }
+    }
+}
+
+/// Returns the format that a file's extension names, among those that `may` be read.
+pub(super) fn by_extension<'a>(
+    table: &'a [Format],
+    path: &Path,
+    may: impl Fn(&Format) -> bool,
+) -> Option<&'a Format> {
+    table.iter().find(|format| may(format) && format.is_for(path))
+}
+
+/// Returns the format that a file's first bytes show, among those that `may` be read. Prefixes come
+/// before rules, because a rule may look for a word that files of other formats contain too.
+fn by_magic<'a>(
+    table: &'a [Format],
+    bytes: &[u8],
+    may: impl Fn(&Format) -> bool,
+) -> Option<&'a Format> {
+    let allowed = || table.iter().filter(|format| may(format));
+    let has_prefix = |format: &&Format| match format.magic {
+        Magic::Prefix(prefix) => bytes.starts_with(prefix),
+        _ => false,
+    };
+    let follows_rule = |format: &&Format| match format.magic {
+        Magic::Rule(rule) => rule(bytes),
+        _ => false,
+    };
+    allowed().find(has_prefix).or_else(|| allowed().find(follows_rule))
+}
+
+/// Returns the format of a file, among those that `may` be read: by its extension, else by its
+/// first bytes.
+pub(super) fn find<'a>(
+    table: &'a [Format],
+    source: &Source,
+    may: impl Fn(&Format) -> bool,
+) -> Option<&'a Format> {
+    by_extension(table, source.path, &may).or_else(|| by_magic(table, source.bytes(), &may))
+}
+
+/// As [`find`], for a volume. If the extension names none and the caller gives a layout, the file
+/// is in the format that needs one.
+pub(super) fn find_volume<'a>(
+    table: &'a [Format],
+    source: &Source,
+    is_described: bool,
+) -> Option<&'a Format> {
+    let may = |format: &Format| format.volume.is_some();
+    let needs_layout = |format: &&Format| matches!(format.volume, Some(VolumeReader::Described(_)));
+    by_extension(table, source.path, may)
+        .or_else(|| table.iter().find(needs_layout).filter(|_| is_described))
+        .or_else(|| by_magic(table, source.bytes(), may))
+}
+
+/// Returns the extensions of the formats that `may` be read, as a list for messages.
+pub(super) fn extensions(table: &[Format], may: impl Fn(&Format) -> bool) -> String {
+    let extensions = table.iter().filter(|format| may(format)).flat_map(|format| format.extensions);
+    listed(extensions.map(|extension| format!(".{extension}")).collect(), "and")
+}
+
+/// Returns “a, b and c”.
+pub(super) fn listed(mut words: Vec<String>, and: &str) -> String {
+    match (words.pop(), words.join(", ")) {
+        (None, _) => String::new(),
+        (Some(last), rest) if rest.is_empty() => last,
+        (Some(last), rest) => format!("{rest} {and} {last}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        Error,
+        formats::{
+            FORMATS,
+            load::{mesh_of, samples_of, volume_of},
+        },
+        input::Limits,
+    };
+    use std::collections::HashSet;
+
+    /// The reader of a format that only this test knows: a word, then the coordinates of points.
+    fn read_toy(source: &Source) -> Result<Mesh> {
+        let text = source.small_text("a toy", 1 << 10)?;
+        let numbers: Vec<f32> = text.split(' ').skip(1).filter_map(|w| w.parse().ok()).collect();
+        let positions = numbers.as_chunks().0.iter().map(|&point| point.into()).collect();
+        Ok(Mesh { positions, ..Mesh::default() })
+    }
+
+    const TOY: Format = Format {
+        name: "toy",
+        extensions: &["toy"],
+        holds: &[Holding { content: Content::PointCloud, when: "" }],
+        feature: "toy",
+        magic: Magic::Prefix(b"toys"),
+        kind: Which::Always(Kind::Mesh),
+        mesh: Some(read_toy),
+        ..Format::ROW
+    };
+
+    fn with<T>(name: &str, bytes: &[u8], read: impl Fn(&Source) -> T) -> T {
+        let limits = Limits::default();
+        read(&Source::from_bytes(Path::new(name), bytes, &limits).expect("a source"))
+    }
+
+    #[test]
+    fn a_new_format_is_one_row() {
+        let table = [FORMATS, &[TOY]].concat();
+        for (name, bytes) in
+            [("a.toy", "1 2 3 4 5 6"), ("a.TOY", "toys 2 3 4"), ("a", "toys 2 3 4")]
+        {
+            let kind = |table: &[Format]| {
+                with(name, bytes.as_bytes(), |source| Kind::find(table, source, false)).unwrap()
+            };
+            assert_eq!((kind(&table), kind(FORMATS)), (Some(Kind::Mesh), None), "{name}");
+            let mesh = with(name, bytes.as_bytes(), |source| mesh_of(&table, source)).unwrap();
+            assert_eq!(mesh.positions[0].to_array(), [2.0, 3.0, 4.0], "{name}");
+            assert!(with(name, bytes.as_bytes(), |source| mesh_of(FORMATS, source)).is_err());
+        }
+        // Messages name it, where it can be read.
+        let hint = |error: Error| match error {
+            Error::Input { hint: Some(hint), .. } => hint,
+            error => panic!("no hint: {error}"),
+        };
+        let none = |source: &Source| hint(mesh_of(&table, source).unwrap_err());
+        assert!(with("a.none", b"none", none).ends_with(".csv, .txt and .toy"));
+        let none = |source: &Source| hint(samples_of(&table, source, None).unwrap_err());
+        assert!(with("a.none", b"none", none).ends_with(".csv, .txt and .xyzv"));
+    }
+
+    #[test]
+    fn rows_say_what_their_readers_read() {
+        let mut names = HashSet::new();
+        for format in FORMATS {
+            let name = format.name;
+            assert!(names.insert(name) && !format.feature.is_empty(), "{name}");
+            for extension in format.extensions {
+                assert!(names.insert(extension), "{extension} is the extension of two formats");
+                assert_eq!(extension.to_ascii_lowercase(), *extension);
+            }
+            assert!(format.written.is_none_or(|own| format.extensions.contains(&own)), "{name}");
+            let holds = |kind| format.holds.iter().any(|holding| holding.content.kind() == kind);
+            assert_eq!(format.mesh.is_some(), holds(Kind::Mesh), "{name}");
+            assert_eq!(format.volume.is_some(), holds(Kind::Volume), "{name}");
+            assert_eq!(format.samples.is_some(), holds(Kind::Samples), "{name}");
+            let is_opened = matches!(format.pieces, InPieces::Opened);
+            assert_eq!(is_opened, holds(Kind::Hierarchy) || holds(Kind::Bricks), "{name}");
+            match format.kind {
+                Which::Always(kind) => assert!(holds(kind), "{name}"),
+                Which::Rule(_) => assert!(format.holds.len() > 1, "{name}"),
+            }
+        }
+    }
+
+    #[test]
+    fn first_bytes_show_the_format() {
+        for (bytes, name) in [
+            ("SPLK", "splatkit hierarchy"),
+            ("SPLV", "splatkit bricks"),
+            ("\n ply\n", "PLY"),
+            ("glTF", "glTF"),
+            (" {\"asset\": 1}", "glTF"),
+            ("solid of one", "STL"),
+            ("LASF", "LAS"),
+            ("ASTM-E57", "E57"),
+            ("# .PCD v0.7", "PCD"),
+            ("# vtk DataFile Version 3.0", "VTK"),
+            ("<?xml?><VTKFile type='ImageData'>", "VTI"),
+            ("<VTKFile type='RectilinearGrid'>", "VTR"),
+            ("<VTKFile type='UnstructuredGrid'>", "VTU, VTP"),
+            ("<VTKFile type='PolyData'>", "VTU, VTP"),
+            ("NRRD0004", "NRRD"),
+            // A comment of a header is no sign of another format.
+            ("NRRD0004\n# from <VTKFile type='PolyData'>", "NRRD"),
+        ] {
+            let found = by_magic(FORMATS, bytes.as_bytes(), |_| true);
+            assert_eq!(found.map(|format| format.name), Some(name), "{bytes}");
+        }
+        let found = by_magic(FORMATS, b"\x93NUMPY\x01\0", |_| true);
+        assert_eq!(found.map(|format| format.name), Some("NPY"));
+        for bytes in ["", "hello", "solid", "<?xml?><svg>", "RectilinearGrid"] {
+            assert!(by_magic(FORMATS, bytes.as_bytes(), |_| true).is_none(), "{bytes}");
+        }
+        // Beyond the first 1024 bytes, words are no sign.
+        let late = [&[b' '; 1020][..], b"<VTKFile type='ImageData'>"].concat();
+        assert!(by_magic(FORMATS, &late, |_| true).is_none());
+    }
+
+    #[test]
+    fn what_no_reader_reads_is_told() {
+        let told = |error: Error| error.to_string();
+        let message = with("a.vti", b"", |source| told(mesh_of(FORMATS, source).unwrap_err()));
+        assert!(message.contains("“.vti” is not a mesh format that can be read"), "{message}");
+        let message =
+            with("a.OBJ", b"", |source| told(samples_of(FORMATS, source, None).unwrap_err()));
+        assert!(message.contains("“.obj” is not a format of scattered samples"), "{message}");
+        let message =
+            with("a.raw", b"", |source| told(volume_of(FORMATS, source, None).unwrap_err()));
+        assert!(message.contains("(VTR, VTI, VTK or NRRD)"), "{message}");
+    }
+}

@@ -1,0 +1,146 @@
+//! The entry points for all formats: meshes and point clouds, volumes, scattered samples.
+
+use super::{
+    FORMATS, RawLayout,
+    format::{Format, VolumeReader, extensions, find, find_volume, listed},
+};
+use crate::{
+    Result,
+    input::{Limits, Source},
+    scattered::Points,
+    surface::Mesh,
+    volume::Volume,
+};
+use std::path::Path;
+
+/// Reads a mesh or point cloud. The file's extension selects the format; for other extensions, the
+/// first bytes do. [`FORMATS`] lists the formats.
+///
+/// # Errors
+/// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file that is in no
+/// format of meshes or point clouds.
+pub fn load_mesh(path: impl AsRef<Path>, limits: &Limits) -> Result<Mesh> {
+    read_mesh(&Source::open(path.as_ref(), limits)?)
+}
+
+/// As [`load_mesh`], but reads from an open source, which may be in memory
+/// ([`Source::from_bytes`]).
+///
+/// # Errors
+/// Those of [`load_mesh`], except those of opening the file.
+pub fn read_mesh(source: &Source) -> Result<Mesh> {
+    let _span = tracing::info_span!("load_mesh", file = %source.path.display()).entered();
+    source.unless_changed(mesh_of(FORMATS, source))
+}
+
+/// As [`read_mesh`], in the formats of a table, but does not check whether the file changed
+/// meanwhile.
+pub(super) fn mesh_of(table: &[Format], source: &Source) -> Result<Mesh> {
+    let may = |format: &Format| format.mesh.is_some();
+    match find(table, source, may).and_then(|format| format.mesh) {
+        Some(read) => read(source),
+        None => Err(source
+            .error("path", format!("“.{}” is not a mesh format that can be read", named(source)))
+            .hint(format!("meshes and point clouds are read from {}", extensions(table, may)))),
+    }
+}
+
+/// Reads a volume. The extension selects the format if it is one of a volume. Any other file is
+/// read as raw if `raw` gives its layout, and otherwise by its first bytes. World units are those
+/// of the file. [`FORMATS`] lists the formats.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a file that is not such a volume,
+/// [`Error::Limit`](crate::Error::Limit) and [`Error::File`](crate::Error::File) as for every
+/// input.
+pub fn load_volume(
+    path: impl AsRef<Path>,
+    limits: &Limits,
+    raw: Option<&RawLayout>,
+) -> Result<Volume> {
+    read_volume(&Source::open(path.as_ref(), limits)?, raw)
+}
+
+/// As [`load_volume`], but reads from an open source, which may be in memory
+/// ([`Source::from_bytes`]).
+///
+/// # Errors
+/// Those of [`load_volume`], except those of opening the file.
+pub fn read_volume(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
+    source.unless_changed(volume_of(FORMATS, source, raw))
+}
+
+/// As [`read_volume`], in the formats of a table, but does not check whether the file changed
+/// meanwhile.
+pub(super) fn volume_of(
+    table: &[Format],
+    source: &Source,
+    raw: Option<&RawLayout>,
+) -> Result<Volume> {
+    let format = find_volume(table, source, raw.is_some());
+    match (format.and_then(|format| format.volume), raw) {
+        (Some(VolumeReader::Plain(read)), _) => read(source),
+        (Some(VolumeReader::Described(read)), Some(layout)) => read(source, layout),
+        _ => {
+            let describes_itself =
+                |format: &&Format| matches!(format.volume, Some(VolumeReader::Plain(_)));
+            let names = table.iter().filter(describes_itself).map(|format| format.name.into());
+            let names = listed(names.collect(), "or");
+            Err(source
+                .error("file", format!("is not a volume that can be read ({names})"))
+                .hint("to read a raw file, give its dimensions and its sample type"))
+        }
+    }
+}
+
+/// Reads scattered samples. The file's extension selects the format; for other extensions, the
+/// first bytes do. [`FORMATS`] lists the formats. `scalar` names the values to read if a file has
+/// several.
+///
+/// # Errors
+/// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file that is in no
+/// format of scattered samples.
+pub fn load_samples(
+    path: impl AsRef<Path>,
+    limits: &Limits,
+    scalar: Option<&str>,
+) -> Result<Points> {
+    read_samples(&Source::open(path.as_ref(), limits)?, scalar)
+}
+
+/// As [`load_samples`], but reads from an open source, which may be in memory
+/// ([`Source::from_bytes`]).
+///
+/// # Errors
+/// Those of [`load_samples`], except those of opening the file.
+pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
+    let _span = tracing::info_span!("load_samples", file = %source.path.display()).entered();
+    source.unless_changed(samples_of(FORMATS, source, scalar))
+}
+
+/// As [`read_samples`], in the formats of a table, but does not check whether the file changed
+/// meanwhile.
+pub(super) fn samples_of(
+    table: &[Format],
+    source: &Source,
+    scalar: Option<&str>,
+) -> Result<Points> {
+    let may = |format: &Format| format.samples.is_some();
+    match find(table, source, may).and_then(|format| format.samples) {
+        Some(read) => read(source, scalar),
+        None => {
+            let named = named(source);
+            Err(source
+                .error(
+                    "path",
+                    format!("“.{named}” is not a format of scattered samples that can be read"),
+                )
+                .hint(format!("scattered samples are read from {}", extensions(table, may))))
+        }
+    }
+}
+
+/// Returns a file's extension in lower case, for messages.
+fn named(source: &Source) -> String {
+    source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase()
+}

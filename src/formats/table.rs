@@ -1,0 +1,269 @@
+//! The table of formats. `Kind`, the loading functions, the streams and the messages that list
+//! extensions all follow from it.
+//!
+//! A new format is a module with its reader, and a row here (docs/files.md).
+
+use super::{
+    Kind, csv, e57,
+    format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
+    gltf, las, npy, nrrd, obj, pcd, ply, raw, stl,
+    stream::Form,
+    vti, vtk, vtr, vtu, xyz,
+};
+
+/// Every format, in the order of messages: surfaces, volumes, scattered samples.
+pub static FORMATS: &[Format] = &[
+    Format {
+        name: "splatkit hierarchy",
+        extensions: &["splk"],
+        holds: &[all(Content::Hierarchy)],
+        written: Some("splk"),
+        feature: "hierarchy",
+        magic: Magic::Prefix(b"SPLK"),
+        kind: Which::Always(Kind::Hierarchy),
+        pieces: InPieces::Opened,
+        ..Format::ROW
+    },
+    Format {
+        name: "PLY",
+        extensions: &["ply"],
+        holds: &[
+            some(Content::Mesh, "with faces"),
+            some(Content::PointCloud, "without faces"),
+            some(Content::Samples, "without faces, if a scalar is named"),
+        ],
+        written: Some("ply"),
+        feature: "ply",
+        magic: Magic::Rule(|bytes| bytes.trim_ascii_start().starts_with(b"ply")),
+        kind: Which::Rule(|source, with_scalar| {
+            let samples = with_scalar && !ply::has_faces(source)?;
+            Ok(if samples { Kind::Samples } else { Kind::Mesh })
+        }),
+        mesh: Some(ply::read),
+        samples: Some(ply::read_samples),
+        pieces: InPieces::Points {
+            of: "binary files",
+            find: |source| Ok(ply::Pieces::find(source)?.map(Form::Ply)),
+        },
+        ..Format::ROW
+    },
+    Format {
+        name: "OBJ",
+        extensions: &["obj"],
+        holds: &WITH_OR_WITHOUT_FACES,
+        refers: true,
+        feature: "obj",
+        kind: Which::Always(Kind::Mesh),
+        mesh: Some(obj::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "glTF",
+        extensions: &["gltf", "glb"],
+        holds: &WITH_OR_WITHOUT_FACES,
+        refers: true,
+        feature: "gltf",
+        magic: Magic::Rule(|bytes| {
+            let text = bytes.trim_ascii_start();
+            text.starts_with(b"glTF") || text.starts_with(b"{")
+        }),
+        kind: Which::Always(Kind::Mesh),
+        mesh: Some(gltf::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "STL",
+        extensions: &["stl"],
+        holds: &[all(Content::Mesh)],
+        feature: "stl",
+        // Binary files begin with any 80 bytes.
+        magic: Magic::Prefix(b"solid "),
+        kind: Which::Always(Kind::Mesh),
+        mesh: Some(stl::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "LAS",
+        extensions: &["las", "laz"],
+        holds: &[all(Content::PointCloud)],
+        feature: "las",
+        magic: Magic::Prefix(b"LASF"),
+        kind: Which::Always(Kind::Mesh),
+        mesh: Some(las::read),
+        pieces: InPieces::Points {
+            of: "",
+            find: |source| Ok(las::Pieces::find(source)?.map(Form::Las)),
+        },
+        ..Format::ROW
+    },
+    Format {
+        name: "E57",
+        extensions: &["e57"],
+        holds: &[all(Content::PointCloud)],
+        feature: "e57",
+        magic: Magic::Prefix(b"ASTM-E57"),
+        kind: Which::Always(Kind::Mesh),
+        mesh: Some(e57::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "PCD",
+        extensions: &["pcd"],
+        holds: &[all(Content::PointCloud)],
+        feature: "pcd",
+        magic: Magic::Prefix(b"# .PCD"),
+        kind: Which::Always(Kind::Mesh),
+        mesh: Some(pcd::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "table of points",
+        extensions: &["xyz", "pts", "asc"],
+        holds: &[all(Content::PointCloud), some(Content::Samples, "if a scalar is named")],
+        feature: "tables",
+        kind: Which::Rule(|_, with_scalar| {
+            Ok(if with_scalar { Kind::Samples } else { Kind::Mesh })
+        }),
+        mesh: Some(xyz::read),
+        samples: Some(csv::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "VTU, VTP",
+        extensions: &["vtu", "vtp"],
+        holds: &[all(Content::Samples)],
+        feature: "vtk",
+        magic: Magic::Rule(|bytes| {
+            let has = |word| has_word(bytes, word);
+            is_vtk_xml(bytes) && (has(b"UnstructuredGrid") || has(b"PolyData"))
+        }),
+        kind: Which::Always(Kind::Samples),
+        samples: Some(vtu::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "VTR",
+        extensions: &["vtr"],
+        holds: &[all(Content::Volume)],
+        feature: "vtk",
+        magic: Magic::Rule(|bytes| is_vtk_xml(bytes) && has_word(bytes, b"RectilinearGrid")),
+        kind: Which::Always(Kind::Volume),
+        volume: Some(VolumeReader::Plain(vtr::read)),
+        ..Format::ROW
+    },
+    Format {
+        name: "VTI",
+        extensions: &["vti"],
+        holds: &[all(Content::Volume)],
+        feature: "vtk",
+        // Comes after the rows of VTK's other data sets, because these begin like that too.
+        magic: Magic::Rule(is_vtk_xml),
+        kind: Which::Always(Kind::Volume),
+        volume: Some(VolumeReader::Plain(vti::read)),
+        ..Format::ROW
+    },
+    Format {
+        name: "VTK",
+        extensions: &["vtk"],
+        holds: &[
+            some(Content::Volume, "structured points, rectilinear grids"),
+            some(Content::Samples, "other data sets"),
+        ],
+        feature: "vtk",
+        magic: Magic::Prefix(b"# vtk DataFile"),
+        kind: Which::Rule(|source, _| {
+            Ok(if vtk::holds_volume(source)? { Kind::Volume } else { Kind::Samples })
+        }),
+        volume: Some(VolumeReader::Plain(vtk::read_volume)),
+        samples: Some(vtk::read_samples),
+        ..Format::ROW
+    },
+    Format {
+        name: "NRRD",
+        extensions: &["nrrd", "nhdr"],
+        holds: &[all(Content::Volume)],
+        written: Some("nrrd"),
+        refers: true,
+        feature: "nrrd",
+        magic: Magic::Prefix(b"NRRD"),
+        kind: Which::Always(Kind::Volume),
+        volume: Some(VolumeReader::Plain(nrrd::read)),
+        pieces: InPieces::Volume { of: "files of raw encoding", find: nrrd::plain },
+        ..Format::ROW
+    },
+    Format {
+        name: "raw",
+        holds: &[some(Content::Volume, "if its layout is given")],
+        feature: "raw",
+        kind: Which::Always(Kind::Volume),
+        volume: Some(VolumeReader::Described(raw::read)),
+        pieces: InPieces::Described { of: "files without gzip", find: raw::plain },
+        ..Format::ROW
+    },
+    Format {
+        name: "splatkit bricks",
+        extensions: &["splv"],
+        holds: &[all(Content::Bricks)],
+        written: Some("splv"),
+        feature: "bricks",
+        magic: Magic::Prefix(b"SPLV"),
+        kind: Which::Always(Kind::Bricks),
+        pieces: InPieces::Opened,
+        ..Format::ROW
+    },
+    Format {
+        name: "NPY",
+        extensions: &["npy"],
+        holds: &[all(Content::Samples)],
+        feature: "npy",
+        magic: Magic::Prefix(b"\x93NUMPY"),
+        kind: Which::Always(Kind::Samples),
+        samples: Some(|source, _| npy::read(source)),
+        ..Format::ROW
+    },
+    Format {
+        name: "table",
+        extensions: &["csv", "txt"],
+        holds: &[
+            some(Content::PointCloud, "with the columns of a point cloud"),
+            some(Content::Samples, "with other columns, or if a scalar is named"),
+        ],
+        feature: "tables",
+        kind: Which::Rule(|source, with_scalar| {
+            let is_cloud = !with_scalar && xyz::is_cloud(source);
+            Ok(if is_cloud { Kind::Mesh } else { Kind::Samples })
+        }),
+        mesh: Some(xyz::read),
+        samples: Some(csv::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "table of samples",
+        extensions: &["xyzv"],
+        holds: &[all(Content::Samples)],
+        feature: "tables",
+        kind: Which::Always(Kind::Samples),
+        samples: Some(csv::read),
+        ..Format::ROW
+    },
+];
+
+const WITH_OR_WITHOUT_FACES: [Holding; 2] =
+    [some(Content::Mesh, "with faces"), some(Content::PointCloud, "without faces")];
+
+const fn all(content: Content) -> Holding {
+    Holding { content, when: "" }
+}
+
+const fn some(content: Content, when: &'static str) -> Holding {
+    Holding { content, when }
+}
+
+fn is_vtk_xml(bytes: &[u8]) -> bool {
+    has_word(bytes, b"<VTKFile")
+}
+
+/// Returns whether a word is among the first 1024 bytes.
+fn has_word(bytes: &[u8], word: &[u8]) -> bool {
+    bytes[..bytes.len().min(1024)].windows(word.len()).any(|found| found == word)
+}
