@@ -72,6 +72,10 @@
 //! found and what was expected. A few functions know no file or place; they return a message as a
 //! string. A damaged or hostile file is an error, never a panic.
 
+// The scenes of the integration tests, which unit tests share, call the crate by its name.
+#[cfg(test)]
+extern crate self as splatkit;
+
 pub mod bricks;
 pub mod compare;
 pub mod container;

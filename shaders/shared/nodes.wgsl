@@ -5,8 +5,8 @@
 @group(0) @binding(0) var<uniform> source: Source;
 @group(0) @binding(1) var<uniform> cut: Cut;
 @group(0) @binding(2) var<storage, read> nodes: array<Node>;
-// The nodes' splats (48 bytes each, see splat.rs).
-@group(0) @binding(3) var<storage, read> splats: array<vec4<f32>>;
+// The nodes' splats.
+@group(0) @binding(3) var<storage, read> splats: array<Splat>;
 // The slots that take part, and the numbers of their nodes.
 @group(0) @binding(4) var<storage, read> slots: array<vec2<u32>>;
 // A bit for each page of the hierarchy: whether it is in memory.
@@ -70,7 +70,7 @@ fn has_children(node: Node) -> bool {
 }
 
 fn is_hidden(index: u32, node: Node) -> bool {
-    let splat = to_view(splats[3u * index].xyz);
+    let splat = to_view(splats[index].center);
     let reach = node.radius + 1.3 * node.size;
     for (var i = 0; i < 4; i++) {
         if dot(cut.sides[i].xyz, splat) + cut.sides[i].w < -reach {
@@ -83,7 +83,7 @@ fn is_hidden(index: u32, node: Node) -> bool {
     if cut.culls == 0u || node.cone <= 0.0 {
         return false;
     }
-    let packed = bitcast<u32>(splats[3u * index + 2u].w);
+    let packed = splats[index].normal;
     if packed == NO_NORMAL {
         return false;
     }

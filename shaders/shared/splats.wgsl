@@ -1,5 +1,4 @@
-// Explicit splats (48 bytes each, see splat.rs), for sources/splats.wgsl and sources/nodes.wgsl,
-// which bind them.
+// Explicit splats, for sources/splats.wgsl and sources/nodes.wgsl, which bind them.
 
 // The picture is sampled at pixel centres. A blur of this many pixels keeps small splats from
 // falling between them.
@@ -9,12 +8,12 @@ const STEP_BACK: f32 = 2.4;
 
 // Returns a splat in view space, widened.
 fn splat_at(index: u32) -> Candidate {
-    let a = splats[3u * index];
-    let b = splats[3u * index + 1u];
-    let d = splats[3u * index + 2u];
+    let own = splats[index];
+    let b = own.factor_a;
+    let d = own.factor_b;
     let to_view = mat3x3<f32>(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz);
     var splat: Candidate;
-    splat.center = to_view * a.xyz + source.origin.xyz;
+    splat.center = to_view * own.center + source.origin.xyz;
     // Columns of B, rotated into view space; B = (b00 0 0, b10 b11 0, b20 b21 b22) row by row.
     let c0 = to_view * vec3(b.x, b.y, b.w);
     let c1 = to_view * vec3(0.0, b.z, d.x);
@@ -32,9 +31,9 @@ fn splat_at(index: u32) -> Candidate {
     splat.covariance.yz = c0.y * c0.z + c1.y * c1.z + c2.y * c2.z;
     splat.covariance.zz = c0.z * c0.z + c1.z * c1.z + c2.z * c2.z + blur2;
     splat.extent = source.extent;
-    splat.strength = a.w;
-    splat.color = bitcast<u32>(d.z);
-    splat.normal = bitcast<u32>(d.w);
+    splat.strength = own.strength;
+    splat.color = own.color;
+    splat.normal = own.normal;
     if SAMPLES && (source.flags & RADIANCE) == 0u {
         // The slope is in the splat's own whitened space; B⁻ᵀ maps it to the set's space.
         let low = unpack2x16float(splat.color);
@@ -60,9 +59,9 @@ fn splat_at(index: u32) -> Candidate {
         if splat.normal != NO_NORMAL {
             let normal = to_view * decode_normal(splat.normal);
             splat.normal = encode_normal(normal);
-            let own = vec3(dot(c0, normal), dot(c1, normal), dot(c2, normal));
-            let own2 = dot(own, own);
-            splat.center -= normal * (STEP_BACK * (sqrt(own2 + blur2) - sqrt(own2)));
+            let across = vec3(dot(c0, normal), dot(c1, normal), dot(c2, normal));
+            let variance = dot(across, across);
+            splat.center -= normal * (STEP_BACK * (sqrt(variance + blur2) - sqrt(variance)));
         }
     }
     return splat;

@@ -2,7 +2,7 @@
 // depth.
 
 @group(1) @binding(0) var<uniform> source: Source;
-@group(1) @binding(1) var<storage, read> splats: array<vec4<f32>>;
+@group(1) @binding(1) var<storage, read> splats: array<Splat>;
 // Number of the node, with its share in the upper ten bits; the element behind the last possible
 // one is the count.
 @group(1) @binding(2) var<storage, read> selected: array<u32>;

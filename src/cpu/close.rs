@@ -7,7 +7,7 @@ use super::{
     rays::Rays,
     vector::{self, Lanes, dot, each, exp, four, log2, three, words},
 };
-use crate::scene::Optics;
+use crate::{plan::uniforms::FrameIsosurface, scene::Optics};
 use fearless_simd::{Simd, f32x4, i32x8, mask32x8, prelude::*};
 
 /// Number of parts of a sheet in which the transfer function is integrated.
@@ -93,7 +93,7 @@ impl Visible {
         let mut shows: Vec<bool> =
             plan.tables.entries[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
         for surface in &plan.frame.isosurfaces[..plan.isosurfaces] {
-            let at = (surface[0][0] + place).clamp(0.0, last) as usize;
+            let at = (surface.value[0] + place).clamp(0.0, last) as usize;
             let end = (at + 2).min(shows.len());
             shows[at..end].fill(true);
         }
@@ -152,7 +152,7 @@ impl Plan<'_> {
         // Values before and behind the table count as those of its ends.
         let before = (high.min(none) - low.min(none)) * inverse;
         let behind = (high.max(all) - low.max(all)) * inverse;
-        let [first, last] = self.frame.beyond;
+        let [first, last] = self.frame.beyond();
         four!(I => within[I] * inverse + before * first[I] + behind * last[I])
     }
 
@@ -400,8 +400,10 @@ impl Plan<'_> {
             for number in 0..self.isosurfaces {
                 // In the order from the front value to the back value.
                 let rises = next.simd_gt(value);
-                let [up, down] =
-                    [number, self.isosurfaces - 1 - number].map(|i| self.frame.isosurfaces[i]);
+                let [up, down] = [number, self.isosurfaces - 1 - number].map(|i| {
+                    let FrameIsosurface { value, color } = self.frame.isosurfaces[i];
+                    [value, color]
+                });
                 let own = |row: usize, column: usize| {
                     rises.select(
                         Lanes::splat(simd, up[row][column]),

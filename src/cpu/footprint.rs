@@ -119,7 +119,7 @@ pub fn counted(plan: &Plan, value: f32) -> f32 {
 }
 
 pub fn to_view(source: &Source) -> Mat3 {
-    let [x, y, z] = source.axes.map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
+    let [x, y, z] = source.axes().map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
     Mat3::from_cols(x, y, z)
 }
 

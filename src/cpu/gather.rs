@@ -454,7 +454,7 @@ impl Gather<'_> {
         let per_value = frame.transfer[1];
         let Point { value, slopes, weight } = self.at(simd, rays, plan.planes[plane]);
         // From steps of the lattice to view space.
-        let axes = &frame.field_axes;
+        let axes = frame.field_axes();
         let gradient = three!(I => {
             (slopes[0] * axes[0][I] + slopes[1] * axes[1][I] + slopes[2] * axes[2][I]) * per_value
         });

@@ -200,7 +200,7 @@ impl<'a> LatticeSource<'a> {
     fn new(plan: &Plan, volume: &'a Volume, kernel: &Kernel) -> Self {
         let lattice = volume.drawn_lattice();
         let source = Source::of_lattice(plan.view, lattice, kernel, false);
-        let [x, y, z] = plan.frame.field_axes.map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
+        let [x, y, z] = plan.frame.field_axes().map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
         Self {
             volume,
             lattice,
@@ -222,7 +222,7 @@ impl<'a> LatticeSource<'a> {
         let [nx, ny, _] = self.lattice.dims;
         let index = [number % nx, number / nx % ny, number / (nx * ny)];
         let mut steps = Vec3::from_array(index.map(|n| n as f32));
-        let mut covariance = symmetric(&self.source.covariance);
+        let mut covariance = symmetric(&self.source.covariance());
         match &self.lattice.arrangement {
             Arrangement::Cartesian => {}
             Arrangement::BodyCentred => {
@@ -233,7 +233,7 @@ impl<'a> LatticeSource<'a> {
                 steps = Vec3::from_array(std::array::from_fn(|axis| {
                     (coordinates[axis][index[axis]] - coordinates[axis][0]) as f32
                 }));
-                let unit = self.lattice.unit(index).as_vec3() * self.source.covariance[1][3];
+                let unit = self.lattice.unit(index).as_vec3() * self.source.covariance_b[3];
                 let own = self.to_view * Mat3::from_diagonal(unit);
                 covariance = own * own.transpose();
             }
@@ -323,7 +323,7 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
         let blocks = cache.blocks(slot);
         let (source, weight) = (&sources[part], choice.levels[part].1 as f32);
         let (to_view, origin, covariance) =
-            (to_view(source), origin(source), symmetric(&source.covariance));
+            (to_view(source), origin(source), symmetric(&source.covariance()));
         let dims = cache.bricks.level(level).dims;
         let first = cache.bricks.level(level).place(brick).map(|at| at * SIDE);
         let mut records = Vec::new();

@@ -4,7 +4,10 @@ use super::{
     plan::Plan,
     vector::{Lanes, dot_with, three},
 };
-use crate::{plan::TILE, scene::Settings};
+use crate::{
+    plan::{TILE, uniforms::FrameClip},
+    scene::Settings,
+};
 use fearless_simd::{Simd, prelude::*};
 
 /// Packets of a tile.
@@ -57,11 +60,11 @@ impl<S: Simd> Rays<S> {
             ([right, down, none], [none, none, one])
         };
         let rows: [[f32; 4]; 3] =
-            three!(I => [frame.world[0][I], frame.world[1][I], frame.world[2][I], 0.0]);
+            three!(I => [frame.world_x[I], frame.world_y[I], frame.world_z[I], 0.0]);
         let (from, toward) =
             (three!(I => dot_with(rows[I], origin)), three!(I => dot_with(rows[I], direction)));
         let mut kept = [Lanes::splat(simd, BEFORE), Lanes::splat(simd, BEHIND)];
-        for [low, high] in &frame.clips[..plan.clips] {
+        for FrameClip { low, high } in &frame.clips[..plan.clips] {
             let part = if high[3] > 0.0 {
                 part_in_box(simd, *low, *high, from, toward)
             } else {
@@ -70,11 +73,12 @@ impl<S: Simd> Rays<S> {
             kept = [kept[0].max(part[0]), kept[1].min(part[1])];
         }
         let mut holes = [[none; 2]; Settings::MAX_CLIPS];
-        for (own, [low, high]) in holes.iter_mut().zip(&frame.holes[..plan.holes]) {
+        for (own, FrameClip { low, high }) in holes.iter_mut().zip(&frame.holes[..plan.holes]) {
             *own = part_in_box(simd, *low, *high, from, toward);
         }
-        let start = three!(I => dot_with(frame.field_axes[I], origin) + frame.field_origin[I]);
-        let way = three!(I => dot_with(frame.field_axes[I], direction));
+        let axes = frame.field_axes();
+        let start = three!(I => dot_with(axes[I], origin) + frame.field_origin[I]);
+        let way = three!(I => dot_with(axes[I], direction));
         let mut inside = kept;
         if plan.has_field && plan.on_lattice {
             let part = part_in_box(simd, frame.field_low, frame.field_high, start, way);

@@ -37,6 +37,8 @@
 //! docs/engine.md explains the mathematics.
 
 pub(crate) mod budget;
+#[cfg(test)]
+mod checks;
 pub(crate) mod device;
 mod frame;
 mod passes;

@@ -25,7 +25,7 @@ use crate::{
             select_bricks::SelectBricks,
         },
         targets::{self, Pool, Targets},
-        variant,
+        variant::{self, Request},
     },
     hierarchy::Detail,
     math::{Camera, Sheets, View},
@@ -363,7 +363,16 @@ impl Renderer {
         let gpu = &self.gpu;
         let Outline { cut_pixels, choice, sheets, gather, .. } = outline;
         let choice = choice.as_ref();
-        let variant = variant::variant(gpu, prepared, view, settings, self.budget, choice, *gather);
+        let kind = prepared.field.as_ref().map_or(0, |field| field.kind);
+        let variant = variant::variant(&Request {
+            scene: &prepared.scene,
+            view,
+            settings,
+            budget: self.budget,
+            choice,
+            gathered: gather.then_some(kind),
+            is_software: gpu.is_software(),
+        });
         let pool = &mut self.pool;
         let targets = targets::targets(
             gpu,

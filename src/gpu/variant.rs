@@ -3,26 +3,35 @@
 
 use crate::{
     bricks::Choice,
-    gpu::{budget::Budget, device::Gpu, pipeline::variant::Variant, scene::PreparedScene},
+    gpu::{budget::Budget, pipeline::variant::Variant},
     math::{Kernel, Profile, View},
     plan::{
         tables::{self},
         uniforms::{self},
     },
-    scene::{Gradient, Item, Optics, Settings},
+    scene::{Gradient, Item, Optics, Scene, Settings},
     volume::{Arrangement, Lattice},
 };
 
+/// The things on which the variant of a picture depends.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    pub scene: &'a Scene,
+    pub view: &'a View,
+    pub settings: &'a Settings,
+    pub budget: Budget,
+    /// The levels and bricks that are drawn, of a volume in bricks.
+    pub choice: Option<&'a Choice>,
+    /// The type of the samples (value.wgsl), if the field is gathered.
+    pub gathered: Option<u32>,
+    /// Whether the adapter runs on the processor.
+    pub is_software: bool,
+}
+
 /// Returns the variant of a picture. Its lighting and its sources decide what is compiled.
-pub fn variant(
-    gpu: &Gpu,
-    prepared: &PreparedScene,
-    view: &View,
-    settings: &Settings,
-    budget: Budget,
-    choice: Option<&Choice>,
-    gather: bool,
-) -> Variant {
+pub fn variant(request: &Request<'_>) -> Variant {
+    let &Request { scene, view, settings, budget, choice, gathered, is_software } = request;
+    let gather = gathered.is_some();
     let mut variant = Variant {
         perspective: view.perspective,
         mode: settings.mode,
@@ -43,7 +52,7 @@ pub fn variant(
         volume_shaded: false,
         surface_shaded: false,
         gradient_opacity: false,
-        occlusion: settings.occlusion && settings.hides() && prepared.scene.can_hide(),
+        occlusion: settings.occlusion && settings.hides() && scene.can_hide(),
         least_share: 0,
         isosurfaces: 0,
         clips: 0,
@@ -51,8 +60,8 @@ pub fn variant(
         central: false,
         // A software adapter runs eight invocations at once: eight columns of eight pixels fill a
         // tile.
-        rows: if gpu.is_software() { 8 } else { 1 },
-        most_entries: budget.tile_entries.unwrap_or(if gpu.is_software() {
+        rows: if is_software { 8 } else { 1 },
+        most_entries: budget.tile_entries.unwrap_or(if is_software {
             SOFTWARE_ENTRIES
         } else {
             u32::MAX
@@ -62,7 +71,7 @@ pub fn variant(
     let classified = settings.classifies_samples();
     // Lighting is visible only with emission and absorption.
     let is_lit = settings.optics == Optics::EmissionAbsorption;
-    for item in &prepared.scene.items {
+    for item in &scene.items {
         let transfer = match item {
             Item::Radiance(_) | Item::Hierarchy(_) => {
                 variant.radiance = true;
@@ -94,8 +103,7 @@ pub fn variant(
             variant.table_kernel = !matches!(kernel.profile, Profile::Gaussian(_));
             let alike = !variant.rectilinear && !variant.table_kernel && !classified;
             variant.isotropic = alike && !gather && are_flat(&volume.lattice, kernel, view, item);
-            variant.sample_kind =
-                prepared.field.as_ref().filter(|_| gather).map_or(0, |field| field.kind);
+            variant.sample_kind = gathered.unwrap_or(0);
         }
         if let (Item::Bricks(bricks, kernel, _), Some(choice)) = (item, choice) {
             variant.lattice = true;

@@ -29,7 +29,9 @@ pub struct Frame {
     pub tile_shift: u32,
     pub record_capacity: u32,
     pub entry_capacity: u32,
-    pub field_axes: [[f32; 4]; 3],
+    pub field_axis_x: [f32; 4],
+    pub field_axis_y: [f32; 4],
+    pub field_axis_z: [f32; 4],
     pub field_origin: [f32; 4],
     pub field_low: [f32; 4],
     pub field_high: [f32; 4],
@@ -39,28 +41,48 @@ pub struct Frame {
     pub transfer: [f32; 4],
     pub gradients: [f32; 4],
     pub table_starts: [u32; 4],
-    pub beyond: [[f32; 4]; 2],
+    pub before: [f32; 4],
+    pub behind: [f32; 4],
     pub kernel: [f32; 4],
     pub levels: [f32; 4],
     pub sheet_normal: [f32; 4],
     pub lattice: [u32; 4],
     pub taps: [f32; 4],
     pub shown: [u32; 4],
-    pub world: [[f32; 4]; 3],
-    pub clips: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
-    pub holes: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
-    pub isosurfaces: [[[f32; 4]; 2]; TransferFunction::MAX_ISOSURFACES],
+    pub world_x: [f32; 4],
+    pub world_y: [f32; 4],
+    pub world_z: [f32; 4],
+    pub clips: [FrameClip; Settings::MAX_CLIPS],
+    pub holes: [FrameClip; Settings::MAX_CLIPS],
+    pub isosurfaces: [FrameIsosurface; TransferFunction::MAX_ISOSURFACES],
 }
 
-const _: () = assert!(size_of::<Frame>() == 64 + (23 + 3 * 16) * 16);
+/// `Clip` in frame.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub struct FrameClip {
+    pub low: [f32; 4],
+    pub high: [f32; 4],
+}
+
+/// `Isosurface` in frame.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub struct FrameIsosurface {
+    pub value: [f32; 4],
+    pub color: [f32; 4],
+}
 
 /// `Source` in frame.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 pub struct Source {
-    pub axes: [[f32; 4]; 3],
+    pub axis_x: [f32; 4],
+    pub axis_y: [f32; 4],
+    pub axis_z: [f32; 4],
     pub origin: [f32; 4],
-    pub covariance: [[f32; 4]; 2],
+    pub covariance_a: [f32; 4],
+    pub covariance_b: [f32; 4],
     pub lattice: [u32; 4],
     pub slices: [u32; 4],
     pub extent: f32,
@@ -68,8 +90,6 @@ pub struct Source {
     pub first_run: u32,
     pub flags: u32,
 }
-
-const _: () = assert!(size_of::<Source>() == 9 * 16);
 
 /// `Source::flags`.
 pub const RADIANCE: u32 = 1;
@@ -97,6 +117,14 @@ fn shade(s: Option<Shade>) -> [f32; 4] {
 }
 
 impl Source {
+    pub fn axes(&self) -> [[f32; 4]; 3] {
+        [self.axis_x, self.axis_y, self.axis_z]
+    }
+
+    pub fn covariance(&self) -> [[f32; 4]; 2] {
+        [self.covariance_a, self.covariance_b]
+    }
+
     /// Returns the source of a chunk of explicit splats.
     pub fn of_splats(view: &View, set: &SplatSet, radiance: bool) -> Self {
         let flags = if radiance { RADIANCE } else { 0 };
@@ -105,8 +133,11 @@ impl Source {
 
     /// Returns the source of a chunk of radiance splats around an origin in the world.
     pub fn of_radiance(view: &View, origin: DVec3, extent: f32) -> Self {
+        let [axis_x, axis_y, axis_z] = columns(view.rotation);
         Self {
-            axes: columns(view.rotation),
+            axis_x,
+            axis_y,
+            axis_z,
             origin: wide(view.to_view(origin), 0.0),
             extent,
             flags: RADIANCE,
@@ -120,15 +151,15 @@ impl Source {
         let axes = view.rotation * lattice.axes;
         let own = axes * DMat3::from_diagonal(lattice.unit([0; 3]) * kernel.unit());
         let c = own * own.transpose();
-        let covariance = [
-            [c.x_axis.x, c.x_axis.y, c.x_axis.z, c.y_axis.y].map(|v| v as f32),
-            [c.y_axis.z, c.z_axis.z, 0.0, kernel.unit()].map(|v| v as f32),
-        ];
         let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
+        let [axis_x, axis_y, axis_z] = columns(axes);
         Self {
-            axes: columns(axes),
+            axis_x,
+            axis_y,
+            axis_z,
             origin: wide(view.to_view(lattice.position(lattice.step_range()[0])), 0.0),
-            covariance,
+            covariance_a: [c.x_axis.x, c.x_axis.y, c.x_axis.z, c.y_axis.y].map(|v| v as f32),
+            covariance_b: [c.y_axis.z, c.z_axis.z, 0.0, kernel.unit()].map(|v| v as f32),
             extent: kernel.radius() as f32,
             flags: if isotropic { ISOTROPIC } else { 0 } | if is_gaussian { 0 } else { ENDS },
             ..Self::default()
@@ -146,6 +177,14 @@ fn smallest_cosine(view: &View) -> f64 {
 }
 
 impl Frame {
+    pub fn field_axes(&self) -> [[f32; 4]; 3] {
+        [self.field_axis_x, self.field_axis_y, self.field_axis_z]
+    }
+
+    pub fn beyond(&self) -> [[f32; 4]; 2] {
+        [self.before, self.behind]
+    }
+
     /// Fills everything except the tiles, the capacities and the tables.
     pub fn new(
         scene: &Scene,
@@ -230,21 +269,23 @@ impl Frame {
         let per_own = (per_magnitude / to_own).min(1e30);
         self.gradients = [first * to_own, per_own, length, view.scale * length].map(|v| v as f32);
         self.table_starts = tables.starts;
-        self.beyond = tables.beyond;
+        [self.before, self.behind] = tables.beyond;
         let mut surfaces = transfer.isosurfaces.clone();
         surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
         for (own, surface) in self.isosurfaces.iter_mut().zip(surfaces) {
             let Isosurface { value, color: [red, green, blue], opacity } = surface;
             let (entry, depth) = ((value - zero) * per_value, -(1.0 - opacity).max(1e-9).ln());
-            *own = [[entry, opacity, depth, 0.0], [red, green, blue, 0.0]]
-                .map(|part| part.map(|v| v as f32));
+            *own = FrameIsosurface {
+                value: [entry, opacity, depth, 0.0].map(|v| v as f32),
+                color: [red, green, blue, 0.0].map(|v| v as f32),
+            };
         }
     }
 
     fn set_field(&mut self, view: &View, lattice: &Lattice) {
         let inverse = (view.rotation * lattice.axes).inverse();
         let rows = inverse.transpose();
-        self.field_axes = columns(rows);
+        [self.field_axis_x, self.field_axis_y, self.field_axis_z] = columns(rows);
         // Relative to the first sample, for the precision of 32-bit numbers.
         let [low, high] = lattice.step_range();
         self.field_origin = wide(-(inverse * view.to_view(lattice.position(low))), 0.0);
@@ -273,10 +314,10 @@ impl Frame {
     /// Sets the clips, relative to the eye and along the world's axes: half-spaces and boxes that
     /// are kept, and boxes that are cut out.
     fn set_clips(&mut self, view: &View, settings: &Settings) {
-        self.world = columns(view.rotation.transpose());
+        [self.world_x, self.world_y, self.world_z] = columns(view.rotation.transpose());
         let (mut clips, mut holes) = (self.clips.iter_mut(), self.holes.iter_mut());
         for clip in &settings.clips {
-            let (slot, parts) = match clip.shape {
+            let (slot, [low, high]) = match clip.shape {
                 ClipShape::HalfSpace { normal, offset } => {
                     // The complement of a half-space is a half-space.
                     let size = if clip.inside { normal.length() } else { -normal.length() };
@@ -289,7 +330,7 @@ impl Frame {
                 }
             };
             if let Some(slot) = slot {
-                *slot = parts;
+                *slot = FrameClip { low, high };
             }
         }
     }

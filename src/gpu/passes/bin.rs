@@ -3,8 +3,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         variant::Variant,
     },
     targets::Targets,
@@ -21,19 +22,24 @@ pub struct Bin {
 
 impl Bin {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        let [prepare, count, fill] = Stage::all(gpu, Self::recipes(variant));
+        Self { prepare, count, fill }
+    }
+
+    pub fn recipes(variant: &Variant) -> [Recipe; 3] {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
         let bindings: &[Binding] =
             &[Uniform, Uniform, Uniform, Read, Read, Write, Write, Write, Write];
-        let stage = |label, entry, groups: &[&[Binding]]| {
+        let recipe = |label, entry, groups: &[&[Binding]]| {
             let sources = [&constants, shaders::FRAME, shaders::BINS, shaders::STATE, shaders::BIN];
-            Stage::new(gpu, label, &sources, entry, groups)
+            Recipe::new(label, &sources, entry, groups)
         };
-        Self {
-            prepare: stage("bin: prepare", "prepare", &[bindings, &[Write]]),
-            count: stage("bin: count", "count", &[bindings]),
-            fill: stage("bin: fill", "fill", &[bindings]),
-        }
+        [
+            recipe("bin: prepare", "prepare", &[bindings, &[Write]]),
+            recipe("bin: count", "count", &[bindings]),
+            recipe("bin: fill", "fill", &[bindings]),
+        ]
     }
 
     fn buffers(targets: &Targets) -> [wgpu::BufferBinding<'_>; 9] {

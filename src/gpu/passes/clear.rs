@@ -4,8 +4,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         state::SCAN_ARGUMENTS,
     },
     targets::Targets,
@@ -17,9 +18,13 @@ pub struct Clear(Stage);
 
 impl Clear {
     pub fn new(gpu: &Gpu) -> Self {
+        Self(Stage::new(gpu, &Self::recipe()))
+    }
+
+    pub fn recipe() -> Recipe {
         use Binding::{Uniform, Write};
         let sources = [shaders::FRAME, shaders::PROGRESS, shaders::CLEAR];
-        Self(Stage::new(gpu, "clear", &sources, "clear", &[&[Uniform, Uniform, Write, Write]]))
+        Recipe::new("clear", &sources, "clear", &[&[Uniform, Uniform, Write, Write]])
     }
 
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {

@@ -4,8 +4,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         variant::Variant,
     },
     scene::chunk::{Chunk, Origin, WORKGROUP_CANDIDATES},
@@ -24,6 +25,11 @@ pub struct Cull {
 
 impl Cull {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        let [cull, prepare] = Stage::all(gpu, Self::recipes(variant));
+        Self { cull, prepare }
+    }
+
+    pub fn recipes(variant: &Variant) -> [Recipe; 2] {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
         let sources = [
@@ -37,10 +43,10 @@ impl Cull {
         ];
         let own: &[Binding] = &[Uniform, Uniform, Read, Read, Read, Write, Write, Write];
         let chunk: &[Binding] = &[Uniform, Read];
-        Self {
-            cull: Stage::new(gpu, "cull", &sources, "cull", &[own, chunk]),
-            prepare: Stage::new(gpu, "cull: prepare", &sources, "prepare", &[own, chunk, &[Write]]),
-        }
+        [
+            Recipe::new("cull", &sources, "cull", &[own, chunk]),
+            Recipe::new("cull: prepare", &sources, "prepare", &[own, chunk, &[Write]]),
+        ]
     }
 
     pub fn encode(

@@ -4,9 +4,10 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         scan::Scan,
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
     },
     scene::nodes::{NodeChunk, OWN_NODES, RUN_NODES, SLOT_NODES, counts_of},
 };
@@ -32,27 +33,27 @@ pub struct Cut {
 
 impl Cut {
     pub fn new(gpu: &Gpu) -> Self {
+        let [count, write, tally] = Stage::all(gpu, Self::recipes());
+        Self { count, write, tally }
+    }
+
+    pub fn recipes() -> [Recipe; 3] {
         use Binding::{Read, Uniform, Write};
         let nodes = [Uniform, Uniform, Read, Read, Read, Read];
-        let stage = |label, shader, entry, groups: &[&[Binding]]| {
-            let sources = [shaders::FRAME, shaders::NORMAL, shaders::NODES, shader];
-            Stage::new(gpu, label, &sources, entry, groups)
+        let recipe = |label, shader, entry, groups: &[&[Binding]]| {
+            let sources = [shaders::FRAME, shaders::NORMAL, shaders::SPLAT, shaders::NODES, shader];
+            Recipe::new(label, &sources, entry, groups)
         };
-        Self {
-            count: stage("cut: count", shaders::CUT, "count", &[&nodes, &[Read, Write, Write]]),
-            write: stage(
+        [
+            recipe("cut: count", shaders::CUT, "count", &[&nodes, &[Read, Write, Write]]),
+            recipe(
                 "cut: write",
                 shaders::CUT,
                 "write",
                 &[&[Uniform], &[Read, Write, Write, Write, Write]],
             ),
-            tally: stage(
-                "tally",
-                shaders::TALLY,
-                "count",
-                &[&[nodes.as_slice(), &[Write]].concat()],
-            ),
-        }
+            recipe("tally", shaders::TALLY, "count", &[&[nodes.as_slice(), &[Write]].concat()]),
+        ]
     }
 
     /// Encodes the commands that list a chunk's drawn nodes.

@@ -5,8 +5,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         variant::Variant,
     },
     targets::Targets,
@@ -21,6 +22,10 @@ pub struct Gather(Stage);
 
 impl Gather {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        Self(Stage::new(gpu, &Self::recipe(variant)))
+    }
+
+    pub fn recipe(variant: &Variant) -> Recipe {
         use Binding::{Read, Uniform, Write};
         // An invocation draws one pixel, and only the field.
         let own = Variant { rows: 1, radiance: false, surface_shaded: false, ..*variant };
@@ -37,7 +42,7 @@ impl Gather {
             shaders::GATHER,
         ];
         let bindings = [Uniform, Read, Uniform, Read, Write, Write, Read, Write];
-        Self(Stage::new(gpu, "gather", &sources, "gather", &[&bindings, &[Binding::Texture]]))
+        Recipe::new("gather", &sources, "gather", &[&bindings, &[Binding::Texture]])
     }
 
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {

@@ -3,8 +3,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         variant::Variant,
     },
     targets::Targets,
@@ -21,18 +22,23 @@ pub struct Large {
 
 impl Large {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        let [prepare, count, fill] = Stage::all(gpu, Self::recipes(variant));
+        Self { prepare, count, fill }
+    }
+
+    pub fn recipes(variant: &Variant) -> [Recipe; 3] {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
         let bindings: &[Binding] = &[Uniform, Uniform, Read, Write, Write, Read];
-        let stage = |label, entry, groups: &[&[Binding]]| {
+        let recipe = |label, entry, groups: &[&[Binding]]| {
             let sources = [&constants, shaders::FRAME, shaders::BINS, shaders::LARGE];
-            Stage::new(gpu, label, &sources, entry, groups)
+            Recipe::new(label, &sources, entry, groups)
         };
-        Self {
-            prepare: stage("large: prepare", "prepare", &[bindings, &[Write]]),
-            count: stage("large: count", "count", &[bindings]),
-            fill: stage("large: fill", "fill", &[bindings]),
-        }
+        [
+            recipe("large: prepare", "prepare", &[bindings, &[Write]]),
+            recipe("large: count", "count", &[bindings]),
+            recipe("large: fill", "fill", &[bindings]),
+        ]
     }
 
     fn buffers(targets: &Targets) -> [wgpu::BufferBinding<'_>; 6] {

@@ -4,8 +4,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         variant::Variant,
     },
     targets::Targets,
@@ -17,6 +18,10 @@ pub struct March(Stage);
 
 impl March {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        Self(Stage::new(gpu, &Self::recipe(variant)))
+    }
+
+    pub fn recipe(variant: &Variant) -> Recipe {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
         let mut sources = vec![
@@ -41,13 +46,7 @@ impl March {
             sources.push(shaders::FIELD_SUMS);
         }
         let texture: &[&[Binding]] = if variant.gather { &[&[Binding::Texture]] } else { &[] };
-        Self(Stage::new(
-            gpu,
-            "march",
-            &sources,
-            "march",
-            &[&[bindings.as_slice()], texture].concat(),
-        ))
+        Recipe::new("march", &sources, "march", &[&[bindings.as_slice()], texture].concat())
     }
 
     /// Encodes the pass. `arguments` is the byte offset of its dispatch in the buffer of indirect

@@ -5,8 +5,9 @@ use crate::gpu::{
     device::Gpu,
     passes::sources::{Sources, per_source},
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         variant::Variant,
     },
     scene::chunk::Chunk,
@@ -19,9 +20,13 @@ pub struct Measure(Sources<Stage>);
 
 impl Measure {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        Self(Self::recipes(variant).map(|recipe| Stage::new(gpu, &recipe)))
+    }
+
+    pub fn recipes(variant: &Variant) -> Sources<Recipe> {
         use Binding::{Read, Uniform, Write};
-        Self(per_source(|source, bindings| {
-            let constants = variant.constants();
+        let constants = variant.constants();
+        per_source(|kind, source, bindings| {
             let sources = [
                 &constants,
                 shaders::FRAME,
@@ -32,14 +37,9 @@ impl Measure {
                 shaders::BINS,
                 shaders::MEASURE,
             ];
-            Stage::new(
-                gpu,
-                "measure",
-                &sources,
-                "measure",
-                &[&[Uniform, Read, Write, Write, Write], bindings],
-            )
-        }))
+            let own = [Uniform, Read, Write, Write, Write];
+            Recipe::new(&format!("measure: {kind}"), &sources, "measure", &[&own, bindings])
+        })
     }
 
     pub fn encode(

@@ -3,8 +3,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         state::MARCH_ARGUMENTS,
         variant::Variant,
     },
@@ -21,8 +22,13 @@ pub struct Occlusion {
 
 impl Occlusion {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        let [look, sum_rows, sum_columns] = Stage::all(gpu, Self::recipes(variant));
+        Self { look, sum_rows, sum_columns }
+    }
+
+    pub fn recipes(variant: &Variant) -> [Recipe; 3] {
         use Binding::{Read, Uniform, Write};
-        let stage = |label, entry| {
+        let recipe = |label, entry| {
             let sources = [
                 &variant.constants(),
                 shaders::FRAME,
@@ -30,13 +36,13 @@ impl Occlusion {
                 shaders::PROGRESS,
                 shaders::OCCLUSION,
             ];
-            Stage::new(gpu, label, &sources, entry, &[&[Uniform, Read, Read, Write]])
+            Recipe::new(label, &sources, entry, &[&[Uniform, Read, Read, Write]])
         };
-        Self {
-            look: stage("occlusion: look", "look"),
-            sum_rows: stage("occlusion: rows", "sum_rows"),
-            sum_columns: stage("occlusion: columns", "sum_columns"),
-        }
+        [
+            recipe("occlusion: look", "look"),
+            recipe("occlusion: rows", "sum_rows"),
+            recipe("occlusion: columns", "sum_columns"),
+        ]
     }
 
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {

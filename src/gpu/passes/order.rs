@@ -4,8 +4,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         state::ORDER_ARGUMENTS,
         variant::Variant,
     },
@@ -22,24 +23,24 @@ pub struct Order {
 
 impl Order {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        let [short, count_long, long] = Stage::all(gpu, Self::recipes(variant));
+        Self { short, count_long, long }
+    }
+
+    pub fn recipes(variant: &Variant) -> [Recipe; 3] {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
         let bindings = [Uniform, Uniform, Read, Write, Write, Write, Read, Read];
-        let stage = |label, entry, arguments: &[&[Binding]]| {
+        let recipe = |label, entry, arguments: &[&[Binding]]| {
             let groups = [&[bindings.as_slice()], arguments].concat();
-            Stage::new(
-                gpu,
-                label,
-                &[&constants, shaders::FRAME, shaders::PROGRESS, shaders::ORDER],
-                entry,
-                &groups,
-            )
+            let sources = [&constants, shaders::FRAME, shaders::PROGRESS, shaders::ORDER];
+            Recipe::new(label, &sources, entry, &groups)
         };
-        Self {
-            short: stage("order", "order", &[]),
-            count_long: stage("order: count long", "count_long", &[&[Write]]),
-            long: stage("order: long", "order_long", &[]),
-        }
+        [
+            recipe("order", "order", &[]),
+            recipe("order: count long", "count_long", &[&[Write]]),
+            recipe("order: long", "order_long", &[]),
+        ]
     }
 
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {

@@ -4,8 +4,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         variant::Variant,
     },
     targets::Targets,
@@ -22,27 +23,26 @@ pub struct Plan {
 
 impl Plan {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        let [total, survey, accumulate, advance] = Stage::all(gpu, Self::recipes(variant));
+        Self { total, survey, accumulate, advance }
+    }
+
+    pub fn recipes(variant: &Variant) -> [Recipe; 4] {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
         let shared = [&constants, shaders::FRAME, shaders::SPANS, shaders::CENSUS];
         let plan = |label, entry| {
             let own = [shaders::STATE, shaders::MAP, shaders::PROGRESS, shaders::PLAN];
             let bindings = [Uniform, Read, Uniform, Write, Write, Write, Write, Write, Read];
-            Stage::new(gpu, label, &[shared.as_slice(), &own].concat(), entry, &[&bindings])
+            Recipe::new(label, &[shared.as_slice(), &own].concat(), entry, &[&bindings])
         };
         let survey = [shared.as_slice(), &[shaders::SURVEY]].concat();
-        Self {
-            total: plan("plan: total", "total"),
-            survey: Stage::new(
-                gpu,
-                "survey",
-                &survey,
-                "survey",
-                &[&[Uniform, Read, Read, Uniform, Write]],
-            ),
-            accumulate: plan("plan: accumulate", "accumulate"),
-            advance: plan("plan: advance", "advance"),
-        }
+        [
+            plan("plan: total", "total"),
+            Recipe::new("survey", &survey, "survey", &[&[Uniform, Read, Read, Uniform, Write]]),
+            plan("plan: accumulate", "accumulate"),
+            plan("plan: advance", "advance"),
+        ]
     }
 
     fn buffers(targets: &Targets) -> [wgpu::BufferBinding<'_>; 9] {

@@ -4,8 +4,9 @@ use crate::gpu::{
     device::Gpu,
     passes::sources::{Sources, per_source},
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         variant::Variant,
     },
     scene::chunk::Chunk,
@@ -18,9 +19,13 @@ pub struct Project(Sources<Stage>);
 
 impl Project {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        Self(Self::recipes(variant).map(|recipe| Stage::new(gpu, &recipe)))
+    }
+
+    pub fn recipes(variant: &Variant) -> Sources<Recipe> {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
-        Self(per_source(|source, bindings| {
+        per_source(|kind, source, bindings| {
             let sources = [
                 &constants,
                 shaders::FRAME,
@@ -32,8 +37,8 @@ impl Project {
                 shaders::PROJECT,
             ];
             let own = [Uniform, Read, Read, Read, Write, Write];
-            Stage::new(gpu, "project", &sources, "project", &[&own, bindings])
-        }))
+            Recipe::new(&format!("project: {kind}"), &sources, "project", &[&own, bindings])
+        })
     }
 
     pub fn encode(

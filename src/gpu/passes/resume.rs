@@ -3,8 +3,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
     },
     targets::Targets,
 };
@@ -19,16 +20,21 @@ pub struct Resume {
 
 impl Resume {
     pub fn new(gpu: &Gpu) -> Self {
+        let [again, hold, resume] = Stage::all(gpu, Self::recipes());
+        Self { again, hold, resume }
+    }
+
+    pub fn recipes() -> [Recipe; 3] {
         use Binding::{Uniform, Write};
-        let stage = |label, entry| {
+        let recipe = |label, entry| {
             let sources = [shaders::FRAME, shaders::STATE, shaders::PROGRESS, shaders::RESUME];
-            Stage::new(gpu, label, &sources, entry, &[&[Uniform, Write, Write, Write, Write]])
+            Recipe::new(label, &sources, entry, &[&[Uniform, Write, Write, Write, Write]])
         };
-        Self {
-            again: stage("resume: again", "again"),
-            hold: stage("resume: hold", "hold"),
-            resume: stage("resume", "resume"),
-        }
+        [
+            recipe("resume: again", "again"),
+            recipe("resume: hold", "hold"),
+            recipe("resume", "resume"),
+        ]
     }
 
     fn encode(stage: &Stage, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {

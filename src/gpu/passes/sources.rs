@@ -5,8 +5,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
     },
     scene::chunk::{Chunk, Origin, WORKGROUP_CANDIDATES},
 };
@@ -20,22 +21,42 @@ pub struct Sources<T> {
     bricks: T,
 }
 
-/// Makes a stage for each kind of source, from the source's shader and the bindings of its group.
-pub fn per_source(make: impl Fn(&str, &[Binding]) -> Stage) -> Sources<Stage> {
+impl<T> Sources<T> {
+    #[cfg(test)]
+    pub fn into_array(self) -> [T; 4] {
+        [self.splats, self.nodes, self.lattice, self.bricks]
+    }
+
+    pub fn map<U>(self, make: impl Fn(T) -> U) -> Sources<U> {
+        let Self { splats, nodes, lattice, bricks } = self;
+        Sources {
+            splats: make(splats),
+            nodes: make(nodes),
+            lattice: make(lattice),
+            bricks: make(bricks),
+        }
+    }
+}
+
+/// Returns the recipes of a pass for all kinds of sources. `make` takes the kind's name, the
+/// source's shader and the bindings of its group.
+pub fn per_source(make: impl Fn(&str, &str, &[Binding]) -> Recipe) -> Sources<Recipe> {
     use Binding::{Read, Uniform};
     let lattice = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
     let bricks = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_BRICKS].concat();
     Sources {
         splats: make(
-            &[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_SPLATS].concat(),
+            "splats",
+            &[shaders::VALUE, shaders::SPLAT, shaders::SPLATS, shaders::SOURCE_SPLATS].concat(),
             &[Uniform, Read],
         ),
         nodes: make(
-            &[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_NODES].concat(),
+            "nodes",
+            &[shaders::VALUE, shaders::SPLAT, shaders::SPLATS, shaders::SOURCE_NODES].concat(),
             &[Uniform, Read, Read],
         ),
-        lattice: make(&lattice, &[Uniform, Read, Read, Uniform]),
-        bricks: make(&bricks, &[Uniform, Read, Read, Uniform]),
+        lattice: make("lattice", &lattice, &[Uniform, Read, Read, Uniform]),
+        bricks: make("bricks", &bricks, &[Uniform, Read, Read, Uniform]),
     }
 }
 

@@ -3,8 +3,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         state::TILE_ARGUMENTS,
     },
     targets::Targets,
@@ -19,16 +20,21 @@ pub struct Tiles {
 
 impl Tiles {
     pub fn new(gpu: &Gpu) -> Self {
+        let [list, prepare] = Stage::all(gpu, Self::recipes());
+        Self { list, prepare }
+    }
+
+    pub fn recipes() -> [Recipe; 2] {
         use Binding::{Read, Uniform, Write};
-        let stage = |label, entry, groups: &[&[Binding]]| {
+        let recipe = |label, entry, groups: &[&[Binding]]| {
             let sources = [shaders::FRAME, shaders::STATE, shaders::PROGRESS, shaders::TILES];
-            Stage::new(gpu, label, &sources, entry, groups)
+            Recipe::new(label, &sources, entry, groups)
         };
         let bindings = [Uniform, Uniform, Read, Write];
-        Self {
-            list: stage("tiles: list", "list", &[&bindings]),
-            prepare: stage("tiles: prepare", "prepare", &[&bindings, &[Write; 2]]),
-        }
+        [
+            recipe("tiles: list", "list", &[&bindings]),
+            recipe("tiles: prepare", "prepare", &[&bindings, &[Write; 2]]),
+        ]
     }
 
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {

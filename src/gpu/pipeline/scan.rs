@@ -6,8 +6,9 @@ use crate::gpu::{
         buffers::{buffer, filled_buffer},
     },
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
     },
 };
 
@@ -28,14 +29,11 @@ pub struct Scan {
 
 impl Scan {
     pub fn new(gpu: &Gpu) -> Self {
-        let stage = |label, entry| {
-            let bindings = [Binding::Uniform, Binding::Write, Binding::Write];
-            Stage::new(gpu, label, &[shaders::SCAN], entry, &[&bindings])
-        };
+        let [sum, spine, spread] = Stage::all(gpu, Self::recipes());
         Self {
-            sum: stage("scan: sum", "sum"),
-            spine: stage("scan: spine", "spine"),
-            spread: stage("scan: spread", "spread"),
+            sum,
+            spine,
+            spread,
             segments: buffer(
                 gpu,
                 "scan segments",
@@ -43,6 +41,18 @@ impl Scan {
                 wgpu::BufferUsages::STORAGE,
             ),
         }
+    }
+
+    pub fn recipes() -> [Recipe; 3] {
+        let recipe = |label, entry| {
+            let bindings = [Binding::Uniform, Binding::Write, Binding::Write];
+            Recipe::new(label, &[shaders::SCAN], entry, &[&bindings])
+        };
+        [
+            recipe("scan: sum", "sum"),
+            recipe("scan: spine", "spine"),
+            recipe("scan: spread", "spread"),
+        ]
     }
 
     /// Replaces each number with the sum of those before it. `size` contains the number of

@@ -1,22 +1,12 @@
-//! A compute pipeline with its bindings. Shaders are joined from whole files: shared declarations
-//! first, then the pass's own file. So each shader says what it uses. Only constants are generated.
+//! One compute pipeline with its bindings, compiled from its recipe.
 
+use super::recipe::{Binding, Recipe};
 use crate::gpu::device::Gpu;
-
-/// The kind of a binding. Lists of bindings follow the shader's binding numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Binding {
-    Uniform,
-    Read,
-    Write,
-    /// A three-dimensional texture of 32-bit words.
-    Texture,
-}
 
 /// A compute pipeline and the layouts of its bind groups.
 #[derive(Debug)]
 pub struct Stage {
-    label: &'static str,
+    label: String,
     pipeline: wgpu::ComputePipeline,
     layouts: Vec<wgpu::BindGroupLayout>,
     /// Maximum number of workgroups along one dimension of a dispatch. Shaders know it as
@@ -25,21 +15,17 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Compiles `entry` of the joined `sources`; `groups` lists the bindings of each bind group.
-    pub fn new(
-        gpu: &Gpu,
-        label: &'static str,
-        sources: &[&str],
-        entry: &str,
-        groups: &[&[Binding]],
-    ) -> Self {
-        let device = &gpu.device;
+    /// Compiles several recipes.
+    pub fn all<const N: usize>(gpu: &Gpu, recipes: [Recipe; N]) -> [Self; N] {
+        recipes.map(|recipe| Self::new(gpu, &recipe))
+    }
+
+    pub fn new(gpu: &Gpu, recipe: &Recipe) -> Self {
+        let (device, label) = (&gpu.device, recipe.label.as_str());
         let most_workgroups = device.limits().max_compute_workgroups_per_dimension;
-        let source =
-            format!("{}\nconst MOST_WORKGROUPS: u32 = {most_workgroups}u;\n", sources.concat());
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
+            source: wgpu::ShaderSource::Wgsl(recipe.source(most_workgroups).into()),
         };
         // Loop counters and clamped indices keep the driver from unrolling the loops over an
         // invocation's pixels. The sums of the pixels then live in memory instead of registers:
@@ -57,7 +43,7 @@ impl Stage {
         #[expect(unsafe_code, reason = "shaders without the checks that untrusted ones need")]
         let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
         let layouts: Vec<_> =
-            groups.iter().map(|bindings| layout(device, label, bindings)).collect();
+            recipe.groups.iter().map(|bindings| layout(device, label, bindings)).collect();
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(label),
             bind_group_layouts: &layouts.iter().map(Some).collect::<Vec<_>>(),
@@ -67,7 +53,7 @@ impl Stage {
             label: Some(label),
             layout: Some(&pipeline_layout),
             module: &module,
-            entry_point: Some(entry),
+            entry_point: Some(recipe.entry),
             // No shader reads workgroup memory before it writes it.
             compilation_options: wgpu::PipelineCompilationOptions {
                 zero_initialize_workgroup_memory: false,
@@ -75,7 +61,7 @@ impl Stage {
             },
             cache: None,
         });
-        Self { label, pipeline, layouts, most_workgroups }
+        Self { label: label.to_owned(), pipeline, layouts, most_workgroups }
     }
 
     /// Binds buffers, or parts of them, to group `group`, in the order of their binding numbers.
@@ -93,7 +79,7 @@ impl Stage {
             })
             .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(self.label),
+            label: Some(&self.label),
             layout: &self.layouts[group],
             entries: &entries,
         })
@@ -107,7 +93,7 @@ impl Stage {
         texture: &wgpu::TextureView,
     ) -> wgpu::BindGroup {
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(self.label),
+            label: Some(&self.label),
             layout: &self.layouts[group],
             entries: &[wgpu::BindGroupEntry {
                 binding: 0,
@@ -151,7 +137,7 @@ impl Stage {
         groups: &[&wgpu::BindGroup],
     ) -> wgpu::ComputePass<'a> {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some(self.label),
+            label: Some(&self.label),
             timestamp_writes: None,
         });
         pass.set_pipeline(&self.pipeline);

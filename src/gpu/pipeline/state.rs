@@ -25,11 +25,9 @@ pub struct State {
     pub tiles: u32,
     pub touched: u32,
     pub advanced: u32,
-    held: [u32; 8],
-    unused: u32,
+    pub held: [u32; 8],
+    pub unused: u32,
 }
-
-const _: () = assert!(size_of::<State>() == 24 * 4);
 
 /// Byte offsets of the indirect dispatches in a pass's `arguments` (state.wgsl).
 pub const SCAN_ARGUMENTS: u64 = 0;

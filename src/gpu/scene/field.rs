@@ -26,7 +26,7 @@ use wgpu::BufferUsages as Usage;
 const MOST_FOURS: u64 = 512 << 20;
 
 /// The number of that layout (`SAMPLE_FOUR` in value.wgsl).
-const FOUR: u32 = 5;
+pub const FOUR: u32 = 5;
 
 /// Capacity behind the samples' bits: a bit for every sheet and tile of a picture (`MOST_BINS` in
 /// pipeline/variant.rs), and the tables.
@@ -43,6 +43,27 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
     unsuited_kernel(kernel)
 }
 
+/// Returns the volume that is gathered, or why no device can gather a scene's field with these
+/// settings.
+pub fn gathered_volume<'a>(
+    scene: &'a Scene,
+    settings: &Settings,
+    sheets: &Sheets,
+) -> Result<&'a Volume, &'static str> {
+    let parts = crate::plan::gathering::parts(scene, sheets, None);
+    if let Some(what) = crate::plan::gathering::obstacle(scene, settings, parts, unsuited) {
+        return Err(what);
+    }
+    if parts > 1 {
+        return Err("sheets thicker than two samples");
+    }
+    let volume = scene
+        .items
+        .iter()
+        .find_map(|item| if let Item::Volume(volume, ..) = item { Some(volume) } else { None });
+    volume.map(Arc::as_ref).ok_or("volumes in bricks")
+}
+
 /// Returns why the engine can't gather a scene's field with these settings, or `None` if it can.
 pub fn obstacle(
     scene: &Scene,
@@ -50,18 +71,10 @@ pub fn obstacle(
     sheets: &Sheets,
     gpu: &Gpu,
 ) -> Option<&'static str> {
-    let parts = crate::plan::gathering::parts(scene, sheets, None);
-    if let Some(what) = crate::plan::gathering::obstacle(scene, settings, parts, unsuited) {
-        return Some(what);
-    }
-    if parts > 1 {
-        return Some("sheets thicker than two samples");
-    }
-    let volume = scene
-        .items
-        .iter()
-        .find_map(|item| if let Item::Volume(volume, ..) = item { Some(volume) } else { None });
-    let Some(volume) = volume else { return Some("volumes in bricks") };
+    let volume = match gathered_volume(scene, settings, sheets) {
+        Ok(volume) => volume,
+        Err(what) => return Some(what),
+    };
     let limits = gpu.device.limits();
     if texture_size(volume, kind_of(volume.samples.scalar()))
         .iter()
@@ -312,7 +325,7 @@ fn visible_before(variant: &Variant, table: &[[f32; 4]], frame: &Frame) -> Vec<u
     let [_, _, last, place] = frame.transfer;
     let mut shows: Vec<bool> = table[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
     for surface in &frame.isosurfaces[..variant.isosurfaces as usize] {
-        let at = (surface[0][0] + place).clamp(0.0, last) as usize;
+        let at = (surface.value[0] + place).clamp(0.0, last) as usize;
         let end = (at + 2).min(shows.len());
         shows[at..end].fill(true);
     }

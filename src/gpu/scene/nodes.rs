@@ -45,15 +45,15 @@ const BATCH: usize = 64;
 /// `Node` in nodes.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-struct GpuNode {
-    center: [f32; 3],
-    radius: f32,
-    size: f32,
-    cone: f32,
-    child_page: u32,
-    parent_size: f32,
-    parent_center: [f32; 3],
-    parent_radius: f32,
+pub struct GpuNode {
+    pub center: [f32; 3],
+    pub radius: f32,
+    pub size: f32,
+    pub cone: f32,
+    pub child_page: u32,
+    pub parent_size: f32,
+    pub parent_center: [f32; 3],
+    pub parent_radius: f32,
 }
 
 const _: () = assert!(size_of::<GpuNode>() == size_of::<crate::splat::Splat>());
@@ -61,11 +61,11 @@ const _: () = assert!(size_of::<GpuNode>() == size_of::<crate::splat::Splat>());
 /// `Bounds` in cut.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-struct GpuBounds {
-    center: [f32; 3],
-    radius: f32,
-    size: f32,
-    unused: [f32; 3],
+pub struct GpuBounds {
+    pub center: [f32; 3],
+    pub radius: f32,
+    pub size: f32,
+    pub unused: [f32; 3],
 }
 
 /// Bytes of the bounds of a slot's batches.
@@ -81,15 +81,15 @@ const SLOT_BYTES: u64 =
 /// `Cut` in nodes.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-struct GpuCut {
-    sides: [[f32; 4]; 4],
-    scale: f32,
-    fineness: f32,
-    perspective: u32,
-    culls: u32,
-    sin_margin: f32,
-    cos_margin: f32,
-    unused: [f32; 2],
+pub struct GpuCut {
+    pub sides: [[f32; 4]; 4],
+    pub scale: f32,
+    pub fineness: f32,
+    pub perspective: u32,
+    pub culls: u32,
+    pub sin_margin: f32,
+    pub cos_margin: f32,
+    pub unused: [f32; 2],
 }
 
 /// The buffers of one chunk of slots, apart from its splats.

@@ -10,9 +10,10 @@ use crate::{
             buffers::{buffer, upload},
         },
         pipeline::{
+            recipe::{Binding, Recipe},
             scan::{SCAN_CAPACITY, Scan},
             shaders,
-            stage::{Binding, Stage},
+            stage::Stage,
         },
     },
 };
@@ -81,13 +82,18 @@ pub struct Select {
 
 impl Select {
     pub fn new(gpu: &Gpu) -> Self {
+        let [count, write] = Stage::all(gpu, Self::recipes());
+        Self { count, write }
+    }
+
+    pub fn recipes() -> [Recipe; 2] {
         use Binding::{Read, Uniform, Write};
         let sources = [shaders::FRAME, shaders::SELECT];
         let bindings: &[&[Binding]] = &[&[Uniform, Read, Read, Write, Write]];
-        Self {
-            count: Stage::new(gpu, "select: count", &sources, "count", bindings),
-            write: Stage::new(gpu, "select: write", &sources, "write", bindings),
-        }
+        [
+            Recipe::new("select: count", &sources, "count", bindings),
+            Recipe::new("select: write", &sources, "write", bindings),
+        ]
     }
 
     /// Makes the list of a chunk, in a buffer of its size, unless `check` refuses the number of

@@ -10,9 +10,10 @@ use crate::{
             buffers::{buffer, upload},
         },
         pipeline::{
+            recipe::{Binding, Recipe},
             scan::Scan,
             shaders,
-            stage::{Binding, Stage},
+            stage::Stage,
         },
         scene::chunk::runs_of,
     },
@@ -28,13 +29,18 @@ pub struct SelectBricks {
 
 impl SelectBricks {
     pub fn new(gpu: &Gpu) -> Self {
+        let [count, write] = Stage::all(gpu, Self::recipes());
+        Self { count, write }
+    }
+
+    pub fn recipes() -> [Recipe; 2] {
         use Binding::{Read, Uniform, Write};
         let sources = [shaders::FRAME, shaders::SELECT_BRICKS];
         let bindings: &[&[Binding]] = &[&[Uniform, Read, Read, Write, Write, Uniform]];
-        Self {
-            count: Stage::new(gpu, "select bricks: count", &sources, "count", bindings),
-            write: Stage::new(gpu, "select bricks: write", &sources, "write", bindings),
-        }
+        [
+            Recipe::new("select bricks: count", &sources, "count", bindings),
+            Recipe::new("select bricks: write", &sources, "write", bindings),
+        ]
     }
 
     /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes. Makes none

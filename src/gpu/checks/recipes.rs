@@ -1,0 +1,71 @@
+//! Every pipeline that the engine can build.
+
+use crate::gpu::{
+    passes::{
+        bin::Bin, clear::Clear, cull::Cull, cut::Cut, gather::Gather, large::Large, march::March,
+        measure::Measure, occlusion::Occlusion, order::Order, plan::Plan, project::Project,
+        resume::Resume, tiles::Tiles,
+    },
+    pipeline::{recipe::Recipe, scan::Scan, variant::Variant},
+    scene::{select::Select, select_bricks::SelectBricks},
+};
+use naga::{Expression, Literal, Module};
+
+/// WebGPU's default limit, which every device is opened with.
+const MOST_WORKGROUPS: u32 = 65_535;
+
+/// Returns the pipelines that serve all variants.
+pub fn shared() -> Vec<Recipe> {
+    let mut all = vec![Clear::recipe()];
+    all.extend(Select::recipes());
+    all.extend(SelectBricks::recipes());
+    all.extend(Cut::recipes());
+    all.extend(Scan::recipes());
+    all.extend(Resume::recipes());
+    all.extend(Tiles::recipes());
+    all
+}
+
+/// Returns the pipelines of one variant.
+pub fn of(variant: &Variant) -> Vec<Recipe> {
+    let mut all = Vec::new();
+    if variant.scatters() {
+        all.extend(Measure::recipes(variant).into_array());
+        all.extend(Plan::recipes(variant));
+        all.extend(Project::recipes(variant).into_array());
+        all.extend(Cull::recipes(variant));
+        all.extend(Bin::recipes(variant));
+        all.extend(Large::recipes(variant));
+        all.extend(Order::recipes(variant));
+        all.push(March::recipe(variant));
+        if variant.occlusion {
+            all.extend(Occlusion::recipes(variant));
+        }
+    }
+    if variant.gather {
+        all.push(Gather::recipe(variant));
+    }
+    all
+}
+
+/// Returns the joined source of a pipeline, as a device compiles it.
+pub fn source_of(recipe: &Recipe) -> String {
+    recipe.source(MOST_WORKGROUPS)
+}
+
+/// Parses the source of a pipeline.
+pub fn parse(recipe: &Recipe) -> Result<Module, String> {
+    let source = source_of(recipe);
+    naga::front::wgsl::parse_str(&source).map_err(|error| error.emit_to_string(&source))
+}
+
+/// Returns the constants of a module that are unsigned integers.
+pub fn integers(module: &Module) -> impl Iterator<Item = (&str, u32)> {
+    module.constants.iter().filter_map(|(_, constant)| {
+        let Expression::Literal(Literal::U32(value)) = module.global_expressions[constant.init]
+        else {
+            return None;
+        };
+        Some((constant.name.as_deref()?, value))
+    })
+}

@@ -1,0 +1,204 @@
+//! The variants of pictures, as the engine itself derives them, of scenes of every kind.
+
+use super::scenes::{self, Case, methods};
+use crate::{
+    bricks::Bricks,
+    gpu::{
+        budget::Budget,
+        pipeline::variant::Variant,
+        scene::field::{FOUR, gathered_volume, kind_of},
+        variant::{Request, variant},
+    },
+    hierarchy::Detail,
+    math::Projection,
+    scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
+    volume::{Shade, Volume},
+};
+use std::{
+    collections::HashSet,
+    sync::{Arc, LazyLock},
+};
+
+/// The scenes of the integration tests.
+fn cases() -> Vec<Case> {
+    let mut all = vec![
+        scenes::ellipsoids_in_perspective(),
+        scenes::ellipsoids_orthographic(),
+        scenes::ellipsoids_unlit(),
+        scenes::ellipsoids_without_normals(),
+        scenes::huge_among_small(),
+        scenes::splats_below_a_pixel(),
+        scenes::flat_discs_head_on(),
+        scenes::camera_among_ellipsoids(),
+        scenes::wide_angle(),
+        scenes::scattered_samples(),
+        scenes::scattered_samples_orthographic(),
+        scenes::blobs_analytic(),
+        scenes::blobs_central(),
+        scenes::blobs_orthographic(),
+        scenes::blobs_unshaded(),
+        scenes::camera_inside_a_volume(),
+        scenes::marschner_lobb(),
+        scenes::sheared_lattice(),
+        scenes::sheared_lattice_central(),
+        scenes::constant_field(),
+        scenes::surface_in_a_volume(),
+        scenes::surface_in_a_volume_orthographic(),
+        methods::body_centred(),
+        methods::body_centred_from_afar(),
+        methods::rectilinear(),
+        methods::b_spline(),
+        methods::table_of_a_gaussian(),
+        methods::closed_form_of_that_gaussian(),
+        methods::thin_shells(),
+        methods::one_value_far_off(),
+        methods::points_far_off(),
+        methods::post_classified(),
+        methods::pre_classified(),
+        methods::axis_sheets(),
+        methods::axis_sheets_body_centred_orthographic(),
+        methods::single_splats(Order::FrontToBack),
+        methods::single_splats(Order::BackToFront),
+        methods::single_ellipsoids(),
+        methods::orthographic(methods::rectilinear()),
+        methods::from_inside(methods::isosurfaces_in_fog()),
+        methods::samples_with_slopes(Classification::PreIntegrated),
+        methods::samples_with_slopes(Classification::Post),
+        methods::samples_with_slopes(Classification::Pre),
+        methods::gradient_opacity(),
+        methods::one_isosurface(),
+        methods::isosurfaces_in_fog(),
+        methods::maximum(),
+        methods::x_ray(),
+        methods::clipped_volume(),
+        methods::clipped_surface_in_a_volume(),
+        methods::sharp(),
+        methods::sharp_body_centred(),
+    ];
+    all.extend([0.25, 9.0, 20.0].map(bricks));
+    all
+}
+
+/// Blobs in bricks, at a given number of pixels a sample.
+fn bricks(pixels: f64) -> Case {
+    let mut case = scenes::blobs_analytic();
+    let Item::Volume(volume, kernel, transfer) = &case.scene.items[0] else {
+        panic!("{} has a volume", case.name)
+    };
+    // Several levels.
+    let mut lattice = volume.lattice.clone();
+    lattice.dims = [70, 40, 33];
+    let samples = vec![100; lattice.len()];
+    let large = Volume::new(lattice, crate::volume::Samples::U8(samples)).expect("a full lattice");
+    let bricks = Bricks::from_volume(Arc::new(large)).expect("a volume in bricks");
+    case.scene = Scene::new().with_bricks(bricks, kernel.clone(), transfer.clone());
+    case.settings.detail = Detail::Pixels(pixels);
+    Case { name: "bricks", ..case }
+}
+
+/// The settings of a case, and those that differ from them in one point.
+fn neighbours(case: &Case) -> Vec<Settings> {
+    let own = || case.settings.clone();
+    let shade = Some(Shade { ambient: 0.1, diffuse: 0.8, specular: 0.1, power: 8.0 });
+    let mut all = vec![
+        own(),
+        Settings { optics: Optics::EmissionAbsorption, ..own() },
+        Settings { optics: Optics::Maximum, ..own() },
+        Settings { optics: Optics::XRay, ..own() },
+        Settings { gradient: Gradient::Analytic, ..own() },
+        Settings { gradient: Gradient::Central, ..own() },
+        Settings { occlusion: !case.settings.occlusion, ..own() },
+        Settings { volume_shade: Some(None), surface_shade: None, ..own() },
+        Settings { volume_shade: Some(shade), surface_shade: shade, ..own() },
+        Settings { clips: Vec::new(), ..own() },
+        Settings { clips: methods::clipped_volume().settings.clips, ..own() },
+    ];
+    let classifications =
+        [Classification::PreIntegrated, Classification::Post, Classification::Pre];
+    all.extend(classifications.map(|classification| Settings { classification, ..own() }));
+    let [front, back] = [Order::FrontToBack, Order::BackToFront].map(Mode::Splats);
+    let modes = [Mode::Sheets, Mode::AxisSheets, front, back];
+    all.extend(modes.map(|mode| Settings { mode, ..own() }));
+    all
+}
+
+/// The cameras of a case: its own, one from afar, and one with parallel rays.
+fn cameras(case: &Case) -> [Case; 3] {
+    let alike = || Case {
+        name: case.name,
+        scene: case.scene.clone(),
+        camera: case.camera.clone(),
+        settings: case.settings.clone(),
+    };
+    let mut afar = alike();
+    let away = afar.camera.position - afar.camera.focal_point;
+    afar.camera.position = afar.camera.focal_point + 30.0 * away;
+    afar.camera.projection = Projection::Perspective { view_angle: 1.0 };
+    [alike(), afar, methods::orthographic(alike())]
+}
+
+/// Adds the variants of a case in some settings: on a GPU and in software, gathered and scattered.
+/// `is_usual` says whether the settings are the case's own.
+fn add(case: &Case, settings: &Settings, is_usual: bool, found: &mut Found) {
+    if case.scene.validate_settings(settings).is_err() {
+        return;
+    }
+    let Ok(view) = case.camera.view(settings.size) else { return };
+    let bounds = case.scene.bounds();
+    let choice = case.scene.choice(&view, settings, settings.detail, usize::MAX, &bounds);
+    let sheets = case.scene.sheets_of(&view, settings, choice.as_ref(), &bounds);
+    let mut kinds = vec![None];
+    if let Ok(volume) = gathered_volume(&case.scene, settings, &sheets) {
+        // Settings do not change how samples are read, so one of them is enough for all types.
+        let own = kind_of(volume.samples.scalar());
+        kinds.extend(if is_usual { 0..=FOUR } else { own..=own }.map(Some));
+    }
+    let stopping = Budget { tile_entries: Some(500), ..Budget::default() };
+    for gathered in kinds {
+        for (is_software, budget) in
+            [(false, Budget::default()), (true, Budget::default()), (false, stopping)]
+        {
+            let (scene, view, choice) = (&case.scene, &view, choice.as_ref());
+            found.add(
+                case.name,
+                variant(&Request { scene, view, settings, budget, choice, gathered, is_software }),
+            );
+        }
+    }
+}
+
+/// Variants, each with the scene that it was first found in.
+#[derive(Default)]
+struct Found {
+    seen: HashSet<Variant>,
+    list: Vec<(&'static str, Variant)>,
+}
+
+impl Found {
+    fn add(&mut self, name: &'static str, variant: Variant) {
+        if self.seen.insert(variant) {
+            self.list.push((name, variant));
+        }
+    }
+}
+
+/// The variants of all cases, in the settings around their own, each with a scene's name.
+pub static ALL: LazyLock<Vec<(&str, Variant)>> = LazyLock::new(|| {
+    let mut found = Found::default();
+    for case in cases() {
+        for case in cameras(&case) {
+            for (number, settings) in neighbours(&case).iter().enumerate() {
+                add(&case, settings, number == 0, &mut found);
+            }
+        }
+    }
+    found.list
+});
+
+/// Returns the variants of one scene with splats and a volume, gathered and scattered.
+pub fn usual() -> Vec<Variant> {
+    let case = scenes::surface_in_a_volume();
+    let mut found = Found::default();
+    add(&case, &case.settings, true, &mut found);
+    found.list.into_iter().map(|(_, variant)| variant).collect()
+}
