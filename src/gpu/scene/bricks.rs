@@ -9,7 +9,7 @@
 
 use crate::{
     Result,
-    bricks::{BRICK_BLOCKS, Brick, Bricks, Choice, SIDE, slot_bytes},
+    bricks::{BLOCK, BLOCKS, BRICK_BLOCKS, Brick, Bricks, Choice, EMPTY, SIDE, slot_bytes},
     gpu::device::{Gpu, buffers::buffer},
     math::Kernel,
 };
@@ -82,6 +82,11 @@ impl Slab {
         self.slots.size() + self.selected.size()
     }
 
+    /// The slots of the chunk, by number.
+    fn all(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.count_slots
+    }
+
     pub(super) fn blocks(&self) -> u32 {
         (self.count_slots * BRICK_BLOCKS) as u32
     }
@@ -122,6 +127,8 @@ pub struct Shelf {
     /// For each slot, its brick and the last update that needed it.
     slots: Vec<Option<(Key, u64)>>,
     slot_of: HashMap<Key, usize>,
+    /// For each slot, the ranges of its brick's blocks.
+    ranges: Vec<Box<[[u8; 2]; BRICK_BLOCKS]>>,
     /// Samples, ranges and first slot of each chunk.
     chunks: Vec<(wgpu::Buffer, wgpu::Buffer, usize)>,
     /// The added chunks that the caller has not taken yet.
@@ -139,6 +146,7 @@ impl Shelf {
             fitting: None,
             slots: Vec::new(),
             slot_of: HashMap::new(),
+            ranges: Vec::new(),
             chunks: Vec::new(),
             grown: Vec::new(),
             update: 0,
@@ -210,6 +218,7 @@ impl Shelf {
         let count = (wanted + wanted / 4 + 1).min(room).min(MOST_SLOTS).min(fit.max(1));
         let first = self.slots.len();
         self.slots.extend(std::iter::repeat_n(None, count));
+        self.ranges.extend(std::iter::repeat_n(Box::new([EMPTY; BRICK_BLOCKS]), count));
         let data = buffer(gpu, "bricks", (count * bytes) as u64, Usage::STORAGE);
         let ranges = buffer(gpu, "brick ranges", (count * 2 * BRICK_BLOCKS) as u64, Usage::STORAGE);
         self.chunks.push((data.clone(), ranges.clone(), first));
@@ -230,7 +239,7 @@ impl Shelf {
                 .par_iter()
                 .map(|&(level, brick)| self.bricks.read(level, brick))
                 .collect::<Result<_>>()?;
-            for ((&key, brick), slot) in batch.iter().zip(&read).zip(&mut places) {
+            for ((&key, brick), slot) in batch.iter().zip(read).zip(&mut places) {
                 if let Some((old, _)) = self.slots[slot].replace((key, self.update)) {
                     self.slot_of.remove(&old);
                 }
@@ -242,6 +251,7 @@ impl Shelf {
                 gpu.queue.write_buffer(data, (at * bytes) as u64, &brick.samples);
                 let own = bytemuck::cast_slice(brick.blocks.as_slice());
                 gpu.queue.write_buffer(ranges, (at * 2 * BRICK_BLOCKS) as u64, own);
+                self.ranges[slot] = brick.blocks;
             }
             // Writes wait in staging memory until the next submission.
             gpu.queue.submit([]);
@@ -249,18 +259,45 @@ impl Shelf {
         Ok(())
     }
 
+    /// Returns the place of a slot's first sample in a level, if the slot contains a drawn brick of
+    /// that level.
+    fn place(&self, slot: usize, level: Option<usize>) -> Option<[usize; 3]> {
+        let ((own, brick), update) = self.slots[slot]?;
+        let is_drawn = Some(own) == level && update == self.update;
+        is_drawn.then(|| self.bricks.level(own).place(brick).map(|at| at * SIDE))
+    }
+
     /// Uploads which slots contain drawn bricks of a level, and where these lie.
     pub fn describe(&self, gpu: &Gpu, slab: &Slab, level: Option<usize>) {
-        let place = |slot: &Option<(Key, u64)>| match slot {
-            Some(((own, brick), update)) if Some(*own) == level && *update == self.update => {
-                let [x, y, z] = self.bricks.level(*own).place(*brick).map(|at| (at * SIDE) as u32);
-                [x, y, z, 1]
-            }
-            _ => [0; 4],
+        let place = |slot| match self.place(slot, level) {
+            Some([x, y, z]) => [x as u32, y as u32, z as u32, 1],
+            None => [0; 4],
         };
-        let places: Vec<[u32; 4]> =
-            self.slots[slab.first..slab.first + slab.count_slots].iter().map(place).collect();
+        let places: Vec<[u32; 4]> = slab.all().map(place).collect();
         gpu.queue.write_buffer(&slab.slots, 0, bytemuck::cast_slice(&places));
+    }
+
+    /// Returns the number of visible samples in the drawn bricks of a level, as
+    /// select_bricks.wgsl counts them. `shown` is that of `Choice`.
+    pub fn count(&self, slab: &Slab, level: Option<usize>, shown: &[u16; 256]) -> u32 {
+        let visible = |slot| {
+            let Some((at, level)) = self.place(slot, level).zip(level) else { return 0 };
+            let dims = self.bricks.level(level).dims;
+            let blocks = self.ranges[slot].iter().enumerate();
+            blocks
+                .filter(|(_, [low, high])| u16::from(*high) >= shown[usize::from(*low)])
+                .map(|(block, _)| {
+                    let place = [block, block / BLOCKS, block / BLOCKS.pow(2)];
+                    let samples = |axis: usize| {
+                        let first = at[axis] + place[axis] % BLOCKS * BLOCK;
+                        // Beyond the level's border, bricks are padded with copies.
+                        dims[axis].saturating_sub(first).min(BLOCK) as u32
+                    };
+                    samples(0) * samples(1) * samples(2)
+                })
+                .sum()
+        };
+        slab.all().map(visible).sum()
     }
 }
 

@@ -328,25 +328,26 @@ impl PreparedScene {
         most: u64,
     ) -> Result<Listed> {
         let Some(shelf) = &mut self.shelf else { return Ok(Listed::All) };
-        let (mut own, mut before) = (Vec::new(), 0);
+        let (mut own, mut before, mut samples, mut runs) = (Vec::new(), 0, 0, 0);
         for chunk in &mut self.chunks {
             let Origin::Bricks { slab, level, .. } = &mut chunk.origin else { continue };
             let drawn = choice.levels.get(slab.part).map(|(level, _)| *level);
             *level = drawn.unwrap_or(0);
+            let count = shelf.count(slab, drawn, &choice.shown);
+            samples += u64::from(count);
+            runs += u64::from(runs_of(count));
             shelf.describe(gpu, slab, drawn);
             let source = chunk.source(view, false, &self.forests);
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
             before += chunk.list_bytes();
             let Origin::Bricks { slab, .. } = &mut chunk.origin else { continue };
-            own.push((slab.as_mut(), &chunk.uniform));
+            own.push((slab.as_mut(), &chunk.uniform, count));
         }
-        let rest = self.bytes - before;
-        let runs = select.update(gpu, scan, &mut own, &choice.shown, most, |count| {
-            gpu.check_memory(rest + list_bytes(count))
-        })?;
         if runs > most {
             return Ok(Listed::TooMany { runs, most });
         }
+        gpu.check_memory(self.bytes - before + list_bytes(samples))?;
+        select.update(gpu, scan, &mut own, &choice.shown);
         self.bytes -= before;
         for chunk in &mut self.chunks {
             let Origin::Bricks { slab, .. } = &chunk.origin else { continue };

@@ -17,6 +17,7 @@ use crate::{
         },
     },
 };
+use rayon::prelude::*;
 use wgpu::BufferUsages as Usage;
 
 /// Samples along each side of the block that an invocation handles (`SIDE` in select.wgsl).
@@ -28,6 +29,7 @@ pub struct Selection {
     ranges: wgpu::Buffer,
     blocks: wgpu::Buffer,
     block_count: u32,
+    counts: Counts,
     /// Indices within the chunk, block by block.
     pub selected: wgpu::Buffer,
     /// The number of selected samples.
@@ -42,11 +44,11 @@ impl Selection {
     pub fn new(gpu: &Gpu, dims: [u32; 3], ranges: &[[u8; 2]]) -> Self {
         let block_count = dims.map(|n| n.div_ceil(SIDE)).iter().product::<u32>();
         debug_assert!(block_count < SCAN_CAPACITY);
-        let usage = Usage::STORAGE | Usage::COPY_SRC;
         Self {
             ranges: upload(gpu, "ranges", bytemuck::cast_slice(ranges)),
-            blocks: buffer(gpu, "select blocks", 4 * (u64::from(block_count) + 1), usage),
+            blocks: buffer(gpu, "select blocks", 4 * (u64::from(block_count) + 1), Usage::STORAGE),
             block_count,
+            counts: Counts::of(ranges),
             selected: buffer(gpu, "selected", 4, Usage::STORAGE),
             count: 0,
             shown: None,
@@ -108,32 +110,58 @@ impl Select {
         shown: &[u16; 256],
         check: impl Fn(u32) -> Result<()>,
     ) -> Result<()> {
-        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
-        let bind = |stage: &Stage, selection: &Selection| {
-            let buffers =
-                [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
-            stage.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()))
-        };
-        let encoder = || {
-            gpu.device
-                .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") })
-        };
-        let (blocks, groups) = (selection.block_count, selection.block_count.div_ceil(64));
-        let mut counting = encoder();
-        // After the scan, the element behind the last block is their sum.
-        counting.clear_buffer(&selection.blocks, 0, None);
-        self.count.dispatch(&mut counting, &[&bind(&self.count, selection)], groups);
-        scan.encode(gpu, &mut counting, &selection.blocks, blocks + 1);
-        gpu.queue.submit([counting.finish()]);
-        let total = gpu.read(&selection.blocks, 4 * u64::from(blocks), 4)?;
-        selection.count = bytemuck::pod_read_unaligned(&total);
+        selection.count = selection.counts.shown(shown);
         check(selection.count)?;
         selection.selected =
             buffer(gpu, "selected", 4 * u64::from(selection.count), Usage::STORAGE);
-        let mut writing = encoder();
-        self.write.dispatch(&mut writing, &[&bind(&self.write, selection)], groups);
-        gpu.queue.submit([writing.finish()]);
+        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
+        let buffers =
+            [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
+        let bind = |stage: &Stage| {
+            stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
+        };
+        let (blocks, groups) = (selection.block_count, selection.block_count.div_ceil(64));
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") });
+        encoder.clear_buffer(&selection.blocks, 0, None);
+        self.count.dispatch(&mut encoder, &[&bind(&self.count)], groups);
+        scan.encode(gpu, &mut encoder, &selection.blocks, blocks + 1);
+        self.write.dispatch(&mut encoder, &[&bind(&self.write)], groups);
+        gpu.queue.submit([encoder.finish()]);
         selection.shown = Some(*shown);
         Ok(())
+    }
+}
+
+/// How many samples have each range of values around them. With it, the length of a list is known
+/// without waiting for the GPU.
+#[derive(Debug)]
+struct Counts {
+    /// The ranges that occur, with their numbers of samples.
+    ranges: Vec<([u8; 2], u32)>,
+}
+
+impl Counts {
+    fn of(ranges: &[[u8; 2]]) -> Self {
+        const EACH: usize = 1 << 20;
+        let count = |part: &[[u8; 2]]| {
+            let mut counts = vec![0u32; 1 << 16];
+            part.iter().for_each(|&range| counts[usize::from(u16::from_le_bytes(range))] += 1);
+            counts
+        };
+        let add = |mut a: Vec<u32>, b: Vec<u32>| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            a
+        };
+        let counts = ranges.par_chunks(EACH).map(count).reduce(|| vec![0; 1 << 16], add);
+        let numbered = (0..=u16::MAX).map(u16::to_le_bytes).zip(counts);
+        Self { ranges: numbered.filter(|(_, count)| *count > 0).collect() }
+    }
+
+    /// Returns the number of samples that show something, as select.wgsl counts them.
+    fn shown(&self, first_visible: &[u16; 256]) -> u32 {
+        let shows = |[low, high]: [u8; 2]| u16::from(high) >= first_visible[usize::from(low)];
+        self.ranges.iter().filter(|(range, _)| shows(*range)).map(|(_, count)| count).sum()
     }
 }
