@@ -99,6 +99,9 @@ pub mod splat;
 pub mod surface;
 pub mod volume;
 
+// What the public functions take and return of these crates, in the versions that they need.
+pub use {glam, wgpu};
+
 pub use deadline::Deadline;
 pub use error::{Error, Result};
 pub use plan::FrameStats;

@@ -35,8 +35,10 @@ const ROOMS: [&str; 22] = [
 ];
 
 /// The rooms of src/gpu, in the same way.
-const GPU: [&str; 9] =
-    ["device", "pipeline", "budget", "scene", "variant", "targets", "passes", "frame", "renderer"];
+const GPU: [&str; 12] = [
+    "device", "output", "pipeline", "budget", "scene", "variant", "targets", "passes", "frame",
+    "outline", "pending", "renderer",
+];
 
 /// Maximum length of a line, in characters.
 const COLUMNS: usize = 100;

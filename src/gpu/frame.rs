@@ -12,7 +12,7 @@ use crate::gpu::{
         state::{AGAIN_ARGUMENTS, MARCH_ARGUMENTS, SCAN_ARGUMENTS},
         variant::Variant,
     },
-    scene::{PreparedScene, chunk::Origin},
+    scene::{PreparedScene, chunk::Origin, select::Select, select_bricks::SelectBricks},
     targets::Targets,
 };
 
@@ -61,6 +61,32 @@ impl Scatter {
     }
 }
 
+/// The passes that all variants share.
+#[derive(Debug)]
+pub struct Passes {
+    pub select: Select,
+    pub select_bricks: SelectBricks,
+    pub cut: Cut,
+    pub scan: Scan,
+    clear: Clear,
+    resume: Resume,
+    tiles: Tiles,
+}
+
+impl Passes {
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            select: Select::new(gpu),
+            select_bricks: SelectBricks::new(gpu),
+            cut: Cut::new(gpu),
+            scan: Scan::new(gpu),
+            clear: Clear::new(gpu),
+            resume: Resume::new(gpu),
+            tiles: Tiles::new(gpu),
+        }
+    }
+}
+
 /// A step of a frame, with its name for profiles.
 pub type Step<'a> = (&'static str, Box<dyn Fn(&mut wgpu::CommandEncoder) + 'a>);
 
@@ -68,11 +94,7 @@ pub type Step<'a> = (&'static str, Box<dyn Fn(&mut wgpu::CommandEncoder) + 'a>);
 #[derive(Clone, Copy)]
 pub struct Work<'a> {
     pub gpu: &'a Gpu,
-    pub cut: &'a Cut,
-    pub scan: &'a Scan,
-    pub clear: &'a Clear,
-    pub resume: &'a Resume,
-    pub tiles: &'a Tiles,
+    pub passes: &'a Passes,
     pub pipelines: &'a Pipelines,
     pub targets: &'a Targets,
     pub prepared: &'a PreparedScene,
@@ -82,7 +104,7 @@ impl<'a> Work<'a> {
     /// Returns the steps before the first depth pass: the cuts of hierarchies, then measure and
     /// plan. If a lattice is gathered, the picture is cleared first.
     pub fn opening(self) -> Vec<Step<'a>> {
-        let Self { gpu, cut, scan, pipelines, targets, prepared, .. } = self;
+        let Self { gpu, passes, pipelines, targets, prepared } = self;
         let mut steps: Vec<Step<'a>> = Vec::new();
         if targets.gathered.is_some() {
             let clear = |encoder: &mut wgpu::CommandEncoder| {
@@ -96,7 +118,10 @@ impl<'a> Work<'a> {
         for chunk in &prepared.chunks {
             if let Origin::Nodes { slots, .. } = &chunk.origin {
                 let own = slots.chunk(&chunk.uniform, &chunk.data);
-                steps.push(("cut", Box::new(move |encoder| cut.encode(gpu, encoder, scan, &own))));
+                steps.push((
+                    "cut",
+                    Box::new(move |encoder| passes.cut.encode(gpu, encoder, &passes.scan, &own)),
+                ));
             }
         }
         steps.push((
@@ -116,7 +141,8 @@ impl<'a> Work<'a> {
 
     /// Returns the steps of the next depth pass. They do nothing if the frame is done.
     pub fn depth_pass(self) -> Vec<Step<'a>> {
-        let Self { gpu, scan, clear, resume, tiles, pipelines, targets, prepared, .. } = self;
+        let Self { gpu, passes, pipelines, targets, prepared } = self;
+        let Passes { scan, clear, resume, tiles, .. } = passes;
         let Some(scatter) = &pipelines.scatter else { return Vec::new() };
         let chunks = prepared.chunks.as_slice();
         let mut steps: Vec<Step<'a>> = vec![
@@ -164,7 +190,7 @@ impl<'a> Work<'a> {
     pub fn resumed(self) -> Vec<Step<'a>> {
         // A march that finds nothing left does nothing.
         const MARCHES: usize = 8;
-        let Self { gpu, resume, pipelines, targets, .. } = self;
+        let Self { gpu, passes: Passes { resume, .. }, pipelines, targets, .. } = self;
         let Some(scatter) = &pipelines.scatter else { return Vec::new() };
         let march: Step<'a> = (
             "march",

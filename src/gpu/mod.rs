@@ -21,6 +21,7 @@
 //! | `resume` | continues tiles that march has stopped |
 //! | `gather` | the field of a lattice that is not scattered, pixel by pixel |
 //! | `occlusion` | which tiles have become opaque |
+//! | `present` | writes the finished picture into the textures of a host application |
 //!
 //! The other modules:
 //!
@@ -31,8 +32,11 @@
 //! | `scene` | the data of a scene on the GPU |
 //! | `targets`, `budget` | the buffers of a frame, and the capacity of a depth pass |
 //! | `variant` | which features of the shaders a picture needs |
+//! | `output` | where a host application gets the picture |
 //! | `frame` | the order of the passes |
-//! | `renderer` | plans frames and draws them |
+//! | `outline` | the plan of a frame: detail, bricks, sheets, strips |
+//! | `pending` | a picture that is being drawn, batch by batch |
+//! | `renderer` | begins pictures, and completes or polls them |
 //!
 //! docs/engine.md explains the mathematics.
 
@@ -41,7 +45,10 @@ pub(crate) mod budget;
 mod checks;
 pub(crate) mod device;
 mod frame;
+mod outline;
+mod output;
 mod passes;
+mod pending;
 mod pipeline;
 mod renderer;
 mod scene;
@@ -50,5 +57,7 @@ mod variant;
 
 pub use budget::Budget;
 pub use device::{AdapterChoice, Gpu};
-pub use renderer::Renderer;
+pub use output::Output;
+pub use pending::PendingFrame;
+pub use renderer::{Progress, Renderer};
 pub use scene::PreparedScene;

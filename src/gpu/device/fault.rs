@@ -4,12 +4,49 @@
 use crate::{Error, Result, gpu::device::Gpu};
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{Arc, Mutex, OnceLock, PoisonError},
-    time::Duration,
+    pin::Pin,
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
+    task::{Context, Poll, Waker},
 };
 
-/// Maximum time between the end of the device's work and the callback that reports it.
-const CALL_BACK: Duration = Duration::from_secs(10);
+/// The answer of an error scope. Browsers give it later, all others at once.
+#[cfg(not(target_arch = "wasm32"))]
+type Answer = Pin<Box<dyn Future<Output = Option<wgpu::Error>> + Send>>;
+#[cfg(target_arch = "wasm32")]
+type Answer = Pin<Box<dyn Future<Output = Option<wgpu::Error>>>>;
+
+/// The answers that are still to come.
+#[derive(Clone, Default)]
+pub(crate) struct Answers(Arc<Mutex<Vec<Answer>>>);
+
+impl std::fmt::Debug for Answers {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Answers").field(&lock(&self.0).len()).finish()
+    }
+}
+
+impl Answers {
+    /// Returns the error of an answer, if it is there. An answer that is not is kept.
+    fn take(&self, mut answer: Answer) -> Option<wgpu::Error> {
+        match answer.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
+            Poll::Ready(error) => error,
+            Poll::Pending => {
+                lock(&self.0).push(answer);
+                None
+            }
+        }
+    }
+
+    /// Returns the first error among the answers that have come.
+    fn late(&self) -> Option<wgpu::Error> {
+        let kept = std::mem::take(&mut *lock(&self.0));
+        kept.into_iter().fold(None, |first, answer| first.or(self.take(answer)))
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// The faults that a device has reported.
 #[derive(Debug, Default)]
@@ -32,10 +69,7 @@ impl Condition {
     }
 
     fn note(&self, complaint: &str) {
-        self.stray
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get_or_insert_with(|| complaint.to_owned());
+        lock(&self.stray).get_or_insert_with(|| complaint.to_owned());
     }
 
     fn lose(&self, reason: impl Into<String>) {
@@ -51,7 +85,7 @@ impl Gpu {
         let (done, complaint) = self.hear(work);
         if complaint.is_some() {
             // What is made on a lost device is invalid. Polling shows whether the device is lost.
-            drop(catch_unwind(AssertUnwindSafe(|| self.device.poll(wgpu::PollType::Poll))));
+            self.look()?;
         }
         if complaint.is_some() || done.is_ok() {
             self.sound()?;
@@ -79,17 +113,27 @@ impl Gpu {
         let done = work();
         // The scope opened last is closed first. If memory ran out, the other errors follow from
         // that.
-        let complaints = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
-        let complaint = complaints.reduce(Option::or).flatten().map(|complaint| {
-            let (name, reason) = (&self.info.name, complaint.to_string());
-            Error::Driver(match complaint {
-                wgpu::Error::OutOfMemory { .. } => {
-                    format!("the memory of {name} ran out: {reason}")
-                }
-                _ => format!("{name}: {reason}"),
-            })
-        });
-        (done, complaint)
+        let answers =
+            scopes.into_iter().rev().map(|scope| self.answers.take(Box::pin(scope.pop())));
+        let complaint = answers.reduce(Option::or).flatten();
+        (done, complaint.map(|complaint| self.told(complaint)))
+    }
+
+    fn told(&self, complaint: wgpu::Error) -> Error {
+        let (name, reason) = (&self.info.name, complaint.to_string());
+        Error::Driver(match complaint {
+            wgpu::Error::OutOfMemory { .. } => format!("the memory of {name} ran out: {reason}"),
+            _ => format!("{name}: {reason}"),
+        })
+    }
+
+    /// Looks once, without waiting, whether submitted work is done.
+    pub(crate) fn look(&self) -> Result<()> {
+        // wgpu panics if a device was lost.
+        if catch_unwind(AssertUnwindSafe(|| self.device.poll(wgpu::PollType::Poll))).is_err() {
+            self.condition.lose("it disappeared");
+        }
+        self.sound()
     }
 
     /// Waits until the device has done all submitted work.
@@ -98,6 +142,7 @@ impl Gpu {
     /// [`Error::DeviceLost`] if the device is lost. [`Error::Driver`] if it does not answer in time
     /// ([`Self::with_patience`]), which loses it, or if it has reported an error since the last
     /// check.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn wait(&self) -> Result<()> {
         if self.condition.lost.get().is_some() {
             return self.sound();
@@ -126,44 +171,13 @@ impl Gpu {
     }
 
     /// Returns an error if the device is lost, or has reported an error since the last check.
-    fn sound(&self) -> Result<()> {
+    pub(crate) fn sound(&self) -> Result<()> {
         if let Some(reason) = self.condition.lost.get() {
             return Err(Error::DeviceLost(format!("{} was lost: {reason}", self.info.name)));
         }
-        match self.condition.stray.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            None => Ok(()),
-            Some(stray) => Err(Error::Driver(stray)),
+        if let Some(stray) = lock(&self.condition.stray).take() {
+            return Err(Error::Driver(stray));
         }
-    }
-
-    /// Reads a part of a buffer back, after all earlier work.
-    pub(crate) fn read(&self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<Vec<u8>> {
-        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("read back"),
-            size: bytes,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder =
-            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
-        self.queue.submit([encoder.finish()]);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        // The receiver outlives the callback: it is waited for below.
-        staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
-        self.wait()?;
-        // Another thread that waits for the same device may be about to call back. A lost device
-        // may never call back.
-        match receiver.recv_timeout(self.patience.min(CALL_BACK)) {
-            Ok(Ok(())) => {}
-            _ => {
-                return Err(Error::DeviceLost(format!(
-                    "{} did not return the requested data",
-                    self.info.name
-                )));
-            }
-        }
-        let view = staging.get_mapped_range(..).map_err(|e| Error::Driver(e.to_string()))?;
-        Ok(view.to_vec())
+        self.answers.late().map_or(Ok(()), |complaint| Err(self.told(complaint)))
     }
 }

@@ -3,10 +3,11 @@
 
 pub(crate) mod buffers;
 pub(crate) mod fault;
+pub(crate) mod readback;
 pub(crate) mod timestamps;
 
 use crate::{Error, Result, memory};
-use fault::Condition;
+use fault::{Answers, Condition};
 use std::{sync::Arc, time::Duration};
 
 /// Storage buffers that march binds if a lattice is gathered among surfaces. WebGPU promises eight.
@@ -25,6 +26,7 @@ pub struct Gpu {
     /// The adapter's name, type, backend and driver.
     pub info: Arc<wgpu::AdapterInfo>,
     pub(crate) condition: Arc<Condition>,
+    pub(crate) answers: Answers,
     pub(crate) patience: Duration,
     /// Maximum bytes of memory that a scene may take.
     memory: u64,
@@ -82,13 +84,14 @@ fn rank(info: &wgpu::AdapterInfo) -> u8 {
     }
 }
 
-fn usable_adapters() -> Vec<wgpu::Adapter> {
-    let mut adapters = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::all()));
-    // An adapter without compute shaders, or with fewer than eight storage buffers in them, cannot
-    // run the engine.
+/// What the shaders need beside eight storage buffers.
+const SHADERS_NEED: wgpu::DownlevelFlags =
+    wgpu::DownlevelFlags::COMPUTE_SHADERS.union(wgpu::DownlevelFlags::SHADER_F16_IN_F32);
+
+async fn usable_adapters() -> Vec<wgpu::Adapter> {
+    let mut adapters = instance().enumerate_adapters(wgpu::Backends::all()).await;
     adapters.retain(|a| {
-        let flags = a.get_downlevel_capabilities().flags;
-        flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+        a.get_downlevel_capabilities().flags.contains(SHADERS_NEED)
             && a.limits().max_storage_buffers_per_shader_stage >= 8
     });
     adapters.sort_by_key(|a| rank(&a.get_info()));
@@ -97,26 +100,37 @@ fn usable_adapters() -> Vec<wgpu::Adapter> {
 
 impl Gpu {
     /// Returns the adapters that can run the engine, fastest first, with their limits.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn adapters() -> Vec<(wgpu::AdapterInfo, wgpu::Limits)> {
-        usable_adapters().iter().map(|a| (a.get_info(), a.limits())).collect()
+        pollster::block_on(usable_adapters()).iter().map(|a| (a.get_info(), a.limits())).collect()
     }
 
     /// Opens the fastest adapter that does not run on the processor, or the adapter named by the
     /// environment variable `WGPU_ADAPTER_NAME`. Returns `None` if there is none or it cannot be
     /// opened.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn hardware() -> Option<Self> {
         let is_named = std::env::var("WGPU_ADAPTER_NAME").is_ok_and(|name| !name.is_empty());
         let gpu = Self::headless(&AdapterChoice::Automatic).ok()?;
         (is_named || !gpu.is_software()).then_some(gpu)
     }
 
-    /// Opens a device without a window.
+    /// Opens a device without a window, and waits for it.
+    ///
+    /// # Errors
+    /// Those of [`Self::request`].
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn headless(choice: &AdapterChoice) -> Result<Self> {
+        pollster::block_on(Self::request(choice))
+    }
+
+    /// Opens a device without a window. Nothing blocks, so that a browser can await it.
     ///
     /// # Errors
     /// [`Error::NoAdapter`] if there is no adapter, or none that matches `choice`. The message says
     /// what to install.
-    pub fn headless(choice: &AdapterChoice) -> Result<Self> {
-        let mut adapters = usable_adapters();
+    pub async fn request(choice: &AdapterChoice) -> Result<Self> {
+        let mut adapters = usable_adapters().await;
         let names = || adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
         let by_name = |part: &str| {
             let part = part.to_lowercase();
@@ -149,7 +163,7 @@ impl Gpu {
                 names()
             )));
         };
-        let gpu = Self::open(&adapters.swap_remove(index))?;
+        let gpu = Self::open(&adapters.swap_remove(index)).await?;
         gpu.condition.listen(&gpu.device);
         Ok(Self { choice: Some(choice.clone()), ..gpu })
     }
@@ -160,6 +174,7 @@ impl Gpu {
     /// # Errors
     /// Those of [`Self::headless`]; [`Error::Argument`] for the device of a host application, which
     /// only the host can reopen.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn reopened(&self) -> Result<Self> {
         let Some(choice) = &self.choice else {
             return Err(Error::Argument(
@@ -203,7 +218,7 @@ impl Gpu {
         })
     }
 
-    fn open(adapter: &wgpu::Adapter) -> Result<Self> {
+    async fn open(adapter: &wgpu::Adapter) -> Result<Self> {
         // The engine is built for WebGPU's default limits. Larger bindings only save passes. With a
         // ninth storage buffer, a volume among surfaces can be gathered.
         let buffers = adapter.limits().max_storage_buffers_per_shader_stage.clamp(8, MOST_BUFFERS);
@@ -220,10 +235,9 @@ impl Gpu {
             required_limits: limits,
             ..Default::default()
         };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| {
-                Error::NoAdapter(format!("{} cannot be opened: {e}", adapter.get_info().name))
-            })?;
+        let (device, queue) = adapter.request_device(&descriptor).await.map_err(|e| {
+            Error::NoAdapter(format!("{} cannot be opened: {e}", adapter.get_info().name))
+        })?;
         Ok(Self::from_wgpu(device, queue, adapter.get_info()))
     }
 
@@ -239,6 +253,7 @@ impl Gpu {
             queue,
             info: Arc::new(info),
             condition: Arc::default(),
+            answers: Answers::default(),
             patience: PATIENCE,
             memory,
             choice: None,

@@ -12,6 +12,7 @@ pub(crate) mod measure;
 pub(crate) mod occlusion;
 pub(crate) mod order;
 pub(crate) mod plan;
+pub(crate) mod present;
 pub(crate) mod project;
 pub(crate) mod resume;
 pub(crate) mod sources;

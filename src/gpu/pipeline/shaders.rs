@@ -20,6 +20,7 @@ pub const LARGE: &str = include_str!("../../../shaders/passes/large.wgsl");
 pub const ORDER: &str = include_str!("../../../shaders/passes/order.wgsl");
 pub const GATHER: &str = include_str!("../../../shaders/passes/gather.wgsl");
 pub const MARCH: &str = include_str!("../../../shaders/passes/march.wgsl");
+pub const PRESENT: &str = include_str!("../../../shaders/passes/present.wgsl");
 
 pub const SOURCE_NODES: &str = include_str!("../../../shaders/sources/nodes.wgsl");
 pub const SOURCE_SPLATS: &str = include_str!("../../../shaders/sources/splats.wgsl");

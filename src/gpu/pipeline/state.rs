@@ -29,6 +29,11 @@ pub struct State {
     pub unused: u32,
 }
 
+/// The words `done` and `stalled`.
+pub const DONE_WORD: u32 = (std::mem::offset_of!(State, done) / 4) as u32;
+
+pub const STALLED_WORD: u32 = (std::mem::offset_of!(State, stalled) / 4) as u32;
+
 /// Byte offsets of the indirect dispatches in a pass's `arguments` (state.wgsl).
 pub const SCAN_ARGUMENTS: u64 = 0;
 

@@ -76,6 +76,8 @@ pub struct PreparedScene {
     pub(crate) bytes: u64,
     /// The data on the GPU cannot be trusted, because an error occurred there.
     pub(crate) broken: bool,
+    /// The number of the picture that was begun last.
+    pub(crate) picture: u64,
     /// The box around everything, which does not change.
     pub(crate) bounds: Bounds,
     /// The device that holds the data.
@@ -102,6 +104,7 @@ impl PreparedScene {
             runs: 0,
             bytes: 0,
             broken: false,
+            picture: 0,
             bounds: scene.bounds(),
             gpu: gpu.clone(),
         };
@@ -145,7 +148,7 @@ impl PreparedScene {
     /// Uploads the scene again if it is broken.
     pub(crate) fn mend(&mut self, gpu: &Gpu) -> Result<()> {
         if self.broken {
-            *self = Self::new(gpu, &self.scene)?;
+            *self = Self { picture: self.picture, ..Self::new(gpu, &self.scene)? };
         }
         Ok(())
     }
