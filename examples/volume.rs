@@ -1,8 +1,8 @@
 //! Draws a volume that the library generates: `cargo run --release --example volume`.
 
-use glam::DVec3;
 use splatkit::{
     Device, Renderer,
+    glam::DVec3,
     math::{Camera, Kernel},
     scene::{Scene, Settings},
     volume::{TransferFunction, phantoms::Phantom},
@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     camera.elevation(30.0);
     camera.zoom(1.9);
     let (picture, stats) = renderer.render(&camera, &settings)?;
-    picture.save("specimen.png".as_ref(), Some([0.0, 0.0, 0.0]))?;
+    picture.save("specimen.png", Some([0.0, 0.0, 0.0]))?;
     println!("{} bytes of memory on {}", stats.gpu_bytes, renderer.device().name());
     Ok(())
 }

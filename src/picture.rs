@@ -95,7 +95,8 @@ impl Picture {
     /// # Errors
     /// [`Error::Argument`] for other extensions, and [`Error::Output`] if the file cannot be
     /// written.
-    pub fn save(&self, path: &Path, background: Option<[f32; 3]>) -> Result<()> {
+    pub fn save(&self, path: impl AsRef<Path>, background: Option<[f32; 3]>) -> Result<()> {
+        let path = path.as_ref();
         let bytes = self.encode(PictureFormat::of(path)?, background)?;
         disk::write(path, &bytes)
     }

@@ -6,7 +6,7 @@
 //! half-integers.
 
 use crate::{Error, Result};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 
 /// A box along the world's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -312,6 +312,48 @@ impl View {
     /// Returns the view-space position of a world point.
     pub fn to_view(&self, world: DVec3) -> DVec3 {
         self.rotation * (world - self.position)
+    }
+
+    /// Returns the matrix from world coordinates to wgpu's clip space, for a host application that
+    /// draws its own geometry in the same view. Depths run from 0 at the view-space z `near` to 1
+    /// at `far`.
+    ///
+    /// ```
+    /// use splatkit::{glam::{DVec3, DVec4}, math::{Camera, Projection}};
+    ///
+    /// let camera = Camera {
+    ///     position: DVec3::Z * 5.0,
+    ///     focal_point: DVec3::ZERO,
+    ///     view_up: DVec3::Y,
+    ///     projection: Projection::Perspective { view_angle: 90.0 },
+    /// };
+    /// let clip = camera.view([200, 100])?.clip_from_world(1.0, 9.0) * DVec4::new(0.0, 5.0, 0.0, 1.0);
+    /// // The middle of the upper side.
+    /// assert!((clip / clip.w - DVec4::new(0.0, 1.0, 0.9, 1.0)).length() < 1e-12);
+    /// # Ok::<(), splatkit::Error>(())
+    /// ```
+    pub fn clip_from_world(&self, near: f64, far: f64) -> DMat4 {
+        // Columns of the projection: x, y and z of view space, where y points down, and 1.
+        let [width, height] = self.size.map(f64::from);
+        let sides = DVec2::new(2.0 / width, -2.0 / height);
+        let (scale, shift) = (self.scale * sides, self.center * sides + DVec2::new(-1.0, 1.0));
+        let depth = 1.0 / (far - near);
+        let projection = if self.perspective {
+            DMat4::from_cols(
+                DVec4::new(scale.x, 0.0, 0.0, 0.0),
+                DVec4::new(0.0, scale.y, 0.0, 0.0),
+                DVec4::new(shift.x, shift.y, far * depth, 1.0),
+                DVec4::new(0.0, 0.0, -far * near * depth, 0.0),
+            )
+        } else {
+            DMat4::from_cols(
+                DVec4::new(scale.x, 0.0, 0.0, 0.0),
+                DVec4::new(0.0, scale.y, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, depth, 0.0),
+                DVec4::new(shift.x, shift.y, -near * depth, 1.0),
+            )
+        };
+        projection * DMat4::from_mat3(self.rotation) * DMat4::from_translation(-self.position)
     }
 
     /// Returns the planes through the picture's four sides, moved outwards by `pixels`. A plane is

@@ -183,7 +183,8 @@ impl TransferFunction {
     /// # Errors
     /// [`Error::File`] and [`Error::Limit`] as for every input; [`Error::Input`] if the file is not
     /// a transfer function.
-    pub fn read(path: &Path, limits: &Limits) -> Result<Self> {
+    pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
         let text = Source::open(path, limits)?.small_text("a transfer function", MOST_BYTES)?;
         Self::parse(&text).map_err(|message| {
             Error::input(path, "transfer function", message).hint(
