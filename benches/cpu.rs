@@ -80,8 +80,7 @@ fn surfaces(criterion: &mut Criterion) {
     criterion.bench_function("surfels of a mesh", |bench| {
         bench.iter(|| black_box(&mesh).surfels(&SurfelOptions::default()).expect("surfels"));
     });
-    let build =
-        || Tree::build(black_box(&set), &BuildOptions::default(), &|_, _| ()).expect("a tree");
+    let build = || Tree::build(black_box(&set), &BuildOptions::default(), None).expect("a tree");
     criterion.bench_function("build a tree", |bench| bench.iter(build));
     let tree = build();
     let encode = || to_bytes(black_box(&tree), &WriteOptions::default()).expect("a file");

@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         None => Mesh::knot(1000, 100),
     };
     let surfels = mesh.surfels(&SurfelOptions::default())?;
-    let tree = Tree::build(&surfels, &BuildOptions::default(), &|_, _| ())?;
+    let tree = Tree::build(&surfels, &BuildOptions::default(), None)?;
     file::write(&tree, "hierarchy.splk", &file::WriteOptions::default())?;
     println!(
         "hierarchy.splk: {} splats, {} bytes",

@@ -91,6 +91,7 @@ pub mod math;
 pub mod memory;
 pub mod picture;
 pub(crate) mod plan;
+pub mod progress;
 pub mod reference;
 mod renderer;
 pub mod scattered;

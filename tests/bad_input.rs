@@ -109,7 +109,7 @@ fn every_flipped_byte_of_a_hierarchy_and_of_bricks_is_found() {
             if name.ends_with("splk") {
                 file::check(path, &limits)
             } else {
-                bricks::check(path, &limits, &|_, _| ())
+                bricks::check(path, &limits, None)
             }
         };
         let path = folder.write(name, &bytes);

@@ -109,7 +109,7 @@ fn the_finest_level_is_the_volume() {
         let plain = Scene::new().with_volume(volume.clone(), Kernel::default(), transfer());
         let path = std::env::temp_dir()
             .join(format!("splatkit-bricks-{}-{bytes}.splv", std::process::id()));
-        bricks::write(&volume, &path, &WriteOptions::default(), &|_, _| ()).expect("a file");
+        bricks::write(&volume, &path, &WriteOptions::default(), None).expect("a file");
         let file = Arc::new(Bricks::open(&path, &Limits::default()).expect("bricks"));
         for (name, camera) in cameras(&plain) {
             for occlusion in [true, false] {

@@ -59,7 +59,7 @@ fn lossless() -> WriteOptions {
 }
 
 fn in_regions(files: &[PathBuf], out: &Path) -> Result<Converted> {
-    convert(files, &Limits::default(), out, &options(), &lossless(), &|_, _, _| ())
+    convert(files, &Limits::default(), out, &options(), &lossless(), None)
 }
 
 /// Checks a file and returns the splats of its finest level, sorted.
@@ -83,7 +83,7 @@ fn both_ways(folder: &Folder, name: &str) -> (Vec<Splat>, Vec<Splat>, Converted)
     let set = mesh.surfels(&SurfelOptions::default()).unwrap();
     let whole = folder.path("whole.splk");
     let build = BuildOptions { preset: hierarchy::Preset::Fastest, ..BuildOptions::default() };
-    hierarchy::build_file(&set, &whole, &build, &lossless(), &|_, _| ()).unwrap();
+    hierarchy::build_file(&set, &whole, &build, &lossless(), None).unwrap();
     let parts = folder.path("parts.splk");
     let converted = in_regions(&[path], &parts).unwrap();
     assert_eq!(converted.closed, mesh.is_solid(), "{name}");

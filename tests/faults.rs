@@ -393,7 +393,7 @@ fn bricks_that_show_too_much_are_drawn_coarser() {
 #[test]
 fn a_budget_counts_for_the_whole_picture() {
     let splats = Mesh::knot(600, 50).surfels(&SurfelOptions::default()).unwrap();
-    let tree = Tree::build(&splats, &BuildOptions::default(), &|_, _| ()).expect("a tree");
+    let tree = Tree::build(&splats, &BuildOptions::default(), None).expect("a tree");
     let scene = Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("a hierarchy"));
     let (camera, settings) = view(&scene);
     let settings = Settings { size: [400, 300], detail: Detail::Splats(3000), ..settings };
@@ -422,7 +422,7 @@ fn a_budget_counts_for_the_whole_picture() {
 #[test]
 fn memory_is_shared_evenly() {
     let splats = Mesh::knot(600, 50).surfels(&SurfelOptions::default()).unwrap();
-    let tree = Tree::build(&splats, &BuildOptions::default(), &|_, _| ()).expect("a tree");
+    let tree = Tree::build(&splats, &BuildOptions::default(), None).expect("a tree");
     let scene = scene(true).with_hierarchy(Hierarchy::from_tree(tree).expect("a hierarchy"));
     let (camera, settings) = view(&scene);
     let mut nearer = camera.clone();

@@ -37,7 +37,7 @@ fn knot(count: u32) -> SplatSet {
 }
 
 fn build(set: &SplatSet, block_splats: usize) -> Tree {
-    Tree::build(set, &BuildOptions { block_splats, ..BuildOptions::default() }, &|_, _| ())
+    Tree::build(set, &BuildOptions { block_splats, ..BuildOptions::default() }, None)
         .expect("a tree")
 }
 
@@ -68,7 +68,7 @@ fn trees_of_every_preset_keep_their_promises_and_all_splats() {
     for preset in [Preset::Fastest, Preset::Fast, Preset::Balanced, Preset::Slow, Preset::Best] {
         for block_splats in [1 << 20, 1000] {
             let options = BuildOptions { preset, block_splats, ..BuildOptions::default() };
-            let tree = Tree::build(&set, &options, &|_, _| ()).expect("a tree");
+            let tree = Tree::build(&set, &options, None).expect("a tree");
             assert_eq!(tree.is_joined(), block_splats == 1000);
             let errors: Vec<_> =
                 validate(&tree).into_iter().filter(|f| f.severity == Severity::Error).collect();
@@ -482,7 +482,7 @@ fn a_closed_surface_looks_the_same_without_what_faces_away() {
 fn an_opened_surface_shows_its_back() {
     let set = knot(30_000);
     let options = BuildOptions { closed: true, ..BuildOptions::default() };
-    let tree = Tree::build(&set, &options, &|_, _| ()).expect("a tree");
+    let tree = Tree::build(&set, &options, None).expect("a tree");
     let bounds = set.bounds();
     let scenes = [
         Scene::new().with_splats(set),
@@ -525,7 +525,7 @@ fn an_opened_surface_shows_its_back() {
 #[test]
 fn optical_depths_beyond_what_can_be_drawn_are_refused() {
     let mut set = knot(500);
-    let built = |set: &SplatSet| Tree::build(set, &BuildOptions::default(), &|_, _| ());
+    let built = |set: &SplatSet| Tree::build(set, &BuildOptions::default(), None);
     set.splats[7].strength = Splat::MOST_OPTICAL_DEPTH;
     let tree = built(&set).expect("a tree");
     let scene = Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("a hierarchy"));
@@ -550,9 +550,8 @@ fn smooth_normals_over_edges_lose_nothing() {
     let options = SurfelOptions { largest_spacing: 1.0 / 32.0, ..SurfelOptions::default() };
     let set = cube.surfels(&options).expect("surfels");
     assert!(cube.is_solid());
-    let tree =
-        Tree::build(&set, &BuildOptions { closed: true, ..BuildOptions::default() }, &|_, _| ())
-            .expect("a tree");
+    let tree = Tree::build(&set, &BuildOptions { closed: true, ..BuildOptions::default() }, None)
+        .expect("a tree");
     let file = to_bytes(&tree, &WriteOptions::default()).expect("a file");
     let file =
         Hierarchy::from_bytes(file, Path::new("memory"), &Limits::default()).expect("a hierarchy");

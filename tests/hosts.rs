@@ -37,7 +37,7 @@ fn with_volume(scene: Scene) -> Scene {
 }
 
 fn hierarchy() -> Scene {
-    let tree = Tree::build(&knot(), &BuildOptions::default(), &|_, _| ()).expect("a tree");
+    let tree = Tree::build(&knot(), &BuildOptions::default(), None).expect("a tree");
     let bytes = file::to_bytes(&tree, &file::WriteOptions::default()).expect("the file");
     let own = Hierarchy::from_bytes(bytes, "knot", &Limits::default()).expect("a hierarchy");
     Scene::new().with_hierarchy(own)
@@ -369,7 +369,7 @@ fn a_host_composites_its_triangles_by_depth() {
     let target = texture(&gpu, TextureFormat::Rgba8Unorm, SIZE);
     let mut host =
         Compositor::new(&gpu, &scene, &corners, TextureFormat::Rgba8Unorm, SIZE).unwrap();
-    let mut draw = |host: &mut Compositor, target: &wgpu::TextureView| {
+    let draw = |host: &mut Compositor, target: &wgpu::TextureView| {
         let mut turns = 0;
         while !host.draw(&camera, target).unwrap() {
             turns += 1;

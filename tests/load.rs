@@ -78,14 +78,14 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
     let surfels = knot(round).surfels(&SurfelOptions::default()).unwrap();
 
     let splk = folder.join("a.splk");
-    let tree = Tree::build(&surfels, &BuildOptions::default(), &|_, _| ()).unwrap();
+    let tree = Tree::build(&surfels, &BuildOptions::default(), None).unwrap();
     hierarchy::file::write(&tree, &splk, &hierarchy::file::WriteOptions::default()).unwrap();
     let found = hierarchy::file::check(&splk, &limits);
     assert!(found.findings.is_empty(), "{:?}", found.findings);
     let read = Hierarchy::open(&splk, &limits).unwrap();
 
     let splv = folder.join("a.splv");
-    bricks::write(&volume, &splv, &bricks::WriteOptions::default(), &|_, _| ()).unwrap();
+    bricks::write(&volume, &splv, &bricks::WriteOptions::default(), None).unwrap();
     let cut = Bricks::open(&splv, &limits).unwrap();
 
     // A table like those that other programs write.

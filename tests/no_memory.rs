@@ -154,8 +154,8 @@ fn convert(input: &Path, output: &Path) -> Result<usize> {
     let build =
         BuildOptions { preset: Preset::Fastest, block_splats: 1 << 10, ..BuildOptions::default() };
     let write = WriteOptions::default();
-    build_file(&set, output, &build, &write, &|_, _| ()).map_err(|error| error.in_file(input))?;
-    let tree = Tree::build(&set, &build, &|_, _| ()).map_err(|error| error.in_file(input))?;
+    build_file(&set, output, &build, &write, None).map_err(|error| error.in_file(input))?;
+    let tree = Tree::build(&set, &build, None).map_err(|error| error.in_file(input))?;
     drop((set, tree));
     Ok(Hierarchy::open(output, &Limits::default())?.leaves()?.splats.len())
 }

@@ -164,7 +164,7 @@ impl Random {
 }
 
 fn any_scenes() -> Vec<(&'static str, Scene)> {
-    let tree = Tree::build(&hills(200), &BuildOptions::default(), &|_, _| {}).expect("a tree");
+    let tree = Tree::build(&hills(200), &BuildOptions::default(), None).expect("a tree");
     let hierarchy = || Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
     let volume = |side| Phantom::Specimen.sample_bytes([side; 3]).expect("samples");
     let shown = |volume: &Volume| TransferFunction::automatic(volume);

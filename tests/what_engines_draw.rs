@@ -163,11 +163,8 @@ fn surface() -> Result<Scene> {
 }
 
 fn hierarchy() -> Result<Hierarchy> {
-    let tree = Tree::build(
-        &surfels()?,
-        &BuildOptions { closed: true, ..BuildOptions::default() },
-        &|_, _| (),
-    )?;
+    let tree =
+        Tree::build(&surfels()?, &BuildOptions { closed: true, ..BuildOptions::default() }, None)?;
     Hierarchy::from_tree(tree)
 }
 

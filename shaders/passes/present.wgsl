@@ -21,9 +21,6 @@ struct Present {
     far: f32,
     // Whether pixels have depths.
     has_depth: u32,
-    unused_a: u32,
-    unused_b: u32,
-    unused_c: u32,
 }
 
 @group(0) @binding(0) var<uniform> present: Present;

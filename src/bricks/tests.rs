@@ -237,14 +237,14 @@ fn streams_become_the_same_file() {
         let limits = Limits::default();
         let stream = VolumeStream::open(&raw, &limits, Some(&layout)).unwrap().unwrap();
         let path = folder.path().join("a.splv");
-        convert(&stream, stream.range(&|_, _| ()).unwrap(), &path, &options(), &|_, _| ()).unwrap();
+        convert(&stream, stream.range(None).unwrap(), &path, &options(), None).unwrap();
         let streamed = std::fs::read(&path).unwrap();
         assert_eq!(streamed, to_bytes(&volume, &options()).unwrap());
-        write(&volume, &path, &options(), &|_, _| ()).unwrap();
+        write(&volume, &path, &options(), None).unwrap();
         assert_eq!(streamed, std::fs::read(&path).unwrap());
         // An invalid range leaves the file as it was.
         for range in [[f64::NAN; 2], [1.0, 0.0], [0.0, f64::INFINITY]] {
-            let result = convert(&stream, range, &path, &options(), &|_, _| ());
+            let result = convert(&stream, range, &path, &options(), None);
             assert!(
                 matches!(
                     &result,
@@ -253,7 +253,7 @@ fn streams_become_the_same_file() {
                 "{result:?}"
             );
         }
-        let report = check(&path, &limits, &|_, _| ());
+        let report = check(&path, &limits, None);
         assert!(report.is_sound(), "{report:?}");
         // Only the input and the file are left.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
@@ -281,7 +281,7 @@ fn other_lattices_and_other_bricks_are_refused() {
     let volume = Volume::new(lattice, Samples::U8(vec![0; 64])).unwrap();
     for error in [
         Bricks::from_volume(Arc::new(volume.clone())).unwrap_err(),
-        write(&volume, Path::new("none.splv"), &options(), &|_, _| ()).unwrap_err(),
+        write(&volume, Path::new("none.splv"), &options(), None).unwrap_err(),
     ] {
         assert!(matches!(error, Error::Argument(message) if message.contains("body-centred")));
     }
@@ -329,7 +329,7 @@ fn damage_is_found() {
         assert_eq!(refusal(&damaged).is_some(), at < hash, "byte {at}");
         if at % 23 == 0 || at >= hash {
             let path = folder.write("a.splv", &damaged);
-            assert!(!check(&path, &limits, &|_, _| ()).is_sound(), "byte {at}");
+            assert!(!check(&path, &limits, None).is_sound(), "byte {at}");
         }
     }
     let message = |at: usize, to: u8| {
@@ -384,7 +384,7 @@ fn wrong_contents_are_found() {
     let folder = Folder::new();
     let right = volume(Scalar::I16, [70, 40, 33]);
     let codes = |bytes: Vec<u8>| {
-        let report = check(folder.write("a.splv", bytes), &Limits::default(), &|_, _| ());
+        let report = check(folder.write("a.splv", bytes), &Limits::default(), None);
         report
             .findings
             .iter()

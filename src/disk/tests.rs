@@ -132,8 +132,7 @@ fn hierarchies_made_in_regions_are_whole_or_not_there() {
     let stops = stop_everywhere("b.splk", |path| {
         let write = file::WriteOptions::default();
         let files = [input.clone()];
-        external::convert(&files, &Limits::default(), path, &options, &write, &|_, _, _| ())
-            .map(|_| ())
+        external::convert(&files, &Limits::default(), path, &options, &write, None).map(|_| ())
     });
     assert!(stops >= 12, "{stops}");
 }
@@ -142,8 +141,7 @@ fn hierarchies_made_in_regions_are_whole_or_not_there() {
 fn volumes_in_bricks_are_whole_or_not_there() {
     let volume = volume();
     let options = bricks::WriteOptions::default();
-    let stops =
-        stop_everywhere("a.splv", |path| bricks::write(&volume, path, &options, &|_, _| ()));
+    let stops = stop_everywhere("a.splv", |path| bricks::write(&volume, path, &options, None));
     assert!(stops >= 12, "{stops}");
     let inputs = Folder::new();
     let input = inputs.write("in.raw", volume.samples.bytes());
@@ -152,7 +150,7 @@ fn volumes_in_bricks_are_whole_or_not_there() {
     let layout = RawLayout { dims, sample_type, spacing, endian: Endian::Little, header: 0 };
     let stream = VolumeStream::open(&input, &Limits::default(), Some(&layout)).unwrap().unwrap();
     let stops = stop_everywhere("b.splv", |path| {
-        bricks::convert(&stream, volume.range, path, &options, &|_, _| ())
+        bricks::convert(&stream, volume.range, path, &options, None)
     });
     assert!(stops >= 12, "{stops}");
 }

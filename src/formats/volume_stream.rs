@@ -8,6 +8,7 @@ use super::{
 use crate::{
     Error, Result,
     input::{Limits, Mapping, Source, intact},
+    progress::{Watch, tell},
     volume::{Lattice, Samples, Scalar},
 };
 use std::{ops::Range, path::Path};
@@ -104,11 +105,11 @@ impl VolumeStream {
     ///
     /// # Errors
     /// [`Error::Input`] for samples that are not finite.
-    pub fn range(&self, watch: &dyn Fn(u64, u64)) -> Result<[f64; 2]> {
+    pub fn range(&self, watch: Watch<'_>) -> Result<[f64; 2]> {
         let count = self.plain.lattice.dims[2];
         let mut range = [f64::INFINITY, f64::NEG_INFINITY];
         for first in (0..count).step_by(PIECE) {
-            watch(first as u64, count as u64);
+            tell(watch, first as u64, count as u64);
             let z = first..(first + PIECE).min(count);
             let [low, high] = self.slices(z.clone())?.range().map_err(|message| {
                 let place = format!("samples of the slices {} to {}", z.start, z.end - 1);
@@ -144,7 +145,7 @@ mod tests {
         let whole = load_volume(path, &limits, layout).unwrap();
         let stream = VolumeStream::open(path, &limits, layout).unwrap().unwrap();
         assert_eq!((stream.lattice(), stream.scalar()), (&whole.lattice, whole.samples.scalar()));
-        assert_eq!(stream.range(&|_, _| ()).unwrap(), whole.range);
+        assert_eq!(stream.range(None).unwrap(), whole.range);
         let slice = whole.lattice.dims[0] * whole.lattice.dims[1] * whole.samples.sample_bytes();
         assert_eq!(
             stream.slices(3..7).unwrap().bytes(),
@@ -230,7 +231,7 @@ mod tests {
         let path = folder.write("a.raw", [1f32, 2.0, f32::NAN, 3.0].map(f32::to_le_bytes).concat());
         let stream =
             VolumeStream::open(&path, &limits, Some(&layout(SampleType::F32))).unwrap().unwrap();
-        let message = stream.range(&|_, _| ()).unwrap_err().to_string();
+        let message = stream.range(None).unwrap_err().to_string();
         assert!(
             message.contains("a.raw: samples of the slices 0 to 1: 1 of 4 samples are not finite"),
             "{message}"

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::{
     Deadline, Error, Result, memory,
+    progress::{Watch, tell},
     splat::{Payload, Splat, SplatSet},
 };
 use rayon::prelude::*;
@@ -62,11 +63,9 @@ impl Default for BuildOptions {
     }
 }
 
-/// Called after each finished part, with the splats built into blocks so far and the total.
-pub type Watch<'a> = &'a (dyn Fn(u64, u64) + Sync);
-
 impl Tree {
-    /// Builds the tree of a set of radiance splats. The same set gives the same tree.
+    /// Builds the tree of a set of radiance splats. The same set gives the same tree. `watch` is
+    /// called with the splats built into blocks so far and the total.
     ///
     /// # Errors
     /// Those of [`check_splats`]; [`Error::Timeout`] after the deadline; [`Error::Memory`] if there
@@ -86,7 +85,8 @@ impl Tree {
                 options.deadline.check(WORK)?;
                 let block = block_of(set, &part, options.preset, outer);
                 let count = part.len() as u64;
-                watch(built.fetch_add(count, Ordering::Relaxed) + count, set.splats.len() as u64);
+                let done = built.fetch_add(count, Ordering::Relaxed) + count;
+                tell(watch, done, set.splats.len() as u64);
                 Ok(block)
             })
             .collect();
@@ -143,7 +143,7 @@ pub fn build_file(
         let blocks: Result<Vec<Block>> = parts.par_iter().map(block).collect();
         builder.add(blocks?)?;
         built += parts.iter().map(|part| part.len() as u64).sum::<u64>();
-        watch(built, set.splats.len() as u64);
+        tell(watch, built, set.splats.len() as u64);
     }
     builder.finish(&Whole {
         origin: set.origin,
@@ -307,13 +307,13 @@ mod tests {
         };
         let options = BuildOptions { deadline: Deadline::after(0), ..BuildOptions::default() };
         let built = [
-            Tree::build(&set, &options, &|_, _| ()).map(drop),
+            Tree::build(&set, &options, None).map(drop),
             build_file(
                 &set,
                 Folder::new().path().join("a.splk"),
                 &options,
                 &WriteOptions::default(),
-                &|_, _| (),
+                None,
             ),
         ];
         for built in built {

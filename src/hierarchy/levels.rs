@@ -82,7 +82,7 @@ impl Levels {
     fn nodes(&mut self, cut: &Cut) -> Result<Arc<SplatSet>> {
         if !matches!(self.fewer, Fewer::Tree(_)) {
             let options = BuildOptions { preset: Preset::Fastest, ..BuildOptions::default() };
-            self.fewer = Fewer::Tree(Tree::build(&self.set, &options, &|_, _| {})?);
+            self.fewer = Fewer::Tree(Tree::build(&self.set, &options, None)?);
         }
         let Fewer::Tree(tree) = &self.fewer else { return Ok(self.set.clone()) };
         Ok(Arc::new(tree.at_cut(cut)))

@@ -19,7 +19,7 @@ mod sphere;
 pub(crate) mod testing;
 mod validate;
 
-pub use build::{BuildOptions, Preset, Watch, build_file, check_splats};
+pub use build::{BuildOptions, Preset, build_file, check_splats};
 pub use cut::{BLEND_BAND, Cut, Detail, SHARE_UNIT};
 pub(crate) use cut::{MOST_PIXELS, cone_margin};
 pub use file::{CutSphere, Hierarchy};

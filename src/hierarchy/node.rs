@@ -67,7 +67,7 @@ pub struct Block {
 /// };
 ///
 /// let ball = Mesh::sphere(4).surfels(&SurfelOptions::default())?;
-/// let tree = Tree::build(&ball, &BuildOptions::default(), &|_, _| ())?;
+/// let tree = Tree::build(&ball, &BuildOptions::default(), None)?;
 /// assert!(validate(&tree).is_empty());
 /// // From afar, few splats stand for the whole.
 /// let camera = Camera::framing(&tree.bounds, DVec3::NEG_Z, DVec3::Y, 1.0);

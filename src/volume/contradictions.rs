@@ -52,7 +52,7 @@ fn refused_by_all(name: &str, word: &str, volume: &Volume) {
     refused(name, word, Reconstruction::new(volume, &kernel));
     refused(name, word, Bricks::from_volume(Arc::new(volume.clone())));
     let options = bricks::WriteOptions::default();
-    refused(name, word, bricks::write(volume, path("a.splv"), &options, &|_, _| ()));
+    refused(name, word, bricks::write(volume, path("a.splv"), &options, None));
     none(&path("a.splv"));
     refused(name, word, nrrd::write(volume, path("a.nrrd")));
     none(&path("a.nrrd"));

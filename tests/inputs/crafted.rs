@@ -67,7 +67,7 @@ pub fn long_splk() -> Vec<u8> {
         .collect();
     let mesh = Mesh { positions, ..Mesh::default() };
     let splats = mesh.surfels(&SurfelOptions::default()).expect("surfels");
-    let tree = Tree::build(&splats, &BuildOptions::default(), &|_, _| ()).expect("a tree");
+    let tree = Tree::build(&splats, &BuildOptions::default(), None).expect("a tree");
     let options = file::WriteOptions { lossless: true, ..file::WriteOptions::default() };
     file::to_bytes(&tree, &options).expect("bytes")
 }

@@ -362,7 +362,7 @@ pub fn tree() -> Tree {
     let positions = (0..9).map(|i| Vec3::new((i % 3) as f32, (i / 3) as f32, 0.0)).collect();
     let mesh = Mesh { positions, ..Mesh::default() };
     let splats = mesh.surfels(&SurfelOptions::default()).expect("surfels");
-    Tree::build(&splats, &BuildOptions::default(), &|_, _| ()).expect("a tree")
+    Tree::build(&splats, &BuildOptions::default(), None).expect("a tree")
 }
 
 pub fn splk(lossless: bool) -> Vec<u8> {
@@ -376,7 +376,7 @@ pub fn splv(folder: &Folder) -> Vec<u8> {
     let volume = Phantom::Specimen.sample_bytes([34, 5, 3]).expect("a volume");
     let path = folder.0.join("made.splv");
     let options = bricks::WriteOptions { unit: "mm".into(), ..bricks::WriteOptions::default() };
-    bricks::write(&volume, &path, &options, &|_, _| ()).expect("a file");
+    bricks::write(&volume, &path, &options, None).expect("a file");
     let bytes = std::fs::read(&path).expect("bytes");
     std::fs::remove_file(&path).ok();
     bytes

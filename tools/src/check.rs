@@ -40,7 +40,7 @@ impl Check {
             Kind::Bricks => {
                 let stages = progress.stages();
                 let watch = |done, all| stages.set("Checking bricks", done, all);
-                bricks::check(&self.file, &limits, &watch).findings
+                bricks::check(&self.file, &limits, Some(&watch)).findings
             }
             _ => match self.load.open(&self.file)? {
                 Input::Mesh(mesh) => {

@@ -128,7 +128,7 @@ impl Demo {
         };
         let write = WriteOptions { source: MESH.into(), ..WriteOptions::default() };
         let splats = mesh.surfels(&SurfelOptions::default())?;
-        build_file(&splats, self.folder.join(TREE), &build, &write, &|_, _| ())?;
+        build_file(&splats, self.folder.join(TREE), &build, &write, None)?;
         formats::nrrd::write(&specimen, self.folder.join(VOLUME))?;
         Ok(disk::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())?)
     }

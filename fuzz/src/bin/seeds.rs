@@ -599,7 +599,7 @@ fn hierarchies(seeds: &mut Seeds) -> Result<()> {
         let tree = Tree::build(
             &set,
             &BuildOptions { block_splats, ..BuildOptions::default() },
-            &|_, _| {},
+            None,
         )?;
         for lossless in [false, true] {
             let options = WriteOptions {
@@ -629,7 +629,7 @@ fn in_bricks(seeds: &mut Seeds) -> Result<()> {
         for samples in samples(dims.iter().product()) {
             let volume = Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples)?;
             let options = bricks::WriteOptions { unit: "mm".into(), source: "a".into() };
-            let bytes = seeds.written(|path| bricks::write(&volume, path, &options, &|_, _| {}))?;
+            let bytes = seeds.written(|path| bricks::write(&volume, path, &options, None))?;
             seeds.put("splv", &bytes)?;
             seeds.known("splv_summed", bytes)?;
         }

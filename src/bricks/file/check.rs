@@ -6,6 +6,7 @@ use crate::{
     bricks::{Brick, Bricks, Level, SIDE, pyramid::Pyramid},
     container::{Finding, Findings, Report},
     input::Limits,
+    progress::{Watch, tell},
     volume::steps::Steps,
 };
 use rayon::prelude::*;
@@ -17,7 +18,7 @@ use std::path::Path;
 /// and the number in all.
 ///
 /// Never returns an error: a file that cannot be opened is a finding.
-pub fn check(path: impl AsRef<Path>, limits: &Limits, watch: &(dyn Fn(u64, u64) + Sync)) -> Report {
+pub fn check(path: impl AsRef<Path>, limits: &Limits, watch: Watch<'_>) -> Report {
     let mut findings = Findings::default();
     match Bricks::open(path, limits) {
         Ok(bricks) => return bricks.check(watch),
@@ -29,7 +30,7 @@ pub fn check(path: impl AsRef<Path>, limits: &Limits, watch: &(dyn Fn(u64, u64) 
 impl Bricks {
     /// Like [`check`](check()), for a file that is already open, or for its bytes. A volume in
     /// memory has nothing to check.
-    pub fn check(&self, watch: &(dyn Fn(u64, u64) + Sync)) -> Report {
+    pub fn check(&self, watch: Watch<'_>) -> Report {
         let mut findings = Findings::default();
         if !self.bytes().is_empty()
             && sums(self, watch, &mut findings)
@@ -46,7 +47,7 @@ fn count(bricks: &Bricks) -> u64 {
 }
 
 /// Returns whether every brick can be read and the hash matches.
-fn sums(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findings) -> bool {
+fn sums(bricks: &Bricks, watch: Watch<'_>, findings: &mut Findings) -> bool {
     let bytes = bricks.bytes();
     let (text, hash) = bytes.split_at(bytes.len() - HASH);
     let mut is_sound = *blake3::hash(text).as_bytes() == *hash;
@@ -64,18 +65,14 @@ fn sums(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findi
             is_sound &= errors.is_empty();
             errors.iter().for_each(|error| findings.push(finding("brick", error)));
             done += layer.len() as u64;
-            watch(done, 2 * count(bricks));
+            tell(watch, done, 2 * count(bricks));
         }
     }
     is_sound
 }
 
 /// Checks that the file is what its level 0 would be converted to.
-fn contents(
-    bricks: &Bricks,
-    watch: &(dyn Fn(u64, u64) + Sync),
-    findings: &mut Findings,
-) -> Result<()> {
+fn contents(bricks: &Bricks, watch: Watch<'_>, findings: &mut Findings) -> Result<()> {
     let header = bricks.header();
     let steps = Steps::new(header.scalar, header.range);
     let mut pyramid = Pyramid::new(header.scalar, header.lattice.dims);
@@ -103,7 +100,7 @@ fn contents(
                 (0..nx * ny).into_par_iter().map(odd).collect::<Result<_>>()?;
             odd.into_iter().flatten().for_each(|finding| findings.push(finding));
             done += (nx * ny) as u64;
-            watch(done, 2 * count(bricks));
+            tell(watch, done, 2 * count(bricks));
             Ok(())
         })?;
     }

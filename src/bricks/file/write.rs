@@ -9,6 +9,7 @@ use crate::{
     bricks::{Header, REACH, SIDE, cut::Slices, level, pyramid::Pyramid},
     container::{Spill, Target},
     formats::VolumeStream,
+    progress::{Watch, tell},
     volume::{Scalar, Volume, steps::Steps},
 };
 use rayon::prelude::*;
@@ -33,9 +34,6 @@ const PIECE: usize = 8;
 /// Bricks that are encoded in parallel before they are written.
 const BATCH: usize = 256;
 
-/// Called with the number of slices done and the number in all.
-type Watch<'a> = &'a dyn Fn(u64, u64);
-
 /// Returns approximately how many bytes of memory [`convert`] needs. For level 0, it holds the
 /// slices of a layer of bricks, those that reach into it and those being read. Each further level
 /// needs a quarter of the one before. Packing needs a little more.
@@ -56,7 +54,7 @@ pub fn write(
     volume: &Volume,
     path: impl AsRef<Path>,
     options: &WriteOptions,
-    watch: Watch,
+    watch: Watch<'_>,
 ) -> Result<()> {
     let path = path.as_ref();
     volume.validate().map_err(Error::Argument)?;
@@ -83,7 +81,7 @@ pub fn convert(
     range: [f64; 2],
     path: impl AsRef<Path>,
     options: &WriteOptions,
-    watch: Watch,
+    watch: Watch<'_>,
 ) -> Result<()> {
     let path = path.as_ref();
     let WriteOptions { unit, source } = options.clone();
@@ -104,7 +102,7 @@ pub fn to_bytes(volume: &Volume, options: &WriteOptions) -> Result<Vec<u8>> {
         memory,
         target,
         |z| Ok(slices(volume, z)),
-        &|_, _| (),
+        None,
     )
 }
 
@@ -149,7 +147,7 @@ fn all<'a>(
     spill: impl FnOnce() -> Result<Spill>,
     target: impl FnOnce() -> Result<Target>,
     slices: impl Fn(Range<usize>) -> Result<Cow<'a, [u8]>>,
-    watch: Watch,
+    watch: Watch<'_>,
 ) -> Result<Vec<u8>> {
     header.validate().map_err(Error::Argument)?;
     let dims = header.lattice.dims;
@@ -158,7 +156,7 @@ fn all<'a>(
     let fail = |e| Error::output(path, e);
     for first in (0..dims[2]).step_by(PIECE) {
         let z = first..(first + PIECE).min(dims[2]);
-        watch(first as u64, dims[2] as u64);
+        tell(watch, first as u64, dims[2] as u64);
         let piece = slices(z)?;
         pyramid
             .push(&piece, |level, layer, slices| coder.layer(level, layer, slices).map_err(fail))?;

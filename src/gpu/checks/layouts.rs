@@ -3,6 +3,7 @@
 use super::{recipes, variants::usual};
 use crate::{
     gpu::{
+        passes::present::Present,
         pipeline::state::{
             AGAIN_ARGUMENTS, ARGUMENT_BYTES, MARCH_ARGUMENTS, ORDER_ARGUMENTS, PASS_BYTES,
             SCAN_ARGUMENTS, State, TILE_ARGUMENTS,
@@ -133,6 +134,10 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
     let cut = layout!(GpuCut:
         sides, scale, fineness, perspective, culls, sin_margin, cos_margin, unused,
     );
+    let present = layout!(Present:
+        size, first_row, is_srgb, center, scale, perspective, word, wanted, stalled, far, has_depth,
+        unused,
+    );
     [
         ("Frame", frame),
         ("Clip", layout!(FrameClip: low, high)),
@@ -147,6 +152,7 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
         // WGSL pads the end of a structure by itself, and has no three numbers without alignment.
         ("Bounds", layout!(GpuBounds: center, radius, size, unused).without_padding("unused")),
         ("Cut", cut),
+        ("Present", present.without_padding("unused")),
     ]
     .into()
 }

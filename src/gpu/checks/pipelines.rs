@@ -3,7 +3,7 @@
 //! checks that untrusted shaders need.
 
 use super::{
-    recipes::{self, parse, source_of},
+    recipes::{self, parse, source_of, stage_of},
     variants,
 };
 use crate::gpu::pipeline::{
@@ -11,8 +11,8 @@ use crate::gpu::pipeline::{
     variant::Variant,
 };
 use naga::{
-    AddressSpace, ImageClass, ImageDimension, Module, ResourceBinding, ScalarKind, ShaderStage,
-    StorageAccess, TypeInner,
+    AddressSpace, ImageClass, ImageDimension, Module, ResourceBinding, ScalarKind, StorageAccess,
+    TypeInner,
     back::{PipelineConstants, hlsl, msl, pipeline_constants::process_overrides, spv},
     valid::{Capabilities, ModuleInfo, ValidationFlags, Validator},
 };
@@ -68,7 +68,7 @@ fn check(recipe: &Recipe) -> Outcome {
         .map_err(|error| error.emit_to_string(&source_of(recipe)))?;
     check_bindings(recipe, &module, &info)?;
     // What wgpu does before it writes a pipeline: only what its entry point reaches is left.
-    let entry = (ShaderStage::Compute, recipe.entry);
+    let entry = (stage_of(recipe, &module), recipe.entry);
     let (module, info) =
         process_overrides(&module, &info, Some(entry), &PipelineConstants::default())
             .map_err(told)?;
@@ -131,7 +131,7 @@ fn write_spirv(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
         ..spv::Options::default()
     };
     let pipeline = spv::PipelineOptions {
-        shader_stage: ShaderStage::Compute,
+        shader_stage: stage_of(recipe, module),
         entry_point: recipe.entry.to_owned(),
     };
     spv::write_vec(module, info, &options, Some(&pipeline)).map(drop).map_err(told)
@@ -166,7 +166,7 @@ fn write_msl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
         ..msl::Options::default()
     };
     let pipeline = msl::PipelineOptions {
-        entry_point: Some((ShaderStage::Compute, recipe.entry.to_owned())),
+        entry_point: Some((stage_of(recipe, module), recipe.entry.to_owned())),
         ..msl::PipelineOptions::default()
     };
     let (_, written) = msl::write_string(module, info, &options, &pipeline).map_err(told)?;
@@ -190,7 +190,7 @@ fn write_hlsl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
         ..hlsl::Options::default()
     };
     let pipeline = hlsl::PipelineOptions {
-        entry_point: Some((ShaderStage::Compute, recipe.entry.to_owned())),
+        entry_point: Some((stage_of(recipe, module), recipe.entry.to_owned())),
     };
     let mut text = String::new();
     let written = hlsl::Writer::new(&mut text, &options, &pipeline)
@@ -260,9 +260,9 @@ fn every_entry_point_has_a_pipeline() {
     for file in folder.read_dir().expect("the folder of the passes") {
         let path = file.expect("a file").path();
         let text = std::fs::read_to_string(&path).expect("a shader");
-        let entries: Vec<&str> = text
-            .split("@compute")
-            .skip(1)
+        let entries: Vec<&str> = ["@compute", "@vertex\n", "@fragment\n"]
+            .iter()
+            .flat_map(|stage| text.split(stage).skip(1))
             .filter_map(|part| part.split_once("fn ")?.1.split('(').next())
             .collect();
         assert!(!entries.is_empty(), "{} has no entry point", path.display());

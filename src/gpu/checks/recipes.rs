@@ -3,13 +3,13 @@
 use crate::gpu::{
     passes::{
         bin::Bin, clear::Clear, cull::Cull, cut::Cut, gather::Gather, large::Large, march::March,
-        measure::Measure, occlusion::Occlusion, order::Order, plan::Plan, project::Project,
-        resume::Resume, tiles::Tiles,
+        measure::Measure, occlusion::Occlusion, order::Order, plan::Plan, present::Presenter,
+        project::Project, resume::Resume, tiles::Tiles,
     },
     pipeline::{recipe::Recipe, scan::Scan, variant::Variant},
     scene::{select::Select, select_bricks::SelectBricks},
 };
-use naga::{Expression, Literal, Module};
+use naga::{Expression, Literal, Module, ShaderStage};
 
 /// WebGPU's default limit, which every device is opened with.
 const MOST_WORKGROUPS: u32 = 65_535;
@@ -23,6 +23,7 @@ pub fn shared() -> Vec<Recipe> {
     all.extend(Scan::recipes());
     all.extend(Resume::recipes());
     all.extend(Tiles::recipes());
+    all.extend(Presenter::recipes());
     all
 }
 
@@ -57,6 +58,12 @@ pub fn source_of(recipe: &Recipe) -> String {
 pub fn parse(recipe: &Recipe) -> Result<Module, String> {
     let source = source_of(recipe);
     naga::front::wgsl::parse_str(&source).map_err(|error| error.emit_to_string(&source))
+}
+
+/// Returns the kind of a pipeline's entry point.
+pub fn stage_of(recipe: &Recipe, module: &Module) -> ShaderStage {
+    let own = module.entry_points.iter().find(|point| point.name == recipe.entry);
+    own.map_or(ShaderStage::Compute, |point| point.stage)
 }
 
 /// Returns the constants of a module that are unsigned integers.

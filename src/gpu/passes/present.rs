@@ -1,12 +1,16 @@
 //! Present: writes a finished strip to where the host application wants it
 //! (shaders/passes/present.wgsl).
 
+#[cfg(test)]
+use crate::gpu::pipeline::recipe::Recipe;
 use crate::{
     gpu::{
         device::{Gpu, buffers::filled_buffer},
         output::Output,
         pipeline::{
+            recipe::Binding,
             shaders,
+            stage::layout_of,
             state::{DONE_WORD, STALLED_WORD},
         },
         targets::{Targets, gathered_word},
@@ -36,7 +40,7 @@ pub struct Present {
     pub stalled: u32,
     pub far: f32,
     pub has_depth: u32,
-    pub unused: [u32; 3],
+    pub unused: u32,
 }
 
 /// A strip of a picture, and where its rows lie.
@@ -49,6 +53,9 @@ pub struct Strip<'a> {
     pub optics: Optics,
 }
 
+/// The bindings of the pass.
+const BINDINGS: [Binding; 4] = [Binding::Uniform, Binding::Read, Binding::Read, Binding::Read];
+
 /// The pipelines of the pass: one for each format of colours, with depths and without.
 #[derive(Debug, Default)]
 pub struct Presenter {
@@ -56,6 +63,14 @@ pub struct Presenter {
 }
 
 impl Presenter {
+    /// Returns the entry points of the shader, for the checks of shaders.
+    #[cfg(test)]
+    pub fn recipes() -> [Recipe; 3] {
+        ["corner", "color", "color_and_depth"].map(|entry| {
+            Recipe::new(&format!("present: {entry}"), &[shaders::PRESENT], entry, &[&BINDINGS])
+        })
+    }
+
     /// Encodes the commands that write a strip, once it is finished.
     pub fn encode(
         &mut self,
@@ -92,9 +107,10 @@ fn pipeline(gpu: &Gpu, format: TextureFormat, has_depth: bool) -> wgpu::RenderPi
         label: Some("present"),
         source: wgpu::ShaderSource::Wgsl(shaders::PRESENT.into()),
     });
+    let group = layout_of(&gpu.device, "present", &BINDINGS, wgpu::ShaderStages::FRAGMENT);
     let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("present"),
-        bind_group_layouts: &[Some(&group_layout(gpu))],
+        bind_group_layouts: &[Some(&group)],
         immediate_size: 0,
     });
     let target = |format| Some(wgpu::ColorTargetState::from(format));
@@ -126,22 +142,6 @@ fn pipeline(gpu: &Gpu, format: TextureFormat, has_depth: bool) -> wgpu::RenderPi
     })
 }
 
-fn group_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
-    let storage = wgpu::BufferBindingType::Storage { read_only: true };
-    let kinds = [wgpu::BufferBindingType::Uniform, storage, storage, storage];
-    let entry = |(binding, ty)| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::FRAGMENT,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
-        count: None,
-    };
-    let entries: Vec<_> = (0..).zip(kinds).map(entry).collect();
-    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("present"),
-        entries: &entries,
-    })
-}
-
 fn bind(
     gpu: &Gpu,
     pipeline: &wgpu::RenderPipeline,
@@ -169,7 +169,7 @@ fn bind(
         far: f32::INFINITY,
         // The maximum of a ray has no depth.
         has_depth: (strip.optics != Optics::Maximum).into(),
-        unused: [0; 3],
+        unused: 0,
     };
     let usage = wgpu::BufferUsages::UNIFORM;
     let constants = filled_buffer(gpu, "present", bytemuck::bytes_of(&constants), usage);

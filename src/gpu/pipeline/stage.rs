@@ -42,8 +42,9 @@ impl Stage {
         // file.
         #[expect(unsafe_code, reason = "shaders without the checks that untrusted ones need")]
         let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
+        let visibility = wgpu::ShaderStages::COMPUTE;
         let layouts: Vec<_> =
-            recipe.groups.iter().map(|bindings| layout(device, label, bindings)).collect();
+            recipe.groups.iter().map(|own| layout_of(device, label, own, visibility)).collect();
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(label),
             bind_group_layouts: &layouts.iter().map(Some).collect::<Vec<_>>(),
@@ -148,14 +149,20 @@ impl Stage {
     }
 }
 
-fn layout(device: &wgpu::Device, label: &str, bindings: &[Binding]) -> wgpu::BindGroupLayout {
+/// Creates the layout of a bind group.
+pub fn layout_of(
+    device: &wgpu::Device,
+    label: &str,
+    bindings: &[Binding],
+    visibility: wgpu::ShaderStages,
+) -> wgpu::BindGroupLayout {
     let buffer =
         |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let entries: Vec<_> = (0..)
         .zip(bindings)
         .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
             binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
+            visibility,
             ty: match kind {
                 Binding::Uniform => buffer(wgpu::BufferBindingType::Uniform),
                 Binding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),

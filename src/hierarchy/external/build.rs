@@ -11,6 +11,7 @@ use super::{
     bins::Bins,
     distribute::Distributed,
     survey::Triangulated,
+    tell,
 };
 use crate::{
     Deadline, Error, Result,
@@ -70,7 +71,7 @@ impl Work<'_> {
             true => Some(Bins::<Side>::beside(wanted, regions as usize, self.options.memory)?),
             false => None,
         };
-        (self.watch)(Stage::Building, self.built, self.points);
+        tell(self.watch, Stage::Building, self.built, self.points);
         for region in 0..regions {
             self.deadline = Deadline::after(self.seconds);
             let surfels = SurfelOptions { deadline: self.deadline, ..self.options.surfels.clone() };
@@ -90,7 +91,7 @@ impl Work<'_> {
                 other => other,
             })?;
             self.built += owned;
-            (self.watch)(Stage::Building, self.built, self.points);
+            tell(self.watch, Stage::Building, self.built, self.points);
         }
         Ok(())
     }

@@ -4,6 +4,7 @@ use super::{
     Stage, StageWatch,
     bins::Bins,
     survey::{Surveyed, name},
+    tell,
 };
 use crate::{
     Result,
@@ -72,7 +73,7 @@ pub fn distribute<'a>(
     input.stream.points(share, |shares| {
         radius = radius.max(shares.radius);
         done += shares.seen;
-        watch(Stage::Distributing, done, total);
+        tell(watch, Stage::Distributing, done, total);
         for (region, point) in shares.items {
             if crowd.takes(&mut points, region, &point)? {
                 points.push(region, point)?;
@@ -89,7 +90,7 @@ pub fn distribute<'a>(
             |_, found| (triangle_shares(&input, found), found.len() as u64),
             |((corners, foreign), seen)| {
                 done += seen;
-                watch(Stage::Distributing, done, total);
+                tell(watch, Stage::Distributing, done, total);
                 corners
                     .into_iter()
                     .try_for_each(|(region, triangle)| bins.push(region, triangle))?;

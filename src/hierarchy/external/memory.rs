@@ -1,6 +1,6 @@
 //! Memory needed by conversions.
 
-use super::{ExternalOptions, Stage, StageWatch, triangles::look};
+use super::{ExternalOptions, Stage, StageWatch, tell, triangles::look};
 use crate::{
     Error, Result,
     formats::{Counts, Stream},
@@ -84,7 +84,7 @@ pub fn memory_of_stream(stream: &mut Stream, options: &SurfelOptions, enough: u6
     if counts.triangles == 0 {
         return Ok(of_counts(counts));
     }
-    let (_, seen) = look(stream, options, room(counts, enough), &|_, _, _| ())?;
+    let (_, seen) = look(stream, options, room(counts, enough), None)?;
     let others = counts.triangles.saturating_sub(seen.long.len() as u64);
     Ok(of_counts(once_cut(counts, others + seen.cut as u64)))
 }
@@ -131,7 +131,7 @@ pub fn check(
     for file in files {
         let Some(mut stream) = Stream::open(file, limits)? else { continue };
         let points = stream.counts().points;
-        stream.settle(&|done| watch(Stage::Reading, done, points))?;
+        stream.settle(&|done| tell(watch, Stage::Reading, done, points))?;
         if stream.counts().triangles > 0 {
             let surfels = SurfelOptions { deadline: limits.deadline(), ..options.surfels.clone() };
             let options = ExternalOptions { surfels, ..options.clone() };

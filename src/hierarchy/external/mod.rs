@@ -49,7 +49,15 @@ pub enum Stage {
 
 /// Called after each finished part, with the stage, its progress and its total, in points,
 /// triangles or splats. A stage may start again for the next input, or for the next pass over it.
-pub type StageWatch<'a> = &'a (dyn Fn(Stage, u64, u64) + Sync);
+/// `None`: nobody wants to know.
+pub type StageWatch<'a> = Option<&'a (dyn Fn(Stage, u64, u64) + Sync)>;
+
+/// Says how far a stage is.
+fn tell(watch: StageWatch<'_>, stage: Stage, done: u64, total: u64) {
+    if let Some(watch) = watch {
+        watch(stage, done, total);
+    }
+}
 
 /// Options for converting a file in regions.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,7 +174,7 @@ pub fn convert(
         return Err(Error::NothingToDraw("no points are left, or no triangle has an area".into()));
     }
     done.splats = work.splats;
-    watch(Stage::Writing, 0, 0);
+    tell(watch, Stage::Writing, 0, 0);
     let Converted { points, closed, .. } = done;
     work.builder.finish(&Whole { origin, bounds: work.bounds, closed, source_points: points })?;
     Ok(done)

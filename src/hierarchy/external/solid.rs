@@ -1,6 +1,6 @@
 //! Determines whether a closed mesh that is read in pieces is solid.
 
-use super::{Stage, StageWatch};
+use super::{Stage, StageWatch, tell};
 use crate::{
     Result,
     formats::{Counts, Stream},
@@ -93,7 +93,7 @@ struct Seen<'a> {
 impl Seen<'_> {
     fn add(&mut self, count: usize) -> Result<()> {
         self.done += count as u64;
-        (self.watch)(Stage::Reading, self.done, self.of);
+        tell(self.watch, Stage::Reading, self.done, self.of);
         Ok(())
     }
 }
@@ -153,8 +153,7 @@ mod tests {
         let limits = Limits::default();
         let mut stream = Stream::open(&path, &limits).unwrap().unwrap();
         stream.settle(&|_| ()).unwrap();
-        let solid =
-            |memory| is_solid(&stream, PiecesClosing::Vertices, memory, &|_, _, _| ()).unwrap();
+        let solid = |memory| is_solid(&stream, PiecesClosing::Vertices, memory, None).unwrap();
         let triangles = Joining::memory(4 * count, 0);
         let need = triangles + Sides::memory(count as usize);
         assert!(2 * triangles < LEAST_MEMORY);

@@ -9,6 +9,7 @@ use super::{
     memory::look_at_long,
     regions::Regions,
     solid::is_solid,
+    tell,
 };
 use crate::{Result, formats::Stream, surface::MeshPieces};
 use glam::{DVec3, Vec3};
@@ -51,7 +52,7 @@ pub fn survey<'a>(
     watch: StageWatch<'_>,
 ) -> Result<Surveyed<'a>> {
     let counted = stream.counts();
-    stream.settle(&|done| watch(Stage::Reading, done, counted.points))?;
+    stream.settle(&|done| tell(watch, Stage::Reading, done, counted.points))?;
     let [low, high] = stream.bounds();
     let cube = Cube::around(low, high);
     let (mut extremes, mut sum) = (Extremes::default(), DVec3::ZERO);
@@ -76,7 +77,7 @@ pub fn survey<'a>(
                 }
                 count(&keys);
                 done += keys.len() as u64;
-                watch(Stage::Reading, done, stream.point_count());
+                tell(watch, Stage::Reading, done, stream.point_count());
                 Ok(())
             },
         )

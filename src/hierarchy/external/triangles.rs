@@ -1,6 +1,6 @@
 //! Visiting the triangles of a stream.
 
-use super::{Stage, StageWatch};
+use super::{Stage, StageWatch, tell};
 use crate::{
     Result,
     formats::Stream,
@@ -30,7 +30,7 @@ pub fn look(
             |(more, count)| {
                 seen.join(more);
                 done += count;
-                watch(Stage::Reading, done, counts.triangles);
+                tell(watch, Stage::Reading, done, counts.triangles);
                 Ok(())
             },
         )?;

@@ -84,7 +84,7 @@ impl Page {
 /// };
 ///
 /// let ball = Mesh::sphere(3).surfels(&SurfelOptions::default())?;
-/// let tree = Tree::build(&ball, &BuildOptions::default(), &|_, _| ())?;
+/// let tree = Tree::build(&ball, &BuildOptions::default(), None)?;
 /// let bytes = file::to_bytes(&tree, &file::WriteOptions::default())?;
 /// let hierarchy = Hierarchy::from_bytes(bytes, "ball.splk", &Limits::default())?;
 /// assert_eq!(hierarchy.header().leaves, ball.splats.len() as u64);

@@ -41,11 +41,11 @@ impl Convert {
         let stages = progress.stages();
         let watch = |done, all| stages.set("Writing bricks, slice by slice", done, all);
         match &source {
-            Source::Whole(volume) => bricks::write(volume, &self.output, &options, &watch),
+            Source::Whole(volume) => bricks::write(volume, &self.output, &options, Some(&watch)),
             Source::Stream(stream) => {
                 let range =
-                    stream.range(&|done, all| stages.set("Scanning the input", done, all))?;
-                bricks::convert(stream, range, &self.output, &options, &watch)
+                    stream.range(Some(&|done, all| stages.set("Scanning the input", done, all)))?;
+                bricks::convert(stream, range, &self.output, &options, Some(&watch))
             }
         }
         .map_err(|error| in_file(file, error))?;

@@ -51,7 +51,7 @@ impl Convert {
         };
         let limits = self.load.limits();
         if self.dry_run {
-            check(&self.files, &limits, &options, &watch)?;
+            check(&self.files, &limits, &options, Some(&watch))?;
             drop(stages);
             progress.clear();
             return self.print_need(need.bytes, most);
@@ -61,7 +61,7 @@ impl Convert {
         let frame =
             Frame { up: first.filter(Stream::z_is_up).map(|_| UpAxis::Z), ..Frame::default() };
         let write = self.surface.write_options(&self.files, &frame);
-        let done = convert(&self.files, &limits, &self.output, &options, &write, &watch)?;
+        let done = convert(&self.files, &limits, &self.output, &options, &write, Some(&watch))?;
         drop(stages);
         progress.clear();
         self.print_converted(&done, milliseconds(start))

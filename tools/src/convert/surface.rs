@@ -122,7 +122,8 @@ impl Convert {
                 self.surface.build_options(&gathered, limits.deadline()),
                 self.surface.write_options(&self.files, &gathered.frame),
             );
-            let built = hierarchy::build_file(&gathered.set, &self.output, &build, &write, &watch);
+            let built =
+                hierarchy::build_file(&gathered.set, &self.output, &build, &write, Some(&watch));
             built.map_err(|error| error.in_file(&self.files[0]))?;
         }
         progress.clear();
@@ -236,7 +237,7 @@ impl Convert {
             self.surface.write_options(&self.files, &gathered.frame),
         );
         let start = Instant::now();
-        let built = hierarchy::Tree::build(&part, &build, &|_, _| ());
+        let built = hierarchy::Tree::build(&part, &build, None);
         let tree = built.map_err(|error| error.in_file(&self.files[0]))?;
         let bytes = hierarchy::file::to_bytes(&tree, &write)?.len() as f64;
         let share = splats.len() as f64 / count as f64;

@@ -40,8 +40,7 @@ fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
         Input::Hierarchy(hierarchy) => Ok(hierarchy),
         Input::Mesh(mesh) => {
             let options = BuildOptions { closed: mesh.is_solid(), ..BuildOptions::default() };
-            let tree =
-                Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, &|_, _| ())?;
+            let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, None)?;
             Ok(Arc::new(Hierarchy::from_tree(tree)?))
         }
         _ => Err(Error::input(&source.path, "file", OTHER).into()),

@@ -286,7 +286,7 @@ pub fn tables(
             source_points: Some(mesh.positions.len() as u64),
             ..BuildOptions::default()
         };
-        let tree = Tree::build(&splats, &options, &|_, _| ())?;
+        let tree = Tree::build(&splats, &options, None)?;
         let (picture, found, drawn) =
             truth.measure(stage, &Scene::new().with_splats(splats), Detail::default())?;
         table.row(source.name(), found.cells(drawn));

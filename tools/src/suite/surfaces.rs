@@ -59,6 +59,6 @@ pub fn hierarchy(mesh: &Mesh) -> Result<(Hierarchy, Bounds)> {
     let [min, max] =
         mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
     let options = BuildOptions { closed: true, ..BuildOptions::default() };
-    let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, &|_, _| ())?;
+    let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, None)?;
     Ok((Hierarchy::from_tree(tree)?, Bounds { min, max }))
 }
