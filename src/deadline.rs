@@ -3,7 +3,7 @@
 use crate::{Error, Result};
 use std::{
     sync::atomic::{AtomicBool, Ordering::Relaxed},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 /// The moment by which work on an input must be done. By default there is none.

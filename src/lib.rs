@@ -89,6 +89,7 @@ pub mod hierarchy;
 pub mod input;
 pub mod math;
 pub mod memory;
+pub(crate) mod parallel;
 pub mod picture;
 pub(crate) mod plan;
 pub mod reference;

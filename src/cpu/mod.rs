@@ -53,6 +53,7 @@ use crate::{
     bricks::{Bricks, Choice},
     hierarchy::Detail,
     math::{Camera, Sheets, View},
+    parallel::prelude::*,
     picture::Picture,
     plan::{
         FrameStats, TILE, gathering,
@@ -78,7 +79,6 @@ use gather::Gather;
 use items::Prepared;
 use march::{EMPTY, March, Tile};
 use plan::Plan;
-use rayon::prelude::*;
 use spare::Spare;
 use std::{
     sync::atomic::{AtomicU64, Ordering::Relaxed},

@@ -21,6 +21,7 @@ use super::shared::texture;
 use crate::{
     Result,
     input::{Source, positions},
+    parallel::prelude::*,
     surface::{Material, Mesh},
 };
 use faces::Faces;
@@ -30,7 +31,6 @@ use glam::{DVec3, Vec2, Vec3};
 use header::Element;
 pub(super) use pieces::Pieces;
 use ply_rs::ply::{PropertyType, ScalarType};
-use rayon::prelude::*;
 use rows::Rows;
 pub use samples::{has_faces, read_samples};
 use table::Table;

@@ -11,10 +11,10 @@ use super::{
 use crate::{
     Result,
     input::{Limits, Source, positions},
+    parallel::{self, prelude::*},
 };
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use std::path::Path;
 
 /// The counts in a file's header.
@@ -274,7 +274,7 @@ impl<'a> Stream<'a> {
         make: impl Fn(usize) -> Result<T> + Sync,
         mut take: impl FnMut(T) -> Result<()>,
     ) -> Result<()> {
-        let batch = 2 * rayon::current_num_threads();
+        let batch = 2 * parallel::current_num_threads();
         for first in (0..pieces).step_by(batch) {
             self.source.restart_time();
             let made: Vec<Result<T>> =

@@ -9,9 +9,9 @@ use crate::{
     bricks::{Header, REACH, SIDE, cut::Slices, level, pyramid::Pyramid},
     container::{Spill, Target},
     formats::VolumeStream,
+    parallel::prelude::*,
     volume::{Scalar, Volume, steps::Steps},
 };
-use rayon::prelude::*;
 use std::{borrow::Cow, io::Write, ops::Range, path::Path};
 use zstd::bulk::Compressor;
 

@@ -10,10 +10,10 @@ use super::{
 use crate::{
     Error, Result,
     input::{Source, positions},
+    parallel::{self, prelude::*},
 };
 use glam::{DVec3, Vec3};
 use laz::LazVlr;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Points per piece of an uncompressed file.
@@ -130,7 +130,7 @@ impl Pieces {
     /// Those of the reader.
     pub fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
         let mut seen = Seen::nothing();
-        let batch = 2 * rayon::current_num_threads();
+        let batch = 2 * parallel::current_num_threads();
         source.restart_time();
         for first in (0..self.pieces()).step_by(batch) {
             let pieces = (first..(first + batch).min(self.pieces())).into_par_iter();

@@ -6,9 +6,12 @@ use super::{
     recipes::{self, parse, source_of},
     variants,
 };
-use crate::gpu::pipeline::{
-    recipe::{Binding, Recipe},
-    variant::Variant,
+use crate::{
+    gpu::pipeline::{
+        recipe::{Binding, Recipe},
+        variant::Variant,
+    },
+    parallel::prelude::*,
 };
 use naga::{
     AddressSpace, ImageClass, ImageDimension, Module, ResourceBinding, ScalarKind, ShaderStage,
@@ -16,7 +19,6 @@ use naga::{
     back::{PipelineConstants, hlsl, msl, pipeline_constants::process_overrides, spv},
     valid::{Capabilities, ModuleInfo, ValidationFlags, Validator},
 };
-use rayon::prelude::*;
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     error::Error,

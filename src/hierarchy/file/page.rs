@@ -7,13 +7,15 @@ use super::{
     pages::{Run, levels, pages, reach, round_up},
     quantise::Shape,
 };
-use crate::hierarchy::{
-    MOST_CHILDREN, Node,
-    merge::{WIDTH, deviation},
-    validate::fault,
+use crate::{
+    hierarchy::{
+        MOST_CHILDREN, Node,
+        merge::{WIDTH, deviation},
+        validate::fault,
+    },
+    parallel::prelude::*,
 };
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// The first byte of a page.
 const LOSSLESS: u8 = 0;

@@ -7,7 +7,6 @@ use super::{
     page::{self, Coded},
     pages::{Around, Run, in_order},
 };
-use crate::container::{Spill, Target};
 use crate::{
     Error, Result,
     hierarchy::{
@@ -17,8 +16,11 @@ use crate::{
     math::Bounds,
     splat::NO_NORMAL,
 };
+use crate::{
+    container::{Spill, Target},
+    parallel::{self, prelude::*},
+};
 use glam::DVec3;
-use rayon::prelude::*;
 use std::{
     io::Write,
     path::{Path, PathBuf},
@@ -341,7 +343,7 @@ fn all(
     let Tree { origin, bounds, closed, source_points, .. } = *tree;
     let whole = Whole { origin, bounds, closed, source_points };
     let below = &tree.blocks[usize::from(tree.is_joined())..];
-    for blocks in below.chunks(2 * rayon::current_num_threads()) {
+    for blocks in below.chunks(2 * parallel::current_num_threads()) {
         writer.blocks(&blocks.iter().map(|block| &block.nodes[..]).collect::<Vec<_>>())?;
     }
     if !tree.is_joined() {
