@@ -5,6 +5,7 @@ use std::{
     sync::atomic::{AtomicBool, Ordering::Relaxed},
     time::Duration,
 };
+use web_time::Instant;
 
 /// The moment by which work on an input must be done. By default there is none.
 ///

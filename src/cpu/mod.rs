@@ -80,11 +80,9 @@ use items::Prepared;
 use march::{EMPTY, March, Tile};
 use plan::Plan;
 use spare::Spare;
-use std::{
-    sync::atomic::{AtomicU64, Ordering::Relaxed},
-    time::Instant,
-};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use vector::lanes;
+use web_time::Instant;
 
 /// A scene, prepared for drawing on the CPU. Cameras and settings may change from picture to
 /// picture.

@@ -33,7 +33,8 @@ use crate::{
     plan::{FrameStats, pace::Pace},
     scene::{Evaluate, Optics, Scene, Settings},
 };
-use std::{collections::HashMap, time::Instant};
+use std::collections::HashMap;
+use web_time::Instant;
 
 /// Draws prepared scenes. One renderer serves any number of scenes, cameras and sizes.
 #[derive(Debug)]

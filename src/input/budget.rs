@@ -11,6 +11,7 @@ use std::{
     },
     time::Duration,
 };
+use web_time::Instant;
 
 /// The bytes used, the time reading began, and the files opened.
 pub(crate) struct Budget {
