@@ -72,6 +72,10 @@
 //! found and what was expected. A few functions know no file or place; they return a message as a
 //! string. A damaged or hostile file is an error, never a panic.
 
+// Rooms that all builds share have items for engines and formats that this build may leave out.
+// What is dead shows in the build with all default features.
+#![cfg_attr(not(feature = "default"), allow(dead_code))]
+
 // The scenes of the integration tests, which unit tests share, call the crate by its name.
 #[cfg(test)]
 extern crate self as splatkit;
@@ -84,6 +88,7 @@ pub mod deadline;
 pub mod disk;
 pub mod error;
 pub mod formats;
+#[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod hierarchy;
 pub mod input;
@@ -92,6 +97,7 @@ pub mod memory;
 pub(crate) mod parallel;
 pub mod picture;
 pub(crate) mod plan;
+#[cfg(feature = "reference")]
 pub mod reference;
 mod renderer;
 pub mod scattered;
