@@ -73,8 +73,8 @@
 //! string. A damaged or hostile file is an error, never a panic.
 
 // Rooms that all builds share have items for engines and formats that this build may leave out.
-// What is dead shows in the build with all default features.
-#![cfg_attr(not(feature = "default"), allow(dead_code))]
+// What is unused shows in the build with all default features.
+#![cfg_attr(not(feature = "default"), allow(dead_code, unused_imports))]
 
 // The scenes of the integration tests, which unit tests share, call the crate by its name.
 #[cfg(test)]

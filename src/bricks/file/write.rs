@@ -7,13 +7,12 @@ use crate::bricks::{Brick, Bricks};
 use crate::{
     Error, Result,
     bricks::{Header, REACH, SIDE, cut::Slices, level, pyramid::Pyramid},
-    container::{Spill, Target},
+    container::{Spill, Target, pack::Compressor},
     formats::VolumeStream,
     parallel::prelude::*,
     volume::{Scalar, Volume, steps::Steps},
 };
 use std::{borrow::Cow, io::Write, ops::Range, path::Path};
-use zstd::bulk::Compressor;
 
 /// Descriptions that are stored in the file.
 #[derive(Debug, Clone, Default, PartialEq)]

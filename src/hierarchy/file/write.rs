@@ -22,7 +22,7 @@ use crate::{
 };
 use glam::DVec3;
 use std::{
-    io::Write,
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -132,11 +132,12 @@ impl Writer {
         }
         let (extent, is_lossless) = (self.extent, self.options.lossless);
         let encode = |nodes: &&[Node]| {
-            let coded = page::encode(nodes, extent, is_lossless);
+            let coded = page::encode(nodes, extent, is_lossless)?;
             let around = arounds(&coded.nodes, &coded.runs);
-            (coded, around)
+            Ok((coded, around))
         };
-        let coded: Vec<(Coded, Vec<Around>)> = blocks.par_iter().map(encode).collect();
+        let coded: io::Result<Vec<(Coded, Vec<Around>)>> = blocks.par_iter().map(encode).collect();
+        let coded = coded.map_err(|e| self.fault(e))?;
         for (coded, around) in coded {
             self.contents.add(&coded.nodes);
             let places = self.push(&coded.pages)?;
@@ -241,7 +242,7 @@ impl Writer {
         }
         page::enclose(&mut nodes);
         check_nodes(&nodes).map_err(refuse)?;
-        let coded = page::encode(&nodes, self.extent, true);
+        let coded = page::encode(&nodes, self.extent, true).map_err(|e| self.fault(e))?;
         let places = self.push(&coded.pages)?;
         let mut directory = Directory::default();
         directory.push_block(&coded.runs, &arounds(&nodes, &coded.runs), &places);
@@ -250,11 +251,15 @@ impl Writer {
         Ok(directory)
     }
 
+    fn fault(&self, e: io::Error) -> Error {
+        Error::output(self.path.as_deref().unwrap_or(Path::new("memory")), e)
+    }
+
     fn push(&mut self, pages: &[Vec<u8>]) -> Result<Vec<Place>> {
         let mut places = Vec::with_capacity(pages.len());
         for bytes in pages {
-            let wanted = self.path.as_deref().unwrap_or(Path::new("memory"));
-            let offset = self.spill.push(bytes).map_err(|e| Error::output(wanted, e))?;
+            let offset = self.spill.push(bytes);
+            let offset = offset.map_err(|e| self.fault(e))?;
             places.push(Place { offset, bytes: bytes.len() as u32, crc: crc32fast::hash(bytes) });
         }
         Ok(places)
