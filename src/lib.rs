@@ -59,6 +59,13 @@
 //! | compare pictures | [`compare`] |
 //! | look up what a picture is, exactly | [`mod@reference`] |
 //!
+//! # Features
+//!
+//! Cargo features leave out what a program does not need: `gpu` and its backends `vulkan`, `metal`,
+//! `dx12` and `webgpu`; the formats `ply`, `obj`, `gltf`, `las`, `e57` and `vtk`; `files` larger
+//! than memory; `rayon`; `reference`. All are on by default except `webgpu`. The README says what
+//! each brings.
+//!
 //! # Units and frames
 //!
 //! World coordinates are in the unit of the files, right-handed. Positions are 32-bit and relative

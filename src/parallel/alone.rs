@@ -169,6 +169,11 @@ impl<I: Iterator> Alone<I> {
         Alone(self.0.rev())
     }
 
+    #[cfg(test)]
+    pub fn step_by(self, step: usize) -> Alone<iter::StepBy<I>> {
+        Alone(self.0.step_by(step))
+    }
+
     pub fn with_min_len(self, _: usize) -> Self {
         self
     }

@@ -6,12 +6,9 @@ use super::{
     recipes::{self, parse, source_of},
     variants,
 };
-use crate::{
-    gpu::pipeline::{
-        recipe::{Binding, Recipe},
-        variant::Variant,
-    },
-    parallel::prelude::*,
+use crate::gpu::pipeline::{
+    recipe::{Binding, Recipe},
+    variant::Variant,
 };
 use naga::{
     AddressSpace, ImageClass, ImageDimension, Module, ResourceBinding, ScalarKind, ShaderStage,
@@ -19,6 +16,7 @@ use naga::{
     back::{PipelineConstants, hlsl, msl, pipeline_constants::process_overrides, spv},
     valid::{Capabilities, ModuleInfo, ValidationFlags, Validator},
 };
+use rayon::prelude::*;
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     error::Error,
