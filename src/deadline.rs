@@ -3,8 +3,9 @@
 use crate::{Error, Result};
 use std::{
     sync::atomic::{AtomicBool, Ordering::Relaxed},
-    time::{Duration, Instant},
+    time::Duration,
 };
+use web_time::Instant;
 
 /// The moment by which work on an input must be done. By default there is none.
 ///

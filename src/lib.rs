@@ -59,6 +59,13 @@
 //! | compare pictures | [`compare`] |
 //! | look up what a picture is, exactly | [`mod@reference`] |
 //!
+//! # Features
+//!
+//! Cargo features leave out what a program does not need: `gpu` and its backends `vulkan`, `metal`,
+//! `dx12` and `webgpu`; the formats `ply`, `obj`, `gltf`, `las`, `e57` and `vtk`; `files` larger
+//! than memory; `rayon`; `reference`. All are on by default except `webgpu`. The README says what
+//! each brings.
+//!
 //! # Units and frames
 //!
 //! World coordinates are in the unit of the files, right-handed. Positions are 32-bit and relative
@@ -72,6 +79,10 @@
 //! found and what was expected. A few functions know no file or place; they return a message as a
 //! string. A damaged or hostile file is an error, never a panic.
 
+// Rooms that all builds share have items for engines and formats that this build may leave out.
+// What is unused shows in the build with all default features.
+#![cfg_attr(not(feature = "default"), allow(dead_code, unused_imports))]
+
 // The scenes of the integration tests, which unit tests share, call the crate by its name.
 #[cfg(test)]
 extern crate self as splatkit;
@@ -84,14 +95,17 @@ pub mod deadline;
 pub mod disk;
 pub mod error;
 pub mod formats;
+#[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod hierarchy;
 pub mod input;
 pub mod math;
 pub mod memory;
+pub(crate) mod parallel;
 pub mod picture;
 pub(crate) mod plan;
 pub mod progress;
+#[cfg(feature = "reference")]
 pub mod reference;
 mod renderer;
 pub mod scattered;
@@ -101,7 +115,9 @@ pub mod surface;
 pub mod volume;
 
 // What the public functions take and return of these crates, in the versions that they need.
-pub use {glam, wgpu};
+pub use glam;
+#[cfg(feature = "gpu")]
+pub use wgpu;
 
 pub use deadline::Deadline;
 pub use error::{Error, Result};

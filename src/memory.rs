@@ -2,20 +2,30 @@
 
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
+#[cfg(feature = "files")]
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
 /// Returns the most bytes that a process should use: three quarters of the machine's memory or of
 /// its control group's limit, whichever is smaller. `None` if the system reports neither.
 pub fn most() -> Option<u64> {
-    let asked = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
-    let machine = System::new_with_specifics(asked)
-        .ok()
-        .map(|system| system.total_memory())
-        .filter(|bytes| *bytes > 0);
     let limits = groups()
         .into_iter()
         .filter_map(|path| std::fs::read_to_string(path).ok()?.trim().parse::<u64>().ok());
-    limits.chain(machine).min().map(|bytes| bytes / 4 * 3)
+    limits.chain(machine()).min().map(|bytes| bytes / 4 * 3)
+}
+
+/// Returns the machine's memory; `None` if the system does not report it.
+#[cfg(feature = "files")]
+fn machine() -> Option<u64> {
+    let asked = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
+    let system = System::new_with_specifics(asked).ok()?;
+    Some(system.total_memory()).filter(|bytes| *bytes > 0)
+}
+
+/// Asking the system is part of the feature `files`.
+#[cfg(not(feature = "files"))]
+fn machine() -> Option<u64> {
+    None
 }
 
 /// Returns an error message if `what` needs more bytes than a process should use. Call it before

@@ -1,9 +1,10 @@
 //! One renderer for both engines, the GPU engine and the CPU engine.
 
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+use crate::gpu::{self, Budget, Gpu, PreparedScene};
 use crate::{
     Error, Result,
     cpu::CpuRenderer,
-    gpu::{self, Budget, Gpu, PreparedScene},
     math::Camera,
     picture::Picture,
     plan::FrameStats,
@@ -14,7 +15,10 @@ use crate::{
 /// The device that draws.
 #[derive(Debug, Clone)]
 pub enum Device {
-    /// The GPU engine on wgpu, with the capacity of its passes.
+    /// The GPU engine on wgpu, with the capacity of its passes. Needs the feature `gpu`. In a
+    /// browser, where nothing may block, see
+    /// [`gpu::Renderer::render_async`](crate::gpu::Renderer::render_async).
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
     Gpu(Gpu, Budget),
     /// The CPU engine. It needs no driver.
     Cpu,
@@ -23,14 +27,19 @@ pub enum Device {
 impl Device {
     /// Returns the fastest hardware adapter, or the CPU if there is none. The CPU engine is faster
     /// than a GPU driver that runs on the processor. `WGPU_ADAPTER_NAME` can name another adapter
-    /// ([`Gpu::hardware`]).
+    /// ([`Gpu::hardware`](crate::gpu::Gpu::hardware)). Without the feature `gpu`, this is the CPU.
     pub fn automatic() -> Self {
-        Gpu::hardware().map_or(Self::Cpu, |gpu| Self::Gpu(gpu, Budget::default()))
+        #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+        if let Some(gpu) = Gpu::hardware() {
+            return Self::Gpu(gpu, Budget::default());
+        }
+        Self::Cpu
     }
 
     /// Returns the adapter's name, or “CPU”.
     pub fn name(&self) -> &str {
         match self {
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Self::Gpu(gpu, _) => &gpu.info.name,
             Self::Cpu => "CPU",
         }
@@ -69,6 +78,7 @@ pub struct Renderer {
 
 #[derive(Debug)]
 enum Drawer {
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
     Gpu(Box<gpu::Renderer>, Box<PreparedScene>),
     Cpu(Box<CpuRenderer>),
 }
@@ -76,6 +86,7 @@ enum Drawer {
 impl Drawer {
     fn new(device: &Device, scene: &Scene) -> Result<Self> {
         Ok(match device {
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Device::Gpu(gpu, budget) => {
                 let renderer = gpu::Renderer::with_budget(gpu, *budget);
                 let prepared = renderer.prepare(scene)?;
@@ -109,7 +120,7 @@ impl Renderer {
     /// Draws a picture. If the device is lost, it is reopened once and the picture is drawn again.
     ///
     /// # Errors
-    /// Those of [`gpu::Renderer::render`] and [`CpuRenderer::render`].
+    /// Those of [`gpu::Renderer::render`](crate::gpu::Renderer::render) and [`CpuRenderer::render`].
     pub fn render(
         &mut self,
         camera: &Camera,
@@ -131,6 +142,7 @@ impl Renderer {
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
         match &mut self.drawer {
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Drawer::Gpu(renderer, prepared) => renderer.render(prepared, camera, settings),
             Drawer::Cpu(renderer) => renderer.render(camera, settings),
         }
@@ -143,6 +155,7 @@ impl Renderer {
     /// Those of [`render`](Self::render). A lost device is not reopened: [`Error::DeviceLost`].
     pub fn draw(&mut self, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
         match &mut self.drawer {
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Drawer::Gpu(renderer, prepared) => renderer.draw(prepared, camera, settings),
             Drawer::Cpu(renderer) => Ok(renderer.render(camera, settings)?.1),
         }
@@ -154,6 +167,7 @@ impl Renderer {
     /// Those of [`draw`](Self::draw).
     pub fn profile(&mut self, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
         match &mut self.drawer {
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Drawer::Gpu(renderer, prepared) => renderer.profile(prepared, camera, settings),
             Drawer::Cpu(renderer) => Ok(renderer.render(camera, settings)?.1),
         }
@@ -167,6 +181,7 @@ impl Renderer {
     pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
         self.scene = self.scene.shown_by(transfer)?;
         match &mut self.drawer {
+            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Drawer::Gpu(_, prepared) => prepared.set_transfer(transfer),
             Drawer::Cpu(renderer) => renderer.set_transfer(transfer),
         }
@@ -175,8 +190,9 @@ impl Renderer {
     /// Reopens a lost device and prepares the scene on it.
     ///
     /// # Errors
-    /// Those of [`Gpu::reopened`] and [`new`](Self::new).
+    /// Those of [`Gpu::reopened`](crate::gpu::Gpu::reopened) and [`new`](Self::new).
     pub fn reopen(&mut self) -> Result<()> {
+        #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
         if let Device::Gpu(gpu, budget) = &self.device {
             self.device = Device::Gpu(gpu.reopened()?, *budget);
         }

@@ -1,10 +1,9 @@
 //! The one primitive: an ellipsoidal Gaussian kernel with a payload.
 
-use crate::{Error, Result, math::Bounds};
+use crate::{Error, Result, math::Bounds, parallel::prelude::*};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use half::f16;
-use rayon::prelude::*;
 
 /// An ellipsoidal Gaussian splat as stored in memory and on the GPU (48 bytes).
 ///

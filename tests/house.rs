@@ -11,6 +11,7 @@ use syn::{Attribute, Item, ItemMod, ItemUse, Meta, UseTree, visit::Visit};
 /// The rooms of src. Each imports only from rooms before it.
 const ROOMS: [&str; 23] = [
     "error",
+    "parallel",
     "deadline",
     "progress",
     "memory",

@@ -1,9 +1,8 @@
 //! Which bricks a picture needs.
 
 use super::{Bricks, SIDE};
-use crate::math::View;
+use crate::{math::View, parallel::prelude::*};
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// The levels and bricks of a picture.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,7 @@
 //! Computes a level from the one below: means of 2×2×2 samples.
 
-use crate::volume::Scalar;
+use crate::{parallel::prelude::*, volume::Scalar};
 use bytemuck::Pod;
-use rayon::prelude::*;
 
 /// A sample type that has means.
 trait Mean: Pod + Send + Sync {

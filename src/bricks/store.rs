@@ -13,9 +13,9 @@ use crate::{
     error::LimitKind,
     input::{Limits, Mapping, Source, intact},
     math::Bounds,
+    parallel::prelude::*,
     volume::{Lattice, Samples, Scalar, Volume, steps::Steps},
 };
-use rayon::prelude::*;
 use std::{
     path::{Path, PathBuf},
     sync::Arc,

@@ -3,6 +3,7 @@
 
 mod bytes;
 mod findings;
+pub(crate) mod pack;
 mod spill;
 
 pub(crate) use bytes::{Cursor, Put};

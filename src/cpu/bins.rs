@@ -2,8 +2,7 @@
 //! block sorts its list by the splats' first sheets and distributes it to the tiles.
 
 use super::{footprint::Record, plan::Plan};
-use crate::{plan::TILE, scene::Order};
-use rayon::prelude::*;
+use crate::{parallel::prelude::*, plan::TILE, scene::Order};
 use std::{
     ops::Range,
     sync::atomic::{AtomicU64, Ordering::Relaxed},

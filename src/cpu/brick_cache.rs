@@ -5,10 +5,10 @@ use crate::{
     Result,
     bricks::{BRICK_BLOCKS, Bricks, Choice, SIDE},
     math::Kernel,
+    parallel::prelude::*,
     volume::{Samples, each_type},
 };
 use bytemuck::AnyBitPattern;
-use rayon::prelude::*;
 use std::{collections::HashMap, sync::Arc};
 
 /// Extra samples on each side of a brick.

@@ -15,6 +15,7 @@ use crate::{
     bricks::{BLOCK, BLOCKS, Choice, SIDE},
     hierarchy::{Cut, Levels},
     math::{Kernel, View},
+    parallel::prelude::*,
     plan::uniforms::Source,
     scene::{Item, Scene, Settings},
     splat::{Payload, Splat, SplatSet},
@@ -22,7 +23,6 @@ use crate::{
 };
 use fearless_simd::Level;
 use glam::{Mat3, Vec3};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Samples along each side of a block. A block's samples are listed together, so that neighbours in

@@ -53,6 +53,7 @@ use crate::{
     bricks::{Bricks, Choice},
     hierarchy::Detail,
     math::{Camera, Sheets, View},
+    parallel::prelude::*,
     picture::Picture,
     plan::{
         FrameStats, TILE, gathering,
@@ -78,13 +79,10 @@ use gather::Gather;
 use items::Prepared;
 use march::{EMPTY, March, Tile};
 use plan::Plan;
-use rayon::prelude::*;
 use spare::Spare;
-use std::{
-    sync::atomic::{AtomicU64, Ordering::Relaxed},
-    time::Instant,
-};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use vector::lanes;
+use web_time::Instant;
 
 /// A scene, prepared for drawing on the CPU. Cameras and settings may change from picture to
 /// picture.

@@ -12,11 +12,11 @@ use crate::{
     Result,
     hierarchy::{Cut, Hierarchy, SHARE_UNIT, needed::Needed},
     math::View,
+    parallel::prelude::*,
     plan::uniforms::Source,
     scene::Settings,
 };
 use fearless_simd::{Level, Simd};
-use rayon::prelude::*;
 use std::{collections::HashMap, sync::Arc};
 
 /// Number of steps between cuts a factor of two apart, in the search for a cut with a given number

@@ -10,6 +10,8 @@ use std::{
     io::{self, Read, Seek, SeekFrom, Write},
     path::Path,
 };
+#[cfg(feature = "files")]
+use tempfile::tempfile_in as nameless;
 
 /// A file without a name. The system removes it when the process ends, however it ends.
 pub struct Scratch(File);
@@ -21,9 +23,16 @@ impl Scratch {
     /// # Errors
     /// [`Error::Output`], naming the file that is to be written.
     pub fn beside(wanted: &Path) -> Result<Self> {
-        let file = step(Step::Create).and_then(|()| tempfile::tempfile_in(folder(wanted)));
+        let file = step(Step::Create).and_then(|()| nameless(folder(wanted)));
         file.map(Self).map_err(|e| Error::output(wanted, e))
     }
+}
+
+#[cfg(not(feature = "files"))]
+fn nameless(_: &Path) -> io::Result<File> {
+    let message = "scratch files come with the feature “files” of the crate splatkit, and this \
+                   program was built without";
+    Err(io::Error::new(io::ErrorKind::Unsupported, message))
 }
 
 impl Write for Scratch {

@@ -1,9 +1,103 @@
-//! The formats whose points are read in pieces.
+//! What a format offers if the points of its files are read in pieces.
 
-use super::{las, ply};
+use super::shared::found::Found;
+use crate::{
+    Result,
+    input::Source,
+    parallel::{self, prelude::*},
+};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
 
-/// What the pieces of a file are, by format.
-pub(super) enum Form {
-    Ply(ply::Pieces),
-    Las(las::Pieces),
+/// The counts in a file's header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counts {
+    /// The number of points, or of vertices of a mesh.
+    pub points: u64,
+    /// The number of triangles; 0 for a point cloud.
+    pub triangles: u64,
+}
+
+/// A point relative to the stream's origin.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct StreamPoint {
+    /// Its index in the file.
+    pub index: u32,
+    pub position: [f32; 3],
+    /// Unit length; zero if the file has none.
+    pub normal: [f32; 3],
+    /// As in [`Mesh::colors`](crate::surface::Mesh::colors); white if the file has none.
+    pub color: [u8; 4],
+}
+
+impl StreamPoint {
+    pub fn new(found: &Found, origin: DVec3) -> Self {
+        Self {
+            index: found.row as u32,
+            position: (found.position - origin).as_vec3().to_array(),
+            normal: found.normal.to_array(),
+            color: found.color,
+        }
+    }
+}
+
+/// Where the points of a file are, and its triangles if it is a mesh.
+pub(super) trait Form: Send + Sync {
+    fn counts(&self) -> Counts;
+
+    /// Returns the number of pieces of points, and of triangles.
+    fn pieces(&self) -> [usize; 2];
+
+    fn z_is_up(&self) -> bool;
+
+    fn has_normals(&self) -> bool;
+
+    fn has_colors(&self) -> bool;
+
+    fn has_uvs(&self) -> bool;
+
+    /// Warns if the file contains more than the points, because only those are read.
+    fn warn(&self, source: &Source);
+
+    /// The first pass over all points: returns their number, without withheld ones, and the corners
+    /// of their bounding box, and finds what their colours are scaled by. Calls `watch` with the
+    /// number of points visited so far.
+    fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])>;
+
+    /// Returns the points of a piece, relative to an origin.
+    fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>>;
+
+    /// Returns the index of a piece's first triangle, and the piece's triangles.
+    fn triangles(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)>;
+
+    /// Returns a vertex of a mesh; `None` for a point cloud.
+    fn vertex(&self, source: &Source, index: usize) -> Option<Found>;
+
+    /// Returns the position of a vertex of a mesh; `None` for a point cloud.
+    fn position(&self, source: &Source, index: usize) -> Option<DVec3>;
+}
+
+/// Makes something of each piece, several in parallel. `take` receives the results one after the
+/// other, in order. The pages of the file that were read are returned to the system.
+pub(super) fn in_order<T: Send>(
+    source: &Source,
+    pieces: usize,
+    make: impl Fn(usize) -> Result<T> + Sync,
+    mut take: impl FnMut(T) -> Result<()>,
+) -> Result<()> {
+    let batch = 2 * parallel::current_num_threads();
+    for first in (0..pieces).step_by(batch) {
+        source.restart_time();
+        let made: Vec<Result<T>> =
+            (first..(first + batch).min(pieces)).into_par_iter().map(&make).collect();
+        // If the file has changed, the results may mix old and new content, so none is taken.
+        source.intact()?;
+        for made in made {
+            take(made?)?;
+        }
+        source.release();
+    }
+    // `take` may have read single points from the file.
+    source.intact()
 }

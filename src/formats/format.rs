@@ -17,8 +17,8 @@ pub struct Format {
     pub written: Option<&'static str>,
     /// Whether a file may refer to other files with a part of its data.
     pub refers: bool,
-    /// The cargo feature that the format belongs to.
-    pub feature: &'static str,
+    /// The cargo feature that brings the reader; `None` if every build has it.
+    pub feature: Option<&'static str>,
     pub(super) magic: Magic,
     pub(super) kind: Which,
     pub(super) mesh: Option<fn(&Source) -> Result<Mesh>>,
@@ -29,6 +29,9 @@ pub struct Format {
 
 /// Reads scattered samples. The second argument names the values to read if a file has several.
 pub(super) type SamplesReader = fn(&Source, Option<&str>) -> Result<Points>;
+
+/// Locates the points of a file; `None` if it can only be read as a whole.
+pub(super) type FindPieces = fn(&Source) -> Result<Option<Box<dyn Form>>>;
 
 /// What a file may hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,7 +92,7 @@ pub(super) enum InPieces {
     /// By [`Stream`](super::Stream).
     Points {
         of: &'static str,
-        find: fn(&Source) -> Result<Option<Form>>,
+        find: FindPieces,
     },
     /// By [`VolumeStream`](super::VolumeStream).
     Volume {
@@ -113,7 +116,7 @@ impl Format {
         holds: &[],
         written: None,
         refers: false,
-        feature: "",
+        feature: None,
         magic: Magic::None,
         kind: Which::Always(Kind::Mesh),
         mesh: None,
@@ -137,6 +140,12 @@ impl Format {
             | InPieces::Volume { of, .. }
             | InPieces::Described { of, .. } => Some(of),
         }
+    }
+
+    /// Returns whether this build has no reader of the format, because its feature is off.
+    pub fn is_left_out(&self) -> bool {
+        let is_read = self.mesh.is_some() || self.volume.is_some() || self.samples.is_some();
+        self.feature.is_some() && !is_read
     }
 
     fn is_for(&self, path: &Path) -> bool {
@@ -232,26 +241,44 @@ fn by_magic<'a>(
 
 /// Returns the format of a file, among those that `may` be read: by its extension, else by its
 /// first bytes.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a format that this build leaves out.
 pub(super) fn find<'a>(
     table: &'a [Format],
     source: &Source,
     may: impl Fn(&Format) -> bool,
-) -> Option<&'a Format> {
-    by_extension(table, source.path, &may).or_else(|| by_magic(table, source.bytes(), &may))
+) -> Result<Option<&'a Format>> {
+    let may = |format: &Format| format.is_left_out() || may(format);
+    let found = by_extension(table, source.path, may);
+    unless_left_out(found.or_else(|| by_magic(table, source.bytes(), may)), source)
 }
 
 /// As [`find`], for a volume. If the extension names none and the caller gives a layout, the file
 /// is in the format that needs one.
+///
+/// # Errors
+/// Those of [`find`].
 pub(super) fn find_volume<'a>(
     table: &'a [Format],
     source: &Source,
     is_described: bool,
-) -> Option<&'a Format> {
-    let may = |format: &Format| format.volume.is_some();
+) -> Result<Option<&'a Format>> {
+    let may = |format: &Format| format.is_left_out() || format.volume.is_some();
     let needs_layout = |format: &&Format| matches!(format.volume, Some(VolumeReader::Described(_)));
-    by_extension(table, source.path, may)
+    let found = by_extension(table, source.path, may)
         .or_else(|| table.iter().find(needs_layout).filter(|_| is_described))
-        .or_else(|| by_magic(table, source.bytes(), may))
+        .or_else(|| by_magic(table, source.bytes(), may));
+    unless_left_out(found, source)
+}
+
+/// Returns what was found, unless this build leaves it out.
+fn unless_left_out<'a>(found: Option<&'a Format>, source: &Source) -> Result<Option<&'a Format>> {
+    let Some(format) = found.filter(|format| format.is_left_out()) else { return Ok(found) };
+    let (name, feature) = (format.name, format.feature.unwrap_or_default());
+    let message = format!("is a file of {name}, but this program was built without “{feature}”");
+    let hint = format!("build it with the feature “{feature}” of the crate splatkit");
+    Err(source.error("file", message).hint(hint))
 }
 
 /// Returns the extensions of the formats that `may` be read, as a list for messages.
@@ -294,7 +321,6 @@ mod tests {
         name: "toy",
         extensions: &["toy"],
         holds: &[Holding { content: Content::PointCloud, when: "" }],
-        feature: "toy",
         magic: Magic::Prefix(b"toys"),
         kind: Which::Always(Kind::Mesh),
         mesh: Some(read_toy),
@@ -332,11 +358,34 @@ mod tests {
     }
 
     #[test]
+    fn what_a_build_leaves_out_is_told() {
+        let row = Format { mesh: None, feature: Some("toys"), ..TOY };
+        let table = [FORMATS, &[row]].concat();
+        assert!(row.is_left_out() && !TOY.is_left_out());
+        for (name, bytes) in [("a.toy", "1 2 3"), ("a.dat", "toys")] {
+            let told = |error: Error| {
+                let message = error.to_string();
+                assert!(message.contains("a file of toy, but"), "{message}");
+                assert!(message.contains("without “toys”"), "{message}");
+            };
+            with(name, bytes.as_bytes(), |source| {
+                told(mesh_of(&table, source).unwrap_err());
+                told(volume_of(&table, source, None).unwrap_err());
+                told(samples_of(&table, source, None).unwrap_err());
+                told(Kind::find(&table, source, false).unwrap_err());
+            });
+        }
+    }
+
+    #[test]
     fn rows_say_what_their_readers_read() {
         let mut names = HashSet::new();
         for format in FORMATS {
             let name = format.name;
-            assert!(names.insert(name) && !format.feature.is_empty(), "{name}");
+            assert!(names.insert(name), "{name}");
+            if format.is_left_out() {
+                continue;
+            }
             for extension in format.extensions {
                 assert!(names.insert(extension), "{extension} is the extension of two formats");
                 assert_eq!(extension.to_ascii_lowercase(), *extension);

@@ -44,7 +44,7 @@ impl Kind {
     ///
     /// # Errors
     /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a PLY file or a legacy
-    /// VTK file with a malformed header.
+    /// VTK file with a malformed header, and for a format that this build leaves out.
     pub fn of(path: impl AsRef<Path>, limits: &Limits, with_scalar: bool) -> Result<Option<Self>> {
         Self::of_source(&Source::open(path.as_ref(), limits)?, with_scalar)
     }
@@ -65,7 +65,7 @@ impl Kind {
         source: &Source,
         with_scalar: bool,
     ) -> Result<Option<Self>> {
-        let format = find(table, source, |_| true);
+        let format = find(table, source, |_| true)?;
         format.map(|format| format.kind.of(source, with_scalar)).transpose()
     }
 }

@@ -14,9 +14,8 @@ mod time;
 pub(super) use pieces::Pieces;
 
 use super::shared::cloud::{Cloud, colors_of_16_bits, greys};
-use crate::{Result, input::Source, surface::Mesh};
+use crate::{Result, input::Source, parallel::prelude::*, surface::Mesh};
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// Reads a point cloud: positions and colours, or intensities as greys if there are no colours.
 /// Points that are marked as withheld are left out.

@@ -37,7 +37,7 @@ pub fn read_mesh(source: &Source) -> Result<Mesh> {
 /// meanwhile.
 pub(super) fn mesh_of(table: &[Format], source: &Source) -> Result<Mesh> {
     let may = |format: &Format| format.mesh.is_some();
-    match find(table, source, may).and_then(|format| format.mesh) {
+    match find(table, source, may)?.and_then(|format| format.mesh) {
         Some(read) => read(source),
         None => Err(source
             .error("path", format!("“.{}” is not a mesh format that can be read", named(source)))
@@ -77,7 +77,7 @@ pub(super) fn volume_of(
     source: &Source,
     raw: Option<&RawLayout>,
 ) -> Result<Volume> {
-    let format = find_volume(table, source, raw.is_some());
+    let format = find_volume(table, source, raw.is_some())?;
     match (format.and_then(|format| format.volume), raw) {
         (Some(VolumeReader::Plain(read)), _) => read(source),
         (Some(VolumeReader::Described(read)), Some(layout)) => read(source, layout),
@@ -126,7 +126,7 @@ pub(super) fn samples_of(
     scalar: Option<&str>,
 ) -> Result<Points> {
     let may = |format: &Format| format.samples.is_some();
-    match find(table, source, may).and_then(|format| format.samples) {
+    match find(table, source, may)?.and_then(|format| format.samples) {
         Some(read) => read(source, scalar),
         None => {
             let named = named(source);

@@ -9,17 +9,22 @@
 #![deny(clippy::disallowed_methods)]
 
 pub mod csv;
+#[cfg(feature = "e57")]
 pub mod e57;
 mod form;
 mod format;
+#[cfg(feature = "gltf")]
 pub mod gltf;
 mod kind;
+#[cfg(feature = "las")]
 pub mod las;
 mod load;
 pub mod npy;
 pub mod nrrd;
+#[cfg(feature = "obj")]
 pub mod obj;
 pub mod pcd;
+#[cfg(feature = "ply")]
 pub mod ply;
 pub mod raw;
 mod shared;
@@ -29,23 +34,31 @@ mod table;
 #[cfg(all(test, any(target_os = "linux", target_os = "macos")))]
 mod vanishing;
 mod volume_stream;
+#[cfg(feature = "vtk")]
 pub mod vti;
+#[cfg(feature = "vtk")]
 pub mod vtk;
+#[cfg(feature = "vtk")]
 mod vtk_array;
+#[cfg(feature = "vtk")]
 mod vtk_cells;
+#[cfg(feature = "vtk")]
 mod vtk_xml;
+#[cfg(feature = "vtk")]
 pub mod vtr;
+#[cfg(feature = "vtk")]
 pub mod vtu;
 pub mod xyz;
 
+pub use form::Counts;
+pub(crate) use form::StreamPoint;
 pub use format::{Content, Format, Holding};
 pub use kind::Kind;
 pub use load::{load_mesh, load_samples, load_volume, read_mesh, read_samples, read_volume};
 pub use raw::RawLayout;
 pub use shared::sample_type::{Endian, SampleType};
 pub(crate) use shared::texture::decode as decode_picture;
-pub(crate) use stream::StreamPoint;
-pub use stream::{Counts, Stream};
+pub use stream::Stream;
 pub use table::FORMATS;
 pub use volume_stream::VolumeStream;
 

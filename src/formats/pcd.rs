@@ -9,11 +9,11 @@ use super::shared::cloud::Cloud;
 use crate::{
     Result,
     input::{Source, copy, growing::Growing, text::lines_of},
+    parallel::prelude::*,
     surface::Mesh,
 };
 use glam::{DVec3, Vec3};
 use header::{Data, Field, Header};
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Bytes per point with every attribute, and its index.

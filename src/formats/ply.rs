@@ -21,16 +21,15 @@ use super::shared::texture;
 use crate::{
     Result,
     input::{Source, positions},
+    parallel::prelude::*,
     surface::{Material, Mesh},
 };
 use faces::Faces;
-pub(super) use gaussians::warn as warn_of_gaussians;
 pub use gaussians::write_gaussians;
 use glam::{DVec3, Vec2, Vec3};
 use header::Element;
 pub(super) use pieces::Pieces;
 use ply_rs::ply::{PropertyType, ScalarType};
-use rayon::prelude::*;
 use rows::Rows;
 pub use samples::{has_faces, read_samples};
 use table::Table;
@@ -245,6 +244,6 @@ fn color(scale: [Option<f64>; 4], value: impl Fn(usize) -> f64) -> [u8; 4] {
 }
 
 /// Returns the larger value of each channel.
-pub(super) fn larger(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+fn larger(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     std::array::from_fn(|channel| a[channel].max(b[channel]))
 }

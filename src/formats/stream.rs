@@ -3,41 +3,16 @@
 
 use super::{
     FORMATS,
-    form::Form,
+    form::{Counts, Form, StreamPoint, in_order},
     format::{InPieces, by_extension},
-    ply,
-    shared::found::Found,
 };
 use crate::{
     Result,
     input::{Limits, Source, positions},
 };
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use std::path::Path;
-
-/// The counts in a file's header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Counts {
-    /// The number of points, or of vertices of a mesh.
-    pub points: u64,
-    /// The number of triangles; 0 for a point cloud.
-    pub triangles: u64,
-}
-
-/// A point relative to the stream's origin.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct StreamPoint {
-    /// Its index in the file.
-    pub index: u32,
-    pub position: [f32; 3],
-    /// Unit length; zero if the file has none.
-    pub normal: [f32; 3],
-    /// As in [`Mesh::colors`](crate::surface::Mesh::colors); white if the file has none.
-    pub color: [u8; 4],
-}
 
 /// A point cloud or mesh file that is read in pieces: binary PLY of points or triangles, LAS and
 /// LAZ.
@@ -47,7 +22,7 @@ pub(crate) struct StreamPoint {
 /// system.
 pub struct Stream<'a> {
     source: Source<'a>,
-    form: Form,
+    form: Box<dyn Form>,
     /// Number of points that are not withheld.
     points: u64,
     origin: DVec3,
@@ -83,26 +58,18 @@ impl<'a> Stream<'a> {
 
     /// Returns the counts in the header.
     pub fn counts(&self) -> Counts {
-        let (points, triangles) = match &self.form {
-            Form::Ply(pieces) => (pieces.points(), pieces.triangles()),
-            Form::Las(pieces) => (pieces.points(), 0),
-        };
-        Counts { points: points as u64, triangles: triangles as u64 }
+        self.form.counts()
     }
 
     /// Warns if the file contains more than the points, because only those are read.
     pub(crate) fn warn(&self) {
-        if let Form::Ply(pieces) = &self.form
-            && pieces.are_gaussians
-        {
-            ply::warn_of_gaussians(&self.source);
-        }
+        self.form.warn(&self.source);
     }
 
     /// Returns whether the third axis of its points is up, as for
     /// [`Mesh::z_is_up`](crate::surface::Mesh::z_is_up).
     pub fn z_is_up(&self) -> bool {
-        matches!(self.form, Form::Las(_))
+        self.form.z_is_up()
     }
 
     /// The first pass over all points: finds their bounds and what their colours are scaled by.
@@ -119,47 +86,12 @@ impl<'a> Stream<'a> {
                 .error("header", message)
                 .hint("split it into several files and convert them together"));
         }
-        let (points, [low, high]) = match &mut self.form {
-            Form::Las(pieces) => self.source.unless_changed(pieces.survey(&self.source, watch))?,
-            Form::Ply(_) => self.survey_ply(watch)?,
-        };
+        let surveyed = self.form.survey(&self.source, watch);
+        let (points, [low, high]) = self.source.unless_changed(surveyed)?;
         self.points = points;
         self.origin = positions::origin(&self.source, low, high)?;
         self.bounds = [(low - self.origin).as_vec3(), (high - self.origin).as_vec3()];
         Ok(())
-    }
-
-    fn survey_ply(&mut self, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
-        let Form::Ply(pieces) = &self.form else { return Ok((0, [DVec3::ZERO; 2])) };
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let mut brightest = [0.0; 4];
-        let asks_for_colors = pieces.asks_for_colors();
-        let of_piece = |piece: usize| {
-            let mut around = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-            let mut brightest = [0.0; 4];
-            for row in pieces.rows(piece) {
-                let position = pieces.position(&self.source, row);
-                if !position.is_finite() {
-                    return Err(pieces.not_finite(&self.source, row));
-                }
-                around = (around.0.min(position), around.1.max(position));
-                if asks_for_colors {
-                    brightest = ply::larger(brightest, pieces.channels(&self.source, row));
-                }
-            }
-            Ok((around, brightest, pieces.rows(piece).end as u64))
-        };
-        self.in_order(pieces.pieces()[0], of_piece, |(around, of_piece, seen)| {
-            (low, high) = (low.min(around.0), high.max(around.1));
-            brightest = ply::larger(brightest, of_piece);
-            watch(seen);
-            Ok(())
-        })?;
-        let points = pieces.points() as u64;
-        if let Form::Ply(pieces) = &mut self.form {
-            pieces.settle_colors(brightest);
-        }
-        Ok((points, [low, high]))
     }
 
     /// Creates an error at a place in the file.
@@ -183,18 +115,15 @@ impl<'a> Stream<'a> {
     }
 
     pub(crate) fn has_normals(&self) -> bool {
-        matches!(&self.form, Form::Ply(pieces) if pieces.has_normals)
+        self.form.has_normals()
     }
 
     pub(crate) fn has_colors(&self) -> bool {
-        match &self.form {
-            Form::Ply(pieces) => pieces.has_colors,
-            Form::Las(pieces) => pieces.has_colors(),
-        }
+        self.form.has_colors()
     }
 
     pub(crate) fn has_uvs(&self) -> bool {
-        matches!(&self.form, Form::Ply(pieces) if pieces.has_uvs)
+        self.form.has_uvs()
     }
 
     /// Visits all points in order. `map` converts the pieces, several in parallel. `take` receives
@@ -204,26 +133,9 @@ impl<'a> Stream<'a> {
         map: impl Fn(&[StreamPoint]) -> T + Sync,
         take: impl FnMut(T) -> Result<()>,
     ) -> Result<()> {
-        let settled = |found: Found| self.settled(found);
-        match &self.form {
-            Form::Ply(pieces) => {
-                let of_piece = |piece: usize| {
-                    let rows = pieces.rows(piece);
-                    let points: Vec<_> =
-                        rows.map(|row| settled(pieces.vertex(&self.source, row))).collect();
-                    Ok(map(&points))
-                };
-                self.in_order(pieces.pieces()[0], of_piece, take)
-            }
-            Form::Las(pieces) => {
-                let of_piece = |piece: usize| {
-                    let points: Vec<_> =
-                        pieces.found(&self.source, piece)?.into_iter().map(settled).collect();
-                    Ok(map(&points))
-                };
-                self.in_order(pieces.pieces(), of_piece, take)
-            }
-        }
+        let of_piece =
+            |piece: usize| Ok(map(&self.form.points(&self.source, piece, self.origin)?));
+        in_order(&self.source, self.form.pieces()[0], of_piece, take)
     }
 
     /// As [`points`](Self::points), for the triangles. `map` also gets the index of the piece's
@@ -233,60 +145,22 @@ impl<'a> Stream<'a> {
         map: impl Fn(usize, &[[u32; 3]]) -> T + Sync,
         take: impl FnMut(T) -> Result<()>,
     ) -> Result<()> {
-        let Form::Ply(pieces) = &self.form else { return Ok(()) };
         let of_piece = |piece: usize| {
-            let (first, triangles) = pieces.triangle_piece(&self.source, piece)?;
+            let (first, triangles) = self.form.triangles(&self.source, piece)?;
             Ok(map(first, &triangles))
         };
-        self.in_order(pieces.pieces()[1], of_piece, take)
+        in_order(&self.source, self.form.pieces()[1], of_piece, take)
     }
 
     /// Returns the position of a vertex of a mesh.
     pub(crate) fn position(&self, index: u32) -> Vec3 {
-        match &self.form {
-            Form::Ply(pieces) => {
-                (pieces.position(&self.source, index as usize) - self.origin).as_vec3()
-            }
-            Form::Las(_) => Vec3::ZERO,
-        }
+        let position = self.form.position(&self.source, index as usize);
+        position.map_or(Vec3::ZERO, |position| (position - self.origin).as_vec3())
     }
 
     /// Returns a vertex of a mesh.
     pub(crate) fn vertex(&self, index: u32) -> StreamPoint {
-        match &self.form {
-            Form::Ply(pieces) => self.settled(pieces.vertex(&self.source, index as usize)),
-            Form::Las(_) => StreamPoint::zeroed(),
-        }
-    }
-
-    fn settled(&self, found: Found) -> StreamPoint {
-        StreamPoint {
-            index: found.row as u32,
-            position: (found.position - self.origin).as_vec3().to_array(),
-            normal: found.normal.to_array(),
-            color: found.color,
-        }
-    }
-
-    fn in_order<T: Send>(
-        &self,
-        pieces: usize,
-        make: impl Fn(usize) -> Result<T> + Sync,
-        mut take: impl FnMut(T) -> Result<()>,
-    ) -> Result<()> {
-        let batch = 2 * rayon::current_num_threads();
-        for first in (0..pieces).step_by(batch) {
-            self.source.restart_time();
-            let made: Vec<Result<T>> =
-                (first..(first + batch).min(pieces)).into_par_iter().map(&make).collect();
-            // If the file has changed, the results may mix old and new content, so none is taken.
-            self.source.intact()?;
-            for made in made {
-                take(made?)?;
-            }
-            self.source.release();
-        }
-        // `take` may have read single points from the file.
-        self.source.intact()
+        let found = self.form.vertex(&self.source, index as usize);
+        found.map_or_else(StreamPoint::zeroed, |found| StreamPoint::new(&found, self.origin))
     }
 }

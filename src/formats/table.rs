@@ -1,14 +1,27 @@
 //! The table of formats. `Kind`, the loading functions, the streams and the messages that list
 //! extensions all follow from it.
 //!
-//! A new format is a module with its reader, and a row here (docs/files.md).
+//! A new format is a module with its reader, and a row here (docs/files.md). If its reader needs
+//! much code or a crate of its own, it belongs to a cargo feature. Without the feature the row has
+//! no readers. It is still found, so that the error can name the feature.
 
+#[cfg(feature = "e57")]
+use super::e57;
+#[cfg(feature = "gltf")]
+use super::gltf;
+#[cfg(feature = "las")]
+use super::las;
+#[cfg(feature = "obj")]
+use super::obj;
+#[cfg(feature = "ply")]
+use super::ply;
 use super::{
-    Kind, csv, e57,
-    form::Form,
+    Kind, csv,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
-    gltf, las, npy, nrrd, obj, pcd, ply, raw, stl, vti, vtk, vtr, vtu, xyz,
+    npy, nrrd, pcd, raw, stl, xyz,
 };
+#[cfg(feature = "vtk")]
+use super::{vti, vtk, vtr, vtu};
 
 /// Every format, in the order of messages: surfaces, volumes, scattered samples.
 pub static FORMATS: &[Format] = &[
@@ -17,7 +30,6 @@ pub static FORMATS: &[Format] = &[
         extensions: &["splk"],
         holds: &[all(Content::Hierarchy)],
         written: Some("splk"),
-        feature: "hierarchy",
         magic: Magic::Prefix(b"SPLK"),
         kind: Which::Always(Kind::Hierarchy),
         pieces: InPieces::Opened,
@@ -32,17 +44,21 @@ pub static FORMATS: &[Format] = &[
             some(Content::Samples, "without faces, if a scalar is named"),
         ],
         written: Some("ply"),
-        feature: "ply",
+        feature: Some("ply"),
         magic: Magic::Rule(|bytes| bytes.trim_ascii_start().starts_with(b"ply")),
+        #[cfg(feature = "ply")]
         kind: Which::Rule(|source, with_scalar| {
             let samples = with_scalar && !ply::has_faces(source)?;
             Ok(if samples { Kind::Samples } else { Kind::Mesh })
         }),
+        #[cfg(feature = "ply")]
         mesh: Some(ply::read),
+        #[cfg(feature = "ply")]
         samples: Some(ply::read_samples),
+        #[cfg(feature = "ply")]
         pieces: InPieces::Points {
             of: "binary files",
-            find: |source| Ok(ply::Pieces::find(source)?.map(Form::Ply)),
+            find: |source| Ok(ply::Pieces::find(source)?.map(|pieces| Box::new(pieces) as _)),
         },
         ..Format::ROW
     },
@@ -51,8 +67,9 @@ pub static FORMATS: &[Format] = &[
         extensions: &["obj"],
         holds: &WITH_OR_WITHOUT_FACES,
         refers: true,
-        feature: "obj",
+        feature: Some("obj"),
         kind: Which::Always(Kind::Mesh),
+        #[cfg(feature = "obj")]
         mesh: Some(obj::read),
         ..Format::ROW
     },
@@ -61,12 +78,13 @@ pub static FORMATS: &[Format] = &[
         extensions: &["gltf", "glb"],
         holds: &WITH_OR_WITHOUT_FACES,
         refers: true,
-        feature: "gltf",
+        feature: Some("gltf"),
         magic: Magic::Rule(|bytes| {
             let text = bytes.trim_ascii_start();
             text.starts_with(b"glTF") || text.starts_with(b"{")
         }),
         kind: Which::Always(Kind::Mesh),
+        #[cfg(feature = "gltf")]
         mesh: Some(gltf::read),
         ..Format::ROW
     },
@@ -74,7 +92,6 @@ pub static FORMATS: &[Format] = &[
         name: "STL",
         extensions: &["stl"],
         holds: &[all(Content::Mesh)],
-        feature: "stl",
         // Binary files begin with any 80 bytes.
         magic: Magic::Prefix(b"solid "),
         kind: Which::Always(Kind::Mesh),
@@ -85,13 +102,15 @@ pub static FORMATS: &[Format] = &[
         name: "LAS",
         extensions: &["las", "laz"],
         holds: &[all(Content::PointCloud)],
-        feature: "las",
+        feature: Some("las"),
         magic: Magic::Prefix(b"LASF"),
         kind: Which::Always(Kind::Mesh),
+        #[cfg(feature = "las")]
         mesh: Some(las::read),
+        #[cfg(feature = "las")]
         pieces: InPieces::Points {
             of: "",
-            find: |source| Ok(las::Pieces::find(source)?.map(Form::Las)),
+            find: |source| Ok(las::Pieces::find(source)?.map(|pieces| Box::new(pieces) as _)),
         },
         ..Format::ROW
     },
@@ -99,9 +118,10 @@ pub static FORMATS: &[Format] = &[
         name: "E57",
         extensions: &["e57"],
         holds: &[all(Content::PointCloud)],
-        feature: "e57",
+        feature: Some("e57"),
         magic: Magic::Prefix(b"ASTM-E57"),
         kind: Which::Always(Kind::Mesh),
+        #[cfg(feature = "e57")]
         mesh: Some(e57::read),
         ..Format::ROW
     },
@@ -109,7 +129,6 @@ pub static FORMATS: &[Format] = &[
         name: "PCD",
         extensions: &["pcd"],
         holds: &[all(Content::PointCloud)],
-        feature: "pcd",
         magic: Magic::Prefix(b"# .PCD"),
         kind: Which::Always(Kind::Mesh),
         mesh: Some(pcd::read),
@@ -119,7 +138,6 @@ pub static FORMATS: &[Format] = &[
         name: "table of points",
         extensions: &["xyz", "pts", "asc"],
         holds: &[all(Content::PointCloud), some(Content::Samples, "if a scalar is named")],
-        feature: "tables",
         kind: Which::Rule(|_, with_scalar| {
             Ok(if with_scalar { Kind::Samples } else { Kind::Mesh })
         }),
@@ -131,12 +149,13 @@ pub static FORMATS: &[Format] = &[
         name: "VTU, VTP",
         extensions: &["vtu", "vtp"],
         holds: &[all(Content::Samples)],
-        feature: "vtk",
+        feature: Some("vtk"),
         magic: Magic::Rule(|bytes| {
             let has = |word| has_word(bytes, word);
             is_vtk_xml(bytes) && (has(b"UnstructuredGrid") || has(b"PolyData"))
         }),
         kind: Which::Always(Kind::Samples),
+        #[cfg(feature = "vtk")]
         samples: Some(vtu::read),
         ..Format::ROW
     },
@@ -144,9 +163,10 @@ pub static FORMATS: &[Format] = &[
         name: "VTR",
         extensions: &["vtr"],
         holds: &[all(Content::Volume)],
-        feature: "vtk",
+        feature: Some("vtk"),
         magic: Magic::Rule(|bytes| is_vtk_xml(bytes) && has_word(bytes, b"RectilinearGrid")),
         kind: Which::Always(Kind::Volume),
+        #[cfg(feature = "vtk")]
         volume: Some(VolumeReader::Plain(vtr::read)),
         ..Format::ROW
     },
@@ -154,10 +174,11 @@ pub static FORMATS: &[Format] = &[
         name: "VTI",
         extensions: &["vti"],
         holds: &[all(Content::Volume)],
-        feature: "vtk",
+        feature: Some("vtk"),
         // Comes after the rows of VTK's other data sets, because these begin like that too.
         magic: Magic::Rule(is_vtk_xml),
         kind: Which::Always(Kind::Volume),
+        #[cfg(feature = "vtk")]
         volume: Some(VolumeReader::Plain(vti::read)),
         ..Format::ROW
     },
@@ -168,12 +189,15 @@ pub static FORMATS: &[Format] = &[
             some(Content::Volume, "structured points, rectilinear grids"),
             some(Content::Samples, "other data sets"),
         ],
-        feature: "vtk",
+        feature: Some("vtk"),
         magic: Magic::Prefix(b"# vtk DataFile"),
+        #[cfg(feature = "vtk")]
         kind: Which::Rule(|source, _| {
             Ok(if vtk::holds_volume(source)? { Kind::Volume } else { Kind::Samples })
         }),
+        #[cfg(feature = "vtk")]
         volume: Some(VolumeReader::Plain(vtk::read_volume)),
+        #[cfg(feature = "vtk")]
         samples: Some(vtk::read_samples),
         ..Format::ROW
     },
@@ -183,7 +207,6 @@ pub static FORMATS: &[Format] = &[
         holds: &[all(Content::Volume)],
         written: Some("nrrd"),
         refers: true,
-        feature: "nrrd",
         magic: Magic::Prefix(b"NRRD"),
         kind: Which::Always(Kind::Volume),
         volume: Some(VolumeReader::Plain(nrrd::read)),
@@ -193,7 +216,6 @@ pub static FORMATS: &[Format] = &[
     Format {
         name: "raw",
         holds: &[some(Content::Volume, "if its layout is given")],
-        feature: "raw",
         kind: Which::Always(Kind::Volume),
         volume: Some(VolumeReader::Described(raw::read)),
         pieces: InPieces::Described { of: "files without gzip", find: raw::plain },
@@ -204,7 +226,6 @@ pub static FORMATS: &[Format] = &[
         extensions: &["splv"],
         holds: &[all(Content::Bricks)],
         written: Some("splv"),
-        feature: "bricks",
         magic: Magic::Prefix(b"SPLV"),
         kind: Which::Always(Kind::Bricks),
         pieces: InPieces::Opened,
@@ -214,7 +235,6 @@ pub static FORMATS: &[Format] = &[
         name: "NPY",
         extensions: &["npy"],
         holds: &[all(Content::Samples)],
-        feature: "npy",
         magic: Magic::Prefix(b"\x93NUMPY"),
         kind: Which::Always(Kind::Samples),
         samples: Some(|source, _| npy::read(source)),
@@ -227,7 +247,6 @@ pub static FORMATS: &[Format] = &[
             some(Content::PointCloud, "with the columns of a point cloud"),
             some(Content::Samples, "with other columns, or if a scalar is named"),
         ],
-        feature: "tables",
         kind: Which::Rule(|source, with_scalar| {
             let is_cloud = !with_scalar && xyz::is_cloud(source);
             Ok(if is_cloud { Kind::Mesh } else { Kind::Samples })
@@ -240,7 +259,6 @@ pub static FORMATS: &[Format] = &[
         name: "table of samples",
         extensions: &["xyzv"],
         holds: &[all(Content::Samples)],
-        feature: "tables",
         kind: Which::Always(Kind::Samples),
         samples: Some(csv::read),
         ..Format::ROW

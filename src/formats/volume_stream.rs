@@ -33,8 +33,8 @@ impl VolumeStream {
     /// - files in which [`load_volume`](super::load_volume) will find an error.
     ///
     /// # Errors
-    /// Those of opening the file, [`Error::Input`] for a malformed header, and [`Error::Limit`] for
-    /// sizes over the limits.
+    /// Those of opening the file, [`Error::Input`] for a malformed header and for a format that this
+    /// build leaves out, and [`Error::Limit`] for sizes over the limits.
     pub fn open(
         path: impl AsRef<Path>,
         limits: &Limits,
@@ -42,7 +42,7 @@ impl VolumeStream {
     ) -> Result<Option<Self>> {
         let path = path.as_ref();
         let source = Source::open(path, limits)?;
-        let format = find_volume(FORMATS, &source, raw.is_some());
+        let format = find_volume(FORMATS, &source, raw.is_some())?;
         let plain = match (format.map(|format| format.pieces), raw) {
             (Some(InPieces::Volume { find, .. }), _) => find(&source)?,
             (Some(InPieces::Described { find, .. }), Some(layout)) => find(&source, layout)?,

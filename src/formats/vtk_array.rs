@@ -1,10 +1,9 @@
 //! The bytes of an array in a VTK XML file: base64, a leading count, and blocks compressed by zlib.
 
 use super::Endian;
-use crate::{Result, input::Source};
+use crate::{Result, input::Source, parallel::prelude::*};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::read::ZlibDecoder;
-use rayon::prelude::*;
 use std::{borrow::Cow, io::Read};
 
 /// How the arrays of a file are encoded.

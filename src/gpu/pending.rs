@@ -23,7 +23,8 @@ use crate::{
     picture::Picture,
     scene::{Optics, Settings},
 };
-use std::{collections::HashMap, time::Instant};
+use std::collections::HashMap;
+use web_time::Instant;
 
 /// Maximum number of depth passes in a batch. Each takes some dozens of bind groups.
 const MOST_PASSES: u32 = 16;

@@ -393,7 +393,7 @@ fn measure(gpu: &Gpu, steps: Vec<Step<'_>>, times: &mut Times) -> Result<()> {
     }
     for (label, encode) in steps {
         encode(&mut encoder);
-        let start = std::time::Instant::now();
+        let start = web_time::Instant::now();
         gpu.queue.submit([std::mem::replace(&mut encoder, new()).finish()]);
         gpu.wait()?;
         add(label, start.elapsed().as_secs_f64() * 1e3);

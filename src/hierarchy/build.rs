@@ -11,10 +11,10 @@ use super::{
 };
 use crate::{
     Deadline, Error, Result, memory,
+    parallel::{self, prelude::*},
     progress::{Watch, tell},
     splat::{Payload, Splat, SplatSet},
 };
-use rayon::prelude::*;
 use std::{
     path::Path,
     sync::atomic::{AtomicU64, Ordering},
@@ -135,7 +135,7 @@ pub fn build_file(
         write,
     )?;
     let mut built = 0;
-    for parts in parts.chunks(2 * rayon::current_num_threads()) {
+    for parts in parts.chunks(2 * parallel::current_num_threads()) {
         let block = |part: &Vec<u32>| {
             build.deadline.check(WORK)?;
             Ok(block_of(set, part, build.preset, builder.outer))
@@ -165,7 +165,7 @@ fn order_bytes(set: &SplatSet) -> u64 {
 /// its nodes, and their encoded form.
 pub(crate) fn at_work(block_splats: usize) -> u64 {
     const OF_SPLAT: u64 = 600;
-    let blocks = 2 * rayon::current_num_threads() as u64;
+    let blocks = 2 * parallel::current_num_threads() as u64;
     blocks.saturating_mul(OF_SPLAT).saturating_mul(block_splats.max(64) as u64)
 }
 

@@ -16,10 +16,10 @@ use super::{
 use crate::{
     Error, Result,
     math::View,
+    parallel::prelude::*,
     splat::{Payload, Splat, SplatSet, decode_normal},
 };
 use glam::{DMat3, DVec3, Vec3, Vec4};
-use rayon::prelude::*;
 
 /// The level of detail at which a hierarchy is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,9 +3,9 @@
 use super::Hierarchy;
 use crate::{
     Result, memory,
+    parallel::prelude::*,
     splat::{Payload, Splat, SplatSet},
 };
-use rayon::prelude::*;
 
 impl Hierarchy {
     /// Returns the splats of the finest level, page by page: those that the hierarchy was built

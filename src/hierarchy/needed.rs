@@ -4,8 +4,8 @@ use super::{
     Cut, CutSphere, Hierarchy,
     file::{Page, PageEntry},
 };
+use crate::parallel::prelude::*;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Margin for rounding in the bounds of several nodes.
 const ROOM: f32 = 1.00001;

@@ -1,8 +1,7 @@
 //! Splits many splats into blocks of neighbours along the space-filling curve of Morton (1966).
 
-use crate::splat::Splat;
+use crate::{parallel::prelude::*, splat::Splat};
 use glam::Vec3;
-use rayon::prelude::*;
 use rdst::RadixSort;
 
 /// Bits of a Morton key on each axis.

@@ -11,10 +11,9 @@
 //! own centre, it would be the parent's sphere.
 
 use super::{Block, Node, merge::leaf};
-use crate::splat::Splat;
+use crate::{parallel::prelude::*, splat::Splat};
 use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sphere {

@@ -9,8 +9,9 @@ use std::{
         Mutex, PoisonError,
         atomic::{AtomicU64, Ordering::Relaxed},
     },
-    time::{Duration, Instant},
+    time::Duration,
 };
+use web_time::Instant;
 
 /// The bytes used, the time reading began, and the files opened.
 pub(crate) struct Budget {

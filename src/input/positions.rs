@@ -1,9 +1,8 @@
 //! Converts the double-precision positions of a file to 32-bit positions around an origin.
 
 use super::Source;
-use crate::{Error, Result};
+use crate::{Error, Result, parallel::prelude::*};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 /// The squares of coordinates up to this size still fit in 32-bit floats.
 const LARGEST: f64 = 1e18;

@@ -6,8 +6,7 @@
 //! the columns. Numbers use a decimal point, not a comma.
 
 use super::{Source, copy, growing::Growing};
-use crate::{Error, Result};
-use rayon::prelude::*;
+use crate::{Error, Result, parallel::prelude::*};
 
 /// Maximum number of columns.
 const MOST_COLUMNS: usize = 4096;

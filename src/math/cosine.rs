@@ -2,7 +2,7 @@
 //! every axis (DCT-I: whole-sample symmetry; Martucci, "Symmetric convolution and the discrete sine
 //! and cosine transforms", 1994).
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use rustfft::{Fft, FftPlanner, num_complex::Complex};
 use std::{f64::consts::PI, sync::Arc};
 

@@ -8,9 +8,9 @@
 //! distances equal.
 
 use super::weld::first_of;
+use crate::parallel::prelude::*;
 use glam::{DMat3, DVec3, Vec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use rayon::prelude::*;
 use std::num::NonZero;
 
 /// Rotates space and scales it by `SCALE`.

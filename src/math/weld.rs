@@ -1,7 +1,7 @@
 //! Points at the same position.
 
+use crate::parallel::prelude::*;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Returns for each position the index of the first one that is equal to it (often itself).
 pub(crate) fn first_of_equals(positions: &[Vec3]) -> Vec<u32> {

@@ -3,10 +3,10 @@
 use super::{TILE, weighting::deviation};
 use crate::{
     math::{Bounds, Kernel, Sheets, View},
+    parallel::{self, prelude::*},
     volume::{Lattice, Volume, reach::neighbourhood_ranges},
 };
 use glam::{DMat3, DVec3};
-use rayon::prelude::*;
 
 /// Samples along each side of a block.
 pub const BLOCK: usize = 4;
@@ -146,7 +146,7 @@ impl Shown {
             a
         };
         let none = || vec![0u64; tiles[0] * tiles[1] * words];
-        let threads = rayon::current_num_threads();
+        let threads = parallel::current_num_threads();
         let all = (0..layers)
             .into_par_iter()
             .with_min_len(layers.div_ceil(threads))

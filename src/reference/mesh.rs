@@ -4,6 +4,7 @@ use super::{composite::Composite, composite::Medium, picture, ray::Ray, shade};
 use crate::{
     Deadline, Error, Result,
     math::{Bounds, Camera, View},
+    parallel::prelude::*,
     picture::Picture,
     scene::{Scene, Settings},
     surface::{Mesh, color_at, corner_normals},
@@ -15,7 +16,6 @@ use obvhs::{
     bvh2::{Bvh2, builder::build_bvh2},
     ray::{Ray as Line, RayHit},
 };
-use rayon::prelude::*;
 use std::time::Duration;
 
 /// Draws the triangles of a mesh by ray tracing, with `side`² rays spread evenly over each pixel.

@@ -158,6 +158,7 @@ pub use truth::integrate;
 use crate::{
     Result,
     math::{Camera, View},
+    parallel::prelude::*,
     picture::Picture,
     scene::{Classification, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
     volume::{Lattice, Shade},
@@ -170,7 +171,6 @@ use glam::{DVec2, DVec3};
 use kernel::Kernel;
 use product::Product;
 use ray::Ray;
-use rayon::prelude::*;
 use sheet::Light;
 
 /// Draws a scene by the definition above. Returns premultiplied colour, and depth. Rows are drawn

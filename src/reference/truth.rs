@@ -13,12 +13,12 @@ use super::{
 use crate::{
     Error, Result,
     math::{Camera, Kernel, View},
+    parallel::prelude::*,
     picture::Picture,
     scene::{Item, Optics, Scene, Settings},
     volume::{Arrangement, Lattice, Shade, TransferFunction, Volume, reach::first_visible},
 };
 use glam::{DMat3, DVec2, DVec3};
-use rayon::prelude::*;
 
 /// Draws a volume without sheets. The field is Q/P of the [definition](self::super), evaluated at
 /// the middles of steps along each ray. Each point is classified and lit alone. `step` is the

@@ -2,9 +2,11 @@
 //! resolve the separate samples.
 
 use super::splats::{LARGEST_SLOPE, factor};
-use crate::splat::{Splat, SplatSet};
+use crate::{
+    parallel::prelude::*,
+    splat::{Splat, SplatSet},
+};
 use glam::{DMat3, DVec3, Vec3};
-use rayon::prelude::*;
 
 /// Cells along an axis that fit in a key.
 const MOST_CELLS: f64 = (1u64 << 21) as f64;

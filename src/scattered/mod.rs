@@ -14,9 +14,11 @@ mod tests;
 pub(crate) use merge::merged;
 pub use splats::SampleOptions;
 
-use crate::volume::{BINS, TransferFunction, Volume};
+use crate::{
+    parallel::prelude::*,
+    volume::{BINS, TransferFunction, Volume},
+};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 /// Points with one value each, in the file's own unit, relative to `origin`, so that doubles far
 /// from zero keep their precision in 32 bits. `radii` and `covariances` are either empty or as long

@@ -6,9 +6,9 @@ use crate::{
     Deadline, Result,
     deadline::Clock,
     math::{eigen, neighbours::Neighbours},
+    parallel::prelude::*,
 };
 use glam::{DMat3, DVec3, Vec3};
-use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Most neighbours that a sample may use.

@@ -6,10 +6,10 @@ use super::{
 };
 use crate::{
     Deadline, Error, Result, memory,
+    parallel::prelude::*,
     splat::{Payload, Splat, SplatSet},
 };
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 /// Footprints end this many standard deviations from the sample, at 1.1 % of the kernel's height.
 const EXTENT: f32 = 3.0;

@@ -7,10 +7,10 @@ use crate::{
     Error, Result,
     hierarchy::Detail,
     math::{Bounds, Kernel},
+    parallel::prelude::*,
     splat::{Payload, Splat, SplatSet},
     volume::{Shade, TransferFunction},
 };
-use rayon::prelude::*;
 
 /// Number of values that a transfer function can distinguish over the range of its data. In a sum
 /// of 32 bits, a value much smaller than 1/`VALUES` of another is lost.

@@ -1,8 +1,12 @@
 //! Which triangle corners meet at each vertex.
 
 use super::Mesh;
-use crate::{Result, math::weld::first_of_equals, memory};
-use rayon::prelude::*;
+use crate::{
+    Result,
+    math::weld::first_of_equals,
+    memory,
+    parallel::{self, prelude::*},
+};
 use std::borrow::Cow;
 
 /// The corners at each vertex. Corner `3·t + i` is the `i`-th of triangle `t`.
@@ -24,7 +28,7 @@ impl Adjacency {
     pub fn new(triangles: &[[u32; 3]], vertices: usize) -> Self {
         // Each task scans all triangles but handles only its own vertices. No two tasks write to
         // the same memory, and the order does not depend on the number of tasks.
-        let step = vertices.div_ceil(rayon::current_num_threads()).max(1);
+        let step = vertices.div_ceil(parallel::current_num_threads()).max(1);
         let parts = (0..vertices.div_ceil(step)).into_par_iter().map(|part| {
             let first = part * step;
             Part::new(triangles, first as u32, step.min(vertices - first) as u32)

@@ -12,10 +12,10 @@ use crate::{
     deadline::Clock,
     math::{eigen, neighbours::Neighbours},
     memory,
+    parallel::prelude::*,
     splat::{NO_NORMAL, Splat, encode_normal},
 };
 use glam::{DMat3, DVec3, Vec3};
-use rayon::prelude::*;
 
 /// Neighbours that a point's plane and spacing are computed from.
 const COUNT: usize = 10;

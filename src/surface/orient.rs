@@ -11,8 +11,8 @@
 //! gives the outside, whatever the shape. An open part is turned away from the centre of the point
 //! cloud. If the sum is indecisive, as on flat ground, the part faces up (+z).
 
+use crate::parallel::prelude::*;
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 /// A sum below this fraction of the largest possible one is indecisive.
 const LEAST_VOTE: f64 = 0.03;

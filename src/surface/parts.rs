@@ -7,7 +7,7 @@
 //! than two triangles meet at an edge, they belong to one part, or to several parts that are each
 //! closed.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Triangles per batch, and bits of the number of slots of its table: a third more slots than the

@@ -10,9 +10,8 @@ use super::{
     surfels::{Whole, largest_edge, of_part},
     survey::{edge, edge_of_places},
 };
-use crate::{Deadline, Result, splat::Splat};
+use crate::{Deadline, Result, parallel::prelude::*, splat::Splat};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// What one pass over the triangles of a mesh collects. The results of two parts can be joined.
 #[derive(Debug, Clone, Default)]

@@ -6,9 +6,8 @@
 //! one) across their width, so these are cut into slabs.
 
 use super::{Mesh, Texture, smooth::corner_normals};
-use crate::{Deadline, Result, memory};
+use crate::{Deadline, Result, memory, parallel::prelude::*};
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// A texture is sampled about this many texels apart …

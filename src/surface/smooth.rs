@@ -4,9 +4,8 @@ use super::{
     Mesh,
     adjacency::{Connected, is_split},
 };
-use crate::{Deadline, Result, deadline::Clock, memory};
+use crate::{Deadline, Result, deadline::Clock, memory, parallel::prelude::*};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Creases sharper than this (degrees) stay creases, whatever the options say, because surfels lie
 /// in the plane of their group.

@@ -6,9 +6,8 @@
 //! of a part is outside.
 
 use super::{Mesh, fan::Sums, mesh::given, parts::Joining, survey::Closing};
-use crate::memory;
+use crate::{memory, parallel::prelude::*};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// The tolerated fraction of a part's area with normals on the wrong side. Also the tolerated
 /// fraction of the whole area in parts without volume. Scans have folds of a few triangles.

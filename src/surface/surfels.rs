@@ -21,10 +21,10 @@ use crate::{
     Deadline, Error, Result,
     deadline::Clock,
     memory,
+    parallel::prelude::*,
     splat::{Payload, Splat, SplatSet},
 };
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use std::{borrow::Cow, ops::RangeInclusive};
 
 /// How surfels are made from a mesh or point cloud.

@@ -1,9 +1,8 @@
 //! Properties of a mesh: whether it is closed, and how many of its elements are irregular.
 
 use super::{Mesh, adjacency::may_be_split};
-use crate::math::weld::first_of_equals;
+use crate::{math::weld::first_of_equals, parallel::prelude::*};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Counts of irregular elements of a mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -8,8 +8,8 @@ use crate::{
         Kernel,
         cosine::{self, frequency, mirrored},
     },
+    parallel::prelude::*,
 };
-use rayon::prelude::*;
 
 /// A grid that continues mirrored on all sides. A Cartesian lattice is a grid itself. The samples
 /// of a body-centred lattice are the points of a grid twice as fine whose indices are all even or

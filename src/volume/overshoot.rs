@@ -1,8 +1,10 @@
 //! How far a sharp reconstruction leaves the range of the samples around it.
 
 use super::grid::{Grid, Response, weight};
-use crate::math::{Kernel, cosine::mirrored};
-use rayon::prelude::*;
+use crate::{
+    math::{Kernel, cosine::mirrored},
+    parallel::prelude::*,
+};
 
 /// Points along an axis of the grid on which the cardinal function is measured. The function falls
 /// by a third per sample or more, so nothing remains of it at the border.

@@ -2,9 +2,8 @@
 //! position, sampled over the cube from −1 to 1. Most have values in 0 … 1.
 
 use super::{Lattice, Samples, Volume, head::head};
-use crate::{Error, Result, memory};
+use crate::{Error, Result, memory, parallel::prelude::*};
 use glam::{DMat3, DVec3};
-use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// A function of position.

@@ -7,8 +7,7 @@
 //! outermost ones, and so do the coefficients.
 
 use super::{Samples, each_type};
-use crate::math::cosine::mirrored;
-use rayon::prelude::*;
+use crate::{math::cosine::mirrored, parallel::prelude::*};
 
 /// The pole of the recursions.
 const POLE: f32 = -0.267_949_2;

@@ -3,7 +3,7 @@
 //! splats between them cannot be seen, and the engine skips them.
 
 use super::{TransferFunction, Volume, steps::Steps};
-use rayon::prelude::*;
+use crate::parallel::{self, prelude::*};
 
 /// Returns, for each sample in memory order, the smallest and the largest value in a box around it.
 /// The box reaches ±`radius` samples along each axis and ends at the volume's border. Both are in
@@ -25,7 +25,7 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
     let (rx, ry, rz) = (reach(0), reach(1), reach(2));
     // Every slab recomputes the slices that reach into it, so slabs are thick compared with the
     // radius.
-    let slab = nz.div_ceil(4 * rayon::current_num_threads()).max(8 * rz).max(1);
+    let slab = nz.div_ceil(4 * parallel::current_num_threads()).max(8 * rz).max(1);
     let mut ranges = vec![[0u8; 2]; slice * nz];
     ranges.par_chunks_mut((slab * slice).max(1)).enumerate().for_each(|(index, slab_ranges)| {
         let mut scratch = vec![[0u8; 2]; slice];

@@ -7,9 +7,9 @@ use super::{Arrangement, Lattice, Samples, Volume};
 use crate::{
     Error, Result,
     math::cosine::{self, frequency, mirrored},
+    parallel::prelude::*,
 };
 use glam::DVec3;
-use rayon::prelude::*;
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
 /// σ of the interpolating Gaussian, in spacings. At half the finest frequency, 5e-5 of a wave's

@@ -4,8 +4,8 @@ use super::{Lattice, Scalar, overshoot::Overshoot, reach::neighbourhood_ranges};
 use crate::{
     Error, Result,
     math::{Kernel, Tensor},
+    parallel::{self, prelude::*},
 };
-use rayon::prelude::*;
 use std::{borrow::Cow, sync::Arc};
 
 /// Samples in the type of their file, first axis fastest.
@@ -342,7 +342,7 @@ impl Volume {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
             a
         };
-        let chunk = self.len().div_ceil(4 * rayon::current_num_threads()).max(CHUNK);
+        let chunk = self.len().div_ceil(4 * parallel::current_num_threads()).max(CHUNK);
         (0..self.len().div_ceil(chunk))
             .into_par_iter()
             .map(|c| count(c * chunk..self.len().min((c + 1) * chunk)))

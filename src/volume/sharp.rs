@@ -18,9 +18,9 @@ use crate::{
     Error, Result,
     math::{Kernel, Profile, Tensor},
     memory,
+    parallel::prelude::*,
 };
 use glam::DVec3;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// The smallest response that a kernel may have. Coefficients are up to 1 / response times as large

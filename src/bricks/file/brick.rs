@@ -4,9 +4,9 @@
 use super::directory::{CONSTANT, Entry, PACKED, UNIFORM};
 use crate::{
     bricks::{BRICK_BLOCKS, Brick, SIDE},
+    container::pack::{self, Compressor},
     volume::Scalar,
 };
-use zstd::bulk::Compressor;
 
 /// Returns the bytes of a brick, and its entry in the directory.
 pub fn encode(
@@ -48,7 +48,7 @@ pub fn decode(entry: &Entry, bytes: &[u8], scalar: Scalar) -> Result<Brick, Stri
     }
     let [samples, blocks] = entry.contents(scalar);
     let mut contents = if entry.has(PACKED) {
-        zstd::bulk::decompress(bytes, samples + blocks)
+        pack::decompress(bytes, samples + blocks)
             .map_err(|e| format!("it cannot be unpacked: {e}"))?
     } else {
         bytes.to_vec()

@@ -6,10 +6,10 @@ use crate::{
     bricks::{Brick, Bricks, Level, SIDE, pyramid::Pyramid},
     container::{Finding, Findings, Report},
     input::Limits,
+    parallel::prelude::*,
     progress::{Watch, tell},
     volume::steps::Steps,
 };
-use rayon::prelude::*;
 use std::path::Path;
 
 /// Checks a file: header, directory, the checksum of every brick, and the hash. If all of these

@@ -7,14 +7,13 @@ use crate::bricks::{Brick, Bricks};
 use crate::{
     Error, Result,
     bricks::{Header, REACH, SIDE, cut::Slices, level, pyramid::Pyramid},
-    container::{Spill, Target},
+    container::{Spill, Target, pack::Compressor},
     formats::VolumeStream,
+    parallel::prelude::*,
     progress::{Watch, tell},
     volume::{Scalar, Volume, steps::Steps},
 };
-use rayon::prelude::*;
 use std::{borrow::Cow, io::Write, ops::Range, path::Path};
-use zstd::bulk::Compressor;
 
 /// Descriptions that are stored in the file.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -5,6 +5,7 @@ use super::{Fields, Header, Point, time::Times};
 use crate::{
     Result,
     input::{Source, isolate::isolated},
+    parallel::prelude::*,
 };
 use laz::{
     DecompressionSelection, LazItem, LazItemType, LazVlr,
@@ -13,7 +14,6 @@ use laz::{
         LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
     },
 };
-use rayon::prelude::*;
 use std::{io::Cursor, ops::Range};
 
 /// Points that are unpacked between two checks of the time limit.

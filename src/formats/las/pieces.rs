@@ -1,19 +1,22 @@
 //! Reads LAS and LAZ files in pieces.
 
 use super::{
-    super::shared::{
-        cloud::{color_of_16_bits, grey},
-        found::Found,
+    super::{
+        form::{Counts, Form, StreamPoint},
+        shared::{
+            cloud::{color_of_16_bits, grey},
+            found::Found,
+        },
     },
     Header, Point, packed, plain_bytes,
 };
 use crate::{
     Error, Result,
     input::{Source, positions},
+    parallel::{self, prelude::*},
 };
 use glam::{DVec3, Vec3};
 use laz::LazVlr;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Points per piece of an uncompressed file.
@@ -78,19 +81,6 @@ impl Pieces {
         Ok(Some(Self { header, packed, firsts, paint: Paint::None }))
     }
 
-    /// Returns the number of points that the header counts, including withheld ones.
-    pub fn points(&self) -> usize {
-        self.header.points
-    }
-
-    pub fn pieces(&self) -> usize {
-        self.firsts.len()
-    }
-
-    pub fn has_colors(&self) -> bool {
-        !matches!(self.paint, Paint::None)
-    }
-
     /// Returns the points of a piece with their indices. Withheld points are left out. Within a
     /// piece, the points are numbered without them.
     fn piece(&self, source: &Source, piece: usize) -> Result<impl Iterator<Item = (usize, Point)>> {
@@ -108,32 +98,56 @@ impl Pieces {
         Ok((first..).zip(points))
     }
 
-    /// Returns the points of a piece with their colours.
-    pub fn found(&self, source: &Source, piece: usize) -> Result<Vec<Found>> {
-        let found = |(row, point): (usize, Point)| Found {
-            row,
-            position: self.header.position(&point),
-            normal: Vec3::ZERO,
-            color: match self.paint {
-                Paint::None => [255; 4],
-                Paint::Color { largest } => color_of_16_bits(point.color, largest),
-                Paint::Grey { low, high } => grey(f32::from(point.intensity), low, high),
-            },
-        };
-        Ok(self.piece(source, piece)?.map(found).collect())
+    fn look(&self, source: &Source, piece: usize) -> Result<Seen> {
+        let mut seen = Seen::nothing();
+        for (row, point) in self.piece(source, piece)? {
+            let position = self.header.position(&point);
+            if !position.is_finite() {
+                seen.bad.get_or_insert((row, position));
+            }
+            (seen.low, seen.high) = (seen.low.min(position), seen.high.max(position));
+            seen.largest = point.color.iter().fold(seen.largest, |a, &b| a.max(b));
+            seen.intensities[usize::from(point.intensity)] += 1;
+            seen.points += 1;
+        }
+        Ok(seen)
+    }
+}
+
+impl Form for Pieces {
+    /// The points include withheld ones.
+    fn counts(&self) -> Counts {
+        Counts { points: self.header.points as u64, triangles: 0 }
     }
 
-    /// Visits all points. Returns their number and the corners of their bounding box, and chooses
-    /// how their colours are made.
-    ///
-    /// # Errors
-    /// Those of the reader.
-    pub fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
+    fn pieces(&self) -> [usize; 2] {
+        [self.firsts.len(), 0]
+    }
+
+    fn z_is_up(&self) -> bool {
+        true
+    }
+
+    fn has_normals(&self) -> bool {
+        false
+    }
+
+    fn has_colors(&self) -> bool {
+        !matches!(self.paint, Paint::None)
+    }
+
+    fn has_uvs(&self) -> bool {
+        false
+    }
+
+    fn warn(&self, _: &Source) {}
+
+    fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
         let mut seen = Seen::nothing();
-        let batch = 2 * rayon::current_num_threads();
+        let batch = 2 * parallel::current_num_threads();
         source.restart_time();
-        for first in (0..self.pieces()).step_by(batch) {
-            let pieces = (first..(first + batch).min(self.pieces())).into_par_iter();
+        for first in (0..self.firsts.len()).step_by(batch) {
+            let pieces = (first..(first + batch).min(self.firsts.len())).into_par_iter();
             let more: Vec<Seen> =
                 pieces.map(|piece| self.look(source, piece)).collect::<Result<_>>()?;
             more.into_iter().for_each(|more| seen.join(more));
@@ -151,19 +165,33 @@ impl Pieces {
         Ok((seen.points, [seen.low, seen.high]))
     }
 
-    fn look(&self, source: &Source, piece: usize) -> Result<Seen> {
-        let mut seen = Seen::nothing();
-        for (row, point) in self.piece(source, piece)? {
-            let position = self.header.position(&point);
-            if !position.is_finite() {
-                seen.bad.get_or_insert((row, position));
-            }
-            (seen.low, seen.high) = (seen.low.min(position), seen.high.max(position));
-            seen.largest = point.color.iter().fold(seen.largest, |a, &b| a.max(b));
-            seen.intensities[usize::from(point.intensity)] += 1;
-            seen.points += 1;
-        }
-        Ok(seen)
+    fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>> {
+        let settled = |(row, point): (usize, Point)| {
+            let found = Found {
+                row,
+                position: self.header.position(&point),
+                normal: Vec3::ZERO,
+                color: match self.paint {
+                    Paint::None => [255; 4],
+                    Paint::Color { largest } => color_of_16_bits(point.color, largest),
+                    Paint::Grey { low, high } => grey(f32::from(point.intensity), low, high),
+                },
+            };
+            StreamPoint::new(&found, origin)
+        };
+        Ok(self.piece(source, piece)?.map(settled).collect())
+    }
+
+    fn triangles(&self, _: &Source, _: usize) -> Result<(usize, Vec<[u32; 3]>)> {
+        Ok((0, Vec::new()))
+    }
+
+    fn vertex(&self, _: &Source, _: usize) -> Option<Found> {
+        None
+    }
+
+    fn position(&self, _: &Source, _: usize) -> Option<DVec3> {
+        None
     }
 }
 

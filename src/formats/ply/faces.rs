@@ -9,11 +9,11 @@ use crate::{
     Error, Result,
     formats::shared::polygon,
     input::{Source, growing::Growing},
+    parallel::prelude::*,
     surface::Mesh,
 };
 use glam::{Vec2, Vec3};
 use ply_rs::ply::{PropertyType, ScalarType};
-use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Represents −1, which separates strips.

@@ -2,9 +2,13 @@
 //! each.
 
 use super::{
-    super::shared::found::Found,
+    super::{
+        form::{Counts, Form, StreamPoint, in_order},
+        shared::found::Found,
+    },
     COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale, gaussians,
     header::{self, Element, Header, width},
+    larger,
     rows::{cut, list_place, number, triangle_stride},
 };
 use crate::{
@@ -22,11 +26,11 @@ const ROWS: usize = 1 << 16;
 pub struct Pieces {
     vertices: Vertices,
     faces: Option<Faces>,
-    pub has_normals: bool,
-    pub has_colors: bool,
-    pub has_uvs: bool,
+    has_normals: bool,
+    has_colors: bool,
+    has_uvs: bool,
     /// Whether the points are the centres of trained 3D Gaussians.
-    pub are_gaussians: bool,
+    are_gaussians: bool,
 }
 
 /// Rows of equal length.
@@ -85,36 +89,31 @@ impl Pieces {
     }
 
     /// Returns whether the scale of the colours depends on all of them.
-    pub fn asks_for_colors(&self) -> bool {
+    fn asks_for_colors(&self) -> bool {
         self.has_colors && self.vertices.color_kind.iter().flatten().any(ColorKind::is_wide)
     }
 
     /// Returns the values of a vertex's colour channels; 0 for a missing channel.
-    pub fn channels(&self, source: &Source, row: usize) -> [f64; 4] {
+    fn channels(&self, source: &Source, row: usize) -> [f64; 4] {
         std::array::from_fn(|channel| self.value(source, row, COLOR + channel))
     }
 
     /// Sets the scale of the colours from the largest values of all channels. Without it there are
     /// no colours.
-    pub fn settle_colors(&mut self, largest: [f64; 4]) {
+    fn settle_colors(&mut self, largest: [f64; 4]) {
         self.vertices.color_scale = color_scale(&self.vertices.color_kind, largest);
     }
 
-    pub fn points(&self) -> usize {
+    fn points(&self) -> usize {
         self.vertices.rows.count
     }
 
-    pub fn triangles(&self) -> usize {
+    fn triangles(&self) -> usize {
         self.faces.as_ref().map_or(0, |faces| faces.rows.count)
     }
 
-    /// Returns the number of pieces of points, and of triangles.
-    pub fn pieces(&self) -> [usize; 2] {
-        [self.points(), self.triangles()].map(|count| count.div_ceil(ROWS))
-    }
-
     /// Returns the rows of a piece of points.
-    pub fn rows(&self, piece: usize) -> Range<usize> {
+    fn rows(&self, piece: usize) -> Range<usize> {
         piece * ROWS..((piece + 1) * ROWS).min(self.points())
     }
 
@@ -124,19 +123,19 @@ impl Pieces {
         fields[role].as_ref().map_or(0.0, |(offset, kind)| number(&row[*offset..], kind, rows.big))
     }
 
-    pub fn position(&self, source: &Source, row: usize) -> DVec3 {
+    fn position(&self, source: &Source, row: usize) -> DVec3 {
         DVec3::from_array([0, 1, 2].map(|axis| self.value(source, row, POSITION + axis)))
     }
 
     /// Returns the error for a vertex whose position is not finite.
-    pub fn not_finite(&self, source: &Source, row: usize) -> Error {
+    fn not_finite(&self, source: &Source, row: usize) -> Error {
         let byte = self.vertices.rows.at + row * self.vertices.rows.stride;
         let place = format!("element “vertex”, row {row}, byte {byte}");
         positions::not_finite(source, place, self.position(source, row))
     }
 
     /// Returns a vertex, converted as by the reader of whole files.
-    pub fn vertex(&self, source: &Source, row: usize) -> Found {
+    fn vertex(&self, source: &Source, row: usize) -> Found {
         let value = |role: usize| self.value(source, row, role);
         let mut found = Found {
             row,
@@ -159,7 +158,7 @@ impl Pieces {
     ///
     /// # Errors
     /// [`Error::Input`] for a polygon, and for an index without a vertex.
-    pub fn triangle_piece(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)> {
+    fn triangle_piece(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)> {
         let Some(faces) = &self.faces else { return Ok((0, Vec::new())) };
         let Rows { at, count, stride, big } = faces.rows;
         let vertices = self.points();
@@ -186,6 +185,84 @@ impl Pieces {
         };
         let rows = piece * ROWS..((piece + 1) * ROWS).min(count);
         Ok((rows.start, rows.map(triangle).collect::<Result<_>>()?))
+    }
+}
+
+impl Form for Pieces {
+    fn counts(&self) -> Counts {
+        Counts { points: self.points() as u64, triangles: self.triangles() as u64 }
+    }
+
+    fn pieces(&self) -> [usize; 2] {
+        [self.points(), self.triangles()].map(|count| count.div_ceil(ROWS))
+    }
+
+    fn z_is_up(&self) -> bool {
+        false
+    }
+
+    fn has_normals(&self) -> bool {
+        self.has_normals
+    }
+
+    fn has_colors(&self) -> bool {
+        self.has_colors
+    }
+
+    fn has_uvs(&self) -> bool {
+        self.has_uvs
+    }
+
+    fn warn(&self, source: &Source) {
+        if self.are_gaussians {
+            gaussians::warn(source);
+        }
+    }
+
+    fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let mut brightest = [0.0; 4];
+        let asks_for_colors = self.asks_for_colors();
+        let of_piece = |piece: usize| {
+            let mut around = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            let mut brightest = [0.0; 4];
+            for row in self.rows(piece) {
+                let position = self.position(source, row);
+                if !position.is_finite() {
+                    return Err(self.not_finite(source, row));
+                }
+                around = (around.0.min(position), around.1.max(position));
+                if asks_for_colors {
+                    brightest = larger(brightest, self.channels(source, row));
+                }
+            }
+            Ok((around, brightest, self.rows(piece).end as u64))
+        };
+        in_order(source, self.pieces()[0], of_piece, |(around, of_piece, seen)| {
+            (low, high) = (low.min(around.0), high.max(around.1));
+            brightest = larger(brightest, of_piece);
+            watch(seen);
+            Ok(())
+        })?;
+        self.settle_colors(brightest);
+        Ok((self.points() as u64, [low, high]))
+    }
+
+    fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>> {
+        let point = |row| StreamPoint::new(&self.vertex(source, row), origin);
+        Ok(self.rows(piece).map(point).collect())
+    }
+
+    fn triangles(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)> {
+        self.triangle_piece(source, piece)
+    }
+
+    fn vertex(&self, source: &Source, index: usize) -> Option<Found> {
+        Some(self.vertex(source, index))
+    }
+
+    fn position(&self, source: &Source, index: usize) -> Option<DVec3> {
+        Some(self.position(source, index))
     }
 }
 

@@ -8,9 +8,9 @@ use super::header::{Element, width};
 use crate::{
     Error, Result,
     input::{Source, copy},
+    parallel::prelude::*,
 };
 use ply_rs::ply::{Encoding, PropertyType, ScalarType};
-use rayon::prelude::*;
 
 /// Returns a number of the file's type. `bytes` has at least the width of the type.
 pub(super) fn number(bytes: &[u8], kind: &ScalarType, big: bool) -> f64 {

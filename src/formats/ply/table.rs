@@ -5,9 +5,8 @@ use super::{
     header::Element,
     rows::{Rows, number, place_in_row},
 };
-use crate::{Result, input::Source};
+use crate::{Result, input::Source, parallel::prelude::*};
 use ply_rs::ply::{PropertyType, ScalarType};
-use rayon::prelude::*;
 
 /// Selected scalar columns of an element, by their index in the list of requested columns.
 pub(super) enum Table<'a> {

@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
     Error,
-    formats::{Stream, stream::StreamPoint},
+    formats::{Stream, StreamPoint},
     input::{Limits, testing::Folder},
 };
 use std::path::Path;

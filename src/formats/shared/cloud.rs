@@ -3,10 +3,10 @@
 use crate::{
     Result,
     input::{Source, positions},
+    parallel::prelude::*,
     surface::{Mesh, Sensor},
 };
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Points as a reader finds them. All but the positions may be empty.

@@ -3,10 +3,10 @@
 use crate::{
     Error, Result,
     input::{Source, positions},
+    parallel::prelude::*,
     scattered::Points,
 };
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// The columns of the rows besides their positions. All but the values may be empty.
 #[derive(Debug, Default)]

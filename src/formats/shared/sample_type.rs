@@ -1,7 +1,6 @@
 //! Sample types of volume files, and how their bytes and texts become [`Samples`].
 
-use crate::volume::Samples;
-use rayon::prelude::*;
+use crate::{parallel::prelude::*, volume::Samples};
 use std::borrow::Cow;
 
 /// The type of a sample in a file.

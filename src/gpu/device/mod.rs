@@ -4,6 +4,7 @@
 pub(crate) mod buffers;
 pub(crate) mod fault;
 pub(crate) mod readback;
+#[cfg(not(target_arch = "wasm32"))]
 pub(crate) mod timestamps;
 
 use crate::{Error, Result, memory};
@@ -15,6 +16,10 @@ pub const MOST_BUFFERS: u32 = 9;
 
 /// Default time limit of a picture: a large scene takes minutes on a processor.
 const PATIENCE: Duration = Duration::from_secs(600);
+
+/// The features that a device needs for its clock.
+const CLOCK: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
 /// A wgpu device and queue, with the adapter's description.
 #[derive(Debug, Clone)]
@@ -228,7 +233,7 @@ impl Gpu {
             max_buffer_size: adapter.limits().max_buffer_size,
             ..wgpu::Limits::default()
         };
-        let features = adapter.features() & timestamps::FEATURES;
+        let features = adapter.features() & CLOCK;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("splatkit"),
             required_features: features,
@@ -274,7 +279,7 @@ impl Gpu {
     /// Whether the times of [`Renderer::profile`](crate::gpu::Renderer::profile) come from the
     /// GPU's own clock.
     pub fn has_clock(&self) -> bool {
-        self.device.features().contains(timestamps::FEATURES)
+        self.device.features().contains(CLOCK)
     }
 
     /// Returns the maximum size of a storage binding in bytes, as a multiple of 256.

@@ -5,10 +5,6 @@ use crate::{
     gpu::device::{Gpu, buffers::buffer},
 };
 
-/// The features that a device needs for this clock.
-pub const FEATURES: wgpu::Features =
-    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
-
 /// Timestamps in a submission, one before the first step and one after each.
 pub struct Timestamps {
     marks: wgpu::QuerySet,
@@ -17,7 +13,7 @@ pub struct Timestamps {
 
 impl Timestamps {
     /// Allocates the timestamps around this number of steps. Returns `None` on devices without a
-    /// clock.
+    /// clock ([`Gpu::has_clock`]).
     pub fn new(gpu: &Gpu, steps: usize) -> Option<Self> {
         if !gpu.has_clock() {
             return None;

@@ -12,8 +12,8 @@ use crate::{
     bricks::{BLOCK, BLOCKS, BRICK_BLOCKS, Brick, Bricks, Choice, EMPTY, SIDE, slot_bytes},
     gpu::device::{Gpu, buffers::buffer},
     math::Kernel,
+    parallel::prelude::*,
 };
-use rayon::prelude::*;
 use std::{collections::HashMap, sync::Arc};
 use wgpu::BufferUsages as Usage;
 

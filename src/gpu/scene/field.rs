@@ -9,6 +9,7 @@ use crate::{
         pipeline::variant::Variant,
     },
     math::{Kernel, Sheets, View},
+    parallel::prelude::*,
     plan::{
         gathering::unsuited_kernel,
         shown::{Shown, field_ranges},
@@ -18,7 +19,6 @@ use crate::{
     scene::{Item, Scene, Settings},
     volume::{Arrangement, Scalar, Volume},
 };
-use rayon::prelude::*;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 

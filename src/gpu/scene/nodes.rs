@@ -14,10 +14,10 @@ use crate::{
         needed::{Needed, parents_around},
     },
     math::View,
+    parallel::prelude::*,
     scene::Settings,
 };
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 use std::sync::{
     Arc,
     atomic::{AtomicU32, Ordering::Relaxed},

@@ -21,6 +21,7 @@ use crate::{
     },
     hierarchy::{Cut, Levels},
     math::{Bounds, Kernel, View},
+    parallel::prelude::*,
     plan::uniforms::Source,
     scene::{Item, Optics, Scene, Settings},
     splat::{Payload, Splat, SplatSet},
@@ -30,7 +31,6 @@ use crate::{
     },
 };
 use glam::{UVec3, Vec3};
-use rayon::prelude::*;
 use std::{borrow::Cow, sync::Arc};
 
 /// Maximum number of voxels in a chunk, apart from those of its neighbours. The spans of all its

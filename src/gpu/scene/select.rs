@@ -16,8 +16,8 @@ use crate::{
             stage::Stage,
         },
     },
+    parallel::prelude::*,
 };
-use rayon::prelude::*;
 use wgpu::BufferUsages as Usage;
 
 /// Samples along each side of the block that an invocation handles (`SIDE` in select.wgsl).

@@ -18,11 +18,11 @@ use crate::{
     formats::StreamPoint,
     math::Bounds,
     memory,
+    parallel::{self, prelude::*},
     splat::{Payload, Splat, SplatSet, decode_normal},
     surface::{EXTENT, Known, Mesh, SurfelOptions, cloud_piece},
 };
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use std::path::Path;
 
 /// How far the surfels of a point cloud are assumed to reach, as a fraction of the core's radius.
@@ -108,7 +108,7 @@ impl Work<'_> {
         check_splats(&set)?;
         self.bounds = self.bounds.union(set.bounds());
         let parts = partition::blocks(&set.splats, self.options.block_splats.max(64));
-        for parts in parts.chunks(2 * rayon::current_num_threads()) {
+        for parts in parts.chunks(2 * parallel::current_num_threads()) {
             let block = |part: &Vec<u32>| {
                 self.deadline.check(WORK)?;
                 Ok(block_of(&set, part, self.options.preset, self.builder.outer))

@@ -1,7 +1,10 @@
 //! Lossless pages: the bytes of the nodes, sorted by their position in a node, then compressed.
 
-use crate::container::Cursor;
-use crate::{hierarchy::Node, splat::Splat};
+use crate::{
+    container::{Cursor, pack},
+    hierarchy::Node,
+    splat::Splat,
+};
 
 /// Bytes of a stored node: splat, centre, radius, size, cone, first child, and number of children.
 const NODE_BYTES: usize = 80;
@@ -9,21 +12,22 @@ const NODE_BYTES: usize = 80;
 /// The zstd level. Higher levels take much longer, and save only a few parts in a thousand.
 const LEVEL: i32 = 3;
 
-pub fn encode(nodes: &[Node]) -> Vec<u8> {
+/// Encodes nodes. Fails only without the feature `files`.
+pub fn encode(nodes: &[Node]) -> std::io::Result<Vec<u8>> {
     let mut planes = vec![0; nodes.len() * NODE_BYTES];
     for (index, node) in nodes.iter().enumerate() {
         for (plane, byte) in to_bytes(node).into_iter().enumerate() {
             planes[plane * nodes.len() + index] = byte;
         }
     }
-    zstd::bulk::compress(&planes, LEVEL).expect("memory can be compressed")
+    pack::compress(&planes, LEVEL)
 }
 
 /// Decodes a page of `count` nodes. An error says what is wrong with the page.
 pub fn decode(bytes: &[u8], count: usize) -> Result<Vec<Node>, String> {
     let length = count * NODE_BYTES;
     let planes =
-        zstd::bulk::decompress(bytes, length).map_err(|e| format!("it cannot be unpacked: {e}"))?;
+        pack::decompress(bytes, length).map_err(|e| format!("it cannot be unpacked: {e}"))?;
     if planes.len() != length {
         return Err(format!("it unpacks to {} bytes where {length} were expected", planes.len()));
     }

@@ -7,13 +7,16 @@ use super::{
     pages::{Run, levels, pages, reach, round_up},
     quantise::Shape,
 };
-use crate::hierarchy::{
-    MOST_CHILDREN, Node,
-    merge::{WIDTH, deviation},
-    validate::fault,
+use crate::{
+    hierarchy::{
+        MOST_CHILDREN, Node,
+        merge::{WIDTH, deviation},
+        validate::fault,
+    },
+    parallel::prelude::*,
 };
 use glam::Vec3;
-use rayon::prelude::*;
+use std::io;
 
 /// The first byte of a page.
 const LOSSLESS: u8 = 0;
@@ -26,12 +29,13 @@ pub struct Coded {
     pub pages: Vec<Vec<u8>>,
 }
 
-/// Encodes a block whose nodes are in order.
-pub fn encode(nodes: &[Node], extent: f32, is_lossless: bool) -> Coded {
+/// Encodes a block whose nodes are in order. Fails only without the feature `files`.
+pub fn encode(nodes: &[Node], extent: f32, is_lossless: bool) -> io::Result<Coded> {
     if is_lossless {
         let runs = pages(nodes);
-        let pages = runs.par_iter().map(|run| lossless_page(&nodes[run.nodes.clone()])).collect();
-        return Coded { nodes: nodes.to_vec(), runs, pages };
+        let page = |run: &Run| lossless_page(&nodes[run.nodes.clone()]);
+        let pages = runs.par_iter().map(page).collect::<io::Result<_>>()?;
+        return Ok(Coded { nodes: nodes.to_vec(), runs, pages });
     }
     let mut nodes = line_up(nodes);
     let runs = pages(&nodes);
@@ -52,19 +56,19 @@ pub fn encode(nodes: &[Node], extent: f32, is_lossless: bool) -> Coded {
             (Some(codes), Some(own)) => {
                 let mut out = vec![LOSSY];
                 lossy::encode(&nodes[run.nodes.clone()], codes, &own, fine, &mut out);
-                out
+                Ok(out)
             }
             _ => lossless_page(&nodes[run.nodes.clone()]),
         }
     };
-    let pages = runs.par_iter().zip(&codes).zip(&firsts).map(page).collect();
-    Coded { nodes, runs, pages }
+    let pages = runs.par_iter().zip(&codes).zip(&firsts).map(page).collect::<io::Result<_>>()?;
+    Ok(Coded { nodes, runs, pages })
 }
 
-fn lossless_page(nodes: &[Node]) -> Vec<u8> {
+fn lossless_page(nodes: &[Node]) -> io::Result<Vec<u8>> {
     let mut out = vec![LOSSLESS];
-    out.extend(lossless::encode(nodes));
-    out
+    out.extend(lossless::encode(nodes)?);
+    Ok(out)
 }
 
 /// The codes of a page before its inner nodes have bounds.

@@ -18,8 +18,8 @@ use crate::{
     },
     input::{Limits, Mapping, Source, intact},
     math::Bounds,
+    parallel::prelude::*,
 };
-use rayon::prelude::*;
 use std::{
     collections::{HashMap, VecDeque},
     path::{Path, PathBuf},

@@ -305,7 +305,7 @@ fn pages_of_noise_are_survived() {
         let nodes = &tree.blocks[0].nodes;
         let runs = pages::pages(nodes);
         for lossless in [true, false] {
-            let page = page::encode(nodes, tree.extent, lossless).pages.swap_remove(0);
+            let page = page::encode(nodes, tree.extent, lossless).unwrap().pages.swap_remove(0);
             for _ in 0..3000 {
                 let mut broken = page.clone();
                 for _ in 0..1 + random.below(3) {
@@ -541,7 +541,7 @@ fn numbers_that_cannot_be_drawn_are_refused() {
         refused(&|tree| change(&mut tree.blocks[0].nodes[7]), &format!("has {message}"));
         let mut nodes = sound.blocks[0].nodes.clone();
         change(&mut nodes[7]);
-        let page = page::encode(&nodes, sound.extent, true).pages.swap_remove(0);
+        let page = page::encode(&nodes, sound.extent, true).unwrap().pages.swap_remove(0);
         let error = page::decode(&page, nodes.len(), 1, sound.extent).unwrap_err();
         assert!(error.contains(&format!("its node 7 has {message}")), "{error}");
     }

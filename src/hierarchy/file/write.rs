@@ -7,7 +7,6 @@ use super::{
     page::{self, Coded},
     pages::{Around, Run, in_order},
 };
-use crate::container::{Spill, Target};
 use crate::{
     Error, Result,
     hierarchy::{
@@ -17,10 +16,13 @@ use crate::{
     math::Bounds,
     splat::NO_NORMAL,
 };
+use crate::{
+    container::{Spill, Target},
+    parallel::{self, prelude::*},
+};
 use glam::DVec3;
-use rayon::prelude::*;
 use std::{
-    io::Write,
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -130,11 +132,12 @@ impl Writer {
         }
         let (extent, is_lossless) = (self.extent, self.options.lossless);
         let encode = |nodes: &&[Node]| {
-            let coded = page::encode(nodes, extent, is_lossless);
+            let coded = page::encode(nodes, extent, is_lossless)?;
             let around = arounds(&coded.nodes, &coded.runs);
-            (coded, around)
+            Ok((coded, around))
         };
-        let coded: Vec<(Coded, Vec<Around>)> = blocks.par_iter().map(encode).collect();
+        let coded: io::Result<Vec<(Coded, Vec<Around>)>> = blocks.par_iter().map(encode).collect();
+        let coded = coded.map_err(|e| self.fault(e))?;
         for (coded, around) in coded {
             self.contents.add(&coded.nodes);
             let places = self.push(&coded.pages)?;
@@ -239,7 +242,7 @@ impl Writer {
         }
         page::enclose(&mut nodes);
         check_nodes(&nodes).map_err(refuse)?;
-        let coded = page::encode(&nodes, self.extent, true);
+        let coded = page::encode(&nodes, self.extent, true).map_err(|e| self.fault(e))?;
         let places = self.push(&coded.pages)?;
         let mut directory = Directory::default();
         directory.push_block(&coded.runs, &arounds(&nodes, &coded.runs), &places);
@@ -248,11 +251,15 @@ impl Writer {
         Ok(directory)
     }
 
+    fn fault(&self, e: io::Error) -> Error {
+        Error::output(self.path.as_deref().unwrap_or(Path::new("memory")), e)
+    }
+
     fn push(&mut self, pages: &[Vec<u8>]) -> Result<Vec<Place>> {
         let mut places = Vec::with_capacity(pages.len());
         for bytes in pages {
-            let wanted = self.path.as_deref().unwrap_or(Path::new("memory"));
-            let offset = self.spill.push(bytes).map_err(|e| Error::output(wanted, e))?;
+            let offset = self.spill.push(bytes);
+            let offset = offset.map_err(|e| self.fault(e))?;
             places.push(Place { offset, bytes: bytes.len() as u32, crc: crc32fast::hash(bytes) });
         }
         Ok(places)
@@ -341,7 +348,7 @@ fn all(
     let Tree { origin, bounds, closed, source_points, .. } = *tree;
     let whole = Whole { origin, bounds, closed, source_points };
     let below = &tree.blocks[usize::from(tree.is_joined())..];
-    for blocks in below.chunks(2 * rayon::current_num_threads()) {
+    for blocks in below.chunks(2 * parallel::current_num_threads()) {
         writer.blocks(&blocks.iter().map(|block| &block.nodes[..]).collect::<Vec<_>>())?;
     }
     if !tree.is_joined() {

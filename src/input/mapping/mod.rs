@@ -11,12 +11,15 @@
 //! this: readers treat every byte as untrusted whenever they use it. Changed bytes therefore lead
 //! to other results or to an error, and those results are discarded.
 
-#[cfg(any(target_os = "linux", target_os = "macos"))]
+//!
+//! Without the feature `files`, the whole file is read into memory instead.
+
+#[cfg(all(feature = "files", any(target_os = "linux", target_os = "macos")))]
 mod fault;
-#[cfg(not(any(target_os = "linux", target_os = "macos")))]
+#[cfg(not(all(feature = "files", any(target_os = "linux", target_os = "macos"))))]
 mod fault {
     //! Windows does not allow mapped files to be shortened. On other systems the signal keeps its
-    //! default effect.
+    //! default effect. Bytes that were read into memory do not change.
 
     pub struct Guard;
 
@@ -32,9 +35,13 @@ mod fault {
 }
 mod stamp;
 
+#[cfg(feature = "files")]
 use memmap2::Mmap;
 use stamp::Stamp;
 use std::{fs::File, io, ops::Deref};
+
+#[cfg(not(feature = "files"))]
+type Mmap = Vec<u8>;
 
 /// The bytes of a file.
 pub(crate) struct Mapping {
@@ -68,7 +75,7 @@ impl Mapping {
     /// Returns the pages read so far to the system. Readers of files larger than memory call this
     /// regularly. Pages that are needed again are read again.
     pub fn release(&self) {
-        #[cfg(unix)]
+        #[cfg(all(feature = "files", unix))]
         #[expect(unsafe_code, reason = "advice that would drop changes written to a mapping")]
         if let Some((_, map)) = &self.bytes {
             // SAFETY: the mapping is read only, backed by a file or by the zeros that `fault` put
@@ -79,6 +86,14 @@ impl Mapping {
     }
 }
 
+#[cfg(not(feature = "files"))]
+fn map(mut file: &File) -> io::Result<(fault::Guard, Mmap)> {
+    let mut bytes = Vec::new();
+    io::Read::read_to_end(&mut file, &mut bytes)?;
+    Ok((fault::Guard::new(&bytes), bytes))
+}
+
+#[cfg(feature = "files")]
 #[expect(unsafe_code, reason = "mapping a file, which others may change")]
 fn map(file: &File) -> io::Result<(fault::Guard, Mmap)> {
     // SAFETY: the mapping is read only. The module's documentation explains what happens if another
