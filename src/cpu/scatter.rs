@@ -273,10 +273,10 @@ impl<'a> Projected<'a> {
         // The kernel on the planes in front of and behind a sheet: the slope's contribution to the
         // sheet.
         let mut before = none;
-        for own in 0..=self.count {
+        for (own, section) in sections.iter().enumerate().take(self.count + 1) {
             let slot = (front + own) % WINDOW;
             sums.has_field[slot] |= packet.bit();
-            let weight = section_kernel * sections[own];
+            let weight = section_kernel * *section;
             let field = &mut sums.field[slot][packet.number];
             field.weight += weight;
             field.value = weight.mul_add(line.value, field.value);
