@@ -43,8 +43,10 @@ pub(crate) mod device;
 mod frame;
 mod passes;
 mod pipeline;
+#[allow(clippy::too_many_lines, reason = "`draw_frame` is to be divided")]
 mod renderer;
 mod scene;
+#[allow(clippy::too_many_lines, reason = "`targets` is to be divided")]
 mod targets;
 mod variant;
 

@@ -262,6 +262,7 @@ impl Field {
 
     /// Lists the tiles and sheets that a picture must evaluate, and sets in `frame` where the lists
     /// lie.
+    #[allow(clippy::too_many_arguments, reason = "takes the parts of a frame one by one")]
     pub fn list(
         &mut self,
         gpu: &Gpu,

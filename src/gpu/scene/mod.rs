@@ -7,8 +7,11 @@ pub(crate) mod bricks;
 pub(crate) mod chunk;
 pub(crate) mod field;
 pub(crate) mod nodes;
+#[allow(clippy::too_many_arguments, reason = "updates take the parts of a frame one by one")]
 mod prepared;
+#[allow(clippy::too_many_arguments, reason = "updates take the parts of a frame one by one")]
 pub(crate) mod select;
+#[allow(clippy::too_many_arguments, reason = "updates take the parts of a frame one by one")]
 pub(crate) mod select_bricks;
 
 pub use prepared::PreparedScene;
