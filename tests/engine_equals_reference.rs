@@ -95,10 +95,10 @@ fn assert_agrees(case: &Case, way: &str, found: &Picture, expected: &Picture, le
     if let Ok(folder) = std::env::var("SPLATKIT_PICTURES") {
         let folder = std::path::Path::new(&folder);
         found
-            .save(&folder.join(format!("{}-{way}.png", case.name)), None)
+            .save(folder.join(format!("{}-{way}.png", case.name)), None)
             .expect("a folder to write to");
         expected
-            .save(&folder.join(format!("{}-reference.png", case.name)), None)
+            .save(folder.join(format!("{}-reference.png", case.name)), None)
             .expect("a folder to write to");
     }
     assert!(agreement >= least, "{} {way}: {agreement:.1} dB, expected {least} dB", case.name);

@@ -110,11 +110,11 @@ enum Source<'a> {
 pub struct Blended<'a> {
     blend: &'a Blend,
     samples: Source<'a>,
+    /// The value that values are relative to.
     zero: f32,
 }
 
 impl<'a> Blended<'a> {
-    /// Values are relative to `zero`.
     pub fn new(volume: &'a Volume, blend: &'a Blend, zero: f64) -> Self {
         let samples = match &volume.coefficients {
             Some(coefficients) => Source::Coefficients(&coefficients.values),
@@ -127,8 +127,157 @@ impl<'a> Blended<'a> {
     /// unit.
     #[inline(always)]
     pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
-        self.blend.at(simd, self.samples, self.zero, place, way)
+        // A separate function for each number of samples.
+        let sums = match self.blend.taps {
+            ..=3 => self.sums::<S, 3, 4, 27>(simd, place, way),
+            4 => self.sums::<S, 4, 4, 64>(simd, place, way),
+            5 => self.sums::<S, 5, 6, 125>(simd, place, way),
+            6 => self.sums::<S, 6, 6, 216>(simd, place, way),
+            8 => self.sums::<S, 8, 8, 512>(simd, place, way),
+            _ => self.sums::<S, MOST_TAPS, MOST_TAPS, { MOST_TAPS * MOST_TAPS * MOST_TAPS }>(
+                simd, place, way,
+            ),
+        };
+        let mut point = sums.quotient(simd, self.blend.per_step);
+        point.weight -= self.blend.least;
+        point
     }
+
+    /// Sums over `N` samples along each axis, `ALL` in total. Rows are loaded `WIDE` samples at a
+    /// time.
+    fn sums<S: Simd, const N: usize, const WIDE: usize, const ALL: usize>(
+        &self,
+        simd: S,
+        place: [Lanes<S>; 3],
+        way: [Lanes<S>; 3],
+    ) -> Sums<S> {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let none = Lanes::splat(simd, 0.0);
+                let mut all: Option<Sums<S>> = None;
+                let mut values = [none; ALL];
+                for part in &self.blend.parts {
+                    let place = three!(I => {
+                        let beyond = part.size[I].mul_add(2.0, BEYOND);
+                        (place[I] - part.shift[I])
+                            .max(Lanes::splat(simd, -beyond))
+                            .min(Lanes::splat(simd, beyond))
+                    });
+                    let own = match &self.blend.form {
+                        Form::Rectilinear(axes) => {
+                            let taps = three!(I => axes.along::<S, N>(simd, I, place[I]));
+                            let around = Around {
+                                starts: three!(I => taps[I].start),
+                                rows: taps[1].counted,
+                                slices: taps[2].counted,
+                            };
+                            self.load::<S, N, WIDE, ALL>(simd, part, &around, &mut values);
+                            Axes::sums(simd, &taps, &values)
+                        }
+                        Form::Radial(radial) => {
+                            let away =
+                                self.load_even::<S, N, WIDE, ALL>(simd, part, place, &mut values);
+                            let away = [&away[0][..], &away[1][..], &away[2][..]];
+                            radial.sums(simd, away, &values, self.blend.extent)
+                        }
+                        Form::Bells { log, radius } => {
+                            let away =
+                                self.load_even::<S, N, WIDE, ALL>(simd, part, place, &mut values);
+                            let away = [&away[0][..], &away[1][..], &away[2][..]];
+                            bells::sums(simd, *log, *radius, way, away, &values)
+                        }
+                    };
+                    all = Some(all.map_or(
+                        own,
+                        #[inline(always)]
+                        |all| all.plus(&own),
+                    ));
+                }
+                all.unwrap_or(Sums {
+                    weight: none,
+                    value: none,
+                    weight_slopes: [none; 3],
+                    value_slopes: [none; 3],
+                })
+            },
+        )
+    }
+
+    /// Loads the values of the samples around places on a part with even steps. Returns how far the
+    /// places are from these samples along each axis, in sample spacings.
+    #[inline(always)]
+    fn load_even<S: Simd, const N: usize, const WIDE: usize, const ALL: usize>(
+        &self,
+        simd: S,
+        part: &Part,
+        place: [Lanes<S>; 3],
+        values: &mut [Lanes<S>; ALL],
+    ) -> [[Lanes<S>; N]; 3] {
+        let starts = three!(I => {
+            let last = part.dims[I] as f32 - N as f32;
+            // The first sample of an even number around the cell, or of an odd number around the
+            // nearest sample.
+            let start = (place[I] - (N as f32 * 0.5 - 1.0)).floor();
+            start.min(Lanes::splat(simd, last)).max(Lanes::splat(simd, 0.0))
+        });
+        let away = three!(I => {
+            let mut away = [Lanes::splat(simd, FAR); N];
+            for (tap, own) in away.iter_mut().enumerate().take(part.dims[I]) {
+                *own = (place[I] - starts[I] - tap as f32) * self.blend.per_step;
+            }
+            away
+        });
+        let around = Around { starts, rows: u32::MAX, slices: u32::MAX };
+        self.load::<S, N, WIDE, ALL>(simd, part, &around, values);
+        away
+    }
+
+    /// Loads the values of samples of a part, `N` along each axis. Samples that the lattice lacks
+    /// get arbitrary values.
+    #[inline(always)]
+    fn load<S: Simd, const N: usize, const WIDE: usize, const ALL: usize>(
+        &self,
+        simd: S,
+        part: &Part,
+        around: &Around<S>,
+        values: &mut [Lanes<S>; ALL],
+    ) {
+        let zero = self.zero;
+        // A separate function for each type of samples; the code that sums is the same for all.
+        simd.vectorize(
+            #[inline(always)]
+            || match self.samples {
+                Source::Coefficients(own) => {
+                    part.load::<S, f32, N, WIDE, ALL>(simd, own, zero, around, values);
+                }
+                Source::Samples(Samples::F32(own)) => {
+                    part.load::<S, f32, N, WIDE, ALL>(simd, own, zero, around, values);
+                }
+                Source::Samples(Samples::U8(own)) => {
+                    part.load::<S, u8, N, WIDE, ALL>(simd, own, zero, around, values);
+                }
+                Source::Samples(Samples::U16(own)) => {
+                    part.load::<S, u16, N, WIDE, ALL>(simd, own, zero, around, values);
+                }
+                Source::Samples(Samples::I16(own)) => {
+                    part.load::<S, i16, N, WIDE, ALL>(simd, own, zero, around, values);
+                }
+                Source::Samples(Samples::I32(own)) => {
+                    part.load::<S, i32, N, WIDE, ALL>(simd, own, zero, around, values);
+                }
+            },
+        );
+    }
+}
+
+/// The samples around eight places.
+struct Around<S: Simd> {
+    /// The first sample along each axis.
+    starts: [Lanes<S>; 3],
+    /// The rows of slices and the slices that are needed, a bit for each.
+    rows: u32,
+    slices: u32,
 }
 
 /// One of the Cartesian lattices that make up a lattice.
@@ -323,172 +472,17 @@ impl Blend {
             *range = if is_inside { &inside } else { &outside }.widen([*range].into_iter());
         }
     }
-
-    /// Returns the field at places in steps. `way` is the direction of the rays, in steps per world
-    /// unit.
-    #[inline(always)]
-    fn at<S: Simd>(
-        &self,
-        simd: S,
-        samples: Source,
-        zero: f32,
-        place: [Lanes<S>; 3],
-        way: [Lanes<S>; 3],
-    ) -> Point<S> {
-        // A separate function for each number of samples.
-        let sums = match self.taps {
-            ..=3 => self.sums::<S, 3, 4, 27>(simd, samples, zero, place, way),
-            4 => self.sums::<S, 4, 4, 64>(simd, samples, zero, place, way),
-            5 => self.sums::<S, 5, 6, 125>(simd, samples, zero, place, way),
-            6 => self.sums::<S, 6, 6, 216>(simd, samples, zero, place, way),
-            8 => self.sums::<S, 8, 8, 512>(simd, samples, zero, place, way),
-            _ => self.sums::<S, MOST_TAPS, MOST_TAPS, { MOST_TAPS * MOST_TAPS * MOST_TAPS }>(
-                simd, samples, zero, place, way,
-            ),
-        };
-        let mut point = sums.quotient(simd, self.per_step);
-        point.weight -= self.least;
-        point
-    }
-
-    /// Sums over `N` samples along each axis, `ALL` in total. Rows are loaded `WIDE` samples at a
-    /// time.
-    fn sums<S: Simd, const N: usize, const WIDE: usize, const ALL: usize>(
-        &self,
-        simd: S,
-        samples: Source,
-        zero: f32,
-        place: [Lanes<S>; 3],
-        way: [Lanes<S>; 3],
-    ) -> Sums<S> {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let none = Lanes::splat(simd, 0.0);
-                let mut all: Option<Sums<S>> = None;
-                let mut values = [none; ALL];
-                for part in &self.parts {
-                    let place = three!(I => {
-                        let beyond = part.size[I].mul_add(2.0, BEYOND);
-                        (place[I] - part.shift[I])
-                            .max(Lanes::splat(simd, -beyond))
-                            .min(Lanes::splat(simd, beyond))
-                    });
-                    let own = match &self.form {
-                        Form::Rectilinear(axes) => {
-                            let taps = three!(I => axes.along::<S, N>(simd, I, place[I]));
-                            let counted = [taps[1].counted, taps[2].counted];
-                            let starts = three!(I => taps[I].start);
-                            part.load::<S, N, WIDE, ALL>(
-                                simd,
-                                samples,
-                                zero,
-                                starts,
-                                counted,
-                                &mut values,
-                            );
-                            Axes::sums(simd, &taps, &values)
-                        }
-                        form => {
-                            let starts = three!(I => {
-                                let last = part.dims[I] as f32 - N as f32;
-                                // The first sample of an even number around the cell, or of an odd
-                                // number around the nearest sample.
-                                let start = (place[I] - (N as f32 * 0.5 - 1.0)).floor();
-                                start.min(Lanes::splat(simd, last)).max(none)
-                            });
-                            let away = three!(I => {
-                                let mut away = [Lanes::splat(simd, FAR); N];
-                                for (tap, own) in away.iter_mut().enumerate().take(part.dims[I]) {
-                                    *own = (place[I] - starts[I] - tap as f32) * self.per_step;
-                                }
-                                away
-                            });
-                            part.load::<S, N, WIDE, ALL>(
-                                simd,
-                                samples,
-                                zero,
-                                starts,
-                                [u32::MAX; 2],
-                                &mut values,
-                            );
-                            let away = [&away[0][..], &away[1][..], &away[2][..]];
-                            match form {
-                                Form::Radial(radial) => {
-                                    radial.sums(simd, away, &values, self.extent)
-                                }
-                                Form::Bells { log, radius } => {
-                                    bells::sums(simd, *log, *radius, way, away, &values)
-                                }
-                                Form::Rectilinear(_) => continue,
-                            }
-                        }
-                    };
-                    all = Some(all.map_or(
-                        own,
-                        #[inline(always)]
-                        |all| all.plus(&own),
-                    ));
-                }
-                all.unwrap_or(Sums {
-                    weight: none,
-                    value: none,
-                    weight_slopes: [none; 3],
-                    value_slopes: [none; 3],
-                })
-            },
-        )
-    }
 }
 
 impl Part {
-    /// Loads the values of samples, relative to `zero`, `N` along each axis. Samples that the
-    /// lattice lacks get arbitrary values. Only the rows of slices and the slices whose bit is set
-    /// in `bits` are loaded.
+    /// Loads the values of the needed samples, relative to `zero`.
     #[inline(always)]
-    fn load<S: Simd, const N: usize, const WIDE: usize, const ALL: usize>(
-        &self,
-        simd: S,
-        samples: Source,
-        zero: f32,
-        starts: [Lanes<S>; 3],
-        bits: [u32; 2],
-        values: &mut [Lanes<S>; ALL],
-    ) {
-        // A separate function for each type of samples; the code that sums is the same for all.
-        simd.vectorize(
-            #[inline(always)]
-            || match samples {
-                Source::Coefficients(own) => {
-                    self.load_of::<S, f32, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
-                }
-                Source::Samples(Samples::F32(own)) => {
-                    self.load_of::<S, f32, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
-                }
-                Source::Samples(Samples::U8(own)) => {
-                    self.load_of::<S, u8, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
-                }
-                Source::Samples(Samples::U16(own)) => {
-                    self.load_of::<S, u16, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
-                }
-                Source::Samples(Samples::I16(own)) => {
-                    self.load_of::<S, i16, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
-                }
-                Source::Samples(Samples::I32(own)) => {
-                    self.load_of::<S, i32, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
-                }
-            },
-        );
-    }
-
-    #[inline(always)]
-    fn load_of<S: Simd, T: Sample, const N: usize, const WIDE: usize, const ALL: usize>(
+    fn load<S: Simd, T: Sample, const N: usize, const WIDE: usize, const ALL: usize>(
         &self,
         simd: S,
         samples: &[T],
         zero: f32,
-        starts: [Lanes<S>; 3],
-        [rows, slices]: [u32; 2],
+        &Around { starts, rows, slices }: &Around<S>,
         values: &mut [Lanes<S>; ALL],
     ) {
         let samples = &samples[self.first..];

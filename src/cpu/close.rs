@@ -43,6 +43,45 @@ impl<S: Simd> Pixels<S> {
         let hit = if plan.optics == Optics::Maximum { Lanes::splat(simd, NO_VALUE) } else { none };
         Self { color: [none; 3], through: Lanes::splat(simd, 1.0), hit }
     }
+
+    /// Records where half of the light is absorbed, if that is in a sheet with optical depth and
+    /// not on an isosurface in it. The sheet lies between two planes, and `before` is the light
+    /// that reaches it.
+    #[inline(always)]
+    fn note_half(
+        &mut self,
+        simd: S,
+        [start, stop]: [f32; 2],
+        before: Lanes<S>,
+        depth: Lanes<S>,
+        has_hit: mask32x8<S>,
+    ) {
+        let passes = before.simd_gt(0.5) & self.through.simd_le(0.5) & !has_hit;
+        if passes.any_true() {
+            // Inside the sheet, optical depth counts as evenly spread.
+            let part = log2(simd, before * 2.0) * std::f32::consts::LN_2
+                / depth.max(Lanes::splat(simd, LEAST_DIVISOR));
+            self.hit = passes.select(part * (stop - start) + start, self.hit);
+        }
+    }
+}
+
+/// A packet of a tile: its rays and its pixels.
+pub struct Packet<S: Simd> {
+    /// Its place among the packets of the tile, row by row.
+    pub number: usize,
+    pub rays: Rays<S>,
+    pub pixels: Pixels<S>,
+    /// No light gets through any of its pixels.
+    pub is_done: bool,
+}
+
+impl<S: Simd> Packet<S> {
+    /// Returns the bit of this packet in masks of a tile's packets.
+    #[inline(always)]
+    pub fn bit(&self) -> u8 {
+        1 << self.number
+    }
 }
 
 /// The field on a plane between two sheets: its value, in entries of the table, and its gradient
@@ -71,6 +110,8 @@ pub struct Layer<S: Simd> {
 
 /// The effect of a sheet on light.
 struct Medium<S: Simd> {
+    /// The light that reaches the sheet.
+    before: Lanes<S>,
     through: Lanes<S>,
     depth: Lanes<S>,
     color: [Lanes<S>; 3],
@@ -79,6 +120,18 @@ struct Medium<S: Simd> {
     has_hit: mask32x8<S>,
     /// The largest value.
     peak: Lanes<S>,
+}
+
+/// A part of a sheet in which the transfer function is integrated at once.
+struct Piece<S: Simd> {
+    /// The pixels whose rays meet it.
+    mask: mask32x8<S>,
+    /// The distance at which it begins.
+    begin: Lanes<S>,
+    length: Lanes<S>,
+    /// The places of both ends, from 0 at the sheet's front to 1 at its back, and the values there.
+    places: [Lanes<S>; 2],
+    values: [Lanes<S>; 2],
 }
 
 /// For each entry of the transfer function's table, the number of visible entries before it.
@@ -213,20 +266,21 @@ impl Plan<'_> {
         three!(I => color[I].mul_add(share, highlight).min(one))
     }
 
-    /// Adds a sheet to the picture: the field in it, at the pixels of a mask, and its radiance
+    /// Adds a sheet to a packet's pixels: the field in it, at the pixels of a mask, and its radiance
     /// (colour times optical depth, and optical depth).
     #[inline(always)]
     pub fn close<S: Simd>(
         &self,
         simd: S,
         sheet: usize,
-        rays: &Rays<S>,
+        packet: &mut Packet<S>,
         field: Option<(&Layer<S>, mask32x8<S>)>,
         radiance: Option<[Lanes<S>; 4]>,
-        pixels: &mut Pixels<S>,
     ) {
+        let Packet { rays, pixels, .. } = packet;
         let none = Lanes::splat(simd, 0.0);
         let one = Lanes::splat(simd, 1.0);
+        let planes = [self.planes[sheet], self.planes[sheet + 1]];
         let before = pixels.through;
         let [red, green, blue, mut depth] = radiance.unwrap_or([none; 4]);
         let mut premultiplied = [red, green, blue];
@@ -244,7 +298,7 @@ impl Plan<'_> {
                 // is.
                 pixels.color = three!(I => before.mul_add(medium.color[I], pixels.color[I]));
                 pixels.through = before * medium.through;
-                self.note_half(simd, sheet, before, medium.depth, has_hit, pixels);
+                pixels.note_half(simd, planes, before, medium.depth, has_hit);
                 return;
             }
             let own = medium.depth.min(Lanes::splat(simd, MOST_DEPTH));
@@ -265,29 +319,7 @@ impl Plan<'_> {
         let per_depth = share / depth.max(Lanes::splat(simd, LEAST_DIVISOR));
         pixels.color = three!(I => per_depth.mul_add(premultiplied[I], pixels.color[I]));
         pixels.through = before - share;
-        self.note_half(simd, sheet, before, depth, has_hit, pixels);
-    }
-
-    /// Records where half of the light is absorbed, if that is in a sheet with optical depth and
-    /// not on an isosurface in it.
-    #[inline(always)]
-    fn note_half<S: Simd>(
-        &self,
-        simd: S,
-        sheet: usize,
-        before: Lanes<S>,
-        depth: Lanes<S>,
-        has_hit: mask32x8<S>,
-        pixels: &mut Pixels<S>,
-    ) {
-        let passes = before.simd_gt(0.5) & pixels.through.simd_le(0.5) & !has_hit;
-        if passes.any_true() {
-            // Inside the sheet, optical depth counts as evenly spread.
-            let part = log2(simd, before * 2.0) * std::f32::consts::LN_2
-                / depth.max(Lanes::splat(simd, LEAST_DIVISOR));
-            let [start, stop] = [self.planes[sheet], self.planes[sheet + 1]];
-            pixels.hit = passes.select(part * (stop - start) + start, pixels.hit);
-        }
+        pixels.note_half(simd, planes, before, depth, has_hit);
     }
 
     /// Returns the effect of a sheet's field on light, inside the lattice's box and what the clips
@@ -303,6 +335,7 @@ impl Plan<'_> {
     ) -> Medium<S> {
         let none = Lanes::splat(simd, 0.0);
         let mut medium = Medium {
+            before,
             through: Lanes::splat(simd, 1.0),
             depth: none,
             color: [none; 3],
@@ -312,7 +345,7 @@ impl Plan<'_> {
         };
         if self.holes == 0 {
             let mask = mask & layer.begin.simd_lt(layer.end);
-            self.pass_piece(simd, layer, [layer.begin, layer.end], mask, before, &mut medium);
+            self.pass_between(simd, layer, [layer.begin, layer.end], mask, &mut medium);
             return medium;
         }
         let holes = &rays.holes[..self.holes];
@@ -332,27 +365,24 @@ impl Plan<'_> {
             }
             let own = mask & begin.simd_lt(end);
             if own.any_true() {
-                self.pass_piece(simd, layer, [begin, end], own, before, &mut medium);
+                self.pass_between(simd, layer, [begin, end], own, &mut medium);
             }
             begin = begin.max(end);
         }
         medium
     }
 
-    /// Adds the part of a sheet between two distances.
+    /// Adds the part of a sheet between two distances, piece by piece.
     #[inline(always)]
-    fn pass_piece<S: Simd>(
+    fn pass_between<S: Simd>(
         &self,
         simd: S,
         layer: &Layer<S>,
         [begin, end]: [Lanes<S>; 2],
         mask: mask32x8<S>,
-        before: Lanes<S>,
         medium: &mut Medium<S>,
     ) {
-        let none = Lanes::splat(simd, 0.0);
-        let one = Lanes::splat(simd, 1.0);
-        let length = (end - begin).max(none);
+        let length = (end - begin).max(Lanes::splat(simd, 0.0));
         let is_curved = self.is_integrated || self.isosurfaces > 0;
         let parts = if is_curved { PARTS } else { 1 };
         let step = length * (1.0 / parts as f32);
@@ -369,77 +399,106 @@ impl Plan<'_> {
             return;
         }
         for part in 0..parts {
-            let near = begin + step * part as f32;
+            let begin = begin + step * part as f32;
             let next_place = place + step * per_thickness;
             let next = if is_curved { layer.parabola(next_place) } else { value };
-            let mut shown = if self.is_integrated {
-                self.between(simd, value, next)
-            } else {
-                self.one(simd, layer.mean())
-            };
-            let mut normal = [none; 3];
-            if self.is_lit || self.has_gradient_opacity {
-                normal = self.gradient(layer, (place + next_place) * 0.5);
-            }
-            if self.has_gradient_opacity {
-                let factor = self.gradient_factor(simd, dot(normal, normal).sqrt());
-                shown = four!(I => shown[I] * factor);
-            }
-            let depth = mask.select(shown[3].max(none) * step * layer.filling, none);
-            if !(depth.simd_gt(0.0).any_true() || self.isosurfaces > 0) {
-                place = next_place;
-                value = next;
-                continue;
-            }
-            let inverse = one / shown[3].max(Lanes::splat(simd, 1e-20));
-            let mut color = three!(I => (shown[I] * inverse).max(none).min(one));
-            if self.is_lit {
-                color = self.lit(simd, color, normal, layer.direction, self.frame.volume_shade);
-            }
-            let mut done = none;
-            for number in 0..self.isosurfaces {
-                // In the order from the front value to the back value.
-                let rises = next.simd_gt(value);
-                let [up, down] = [number, self.isosurfaces - 1 - number].map(|i| {
-                    let FrameIsosurface { value, color } = self.frame.isosurfaces[i];
-                    [value, color]
-                });
-                let own = |row: usize, column: usize| {
-                    rises.select(
-                        Lanes::splat(simd, up[row][column]),
-                        Lanes::splat(simd, down[row][column]),
-                    )
-                };
-                let level = own(0, 0);
-                let crosses = (value.simd_lt(level) ^ next.simd_lt(level)) & mask;
-                if !crosses.any_true() {
-                    continue;
-                }
-                let share = crosses.select((level - value) / (next - value), done);
-                medium.pass(simd, depth * (share - done), color);
-                done = share;
-                let opacity = crosses.select(own(0, 1), none);
-                let taken = medium.through * opacity;
-                let outside = before * medium.through;
-                medium.through -= taken;
-                medium.depth += crosses.select(own(0, 2), none);
-                let hits = outside.simd_gt(0.5) & (before * medium.through).simd_le(0.5) & crosses;
-                medium.hit = hits.select(near + step * share, medium.hit);
-                medium.has_hit |= hits;
-                let mut surface = [0, 1, 2].map(|channel| own(1, channel));
-                if self.is_lit {
-                    let normal = self.gradient(layer, place + (next_place - place) * share);
-                    surface =
-                        self.lit(simd, surface, normal, layer.direction, self.frame.volume_shade);
-                }
-                for (sum, channel) in medium.color.iter_mut().zip(surface) {
-                    *sum = taken.mul_add(channel, *sum);
-                }
-            }
-            medium.pass(simd, depth * (one - done), color);
+            let places = [place, next_place];
+            let piece = Piece { mask, begin, length: step, places, values: [value, next] };
+            self.pass_piece(simd, layer, &piece, medium);
             place = next_place;
             value = next;
         }
+    }
+
+    /// Adds a piece of a sheet: what the transfer function shows in it, and the isosurfaces.
+    #[inline(always)]
+    fn pass_piece<S: Simd>(
+        &self,
+        simd: S,
+        layer: &Layer<S>,
+        piece: &Piece<S>,
+        medium: &mut Medium<S>,
+    ) {
+        let none = Lanes::splat(simd, 0.0);
+        let Some((color, depth)) = self.shown_in(simd, layer, piece) else { return };
+        let ([place, next_place], [value, next]) = (piece.places, piece.values);
+        let mut done = none;
+        for number in 0..self.isosurfaces {
+            // In the order from the front value to the back value.
+            let rises = next.simd_gt(value);
+            let [up, down] = [number, self.isosurfaces - 1 - number].map(|i| {
+                let FrameIsosurface { value, color } = self.frame.isosurfaces[i];
+                [value, color]
+            });
+            let own = |row: usize, column: usize| {
+                rises.select(
+                    Lanes::splat(simd, up[row][column]),
+                    Lanes::splat(simd, down[row][column]),
+                )
+            };
+            let level = own(0, 0);
+            let crosses = (value.simd_lt(level) ^ next.simd_lt(level)) & piece.mask;
+            if !crosses.any_true() {
+                continue;
+            }
+            let share = crosses.select((level - value) / (next - value), done);
+            medium.pass(simd, depth * (share - done), color);
+            done = share;
+            let opacity = crosses.select(own(0, 1), none);
+            let taken = medium.through * opacity;
+            let outside = medium.before * medium.through;
+            medium.through -= taken;
+            medium.depth += crosses.select(own(0, 2), none);
+            let inside = medium.before * medium.through;
+            let hits = outside.simd_gt(0.5) & inside.simd_le(0.5) & crosses;
+            medium.hit = hits.select(piece.begin + piece.length * share, medium.hit);
+            medium.has_hit |= hits;
+            let mut surface = [0, 1, 2].map(|channel| own(1, channel));
+            if self.is_lit {
+                let normal = self.gradient(layer, place + (next_place - place) * share);
+                surface = self.lit(simd, surface, normal, layer.direction, self.frame.volume_shade);
+            }
+            for (sum, channel) in medium.color.iter_mut().zip(surface) {
+                *sum = taken.mul_add(channel, *sum);
+            }
+        }
+        medium.pass(simd, depth * (Lanes::splat(simd, 1.0) - done), color);
+    }
+
+    /// Returns the colour and the optical depth that the transfer function shows in a piece, or
+    /// `None` if the piece has no visible value and the transfer function no isosurface.
+    #[inline(always)]
+    fn shown_in<S: Simd>(
+        &self,
+        simd: S,
+        layer: &Layer<S>,
+        piece: &Piece<S>,
+    ) -> Option<([Lanes<S>; 3], Lanes<S>)> {
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let ([place, next_place], [value, next]) = (piece.places, piece.values);
+        let mut shown = if self.is_integrated {
+            self.between(simd, value, next)
+        } else {
+            self.one(simd, layer.mean())
+        };
+        let mut normal = [none; 3];
+        if self.is_lit || self.has_gradient_opacity {
+            normal = self.gradient(layer, (place + next_place) * 0.5);
+        }
+        if self.has_gradient_opacity {
+            let factor = self.gradient_factor(simd, dot(normal, normal).sqrt());
+            shown = four!(I => shown[I] * factor);
+        }
+        let depth = piece.mask.select(shown[3].max(none) * piece.length * layer.filling, none);
+        if !(depth.simd_gt(0.0).any_true() || self.isosurfaces > 0) {
+            return None;
+        }
+        let inverse = one / shown[3].max(Lanes::splat(simd, 1e-20));
+        let mut color = three!(I => (shown[I] * inverse).max(none).min(one));
+        if self.is_lit {
+            color = self.lit(simd, color, normal, layer.direction, self.frame.volume_shade);
+        }
+        Some((color, depth))
     }
 
     /// Returns the gradient in view space, in entries per thickness of a sheet.

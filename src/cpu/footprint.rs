@@ -223,52 +223,67 @@ fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> [f32; 2] {
 }
 
 fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
-    let frame = &plan.frame;
     let (c, s, extent) = (splat.center, &splat.covariance, splat.extent);
-    let e2 = extent * extent;
     let reaches = extent * Vec3::new(s.x_axis.x.sqrt(), s.y_axis.y.sqrt(), s.z_axis.z.sqrt());
     let (mut distance, mut reach, mut far) = (c.z, reaches.z, c.z + reaches.z);
-    let bounds: [[f32; 2]; 2];
     if plan.view.perspective {
-        if c.z + reaches.z <= frame.z_near {
+        if c.z + reaches.z <= plan.frame.z_near {
             return None;
         }
         distance = c.length();
         let toward = c / distance.max(1e-30);
         reach = extent * toward.dot(*s * toward).max(0.0).sqrt();
-        let across = e2 * (s.x_axis.x + s.y_axis.y + s.z_axis.z);
+        let across = extent * extent * (s.x_axis.x + s.y_axis.y + s.z_axis.z);
         far = ((distance + reach) * (distance + reach) + across).sqrt();
-        bounds = if c.z - reaches.z > frame.z_near {
-            let (xz, yz, zz) = (e2 * s.x_axis.z, e2 * s.y_axis.z, e2 * s.z_axis.z);
-            [
-                tangent_bounds(c.x, c.z, e2 * s.x_axis.x, xz, zz),
-                tangent_bounds(c.y, c.z, e2 * s.y_axis.y, yz, zz),
-            ]
-        } else {
-            let high = c.z + reaches.z;
-            [
-                box_bounds(c.x, reaches.x, frame.z_near, high),
-                box_bounds(c.y, reaches.y, frame.z_near, high),
-            ]
-        };
-    } else {
-        bounds = [[c.x - reaches.x, c.x + reaches.x], [c.y - reaches.y, c.y + reaches.y]];
     }
     // Near the rim of a footprint, sections reach beyond the ellipsoid, because kernels are not cut
     // along a ray.
     let overreach = if ends { 1.0 } else { SECTION_OVERREACH };
     far = distance + overreach * (far - distance);
     let near = distance - overreach * reach;
-    let last_plane = plan.planes[plan.sheets + 1];
     // Written so that NaN fails.
-    let meets = far > plan.planes[1] && near < last_plane;
+    let meets = far > plan.planes[1] && near < plan.planes[plan.sheets + 1];
     if !plan.is_whole() && !meets {
         return None;
     }
+    let pixels = pixels(plan, bounds(plan, splat, reaches))?;
+    if plan.is_whole() {
+        return whole_sheet(plan, c, distance).map(|sheet| Place { pixels, sheets: [sheet; 2] });
+    }
+    // Beside the eye, a kernel's middle lies behind the ray's start: the part in front of the first
+    // plane must be cut off.
+    let is_beside = plan.view.perspective && distance < 2.0 * reach;
+    let first = if is_beside { 0 } else { plan.sheet_of(near) };
+    Some(Place { pixels, sheets: [first, plan.sheet_of(far).max(1)] })
+}
+
+/// Bounds a splat in the image plane, at distance 1 in perspective. `reaches` are half the sides of
+/// the box around it in view space.
+fn bounds(plan: &Plan, splat: &Candidate, reaches: Vec3) -> [[f32; 2]; 2] {
+    let (c, s, e2) = (splat.center, &splat.covariance, splat.extent * splat.extent);
+    if !plan.view.perspective {
+        return [[c.x - reaches.x, c.x + reaches.x], [c.y - reaches.y, c.y + reaches.y]];
+    }
+    let z_near = plan.frame.z_near;
+    if c.z - reaches.z > z_near {
+        let (xz, yz, zz) = (e2 * s.x_axis.z, e2 * s.y_axis.z, e2 * s.z_axis.z);
+        [
+            tangent_bounds(c.x, c.z, e2 * s.x_axis.x, xz, zz),
+            tangent_bounds(c.y, c.z, e2 * s.y_axis.y, yz, zz),
+        ]
+    } else {
+        let high = c.z + reaches.z;
+        [box_bounds(c.x, reaches.x, z_near, high), box_bounds(c.y, reaches.y, z_near, high)]
+    }
+}
+
+/// Returns the first and the last pixel whose centre lies in a box of the image plane, with a
+/// margin for rounding, or `None` if there is none.
+fn pixels(plan: &Plan, bounds: [[f32; 2]; 2]) -> Option<[[i32; 2]; 2]> {
+    let frame = &plan.frame;
     let apron = plan.apron() as f32;
     let mut pixels = [[0; 2]; 2];
     for axis in 0..2 {
-        // Pixels whose centres lie in the box, with a margin for rounding.
         let limit = frame.size[axis] as f32 + apron;
         let [low, high] = bounds[axis].map(|bound| frame.center[axis] + frame.scale * bound);
         let first = (low - 0.51).clamp(-apron, limit).ceil();
@@ -279,24 +294,22 @@ fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
         }
         (pixels[0][axis], pixels[1][axis]) = (first as i32, last as i32);
     }
-    if plan.is_whole() {
-        // A whole splat belongs to the sheet of its centre.
-        let mut key = distance;
-        if plan.mode == Mode::AxisSheets {
-            let [x, y, z, _] = frame.sheet_normal;
-            key = Vec3::new(x, y, z).dot(c);
-            key = if plan.view.perspective { key.abs() } else { key };
-        }
-        let is_within = key >= plan.planes[1] && key < last_plane;
-        let mut sheet = plan.sheet_of(key).min(plan.sheets);
-        if plan.single() == Some(Order::BackToFront) {
-            sheet = plan.sheets + 1 - sheet;
-        }
-        return is_within.then_some(Place { pixels, sheets: [sheet; 2] });
+    Some(pixels)
+}
+
+/// Returns the sheet of a splat that is drawn whole: that of its centre, or `None` if no sheet
+/// contains the centre.
+fn whole_sheet(plan: &Plan, center: Vec3, distance: f32) -> Option<usize> {
+    let mut key = distance;
+    if plan.mode == Mode::AxisSheets {
+        let [x, y, z, _] = plan.frame.sheet_normal;
+        key = Vec3::new(x, y, z).dot(center);
+        key = if plan.view.perspective { key.abs() } else { key };
     }
-    // Beside the eye, a kernel's middle lies behind the ray's start: the part in front of the first
-    // plane must be cut off.
-    let is_beside = plan.view.perspective && distance < 2.0 * reach;
-    let first = if is_beside { 0 } else { plan.sheet_of(near) };
-    Some(Place { pixels, sheets: [first, plan.sheet_of(far).max(1)] })
+    let is_within = key >= plan.planes[1] && key < plan.planes[plan.sheets + 1];
+    let mut sheet = plan.sheet_of(key).min(plan.sheets);
+    if plan.single() == Some(Order::BackToFront) {
+        sheet = plan.sheets + 1 - sheet;
+    }
+    is_within.then_some(sheet)
 }

@@ -4,7 +4,7 @@
 use super::{
     blend::Way,
     brick_cache::Grid,
-    close::{Face, Layer, OPAQUE, Visible},
+    close::{Face, Layer, OPAQUE, Packet, Visible},
     field::{BEYOND, Typed},
     kernel_sums::{MOST_TAPS, Point},
     plan::Plan,
@@ -27,6 +27,7 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
 
 /// A lattice whose field is gathered.
 pub struct Gather<'a> {
+    pub plan: &'a Plan<'a>,
     /// One level, or up to two for volumes in bricks, the finer first.
     pub levels: Vec<Level<'a>>,
     /// Parts of a sheet: one, except in sheets thicker than two samples.
@@ -171,27 +172,26 @@ impl<S: Simd> Face<S> {
 
 impl Gather<'_> {
     /// Returns the field of a sheet and the rays on which it counts, or `None` if it is invisible.
-    #[expect(clippy::too_many_arguments, reason = "the state of one packet")]
     #[inline(always)]
     pub fn layer<S: Simd>(
         &self,
         simd: S,
-        plan: &Plan,
-        rays: &Rays<S>,
+        packet: &Packet<S>,
         sheet: usize,
         marks: &[u64],
-        through: Lanes<S>,
         last: &mut Last<S>,
     ) -> Option<(Layer<S>, mask32x8<S>)> {
+        let Packet { rays, pixels, .. } = packet;
+        let plan = self.plan;
         let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
         let begin = rays.inside[0].max(Lanes::splat(simd, start));
         let end = rays.inside[1].min(Lanes::splat(simd, stop));
-        let mask = begin.simd_lt(end) & through.simd_ge(OPAQUE);
+        let mask = begin.simd_lt(end) & pixels.through.simd_ge(OPAQUE);
         if !mask.any_true() {
             return None;
         }
         if !(last.first..last.first + LOOKED_UP).contains(&sheet) {
-            self.look_up(simd, plan, rays, sheet, marks, last);
+            self.look_up(simd, rays, sheet, marks, last);
         }
         let shows = last.shows[sheet - last.first].into();
         let mask = mask & mask32x8::from_bitmask(simd, shows);
@@ -199,10 +199,10 @@ impl Gather<'_> {
             return None;
         }
         if last.plane != sheet {
-            self.face(simd, plan, rays, sheet, last);
+            self.face(simd, rays, sheet, last);
         }
         let (front, front_along, front_weight) = (last.face, last.along, last.weight);
-        self.face(simd, plan, rays, sheet + 1, last);
+        self.face(simd, rays, sheet + 1, last);
         let (back, back_along) = (last.face, last.along);
         let thickness = stop - start;
         let sum = front.value + back.value;
@@ -215,41 +215,35 @@ impl Gather<'_> {
         let mut layer =
             Layer { front, back, middle, start, thickness, begin, end, filling, direction };
         if self.parts > 1 {
-            let mask =
-                mask & self.fill_thick(simd, plan, rays, [front_weight, last.weight], &mut layer);
-            let shows = plan.optics == Optics::Maximum || self.visible.may_show(simd, plan, &layer);
-            return (shows && mask.any_true()).then_some((layer, mask));
+            let mask = mask & self.fill_thick(simd, rays, [front_weight, last.weight], &mut layer);
+            return (self.may_show(simd, &layer) && mask.any_true()).then_some((layer, mask));
         }
-        if self.is_blended {
-            let least = front_weight.min(last.weight);
-            let has_gaps = (mask & least.simd_le(0.0)).any_true();
-            if !has_gaps
-                && plan.optics != Optics::Maximum
-                && !self.visible.may_show(simd, plan, &layer)
-            {
-                return None;
-            }
-            if !has_gaps && !bend.abs().simd_gt(STRAIGHT).any_true() {
-                return Some((layer, mask));
-            }
-            let inside = self.at(simd, rays, 0.5 * (start + stop));
-            let has_field = layer.blend(simd, plan, bend, [front_weight, last.weight], &inside);
-            let mask = mask & has_field;
-            let shows = plan.optics == Optics::Maximum || self.visible.may_show(simd, plan, &layer);
-            return (shows && mask.any_true()).then_some((layer, mask));
-        }
-        if plan.optics != Optics::Maximum && !self.visible.may_show(simd, plan, &layer) {
+        let has_gaps =
+            self.is_blended && (mask & front_weight.min(last.weight).simd_le(0.0)).any_true();
+        if !has_gaps && !self.may_show(simd, &layer) {
             return None;
         }
-        if !bend.abs().simd_gt(STRAIGHT).any_true() {
+        if !has_gaps && !bend.abs().simd_gt(STRAIGHT).any_true() {
             return Some((layer, mask));
+        }
+        let inside = self.at(simd, rays, 0.5 * (start + stop));
+        if self.is_blended {
+            let has_field = layer.blend(simd, plan, bend, [front_weight, last.weight], &inside);
+            let mask = mask & has_field;
+            return (self.may_show(simd, &layer) && mask.any_true()).then_some((layer, mask));
         }
         // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with
         // slopes).
-        let inside = self.at(simd, rays, 0.5 * (start + stop)).value * plan.frame.transfer[1];
+        let inside = inside.value * plan.frame.transfer[1];
         let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
         layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
+    }
+
+    /// Whether any value that a sheet may have counts in the picture.
+    #[inline(always)]
+    fn may_show<S: Simd>(&self, simd: S, layer: &Layer<S>) -> bool {
+        self.plan.optics == Optics::Maximum || self.visible.may_show(simd, self.plan, layer)
     }
 
     /// Sets the mean of a sheet with several parts, and returns where it has one. A place is
@@ -258,7 +252,6 @@ impl Gather<'_> {
     fn fill_thick<S: Simd>(
         &self,
         simd: S,
-        plan: &Plan,
         rays: &Rays<S>,
         weights: [Lanes<S>; 2],
         layer: &mut Layer<S>,
@@ -266,6 +259,7 @@ impl Gather<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
+                let plan = self.plan;
                 let none = Lanes::splat(simd, 0.0);
                 let start = none + layer.start;
                 let stop = start + layer.thickness;
@@ -285,7 +279,7 @@ impl Gather<'_> {
                         let weight = if self.is_blended {
                             point.weight.simd_gt(0.0).select(point.weight + least, none)
                         } else {
-                            self.kernels_at(simd, plan, place)
+                            self.kernels_at(simd, place)
                         };
                         sum = weight.mul_add(point.value, sum);
                         all += weight;
@@ -319,10 +313,11 @@ impl Gather<'_> {
     /// Returns the sum of a lattice's kernels at a place, relative to their sum far from the
     /// borders.
     #[inline(always)]
-    fn kernels_at<S: Simd>(&self, simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
+    fn kernels_at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> Lanes<S> {
         let mut all = Lanes::splat(simd, 1.0);
         let Some(per_deviation) = self.ends else { return all };
-        let ends = plan.frame.field_low.iter().zip(plan.frame.field_high);
+        let frame = &self.plan.frame;
+        let ends = frame.field_low.iter().zip(frame.field_high);
         for (place, (low, high)) in place.into_iter().zip(ends) {
             let after = place - *low;
             let before = high - place;
@@ -343,12 +338,12 @@ impl Gather<'_> {
     fn look_up<S: Simd>(
         &self,
         simd: S,
-        plan: &Plan,
         rays: &Rays<S>,
         first: usize,
         marks: &[u64],
         last: &mut Last<S>,
     ) {
+        let plan = self.plan;
         last.first = first;
         last.shows = [0; LOOKED_UP];
         // The result for the plane behind the previous sheet.
@@ -442,17 +437,10 @@ impl Gather<'_> {
 
     /// Evaluates the field on a plane, and its change along the rays per world unit.
     #[inline(always)]
-    fn face<S: Simd>(
-        &self,
-        simd: S,
-        plan: &Plan,
-        rays: &Rays<S>,
-        plane: usize,
-        last: &mut Last<S>,
-    ) {
-        let frame = &plan.frame;
+    fn face<S: Simd>(&self, simd: S, rays: &Rays<S>, plane: usize, last: &mut Last<S>) {
+        let frame = &self.plan.frame;
         let per_value = frame.transfer[1];
-        let Point { value, slopes, weight } = self.at(simd, rays, plan.planes[plane]);
+        let Point { value, slopes, weight } = self.at(simd, rays, self.plan.planes[plane]);
         // From steps of the lattice to view space.
         let axes = frame.field_axes();
         let gradient = three!(I => {

@@ -5,7 +5,7 @@ use super::{
     brick_cache::{BESIDE, BrickCache, SLOT, SLOT_SIDE},
     footprint::{Candidate, Carried, Record, counted, origin, record, to_view, widened},
     page_cache::PageCache,
-    plan::Plan,
+    plan::{Outline, Plan},
     project::Projector,
     spare::{Spare, spare_for},
     vector::lanes,
@@ -95,12 +95,11 @@ impl Prepared {
         &mut self,
         plan: &Plan,
         settings: &Settings,
-        pixels: f64,
-        choice: Option<&Choice>,
-        shown: &[u16; 256],
+        outline: &Outline,
         spare: &mut Spare,
     ) -> Result<Vec<Vec<Record>>> {
         let view = plan.view;
+        let Outline { cut_pixels, choice, shown, .. } = outline;
         match self {
             Self::Set { drawn, .. } if drawn.payload == Payload::Radiance => {
                 let projector = Projector::new(plan, Source::of_splats(view, drawn, true));
@@ -120,8 +119,8 @@ impl Prepared {
                 }))
             }
             Self::Hierarchy(pages) => {
-                pages.update(view, settings, pixels)?;
-                Ok(pages.records(plan, settings, pixels, spare))
+                pages.update(view, settings, *cut_pixels)?;
+                Ok(pages.records(plan, settings, *cut_pixels, spare))
             }
             Self::Volume { volume, kernel, ranges, listed } => {
                 let ranges = ranges.get_or_insert_with(|| volume.drawn_ranges(kernel).into_owned());
@@ -137,7 +136,8 @@ impl Prepared {
                 }))
             }
             Self::Bricks(cache) => {
-                Ok(choice.map_or_else(Vec::new, |choice| brick_records(plan, cache, choice)))
+                let records = |choice| brick_records(plan, cache, choice);
+                Ok(choice.as_ref().map_or_else(Vec::new, records))
             }
         }
     }

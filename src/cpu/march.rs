@@ -3,12 +3,12 @@
 
 use super::{
     bins::Entry,
-    close::{OPAQUE, Pixels, Visible},
+    close::{OPAQUE, Packet, Pixels, Visible},
     footprint::Record,
     gather::{Gather, Last},
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
-    scatter::{Packet, Window, add},
+    scatter::{OpenTile, Window},
     skip::is_marked,
     sums::{Sums, WINDOW, differences},
     vector::{each, three},
@@ -34,8 +34,13 @@ pub struct March<'a> {
     pub records: &'a [Vec<Record>],
 }
 
-/// The splats whose next window begins at each of the sheets ahead.
-type Ahead = [Vec<u32>; WINDOW];
+/// The windows of a tile's splats that are still to be added.
+struct Ahead<'a> {
+    /// The splats whose first window has not begun, sorted by first sheet.
+    entries: &'a [Entry],
+    /// The splats whose next window begins at each of the sheets ahead.
+    continued: [Vec<u32>; WINDOW],
+}
 
 impl March<'_> {
     /// Draws a tile. `entries` are its splats, sorted by first sheet. `marks` has a bit for each
@@ -54,19 +59,21 @@ impl March<'_> {
         }
         let plan = self.plan;
         let corner = plan.corner(at);
-        let mut packets: [Packet<S>; PACKETS] = each!([0, 1, 2, 3, 4, 5, 6, 7], I => {
+        let packets = each!([0, 1, 2, 3, 4, 5, 6, 7], I => {
             let first = [corner[0] + (I % 2 * WIDE) as i32, corner[1] + (I / 2 * HIGH) as i32];
             Packet {
+                number: I,
                 rays: Rays::new(simd, plan, first),
                 pixels: Pixels::new(simd, plan),
                 is_done: false,
             }
         });
+        let mut tile = OpenTile { corner, packets, sums: Sums::new(simd) };
         match plan.single() {
-            Some(order) => self.one_by_one(simd, corner, entries, order, &mut packets, drawn),
-            None => self.sheets(simd, corner, entries, marks, &mut packets, drawn),
+            Some(order) => self.one_by_one(simd, entries, order, &mut tile, drawn),
+            None => self.sheets(simd, entries, marks, &mut tile, drawn),
         }
-        self.finished(simd, &packets)
+        self.finished(simd, &tile.packets)
     }
 
     /// Adds the splats one by one.
@@ -74,30 +81,20 @@ impl March<'_> {
     fn one_by_one<S: Simd>(
         &self,
         simd: S,
-        corner: [i32; 2],
         entries: &[Entry],
         order: Order,
-        packets: &mut [Packet<S>; PACKETS],
+        tile: &mut OpenTile<S>,
         drawn: &mut u64,
     ) {
-        let mut sums = Sums::new(simd);
         for entry in entries {
             let window = Window { front: usize::from(entry.sheet), is_continued: false };
-            add(
-                simd,
-                self.plan,
-                record_of(self.records, entry.record),
-                window,
-                corner,
-                packets,
-                &mut sums,
-            );
+            tile.add(simd, self.plan, record_of(self.records, entry.record), window);
             *drawn += 1;
             if order == Order::FrontToBack {
-                for packet in packets.iter_mut() {
+                for packet in &mut tile.packets {
                     packet.is_done = !packet.pixels.through.simd_ge(OPAQUE).any_true();
                 }
-                if packets.iter().all(|packet| packet.is_done) {
+                if tile.packets.iter().all(|packet| packet.is_done) {
                     return;
                 }
             }
@@ -108,87 +105,70 @@ impl March<'_> {
     fn sheets<S: Simd>(
         &self,
         simd: S,
-        corner: [i32; 2],
         entries: &[Entry],
         marks: &[u64],
-        packets: &mut [Packet<S>; PACKETS],
+        tile: &mut OpenTile<S>,
         drawn: &mut u64,
     ) {
-        let mut sums = Sums::new(simd);
-        let mut ahead: Ahead = std::array::from_fn(|_| Vec::new());
+        let mut ahead = Ahead { entries, continued: std::array::from_fn(|_| Vec::new()) };
         let mut last = [Last::new(simd); PACKETS];
-        let mut next = 0;
         let mut sheet = 0;
         // Number of sheets with sums, from `sheet` on.
         let mut open = 0;
         while sheet <= self.plan.sheets {
             if open == 0 {
-                let entry = entries.get(next).map_or(usize::MAX, |entry| usize::from(entry.sheet));
+                let entry = ahead.entries.first();
+                let entry = entry.map_or(usize::MAX, |entry| usize::from(entry.sheet));
                 let Some(first) = entry.min(next_mark(marks, sheet)).checked_add(1) else { return };
                 sheet = first - 1;
             }
-            let continued = std::mem::take(&mut ahead[sheet % WINDOW]);
-            let added = self.add(
-                simd, sheet, entries, &mut next, continued, corner, packets, &mut sums, &mut ahead,
-            );
+            let added = self.add(simd, sheet, &mut ahead, tile);
             *drawn += added;
             if added > 0 {
                 open = WINDOW;
             }
             if sheet > 0 {
-                self.close(simd, sheet, marks, packets, &mut sums, &mut last);
-                let is_done = packets.iter().all(|packet| packet.is_done);
+                self.close(simd, sheet, marks, tile, &mut last);
+                let is_done = tile.packets.iter().all(|packet| packet.is_done);
                 if is_done && self.plan.optics != Optics::Maximum {
                     return;
                 }
             }
-            sums.clear(sheet);
+            tile.sums.clear(sheet);
             open = open.saturating_sub(1);
             sheet += 1;
         }
     }
 
     /// Adds the windows that begin at a sheet. Returns their number.
-    #[expect(clippy::too_many_arguments, reason = "the state of one tile")]
     #[inline(always)]
     fn add<S: Simd>(
         &self,
         simd: S,
         sheet: usize,
-        entries: &[Entry],
-        next: &mut usize,
-        mut continued: Vec<u32>,
-        corner: [i32; 2],
-        packets: &mut [Packet<S>; PACKETS],
-        sums: &mut Sums<S>,
         ahead: &mut Ahead,
+        tile: &mut OpenTile<S>,
     ) -> u64 {
-        let first = *next;
-        while entries.get(*next).is_some_and(|entry| usize::from(entry.sheet) <= sheet) {
-            *next += 1;
-        }
-        let begun = entries[first..*next].iter().map(|entry| (entry.record, false));
+        let mut continued = std::mem::take(&mut ahead.continued[sheet % WINDOW]);
+        let begins = |entry: &&Entry| usize::from(entry.sheet) <= sheet;
+        let count = ahead.entries.iter().take_while(begins).count();
+        let (begun, later) = ahead.entries.split_at(count);
+        ahead.entries = later;
+        let begun = begun.iter().map(|entry| (entry.record, false));
         let mut added = 0;
         for (number, is_continued) in continued.iter().map(|number| (*number, true)).chain(begun) {
             let record = record_of(self.records, number);
-            add(
-                simd,
-                self.plan,
-                record,
-                Window { front: sheet, is_continued },
-                corner,
-                packets,
-                sums,
-            );
+            tile.add(simd, self.plan, record, Window { front: sheet, is_continued });
             added += 1;
             if usize::from(record.sheets[1]) >= sheet + WINDOW && !self.plan.is_whole() {
-                ahead[(sheet + WINDOW - 1) % WINDOW].push(number);
+                ahead.continued[(sheet + WINDOW - 1) % WINDOW].push(number);
             }
         }
         // This sheet's slot is next used by the sheet four further on, which reuses the memory.
         continued.clear();
-        if ahead[sheet % WINDOW].is_empty() {
-            ahead[sheet % WINDOW] = continued;
+        let own = &mut ahead.continued[sheet % WINDOW];
+        if own.is_empty() {
+            *own = continued;
         }
         added
     }
@@ -199,37 +179,28 @@ impl March<'_> {
         simd: S,
         sheet: usize,
         marks: &[u64],
-        packets: &mut [Packet<S>; PACKETS],
-        sums: &mut Sums<S>,
+        tile: &mut OpenTile<S>,
         last: &mut [Last<S>; PACKETS],
     ) {
-        let plan = self.plan;
+        let (plan, sums) = (self.plan, &mut tile.sums);
         let has_lattice = is_marked(marks, sheet);
         let has_sums = plan.has_field && sums.has_field[sheet % WINDOW] != 0;
         let values = (plan.central && has_sums)
             .then(|| [sums.values_on(simd, plan, sheet), sums.values_on(simd, plan, sheet + 1)]);
-        for (number, packet) in packets.iter_mut().enumerate() {
+        for (packet, last) in tile.packets.iter_mut().zip(last) {
             if packet.is_done {
                 continue;
             }
-            let rays = &packet.rays;
-            let radiance = sums.take_radiance(simd, plan, rays, sheet, number);
+            let radiance = sums.take_radiance(simd, plan, packet, sheet);
             let field = match &self.gather {
-                Some(gather) if has_lattice => gather.layer(
-                    simd,
-                    plan,
-                    rays,
-                    sheet,
-                    marks,
-                    packet.pixels.through,
-                    &mut last[number],
-                ),
+                Some(gather) if has_lattice => gather.layer(simd, packet, sheet, marks, last),
                 Some(_) => None,
                 None if has_sums => {
+                    let number = packet.number;
                     let slopes = values
                         .as_ref()
                         .map(|values| values.each_ref().map(|on| differences(simd, on, number)));
-                    let layer = sums.resolve(simd, plan, rays, sheet, number, slopes);
+                    let layer = sums.resolve(simd, plan, packet, sheet, slopes);
                     let is_maximum = plan.optics == Optics::Maximum;
                     layer
                         .filter(|(layer, _)| is_maximum || self.visible.may_show(simd, plan, layer))
@@ -240,7 +211,7 @@ impl March<'_> {
                 continue;
             }
             let field = field.as_ref().map(|(layer, mask)| (layer, *mask));
-            plan.close(simd, sheet, rays, field, radiance, &mut packet.pixels);
+            plan.close(simd, sheet, packet, field, radiance);
             packet.is_done =
                 plan.optics != Optics::Maximum && !packet.pixels.through.simd_ge(OPAQUE).any_true();
         }

@@ -52,7 +52,7 @@ use crate::{
     Error, Result,
     bricks::{Bricks, Choice},
     hierarchy::Detail,
-    math::{Camera, Sheets, View},
+    math::{Camera, Kernel, View},
     parallel::prelude::*,
     picture::Picture,
     plan::{
@@ -60,17 +60,17 @@ use crate::{
         pace::Pace,
         shown::{self, Shown},
         uniforms::Frame,
-        weighting::{deviation, weighting},
+        weighting::{Weighting, deviation, weighting},
     },
     scene::{Evaluate, Item, Optics, Scene, Settings},
     volume::{
-        Lattice, TransferFunction,
+        Lattice, TransferFunction, Volume,
         reach::{EVERYTHING, first_visible},
     },
 };
 use bins::{BLOCK, Bins, TileLists};
 use blend::{Blend, Way};
-use brick_cache::Grid;
+use brick_cache::{BrickCache, Grid};
 use close::{NO_VALUE, Visible};
 use fearless_simd::Level;
 use field::Typed;
@@ -78,7 +78,7 @@ use footprint::Record;
 use gather::Gather;
 use items::Prepared;
 use march::{EMPTY, March, Tile};
-use plan::Plan;
+use plan::{Outline, Plan};
 use spare::Spare;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use vector::lanes;
@@ -104,16 +104,6 @@ pub struct CpuRenderer {
     /// Memory to reuse.
     spare: Spare,
     spare_bins: bins::Spare,
-}
-
-/// What a picture draws of the scene, decided before drawing.
-struct Outline {
-    /// The cut of hierarchies, in pixels.
-    cut_pixels: f64,
-    choice: Option<Choice>,
-    sheets: Sheets,
-    /// The ranges of values that are visible.
-    shown: [u16; 256],
 }
 
 /// The times of a picture's steps.
@@ -190,20 +180,11 @@ impl CpuRenderer {
         let mut records = Vec::new();
         let mut spare = std::mem::take(&mut self.spare);
         for (item, prepared) in self.scene.items.iter().zip(&mut self.prepared) {
-            let Outline { cut_pixels, choice, shown, .. } = &outline;
-            let choice = choice.as_ref();
-            if let (Prepared::Bricks(cache), Some(choice)) = (&mut *prepared, choice) {
+            if let (Prepared::Bricks(cache), Some(choice)) = (&mut *prepared, &outline.choice) {
                 cache.update(choice, most_bricks(&cache.bricks, settings))?;
             }
             if !(gathers && matches!(item, Item::Volume(..) | Item::Bricks(..))) {
-                records.extend(prepared.records(
-                    &plan,
-                    settings,
-                    *cut_pixels,
-                    choice,
-                    shown,
-                    &mut spare,
-                )?);
+                records.extend(prepared.records(&plan, settings, &outline, &mut spare)?);
             }
         }
         items::check_count(&records)?;
@@ -340,7 +321,7 @@ impl CpuRenderer {
     /// Returns the gathered field, or `None` if none of its bricks is visible.
     fn gather<'a>(
         &'a self,
-        plan: &Plan,
+        plan: &'a Plan,
         outline: &Outline,
         visible: &'a Visible,
     ) -> Option<Gather<'a>> {
@@ -349,57 +330,12 @@ impl CpuRenderer {
         for (item, prepared) in self.scene.items.iter().zip(&self.prepared) {
             match (item, prepared) {
                 (Item::Volume(volume, kernel, _), _) => {
-                    let (_, shown) = self.shown.as_ref()?;
-                    let field = match &self.blend {
-                        Some(blend) => Typed::blended(volume, blend, zero),
-                        None => Typed::new(volume, weighting(kernel)?, zero),
-                    };
-                    // Coefficients begin before the samples.
-                    let drawn = volume.drawn_lattice();
-                    let before =
-                        volume.lattice.axes.inverse() * (volume.lattice.origin - drawn.origin);
-                    let shift = before.as_vec3().to_array();
-                    let cells = self
-                        .blend
-                        .as_ref()
-                        .map_or([[1.0; 3], shift], |blend| blend.to_cells(shift));
-                    levels.push(gather::Level {
-                        field,
-                        dims: drawn.dims,
-                        grid: None,
-                        shown,
-                        share: 1.0,
-                        scale: [1.0; 3],
-                        shift,
-                        cells,
-                    });
+                    levels.push(self.whole_level(volume, kernel, zero)?);
                 }
                 (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache))
                     if !cache.samples().is_empty() =>
                 {
-                    let (choice, found) = self.levels.as_ref()?;
-                    let fine = &bricks.header().lattice;
-                    for ((level, share), (grid, shown)) in choice.levels.iter().zip(found) {
-                        let (own, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
-                        let field =
-                            Typed::of_bricks(cache.samples(), dims, grid, weighting(kernel)?, zero);
-                        let to_own = own.axes.inverse();
-                        let scale = (to_own * fine.axes).to_cols_array_2d();
-                        let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
-                        let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
-                        let share = *share as f32;
-                        let cells = [scale, shift];
-                        levels.push(gather::Level {
-                            field,
-                            dims,
-                            grid: Some(grid),
-                            shown,
-                            share,
-                            scale,
-                            shift,
-                            cells,
-                        });
-                    }
+                    levels = self.levels_of_bricks(bricks, cache, weighting(kernel)?, zero)?;
                 }
                 _ => {}
             }
@@ -416,7 +352,66 @@ impl CpuRenderer {
         let deviation = self.scene.items.iter().find_map(|item| deviation(item.kernel()?));
         let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
         let is_blended = self.blend.is_some();
-        Some(Gather { levels, parts, ends, looks, is_blended, visible, zero: zero as f32 })
+        Some(Gather { plan, levels, parts, ends, looks, is_blended, visible, zero: zero as f32 })
+    }
+
+    /// Returns a volume in memory as the only level. Values are relative to `zero`.
+    fn whole_level<'a>(
+        &'a self,
+        volume: &'a Volume,
+        kernel: &Kernel,
+        zero: f64,
+    ) -> Option<gather::Level<'a>> {
+        let (_, shown) = self.shown.as_ref()?;
+        let field = match &self.blend {
+            Some(blend) => Typed::blended(volume, blend, zero),
+            None => Typed::new(volume, weighting(kernel)?, zero),
+        };
+        // Coefficients begin before the samples.
+        let drawn = volume.drawn_lattice();
+        let before = volume.lattice.axes.inverse() * (volume.lattice.origin - drawn.origin);
+        let shift = before.as_vec3().to_array();
+        let to_cells = |blend: &Blend| blend.to_cells(shift);
+        Some(gather::Level {
+            field,
+            dims: drawn.dims,
+            grid: None,
+            shown,
+            share: 1.0,
+            scale: [1.0; 3],
+            shift,
+            cells: self.blend.as_ref().map_or([[1.0; 3], shift], to_cells),
+        })
+    }
+
+    /// Returns the levels of a volume in bricks, the finer first.
+    fn levels_of_bricks<'a>(
+        &'a self,
+        bricks: &Bricks,
+        cache: &'a BrickCache,
+        weighting: Weighting,
+        zero: f64,
+    ) -> Option<Vec<gather::Level<'a>>> {
+        let (choice, found) = self.levels.as_ref()?;
+        let fine = &bricks.header().lattice;
+        let level = |((level, share), (grid, shown)): (&(usize, f64), &'a (Grid, Shown))| {
+            let (own, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
+            let to_own = own.axes.inverse();
+            let scale = (to_own * fine.axes).to_cols_array_2d();
+            let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
+            let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
+            gather::Level {
+                field: Typed::of_bricks(cache.samples(), dims, grid, weighting, zero),
+                dims,
+                grid: Some(grid),
+                shown,
+                share: *share as f32,
+                scale,
+                shift,
+                cells: [scale, shift],
+            }
+        };
+        Some(choice.levels.iter().zip(found).map(level).collect())
     }
 
     /// Returns the lattices of the gathered levels.

@@ -16,6 +16,16 @@ use crate::{
 /// The place of a plane in front of or behind all others.
 const NOWHERE: f32 = 3e38;
 
+/// What a picture draws of the scene, decided before drawing.
+pub struct Outline {
+    /// The cut of hierarchies, in pixels.
+    pub cut_pixels: f64,
+    pub choice: Option<Choice>,
+    pub sheets: Sheets,
+    /// The ranges of values that are visible.
+    pub shown: [u16; 256],
+}
+
 /// The plan of a picture. Sheets are numbered from 1; sheet n lies between planes n and n + 1.
 /// Sheet 0 is everything in front of the first plane and is not drawn.
 pub struct Plan<'a> {

@@ -30,6 +30,15 @@ struct Eight {
     normal: [i32; 8],
 }
 
+/// Eight splats in view space, widened as by [`widened`].
+struct Widened<S: Simd> {
+    center: [Lanes<S>; 3],
+    covariance: Symmetric<S>,
+    /// A zero vector for none.
+    normal: [Lanes<S>; 3],
+    has_normal: mask32x8<S>,
+}
+
 /// The places of footprints: the first and the last pixel, the range of distances, and which
 /// footprints meet the picture.
 struct Places<S: Simd> {
@@ -101,10 +110,47 @@ impl<'a> Projector<'a> {
     /// Adds the records of those of eight splats whose bit in a mask is set.
     #[inline(always)]
     fn add_eight<S: Simd>(&self, simd: S, eight: &Eight, mask: u64, records: &mut Vec<Record>) {
+        let splats = self.widened(simd, eight);
+        let Places { pixels, near, far, meets } = self.locate(simd, &splats);
+        let mut bits = meets.to_bitmask() & mask;
+        if bits == 0 {
+            return;
+        }
+        let whitening = whitening(simd, &splats.covariance);
+        let [strength, payload @ ..] = self.payload(simd, eight, &splats);
+        let strength: [f32; 8] = strength.into();
+        let payload: [[f32; 8]; 7] = each!([0, 1, 2, 3, 4, 5, 6], I => payload[I].into());
+        let center: [[f32; 8]; 3] = three!(I => splats.center[I].into());
+        let whitening: [[f32; 8]; 6] = each!([0, 1, 2, 3, 4, 5], I => whitening[I].into());
+        let sheets = [self.sheets_of(simd, near), self.sheets_of(simd, far)];
+        let [[left, top], [right, bottom]]: [[[i32; 8]; 2]; 2] =
+            each!([0, 1], I => each!([0, 1], J => i32x8::truncate_from(pixels[I][J]).into()));
+        records.reserve(8);
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize & 7;
+            bits &= bits - 1;
+            let [facing, red, green, blue, nx, ny, nz] =
+                each!([0, 1, 2, 3, 4, 5, 6], I => payload[I][lane]);
+            records.push(Record {
+                center: three!(I => center[I][lane]),
+                strength: strength[lane],
+                whitening: each!([0, 1, 2, 3, 4, 5], I => whitening[I][lane]),
+                extent2: self.source.extent * self.source.extent,
+                kind: Kind::Radiance,
+                payload: [1.0, facing, red, green, blue, nx, ny, nz],
+                pixels: [[left[lane], top[lane]], [right[lane], bottom[lane]]],
+                sheets: [sheets[0][lane], sheets[1][lane].max(1)],
+            });
+        }
+    }
+
+    /// Returns splats in view space, widened so that none falls between pixels.
+    #[inline(always)]
+    fn widened<S: Simd>(&self, simd: S, eight: &Eight) -> Widened<S> {
         let plan = self.plan;
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let turned = self.turned(three!(I => eight.center[I].simd_into(simd)));
-        let mut center: [Lanes<S>; 3] = three!(I => turned[I] + self.origin[I]);
+        let center: [Lanes<S>; 3] = three!(I => turned[I] + self.origin[I]);
         let [b00, b10, b11, b20, b21, b22]: [Lanes<S>; 6] =
             each!([0, 1, 2, 3, 4, 5], I => eight.factor[I].simd_into(simd));
         let [_, b, c] = self.axes;
@@ -133,16 +179,18 @@ impl<'a> Projector<'a> {
         let along = three!(I => dot(columns[I], normal));
         let own2 = dot(along, along);
         let back = ((own2 + blur2).sqrt() - own2.sqrt()) * STEP_BACK as f32;
-        center = three!(I => center[I] - normal[I] * back);
-        let Places { pixels, near, far, meets } = self.locate(simd, center, &covariance);
-        let mut bits = meets.to_bitmask() & mask;
-        if bits == 0 {
-            return;
-        }
-        let whitening = whitening(simd, &covariance);
+        let center = three!(I => center[I] - normal[I] * back);
+        Widened { center, covariance, normal, has_normal }
+    }
+
+    /// Returns the strengths of splats, and the payloads of their records after the first part.
+    #[inline(always)]
+    fn payload<S: Simd>(&self, simd: S, eight: &Eight, splats: &Widened<S>) -> [Lanes<S>; 8] {
+        let Widened { center, normal, has_normal, .. } = *splats;
+        let one = Lanes::splat(simd, 1.0);
         // Within a sheet, splats that face the eye hide those that face away.
         let mut away = normal[2];
-        if plan.view.perspective {
+        if self.plan.view.perspective {
             away = dot(normal, center) / dot(center, center).sqrt().max(Lanes::splat(simd, 1e-30));
         }
         let facing = (away * -4.0 + 0.5).max(Lanes::splat(simd, 1.0 / 255.0)).min(one);
@@ -151,46 +199,16 @@ impl<'a> Projector<'a> {
         let [red, green, blue, opacity] = each!([0, 8, 16, 24], SHIFT =>
             Lanes::<S>::float_from((packed >> SHIFT as u32) & 0xff) * (1.0 / 255.0));
         let strength: Lanes<S> = eight.strength.simd_into(simd);
-        let [strength, facing, red, green, blue, nx, ny, nz]: [[f32; 8]; 8] = [
-            (strength * opacity).into(),
-            facing.into(),
-            (red * facing).into(),
-            (green * facing).into(),
-            (blue * facing).into(),
-            (normal[0] * facing).into(),
-            (normal[1] * facing).into(),
-            (normal[2] * facing).into(),
-        ];
-        let center: [[f32; 8]; 3] = three!(I => center[I].into());
-        let whitening: [[f32; 8]; 6] = each!([0, 1, 2, 3, 4, 5], I => whitening[I].into());
-        let sheets = [self.sheets_of(simd, near), self.sheets_of(simd, far)];
-        let [[left, top], [right, bottom]]: [[[i32; 8]; 2]; 2] =
-            each!([0, 1], I => each!([0, 1], J => i32x8::truncate_from(pixels[I][J]).into()));
-        records.reserve(8);
-        while bits != 0 {
-            let lane = bits.trailing_zeros() as usize & 7;
-            bits &= bits - 1;
-            let payload = [
-                1.0,
-                facing[lane],
-                red[lane],
-                green[lane],
-                blue[lane],
-                nx[lane],
-                ny[lane],
-                nz[lane],
-            ];
-            records.push(Record {
-                center: three!(I => center[I][lane]),
-                strength: strength[lane],
-                whitening: each!([0, 1, 2, 3, 4, 5], I => whitening[I][lane]),
-                extent2: self.source.extent * self.source.extent,
-                kind: Kind::Radiance,
-                payload,
-                pixels: [[left[lane], top[lane]], [right[lane], bottom[lane]]],
-                sheets: [sheets[0][lane], sheets[1][lane].max(1)],
-            });
-        }
+        [
+            strength * opacity,
+            facing,
+            red * facing,
+            green * facing,
+            blue * facing,
+            normal[0] * facing,
+            normal[1] * facing,
+            normal[2] * facing,
+        ]
     }
 
     #[inline(always)]
@@ -200,46 +218,27 @@ impl<'a> Projector<'a> {
     }
 
     #[inline(always)]
-    fn locate<S: Simd>(&self, simd: S, c: [Lanes<S>; 3], covariance: &Symmetric<S>) -> Places<S> {
+    fn locate<S: Simd>(&self, simd: S, splats: &Widened<S>) -> Places<S> {
         let (plan, extent) = (self.plan, self.source.extent);
-        let frame = &plan.frame;
-        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-        let [xx, xy, xz, yy, yz, zz] = *covariance;
+        let c = splats.center;
+        let [xx, xy, xz, yy, yz, zz] = splats.covariance;
         let reaches = [xx.sqrt() * extent, yy.sqrt() * extent, zz.sqrt() * extent];
         let (mut distance, mut reach, mut far) = (c[2], reaches[2], c[2] + reaches[2]);
         let mut meets = mask32x8::splat(simd, true);
         let mut is_beside = mask32x8::splat(simd, false);
-        let mut bounds =
-            [[c[0] - reaches[0], c[0] + reaches[0]], [c[1] - reaches[1], c[1] + reaches[1]]];
         if plan.view.perspective {
-            let high = c[2] + reaches[2];
-            meets = high.simd_gt(frame.z_near);
+            meets = (c[2] + reaches[2]).simd_gt(plan.frame.z_near);
             distance = dot(c, c).sqrt();
-            let inverse = one / distance.max(Lanes::splat(simd, 1e-30));
+            let inverse = Lanes::splat(simd, 1.0) / distance.max(Lanes::splat(simd, 1e-30));
             let toward = three!(I => c[I] * inverse);
             let along = [
                 xx * toward[0] + xy * toward[1] + xz * toward[2],
                 xy * toward[0] + yy * toward[1] + yz * toward[2],
                 xz * toward[0] + yz * toward[1] + zz * toward[2],
             ];
-            reach = dot(toward, along).max(none).sqrt() * extent;
-            let e2 = extent * extent;
-            let across = (xx + yy + zz) * e2;
+            reach = dot(toward, along).max(Lanes::splat(simd, 0.0)).sqrt() * extent;
+            let across = (xx + yy + zz) * (extent * extent);
             far = ((distance + reach) * (distance + reach) + across).sqrt();
-            let is_front = (c[2] - reaches[2]).simd_gt(frame.z_near);
-            let (xz, yz, zz) = (xz * e2, yz * e2, zz * e2);
-            let tangents = [
-                tangent_bounds(simd, c[0], c[2], xx * e2, xz, zz),
-                tangent_bounds(simd, c[1], c[2], yy * e2, yz, zz),
-            ];
-            if is_front.all_true() {
-                bounds = tangents;
-            } else {
-                let low = Lanes::splat(simd, frame.z_near);
-                let boxes = each!([0, 1], I => box_bounds(simd, bounds[I], low, high));
-                bounds = each!([0, 1], I => each!([0, 1], J =>
-                    is_front.select(tangents[I][J], boxes[I][J])));
-            }
             // Beside the eye, a kernel's middle lies behind the ray's start: the part in front of
             // the first plane must be cut off.
             is_beside = distance.simd_lt(reach * 2.0);
@@ -250,25 +249,68 @@ impl<'a> Projector<'a> {
         let near = distance - reach * SECTION_OVERREACH;
         meets &= far.simd_gt(plan.planes[1]) & near.simd_lt(plan.planes[plan.sheets + 1]);
         let near = is_beside.select(Lanes::splat(simd, -1e38), near);
-        let apron = plan.apron() as f32;
-        let mut pixels = [[none; 2]; 2];
+        let (pixels, has_pixels) = self.pixels(simd, self.bounds(simd, splats, reaches));
+        Places { pixels, near, far, meets: meets & has_pixels }
+    }
+
+    /// Bounds splats in the image plane, at distance 1 in perspective. `reaches` are half the sides
+    /// of the boxes around them in view space.
+    #[inline(always)]
+    fn bounds<S: Simd>(
+        &self,
+        simd: S,
+        splats: &Widened<S>,
+        reaches: [Lanes<S>; 3],
+    ) -> [[Lanes<S>; 2]; 2] {
+        let c = splats.center;
+        let bounds = each!([0, 1], I => [c[I] - reaches[I], c[I] + reaches[I]]);
+        if !self.plan.view.perspective {
+            return bounds;
+        }
+        let [xx, _, xz, yy, yz, zz] = splats.covariance;
+        let e2 = self.source.extent * self.source.extent;
+        let is_front = (c[2] - reaches[2]).simd_gt(self.plan.frame.z_near);
+        let (xz, yz, zz) = (xz * e2, yz * e2, zz * e2);
+        let tangents = [
+            tangent_bounds(simd, c[0], c[2], xx * e2, xz, zz),
+            tangent_bounds(simd, c[1], c[2], yy * e2, yz, zz),
+        ];
+        if is_front.all_true() {
+            return tangents;
+        }
+        let (low, high) = (Lanes::splat(simd, self.plan.frame.z_near), c[2] + reaches[2]);
+        let boxes = each!([0, 1], I => box_bounds(simd, bounds[I], low, high));
+        each!([0, 1], I => each!([0, 1], J => is_front.select(tangents[I][J], boxes[I][J])))
+    }
+
+    /// Returns the first and the last pixels whose centres lie in boxes of the image plane, with a
+    /// margin for rounding, and which boxes contain any.
+    #[inline(always)]
+    fn pixels<S: Simd>(
+        &self,
+        simd: S,
+        bounds: [[Lanes<S>; 2]; 2],
+    ) -> ([[Lanes<S>; 2]; 2], mask32x8<S>) {
+        let frame = &self.plan.frame;
+        let apron = self.plan.apron() as f32;
+        let mut has_pixels = mask32x8::splat(simd, true);
+        let mut pixels = [[Lanes::splat(simd, 0.0); 2]; 2];
         for axis in 0..2 {
-            // Pixels whose centres lie in the box, with a margin for rounding.
             let limit = frame.size[axis] as f32 + apron;
             let low = bounds[axis][0] * frame.scale + frame.center[axis];
             let high = bounds[axis][1] * frame.scale + frame.center[axis];
             // NaN fails.
-            meets &= low.simd_le(high);
+            has_pixels &= low.simd_le(high);
             let first =
                 (low - 0.51).max(Lanes::splat(simd, -apron)).min(Lanes::splat(simd, limit)).ceil();
             let last = (high - 0.49)
                 .max(Lanes::splat(simd, -apron - 1.0))
                 .min(Lanes::splat(simd, limit - 1.0))
                 .floor();
-            meets &= first.simd_le(last);
+            has_pixels &= first.simd_le(last);
             (pixels[0][axis], pixels[1][axis]) = (first, last);
         }
-        Places { pixels, near, far, meets }
+        (pixels, has_pixels)
     }
 
     /// Returns the sheets that contain distances.

@@ -3,12 +3,12 @@
 //! explains the mathematics.
 
 use super::{
-    close::Pixels,
+    close::Packet,
     footprint::{Kind, Record},
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
     sums::{Sums, WINDOW},
-    vector::{Lanes, dot, exp, three},
+    vector::{Lanes, dot, each, exp, three},
 };
 use crate::scene::{Optics, Order};
 use fearless_simd::{Simd, mask32x8, prelude::*};
@@ -25,12 +25,13 @@ const LEAST_ADDED: f32 = 1e-7;
 const RADII: usize = crate::plan::tables::RADII;
 const SECTIONS: usize = crate::plan::tables::SECTIONS;
 
-/// A packet of a tile: its rays and its pixels.
-pub struct Packet<S: Simd> {
-    pub rays: Rays<S>,
-    pub pixels: Pixels<S>,
-    /// No light gets through any of its pixels.
-    pub is_done: bool,
+/// A tile while splats are added to it.
+pub struct OpenTile<S: Simd> {
+    /// The first pixel, which may lie outside the picture.
+    pub corner: [i32; 2],
+    pub packets: [Packet<S>; PACKETS],
+    /// The sums of the open sheets.
+    pub sums: Sums<S>,
 }
 
 /// A splat's window of four sheets in a tile.
@@ -57,17 +58,41 @@ struct Along<S: Simd> {
     l: Lanes<S>,
 }
 
-/// The values of a record that are the same for all pixels.
-struct Projected {
+/// The value of a sample along the rays of a packet, which is linear in the whitened distance from
+/// the closest approach.
+struct Line<S: Simd> {
+    /// The closest approach and the direction of the rays, in whitened space.
+    nearest: [Lanes<S>; 3],
+    unit: [Lanes<S>; 3],
+    /// The value at the closest approach, and its change per whitened length.
+    value: Lanes<S>,
+    slope: Lanes<S>,
+}
+
+/// The change of a sample per pixel to the right or down, on a plane at distance 1.
+struct Across<S: Simd> {
+    /// The change of half the squared whitened radius, at the closest approach and per whitened
+    /// length from there.
+    nearest: Lanes<S>,
+    unit: Lanes<S>,
+    value: Lanes<S>,
+}
+
+/// A window of a splat, with the values that are the same for all pixels.
+struct Projected<'a> {
+    record: &'a Record,
+    window: Window,
+    /// Number of the window's planes that the splat reaches.
+    count: usize,
     at: [f32; 2],
     whitened: [f32; 3],
     m: [[f32; 3]; 3],
     v: [[f32; 3]; 2],
 }
 
-impl Projected {
+impl<'a> Projected<'a> {
     #[inline(always)]
-    fn new(plan: &Plan, record: &Record) -> Self {
+    fn new(plan: &Plan, record: &'a Record, window: Window) -> Self {
         let scale = plan.frame.scale;
         let [m00, m10, m20, m11, m21, m22] = record.whitening;
         let inverse = 1.0 / scale;
@@ -90,21 +115,13 @@ impl Projected {
             whitened = std::array::from_fn(|i| (m[0][i] * x + m[1][i] * y) * scale + m[2][i] * z);
             v = [cross(whitened, m[0]), cross(whitened, m[1])];
         }
-        Self { at, whitened, m, v }
+        Self { record, window, count: planes_of(plan, record, window), at, whitened, m, v }
     }
 
-    /// Returns the kernel's position on the rays of a packet and relative to `count` planes, or
-    /// `None` if it misses all rays.
+    /// Returns the kernel's position on the rays of a packet and relative to the window's planes,
+    /// or `None` if it misses all rays.
     #[inline(always)]
-    fn along<S: Simd>(
-        &self,
-        simd: S,
-        plan: &Plan,
-        record: &Record,
-        rays: &Rays<S>,
-        planes: &[f32],
-        count: usize,
-    ) -> Option<Along<S>> {
+    fn along<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>) -> Option<Along<S>> {
         let [m0, m1, m2] = &self.m;
         let [v0, v1] = &self.v;
         let dx = rays.pixel[0] - self.at[0];
@@ -126,16 +143,222 @@ impl Projected {
         let size2 = dot(beta, beta);
         let inverse = Lanes::splat(simd, 1.0) / size2.max(Lanes::splat(simd, 1e-37)).sqrt();
         let rho2 = dot(v, v) * inverse * inverse;
-        let inside = rho2.simd_le(record.extent2);
+        let inside = rho2.simd_le(self.record.extent2);
         if !inside.any_true() {
             return None;
         }
         let far = Lanes::splat(simd, FAR);
         let mut t = [far; 3];
-        for (t, plane) in t.iter_mut().zip(planes).take(count) {
+        let planes = &plan.planes[self.window.front + 1..];
+        for (t, plane) in t.iter_mut().zip(planes).take(self.count) {
             *t = ((size2 * (rays.cosine * *plane) - l) * inverse).max(-far).min(far);
         }
         Some(Along { rho2, inside, t, v, beta, inverse, l })
+    }
+
+    /// Returns the sections of the kernel between the window's planes. Everything behind the last
+    /// plane belongs to the last sheet.
+    #[inline(always)]
+    fn sections<S: Simd>(
+        &self,
+        simd: S,
+        plan: &Plan,
+        along: &Along<S>,
+        from_table: bool,
+    ) -> [Lanes<S>; WINDOW] {
+        let none = Lanes::splat(simd, 0.0);
+        let before = |whole: Lanes<S>| if self.window.is_continued { whole } else { none };
+        let mut sections = [none; WINDOW];
+        if from_table {
+            let half = kernel_integral(simd, plan, along.rho2.sqrt(), Lanes::splat(simd, 3e38));
+            let mut last = before(half * 2.0) - half;
+            for (section, t) in sections.iter_mut().zip(along.t).take(self.count) {
+                let next = kernel_integral(simd, plan, along.rho2.sqrt(), t);
+                *section = next - last;
+                last = next;
+            }
+            sections[self.count] = half - last;
+            return sections;
+        }
+        let one = Lanes::splat(simd, 1.0);
+        let mut last = before(one);
+        for (section, t) in sections.iter_mut().zip(along.t).take(self.count) {
+            let next = if plan.has_field || plan.is_classified {
+                normal_cdf(simd, t)
+            } else {
+                near_normal_cdf(simd, t)
+            };
+            *section = next - last;
+            last = next;
+        }
+        sections[self.count] = one - last;
+        sections
+    }
+
+    /// Adds the radiance of the splat to the sheets, or composites a splat that is drawn alone.
+    #[inline(always)]
+    fn add_radiance<S: Simd>(
+        &self,
+        simd: S,
+        plan: &Plan,
+        packet: &mut Packet<S>,
+        sums: &mut Sums<S>,
+    ) {
+        let (record, rays) = (self.record, &packet.rays);
+        let Some(along) = self.along(simd, plan, rays) else { return };
+        let none = Lanes::splat(simd, 0.0);
+        let from_table = plan.table_kernel && record.kind == Kind::Classified;
+        let mut strength = Lanes::splat(simd, record.strength);
+        if !from_table {
+            strength *= exp(simd, along.rho2 * -0.5);
+        }
+        if record.kind == Kind::Classified {
+            // Whitened length to world length along the ray.
+            strength = strength * along.inverse / rays.cosine;
+            if !from_table {
+                strength *= SQRT_TAU;
+            }
+        }
+        let mut counts = along.inside;
+        if plan.clips + plan.holes > 0 {
+            counts &= is_kept(plan, rays, along.l * along.inverse * along.inverse / rays.cosine);
+        }
+        if plan.is_whole() && plan.view.perspective {
+            // The kernel's middle must be in front of the eye.
+            counts &= along.l.simd_gt(0.0);
+        }
+        let strength = counts.select(strength, none);
+        let sections = self.sections(simd, plan, &along, from_table);
+        if let Some(order) = plan.single() {
+            single(simd, plan, record, strength * sections[0], order, packet);
+            return;
+        }
+        let [_, payload @ ..] = record.payload;
+        for (own, section) in sections.iter().enumerate().take(self.count + 1) {
+            let depth = strength * *section;
+            let adds = depth.abs().simd_gt(LEAST_ADDED);
+            if !adds.any_true() {
+                continue;
+            }
+            let depth = adds.select(depth, none);
+            let slot = (self.window.front + own) % WINDOW;
+            sums.has_radiance[slot] |= packet.bit();
+            // The first part of the payload is 1.
+            let [whole, parts @ ..] = &mut sums.radiance[slot][packet.number];
+            *whole += depth;
+            for (sum, part) in parts.iter_mut().zip(payload) {
+                *sum = depth.mul_add(Lanes::splat(simd, part), *sum);
+            }
+        }
+    }
+
+    /// Adds the value of the splat to the sheets, and to the planes between them.
+    #[inline(always)]
+    fn add_scalar<S: Simd>(&self, simd: S, plan: &Plan, packet: &Packet<S>, sums: &mut Sums<S>) {
+        let (front, rays) = (self.window.front, &packet.rays);
+        let Some(along) = self.along(simd, plan, rays) else { return };
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let kernel = if plan.table_kernel { one } else { exp(simd, along.rho2 * -0.5) };
+        let kernel = along.inside.select(kernel, none) * self.record.payload[0];
+        let closest = if plan.table_kernel { one } else { Lanes::splat(simd, SQRT_TAU) };
+        let length_of = along.inverse / rays.cosine;
+        let sections = self.sections(simd, plan, &along, plan.table_kernel);
+        let line = self.line(simd, plan, &along);
+        let has_slopes = plan.has_gradients() && !plan.central;
+        let across = has_slopes.then(
+            #[inline(always)]
+            || self.across(simd, plan, rays, &along, &line),
+        );
+        let section_kernel = kernel * closest * length_of;
+        // The kernel on the planes in front of and behind a sheet: the slope's contribution to the
+        // sheet.
+        let mut before = none;
+        for (own, section) in sections.iter().enumerate().take(self.count + 1) {
+            let slot = (front + own) % WINDOW;
+            sums.has_field[slot] |= packet.bit();
+            let weight = section_kernel * *section;
+            let field = &mut sums.field[slot][packet.number];
+            field.weight += weight;
+            field.value = weight.mul_add(line.value, field.value);
+            if own == self.count {
+                if plan.has_slopes {
+                    field.value += before * line.slope * length_of;
+                }
+                break;
+            }
+            let t = along.t[own];
+            let (on_plane, steep) = if plan.table_kernel {
+                let [on_plane, steep] = kernel_at(simd, plan, (along.rho2 + t * t).sqrt());
+                (on_plane * kernel, steep * kernel)
+            } else {
+                let on_plane = exp(simd, t * t * -0.5) * kernel;
+                (on_plane, on_plane)
+            };
+            if plan.has_slopes {
+                field.value += (before - on_plane) * line.slope * length_of;
+            }
+            before = on_plane;
+            let here = t.mul_add(line.slope, line.value);
+            let face = &mut sums.faces[(front + own + 1) % WINDOW][packet.number];
+            face.weight += on_plane;
+            face.value = on_plane.mul_add(here, face.value);
+            let Some(across) = &across else { continue };
+            let plane = plan.planes[front + 1 + own];
+            let size = if plan.view.perspective { rays.cosine * plane } else { one };
+            for (axis, change) in across.iter().enumerate() {
+                let moved = size * (change.nearest + t * change.unit);
+                face.weight_slope[axis] += steep * moved;
+                face.value_slope[axis] = (steep * moved).mul_add(here, face.value_slope[axis]);
+                if plan.has_slopes {
+                    face.value_slope[axis] -= on_plane * size * change.value;
+                }
+            }
+        }
+        debug_assert!(plan.optics != Optics::Maximum || plan.has_field);
+    }
+
+    /// Returns the value of a sample along rays.
+    #[inline(always)]
+    fn line<S: Simd>(&self, simd: S, plan: &Plan, along: &Along<S>) -> Line<S> {
+        let nearest = three!(I => {
+            let (a, b) = ((I + 1) % 3, (I + 2) % 3);
+            (along.v[a] * along.beta[b] - along.v[b] * along.beta[a])
+                * (along.inverse * along.inverse)
+        });
+        let unit = three!(I => along.beta[I] * along.inverse);
+        let mut value = Lanes::splat(simd, self.record.strength);
+        let mut slope = Lanes::splat(simd, 0.0);
+        if plan.has_slopes {
+            let [_, x, y, z, ..] = self.record.payload;
+            value += nearest[0] * x + nearest[1] * y + nearest[2] * z;
+            slope = unit[0] * x + unit[1] * y + unit[2] * z;
+        }
+        Line { nearest, unit, value, slope }
+    }
+
+    /// Returns the changes of a sample per pixel to the right and down.
+    #[inline(always)]
+    fn across<S: Simd>(
+        &self,
+        simd: S,
+        plan: &Plan,
+        rays: &Rays<S>,
+        along: &Along<S>,
+        line: &Line<S>,
+    ) -> [Across<S>; 2] {
+        let [_, x, y, z, ..] = self.record.payload;
+        each!([0, 1], AXIS => {
+            let mut across = three!(I => Lanes::splat(simd, self.m[AXIS][I]));
+            if plan.view.perspective {
+                let k = rays.cosine * rays.cosine * rays.aside[AXIS] * (1.0 / plan.frame.scale);
+                across = three!(I => across[I] - along.beta[I] * k);
+            }
+            Across {
+                nearest: dot(line.nearest, across),
+                unit: dot(line.unit, across),
+                value: across[0] * x + across[1] * y + across[2] * z,
+            }
+        })
     }
 }
 
@@ -177,77 +400,30 @@ fn near_normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
     x.mul_add(p, Lanes::splat(simd, 0.5))
 }
 
-/// Adds a splat's window to all packets of a tile that it meets.
-#[inline(always)]
-pub fn add<S: Simd>(
-    simd: S,
-    plan: &Plan,
-    record: &Record,
-    window: Window,
-    corner: [i32; 2],
-    packets: &mut [Packet<S>; PACKETS],
-    sums: &mut Sums<S>,
-) {
-    let projected = Projected::new(plan, record);
-    let [first, last] = record.pixels;
-    let from: [usize; 2] = [0, 1].map(|axis| (first[axis] - corner[axis]).max(0) as usize);
-    let to: [usize; 2] =
-        [0, 1].map(|axis| (last[axis] - corner[axis]).min(crate::plan::TILE as i32 - 1) as usize);
-    for row in from[1] / HIGH..=to[1] / HIGH {
-        for column in from[0] / WIDE..=to[0] / WIDE {
-            let number = row * 2 + column;
-            let packet = &mut packets[number];
-            // Neighbouring pixels need a pixel's value, however opaque it is.
-            if packet.is_done && !plan.central {
-                continue;
-            }
-            if record.kind == Kind::Scalar {
-                add_scalar(simd, plan, record, &projected, window, number, packet, sums);
-            } else {
-                add_radiance(simd, plan, record, &projected, window, number, packet, sums);
+impl<S: Simd> OpenTile<S> {
+    /// Adds a splat's window to all packets that it meets.
+    #[inline(always)]
+    pub fn add(&mut self, simd: S, plan: &Plan, record: &Record, window: Window) {
+        let splat = Projected::new(plan, record, window);
+        let [first, last] = record.pixels;
+        let inside = |pixel: [i32; 2]| [0, 1].map(|axis| pixel[axis] - self.corner[axis]);
+        let from = inside(first).map(|at| at.max(0) as usize);
+        let to = inside(last).map(|at| at.min(crate::plan::TILE as i32 - 1) as usize);
+        for row in from[1] / HIGH..=to[1] / HIGH {
+            for column in from[0] / WIDE..=to[0] / WIDE {
+                let packet = &mut self.packets[row * 2 + column];
+                // Neighbouring pixels need a pixel's value, however opaque it is.
+                if packet.is_done && !plan.central {
+                    continue;
+                }
+                if record.kind == Kind::Scalar {
+                    splat.add_scalar(simd, plan, packet, &mut self.sums);
+                } else {
+                    splat.add_radiance(simd, plan, packet, &mut self.sums);
+                }
             }
         }
     }
-}
-
-/// Returns the sections of a kernel between planes. The window contains `count` planes; everything
-/// behind the last one belongs to the last sheet.
-#[inline(always)]
-fn sections<S: Simd>(
-    simd: S,
-    plan: &Plan,
-    along: &Along<S>,
-    from_table: bool,
-    count: usize,
-    window: Window,
-) -> [Lanes<S>; WINDOW] {
-    let none = Lanes::splat(simd, 0.0);
-    let before = |whole: Lanes<S>| if window.is_continued { whole } else { none };
-    let mut sections = [none; WINDOW];
-    if from_table {
-        let half = kernel_integral(simd, plan, along.rho2.sqrt(), Lanes::splat(simd, 3e38));
-        let mut last = before(half * 2.0) - half;
-        for (section, t) in sections.iter_mut().zip(along.t).take(count) {
-            let next = kernel_integral(simd, plan, along.rho2.sqrt(), t);
-            *section = next - last;
-            last = next;
-        }
-        sections[count] = half - last;
-        return sections;
-    }
-    let one = Lanes::splat(simd, 1.0);
-    let mut last = before(one);
-    for (section, t) in sections.iter_mut().zip(along.t).take(count) {
-        let next = if plan.has_field || plan.is_classified {
-            normal_cdf(simd, t)
-        } else {
-            near_normal_cdf(simd, t)
-        };
-        *section = next - last;
-        last = next;
-    }
-    sections[count] = one - last;
-    sections
 }
 
 /// Returns the number of a window's planes that its splat reaches. That is one more than its last
@@ -256,68 +432,6 @@ fn sections<S: Simd>(
 fn planes_of(plan: &Plan, record: &Record, window: Window) -> usize {
     let ahead = (usize::from(record.sheets[1]) + 1).saturating_sub(window.front);
     if plan.is_whole() { 0 } else { ahead.min(WINDOW - 1) }
-}
-
-#[expect(clippy::too_many_arguments, reason = "the data of one splat, one packet and the picture")]
-#[inline(always)]
-fn add_radiance<S: Simd>(
-    simd: S,
-    plan: &Plan,
-    record: &Record,
-    projected: &Projected,
-    window: Window,
-    number: usize,
-    packet: &mut Packet<S>,
-    sums: &mut Sums<S>,
-) {
-    let count = planes_of(plan, record, window);
-    let planes = &plan.planes[window.front + 1..];
-    let rays = &packet.rays;
-    let Some(along) = projected.along(simd, plan, record, rays, planes, count) else { return };
-    let none = Lanes::splat(simd, 0.0);
-    let from_table = plan.table_kernel && record.kind == Kind::Classified;
-    let mut strength = Lanes::splat(simd, record.strength);
-    if !from_table {
-        strength *= exp(simd, along.rho2 * -0.5);
-    }
-    if record.kind == Kind::Classified {
-        // Whitened length to world length along the ray.
-        strength = strength * along.inverse / rays.cosine;
-        if !from_table {
-            strength *= SQRT_TAU;
-        }
-    }
-    let mut counts = along.inside;
-    if plan.clips + plan.holes > 0 {
-        counts &= is_kept(plan, rays, along.l * along.inverse * along.inverse / rays.cosine);
-    }
-    if plan.is_whole() && plan.view.perspective {
-        // The kernel's middle must be in front of the eye.
-        counts &= along.l.simd_gt(0.0);
-    }
-    let strength = counts.select(strength, none);
-    let sections = sections(simd, plan, &along, from_table, count, window);
-    if let Some(order) = plan.single() {
-        single(simd, plan, record, strength * sections[0], order, packet);
-        return;
-    }
-    let [_, payload @ ..] = record.payload;
-    for (own, section) in sections.iter().enumerate().take(count + 1) {
-        let depth = strength * *section;
-        let adds = depth.abs().simd_gt(LEAST_ADDED);
-        if !adds.any_true() {
-            continue;
-        }
-        let depth = adds.select(depth, none);
-        let slot = (window.front + own) % WINDOW;
-        sums.has_radiance[slot] |= 1 << number;
-        // The first part of the payload is 1.
-        let [whole, parts @ ..] = &mut sums.radiance[slot][number];
-        *whole += depth;
-        for (sum, part) in parts.iter_mut().zip(payload) {
-            *sum = depth.mul_add(Lanes::splat(simd, part), *sum);
-        }
-    }
 }
 
 /// Composites a splat alone, in front of or behind the pixels so far.
@@ -367,96 +481,6 @@ fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask32x8
         kept &= !(distance.simd_gt(*from) & distance.simd_lt(*to));
     }
     kept
-}
-
-#[expect(clippy::too_many_arguments, reason = "the data of one splat, one packet and the picture")]
-#[inline(always)]
-fn add_scalar<S: Simd>(
-    simd: S,
-    plan: &Plan,
-    record: &Record,
-    projected: &Projected,
-    window: Window,
-    number: usize,
-    packet: &Packet<S>,
-    sums: &mut Sums<S>,
-) {
-    let count = planes_of(plan, record, window);
-    let planes = &plan.planes[window.front + 1..];
-    let rays = &packet.rays;
-    let Some(along) = projected.along(simd, plan, record, rays, planes, count) else { return };
-    let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-    let [weight, slope @ ..] = record.payload;
-    let slope = [slope[0], slope[1], slope[2]];
-    let kernel = if plan.table_kernel { one } else { exp(simd, along.rho2 * -0.5) };
-    let kernel = along.inside.select(kernel, none) * weight;
-    let closest = if plan.table_kernel { one } else { Lanes::splat(simd, SQRT_TAU) };
-    let length_of = along.inverse / rays.cosine;
-    let sections = sections(simd, plan, &along, plan.table_kernel, count, window);
-    let nearest = three!(I => {
-        let (a, b) = ((I + 1) % 3, (I + 2) % 3);
-        (along.v[a] * along.beta[b] - along.v[b] * along.beta[a]) * (along.inverse * along.inverse)
-    });
-    let unit = three!(I => along.beta[I] * along.inverse);
-    let mut value = Lanes::splat(simd, record.strength);
-    let mut slope_along = none;
-    if plan.has_slopes {
-        value += nearest[0] * slope[0] + nearest[1] * slope[1] + nearest[2] * slope[2];
-        slope_along = unit[0] * slope[0] + unit[1] * slope[1] + unit[2] * slope[2];
-    }
-    let section_kernel = kernel * closest * length_of;
-    // The kernel on the planes in front of and behind a sheet: the slope's contribution to the
-    // sheet.
-    let mut before = none;
-    for own in 0..=count {
-        let slot = (window.front + own) % WINDOW;
-        sums.has_field[slot] |= 1 << number;
-        let weight = section_kernel * sections[own];
-        let field = &mut sums.field[slot][number];
-        field.weight += weight;
-        field.value = weight.mul_add(value, field.value);
-        if own == count {
-            if plan.has_slopes {
-                field.value += before * slope_along * length_of;
-            }
-            break;
-        }
-        let t = along.t[own];
-        let (on_plane, steep) = if plan.table_kernel {
-            let [on_plane, steep] = kernel_at(simd, plan, (along.rho2 + t * t).sqrt());
-            (on_plane * kernel, steep * kernel)
-        } else {
-            let on_plane = exp(simd, t * t * -0.5) * kernel;
-            (on_plane, on_plane)
-        };
-        if plan.has_slopes {
-            field.value += (before - on_plane) * slope_along * length_of;
-        }
-        before = on_plane;
-        let here = t.mul_add(slope_along, value);
-        let face = &mut sums.faces[(window.front + own + 1) % WINDOW][number];
-        face.weight += on_plane;
-        face.value = on_plane.mul_add(here, face.value);
-        if plan.has_gradients() && !plan.central {
-            let size = if plan.view.perspective { rays.cosine * planes[own] } else { one };
-            for axis in 0..2 {
-                // The change of the whitened place on the plane per pixel to the right or down.
-                let mut across = three!(I => Lanes::splat(simd, projected.m[axis][I]));
-                if plan.view.perspective {
-                    let k = rays.cosine * rays.cosine * rays.aside[axis] * (1.0 / plan.frame.scale);
-                    across = three!(I => across[I] - along.beta[I] * k);
-                }
-                let moved = size * (dot(nearest, across) + t * dot(unit, across));
-                face.weight_slope[axis] += steep * moved;
-                face.value_slope[axis] = (steep * moved).mul_add(here, face.value_slope[axis]);
-                if plan.has_slopes {
-                    let change = across[0] * slope[0] + across[1] * slope[1] + across[2] * slope[2];
-                    face.value_slope[axis] -= on_plane * size * change;
-                }
-            }
-        }
-    }
-    debug_assert!(plan.optics != Optics::Maximum || plan.has_field);
 }
 
 /// Returns the kernel and −h′(r)/r at radii in kernel space; 0 beyond its extent.

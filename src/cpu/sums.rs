@@ -4,7 +4,7 @@
 //! use slot n mod 4.
 
 use super::{
-    close::{Face, Layer},
+    close::{Face, Layer, Packet},
     plan::Plan,
     rays::{PACKETS, Rays},
     vector::{Lanes, three},
@@ -79,17 +79,16 @@ impl<S: Simd> Sums<S> {
         &mut self,
         simd: S,
         plan: &Plan,
-        rays: &Rays<S>,
+        packet: &Packet<S>,
         sheet: usize,
-        packet: usize,
     ) -> Option<[Lanes<S>; 4]> {
         let slot = sheet % WINDOW;
-        if self.has_radiance[slot] & (1 << packet) == 0 {
+        if self.has_radiance[slot] & packet.bit() == 0 {
             return None;
         }
-        self.has_radiance[slot] &= !(1 << packet);
+        self.has_radiance[slot] &= !packet.bit();
         let [depth, facing, red, green, blue, x, y, z] =
-            std::mem::replace(&mut self.radiance[slot][packet], [self.none; 8]);
+            std::mem::replace(&mut self.radiance[slot][packet.number], [self.none; 8]);
         let one = Lanes::splat(simd, 1.0);
         // If next to nothing faces the eye, rounding may have left a weight of any sign.
         let inverse = one / facing.max(Lanes::splat(simd, 1e-12));
@@ -97,7 +96,8 @@ impl<S: Simd> Sums<S> {
         let mut color = three!(I => (sum[I] * inverse).max(self.none).min(one));
         if plan.lit_surfaces {
             let normal = [x, y, z];
-            let lit = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_shade);
+            let direction = packet.rays.direction;
+            let lit = plan.lit(simd, color, normal, direction, plan.frame.surface_shade);
             let has_normal = (x * x + y * y + z * z).simd_gt(0.0);
             color = three!(I => has_normal.select(lit[I], color[I]));
         }
@@ -114,24 +114,23 @@ impl<S: Simd> Sums<S> {
         &self,
         simd: S,
         plan: &Plan,
-        rays: &Rays<S>,
+        packet: &Packet<S>,
         sheet: usize,
-        packet: usize,
         slopes: Option<[[Lanes<S>; 2]; 2]>,
     ) -> Option<(Layer<S>, mask32x8<S>)> {
-        let slot = sheet % WINDOW;
-        if self.has_field[slot] & (1 << packet) == 0 {
+        let (slot, rays) = (sheet % WINDOW, &packet.rays);
+        if self.has_field[slot] & packet.bit() == 0 {
             return None;
         }
         let [start, stop] = [plan.planes[sheet], plan.planes[sheet + 1]];
         let thickness = stop - start;
-        let own = &self.field[slot][packet];
+        let own = &self.field[slot][packet.number];
         let has_value = own.weight.simd_gt(plan.frame.isotropic[3] * thickness);
         let value = own.value / own.weight.max(Lanes::splat(simd, 1e-37));
         let one = Lanes::splat(simd, 1.0);
         let filling = if plan.on_lattice { one } else { (own.weight * (1.0 / thickness)).min(one) };
-        let front = self.face(simd, plan, rays, sheet, packet, slopes.map(|[front, _]| front));
-        let back = self.face(simd, plan, rays, sheet + 1, packet, slopes.map(|[_, back]| back));
+        let front = self.face(simd, plan, packet, sheet, slopes.map(|[front, _]| front));
+        let back = self.face(simd, plan, packet, sheet + 1, slopes.map(|[_, back]| back));
         let either = |a: &Resolved<S>, b: &Resolved<S>| {
             let across = three!(I => a
                 .has_value
@@ -161,12 +160,11 @@ impl<S: Simd> Sums<S> {
         &self,
         simd: S,
         plan: &Plan,
-        rays: &Rays<S>,
+        packet: &Packet<S>,
         plane: usize,
-        packet: usize,
         differences: Option<[Lanes<S>; 2]>,
     ) -> Resolved<S> {
-        let own = &self.faces[plane % WINDOW][packet];
+        let own = &self.faces[plane % WINDOW][packet.number];
         let has_value = own.weight.simd_gt(plan.frame.isotropic[3]);
         let inverse = Lanes::splat(simd, 1.0) / own.weight.max(Lanes::splat(simd, 1e-37));
         let value = own.value * inverse;
@@ -175,7 +173,7 @@ impl<S: Simd> Sums<S> {
             let of =
                 |axis: usize| (value * own.weight_slope[axis] - own.value_slope[axis]) * inverse;
             let slopes = differences.unwrap_or([of(0), of(1)]);
-            across = across_of(simd, plan, rays, slopes, plan.planes[plane]);
+            across = across_of(simd, plan, &packet.rays, slopes, plan.planes[plane]);
         }
         Resolved { face: Face { value, across }, has_value }
     }

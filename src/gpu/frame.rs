@@ -15,6 +15,7 @@ use crate::gpu::{
     scene::{PreparedScene, chunk::Origin, select::Select, select_bricks::SelectBricks},
     targets::Targets,
 };
+use std::sync::Arc;
 
 /// The pipelines of a variant: those that scatter splats, and the one that gathers a lattice.
 #[derive(Debug)]
@@ -67,7 +68,7 @@ pub struct Passes {
     pub select: Select,
     pub select_bricks: SelectBricks,
     pub cut: Cut,
-    pub scan: Scan,
+    scan: Arc<Scan>,
     clear: Clear,
     resume: Resume,
     tiles: Tiles,
@@ -75,11 +76,12 @@ pub struct Passes {
 
 impl Passes {
     pub fn new(gpu: &Gpu) -> Self {
+        let scan = Arc::new(Scan::new(gpu));
         Self {
-            select: Select::new(gpu),
-            select_bricks: SelectBricks::new(gpu),
+            select: Select::new(gpu, &scan),
+            select_bricks: SelectBricks::new(gpu, &scan),
             cut: Cut::new(gpu),
-            scan: Scan::new(gpu),
+            scan,
             clear: Clear::new(gpu),
             resume: Resume::new(gpu),
             tiles: Tiles::new(gpu),

@@ -67,7 +67,7 @@ impl Request<'_> {
             prepared.update_field(gpu, settings)?;
         } else {
             let all = prepared.scene.mixes_afar(settings, &sheets, choice.as_ref());
-            prepared.update_selections(gpu, &passes.select, &passes.scan, view, all)?;
+            prepared.update_selections(gpu, &passes.select, view, all)?;
         }
         Ok(Outline { cut_pixels, choice, read_bricks: reads(prepared) - before, sheets, gather })
     }
@@ -101,14 +101,8 @@ impl Request<'_> {
             // that is an error.
             let runs = if choice.bricks.len() > 1 { most_runs } else { u64::MAX };
             let room = Room { bytes, runs };
-            let Listed::TooMany { runs, most: fit } = prepared.update_bricks(
-                gpu,
-                &passes.select_bricks,
-                &passes.scan,
-                view,
-                &choice,
-                room,
-            )?
+            let Listed::TooMany { runs, most: fit } =
+                prepared.update_bricks(gpu, &passes.select_bricks, view, &choice, room)?
             else {
                 if let (Some(most), Some(shelf)) = (most, &mut prepared.shelf) {
                     shelf.set_fitting(&wanted, most_runs, most);

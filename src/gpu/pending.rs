@@ -276,17 +276,15 @@ impl PendingFrame {
             gathered: outline.gather.then_some(kind),
             is_software: gpu.is_software(),
         });
-        let targets = targets::targets(
-            gpu,
-            &mut engine.pool,
-            prepared,
-            &variant,
+        let request = targets::Request {
+            variant: &variant,
             view,
-            &outline.sheets,
+            sheets: &outline.sheets,
             settings,
-            engine.budget,
+            budget: engine.budget,
             choice,
-        )?;
+        };
+        let targets = request.targets(gpu, &mut engine.pool, prepared)?;
         engine.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
         for chunk in &prepared.chunks {
             let lattice = matches!(chunk.origin, Origin::Lattice { .. } | Origin::Bricks { .. });

@@ -152,117 +152,182 @@ impl Pool {
     }
 }
 
-/// Creates everything that a frame needs, or takes it from the pool.
-#[allow(clippy::too_many_arguments, reason = "each is a separate part of the renderer")]
-pub fn targets(
-    gpu: &Gpu,
-    pool: &mut Pool,
-    prepared: &mut PreparedScene,
-    variant: &Variant,
-    view: &View,
-    sheets: &Sheets,
-    settings: &Settings,
-    budget: Budget,
-    choice: Option<&Choice>,
-) -> Result<Targets> {
-    let [width, height] = view.size;
-    let pixels = u64::from(width) * u64::from(height);
-    if pixels * 16 > gpu.binding_size() {
-        // The renderer divides pictures into strips of whole rows. Only a single row can be too
-        // long.
-        return Err(Error::Argument(format!(
-            "a picture {width} pixels wide is too wide for {}",
-            gpu.info.name
-        )));
-    }
-    let most_runs = most_runs(gpu);
-    if prepared.runs > most_runs {
-        return Err(Error::Argument(format!(
-            "the scene has more than {} splats and visible samples, too many for one picture on \
-             {}; convert it and draw it with a coarser --cut, or use a transfer function that \
-             shows less",
-            u64::from(most_runs) * u64::from(RUN),
-            gpu.info.name
-        )));
-    }
-    let budget = budget.within(gpu);
-    let scatters = variant.scatters();
-    let room = |count: u64| if scatters { count } else { 0 };
-    let step = variant.tile_step();
-    let tiles = [width.div_ceil(step), height.div_ceil(step)];
-    let tile_count = tiles[0] * tiles[1];
-    let groups = |shift: u32| groups(sheets.count(), shift);
-    if groups(MOST_GROUP_SHIFT) * u64::from(tile_count) > u64::from(MOST_BINS) {
-        return Err(Error::Argument(format!(
-            "a picture of {width}x{height} with {} sheets is too large; draw it smaller or with \
-             thicker sheets",
-            sheets.count()
-        )));
-    }
-    let slots = (u64::from(tile_count) * SLOT_BYTES).min(most_slot_bytes(gpu));
-    let slots = if variant.can_stop() { room(slots) } else { 0 };
-    // The number of entries is stored behind the last bin.
-    let bin_count = room((groups(0) * u64::from(tile_count)).min(u64::from(MOST_BINS)) + 1);
-    let most_tiles = tiles[0].max(tiles[1]);
+/// What a strip shows, and within which capacity.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    pub variant: &'a Variant,
+    pub view: &'a View,
+    pub sheets: &'a Sheets,
+    pub settings: &'a Settings,
+    pub budget: Budget,
+    pub choice: Option<&'a Choice>,
+}
 
-    let mut frame = Frame::new(&prepared.scene, view, sheets, settings, choice);
-    frame.tiles = tiles;
-    frame.tile_shift = most_tiles.div_ceil(SPAN_TILES).next_power_of_two().trailing_zeros();
-    frame.entry_capacity = budget.entries;
-    frame.record_capacity = budget.record_words;
-    let table = tables_of(prepared, view, sheets, &mut frame);
-    let field = prepared.field.as_mut().filter(|_| variant.gather);
-    let before = field.as_ref().map_or(0, |field| field.bytes());
-    let gathered =
-        field.and_then(|field| field.list(gpu, view, sheets, variant, &table, &mut frame));
-    if gathered.is_some() {
-        prepared.bytes += prepared.field.as_ref().map_or(0, |field| field.bytes()) - before;
+impl Request<'_> {
+    /// Creates everything that the strip needs, or takes it from the pool.
+    pub fn targets(
+        &self,
+        gpu: &Gpu,
+        pool: &mut Pool,
+        prepared: &mut PreparedScene,
+    ) -> Result<Targets> {
+        self.check(gpu, prepared.runs)?;
+        let (budget, tiles) = (self.budget.within(gpu), self.tiles());
+        let mut frame = self.frame(prepared, budget);
+        let table = tables_of(prepared, self.view, self.sheets, &mut frame);
+        let gathered = self.gathered(gpu, prepared, &table, &mut frame);
+        let uniform = |label, bytes: &[u8]| filled_buffer(gpu, label, bytes, Usage::UNIFORM);
+        let sizes = Sizes::of(self, gpu, budget, prepared.runs);
+        let Sizes { tile_count, pixels, slots, bin_count, words, runs, .. } = sizes;
+        Ok(Targets {
+            frame: uniform("frame", bytemuck::bytes_of(&frame)),
+            planes: upload(gpu, "planes", bytemuck::cast_slice(&planes(self.sheets))),
+            tables: upload(gpu, "tables", bytemuck::cast_slice(&table)),
+            run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
+            run_spans: pool.take(gpu, "run spans", RUN_BYTES * runs),
+            needs: pool.take(gpu, "needs", RUN_BYTES * runs),
+            census: pool.take(gpu, "census", sizes.census),
+            state: pool.take(gpu, "state", size_of::<State>() as u64),
+            pass: pool.take(gpu, "pass", PASS_BYTES),
+            arguments: pool.take(gpu, "arguments", ARGUMENT_BYTES),
+            bin_size: pool.take(gpu, "bin size", 16),
+            map: pool.take(gpu, "map", sizes.map),
+            runs: pool.take(gpu, "runs", 4 * (runs + 1)),
+            active: pool.take(gpu, "active", 8 * runs),
+            records: pool.take(gpu, "records", 16 * words),
+            boxes: pool.take(gpu, "boxes", 12 * words),
+            bins: pool.take(gpu, "bins", 4 * bin_count),
+            entries: pool.take(gpu, "entries", sizes.entries),
+            bin_arguments: pool.take(gpu, "bin arguments", 12),
+            large: pool.take(gpu, "large", 4 * (words + 1)),
+            large_arguments: pool.take(gpu, "large arguments", 12),
+            long_bins: pool.take(gpu, "long bins", 4 * bin_count),
+            long_count: pool.take(gpu, "long count", 4),
+            long_arguments: pool.take(gpu, "long arguments", 12),
+            progress: pool.take(
+                gpu,
+                "progress",
+                4 * (gathered_word(tile_count) + 1 + u64::from(tile_count)),
+            ),
+            colors: pool.take(gpu, "colors", 16 * pixels + slots),
+            depths: pool.take(gpu, "depths", 4 * pixels),
+            gathered,
+            run_total: prepared.runs,
+            tiles,
+        })
     }
 
-    // The sheet before the first extends backward without end, the sheet after the last forward.
+    /// Columns and rows of tiles.
+    fn tiles(&self) -> [u32; 2] {
+        self.view.size.map(|n| n.div_ceil(self.variant.tile_step()))
+    }
+
+    /// Returns an error if the strip, or the candidates of the scene, are too many for this device.
+    fn check(&self, gpu: &Gpu, runs: u32) -> Result<()> {
+        let ([width, height], sheets) = (self.view.size, self.sheets.count());
+        if u64::from(width) * u64::from(height) * 16 > gpu.binding_size() {
+            // The renderer divides pictures into strips of whole rows. Only a single row can be too
+            // long.
+            return Err(Error::Argument(format!(
+                "a picture {width} pixels wide is too wide for {}",
+                gpu.info.name
+            )));
+        }
+        let most_runs = most_runs(gpu);
+        if runs > most_runs {
+            return Err(Error::Argument(format!(
+                "the scene has more than {} splats and visible samples, too many for one picture \
+                 on {}; convert it and draw it with a coarser --cut, or use a transfer function \
+                 that shows less",
+                u64::from(most_runs) * u64::from(RUN),
+                gpu.info.name
+            )));
+        }
+        let [columns, rows] = self.tiles();
+        let bins = groups(sheets, MOST_GROUP_SHIFT) * u64::from(columns * rows);
+        if bins > u64::from(MOST_BINS) {
+            return Err(Error::Argument(format!(
+                "a picture of {width}x{height} with {sheets} sheets is too large; draw it smaller \
+                 or with thicker sheets"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Returns the constants of the frame, without its tables.
+    fn frame(&self, prepared: &PreparedScene, budget: Budget) -> Frame {
+        let Self { view, sheets, settings, choice, .. } = *self;
+        let tiles = self.tiles();
+        let most_tiles = tiles[0].max(tiles[1]);
+        let mut frame = Frame::new(&prepared.scene, view, sheets, settings, choice);
+        frame.tiles = tiles;
+        frame.tile_shift = most_tiles.div_ceil(SPAN_TILES).next_power_of_two().trailing_zeros();
+        frame.entry_capacity = budget.entries;
+        frame.record_capacity = budget.record_words;
+        frame
+    }
+
+    /// Lists what a gathered lattice shows in the strip.
+    fn gathered(
+        &self,
+        gpu: &Gpu,
+        prepared: &mut PreparedScene,
+        table: &[[f32; 4]],
+        frame: &mut Frame,
+    ) -> Option<Gathered> {
+        let field = prepared.field.as_mut().filter(|_| self.variant.gather)?;
+        let before = field.bytes();
+        let gathered = field.list(gpu, (self.view, self.sheets), self.variant, table, frame)?;
+        prepared.bytes += field.bytes() - before;
+        Some(gathered)
+    }
+}
+
+/// The sizes of buffers, in bytes or elements. Those that only scattering needs are empty without.
+struct Sizes {
+    tile_count: u32,
+    pixels: u64,
+    /// Bytes of the saved sums of tiles.
+    slots: u64,
+    bin_count: u64,
+    /// Record words.
+    words: u64,
+    runs: u64,
+    census: u64,
+    map: u64,
+    entries: u64,
+}
+
+impl Sizes {
+    fn of(request: &Request<'_>, gpu: &Gpu, budget: Budget, runs: u32) -> Self {
+        let Request { variant, view, sheets, .. } = *request;
+        let room = |count: u64| if variant.scatters() { count } else { 0 };
+        let tiles = request.tiles();
+        let tile_count = tiles[0] * tiles[1];
+        let slots = (u64::from(tile_count) * SLOT_BYTES).min(most_slot_bytes(gpu));
+        // The number of entries is stored behind the last bin.
+        let bins = (groups(sheets.count(), 0) * u64::from(tile_count)).min(u64::from(MOST_BINS));
+        Self {
+            tile_count,
+            pixels: u64::from(view.size[0]) * u64::from(view.size[1]),
+            slots: if variant.can_stop() { room(slots) } else { 0 },
+            bin_count: room(bins + 1),
+            words: room(u64::from(budget.record_words)),
+            runs: room(u64::from(runs)),
+            census: room(census_bytes(sheets.count())),
+            map: room(map_bytes(tiles)),
+            entries: room(4 * u64::from(budget.entries)),
+        }
+    }
+}
+
+/// Returns the boundaries of the sheets. The sheet before the first extends backward without end,
+/// the sheet after the last forward.
+fn planes(sheets: &Sheets) -> Vec<f32> {
     let mut planes = vec![-3e38f32];
     planes.extend(sheets.planes.iter().map(|&s| s as f32));
     planes.extend([3e38; 4]);
-
-    let uniform = |label, bytes: &[u8]| filled_buffer(gpu, label, bytes, Usage::UNIFORM);
-    let words = room(u64::from(budget.record_words));
-    let runs = room(u64::from(prepared.runs));
-    Ok(Targets {
-        frame: uniform("frame", bytemuck::bytes_of(&frame)),
-        planes: upload(gpu, "planes", bytemuck::cast_slice(&planes)),
-        tables: upload(gpu, "tables", bytemuck::cast_slice(&table)),
-        run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
-        run_spans: pool.take(gpu, "run spans", RUN_BYTES * runs),
-        needs: pool.take(gpu, "needs", RUN_BYTES * runs),
-        census: pool.take(gpu, "census", room(census_bytes(sheets.count()))),
-        state: pool.take(gpu, "state", size_of::<State>() as u64),
-        pass: pool.take(gpu, "pass", PASS_BYTES),
-        arguments: pool.take(gpu, "arguments", ARGUMENT_BYTES),
-        bin_size: pool.take(gpu, "bin size", 16),
-        map: pool.take(gpu, "map", room(map_bytes(tiles))),
-        runs: pool.take(gpu, "runs", 4 * (runs + 1)),
-        active: pool.take(gpu, "active", 8 * runs),
-        records: pool.take(gpu, "records", 16 * words),
-        boxes: pool.take(gpu, "boxes", 12 * words),
-        bins: pool.take(gpu, "bins", 4 * bin_count),
-        entries: pool.take(gpu, "entries", room(4 * u64::from(budget.entries))),
-        bin_arguments: pool.take(gpu, "bin arguments", 12),
-        large: pool.take(gpu, "large", 4 * (words + 1)),
-        large_arguments: pool.take(gpu, "large arguments", 12),
-        long_bins: pool.take(gpu, "long bins", 4 * bin_count),
-        long_count: pool.take(gpu, "long count", 4),
-        long_arguments: pool.take(gpu, "long arguments", 12),
-        progress: pool.take(
-            gpu,
-            "progress",
-            4 * (gathered_word(tile_count) + 1 + u64::from(tile_count)),
-        ),
-        colors: pool.take(gpu, "colors", 16 * pixels + slots),
-        depths: pool.take(gpu, "depths", 4 * pixels),
-        gathered,
-        run_total: prepared.runs,
-        tiles,
-    })
+    planes
 }
 
 /// Returns the word of `progress` that counts the tiles that gather has drawn (progress.wgsl).

@@ -10,7 +10,7 @@ use crate::{
         uniforms::{self},
     },
     scene::{Gradient, Item, Optics, Scene, Settings},
-    volume::{Arrangement, Lattice},
+    volume::{Arrangement, Lattice, TransferFunction},
 };
 
 /// The things on which the variant of a picture depends.
@@ -30,9 +30,42 @@ pub struct Request<'a> {
 
 /// Returns the variant of a picture. Its lighting and its sources decide what is compiled.
 pub fn variant(request: &Request<'_>) -> Variant {
-    let &Request { scene, view, settings, budget, choice, gathered, is_software } = request;
-    let gather = gathered.is_some();
-    let mut variant = Variant {
+    let &Request { scene, settings, budget, gathered, .. } = request;
+    let mut variant = without_items(request);
+    for item in &scene.items {
+        match item {
+            Item::Radiance(_) | Item::Hierarchy(_) => {
+                variant.radiance = true;
+                variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
+            }
+            Item::Scalar(_, transfer)
+            | Item::Volume(_, _, transfer)
+            | Item::Bricks(_, _, transfer) => {
+                add_field(&mut variant, settings, item, transfer);
+                add_lattice(&mut variant, request, item);
+            }
+        }
+    }
+    // At the end of a pass, march meets splats again and closes sheets twice. That costs more for a
+    // field than for a surface.
+    variant.least_share =
+        budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
+    variant.central = variant.gradients() && settings.gradient == Gradient::Central;
+    if gathered.is_some() && variant.rows > 1 {
+        // Each pixel evaluates the samples around its own ray, so the pixels of an invocation would
+        // share nothing.
+        variant.rows = GATHERED_ROWS;
+        variant.most_entries = variant.most_entries.min(GATHERED_ENTRIES);
+    }
+    variant
+}
+
+/// Returns the variant of a picture without any item.
+fn without_items(request: &Request<'_>) -> Variant {
+    let &Request { scene, view, settings, budget, gathered, is_software, .. } = request;
+    let most_entries = if is_software { SOFTWARE_ENTRIES } else { u32::MAX };
+    let [clips, holes] = uniforms::clip_counts(settings);
+    Variant {
         perspective: view.perspective,
         mode: settings.mode,
         classification: settings.classification,
@@ -42,7 +75,7 @@ pub fn variant(request: &Request<'_>) -> Variant {
         lattice: false,
         body_centred: false,
         rectilinear: false,
-        gather,
+        gather: gathered.is_some(),
         sample_kind: 0,
         two_levels: false,
         radiance: false,
@@ -55,76 +88,60 @@ pub fn variant(request: &Request<'_>) -> Variant {
         occlusion: settings.occlusion && settings.hides() && scene.can_hide(),
         least_share: 0,
         isosurfaces: 0,
-        clips: 0,
-        holes: 0,
+        clips,
+        holes,
         central: false,
         // A software adapter runs eight invocations at once: eight columns of eight pixels fill a
         // tile.
         rows: if is_software { 8 } else { 1 },
-        most_entries: budget.tile_entries.unwrap_or(if is_software {
-            SOFTWARE_ENTRIES
-        } else {
-            u32::MAX
-        }),
-    };
-    [variant.clips, variant.holes] = uniforms::clip_counts(settings);
-    let classified = settings.classifies_samples();
-    // Lighting is visible only with emission and absorption.
-    let is_lit = settings.optics == Optics::EmissionAbsorption;
-    for item in &scene.items {
-        let transfer = match item {
-            Item::Radiance(_) | Item::Hierarchy(_) => {
-                variant.radiance = true;
-                variant.surface_shaded |= is_lit && settings.surface_shade.is_some();
-                continue;
-            }
-            Item::Scalar(_, transfer)
-            | Item::Volume(_, _, transfer)
-            | Item::Bricks(_, _, transfer) => transfer,
-        };
-        let shaded = is_lit && settings.shade_of(transfer).is_some();
-        if classified {
-            variant.classified = true;
-            variant.surface_shaded |= shaded;
-        } else {
-            variant.scalar = true;
-            variant.volume_shaded = shaded;
-            variant.gradient_opacity =
-                !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
-            variant.isosurfaces = if is_lit { transfer.isosurfaces.len() as u32 } else { 0 };
-        }
-        // Finding the range of scattered samples would take longer.
-        let range = item.lattice().and_then(|_| item.value_range());
-        variant.beyond = range.is_none_or(|range| tables::leaves_out(transfer, range));
-        if let Item::Volume(volume, kernel, _) = item {
-            variant.lattice = true;
-            variant.body_centred = volume.lattice.arrangement == Arrangement::BodyCentred;
-            variant.rectilinear = matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
-            variant.table_kernel = !matches!(kernel.profile, Profile::Gaussian(_));
-            let alike = !variant.rectilinear && !variant.table_kernel && !classified;
-            variant.isotropic = alike && !gather && are_flat(&volume.lattice, kernel, view, item);
-            variant.sample_kind = gathered.unwrap_or(0);
-        }
-        if let (Item::Bricks(bricks, kernel, _), Some(choice)) = (item, choice) {
-            variant.lattice = true;
-            variant.two_levels = choice.levels.len() > 1;
-            let flat =
-                |&(level, _): &(usize, f64)| are_flat(&bricks.lattice(level), kernel, view, item);
-            variant.isotropic = choice.levels.iter().all(flat);
-        }
+        most_entries: budget.tile_entries.unwrap_or(most_entries),
     }
-    // At the end of a pass, march meets splats again and closes sheets twice. That costs more for a
-    // field than for a surface.
-    variant.least_share =
-        budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
-    variant.central = variant.gradients() && settings.gradient == Gradient::Central;
-    if gather && variant.rows > 1 {
-        // Each pixel evaluates the samples around its own ray, so the pixels of an invocation would
-        // share nothing.
-        variant.rows = GATHERED_ROWS;
-        variant.most_entries = variant.most_entries.min(GATHERED_ENTRIES);
+}
+
+/// Whether lighting is visible: only with emission and absorption.
+fn is_lit(settings: &Settings) -> bool {
+    settings.optics == Optics::EmissionAbsorption
+}
+
+/// Adds what the transfer function of a field needs.
+fn add_field(variant: &mut Variant, settings: &Settings, item: &Item, transfer: &TransferFunction) {
+    let is_lit = is_lit(settings);
+    let shaded = is_lit && settings.shade_of(transfer).is_some();
+    if settings.classifies_samples() {
+        variant.classified = true;
+        variant.surface_shaded |= shaded;
+    } else {
+        variant.scalar = true;
+        variant.volume_shaded = shaded;
+        variant.gradient_opacity =
+            !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
+        variant.isosurfaces = if is_lit { transfer.isosurfaces.len() as u32 } else { 0 };
     }
-    variant
+    // Finding the range of scattered samples would take longer.
+    let range = item.lattice().and_then(|_| item.value_range());
+    variant.beyond = range.is_none_or(|range| tables::leaves_out(transfer, range));
+}
+
+/// Adds what the lattice and the kernel of an item need, if it has a lattice.
+fn add_lattice(variant: &mut Variant, request: &Request<'_>, item: &Item) {
+    let &Request { view, settings, choice, gathered, .. } = request;
+    if let Item::Volume(volume, kernel, _) = item {
+        variant.lattice = true;
+        variant.body_centred = volume.lattice.arrangement == Arrangement::BodyCentred;
+        variant.rectilinear = matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
+        variant.table_kernel = !matches!(kernel.profile, Profile::Gaussian(_));
+        let alike = !variant.rectilinear && !variant.table_kernel && !settings.classifies_samples();
+        variant.isotropic =
+            alike && gathered.is_none() && are_flat(&volume.lattice, kernel, view, item);
+        variant.sample_kind = gathered.unwrap_or(0);
+    }
+    if let (Item::Bricks(bricks, kernel, _), Some(choice)) = (item, choice) {
+        variant.lattice = true;
+        variant.two_levels = choice.levels.len() > 1;
+        let flat =
+            |&(level, _): &(usize, f64)| are_flat(&bricks.lattice(level), kernel, view, item);
+        variant.isotropic = choice.levels.iter().all(flat);
+    }
 }
 
 /// Mesa's software driver ends all loops of an invocation after 65,535 iterations in total. In

@@ -327,7 +327,8 @@ impl View {
     ///     view_up: DVec3::Y,
     ///     projection: Projection::Perspective { view_angle: 90.0 },
     /// };
-    /// let clip = camera.view([200, 100])?.clip_from_world(1.0, 9.0) * DVec4::new(0.0, 5.0, 0.0, 1.0);
+    /// let view = camera.view([200, 100])?;
+    /// let clip = view.clip_from_world(1.0, 9.0) * DVec4::new(0.0, 5.0, 0.0, 1.0);
     /// // The middle of the upper side.
     /// assert!((clip / clip.w - DVec4::new(0.0, 1.0, 0.9, 1.0)).length() < 1e-12);
     /// # Ok::<(), splatkit::Error>(())

@@ -24,6 +24,12 @@ pub struct Shown {
     pub words: Vec<[u32; 2]>,
 }
 
+/// A cube of samples: the first one, and the number of samples along each axis.
+struct Cube {
+    first: [usize; 3],
+    side: usize,
+}
+
 /// The bits of 2 × 2 × 2 cells in a word.
 const QUARTER: u32 = 0x0033_0033;
 
@@ -117,7 +123,8 @@ impl Shown {
                 let place = [block % columns, block / columns, layer].map(|at| at * BLOCK);
                 if self.coarse == 0 {
                     if words != [0; 2] {
-                        self.mark(lattice, view, sheets, place, BLOCK, &mut own);
+                        let block = Cube { first: place, side: BLOCK };
+                        self.mark(lattice, view, sheets, &block, &mut own);
                     }
                     continue;
                 }
@@ -127,14 +134,9 @@ impl Shown {
                         let [x, y] = [quarter % 2 * 2, quarter / 2 * 2];
                         if word >> (x + BLOCK * y) & QUARTER != 0 {
                             let at = [place[0] + x, place[1] + y, place[2] + 2 * half];
-                            self.mark(
-                                lattice,
-                                view,
-                                sheets,
-                                at.map(|at| at << self.coarse),
-                                2 << self.coarse,
-                                &mut own,
-                            );
+                            let first = at.map(|at| at << self.coarse);
+                            let cells = Cube { first, side: 2 << self.coarse };
+                            self.mark(lattice, view, sheets, &cells, &mut own);
                         }
                     }
                 }
@@ -154,15 +156,13 @@ impl Shown {
         all.reduce(none, join).chunks(words.max(1)).map(<[u64]>::to_vec).collect()
     }
 
-    /// Marks the tiles and sheets that a cube of samples may meet. The cube begins at sample
-    /// `first` and has `side` samples along each axis.
+    /// Marks the tiles and sheets that a cube of samples may meet.
     fn mark(
         &self,
         lattice: &Lattice,
         view: &View,
         sheets: &Sheets,
-        first: [usize; 3],
-        side: usize,
+        &Cube { first, side }: &Cube,
         marks: &mut [u64],
     ) {
         let low = DVec3::from_array(first.map(|n| n as f64 - 0.5));

@@ -3,9 +3,9 @@
 use super::{ClipShape, Item, Optics, Scene, Settings, numbers};
 use crate::{
     Error, Result,
-    math::{Bounds, Profile, Tensor},
+    math::{Bounds, Kernel, Profile, Tensor},
     splat::{Payload, SplatSet},
-    volume::{Arrangement, Lattice},
+    volume::{Arrangement, Lattice, TransferFunction, Volume},
 };
 
 impl Scene {
@@ -16,116 +16,13 @@ impl Scene {
     /// # Errors
     /// [`Error::Argument`] with the reason.
     pub fn validate_settings(&self, settings: &Settings) -> Result<()> {
-        let wrong = |message: String| Err(Error::Argument(message));
         numbers::check_settings(settings)?;
-        let [width, height] = settings.size;
-        if u64::from(width) * u64::from(height) > Settings::MAX_PIXELS {
-            let most = Settings::MAX_PIXELS;
-            return wrong(format!(
-                "a picture of {width}x{height} pixels is larger than {most} pixels"
-            ));
-        }
-        if settings.clips.len() > Settings::MAX_CLIPS {
-            return wrong(format!(
-                "there are {} clips; at most {} are allowed",
-                settings.clips.len(),
-                Settings::MAX_CLIPS
-            ));
-        }
-        for clip in &settings.clips {
-            match clip.shape {
-                ClipShape::HalfSpace { normal, offset } => {
-                    if !((1e-150..=1e150).contains(&normal.length()) && offset.is_finite()) {
-                        return wrong(format!(
-                            "a clip plane needs a normal of a length from 1e-150 to 1e150 and a \
-                             finite offset, found {normal} and {offset}"
-                        ));
-                    }
-                }
-                ClipShape::Box(bounds) => {
-                    if !(bounds.min.is_finite()
-                        && bounds.max.is_finite()
-                        && bounds.min.cmplt(bounds.max).all())
-                    {
-                        let Bounds { min, max } = bounds;
-                        return wrong(format!("a clip box from {min} to {max} holds nothing"));
-                    }
-                }
-            }
-        }
-        let before = settings.classifies_samples();
+        check_size(settings.size)?;
+        check_clips(settings)?;
         for (number, item) in self.items.iter().enumerate() {
             // The transfer function may have changed since the scene was validated.
             numbers::check_transfer(item).map_err(numbers::of_item(number))?;
-            match item {
-                Item::Radiance(_) | Item::Hierarchy(_) if settings.optics == Optics::Maximum => {
-                    return wrong(
-                        "a maximum intensity picture takes a volume or samples alone, without \
-                         surfaces"
-                            .into(),
-                    );
-                }
-                Item::Radiance(_) | Item::Hierarchy(_) => {}
-                Item::Volume(volume, kernel, _) => {
-                    let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
-                    if let Some(tensor) = kernel.as_tensor() {
-                        check_tensor(tensor, &volume.lattice, before).map_err(Error::Argument)?;
-                    }
-                    if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_))
-                        && !is_gaussian
-                        && !before
-                    {
-                        return wrong(
-                            "a rectilinear volume takes a Gaussian kernel, unless it is classified \
-                             before"
-                                .into(),
-                        );
-                    }
-                    if let Some(coefficients) = &volume.coefficients {
-                        if before {
-                            return wrong(
-                                "a sharp volume must be classified after interpolation, in \
-                                 image-aligned sheets"
-                                    .into(),
-                            );
-                        }
-                        if coefficients.kernel != *kernel {
-                            return wrong("the volume was made sharp for another kernel".into());
-                        }
-                    }
-                }
-                Item::Bricks(_, kernel, _) => {
-                    if !matches!(kernel.profile, Profile::Gaussian(_)) {
-                        return wrong("a volume in bricks takes a Gaussian kernel".into());
-                    }
-                    if before {
-                        return wrong(
-                            "a volume in bricks must be classified after interpolation, in \
-                             image-aligned sheets"
-                                .into(),
-                        );
-                    }
-                }
-                Item::Scalar(..) => {}
-            }
-            if let Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) = item
-                && before
-            {
-                if settings.optics == Optics::Maximum {
-                    return wrong(
-                        "the maximum of a field needs image-aligned sheets, classified after \
-                         interpolation"
-                            .into(),
-                    );
-                }
-                if !(transfer.isosurfaces.is_empty() && transfer.gradient.is_empty()) {
-                    return wrong(
-                        "isosurfaces and gradient opacity need image-aligned sheets, classified \
-                         after interpolation"
-                            .into(),
-                    );
-                }
-            }
+            check_item(item, settings)?;
         }
         Ok(())
     }
@@ -177,6 +74,120 @@ impl Scene {
         }
         Ok(())
     }
+}
+
+fn check_size([width, height]: [u32; 2]) -> Result<()> {
+    let most = Settings::MAX_PIXELS;
+    if u64::from(width) * u64::from(height) > most {
+        return wrong(format!("a picture of {width}x{height} pixels is larger than {most} pixels"));
+    }
+    Ok(())
+}
+
+/// Returns an error if there are too many clips, or if one of them has no shape.
+fn check_clips(settings: &Settings) -> Result<()> {
+    if settings.clips.len() > Settings::MAX_CLIPS {
+        return wrong(format!(
+            "there are {} clips; at most {} are allowed",
+            settings.clips.len(),
+            Settings::MAX_CLIPS
+        ));
+    }
+    for clip in &settings.clips {
+        match clip.shape {
+            ClipShape::HalfSpace { normal, offset } => {
+                if !((1e-150..=1e150).contains(&normal.length()) && offset.is_finite()) {
+                    return wrong(format!(
+                        "a clip plane needs a normal of a length from 1e-150 to 1e150 and a \
+                         finite offset, found {normal} and {offset}"
+                    ));
+                }
+            }
+            ClipShape::Box(Bounds { min, max }) => {
+                if !(min.is_finite() && max.is_finite() && min.cmplt(max).all()) {
+                    return wrong(format!("a clip box from {min} to {max} holds nothing"));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Returns an error if an item cannot be drawn with the settings.
+fn check_item(item: &Item, settings: &Settings) -> Result<()> {
+    match item {
+        Item::Radiance(_) | Item::Hierarchy(_) if settings.optics == Optics::Maximum => {
+            wrong("a maximum intensity picture takes a volume or samples alone, without surfaces")
+        }
+        Item::Radiance(_) | Item::Hierarchy(_) => Ok(()),
+        Item::Scalar(_, transfer) => check_classified(transfer, settings),
+        Item::Volume(volume, kernel, transfer) => {
+            check_volume(volume, kernel, settings)?;
+            check_classified(transfer, settings)
+        }
+        Item::Bricks(_, kernel, _) => check_bricks(kernel, settings),
+    }
+}
+
+/// Returns an error if a kernel cannot be that of a volume's samples.
+fn check_volume(volume: &Volume, kernel: &Kernel, settings: &Settings) -> Result<()> {
+    let before = settings.classifies_samples();
+    let arrangement = &volume.lattice.arrangement;
+    if let Some(tensor) = kernel.as_tensor() {
+        check_tensor(tensor, &volume.lattice, before).map_err(Error::Argument)?;
+    }
+    let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
+    if matches!(arrangement, Arrangement::Rectilinear(_)) && !is_gaussian && !before {
+        return wrong(
+            "a rectilinear volume takes a Gaussian kernel, unless it is classified before",
+        );
+    }
+    let Some(coefficients) = &volume.coefficients else { return Ok(()) };
+    if before {
+        return wrong(
+            "a sharp volume must be classified after interpolation, in image-aligned sheets",
+        );
+    }
+    if coefficients.kernel != *kernel {
+        return wrong("the volume was made sharp for another kernel");
+    }
+    Ok(())
+}
+
+fn check_bricks(kernel: &Kernel, settings: &Settings) -> Result<()> {
+    if !matches!(kernel.profile, Profile::Gaussian(_)) {
+        return wrong("a volume in bricks takes a Gaussian kernel");
+    }
+    if settings.classifies_samples() {
+        return wrong(
+            "a volume in bricks must be classified after interpolation, in image-aligned sheets",
+        );
+    }
+    Ok(())
+}
+
+/// Returns an error if samples are classified before they are interpolated, but the picture needs
+/// the field between them.
+fn check_classified(transfer: &TransferFunction, settings: &Settings) -> Result<()> {
+    if !settings.classifies_samples() {
+        return Ok(());
+    }
+    if settings.optics == Optics::Maximum {
+        return wrong(
+            "the maximum of a field needs image-aligned sheets, classified after interpolation",
+        );
+    }
+    if !(transfer.isosurfaces.is_empty() && transfer.gradient.is_empty()) {
+        return wrong(
+            "isosurfaces and gradient opacity need image-aligned sheets, classified after \
+             interpolation",
+        );
+    }
+    Ok(())
+}
+
+fn wrong(message: impl Into<String>) -> Result<()> {
+    Err(Error::Argument(message.into()))
 }
 
 /// Returns an error if a tensor product cannot be the kernel of a lattice's samples. `before` says

@@ -197,7 +197,7 @@ fn pictures_are_compared() {
         let color = vec![[value, value, value, 1.0]; (size * size) as usize];
         let picture =
             splatkit::picture::Picture { width: size, height: size, color, depth: Vec::new() };
-        picture.save(&folder.path(name), None).unwrap();
+        picture.save(folder.path(name), None).unwrap();
     };
     picture("a.png", 16, 0.5);
     picture("b.png", 16, 0.6);

@@ -37,6 +37,8 @@ fn main() -> Result<()> {
     pcd(&mut seeds)?;
     npy(&mut seeds)?;
     volumes(&mut seeds)?;
+    vti(&mut seeds)?;
+    vtr_vtu(&mut seeds)?;
     vtk(&mut seeds)?;
     hierarchies(&mut seeds)?;
     in_bricks(&mut seeds)?;
@@ -480,7 +482,7 @@ fn volumes(seeds: &mut Seeds) -> Result<()> {
     seeds.put("raw", [&[2, 2, 2, 0, 16, 0][..], &packer.finish()?].concat())
 }
 
-fn vtk(seeds: &mut Seeds) -> Result<()> {
+fn vti(seeds: &mut Seeds) -> Result<()> {
     let image = "<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\"><ImageData \
          WholeExtent=\"0 2 0 1 0 0\" Origin=\"0 0 0\" Spacing=\"1 1 2\"><Piece Extent=\"0 2 0 1 0 \
          0\"><PointData Scalars=\"s\">";
@@ -521,7 +523,10 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
             base64(&sizes),
             base64(&packed)
         ),
-    )?;
+    )
+}
+
+fn vtr_vtu(seeds: &mut Seeds) -> Result<()> {
     let array = |kind: &str, name: &str, parts: u32, text: &str| {
         format!(
             "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{parts}' format='ascii'>\
@@ -565,7 +570,10 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
              {cells}</Polys></Piece></PolyData></VTKFile>",
             array("Float32", "value", 1, "1 2 3 4")
         ),
-    )?;
+    )
+}
+
+fn vtk(seeds: &mut Seeds) -> Result<()> {
     let head = |encoding: &str| format!("# vtk DataFile Version 3.0\ntitle\n{encoding}\n");
     let image = "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\n\
          POINT_DATA 6\nSCALARS density unsigned_char 1\nLOOKUP_TABLE default\n";

@@ -98,17 +98,30 @@ impl Variant {
         self.most_entries < u32::MAX
     }
 
+    /// Whether the field in a sheet counts as a parabola, not as a constant.
+    fn parabola(&self) -> bool {
+        let post = self.classification == Classification::Post;
+        self.scalar && (!post || self.isosurfaces > 0)
+    }
+
     /// Returns the constants, as WGSL.
     pub fn constants(&self) -> String {
-        let whole = self.mode != Mode::Sheets;
-        let single = matches!(self.mode, Mode::Splats(_));
-        let post = self.classification == Classification::Post;
-        let maximum = self.optics == Optics::Maximum;
-        let parabola = self.scalar && (!post || self.isosurfaces > 0);
-        let parts = if parabola { PARTS } else { 1 };
+        let flags = self.flags().map(|(name, value)| format!("const {name}: bool = {value};\n"));
+        let counts = self.counts().map(|(name, value)| format!("const {name}: u32 = {value}u;\n"));
+        let (flags, counts) = (flags.concat(), counts.concat());
+        let apron = i32::from(self.central);
+        let step = self.tile_step();
+        format!(
+            "{flags}{counts}const APRON: i32 = {apron};\nconst TILE_STEP: i32 = {step};\n{}",
+            tables::constants()
+        )
+    }
+
+    /// The constants that are true or false.
+    fn flags(&self) -> [(&'static str, bool); 33] {
         let radiance = self.radiance || self.classified;
         let samples = (self.scalar || self.classified) && !self.lattice;
-        let flags = [
+        [
             ("PERSPECTIVE", self.perspective),
             ("SCALAR", self.scalar),
             ("GATHER", self.gather),
@@ -133,22 +146,27 @@ impl Variant {
             ("GRADIENTS", self.gradients()),
             ("CENTRAL", self.central),
             ("OCCLUSION", self.occlusion),
-            ("WHOLE", whole),
+            ("WHOLE", self.mode != Mode::Sheets),
             ("AXIS_SHEETS", self.mode == Mode::AxisSheets),
-            ("SINGLE_SPLATS", single),
+            ("SINGLE_SPLATS", matches!(self.mode, Mode::Splats(_))),
             ("BACK_TO_FRONT", self.mode == Mode::Splats(Order::BackToFront)),
-            ("POST", post),
-            ("PARABOLA", parabola),
-            ("MAXIMUM", maximum),
+            ("POST", self.classification == Classification::Post),
+            ("PARABOLA", self.parabola()),
+            ("MAXIMUM", self.optics == Optics::Maximum),
             ("XRAY", self.optics == Optics::XRay),
             ("CAN_STOP", self.can_stop()),
-        ];
+        ]
+    }
+
+    /// The constants that are whole numbers.
+    fn counts(&self) -> [(&'static str, u32); 13] {
+        let parts = if self.parabola() { PARTS } else { 1 };
         // The cost of closing a sheet, in entries, against the driver's limit on iterations (see
         // docs/engine.md).
         let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes))
             .div_ceil(ENTRY_ITERATIONS);
         let closing = closing + u32::from(self.gather);
-        let counts = [
+        [
             ("ISOSURFACES", self.isosurfaces),
             ("PARTS", parts),
             ("CLIPS", self.clips),
@@ -162,15 +180,6 @@ impl Variant {
             ("SAMPLE_KIND", self.sample_kind),
             ("ROWS", self.rows),
             ("LANE_ROWS", 8 / self.rows),
-        ];
-        let flags = flags.map(|(name, value)| format!("const {name}: bool = {value};\n")).concat();
-        let counts =
-            counts.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).concat();
-        let apron = i32::from(self.central);
-        let step = self.tile_step();
-        format!(
-            "{flags}{counts}const APRON: i32 = {apron};\nconst TILE_STEP: i32 = {step};\n{}",
-            tables::constants()
-        )
+        ]
     }
 }

@@ -128,7 +128,7 @@ pub struct Shelf {
     slots: Vec<Option<(Key, u64)>>,
     slot_of: HashMap<Key, usize>,
     /// For each slot, the ranges of its brick's blocks.
-    ranges: Vec<Box<[[u8; 2]; BRICK_BLOCKS]>>,
+    ranges: Vec<[[u8; 2]; BRICK_BLOCKS]>,
     /// Samples, ranges and first slot of each chunk.
     chunks: Vec<(wgpu::Buffer, wgpu::Buffer, usize)>,
     /// The added chunks that the caller has not taken yet.
@@ -218,7 +218,7 @@ impl Shelf {
         let count = (wanted + wanted / 4 + 1).min(room).min(MOST_SLOTS).min(fit.max(1));
         let first = self.slots.len();
         self.slots.extend(std::iter::repeat_n(None, count));
-        self.ranges.extend(std::iter::repeat_n(Box::new([EMPTY; BRICK_BLOCKS]), count));
+        self.ranges.extend(std::iter::repeat_n([EMPTY; BRICK_BLOCKS], count));
         let data = buffer(gpu, "bricks", (count * bytes) as u64, Usage::STORAGE);
         let ranges = buffer(gpu, "brick ranges", (count * 2 * BRICK_BLOCKS) as u64, Usage::STORAGE);
         self.chunks.push((data.clone(), ranges.clone(), first));
@@ -251,7 +251,7 @@ impl Shelf {
                 gpu.queue.write_buffer(data, (at * bytes) as u64, &brick.samples);
                 let own = bytemuck::cast_slice(brick.blocks.as_slice());
                 gpu.queue.write_buffer(ranges, (at * 2 * BRICK_BLOCKS) as u64, own);
-                self.ranges[slot] = brick.blocks;
+                self.ranges[slot] = *brick.blocks;
             }
             // Writes wait in staging memory until the next submission.
             gpu.queue.submit([]);

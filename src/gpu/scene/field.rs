@@ -265,8 +265,7 @@ impl Field {
     pub fn list(
         &mut self,
         gpu: &Gpu,
-        view: &View,
-        sheets: &Sheets,
+        (view, sheets): (&View, &Sheets),
         variant: &Variant,
         table: &[[f32; 4]],
         frame: &mut Frame,

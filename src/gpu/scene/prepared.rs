@@ -10,7 +10,6 @@ use crate::{
             Gpu,
             buffers::{buffer, filled_buffer, upload},
         },
-        pipeline::scan::Scan,
         scene::{
             bricks::{Listed, Room, Shelf, Slab},
             field::{Field, texture_bytes, unsuited},
@@ -229,7 +228,6 @@ impl PreparedScene {
         &mut self,
         gpu: &Gpu,
         select: &Select,
-        scan: &Scan,
         view: &View,
         all: bool,
     ) -> Result<()> {
@@ -248,7 +246,7 @@ impl PreparedScene {
             }
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
             let rest = self.bytes - before;
-            select.update(gpu, scan, selection, &chunk.uniform, &shown, |count| {
+            select.update(gpu, selection, &chunk.uniform, &shown, |count| {
                 gpu.check_memory(rest + list_bytes(u64::from(count)))
             })?;
             chunk.candidates = selection.count;
@@ -265,7 +263,6 @@ impl PreparedScene {
         &mut self,
         gpu: &Gpu,
         select: &SelectBricks,
-        scan: &Scan,
         view: &View,
         choice: &Choice,
         room: Room,
@@ -290,7 +287,7 @@ impl PreparedScene {
             self.bytes += samples.ranges.size();
             self.bytes -= samples.data.size();
         }
-        self.select_bricks(gpu, select, scan, view, choice, room.runs)
+        self.select_bricks(gpu, select, view, choice, room.runs)
     }
 
     /// Returns the batches of candidates in bricks.
@@ -325,7 +322,6 @@ impl PreparedScene {
         &mut self,
         gpu: &Gpu,
         select: &SelectBricks,
-        scan: &Scan,
         view: &View,
         choice: &Choice,
         most: u64,
@@ -350,7 +346,7 @@ impl PreparedScene {
             return Ok(Listed::TooMany { runs, most });
         }
         gpu.check_memory(self.bytes - before + list_bytes(samples))?;
-        select.update(gpu, scan, &mut own, &choice.shown);
+        select.update(gpu, &mut own, &choice.shown);
         self.bytes -= before;
         for chunk in &mut self.chunks {
             let Origin::Bricks { slab, .. } = &chunk.origin else { continue };

@@ -18,6 +18,7 @@ use crate::{
     },
     parallel::prelude::*,
 };
+use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
 /// Samples along each side of the block that an invocation handles (`SIDE` in select.wgsl).
@@ -80,12 +81,13 @@ impl Selection {
 pub struct Select {
     count: Stage,
     write: Stage,
+    scan: Arc<Scan>,
 }
 
 impl Select {
-    pub fn new(gpu: &Gpu) -> Self {
+    pub fn new(gpu: &Gpu, scan: &Arc<Scan>) -> Self {
         let [count, write] = Stage::all(gpu, Self::recipes());
-        Self { count, write }
+        Self { count, write, scan: scan.clone() }
     }
 
     pub fn recipes() -> [Recipe; 2] {
@@ -104,7 +106,6 @@ impl Select {
     pub fn update(
         &self,
         gpu: &Gpu,
-        scan: &Scan,
         selection: &mut Selection,
         uniform: &wgpu::Buffer,
         shown: &[u16; 256],
@@ -126,7 +127,7 @@ impl Select {
             .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") });
         encoder.clear_buffer(&selection.blocks, 0, None);
         self.count.dispatch(&mut encoder, &[&bind(&self.count)], groups);
-        scan.encode(gpu, &mut encoder, &selection.blocks, blocks + 1);
+        self.scan.encode(gpu, &mut encoder, &selection.blocks, blocks + 1);
         self.write.dispatch(&mut encoder, &[&bind(&self.write)], groups);
         gpu.queue.submit([encoder.finish()]);
         selection.shown = Some(*shown);

@@ -14,6 +14,7 @@ use crate::gpu::{
         stage::Stage,
     },
 };
+use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
 /// The pass.
@@ -21,12 +22,13 @@ use wgpu::BufferUsages as Usage;
 pub struct SelectBricks {
     count: Stage,
     write: Stage,
+    scan: Arc<Scan>,
 }
 
 impl SelectBricks {
-    pub fn new(gpu: &Gpu) -> Self {
+    pub fn new(gpu: &Gpu, scan: &Arc<Scan>) -> Self {
         let [count, write] = Stage::all(gpu, Self::recipes());
-        Self { count, write }
+        Self { count, write, scan: scan.clone() }
     }
 
     pub fn recipes() -> [Recipe; 2] {
@@ -44,7 +46,6 @@ impl SelectBricks {
     pub fn update(
         &self,
         gpu: &Gpu,
-        scan: &Scan,
         slabs: &mut [(&mut Slab, &wgpu::Buffer, u32)],
         shown: &[u16; 256],
     ) {
@@ -68,7 +69,7 @@ impl SelectBricks {
             let groups = slab.blocks().div_ceil(64);
             encoder.clear_buffer(&blocks, 0, None);
             self.count.dispatch(&mut encoder, &[&bind(&self.count)], groups);
-            scan.encode(gpu, &mut encoder, &blocks, slab.blocks() + 1);
+            self.scan.encode(gpu, &mut encoder, &blocks, slab.blocks() + 1);
             self.write.dispatch(&mut encoder, &[&bind(&self.write)], groups);
         }
         gpu.queue.submit([encoder.finish()]);
