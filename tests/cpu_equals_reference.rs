@@ -34,10 +34,10 @@ fn assert_matches(case: &Case, least: f64) {
     if let Ok(folder) = std::env::var("SPLATKIT_PICTURES") {
         let folder = std::path::Path::new(&folder);
         found
-            .save(&folder.join(format!("{}-cpu.png", case.name)), None)
+            .save(folder.join(format!("{}-cpu.png", case.name)), None)
             .expect("a folder to write to");
         truth
-            .save(&folder.join(format!("{}-reference.png", case.name)), None)
+            .save(folder.join(format!("{}-reference.png", case.name)), None)
             .expect("a folder to write to");
     }
     assert!(psnr >= least, "{}: {psnr:.1} dB, expected {least} dB", case.name);
