@@ -148,6 +148,7 @@ impl Picture {
 
 /// The format of a picture file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PictureFormat {
     /// PNG: lossless, with opacity.
     Png,

@@ -35,6 +35,7 @@ pub(super) type FindPieces = fn(&Source) -> Result<Option<Box<dyn Form>>>;
 
 /// What a file may hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Content {
     /// Triangles.
     Mesh,

@@ -11,6 +11,7 @@ use wgpu::{TextureFormat, TextureUsages};
 /// [`Picture::depth`](crate::picture::Picture::depth): view-space z in world units, infinite where
 /// less than half of the light is absorbed.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Output {
     /// Textures to draw into, with [`TextureUsages::RENDER_ATTACHMENT`].
     Textures {

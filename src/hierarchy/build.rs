@@ -22,6 +22,7 @@ use std::{
 
 /// Trades the time of building against the quality of the tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Preset {
     /// Compares each splat with the fewest neighbours before it is paired.
     Fastest,

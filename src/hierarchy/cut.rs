@@ -23,6 +23,7 @@ use glam::{DMat3, DVec3, Vec3, Vec4};
 
 /// The level of detail at which a hierarchy is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Detail {
     /// No splat except a leaf is wider than this many pixels (full width at half maximum of its
     /// footprint, see [`Node::size`]). 0 draws the leaves.

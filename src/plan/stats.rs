@@ -2,6 +2,7 @@
 
 /// Statistics of a frame.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct FrameStats {
     /// Splats that meet the picture. The samples of a gathered lattice do not count.
     pub splats: u64,

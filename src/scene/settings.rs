@@ -35,6 +35,7 @@ pub enum Order {
 
 /// When the values of a field are mapped to colour and opacity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Classification {
     /// Everywhere along the ray inside a sheet. The values at its two faces and its mean define a
     /// parabola, over which the transfer function is integrated. Thin shells keep their look in
@@ -84,6 +85,7 @@ pub enum ClipShape {
 
 /// How the gradient across the picture is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Gradient {
     /// From the derivative of the kernels.
     #[default]
@@ -95,6 +97,7 @@ pub enum Gradient {
 
 /// How the field of a lattice is evaluated in a sheet. The pictures agree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Evaluate {
     /// Gathers a volume if possible, and scatters everything else.
     #[default]

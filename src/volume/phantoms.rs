@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 
 /// A function of position.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Phantom {
     /// The test signal of Marschner and Lobb (“An Evaluation of Reconstruction Filters for Volume
     /// Rendering”, 1994), with their f_M = 6 and α = 0.25: rings that 41³ samples can just

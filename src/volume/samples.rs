@@ -10,6 +10,7 @@ use std::{borrow::Cow, sync::Arc};
 
 /// Samples in the type of their file, first axis fastest.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Samples {
     /// 8 bits, unsigned.
     U8(Vec<u8>),

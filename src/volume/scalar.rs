@@ -2,6 +2,7 @@
 
 /// The type of a volume's samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Scalar {
     /// 8 bits, unsigned.
     U8,

@@ -41,6 +41,7 @@ pub struct Gpu {
 
 /// Which adapter to use.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum AdapterChoice {
     /// The adapter named by the environment variable `WGPU_ADAPTER_NAME`, if that is set; otherwise
     /// the fastest: discrete, integrated, virtual, then software.
