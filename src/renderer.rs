@@ -120,7 +120,8 @@ impl Renderer {
     /// Draws a picture. If the device is lost, it is reopened once and the picture is drawn again.
     ///
     /// # Errors
-    /// Those of [`gpu::Renderer::render`](crate::gpu::Renderer::render) and [`CpuRenderer::render`].
+    /// Those of [`gpu::Renderer::render`](crate::gpu::Renderer::render) and
+    /// [`CpuRenderer::render`].
     pub fn render(
         &mut self,
         camera: &Camera,

@@ -1,7 +1,8 @@
 //! The README's table of formats is the one that the library follows, and its table of features is
 //! that of `Cargo.toml`.
 //!
-//! To update the table of formats, run `SPLATKIT_WRITE=1 cargo test --release --test list_of_formats`.
+//! To update the table of formats, run
+//! `SPLATKIT_WRITE=1 cargo test --release --test list_of_formats`.
 
 use splatkit::formats::FORMATS;
 use std::{

@@ -266,8 +266,8 @@ impl Plan<'_> {
         three!(I => color[I].mul_add(share, highlight).min(one))
     }
 
-    /// Adds a sheet to a packet's pixels: the field in it, at the pixels of a mask, and its radiance
-    /// (colour times optical depth, and optical depth).
+    /// Adds a sheet to a packet's pixels: the field in it, at the pixels of a mask, and its
+    /// radiance (colour times optical depth, and optical depth).
     #[inline(always)]
     pub fn close<S: Simd>(
         &self,

@@ -33,8 +33,8 @@ impl VolumeStream {
     /// - files in which [`load_volume`](super::load_volume) will find an error.
     ///
     /// # Errors
-    /// Those of opening the file, [`Error::Input`] for a malformed header and for a format that this
-    /// build leaves out, and [`Error::Limit`] for sizes over the limits.
+    /// Those of opening the file, [`Error::Input`] for a malformed header and for a format that
+    /// this build leaves out, and [`Error::Limit`] for sizes over the limits.
     pub fn open(
         path: impl AsRef<Path>,
         limits: &Limits,
