@@ -164,18 +164,18 @@ fn number_of(id: vec3<u32>) -> u32 {
 // Some drivers (Mesa's software Vulkan) give each of their threads one row of a dispatch's
 // workgroups. If neighbouring workgroups have similar amounts of work, one row may have all of it.
 // So numbers are dealt out like cards, to this many lanes.
-const HANDS: u32 = 16u;
+const LANES: u32 = 16u;
 
 // Returns the dealt number, or `count` for a number behind the last card.
 fn dealt(number: u32, count: u32) -> u32 {
-    let each = (count + HANDS - 1u) / HANDS;
-    return select((number % each) * HANDS + number / each, count, number >= each * HANDS);
+    let each = (count + LANES - 1u) / LANES;
+    return select((number % each) * LANES + number / each, count, number >= each * LANES);
 }
 
 // Returns how many numbers must be dealt so that all numbers below `count` come up; some results
 // lie beyond it.
 fn dealt_count(count: u32) -> u32 {
-    return (count + HANDS - 1u) / HANDS * HANDS;
+    return (count + LANES - 1u) / LANES * LANES;
 }
 
 // The batch size: candidates that one invocation handles in order, so that lists have the same

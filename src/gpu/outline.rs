@@ -55,7 +55,7 @@ impl Request<'_> {
     ) -> Result<Outline> {
         let Self { view, settings, detail, cut_pixels } = self;
         let reads =
-            |prepared: &PreparedScene| prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads);
+            |prepared: &PreparedScene| prepared.brick_cache.as_ref().map_or(0, |cache| cache.reads);
         let before = reads(prepared);
         let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
         prepared.update_levels(gpu, view, pixels)?;
@@ -84,16 +84,17 @@ impl Request<'_> {
         let choose = |prepared: &PreparedScene, most| {
             prepared.scene.choice(view, settings, detail, most, &prepared.bounds)
         };
-        let Some(shelf) = &prepared.shelf else { return Ok(None) };
+        let Some(brick_cache) = &prepared.brick_cache else { return Ok(None) };
         // The other half of the memory is for the lists of visible samples.
         let room = prepared.room_to_read(gpu);
         let bytes = settings.page_memory.min(room / 2);
-        let held = usize::try_from(bytes / slot_bytes(&shelf.bricks)).unwrap_or(usize::MAX);
+        let held = usize::try_from(bytes / slot_bytes(&brick_cache.bricks)).unwrap_or(usize::MAX);
         let Some(wanted) = choose(prepared, held) else { return Ok(None) };
         let most_runs = u64::from(targets::most_runs(gpu)).saturating_sub(prepared.other_runs());
         let most_runs = most_runs.min((room - bytes) / list_bytes(u64::from(RUN)));
         // For a resting view, the number found last time is used.
-        let mut most = prepared.shelf.as_ref().and_then(|shelf| shelf.fitting(&wanted, most_runs));
+        let mut most =
+            prepared.brick_cache.as_ref().and_then(|cache| cache.fitting(&wanted, most_runs));
         loop {
             let choice =
                 most.and_then(|most| choose(prepared, most)).unwrap_or_else(|| wanted.clone());
@@ -104,8 +105,8 @@ impl Request<'_> {
             let Listed::TooMany { runs, most: fit } =
                 prepared.update_bricks(gpu, &passes.select_bricks, view, &choice, room)?
             else {
-                if let (Some(most), Some(shelf)) = (most, &mut prepared.shelf) {
-                    shelf.set_fitting(&wanted, most_runs, most);
+                if let (Some(most), Some(brick_cache)) = (most, &mut prepared.brick_cache) {
+                    brick_cache.set_fitting(&wanted, most_runs, most);
                 }
                 return Ok(Some(choice));
             };

@@ -14,7 +14,7 @@ use crate::{
             present::{Presenter, Strip},
         },
         pipeline::{state::State, variant::Variant},
-        scene::{PreparedScene, chunk::Origin, nodes::Forest},
+        scene::{PreparedScene, chunk::Origin, nodes::PageCache},
         targets::{self, Pool, Targets},
         variant,
     },
@@ -147,14 +147,14 @@ impl PendingFrame {
         sink: Sink,
     ) -> Result<Self> {
         let stage = match detail {
-            _ if prepared.forests.is_empty() => Stage::Plan { cut_pixels: 0.0 },
+            _ if prepared.page_caches.is_empty() => Stage::Plan { cut_pixels: 0.0 },
             Detail::Pixels(pixels) => Stage::Plan { cut_pixels: pixels },
             Detail::Milliseconds(_) => Stage::Plan { cut_pixels: Detail::PIXELS },
             Detail::Splats(most) => {
                 // The pages of a cut contain several times as many nodes as it draws.
                 let nodes = most.saturating_mul(8).max(1 << 16);
-                let finest = |forest: &Forest| forest.finest_within(&view, settings, nodes);
-                let pixels = prepared.forests.iter().map(finest).fold(0.0, f64::max);
+                let finest = |cache: &PageCache| cache.finest_within(&view, settings, nodes);
+                let pixels = prepared.page_caches.iter().map(finest).fold(0.0, f64::max);
                 prepared.update_forests(&engine.gpu, &view, settings, pixels)?;
                 Stage::Tally { pixels, most }
             }
@@ -288,7 +288,7 @@ impl PendingFrame {
         engine.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
         for chunk in &prepared.chunks {
             let lattice = matches!(chunk.origin, Origin::Lattice { .. } | Origin::Bricks { .. });
-            let source = chunk.source(view, variant.isotropic && lattice, &prepared.forests);
+            let source = chunk.source(view, variant.isotropic && lattice, &prepared.page_caches);
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
         }
         self.strip = Some(Drawn { rows, variant, targets, state: State::default() });
@@ -307,7 +307,7 @@ impl PendingFrame {
         let counters = buffer(gpu, "tally", tally_bytes(), usage);
         for chunk in &prepared.chunks {
             if let Origin::Nodes { slots, .. } = &chunk.origin {
-                let source = chunk.source(&self.view, false, &prepared.forests);
+                let source = chunk.source(&self.view, false, &prepared.page_caches);
                 gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
                 let own = slots.chunk(&chunk.uniform, &chunk.data);
                 engine.passes.cut.encode_tally(gpu, encoder, &own, &counters);
@@ -450,12 +450,12 @@ impl PendingFrame {
             gathered: targets.gathered.as_ref().map_or(0, |gathered| gathered.pairs),
             gpu_bytes: prepared.bytes + targets.bytes(),
             cut_pixels: outline.cut_pixels,
-            missing_pages: prepared.forests.iter().map(|forest| forest.missing as u64).sum(),
+            missing_pages: prepared.page_caches.iter().map(|cache| cache.missing as u64).sum(),
             lambda: choice.map_or(0.0, |choice| choice.lambda),
             bricks: choice.map_or(0, |choice| choice.bricks.len() as u64),
             // Already counted for the whole picture.
             read_bricks: 0,
-            brick_bytes: prepared.shelf.as_ref().map_or(0, |shelf| shelf.bytes()),
+            brick_bytes: prepared.brick_cache.as_ref().map_or(0, |cache| cache.bytes()),
             steps: Vec::new(),
         });
         tracing::debug!(passes = state.passes, device = engine.gpu.info.name, "strip drawn");

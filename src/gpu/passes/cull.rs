@@ -13,8 +13,8 @@ use crate::gpu::{
     targets::Targets,
 };
 
-/// Number of lanes to which workgroups are dealt (`HANDS` in frame.wgsl).
-const HANDS: u32 = 16;
+/// Number of lanes to which workgroups are dealt (`LANES` in frame.wgsl).
+const LANES: u32 = 16;
 
 /// The pass.
 #[derive(Debug)]
@@ -80,7 +80,7 @@ impl Cull {
             let own = [&chunk.uniform, numbers].map(|b| b.as_entire_buffer_binding());
             let groups = [self.cull.bind(gpu, 0, &buffers), self.cull.bind(gpu, 1, &own)];
             let workgroups =
-                chunk.candidates.div_ceil(WORKGROUP_CANDIDATES).next_multiple_of(HANDS);
+                chunk.candidates.div_ceil(WORKGROUP_CANDIDATES).next_multiple_of(LANES);
             self.cull.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
             let arguments =
                 self.prepare.bind(gpu, 2, &[chunk.active_arguments.as_entire_buffer_binding()]);

@@ -13,8 +13,8 @@ use crate::gpu::{
     targets::Targets,
 };
 
-/// Number of lanes to which tiles are dealt (`HANDS` in frame.wgsl).
-const HANDS: u32 = 16;
+/// Number of lanes to which tiles are dealt (`LANES` in frame.wgsl).
+const LANES: u32 = 16;
 
 /// The pass.
 #[derive(Debug)]
@@ -60,7 +60,7 @@ impl Gather {
             ];
             let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
             let samples = self.0.bind_texture(gpu, 1, &gathered.samples);
-            self.0.dispatch(encoder, &[&group, &samples], gathered.tiles.next_multiple_of(HANDS));
+            self.0.dispatch(encoder, &[&group, &samples], gathered.tiles.next_multiple_of(LANES));
         }
     }
 }

@@ -114,7 +114,7 @@ pub enum Listed {
 
 /// The brick cache of a volume.
 #[derive(Debug)]
-pub struct Shelf {
+pub struct BrickCache {
     pub bricks: Arc<Bricks>,
     pub kernel: Kernel,
     /// Bricks read so far.
@@ -136,7 +136,7 @@ pub struct Shelf {
     update: u64,
 }
 
-impl Shelf {
+impl BrickCache {
     pub fn new(bricks: &Arc<Bricks>, kernel: &Kernel) -> Self {
         Self {
             bricks: bricks.clone(),

@@ -7,7 +7,7 @@ use crate::{
         scene::{
             bricks::Slab,
             field::kind_of,
-            nodes::{Forest, Slots},
+            nodes::{PageCache, Slots},
             select::Selection,
         },
     },
@@ -34,7 +34,7 @@ pub enum Origin {
         item: usize,
     },
     /// Slots for pages of the hierarchy with this number.
-    Nodes { forest: usize, slots: Box<Slots> },
+    Nodes { page_cache: usize, slots: Box<Slots> },
     Lattice {
         volume: Arc<Volume>,
         kernel: Kernel,
@@ -85,10 +85,10 @@ impl Chunk {
     }
 
     /// Returns the chunk's uniform for a view.
-    pub fn source(&self, view: &View, isotropic: bool, forests: &[Forest]) -> Source {
+    pub fn source(&self, view: &View, isotropic: bool, page_caches: &[PageCache]) -> Source {
         let source = match &self.origin {
-            Origin::Nodes { forest, .. } => {
-                let header = forests[*forest].hierarchy.header();
+            Origin::Nodes { page_cache, .. } => {
+                let header = page_caches[*page_cache].hierarchy.header();
                 Source::of_radiance(view, header.origin, header.extent)
             }
             Origin::Splats { set, radiance, .. } => Source::of_splats(view, set, *radiance),

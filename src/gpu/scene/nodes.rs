@@ -162,7 +162,7 @@ pub struct Growth {
 
 /// The page cache of one hierarchy.
 #[derive(Debug)]
-pub struct Forest {
+pub struct PageCache {
     pub hierarchy: Arc<Hierarchy>,
     resident: wgpu::Buffer,
     cut: wgpu::Buffer,
@@ -176,7 +176,7 @@ pub struct Forest {
     pub missing: usize,
 }
 
-impl Forest {
+impl PageCache {
     pub fn new(gpu: &Gpu, hierarchy: &Arc<Hierarchy>) -> Self {
         let pages = hierarchy.pages().len();
         Self {

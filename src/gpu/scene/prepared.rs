@@ -11,9 +11,9 @@ use crate::{
             buffers::{buffer, filled_buffer, upload},
         },
         scene::{
-            bricks::{Listed, Room, Shelf, Slab},
+            bricks::{BrickCache, Listed, Room, Slab},
             field::{Field, texture_bytes, unsuited},
-            nodes::{Forest, Growth, Slots},
+            nodes::{Growth, PageCache, Slots},
             select::{Select, Selection},
             select_bricks::SelectBricks,
         },
@@ -64,9 +64,9 @@ pub struct PreparedScene {
     /// The sets that pictures may show in levels of detail.
     levels: Vec<LevelledSet>,
     /// The hierarchies, in the scene's order.
-    pub(crate) forests: Vec<Forest>,
+    pub(crate) page_caches: Vec<PageCache>,
     /// The brick cache of the scene's volume in bricks.
-    pub(crate) shelf: Option<Shelf>,
+    pub(crate) brick_cache: Option<BrickCache>,
     /// The data to gather the scene's volume. It is made for the first picture that gathers.
     pub(crate) field: Option<Field>,
     /// Batches of candidates in all chunks.
@@ -97,8 +97,8 @@ impl PreparedScene {
             scene: scene.clone(),
             chunks: Vec::new(),
             levels: Vec::new(),
-            forests: Vec::new(),
-            shelf: None,
+            page_caches: Vec::new(),
+            brick_cache: None,
             field: None,
             runs: 0,
             bytes: 0,
@@ -117,7 +117,9 @@ impl PreparedScene {
             gpu.check_memory(prepared.bytes + bytes_of(item))?;
             match item {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true, number),
-                Item::Hierarchy(hierarchy) => prepared.forests.push(Forest::new(gpu, hierarchy)),
+                Item::Hierarchy(hierarchy) => {
+                    prepared.page_caches.push(PageCache::new(gpu, hierarchy));
+                }
                 Item::Scalar(set, _) => prepared.add_splats(gpu, set, false, number),
                 // Other volumes are uploaded when a picture first gathers or scatters them.
                 Item::Volume(volume, kernel, _) if unsuited(volume, kernel).is_some() => {
@@ -125,7 +127,7 @@ impl PreparedScene {
                 }
                 Item::Volume(..) => {}
                 Item::Bricks(bricks, kernel, _) => {
-                    prepared.shelf = Some(Shelf::new(bricks, kernel));
+                    prepared.brick_cache = Some(BrickCache::new(bricks, kernel));
                 }
             }
         }
@@ -239,7 +241,8 @@ impl PreparedScene {
         let Some(shown) = shown else { return Ok(()) };
         self.bring_lattice(gpu)?;
         for chunk in &mut self.chunks {
-            let (source, before) = (chunk.source(view, false, &self.forests), chunk.list_bytes());
+            let (source, before) =
+                (chunk.source(view, false, &self.page_caches), chunk.list_bytes());
             let Origin::Lattice { selection, .. } = &mut chunk.origin else { continue };
             if selection.is_for(&shown) {
                 continue;
@@ -267,13 +270,13 @@ impl PreparedScene {
         choice: &Choice,
         room: Room,
     ) -> Result<Listed> {
-        let Some(shelf) = &mut self.shelf else { return Ok(Listed::All) };
-        if shelf.draws(choice) {
+        let Some(brick_cache) = &mut self.brick_cache else { return Ok(Listed::All) };
+        if brick_cache.draws(choice) {
             let (runs, most) = (self.brick_runs(), room.runs);
             return Ok(if runs <= most { Listed::All } else { Listed::TooMany { runs, most } });
         }
-        let grown = shelf.update(gpu, choice, room.bytes)?;
-        let (bricks, kernel) = (shelf.bricks.clone(), shelf.kernel.clone());
+        let grown = brick_cache.update(gpu, choice, room.bytes)?;
+        let (bricks, kernel) = (brick_cache.bricks.clone(), brick_cache.kernel.clone());
         for samples in grown {
             // One chunk for each of two levels: they share the slots.
             for part in 0..2 {
@@ -306,8 +309,8 @@ impl PreparedScene {
             Origin::Bricks { slab, .. } => slab.slots.size() + chunk.list_bytes(),
             Origin::Splats { .. } | Origin::Lattice { .. } => 0,
         });
-        let slots = self.shelf.as_ref().map_or(0, Shelf::bytes);
-        let readers = self.forests.len() + usize::from(self.shelf.is_some());
+        let slots = self.brick_cache.as_ref().map_or(0, BrickCache::bytes);
+        let readers = self.page_caches.len() + usize::from(self.brick_cache.is_some());
         gpu.memory_left(self.bytes.saturating_sub(slots + held.sum::<u64>()))
             / readers.max(1) as u64
     }
@@ -326,17 +329,17 @@ impl PreparedScene {
         choice: &Choice,
         most: u64,
     ) -> Result<Listed> {
-        let Some(shelf) = &mut self.shelf else { return Ok(Listed::All) };
+        let Some(brick_cache) = &mut self.brick_cache else { return Ok(Listed::All) };
         let (mut own, mut before, mut samples, mut runs) = (Vec::new(), 0, 0, 0);
         for chunk in &mut self.chunks {
             let Origin::Bricks { slab, level, .. } = &mut chunk.origin else { continue };
             let drawn = choice.levels.get(slab.part).map(|(level, _)| *level);
             *level = drawn.unwrap_or(0);
-            let count = shelf.count(slab, drawn, &choice.shown);
+            let count = brick_cache.count(slab, drawn, &choice.shown);
             samples += u64::from(count);
             runs += u64::from(runs_of(count));
-            shelf.describe(gpu, slab, drawn);
-            let source = chunk.source(view, false, &self.forests);
+            brick_cache.describe(gpu, slab, drawn);
+            let source = chunk.source(view, false, &self.page_caches);
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
             before += chunk.list_bytes();
             let Origin::Bricks { slab, .. } = &mut chunk.origin else { continue };
@@ -354,7 +357,7 @@ impl PreparedScene {
             chunk.spans = spans(gpu, slab.count);
             self.bytes += chunk.list_bytes();
         }
-        shelf.set_drawn(choice);
+        brick_cache.set_drawn(choice);
         self.number_runs();
         Ok(Listed::All)
     }
@@ -485,24 +488,24 @@ impl PreparedScene {
         pixels: f64,
     ) -> Result<()> {
         let room = settings.page_memory.min(self.room_to_read(gpu));
-        for index in 0..self.forests.len() {
-            let cut = self.forests[index].cut(view, settings, pixels);
+        for index in 0..self.page_caches.len() {
+            let cut = self.page_caches[index].cut(view, settings, pixels);
             let own: Vec<(&Slots, &wgpu::Buffer)> = self
                 .chunks
                 .iter()
                 .filter_map(|chunk| match &chunk.origin {
-                    Origin::Nodes { forest, slots } if *forest == index => {
+                    Origin::Nodes { page_cache, slots } if *page_cache == index => {
                         Some((slots.as_ref(), &chunk.data))
                     }
                     _ => None,
                 })
                 .collect();
-            let grown = self.forests[index].update(gpu, &cut, room, &own)?;
+            let grown = self.page_caches[index].update(gpu, &cut, room, &own)?;
             for Growth { slots, splats, capacity } in grown {
                 self.bytes += slots.bytes();
                 self.push_chunk(
                     gpu,
-                    Origin::Nodes { forest: index, slots: Box::new(slots) },
+                    Origin::Nodes { page_cache: index, slots: Box::new(slots) },
                     splats,
                     capacity,
                 );
