@@ -15,10 +15,7 @@ use splatkit::{
     surface::{Mesh, SurfelOptions},
     volume::{Volume, phantoms::Phantom, reach::neighbourhood_ranges},
 };
-use std::{
-    hint::black_box,
-    path::Path,
-};
+use std::{hint::black_box, path::Path};
 
 /// Samples along each side of the volume.
 const SIDE: usize = 96;
