@@ -226,10 +226,7 @@ fn worst_inputs_stay_within_their_limits() {
             let mut number =
                 || words.next().and_then(|word| word.parse::<u64>().ok()).expect("a number");
             let (milliseconds, taken) = (number(), number());
-            let outcome = words
-                .next()
-                .unwrap_or_default()
-                .replace(&format!("{}/", folder.as_ref().display()), "");
+            let outcome = folder.without_path(words.next().unwrap_or_default());
             let (size, taken_mib) = (bytes.len() as f64 / 1048576.0, taken as f64 / 1048576.0);
             println!(
                 "{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: \
@@ -266,7 +263,7 @@ fn places_beyond_what_32_bits_count_are_found() {
     let read =
         |name: &str, limits: &Limits| match load_volume(folder.path(name), limits, Some(&layout)) {
             Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
-            Err(error) => error.to_string().replace(&format!("{}/", folder.as_ref().display()), ""),
+            Err(error) => folder.without_path(&error.to_string()),
         };
     assert_eq!(read("far.raw", &Limits::default()), "[0.0, 63.0] 63");
     assert_eq!(

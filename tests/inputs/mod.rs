@@ -23,8 +23,13 @@ impl Folder {
     pub fn outcome(&self, name: &str, limits: &Limits) -> String {
         match load(&self.path(name), limits) {
             Ok(told) => told,
-            Err(error) => error.to_string().replace(&format!("{}/", self.as_ref().display()), ""),
+            Err(error) => self.without_path(&error.to_string()),
         }
+    }
+
+    /// Returns a text without the path of the folder.
+    pub fn without_path(&self, text: &str) -> String {
+        text.replace(&format!("{}/", self.as_ref().display()), "")
     }
 }
 
