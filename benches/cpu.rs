@@ -15,10 +15,7 @@ use splatkit::{
     surface::{Mesh, SurfelOptions},
     volume::{Volume, phantoms::Phantom, reach::neighbourhood_ranges},
 };
-use std::{
-    hint::black_box,
-    path::{Path, PathBuf},
-};
+use std::{hint::black_box, path::Path};
 
 /// Samples along each side of the volume.
 const SIDE: usize = 96;
@@ -35,32 +32,18 @@ fn volume() -> Volume {
     Phantom::Specimen.sample_bytes([SIDE; 3]).expect("a volume")
 }
 
-/// A temporary file, removed when the value is dropped.
-struct File(PathBuf);
-
-impl File {
-    fn new(name: &str) -> Self {
-        Self(std::env::temp_dir().join(format!("splatkit-bench-{}-{name}", std::process::id())))
-    }
-}
-
-impl Drop for File {
-    fn drop(&mut self) {
-        std::fs::remove_file(&self.0).ok();
-    }
-}
-
 fn reading(criterion: &mut Criterion) {
     let limits = Limits::default();
-    let ply = File::new("knot.ply");
-    formats::ply::write(&mesh(), &ply.0).expect("a mesh is written");
+    let folder = tempfile::tempdir().expect("a folder");
+    let ply = folder.path().join("knot.ply");
+    formats::ply::write(&mesh(), &ply).expect("a mesh is written");
     criterion.bench_function("read a binary PLY file", |bench| {
-        bench.iter(|| formats::load_mesh(black_box(&ply.0), &limits).expect("a mesh"));
+        bench.iter(|| formats::load_mesh(black_box(&ply), &limits).expect("a mesh"));
     });
-    let raw = File::new("specimen.raw");
+    let raw = folder.path().join("specimen.raw");
     let values = volume();
     let bytes: Vec<u8> = (0..values.len()).map(|index| values.value(index) as u8).collect();
-    std::fs::write(&raw.0, bytes).expect("samples are written");
+    std::fs::write(&raw, bytes).expect("samples are written");
     let layout = RawLayout {
         dims: [SIDE; 3],
         sample_type: SampleType::U8,
@@ -70,7 +53,7 @@ fn reading(criterion: &mut Criterion) {
     };
     criterion.bench_function("read a raw volume", |bench| {
         bench.iter(|| {
-            formats::load_volume(black_box(&raw.0), &limits, Some(&layout)).expect("a volume")
+            formats::load_volume(black_box(&raw), &limits, Some(&layout)).expect("a volume")
         });
     });
 }

@@ -190,6 +190,7 @@ fn window(length: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::testing::Folder;
 
     /// A grey, opaque picture with the given values.
     fn texture(size: [usize; 2], value: impl Fn(usize, usize) -> u8) -> Vec<u8> {
@@ -286,9 +287,8 @@ mod tests {
 
     #[test]
     fn files_are_read_within_limits() {
-        let folder = std::env::temp_dir().join(format!("splatkit-compare-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        let [png, jpeg, text] = ["a.png", "a.jpg", "a.txt"].map(|name| folder.join(name));
+        let folder = Folder::new();
+        let [png, jpeg, text] = ["a.png", "a.jpg", "a.txt"].map(|name| folder.path(name));
         let color = (0..64 * 48).map(|i| [i as f32 / 3072.0, 0.5, 0.25, 1.0]).collect();
         let picture = Picture { width: 64, height: 48, color, depth: Vec::new() };
         picture.save(&png, None).unwrap();
@@ -299,7 +299,7 @@ mod tests {
         assert!(compare_files(&png, &jpeg, &limits).unwrap().psnr.unwrap() > 30.0);
         assert!(matches!(compare_files(&png, &text, &limits), Err(Error::Input { .. })));
         assert!(matches!(
-            compare_files(&folder.join("none.png"), &png, &limits),
+            compare_files(&folder.path("none.png"), &png, &limits),
             Err(Error::File { .. })
         ));
         let small = Limits { texels: 64 * 47, ..Limits::default() };
@@ -313,6 +313,5 @@ mod tests {
                 "{bytes}: {found:?}"
             );
         }
-        std::fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -2,6 +2,7 @@
 //! None causes a panic, hangs or exceeds its memory limit.
 
 mod inputs;
+mod testing;
 
 use inputs::*;
 use splatkit::{
@@ -17,6 +18,7 @@ use std::{
     },
     time::Instant,
 };
+use testing::folder::Folder;
 
 /// Time limit for reading a bad input, in seconds.
 const MOST_SECONDS: f64 = 2.0;
@@ -76,12 +78,12 @@ fn every_cut_of_every_format_is_told() {
         ("a.png", "a.obj", false),
         ("a.mtl", "a.obj", true),
     ] {
-        let bytes = std::fs::read(folder.0.join(name)).expect("a file");
+        let bytes = std::fs::read(folder.path(name)).expect("a file");
         for at in 0..bytes.len() {
             folder.write(name, &bytes[..at]);
             let context = format!("{referring} with {name} cut at {at} of {}", bytes.len());
-            match load(&folder.0.join(referring), &limits) {
-                Err(error) => refused(&folder.0.join(referring), &error, &context),
+            match load(&folder.path(referring), &limits) {
+                Err(error) => refused(&folder.path(referring), &error, &context),
                 // The last bytes of a PNG hold nothing that decoding needs.
                 Ok(told) => {
                     assert!(
@@ -146,7 +148,7 @@ fn each_bad_input_has_its_message() {
     folder.write("self.obj", "mtllib self.obj\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     folder.write("chain.mtl", "mtllib chain.mtl\nnewmtl m\nmap_Kd ../a.png\n");
     folder.write("beside.splv", "");
-    std::fs::create_dir_all(folder.0.join("folder")).expect("a folder");
+    std::fs::create_dir_all(folder.path("folder")).expect("a folder");
     let limits = Limits::default();
     let mut wrong = Vec::new();
     let mut slowest = (0.0, "");
@@ -169,7 +171,7 @@ fn each_bad_input_has_its_message() {
         if found != expected {
             wrong.push(format!("{name}\n  expected: {expected}\n  found:    {found}"));
         }
-        std::fs::remove_file(folder.0.join(name)).ok();
+        std::fs::remove_file(folder.path(name)).ok();
     }
     println!("slowest: {} in {:.3} s, of {} cases", slowest.1, slowest.0, cases().len());
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -224,8 +226,7 @@ fn worst_inputs_stay_within_their_limits() {
             let mut number =
                 || words.next().and_then(|word| word.parse::<u64>().ok()).expect("a number");
             let (milliseconds, taken) = (number(), number());
-            let outcome =
-                words.next().unwrap_or_default().replace(&format!("{}/", folder.0.display()), "");
+            let outcome = folder.without_path(words.next().unwrap_or_default());
             let (size, taken_mib) = (bytes.len() as f64 / 1048576.0, taken as f64 / 1048576.0);
             println!(
                 "{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: \
@@ -253,17 +254,16 @@ fn places_beyond_what_32_bits_count_are_found() {
     let header = (4u64 << 30) + 36;
     let samples: Vec<u8> = (0..64).collect();
     for (name, end) in [("far.raw", 64), ("far_cut.raw", 63)] {
-        let mut file = std::fs::File::create(folder.0.join(name)).expect("a file");
+        let mut file = std::fs::File::create(folder.path(name)).expect("a file");
         file.seek(SeekFrom::Start(header))
             .and_then(|_| file.write_all(&samples[..end]))
             .expect("room");
     }
     let layout = RawLayout { header, ..RAW };
     let read =
-        |name: &str, limits: &Limits| match load_volume(folder.0.join(name), limits, Some(&layout))
-        {
+        |name: &str, limits: &Limits| match load_volume(folder.path(name), limits, Some(&layout)) {
             Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
-            Err(error) => error.to_string().replace(&format!("{}/", folder.0.display()), ""),
+            Err(error) => folder.without_path(&error.to_string()),
         };
     assert_eq!(read("far.raw", &Limits::default()), "[0.0, 63.0] 63");
     assert_eq!(

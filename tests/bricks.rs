@@ -1,11 +1,12 @@
 //! Volumes in bricks. Their pictures match those of the volume, or are coarser if the view or the
 //! memory budget asks for it. No brick is read twice.
 
+mod testing;
+
 use glam::DVec3;
 use splatkit::{
     FrameStats,
     bricks::{self, Bricks, WriteOptions},
-    compare::compare_pictures,
     cpu::CpuRenderer,
     gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::Detail,
@@ -17,6 +18,7 @@ use splatkit::{
     volume::{Lattice, Samples, TransferFunction, Volume, reach::EVERYTHING},
 };
 use std::sync::Arc;
+use testing::{folder::Folder, psnr::measured};
 
 /// Spherical waves that reach the borders of a lattice of any size. Values are 0 … 200.
 fn value(dims: [usize; 3], index: usize) -> f64 {
@@ -90,10 +92,6 @@ fn draw(
     renderer.render(&mut prepared, camera, settings).expect("a picture")
 }
 
-fn decibels(a: &Picture, b: &Picture) -> f64 {
-    compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
-}
-
 fn assert_shows_something(picture: &Picture) {
     let covered = picture.color.iter().filter(|color| color[3] > 0.1).count();
     assert!(covered * 5 > picture.color.len(), "{covered} pixels");
@@ -107,8 +105,8 @@ fn the_finest_level_is_the_volume() {
     {
         let volume = volume(dims, spacing, bytes);
         let plain = Scene::new().with_volume(volume.clone(), Kernel::default(), transfer());
-        let path = std::env::temp_dir()
-            .join(format!("splatkit-bricks-{}-{bytes}.splv", std::process::id()));
+        let folder = Folder::new();
+        let path = folder.path("a.splv");
         bricks::write(&volume, &path, &WriteOptions::default(), None).expect("a file");
         let file = Arc::new(Bricks::open(&path, &Limits::default()).expect("bricks"));
         for (name, camera) in cameras(&plain) {
@@ -119,7 +117,7 @@ fn the_finest_level_is_the_volume() {
                 for (origin, bricks) in [("memory", bricks_of(&volume)), ("file", file.clone())] {
                     let (found, stats) = draw(&mut renderer, &scene(&bricks), &camera, &settings);
                     assert_eq!(stats.lambda, 0.0);
-                    let agreement = decibels(&found, &expected);
+                    let agreement = measured(&found, &expected);
                     println!(
                         "{name}, bytes: {bytes}, {origin}, occlusion: {occlusion}: {agreement:.1} \
                          dB"
@@ -131,8 +129,6 @@ fn the_finest_level_is_the_volume() {
                 }
             }
         }
-        drop(file);
-        std::fs::remove_file(&path).expect("the file");
     }
 }
 
@@ -153,7 +149,7 @@ fn thick_sheets_take_all_bricks() {
         let settings = Settings { sheet_thickness: Some(thickness), ..settings(0.0) };
         let (expected, _) = draw(&mut renderer, &plain, camera, &settings);
         let (found, stats) = renderer.render(&mut prepared, camera, &settings).expect("a picture");
-        let agreement = decibels(&found, &expected);
+        let agreement = measured(&found, &expected);
         assert!(agreement > 80.0, "{thickness}: {agreement:.1} dB");
         counts.push((stats.bricks, stats.splats));
     }
@@ -169,7 +165,7 @@ fn the_reference_draws_the_whole_volume() {
     let expected =
         reference::render(&scene(&bricks_of(&volume)), &camera, &settings).expect("a picture");
     let (found, _) = draw(&mut renderer(), &scene(&bricks_of(&volume)), &camera, &settings);
-    let agreement = decibels(&found, &expected);
+    let agreement = measured(&found, &expected);
     assert!(agreement > 50.0, "{agreement:.1} dB");
 }
 
@@ -188,7 +184,7 @@ fn budgets_are_kept_by_coarser_levels() {
         let (found, stats) = draw(&mut renderer, &scene, camera, &settings);
         assert_eq!(stats.lambda, lambda, "{count}");
         assert!(stats.brick_bytes <= count * slot, "{count}: {}", stats.brick_bytes);
-        let agreement = decibels(&found, &finest);
+        let agreement = measured(&found, &finest);
         println!("{count} bricks: {agreement:.1} dB");
         assert!(agreement > 20.0, "{count}: {agreement:.1} dB");
     }
@@ -209,7 +205,7 @@ fn budgets_are_kept_by_coarser_levels() {
     assert!(between.read_bricks > 0 && between.brick_bytes <= 16 * slot, "{between:?}");
     let (again, _) = renderer.render(&mut prepared, camera, &room).expect("a picture");
     // Bricks now lie in other slots, so sums are added in another order.
-    assert!(decibels(&again, &first) > 80.0);
+    assert!(measured(&again, &first) > 80.0);
 }
 
 #[test]
@@ -285,7 +281,7 @@ fn bricks_are_read_once() {
     prepared.set_transfer(&other).unwrap();
     let (third, stats) = frame(&mut prepared, camera);
     assert_eq!(stats.read_bricks, 0);
-    assert!(decibels(&third, &expected) > 60.0 && decibels(&third, &first) < 40.0);
+    assert!(measured(&third, &expected) > 60.0 && measured(&third, &first) < 40.0);
 }
 
 #[test]
@@ -330,7 +326,7 @@ fn processors_gather_bricks() {
                 "{name}, {dims:?}: an empty picture"
             );
             assert!(stats.gathered > 0 && stats.lambda == 0.0, "{stats:?}");
-            let agreement = decibels(&found, &whole);
+            let agreement = measured(&found, &whole);
             println!("{name}, {dims:?}: {agreement:.1} dB to the whole volume");
             assert!(agreement > 80.0, "{name}, {dims:?}: {agreement:.1} dB");
             let step = spacing.max_element() * camera.view([96, 96]).expect("a view").scale;
@@ -347,7 +343,7 @@ fn processors_gather_bricks() {
                 let (found, stats) = drawn(&bricks, &between);
                 let (scattered, _) =
                     drawn(&bricks, &Settings { evaluate: Evaluate::Scatter, ..between });
-                let agreement = decibels(&found, &scattered);
+                let agreement = measured(&found, &scattered);
                 println!(
                     "{name}, {dims:?}, level {:.2}: {agreement:.1} dB to scattering",
                     stats.lambda

@@ -2,11 +2,11 @@
 
 #[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
+mod testing;
 
 use glam::DVec3;
 use scenes::{Case, methods};
 use splatkit::{
-    compare::compare_pictures,
     cpu::CpuRenderer,
     math::Projection,
     picture::Picture,
@@ -14,14 +14,11 @@ use splatkit::{
     scene::{Classification, Item, Mode, Order, Scene},
     volume::Volume,
 };
+use testing::psnr::measured;
 
 fn drawn(case: &Case) -> Picture {
     let mut renderer = CpuRenderer::new(&case.scene).expect(case.name);
     renderer.render(&case.camera, &case.settings).expect(case.name).0
-}
-
-fn agreement(a: &Picture, b: &Picture) -> f64 {
-    compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
 }
 
 /// Asserts that both pictures of a case agree to `least` dB or better. Depths are compared where
@@ -29,7 +26,7 @@ fn agreement(a: &Picture, b: &Picture) -> f64 {
 fn assert_matches(case: &Case, least: f64) {
     let found = drawn(case);
     let truth = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
-    let psnr = agreement(&found, &truth);
+    let psnr = measured(&found, &truth);
     println!("{}: {psnr:.1} dB", case.name);
     if let Ok(folder) = std::env::var("SPLATKIT_PICTURES") {
         let folder = std::path::Path::new(&folder);

@@ -7,6 +7,7 @@
 //! sheets thinner than a splat's tails (1e-3 of its mass), and rays that end early (5e-4).
 
 mod scenes;
+mod testing;
 
 use glam::DVec3;
 use scenes::{Case, methods};
@@ -18,6 +19,7 @@ use splatkit::{
     scene::{Classification, Evaluate, Item, Mode, Optics, Order, Scene, Settings},
     volume::{Lattice, Samples, Volume},
 };
+use testing::psnr::psnr;
 
 /// Draws the case with its own settings, by which the engine usually chooses how to fill sheets.
 fn drawn(case: &Case, budget: Budget) -> Picture {
@@ -58,17 +60,6 @@ fn blobs_from_afar() {
     case.camera.position = case.camera.focal_point + 30.0 * away;
     case.camera.projection = splatkit::math::Projection::Perspective { view_angle: 1.0 };
     assert_matches(Case { name: "blobs_from_afar", ..case }, 50.0);
-}
-
-/// Peak signal-to-noise ratio of premultiplied colour and opacity, in dB.
-fn psnr(a: &Picture, b: &Picture) -> f64 {
-    assert_eq!((a.width, a.height), (b.width, b.height));
-    let squares = a
-        .color
-        .iter()
-        .zip(&b.color)
-        .flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2)));
-    -10.0 * (squares.sum::<f64>() / (4 * a.color.len()) as f64).log10()
 }
 
 /// Draws a case by the reference, and by every method that the GPU engine has for it. Asserts that

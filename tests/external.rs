@@ -1,5 +1,7 @@
 //! Hierarchies converted in regions have the same leaves as hierarchies built as a whole.
 
+mod testing;
+
 use glam::Vec3;
 use splatkit::{
     Result, formats,
@@ -13,36 +15,7 @@ use splatkit::{
     surface::{Mesh, SurfelOptions},
 };
 use std::path::{Path, PathBuf};
-
-/// A folder for one test, removed at its end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path =
-            std::env::temp_dir().join(format!("splatkit-external-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.0).unwrap();
-        let mut names: Vec<_> =
-            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).ok();
-    }
-}
+use testing::folder::Folder;
 
 /// Options with so little memory that regions are as small as possible.
 fn options() -> ExternalOptions {
@@ -162,7 +135,7 @@ fn nearly_the_same(a: &Splat, b: &Splat) -> bool {
 
 #[test]
 fn meshes_have_the_same_leaves() {
-    let folder = Folder::new("meshes");
+    let folder = Folder::new();
     // Fine enough that no edge is subdivided.
     let shared = torus(1000, 50);
     // Long edges: a lid, and a needle.
@@ -211,7 +184,7 @@ fn meshes_have_the_same_leaves() {
         ("split.ply", split, false, false),
         ("far.ply", far, true, true),
     ] {
-        std::fs::write(folder.path(name), ply(&mesh, big, double)).unwrap();
+        folder.write(name, ply(&mesh, big, double));
         let (whole, parts, converted) = both_ways(&folder, name);
         assert!(converted.regions > 10, "{name}: {}", converted.regions);
         assert_eq!(
@@ -233,14 +206,14 @@ fn meshes_have_the_same_leaves() {
 
 #[test]
 fn clouds_have_nearly_the_same_leaves() {
-    let folder = Folder::new("clouds");
+    let folder = Folder::new();
     let mut cloud = torus(600, 60);
     cloud.triangles.clear();
     // Add points at one place, and points far from all others.
     cloud.positions.extend([Vec3::new(9.0, 9.0, 9.0), Vec3::new(-9.0, 4.0, 0.0)]);
     cloud.positions.extend([cloud.positions[77]; 3]);
     cloud.colors.resize(cloud.positions.len(), [9, 8, 7, 255]);
-    std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, true)).unwrap();
+    folder.write("cloud.ply", ply(&cloud, false, true));
     let (whole, parts, converted) = both_ways(&folder, "cloud.ply");
     assert!(converted.regions > 20, "{}", converted.regions);
     assert_eq!(whole.len(), parts.len());
@@ -266,7 +239,7 @@ fn clouds_have_nearly_the_same_leaves() {
 /// the median of the whole, so their points are as wide.
 #[test]
 fn uneven_clouds_are_as_wide() {
-    let folder = Folder::new("uneven");
+    let folder = Folder::new();
     let shifted = |i: u32, edge: u32, step: f32| {
         let jitter = |salt: u32| (i.wrapping_mul(salt) >> 16 & 255) as f32 / 255.0 - 0.5;
         let [x, y] =
@@ -276,7 +249,7 @@ fn uneven_clouds_are_as_wide() {
     let mut cloud =
         Mesh { positions: (0..40_000).map(|i| shifted(i, 200, 0.01)).collect(), ..Mesh::default() };
     cloud.positions.extend((0..400).map(|i| shifted(i, 20, 1.0) + Vec3::new(5.0, 5.0, 0.0)));
-    std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, false)).unwrap();
+    folder.write("cloud.ply", ply(&cloud, false, false));
     let (whole, parts, converted) = both_ways(&folder, "cloud.ply");
     assert!(converted.regions > 10 && whole.len() == parts.len());
     let coarse = |splats: &[Splat]| {
@@ -290,13 +263,13 @@ fn uneven_clouds_are_as_wide() {
 
 #[test]
 fn crowded_clouds_are_cut_too() {
-    let folder = Folder::new("crowded");
+    let folder = Folder::new();
     let mut cloud = Mesh { positions: vec![Vec3::ONE; 20_000], ..Mesh::default() };
     cloud
         .positions
         .extend((0..5000).map(|i| Vec3::new((i % 50) as f32, (i / 50) as f32, 0.0) * 1e-5));
     cloud.positions.push(Vec3::splat(100.0));
-    std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, false)).unwrap();
+    folder.write("cloud.ply", ply(&cloud, false, false));
     let (whole, parts, converted) = both_ways(&folder, "cloud.ply");
     assert!(converted.regions > 5);
     assert_eq!(whole.len(), parts.len());
@@ -307,11 +280,11 @@ fn crowded_clouds_are_cut_too() {
 /// cause.
 #[test]
 fn points_far_off_are_told() {
-    let folder = Folder::new("far_off");
+    let folder = Folder::new();
     let positions = (0..20_000).map(|i| Vec3::new((i % 200) as f32, (i / 200) as f32, 0.0) * 1e-7);
     let far = [Vec3::splat(100.0), Vec3::splat(-100.0)];
     let cloud = Mesh { positions: positions.chain(far).collect(), ..Mesh::default() };
-    std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, false)).unwrap();
+    folder.write("cloud.ply", ply(&cloud, false, false));
     let out = folder.path("out.splk");
     let error = in_regions(&[folder.path("cloud.ply")], &out).unwrap_err().to_string();
     assert!(error.contains("cloud.ply: points: more than 8192 points lie within"), "{error}");
@@ -320,12 +293,12 @@ fn points_far_off_are_told() {
 
 #[test]
 fn several_files_become_one() {
-    let folder = Folder::new("several");
+    let folder = Folder::new();
     let near = torus(100, 30);
     let mut far = near.clone();
     far.origin = glam::DVec3::new(10.0, 20.0, 30.0);
-    std::fs::write(folder.path("a.ply"), ply(&near, false, true)).unwrap();
-    std::fs::write(folder.path("b.ply"), ply(&far, false, true)).unwrap();
+    folder.write("a.ply", ply(&near, false, true));
+    folder.write("b.ply", ply(&far, false, true));
     let out = folder.path("out.splk");
     let converted = in_regions(&[folder.path("a.ply"), folder.path("b.ply")], &out).unwrap();
     assert_eq!((converted.points, converted.closed), (6000, near.is_solid()));
@@ -339,7 +312,7 @@ fn several_files_become_one() {
 /// mesh counts as not solid.
 #[test]
 fn solid_parts_are_those_of_the_whole() {
-    let folder = Folder::new("solid");
+    let folder = Folder::new();
     let tetrahedra = |count: u32, turned: u32| {
         let mut mesh = Mesh::default();
         for i in 0..count {
@@ -363,7 +336,7 @@ fn solid_parts_are_those_of_the_whole() {
         mesh
     };
     for (mesh, is_solid) in [(tetrahedra(1000, u32::MAX), true), (tetrahedra(1000, 500), false)] {
-        std::fs::write(folder.path("a.ply"), ply(&mesh, false, false)).unwrap();
+        folder.write("a.ply", ply(&mesh, false, false));
         let (whole, parts, converted) = both_ways(&folder, "a.ply");
         assert!(converted.regions > 1 && whole.len() == parts.len());
         assert_eq!((mesh.is_closed(), converted.closed), (true, is_solid));
@@ -372,7 +345,7 @@ fn solid_parts_are_those_of_the_whole() {
 
 #[test]
 fn what_is_damaged_leaves_nothing() {
-    let folder = Folder::new("damaged");
+    let folder = Folder::new();
     let mesh = torus(200, 40);
     let whole = ply(&mesh, false, false);
     let at = |from: usize, bytes: &[u8]| {
@@ -393,7 +366,7 @@ fn what_is_damaged_leaves_nothing() {
         (lost, "refers to vertex 4294967295"),
         (endless, "is not finite"),
     ] {
-        std::fs::write(folder.path("a.ply"), bytes).unwrap();
+        folder.write("a.ply", bytes);
         let error =
             in_regions(&[folder.path("a.ply")], &folder.path("out.splk")).unwrap_err().to_string();
         assert!(error.contains(message), "{error}");
@@ -403,7 +376,7 @@ fn what_is_damaged_leaves_nothing() {
 
 #[test]
 fn points_of_surveys_keep_their_millimetres_and_colours() {
-    let folder = Folder::new("las");
+    let folder = Folder::new();
     let count = 3000u32;
     let record = |i: u32| {
         let mut record = vec![0; 26];
@@ -432,7 +405,7 @@ fn points_of_surveys_keep_their_millimetres_and_colours() {
             las[at..at + 8].copy_from_slice(&f64::to_le_bytes(value));
         }
         las.extend((0..count).flat_map(record));
-        std::fs::write(folder.path("a.las"), las).unwrap();
+        folder.write("a.las", las);
         let (whole, parts, converted) = both_ways(&folder, "a.las");
         assert!(converted.regions > 2 && converted.points == 2999);
         let same = |(a, b): (&Splat, &Splat)| (a.center, a.color) == (b.center, b.color);

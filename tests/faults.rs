@@ -1,11 +1,12 @@
 //! Faults of a device: it is lost, does not answer, or has little memory. The result is the usual
 //! picture or an error, never a part of a picture.
 
+mod testing;
+
 use glam::DVec3;
 use splatkit::{
     Error, FrameStats,
     bricks::Bricks,
-    compare::compare_pictures,
     gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
     math::{Camera, Kernel},
@@ -15,6 +16,7 @@ use splatkit::{
     volume::{Lattice, Samples, TransferFunction, Volume, phantoms::Phantom},
 };
 use std::{sync::Arc, time::Duration};
+use testing::psnr::measured;
 
 fn gpu() -> Gpu {
     Gpu::headless(&AdapterChoice::Automatic).expect("an adapter")
@@ -381,10 +383,7 @@ fn bricks_that_show_too_much_are_drawn_coarser() {
     });
     assert_eq!((all.lambda, all.bricks), (0.0, 64));
     assert!(fewer.lambda > 0.0 && fewer.bricks < 64, "{fewer:?}");
-    let agreement = compare_pictures(&fine, &coarse)
-        .expect("pictures of one size")
-        .psnr
-        .unwrap_or(f64::INFINITY);
+    let agreement = measured(&fine, &coarse);
     assert!(agreement > 25.0, "{agreement:.1} dB");
 }
 
@@ -510,11 +509,8 @@ fn memory_is_kept_to() {
                 Ok(picture) if same(&picture, &expected) => "done",
                 // Coarser bricks were drawn.
                 Ok(picture) if in_bricks => {
-                    let like = compare_pictures(&picture, &expected).expect("of one size").psnr;
-                    assert!(
-                        like.is_some_and(|decibels| decibels > 15.0),
-                        "2^{shift} bytes: {like:?} dB"
-                    );
+                    let like = measured(&picture, &expected);
+                    assert!(like > 15.0 && like.is_finite(), "2^{shift} bytes: {like:.1} dB");
                     "coarser"
                 }
                 Ok(_) => panic!("2^{shift} bytes: a different picture"),

@@ -3,11 +3,11 @@
 
 #[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
+mod testing;
 
 use glam::{DMat3, DVec3};
 use scenes::{Case, methods};
 use splatkit::{
-    compare::compare_pictures,
     cpu::CpuRenderer,
     math::Kernel,
     picture::Picture,
@@ -16,6 +16,7 @@ use splatkit::{
     volume::{Arrangement, Lattice, Samples, Volume},
 };
 use std::sync::Arc;
+use testing::psnr::measured;
 
 fn drawn(case: &Case) -> Picture {
     let settings = Settings { evaluate: Evaluate::Gather, ..case.settings.clone() };
@@ -28,10 +29,6 @@ fn drawn(case: &Case) -> Picture {
 
 fn truth(case: &Case) -> Picture {
     reference::render(&case.scene, &case.camera, &case.settings).expect(case.name)
-}
-
-fn agreement(a: &Picture, b: &Picture) -> f64 {
-    compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
 }
 
 /// The case with another kernel. Its volume is sharpened if `is_sharp`.
@@ -102,7 +99,7 @@ fn agree(cases: impl IntoIterator<Item = (String, Case)>, least: impl Fn(&str) -
     for (name, case) in cases {
         let truth = truth(&case);
         assert!(truth.color.iter().any(|pixel| pixel[3] > 0.3), "{name}: an empty picture");
-        let gathered = agreement(&drawn(&case), &truth);
+        let gathered = measured(&drawn(&case), &truth);
         let line = format!("{name}: {gathered:.1} dB");
         println!("{line}");
         if gathered < least(&name) {

@@ -1,10 +1,11 @@
 //! Trees of splats. Every tree keeps its promises, and pictures of its cuts match pictures of the
 //! splats.
 
+mod testing;
+
 use glam::{DVec3, Vec3};
 use splatkit::{
     bricks::Bricks,
-    compare::compare_pictures,
     container::Severity,
     gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{
@@ -22,6 +23,7 @@ use splatkit::{
     volume::{TransferFunction, phantoms::Phantom},
 };
 use std::{path::Path, sync::Arc};
+use testing::psnr::measured;
 
 /// A knotted tube of about `count` vertices, coloured by position.
 fn knot(count: u32) -> SplatSet {
@@ -54,10 +56,6 @@ fn renderer() -> Renderer {
 
 fn settings(pixels: f64) -> Settings {
     Settings { detail: Detail::Pixels(pixels), ..Settings::new([160, 160]) }
-}
-
-fn decibels(a: &Picture, b: &Picture) -> f64 {
-    compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
 }
 
 #[test]
@@ -145,7 +143,7 @@ fn a_hierarchy_in_a_volume() {
             };
             let truth = reference::render(&scene, &camera, &settings(1.0)).expect("draws");
             let found = renderer.render(&mut prepared, &camera, &settings(1.0)).expect("draws").0;
-            let agreement = decibels(&found, &truth);
+            let agreement = measured(&found, &truth);
             println!("{part}: {agreement:.1} dB");
             assert!(agreement > 50.0, "{part}: {agreement:.1} dB");
         }
@@ -178,7 +176,7 @@ fn a_page_that_cannot_be_read_takes_nothing_with_it() {
     let mut fresh = renderer.prepare(&scene).expect("fits");
     let truth = renderer.render(&mut fresh, &camera, &coarse).expect("draws").0;
     assert!(truth.color.iter().any(|color| color[3] > 0.5));
-    assert!(decibels(&found, &truth) > 90.0, "{:.1} dB", decibels(&found, &truth));
+    assert!(measured(&found, &truth) > 90.0, "{:.1} dB", measured(&found, &truth));
 }
 
 fn bytes(splat: &splatkit::splat::Splat) -> [u8; 48] {
@@ -300,7 +298,7 @@ fn the_engine_draws_the_cut_that_the_oracle_finds() {
                     // approximately.
                     let (expected, _) =
                         renderer.render(&mut flat, &camera, &settings).expect("a picture");
-                    let agreement = decibels(&found, &expected);
+                    let agreement = measured(&found, &expected);
                     assert!(agreement > 40.0, "{part} {pixels}: {agreement:.1} dB");
                 }
             }
@@ -320,7 +318,7 @@ fn the_engine_matches_the_reference() {
         let camera = camera(&scene.bounds(), 0.9);
         let (found, _) = renderer.render(&mut prepared, &camera, &settings).expect("a picture");
         let expected = reference::render(&scene, &camera, &settings).expect("a picture");
-        let agreement = decibels(&found, &expected);
+        let agreement = measured(&found, &expected);
         println!("{pixels}: {agreement:.1} dB");
         assert!(agreement > 50.0, "{pixels}: {agreement:.1} dB");
     }
@@ -356,7 +354,7 @@ fn coarse_cuts_have_no_holes_and_look_like_the_leaves() {
         for (pixels, least) in [(1.0, 40.0), (2.0, 30.0), (4.0, 24.0)] {
             let (cut, stats) =
                 renderer.render(&mut prepared, &camera, &settings(pixels)).expect("a picture");
-            let agreement = decibels(&cut, &leaves);
+            let agreement = measured(&cut, &leaves);
             println!(
                 "{part} {pixels}: {} of {} splats, {agreement:.1} dB",
                 stats.splats, all.splats
@@ -410,7 +408,7 @@ fn a_page_cache_of_any_size_draws_a_whole_picture() {
         let (some, stats) = draw(pages * 4096 * 96, 0.0);
         assert!(stats.missing_pages > 0 && stats.splats < set.splats.len() as u64);
         assert_eq!(holes(&all, &some), 0, "{pages} pages");
-        let agreement = decibels(&some, &all);
+        let agreement = measured(&some, &all);
         println!(
             "{pages} pages: {} missing, {} splats, {agreement:.1} dB",
             stats.missing_pages, stats.splats
@@ -449,9 +447,9 @@ fn a_view_looks_the_same_however_it_was_reached() {
         let (expected, _) = renderer.render(&mut fresh, &camera, &settings).expect("a picture");
         // The order of the splats differs, and with it the rounding of their sums.
         assert!(
-            decibels(&found, &expected) > 60.0,
+            measured(&found, &expected) > 60.0,
             "{part}: {:.1} dB",
-            decibels(&found, &expected)
+            measured(&found, &expected)
         );
     }
 }
@@ -469,7 +467,7 @@ fn a_closed_surface_looks_the_same_without_what_faces_away() {
             renderer.render(&mut prepared, &camera, &settings).expect("a picture")
         };
         let ((all, whole), (front, culled)) = (draw(false), draw(true));
-        let agreement = decibels(&front, &all);
+        let agreement = measured(&front, &all);
         println!("{pixels}: {} of {} splats, {agreement:.1} dB", culled.splats, whole.splats);
         assert!(culled.splats * 10 < whole.splats * 8);
         assert!(agreement > 40.0, "{agreement:.1} dB");
@@ -508,7 +506,7 @@ fn an_opened_surface_shows_its_back() {
         let [(expected, all), (found, drawn)] = prepared
             .each_mut()
             .map(|prepared| renderer.render(prepared, camera, &settings).expect("a picture"));
-        let agreement = decibels(&found, &expected);
+        let agreement = measured(&found, &expected);
         println!("{name}: {} of {} splats, {agreement:.1} dB", drawn.splats, all.splats);
         assert!(agreement > 40.0, "{name}: {agreement:.1} dB");
         assert_eq!(

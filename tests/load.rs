@@ -4,6 +4,8 @@
 //! The default run is short. For a long one:
 //! `SPLATKIT_LOAD_SECONDS=3600 cargo test --release --test load -- --nocapture`
 
+mod testing;
+
 use glam::DVec3;
 use splatkit::{
     bricks::{self, Bricks},
@@ -18,10 +20,11 @@ use splatkit::{
     volume::{TransferFunction, phantoms::Phantom},
 };
 use std::{
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
     time::{Duration, Instant},
 };
+use testing::folder::Folder;
 
 /// Rounds of the default run, and how many rounds differ. A round draws one scene of each kind.
 /// Each kind of scene and settings has shaders that a driver keeps. So memory settles only after
@@ -32,27 +35,6 @@ const LONG_CYCLE: u32 = 20;
 /// How much memory the last third of all rounds may hold beyond the first third, in bytes. A
 /// twentieth of the first third is allowed in addition. Allocators keep freed memory.
 const SLACK: u64 = 24 << 20;
-
-/// A temporary folder, removed when it is dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new() -> Self {
-        let path = std::env::temp_dir().join(format!("splatkit-load-{}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn files(&self) -> usize {
-        std::fs::read_dir(&self.0).unwrap().count()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
 
 /// A number below `below` that varies from round to round.
 fn varied(round: u32, salt: u32, below: u32) -> u32 {
@@ -165,7 +147,7 @@ fn nothing_grows() {
         let round = number % if end.is_some() { LONG_CYCLE } else { CYCLE };
         {
             let mut renderer = Renderer::new(&gpu);
-            for (name, scene) in scenes(round, &folder.0) {
+            for (name, scene) in scenes(round, folder.as_ref()) {
                 let mut prepared = renderer.prepare(&scene).unwrap();
                 let mut camera =
                     Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.7, -1.0), DVec3::Y, 1.2);
@@ -187,7 +169,7 @@ fn nothing_grows() {
         let own = on_the_gpu(&gpu);
         // Everything that the round created is freed.
         assert_eq!(*buffers.get_or_insert(own), own, "round {round}: buffers and bytes on the GPU");
-        assert_eq!(folder.files(), 2, "files are replaced, and nothing else is left");
+        assert_eq!(folder.names().len(), 2, "files are replaced, and nothing else is left");
         held.push(resident());
         if end.is_some() && number % 50 == 0 {
             let [mib, gpu_mib] = [resident() >> 20, own.1 >> 20];

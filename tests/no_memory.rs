@@ -4,6 +4,8 @@
 //! The allocator of this test refuses single allocations above a bound. In the second test it
 //! refuses allocations whose sum would exceed a bound.
 
+mod testing;
+
 use splatkit::{
     Error, Result,
     formats::load_mesh,
@@ -13,12 +15,13 @@ use splatkit::{
 };
 use std::{
     alloc::{GlobalAlloc, Layout, System},
-    path::{Path, PathBuf},
+    path::Path,
     sync::{
         Mutex, PoisonError,
         atomic::{AtomicUsize, Ordering::Relaxed},
     },
 };
+use testing::folder::Folder;
 
 /// The most bytes of one allocation, the most bytes of all together, and the bytes allocated now.
 static LARGEST: AtomicUsize = AtomicUsize::new(usize::MAX);
@@ -85,24 +88,6 @@ unsafe impl GlobalAlloc for Bounded {
     }
 }
 
-/// A folder for one test, removed at its end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path =
-            std::env::temp_dir().join(format!("splatkit-no-memory-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).ok();
-    }
-}
-
 /// A binary PLY file of a wavy sheet of `side`² vertices, with triangles or without.
 fn ply(side: u32, has_triangles: bool) -> Vec<u8> {
     let triangles = if has_triangles { 2 * (side - 1) * (side - 1) } else { 0 };
@@ -164,8 +149,8 @@ fn convert(input: &Path, output: &Path) -> Result<usize> {
 /// small.
 fn walk(name: &str, content: Vec<u8>, mut bound: impl FnMut(usize), first: usize) -> usize {
     let _held = BOUNDS.lock().unwrap_or_else(PoisonError::into_inner);
-    let folder = Folder::new(name);
-    let (input, output) = (folder.0.join(format!("in.{name}")), folder.0.join("out.splk"));
+    let folder = Folder::new();
+    let (input, output) = (folder.path(format!("in.{name}")), folder.path("out.splk"));
     std::fs::write(&input, content).unwrap();
     let whole = convert(&input, &output).unwrap();
     let mut refused = 0;

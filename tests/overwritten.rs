@@ -8,8 +8,8 @@
 
 #[allow(dead_code, reason = "other tests use the rest")]
 mod inputs;
+mod testing;
 
-use inputs::Folder;
 use splatkit::input::Limits;
 use std::{
     fs::File,
@@ -17,6 +17,7 @@ use std::{
     sync::atomic::{AtomicBool, Ordering::Relaxed},
     time::{Duration, Instant},
 };
+use testing::folder::Folder;
 
 /// How long each file is read, over and over.
 const TIME: Duration = Duration::from_millis(150);

@@ -2,6 +2,8 @@
 //! is refused by an error that names the problem, or drawn as the reference in double precision
 //! draws it. No picture is spoilt silently.
 
+mod testing;
+
 use glam::{DMat3, DVec3, Vec3};
 use splatkit::{
     Error, Result,
@@ -17,6 +19,7 @@ use splatkit::{
     volume::{Lattice, Samples, Shade, TransferFunction, Volume},
 };
 use std::sync::{Arc, OnceLock};
+use testing::psnr::psnr;
 
 const NOT_FINITE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 /// Numbers near both ends of the range of 32-bit floats; the last two are denormal.
@@ -146,9 +149,7 @@ fn difference(found: &Picture, expected: &Picture) -> Option<String> {
             return Some(format!("a depth of the {name} is not a number"));
         }
     }
-    let pairs = found.color.iter().flatten().zip(expected.color.iter().flatten());
-    let squares: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
-    let agreement = -10.0 * (squares / (4 * found.color.len()) as f64).log10();
+    let agreement = psnr(found, expected);
     let shown = |picture: &Picture| {
         picture.color.iter().map(|color| color[3]).sum::<f32>() / picture.color.len() as f32
     };

@@ -6,6 +6,7 @@
 
 #[path = "regressions/oracle.rs"]
 mod oracle;
+mod testing;
 
 use std::{
     fs,

@@ -1,10 +1,11 @@
 //! Dense scenes in small pictures, with thousands of splats in every pixel. They are drawn at any
 //! size. A picture that takes too long ends with an error at the time limit.
 
+mod testing;
+
 use glam::{DVec3, Vec3};
 use splatkit::{
     bricks::Bricks,
-    compare::compare_pictures,
     gpu::{AdapterChoice, Budget, Gpu, Renderer},
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
     math::{Camera, Kernel},
@@ -20,6 +21,7 @@ use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
+use testing::psnr::measured;
 
 fn gpu() -> Gpu {
     Gpu::headless(&AdapterChoice::Automatic).expect("an adapter")
@@ -64,10 +66,6 @@ fn camera(scene: &Scene, [width, height]: [u32; 2]) -> Camera {
     Camera::framing(&scene.bounds(), DVec3::new(0.2, 0.3, -1.0), DVec3::Y, aspect)
 }
 
-fn psnr(a: &Picture, b: &Picture) -> f64 {
-    compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
-}
-
 /// A tile of one sheet holds more splats than a driver adds up in one dispatch; for every kind of
 /// splat.
 #[test]
@@ -88,10 +86,10 @@ fn thousands_of_splats_in_a_pixel_agree_with_the_reference() {
                 drawn(&scene, &settings, Budget { tile_entries, ..Budget::default() })
             };
             let whole = draw(None);
-            let stopped = psnr(&draw(Some(700)), &whole);
+            let stopped = measured(&draw(Some(700)), &whole);
             let truth = reference::render(&scene, &camera(&scene, size), &settings)
                 .expect("the reference draws");
-            let agreement = psnr(&whole, &truth);
+            let agreement = measured(&whole, &truth);
             println!("{name} {size:?}: {agreement:.1} dB, with more stops {stopped:.1} dB");
             assert!(stopped > 80.0, "{name} {size:?}: {stopped:.1} dB with more stops");
             // Footprints as large as the scene, or as half the distance to it, are beyond what
@@ -121,7 +119,7 @@ fn fewer_splats_stand_for_what_is_too_fine() {
         let (again, _) = draw(Detail::default());
         let reduced =
             |picture: &Picture| picture.clone().reduced(factor).expect("a smaller picture");
-        let agreement = psnr(&reduced(&small), &reduced(&whole));
+        let agreement = measured(&reduced(&small), &reduced(&whole));
         println!("{name}: {} splats for {}, {agreement:.1} dB", few.splats, all.splats);
         assert!(few.splats * 8 < all.splats, "{name}: {} splats for {}", few.splats, all.splats);
         assert!(agreement > 35.0, "{name}: {agreement:.1} dB");

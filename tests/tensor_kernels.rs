@@ -3,11 +3,11 @@
 
 #[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
+mod testing;
 
 use glam::{DMat3, DVec3};
 use scenes::{Case, methods};
 use splatkit::{
-    compare::compare_pictures,
     cpu::CpuRenderer,
     math::{Kernel, Tensor},
     picture::Picture,
@@ -15,6 +15,7 @@ use splatkit::{
     scene::{Classification, Item, Mode, Order, Scene, Settings},
     volume::{Lattice, Reconstruction, Samples, Volume},
 };
+use testing::psnr::measured;
 
 /// The kernels, and whether the volume is sharpened.
 const KERNELS: [(Tensor, bool); 4] = [
@@ -74,7 +75,7 @@ fn agreement(case: &Case) -> f64 {
     let found = drawn(case).expect(case.name);
     let truth = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
     assert!(truth.color.iter().any(|pixel| pixel[3] > 0.3), "{}: an empty picture", case.name);
-    compare_pictures(&found, &truth).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
+    measured(&found, &truth)
 }
 
 fn agree(cases: impl Iterator<Item = Case>, least: impl Fn(&str, Tensor) -> f64) {

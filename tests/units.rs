@@ -1,6 +1,8 @@
 //! A scene shows the same picture in any unit of length or value, and wherever the zero of its
 //! values lies.
 
+mod testing;
+
 use glam::DVec3;
 use splatkit::{
     gpu::{AdapterChoice, Gpu, PreparedScene, Renderer},
@@ -141,12 +143,7 @@ fn psnr(a: &Picture, b: &Picture) -> f64 {
         a.color.iter().filter(|color| color[3] > 0.1).count() > a.color.len() / 8,
         "an empty picture"
     );
-    let squares = a
-        .color
-        .iter()
-        .zip(&b.color)
-        .flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2)));
-    -10.0 * (squares.sum::<f64>() / (4 * a.color.len()) as f64).log10()
+    testing::psnr::psnr(a, b)
 }
 
 fn settings() -> Settings {

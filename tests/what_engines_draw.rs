@@ -3,11 +3,12 @@
 //!
 //! To update the table, run `SPLATKIT_WRITE=1 cargo test --release --test what_engines_draw`.
 
+mod testing;
+
 use glam::{DMat3, DVec3};
 use splatkit::{
     Error, Result,
     bricks::Bricks,
-    compare::compare_pictures,
     cpu::CpuRenderer,
     gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{BuildOptions, Hierarchy, Tree},
@@ -26,6 +27,7 @@ use splatkit::{
     },
 };
 use std::{fmt::Write, fs, path::Path, sync::Arc};
+use testing::psnr::measured;
 
 const SIDE: usize = 12;
 const SIZE: [u32; 2] = [16, 16];
@@ -346,10 +348,7 @@ fn check_likeness(row: &Row, pictures: &[(&str, &Picture)]) {
     let truth = reference::render(scene, &row.camera, &row.settings).expect(row.name);
     assert!(truth.color.iter().any(|pixel| pixel[3] > 0.3), "{}: an empty picture", row.name);
     for (column, picture) in pictures {
-        let psnr = compare_pictures(picture, &truth)
-            .expect("pictures of one size")
-            .psnr
-            .unwrap_or(f64::INFINITY);
+        let psnr = measured(picture, &truth);
         assert!(psnr > LIKENESS, "{}, {column}: {psnr:.1} dB", row.name);
     }
 }

@@ -3,6 +3,8 @@
 
 #[path = "../../tests/regressions/oracle.rs"]
 pub mod oracle;
+#[path = "../../tests/testing/mod.rs"]
+mod testing;
 
 pub use libfuzzer_sys;
 

@@ -27,10 +27,8 @@ const OLD: &[u8] = b"what was there before";
 
 /// The names in a folder, except for inputs, whose names begin with “in.”.
 fn names(folder: &Folder) -> Vec<String> {
-    let entries = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
-    let mut names: Vec<_> = entries.map(|name| name.into_string().unwrap()).collect();
+    let mut names = folder.names();
     names.retain(|name| !name.starts_with("in."));
-    names.sort();
     names
 }
 
@@ -38,7 +36,7 @@ fn names(folder: &Folder) -> Vec<String> {
 /// Returns the number of stops.
 fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
     let folder = Folder::new();
-    let path = folder.path().join(name);
+    let path = folder.path(name);
     let (done, steps) = faults::with(None, || writer(&path));
     done.unwrap();
     let new = std::fs::read(&path).unwrap();
@@ -82,7 +80,7 @@ fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
                     left.starts_with(&format!(".{name}.")) && left.ends_with(".splatkit-part"),
                     "{told}: {left}"
                 );
-                let bytes = std::fs::read(folder.path().join(left)).unwrap();
+                let bytes = std::fs::read(folder.path(left)).unwrap();
                 assert!(bytes == new || !is_read(name, bytes), "{told}");
             }
             writer(&path).unwrap();
@@ -119,7 +117,7 @@ fn hierarchies_are_whole_or_not_there() {
 #[test]
 fn hierarchies_made_in_regions_are_whole_or_not_there() {
     let inputs = Folder::new();
-    let input = inputs.path().join("in.ply");
+    let input = inputs.path("in.ply");
     // Triangles as coarse as these would be subdivided into very many.
     ply::write(&Mesh { triangles: Vec::new(), normals: Vec::new(), ..Mesh::sphere(4) }, &input)
         .unwrap();
@@ -184,7 +182,7 @@ fn other_files_are_whole_or_not_there() {
 #[test]
 fn several_write_one_file_and_the_last_one_stays() {
     let folder = Folder::new();
-    let path = folder.path().join("a.txt");
+    let path = folder.path("a.txt");
     let mut files: Vec<AtomicFile> = (0..3).map(|_| AtomicFile::create(&path).unwrap()).collect();
     for (number, file) in files.iter_mut().enumerate() {
         write!(file, "{number}").unwrap();
@@ -202,11 +200,11 @@ fn several_write_one_file_and_the_last_one_stays() {
 #[test]
 fn what_is_there_is_left_as_it_is() {
     let folder = Folder::new();
-    std::fs::create_dir(folder.path().join("a.png")).unwrap();
+    std::fs::create_dir(folder.path("a.png")).unwrap();
     for (name, message) in
         [("a.png", "that is not a regular file"), ("none/a.png", "a.png: cannot be written")]
     {
-        let error = write(&folder.path().join(name), b"new").unwrap_err();
+        let error = write(&folder.path(name), b"new").unwrap_err();
         assert!(
             matches!(error, Error::Output { .. }) && error.to_string().contains(message),
             "{error}"
@@ -214,11 +212,11 @@ fn what_is_there_is_left_as_it_is() {
     }
     assert_eq!(names(&folder), ["a.png"]);
     // A folder and a link that have the names of leftovers.
-    let path = folder.path().join("b.txt");
-    std::fs::create_dir(folder.path().join(".b.txt.0.splatkit-part")).unwrap();
+    let path = folder.path("b.txt");
+    std::fs::create_dir(folder.path(".b.txt.0.splatkit-part")).unwrap();
     let other = folder.write("other", OLD);
     #[cfg(unix)]
-    std::os::unix::fs::symlink(&other, folder.path().join(".b.txt.1.splatkit-part")).unwrap();
+    std::os::unix::fs::symlink(&other, folder.path(".b.txt.1.splatkit-part")).unwrap();
     write(&path, b"new").unwrap();
     assert_eq!(std::fs::read(other).unwrap(), OLD);
     #[cfg(unix)]
@@ -230,7 +228,7 @@ fn what_is_there_is_left_as_it_is() {
         assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o600);
     }
     // A name too long for a suffix.
-    let long = folder.path().join(format!("{}.txt", "ö".repeat(120)));
+    let long = folder.path(format!("{}.txt", "ö".repeat(120)));
     write(&long, b"new").unwrap();
     assert_eq!(std::fs::read(&long).unwrap(), b"new");
 }
@@ -241,7 +239,7 @@ fn what_is_there_is_left_as_it_is() {
 #[test]
 fn a_new_part_is_not_taken_for_the_leftover_before_it() {
     let folder = Folder::new();
-    let path = folder.path().join("a.txt");
+    let path = folder.path("a.txt");
     let part = folder.write(".a.txt.0.splatkit-part", OLD);
     let mut is_first = true;
     let (name, wanted) = (part.clone(), path.clone());
@@ -269,8 +267,8 @@ fn a_new_part_is_not_taken_for_the_leftover_before_it() {
 #[test]
 fn a_part_that_was_replaced_is_not_used() {
     let folder = Folder::new();
-    let path = folder.path().join("a.txt");
-    let part = folder.path().join(".a.txt.0.splatkit-part");
+    let path = folder.path("a.txt");
+    let part = folder.path(".a.txt.0.splatkit-part");
     let name = part.clone();
     faults::against(
         move |moment, at| {
@@ -292,7 +290,7 @@ fn a_part_that_was_replaced_is_not_used() {
 fn a_part_that_is_replaced_while_it_is_written_is_an_error() {
     let folder = Folder::new();
     let path = folder.write("a.txt", OLD);
-    let part = folder.path().join(".a.txt.0.splatkit-part");
+    let part = folder.path(".a.txt.0.splatkit-part");
     let mut file = AtomicFile::create(&path).unwrap();
     file.write_all(b"new").unwrap();
     std::fs::remove_file(&part).unwrap();
@@ -311,7 +309,7 @@ fn nobody_reads_a_part_who_may_not_read_the_file() {
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
     let folder = Folder::new();
     let path = folder.write("a.txt", OLD);
-    let part = folder.path().join(".a.txt.0.splatkit-part");
+    let part = folder.path(".a.txt.0.splatkit-part");
     for mode in [0o600, 0o640, 0o400, 0o664] {
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
         // The permissions at creation.
@@ -341,10 +339,10 @@ fn links_stay_and_what_they_lead_to_is_written() {
     let (folder, other) = (Folder::new(), Folder::new());
     let target = other.write("target.txt", OLD);
     let [one, two, nowhere, round] =
-        ["one.txt", "two.txt", "nowhere.txt", "round.txt"].map(|name| folder.path().join(name));
+        ["one.txt", "two.txt", "nowhere.txt", "round.txt"].map(|name| folder.path(name));
     symlink(&target, &one).unwrap();
     symlink("one.txt", &two).unwrap();
-    symlink(other.path().join("none.txt"), &nowhere).unwrap();
+    symlink(other.path("none.txt"), &nowhere).unwrap();
     symlink("round.txt", &round).unwrap();
     for (link, content) in [(&one, "first"), (&two, "second")] {
         let file = AtomicFile::create(link).unwrap();
@@ -374,7 +372,7 @@ fn links_stay_and_what_they_lead_to_is_written() {
 #[test]
 fn writers_at_once_leave_a_whole_file() {
     let folder = Folder::new();
-    let path = folder.path().join("a.bin");
+    let path = folder.path("a.bin");
     std::thread::scope(|scope| {
         for writer in 0..8u8 {
             let path = &path;

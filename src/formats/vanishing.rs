@@ -51,7 +51,7 @@ fn lines(count: usize, line: impl Fn(usize) -> String) -> String {
 #[test]
 fn meshes_and_clouds() {
     let folder = Folder::new();
-    let binary = folder.path().join("a.ply");
+    let binary = folder.path("a.ply");
     ply::write(&Mesh::knot(80, 20), &binary).unwrap();
     let header =
         "element vertex 3000\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
@@ -135,7 +135,7 @@ fn volumes_and_samples() {
 #[test]
 fn streams() {
     let folder = Folder::new();
-    let path = folder.path().join("a.ply");
+    let path = folder.path("a.ply");
     for length in [0, 10_000] {
         ply::write(&Mesh::knot(80, 20), &path).unwrap();
         let limits = Limits::default();
@@ -153,7 +153,7 @@ fn streams() {
 #[test]
 fn hierarchies_and_bricks() {
     let folder = Folder::new();
-    let path = folder.path().join("a.splk");
+    let path = folder.path("a.splk");
     file::write(&tree(&surface(5000, 1)), &path, &file::WriteOptions::default()).unwrap();
     let hierarchy = Hierarchy::open(&path, &Limits::default()).unwrap();
     let pages = hierarchy.pages().len() as u32;
@@ -161,7 +161,7 @@ fn hierarchies_and_bricks() {
     cut(&path, 100);
     is_told("page", hierarchy.read_page(pages - 1));
     is_told("tree", hierarchy.read_tree());
-    let path = folder.path().join("a.splv");
+    let path = folder.path("a.splv");
     let volume = Phantom::named("ball").unwrap().sample([60, 60, 60]).unwrap();
     bricks::write(&volume, &path, &bricks::WriteOptions::default(), None).unwrap();
     let bricks = Bricks::open(&path, &Limits::default()).unwrap();

@@ -311,7 +311,7 @@ mod tests {
             Tree::build(&set, &options, None).map(drop),
             build_file(
                 &set,
-                Folder::new().path().join("a.splk"),
+                Folder::new().path("a.splk"),
                 &options,
                 &WriteOptions::default(),
                 None,

@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn references_stay_in_their_folder() {
         let folder = Folder::new();
-        let inside = folder.path().join("model");
+        let inside = folder.path("model");
         std::fs::create_dir_all(inside.join("below")).unwrap();
         let path = inside.join("a.gltf");
         for file in ["a.gltf", "b.bin", "below/c.bin", "two words.bin", "x..y.bin"] {
@@ -97,7 +97,7 @@ mod tests {
         {
             assert!(source.neighbour("buffer 0", name).is_ok(), "{name}");
         }
-        let outside = folder.path().join("outside.bin");
+        let outside = folder.path("outside.bin");
         for (reference, reason) in [
             ("../outside.bin", "leads out of the file's own folder"),
             ("below/../../outside.bin", "leads out of the file's own folder"),
@@ -134,14 +134,14 @@ mod tests {
     fn links_and_pipes_are_looked_through() {
         use std::os::unix::fs::symlink;
         let folder = Folder::new();
-        let inside = folder.path().join("model");
+        let inside = folder.path("model");
         std::fs::create_dir(&inside).unwrap();
         let path = inside.join("a.gltf");
         std::fs::write(&path, "{}").unwrap();
         std::fs::write(inside.join("b.bin"), "bytes").unwrap();
         let outside = folder.write("outside.bin", "bytes");
         symlink(&outside, inside.join("out.bin")).unwrap();
-        symlink(folder.path(), inside.join("up")).unwrap();
+        symlink(&folder, inside.join("up")).unwrap();
         symlink("b.bin", inside.join("in.bin")).unwrap();
         symlink("a.gltf", inside.join("self.bin")).unwrap();
         symlink("/dev/zero", inside.join("zero.bin")).unwrap();
@@ -171,6 +171,6 @@ mod tests {
             assert!(Source::open(&pipe, &limits).is_err());
         }
         assert!(Source::open(Path::new("/dev/zero"), &limits).is_err());
-        assert!(Source::open(folder.path(), &limits).is_err());
+        assert!(Source::open(folder.as_ref(), &limits).is_err());
     }
 }

@@ -2,44 +2,12 @@
 
 use super::{Limits, Source};
 use crate::{Error, Result};
-use std::{
-    path::{Path, PathBuf},
-    sync::atomic::{AtomicU32, Ordering},
-};
+use std::path::Path;
 
-/// A folder for one test, removed at its end.
-pub struct Folder(PathBuf);
+#[path = "../../tests/testing/folder.rs"]
+mod folder;
 
-impl Folder {
-    pub fn new() -> Self {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path =
-            std::env::temp_dir().join(format!("splatkit-test-{}-{number}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    /// Writes a file and returns its path.
-    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.join(name);
-        // Some file systems wait for the disk when a file is truncated and rewritten, but not for a
-        // new one.
-        std::fs::remove_file(&path).ok();
-        std::fs::write(&path, bytes).unwrap();
-        path
-    }
-
-    pub fn path(&self) -> &Path {
-        &self.0
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).ok();
-    }
-}
+pub use folder::Folder;
 
 /// Opens a file with the default limits and reads it.
 pub fn read_with<T>(path: &Path, read: impl Fn(&Source) -> Result<T>) -> Result<T> {

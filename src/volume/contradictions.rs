@@ -45,7 +45,7 @@ fn refused<T: Debug>(name: &str, word: &str, result: Result<T>) {
 fn refused_by_all(name: &str, word: &str, volume: &Volume) {
     let kernel = Kernel::default();
     let folder = Folder::new();
-    let path = |name: &str| folder.path().join(name);
+    let path = |name: &str| folder.path(name);
     let none = |path: &Path| assert!(!path.exists(), "{name}: a file is left");
     refused(name, word, scene(volume.clone(), kernel.clone()).validate());
     refused(name, word, body_centred(volume));

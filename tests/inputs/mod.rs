@@ -2,6 +2,7 @@
 
 pub mod crafted;
 
+use crate::testing::folder::Folder;
 use glam::Vec3;
 use splatkit::{
     Error, Result, bricks,
@@ -13,45 +14,22 @@ use splatkit::{
 };
 use std::{
     io::{Cursor, Write},
-    path::{Path, PathBuf},
-    sync::atomic::{AtomicU32, Ordering},
+    path::Path,
 };
 
-/// A folder for one test, removed at its end.
-pub struct Folder(pub PathBuf);
-
 impl Folder {
-    pub fn new() -> Self {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path =
-            std::env::temp_dir().join(format!("splatkit-inputs-{}-{number}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a folder");
-        Self(path)
-    }
-
-    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.join(name);
-        // Some file systems wait for the disk when a file is truncated and rewritten, but not for a
-        // new file.
-        std::fs::remove_file(&path).ok();
-        std::fs::write(&path, bytes).expect("a file");
-        path
-    }
-
     /// Returns a summary of what reading the file returns, or the error without the path of the
     /// folder.
     pub fn outcome(&self, name: &str, limits: &Limits) -> String {
-        match load(&self.0.join(name), limits) {
+        match load(&self.path(name), limits) {
             Ok(told) => told,
-            Err(error) => error.to_string().replace(&format!("{}/", self.0.display()), ""),
+            Err(error) => self.without_path(&error.to_string()),
         }
     }
-}
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).ok();
+    /// Returns a text without the path of the folder.
+    pub fn without_path(&self, text: &str) -> String {
+        text.replace(&format!("{}/", self.as_ref().display()), "")
     }
 }
 
@@ -374,7 +352,7 @@ pub fn splk(lossless: bool) -> Vec<u8> {
 /// Bricks of several levels; some bricks hold a single value.
 pub fn splv(folder: &Folder) -> Vec<u8> {
     let volume = Phantom::Specimen.sample_bytes([34, 5, 3]).expect("a volume");
-    let path = folder.0.join("made.splv");
+    let path = folder.path("made.splv");
     let options = bricks::WriteOptions { unit: "mm".into(), ..bricks::WriteOptions::default() };
     bricks::write(&volume, &path, &options, None).expect("a file");
     let bytes = std::fs::read(&path).expect("bytes");

@@ -7,6 +7,7 @@
 
 mod checksums;
 
+use crate::testing::folder::Folder;
 use arbitrary::{Arbitrary, Unstructured};
 use checksums::{sum_bricks, sum_hierarchy};
 use glam::{DVec3, Vec3};
@@ -28,7 +29,7 @@ use splatkit::{
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
 };
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Reads bytes as a file of one format and checks the result.
 pub type Look = fn(&[u8]);
@@ -217,32 +218,6 @@ fn cut<'a>(bytes: &'a [u8], mark: &[u8]) -> Option<(&'a [u8], &'a [u8])> {
     Some((&bytes[..at + 1], &bytes[at + mark.len()..]))
 }
 
-/// A folder that holds only the files written here.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new() -> Self {
-        let thread = format!("{:?}", std::thread::current().id());
-        let number: String = thread.chars().filter(char::is_ascii_digit).collect();
-        let path = std::env::temp_dir()
-            .join(format!("splatkit-regressions-{}-{number}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a place for temporary files");
-        Self(path)
-    }
-
-    fn write(&self, name: &str, bytes: &[u8]) -> PathBuf {
-        let path = self.0.join(name);
-        std::fs::write(&path, bytes).expect("a place for temporary files");
-        path
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).ok();
-    }
-}
-
 pub fn stl(bytes: &[u8]) {
     mesh("input.stl", bytes, formats::stl::read);
 }
@@ -403,7 +378,7 @@ pub fn regions(bytes: &[u8]) {
     let folder = Folder::new();
     let path =
         folder.write(if bytes.starts_with(b"ply") { "input.ply" } else { "input.laz" }, bytes);
-    let made = folder.0.join("made.splk");
+    let made = folder.path("made.splk");
     let limits = limits();
     let options = ExternalOptions {
         memory: 1,

@@ -213,7 +213,8 @@ mod tests {
 
     #[test]
     fn what_is_edited_meanwhile_stays() {
-        let path = std::env::temp_dir().join(format!("splatkit-report-{}.md", std::process::id()));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.md");
         let page = |before: &str, inside: &str| {
             format!(
                 "{before}\n<!-- a: written by `splatkit b --write` -->\n\n{inside}\n\
@@ -229,6 +230,5 @@ mod tests {
         std::fs::write(&path, "other").unwrap();
         assert!(block.replace(str::to_owned).is_err());
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "other");
-        std::fs::remove_file(path).unwrap();
     }
 }

@@ -10,8 +10,8 @@ fn floats(value: impl Fn(usize) -> f32) -> Vec<u8> {
     nrrd("float", &(0..4096).flat_map(|i| value(i).to_le_bytes()).collect::<Vec<_>>())
 }
 
-fn folder(name: &str) -> Folder {
-    let folder = Folder::new(name);
+fn folder() -> Folder {
+    let folder = Folder::new();
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.put("flat.nrrd", nrrd("uint8", &[7; 4096]));
     folder.put("nan.nrrd", floats(|i| if i % 100 == 7 { f32::NAN } else { i as f32 }));
@@ -308,7 +308,7 @@ const WRONG: &[(&str, i32, &str)] = &[
 
 #[test]
 fn each_wrong_input_has_its_message() {
-    let folder = folder("wrong");
+    let folder = folder();
     for (arguments, code, message) in WRONG {
         folder.run(&format!("render {arguments} -o out.png")).fails(*code, &[message]);
     }
@@ -317,7 +317,7 @@ fn each_wrong_input_has_its_message() {
 
 #[test]
 fn what_cannot_be_generated_is_told() {
-    let folder = Folder::new("generate");
+    let folder = Folder::new();
     folder.put("cloud.xyz", "1 2 3\n4 5 6\n7 8 10\n");
     for (arguments, message) in [
         ("ball -o a.nrrd --dims 18446744073709551615x1x1", "samples can be made at once"),
@@ -411,7 +411,7 @@ const OVER: &[(&str, &str, &str)] = &[
 
 #[test]
 fn each_limit_names_its_flag() {
-    let folder = folder("limits");
+    let folder = folder();
     folder.put("a.ply", PLY);
     folder.put("a.glb", glb());
     folder.put("points.csv", "x,y,z\n1,2,3\n4,5,6\n");
@@ -452,7 +452,7 @@ fn each_limit_names_its_flag() {
 #[cfg(unix)]
 #[test]
 fn pipes_devices_and_folders_are_refused() {
-    let folder = folder("pipes");
+    let folder = folder();
     std::fs::create_dir(folder.path("folder.ply")).unwrap();
     folder.run("info folder.ply").fails(3, &["folder.ply: path: is not a regular file"]);
     std::os::unix::fs::symlink("/dev/zero", folder.path("zero.ply")).unwrap();
@@ -476,7 +476,7 @@ fn pipes_devices_and_folders_are_refused() {
 
 #[test]
 fn clouds_of_every_text_draw() {
-    let folder = Folder::new("clouds");
+    let folder = Folder::new();
     let points: Vec<[usize; 3]> =
         (0..400).map(|i| [i % 20, i / 20, (i % 20) * (i / 20) / 20]).collect();
     let lines = |end: &str| {
@@ -506,7 +506,7 @@ fn clouds_of_every_text_draw() {
 
 #[test]
 fn what_is_unusual_draws() {
-    let folder = folder("unusual");
+    let folder = folder();
     for arguments in [
         // A constant volume is a faint haze.
         "flat.nrrd",
@@ -555,7 +555,7 @@ fn errors_that_nobody_reads_keep_their_code() {
     drop(child.stderr.take());
     assert_eq!(child.wait().unwrap().code(), Some(3));
     // The same holds if nobody reads the log.
-    let folder = folder("unread");
+    let folder = folder();
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_splatkit"));
     command.args(["-vv", "convert", "a.nrrd", "-o", "a.splv"]).current_dir(folder.path(""));
     let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
@@ -610,7 +610,7 @@ fn hostile_files(folder: &Folder) {
 /// The text of a file is shown, but does nothing to the terminal that shows it.
 #[test]
 fn no_text_of_a_file_commands_the_terminal() {
-    let folder = Folder::new("terminal");
+    let folder = Folder::new();
     hostile_files(&folder);
     let is_quiet = |run: &Run, what: &str| {
         let printed = run.printed();
@@ -667,7 +667,7 @@ fn no_text_of_a_file_commands_the_terminal() {
 /// files in them have a limited length.
 #[test]
 fn messages_are_whole_lines_and_not_too_long() {
-    let folder = Folder::new("lines");
+    let folder = Folder::new();
     folder.put(
         "a.gltf",
         format!(
@@ -699,7 +699,7 @@ fn messages_are_whole_lines_and_not_too_long() {
 
 #[test]
 fn points_at_one_place_draw() {
-    let folder = Folder::new("place");
+    let folder = Folder::new();
     folder.put("one.xyz", "1 2 3\n");
     folder.put("three.xyz", "1 2 3\n1 2 3\n1 2 3\n");
     folder.put("far.xyz", "1e8 2e8 3e8\n1e8 2e8 3e8\n");
@@ -727,7 +727,7 @@ fn points_at_one_place_draw() {
 
 #[test]
 fn trained_gaussians_are_told() {
-    let folder = Folder::new("gaussians");
+    let folder = Folder::new();
     folder.put("a.ply", PLY);
     folder.run("convert a.ply -o gaussians.ply").ok();
     let warning = "gaussians.ply: contains trained 3D Gaussians, whose shapes and colours are not \
@@ -747,7 +747,7 @@ fn trained_gaussians_are_told() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_fails_what_is_printed() {
-    let folder = Folder::new("full");
+    let folder = Folder::new();
     folder.put("a.ply", PLY);
     for arguments in [
         "help",
@@ -784,7 +784,7 @@ fn a_full_disk_fails_what_is_printed() {
 #[cfg(unix)]
 #[test]
 fn headers_of_two_gigabytes_are_refused_soon() {
-    let folder = Folder::new("headers");
+    let folder = Folder::new();
     for (name, start, message) in [
         (
             "a.ply",

@@ -11,7 +11,7 @@ fn bytes() -> Vec<u8> {
 
 #[test]
 fn volumes_of_any_format_become_bricks() {
-    let folder = Folder::new("bricks");
+    let folder = Folder::new();
     folder.put("a.raw", ball());
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.put("a.vti", vti());
@@ -37,7 +37,7 @@ fn volumes_of_any_format_become_bricks() {
 
 #[test]
 fn bricks_tell_what_they_hold() {
-    let folder = Folder::new("bricks-info");
+    let folder = Folder::new();
     folder.put("a.raw", bytes());
     let arguments = "convert a.raw --dims 100x40x70 --type u8 --spacing 1,2,3 -o a.splv --unit mm";
     let expected = folder.json(&format!("{arguments} --dry-run --json"));
@@ -69,7 +69,7 @@ fn bricks_tell_what_they_hold() {
 
 #[test]
 fn damaged_bricks_are_found() {
-    let folder = Folder::new("bricks-damage");
+    let folder = Folder::new();
     folder.put("a.raw", bytes());
     folder.run("convert a.raw --dims 100x40x70 --type u8 -o a.splv").ok();
     let whole = std::fs::read(folder.path("a.splv")).unwrap();
@@ -90,7 +90,7 @@ fn damaged_bricks_are_found() {
 
 #[test]
 fn what_cannot_be_cut_in_bricks_is_told() {
-    let folder = Folder::new("bricks-refused");
+    let folder = Folder::new();
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.put("a.raw", ball());
     folder.put("a.ply", PLY);
@@ -112,7 +112,7 @@ fn what_cannot_be_cut_in_bricks_is_told() {
 
 #[test]
 fn generated_bytes_come_slice_by_slice() {
-    let folder = Folder::new("bricks-generate");
+    let folder = Folder::new();
     folder.run("generate ball -o a.nrrd --dims 40x30x20 --type u8").ok();
     let told = folder.json("convert a.nrrd -o a.splv --json");
     assert_eq!((told["type"].as_str(), told["slice_by_slice"].as_bool()), (Some("u8"), Some(true)));

@@ -16,7 +16,7 @@ fn volume(folder: &Folder, name: &str) -> Volume {
 
 #[test]
 fn volumes_of_any_format_become_nrrd() {
-    let folder = Folder::new("convert");
+    let folder = Folder::new();
     folder.put("a.raw", ball());
     for input in [
         folder.put("a.vti", vti()),
@@ -39,7 +39,7 @@ fn volumes_of_any_format_become_nrrd() {
 
 #[test]
 fn body_centred_volumes_are_written_and_read() {
-    let folder = Folder::new("bcc");
+    let folder = Folder::new();
     folder.put("a.vti", vti());
     let text = folder.run("convert a.vti -o bcc.nrrd --lattice bcc").ok().stdout;
     let written = volume(&folder, "bcc.nrrd");
@@ -60,7 +60,7 @@ fn body_centred_volumes_are_written_and_read() {
 
 #[test]
 fn a_hierarchy_of_a_hierarchy_keeps_what_is_told_of_it() {
-    let folder = Folder::new("again");
+    let folder = Folder::new();
     folder.put("a.ply", PLY);
     folder.run("convert a.ply -o a.splk --up x --unit mm --lossless").ok();
     folder.run("convert a.splk -o b.splk --radius-scale 2 --lossless").ok();
@@ -91,7 +91,7 @@ fn a_hierarchy_of_a_hierarchy_keeps_what_is_told_of_it() {
 
 #[test]
 fn what_cannot_be_converted_is_told() {
-    let folder = Folder::new("refused");
+    let folder = Folder::new();
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.put("a.ply", PLY);
     folder.run("convert a.nrrd -o a.nrrd").fails(1, &["exists already", "--overwrite"]);
@@ -127,7 +127,7 @@ fn what_cannot_be_converted_is_told() {
 
 #[test]
 fn flags_are_for_some_formats() {
-    let folder = Folder::new("flags");
+    let folder = Folder::new();
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.put("a.ply", PLY);
     for (arguments, flag) in [
@@ -146,7 +146,7 @@ fn flags_are_for_some_formats() {
 
 #[test]
 fn lattices_that_cannot_be_converted() {
-    let folder = Folder::new("lattices");
+    let folder = Folder::new();
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 1\nencoding: raw\n\n";
     folder.put("flat.nrrd", [header.as_bytes(), &[1; 16]].concat());
     folder.run("convert flat.nrrd -o b.nrrd --lattice bcc").fails(2, &["4 × 4 × 1", "2 or more"]);
@@ -160,7 +160,7 @@ fn lattices_that_cannot_be_converted() {
 
 #[test]
 fn files_that_an_input_refers_to_are_not_replaced() {
-    let folder = Folder::new("away");
+    let folder = Folder::new();
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: raw\n\
         data file: data.nrrd\n";
     folder.put("away.nhdr", header);

@@ -6,7 +6,7 @@ use common::*;
 
 #[test]
 fn what_is_larger_than_the_memory_is_converted_in_regions() {
-    let folder = Folder::new("memory");
+    let folder = Folder::new();
     folder.put("a.ply", sheet(150));
     let whole = folder.json("convert a.ply -o whole.splk --json");
     let parts = folder.json("convert a.ply -o parts.splk --memory 8MiB --json");
@@ -21,7 +21,7 @@ fn what_is_larger_than_the_memory_is_converted_in_regions() {
 
 #[test]
 fn what_can_only_be_read_as_a_whole_is_told() {
-    let folder = Folder::new("as_a_whole");
+    let folder = Folder::new();
     folder.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     folder.run("convert a.obj -o a.splk --memory 100").fails(2, &["--memory allows more"]);
     folder.run("convert a.obj -o a.splk --memory much").fails(2, &["the units are KiB"]);
@@ -66,7 +66,7 @@ fn long(count: u32) -> (Vec<u8>, String) {
 /// before.
 #[test]
 fn cutting_keeps_to_the_memory() {
-    let folder = Folder::new("cutting");
+    let folder = Folder::new();
     let (ply, obj) = long(150);
     folder.put("a.ply", ply);
     folder.put("a.obj", obj);
@@ -87,7 +87,7 @@ fn cutting_keeps_to_the_memory() {
 /// An input that fits by itself need not fit beside others.
 #[test]
 fn inputs_keep_to_the_memory_together() {
-    let folder = Folder::new("together");
+    let folder = Folder::new();
     let (ply, obj) = long(10);
     for name in ["a", "b", "c"] {
         folder.put(&format!("{name}.ply"), &ply);
@@ -108,7 +108,7 @@ fn inputs_keep_to_the_memory_together() {
 
 #[test]
 fn volumes_keep_to_the_memory() {
-    let folder = Folder::new("volume_memory");
+    let folder = Folder::new();
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.run("convert a.nrrd -o packed.nrrd --memory 5000").ok();
     // The samples alone, and with the values that they are resampled from.

@@ -6,7 +6,7 @@ use common::*;
 
 #[test]
 fn phantoms_become_files() {
-    let folder = Folder::new("generate");
+    let folder = Folder::new();
     folder.run("generate ball -o ball.nrrd --dims 9x7x5").ok();
     let found = folder.json("info ball.nrrd --json");
     assert_eq!(
@@ -31,7 +31,7 @@ fn figure(table: &serde_json::Value, row: &str, column: &str) -> f64 {
 
 #[test]
 fn figures_are_measured_and_written() {
-    let folder = Folder::new("figures");
+    let folder = Folder::new();
     let marks =
         ["<!-- figures: written by `splatkit figures --write` -->", "<!-- end of figures -->"];
     folder
@@ -57,7 +57,7 @@ fn figures_are_measured_and_written() {
 /// opened: none has this name.
 #[test]
 fn wrong_inputs_and_outputs_of_figures_are_told_first() {
-    let folder = Folder::new("figures-first");
+    let folder = Folder::new();
     folder.put("a.obj", OBJ);
     folder.put("a.ply", PLY);
     folder.put("a.nrrd", nrrd("uint8", &ball()));
@@ -88,7 +88,7 @@ fn wrong_inputs_and_outputs_of_figures_are_told_first() {
 #[cfg(unix)]
 #[test]
 fn pages_that_are_no_files_are_refused() {
-    let folder = Folder::new("figures-pipe");
+    let folder = Folder::new();
     std::os::unix::fs::symlink("/dev/zero", folder.path("zero.md")).unwrap();
     let mut pages = vec!["zero.md"];
     let pipe = std::process::Command::new("mkfifo").arg(folder.path("pipe.md")).status();

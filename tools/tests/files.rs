@@ -6,7 +6,7 @@ use common::*;
 
 #[test]
 fn info_tells_what_a_file_holds() {
-    let folder = Folder::new("info");
+    let folder = Folder::new();
     let mesh = folder.json(&format!("info {} --json", folder.put("a.ply", PLY)));
     assert_eq!(
         (mesh["kind"].as_str(), mesh["count"].as_u64(), mesh["triangles"].as_u64()),
@@ -52,7 +52,7 @@ fn info_tells_what_a_file_holds() {
 
 #[test]
 fn texts_of_files_do_not_command_the_terminal() {
-    let folder = Folder::new("escape");
+    let folder = Folder::new();
     folder.put("a.ply", PLY);
     folder.run_with(&["convert", "a.ply", "-o", "a.splk", "--unit", "\u{1b}[31m"]).ok();
     let told = folder.run("info a.splk").stdout();
@@ -61,7 +61,7 @@ fn texts_of_files_do_not_command_the_terminal() {
 
 #[test]
 fn scattered_samples_are_told_from_clouds_and_volumes() {
-    let folder = Folder::new("samples");
+    let folder = Folder::new();
     let ply = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n\
         property float z\nproperty float p\nproperty float q\nproperty float radius\nend_header\n\
         0 0 0 1 5 1\n1 0 0 2 6 1\n";
@@ -103,7 +103,7 @@ fn scattered_samples_are_told_from_clouds_and_volumes() {
 /// The files that a model refers to are inputs as well, under any of their names.
 #[test]
 fn pictures_do_not_replace_what_the_scene_is_read_from() {
-    let folder = Folder::new("replaced");
+    let folder = Folder::new();
     let text = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n\
         f 1/1 2/2 3/3\n";
     folder.put("a.obj", text);
@@ -142,7 +142,7 @@ fn pictures_do_not_replace_what_the_scene_is_read_from() {
 
 #[test]
 fn bad_inputs_are_named() {
-    let folder = Folder::new("bad");
+    let folder = Folder::new();
     let cut = |bytes: &[u8]| bytes[..bytes.len() * 3 / 4].to_vec();
     let nan: Vec<u8> =
         (0..4096).flat_map(|i| (if i == 7 { f32::NAN } else { 1.0 }).to_le_bytes()).collect();
@@ -192,7 +192,7 @@ fn bad_inputs_are_named() {
 
 #[test]
 fn pictures_are_compared() {
-    let folder = Folder::new("compare");
+    let folder = Folder::new();
     let picture = |name: &str, size: u32, value: f32| {
         let color = vec![[value, value, value, 1.0]; (size * size) as usize];
         let picture =
@@ -221,7 +221,7 @@ fn pictures_are_compared() {
 
 #[test]
 fn the_cpu_engine_needs_no_adapter() {
-    let folder = Folder::new("cpu");
+    let folder = Folder::new();
     folder.put("a.ply", PLY);
     folder.run("render a.ply -o a.png --engine cpu --size 64x48").ok();
     let found = folder.json("bench a.ply --engine cpu --size 64x48 --frames 1 --threads 1 --json");
@@ -234,7 +234,7 @@ fn the_cpu_engine_needs_no_adapter() {
 
 #[test]
 fn wrong_usage_is_told() {
-    let folder = Folder::new("usage");
+    let folder = Folder::new();
     for arguments in [
         "",
         "paint",
@@ -264,13 +264,13 @@ fn wrong_usage_is_told() {
 #[test]
 fn names_that_are_no_text_are_told() {
     use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
-    let folder = Folder::new("no-text");
+    let folder = Folder::new();
     for (name, bytes) in [
         (&b"\xff.ply"[..], PLY.into()),
         (b"\xff.nrrd", nrrd("uint8", &ball())),
         (b"s\xff.ply", sheet(300)),
     ] {
-        std::fs::write(folder.0.join(OsStr::from_bytes(name)), bytes).unwrap();
+        std::fs::write(folder.path(OsStr::from_bytes(name)), bytes).unwrap();
     }
     for (arguments, told) in [
         (&b"info \xff.ply"[..], "\u{fffd}.ply"),
@@ -291,12 +291,12 @@ fn names_that_are_no_text_are_told() {
     folder
         .run_with(&turntable.split(|byte| *byte == b' ').map(OsStr::from_bytes).collect::<Vec<_>>())
         .ok();
-    assert!(folder.0.join(OsStr::from_bytes(b"t\xff_0001.png")).exists());
+    assert!(folder.path(OsStr::from_bytes(b"t\xff_0001.png")).exists());
 }
 
 #[test]
 fn formats_are_listed() {
-    let folder = Folder::new("formats");
+    let folder = Folder::new();
     let list = folder.json("formats --json");
     let text = folder.run("formats").stdout();
     let named = |name: &str| {

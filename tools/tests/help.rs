@@ -15,7 +15,7 @@ fn tasks(folder: &Folder) -> Vec<String> {
 
 #[test]
 fn every_shell_gets_a_script_with_tasks_and_flags() {
-    let folder = Folder::new("completions");
+    let folder = Folder::new();
     let tasks = tasks(&folder);
     assert!(tasks.iter().any(|task| task == "render"), "{tasks:?}");
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
@@ -34,13 +34,13 @@ fn every_shell_gets_a_script_with_tasks_and_flags() {
 #[cfg(unix)]
 #[test]
 fn bash_completes_a_flag() {
-    let folder = Folder::new("bash");
+    let folder = Folder::new();
     folder.put("script", folder.run("completions bash").ok().stdout);
     let commands = "source ./script; COMP_WORDS=(splatkit render --gpu-m); COMP_CWORD=2; \
         _splatkit splatkit --gpu-m render; echo \"${COMPREPLY[@]}\"";
     let bash = std::process::Command::new("bash")
         .args(["--norc", "-c", commands])
-        .current_dir(&folder.0)
+        .current_dir(&folder)
         .output();
     let Ok(output) = bash else { return };
     let (out, errors) = [&output.stdout, &output.stderr].map(|b| String::from_utf8_lossy(b)).into();
@@ -49,7 +49,7 @@ fn bash_completes_a_flag() {
 
 #[test]
 fn manual_pages_are_written_like_other_files() {
-    let folder = Folder::new("man");
+    let folder = Folder::new();
     folder.run("man pages/man1").ok();
     let read = |name: &str| std::fs::read_to_string(folder.path("pages/man1").join(name)).unwrap();
     let main = read("splatkit.1");

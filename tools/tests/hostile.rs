@@ -59,7 +59,7 @@ fn with_far_vertex(x: f32) -> Vec<u8> {
 
 #[test]
 fn texture_coordinates_do_not_keep_it_busy() {
-    let folder = Folder::new("texture");
+    let folder = Folder::new();
     for [coordinates, told] in
         [["inf 0.5", "[inf"], ["nan 0.5", "[NaN"], ["0.5 -1e39", "inf]"], ["1e400 0", "[inf"]]
     {
@@ -93,7 +93,7 @@ fn texture_coordinates_do_not_keep_it_busy() {
 
 #[test]
 fn a_far_vertex_is_named_at_once() {
-    let folder = Folder::new("far");
+    let folder = Folder::new();
     for x in [1e13, 1e15, 1e17] {
         folder.put("a.ply", with_far_vertex(x));
         let begin = Instant::now();
@@ -113,7 +113,7 @@ fn a_far_vertex_is_named_at_once() {
 /// after reading.
 #[test]
 fn seconds_are_limited_after_reading() {
-    let folder = Folder::new("seconds");
+    let folder = Folder::new();
     textured(&folder, "fine.obj", 300, "0.5 0.5");
     let fine = std::fs::read_to_string(folder.path("fine.obj")).unwrap().replace("\nvt ", "\nvt 9");
     folder.put("fine.obj", fine);
@@ -146,18 +146,18 @@ fn seconds_are_limited_after_reading() {
 /// of them.
 #[test]
 fn two_commands_write_one_file() {
-    let folder = Folder::new("two");
+    let folder = Folder::new();
     folder.put("a.ply", sheet(60));
     folder.put("b.ply", sheet(90));
     let whole = ["a", "b"].map(|name| {
         folder.run(&format!("convert {name}.ply -o {name}.splk")).ok();
-        std::fs::read(folder.path(&format!("{name}.splk"))).unwrap()
+        std::fs::read(folder.path(format!("{name}.splk"))).unwrap()
     });
     let start = |name: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
         command
             .args(["convert", &format!("{name}.ply"), "--overwrite", "-o", "out.splk"])
-            .current_dir(&folder.0);
+            .current_dir(&folder);
         command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
     };
     for round in 0..12 {
@@ -176,16 +176,14 @@ fn two_commands_write_one_file() {
         // The file contains its source's name, so the results of a and b differ.
         assert!(whole.contains(&found), "round {round}: neither of them");
     }
-    let names = std::fs::read_dir(&folder.0)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let left: Vec<_> = names.filter(|name| name.ends_with("part")).collect();
+    let mut left = folder.names();
+    left.retain(|name| name.ends_with("part"));
     assert_eq!(left, [""; 0]);
 }
 
 #[test]
 fn links_and_permissions_stay() {
-    let folder = Folder::new("links");
+    let folder = Folder::new();
     folder.put("a.ply", PLY);
     std::fs::create_dir(folder.path("other")).unwrap();
     folder.put("other/real.splk", "old");
@@ -211,7 +209,7 @@ fn run_by(folder: &Folder, before: &str, arguments: &str) -> Output {
     let script = format!("{before} '{}' {arguments}", env!("CARGO_BIN_EXE_splatkit"));
     Command::new("sh")
         .args(["-c", &script])
-        .current_dir(&folder.0)
+        .current_dir(folder)
         .env("NO_COLOR", "1")
         .output()
         .unwrap()
@@ -219,7 +217,7 @@ fn run_by(folder: &Folder, before: &str, arguments: &str) -> Output {
 
 #[test]
 fn without_threads_one_does_the_work() {
-    let folder = Folder::new("threads");
+    let folder = Folder::new();
     folder.put("a.ply", sheet(60));
     folder.run("convert a.ply -o a.splk").ok();
     let whole = std::fs::read(folder.path("a.splk")).unwrap();
@@ -232,7 +230,7 @@ fn without_threads_one_does_the_work() {
         .status
         .success()
     {
-        std::fs::set_permissions(&folder.0, std::fs::Permissions::from_mode(0o777)).unwrap();
+        std::fs::set_permissions(&folder, std::fs::Permissions::from_mode(0o777)).unwrap();
         cases.push(limited);
     }
     for case in cases {

@@ -22,8 +22,8 @@ const CONVERSIONS: [[&str; 2]; 5] = [
     ["a.nrrd", "d.nrrd"],
 ];
 
-fn folder(name: &str) -> Folder {
-    let folder = Folder::new(name);
+fn folder() -> Folder {
+    let folder = Folder::new();
     folder.put("a.ply", sheet(90));
     let samples: Vec<u8> = (0..64usize * 64 * 64).map(|i| (i * i / 77) as u8).collect();
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 64 64 64\nencoding: raw\n\n";
@@ -33,14 +33,14 @@ fn folder(name: &str) -> Folder {
 
 /// Returns what is in a folder besides the inputs and one output.
 fn left(folder: &Folder, output: &str) -> Vec<String> {
-    let entries = std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name());
-    let names = entries.map(|name| name.into_string().unwrap());
-    names.filter(|name| !["a.ply", "a.nrrd", output].contains(&&**name)).collect()
+    let mut names = folder.names();
+    names.retain(|name| !["a.ply", "a.nrrd", output].contains(&&**name));
+    names
 }
 
 fn start(folder: &Folder, arguments: &str) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
-    command.args(arguments.split_whitespace()).current_dir(&folder.0);
+    command.args(arguments.split_whitespace()).current_dir(folder);
     command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
@@ -58,7 +58,7 @@ fn stop(
     stop: impl Fn(u32, &mut Child),
     check: impl Fn(ExitStatus, &[String], &Folder, &str),
 ) -> [u32; 2] {
-    let folder = folder(name);
+    let folder = folder();
     let (mut stopped, mut finished) = (0, 0);
     for [input, output] in CONVERSIONS {
         let arguments = format!("convert {input} --overwrite -o {output}");
@@ -124,9 +124,9 @@ fn who_is_killed_leaves_the_old_file_or_the_new_one() {
             // A leftover cannot be mistaken: it is a file with all its checksums, or `check`
             // refuses it.
             if file.ends_with(".splk") || file.ends_with(".splv") {
-                std::fs::copy(folder.path(name), folder.path(&format!("copy.{file}"))).unwrap();
+                std::fs::copy(folder.path(name), folder.path(format!("copy.{file}"))).unwrap();
                 let code = folder.run(&format!("check copy.{file}")).code();
-                std::fs::remove_file(folder.path(&format!("copy.{file}"))).unwrap();
+                std::fs::remove_file(folder.path(format!("copy.{file}"))).unwrap();
                 assert!([Some(0), Some(3)].contains(&code), "{name}: {code:?}");
             }
         }
@@ -151,7 +151,7 @@ fn who_is_interrupted_leaves_nothing() {
 
 #[test]
 fn who_is_interrupted_while_drawing_ends_at_once() {
-    let folder = folder("drawing");
+    let folder = folder();
     let arguments = "render a.nrrd -o a.png --overwrite --size 640x480";
     let begin = Instant::now();
     folder.run(arguments).ok();
@@ -179,13 +179,13 @@ fn who_is_interrupted_while_drawing_ends_at_once() {
 fn with_room_for(folder: &Folder, blocks: u64, arguments: &str) -> (Option<i32>, String) {
     let command = env!("CARGO_BIN_EXE_splatkit");
     let script = format!("ulimit -f {blocks}; exec '{command}' {arguments}");
-    let output = Command::new("sh").args(["-c", &script]).current_dir(&folder.0).output().unwrap();
+    let output = Command::new("sh").args(["-c", &script]).current_dir(folder).output().unwrap();
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
 #[test]
 fn who_finds_no_room_says_so() {
-    let folder = folder("full");
+    let folder = folder();
     for [input, output] in CONVERSIONS {
         let arguments = format!("convert {input} --overwrite -o {output}");
         let file = output.split(' ').next().unwrap();
@@ -210,7 +210,7 @@ fn who_finds_no_room_says_so() {
 #[cfg(target_os = "linux")]
 #[test]
 fn who_finds_no_memory_says_so_or_ends() {
-    let folder = folder("memory");
+    let folder = folder();
     // If the driver finds no memory, `--engine auto` would draw with the other engine.
     let arguments = "render a.nrrd --overwrite -o a.png --size 320x240 --engine gpu";
     folder.run(arguments).ok();
@@ -222,7 +222,7 @@ fn who_finds_no_memory_says_so_or_ends() {
         let kibibytes = mebibytes << 10;
         let script = format!("ulimit -v {kibibytes}; exec timeout 100 '{command}' {arguments}");
         let output =
-            Command::new("sh").args(["-c", &script]).current_dir(&folder.0).output().unwrap();
+            Command::new("sh").args(["-c", &script]).current_dir(&folder).output().unwrap();
         let code = output.status.code();
         let told = String::from_utf8_lossy(&output.stderr);
         let picture = std::fs::read(folder.path("a.png")).ok();
@@ -246,10 +246,12 @@ fn who_finds_no_memory_says_so_or_ends() {
 
 #[test]
 fn where_nothing_can_be_written_it_is_told() {
-    let folder = folder("nowhere");
+    let folder = folder();
     std::fs::create_dir(folder.path("folder.splk")).unwrap();
-    let own =
-        format!("a.nrrd -o ../{}/a.nrrd --overwrite", folder.0.file_name().unwrap().display());
+    let own = format!(
+        "a.nrrd -o ../{}/a.nrrd --overwrite",
+        folder.as_ref().file_name().unwrap().display()
+    );
     for (arguments, told) in [
         ("a.ply -o none/a.splk", ["none/a.splk", "make the folder first"]),
         ("a.ply -o folder.splk --overwrite", ["folder.splk", "is a folder"]),
@@ -278,7 +280,7 @@ fn where_nothing_can_be_written_it_is_told() {
 
 #[test]
 fn inputs_that_are_cut_meanwhile_are_told() {
-    let folder = Folder::new("cut_meanwhile");
+    let folder = Folder::new();
     let mesh = sheet(300);
     let samples = vec![7; 128 * 128 * 128];
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 128\nencoding: raw\n\n";
@@ -305,7 +307,7 @@ fn inputs_that_are_cut_meanwhile_are_told() {
             let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
             command
                 .args(arguments.split(' '))
-                .current_dir(&folder.0)
+                .current_dir(&folder)
                 .stdout(Stdio::null())
                 .stderr(Stdio::piped());
             let child = command.spawn().unwrap();

@@ -30,7 +30,7 @@ fn is_whole(case: &Value) -> bool {
 
 #[test]
 fn the_suite_measures_growth() {
-    let folder = Folder::new("suite");
+    let folder = Folder::new();
     folder.put(
         "page.md",
         "a\n<!-- suite: written by `splatkit bench --suite --write` -->\n### other\n\nkept\n\
@@ -79,7 +79,7 @@ fn the_suite_measures_growth() {
 
 #[test]
 fn tables_with_failed_cases_are_not_written() {
-    let folder = Folder::new("suite-lost");
+    let folder = Folder::new();
     let page =
         "<!-- suite: written by `splatkit bench --suite --write` -->\nold\n<!-- end of suite -->\n";
     folder.put("page.md", page);
@@ -100,7 +100,7 @@ fn tables_with_failed_cases_are_not_written() {
 
 #[test]
 fn the_classic_table_takes_files() {
-    let folder = Folder::new("suite-data");
+    let folder = Folder::new();
     folder.put("aneurism.nrrd", nrrd("uint8", &ball()));
     folder.put("foot.nrrd", "no volume");
     let run = folder
@@ -118,7 +118,7 @@ fn the_classic_table_takes_files() {
 
 #[test]
 fn the_suite_takes_no_scene() {
-    let folder = Folder::new("suite-flags");
+    let folder = Folder::new();
     folder.put("a.obj", OBJ);
     for other in [
         "a.obj",

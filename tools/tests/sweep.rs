@@ -6,7 +6,7 @@ use common::*;
 
 #[test]
 fn the_sweep_compares_neighbours() {
-    let folder = Folder::new("sweep");
+    let folder = Folder::new();
     let page = "a\n<!-- sweep: written by `splatkit bench --sweep --write` -->\n\
         <!-- end of sweep -->\nb\n";
     folder.put("page.md", page);

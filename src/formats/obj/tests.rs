@@ -152,10 +152,7 @@ fn materials_and_pictures() {
     assert_eq!(mesh.uvs[mesh.triangles[1][1] as usize], Vec2::new(1.0, 0.0));
     assert_eq!(mesh.uvs.len(), mesh.positions.len());
     let limits = Limits { texels: 1, ..Limits::default() };
-    assert!(matches!(
-        load_mesh(folder.path().join("a.obj"), &limits),
-        Err(Error::Limit { found: 2, .. })
-    ));
+    assert!(matches!(load_mesh(folder.path("a.obj"), &limits), Err(Error::Limit { found: 2, .. })));
 }
 
 /// Only `d` is part of the format; `Tr` has two meanings.

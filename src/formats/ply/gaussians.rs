@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn gaussians_are_the_splats() {
         let folder = Folder::new();
-        let path = folder.path().join("scene.ply");
+        let path = folder.path("scene.ply");
         let set = Mesh::sphere(2).surfels(&Default::default()).unwrap();
         write_gaussians(&set, &path).unwrap();
         let bytes = std::fs::read(&path).unwrap();
@@ -143,7 +143,7 @@ mod tests {
         let folder = Folder::new();
         let mut set = Mesh::sphere(1).surfels(&Default::default()).unwrap();
         set.payload = Payload::Scalar;
-        let path = folder.path().join("samples.ply");
+        let path = folder.path("samples.ply");
         assert!(matches!(write_gaussians(&set, &path), Err(Error::Argument(_))));
         assert!(!path.exists());
     }

@@ -255,8 +255,8 @@ fn colors_of_wider_types_may_be_bytes() {
 fn texture_coordinates_of_corners() {
     let folder = Folder::new();
     let dot = |color| image::RgbaImage::from_pixel(1, 1, image::Rgba(color));
-    dot([255, 0, 0, 255]).save(folder.path().join("a.png")).expect("a picture");
-    dot([0, 255, 0, 255]).save(folder.path().join("b.png")).expect("a picture");
+    dot([255, 0, 0, 255]).save(folder.path("a.png")).expect("a picture");
+    dot([0, 255, 0, 255]).save(folder.path("b.png")).expect("a picture");
     let file = |faces: &str| {
         let text = format!(
             "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement \

@@ -2,39 +2,21 @@
 
 #![allow(dead_code, reason = "each test file uses only a part")]
 
+#[path = "../../../tests/testing/folder.rs"]
+mod folder;
+
+pub use folder::Folder;
+
 use std::{
     ffi::OsStr,
     path::{Path, PathBuf},
     process::{Command, Output},
 };
 
-/// A folder for one test, removed at its end.
-pub struct Folder(pub PathBuf);
-
 impl Folder {
-    pub fn new(name: &str) -> Self {
-        let path =
-            std::env::temp_dir().join(format!("splatkit-command-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-
-    /// Returns the names of all files in the folder, sorted.
-    pub fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.0).unwrap();
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-
     /// Writes an input and returns its name.
     pub fn put<'a>(&self, name: &'a str, bytes: impl AsRef<[u8]>) -> &'a str {
-        std::fs::write(self.path(name), bytes).unwrap();
+        self.write(name, bytes);
         name
     }
 
@@ -47,7 +29,7 @@ impl Folder {
         let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
         let output = command
             .args(arguments)
-            .current_dir(&self.0)
+            .current_dir(self)
             .env("NO_COLOR", "1")
             .env_remove("RUST_LOG")
             .output();
@@ -59,12 +41,6 @@ impl Folder {
     /// Runs a command that must succeed, with a JSON result.
     pub fn json(&self, arguments: &str) -> serde_json::Value {
         serde_json::from_slice(&self.run(arguments).ok().stdout).unwrap()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).ok();
     }
 }
 

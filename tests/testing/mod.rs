@@ -1,0 +1,6 @@
+//! Helpers that several integration tests share.
+
+#![allow(dead_code, reason = "each test file uses only a part")]
+
+pub mod folder;
+pub mod psnr;
