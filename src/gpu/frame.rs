@@ -15,7 +15,6 @@ use crate::gpu::{
     scene::{PreparedScene, chunk::Origin, select::Select, select_bricks::SelectBricks},
     targets::Targets,
 };
-use std::sync::Arc;
 
 /// The pipelines of a variant: those that scatter splats, and the one that gathers a lattice.
 #[derive(Debug)]
@@ -68,7 +67,7 @@ pub struct Passes {
     pub select: Select,
     pub select_bricks: SelectBricks,
     pub cut: Cut,
-    scan: Arc<Scan>,
+    scan: Scan,
     clear: Clear,
     resume: Resume,
     tiles: Tiles,
@@ -76,7 +75,7 @@ pub struct Passes {
 
 impl Passes {
     pub fn new(gpu: &Gpu) -> Self {
-        let scan = Arc::new(Scan::new(gpu));
+        let scan = Scan::new(gpu);
         Self {
             select: Select::new(gpu, &scan),
             select_bricks: SelectBricks::new(gpu, &scan),

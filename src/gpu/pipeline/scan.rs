@@ -18,8 +18,8 @@ pub const SCAN_CAPACITY: u32 = 1 << 24;
 /// Numbers per invocation (`SEGMENT` in scan.wgsl).
 const SEGMENT: u32 = 64;
 
-/// The pass, with a buffer for the sums of its segments.
-#[derive(Debug)]
+/// The pass, with a buffer for the sums of its segments, which its clones share.
+#[derive(Debug, Clone)]
 pub struct Scan {
     sum: Stage,
     spine: Stage,

@@ -4,7 +4,7 @@ use super::recipe::{Binding, Recipe};
 use crate::gpu::device::Gpu;
 
 /// A compute pipeline and the layouts of its bind groups.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Stage {
     label: String,
     pipeline: wgpu::ComputePipeline,

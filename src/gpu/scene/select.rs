@@ -18,7 +18,6 @@ use crate::{
     },
     parallel::prelude::*,
 };
-use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
 /// Samples along each side of the block that an invocation handles (`SIDE` in select.wgsl).
@@ -81,11 +80,11 @@ impl Selection {
 pub struct Select {
     count: Stage,
     write: Stage,
-    scan: Arc<Scan>,
+    scan: Scan,
 }
 
 impl Select {
-    pub fn new(gpu: &Gpu, scan: &Arc<Scan>) -> Self {
+    pub fn new(gpu: &Gpu, scan: &Scan) -> Self {
         let [count, write] = Stage::all(gpu, Self::recipes());
         Self { count, write, scan: scan.clone() }
     }

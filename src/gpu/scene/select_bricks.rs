@@ -14,7 +14,6 @@ use crate::gpu::{
         stage::Stage,
     },
 };
-use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
 /// The pass.
@@ -22,11 +21,11 @@ use wgpu::BufferUsages as Usage;
 pub struct SelectBricks {
     count: Stage,
     write: Stage,
-    scan: Arc<Scan>,
+    scan: Scan,
 }
 
 impl SelectBricks {
-    pub fn new(gpu: &Gpu, scan: &Arc<Scan>) -> Self {
+    pub fn new(gpu: &Gpu, scan: &Scan) -> Self {
         let [count, write] = Stage::all(gpu, Self::recipes());
         Self { count, write, scan: scan.clone() }
     }
