@@ -4,7 +4,7 @@
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use splatkit::{
-    formats::{self, Endian, RawLayout, SampleType},
+    formats::{self, Endian, RawLayout, ReadOptions, SampleType},
     hierarchy::{
         BuildOptions, Hierarchy, Tree,
         file::{WriteOptions, to_bytes},
@@ -38,7 +38,9 @@ fn reading(criterion: &mut Criterion) {
     let ply = folder.path().join("knot.ply");
     formats::ply::write(&mesh(), &ply).expect("a mesh is written");
     criterion.bench_function("read a binary PLY file", |bench| {
-        bench.iter(|| formats::load_mesh(black_box(&ply), &limits).expect("a mesh"));
+        bench.iter(|| {
+            formats::load_mesh(black_box(&ply), &limits, &ReadOptions::default()).expect("a mesh")
+        });
     });
     let raw = folder.path().join("specimen.raw");
     let values = volume();
@@ -53,7 +55,8 @@ fn reading(criterion: &mut Criterion) {
     };
     criterion.bench_function("read a raw volume", |bench| {
         bench.iter(|| {
-            formats::load_volume(black_box(&raw), &limits, Some(&layout)).expect("a volume")
+            formats::load_volume(black_box(&raw), &limits, &ReadOptions::raw(Some(&layout)))
+                .expect("a volume")
         });
     });
 }

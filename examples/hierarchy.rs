@@ -15,7 +15,7 @@ use splatkit::{
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let limits = Limits::default();
     let mesh = match std::env::args().nth(1) {
-        Some(path) => formats::load_mesh(path, &limits)?,
+        Some(path) => formats::load_mesh(path, &limits, &formats::ReadOptions::default())?,
         None => Mesh::knot(1000, 100),
     };
     let surfels = mesh.surfels(&SurfelOptions::default())?;

@@ -13,7 +13,9 @@ use splatkit::{
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mesh = match std::env::args().nth(1) {
         // PLY, OBJ, glTF, STL, … by their contents, not their names.
-        Some(path) => formats::load_mesh(path, &Limits::default())?,
+        Some(path) => {
+            formats::load_mesh(path, &Limits::default(), &formats::ReadOptions::default())?
+        }
         None => Mesh::knot(400, 60),
     };
     // One flat, elliptic splat for each vertex.

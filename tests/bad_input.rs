@@ -248,7 +248,7 @@ fn worst_inputs_stay_within_their_limits() {
 #[cfg(unix)]
 #[test]
 fn places_beyond_what_32_bits_count_are_found() {
-    use splatkit::formats::{RawLayout, load_volume};
+    use splatkit::formats::{RawLayout, ReadOptions, load_volume};
     use std::io::{Seek, SeekFrom, Write};
     let folder = Folder::new();
     let header = (4u64 << 30) + 36;
@@ -260,11 +260,14 @@ fn places_beyond_what_32_bits_count_are_found() {
             .expect("room");
     }
     let layout = RawLayout { header, ..RAW };
-    let read =
-        |name: &str, limits: &Limits| match load_volume(folder.path(name), limits, Some(&layout)) {
-            Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
-            Err(error) => folder.without_path(&error.to_string()),
-        };
+    let read = |name: &str, limits: &Limits| match load_volume(
+        folder.path(name),
+        limits,
+        &ReadOptions::raw(Some(&layout)),
+    ) {
+        Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
+        Err(error) => folder.without_path(&error.to_string()),
+    };
     assert_eq!(read("far.raw", &Limits::default()), "[0.0, 63.0] 63");
     assert_eq!(
         read("far_cut.raw", &Limits::default()),

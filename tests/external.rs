@@ -52,7 +52,8 @@ fn sort(splats: &mut [Splat]) {
 /// Converts a mesh or point cloud as a whole and in regions, and returns the leaves of both.
 fn both_ways(folder: &Folder, name: &str) -> (Vec<Splat>, Vec<Splat>, Converted) {
     let path = folder.path(name);
-    let mesh = formats::load_mesh(&path, &Limits::default()).unwrap();
+    let mesh =
+        formats::load_mesh(&path, &Limits::default(), &formats::ReadOptions::default()).unwrap();
     let set = mesh.surfels(&SurfelOptions::default()).unwrap();
     let whole = folder.path("whole.splk");
     let build = BuildOptions { preset: hierarchy::Preset::Fastest, ..BuildOptions::default() };

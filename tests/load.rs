@@ -78,9 +78,11 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
         table += &format!("{x},{y},{z},{}\n", x * y + z);
     }
     let name = Path::new("a.csv");
-    let points =
-        formats::read_samples(&Source::from_bytes(name, table.as_bytes(), &limits).unwrap(), None)
-            .unwrap();
+    let points = formats::read_samples(
+        &Source::from_bytes(name, table.as_bytes(), &limits).unwrap(),
+        &formats::ReadOptions::default(),
+    )
+    .unwrap();
     let scattered = points.to_splats(&SampleOptions::default()).unwrap();
     let range = points.range();
     let shown = TransferFunction {

@@ -8,7 +8,7 @@ mod testing;
 
 use splatkit::{
     Error, Result,
-    formats::load_mesh,
+    formats::{ReadOptions, load_mesh},
     hierarchy::{BuildOptions, Hierarchy, Preset, Tree, build_file, file::WriteOptions},
     input::Limits,
     surface::SurfelOptions,
@@ -132,7 +132,7 @@ fn obj(side: u32) -> Vec<u8> {
 
 /// Converts a file to a hierarchy, reads the hierarchy back and returns its number of splats.
 fn convert(input: &Path, output: &Path) -> Result<usize> {
-    let mesh = load_mesh(input, &Limits::default())?;
+    let mesh = load_mesh(input, &Limits::default(), &ReadOptions::default())?;
     mesh.is_solid();
     let set = mesh.surfels(&SurfelOptions::default()).map_err(|error| error.in_file(input))?;
     drop(mesh);

@@ -359,6 +359,7 @@ fn scattered_samples_are_drawn_or_refused() {
         values: (0..64).map(|i| i as f32 / 64.0).collect(),
         radii: Vec::new(),
         covariances: Vec::new(),
+        ..Points::default()
     };
     let refused = |points: Points, word: &str| {
         let error = points.to_splats(&SampleOptions::default()).unwrap_err().to_string();

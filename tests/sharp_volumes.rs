@@ -282,8 +282,12 @@ fn body_centred_lattices_hold_as_much() {
 #[ignore = "needs a scan, and prints times"]
 fn a_scan_is_made_sharp_in_seconds() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/bonsai.vti");
-    let volume =
-        splatkit::formats::load_volume(&path, &splatkit::input::Limits::default(), None).unwrap();
+    let volume = splatkit::formats::load_volume(
+        &path,
+        &splatkit::input::Limits::default(),
+        &splatkit::formats::ReadOptions::default(),
+    )
+    .unwrap();
     let peak = || {
         let status = std::fs::read_to_string("/proc/self/status").unwrap();
         status.lines().find(|line| line.starts_with("VmHWM")).unwrap().to_owned()

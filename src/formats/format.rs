@@ -1,6 +1,6 @@
 //! What a row of the table of formats says, and how the row of a file is found.
 
-use super::{Kind, RawLayout, form::Form, shared::plain::Plain};
+use super::{Kind, RawLayout, ReadOptions, form::Form, shared::plain::Plain};
 use crate::{Result, input::Source, scattered::Points, surface::Mesh, volume::Volume};
 use std::{fmt, path::Path};
 
@@ -21,14 +21,14 @@ pub struct Format {
     pub feature: Option<&'static str>,
     pub(super) magic: Magic,
     pub(super) kind: Which,
-    pub(super) mesh: Option<fn(&Source) -> Result<Mesh>>,
+    pub(super) mesh: Option<fn(&Source, &ReadOptions) -> Result<Mesh>>,
     pub(super) volume: Option<VolumeReader>,
     pub(super) samples: Option<SamplesReader>,
     pub(super) pieces: InPieces,
 }
 
-/// Reads scattered samples. The second argument names the values to read if a file has several.
-pub(super) type SamplesReader = fn(&Source, Option<&str>) -> Result<Points>;
+/// Reads scattered samples.
+pub(super) type SamplesReader = fn(&Source, &ReadOptions) -> Result<Points>;
 
 /// Locates the points of a file; `None` if it can only be read as a whole.
 pub(super) type FindPieces = fn(&Source) -> Result<Option<Box<dyn Form>>>;
@@ -74,13 +74,13 @@ pub(super) enum Magic {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Which {
     Always(Kind),
-    /// A function of the file, and of whether the caller asks for a scalar.
-    Rule(fn(&Source, bool) -> Result<Kind>),
+    /// A function of the file and of what the caller asks for.
+    Rule(fn(&Source, &ReadOptions) -> Result<Kind>),
 }
 
 #[derive(Debug, Clone, Copy)]
 pub(super) enum VolumeReader {
-    Plain(fn(&Source) -> Result<Volume>),
+    Plain(fn(&Source, &ReadOptions) -> Result<Volume>),
     /// For files that do not describe themselves: the caller gives the layout.
     Described(fn(&Source, &RawLayout) -> Result<Volume>),
 }
@@ -204,10 +204,10 @@ impl fmt::Display for Holding {
 }
 
 impl Which {
-    pub fn of(self, source: &Source, with_scalar: bool) -> Result<Kind> {
+    pub fn of(self, source: &Source, options: &ReadOptions) -> Result<Kind> {
         match self {
             Self::Always(kind) => Ok(kind),
-            Self::Rule(decide) => decide(source, with_scalar),
+            Self::Rule(decide) => decide(source, options),
         }
     }
 }
@@ -311,7 +311,7 @@ mod tests {
     use std::collections::HashSet;
 
     /// The reader of a format that only this test knows: a word, then the coordinates of points.
-    fn read_toy(source: &Source) -> Result<Mesh> {
+    fn read_toy(source: &Source, _: &ReadOptions) -> Result<Mesh> {
         let text = source.small_text("a toy", 1 << 10)?;
         let numbers: Vec<f32> = text.split(' ').skip(1).filter_map(|w| w.parse().ok()).collect();
         let positions = numbers.as_chunks().0.iter().map(|&point| point.into()).collect();
@@ -340,21 +340,37 @@ mod tests {
             [("a.toy", "1 2 3 4 5 6"), ("a.TOY", "toys 2 3 4"), ("a", "toys 2 3 4")]
         {
             let kind = |table: &[Format]| {
-                with(name, bytes.as_bytes(), |source| Kind::find(table, source, false)).unwrap()
+                with(name, bytes.as_bytes(), |source| {
+                    Kind::find(table, source, &ReadOptions::default())
+                })
+                .unwrap()
             };
             assert_eq!((kind(&table), kind(FORMATS)), (Some(Kind::Mesh), None), "{name}");
-            let mesh = with(name, bytes.as_bytes(), |source| mesh_of(&table, source)).unwrap();
+            let mesh = with(name, bytes.as_bytes(), |source| {
+                mesh_of(&table, source, &ReadOptions::default())
+            })
+            .unwrap();
             assert_eq!(mesh.positions[0].to_array(), [2.0, 3.0, 4.0], "{name}");
-            assert!(with(name, bytes.as_bytes(), |source| mesh_of(FORMATS, source)).is_err());
+            assert!(
+                with(name, bytes.as_bytes(), |source| mesh_of(
+                    FORMATS,
+                    source,
+                    &ReadOptions::default()
+                ))
+                .is_err()
+            );
         }
         // Messages name it, where it can be read.
         let hint = |error: Error| match error {
             Error::Input { hint: Some(hint), .. } => hint,
             error => panic!("no hint: {error}"),
         };
-        let none = |source: &Source| hint(mesh_of(&table, source).unwrap_err());
+        let none =
+            |source: &Source| hint(mesh_of(&table, source, &ReadOptions::default()).unwrap_err());
         assert!(with("a.none", b"none", none).ends_with(".csv, .txt and .toy"));
-        let none = |source: &Source| hint(samples_of(&table, source, None).unwrap_err());
+        let none = |source: &Source| {
+            hint(samples_of(&table, source, &ReadOptions::default()).unwrap_err())
+        };
         assert!(with("a.none", b"none", none).ends_with(".csv, .txt and .xyzv"));
     }
 
@@ -370,10 +386,10 @@ mod tests {
                 assert!(message.contains("without “toys”"), "{message}");
             };
             with(name, bytes.as_bytes(), |source| {
-                told(mesh_of(&table, source).unwrap_err());
-                told(volume_of(&table, source, None).unwrap_err());
-                told(samples_of(&table, source, None).unwrap_err());
-                told(Kind::find(&table, source, false).unwrap_err());
+                told(mesh_of(&table, source, &ReadOptions::default()).unwrap_err());
+                told(volume_of(&table, source, &ReadOptions::default()).unwrap_err());
+                told(samples_of(&table, source, &ReadOptions::default()).unwrap_err());
+                told(Kind::find(&table, source, &ReadOptions::default()).unwrap_err());
             });
         }
     }
@@ -442,13 +458,17 @@ mod tests {
     #[test]
     fn what_no_reader_reads_is_told() {
         let told = |error: Error| error.to_string();
-        let message = with("a.vti", b"", |source| told(mesh_of(FORMATS, source).unwrap_err()));
+        let message = with("a.vti", b"", |source| {
+            told(mesh_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
+        });
         assert!(message.contains("“.vti” is not a mesh format that can be read"), "{message}");
-        let message =
-            with("a.OBJ", b"", |source| told(samples_of(FORMATS, source, None).unwrap_err()));
+        let message = with("a.OBJ", b"", |source| {
+            told(samples_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
+        });
         assert!(message.contains("“.obj” is not a format of scattered samples"), "{message}");
-        let message =
-            with("a.raw", b"", |source| told(volume_of(FORMATS, source, None).unwrap_err()));
+        let message = with("a.raw", b"", |source| {
+            told(volume_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
+        });
         assert!(message.contains("(VTR, VTI, VTK or NRRD)"), "{message}");
     }
 }

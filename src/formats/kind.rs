@@ -2,7 +2,7 @@
 //! extension does not decide.
 
 use super::{
-    FORMATS,
+    FORMATS, ReadOptions,
     format::{Format, find},
 };
 use crate::{
@@ -29,7 +29,7 @@ pub enum Kind {
 impl Kind {
     /// Returns the kind of a file, or `None` if neither its name nor its first bytes determine it.
     /// A PLY file with faces is a mesh. A PLY file without faces is a point cloud, or samples if
-    /// the caller asks for a scalar (`with_scalar`). Legacy VTK files are volumes or samples,
+    /// the caller asks for a scalar ([`ReadOptions::scalar`]). Legacy VTK files are volumes or samples,
     /// depending on their data set.
     ///
     /// Text tables (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`) are samples if the caller asks for a
@@ -45,8 +45,12 @@ impl Kind {
     /// # Errors
     /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a PLY file or a legacy
     /// VTK file with a malformed header, and for a format that this build leaves out.
-    pub fn of(path: impl AsRef<Path>, limits: &Limits, with_scalar: bool) -> Result<Option<Self>> {
-        Self::of_source(&Source::open(path.as_ref(), limits)?, with_scalar)
+    pub fn of(
+        path: impl AsRef<Path>,
+        limits: &Limits,
+        options: &ReadOptions,
+    ) -> Result<Option<Self>> {
+        Self::of_source(&Source::open(path.as_ref(), limits)?, options)
     }
 
     /// As [`of`](Self::of), but reads from an open source, which may be in memory
@@ -54,8 +58,8 @@ impl Kind {
     ///
     /// # Errors
     /// Those of [`of`](Self::of), except those of opening the file.
-    pub fn of_source(source: &Source, with_scalar: bool) -> Result<Option<Self>> {
-        source.unless_changed(Self::find(FORMATS, source, with_scalar))
+    pub fn of_source(source: &Source, options: &ReadOptions) -> Result<Option<Self>> {
+        source.unless_changed(Self::find(FORMATS, source, options))
     }
 
     /// As [`of_source`](Self::of_source), in the formats of a table, but does not check whether the
@@ -63,9 +67,9 @@ impl Kind {
     pub(super) fn find(
         table: &[Format],
         source: &Source,
-        with_scalar: bool,
+        options: &ReadOptions,
     ) -> Result<Option<Self>> {
         let format = find(table, source, |_| true)?;
-        format.map(|format| format.kind.of(source, with_scalar)).transpose()
+        format.map(|format| format.kind.of(source, options)).transpose()
     }
 }

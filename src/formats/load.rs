@@ -1,7 +1,7 @@
 //! The entry points for all formats: meshes and point clouds, volumes, scattered samples.
 
 use super::{
-    FORMATS, RawLayout,
+    FORMATS, ReadOptions,
     format::{Format, VolumeReader, extensions, find, find_volume, listed},
 };
 use crate::{
@@ -19,8 +19,8 @@ use std::path::Path;
 /// # Errors
 /// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file that is in no
 /// format of meshes or point clouds.
-pub fn load_mesh(path: impl AsRef<Path>, limits: &Limits) -> Result<Mesh> {
-    read_mesh(&Source::open(path.as_ref(), limits)?)
+pub fn load_mesh(path: impl AsRef<Path>, limits: &Limits, options: &ReadOptions) -> Result<Mesh> {
+    read_mesh(&Source::open(path.as_ref(), limits)?, options)
 }
 
 /// As [`load_mesh`], but reads from an open source, which may be in memory
@@ -28,17 +28,17 @@ pub fn load_mesh(path: impl AsRef<Path>, limits: &Limits) -> Result<Mesh> {
 ///
 /// # Errors
 /// Those of [`load_mesh`], except those of opening the file.
-pub fn read_mesh(source: &Source) -> Result<Mesh> {
+pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     let _span = tracing::info_span!("load_mesh", file = %source.path.display()).entered();
-    source.unless_changed(mesh_of(FORMATS, source))
+    source.unless_changed(mesh_of(FORMATS, source, options))
 }
 
 /// As [`read_mesh`], in the formats of a table, but does not check whether the file changed
 /// meanwhile.
-pub(super) fn mesh_of(table: &[Format], source: &Source) -> Result<Mesh> {
+pub(super) fn mesh_of(table: &[Format], source: &Source, options: &ReadOptions) -> Result<Mesh> {
     let may = |format: &Format| format.mesh.is_some();
     match find(table, source, may)?.and_then(|format| format.mesh) {
-        Some(read) => read(source),
+        Some(read) => read(source, options),
         None => Err(source
             .error("path", format!("“.{}” is not a mesh format that can be read", named(source)))
             .hint(format!("meshes and point clouds are read from {}", extensions(table, may)))),
@@ -46,7 +46,7 @@ pub(super) fn mesh_of(table: &[Format], source: &Source) -> Result<Mesh> {
 }
 
 /// Reads a volume. The extension selects the format if it is one of a volume. Any other file is
-/// read as raw if `raw` gives its layout, and otherwise by its first bytes. World units are those
+/// read as raw if the options give its layout, and otherwise by its first bytes. World units are those
 /// of the file. [`FORMATS`] lists the formats.
 ///
 /// # Errors
@@ -56,9 +56,9 @@ pub(super) fn mesh_of(table: &[Format], source: &Source) -> Result<Mesh> {
 pub fn load_volume(
     path: impl AsRef<Path>,
     limits: &Limits,
-    raw: Option<&RawLayout>,
+    options: &ReadOptions,
 ) -> Result<Volume> {
-    read_volume(&Source::open(path.as_ref(), limits)?, raw)
+    read_volume(&Source::open(path.as_ref(), limits)?, options)
 }
 
 /// As [`load_volume`], but reads from an open source, which may be in memory
@@ -66,8 +66,8 @@ pub fn load_volume(
 ///
 /// # Errors
 /// Those of [`load_volume`], except those of opening the file.
-pub fn read_volume(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
-    source.unless_changed(volume_of(FORMATS, source, raw))
+pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
+    source.unless_changed(volume_of(FORMATS, source, options))
 }
 
 /// As [`read_volume`], in the formats of a table, but does not check whether the file changed
@@ -75,11 +75,11 @@ pub fn read_volume(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
 pub(super) fn volume_of(
     table: &[Format],
     source: &Source,
-    raw: Option<&RawLayout>,
+    options: &ReadOptions,
 ) -> Result<Volume> {
-    let format = find_volume(table, source, raw.is_some())?;
-    match (format.and_then(|format| format.volume), raw) {
-        (Some(VolumeReader::Plain(read)), _) => read(source),
+    let format = find_volume(table, source, options.raw.is_some())?;
+    match (format.and_then(|format| format.volume), &options.raw) {
+        (Some(VolumeReader::Plain(read)), _) => read(source, options),
         (Some(VolumeReader::Described(read)), Some(layout)) => read(source, layout),
         _ => {
             let describes_itself =
@@ -94,8 +94,7 @@ pub(super) fn volume_of(
 }
 
 /// Reads scattered samples. The file's extension selects the format; for other extensions, the
-/// first bytes do. [`FORMATS`] lists the formats. `scalar` names the values to read if a file has
-/// several.
+/// first bytes do. [`FORMATS`] lists the formats.
 ///
 /// # Errors
 /// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file that is in no
@@ -103,9 +102,9 @@ pub(super) fn volume_of(
 pub fn load_samples(
     path: impl AsRef<Path>,
     limits: &Limits,
-    scalar: Option<&str>,
+    options: &ReadOptions,
 ) -> Result<Points> {
-    read_samples(&Source::open(path.as_ref(), limits)?, scalar)
+    read_samples(&Source::open(path.as_ref(), limits)?, options)
 }
 
 /// As [`load_samples`], but reads from an open source, which may be in memory
@@ -113,9 +112,9 @@ pub fn load_samples(
 ///
 /// # Errors
 /// Those of [`load_samples`], except those of opening the file.
-pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
+pub fn read_samples(source: &Source, options: &ReadOptions) -> Result<Points> {
     let _span = tracing::info_span!("load_samples", file = %source.path.display()).entered();
-    source.unless_changed(samples_of(FORMATS, source, scalar))
+    source.unless_changed(samples_of(FORMATS, source, options))
 }
 
 /// As [`read_samples`], in the formats of a table, but does not check whether the file changed
@@ -123,11 +122,11 @@ pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
 pub(super) fn samples_of(
     table: &[Format],
     source: &Source,
-    scalar: Option<&str>,
+    options: &ReadOptions,
 ) -> Result<Points> {
     let may = |format: &Format| format.samples.is_some();
     match find(table, source, may)?.and_then(|format| format.samples) {
-        Some(read) => read(source, scalar),
+        Some(read) => read(source, options),
         None => {
             let named = named(source);
             Err(source

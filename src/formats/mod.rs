@@ -23,6 +23,7 @@ pub mod npy;
 pub mod nrrd;
 #[cfg(feature = "obj")]
 pub mod obj;
+mod options;
 pub mod pcd;
 #[cfg(feature = "ply")]
 pub mod ply;
@@ -55,6 +56,7 @@ pub(crate) use form::StreamPoint;
 pub use format::{Content, Format, Holding};
 pub use kind::Kind;
 pub use load::{load_mesh, load_samples, load_volume, read_mesh, read_samples, read_volume};
+pub use options::ReadOptions;
 pub use raw::RawLayout;
 pub use shared::sample_type::{Endian, SampleType};
 pub(crate) use shared::texture::decode as decode_picture;

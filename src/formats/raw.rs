@@ -139,7 +139,7 @@ fn guess(size: u64, layout: &RawLayout) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Error, input::testing::*, volume::Samples};
+    use crate::{Error, formats::ReadOptions, input::testing::*, volume::Samples};
     use flate2::{Compression, write::GzEncoder};
     use std::io::Write;
 
@@ -257,7 +257,7 @@ mod tests {
             crate::formats::load_volume(
                 folder.write(name, nrrd),
                 &crate::input::Limits::default(),
-                raw,
+                &ReadOptions::raw(raw),
             )
         };
         assert_eq!(load("a.nrrd", Some(&layout)).unwrap().len(), 2);
@@ -267,8 +267,12 @@ mod tests {
         let path = folder.write("b.raw", [1, 2, 3]);
         assert!(
             hint(
-                crate::formats::load_volume(&path, &crate::input::Limits::default(), None)
-                    .unwrap_err()
+                crate::formats::load_volume(
+                    &path,
+                    &crate::input::Limits::default(),
+                    &ReadOptions::default()
+                )
+                .unwrap_err()
             )
             .contains("dimensions")
         );

@@ -47,14 +47,14 @@ pub static FORMATS: &[Format] = &[
         feature: Some("ply"),
         magic: Magic::Rule(|bytes| bytes.trim_ascii_start().starts_with(b"ply")),
         #[cfg(feature = "ply")]
-        kind: Which::Rule(|source, with_scalar| {
-            let samples = with_scalar && !ply::has_faces(source)?;
+        kind: Which::Rule(|source, options| {
+            let samples = options.scalar.is_some() && !ply::has_faces(source)?;
             Ok(if samples { Kind::Samples } else { Kind::Mesh })
         }),
         #[cfg(feature = "ply")]
-        mesh: Some(ply::read),
+        mesh: Some(|source, _| ply::read(source)),
         #[cfg(feature = "ply")]
-        samples: Some(ply::read_samples),
+        samples: Some(|source, options| ply::read_samples(source, options.scalar.as_deref())),
         #[cfg(feature = "ply")]
         pieces: InPieces::Points {
             of: "binary files",
@@ -70,7 +70,7 @@ pub static FORMATS: &[Format] = &[
         feature: Some("obj"),
         kind: Which::Always(Kind::Mesh),
         #[cfg(feature = "obj")]
-        mesh: Some(obj::read),
+        mesh: Some(|source, _| obj::read(source)),
         ..Format::ROW
     },
     Format {
@@ -85,7 +85,7 @@ pub static FORMATS: &[Format] = &[
         }),
         kind: Which::Always(Kind::Mesh),
         #[cfg(feature = "gltf")]
-        mesh: Some(gltf::read),
+        mesh: Some(|source, _| gltf::read(source)),
         ..Format::ROW
     },
     Format {
@@ -95,7 +95,7 @@ pub static FORMATS: &[Format] = &[
         // Binary files begin with any 80 bytes.
         magic: Magic::Prefix(b"solid "),
         kind: Which::Always(Kind::Mesh),
-        mesh: Some(stl::read),
+        mesh: Some(|source, _| stl::read(source)),
         ..Format::ROW
     },
     Format {
@@ -106,7 +106,7 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Prefix(b"LASF"),
         kind: Which::Always(Kind::Mesh),
         #[cfg(feature = "las")]
-        mesh: Some(las::read),
+        mesh: Some(|source, _| las::read(source)),
         #[cfg(feature = "las")]
         pieces: InPieces::Points {
             of: "",
@@ -122,7 +122,7 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Prefix(b"ASTM-E57"),
         kind: Which::Always(Kind::Mesh),
         #[cfg(feature = "e57")]
-        mesh: Some(e57::read),
+        mesh: Some(|source, _| e57::read(source)),
         ..Format::ROW
     },
     Format {
@@ -131,18 +131,18 @@ pub static FORMATS: &[Format] = &[
         holds: &[all(Content::PointCloud)],
         magic: Magic::Prefix(b"# .PCD"),
         kind: Which::Always(Kind::Mesh),
-        mesh: Some(pcd::read),
+        mesh: Some(|source, _| pcd::read(source)),
         ..Format::ROW
     },
     Format {
         name: "table of points",
         extensions: &["xyz", "pts", "asc"],
         holds: &[all(Content::PointCloud), some(Content::Samples, "if a scalar is named")],
-        kind: Which::Rule(|_, with_scalar| {
-            Ok(if with_scalar { Kind::Samples } else { Kind::Mesh })
+        kind: Which::Rule(|_, options| {
+            Ok(if options.scalar.is_some() { Kind::Samples } else { Kind::Mesh })
         }),
-        mesh: Some(xyz::read),
-        samples: Some(csv::read),
+        mesh: Some(|source, _| xyz::read(source)),
+        samples: Some(|source, options| csv::read(source, options.scalar.as_deref())),
         ..Format::ROW
     },
     Format {
@@ -156,7 +156,7 @@ pub static FORMATS: &[Format] = &[
         }),
         kind: Which::Always(Kind::Samples),
         #[cfg(feature = "vtk")]
-        samples: Some(vtu::read),
+        samples: Some(|source, options| vtu::read(source, options.scalar.as_deref())),
         ..Format::ROW
     },
     Format {
@@ -167,7 +167,7 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Rule(|bytes| is_vtk_xml(bytes) && has_word(bytes, b"RectilinearGrid")),
         kind: Which::Always(Kind::Volume),
         #[cfg(feature = "vtk")]
-        volume: Some(VolumeReader::Plain(vtr::read)),
+        volume: Some(VolumeReader::Plain(|source, _| vtr::read(source))),
         ..Format::ROW
     },
     Format {
@@ -179,7 +179,7 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Rule(is_vtk_xml),
         kind: Which::Always(Kind::Volume),
         #[cfg(feature = "vtk")]
-        volume: Some(VolumeReader::Plain(vti::read)),
+        volume: Some(VolumeReader::Plain(|source, _| vti::read(source))),
         ..Format::ROW
     },
     Format {
@@ -196,9 +196,9 @@ pub static FORMATS: &[Format] = &[
             Ok(if vtk::holds_volume(source)? { Kind::Volume } else { Kind::Samples })
         }),
         #[cfg(feature = "vtk")]
-        volume: Some(VolumeReader::Plain(vtk::read_volume)),
+        volume: Some(VolumeReader::Plain(|source, _| vtk::read_volume(source))),
         #[cfg(feature = "vtk")]
-        samples: Some(vtk::read_samples),
+        samples: Some(|source, options| vtk::read_samples(source, options.scalar.as_deref())),
         ..Format::ROW
     },
     Format {
@@ -209,7 +209,7 @@ pub static FORMATS: &[Format] = &[
         refers: true,
         magic: Magic::Prefix(b"NRRD"),
         kind: Which::Always(Kind::Volume),
-        volume: Some(VolumeReader::Plain(nrrd::read)),
+        volume: Some(VolumeReader::Plain(|source, _| nrrd::read(source))),
         pieces: InPieces::Volume { of: "files of raw encoding", find: nrrd::plain },
         ..Format::ROW
     },
@@ -247,12 +247,12 @@ pub static FORMATS: &[Format] = &[
             some(Content::PointCloud, "with the columns of a point cloud"),
             some(Content::Samples, "with other columns, or if a scalar is named"),
         ],
-        kind: Which::Rule(|source, with_scalar| {
-            let is_cloud = !with_scalar && xyz::is_cloud(source);
+        kind: Which::Rule(|source, options| {
+            let is_cloud = options.scalar.is_none() && xyz::is_cloud(source);
             Ok(if is_cloud { Kind::Mesh } else { Kind::Samples })
         }),
-        mesh: Some(xyz::read),
-        samples: Some(csv::read),
+        mesh: Some(|source, _| xyz::read(source)),
+        samples: Some(|source, options| csv::read(source, options.scalar.as_deref())),
         ..Format::ROW
     },
     Format {
@@ -260,7 +260,7 @@ pub static FORMATS: &[Format] = &[
         extensions: &["xyzv"],
         holds: &[all(Content::Samples)],
         kind: Which::Always(Kind::Samples),
-        samples: Some(csv::read),
+        samples: Some(|source, options| csv::read(source, options.scalar.as_deref())),
         ..Format::ROW
     },
 ];

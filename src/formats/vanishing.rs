@@ -1,7 +1,7 @@
 //! Files that are truncated while they are read, by every way of reading.
 
 use super::{
-    Endian, FORMATS, RawLayout, SampleType, Stream, VolumeStream,
+    Endian, FORMATS, RawLayout, ReadOptions, SampleType, Stream, VolumeStream,
     load::{mesh_of, samples_of, volume_of},
     ply,
 };
@@ -92,7 +92,7 @@ fn meshes_and_clouds() {
         ("a.xyz", points.into_bytes()),
     ];
     for (name, bytes) in files {
-        cut_when_open(name, bytes, |source| mesh_of(FORMATS, source));
+        cut_when_open(name, bytes, |source| mesh_of(FORMATS, source, &ReadOptions::default()));
     }
 }
 
@@ -114,15 +114,17 @@ fn volumes_and_samples() {
     let nrrd =
         [&b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 30 30 30\nencoding: raw\n\n"[..], &samples]
             .concat();
-    cut_when_open("a.vti", vti, |source| volume_of(FORMATS, source, None));
-    cut_when_open("a.vtk", vtk, |source| volume_of(FORMATS, source, None));
-    cut_when_open("a.nrrd", nrrd, |source| volume_of(FORMATS, source, None));
+    cut_when_open("a.vti", vti, |source| volume_of(FORMATS, source, &ReadOptions::default()));
+    cut_when_open("a.vtk", vtk, |source| volume_of(FORMATS, source, &ReadOptions::default()));
+    cut_when_open("a.nrrd", nrrd, |source| volume_of(FORMATS, source, &ReadOptions::default()));
     let (sample_type, spacing) = (SampleType::from_name("u8").unwrap(), DVec3::ONE);
     let layout =
         RawLayout { dims: [30; 3], sample_type, spacing, endian: Endian::Little, header: 0 };
-    cut_when_open("a.raw", &samples, |source| volume_of(FORMATS, source, Some(&layout)));
+    cut_when_open("a.raw", &samples, |source| {
+        volume_of(FORMATS, source, &ReadOptions::raw(Some(&layout)))
+    });
     let table = lines(3000, |i| format!("{},{},{},{}\n", i % 60, i / 60, i % 7, i % 11));
-    cut_when_open("a.csv", table, |source| samples_of(FORMATS, source, None));
+    cut_when_open("a.csv", table, |source| samples_of(FORMATS, source, &ReadOptions::default()));
     let folder = Folder::new();
     let path = folder.write("b.raw", &samples);
     let stream = VolumeStream::open(&path, &Limits::default(), Some(&layout)).unwrap().unwrap();

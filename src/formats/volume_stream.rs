@@ -125,7 +125,10 @@ impl VolumeStream {
 mod tests {
     use super::*;
     use crate::formats::Endian;
-    use crate::{formats::load_volume, input::testing::Folder};
+    use crate::{
+        formats::{ReadOptions, load_volume},
+        input::testing::Folder,
+    };
     use glam::DVec3;
 
     /// Numbers that every type can represent, as bytes.
@@ -142,7 +145,7 @@ mod tests {
 
     fn compare(path: &Path, layout: Option<&RawLayout>) {
         let limits = Limits::default();
-        let whole = load_volume(path, &limits, layout).unwrap();
+        let whole = load_volume(path, &limits, &ReadOptions::raw(layout)).unwrap();
         let stream = VolumeStream::open(path, &limits, layout).unwrap().unwrap();
         assert_eq!((stream.lattice(), stream.scalar()), (&whole.lattice, whole.samples.scalar()));
         assert_eq!(stream.range(None).unwrap(), whole.range);

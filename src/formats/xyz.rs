@@ -228,7 +228,7 @@ mod tests {
     use super::*;
     use crate::{
         Error,
-        formats::{Kind, load_mesh},
+        formats::{Kind, ReadOptions, load_mesh},
         input::{Limits, testing::*},
     };
     use glam::Vec3;
@@ -347,14 +347,19 @@ mod tests {
             ("a.csv", "x,y,z,r,g,b,value\n1,2,3,4,5,6,7\n", false),
         ] {
             let path = folder.write(name, text);
-            let kind = |scalar| Kind::of(&path, &Limits::default(), scalar).unwrap();
+            let kind = |scalar: Option<&str>| {
+                Kind::of(&path, &Limits::default(), &ReadOptions::scalar(scalar)).unwrap()
+            };
             assert_eq!(
-                kind(false),
+                kind(None),
                 Some(if cloud { Kind::Mesh } else { Kind::Samples }),
                 "{name}: {text}"
             );
-            assert_eq!(kind(true), Some(Kind::Samples), "{name}: {text}");
-            assert!(!cloud || load_mesh(&path, &Limits::default()).is_ok(), "{name}: {text}");
+            assert_eq!(kind(Some("v")), Some(Kind::Samples), "{name}: {text}");
+            assert!(
+                !cloud || load_mesh(&path, &Limits::default(), &ReadOptions::default()).is_ok(),
+                "{name}: {text}"
+            );
         }
     }
 }

@@ -16,7 +16,7 @@ pub use splats::SampleOptions;
 
 use crate::{
     parallel::prelude::*,
-    volume::{BINS, TransferFunction, Volume},
+    volume::{About, BINS, TransferFunction, Volume},
 };
 use glam::{DVec3, Vec3};
 
@@ -53,6 +53,8 @@ pub struct Points {
     /// The covariance of each sample's kernel: xx, xy, xz, yy, yz, zz, in squared world units. It
     /// takes precedence over a radius.
     pub covariances: Vec<[f32; 6]>,
+    /// What the file says beyond the values.
+    pub about: About,
 }
 
 impl Points {

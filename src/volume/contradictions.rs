@@ -2,7 +2,7 @@
 //! returns an error.
 
 use super::{
-    Arrangement, Coefficients, Lattice, Reconstruction, Samples, TransferFunction, Volume,
+    About, Arrangement, Coefficients, Lattice, Reconstruction, Samples, TransferFunction, Volume,
     body_centred,
 };
 use crate::bricks::{self, Bricks};
@@ -85,7 +85,13 @@ fn volumes_are_refused_where_they_come_in() {
         ("must be finite", Lattice { origin: DVec3::INFINITY, ..spaced([2; 3], 1.0) }),
     ] {
         let samples = Samples::U8(vec![0, 1, 2, 3, 4, 5, 6, 7]);
-        let volume = Volume { lattice, samples, range: [0.0, 7.0], coefficients: None };
+        let volume = Volume {
+            lattice,
+            samples,
+            range: [0.0, 7.0],
+            coefficients: None,
+            about: About::default(),
+        };
         refused_by_all(&format!("{:?}", volume.lattice), word, &volume);
         refused("sharpened", "", volume.sharpened(&Kernel::default()));
     }

@@ -93,7 +93,7 @@ pub fn body_centred(volume: &Volume) -> Result<Volume> {
         Samples::I32(_) => Samples::I32(layers.of(|value| value.clamp(low, high).round() as i32)),
         Samples::F32(_) => Samples::F32(layers.of(|value| value.clamp(low, high) as f32)),
     };
-    Volume::new(lattice, samples)
+    Ok(Volume { about: volume.about.clone(), ..Volume::new(lattice, samples)? })
 }
 
 /// Returns a body-centred lattice of edge √2 with the centre of a Cartesian one, and the position

@@ -1,6 +1,6 @@
 //! The values of a volume, in the sample type of their file.
 
-use super::{Lattice, Scalar, overshoot::Overshoot, reach::neighbourhood_ranges};
+use super::{About, Lattice, Scalar, overshoot::Overshoot, reach::neighbourhood_ranges};
 use crate::{
     Error, Result,
     math::{Kernel, Tensor},
@@ -161,6 +161,8 @@ pub struct Volume {
     /// If set, kernels carry these values instead of the samples, so that their sum passes through
     /// the samples ([`Volume::sharpened`]).
     pub coefficients: Option<Arc<Coefficients>>,
+    /// What the file says beyond the values.
+    pub about: About,
 }
 
 /// Values for kernels on a lattice, chosen so that their normalised sum passes through a volume's
@@ -207,7 +209,7 @@ impl Volume {
             ));
         }
         let range = samples.range()?;
-        Ok(Self { lattice, samples, range, coefficients: None })
+        Ok(Self { lattice, samples, range, coefficients: None, about: About::default() })
     }
 
     /// Checks what [`new`](Self::new) checks, and what may have changed since then. Call it first

@@ -8,7 +8,7 @@
 //! regular volume sampling", 2001.
 
 use super::{
-    Arrangement, Coefficients, Lattice, Samples, Volume,
+    About, Arrangement, Coefficients, Lattice, Samples, Volume,
     grid::{Grid, Response},
     overshoot::Overshoot,
     prefilter,
@@ -145,6 +145,7 @@ impl Volume {
             range: self.range,
             lattice: self.lattice.clone(),
             coefficients: None,
+            about: About::default(),
         };
         let ranges = neighbourhood_ranges(&drawn, self.lattice.reach(kernel.extent));
         let Samples::F32(values) = drawn.samples else { return Ok(self) };

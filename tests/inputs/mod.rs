@@ -6,7 +6,7 @@ use crate::testing::folder::Folder;
 use glam::Vec3;
 use splatkit::{
     Error, Result, bricks,
-    formats::{self, Endian, Kind, RawLayout, SampleType},
+    formats::{self, Endian, Kind, RawLayout, ReadOptions, SampleType},
     hierarchy::{BuildOptions, Hierarchy, Tree, file},
     input::Limits,
     surface::{Mesh, SurfelOptions},
@@ -58,18 +58,24 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
         return Ok(format!("compared, {} pixels differ", found.different_pixels));
     }
     let raw = ["raw", "gz"].contains(&extension).then_some(RAW);
-    let kind = Kind::of(path, limits, false)?.or(raw.as_ref().map(|_| Kind::Volume));
+    let kind =
+        Kind::of(path, limits, &ReadOptions::default())?.or(raw.as_ref().map(|_| Kind::Volume));
     Ok(match kind {
         None => return Err(Error::input(path, "file", "is of no kind")),
         Some(Kind::Mesh) => {
-            let mesh = formats::load_mesh(path, limits)?;
+            let mesh = formats::load_mesh(path, limits, &ReadOptions::default())?;
             let pictures =
                 mesh.materials.iter().filter(|material| material.texture.is_some()).count();
             format!("mesh {} {} {pictures}", mesh.positions.len(), mesh.triangles.len())
         }
-        Some(Kind::Volume) => of_volume(&formats::load_volume(path, limits, raw.as_ref())?),
+        Some(Kind::Volume) => {
+            of_volume(&formats::load_volume(path, limits, &ReadOptions::raw(raw.as_ref()))?)
+        }
         Some(Kind::Samples) => {
-            format!("samples {}", formats::load_samples(path, limits, None)?.len())
+            format!(
+                "samples {}",
+                formats::load_samples(path, limits, &ReadOptions::default())?.len()
+            )
         }
         Some(Kind::Hierarchy) => {
             let tree = Hierarchy::open(path, limits)?.read_tree()?;

@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 use splatkit::{
     Error, Result,
     bricks::Bricks,
-    formats::{self, Endian, Kind, RawLayout, SampleType, Stream, VolumeStream},
+    formats::{self, Endian, Kind, RawLayout, ReadOptions, SampleType, Stream, VolumeStream},
     hierarchy::{
         BuildOptions, Hierarchy, Preset, Tree,
         external::{self, ExternalOptions},
@@ -183,7 +183,9 @@ fn stream(name: &str, bytes: &[u8], whole: Option<&Mesh>) {
 pub fn ply(bytes: &[u8]) {
     let whole = mesh("input.ply", bytes, formats::ply::read);
     stream("input.ply", bytes, whole.as_ref());
-    samples("input.ply", bytes, formats::read_samples);
+    samples("input.ply", bytes, |source, scalar| {
+        formats::read_samples(source, &ReadOptions::scalar(scalar))
+    });
 }
 
 /// An OBJ file. A line `#mtl` may separate its materials, `input.mtl`, and a line `#png` after them
@@ -297,7 +299,7 @@ pub fn nrrd(bytes: &[u8]) {
         .for_each(|(number, data)| drop(folder.write(&format!("{number}.raw"), data)));
     let path = folder.write("input.nhdr", header);
     let limits = limits();
-    let whole = accepted(formats::load_volume(&path, &limits, None));
+    let whole = accepted(formats::load_volume(&path, &limits, &ReadOptions::default()));
     whole.iter().for_each(sound_volume);
     let stream = accepted(VolumeStream::open(&path, &limits, None)).flatten();
     if let (Some(whole), Some(stream)) = (whole, stream) {
@@ -354,17 +356,25 @@ pub fn raw(bytes: &[u8]) {
 
 /// A file whose name does not reveal its format.
 pub fn any(bytes: &[u8]) {
-    let kind =
-        |with_scalar| read("input", bytes, |source| Kind::of_source(source, with_scalar)).flatten();
-    for kind in [kind(false), kind(true)] {
+    let kind = |scalar| {
+        read("input", bytes, |source| Kind::of_source(source, &ReadOptions::scalar(scalar)))
+            .flatten()
+    };
+    for kind in [kind(None), kind(Some("value"))] {
         match kind {
             Some(Kind::Mesh) => {
-                read("input", bytes, formats::read_mesh).iter().for_each(sound_mesh);
+                read("input", bytes, |source| formats::read_mesh(source, &ReadOptions::default()))
+                    .iter()
+                    .for_each(sound_mesh);
             }
             Some(Kind::Volume) => {
-                volume("input", bytes, |source| formats::read_volume(source, None));
+                volume("input", bytes, |source| {
+                    formats::read_volume(source, &ReadOptions::default())
+                });
             }
-            Some(Kind::Samples) => samples("input", bytes, formats::read_samples),
+            Some(Kind::Samples) => samples("input", bytes, |source, scalar| {
+                formats::read_samples(source, &ReadOptions::scalar(scalar))
+            }),
             Some(Kind::Hierarchy) => splk(bytes),
             Some(Kind::Bricks) => splv(bytes),
             None => {}
@@ -386,7 +396,7 @@ pub fn regions(bytes: &[u8]) {
         block_splats: 64,
         surfels: surfel_options(),
     };
-    let whole = accepted(formats::load_mesh(&path, &limits));
+    let whole = accepted(formats::load_mesh(&path, &limits, &ReadOptions::default()));
     let converted = accepted(external::convert(
         &[path],
         &limits,

@@ -98,7 +98,7 @@ impl Generate {
             (What::Scan, Some(from), "ply") => {
                 let limits = LimitFlags::default().whole(memory::most());
                 let source = Source::open(from, &limits)?;
-                let mesh = formats::read_mesh(&source)?;
+                let mesh = formats::read_mesh(&source, &formats::ReadOptions::default())?;
                 output::check_unneeded(&self.output, &source.files())?;
                 if mesh.triangles.is_empty() {
                     let message = format!("{} has no triangles to subdivide", from.display());

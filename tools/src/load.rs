@@ -6,7 +6,10 @@ use glam::DVec3;
 use splatkit::{
     Deadline, Error,
     bricks::Bricks,
-    formats::{self, Content, Endian, FORMATS, Format, Kind, RawLayout, SampleType, VolumeStream},
+    formats::{
+        self, Content, Endian, FORMATS, Format, Kind, RawLayout, ReadOptions, SampleType,
+        VolumeStream,
+    },
     hierarchy::Hierarchy,
     input::{Limits, Source},
     memory,
@@ -54,10 +57,24 @@ pub struct LoadFlags {
     /// Raw volumes: skip this many bytes before the first sample [default: 0]
     #[arg(long, value_name = "BYTES", requires = "dims")]
     header: Option<u64>,
-    /// Scattered samples: read the values from this property, column or array. With it, a PLY file
+    /// Read the values from this array, property or column. NAME:x takes one component of a
+    /// vector, NAME:magnitude its length, cell:NAME an array of the cells. With it, a PLY file
     /// without faces and a table of points are read as samples; without it, as point clouds.
     #[arg(long, value_name = "NAME")]
     scalar: Option<String>,
+    /// Volumes at several times: read this one, counted from 0 [default: 0]
+    #[arg(long, value_name = "NUMBER")]
+    time: Option<usize>,
+    /// DICOM: read this series of the folder: its number, its UID or a part of its description
+    /// [default: the one with the most slices]
+    #[arg(long, value_name = "SERIES")]
+    series: Option<String>,
+    /// HDF5 and NPZ: read this data set [default: the largest of three dimensions]
+    #[arg(long, value_name = "PATH")]
+    dataset: Option<String>,
+    /// Take samples of this value as holes, as samples that are not numbers are.
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    missing: Option<f64>,
     /// Scattered samples: use one radius for all samples, in world units. A radius is two standard
     /// deviations [default: the file's radii, or estimated from the neighbours]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
@@ -102,21 +119,15 @@ impl LoadFlags {
             }
             Kind::Mesh => {
                 let source = Source::open(path, &whole)?;
-                (Input::Mesh(formats::read_mesh(&source)?), source.files())
+                (Input::Mesh(formats::read_mesh(&source, &self.options())?), source.files())
             }
             Kind::Volume => {
                 let source = Source::open(path, &whole)?;
-                (
-                    Input::Volume(formats::read_volume(&source, self.layout().as_ref())?),
-                    source.files(),
-                )
+                (Input::Volume(formats::read_volume(&source, &self.options())?), source.files())
             }
             Kind::Samples => {
                 let source = Source::open(path, &whole)?;
-                (
-                    Input::Samples(formats::read_samples(&source, self.scalar.as_deref())?),
-                    source.files(),
-                )
+                (Input::Samples(formats::read_samples(&source, &self.options())?), source.files())
             }
         };
         read.extend(files);
@@ -126,15 +137,25 @@ impl LoadFlags {
     /// Returns the kind of a file, even if the file is damaged.
     pub fn kind(&self, path: &Path) -> Result<Kind, Failure> {
         let raw = self.layout().map(|_| Kind::Volume);
-        Ok(Kind::of(path, &self.limits(), self.scalar.is_some())?
-            .or(raw)
-            .ok_or_else(|| unknown(path))?)
+        Ok(Kind::of(path, &self.limits(), &self.options())?.or(raw).ok_or_else(|| unknown(path))?)
     }
 
     /// Opens a volume that can be read slice by slice. Returns `None` for volumes that are read as
     /// a whole.
     pub fn stream(&self, path: &Path) -> Result<Option<VolumeStream>, Failure> {
         Ok(VolumeStream::open(path, &self.limits(), self.layout().as_ref())?)
+    }
+
+    /// Returns what to read of a file.
+    pub fn options(&self) -> ReadOptions {
+        ReadOptions {
+            scalar: self.scalar.clone(),
+            raw: self.layout(),
+            time: self.time,
+            series: self.series.clone(),
+            dataset: self.dataset.clone(),
+            missing: self.missing,
+        }
     }
 
     fn layout(&self) -> Option<RawLayout> {

@@ -11,7 +11,8 @@ use splatkit::{
 };
 
 fn volume(folder: &Folder, name: &str) -> Volume {
-    formats::load_volume(folder.path(name), &Limits::default(), None).unwrap()
+    formats::load_volume(folder.path(name), &Limits::default(), &formats::ReadOptions::default())
+        .unwrap()
 }
 
 #[test]

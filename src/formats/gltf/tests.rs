@@ -1,6 +1,6 @@
 use super::*;
 use crate::{
-    formats::load_mesh,
+    formats::{ReadOptions, load_mesh},
     input::{
         Limits,
         testing::{Folder, png},
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 fn load(name: &str, bytes: impl AsRef<[u8]>) -> Result<Mesh> {
     let folder = Folder::new();
-    load_mesh(folder.write(name, bytes), &Limits::default())
+    load_mesh(folder.write(name, bytes), &Limits::default(), &ReadOptions::default())
 }
 
 fn load_json(value: &Value) -> Result<Mesh> {

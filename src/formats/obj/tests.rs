@@ -1,6 +1,6 @@
 use super::*;
 use crate::{
-    formats::load_mesh,
+    formats::{ReadOptions, load_mesh},
     input::{
         Limits,
         testing::{Folder, png},
@@ -9,7 +9,7 @@ use crate::{
 
 fn load(text: impl AsRef<[u8]>) -> Result<Mesh> {
     let folder = Folder::new();
-    load_mesh(folder.write("a.obj", text), &Limits::default())
+    load_mesh(folder.write("a.obj", text), &Limits::default(), &ReadOptions::default())
 }
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
@@ -81,7 +81,8 @@ fn every_triangle_of_a_polygon_has_its_material() {
     folder.write("m.mtl", "newmtl a\nnewmtl b\n");
     let obj =
         format!("mtllib m.mtl\n{head}usemtl a\nf 1 2 3 4 5 6\nusemtl b\nf 1 2 3\nf 1 2 3 6\n");
-    let mesh = load_mesh(folder.write("a.obj", obj), &Limits::default()).expect("loads");
+    let mesh = load_mesh(folder.write("a.obj", obj), &Limits::default(), &ReadOptions::default())
+        .expect("loads");
     let names: Vec<&str> =
         mesh.triangle_materials.iter().map(|&m| mesh.materials[m as usize].name.as_str()).collect();
     assert_eq!(names, ["a", "a", "a", "a", "b", "b", "b"]);
@@ -139,7 +140,8 @@ fn materials_and_pictures() {
     );
     let obj = "mtllib a b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n\
         usemtl red\nf 1 2 3\nusemtl tex\nf 1/1 3/3 4/2\nusemtl unknown\nf 1 2 4\n";
-    let mesh = load_mesh(folder.write("a.obj", obj), &Limits::default()).expect("loads");
+    let mesh = load_mesh(folder.write("a.obj", obj), &Limits::default(), &ReadOptions::default())
+        .expect("loads");
     let names: Vec<&str> =
         mesh.triangle_materials.iter().map(|&m| mesh.materials[m as usize].name.as_str()).collect();
     assert_eq!(names, ["red", "tex", "none"]);
@@ -152,7 +154,10 @@ fn materials_and_pictures() {
     assert_eq!(mesh.uvs[mesh.triangles[1][1] as usize], Vec2::new(1.0, 0.0));
     assert_eq!(mesh.uvs.len(), mesh.positions.len());
     let limits = Limits { texels: 1, ..Limits::default() };
-    assert!(matches!(load_mesh(folder.path("a.obj"), &limits), Err(Error::Limit { found: 2, .. })));
+    assert!(matches!(
+        load_mesh(folder.path("a.obj"), &limits, &ReadOptions::default()),
+        Err(Error::Limit { found: 2, .. })
+    ));
 }
 
 /// Only `d` is part of the format; `Tr` has two meanings.
@@ -172,7 +177,9 @@ fn opacities_of_materials() {
     ] {
         folder.write("a.mtl", format!("newmtl m\nKd 1 1 1\n{statements}\n"));
         let obj = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-        let mesh = load_mesh(folder.write("a.obj", obj), &Limits::default()).expect("loads");
+        let mesh =
+            load_mesh(folder.write("a.obj", obj), &Limits::default(), &ReadOptions::default())
+                .expect("loads");
         assert_eq!(
             mesh.materials[mesh.triangle_materials[0] as usize].color[3], opacity,
             "{statements}"
@@ -201,8 +208,11 @@ fn missing_files_are_warnings_and_traversal_is_refused() {
         ("newmtl a\nKd nan 1 1\nmap_Kd\nmap_Kd no.png\nmap_Kd -s\n", ""),
     ] {
         folder.write("m.mtl", mtl);
-        let loaded =
-            load_mesh(folder.write("a.obj", format!("mtllib m.mtl\n{SQUARE}")), &Limits::default());
+        let loaded = load_mesh(
+            folder.write("a.obj", format!("mtllib m.mtl\n{SQUARE}")),
+            &Limits::default(),
+            &ReadOptions::default(),
+        );
         match loaded {
             Ok(_) => assert!(reason.is_empty(), "{mtl}"),
             Err(error) => {
@@ -270,7 +280,7 @@ fn texture_coordinates_are_finite() {
             "mtllib m.mtl\nusemtl {material}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt {uv}\nvt 1 1\n\
              f 1/1 2/2 3/3\n"
         );
-        load_mesh(folder.write("a.obj", text), &Limits::default())
+        load_mesh(folder.write("a.obj", text), &Limits::default(), &ReadOptions::default())
     };
     for uv in ["inf 0", "0 NaN", "-inf nan", "1e39 0", "0 -1e400"] {
         let error = obj(uv, "a").unwrap_err().to_string();

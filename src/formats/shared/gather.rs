@@ -48,6 +48,7 @@ pub(crate) fn gather(
         values,
         radii: columns.radii,
         covariances: columns.covariances,
+        ..Points::default()
     };
     points.check().map_err(|message| source.error("samples", message))?;
     Ok(points)

@@ -116,7 +116,10 @@ fn volumes(folder: &Path) -> Result<Vec<PathBuf>> {
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         if path.is_file()
-            && matches!(Kind::of(&path, &Limits::default(), false), Ok(Some(Kind::Volume)))
+            && matches!(
+                Kind::of(&path, &Limits::default(), &formats::ReadOptions::default()),
+                Ok(Some(Kind::Volume))
+            )
         {
             files.push(path);
         }
@@ -136,7 +139,11 @@ impl Row {
         let wanted = effort.samples(self.seed.splats);
         let (volume, drawn) = match file {
             Some(file) => {
-                let volume = formats::load_volume(file, &Limits::default(), None)?;
+                let volume = formats::load_volume(
+                    file,
+                    &Limits::default(),
+                    &formats::ReadOptions::default(),
+                )?;
                 let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 (if self.centred { body_centred(&volume)? } else { volume }, name)
             }
