@@ -87,6 +87,7 @@
 #[cfg(test)]
 extern crate self as splatkit;
 
+pub mod about;
 pub mod bricks;
 pub mod compare;
 pub mod container;

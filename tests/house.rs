@@ -9,7 +9,7 @@ use std::{
 use syn::{Attribute, Item, ItemMod, ItemUse, Meta, UseTree, visit::Visit};
 
 /// The rooms of src. Each imports only from rooms before it.
-const ROOMS: [&str; 24] = [
+const ROOMS: [&str; 25] = [
     "error",
     "parallel",
     "deadline",
@@ -19,6 +19,7 @@ const ROOMS: [&str; 24] = [
     "math",
     "input",
     "container",
+    "about",
     "splat",
     "volume",
     "surface",

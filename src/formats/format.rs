@@ -1,6 +1,6 @@
 //! What a row of the table of formats says, and how the row of a file is found.
 
-use super::{Kind, RawLayout, ReadOptions, form::Form, shared::plain::Plain};
+use super::{Array, Kind, RawLayout, ReadOptions, form::Form, shared::plain::Plain};
 use crate::{Result, input::Source, scattered::Points, surface::Mesh, volume::Volume};
 use std::{fmt, path::Path};
 
@@ -25,6 +25,7 @@ pub struct Format {
     pub(super) volume: Option<VolumeReader>,
     pub(super) samples: Option<SamplesReader>,
     pub(super) pieces: InPieces,
+    pub(super) arrays: Option<fn(&Source, &ReadOptions) -> Result<Vec<Array>>>,
 }
 
 /// Reads scattered samples.
@@ -124,6 +125,7 @@ impl Format {
         volume: None,
         samples: None,
         pieces: InPieces::No,
+        arrays: None,
     };
 
     /// Returns the format that the extension of a path names.

@@ -29,8 +29,8 @@ pub enum Kind {
 impl Kind {
     /// Returns the kind of a file, or `None` if neither its name nor its first bytes determine it.
     /// A PLY file with faces is a mesh. A PLY file without faces is a point cloud, or samples if
-    /// the caller asks for a scalar ([`ReadOptions::scalar`]). Legacy VTK files are volumes or samples,
-    /// depending on their data set.
+    /// the caller asks for a scalar ([`ReadOptions::scalar`]). Legacy VTK files are volumes or
+    /// samples, depending on their data set.
     ///
     /// Text tables (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`) are samples if the caller asks for a
     /// scalar. Otherwise `.xyz`, `.pts` and `.asc` are point clouds. `.csv` and `.txt` are point

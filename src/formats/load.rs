@@ -46,8 +46,8 @@ pub(super) fn mesh_of(table: &[Format], source: &Source, options: &ReadOptions) 
 }
 
 /// Reads a volume. The extension selects the format if it is one of a volume. Any other file is
-/// read as raw if the options give its layout, and otherwise by its first bytes. World units are those
-/// of the file. [`FORMATS`] lists the formats.
+/// read as raw if the options give its layout, and otherwise by its first bytes. World units are
+/// those of the file. [`FORMATS`] lists the formats.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a file that is not such a volume,

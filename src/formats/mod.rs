@@ -8,6 +8,7 @@
 
 #![deny(clippy::disallowed_methods)]
 
+mod array;
 pub mod csv;
 #[cfg(feature = "e57")]
 pub mod e57;
@@ -51,6 +52,7 @@ pub mod vtr;
 pub mod vtu;
 pub mod xyz;
 
+pub use array::{Array, Place, arrays};
 pub use form::Counts;
 pub(crate) use form::StreamPoint;
 pub use format::{Content, Format, Holding};

@@ -15,8 +15,9 @@ pub(crate) use merge::merged;
 pub use splats::SampleOptions;
 
 use crate::{
+    about::About,
     parallel::prelude::*,
-    volume::{About, BINS, TransferFunction, Volume},
+    volume::{BINS, TransferFunction, Volume},
 };
 use glam::{DVec3, Vec3};
 

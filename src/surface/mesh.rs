@@ -1,5 +1,6 @@
 //! The content of a mesh or point cloud file, whatever its format.
 
+use crate::about::About;
 use glam::{DVec3, Vec2, Vec3};
 use std::{ops::Range, sync::Arc};
 
@@ -46,14 +47,20 @@ pub struct Mesh {
     /// Positions of scanners, in the order of the points that they saw; empty if the file has none.
     /// The normals of those points face the scanner.
     pub sensors: Vec<Sensor>,
+    /// One value of each vertex, to colour it by; empty if the file has none, or none was asked
+    /// for. NaN where a vertex has no value. `about` has the name and the unit.
+    pub values: Vec<f32>,
     /// Whether the format's convention is that +Z is up, as in surveying.
     pub z_is_up: bool,
+    /// What the file says beyond this.
+    pub about: About,
 }
 
 impl Mesh {
     /// Bytes of the arrays. Textures are shared and do not count.
     pub(crate) fn bytes(&self) -> u64 {
-        let Self { positions, normals, colors, uvs, triangles, triangle_materials, .. } = self;
+        let Self { positions, normals, colors, uvs, triangles, triangle_materials, values, .. } =
+            self;
         let arrays = [
             size_of_val(&positions[..]),
             size_of_val(&normals[..]),
@@ -61,6 +68,7 @@ impl Mesh {
             size_of_val(&uvs[..]),
             size_of_val(&triangles[..]),
             size_of_val(&triangle_materials[..]),
+            size_of_val(&values[..]),
         ];
         arrays.iter().map(|&bytes| bytes as u64).sum()
     }

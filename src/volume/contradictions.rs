@@ -2,12 +2,13 @@
 //! returns an error.
 
 use super::{
-    About, Arrangement, Coefficients, Lattice, Reconstruction, Samples, TransferFunction, Volume,
+    Arrangement, Coefficients, Lattice, Reconstruction, Samples, TransferFunction, Volume,
     body_centred,
 };
 use crate::bricks::{self, Bricks};
 use crate::{
     Error, Result,
+    about::About,
     formats::nrrd,
     input::testing::Folder,
     math::{Kernel, Profile, Tensor},

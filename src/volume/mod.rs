@@ -1,6 +1,5 @@
 //! Volumes: samples on a lattice, and the transfer functions that give them colour and opacity.
 
-mod about;
 #[cfg(test)]
 mod contradictions;
 mod grid;
@@ -19,7 +18,6 @@ mod sharp;
 pub(crate) mod steps;
 mod transfer;
 
-pub use about::{About, Modality, Stance};
 pub use lattice::{Arrangement, Lattice};
 pub(crate) use presets::BINS;
 pub use reconstruct::Reconstruction;

@@ -1,8 +1,9 @@
 //! The values of a volume, in the sample type of their file.
 
-use super::{About, Lattice, Scalar, overshoot::Overshoot, reach::neighbourhood_ranges};
+use super::{Lattice, Scalar, overshoot::Overshoot, reach::neighbourhood_ranges};
 use crate::{
     Error, Result,
+    about::About,
     math::{Kernel, Tensor},
     parallel::{self, prelude::*},
 };

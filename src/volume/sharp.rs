@@ -8,7 +8,7 @@
 //! regular volume sampling", 2001.
 
 use super::{
-    About, Arrangement, Coefficients, Lattice, Samples, Volume,
+    Arrangement, Coefficients, Lattice, Samples, Volume,
     grid::{Grid, Response},
     overshoot::Overshoot,
     prefilter,
@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    about::About,
     math::{Kernel, Profile, Tensor},
     memory,
     parallel::prelude::*,
