@@ -3,7 +3,7 @@
 //! Data flows through these modules:
 //!
 //! - [`input`] opens a file and guards against damaged ones; [`formats`] decodes it.
-//! - [`volume`], [`scattered`] and [`surface`] interpret its content. Meshes, points and scattered
+//! - [`volume`], [`scattered`], [`cells`] and [`surface`] interpret its content. Meshes, points and scattered
 //!   samples become splats ([`splat`]).
 //! - A [`Scene`](scene::Scene) holds splats, hierarchies and volumes, and the transfer functions
 //!   that show them.
@@ -52,7 +52,7 @@
 //! |---|---|
 //! | read a file of any known format, or bytes in memory | [`formats`] |
 //! | limit what a file may take: memory, points, time | [`input::Limits`] |
-//! | work with meshes, volumes and samples | [`surface`], [`volume`], [`scattered`] |
+//! | work with meshes, volumes, samples and cells | [`surface`], [`volume`], [`scattered`], [`cells`] |
 //! | draw data larger than memory | [`hierarchy`], [`bricks`] |
 //! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |
 //! | use the device of a host application | [`gpu::Gpu::from_wgpu`] |
@@ -89,6 +89,7 @@ extern crate self as splatkit;
 
 pub mod about;
 pub mod bricks;
+pub mod cells;
 pub mod compare;
 pub mod container;
 pub mod cpu;

@@ -9,7 +9,7 @@ use std::{
 use syn::{Attribute, Item, ItemMod, ItemUse, Meta, UseTree, visit::Visit};
 
 /// The rooms of src. Each imports only from rooms before it.
-const ROOMS: [&str; 25] = [
+const ROOMS: [&str; 26] = [
     "error",
     "parallel",
     "deadline",
@@ -24,6 +24,7 @@ const ROOMS: [&str; 25] = [
     "volume",
     "surface",
     "scattered",
+    "cells",
     "picture",
     "formats",
     "bricks",

@@ -1,7 +1,9 @@
 //! What a row of the table of formats says, and how the row of a file is found.
 
 use super::{Array, Kind, RawLayout, ReadOptions, form::Form, shared::plain::Plain};
-use crate::{Result, input::Source, scattered::Points, surface::Mesh, volume::Volume};
+use crate::{
+    Result, cells::Cells, input::Source, scattered::Points, surface::Mesh, volume::Volume,
+};
 use std::{fmt, path::Path};
 
 /// A file format: a row of [`FORMATS`](super::FORMATS).
@@ -24,6 +26,7 @@ pub struct Format {
     pub(super) mesh: Option<fn(&Source, &ReadOptions) -> Result<Mesh>>,
     pub(super) volume: Option<VolumeReader>,
     pub(super) samples: Option<SamplesReader>,
+    pub(super) cells: Option<fn(&Source, &ReadOptions) -> Result<Cells>>,
     pub(super) pieces: InPieces,
     pub(super) arrays: Option<fn(&Source, &ReadOptions) -> Result<Vec<Array>>>,
 }
@@ -46,6 +49,8 @@ pub enum Content {
     Volume,
     /// Samples at any positions.
     Samples,
+    /// Cells with a field inside.
+    Cells,
     /// A hierarchy of splats.
     Hierarchy,
     /// A volume in bricks.
@@ -124,6 +129,7 @@ impl Format {
         mesh: None,
         volume: None,
         samples: None,
+        cells: None,
         pieces: InPieces::No,
         arrays: None,
     };
@@ -147,7 +153,10 @@ impl Format {
 
     /// Returns whether this build has no reader of the format, because its feature is off.
     pub fn is_left_out(&self) -> bool {
-        let is_read = self.mesh.is_some() || self.volume.is_some() || self.samples.is_some();
+        let is_read = self.mesh.is_some()
+            || self.volume.is_some()
+            || self.samples.is_some()
+            || self.cells.is_some();
         self.feature.is_some() && !is_read
     }
 
@@ -159,8 +168,15 @@ impl Format {
 
 impl Content {
     /// Every content, in the order of messages.
-    pub const ALL: [Self; 6] =
-        [Self::Hierarchy, Self::Bricks, Self::Mesh, Self::PointCloud, Self::Volume, Self::Samples];
+    pub const ALL: [Self; 7] = [
+        Self::Hierarchy,
+        Self::Bricks,
+        Self::Mesh,
+        Self::PointCloud,
+        Self::Volume,
+        Self::Cells,
+        Self::Samples,
+    ];
 
     /// Returns its name for one file.
     pub fn name(self) -> &'static str {
@@ -169,6 +185,7 @@ impl Content {
             Self::PointCloud => "point cloud",
             Self::Volume => "volume",
             Self::Samples => "scattered samples",
+            Self::Cells => "cells",
             Self::Hierarchy => "hierarchy",
             Self::Bricks => "volume in bricks",
         }
@@ -181,6 +198,7 @@ impl Content {
             Self::PointCloud => "point clouds",
             Self::Volume => "volumes",
             Self::Samples => "scattered samples",
+            Self::Cells => "cells",
             Self::Hierarchy => "hierarchies",
             Self::Bricks => "volumes in bricks",
         }
@@ -192,6 +210,7 @@ impl Content {
             Self::Mesh | Self::PointCloud => Kind::Mesh,
             Self::Volume => Kind::Volume,
             Self::Samples => Kind::Samples,
+            Self::Cells => Kind::Cells,
             Self::Hierarchy => Kind::Hierarchy,
             Self::Bricks => Kind::Bricks,
         }
@@ -414,6 +433,7 @@ mod tests {
             assert_eq!(format.mesh.is_some(), holds(Kind::Mesh), "{name}");
             assert_eq!(format.volume.is_some(), holds(Kind::Volume), "{name}");
             assert_eq!(format.samples.is_some(), holds(Kind::Samples), "{name}");
+            assert_eq!(format.cells.is_some(), holds(Kind::Cells), "{name}");
             let is_opened = matches!(format.pieces, InPieces::Opened);
             assert_eq!(is_opened, holds(Kind::Hierarchy) || holds(Kind::Bricks), "{name}");
             match format.kind {

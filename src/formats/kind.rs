@@ -20,6 +20,8 @@ pub enum Kind {
     Volume,
     /// [`load_samples`](super::load_samples)
     Samples,
+    /// [`load_cells`](super::load_cells)
+    Cells,
     /// [`Hierarchy::open`](crate::hierarchy::Hierarchy::open)
     Hierarchy,
     /// [`Bricks::open`](crate::bricks::Bricks::open)

@@ -1,4 +1,4 @@
-//! The entry points for all formats: meshes and point clouds, volumes, scattered samples.
+//! The entry points for all formats: meshes and point clouds, volumes, scattered samples, cells.
 
 use super::{
     FORMATS, ReadOptions,
@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     Result,
+    cells::Cells,
     input::{Limits, Source},
     scattered::Points,
     surface::Mesh,
@@ -136,6 +137,41 @@ pub(super) fn samples_of(
                 )
                 .hint(format!("scattered samples are read from {}", extensions(table, may))))
         }
+    }
+}
+
+/// Reads cells. The file's extension selects the format; for other extensions, the first bytes do.
+/// [`FORMATS`] lists the formats.
+///
+/// # Errors
+/// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file that is in no
+/// format of cells.
+pub fn load_cells(path: impl AsRef<Path>, limits: &Limits, options: &ReadOptions) -> Result<Cells> {
+    read_cells(&Source::open(path.as_ref(), limits)?, options)
+}
+
+/// As [`load_cells`], but reads from an open source, which may be in memory
+/// ([`Source::from_bytes`]).
+///
+/// # Errors
+/// Those of [`load_cells`], except those of opening the file.
+pub fn read_cells(source: &Source, options: &ReadOptions) -> Result<Cells> {
+    let _span = tracing::info_span!("load_cells", file = %source.path.display()).entered();
+    source.unless_changed(cells_of(FORMATS, source, options))
+}
+
+/// As [`read_cells`], in the formats of a table, but does not check whether the file changed
+/// meanwhile.
+pub(super) fn cells_of(table: &[Format], source: &Source, options: &ReadOptions) -> Result<Cells> {
+    let may = |format: &Format| format.cells.is_some();
+    match find(table, source, may)?.and_then(|format| format.cells) {
+        Some(read) => read(source, options),
+        None => Err(source
+            .error(
+                "path",
+                format!("“.{}” is not a format of cells that can be read", named(source)),
+            )
+            .hint(format!("cells are read from {}", extensions(table, may)))),
     }
 }
 

@@ -1,10 +1,10 @@
 //! Readers and writers of files, one module per format. [`FORMATS`] is the table of all formats.
 //!
-//! [`load_mesh`], [`load_volume`] and [`load_samples`] look at the name and the first bytes, and
-//! return a mesh (or point cloud), a volume or scattered samples; [`Kind`] says which of them a
-//! file needs. [`read_mesh`], [`read_volume`] and [`read_samples`] do the same with bytes in memory
-//! ([`Source::from_bytes`]). All of them read through a [`Source`], within its
-//! [`Limits`](crate::input::Limits).
+//! [`load_mesh`], [`load_volume`], [`load_samples`] and [`load_cells`] look at the name and the
+//! first bytes, and return a mesh (or point cloud), a volume, scattered samples or cells; [`Kind`]
+//! says which of them a file needs. [`read_mesh`], [`read_volume`], [`read_samples`] and
+//! [`read_cells`] do the same with bytes in memory ([`Source::from_bytes`]). All of them read
+//! through a [`Source`], within its [`Limits`](crate::input::Limits).
 
 #![deny(clippy::disallowed_methods)]
 
@@ -57,7 +57,10 @@ pub use form::Counts;
 pub(crate) use form::StreamPoint;
 pub use format::{Content, Format, Holding};
 pub use kind::Kind;
-pub use load::{load_mesh, load_samples, load_volume, read_mesh, read_samples, read_volume};
+pub use load::{
+    load_cells, load_mesh, load_samples, load_volume, read_cells, read_mesh, read_samples,
+    read_volume,
+};
 pub use options::ReadOptions;
 pub use raw::RawLayout;
 pub use shared::sample_type::{Endian, SampleType};

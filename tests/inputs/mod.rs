@@ -77,6 +77,9 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
                 formats::load_samples(path, limits, &ReadOptions::default())?.len()
             )
         }
+        Some(Kind::Cells) => {
+            format!("cells {}", formats::load_cells(path, limits, &ReadOptions::default())?.len())
+        }
         Some(Kind::Hierarchy) => {
             let tree = Hierarchy::open(path, limits)?.read_tree()?;
             format!("hierarchy {}", tree.leaf_count())

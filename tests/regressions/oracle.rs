@@ -14,6 +14,7 @@ use glam::{DVec3, Vec3};
 use splatkit::{
     Error, Result,
     bricks::Bricks,
+    cells::Cells,
     formats::{self, Endian, Kind, RawLayout, ReadOptions, SampleType, Stream, VolumeStream},
     hierarchy::{
         BuildOptions, Hierarchy, Preset, Tree,
@@ -153,6 +154,14 @@ fn sound_volume(volume: &Volume) {
 
 fn mesh(name: &str, bytes: &[u8], reader: fn(&Source) -> Result<Mesh>) -> Option<Mesh> {
     read(name, bytes, reader).inspect(sound_mesh)
+}
+
+/// Cells are valid, and so are the facts that `info` prints of them.
+fn sound_cells(cells: &Cells) {
+    cells.validate().expect("valid cells");
+    let [low, high] = cells.bounds();
+    assert!(low.is_finite() && high.is_finite() && low.cmple(high).all(), "{low} {high}");
+    assert!(cells.range().iter().all(|end| !end.is_nan()));
 }
 
 fn samples(name: &str, bytes: &[u8], reader: fn(&Source, Option<&str>) -> Result<Points>) {
@@ -375,6 +384,11 @@ pub fn any(bytes: &[u8]) {
             Some(Kind::Samples) => samples("input", bytes, |source, scalar| {
                 formats::read_samples(source, &ReadOptions::scalar(scalar))
             }),
+            Some(Kind::Cells) => {
+                read("input", bytes, |source| formats::read_cells(source, &ReadOptions::default()))
+                    .iter()
+                    .for_each(sound_cells);
+            }
             Some(Kind::Hierarchy) => splk(bytes),
             Some(Kind::Bricks) => splv(bytes),
             None => {}

@@ -10,13 +10,20 @@ use crate::{
 use clap::Args;
 use serde_json::{Map, Value, json};
 use splatkit::{
-    Error, bricks::Bricks, hierarchy::Hierarchy, scattered::Points, surface::Mesh, volume::Volume,
+    Error,
+    bricks::Bricks,
+    cells::{CellKind, Cells, Place},
+    hierarchy::Hierarchy,
+    scattered::Points,
+    surface::Mesh,
+    volume::Volume,
 };
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Info {
-    /// A mesh, point cloud, hierarchy, volume, volume in bricks, or a set of scattered samples.
+    /// A mesh, point cloud, hierarchy, volume, volume in bricks, cells, or a set of scattered
+    /// samples.
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,
@@ -35,6 +42,7 @@ impl Info {
             Input::Mesh(mesh) => (mesh.positions.len(), of_mesh(mesh)),
             Input::Volume(volume) => (volume.len(), of_volume(volume)),
             Input::Samples(points) => (points.len(), of_samples(points)),
+            Input::Cells(cells) => (cells.len(), of_cells(cells)),
             Input::Hierarchy(hierarchy) => {
                 (hierarchy.header().source_points as usize, of_hierarchy(hierarchy))
             }
@@ -56,6 +64,8 @@ impl Info {
             "kind",
             "count",
             "triangles",
+            "points",
+            "cells",
             "dims",
             "spacing",
             "type",
@@ -186,6 +196,22 @@ fn of_samples(points: &Points) -> Map<String, Value> {
     facts.insert("range".into(), json!(points.range()));
     facts.insert("attributes".into(), json!(attributes));
     facts.insert("bounds".into(), bounds(Some(points.bounds())));
+    facts
+}
+
+fn of_cells(cells: &Cells) -> Map<String, Value> {
+    let count = |kind: CellKind| cells.kinds.iter().filter(|own| **own == kind).count();
+    let kinds = CellKind::ALL.into_iter().map(|kind| (kind, count(kind)));
+    let kinds = kinds.filter(|(_, count)| *count > 0);
+    let kinds = kinds.map(|(kind, count)| (kind.name().to_owned(), json!(count)));
+    let place = if cells.place == Place::Points { "points" } else { "cells" };
+    let mut facts = Map::new();
+    facts.insert("kind".into(), json!("cells"));
+    facts.insert("points".into(), json!(cells.points.len()));
+    facts.insert("cells".into(), Value::Object(kinds.collect()));
+    facts.insert("range".into(), json!(cells.range()));
+    facts.insert("attributes".into(), json!(["position", format!("value of {place}")]));
+    facts.insert("bounds".into(), bounds(Some(cells.bounds())));
     facts
 }
 

@@ -6,6 +6,7 @@ use glam::DVec3;
 use splatkit::{
     Deadline, Error,
     bricks::Bricks,
+    cells::Cells,
     formats::{
         self, Content, Endian, FORMATS, Format, Kind, RawLayout, ReadOptions, SampleType,
         VolumeStream,
@@ -27,6 +28,7 @@ pub enum Input {
     Mesh(Mesh),
     Volume(Volume),
     Samples(Points),
+    Cells(Cells),
     Hierarchy(Arc<Hierarchy>),
     Bricks(Arc<Bricks>),
 }
@@ -128,6 +130,10 @@ impl LoadFlags {
             Kind::Samples => {
                 let source = Source::open(path, &whole)?;
                 (Input::Samples(formats::read_samples(&source, &self.options())?), source.files())
+            }
+            Kind::Cells => {
+                let source = Source::open(path, &whole)?;
+                (Input::Cells(formats::read_cells(&source, &self.options())?), source.files())
             }
         };
         read.extend(files);

@@ -142,6 +142,9 @@ impl Adding<'_> {
             Input::Bricks(bricks) => self.add_bricks(path, bricks),
             Input::Volume(volume) => self.add_volume(path, volume),
             Input::Samples(points) => self.add_samples(path, &points, deadline),
+            Input::Cells(_) => {
+                Err(Error::input(path, "content", "holds cells, which are not drawn yet").into())
+            }
         }
     }
 

@@ -42,6 +42,11 @@ impl Convert {
                     "{name} holds scattered samples; only volumes on a lattice can be converted"
                 )));
             }
+            Kind::Cells => {
+                return Err(Failure::Usage(format!(
+                    "{name} holds cells; only volumes on a lattice can be converted"
+                )));
+            }
             Kind::Mesh | Kind::Hierarchy => return Err(none(file)),
         }
         if let Some(stream) = self.load.stream(file)? {

@@ -203,10 +203,10 @@ impl Convert {
                 let frame = Frame { up: header.up, unit: header.unit.clone() };
                 (set, header.closed, frame, header.source_points)
             }
-            Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) => {
+            Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) | Input::Cells(_) => {
                 let file = path.display();
                 return Err(Failure::Usage(format!(
-                    "{file} holds a volume or samples; hierarchies are built from meshes and point \
+                    "{file} holds a volume, cells or samples; hierarchies are built from meshes and point \
                      clouds"
                 )));
             }

@@ -1,0 +1,251 @@
+//! Cells: tetrahedra, hexahedra and their kin with a field inside, as solvers write them.
+
+mod kind;
+#[cfg(test)]
+mod tests;
+
+pub use kind::CellKind;
+
+use crate::{
+    about::About,
+    parallel::prelude::*,
+    volume::{BINS, TransferFunction, Volume},
+};
+use glam::{DVec3, Vec3};
+
+/// Cells that fill space, with one value for each of their points or for each cell. Between the
+/// nodes of a cell, the field is what the cell's kind interpolates. Values that are not numbers are
+/// holes: nothing is drawn in a cell with a hole at a node.
+///
+/// ```
+/// use glam::Vec3;
+/// use splatkit::cells::{CellKind, Cells};
+///
+/// let cells = Cells {
+///     points: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
+///     values: vec![0.0, 1.0, 2.0, 3.0],
+///     kinds: vec![CellKind::Tetrahedron],
+///     offsets: vec![0, 4],
+///     nodes: vec![0, 1, 2, 3],
+///     ..Cells::default()
+/// };
+/// cells.validate()?;
+/// assert_eq!((cells.len(), cells.range()), (1, [0.0, 3.0]));
+/// # Ok::<(), splatkit::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cells {
+    /// World position that the points are relative to.
+    pub origin: DVec3,
+    /// The points that cells refer to, relative to `origin`.
+    pub points: Vec<Vec3>,
+    /// One value for each point or each cell, by `place`.
+    pub values: Vec<f32>,
+    /// Where the values sit.
+    pub place: Place,
+    /// The kind of each cell.
+    pub kinds: Vec<CellKind>,
+    /// Where the nodes of each cell begin in `nodes`, and at last where those of the last cell end:
+    /// one entry more than there are cells.
+    pub offsets: Vec<usize>,
+    /// The points of all cells, cell after cell, in VTK's order.
+    pub nodes: Vec<u32>,
+    /// What the file says beyond the values.
+    pub about: About,
+}
+
+/// Where the values of cells sit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Place {
+    /// One a point; interpolated in between.
+    #[default]
+    Points,
+    /// One a cell; the same everywhere in it.
+    Cells,
+}
+
+impl Default for Cells {
+    fn default() -> Self {
+        Self {
+            origin: DVec3::ZERO,
+            points: Vec::new(),
+            values: Vec::new(),
+            place: Place::Points,
+            kinds: Vec::new(),
+            offsets: vec![0],
+            nodes: Vec::new(),
+            about: About::default(),
+        }
+    }
+}
+
+impl Cells {
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        self.kinds.len()
+    }
+
+    /// Returns whether there are no cells.
+    pub fn is_empty(&self) -> bool {
+        self.kinds.is_empty()
+    }
+
+    /// Adds a cell.
+    pub fn push(&mut self, kind: CellKind, nodes: impl IntoIterator<Item = u32>) {
+        self.kinds.push(kind);
+        self.nodes.extend(nodes);
+        self.offsets.push(self.nodes.len());
+    }
+
+    /// Returns the nodes of a cell; for a polyhedron, the stream of its faces.
+    ///
+    /// # Panics
+    /// If there is no such cell, or if [`validate`](Self::validate) would refuse the offsets.
+    pub fn nodes_of(&self, cell: usize) -> &[u32] {
+        &self.nodes[self.offsets[cell]..self.offsets[cell + 1]]
+    }
+
+    /// Returns the points of a cell. Those of a polyhedron repeat, face by face.
+    pub(crate) fn points_of(&self, cell: usize) -> impl Iterator<Item = u32> {
+        let nodes = self.nodes_of(cell);
+        let is_stream = self.kinds[cell] == CellKind::Polyhedron;
+        let stream = if is_stream { nodes } else { &[] };
+        let own = if is_stream { &[] } else { nodes };
+        let faces = kind::faces(stream).filter_map(Result::ok).flatten();
+        own.iter().chain(faces).copied()
+    }
+
+    /// Checks that the cells are usable.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument), which names the first cell or point that is
+    /// wrong. Causes are no cells, lists of different lengths, more than 2³² points, nodes that do
+    /// not fit the kind of their cell, nodes without a point, and numbers that are not finite
+    /// (except values that are holes).
+    pub fn validate(&self) -> crate::Result<()> {
+        self.check().map_err(crate::Error::Argument)
+    }
+
+    /// Like [`validate`](Self::validate). The error is a message, to which the caller adds the
+    /// place.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        self.check_lists()?;
+        let (points, count) = (self.points.len(), self.len());
+        let find = |range: usize, is_bad: &(dyn Fn(usize) -> bool + Sync)| {
+            (0..range).into_par_iter().find_first(|&index| is_bad(index))
+        };
+        if let Some(point) = find(points, &|point| !self.points[point].is_finite()) {
+            return Err(format!("the position {} of point {point} is not finite", {
+                self.points[point]
+            }));
+        }
+        if let Some(index) = find(self.values.len(), &|index| self.values[index].is_infinite()) {
+            let of = if self.place == Place::Points { "point" } else { "cell" };
+            return Err(format!("the value of {of} {index} is {}", self.values[index]));
+        }
+        if let Some(cell) =
+            find(count, &|cell| self.kinds[cell].check(self.nodes_of(cell)).is_err())
+        {
+            let what = self.kinds[cell].check(self.nodes_of(cell)).err().unwrap_or_default();
+            return Err(format!("cell {cell} {what}"));
+        }
+        let is_out = |node: &u32| *node as usize >= points;
+        if let Some(cell) = find(count, &|cell| self.points_of(cell).any(|node| is_out(&node))) {
+            let node = self.points_of(cell).find(is_out).unwrap_or_default();
+            return Err(format!("cell {cell} refers to point {node} of {points}"));
+        }
+        Ok(())
+    }
+
+    /// Checks the lengths of the lists, and the offsets.
+    fn check_lists(&self) -> Result<(), String> {
+        let (points, count) = (self.points.len(), self.len());
+        if count == 0 {
+            return Err("there are no cells that fill space".into());
+        }
+        if u32::try_from(points.max(count)).is_err() {
+            return Err(format!(
+                "{count} cells of {points} points are more than 32 bits can count"
+            ));
+        }
+        let (wanted, of) = match self.place {
+            Place::Points => (points, "points"),
+            Place::Cells => (count, "cells"),
+        };
+        if self.values.len() != wanted {
+            return Err(format!("there are {} values for {wanted} {of}", self.values.len()));
+        }
+        let ends = [self.offsets.first(), self.offsets.last()];
+        let is_ascending = self.offsets.par_windows(2).all(|pair| pair[0] <= pair[1]);
+        if !(self.offsets.len() == count + 1
+            && ends == [Some(&0), Some(&self.nodes.len())]
+            && is_ascending)
+        {
+            return Err(format!(
+                "the offsets of {count} cells must be {} ascending numbers from 0 to {}",
+                count + 1,
+                self.nodes.len()
+            ));
+        }
+        if !self.origin.is_finite() {
+            return Err(format!("the origin {} is not finite", self.origin));
+        }
+        Ok(())
+    }
+
+    /// Returns the smallest and largest value; `[∞, −∞]` if all are holes.
+    pub fn range(&self) -> [f64; 2] {
+        let none = || [f32::INFINITY, f32::NEG_INFINITY];
+        let ends = self
+            .values
+            .par_iter()
+            .filter(|value| !value.is_nan())
+            .fold(none, |[low, high], &value| [low.min(value), high.max(value)])
+            .reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        ends.map(f64::from)
+    }
+
+    /// Returns the smallest and largest world coordinates of the cells' nodes.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let none = || [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        let add = |[low, high]: [Vec3; 2], node: u32| {
+            let at = self.points[node as usize];
+            [low.min(at), high.max(at)]
+        };
+        let ends = (0..self.len())
+            .into_par_iter()
+            .fold(none, |ends, cell| self.points_of(cell).fold(ends, add))
+            .reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        ends.map(|end| self.origin + end.as_dvec3())
+    }
+
+    /// Counts the values in each of `bins` equal parts of the range. The largest value counts in
+    /// the last bin. If all values are equal, they fill the first bin.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument) for more than [`Volume::MAX_BINS`] bins.
+    pub fn histogram(&self, bins: usize) -> crate::Result<Vec<u64>> {
+        Volume::check_bins(bins)?;
+        Ok(self.counts(bins))
+    }
+
+    /// The [`histogram`](Self::histogram), for a number of bins that is known to be allowed.
+    fn counts(&self, bins: usize) -> Vec<u64> {
+        let mut counts = vec![0; bins];
+        let [low, high] = self.range();
+        let scale = if high > low { bins as f64 / (high - low) } else { 0.0 };
+        for &value in self.values.iter().filter(|value| bins > 0 && !value.is_nan()) {
+            // Casts saturate, so the largest value stays in the last bin.
+            counts[(((f64::from(value) - low) * scale) as usize).min(bins - 1)] += 1;
+        }
+        counts
+    }
+
+    /// Derives a transfer function from the values.
+    pub fn automatic_transfer(&self) -> TransferFunction {
+        let [first, last] = self.bounds();
+        let diagonal = (last - first).length();
+        let unit = if diagonal > 0.0 { diagonal / 100.0 } else { 1.0 };
+        TransferFunction::of_histogram(self.counts(BINS), self.range(), unit, false)
+    }
+}
