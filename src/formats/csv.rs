@@ -1,10 +1,19 @@
 //! Scattered samples as text tables (`.csv`, `.txt`, `.xyzv`): one sample a line, with or without a
 //! line of column names.
 
-use super::shared::gather::{Columns, choose, gather};
+use super::{
+    Array, Place, ReadOptions,
+    shared::{
+        choice::{self, Candidate, Part, Role},
+        gather::{Columns, gather},
+    },
+};
 use crate::{
     Result,
-    input::{Source, text::Text},
+    input::{
+        Source,
+        text::{Text, Want},
+    },
     scattered::Points,
 };
 use glam::DVec3;
@@ -14,23 +23,27 @@ const COVARIANCE: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 
 /// Reads samples. With column names, the table has:
 /// - `x`, `y` and `z`;
-/// - a value: the column that `scalar` names, else `value` or `scalar`, else the only column left;
+/// - a value: the column that [`ReadOptions::scalar`] names, else `value` or `scalar`, else the
+///   first other column of numbers that are not identifiers;
 /// - optionally `radius`, and `xx`, `xy`, `xz`, `yy`, `yz`, `zz` (or `cov_xx`, …).
 ///
 /// Without names, the columns are x, y, z and value, then nothing, a radius, or the six terms of a
 /// covariance in that order.
 ///
+/// Samples without a value are left out: those whose value is empty, `nan`, `NA`, `null`, `none`,
+/// `-`, not finite in 32 bits, or [`ReadOptions::missing`].
+///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) with the line, for other columns, lines with another
-/// number of columns, words that are not numbers, and numbers that are not finite;
+/// number of columns, words that are not numbers, and positions that are not finite;
 /// [`Error::Limit`](crate::Error::Limit) for more lines than the limits allow points.
-pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
+pub fn read(source: &Source, options: &ReadOptions) -> Result<Points> {
     let text = Text::of(source, |_, _| Ok(false))?;
     let layout = match &text.names {
-        Some(names) => Layout::named(source, text.first, names, scalar)?,
+        Some(names) => Layout::named(source, &text, names, options.scalar.as_deref())?,
         None => Layout::plain(source, text.width)?,
     };
-    let table = text.numbers(source, |column| layout.uses(column))?;
+    let table = text.numbers(source, |column| layout.want(column))?;
     let (count, width) = (text.len(), text.width);
     let value = |row: usize, column: usize| table[row * width + column];
     let column = |column: usize| (0..count).map(move |row| value(row, column));
@@ -46,7 +59,63 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     };
     let [x, y, z] = layout.position;
     let position = |row| DVec3::new(value(row, x), value(row, y), value(row, z));
-    gather(source, count, position, |row| text.place(row), columns)
+    let mut points = gather(source, count, position, |row| text.place(row), columns, options)?;
+    points.about.name = text.names.map_or(String::new(), |names| names[layout.value].clone());
+    Ok(points)
+}
+
+/// Returns the columns of a table with column names; nothing for a table without.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
+    let text = Text::of(source, |_, _| Ok(false))?;
+    let Some(names) = &text.names else { return Ok(Vec::new()) };
+    let candidates = candidates(&text, names);
+    let drawn = Layout::named(source, &text, names, options.scalar.as_deref()).ok();
+    let mut arrays = Vec::new();
+    for (column, candidate) in candidates.iter().enumerate() {
+        let values = if candidate.is_numeric { of_column(source, &text, column)? } else { vec![] };
+        arrays.push(Array {
+            range: choice::range(values.into_iter(), options.missing),
+            is_drawn: drawn.as_ref().is_some_and(|layout| layout.value == column),
+            ..candidate.listed()
+        });
+    }
+    Ok(arrays)
+}
+
+/// Returns the columns of a table as arrays to choose from, in their order.
+fn candidates(text: &Text, names: &[String]) -> Vec<Candidate> {
+    let is_known = |name: &str| {
+        let name = name.to_ascii_lowercase();
+        let term = name.strip_prefix("cov_").unwrap_or(&name);
+        matches!(name.as_str(), "x" | "y" | "z" | "radius") || COVARIANCE.contains(&term)
+    };
+    let role = |name: &str| match name.to_ascii_lowercase().as_str() {
+        "value" | "scalar" => Role::Scalars,
+        _ if is_known(name) => Role::Geometry,
+        _ => Role::None,
+    };
+    let of = |(column, name): (usize, &String)| {
+        let is_numeric = text.is_numeric(column);
+        Candidate {
+            name: name.clone(),
+            place: Place::Points,
+            kind: if is_numeric { "number" } else { "string" }.into(),
+            is_numeric,
+            components: 1,
+            role: role(name),
+        }
+    };
+    names.iter().enumerate().map(of).collect()
+}
+
+/// Returns the numbers of one column.
+fn of_column(source: &Source, text: &Text, column: usize) -> Result<Vec<f64>> {
+    let want = |other: usize| if other == column { Want::Values } else { Want::Nothing };
+    let table = text.numbers(source, want)?;
+    Ok(table.chunks_exact(text.width).map(|row| row[column]).collect())
 }
 
 /// The meaning of the columns.
@@ -71,8 +140,8 @@ impl Layout {
         }
     }
 
-    fn named(source: &Source, line: usize, names: &[String], scalar: Option<&str>) -> Result<Self> {
-        let place = format!("line {line}");
+    fn named(source: &Source, text: &Text, names: &[String], scalar: Option<&str>) -> Result<Self> {
+        let place = format!("line {}", text.first);
         let at = |name: &str| names.iter().position(|other| other.eq_ignore_ascii_case(name));
         let need = |name: &str| {
             at(name).ok_or_else(|| source.error(&place, format!("has no column “{name}”")))
@@ -82,24 +151,28 @@ impl Layout {
         let terms = COVARIANCE.map(|term| at(term).or_else(|| at(&format!("cov_{term}"))));
         let covariance =
             terms.iter().all(Option::is_some).then(|| terms.map(Option::unwrap_or_default));
-        let taken = |column: &usize| {
-            position.contains(column) || radius == Some(*column) || terms.contains(&Some(*column))
+        let candidates = candidates(text, names);
+        let chosen = match scalar {
+            Some(name) => choice::named(source, &candidates, name)?,
+            None => choice::needed(source, &candidates, |column| {
+                Ok(choice::is_ramp(&of_column(source, text, column)?))
+            })?,
         };
-        let rest: Vec<usize> = (0..names.len()).filter(|column| !taken(column)).collect();
-        let of_rest: Vec<&str> = rest.iter().map(|&column| names[column].as_str()).collect();
-        let usual = || at("value").or_else(|| at("scalar")).filter(|_| scalar.is_none());
-        let value = match usual() {
-            Some(value) => value,
-            None => rest[choose(source, &place, scalar, &of_rest)?],
-        };
-        Ok(Self { position, value, radius, covariance })
+        debug_assert_eq!(chosen.part, Part::Whole);
+        Ok(Self { position, value: chosen.array, radius, covariance })
     }
 
-    fn uses(&self, column: usize) -> bool {
-        self.position.contains(&column)
-            || self.value == column
+    fn want(&self, column: usize) -> Want {
+        let is_geometry = self.position.contains(&column)
             || self.radius == Some(column)
-            || self.covariance.is_some_and(|terms| terms.contains(&column))
+            || self.covariance.is_some_and(|terms| terms.contains(&column));
+        if is_geometry {
+            Want::Numbers
+        } else if self.value == column {
+            Want::Values
+        } else {
+            Want::Nothing
+        }
     }
 }
 
@@ -108,13 +181,18 @@ mod tests {
     use super::*;
     use crate::{
         Error,
+        about::About,
         input::{Limits, testing::*},
     };
     use glam::Vec3;
 
     fn load(text: &str, scalar: Option<&str>) -> Result<Points> {
         let folder = Folder::new();
-        read_with(&folder.write("a.csv", text), |source| read(source, scalar))
+        read_with(&folder.write("a.csv", text), |source| {
+            let mut points = read(source, &ReadOptions::scalar(scalar))?;
+            points.about = About::default();
+            Ok(points)
+        })
     }
 
     #[test]
@@ -158,11 +236,12 @@ mod tests {
             ("# nothing\n", None, "no rows"),
             ("hello", None, "no column “x”"),
             ("1 2 3", None, "3 columns without names"),
-            ("x,y,z\n1,2,3", None, "line 1: has no scalar"),
-            ("x,y,z,a,b\n1,2,3,4,5", None, "2 scalars to choose from"),
-            ("x,y,z,a,b\n1,2,3,4,5", Some("c"), "no scalar “c”"),
+            ("x,y,z\n1,2,3", None, "no values that can be drawn"),
+            ("x,y,z,id\n1,2,3,4", None, "only identifiers"),
+            ("x,y,z,a,b\n1,2,3,4,5", Some("c"), "no array “c”"),
+            ("x,y,z,name\n1,2,3,four", Some("name"), "not numbers"),
             ("x,y,z,v\n", None, "no samples"),
-            ("1 2 3 4\n\n5 6 7 nan", None, "line 3: number 4 is NaN"),
+            ("1 2 3 nan\n\n5 6 7 inf", None, "none of the 2 samples has a value"),
             ("1 2 3 4\n5 inf 7 8", None, "line 2: number 2 is inf"),
             ("1 2 3 4\n5 6 7", None, "line 2: has 3 columns, but the first line has 4"),
             ("1 2 3 4\n5 6 7 8 9", None, "line 2: has 5 columns"),
@@ -171,7 +250,6 @@ mod tests {
             ("\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "neither numbers nor column names"),
             ("1,2,3,4\n\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "“1,5” is not a number"),
             ("1 2 3 4 0", None, "radius of sample 0 is 0"),
-            ("1 2 3 1e39", None, "line 1: the value"),
         ] {
             let message = load(text, scalar).unwrap_err().to_string();
             assert!(message.contains(word), "{text}: {message}");
@@ -180,7 +258,7 @@ mod tests {
         let path = folder.write("a.csv", "1 2 3 4\n5 6 7 8\n");
         let limits = Limits { points: 1, ..Limits::default() };
         assert!(matches!(
-            read(&Source::open(&path, &limits).unwrap(), None),
+            read(&Source::open(&path, &limits).unwrap(), &ReadOptions::default()),
             Err(Error::Limit { .. })
         ));
     }
@@ -195,5 +273,28 @@ mod tests {
                 Err(error) => assert!(matches!(error, Error::Input { .. }), "{error}"),
             }
         }
+    }
+
+    /// Samples without a value are holes; identifiers and words are not chosen.
+    #[test]
+    fn values_may_be_missing() {
+        let text = "station,id,x,y,z,t,u\nA,7,1,2,3,-0.5,1\nB,9,0,0,0,,2\nC,9,0,0,0,NA,-99\n\
+                    D,3,4,5,6,70,4\n";
+        let folder = Folder::new();
+        let path = folder.write("a.csv", text);
+        let load = |scalar: Option<&str>, missing| {
+            let options = ReadOptions { missing, ..ReadOptions::scalar(scalar) };
+            read_with(&path, |source| Ok((read(source, &options)?, arrays(source, &options)?)))
+        };
+        let (points, arrays) = load(None, None).unwrap();
+        assert_eq!((points.values, points.about.holes), (vec![-0.5, 70.0], 2));
+        assert_eq!(points.positions[1], Vec3::new(4.0, 5.0, 6.0));
+        assert_eq!(points.about.name, "t");
+        let drawn: Vec<&str> =
+            arrays.iter().filter(|array| array.is_drawn).map(|array| array.name.as_str()).collect();
+        assert_eq!((arrays.len(), drawn), (7, vec!["t"]));
+        assert_eq!((arrays[0].range, arrays[5].range), (None, Some([-0.5, 70.0])));
+        let (points, _) = load(Some("u"), Some(-99.0)).unwrap();
+        assert_eq!((points.values, points.about.holes), (vec![1.0, 2.0, 4.0], 1));
     }
 }

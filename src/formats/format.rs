@@ -88,7 +88,7 @@ pub(super) enum Which {
 pub(super) enum VolumeReader {
     Plain(fn(&Source, &ReadOptions) -> Result<Volume>),
     /// For files that do not describe themselves: the caller gives the layout.
-    Described(fn(&Source, &RawLayout) -> Result<Volume>),
+    Described(fn(&Source, &RawLayout, &ReadOptions) -> Result<Volume>),
 }
 
 /// How a format is read in pieces. `of` says which of its files are (“binary files”); it is empty

@@ -81,7 +81,7 @@ pub(super) fn volume_of(
     let format = find_volume(table, source, options.raw.is_some())?;
     match (format.and_then(|format| format.volume), &options.raw) {
         (Some(VolumeReader::Plain(read)), _) => read(source, options),
-        (Some(VolumeReader::Described(read)), Some(layout)) => read(source, layout),
+        (Some(VolumeReader::Described(read)), Some(layout)) => read(source, layout, options),
         _ => {
             let describes_itself =
                 |format: &&Format| matches!(format.volume, Some(VolumeReader::Plain(_)));

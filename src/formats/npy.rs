@@ -2,7 +2,7 @@
 //! Follows the format's description in NumPy Enhancement Proposal 1.
 
 use super::{
-    Endian, SampleType,
+    Endian, ReadOptions, SampleType,
     shared::gather::{Columns, gather},
 };
 use crate::{
@@ -19,7 +19,7 @@ use glam::DVec3;
 /// [`Error::Input`](crate::Error::Input) for a file that is not such an array, for another size
 /// than the header claims, and for numbers that are not finite, with the row;
 /// [`Error::Limit`](crate::Error::Limit) for more rows than the limits allow points.
-pub fn read(source: &Source) -> Result<Points> {
+pub fn read(source: &Source, options: &ReadOptions) -> Result<Points> {
     let bytes = source.bytes();
     let (header, start) = header(bytes).ok_or_else(|| {
         source.error("header", "is cut off, is longer than 1 MiB, or is not a NumPy header")
@@ -54,6 +54,7 @@ pub fn read(source: &Source) -> Result<Points> {
         |index| DVec3::from_slice(row(index)),
         |index| format!("row {index}"),
         columns,
+        options,
     )
 }
 
@@ -144,6 +145,10 @@ mod tests {
     use crate::{Error, input::testing::*};
     use glam::Vec3;
 
+    fn read(source: &Source) -> Result<Points> {
+        super::read(source, &ReadOptions::default())
+    }
+
     fn file(version: u8, descr: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
         let text =
             format!("{{'descr': {descr}, 'fortran_order': {order}, 'shape': {shape}, }}    \n");
@@ -210,7 +215,7 @@ mod tests {
             (file(4, "'<f4'", "False", "(1, 4)", &data), "not a NumPy header"),
             (
                 file(1, "'<f4'", "False", "(1, 4)", &[0, 0, 192, 127].repeat(4)),
-                "row 0: the value NaN",
+                "none of the 1 samples has a value",
             ),
         ] {
             let message = load(&content).unwrap_err().to_string();

@@ -4,7 +4,10 @@
 mod files;
 mod write;
 
-use super::{Endian, SampleType, shared::plain::Plain};
+use super::{
+    Endian, ReadOptions, SampleType,
+    shared::{holes, plain::Plain},
+};
 use crate::{
     Error, Result,
     input::{Source, copy},
@@ -34,10 +37,12 @@ pub use write::{write, write_bytes};
 /// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder,
 /// or several: as a list, or by a pattern with a number (`slice%03d.raw 1 90 1`).
 ///
+/// Samples that are not finite, or equal [`ReadOptions::missing`], are holes.
+///
 /// # Errors
-/// [`Error::Input`] with the field that is missing or wrong, for data that are cut off, and for
-/// samples that are not finite; [`Error::Limit`] for sizes over the limits.
-pub fn read(source: &Source) -> Result<Volume> {
+/// [`Error::Input`] with the field that is missing or wrong, for data that are cut off, and if no
+/// sample has a value; [`Error::Limit`] for sizes over the limits.
+pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let (header, body) = Header::read(source)?;
     let dims = header.dims()?;
     let lattice = header.lattice(dims)?;
@@ -59,8 +64,7 @@ pub fn read(source: &Source) -> Result<Volume> {
     source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
     let Some(field) = header.data_file() else {
         let (bytes, endian) = header.bytes(source, rest, kind, size)?;
-        return Volume::checked(lattice, kind.decode(bytes, endian))
-            .map_err(|message| source.error("samples", message));
+        return holes::volume(source, lattice, kind.decode(bytes, endian), options);
     };
     let names = files::names(source, field, rest, dims)?;
     let part = size / names.len();
@@ -68,8 +72,7 @@ pub fn read(source: &Source) -> Result<Volume> {
         let path = source.neighbour("data file", name)?;
         let data = source.open_beside(&path)?;
         let volume = header.bytes(&data, data.bytes(), kind, size).and_then(|(bytes, endian)| {
-            Volume::checked(lattice, kind.decode(bytes, endian))
-                .map_err(|message| data.error("samples", message))
+            holes::volume(&data, lattice, kind.decode(bytes, endian), options)
         });
         return data.unless_changed(volume);
     }
@@ -84,8 +87,7 @@ pub fn read(source: &Source) -> Result<Volume> {
         order = endian;
         data.intact()?;
     }
-    Volume::checked(lattice, kind.decode(all.into(), order))
-        .map_err(|message| source.error("samples", message))
+    holes::volume(source, lattice, kind.decode(all.into(), order), options)
 }
 
 /// Returns where the samples are in a file with raw encoding; `None` for other encodings, and if
@@ -594,6 +596,10 @@ mod tests {
 
     const VALUES: [i16; 12] = [0, 1, -2, 300, -4000, 5, 6, 7, 8, 9, 10, 32767];
 
+    fn read(source: &Source) -> Result<Volume> {
+        super::read(source, &ReadOptions::default())
+    }
+
     fn gzip(bytes: &[u8]) -> Vec<u8> {
         let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
         encoder.write_all(bytes).unwrap();
@@ -837,7 +843,7 @@ mod tests {
             ("type: short\nsizes: 1 1 1\nencoding: raw\nendian: middle", &[0; 2], "middle"),
             ("type: uchar\nsizes: 1 1 1\nencoding: ascii", b"256", "256"),
             ("type: uchar\nsizes: 1 1 1\nencoding: ascii", b"\xff", "not text"),
-            ("type: float\nsizes: 1 1 2\nencoding: ascii", b"1 nan", "not finite"),
+            ("type: float\nsizes: 1 1 2\nencoding: ascii", b"inf nan", "none of the 2 samples"),
             ("nonsense\ntype: float", b"", "line 4"),
         ] {
             let message = error(fields, data).to_string();

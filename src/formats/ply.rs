@@ -17,7 +17,10 @@ mod table;
 mod tests;
 mod write;
 
-use super::shared::texture;
+use super::{
+    ReadOptions,
+    shared::{holes::is_hole, texture},
+};
 use crate::{
     Result,
     input::{Source, positions},
@@ -31,7 +34,7 @@ use header::Element;
 pub(super) use pieces::Pieces;
 use ply_rs::ply::{PropertyType, ScalarType};
 use rows::Rows;
-pub use samples::{has_faces, read_samples};
+pub use samples::{arrays, has_faces, read_samples};
 use table::Table;
 pub use write::write;
 
@@ -43,13 +46,14 @@ const CHUNK: usize = 1 << 14;
 /// Faces with more than three corners are cut into triangles, and so are `tristrips`. Texture
 /// coordinates are those of the vertices, or else those that faces have for their corners
 /// (`texcoord`, with a `texnumber`). Colours are bytes, 16-bit numbers or fractions of 1. In wider
-/// types, they are bytes if the largest value of the file shows it.
+/// types, they are bytes if the largest value of the file shows it. The property of the vertices
+/// that [`ReadOptions::scalar`] names becomes the mesh's values.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed header, a file that ends before its last
 /// row, positions that are not finite, and face indices without a vertex;
 /// [`Error::Limit`](crate::Error::Limit) for more vertices or faces than the limits allow.
-pub fn read(source: &Source) -> Result<Mesh> {
+pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     let header = header::read(source)?;
     let vertices = header.elements.iter().find(|element| element.name == "vertex");
     let mut mesh = Mesh::default();
@@ -69,6 +73,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
                 gaussians::warn(source);
             }
             read_vertices(source, element, &rows, &mut mesh)?;
+            if options.scalar.is_some() {
+                read_values(source, element, &rows, options, &mut mesh)?;
+            }
         } else if is_face {
             // Faces are read last, because their vertices may come after them.
             faces.push((element, rows));
@@ -145,6 +152,22 @@ fn read_vertices(source: &Source, element: &Element, rows: &Rows, mesh: &mut Mes
     }
     let table = Table::read(source, element, rows, &columns)?;
     fill(source, element, rows, &columns, |row, role| table.value(row, role), mesh)
+}
+
+/// Gives the mesh the values of a property. `options` names it.
+fn read_values(
+    source: &Source,
+    element: &Element,
+    rows: &Rows,
+    options: &ReadOptions,
+    mesh: &mut Mesh,
+) -> Result<()> {
+    let name = options.scalar.as_deref().unwrap_or_default();
+    let (name, values) = samples::named_values(source, element, rows, name)?;
+    let value = |value: f64| if is_hole(value, options.missing) { f32::NAN } else { value as f32 };
+    mesh.values = values.into_iter().map(value).collect();
+    mesh.about.name = name;
+    Ok(())
 }
 
 /// Fills the mesh from the values of rows and roles.

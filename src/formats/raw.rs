@@ -1,6 +1,9 @@
 //! Raw volumes: samples without a header, or after a header to skip. The caller gives the layout.
 
-use super::{Endian, SampleType, shared::plain::Plain};
+use super::{
+    Endian, ReadOptions, SampleType,
+    shared::{holes, plain::Plain},
+};
 use crate::{
     Result,
     input::Source,
@@ -26,12 +29,13 @@ pub struct RawLayout {
 }
 
 /// Reads a raw file, which may be compressed by gzip. Sample (0, 0, 0) is at the world's origin.
+/// Of the options, only [`ReadOptions::missing`] matters.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) if the file's size is not exactly that of header and
 /// samples, with a guess at the layout it fits; [`Error::Limit`](crate::Error::Limit) for a layout
 /// over the limits.
-pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
+pub fn read(source: &Source, layout: &RawLayout, options: &ReadOptions) -> Result<Volume> {
     let (lattice, wanted) = whole(source, layout)?;
     let bytes = source.bytes();
     let mut unpacked: Cow<[u8]> = if is_packed(source, wanted) {
@@ -62,7 +66,7 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
         Cow::Owned(bytes) => drop(bytes.drain(..header)),
     }
     let samples = layout.sample_type.decode(unpacked, layout.endian);
-    Volume::checked(lattice, samples).map_err(|message| source.error("samples", message))
+    holes::volume(source, lattice, samples, options)
 }
 
 /// Returns where the samples are in a file that contains exactly the header and the samples; `None`
@@ -139,9 +143,13 @@ fn guess(size: u64, layout: &RawLayout) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Error, formats::ReadOptions, input::testing::*, volume::Samples};
+    use crate::{Error, input::testing::*, volume::Samples};
     use flate2::{Compression, write::GzEncoder};
     use std::io::Write;
+
+    fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
+        super::read(source, layout, &ReadOptions::default())
+    }
 
     fn layout(dims: [usize; 3], sample_type: SampleType) -> RawLayout {
         RawLayout {
@@ -243,9 +251,15 @@ mod tests {
         ));
         assert!(matches!(small(layout([2, 0, 2], SampleType::U8)), Error::Argument(_)));
         let path = folder.write("nan.raw", [0, 0, 192, 127, 0, 0, 128, 63]);
-        let error = read_with(&path, |source| read(source, &layout([2, 1, 1], SampleType::F32)))
-            .unwrap_err();
-        assert!(error.to_string().contains("1 of 2 samples are not finite, the first is sample 0"));
+        let load = |missing| {
+            let options = ReadOptions { missing, ..ReadOptions::default() };
+            let layout = layout([2, 1, 1], SampleType::F32);
+            read_with(&path, |source| super::read(source, &layout, &options))
+        };
+        let volume = load(None).unwrap();
+        assert_eq!((volume.samples, volume.about.holes), (Samples::F32(vec![1.0; 2]), 1));
+        let message = load(Some(1.0)).unwrap_err().to_string();
+        assert!(message.contains("samples: none of the 2 samples has a value"), "{message}");
     }
 
     #[test]

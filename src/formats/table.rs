@@ -52,9 +52,11 @@ pub static FORMATS: &[Format] = &[
             Ok(if samples { Kind::Samples } else { Kind::Mesh })
         }),
         #[cfg(feature = "ply")]
-        mesh: Some(|source, _| ply::read(source)),
+        mesh: Some(ply::read),
         #[cfg(feature = "ply")]
-        samples: Some(|source, options| ply::read_samples(source, options.scalar.as_deref())),
+        arrays: Some(ply::arrays),
+        #[cfg(feature = "ply")]
+        samples: Some(ply::read_samples),
         #[cfg(feature = "ply")]
         pieces: InPieces::Points {
             of: "binary files",
@@ -142,7 +144,8 @@ pub static FORMATS: &[Format] = &[
             Ok(if options.scalar.is_some() { Kind::Samples } else { Kind::Mesh })
         }),
         mesh: Some(|source, _| xyz::read(source)),
-        samples: Some(|source, options| csv::read(source, options.scalar.as_deref())),
+        samples: Some(csv::read),
+        arrays: Some(csv::arrays),
         ..Format::ROW
     },
     Format {
@@ -156,7 +159,7 @@ pub static FORMATS: &[Format] = &[
         }),
         kind: Which::Always(Kind::Samples),
         #[cfg(feature = "vtk")]
-        samples: Some(|source, options| vtu::read(source, options.scalar.as_deref())),
+        samples: Some(vtu::read),
         ..Format::ROW
     },
     Format {
@@ -167,7 +170,7 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Rule(|bytes| is_vtk_xml(bytes) && has_word(bytes, b"RectilinearGrid")),
         kind: Which::Always(Kind::Volume),
         #[cfg(feature = "vtk")]
-        volume: Some(VolumeReader::Plain(|source, _| vtr::read(source))),
+        volume: Some(VolumeReader::Plain(vtr::read)),
         ..Format::ROW
     },
     Format {
@@ -179,7 +182,7 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Rule(is_vtk_xml),
         kind: Which::Always(Kind::Volume),
         #[cfg(feature = "vtk")]
-        volume: Some(VolumeReader::Plain(|source, _| vti::read(source))),
+        volume: Some(VolumeReader::Plain(vti::read)),
         ..Format::ROW
     },
     Format {
@@ -196,9 +199,9 @@ pub static FORMATS: &[Format] = &[
             Ok(if vtk::holds_volume(source)? { Kind::Volume } else { Kind::Samples })
         }),
         #[cfg(feature = "vtk")]
-        volume: Some(VolumeReader::Plain(|source, _| vtk::read_volume(source))),
+        volume: Some(VolumeReader::Plain(vtk::read_volume)),
         #[cfg(feature = "vtk")]
-        samples: Some(|source, options| vtk::read_samples(source, options.scalar.as_deref())),
+        samples: Some(vtk::read_samples),
         ..Format::ROW
     },
     Format {
@@ -209,7 +212,7 @@ pub static FORMATS: &[Format] = &[
         refers: true,
         magic: Magic::Prefix(b"NRRD"),
         kind: Which::Always(Kind::Volume),
-        volume: Some(VolumeReader::Plain(|source, _| nrrd::read(source))),
+        volume: Some(VolumeReader::Plain(nrrd::read)),
         pieces: InPieces::Volume { of: "files of raw encoding", find: nrrd::plain },
         ..Format::ROW
     },
@@ -237,7 +240,7 @@ pub static FORMATS: &[Format] = &[
         holds: &[all(Content::Samples)],
         magic: Magic::Prefix(b"\x93NUMPY"),
         kind: Which::Always(Kind::Samples),
-        samples: Some(|source, _| npy::read(source)),
+        samples: Some(npy::read),
         ..Format::ROW
     },
     Format {
@@ -252,7 +255,8 @@ pub static FORMATS: &[Format] = &[
             Ok(if is_cloud { Kind::Mesh } else { Kind::Samples })
         }),
         mesh: Some(|source, _| xyz::read(source)),
-        samples: Some(|source, options| csv::read(source, options.scalar.as_deref())),
+        samples: Some(csv::read),
+        arrays: Some(csv::arrays),
         ..Format::ROW
     },
     Format {
@@ -260,7 +264,8 @@ pub static FORMATS: &[Format] = &[
         extensions: &["xyzv"],
         holds: &[all(Content::Samples)],
         kind: Which::Always(Kind::Samples),
-        samples: Some(|source, options| csv::read(source, options.scalar.as_deref())),
+        samples: Some(csv::read),
+        arrays: Some(csv::arrays),
         ..Format::ROW
     },
 ];

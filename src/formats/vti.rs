@@ -1,7 +1,8 @@
 //! VTK's XML image data (`.vti`): a volume in any of the encodings of vtk_xml.rs.
 
 use super::{
-    Endian, SampleType,
+    Endian, ReadOptions, SampleType,
+    shared::holes,
     vtk_xml::{Document, Extent, Part, dims, extent, numbers},
 };
 use crate::{
@@ -19,14 +20,14 @@ use glam::{DMat3, DVec3};
 /// [`Error::Input`](crate::Error::Input) for a file that is not image data, is compressed by
 /// anything but zlib, has no such scalars, is cut off, or has samples that are not finite;
 /// [`Error::Limit`](crate::Error::Limit) for extents over the limits.
-pub fn read(source: &Source) -> Result<Volume> {
+pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let document = Document::read(source, "ImageData")?;
     let whole = whole_extent(source, &document, "ImageData")?;
     let lattice = lattice(source, &document, whole)?;
     let part = samples(source, &document, whole)?;
     source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
     let samples = part.kind.decode(part.bytes, part.endian);
-    Volume::checked(lattice, samples).map_err(|message| source.error("samples", message))
+    holes::volume(source, lattice, samples, options)
 }
 
 /// Returns the extent of all pieces together.

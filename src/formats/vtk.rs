@@ -6,7 +6,7 @@ mod parser;
 #[cfg(test)]
 mod tests;
 
-use super::{shared::gather::which_scalar, vtk_cells::Cells, vtk_xml::Part, vtr};
+use super::{ReadOptions, shared::holes, vtk_cells::Cells, vtk_xml::Part, vtr};
 use crate::{
     Error, Result,
     input::Source,
@@ -60,7 +60,7 @@ fn is_volume(kind: &str) -> bool {
 /// # Errors
 /// [`Error::Input`] for another data set, missing scalars, a file that is cut off, or numbers that
 /// are not finite; [`Error::Limit`] for counts over the limits.
-pub fn read_volume(source: &Source) -> Result<Volume> {
+pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let mut data = DataSet::read(source)?;
     if !is_volume(&data.kind) {
         return Err(source.error("DATASET", format!("is {}, which is not a volume", data.kind)));
@@ -73,21 +73,18 @@ pub fn read_volume(source: &Source) -> Result<Volume> {
     let (_, part) = data.points.arrays.swap_remove(0);
     source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
     let samples = part.kind.decode(part.bytes, part.endian);
-    let volume = if data.kind == "RECTILINEAR_GRID" {
+    let lattice = if data.kind == "RECTILINEAR_GRID" {
         let found = data.places.each_ref().map(|places| places.len() as u64);
         if found != data.dims {
             let message = format!("there are {found:?} coordinates for {:?} points", data.dims);
             return Err(source.error("DIMENSIONS", message));
         }
-        vtr::volume(data.places, samples)
+        vtr::lattice(data.places)
     } else {
         let dims = data.dims.map(|count| count as usize);
-        Volume::checked(
-            Lattice::cartesian(dims, data.origin, DMat3::from_diagonal(data.spacing)),
-            samples,
-        )
+        Lattice::cartesian(dims, data.origin, DMat3::from_diagonal(data.spacing))
     };
-    volume.map_err(|message| source.error("samples", message))
+    holes::volume(source, lattice, samples, options)
 }
 
 /// Reads an unstructured grid, polygons or a structured grid, as [`vtu::read`](super::vtu::read)
@@ -95,7 +92,8 @@ pub fn read_volume(source: &Source) -> Result<Volume> {
 ///
 /// # Errors
 /// Those of [`read_volume`]. Also [`Error::Input`] if no array is named `scalar`.
-pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
+pub fn read_samples(source: &Source, options: &ReadOptions) -> Result<Points> {
+    let scalar = options.scalar.as_deref();
     let data = DataSet::read(source)?;
     if is_volume(&data.kind) {
         return Err(source.error(
@@ -121,17 +119,19 @@ pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     };
     if let Some(index) = wanted(&data.points) {
         count("POINT_DATA", data.cells.points.len(), &data.points)?;
-        return data.cells.samples_at_points(source, data.points.arrays[index].1.doubles(source)?);
+        let values = data.points.arrays[index].1.doubles(source)?;
+        return data.cells.samples_at_points(source, values, options);
     }
     if let Some(index) = wanted(&data.of_cells) {
         count("CELL_DATA", data.cells.ends.len(), &data.of_cells)?;
-        return data
-            .cells
-            .samples_at_centres(source, data.of_cells.arrays[index].1.doubles(source)?);
+        let values = data.of_cells.arrays[index].1.doubles(source)?;
+        return data.cells.samples_at_centres(source, values, options);
     }
     let arrays = data.points.arrays.iter().chain(&data.of_cells.arrays);
     let names: Vec<&str> = arrays.map(|(name, _)| name.as_str()).collect();
-    Err(which_scalar(source, "POINT_DATA and CELL_DATA", scalar, &names))
+    let message = scalar.map_or("has no scalar".into(), |name| format!("has no scalar “{name}”"));
+    let error = source.error("POINT_DATA and CELL_DATA", message);
+    Err(error.hint(format!("name one of them: {}", names.join(", "))))
 }
 
 impl<'a> DataSet<'a> {

@@ -1,6 +1,9 @@
 //! Points and cells of VTK files, and the samples made from them.
 
-use super::shared::gather::{Columns, gather};
+use super::{
+    ReadOptions,
+    shared::gather::{Columns, gather},
+};
 use crate::{Result, input::Source, scattered::Points};
 use glam::DVec3;
 
@@ -57,7 +60,12 @@ impl Cells {
     }
 
     /// Returns samples at the points.
-    pub fn samples_at_points(self, source: &Source, values: Vec<f64>) -> Result<Points> {
+    pub fn samples_at_points(
+        self,
+        source: &Source,
+        values: Vec<f64>,
+        options: &ReadOptions,
+    ) -> Result<Points> {
         let place = |row| format!("point {row}");
         gather(
             source,
@@ -65,12 +73,18 @@ impl Cells {
             |row| self.points[row],
             place,
             Columns { values, ..Columns::default() },
+            options,
         )
     }
 
     /// Returns samples at the cells' centres, the means of their corners. Radii follow from the
     /// sizes of the cells; if any cell has no size, there are no radii.
-    pub fn samples_at_centres(self, source: &Source, values: Vec<f64>) -> Result<Points> {
+    pub fn samples_at_centres(
+        self,
+        source: &Source,
+        values: Vec<f64>,
+        options: &ReadOptions,
+    ) -> Result<Points> {
         let mut start = 0;
         let (mut centres, mut radii) = (Vec::new(), Vec::new());
         for (cell, &end) in self.ends.iter().enumerate() {
@@ -93,6 +107,7 @@ impl Cells {
             radii.clear();
         }
         let columns = Columns { values, radii, ..Columns::default() };
-        gather(source, centres.len(), |row| centres[row], |row| format!("cell {row}"), columns)
+        let place = |row| format!("cell {row}");
+        gather(source, centres.len(), |row| centres[row], place, columns, options)
     }
 }

@@ -2,6 +2,8 @@
 //! each axis.
 
 use super::{
+    ReadOptions,
+    shared::holes,
     vti,
     vtk_xml::{Document, Extent, dims, extent},
 };
@@ -18,7 +20,7 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// Those of [`vti::read`]; also for coordinates that are missing or do not ascend.
-pub fn read(source: &Source) -> Result<Volume> {
+pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let document = Document::read(source, "RectilinearGrid")?;
     let whole = vti::whole_extent(source, &document, "RectilinearGrid")?;
     let part = vti::samples(source, &document, whole)?;
@@ -27,20 +29,14 @@ pub fn read(source: &Source) -> Result<Volume> {
     let places = coordinates(source, &document, whole)?;
     source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
     let samples = part.kind.decode(part.bytes, part.endian);
-    volume(places, samples).map_err(|message| source.error("RectilinearGrid", message))
+    holes::volume(source, lattice(places), samples, options)
 }
 
-/// Returns a volume with samples at these coordinates along x, y and z.
-pub(super) fn volume(
-    places: [Vec<f64>; 3],
-    samples: crate::volume::Samples,
-) -> Result<Volume, String> {
+/// Returns the lattice of samples at these coordinates along x, y and z.
+pub(super) fn lattice(places: [Vec<f64>; 3]) -> Lattice {
     let dims = places.each_ref().map(Vec::len);
     let arrangement = Arrangement::Rectilinear(Arc::new(places));
-    Volume::checked(
-        Lattice { dims, origin: DVec3::ZERO, axes: DMat3::IDENTITY, arrangement },
-        samples,
-    )
+    Lattice { dims, origin: DVec3::ZERO, axes: DMat3::IDENTITY, arrangement }
 }
 
 /// Returns the coordinates along each axis, joined from all pieces.
@@ -77,6 +73,10 @@ fn coordinates(source: &Source, document: &Document, whole: Extent) -> Result<[V
 mod tests {
     use super::*;
     use crate::input::testing::*;
+
+    fn read(source: &Source) -> Result<Volume> {
+        super::read(source, &ReadOptions::default())
+    }
 
     fn grid(whole: &str, pieces: &[(&str, [&str; 3], &str)]) -> String {
         let pieces: String = pieces

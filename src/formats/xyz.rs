@@ -8,7 +8,7 @@ use crate::{
     input::{
         Source, copy,
         growing::Growing,
-        text::{Text, first_words},
+        text::{Text, Want, first_words},
     },
     surface::Mesh,
 };
@@ -56,7 +56,13 @@ pub fn read(source: &Source) -> Result<Mesh> {
         Some(names) => Layout::named(source, text.first, names)?,
         None => Layout::plain(source, text.first, text.width)?,
     };
-    let numbers = text.numbers(source, |column| layout.uses(column))?;
+    let numbers =
+        text.numbers(
+            source,
+            |column| {
+                if layout.uses(column) { Want::Numbers } else { Want::Nothing }
+            },
+        )?;
     let table = Table { numbers, width: text.width, rows: text.len() };
     for columns in std::mem::take(&mut layout.untold) {
         let slot = if table.is_normal(columns) { &mut layout.normal } else { &mut layout.color };

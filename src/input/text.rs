@@ -13,6 +13,20 @@ const MOST_COLUMNS: usize = 4096;
 /// Rows that are read between two checks of the time limit.
 const ROWS: usize = 1 << 12;
 
+/// What a column must hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Want {
+    /// Anything: it is not read.
+    Nothing,
+    /// Finite numbers.
+    Numbers,
+    /// Numbers, or a word that stands for a missing value.
+    Values,
+}
+
+/// Words that stand for a missing value, in lower case.
+const MISSING: [&[u8]; 8] = [b"", b"na", b"n/a", b"null", b"none", b"-", b"--", b"missing"];
+
 /// A table whose lines have been found but whose numbers have not been read yet.
 pub(crate) struct Text<'a> {
     /// The column names, if the first line gives them.
@@ -74,12 +88,12 @@ impl<'a> Text<'a> {
         format!("line {}", self.rows[row].0)
     }
 
-    /// Returns the numbers of all rows, row after row. Columns for which `asked` is false may hold
-    /// anything; their numbers are zero.
+    /// Returns the numbers of all rows, row after row. `want` says what the columns must hold.
+    /// Numbers of columns that are not wanted are zero; missing values are NaN.
     pub fn numbers(
         &self,
         source: &Source,
-        asked: impl Fn(usize) -> bool + Sync,
+        want: impl Fn(usize) -> Want + Sync,
     ) -> Result<Vec<f64>> {
         let width = self.width;
         // Each number takes at least one byte. If the file is too small for all numbers, a line is
@@ -98,27 +112,9 @@ impl<'a> Text<'a> {
                 let place = || format!("line {number}");
                 let mut count = 0;
                 for word in words(line, self.separator) {
-                    if let Some(slot) = row.get_mut(count).filter(|_| asked(count)) {
-                        let word = without_quotes(word);
-                        *slot = copy::number(word).ok_or_else(|| {
-                            let shown = copy::excerpt(word);
-                            let error = source.error(place(), format!("“{shown}” is not a number"));
-                            if shown.contains(',') {
-                                error.hint("write numbers with a decimal point, not a comma")
-                            } else {
-                                error
-                            }
-                        })?;
-                        if !slot.is_finite() {
-                            return Err(source.error(
-                                place(),
-                                format!(
-                                    "number {} is {slot}, but numbers \
-                                                               must be finite",
-                                    count + 1
-                                ),
-                            ));
-                        }
+                    let want = want(count);
+                    if let Some(slot) = row.get_mut(count).filter(|_| want != Want::Nothing) {
+                        *slot = parsed(source, &place, without_quotes(word), (count, want))?;
                     }
                     count += 1;
                 }
@@ -126,6 +122,24 @@ impl<'a> Text<'a> {
             },
         )?;
         Ok(table)
+    }
+
+    /// Returns whether the first rows have numbers in a column, and nothing but numbers and missing
+    /// values.
+    pub fn is_numeric(&self, column: usize) -> bool {
+        /// Rows to look at.
+        const FIRST: usize = 64;
+        let mut has_number = false;
+        for &(_, line) in self.rows.iter().take(FIRST) {
+            let Some(word) = words(line, self.separator).nth(column) else { continue };
+            let word = without_quotes(word);
+            if copy::number::<f64>(word).is_some() {
+                has_number = true;
+            } else if !MISSING.iter().any(|other| word.eq_ignore_ascii_case(other)) {
+                return false;
+            }
+        }
+        has_number
     }
 
     fn check_widths(&self, source: &Source) -> Result<()> {
@@ -211,4 +225,32 @@ fn words(line: &[u8], separator: Option<u8>) -> impl Iterator<Item = &[u8]> {
         })
         .map(<[u8]>::trim_ascii)
         .filter(move |word| separator.is_some() || !word.is_empty())
+}
+
+/// Returns the number in a word of a column.
+fn parsed(
+    source: &Source,
+    place: impl Fn() -> String,
+    word: &[u8],
+    (column, want): (usize, Want),
+) -> Result<f64> {
+    let may_lack = want == Want::Values;
+    let number: f64 = match copy::number(word) {
+        Some(number) => number,
+        None if may_lack && MISSING.iter().any(|other| word.eq_ignore_ascii_case(other)) => {
+            f64::NAN
+        }
+        None => {
+            let shown = copy::excerpt(word);
+            let error = source.error(place(), format!("“{shown}” is not a number"));
+            let has_comma = shown.contains(',');
+            let hint = "write numbers with a decimal point, not a comma";
+            return Err(if has_comma { error.hint(hint) } else { error });
+        }
+    };
+    if number.is_finite() || may_lack {
+        return Ok(number);
+    }
+    let message = format!("number {} is {number}, but numbers must be finite", column + 1);
+    Err(source.error(place(), message))
 }

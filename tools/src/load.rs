@@ -137,6 +137,7 @@ impl LoadFlags {
             }
         };
         read.extend(files);
+        warn_of_holes(path, &input);
         Ok(input)
     }
 
@@ -185,6 +186,31 @@ impl LoadFlags {
             ..default
         }
     }
+}
+
+/// Says how many values of an input are missing, and what was done about it.
+fn warn_of_holes(path: &Path, input: &Input) {
+    let (holes, all, done) = match input {
+        Input::Volume(volume) => {
+            (volume.about.holes, volume.len() as u64, "were read as the lowest value")
+        }
+        Input::Samples(points) => {
+            let holes = points.about.holes;
+            (holes, points.len() as u64 + holes, "were left out")
+        }
+        _ => return,
+    };
+    if holes > 0 {
+        let (holes, all) = (grouped(holes), grouped(all));
+        tracing::warn!("{}: {holes} of {all} values are missing and {done}", path.display());
+    }
+}
+
+/// Formats a count in groups of three digits: 1,234,567.
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let groups: Vec<&[u8]> = digits.as_bytes().rchunks(3).rev().collect();
+    groups.into_iter().map(String::from_utf8_lossy).collect::<Vec<_>>().join(",")
 }
 
 /// Returns the error for a file in no known format, with a hint that lists the known ones.

@@ -170,7 +170,11 @@ impl<'a> Pattern<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{formats::nrrd::read, input::testing::*, volume::Volume};
+    use crate::{
+        formats::{ReadOptions, nrrd},
+        input::testing::*,
+        volume::Volume,
+    };
 
     /// Reads a header of 2×1×4 bytes next to files of two and of four samples.
     fn volume(folder: &Folder, data_file: &str) -> Result<Volume> {
@@ -185,7 +189,9 @@ mod tests {
             "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 4\nencoding: raw\ndata file: \
              {data_file}\n"
         );
-        read_with(&folder.write("volume.nhdr", text), read)
+        read_with(&folder.write("volume.nhdr", text), |source| {
+            nrrd::read(source, &ReadOptions::default())
+        })
     }
 
     #[test]

@@ -105,7 +105,11 @@ fn vector(v: DVec3) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{formats::nrrd, input::testing::*, volume::Samples};
+    use crate::{
+        formats::{ReadOptions, nrrd},
+        input::testing::*,
+        volume::Samples,
+    };
 
     #[test]
     fn what_is_written_reads_back() {
@@ -128,7 +132,8 @@ mod tests {
             for lattice in [&lattice, &body_centred, &rectilinear] {
                 let path = folder.write("volume.nrrd", b"");
                 write(&Volume::new(lattice.clone(), samples.clone()).unwrap(), &path).unwrap();
-                let read = read_with(&path, nrrd::read).unwrap();
+                let read =
+                    read_with(&path, |source| nrrd::read(source, &ReadOptions::default())).unwrap();
                 assert_eq!((&read.samples, &read.lattice), (&samples, lattice));
             }
         }
@@ -145,7 +150,8 @@ mod tests {
             let path = folder.write("bytes.nrrd", b"");
             write_bytes(&lattice, &path, |k| (0..6).map(|at| (6 * k + at) as u8).collect())
                 .unwrap();
-            let read = read_with(&path, nrrd::read).unwrap();
+            let read =
+                read_with(&path, |source| nrrd::read(source, &ReadOptions::default())).unwrap();
             assert_eq!((read.samples, read.lattice), (Samples::U8((0..18).collect()), lattice));
         }
     }

@@ -329,4 +329,7 @@ fn copy(mesh: &mut Mesh, vertex: usize) {
     if let Some(&color) = mesh.colors.get(vertex) {
         mesh.colors.push(color);
     }
+    if let Some(&value) = mesh.values.get(vertex) {
+        mesh.values.push(value);
+    }
 }

@@ -1,13 +1,20 @@
 //! Scattered samples in PLY: vertices with a scalar property.
 
 use super::{
-    super::shared::gather::{Columns, choose, gather},
+    super::{
+        Array, Place, ReadOptions,
+        shared::{
+            choice::{self, Candidate, Chosen, Role},
+            gather::{Columns, gather},
+        },
+    },
     ALPHA, COLOR, NORMAL, POSITION, ROLES, Table, UV,
     header::{self, Element},
     rows::Rows,
 };
 use crate::{Result, input::Source, scattered::Points};
 use glam::DVec3;
+use ply_rs::ply::{PropertyType, ScalarType};
 
 /// Properties that shape a kernel.
 const RADIUS: &str = "radius";
@@ -25,42 +32,78 @@ pub fn has_faces(source: &Source) -> Result<bool> {
         .any(|element| matches!(element.name.as_str(), "face" | "tristrips") && element.count > 0))
 }
 
-/// Reads the vertices as scattered samples. The value is the property that `scalar` names. Without
-/// `scalar`, it is the only property that is not a position, normal, colour, texture coordinate or
-/// part of a kernel. Kernels come from a property `radius`, or from `cov_xx`, `cov_xy`, `cov_xz`,
-/// `cov_yy`, `cov_yz` and `cov_zz`.
+/// Reads the vertices as scattered samples. The value is the property that
+/// [`ReadOptions::scalar`] names. Without it, it is the first property of no other meaning: not a
+/// position, normal, colour, texture coordinate, identifier or part of a kernel. Kernels come from
+/// a property `radius`, or from `cov_xx`, `cov_xy`, `cov_xz`, `cov_yy`, `cov_yz` and `cov_zz`.
+/// Vertices without a value are left out.
 ///
 /// # Errors
-/// As [`read`](super::read). Also [`Error::Input`](crate::Error::Input) if the scalar is ambiguous,
-/// with the available names, and for values that are not finite.
-pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
+/// As [`read`](super::read). Also [`Error::Input`](crate::Error::Input) if no property has that
+/// name, with the names that there are.
+pub fn read_samples(source: &Source, options: &ReadOptions) -> Result<Points> {
+    with_vertices(source, |element, rows| of_vertices(source, element, rows, options))
+}
+
+/// Returns the scalar properties of the vertices.
+///
+/// # Errors
+/// Those of [`read_samples`].
+pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
+    let shows_values = options.scalar.is_some() || !has_faces(source)?;
+    with_vertices(source, |element, rows| {
+        let (candidates, columns) = candidates(element);
+        let drawn = options.scalar.as_deref().filter(|_| shows_values);
+        let drawn = drawn.and_then(|name| choice::named(source, &candidates, name).ok());
+        let mut arrays = Vec::new();
+        for (index, candidate) in candidates.iter().enumerate() {
+            let values = values_of(source, element, rows, columns[index])?;
+            arrays.push(Array {
+                range: choice::range(values.into_iter(), options.missing),
+                is_drawn: drawn.is_some_and(|chosen| chosen.array == index),
+                ..candidate.listed()
+            });
+        }
+        Ok(arrays)
+    })
+}
+
+/// Returns the property of the vertices that a caller names, and its values.
+pub(super) fn named_values(
+    source: &Source,
+    element: &Element,
+    rows: &Rows,
+    name: &str,
+) -> Result<(String, Vec<f64>)> {
+    let (candidates, columns) = candidates(element);
+    let chosen = choice::named(source, &candidates, name)?;
+    let values = values_of(source, element, rows, columns[chosen.array])?;
+    Ok((candidates[chosen.array].name.clone(), values))
+}
+
+/// Passes the vertices of a file, located but not decoded, to `read`.
+fn with_vertices<T>(source: &Source, read: impl FnOnce(&Element, &Rows) -> Result<T>) -> Result<T> {
     let header = header::read(source)?;
     let mut at = header.payload;
     for element in &header.elements {
         let rows = Rows::find(source, element, header.encoding, &mut at)?;
         if element.name == "vertex" {
             source.check_points("the count of element “vertex”", element.count as u64)?;
-            return of_vertices(source, element, &rows, scalar);
+            return read(element, &rows);
         }
     }
     Err(source.error("header", "has no element “vertex”"))
 }
 
-fn of_vertices(
-    source: &Source,
-    element: &Element,
-    rows: &Rows,
-    scalar: Option<&str>,
-) -> Result<Points> {
-    let place = "element “vertex”";
-    let column = |names: &[&str]| {
-        element.column(names).filter(|&column| element.columns[column].width().is_some())
-    };
-    let mut position = [0; 3];
-    for (at, names) in position.iter_mut().zip(ROLES) {
-        *at = column(names)
-            .ok_or_else(|| source.error(place, format!("has no scalar property “{}”", names[0])))?;
-    }
+fn values_of(source: &Source, element: &Element, rows: &Rows, column: usize) -> Result<Vec<f64>> {
+    let table = Table::read(source, element, rows, &[Some(column)])?;
+    source.room::<f64>("the values", element.count)?;
+    Ok((0..element.count).map(|row| table.value(row, 0)).collect())
+}
+
+/// Returns the scalar properties of an element as arrays to choose from, and their columns.
+/// Properties with another meaning are not chosen unless they are named.
+fn candidates(element: &Element) -> (Vec<Candidate>, Vec<usize>) {
     // A name belongs to a group only if the group is complete: a lone “t” or “v” is not a texture
     // coordinate.
     let groups = [POSITION..NORMAL, NORMAL..COLOR, COLOR..UV, UV..ROLES.len()];
@@ -71,14 +114,57 @@ fn of_vertices(
         });
         of_group || name == RADIUS || COVARIANCE.contains(&name)
     };
-    let scalars = element
-        .columns
-        .iter()
-        .filter(|column| column.width().is_some())
-        .map(|column| column.name.as_str());
-    // Properties with another meaning can also be requested by name.
-    let names: Vec<&str> = scalars.filter(|name| scalar == Some(*name) || !known(name)).collect();
-    let value = element.column(&[names[choose(source, place, scalar, &names)?]]);
+    let scalars = element.columns.iter().enumerate().filter_map(|(index, column)| {
+        let PropertyType::Scalar(kind) = &column.kind else { return None };
+        let candidate = Candidate {
+            name: column.name.clone(),
+            place: Place::Points,
+            kind: kind_name(kind).into(),
+            is_numeric: true,
+            components: 1,
+            role: if known(&column.name) { Role::Geometry } else { Role::None },
+        };
+        Some((candidate, index))
+    });
+    scalars.unzip()
+}
+
+fn kind_name(kind: &ScalarType) -> &'static str {
+    match kind {
+        ScalarType::Char => "i8",
+        ScalarType::UChar => "u8",
+        ScalarType::Short => "i16",
+        ScalarType::UShort => "u16",
+        ScalarType::Int => "i32",
+        ScalarType::UInt => "u32",
+        ScalarType::Float => "f32",
+        ScalarType::Double => "f64",
+    }
+}
+
+fn of_vertices(
+    source: &Source,
+    element: &Element,
+    rows: &Rows,
+    options: &ReadOptions,
+) -> Result<Points> {
+    let place = "element “vertex”";
+    let column = |names: &[&str]| {
+        element.column(names).filter(|&column| element.columns[column].width().is_some())
+    };
+    let mut position = [0; 3];
+    for (at, names) in position.iter_mut().zip(ROLES) {
+        *at = column(names)
+            .ok_or_else(|| source.error(place, format!("has no scalar property “{}”", names[0])))?;
+    }
+    let (candidates, columns) = candidates(element);
+    let counts =
+        |index: usize| Ok(choice::is_ramp(&values_of(source, element, rows, columns[index])?));
+    let Chosen { array, .. } = match options.scalar.as_deref() {
+        Some(name) => choice::named(source, &candidates, name)?,
+        None => choice::needed(source, &candidates, counts)?,
+    };
+    let value = Some(columns[array]);
     let radius = column(&[RADIUS]);
     let covariance = COVARIANCE.map(|name| column(&[name]));
     let has_covariance = covariance.iter().all(Option::is_some);
@@ -88,23 +174,22 @@ fn of_vertices(
     let table = Table::read(source, element, rows, &columns)?;
     let count = element.count;
     source.spend("the size of the samples in bytes", Columns::ROW * count as u64)?;
+    let term = |row: usize, term: usize| table.value(row, 5 + term) as f32;
     let columns = Columns {
         values: (0..count).map(|row| table.value(row, 3)).collect(),
-        radii: if radius.is_some() {
-            (0..count).map(|row| table.value(row, 4) as f32).collect()
-        } else {
-            Vec::new()
-        },
+        radii: radius
+            .map_or(Vec::new(), |_| (0..count).map(|row| table.value(row, 4) as f32).collect()),
         covariances: if has_covariance {
-            (0..count)
-                .map(|row| std::array::from_fn(|term| table.value(row, 5 + term) as f32))
-                .collect()
+            (0..count).map(|row| std::array::from_fn(|of| term(row, of))).collect()
         } else {
             Vec::new()
         },
     };
     let position = |row| DVec3::new(table.value(row, 0), table.value(row, 1), table.value(row, 2));
-    gather(source, count, position, |row| rows.place(source, element, row), columns)
+    let place = |row| rows.place(source, element, row);
+    let mut points = gather(source, count, position, place, columns, options)?;
+    points.about.name.clone_from(&candidates[array].name);
+    Ok(points)
 }
 
 #[cfg(test)]
@@ -133,7 +218,9 @@ mod tests {
 
     fn load(content: &[u8], scalar: Option<&str>) -> Result<Points> {
         let folder = Folder::new();
-        read_with(&folder.write("a.ply", content), |source| read_samples(source, scalar))
+        read_with(&folder.write("a.ply", content), |source| {
+            read_samples(source, &ReadOptions::scalar(scalar))
+        })
     }
 
     #[test]
@@ -162,7 +249,7 @@ mod tests {
             for end in 0..short.len() {
                 // A text that ends within its last number is read with the shorter number.
                 let cut = read_with(&folder.write("a.ply", &short[..end]), |source| {
-                    read_samples(source, None)
+                    read_samples(source, &ReadOptions::default())
                 });
                 assert!(
                     cut.is_err() || format == "ascii" && end + 3 > short.len(),
@@ -175,11 +262,11 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told() {
         for (properties, row, scalar, word) in [
-            ("x y z", &[1.0, 2.0, 3.0][..], None, "has no scalar"),
-            ("x y z a b", &[1.0; 5], None, "2 scalars to choose from"),
-            ("x y z a b", &[1.0; 5], Some("c"), "no scalar “c”"),
+            ("x y z", &[1.0, 2.0, 3.0][..], None, "no values that can be drawn"),
+            ("x y z id", &[1.0; 4], None, "only identifiers"),
+            ("x y z a b", &[1.0; 5], Some("c"), "no array “c”"),
             ("x y a", &[1.0; 3], None, "no scalar property “z”"),
-            ("x y z a", &[1.0, 2.0, 3.0, f64::NAN], None, "row 0, byte"),
+            ("x y z a", &[1.0, 2.0, 3.0, f64::NAN], None, "none of the 1 samples"),
             ("x y z a", &[1.0, f64::NAN, 3.0, 4.0], None, "not finite"),
             ("x y z a radius", &[1.0, 2.0, 3.0, 4.0, -1.0], None, "radius of sample 0"),
         ] {
@@ -192,10 +279,10 @@ mod tests {
                 .to_string()
                 .contains("no samples")
         );
-        let hint = match load(&file("ascii", "x y z a b", &[&[1.0; 5]]), None) {
+        let hint = match load(&file("ascii", "x y z a b", &[&[1.0; 5]]), Some("c")) {
             Err(crate::Error::Input { hint, .. }) => hint,
             other => panic!("{other:?}"),
         };
-        assert_eq!(hint.as_deref(), Some("name one of them: a, b"));
+        assert!(hint.is_some_and(|hint| hint.contains("a (f64, points), b (f64, points)")));
     }
 }

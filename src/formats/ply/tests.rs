@@ -13,7 +13,7 @@ fn load(bytes: impl AsRef<[u8]>) -> Result<Mesh> {
 fn load_within(bytes: impl AsRef<[u8]>, limits: &Limits) -> Result<Mesh> {
     let folder = Folder::new();
     let path = folder.write("a.ply", bytes);
-    read(&Source::open(&path, limits)?)
+    read(&Source::open(&path, limits)?, &ReadOptions::default())
 }
 
 const POINTS: [[f64; 3]; 4] =
@@ -267,7 +267,7 @@ fn texture_coordinates_of_corners() {
             faces.lines().count()
         );
         let path = folder.write("a.ply", text);
-        read(&Source::open(&path, &Limits::default())?)
+        read(&Source::open(&path, &Limits::default())?, &ReadOptions::default())
     };
     let mesh =
         file("3 0 1 2 6 0 0 1 0 1 1 0\n3 0 2 3 6 0 0 0.5 1 0 1 1\n3 0 1 3 0 0\n").expect("loads");

@@ -66,7 +66,10 @@ fn little(value: f32) -> [u8; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{formats::ply, input::testing::*};
+    use crate::{
+        formats::{ReadOptions, ply},
+        input::testing::*,
+    };
 
     #[test]
     fn what_is_written_reads_back() {
@@ -76,7 +79,8 @@ mod tests {
         {
             let path = folder.write("mesh.ply", b"");
             write(&mesh, &path).unwrap();
-            let read = read_with(&path, ply::read).unwrap();
+            let read =
+                read_with(&path, |source| ply::read(source, &ReadOptions::default())).unwrap();
             assert_eq!(read.triangles, mesh.triangles);
             assert_eq!(read.colors, mesh.colors);
             assert_eq!(read.normals.len(), mesh.normals.len());

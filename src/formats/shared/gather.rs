@@ -1,7 +1,9 @@
 //! Builds scattered samples from the rows of a file.
 
+use super::holes::{all_missing, is_hole};
 use crate::{
-    Error, Result,
+    Result,
+    formats::ReadOptions,
     input::{Source, positions},
     parallel::prelude::*,
     scattered::Points,
@@ -19,30 +21,56 @@ pub(crate) struct Columns {
 impl Columns {
     /// Bytes per row with all columns.
     pub const ROW: u64 = 8 + 4 + 24;
+
+    /// Leaves out the rows without a value. Returns the rows that are kept.
+    fn without_holes(
+        &mut self,
+        source: &Source,
+        missing: Option<f64>,
+    ) -> Result<Option<Vec<usize>>> {
+        let count = self.values.len();
+        source.room::<usize>("the list of rows", count)?;
+        let kept: Vec<usize> =
+            (0..count).filter(|&row| !is_hole(self.values[row], missing)).collect();
+        if kept.is_empty() {
+            return Err(source.error("samples", all_missing(count, missing)));
+        }
+        fn keep<T: Copy>(list: &mut Vec<T>, kept: &[usize]) {
+            if !list.is_empty() {
+                kept.iter().enumerate().for_each(|(to, &from)| list[to] = list[from]);
+                list.truncate(kept.len());
+            }
+        }
+        keep(&mut self.values, &kept);
+        keep(&mut self.radii, &kept);
+        keep(&mut self.covariances, &kept);
+        Ok(Some(kept))
+    }
 }
 
-/// Builds `count` samples. `place` names a row in an error.
+/// Builds `count` samples. `place` names a row in an error. Rows without a value are left out, and
+/// counted in [`About::holes`](crate::about::About::holes).
 pub(crate) fn gather(
     source: &Source,
     count: usize,
     position: impl Fn(usize) -> DVec3 + Sync,
     place: impl Fn(usize) -> String,
-    columns: Columns,
+    mut columns: Columns,
+    options: &ReadOptions,
 ) -> Result<Points> {
     if count == 0 {
         return Err(source.error("file", "contains no samples"));
     }
-    let wrong = |&value: &f64| !(value as f32).is_finite();
-    if let Some(row) = columns.values.par_iter().position_first(wrong) {
-        let message = format!("the value {} is not finite in 32 bits", columns.values[row]);
-        return Err(source
-            .error(place(row), message)
-            .hint("remove the sample, or write the file without it"));
-    }
-    let (origin, positions) = positions::settle(source, count, position, place)?;
+    let missing = options.missing;
+    let has_holes = columns.values.par_iter().any(|&value| is_hole(value, missing));
+    let kept = if has_holes { columns.without_holes(source, missing)? } else { None };
+    let row = |index: usize| kept.as_ref().map_or(index, |kept| kept[index]);
+    let left = kept.as_ref().map_or(count, Vec::len);
+    let (origin, positions) =
+        positions::settle(source, left, |index| position(row(index)), |index| place(row(index)))?;
     source.room::<f32>("the values", columns.values.len())?;
     let values = columns.values.into_par_iter().map(|value| value as f32).collect();
-    let points = Points {
+    let mut points = Points {
         origin,
         positions,
         values,
@@ -50,41 +78,7 @@ pub(crate) fn gather(
         covariances: columns.covariances,
         ..Points::default()
     };
+    points.about.holes = (count - left) as u64;
     points.check().map_err(|message| source.error("samples", message))?;
     Ok(points)
-}
-
-/// Returns the error for a file in which the scalar is missing or ambiguous; `names` are those
-/// available.
-pub(crate) fn which_scalar(
-    source: &Source,
-    place: &str,
-    wanted: Option<&str>,
-    names: &[&str],
-) -> Error {
-    let message = match wanted {
-        Some(name) => format!("has no scalar “{name}”"),
-        None if names.is_empty() => "has no scalar".to_owned(),
-        None => format!("has {} scalars to choose from", names.len()),
-    };
-    let error = source.error(place, message);
-    if names.is_empty() {
-        error
-    } else {
-        error.hint(format!("name one of them: {}", names.join(", ")))
-    }
-}
-
-/// Returns the index of the requested name, or of the only one.
-pub(crate) fn choose(
-    source: &Source,
-    place: &str,
-    wanted: Option<&str>,
-    names: &[&str],
-) -> Result<usize> {
-    let found = match wanted {
-        Some(wanted) => names.iter().position(|name| *name == wanted),
-        None => (names.len() == 1).then_some(0),
-    };
-    found.ok_or_else(|| which_scalar(source, place, wanted, names))
 }

@@ -1,9 +1,12 @@
-//! Code that several formats share: point clouds, columns of samples, polygons, textures, sample
-//! types.
+//! Code that several formats share: the choice among arrays, holes, point clouds, columns of
+//! samples, polygons, textures, sample types.
 
+#[allow(dead_code)]
+pub(super) mod choice;
 pub(super) mod cloud;
 pub(super) mod found;
 pub(super) mod gather;
+pub(super) mod holes;
 pub(super) mod plain;
 pub(super) mod polygon;
 pub(super) mod sample_type;

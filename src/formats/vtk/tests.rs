@@ -34,12 +34,16 @@ fn file(binary: bool, body: &[(&str, &str, &str)]) -> Vec<u8> {
 
 fn volume(content: &[u8]) -> Result<Volume> {
     let folder = Folder::new();
-    read_with(&folder.write("a.vtk", content), read_volume)
+    read_with(&folder.write("a.vtk", content), |source| {
+        read_volume(source, &ReadOptions::default())
+    })
 }
 
 fn samples(content: &[u8], scalar: Option<&str>) -> Result<Points> {
     let folder = Folder::new();
-    read_with(&folder.write("a.vtk", content), |source| read_samples(source, scalar))
+    read_with(&folder.write("a.vtk", content), |source| {
+        read_samples(source, &ReadOptions::scalar(scalar))
+    })
 }
 
 const IMAGE: &[(&str, &str, &str)] = &[
