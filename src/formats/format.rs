@@ -28,11 +28,14 @@ pub struct Format {
     pub(super) samples: Option<SamplesReader>,
     pub(super) cells: Option<fn(&Source, &ReadOptions) -> Result<Cells>>,
     pub(super) pieces: InPieces,
-    pub(super) arrays: Option<fn(&Source, &ReadOptions) -> Result<Vec<Array>>>,
+    pub(super) arrays: Option<ListArrays>,
 }
 
 /// Reads scattered samples.
 pub(super) type SamplesReader = fn(&Source, &ReadOptions) -> Result<Points>;
+
+/// Lists the arrays of a file.
+pub(super) type ListArrays = fn(&Source, &ReadOptions) -> Result<Vec<Array>>;
 
 /// Locates the points of a file; `None` if it can only be read as a whole.
 pub(super) type FindPieces = fn(&Source) -> Result<Option<Box<dyn Form>>>;
