@@ -34,10 +34,21 @@ macro_rules! words {
     }};
 }
 /// Runs code with the processor's vectors, like `fearless_simd::dispatch`, but with one copy of the
-/// code fewer. Processors from before 2013, with SSE4.2 but no AVX2, use the SSE2 copy.
+/// code fewer. Processors from before 2013, with SSE4.2 but no AVX2, use the SSE2 copy. Builds with
+/// debug assertions have only that copy, because the copies are most of what there is to compile.
 macro_rules! lanes {
     ($level:expr, $simd:ident => $of_lanes:expr) => {{
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", debug_assertions))]
+        {
+            let level: fearless_simd::Level = $level;
+            let $simd = level.as_sse2().expect("every x86-64 processor has SSE2");
+            fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $of_lanes,
+            )
+        }
+        #[cfg(all(target_arch = "x86_64", not(debug_assertions)))]
         {
             let level: fearless_simd::Level = $level;
             if let Some($simd) = level.as_avx512() {
