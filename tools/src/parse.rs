@@ -63,22 +63,24 @@ pub fn range(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// `#rrggbb`, with or without `#`. `none` keeps the picture's opacity.
+/// A colour, as [`color`]. `none` keeps the picture's opacity.
 pub fn background(text: &str) -> Result<Background, String> {
-    if text.eq_ignore_ascii_case("none") {
+    if text.trim().eq_ignore_ascii_case("none") {
         return Ok(Background(None));
     }
-    color(text).map(|color| Background(Some(color))).map_err(|message| message + " or none")
+    color(text).map(|color| Background(Some(color))).map_err(|message| message + ", or none")
 }
 
-/// `#rrggbb`, with or without `#`.
+/// A colour as in CSS: a name, `#rgb`, `#rrggbb` (also without `#`) or `rgb(…)`, without opacity.
 pub fn color(text: &str) -> Result<[f32; 3], String> {
-    let digits = text.strip_prefix('#').unwrap_or(text);
-    let bytes = u32::from_str_radix(digits, 16)
-        .ok()
-        .filter(|_| digits.len() == 6 && !digits.starts_with('+'));
-    let [_, red, green, blue] = bytes.ok_or("the form is '#rrggbb'")?.to_be_bytes();
-    Ok([red, green, blue].map(|channel| f32::from(channel) / 255.0))
+    // An empty text would be black.
+    let parsed = Some(text.trim()).filter(|text| !text.is_empty());
+    let parsed = parsed.and_then(|text| csscolorparser::parse(text).ok());
+    let color = parsed.ok_or("a colour is a name, #rgb or #rrggbb, such as orange or '#ff8800'")?;
+    if color.a < 1.0 {
+        return Err("a colour has no opacity here: write '#rrggbb', such as '#ff8800'".into());
+    }
+    Ok([color.r, color.g, color.b].map(|channel| channel.clamp(0.0, 1.0)))
 }
 
 /// The colour behind the picture; `None` for transparency.
@@ -201,11 +203,17 @@ mod tests {
     fn colours_and_axes() {
         assert_eq!(background("#ff0080"), Ok(Background(Some([1.0, 0.0, 128.0 / 255.0]))));
         assert_eq!(background("NONE"), Ok(Background(None)));
-        assert!(
-            background("#ff00").is_err()
-                && background("+ff008").is_err()
-                && background("#gg0000").is_err()
-        );
+        let orange = Ok([1.0, 136.0 / 255.0, 0.0]);
+        for text in ["#ff8800", "ff8800", "#F80", " #f80 ", "rgb(255 136 0)"] {
+            assert_eq!(color(text), orange, "{text}");
+        }
+        assert_eq!((color("White"), color("black")), (Ok([1.0; 3]), Ok([0.0; 3])));
+        for bad in ["", "+ff008", "#gg0000", "#ff000", "whitish", "ff", "nan"] {
+            let message = background(bad).unwrap_err();
+            assert!(message.contains("such as orange or '#ff8800', or none"), "{bad}: {message}");
+        }
+        assert!(color("#ff880080").unwrap_err().contains("no opacity"));
+        assert!(color("transparent").is_err());
         assert_eq!(
             (axis("+Z"), axis("-x"), axis("Y")),
             (Ok(DVec3::Z), Ok(DVec3::NEG_X), Ok(DVec3::Y))

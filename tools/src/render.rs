@@ -36,7 +36,7 @@ pub struct Render {
     /// Replace existing files.
     #[arg(long)]
     overwrite: bool,
-    /// Set the background colour, '#rrggbb', or none for a transparent PNG.
+    /// Set the background colour: a name, '#rgb', '#rrggbb', or none for a transparent PNG.
     #[arg(long, value_name = "COLOR", value_parser = parse::background, default_value = "#000000")]
     background: Background,
     /// Draw this many pixels for each pixel of the picture and average them: 1, 4, 9, 16 or 64.

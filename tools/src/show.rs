@@ -24,9 +24,9 @@ pub struct ShowFlags {
     /// Set the length that the transfer function's opacities hold for, in world units.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     opacity_unit: Option<f64>,
-    /// Draw isosurfaces of these values, each as VALUE, VALUE:#rrggbb, VALUE:OPACITY or
-    /// VALUE:#rrggbb:OPACITY. Without --transfer, nothing else of the volume is drawn [default:
-    /// opaque, in the transfer function's colour of the value]
+    /// Draw isosurfaces of these values, each as VALUE, VALUE:COLOR, VALUE:OPACITY or
+    /// VALUE:COLOR:OPACITY. A colour is a name, #rgb or #rrggbb. Without --transfer, nothing else
+    /// of the volume is drawn [default: opaque, in the transfer function's colour of the value]
     #[arg(
         long,
         value_name = "VALUE,…",
@@ -208,12 +208,15 @@ impl Show<'_> {
 }
 
 impl Surface {
-    /// `80`, `80:#ff8800`, `80:0.5` or `80:#ff8800:0.5`.
+    /// `80`, `80:orange`, `80:0.5` or `80:#ff8800:0.5`.
     fn parse(text: &str) -> Result<Self, String> {
-        let form = "the form is VALUE, VALUE:#rrggbb, VALUE:OPACITY or VALUE:#rrggbb:OPACITY";
+        let form = "the form is VALUE, VALUE:COLOR, VALUE:OPACITY or VALUE:COLOR:OPACITY, such \
+                    as 400:orange:0.5";
         let mut parts = text.split(':').peekable();
         let value = parse::finite(parts.next().unwrap_or_default().trim()).map_err(|_| form)?;
-        let color = match parts.next_if(|part| part.starts_with('#')) {
+        // A number is an opacity, although its digits may look like a colour.
+        let is_color = |part: &&str| !part.is_empty() && parse::finite(part).is_err();
+        let color = match parts.next_if(is_color) {
             Some(text) => Some(parse::color(text)?.map(f64::from)),
             None => None,
         };
@@ -261,9 +264,21 @@ mod tests {
             surface("80:#00ff00:0.5"),
             Ok(Surface { value: 80.0, color: Some([0.0, 1.0, 0.0]), opacity: 0.5 })
         );
-        for bad in
-            ["", "x", "80:", "80:#ff", "80:0", "80:2", "80:0.5:#ffffff", "80:#ffffff:1:1", "nan"]
-        {
+        for text in ["80:lime:0.5", "80:0f0:0.5"] {
+            assert_eq!(surface(text), surface("80:#00ff00:0.5"), "{text}");
+        }
+        for bad in [
+            "",
+            "x",
+            "80:",
+            "80:#ff",
+            "80:0",
+            "80:2",
+            "80:0.5:#ffffff",
+            "80:#ffffff:1:1",
+            "nan",
+            "80:oranje",
+        ] {
             assert!(surface(bad).is_err(), "{bad}");
         }
     }

@@ -243,7 +243,7 @@ fn wrong_usage_is_told() {
         "render a.ply -o a.png --size 10",
         "render a.ply -o a.png --samples 3",
         "render a.ply -o a.png --engine cpu --gpu 0",
-        "render a.ply -o a.png --background red",
+        "render a.ply -o a.png --background redd",
         "render a.ply -o a.png --view-angle 180",
         "render a.ply -o a.png --dims 2x2x2",
         "render a.ply -o a.png --sigma -1",
