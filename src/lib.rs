@@ -53,6 +53,7 @@
 //! | read a file of any known format, or bytes in memory | [`formats`] |
 //! | limit what a file may take: memory, points, time | [`input::Limits`] |
 //! | work with meshes, volumes, samples and cells | [`surface`], [`volume`], [`scattered`], [`cells`] |
+//! | colour them by a named map | [`color`] |
 //! | draw data larger than memory | [`hierarchy`], [`bricks`] |
 //! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |
 //! | use the device of a host application | [`gpu::Gpu::from_wgpu`] |
@@ -90,6 +91,7 @@ extern crate self as splatkit;
 pub mod about;
 pub mod bricks;
 pub mod cells;
+pub mod color;
 pub mod compare;
 pub mod container;
 pub mod cpu;

@@ -4,7 +4,9 @@ mod testing;
 
 use glam::Vec3;
 use splatkit::{
-    Result, formats,
+    Result,
+    color::{ColorMap, ColorScale, Spread},
+    formats,
     hierarchy::{
         self, BuildOptions, Hierarchy,
         external::{Converted, ExternalOptions, convert},
@@ -12,7 +14,7 @@ use splatkit::{
     },
     input::Limits,
     splat::{Splat, decode_normal},
-    surface::{Mesh, SurfelOptions},
+    surface::{Mesh, Paint, SurfelOptions, Values},
 };
 use std::path::{Path, PathBuf};
 use testing::folder::Folder;
@@ -24,6 +26,8 @@ fn options() -> ExternalOptions {
         preset: hierarchy::Preset::Fastest,
         block_splats: 1 << 9,
         surfels: SurfelOptions::default(),
+        paint: None,
+        scalar: None,
     }
 }
 
@@ -412,4 +416,59 @@ fn points_of_surveys_keep_their_millimetres_and_colours() {
         let same = |(a, b): (&Splat, &Splat)| (a.center, a.color) == (b.center, b.color);
         assert!(whole.len() == parts.len() && whole.iter().zip(&parts).all(same));
     }
+}
+
+/// Converts a file as a whole and in regions, painted, and compares the leaves.
+fn painted_both_ways(folder: &Folder, name: &str, paint: &Paint, scalar: &str) -> Vec<Splat> {
+    let path = folder.path(name);
+    let options =
+        ExternalOptions { paint: Some(paint.clone()), scalar: Some(scalar.into()), ..options() };
+    let read = formats::ReadOptions::scalar(Some(scalar));
+    let mut mesh = formats::load_mesh(&path, &Limits::default(), &read).unwrap();
+    mesh.paint(paint).unwrap();
+    let set = mesh.surfels(&options.surfels).unwrap();
+    let whole = folder.path("whole.splk");
+    let build = BuildOptions { preset: hierarchy::Preset::Fastest, ..BuildOptions::default() };
+    hierarchy::build_file(&set, &whole, &build, &lossless(), None).unwrap();
+    let parts = folder.path("parts.splk");
+    let converted =
+        convert(&[path], &Limits::default(), &parts, &options, &lossless(), None).unwrap();
+    assert!(converted.regions > 1 && converted.closed == mesh.is_solid(), "{name}");
+    let (whole, parts) = (leaves(&whole), leaves(&parts));
+    assert_eq!(whole.len(), parts.len(), "{name}");
+    let mut wrong = whole.iter().zip(&parts).filter(|(a, b)| a.color != b.color);
+    assert!(wrong.next().is_none(), "{name}: {paint:?}");
+    whole
+}
+
+#[test]
+fn paints_are_the_same_in_regions() {
+    let folder = Folder::new();
+    let mesh = torus(300, 30);
+    folder.write("mesh.ply", ply(&mesh, true, false));
+    folder.write("cloud.ply", ply(&Mesh { triangles: Vec::new(), ..mesh }, false, true));
+    let scale = ColorScale::new(ColorMap::named("turbo").unwrap());
+    let values = |of, spread| Paint::Values { of, scale, spread };
+    let height = Values::Height(glam::DVec3::Y);
+    let fixed = ColorScale { range: [0.0, 255.0], ..scale };
+    let fixed = Paint::Values { of: Values::Own, scale: fixed, spread: None };
+    for (name, paint) in [
+        ("mesh.ply", values(Values::Own, Some(Spread::Full))),
+        ("cloud.ply", values(Values::Own, Some(Spread::Percentiles))),
+        ("cloud.ply", values(height, Some(Spread::Percentiles))),
+        ("mesh.ply", fixed),
+        ("mesh.ply", Paint::Plain([1.0, 0.5, 0.0])),
+    ] {
+        let splats = painted_both_ways(&folder, name, &paint, "red");
+        let colors: std::collections::HashSet<u32> = splats.iter().map(|s| s.color).collect();
+        assert_eq!(colors.len() == 1, matches!(paint, Paint::Plain(_)), "{name}");
+        assert!(colors.iter().all(|color| color >> 24 == 255), "{name}");
+    }
+    // A property that is not there is named, with those that are.
+    let paint = values(Values::Own, Some(Spread::Full));
+    let options = ExternalOptions { paint: Some(paint), scalar: Some("heat".into()), ..options() };
+    let (files, out) = ([folder.path("mesh.ply")], folder.path("none.splk"));
+    let error = convert(&files, &Limits::default(), &out, &options, &lossless(), None);
+    let message = error.unwrap_err().to_string();
+    assert!(message.contains("no array “heat”"), "{message}");
 }

@@ -20,6 +20,7 @@ const ROOMS: [&str; 26] = [
     "input",
     "container",
     "about",
+    "color",
     "splat",
     "volume",
     "surface",

@@ -126,6 +126,8 @@ fn hierarchies_made_in_regions_are_whole_or_not_there() {
         preset: hierarchy::Preset::Fastest,
         block_splats: 1 << 9,
         surfels: SurfelOptions::default(),
+        paint: None,
+        scalar: None,
     };
     let stops = stop_everywhere("b.splk", |path| {
         let write = file::WriteOptions::default();

@@ -6,9 +6,13 @@ mod streams;
 #[cfg(test)]
 mod tests;
 
-use super::shared::cloud::{Cloud, greys};
+use super::shared::{
+    attribute,
+    cloud::{Cloud, greys},
+};
 use crate::{
     Result,
+    about::About,
     input::{Source, growing::Growing, isolate::isolated},
     surface::Mesh,
 };
@@ -35,13 +39,23 @@ const POINTS: u64 = 1 << 16;
 /// scans that end before their last point; [`Error::Limit`](crate::Error::Limit) for more points
 /// than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
+    read_named(source, None)
+}
+
+/// As [`read`], with the values of the attribute that `scalar` names: `intensity`.
+///
+/// # Errors
+/// Those of [`read`]; [`Error::Input`](crate::Error::Input) for another name.
+pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
+    let named = scalar.map(|name| attribute::named(source, "scans", name, &["intensity"]));
+    let has_values = named.transpose()?.is_some();
     // The crate asserts on numbers of the file and clamps by them, which may panic.
-    let cloud = isolated(source, "scans", || read_scans(source))?;
+    let cloud = isolated(source, "scans", || read_scans(source, has_values))?;
     cloud.into_mesh(source, |point| format!("point {point}"))
 }
 
 /// Reads the points of all scans.
-fn read_scans(source: &Source) -> Result<Cloud> {
+fn read_scans(source: &Source, has_values: bool) -> Result<Cloud> {
     let unreadable =
         |error: ::e57::Error| source.error("file", format!("cannot be read as E57: {error}"));
     let xml = E57Reader::raw_xml(Cursor::new(source.bytes())).map_err(unreadable)?;
@@ -58,7 +72,7 @@ fn read_scans(source: &Source) -> Result<Cloud> {
     if left_out > 0 {
         tracing::info!(points = left_out, "points without a valid position are left out");
     }
-    points.into_cloud()
+    points.into_cloud(has_values)
 }
 
 /// The points of the scans that are read so far.
@@ -141,16 +155,22 @@ impl<'a> Points<'a> {
         self.intensities.push(point.intensity.unwrap_or(f32::NAN))
     }
 
-    fn into_cloud(self) -> Result<Cloud> {
+    fn into_cloud(self, has_values: bool) -> Result<Cloud> {
         // `greys` sorts a copy of the intensities.
         self.source.room::<f32>("the intensities", self.intensities.len())?;
         let colors =
             if self.has_colors { self.colors.into_inner() } else { greys(&self.intensities) };
+        let mut about = About::default();
+        if has_values {
+            about.name = "intensity".into();
+        }
         Ok(Cloud {
             positions: self.positions.into_inner(),
             colors,
             sensors: self.sensors,
             z_is_up: true,
+            values: if has_values { self.intensities.into_inner() } else { Vec::new() },
+            about,
             ..Cloud::default()
         })
     }

@@ -3,6 +3,7 @@
 use super::shared::found::Found;
 use crate::{
     Result,
+    about::About,
     input::Source,
     parallel::{self, prelude::*},
 };
@@ -27,11 +28,17 @@ pub(crate) struct StreamPoint {
     pub position: [f32; 3],
     /// Unit length; zero if the file has none.
     pub normal: [f32; 3],
-    /// As in [`Mesh::colors`](crate::surface::Mesh::colors); white if the file has none.
+    /// As in [`Mesh::colors`](crate::surface::Mesh::colors); white if the file has none. If an
+    /// attribute colours the points, the bytes of its value.
     pub color: [u8; 4],
 }
 
 impl StreamPoint {
+    /// Returns the value that takes the place of the colour.
+    pub fn value(&self) -> f32 {
+        f32::from_le_bytes(self.color)
+    }
+
     pub fn new(found: &Found, origin: DVec3) -> Self {
         Self {
             index: found.row as u32,
@@ -59,6 +66,10 @@ pub(super) trait Form: Send + Sync {
 
     /// Warns if the file contains more than the points, because only those are read.
     fn warn(&self, source: &Source);
+
+    /// Chooses the attribute of a name. From then on, the colours of points are the four bytes of
+    /// its value, a 32-bit float, the lowest first. Returns its name and unit.
+    fn choose(&mut self, source: &Source, name: &str) -> Result<About>;
 
     /// The first pass over all points: returns their number, without withheld ones, and the corners
     /// of their bounding box, and finds what their colours are scaled by. Calls `watch` with the

@@ -5,6 +5,7 @@
 //! The header and the points are read here, so that every count is checked against the bytes
 //! present. The `laz` crate unpacks the chunks of points (`packed`).
 
+mod attribute;
 mod packed;
 mod pieces;
 #[cfg(test)]
@@ -15,6 +16,7 @@ pub(super) use pieces::Pieces;
 
 use super::shared::cloud::{Cloud, colors_of_16_bits, greys};
 use crate::{Result, input::Source, parallel::prelude::*, surface::Mesh};
+use attribute::Attribute;
 use glam::DVec3;
 
 /// Reads a point cloud: positions and colours, or intensities as greys if there are no colours.
@@ -25,7 +27,17 @@ use glam::DVec3;
 /// chunks that cannot be unpacked; [`Error::Limit`](crate::Error::Limit) for more points than the
 /// limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
-    let header = Header::read(source)?;
+    read_named(source, None)
+}
+
+/// As [`read`], with the values of the attribute that `scalar` names: `intensity`,
+/// `classification`, `return_number`, …
+///
+/// # Errors
+/// Those of [`read`]; [`Error::Input`](crate::Error::Input) if the points have no such attribute.
+pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
+    let mut header = Header::read(source)?;
+    header.choose(source, scalar)?;
     let points =
         if header.packed { packed::read(source, &header)? } else { plain(source, &header)? };
     let left_out = header.points - points.len();
@@ -42,6 +54,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
     if cloud.colors.is_empty() {
         cloud.colors =
             greys(&points.par_iter().map(|p| f32::from(p.intensity)).collect::<Vec<f32>>());
+    }
+    if let Some(attribute) = header.attribute {
+        cloud.values = points.par_iter().map(|point| point.value).collect();
+        cloud.about = attribute.about();
     }
     cloud.into_mesh(source, |point| format!("point {point}"))
 }
@@ -68,14 +84,17 @@ fn plain_bytes<'a>(source: &'a Source, header: &Header) -> Result<&'a [u8]> {
     Ok(&data[..size as usize])
 }
 
-/// Bytes per point besides `Point`: its position, its colour in 16 and in 8 bits, its intensity.
-const POINT: u64 = 24 + 6 + 4 + 4;
+/// Bytes per point besides `Point`: its position, its colour in 16 and in 8 bits, its intensity,
+/// its value.
+const POINT: u64 = 24 + 6 + 4 + 4 + 4;
 
 /// The attributes of a point that are used.
 struct Point {
     position: [i32; 3],
     color: [u16; 3],
     intensity: u16,
+    /// The value of the attribute that the user names; NaN if none is named.
+    value: f32,
 }
 
 /// The contents of the header.
@@ -91,6 +110,8 @@ struct Header {
     offset: DVec3,
     /// Offset of the colour in a point.
     color_at: Option<usize>,
+    /// The attribute that the user names.
+    attribute: Option<Attribute>,
     /// Offset of the first variable length record, and the number of these records.
     records: (usize, u32),
 }
@@ -135,16 +156,25 @@ impl Header {
         }
         let packed = format & 0xc0 != 0;
         let format = format & 0x3f;
-        let color_at = match format {
-            2 => Some(20),
-            3 | 5 => Some(28),
-            7 | 8 | 10 => Some(30),
-            _ => None,
+        let header = Self {
+            start,
+            points: 0,
+            size,
+            format,
+            packed,
+            scale,
+            offset,
+            color_at: attribute::color_at(format),
+            attribute: None,
+            records: (header_size, record_count),
         };
-        let records = (header_size, record_count);
-        let header =
-            Self { start, points: 0, size, format, packed, scale, offset, color_at, records };
         Ok((header, points))
+    }
+
+    /// Reads the values of an attribute too, if one is named.
+    fn choose(&mut self, source: &Source, name: Option<&str>) -> Result<()> {
+        self.attribute = name.map(|name| Attribute::named(source, self, name)).transpose()?;
+        Ok(())
     }
 
     /// Returns an error if points cannot be read as the header of a file of `length` bytes
@@ -184,6 +214,9 @@ impl Header {
             position,
             color: self.color_at.map_or([0; 3], |at| [0, 2, 4].map(|channel| short(at + channel))),
             intensity: short(12),
+            value: self
+                .attribute
+                .map_or(f32::NAN, |attribute| attribute.value(self.format, record) as f32),
         })
     }
 

@@ -5,9 +5,10 @@ mod lzf;
 #[cfg(test)]
 mod tests;
 
-use super::shared::cloud::Cloud;
+use super::shared::{attribute, cloud::Cloud};
 use crate::{
     Result,
+    about::About,
     input::{Source, copy, growing::Growing, text::lines_of},
     parallel::prelude::*,
     surface::Mesh,
@@ -30,6 +31,14 @@ const POINT: u64 = 8 + 24 + 12 + 4;
 /// that cannot be unpacked, and lines of text that do not match the header;
 /// [`Error::Limit`](crate::Error::Limit) for more points or bytes than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
+    read_named(source, None)
+}
+
+/// As [`read`], with the values of the field that `scalar` names.
+///
+/// # Errors
+/// Those of [`read`]; [`Error::Input`](crate::Error::Input) if no field has the name.
+pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     let header = header::read(source)?;
     let count = source.check_points("the number of points", header.points)?;
     let find =
@@ -43,6 +52,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
     };
     let normal = triple([&["normal_x", "nx"], &["normal_y", "ny"], &["normal_z", "nz"]]);
     let color = find(&["rgb", "rgba"]);
+    let names: Vec<&str> = header.fields.iter().map(|field| field.name.as_str()).collect();
+    let value = scalar.map(|name| attribute::named(source, "header", name, &names)).transpose()?;
+    let value = value.map(|at| &header.fields[at]);
     let rows = Rows::find(source, &header, count)?;
     source.spend("the size of the points in bytes", POINT * count as u64)?;
     let three = |row: usize, fields: [&Field; 3]| {
@@ -60,6 +72,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
         let bytes = |row| rows.bits(row, field).to_le_bytes();
         each().map(bytes).map(|[b, g, r, _]| [r, g, b, 255]).collect::<Vec<_>>()
     });
+    let values = value.map(|field| each().map(|row| rows.number(row, field) as f32).collect());
     let sensor = header.viewpoint.filter(|place| *place != DVec3::ZERO || header.height > 1);
     let cloud = Cloud {
         positions: each().map(|row| three(row, position)).collect(),
@@ -67,6 +80,11 @@ pub fn read(source: &Source) -> Result<Mesh> {
         colors: colors.unwrap_or_default(),
         sensors: sensor.map(|place| (place, 0..kept.len())).into_iter().collect(),
         z_is_up: false,
+        values: values.unwrap_or_default(),
+        about: About {
+            name: value.map_or(String::new(), |field| field.name.clone()),
+            ..About::default()
+        },
     };
     cloud.into_mesh(source, |point| format!("point {}", kept[point]))
 }

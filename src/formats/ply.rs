@@ -154,6 +154,11 @@ fn read_vertices(source: &Source, element: &Element, rows: &Rows, mesh: &mut Mes
     fill(source, element, rows, &columns, |row, role| table.value(row, role), mesh)
 }
 
+/// Returns the column of the property of a vertex that a user names.
+fn column_named(source: &Source, element: &Element, name: &str) -> Result<usize> {
+    Ok(samples::named_column(source, element, name)?.1)
+}
+
 /// Gives the mesh the values of a property. `options` names it.
 fn read_values(
     source: &Source,

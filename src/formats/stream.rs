@@ -8,11 +8,16 @@ use super::{
 };
 use crate::{
     Result,
+    color::{ColorScale, Spread},
     input::{Limits, Source, positions},
+    surface::{Paint, Values},
 };
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 use std::path::Path;
+
+/// Values of which percentiles are taken: of more, every second, third, … one.
+const LOOKS: u64 = 1 << 20;
 
 /// A point cloud or mesh file that is read in pieces: binary PLY of points or triangles, LAS and
 /// LAZ.
@@ -27,6 +32,8 @@ pub struct Stream<'a> {
     points: u64,
     origin: DVec3,
     bounds: [Vec3; 2],
+    /// What colours the points instead of the file's colours.
+    paint: Option<Paint>,
 }
 
 impl<'a> Stream<'a> {
@@ -53,7 +60,23 @@ impl<'a> Stream<'a> {
             _ => source.unless_changed(Ok(None))?,
         };
         let (origin, bounds) = (DVec3::ZERO, [Vec3::ZERO; 2]);
-        Ok(form.map(|form| Self { source, form, points: 0, origin, bounds }))
+        Ok(form.map(|form| Self { source, form, points: 0, origin, bounds, paint: None }))
+    }
+
+    /// Colours the points by a paint instead of the file's colours, as
+    /// [`Mesh::paint`](crate::surface::Mesh::paint) does. `scalar` names the attribute of
+    /// [`Values::Own`].
+    ///
+    /// # Errors
+    /// [`Error::Input`](crate::Error::Input) if the points have no attribute of the name.
+    pub fn painted(mut self, paint: Paint, scalar: Option<&str>) -> Result<Self> {
+        if let Paint::Values { of: Values::Own, .. } = paint {
+            let Some(name) = scalar else { return Err(no_values(&self.source)) };
+            let chosen = self.form.choose(&self.source, name);
+            self.source.unless_changed(chosen)?;
+        }
+        self.paint = Some(paint);
+        Ok(self)
     }
 
     /// Returns the counts in the header.
@@ -91,7 +114,62 @@ impl<'a> Stream<'a> {
         self.points = points;
         self.origin = positions::origin(&self.source, low, high)?;
         self.bounds = [(low - self.origin).as_vec3(), (high - self.origin).as_vec3()];
+        self.settle_scale()
+    }
+
+    /// Spreads the scale of the colours over the values, unless its range is given.
+    fn settle_scale(&mut self) -> Result<()> {
+        let Some(Paint::Values { mut scale, spread: Some(spread), .. }) = self.paint else {
+            return Ok(());
+        };
+        let step = self.points.div_ceil(LOOKS).max(1) as usize;
+        let mut looks = Vec::new();
+        let of_piece = |points: &[StreamPoint]| {
+            let some = points.iter().filter(|point| (point.index as usize).is_multiple_of(step));
+            let found: Vec<f32> = some.map(StreamPoint::value).collect();
+            let all: Vec<f32> = points.iter().map(StreamPoint::value).collect();
+            (found, Spread::Full.range(&all, scale.is_log))
+        };
+        let mut ends: Option<[f64; 2]> = None;
+        self.points(of_piece, |(found, of_piece)| {
+            looks.extend(found);
+            ends = match (ends, of_piece) {
+                (Some([a, b]), Some([c, d])) => Some([f64::min(a, c), f64::max(b, d)]),
+                (one, other) => one.or(other),
+            };
+            Ok(())
+        })?;
+        let range = if spread == Spread::Full { ends } else { spread.range(&looks, scale.is_log) };
+        scale.range = range.ok_or_else(|| no_values(&self.source))?;
+        if let Some(Paint::Values { scale: own, spread, .. }) = &mut self.paint {
+            (*own, *spread) = (scale, None);
+        }
         Ok(())
+    }
+
+    /// Returns how the values of the points become colours; `None` if they have colours.
+    pub(crate) fn scale(&self) -> Option<ColorScale> {
+        match self.paint {
+            Some(Paint::Values { scale, .. }) => Some(scale),
+            _ => None,
+        }
+    }
+
+    /// Returns whether a point is opaque.
+    pub(crate) fn is_opaque(&self, point: &StreamPoint) -> bool {
+        self.paint.is_some() || point.color[3] == 255
+    }
+
+    /// Paints a point that the form has read.
+    fn paint(&self, point: &mut StreamPoint) {
+        match &self.paint {
+            Some(Paint::Plain(color)) => point.color = Paint::bytes(*color),
+            Some(Paint::Values { of: Values::Height(up), .. }) => {
+                let place = self.origin + Vec3::from(point.position).as_dvec3();
+                point.color = (place.dot(*up) as f32).to_le_bytes();
+            }
+            _ => {}
+        }
     }
 
     /// Creates an error at a place in the file.
@@ -119,7 +197,11 @@ impl<'a> Stream<'a> {
     }
 
     pub(crate) fn has_colors(&self) -> bool {
-        self.form.has_colors()
+        match self.paint {
+            Some(Paint::Plain(_)) => true,
+            Some(_) => false,
+            None => self.form.has_colors(),
+        }
     }
 
     pub(crate) fn has_uvs(&self) -> bool {
@@ -133,8 +215,11 @@ impl<'a> Stream<'a> {
         map: impl Fn(&[StreamPoint]) -> T + Sync,
         take: impl FnMut(T) -> Result<()>,
     ) -> Result<()> {
-        let of_piece =
-            |piece: usize| Ok(map(&self.form.points(&self.source, piece, self.origin)?));
+        let of_piece = |piece: usize| {
+            let mut points = self.form.points(&self.source, piece, self.origin)?;
+            points.iter_mut().for_each(|point| self.paint(point));
+            Ok(map(&points))
+        };
         in_order(&self.source, self.form.pieces()[0], of_piece, take)
     }
 
@@ -161,6 +246,13 @@ impl<'a> Stream<'a> {
     /// Returns a vertex of a mesh.
     pub(crate) fn vertex(&self, index: u32) -> StreamPoint {
         let found = self.form.vertex(&self.source, index as usize);
-        found.map_or_else(StreamPoint::zeroed, |found| StreamPoint::new(&found, self.origin))
+        let mut point =
+            found.map_or_else(StreamPoint::zeroed, |found| StreamPoint::new(&found, self.origin));
+        self.paint(&mut point);
+        point
     }
+}
+
+fn no_values(source: &Source) -> crate::Error {
+    source.error("points", "have no values to colour by")
 }

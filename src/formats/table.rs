@@ -108,7 +108,7 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Prefix(b"LASF"),
         kind: Which::Always(Kind::Mesh),
         #[cfg(feature = "las")]
-        mesh: Some(|source, _| las::read(source)),
+        mesh: Some(|source, options| las::read_named(source, options.scalar.as_deref())),
         #[cfg(feature = "las")]
         pieces: InPieces::Points {
             of: "",
@@ -124,7 +124,7 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Prefix(b"ASTM-E57"),
         kind: Which::Always(Kind::Mesh),
         #[cfg(feature = "e57")]
-        mesh: Some(|source, _| e57::read(source)),
+        mesh: Some(|source, options| e57::read_named(source, options.scalar.as_deref())),
         ..Format::ROW
     },
     Format {
@@ -133,7 +133,7 @@ pub static FORMATS: &[Format] = &[
         holds: &[all(Content::PointCloud)],
         magic: Magic::Prefix(b"# .PCD"),
         kind: Which::Always(Kind::Mesh),
-        mesh: Some(|source, _| pcd::read(source)),
+        mesh: Some(|source, options| pcd::read_named(source, options.scalar.as_deref())),
         ..Format::ROW
     },
     Format {
@@ -143,7 +143,7 @@ pub static FORMATS: &[Format] = &[
         kind: Which::Rule(|_, options| {
             Ok(if options.scalar.is_some() { Kind::Samples } else { Kind::Mesh })
         }),
-        mesh: Some(|source, _| xyz::read(source)),
+        mesh: Some(|source, options| xyz::read_named(source, options.scalar.as_deref())),
         samples: Some(csv::read),
         arrays: Some(csv::arrays),
         ..Format::ROW
@@ -254,7 +254,7 @@ pub static FORMATS: &[Format] = &[
             let is_cloud = options.scalar.is_none() && xyz::is_cloud(source);
             Ok(if is_cloud { Kind::Mesh } else { Kind::Samples })
         }),
-        mesh: Some(|source, _| xyz::read(source)),
+        mesh: Some(|source, options| xyz::read_named(source, options.scalar.as_deref())),
         samples: Some(csv::read),
         arrays: Some(csv::arrays),
         ..Format::ROW

@@ -2,7 +2,10 @@
 //! without a line of column names. `.pts` files begin each scan with its number of points on a line
 //! of its own.
 
-use super::shared::cloud::{Cloud, greys};
+use super::shared::{
+    attribute,
+    cloud::{Cloud, greys},
+};
 use crate::{
     Result,
     input::{
@@ -46,6 +49,15 @@ const INTENSITY: &[&str] = &["intensity", "i", "grey", "gray", "reflectance"];
 /// than the file counts; [`Error::Limit`](crate::Error::Limit) for more lines than the limits allow
 /// points.
 pub fn read(source: &Source) -> Result<Mesh> {
+    read_named(source, None)
+}
+
+/// As [`read`], with the values of the column that `scalar` names. Without names of columns, an
+/// intensity is called `intensity`.
+///
+/// # Errors
+/// Those of [`read`]; [`Error::Input`](crate::Error::Input) if no column has the name.
+pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     let mut counts = Growing::new(source, "the counts");
     let text = Text::of(source, |number, line| match copy::number::<u64>(line) {
         Some(count) => counts.push((number, count)).map(|()| true),
@@ -56,13 +68,12 @@ pub fn read(source: &Source) -> Result<Mesh> {
         Some(names) => Layout::named(source, text.first, names)?,
         None => Layout::plain(source, text.first, text.width)?,
     };
-    let numbers =
-        text.numbers(
-            source,
-            |column| {
-                if layout.uses(column) { Want::Numbers } else { Want::Nothing }
-            },
-        )?;
+    let value = scalar.map(|name| layout.column(source, &text, name)).transpose()?;
+    let numbers = text.numbers(source, |column| match value {
+        _ if layout.uses(column) => Want::Numbers,
+        Some(own) if own == column => Want::Values,
+        _ => Want::Nothing,
+    })?;
     let table = Table { numbers, width: text.width, rows: text.len() };
     for columns in std::mem::take(&mut layout.untold) {
         let slot = if table.is_normal(columns) { &mut layout.normal } else { &mut layout.color };
@@ -86,6 +97,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
     } else if let Some(column) = layout.intensity {
         let intensities = (0..table.rows).map(|row| table.value(row, column) as f32);
         cloud.colors = greys(&intensities.collect::<Vec<f32>>());
+    }
+    if let (Some(column), Some(name)) = (value, scalar) {
+        cloud.values = (0..table.rows).map(|row| table.value(row, column) as f32).collect();
+        cloud.about.name = name.into();
     }
     cloud.into_mesh(source, |row| text.place(row))
 }
@@ -213,6 +228,18 @@ impl Layout {
         }
     }
 
+    /// Returns the column of an attribute.
+    fn column(&self, source: &Source, text: &Text, name: &str) -> Result<usize> {
+        let place = format!("line {}", text.first);
+        match (&text.names, self.intensity) {
+            (Some(names), _) => attribute::named(source, &place, name, names),
+            (None, Some(column)) => {
+                attribute::named(source, &place, name, &["intensity"]).map(|_| column)
+            }
+            (None, None) => attribute::named(source, &place, name, &[""; 0]).map(|_| 0),
+        }
+    }
+
     fn uses(&self, column: usize) -> bool {
         let triples = [Some(self.position), self.color, self.normal];
         self.intensity == Some(column)
@@ -274,6 +301,29 @@ mod tests {
         }
         for text in ["1 2 3 100\n4 5 6 300", "x y z intensity\n1 2 3 -1\n4 5 6 0"] {
             assert_eq!(load(text).unwrap().colors, [[0, 0, 0, 255], [255; 4]], "{text}");
+        }
+    }
+
+    #[test]
+    fn columns_are_values_by_name() {
+        let folder = Folder::new();
+        for (text, name, wanted) in [
+            ("x y z heat r g b\n1 2 3 7 255 0 0\n4 5 6 8 0 0 0", "Heat", Some([7.0, 8.0])),
+            ("1 2 3 40\n4 5 6 50", "intensity", Some([40.0, 50.0])),
+            ("1 2 3 40 255 0 0\n4 5 6 50 0 0 0", "intensity", Some([40.0, 50.0])),
+            ("x y z heat\n1 2 3 4\n4 5 6 5", "cold", None),
+            ("1 2 3\n4 5 6", "intensity", None),
+        ] {
+            let path = folder.write("a.xyz", text);
+            let found = read_with(&path, |source| read_named(source, Some(name)));
+            match (found, wanted) {
+                (Ok(mesh), Some(wanted)) => assert_eq!(mesh.values, wanted, "{text}"),
+                (Err(error), None) => {
+                    let message = error.to_string();
+                    assert!(message.contains("line 1: has no attribute"), "{message}");
+                }
+                (found, _) => panic!("{text}: {:?}", found.map(|mesh| mesh.values)),
+            }
         }
     }
 

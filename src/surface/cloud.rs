@@ -5,7 +5,7 @@ use super::{
     Mesh, SurfelOptions,
     ellipse::{Tensor, factor, lower},
     orient::{Known, orient},
-    paint::{pack, point_color},
+    paint::{of_normal, pack, point_color},
 };
 use crate::{
     Deadline, Result,
@@ -153,12 +153,16 @@ impl<'a> Judged<'a> {
         let known = !self.lone[at] || !self.free[at];
         let normal =
             Some(self.normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
+        let packed = normal.map_or(NO_NORMAL, |normal| encode_normal(normal.as_vec3()));
         Splat {
             center: self.points[at].to_array(),
             strength: options.optical_depth,
             factor: shape(&self.around[at], width, normal),
-            color: pack(point_color(self.mesh, self.kept[at] as usize)),
-            normal: normal.map_or(NO_NORMAL, |normal| encode_normal(normal.as_vec3())),
+            color: match options.color_by_normal {
+                true => of_normal(packed),
+                false => pack(point_color(self.mesh, self.kept[at] as usize)),
+            },
+            normal: packed,
         }
     }
 }

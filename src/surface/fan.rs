@@ -9,7 +9,7 @@ use super::{
         ALIKE, CENTROID, CORNER, LEAST_RATIO_SQUARED, LEAST_SQUARE, MIDDLE, SAG, SPREAD, STEEP,
         THICKNESS, mixed,
     },
-    paint::{NEUTRAL, corner_color, pack},
+    paint::{NEUTRAL, corner_color, of_normal, pack},
     refine::Origin,
     smooth::Groups,
 };
@@ -190,12 +190,13 @@ impl Maker<'_> {
         let cross = Vec3::new(found.cross[0][lane], found.cross[1][lane], found.cross[2][lane]);
         made.sums.add(self.mesh.positions[vertex], found.area[lane], cross);
         let [f0, f1, f2, f3, f4, f5] = &found.factor;
+        let normal = pack(found.normal[0][lane]) | pack(found.normal[1][lane]) << 16;
         made.splats.push(Splat {
             center: [found.center[0][lane], found.center[1][lane], found.center[2][lane]],
             strength: self.options.optical_depth,
             factor: [f0[lane], f1[lane], f2[lane], f3[lane], f4[lane], f5[lane]],
-            color: self.color(vertex, &[], 1.0),
-            normal: pack(found.normal[0][lane]) | pack(found.normal[1][lane]) << 16,
+            color: self.color(vertex, &[], 1.0, normal),
+            normal,
         });
     }
 
@@ -330,20 +331,20 @@ impl Maker<'_> {
             center: (self.mesh.positions[vertex] + offset * self.unit).to_array(),
             strength: self.options.optical_depth,
             factor: ellipse.factor([x, y, normal], scale * self.unit, thickness * self.unit),
-            color: self.color(vertex, group, area),
+            color: self.color(vertex, group, area, encode_normal(outward)),
             normal: encode_normal(outward),
         })
     }
 
-    /// Returns the mean colour of the triangles at their corners.
-    fn color(&self, vertex: usize, group: &[Around], area: f32) -> u32 {
+    /// Returns the mean colour of the triangles at their corners, or that of the packed normal.
+    fn color(&self, vertex: usize, group: &[Around], area: f32, normal: u32) -> u32 {
+        if self.options.color_by_normal {
+            return of_normal(normal);
+        }
         if self.plain {
             // Packed as in memory, red lowest.
-            return self
-                .mesh
-                .colors
-                .get(vertex)
-                .map_or_else(|| pack(NEUTRAL), |color| u32::from_le_bytes(*color));
+            let own = self.mesh.vertex_color(vertex);
+            return own.map_or_else(|| pack(NEUTRAL), u32::from_le_bytes);
         }
         let mut color = [0.0; 4];
         for t in group {

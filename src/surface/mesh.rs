@@ -1,6 +1,6 @@
 //! The content of a mesh or point cloud file, whatever its format.
 
-use crate::about::About;
+use crate::{about::About, color::ColorScale};
 use glam::{DVec3, Vec2, Vec3};
 use std::{ops::Range, sync::Arc};
 
@@ -50,6 +50,9 @@ pub struct Mesh {
     /// One value of each vertex, to colour it by; empty if the file has none, or none was asked
     /// for. NaN where a vertex has no value. `about` has the name and the unit.
     pub values: Vec<f32>,
+    /// How `values` colour the mesh instead of its own colours; `None` if they do not
+    /// ([`paint`](Self::paint)).
+    pub scale: Option<ColorScale>,
     /// Whether the format's convention is that +Z is up, as in surveying.
     pub z_is_up: bool,
     /// What the file says beyond this.

@@ -22,6 +22,7 @@ mod survey;
 pub use mesh::{Material, Mesh, Sensor, Texture};
 pub(crate) use orient::Known;
 pub(crate) use paint::color_at;
+pub use paint::{Paint, Values};
 pub(crate) use parts::Joining;
 pub(crate) use piece::{MeshPieces, PiecesClosing, Triangles, cloud_piece};
 pub(crate) use smooth::corner_normals;

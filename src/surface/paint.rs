@@ -1,10 +1,113 @@
 //! The colour of a mesh at a corner: vertex colour × material colour × texture.
 
 use super::{Material, Mesh, Texture};
-use glam::Vec2;
+use crate::{
+    Error, Result,
+    color::{ColorScale, Spread},
+    parallel::prelude::*,
+    splat::decode_normal,
+};
+use glam::{DVec3, Vec2};
 
 /// The colour of a mesh that defines none.
 pub(super) const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
+
+/// What colours a surface instead of its file's colours.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Paint {
+    /// One colour: red, green and blue in 0 … 1.
+    Plain([f32; 3]),
+    /// Values at the vertices, which are mixed before they become colours.
+    Values {
+        /// Which values.
+        of: Values,
+        /// Their colours.
+        scale: ColorScale,
+        /// Which of the values the scale spans, in place of its own range.
+        spread: Option<Spread>,
+    },
+}
+
+/// Values that may colour a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Values {
+    /// [`Mesh::values`], which the reader has filled.
+    Own,
+    /// The world coordinate along a direction of unit length.
+    Height(DVec3),
+}
+
+impl Paint {
+    /// Returns a colour as a mesh has it.
+    pub(crate) fn bytes([r, g, b]: [f32; 3]) -> [u8; 4] {
+        let [r, g, b] = [r, g, b].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);
+        [r, g, b, 255]
+    }
+}
+
+impl Mesh {
+    /// Colours the mesh by a paint. Its own colours, materials and opacity are dropped.
+    ///
+    /// ```
+    /// use splatkit::{
+    ///     color::{ColorMap, ColorScale, Spread},
+    ///     glam::DVec3,
+    ///     surface::{Mesh, Paint, Values},
+    /// };
+    ///
+    /// let mut ball = Mesh::sphere(2);
+    /// let scale = ColorScale::new(ColorMap::VIRIDIS);
+    /// let of = Values::Height(DVec3::Z);
+    /// ball.paint(&Paint::Values { of, scale, spread: Some(Spread::Full) })?;
+    /// assert_eq!(ball.scale.map(|scale| scale.range), Some([-1.0, 1.0]));
+    /// # Ok::<(), splatkit::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there are no values that the scale could span.
+    pub fn paint(&mut self, paint: &Paint) -> Result<()> {
+        let scale = match paint {
+            Paint::Plain(_) => None,
+            Paint::Values { of, scale, spread } => {
+                if let Values::Height(up) = of {
+                    let height =
+                        |place: &glam::Vec3| (self.origin + place.as_dvec3()).dot(*up) as f32;
+                    self.values = self.positions.par_iter().map(height).collect();
+                }
+                let mut scale = *scale;
+                if let Some(spread) = spread {
+                    scale.range = spread.range(&self.values, scale.is_log).ok_or_else(|| {
+                        let which = if scale.is_log { " above 0" } else { "" };
+                        Error::Argument(format!("there are no values{which} to colour by"))
+                    })?;
+                }
+                Some(scale)
+            }
+        };
+        self.colors = match paint {
+            Paint::Plain(color) => vec![Paint::bytes(*color); self.positions.len()],
+            Paint::Values { .. } => Vec::new(),
+        };
+        self.scale = scale;
+        self.uvs.clear();
+        self.triangle_materials.clear();
+        self.materials.clear();
+        Ok(())
+    }
+
+    /// Returns whether vertices have colours.
+    pub(super) fn is_painted(&self) -> bool {
+        !self.colors.is_empty() || self.scale.is_some() && !self.values.is_empty()
+    }
+
+    /// Returns the colour of a vertex; `None` if vertices have no colours.
+    pub(super) fn vertex_color(&self, vertex: usize) -> Option<[u8; 4]> {
+        match (self.scale, self.values.get(vertex)) {
+            (Some(scale), Some(&value)) => Some(Paint::bytes(scale.color(f64::from(value)))),
+            _ => self.colors.get(vertex).copied(),
+        }
+    }
+}
 
 impl Texture {
     /// Returns the mean colour over the parallelogram from `uv` along `a` and `b`. Samples are
@@ -62,7 +165,7 @@ pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32;
         mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
     let mut color = base_color(mesh, material);
     let mut multiply = |by: [f32; 4]| color.iter_mut().zip(by).for_each(|(part, by)| *part *= by);
-    if let Some(own) = mesh.colors.get(vertex) {
+    if let Some(own) = mesh.vertex_color(vertex) {
         multiply(own.map(|part| f32::from(part) / 255.0));
     }
     let texture = material.and_then(|material| material.texture.as_ref());
@@ -80,7 +183,12 @@ pub(crate) fn color_at(mesh: &Mesh, triangle: usize, weights: [f32; 3]) -> [f32;
         mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
     let mut color = base_color(mesh, material);
     let mut multiply = |by: [f32; 4]| color.iter_mut().zip(by).for_each(|(part, by)| *part *= by);
-    if !mesh.colors.is_empty() {
+    if let Some(scale) = mesh.scale.filter(|_| !mesh.values.is_empty()) {
+        let value: f32 =
+            vertices.iter().zip(weights).map(|(&v, weight)| weight * mesh.values[v]).sum();
+        let [r, g, b] = scale.color(f64::from(value));
+        multiply([r, g, b, 1.0]);
+    } else if !mesh.colors.is_empty() {
         let part = |i: usize, v: usize| f32::from(mesh.colors[v][i]) / 255.0;
         multiply(std::array::from_fn(|i| {
             vertices.iter().zip(weights).map(|(&v, weight)| weight * part(i, v)).sum()
@@ -100,14 +208,22 @@ pub(crate) fn color_at(mesh: &Mesh, triangle: usize, weights: [f32; 3]) -> [f32;
 fn base_color(mesh: &Mesh, material: Option<&Material>) -> [f32; 4] {
     match material {
         Some(material) => material.color,
-        None if mesh.colors.is_empty() => NEUTRAL,
+        None if !mesh.is_painted() => NEUTRAL,
         None => [1.0; 4],
     }
 }
 
 /// Returns the colour of a point that belongs to no triangle.
 pub(super) fn point_color(mesh: &Mesh, vertex: usize) -> [f32; 4] {
-    mesh.colors.get(vertex).map_or(NEUTRAL, |color| color.map(|part| f32::from(part) / 255.0))
+    mesh.vertex_color(vertex).map_or(NEUTRAL, |color| color.map(|part| f32::from(part) / 255.0))
+}
+
+/// Returns the colour of a packed normal: its coordinates from −1 to 1 as red, green and blue.
+pub(super) fn of_normal(packed: u32) -> u32 {
+    pack(decode_normal(packed).map_or(NEUTRAL, |normal| {
+        let [r, g, b] = (normal * 0.5 + 0.5).to_array();
+        [r, g, b, 1.0]
+    }))
 }
 
 /// Packs a colour into 32 bits, red lowest.

@@ -718,6 +718,7 @@ fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) -> Result<()> {
     extend(&mut mesh.positions, new, |a: Vec3, b, part| a * (1.0 - part) + b * part)?;
     extend(&mut mesh.normals, new, |a: Vec3, b, part| a.lerp(b, part).normalize_or_zero())?;
     extend(&mut mesh.uvs, new, |a: Vec2, b, part| a.lerp(b, part))?;
+    extend(&mut mesh.values, new, |a: f32, b, part| a * (1.0 - part) + b * part)?;
     extend(&mut mesh.colors, new, |a: [u8; 4], b, part| {
         std::array::from_fn(|i| {
             (f32::from(a[i]) * (1.0 - part) + f32::from(b[i]) * part).round() as u8

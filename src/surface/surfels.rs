@@ -43,6 +43,9 @@ pub struct SurfelOptions {
     /// Most triangles after cutting, unless an eighth more than the input is larger. The spacing
     /// grows to stay within this limit.
     pub most_triangles: usize,
+    /// Whether the directions of normals are their colours: x, y and z from −1 to 1 become red,
+    /// green and blue.
+    pub color_by_normal: bool,
     /// When the surfels must be ready.
     pub deadline: Deadline,
 }
@@ -68,6 +71,7 @@ impl Default for SurfelOptions {
             crease_angle_degrees: 75.0,
             largest_spacing: 1.0 / 128.0,
             most_triangles: 1 << 23,
+            color_by_normal: false,
             deadline: Deadline::NEVER,
         }
     }
@@ -216,6 +220,7 @@ impl Mesh {
             ("normals", self.normals.len(), count),
             ("colors", self.colors.len(), count),
             ("uvs", self.uvs.len(), count),
+            ("values", self.values.len(), count),
             ("triangle_materials", self.triangle_materials.len(), self.triangles.len()),
         ] {
             if length != 0 && length != wanted {
@@ -419,7 +424,7 @@ fn make(
     memory::room(WORK, (size_of::<Splat>() * mesh.positions.len()) as u64)?;
     let clock = Clock::new(options.deadline);
     let plain = mesh.materials.is_empty()
-        && (mesh.colors.is_empty() || matches!(connected.places, Cow::Borrowed(_)));
+        && (!mesh.is_painted() || matches!(connected.places, Cow::Borrowed(_)));
     let maker = Maker { mesh, connected: &connected, options, origin, unit, outward, plain };
     let made = (0..mesh.positions.len().div_ceil(CHUNK))
         .into_par_iter()

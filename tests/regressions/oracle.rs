@@ -415,6 +415,8 @@ pub fn regions(bytes: &[u8]) {
         preset: Preset::default(),
         block_splats: 64,
         surfels: surfel_options(),
+        paint: None,
+        scalar: None,
     };
     let whole = accepted(formats::load_mesh(&path, &limits, &ReadOptions::default()));
     let converted = accepted(external::convert(

@@ -110,8 +110,25 @@ impl LoadFlags {
         memory: Option<u64>,
         read: &mut Vec<PathBuf>,
     ) -> Result<Input, Failure> {
+        self.open_colored(path, None, memory, read)
+    }
+
+    /// As [`open_within`](Self::open_within). A mesh or point cloud has the values of this
+    /// attribute, if one is named.
+    pub fn open_colored(
+        &self,
+        path: &Path,
+        attribute: Option<&str>,
+        memory: Option<u64>,
+        read: &mut Vec<PathBuf>,
+    ) -> Result<Input, Failure> {
         let (limits, whole) = (self.limits(), self.limits.whole(memory));
-        let (input, files) = match self.kind(path)? {
+        // An attribute colours points. It does not make samples of them, as --scalar does.
+        let kind = match attribute {
+            Some(_) => self.kind_with(path, &ReadOptions { scalar: None, ..self.options() })?,
+            None => self.kind(path)?,
+        };
+        let (input, files) = match kind {
             // Bricks and hierarchies refer to no other files.
             Kind::Bricks => {
                 (Input::Bricks(Arc::new(Bricks::open(path, &limits)?)), vec![path.to_owned()])
@@ -121,7 +138,9 @@ impl LoadFlags {
             }
             Kind::Mesh => {
                 let source = Source::open(path, &whole)?;
-                (Input::Mesh(formats::read_mesh(&source, &self.options())?), source.files())
+                let mut options = self.options();
+                options.scalar = attribute.map(str::to_owned).or(options.scalar);
+                (Input::Mesh(formats::read_mesh(&source, &options)?), source.files())
             }
             Kind::Volume => {
                 let source = Source::open(path, &whole)?;
@@ -143,14 +162,23 @@ impl LoadFlags {
 
     /// Returns the kind of a file, even if the file is damaged.
     pub fn kind(&self, path: &Path) -> Result<Kind, Failure> {
+        self.kind_with(path, &self.options())
+    }
+
+    fn kind_with(&self, path: &Path, options: &ReadOptions) -> Result<Kind, Failure> {
         let raw = self.layout().map(|_| Kind::Volume);
-        Ok(Kind::of(path, &self.limits(), &self.options())?.or(raw).ok_or_else(|| unknown(path))?)
+        Ok(Kind::of(path, &self.limits(), options)?.or(raw).ok_or_else(|| unknown(path))?)
     }
 
     /// Opens a volume that can be read slice by slice. Returns `None` for volumes that are read as
     /// a whole.
     pub fn stream(&self, path: &Path) -> Result<Option<VolumeStream>, Failure> {
         Ok(VolumeStream::open(path, &self.limits(), self.layout().as_ref())?)
+    }
+
+    /// Returns the name of the values to read, if the user named them.
+    pub fn scalar(&self) -> Option<&str> {
+        self.scalar.as_deref()
     }
 
     /// Returns what to read of a file.

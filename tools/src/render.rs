@@ -6,6 +6,7 @@ use crate::{
     engine::EngineFlags,
     failure::Failure,
     output::{self, Target},
+    overlay::OverlayFlags,
     parse::{self, Background},
     progress::Progress,
     samples::Samples,
@@ -46,6 +47,8 @@ pub struct Render {
     /// Draw this many frames while the camera turns once around the up axis.
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     turntable: Option<u32>,
+    #[command(flatten)]
+    overlay: OverlayFlags,
     #[command(flatten)]
     camera: CameraFlags,
     #[command(flatten)]
@@ -105,6 +108,8 @@ struct Drawn {
     stats: FrameStats,
     camera: Camera,
     frame_ms: f64,
+    /// The texts over the last frame.
+    overlay: serde_json::Value,
 }
 
 impl Render {
@@ -124,7 +129,7 @@ impl Render {
         let upload_ms = milliseconds(start);
         let drawn = self.draw_frames(&mut drawer, &loaded, &settings, &targets, progress)?;
         progress.clear();
-        let Drawn { stats, camera, frame_ms } = drawn;
+        let Drawn { stats, camera, frame_ms, overlay } = drawn;
         tracing::info!(
             splats = stats.splats,
             hidden = stats.hidden,
@@ -151,6 +156,7 @@ impl Render {
                 "load_ms": loaded.load_ms,
                 "upload_ms": upload_ms,
                 "camera": crate::camera::to_json(&camera),
+                "overlay": overlay,
                 "settings": describe::settings(&loaded.scene, &settings),
             }))?;
         }
@@ -167,6 +173,8 @@ impl Render {
         progress: &Progress,
     ) -> Result<Drawn, Failure> {
         let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
+        let overlay = self.overlay.open(&loaded.facts, self.background.0)?;
+        let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
         let mut last = (FrameStats::default(), self.camera.camera(&loaded.subject, settings.size)?);
         for (frame, target) in targets.iter().enumerate() {
@@ -182,8 +190,11 @@ impl Render {
             let (picture, stats) = drawer.draw(loaded, &camera, settings)?;
             times.push(milliseconds(start));
             self.engine.require_content(&picture)?;
-            let picture = if factor > 1 { picture.reduced(factor)? } else { picture };
+            let mut picture = if factor > 1 { picture.reduced(factor)? } else { picture };
             progress.stage(format!("Writing {}", target.name()));
+            if let Some(overlay) = &overlay {
+                texts = overlay.draw(&mut picture, &camera);
+            }
             target.write(&picture.encode(target.format(), self.background.0)?)?;
             if let Some(depth) = &self.depth {
                 disk::write(depth, &picture.encode_depth()?)?;
@@ -192,7 +203,7 @@ impl Render {
         }
         times.sort_by(f64::total_cmp);
         let (stats, camera) = last;
-        Ok(Drawn { stats, camera, frame_ms: times[times.len() / 2] })
+        Ok(Drawn { stats, camera, frame_ms: times[times.len() / 2], overlay: texts })
     }
 
     /// Returns one target per frame. Fails if one of the files exists and may not be replaced, or

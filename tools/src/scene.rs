@@ -2,8 +2,10 @@
 
 use crate::{
     camera::Subject,
+    color::titled,
     failure::{Failure, in_file},
     load::{Input, LoadFlags},
+    overlay::Facts,
     progress::Progress,
     show::{Show, ShowFlags},
 };
@@ -47,6 +49,8 @@ pub struct Loaded {
     /// Number of splats and samples.
     pub count: u64,
     pub load_ms: f64,
+    /// What the inputs say for the texts over a picture.
+    pub facts: Facts,
     /// The files that were read: the inputs, the files that they refer to, and the files that flags
     /// name.
     pub read: Vec<PathBuf>,
@@ -62,6 +66,7 @@ impl SceneFlags {
             subject: Subject { bounds: Bounds::EMPTY, up: DVec3::Z },
             count: 0,
             load_ms: 0.0,
+            facts: Facts::default(),
             read: self.show.files(),
         };
         let mut adding = Adding { flags: self, show, progress, loaded };
@@ -70,7 +75,9 @@ impl SceneFlags {
             progress.stage(format!("Reading {}", path.display()));
             // One deadline covers reading the input and making its splats.
             let deadline = self.load.limits().deadline();
-            let input = self.load.open_within(path, memory::most(), &mut adding.loaded.read)?;
+            let attribute = self.show.color.attribute();
+            let read = &mut adding.loaded.read;
+            let input = self.load.open_colored(path, attribute, memory::most(), read)?;
             match &input {
                 Input::Mesh(_) => is_scaled = true,
                 Input::Hierarchy(_) => unscaled = Some(path),
@@ -79,6 +86,7 @@ impl SceneFlags {
             adding.add(path, input, deadline)?;
         }
         let mut loaded = adding.loaded;
+        self.show.color.check_effect(is_scaled, !loaded.facts.bars.is_empty())?;
         if let (Some(_), Some(path), false) = (self.show.radius_scale, unscaled, is_scaled) {
             return Err(Failure::Usage(format!(
                 "--radius-scale does not apply to {}: a hierarchy keeps the radii that it was \
@@ -134,7 +142,7 @@ impl Adding<'_> {
     /// Adds an input to the scene. Its splats must be made by the deadline.
     fn add(&mut self, path: &Path, input: Input, deadline: Deadline) -> Result<(), Failure> {
         match input {
-            Input::Mesh(mesh) => self.add_mesh(path, &mesh, deadline),
+            Input::Mesh(mesh) => self.add_mesh(path, mesh, deadline),
             Input::Hierarchy(hierarchy) => {
                 self.add_hierarchy(hierarchy);
                 Ok(())
@@ -148,10 +156,21 @@ impl Adding<'_> {
         }
     }
 
-    fn add_mesh(&mut self, path: &Path, mesh: &Mesh, deadline: Deadline) -> Result<(), Failure> {
+    fn add_mesh(&mut self, path: &Path, mut mesh: Mesh, deadline: Deadline) -> Result<(), Failure> {
+        let color = &self.flags.show.color;
+        let up = up_of(&mesh);
+        let named = self.flags.load.scalar().is_some();
+        self.loaded.facts.bars.extend(color.paint(
+            path,
+            &mut mesh,
+            self.flags.show.range,
+            up,
+            named,
+        )?);
         self.progress.stage(format!("Making surfels of {}", path.display()));
         let mut options = SurfelOptions { deadline, ..SurfelOptions::default() };
         options.radius_scale *= self.flags.show.radius_scale.unwrap_or(1.0);
+        options.color_by_normal = color.by_normal();
         let splats = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
         let bounds = mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
         self.loaded.count_in(bounds, splats.splats.len());
@@ -165,6 +184,7 @@ impl Adding<'_> {
     fn add_hierarchy(&mut self, hierarchy: Arc<Hierarchy>) {
         let header = hierarchy.header();
         self.loaded.count_in(header.bounds, header.leaves as usize);
+        self.add_unit(&header.unit.clone());
         self.loaded.subject.up = match header.up {
             Some(UpAxis::X) => DVec3::X,
             Some(UpAxis::Z) => DVec3::Z,
@@ -181,6 +201,9 @@ impl Adding<'_> {
         let overview = bricks.volume(overview(&bricks))?;
         let automatic = || TransferFunction::automatic(&overview);
         let transfer = self.show.transfer(path, bricks.header().range, automatic)?;
+        let values = bricks.header().range;
+        self.add_bar(&transfer, values, titled("", ""));
+        self.add_unit(&bricks.header().unit);
         self.loaded.count_in(bricks.bounds(), bricks.level(0).dims.iter().product());
         let kernel = self.show.kernel.clone();
         self.change(|scene| scene.with_bricks(bricks, kernel, transfer));
@@ -190,6 +213,10 @@ impl Adding<'_> {
     fn add_volume(&mut self, path: &Path, mut volume: Volume) -> Result<(), Failure> {
         let automatic = || TransferFunction::automatic(&volume);
         let transfer = self.show.transfer(path, volume.range, automatic)?;
+        let title = titled(&volume.about.name, &volume.about.unit);
+        self.add_bar(&transfer, volume.range, title);
+        self.add_unit(&volume.about.length);
+        self.loaded.facts.patient = volume.about.stance;
         let [min, max] = volume.bounds();
         self.loaded.count_in(Bounds { min, max }, volume.len());
         let kernel = self.show.kernel.clone();
@@ -209,6 +236,7 @@ impl Adding<'_> {
     ) -> Result<(), Failure> {
         let automatic = || points.automatic_transfer();
         let transfer = self.show.transfer(path, points.range(), automatic)?;
+        self.add_bar(&transfer, points.range(), titled(&points.about.name, &points.about.unit));
         self.progress.stage(format!("Making splats of {}", path.display()));
         let options = self.flags.load.sample_options(deadline);
         let splats = points.to_splats(&options).map_err(|e| in_file(path, e))?;
@@ -216,6 +244,16 @@ impl Adding<'_> {
         self.loaded.count_in(Bounds { min, max }.union(splats.bounds()), points.len());
         self.change(|scene| scene.with_samples(splats, transfer));
         Ok(())
+    }
+
+    fn add_unit(&mut self, unit: &str) {
+        if self.loaded.facts.length.is_empty() {
+            self.loaded.facts.length = unit.to_owned();
+        }
+    }
+
+    fn add_bar(&mut self, transfer: &TransferFunction, values: [f64; 2], title: String) {
+        self.loaded.facts.bars.push(self.flags.show.color.bar(transfer, values, title));
     }
 
     fn change(&mut self, change: impl FnOnce(Scene) -> Scene) {
@@ -229,6 +267,12 @@ impl Loaded {
         self.subject.bounds = self.subject.bounds.union(bounds);
         self.count += count as u64;
     }
+}
+
+/// Returns the direction in which a mesh's heights are measured.
+pub fn up_of(mesh: &Mesh) -> DVec3 {
+    let usual = if mesh.z_is_up { DVec3::Z } else { DVec3::Y };
+    mesh.about.stance.map_or(usual, |stance| stance.up)
 }
 
 /// Whether a box is no larger than the rounding error of its coordinates.

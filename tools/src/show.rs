@@ -1,6 +1,6 @@
 //! The flags that set how values and surfaces are shown.
 
-use crate::{failure::Failure, kernel::KernelFlags, parse};
+use crate::{color::ColorFlags, failure::Failure, kernel::KernelFlags, parse};
 use clap::Args;
 use splatkit::{
     Error,
@@ -18,9 +18,11 @@ pub struct ShowFlags {
     /// ct-angiography, mri, generic, or a JSON file [default: made from their histogram]
     #[arg(long, value_name = "NAME|FILE.json")]
     transfer: Option<String>,
-    /// Spread the transfer function over these values instead of its own.
+    /// Spread the transfer function over these values instead of its own, and the colour map of
+    /// meshes and point clouds [default of the map: all values of a mesh, the 1st to the 99th
+    /// percentile of a point cloud]
     #[arg(long, value_name = "LOW,HIGH", value_parser = parse::range, allow_hyphen_values = true)]
-    range: Option<[f64; 2]>,
+    pub range: Option<[f64; 2]>,
     /// Set the length that the transfer function's opacities hold for, in world units.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     opacity_unit: Option<f64>,
@@ -43,6 +45,8 @@ pub struct ShowFlags {
     /// they were converted with.
     #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
     pub radius_scale: Option<f32>,
+    #[command(flatten)]
+    pub color: ColorFlags,
     #[command(flatten)]
     kernel: KernelFlags,
 }
@@ -165,6 +169,7 @@ impl Show<'_> {
             Some(range) => transfer.spread_over(range),
             None => transfer,
         };
+        self.flags.color.color_transfer(&mut transfer, self.flags.range, values)?;
         if let Some(unit) = self.flags.opacity_unit {
             transfer.unit = unit;
         }

@@ -127,6 +127,12 @@ fn spherical_coordinates_and_intensities() {
     );
     assert_eq!(mesh.colors, [[0, 0, 0, 255], [255; 4]]);
     assert_eq!(mesh.sensors, [Sensor { position: Vec3::ZERO, points: 0..2 }]);
+    let folder = Folder::new();
+    let path = folder.write("a.e57", file(&scans(), |xml| xml));
+    let read = |name| read_with(&path, |source| read_named(source, Some(name)));
+    let mesh = read("intensity").unwrap();
+    assert!(mesh.values[..2].iter().all(|value| value.is_nan()) && mesh.values[2] < mesh.values[3]);
+    assert!(read("heat").unwrap_err().to_string().contains("no attribute “heat”"));
 }
 
 #[test]

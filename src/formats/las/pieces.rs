@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    about::About,
     input::{Source, positions},
     parallel::{self, prelude::*},
 };
@@ -142,6 +143,11 @@ impl Form for Pieces {
 
     fn warn(&self, _: &Source) {}
 
+    fn choose(&mut self, source: &Source, name: &str) -> Result<About> {
+        self.header.choose(source, Some(name))?;
+        Ok(self.header.attribute.map_or(About::default(), |attribute| attribute.about()))
+    }
+
     fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
         let mut seen = Seen::nothing();
         let batch = 2 * parallel::current_num_threads();
@@ -172,6 +178,7 @@ impl Form for Pieces {
                 position: self.header.position(&point),
                 normal: Vec3::ZERO,
                 color: match self.paint {
+                    _ if self.header.attribute.is_some() => point.value.to_le_bytes(),
                     Paint::None => [255; 4],
                     Paint::Color { largest } => color_of_16_bits(point.color, largest),
                     Paint::Grey { low, high } => grey(f32::from(point.intensity), low, high),

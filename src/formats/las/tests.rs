@@ -235,3 +235,60 @@ fn no_changed_byte_does_harm() {
         }
     }
 }
+
+/// Sets what a user may colour by.
+fn attributed(format: u8, number: i32) -> Vec<u8> {
+    let mut record = record(format, number, 0xffff, false);
+    let time = (1e9 + f64::from(number) * 0.5).to_le_bytes();
+    if format < 6 {
+        record[14] = 2 | 3 << 3;
+        record[15] = number as u8 % 12;
+        record[16] = -(number as i8) as u8;
+        record[18..20].copy_from_slice(&77u16.to_le_bytes());
+        if matches!(format, 1 | 3..=5) {
+            record[20..28].copy_from_slice(&time);
+        }
+    } else {
+        record[14] = 2 | 3 << 4;
+        record[16] = number as u8 % 12;
+        record[18..20].copy_from_slice(&(-1000 * number as i16).to_le_bytes());
+        record[20..22].copy_from_slice(&77u16.to_le_bytes());
+        record[22..30].copy_from_slice(&time);
+    }
+    record
+}
+
+#[test]
+fn attributes_are_read_by_name() {
+    let folder = Folder::new();
+    for format in [0, 1, 2, 3, 6, 7] {
+        let records: Vec<Vec<u8>> = (0..30).map(|i| attributed(format, i)).collect();
+        for (name, content) in
+            [("a.las", las(format, &records)), ("b.laz", laz(format, &records, 30))]
+        {
+            let path = folder.write(name, content);
+            let value = |name: &str| {
+                read_with(&path, |source| read_named(source, Some(name))).map(|mesh| mesh.values[7])
+            };
+            let angle = if format < 6 { -7.0 } else { -42.0 };
+            for (name, wanted) in [
+                ("intensity", 21.0),
+                ("Classification", 7.0),
+                ("return_number", 2.0),
+                ("number_of_returns", 3.0),
+                ("scan_angle", angle),
+                ("point_source_id", 77.0),
+            ] {
+                assert_eq!(value(name).unwrap(), wanted, "{format}: {name}");
+            }
+            let timed = matches!(format, 1 | 3..) && path.ends_with("a.las");
+            assert_eq!(value("gps_time").ok(), timed.then_some(3.5), "{format}");
+            assert_eq!(value("green").is_ok(), matches!(format, 2 | 3 | 7), "{format}");
+        }
+    }
+    let path = folder.write("a.las", las(0, &[attributed(0, 1)]));
+    let error = read_with(&path, |source| read_named(source, Some("heat"))).unwrap_err();
+    let Error::Input { hint: Some(hint), .. } = &error else { panic!("{error}") };
+    assert!(error.to_string().contains("no attribute “heat”"), "{error}");
+    assert!(hint.contains("intensity, return_number") && !hint.contains("gps_time"), "{hint}");
+}

@@ -116,3 +116,18 @@ fn cuts_and_lies_are_errors() {
     let limits = Limits { points: 1, ..Limits::default() };
     assert!(matches!(read(&Source::open(&path, &limits).unwrap()), Err(Error::Limit { .. })));
 }
+
+#[test]
+fn fields_are_values_by_name() {
+    let folder = Folder::new();
+    for content in [text(), binary(), packed()] {
+        let path = folder.write("a.pcd", content);
+        let read = |name| read_with(&path, |source| read_named(source, Some(name)));
+        let mesh = read("Normal_X").unwrap();
+        // As the file has it, not as the unit vector that it becomes.
+        assert_eq!((mesh.values, mesh.about.name), (vec![0.0, 2.0], "normal_x".to_owned()));
+        assert_eq!(read("z").unwrap().values, [3.0, 6.0]);
+        let message = read("heat").unwrap_err().to_string();
+        assert!(message.contains("no attribute “heat”"), "{message}");
+    }
+}

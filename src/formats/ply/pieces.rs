@@ -6,13 +6,15 @@ use super::{
         form::{Counts, Form, StreamPoint, in_order},
         shared::found::Found,
     },
-    COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale, gaussians,
+    COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale, column_named,
+    gaussians,
     header::{self, Element, Header, width},
     larger,
     rows::{cut, list_place, number, triangle_stride},
 };
 use crate::{
     Error, Result,
+    about::About,
     input::{Source, positions},
 };
 use glam::{DVec3, Vec3};
@@ -31,6 +33,8 @@ pub struct Pieces {
     has_uvs: bool,
     /// Whether the points are the centres of trained 3D Gaussians.
     are_gaussians: bool,
+    /// The property that the user names: its offset in a row, and its type.
+    value: Option<(usize, ScalarType)>,
 }
 
 /// Rows of equal length.
@@ -85,7 +89,8 @@ impl Pieces {
         let color_kind = color_kind(element, &columns);
         let fields = columns.map(|column| column.and_then(|column| field(element, column)));
         let vertices = Vertices { rows, fields, color_kind, color_scale: [None; 4] };
-        Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs, are_gaussians }))
+        let value = None;
+        Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs, are_gaussians, value }))
     }
 
     /// Returns whether the scale of the colours depends on all of them.
@@ -150,6 +155,11 @@ impl Pieces {
         }
         if self.has_colors {
             found.color = color(self.vertices.color_scale, |channel| value(COLOR + channel));
+        }
+        if let Some((offset, kind)) = &self.value {
+            let Rows { at, stride, big, .. } = self.vertices.rows;
+            let bytes = &source.bytes()[at + row * stride + offset..];
+            found.color = (number(bytes, kind, big) as f32).to_le_bytes();
         }
         found
     }
@@ -217,6 +227,15 @@ impl Form for Pieces {
         if self.are_gaussians {
             gaussians::warn(source);
         }
+    }
+
+    fn choose(&mut self, source: &Source, name: &str) -> Result<About> {
+        let header = header::read(source)?;
+        let vertices = header.elements.iter().find(|element| element.name == "vertex");
+        let Some(element) = vertices else { return Ok(About::default()) };
+        let column = column_named(source, element, name)?;
+        self.value = field(element, column);
+        Ok(About { name: element.columns[column].name.clone(), ..About::default() })
     }
 
     fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {

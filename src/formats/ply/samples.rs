@@ -75,10 +75,19 @@ pub(super) fn named_values(
     rows: &Rows,
     name: &str,
 ) -> Result<(String, Vec<f64>)> {
+    let (name, column) = named_column(source, element, name)?;
+    Ok((name, values_of(source, element, rows, column)?))
+}
+
+/// Returns the name of the property that a caller names, and its column.
+pub(super) fn named_column(
+    source: &Source,
+    element: &Element,
+    name: &str,
+) -> Result<(String, usize)> {
     let (candidates, columns) = candidates(element);
     let chosen = choice::named(source, &candidates, name)?;
-    let values = values_of(source, element, rows, columns[chosen.array])?;
-    Ok((candidates[chosen.array].name.clone(), values))
+    Ok((candidates[chosen.array].name.clone(), columns[chosen.array]))
 }
 
 /// Passes the vertices of a file, located but not decoded, to `read`.

@@ -420,3 +420,23 @@ fn put_len(kind: &str) -> usize {
     put(&mut out, kind, 0.0, false);
     out.len()
 }
+
+#[test]
+fn properties_are_values_by_name() {
+    let folder = Folder::new();
+    let row = |value: f64| [value, 2.0 * value, 1.0, 10.0 * value, 5.0].map(|v| ("float", v));
+    let rows = [0.0, 1.0, 3.0].map(row);
+    let names = "property float scalar_Heat\nproperty float t\n";
+    let path = folder.write("a.ply", cloud("", names, &[&rows[0], &rows[1], &rows[2]]));
+    let options = |name| ReadOptions::scalar(Some(name));
+    let read = |name| {
+        crate::input::testing::read_with(&path, |source| super::read(source, &options(name)))
+    };
+    for name in ["scalar_Heat", "heat"] {
+        let mesh = read(name).unwrap();
+        assert_eq!((mesh.values, mesh.about.name.as_str()), (vec![0.0, 10.0, 30.0], "scalar_Heat"));
+    }
+    assert_eq!(read("x").unwrap().values, [0.0, 1.0, 3.0]);
+    let message = read("cold").unwrap_err().to_string();
+    assert!(message.contains("no array “cold”"), "{message}");
+}

@@ -268,7 +268,12 @@ fn find(candidates: &[Candidate], place: Option<Place>, name: &str) -> Option<us
     let here = |candidate: &&Candidate| place.is_none_or(|place| candidate.place == place);
     let exact = candidates.iter().position(|own| here(&own) && own.name == name);
     exact.or_else(|| {
-        let like = |own: &Candidate| here(&own) && own.name.eq_ignore_ascii_case(name);
+        // CloudCompare writes names with a word before them.
+        let like = |own: &Candidate| {
+            let plain = own.name.strip_prefix("scalar_").unwrap_or(&own.name);
+            here(&own)
+                && (own.name.eq_ignore_ascii_case(name) || plain.eq_ignore_ascii_case(name))
+        };
         let first = candidates.iter().position(like)?;
         let others = candidates[first + 1..]
             .iter()

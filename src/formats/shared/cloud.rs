@@ -2,6 +2,7 @@
 
 use crate::{
     Result,
+    about::About,
     input::{Source, positions},
     parallel::prelude::*,
     surface::{Mesh, Sensor},
@@ -19,6 +20,9 @@ pub(crate) struct Cloud {
     /// The positions of scanners, in world coordinates, and the points that each has seen.
     pub sensors: Vec<(DVec3, Range<usize>)>,
     pub z_is_up: bool,
+    /// One value of each point; NaN where there is none.
+    pub values: Vec<f32>,
+    pub about: About,
 }
 
 impl Cloud {
@@ -40,6 +44,8 @@ impl Cloud {
             normals: self.normals.into_par_iter().map(positions::unit).collect(),
             colors: self.colors,
             z_is_up: self.z_is_up,
+            values: self.values,
+            about: self.about,
             sensors: sensors.filter(|sensor| sensor.position.is_finite()).collect(),
             ..Mesh::default()
         })

@@ -1,6 +1,7 @@
 //! Code that several formats share: the choice among arrays, holes, point clouds, columns of
 //! samples, polygons, textures, sample types.
 
+pub(super) mod attribute;
 #[allow(dead_code)]
 pub(super) mod choice;
 pub(super) mod cloud;

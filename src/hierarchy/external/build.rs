@@ -146,6 +146,10 @@ impl Part {
         if stream.has_colors() {
             mesh.colors = points.par_iter().map(|point| point.color).collect();
         }
+        if let Some(scale) = stream.scale() {
+            mesh.values = points.par_iter().map(StreamPoint::value).collect();
+            mesh.scale = Some(scale);
+        }
         drop(points);
         if let Some(triangles) = &mut input.triangles {
             mesh.triangles = triangles.read(region)?;

@@ -129,7 +129,7 @@ pub fn check(
     watch: StageWatch<'_>,
 ) -> Result<()> {
     for file in files {
-        let Some(mut stream) = Stream::open(file, limits)? else { continue };
+        let Some(mut stream) = options.open(file, limits)? else { continue };
         let points = stream.counts().points;
         stream.settle(&|done| tell(watch, Stage::Reading, done, points))?;
         if stream.counts().triangles > 0 {

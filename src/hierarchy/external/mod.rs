@@ -26,7 +26,7 @@ use crate::{
     hierarchy::file::Whole,
     input::Limits,
     math::Bounds,
-    surface::{EXTENT, SurfelOptions},
+    surface::{EXTENT, Paint, SurfelOptions},
 };
 use std::path::{Path, PathBuf};
 
@@ -71,6 +71,21 @@ pub struct ExternalOptions {
     pub block_splats: usize,
     /// How points and triangles become splats.
     pub surfels: SurfelOptions,
+    /// What colours the points instead of the files' own colours.
+    pub paint: Option<Paint>,
+    /// The attribute of the files that [`Values::Own`](crate::surface::Values::Own) means.
+    pub scalar: Option<String>,
+}
+
+impl ExternalOptions {
+    /// Opens a file, and colours its points as the options say.
+    fn open<'a>(&self, file: &'a Path, limits: &'a Limits) -> Result<Option<Stream<'a>>> {
+        let Some(stream) = Stream::open(file, limits)? else { return Ok(None) };
+        match &self.paint {
+            None => Ok(Some(stream)),
+            Some(paint) => stream.painted(paint.clone(), self.scalar.as_deref()).map(Some),
+        }
+    }
 }
 
 /// The result of a conversion.
@@ -125,7 +140,7 @@ pub fn convert(
     let most = (options.memory / OF_POINT).clamp(FEWEST_POINTS, MOST_POINTS);
     let mut inputs = Vec::new();
     for file in files {
-        let stream = Stream::open(file, limits)?.ok_or_else(|| {
+        let stream = options.open(file, limits)?.ok_or_else(|| {
             Error::Argument(format!(
                 "{}: a file of this kind can only be read as a whole",
                 file.display()

@@ -66,7 +66,7 @@ pub fn is_solid(
             let mut told = Told::default();
             for (number, triangle) in (first..).zip(triangles) {
                 let corners = triangle.map(|vertex| stream.vertex(vertex));
-                let is_opaque = corners.iter().all(|corner| corner.color[3] == 255);
+                let is_opaque = corners.iter().all(|corner| stream.is_opaque(corner));
                 let [places, normals] = [
                     corners.map(|corner| corner.position.into()),
                     corners.map(|corner| corner.normal.into()),

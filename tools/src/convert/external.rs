@@ -1,7 +1,12 @@
 //! Conversion of files larger than memory, region by region.
 
-use super::{Convert, memory::Need, surface::Frame};
+use super::{
+    Convert,
+    memory::Need,
+    surface::{Frame, Up},
+};
 use crate::{failure::Failure, output, progress::Progress, render::milliseconds};
+use glam::DVec3;
 use serde_json::json;
 use splatkit::{
     Deadline, Error,
@@ -11,6 +16,7 @@ use splatkit::{
         external::{BLOCKS, Converted, ExternalOptions, Stage, check, convert},
         file::UpAxis,
     },
+    surface::{Paint, SurfelOptions},
 };
 use std::time::Instant;
 
@@ -37,7 +43,12 @@ impl Convert {
             preset: self.surface.preset(),
             block_splats: BuildOptions::default().block_splats,
             // Each region has its own deadline.
-            surfels: self.surface.surfel_options(Deadline::NEVER),
+            surfels: SurfelOptions {
+                color_by_normal: self.color.by_normal(),
+                ..self.surface.surfel_options(Deadline::NEVER)
+            },
+            paint: self.paint_in_regions()?,
+            scalar: self.attribute().map(str::to_owned),
         };
         let stages = progress.stages();
         let watch = |stage: Stage, done: u64, total: u64| {
@@ -65,6 +76,24 @@ impl Convert {
         drop(stages);
         progress.clear();
         self.print_converted(&done, milliseconds(start))
+    }
+
+    /// Returns what colours the points, which the first file decides.
+    fn paint_in_regions(&self) -> Result<Option<Paint>, Failure> {
+        let limits = self.load.limits();
+        let first =
+            self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
+        let (z_is_up, is_cloud) =
+            first.map_or((false, false), |file| (file.z_is_up(), file.counts().triangles == 0));
+        let usual = if z_is_up { DVec3::Z } else { DVec3::Y };
+        let up = self.surface.up.map_or(usual, Up::axis);
+        let named = self.attribute().is_some();
+        let paint = self.color.surface_paint(self.range, up, [named, false, is_cloud]);
+        let name = self.attribute().unwrap_or_default();
+        let paint = paint.map(|paint| self.color.with_classes(paint, name));
+        let has_values = matches!(paint, Some(Paint::Values { .. }));
+        self.color.check_effect(true, has_values)?;
+        Ok(paint)
     }
 
     /// Prints the memory that converting region by region takes.

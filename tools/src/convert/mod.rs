@@ -7,7 +7,9 @@ mod source;
 mod surface;
 mod volume;
 
-use crate::{failure::Failure, load::LoadFlags, output, progress::Progress};
+use crate::{
+    color::ColorFlags, failure::Failure, load::LoadFlags, output, parse, progress::Progress,
+};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -23,6 +25,18 @@ pub struct Convert {
     output: PathBuf,
     #[command(flatten)]
     surface: surface::SurfaceFlags,
+    #[command(flatten)]
+    color: ColorFlags,
+    /// Spread the colour map over these values [default: all values of a mesh, the 1st to the 99th
+    /// percentile of a point cloud]
+    #[arg(
+        long,
+        help_heading = "Appearance",
+        value_name = "LOW,HIGH",
+        value_parser = parse::range,
+        allow_hyphen_values = true
+    )]
+    range: Option<[f64; 2]>,
     /// Resample a Cartesian volume. bcc is the body-centred cubic lattice, which has 29.3 % fewer
     /// samples for the same detail in all directions [default: the file's lattice]
     #[arg(long, value_name = "NAME")]
@@ -58,6 +72,12 @@ impl Convert {
             )));
         }
         self.surface.check(&extension)?;
+        let flag = self.color.given().or(self.range.map(|_| "--range"));
+        if let Some(flag) = flag.filter(|_| !matches!(extension.as_str(), "splk" | "ply")) {
+            return Err(Failure::Usage(format!(
+                "{flag} colours meshes and point clouds, which become .splk or .ply"
+            )));
+        }
         if !self.dry_run {
             output::check(&self.output, self.overwrite)?;
             output::try_writing(&self.output, &self.files)?;

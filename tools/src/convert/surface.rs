@@ -7,8 +7,10 @@ use crate::{
     output, parse,
     progress::Progress,
     render::milliseconds,
+    scene::up_of,
 };
 use clap::{Args, ValueEnum};
+use glam::DVec3;
 use serde_json::json;
 use splatkit::{
     Deadline, Error,
@@ -18,7 +20,7 @@ use splatkit::{
         file::{UpAxis, WriteOptions},
     },
     splat::SplatSet,
-    surface::SurfelOptions,
+    surface::{Mesh, SurfelOptions},
 };
 use std::{
     path::{Path, PathBuf},
@@ -40,7 +42,7 @@ pub struct SurfaceFlags {
     radius_scale: Option<f32>,
     /// Record the axis that points up, for viewers of the result.
     #[arg(long, value_name = "AXIS")]
-    up: Option<Up>,
+    pub(super) up: Option<Up>,
     /// Record the unit of lengths, such as m or mm, for viewers of the result [default: that of a
     /// converted hierarchy]
     #[arg(long, value_name = "NAME")]
@@ -63,10 +65,20 @@ enum Preset {
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
-enum Up {
+pub(super) enum Up {
     X,
     Y,
     Z,
+}
+
+impl Up {
+    pub(super) fn axis(self) -> DVec3 {
+        match self {
+            Self::X => DVec3::X,
+            Self::Y => DVec3::Y,
+            Self::Z => DVec3::Z,
+        }
+    }
 }
 
 /// The splats of all inputs, and facts about their source.
@@ -168,6 +180,11 @@ impl Convert {
         gathered.ok_or_else(|| Failure::Usage("there is nothing to convert".into()))
     }
 
+    /// Returns the attribute of meshes and point clouds to read, if the user names one.
+    pub(super) fn attribute(&self) -> Option<&str> {
+        self.color.attribute().or(self.load.scalar())
+    }
+
     /// Returns the splats of an input. The splats of earlier inputs have `taken` this many bytes.
     fn splats_of(&self, path: &Path, taken: u64, progress: &Progress) -> Result<Gathered, Failure> {
         progress.stage(format!("Reading {}", path.display()));
@@ -176,14 +193,19 @@ impl Convert {
         let deadline = self.load.limits().deadline();
         let most = self.most_memory();
         let mut read = Vec::new();
-        let input = self.load.open_within(path, Some(most), &mut read)?;
+        let input = self.load.open_colored(path, self.attribute(), Some(most), &mut read)?;
         self.check_unneeded(&read)?;
         let read_ms = milliseconds(start);
         let start = Instant::now();
         let (set, closed, frame, points) = match input {
-            Input::Mesh(mesh) => {
+            Input::Mesh(mut mesh) => {
+                let up = self.surface.up_of(&mesh);
+                let named = self.load.scalar().is_some();
+                let bar = self.color.paint(path, &mut mesh, self.range, up, named)?;
+                self.color.check_effect(true, bar.is_some())?;
                 progress.stage(format!("Making splats of {} points", mesh.positions.len()));
-                let options = self.surface.surfel_options(deadline);
+                let mut options = self.surface.surfel_options(deadline);
+                options.color_by_normal = self.color.by_normal();
                 let need = memory_of_mesh(&mesh, &options, most.saturating_sub(taken));
                 memory::check(path, need.map_err(|e| in_file(path, e))?, taken, most)?;
                 let closed = mesh.is_solid();
@@ -192,6 +214,7 @@ impl Convert {
                 (set, closed, frame, mesh.positions.len() as u64)
             }
             Input::Hierarchy(hierarchy) => {
+                self.color.check_effect(false, false)?;
                 progress.stage("Reading the splats of the finest level");
                 let header = hierarchy.header();
                 memory::check(path, memory_of_splats(header.leaves as usize), taken, most)?;
@@ -323,6 +346,11 @@ impl SurfaceFlags {
             Preset::Slow => hierarchy::Preset::Slow,
             Preset::Best => hierarchy::Preset::Best,
         }
+    }
+
+    /// Returns the direction in which heights are measured: that of --up, or of the file.
+    fn up_of(&self, mesh: &Mesh) -> DVec3 {
+        self.up.map_or_else(|| up_of(mesh), Up::axis)
     }
 
     fn radius_scale(&self) -> f32 {

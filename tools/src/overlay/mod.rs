@@ -1,0 +1,340 @@
+//! What is written over a finished picture: scalar bars, axes, a scale bar and a caption. All sizes
+//! follow the picture's, so that a picture of 200 pixels and one of 8000 look alike.
+
+mod axes;
+mod bar;
+mod canvas;
+mod ruler;
+mod text;
+mod ticks;
+
+use crate::{color::Bar, failure::Failure};
+use axes::Names;
+use bar::Laid;
+use canvas::{Align, Area, Canvas, Ink};
+use clap::Args;
+use glam::DVec2;
+use ruler::Ruler;
+use serde_json::{Value, json};
+use splatkit::{Error, about::Stance, math::Camera, picture::Picture};
+use text::Face;
+
+/// What is written over the picture.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Texts")]
+pub struct OverlayFlags {
+    /// Draw the colours of the values, with their name, their unit and round numbers.
+    #[arg(long)]
+    scalar_bar: bool,
+    /// Draw how the axes X, Y and Z lie; of patients, left and right (L, R), front and back (A, P),
+    /// head and feet (S, I).
+    #[arg(long)]
+    axes: bool,
+    /// Draw a round length in the file's unit. In perspective it holds at the distance of the focal
+    /// point; with --orthographic, everywhere.
+    #[arg(long)]
+    scale_bar: bool,
+    /// Write this text above the picture's content; \n begins a new line.
+    #[arg(long, value_name = "TEXT")]
+    caption: Option<String>,
+}
+
+/// What the inputs of a scene say for texts.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Facts {
+    /// The colours of values, in the order of the inputs.
+    pub bars: Vec<Bar>,
+    /// The unit of lengths; empty if no file says it.
+    pub length: String,
+    /// How a patient stands.
+    pub patient: Option<Stance>,
+}
+
+/// The texts of a run's pictures.
+pub struct Overlay<'a> {
+    flags: &'a OverlayFlags,
+    facts: &'a Facts,
+    face: Face,
+    ink: Ink,
+}
+
+/// Most scalar bars; more would hide the picture.
+const MOST_BARS: usize = 3;
+
+impl OverlayFlags {
+    /// Returns the texts to draw over pictures with a background; `None` if no flag asks for any.
+    /// A flag that has nothing to draw is an error.
+    pub fn open<'a>(
+        &'a self,
+        facts: &'a Facts,
+        background: Option<[f32; 3]>,
+    ) -> Result<Option<Overlay<'a>>, Failure> {
+        if !(self.scalar_bar || self.axes || self.scale_bar || self.caption.is_some()) {
+            return Ok(None);
+        }
+        if self.scalar_bar && facts.bars.is_empty() {
+            return Err(Failure::Usage(
+                "--scalar-bar has nothing to show, because nothing here is coloured by values; \
+                 --color height or --color with an attribute of the file colours surfaces"
+                    .into(),
+            ));
+        }
+        let face = Face::open();
+        let face = face.ok_or_else(|| Error::Argument("the built-in font is damaged".into()))?;
+        Ok(Some(Overlay { flags: self, facts, face, ink: Ink::over(background) }))
+    }
+}
+
+impl Overlay<'_> {
+    /// Draws the texts over a picture, and returns what was drawn.
+    pub fn draw(&self, picture: &mut Picture, camera: &Camera) -> Value {
+        let (width, height) = (f64::from(picture.width), f64::from(picture.height));
+        let size = (width.min(height) / 34.0).max(8.5);
+        let margin = (0.9 * size).min(0.1 * width.min(height));
+        let mut area = Area { left: 0.0, top: 0.0, right: width, bottom: height }.grown(-margin);
+        let pixels = picture.height;
+        let mut canvas = Canvas { picture, face: &self.face, ink: self.ink, size };
+        let mut drawn = json!({});
+        if let Some(text) = &self.flags.caption {
+            drawn["caption"] = json!(text);
+            area.top += self.caption(&mut canvas, area, text);
+        }
+        if self.flags.axes {
+            let side = (7.0 * size).min(0.42 * area.width()).min(area.height());
+            let square = Area {
+                left: area.left,
+                top: area.bottom - side,
+                right: area.left + side,
+                bottom: area.bottom,
+            };
+            if let Ok(view) = camera.view([canvas.picture.width, pixels]) {
+                axes::draw(&mut canvas, square, view.rotation, self.names());
+                drawn["axes"] = json!(self.names().concat().concat());
+            }
+        }
+        if self.flags.scale_bar {
+            let most = 0.3 * area.width();
+            if let Some(ruler) = Ruler::new(camera, pixels, most, &self.facts.length) {
+                ruler.draw(&mut canvas, area);
+                area.bottom -= 2.4 * size;
+                let Ruler { length, pixels, text } = ruler;
+                drawn["scale_bar"] = json!({ "length": length, "pixels": pixels, "text": text });
+            }
+        }
+        if self.flags.scalar_bar {
+            drawn["scalar_bars"] = self.bars(&mut canvas, area);
+        }
+        drawn
+    }
+
+    /// Returns the names of the axes: those of patients for the frames of patients.
+    fn names(&self) -> Names {
+        match self.facts.patient {
+            Some(stance) if stance == Stance::LPS => axes::LPS,
+            Some(stance) if stance == Stance::RAS => axes::RAS,
+            _ => axes::PLAIN,
+        }
+    }
+
+    /// Draws the caption, and returns the height that it takes.
+    fn caption(&self, canvas: &mut Canvas, area: Area, text: &str) -> f64 {
+        let lines = canvas.wrapped(text, area.width(), 3);
+        let middle = 0.5 * (area.left + area.right);
+        for (line, text) in lines.iter().enumerate() {
+            let y = area.top + (0.5 + 1.3 * line as f64) * canvas.size;
+            canvas.text(text, DVec2::new(middle, y), Align::Middle);
+        }
+        (1.3 * lines.len() as f64 + 0.4) * canvas.size
+    }
+
+    /// Draws the bars from right to left.
+    fn bars(&self, canvas: &mut Canvas, area: Area) -> Value {
+        let size = canvas.size;
+        let height = (0.62 * area.height()).max(8.0 * size).min(area.height());
+        let top = area.top + 0.5 * (area.height() - height);
+        let shown = self.facts.bars.len().min(MOST_BARS);
+        let most = (0.5 * area.width() / shown as f64).max(5.0 * size);
+        let laid = self.facts.bars.iter().take(MOST_BARS);
+        let laid: Vec<Laid> = laid.map(|bar| Laid::new(canvas, bar, height, most)).collect();
+        let lines = laid.iter().map(Laid::title_lines).max().unwrap_or(0);
+        let mut right = area.right;
+        for bar in laid.iter().rev() {
+            let own = Area { left: area.left, top, right, bottom: top + height };
+            bar.draw(canvas, own, lines);
+            right -= bar.width + 1.2 * size;
+        }
+        laid.iter().map(Laid::to_json).collect()
+    }
+}
+
+impl Canvas<'_> {
+    /// Returns the lines of a text, none wider than `most` pixels and at most so many. What does
+    /// not fit ends with “…”.
+    pub(self) fn wrapped(&self, text: &str, most: f64, count: usize) -> Vec<String> {
+        let mut lines = Vec::new();
+        for paragraph in text.replace("\\n", "\n").lines() {
+            let mut line = String::new();
+            for word in paragraph.split_whitespace() {
+                let longer = if line.is_empty() { word.into() } else { format!("{line} {word}") };
+                if line.is_empty() || self.text_width(&longer) <= most {
+                    line = longer;
+                } else {
+                    lines.push(std::mem::replace(&mut line, word.into()));
+                }
+            }
+            lines.push(line);
+        }
+        if lines.len() > count {
+            lines.truncate(count);
+            lines.iter_mut().next_back().into_iter().for_each(|last| last.push('…'));
+        }
+        lines.into_iter().map(|line| self.shortened(line, most)).collect()
+    }
+
+    /// Cuts a line that is too wide.
+    fn shortened(&self, line: String, most: f64) -> String {
+        if self.text_width(&line) <= most {
+            return line;
+        }
+        let mut letters: Vec<char> = line.chars().collect();
+        while letters.pop().is_some() {
+            let text: String = letters.iter().chain(&['…']).collect();
+            if self.text_width(&text) <= most {
+                return text;
+            }
+        }
+        String::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::titled;
+    use splatkit::{
+        color::{ColorMap, ColorScale},
+        glam::DVec3,
+        math::Bounds,
+    };
+
+    const SIZES: [[u32; 2]; 4] = [[200, 200], [320, 200], [640, 900], [1600, 1200]];
+
+    fn facts(patient: Option<Stance>) -> Facts {
+        let range = [-1024.0, 3071.0];
+        let scale = ColorScale { range, ..ColorScale::new(ColorMap::VIRIDIS) };
+        let color = |i: usize| scale.color(scale.value(i as f64 / 255.0));
+        let colors: Vec<[f32; 3]> = (0..256).map(color).collect();
+        let bar = Bar { title: titled("Radiodensity", "HU"), scale, colors };
+        Facts { bars: vec![bar], length: "mm".into(), patient }
+    }
+
+    fn flags(which: [bool; 4]) -> OverlayFlags {
+        let [scalar_bar, axes, scale_bar, has_caption] = which;
+        let caption = has_caption.then(|| "A chest, from the front".to_owned());
+        OverlayFlags { scalar_bar, axes, scale_bar, caption }
+    }
+
+    fn drawn(which: [bool; 4], size: [u32; 2], background: Option<[f32; 3]>) -> Picture {
+        let [width, height] = size;
+        let count = (width * height) as usize;
+        let (color, depth) = (vec![[0.0; 4]; count], vec![f32::INFINITY; count]);
+        let mut picture = Picture { width, height, color, depth };
+        let bounds = Bounds { min: DVec3::splat(-150.0), max: DVec3::splat(150.0) };
+        let mut camera = Camera::framing(&bounds, DVec3::Y, DVec3::Z, 1.0);
+        camera.azimuth(30.0);
+        camera.elevation(20.0);
+        let (flags, facts) = (flags(which), facts(Some(Stance::LPS)));
+        let overlay = flags.open(&facts, background).unwrap().unwrap();
+        overlay.draw(&mut picture, &camera);
+        picture
+    }
+
+    #[test]
+    fn texts_keep_apart_at_every_size() {
+        for size in SIZES {
+            let mut taken = vec![false; (size[0] * size[1]) as usize];
+            for one in 0..4 {
+                let all = drawn([true; 4], size, None);
+                // What one flag draws beside all others, which may move it.
+                let mut others = [true; 4];
+                others[one] = false;
+                let without = drawn(others, size, None);
+                let own = |at: &usize| all.color[*at] != without.color[*at];
+                let found: Vec<usize> = (0..taken.len()).filter(own).collect();
+                assert!(found.len() > 60, "{size:?}: {one} draws {} pixels", found.len());
+            }
+            // The bar, the axes and the scale bar, which nothing else moves if there is no caption.
+            for one in 0..3 {
+                let mut which = [false; 4];
+                which[one] = true;
+                which[2] |= one == 0;
+                let own = drawn(which, size, None);
+                let ruler = drawn([false, false, true, false], size, None);
+                for at in 0..taken.len() {
+                    let is_ruler = one == 0 && ruler.color[at][3] > 0.0;
+                    if own.color[at][3] > 0.05 && !is_ruler {
+                        assert!(!taken[at], "{size:?}: {one} covers another at {at}");
+                        taken[at] = true;
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn texts_show_on_every_background() {
+        for background in [None, Some([0.0; 3]), Some([1.0; 3]), Some([0.5, 0.9, 0.4])] {
+            let picture = drawn([true; 4], [640, 480], background);
+            let ink = Ink::over(background);
+            for color in [ink.color, ink.edge] {
+                let is = |pixel: &&[f32; 4]| {
+                    (0..3).all(|c| (pixel[c] - color[c]).abs() < 0.16) && pixel[3] > 0.84
+                };
+                let count = picture.color.iter().filter(is).count();
+                assert!(count > 200, "{background:?}: {count} pixels of {color:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn bars_have_the_colours_of_the_ends_where_they_belong() {
+        let picture = drawn([true, false, false, false], [600, 400], None);
+        let scale = ColorScale::new(ColorMap::VIRIDIS);
+        let near = |pixel: &[f32; 4], wanted: [f32; 3]| {
+            (0..3).all(|c| (pixel[c] - wanted[c]).abs() < 0.02) && pixel[3] > 0.99
+        };
+        let rows = |share: f64| {
+            let wanted = scale.color(share);
+            let found = (0..picture.color.len()).filter(|&at| near(&picture.color[at], wanted));
+            found.map(|at| at / 600).collect::<Vec<_>>()
+        };
+        let (low, high) = (rows(0.0), rows(1.0));
+        assert!(!low.is_empty() && !high.is_empty());
+        assert!(low.iter().min() > high.iter().max(), "the highest value is on top");
+        assert!(low.iter().max() < Some(&340) && high.iter().min() > Some(&60));
+    }
+
+    #[test]
+    fn patients_have_letters_and_other_things_axes() {
+        let names = |patient| {
+            let (flags, facts) = (flags([false, true, false, false]), facts(patient));
+            flags.open(&facts, None).unwrap().unwrap().names()
+        };
+        assert_eq!(names(Some(Stance::LPS))[0], ["L", "R"]);
+        assert_eq!(names(Some(Stance::RAS))[0], ["R", "L"]);
+        assert_eq!(names(None)[2], ["Z", ""]);
+    }
+
+    #[test]
+    fn long_texts_are_wrapped_and_cut() {
+        let face = Face::open().unwrap();
+        let mut picture = Picture { width: 1, height: 1, color: vec![[0.0; 4]], depth: vec![0.0] };
+        let ink = Ink::over(None);
+        let canvas = Canvas { picture: &mut picture, face: &face, ink, size: 20.0 };
+        let lines = canvas.wrapped("one two three four five six seven eight", 120.0, 2);
+        assert!(lines.len() == 2 && lines[1].ends_with('…'), "{lines:?}");
+        assert!(lines.iter().all(|line| canvas.text_width(line) <= 120.0), "{lines:?}");
+        assert_eq!(canvas.wrapped("a\\nb", 120.0, 3), ["a", "b"]);
+        assert!(canvas.wrapped("Donaudampfschifffahrt", 60.0, 1)[0].ends_with('…'));
+    }
+}
