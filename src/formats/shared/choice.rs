@@ -271,8 +271,7 @@ fn find(candidates: &[Candidate], place: Option<Place>, name: &str) -> Option<us
         // CloudCompare writes names with a word before them.
         let like = |own: &Candidate| {
             let plain = own.name.strip_prefix("scalar_").unwrap_or(&own.name);
-            here(&own)
-                && (own.name.eq_ignore_ascii_case(name) || plain.eq_ignore_ascii_case(name))
+            here(&own) && (own.name.eq_ignore_ascii_case(name) || plain.eq_ignore_ascii_case(name))
         };
         let first = candidates.iter().position(like)?;
         let others = candidates[first + 1..]
