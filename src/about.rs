@@ -54,4 +54,40 @@ impl Stance {
 
     /// The frame of NIfTI (RAS): x to the patient's right, y to the front, z to the head.
     pub const RAS: Self = Self { up: DVec3::Z, front: DVec3::Y };
+
+    /// The frame of surveyors, and of most tools for construction: z up, seen along +y.
+    pub const SURVEY: Self = Self { up: DVec3::Z, front: DVec3::NEG_Y };
+
+    /// The frame of glTF and of most tools for animation: y up, z to the front.
+    pub const Y_UP: Self = Self { up: DVec3::Y, front: DVec3::Z };
+
+    /// Returns the stance with this direction up, and the front that is usual for it: −Y if Z or −Z
+    /// is nearest to the direction, otherwise +Z; made perpendicular to it.
+    ///
+    /// # Panics
+    /// If the direction has no length, or is not finite.
+    pub fn with_up(up: DVec3) -> Self {
+        let up = up.try_normalize().expect("a direction");
+        let is_z = up.z.abs() > up.x.abs().max(up.y.abs());
+        let usual = if is_z { DVec3::NEG_Y } else { DVec3::Z };
+        Self { up, front: (usual - up * up.dot(usual)).normalize() + DVec3::ZERO }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_direction_has_a_front() {
+        assert_eq!(Stance::with_up(2.0 * DVec3::Z), Stance::SURVEY);
+        assert_eq!(Stance::with_up(DVec3::Y), Stance::Y_UP);
+        assert_eq!(Stance::with_up(DVec3::X).front, DVec3::Z);
+        assert_eq!(Stance::with_up(DVec3::NEG_Z).front, DVec3::NEG_Y);
+        for up in [DVec3::ONE, DVec3::new(-0.2, 0.9, 0.8), DVec3::new(0.1, 0.7, 0.7)] {
+            let stance = Stance::with_up(up);
+            assert!(stance.front.dot(stance.up).abs() < 1e-12, "{stance:?}");
+            assert!((stance.front.length() - 1.0).abs() < 1e-12, "{stance:?}");
+        }
+    }
 }

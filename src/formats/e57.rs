@@ -12,7 +12,7 @@ use super::shared::{
 };
 use crate::{
     Result,
-    about::About,
+    about::{About, Stance},
     input::{Source, growing::Growing, isolate::isolated},
     surface::Mesh,
 };
@@ -168,9 +168,8 @@ impl<'a> Points<'a> {
             positions: self.positions.into_inner(),
             colors,
             sensors: self.sensors,
-            z_is_up: true,
             values: if has_values { self.intensities.into_inner() } else { Vec::new() },
-            about,
+            about: About { stance: Some(Stance::SURVEY), ..about },
             ..Cloud::default()
         })
     }

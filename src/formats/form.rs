@@ -3,7 +3,7 @@
 use super::shared::found::Found;
 use crate::{
     Result,
-    about::About,
+    about::{About, Stance},
     input::Source,
     parallel::{self, prelude::*},
 };
@@ -56,7 +56,8 @@ pub(super) trait Form: Send + Sync {
     /// Returns the number of pieces of points, and of triangles.
     fn pieces(&self) -> [usize; 2];
 
-    fn z_is_up(&self) -> bool;
+    /// Returns how the points stand, if the file or the format's convention says so.
+    fn stance(&self) -> Option<Stance>;
 
     fn has_normals(&self) -> bool;
 

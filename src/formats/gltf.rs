@@ -13,6 +13,7 @@ mod tests;
 
 use crate::{
     Result,
+    about::Stance,
     input::{Source, copy, positions},
     surface::{Mesh, Texture},
 };
@@ -336,6 +337,7 @@ impl Builder<'_> {
         if !self.mesh.uvs.is_empty() {
             self.mesh.uvs.resize(count, Vec2::ZERO);
         }
+        self.mesh.about.stance = Some(Stance::Y_UP);
         Ok(self.mesh)
     }
 }

@@ -15,7 +15,13 @@ mod time;
 pub(super) use pieces::Pieces;
 
 use super::shared::cloud::{Cloud, colors_of_16_bits, greys};
-use crate::{Result, input::Source, parallel::prelude::*, surface::Mesh};
+use crate::{
+    Result,
+    about::Stance,
+    input::Source,
+    parallel::prelude::*,
+    surface::Mesh,
+};
 use attribute::Attribute;
 use glam::DVec3;
 
@@ -46,7 +52,7 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     }
     source.spend("the size of the points in bytes", POINT * points.len() as u64)?;
     let positions = points.par_iter().map(|point| header.position(point)).collect();
-    let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
+    let mut cloud = Cloud { positions, ..Cloud::default() };
     if header.color_at.is_some() {
         cloud.colors =
             colors_of_16_bits(&points.par_iter().map(|p| p.color).collect::<Vec<[u16; 3]>>());
@@ -59,6 +65,7 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
         cloud.values = points.par_iter().map(|point| point.value).collect();
         cloud.about = attribute.about();
     }
+    cloud.about.stance = Some(Stance::SURVEY);
     cloud.into_mesh(source, |point| format!("point {point}"))
 }
 

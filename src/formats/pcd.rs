@@ -79,7 +79,6 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
         normals: normals.unwrap_or_default(),
         colors: colors.unwrap_or_default(),
         sensors: sensor.map(|place| (place, 0..kept.len())).into_iter().collect(),
-        z_is_up: false,
         values: values.unwrap_or_default(),
         about: About {
             name: value.map_or(String::new(), |field| field.name.clone()),

@@ -8,9 +8,10 @@ use super::{
 };
 use crate::{
     Result,
+    about::Stance,
     color::{ColorScale, Spread},
     input::{Limits, Source, positions},
-    surface::{Paint, Values},
+    surface::{Mesh, Paint, Values},
 };
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
@@ -89,10 +90,40 @@ impl<'a> Stream<'a> {
         self.form.warn(&self.source);
     }
 
-    /// Returns whether the third axis of its points is up, as for
-    /// [`Mesh::z_is_up`](crate::surface::Mesh::z_is_up).
-    pub fn z_is_up(&self) -> bool {
-        self.form.z_is_up()
+    /// Returns how its points stand, if the file or its format's convention says so.
+    pub fn stance(&self) -> Option<Stance> {
+        self.form.stance()
+    }
+
+    /// Guesses how its points stand ([`Mesh::guess_stance`]), from pieces spread over the file.
+    ///
+    /// # Errors
+    /// [`Error::Input`](crate::Error::Input) for damaged pieces.
+    pub fn guess_stance(&self) -> Result<Option<Stance>> {
+        const PIECES: usize = 64;
+        const MOST_POINTS: usize = 1 << 20;
+        let pieces = self.form.pieces()[0];
+        let read = |piece: usize, origin: DVec3| {
+            self.source.restart_time();
+            let points = self.form.points(&self.source, piece, origin);
+            let points = self.source.unless_changed(points);
+            self.source.release();
+            points
+        };
+        if pieces == 0 {
+            return Ok(None);
+        }
+        // Around the first point, large coordinates keep their precision.
+        let first = read(0, DVec3::ZERO)?.first().map(|point| Vec3::from(point.position));
+        let origin = first.unwrap_or_default().as_dvec3();
+        let chosen: Vec<usize> = (0..pieces).step_by(pieces.div_ceil(PIECES)).collect();
+        let mut positions = Vec::new();
+        for &piece in &chosen {
+            let points = read(piece, origin)?;
+            let step = points.len().div_ceil(MOST_POINTS / chosen.len()).max(1);
+            positions.extend(points.iter().step_by(step).map(|point| Vec3::from(point.position)));
+        }
+        Ok(Mesh { positions, ..Mesh::default() }.guess_stance())
     }
 
     /// The first pass over all points: finds their bounds and what their colours are scaled by.

@@ -8,6 +8,7 @@ use super::shared::{
 };
 use crate::{
     Result,
+    about::Stance,
     input::{
         Source, copy,
         growing::Growing,
@@ -88,7 +89,8 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     }
     source.spend("the size of the points in bytes", POINT * text.len() as u64)?;
     let positions = table.triples(layout.position).collect();
-    let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
+    let mut cloud = Cloud { positions, ..Cloud::default() };
+    cloud.about.stance = Some(Stance::SURVEY);
     if let Some(columns) = layout.normal {
         cloud.normals = table.triples(columns).map(|normal| normal.as_vec3()).collect();
     }

@@ -3,6 +3,8 @@
 mod camera;
 pub(crate) mod cosine;
 mod eigen;
+mod fit;
+pub(crate) mod hull;
 mod kernel;
 pub(crate) mod neighbours;
 mod sheets;

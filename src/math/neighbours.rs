@@ -51,6 +51,14 @@ impl<'a> Neighbours<'a> {
         self.tree.iter().map(|(index, _)| index).collect()
     }
 
+    /// Returns the distance of a position from the nearest point.
+    pub fn distance(&self, at: Vec3) -> f64 {
+        let at = turned(at);
+        let query = self.tree.query(&at);
+        let found = query.nearest_n::<SquaredEuclidean<f64>>(NonZero::<usize>::MIN).execute();
+        found.iter().map(|found| found.distance.sqrt() / SCALE).fold(f64::INFINITY, f64::min)
+    }
+
     /// Returns distance and index of the `count` points nearest to point `index`, which is
     /// excluded, nearest first.
     pub fn of(&self, index: u32, count: usize) -> Vec<(f32, u32)> {

@@ -3,6 +3,7 @@
 mod choice;
 mod item;
 mod numbers;
+mod seen;
 mod settings;
 mod sheets;
 mod validate;

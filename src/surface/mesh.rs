@@ -53,8 +53,6 @@ pub struct Mesh {
     /// How `values` colour the mesh instead of its own colours; `None` if they do not
     /// ([`paint`](Self::paint)).
     pub scale: Option<ColorScale>,
-    /// Whether the format's convention is that +Z is up, as in surveying.
-    pub z_is_up: bool,
     /// What the file says beyond this.
     pub about: About,
 }

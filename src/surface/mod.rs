@@ -18,6 +18,7 @@ mod smooth;
 mod solid;
 mod surfels;
 mod survey;
+mod upright;
 
 pub use mesh::{Material, Mesh, Sensor, Texture};
 pub(crate) use orient::Known;

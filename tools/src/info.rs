@@ -1,6 +1,7 @@
 //! `splatkit info`.
 
 use crate::{
+    camera::direction_name,
     failure::Failure,
     load::{Input, LoadFlags},
     output,
@@ -11,6 +12,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 use splatkit::{
     Error,
+    about::Stance,
     bricks::Bricks,
     cells::{CellKind, Cells, Place},
     hierarchy::Hierarchy,
@@ -83,6 +85,7 @@ impl Info {
             "closed",
             "lossless",
             "up",
+            "up_from",
             "unit",
             "source",
             "bytes",
@@ -116,6 +119,7 @@ fn of_mesh(mesh: &Mesh) -> Map<String, Value> {
         "textures".into(),
         json!(mesh.materials.iter().filter(|m| m.texture.is_some()).count()),
     );
+    stand(&mut facts, mesh.about.stance);
     facts.insert("bounds".into(), bounds(mesh.bounds()));
     facts
 }
@@ -128,6 +132,7 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     facts.insert("type".into(), json!(volume.samples.type_name()));
     facts.insert("range".into(), json!(volume.range));
     facts.insert("attributes".into(), json!(["value"]));
+    stand(&mut facts, volume.about.stance);
     facts.insert("bounds".into(), bounds(Some(volume.bounds())));
     facts
 }
@@ -170,7 +175,10 @@ fn of_hierarchy(hierarchy: &Hierarchy) -> Map<String, Value> {
     facts.insert("pages".into(), json!(hierarchy.pages().len()));
     facts.insert("closed".into(), json!(header.closed));
     facts.insert("lossless".into(), json!(header.lossless));
-    facts.insert("up".into(), header.up.map_or(Value::Null, |up| json!(format!("{up:?}"))));
+    facts.insert("up".into(), header.stance.map_or(Value::Null, |stance| up(&stance)));
+    if header.is_guessed {
+        facts.insert("up_from".into(), json!("guess"));
+    }
     for (name, text) in [("unit", &header.unit), ("source", &header.source)] {
         if !text.is_empty() {
             facts.insert(name.into(), json!(text));
@@ -195,6 +203,7 @@ fn of_samples(points: &Points) -> Map<String, Value> {
     facts.insert("kind".into(), json!("samples"));
     facts.insert("range".into(), json!(points.range()));
     facts.insert("attributes".into(), json!(attributes));
+    stand(&mut facts, points.about.stance);
     facts.insert("bounds".into(), bounds(Some(points.bounds())));
     facts
 }
@@ -211,8 +220,21 @@ fn of_cells(cells: &Cells) -> Map<String, Value> {
     facts.insert("cells".into(), Value::Object(kinds.collect()));
     facts.insert("range".into(), json!(cells.range()));
     facts.insert("attributes".into(), json!(["position", format!("value of {place}")]));
+    stand(&mut facts, cells.about.stance);
     facts.insert("bounds".into(), bounds(Some(cells.bounds())));
     facts
+}
+
+/// Adds the direction that is up, if the file says so.
+fn stand(facts: &mut Map<String, Value>, stance: Option<Stance>) {
+    if let Some(stance) = stance {
+        facts.insert("up".into(), up(&stance));
+    }
+}
+
+/// Returns the direction that is up: X, Y, Z, -X, …
+fn up(stance: &Stance) -> Value {
+    json!(direction_name(stance.up).trim_start_matches('+'))
 }
 
 fn bounds(bounds: Option<[glam::DVec3; 2]>) -> Value {

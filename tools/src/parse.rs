@@ -102,6 +102,14 @@ pub fn axis(text: &str) -> Result<DVec3, String> {
     Ok(sign * axis)
 }
 
+/// An axis, or a direction as `X,Y,Z`.
+pub fn direction(text: &str) -> Result<DVec3, String> {
+    if !text.contains(',') {
+        return axis(text).map_err(|message| message + ", and a direction is X,Y,Z");
+    }
+    vector(text)?.try_normalize().ok_or_else(|| "a direction needs a length above 0".into())
+}
+
 /// A number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     text.parse()

@@ -1,16 +1,27 @@
 //! The stage that the command is at, shown on stderr if it is a terminal.
 
-use crate::{terminal::safe, threads};
+use crate::{
+    terminal::{safe, safe_lines},
+    threads,
+};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::{io::IsTerminal, sync::Mutex, time::Duration};
+use std::{
+    io::{IsTerminal, Write},
+    sync::Mutex,
+    time::Duration,
+};
 
 /// One line that names the current stage.
-pub struct Progress(ProgressBar);
+pub struct Progress {
+    bar: ProgressBar,
+    /// Whether notes are printed.
+    talks: bool,
+}
 
 impl Progress {
     pub fn new(wanted: bool) -> Self {
         if !wanted || !std::io::stderr().is_terminal() {
-            return Self(ProgressBar::hidden());
+            return Self { bar: ProgressBar::hidden(), talks: wanted };
         }
         let bar = ProgressBar::new_spinner();
         // The spinner turns on its own thread, and starting that panics if the system gives no
@@ -18,31 +29,45 @@ impl Progress {
         if threads::is_available() {
             bar.enable_steady_tick(Duration::from_millis(100));
         }
-        let progress = Self(bar);
+        let progress = Self { bar, talks: true };
         progress.spin();
         progress
     }
 
     fn spin(&self) {
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} ({elapsed})") {
-            self.0.set_style(style);
+            self.bar.set_style(style);
         }
+    }
+
+    /// Prints a line to stderr, unless only errors are printed.
+    pub fn note(&self, text: impl std::fmt::Display) {
+        if self.talks {
+            let line = safe_lines(&text.to_string()).into_owned();
+            // If stderr is closed, nobody reads notes.
+            self.bar.suspend(|| writeln!(std::io::stderr(), "{line}").ok());
+        }
+    }
+
+    /// Prints a warning, unless only errors are printed.
+    pub fn warn(&self, text: impl std::fmt::Display) {
+        self.note(format_args!("warning: {text}"));
     }
 
     /// Names the stage that begins now.
     pub fn stage(&self, name: impl Into<String>) {
-        self.0.reset_elapsed();
-        self.0.set_message(safe(&name.into()).into_owned());
+        self.bar.reset_elapsed();
+        self.bar.set_message(safe(&name.into()).into_owned());
     }
 
     /// Names the stage that begins now, and its total amount of work.
     pub fn bar(&self, name: impl Into<String>, total: u64) -> Bar<'_> {
         self.stage(name);
-        self.0.set_length(total);
-        self.0.set_position(0);
+        self.bar.set_length(total);
+        self.bar.set_position(0);
         let form = "{spinner} {msg} {wide_bar} {human_pos}/{human_len} ({per_sec}, {eta} left)";
         if let Ok(style) = ProgressStyle::with_template(form) {
-            self.0.set_style(style);
+            self.bar.set_style(style);
         }
         Bar(self)
     }
@@ -54,7 +79,7 @@ impl Progress {
 
     /// Removes the line.
     pub fn clear(&self) {
-        self.0.finish_and_clear();
+        self.bar.finish_and_clear();
     }
 }
 
@@ -64,7 +89,7 @@ pub struct Bar<'a>(&'a Progress);
 impl Bar<'_> {
     /// Sets how much is done.
     pub fn set(&self, done: u64) {
-        self.0.0.set_position(done);
+        self.0.bar.set_position(done);
     }
 }
 

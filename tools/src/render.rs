@@ -1,7 +1,7 @@
 //! `splatkit render`.
 
 use crate::{
-    camera::CameraFlags,
+    camera::{CameraFlags, Origin, direction_name},
     describe,
     engine::EngineFlags,
     failure::Failure,
@@ -117,10 +117,19 @@ impl Render {
         let frames = self.turntable.unwrap_or(1);
         let targets = self.targets(frames)?;
         self.engine.check()?;
-        let loaded = self.scene.load(progress)?;
+        let mut loaded = self.scene.load(progress)?;
         let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
         files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
         let settings = self.engine.settings(&loaded, self.samples)?;
+        if !self.camera.is_placed() {
+            progress.stage("Framing the scene");
+            loaded.subject.seen = loaded.scene.seen(&settings.clips)?;
+        }
+        let (stance, origin) = self.camera.stance(&loaded.subject);
+        let up = direction_name(stance.up);
+        if origin == Origin::Guess {
+            progress.note(format_args!("up: {up}, guessed from the shape; --up sets another"));
+        }
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
@@ -157,6 +166,8 @@ impl Render {
                 "upload_ms": upload_ms,
                 "camera": crate::camera::to_json(&camera),
                 "overlay": overlay,
+                "up": up,
+                "up_from": origin.name(),
                 "settings": describe::settings(&loaded.scene, &settings),
             }))?;
         }
@@ -176,16 +187,13 @@ impl Render {
         let overlay = self.overlay.open(&loaded.facts, self.background.0)?;
         let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
-        let mut last = (FrameStats::default(), self.camera.camera(&loaded.subject, settings.size)?);
-        for (frame, target) in targets.iter().enumerate() {
+        let cameras = match self.turntable {
+            Some(frames) => self.camera.turntable(&loaded.subject, settings.size, frames)?,
+            None => vec![self.camera.camera(&loaded.subject, settings.size)?],
+        };
+        let mut last = (FrameStats::default(), cameras[0].clone());
+        for (target, camera) in targets.iter().zip(cameras) {
             progress.stage(format!("Drawing {}", target.name()));
-            let camera = match self.turntable {
-                Some(frames) => {
-                    let turn = 360.0 * frame as f64 / f64::from(frames);
-                    self.camera.turned(&loaded.subject, settings.size, turn)
-                }
-                None => last.1,
-            };
             let start = Instant::now();
             let (picture, stats) = drawer.draw(loaded, &camera, settings)?;
             times.push(milliseconds(start));

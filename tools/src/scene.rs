@@ -1,7 +1,7 @@
 //! The flags of a scene, and loading the scene that they describe.
 
 use crate::{
-    camera::Subject,
+    camera::{Origin, Subject, direction_name},
     color::titled,
     failure::{Failure, in_file},
     load::{Input, LoadFlags},
@@ -13,8 +13,9 @@ use clap::Args;
 use glam::DVec3;
 use splatkit::{
     Deadline, Error,
+    about::Stance,
     bricks::{Bricks, Level},
-    hierarchy::{Hierarchy, file::UpAxis},
+    hierarchy::Hierarchy,
     math::Bounds,
     memory,
     scattered::Points,
@@ -63,7 +64,7 @@ impl SceneFlags {
         let show = self.show.open(&self.load.limits())?;
         let loaded = Loaded {
             scene: Scene::new(),
-            subject: Subject { bounds: Bounds::EMPTY, up: DVec3::Z },
+            subject: Subject::new(Bounds::EMPTY, DVec3::Y),
             count: 0,
             load_ms: 0.0,
             facts: Facts::default(),
@@ -144,7 +145,7 @@ impl Adding<'_> {
         match input {
             Input::Mesh(mesh) => self.add_mesh(path, mesh, deadline),
             Input::Hierarchy(hierarchy) => {
-                self.add_hierarchy(hierarchy);
+                self.add_hierarchy(path, hierarchy);
                 Ok(())
             }
             Input::Bricks(bricks) => self.add_bricks(path, bricks),
@@ -157,8 +158,9 @@ impl Adding<'_> {
     }
 
     fn add_mesh(&mut self, path: &Path, mut mesh: Mesh, deadline: Deadline) -> Result<(), Failure> {
+        self.stand_mesh(path, &mesh);
         let color = &self.flags.show.color;
-        let up = up_of(&mesh);
+        let up = self.loaded.subject.stance.up;
         let named = self.flags.load.scalar().is_some();
         self.loaded.facts.bars.extend(color.paint(
             path,
@@ -175,21 +177,17 @@ impl Adding<'_> {
         let bounds = mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
         self.loaded.count_in(bounds, splats.splats.len());
         self.change(|scene| scene.with_splats(splats));
-        if !mesh.z_is_up {
-            self.loaded.subject.up = DVec3::Y;
-        }
         Ok(())
     }
 
-    fn add_hierarchy(&mut self, hierarchy: Arc<Hierarchy>) {
+    fn add_hierarchy(&mut self, path: &Path, hierarchy: Arc<Hierarchy>) {
         let header = hierarchy.header();
         self.loaded.count_in(header.bounds, header.leaves as usize);
         self.add_unit(&header.unit.clone());
-        self.loaded.subject.up = match header.up {
-            Some(UpAxis::X) => DVec3::X,
-            Some(UpAxis::Z) => DVec3::Z,
-            Some(UpAxis::Y) | None => DVec3::Y,
-        };
+        if let Some(stance) = header.stance {
+            let origin = if header.is_guessed { Origin::Guess } else { Origin::File };
+            self.stand(path, stance, origin);
+        }
         self.change(|scene| scene.with_hierarchy(hierarchy));
     }
 
@@ -205,6 +203,7 @@ impl Adding<'_> {
         self.add_bar(&transfer, values, titled("", ""));
         self.add_unit(&bricks.header().unit);
         self.loaded.count_in(bricks.bounds(), bricks.level(0).dims.iter().product());
+        self.stand(path, Stance::SURVEY, Origin::Convention);
         let kernel = self.show.kernel.clone();
         self.change(|scene| scene.with_bricks(bricks, kernel, transfer));
         Ok(())
@@ -219,6 +218,7 @@ impl Adding<'_> {
         self.loaded.facts.patient = volume.about.stance;
         let [min, max] = volume.bounds();
         self.loaded.count_in(Bounds { min, max }, volume.len());
+        self.stand_as_told(path, volume.about.stance);
         let kernel = self.show.kernel.clone();
         if self.show.sharp {
             self.progress.stage(format!("Sharpening {}", path.display()));
@@ -242,6 +242,7 @@ impl Adding<'_> {
         let splats = points.to_splats(&options).map_err(|e| in_file(path, e))?;
         let [min, max] = points.bounds();
         self.loaded.count_in(Bounds { min, max }.union(splats.bounds()), points.len());
+        self.stand_as_told(path, points.about.stance);
         self.change(|scene| scene.with_samples(splats, transfer));
         Ok(())
     }
@@ -256,6 +257,42 @@ impl Adding<'_> {
         self.loaded.facts.bars.push(self.flags.show.color.bar(transfer, values, title));
     }
 
+    /// Takes the stance of a mesh, or guesses it.
+    fn stand_mesh(&mut self, path: &Path, mesh: &Mesh) {
+        match mesh.about.stance {
+            Some(stance) => self.stand(path, stance, Origin::File),
+            // A guess would not count.
+            None if self.loaded.subject.origin >= Origin::Guess => {}
+            None => {
+                self.progress.stage(format!("Finding the way up of {}", path.display()));
+                if let Some(stance) = mesh.guess_stance() {
+                    self.stand(path, stance, Origin::Guess);
+                }
+            }
+        }
+    }
+
+    /// Takes the stance of a volume or of samples, or the convention for them.
+    fn stand_as_told(&mut self, path: &Path, told: Option<Stance>) {
+        match told {
+            Some(stance) => self.stand(path, stance, Origin::File),
+            None => self.stand(path, Stance::SURVEY, Origin::Convention),
+        }
+    }
+
+    /// Takes the stance of an input, unless an earlier one counts more. The first statement of a
+    /// file decides, then the convention, then the first guess.
+    fn stand(&mut self, path: &Path, stance: Stance, origin: Origin) {
+        if self.loaded.subject.consider(stance, origin) {
+            let [own, scene] = [stance.up, self.loaded.subject.stance.up].map(direction_name);
+            self.progress.warn(format_args!(
+                "{} says that {own} is up, but the scene stands with {scene} up, as an input \
+                 before says; --up sets another",
+                path.display()
+            ));
+        }
+    }
+
     fn change(&mut self, change: impl FnOnce(Scene) -> Scene) {
         self.loaded.scene = change(std::mem::take(&mut self.loaded.scene));
     }
@@ -267,12 +304,6 @@ impl Loaded {
         self.subject.bounds = self.subject.bounds.union(bounds);
         self.count += count as u64;
     }
-}
-
-/// Returns the direction in which a mesh's heights are measured.
-pub fn up_of(mesh: &Mesh) -> DVec3 {
-    let usual = if mesh.z_is_up { DVec3::Z } else { DVec3::Y };
-    mesh.about.stance.map_or(usual, |stance| stance.up)
 }
 
 /// Whether a box is no larger than the rounding error of its coordinates.

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::About,
+    about::{About, Stance},
     input::{Source, positions},
     parallel::{self, prelude::*},
 };
@@ -125,8 +125,8 @@ impl Form for Pieces {
         [self.firsts.len(), 0]
     }
 
-    fn z_is_up(&self) -> bool {
-        true
+    fn stance(&self) -> Option<Stance> {
+        Some(Stance::SURVEY)
     }
 
     fn has_normals(&self) -> bool {

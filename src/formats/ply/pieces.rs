@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::About,
+    about::{About, Stance},
     input::{Source, positions},
 };
 use glam::{DVec3, Vec3};
@@ -207,8 +207,8 @@ impl Form for Pieces {
         [self.points(), self.triangles()].map(|count| count.div_ceil(ROWS))
     }
 
-    fn z_is_up(&self) -> bool {
-        false
+    fn stance(&self) -> Option<Stance> {
+        None
     }
 
     fn has_normals(&self) -> bool {

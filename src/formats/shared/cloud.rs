@@ -19,7 +19,6 @@ pub(crate) struct Cloud {
     pub colors: Vec<[u8; 4]>,
     /// The positions of scanners, in world coordinates, and the points that each has seen.
     pub sensors: Vec<(DVec3, Range<usize>)>,
-    pub z_is_up: bool,
     /// One value of each point; NaN where there is none.
     pub values: Vec<f32>,
     pub about: About,
@@ -43,7 +42,6 @@ impl Cloud {
             positions,
             normals: self.normals.into_par_iter().map(positions::unit).collect(),
             colors: self.colors,
-            z_is_up: self.z_is_up,
             values: self.values,
             about: self.about,
             sensors: sensors.filter(|sensor| sensor.position.is_finite()).collect(),

@@ -3,22 +3,12 @@
 use super::{MAGIC, VERSION};
 use crate::container::{Cursor, Put};
 use crate::{
+    about::Stance,
     hierarchy::validate::{fault_of_box, fault_of_extent},
     input::copy,
     math::Bounds,
 };
-use glam::DVec3;
-
-/// Which axis of the source points up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum UpAxis {
-    /// The positive x axis.
-    X,
-    /// The positive y axis.
-    Y,
-    /// The positive z axis.
-    Z,
-}
+use glam::{DMat3, DQuat, DVec3};
 
 /// The properties of the whole hierarchy. Lengths are in world units.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,8 +33,10 @@ pub struct Header {
     pub leaves: u64,
     /// All nodes, including portals.
     pub nodes: u64,
-    /// `None` if unknown.
-    pub up: Option<UpAxis>,
+    /// How the source stands; `None` if unknown.
+    pub stance: Option<Stance>,
+    /// Whether the stance was guessed from the shape, not stated by the source.
+    pub is_guessed: bool,
     /// The name of the world's unit (`"m"`); empty if unknown.
     pub unit: String,
     /// The name of the file that this one was made from; empty if there is none.
@@ -53,6 +45,9 @@ pub struct Header {
 
 /// Bytes before the texts.
 pub const FIXED: usize = 160;
+
+/// Where the rotation to the stance begins.
+const TURN: usize = 144;
 
 /// The header as stored, with what the reader needs to find the rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,10 +82,11 @@ impl Stored {
         out.f32s(&[header.extent]);
         out.u32(self.blocks);
         out.u32(self.pages);
-        out.put(&[header.up.map_or(0, |axis| axis as u8 + 1), 0, 0, 0]);
+        let axis = header.stance.map_or(0, |stance| nearest_axis(stance.up));
+        out.put(&[axis, u8::from(header.is_guessed), 0, 0]);
         out.u32(header.unit.len() as u32);
         out.u32(header.source.len() as u32);
-        out.put(&[0; FIXED - 144]);
+        out.f32s(&header.stance.map_or([0.0; 4], turn_to));
         debug_assert_eq!(out.len(), FIXED);
         out.put(header.unit.as_bytes());
         out.put(header.source.as_bytes());
@@ -121,10 +117,12 @@ impl Stored {
         if stated != crc32fast::hash(text) {
             return Err(Refusal::Damaged("its checksum does not match"));
         }
-        Self::fields(cursor, &text[FIXED..], unit).ok_or(Refusal::Incomplete)?
+        Self::fields(cursor, text, unit).ok_or(Refusal::Incomplete)?
     }
 
-    fn fields(mut cursor: Cursor, texts: &[u8], unit: usize) -> Option<Result<Self, Refusal>> {
+    /// Reads the fields from a cursor behind the version. `text` is the header without its checksum.
+    fn fields(mut cursor: Cursor, text: &[u8], unit: usize) -> Option<Result<Self, Refusal>> {
+        let (fixed, texts) = text.split_at_checked(FIXED)?;
         let flags = cursor.u32()?;
         let file_bytes = cursor.u64()?;
         let origin = cursor.dvec3()?;
@@ -132,12 +130,18 @@ impl Stored {
         let [source_points, leaves, nodes] = [cursor.u64()?, cursor.u64()?, cursor.u64()?];
         let extent = cursor.f32()?;
         let [blocks, pages] = [cursor.u32()?, cursor.u32()?];
-        let up = match cursor.u8()? {
+        let axis = match cursor.u8()? {
             0 => None,
-            1 => Some(UpAxis::X),
-            2 => Some(UpAxis::Y),
-            3 => Some(UpAxis::Z),
+            axis @ 1..=3 => Some(Stance::with_up(DVec3::AXES[usize::from(axis - 1)])),
             _ => return Some(Err(Refusal::Damaged("its up axis is unknown"))),
+        };
+        let is_guessed = cursor.u8()? != 0;
+        let mut turn = Cursor::new(fixed.get(TURN..FIXED)?);
+        let stance = match turned_by(turn.f32s()?) {
+            // Older files state an axis alone.
+            None => axis,
+            Some(Ok(stance)) => Some(stance),
+            Some(Err(message)) => return Some(Err(Refusal::Damaged(message))),
         };
         let (Ok(unit), Ok(source)) = (copy::text(&texts[..unit]), copy::text(&texts[unit..]))
         else {
@@ -163,12 +167,44 @@ impl Stored {
             source_points,
             leaves,
             nodes,
-            up,
+            stance,
+            is_guessed,
             unit,
             source,
         };
         Some(Ok(Self { header, file_bytes, blocks, pages }))
     }
+}
+
+/// Returns 1, 2 or 3 for the axis nearest to a direction, as older versions of the format state it.
+fn nearest_axis(up: DVec3) -> u8 {
+    let along = up.abs();
+    1 + (along.max_position() as u8)
+}
+
+/// Returns the rotation that turns +Y to a stance's up and +Z to its front, as a quaternion.
+fn turn_to(Stance { up, front }: Stance) -> [f32; 4] {
+    let turn = DQuat::from_mat3(&DMat3::from_cols(up.cross(front), up, front));
+    turn.normalize().to_array().map(|part| part as f32)
+}
+
+/// Returns the stance that a quaternion turns to; `None` for zeros, which stand for no stance.
+fn turned_by(turn: [f32; 4]) -> Option<Result<Stance, &'static str>> {
+    if turn == [0.0; 4] {
+        return None;
+    }
+    let turn = DQuat::from_array(turn.map(f64::from));
+    // NaN is refused too.
+    if !((turn.length() - 1.0).abs() < 1e-3) {
+        return Some(Err("its rotation to the up axis does not have unit length"));
+    }
+    // Rounding to 32 bits moves the axes a little.
+    let exact = |v: f64| if (v - v.round()).abs() < 1e-6 { v.round() + 0.0 } else { v };
+    let axis = |axis: DVec3| {
+        let turned = turn.normalize() * axis;
+        DVec3::new(exact(turned.x), exact(turned.y), exact(turned.z))
+    };
+    Some(Ok(Stance { up: axis(DVec3::Y), front: axis(DVec3::Z) }))
 }
 
 /// The lengths of the two texts.
@@ -187,4 +223,26 @@ pub enum Refusal {
     /// An unknown version.
     Version(u32),
     Damaged(&'static str),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stances_survive() {
+        for stance in [Stance::SURVEY, Stance::RAS, Stance::Y_UP]
+            .into_iter()
+            .chain([DVec3::X, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z].map(Stance::with_up))
+        {
+            assert_eq!(turned_by(turn_to(stance)), Some(Ok(stance)));
+        }
+        let stance = Stance::with_up(DVec3::new(0.2, -0.4, 0.9));
+        let Some(Ok(read)) = turned_by(turn_to(stance)) else { panic!("a stance") };
+        assert!(read.up.distance(stance.up) < 1e-6 && read.front.distance(stance.front) < 1e-6);
+        assert_eq!(nearest_axis(stance.up), 3);
+        assert_eq!(turned_by([0.0; 4]), None);
+        assert!(turned_by([f32::NAN, 0.0, 0.0, 1.0]).is_some_and(|read| read.is_err()));
+        assert!(turned_by([0.0, 0.0, 0.0, 2.0]).is_some_and(|read| read.is_err()));
+    }
 }

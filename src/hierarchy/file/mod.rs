@@ -27,7 +27,7 @@ mod write;
 
 pub use check::check;
 pub use directory::PageEntry;
-pub use header::{Header, UpAxis};
+pub use header::Header;
 pub use read::{CutSphere, Hierarchy, NO_PAGE, Page};
 pub use write::{Top, Whole, WriteOptions, Writer, to_bytes, write};
 

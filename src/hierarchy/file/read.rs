@@ -181,7 +181,8 @@ impl Hierarchy {
             source_points: tree.source_points,
             leaves: tree.leaf_count(),
             nodes: tree.blocks.iter().map(|block| block.nodes.len() as u64).sum(),
-            up: None,
+            stance: None,
+            is_guessed: false,
             unit: String::new(),
             source: String::new(),
         };

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::{
+    about::Stance,
     hierarchy::{
         Block, Detail, Tree,
         testing::{cloud, joined, surface, tree},
@@ -15,7 +16,13 @@ use glam::DVec3;
 use std::path::Path;
 
 fn options(lossless: bool) -> WriteOptions {
-    WriteOptions { lossless, up: Some(UpAxis::Z), unit: "m".into(), source: "scan.ply".into() }
+    WriteOptions {
+        lossless,
+        stance: Some(Stance::RAS),
+        is_guessed: true,
+        unit: "m".into(),
+        source: "scan.ply".into(),
+    }
 }
 
 fn open(bytes: Vec<u8>) -> Hierarchy {
@@ -60,8 +67,8 @@ fn lossless_keeps_every_bit() {
         same(&hierarchy.read_tree().unwrap(), &tree);
         let header = hierarchy.header();
         assert_eq!(
-            (header.leaves, header.up, header.unit.as_str()),
-            (tree.leaf_count(), Some(UpAxis::Z), "m")
+            (header.leaves, header.stance, header.unit.as_str()),
+            (tree.leaf_count(), Some(Stance::RAS), "m")
         );
         assert_eq!((header.lossless, header.source.as_str()), (true, "scan.ply"));
     }

@@ -3,12 +3,13 @@
 use super::{
     HASH,
     directory::{Directory, Place},
-    header::{Header, Stored, UpAxis},
+    header::{Header, Stored},
     page::{self, Coded},
     pages::{Around, Run, in_order},
 };
 use crate::{
     Error, Result,
+    about::Stance,
     hierarchy::{
         Node, Tree,
         validate::{fault, fault_of_box, fault_of_extent},
@@ -31,8 +32,10 @@ use std::{
 pub struct WriteOptions {
     /// Store every bit, at about eight times the size.
     pub lossless: bool,
-    /// Which axis of the source points up.
-    pub up: Option<UpAxis>,
+    /// How the source stands; `None` if unknown.
+    pub stance: Option<Stance>,
+    /// Whether the stance was guessed from the shape.
+    pub is_guessed: bool,
     /// The name of the world's unit.
     pub unit: String,
     /// The name of the source.
@@ -277,7 +280,8 @@ impl Writer {
             source_points: whole.source_points,
             leaves: self.contents.leaves,
             nodes: directory.blocks.iter().map(|block| u64::from(block.nodes)).sum(),
-            up: self.options.up,
+            stance: self.options.stance,
+            is_guessed: self.options.is_guessed,
             unit: self.options.unit.clone(),
             source: self.options.source.clone(),
         }

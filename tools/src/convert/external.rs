@@ -1,12 +1,7 @@
 //! Conversion of files larger than memory, region by region.
 
-use super::{
-    Convert,
-    memory::Need,
-    surface::{Frame, Up},
-};
+use super::{Convert, memory::Need, surface::Frame};
 use crate::{failure::Failure, output, progress::Progress, render::milliseconds};
-use glam::DVec3;
 use serde_json::json;
 use splatkit::{
     Deadline, Error,
@@ -14,7 +9,6 @@ use splatkit::{
     hierarchy::{
         BuildOptions,
         external::{BLOCKS, Converted, ExternalOptions, Stage, check, convert},
-        file::UpAxis,
     },
     surface::{Paint, SurfelOptions},
 };
@@ -38,6 +32,13 @@ impl Convert {
             )));
         }
         let start = Instant::now();
+        let limits = self.load.limits();
+        let first =
+            self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
+        let frame = match &first {
+            Some(first) => Frame::of(first.stance(), || first.guess_stance())?,
+            None => Frame::default(),
+        };
         let options = ExternalOptions {
             memory: most,
             preset: self.surface.preset(),
@@ -47,7 +48,7 @@ impl Convert {
                 color_by_normal: self.color.by_normal(),
                 ..self.surface.surfel_options(Deadline::NEVER)
             },
-            paint: self.paint_in_regions()?,
+            paint: self.paint_in_regions(&frame)?,
             scalar: self.attribute().map(str::to_owned),
         };
         let stages = progress.stages();
@@ -60,17 +61,12 @@ impl Convert {
             };
             stages.set(name, done, total);
         };
-        let limits = self.load.limits();
         if self.dry_run {
             check(&self.files, &limits, &options, Some(&watch))?;
             drop(stages);
             progress.clear();
             return self.print_need(need.bytes, most);
         }
-        let first =
-            self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
-        let frame =
-            Frame { up: first.filter(Stream::z_is_up).map(|_| UpAxis::Z), ..Frame::default() };
         let write = self.surface.write_options(&self.files, &frame);
         let done = convert(&self.files, &limits, &self.output, &options, &write, Some(&watch))?;
         drop(stages);
@@ -79,14 +75,12 @@ impl Convert {
     }
 
     /// Returns what colours the points, which the first file decides.
-    fn paint_in_regions(&self) -> Result<Option<Paint>, Failure> {
+    fn paint_in_regions(&self, frame: &Frame) -> Result<Option<Paint>, Failure> {
         let limits = self.load.limits();
         let first =
             self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
-        let (z_is_up, is_cloud) =
-            first.map_or((false, false), |file| (file.z_is_up(), file.counts().triangles == 0));
-        let usual = if z_is_up { DVec3::Z } else { DVec3::Y };
-        let up = self.surface.up.map_or(usual, Up::axis);
+        let is_cloud = first.is_some_and(|file| file.counts().triangles == 0);
+        let up = self.surface.up_of(frame);
         let named = self.attribute().is_some();
         let paint = self.color.surface_paint(self.range, up, [named, false, is_cloud]);
         let name = self.attribute().unwrap_or_default();

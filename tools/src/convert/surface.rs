@@ -7,20 +7,20 @@ use crate::{
     output, parse,
     progress::Progress,
     render::milliseconds,
-    scene::up_of,
 };
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use serde_json::json;
 use splatkit::{
     Deadline, Error,
+    about::Stance,
     hierarchy::{
         self, BuildOptions,
         external::{memory_of_mesh, memory_of_splats},
-        file::{UpAxis, WriteOptions},
+        file::WriteOptions,
     },
     splat::SplatSet,
-    surface::{Mesh, SurfelOptions},
+    surface::SurfelOptions,
 };
 use std::{
     path::{Path, PathBuf},
@@ -40,9 +40,15 @@ pub struct SurfaceFlags {
     /// Scale all radii by this factor. Below 1, surfaces may show holes [default: 1]
     #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
     radius_scale: Option<f32>,
-    /// Record the axis that points up, for viewers of the result.
-    #[arg(long, value_name = "AXIS")]
-    pub(super) up: Option<Up>,
+    /// Record the direction that points up: x, y, z, -x, -y, -z or X,Y,Z [default: as the first
+    /// input says that does; otherwise guessed from the shape of the first]
+    #[arg(
+        long,
+        value_name = "AXIS",
+        value_parser = parse::direction,
+        allow_hyphen_values = true
+    )]
+    pub(super) up: Option<DVec3>,
     /// Record the unit of lengths, such as m or mm, for viewers of the result [default: that of a
     /// converted hierarchy]
     #[arg(long, value_name = "NAME")]
@@ -64,23 +70,6 @@ enum Preset {
     Best,
 }
 
-#[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
-pub(super) enum Up {
-    X,
-    Y,
-    Z,
-}
-
-impl Up {
-    pub(super) fn axis(self) -> DVec3 {
-        match self {
-            Self::X => DVec3::X,
-            Self::Y => DVec3::Y,
-            Self::Z => DVec3::Z,
-        }
-    }
-}
-
 /// The splats of all inputs, and facts about their source.
 struct Gathered {
     set: SplatSet,
@@ -95,8 +84,24 @@ struct Gathered {
 /// Facts about an input's coordinates, for viewers.
 #[derive(Default)]
 pub(super) struct Frame {
-    pub up: Option<UpAxis>,
+    pub stance: Option<Stance>,
+    /// Whether the stance was guessed from the shape.
+    pub is_guessed: bool,
     pub unit: String,
+}
+
+impl Frame {
+    /// Takes what a file says of its stance, or a guess.
+    pub fn of(
+        told: Option<Stance>,
+        guess: impl FnOnce() -> splatkit::Result<Option<Stance>>,
+    ) -> splatkit::Result<Self> {
+        let stance = match told {
+            Some(stance) => Some(stance),
+            None => guess()?,
+        };
+        Ok(Self { stance, is_guessed: told.is_none() && stance.is_some(), unit: String::new() })
+    }
 }
 
 /// Number of splats that a dry run tries.
@@ -199,7 +204,8 @@ impl Convert {
         let start = Instant::now();
         let (set, closed, frame, points) = match input {
             Input::Mesh(mut mesh) => {
-                let up = self.surface.up_of(&mesh);
+                let frame = Frame::of(mesh.about.stance, || Ok(mesh.guess_stance()))?;
+                let up = self.surface.up_of(&frame);
                 let named = self.load.scalar().is_some();
                 let bar = self.color.paint(path, &mut mesh, self.range, up, named)?;
                 self.color.check_effect(true, bar.is_some())?;
@@ -210,7 +216,6 @@ impl Convert {
                 memory::check(path, need.map_err(|e| in_file(path, e))?, taken, most)?;
                 let closed = mesh.is_solid();
                 let set = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
-                let frame = Frame { up: mesh.z_is_up.then_some(UpAxis::Z), ..Frame::default() };
                 (set, closed, frame, mesh.positions.len() as u64)
             }
             Input::Hierarchy(hierarchy) => {
@@ -223,7 +228,8 @@ impl Convert {
                 set.splats
                     .iter_mut()
                     .for_each(|splat| splat.factor = splat.factor.map(|entry| entry * scale));
-                let frame = Frame { up: header.up, unit: header.unit.clone() };
+                let unit = header.unit.clone();
+                let frame = Frame { stance: header.stance, is_guessed: header.is_guessed, unit };
                 (set, header.closed, frame, header.source_points)
             }
             Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) | Input::Cells(_) => {
@@ -305,6 +311,12 @@ impl Gathered {
         let mut set = other.set;
         set.move_origin(self.set.origin).map_err(|error| in_file(path, error))?;
         self.set.splats.append(&mut set.splats);
+        // A statement counts more than a guess before it.
+        let frame = other.frame;
+        let states = frame.stance.is_some() && !frame.is_guessed;
+        if self.frame.stance.is_none() || (self.frame.is_guessed && states) {
+            (self.frame.stance, self.frame.is_guessed) = (frame.stance, frame.is_guessed);
+        }
         self.closed &= other.closed;
         self.points += other.points;
         self.read_ms += other.read_ms;
@@ -348,9 +360,10 @@ impl SurfaceFlags {
         }
     }
 
-    /// Returns the direction in which heights are measured: that of --up, or of the file.
-    fn up_of(&self, mesh: &Mesh) -> DVec3 {
-        self.up.map_or_else(|| up_of(mesh), Up::axis)
+    /// Returns the direction in which heights are measured: that of --up, or of the input.
+    pub(super) fn up_of(&self, frame: &Frame) -> DVec3 {
+        let own = frame.stance.map_or(DVec3::Y, |stance| stance.up);
+        self.up.unwrap_or(own)
     }
 
     fn radius_scale(&self) -> f32 {
@@ -377,12 +390,8 @@ impl SurfaceFlags {
             |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
         WriteOptions {
             lossless: self.lossless,
-            up: match self.up {
-                Some(Up::X) => Some(UpAxis::X),
-                Some(Up::Y) => Some(UpAxis::Y),
-                Some(Up::Z) => Some(UpAxis::Z),
-                None => frame.up,
-            },
+            stance: self.up.map(Stance::with_up).or(frame.stance),
+            is_guessed: self.up.is_none() && frame.is_guessed,
             unit: self.unit.clone().unwrap_or_else(|| frame.unit.clone()),
             source: files.iter().filter_map(name).collect::<Vec<_>>().join(", "),
         }

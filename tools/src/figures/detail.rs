@@ -54,7 +54,7 @@ fn camera(
     size: [u32; 2],
     farther: f64,
 ) -> splatkit::Result<Camera> {
-    let subject = Subject { bounds: hierarchy.bounds(), up: source.up };
+    let subject = Subject::new(hierarchy.bounds(), source.up);
     let mut camera = CameraFlags::default().camera(&subject, size)?;
     camera.position = camera.focal_point + (camera.position - camera.focal_point) * farther;
     Ok(camera)

@@ -68,7 +68,7 @@ impl Truth {
         let settings = Settings::new([PIXELS; 2]);
         let [min, max] =
             mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
-        let subject = Subject { bounds: Bounds { min, max }, up };
+        let subject = Subject::new(Bounds { min, max }, up);
         let camera = CameraFlags::default().camera(&subject, settings.size)?;
         let crease = SurfelOptions::default().crease_angle_degrees;
         let picture = reference::trace(mesh, crease, &camera, &settings, RAYS)?;

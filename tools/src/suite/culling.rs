@@ -90,7 +90,7 @@ fn volume(effort: Effort, opacity: f64) -> Result<Case> {
         ..TransferFunction::default()
     };
     let (scene, effective) = case::volume(Arc::new(volume), transfer);
-    let subject = Subject { bounds: splatkit::math::Bounds { min, max }, up: DVec3::Z };
+    let subject = Subject::new(splatkit::math::Bounds { min, max }, DVec3::Z);
     Ok(Case::new(
         "generated: specimen",
         scene,

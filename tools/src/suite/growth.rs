@@ -64,7 +64,7 @@ fn volume(side: usize, size: u32) -> Result<Case> {
     let effective = case::effective(&volume, &kernel, &transfer);
     let samples = volume.len() as f64;
     let scene = Scene::new().with_bricks(Bricks::from_volume(Arc::new(volume))?, kernel, transfer);
-    let subject = Subject { bounds: Bounds { min, max }, up: DVec3::Z };
+    let subject = Subject::new(Bounds { min, max }, DVec3::Z);
     let mut case = Case::new(
         "generated: specimen, in bricks",
         scene,

@@ -160,7 +160,7 @@ impl Row {
         }
         let transfer = self.look.transfer(&volume, wanted);
         let (scene, effective) = case::volume(Arc::new(volume), transfer);
-        let subject = Subject { bounds: Bounds { min, max }, up: DVec3::Z };
+        let subject = Subject::new(Bounds { min, max }, DVec3::Z);
         let mut case = Case::new(format!("{drawn}, {dims}"), scene, subject, settings, effective);
         case.seed = Some(self.seed);
         Ok(case)

@@ -44,7 +44,7 @@ pub fn model(points: u32, size: u32) -> Result<Case> {
     let settings = Settings { detail: Detail::Pixels(CUT), ..Settings::new([size; 2]) };
     let leaves = hierarchy.header().leaves;
     let scene = Scene::new().with_hierarchy(hierarchy);
-    Ok(Case::new("generated: knot", scene, Subject { bounds, up: DVec3::Y }, settings, leaves))
+    Ok(Case::new("generated: knot", scene, Subject::new(bounds, DVec3::Y), settings, leaves))
 }
 
 /// Makes a knot whose triangles are about as long as they are wide: the knot is twelve times as

@@ -1,0 +1,404 @@
+//! Points that span what a picture shows of a scene, for cameras that are fitted to it.
+
+use super::{Clip, ClipShape, Item, Scene};
+use crate::{
+    Result,
+    bricks::{Bricks, Level},
+    hierarchy::Hierarchy,
+    math::{
+        Bounds,
+        hull::{outermost, without_strays},
+    },
+    parallel::prelude::*,
+    splat::{Splat, SplatSet},
+    volume::{Lattice, TransferFunction, Volume, steps::Steps},
+};
+use glam::{DVec3, Vec3};
+use std::collections::HashSet;
+
+/// How far a splat is seen from its centre, in standard deviations.
+const REACH: f32 = 1.5;
+
+/// Most pages of a hierarchy that are read. If there are more, its coarse nodes stand for it.
+const MOST_PAGES: usize = 64;
+
+/// Most samples of a volume that are looked at. Of larger volumes, some rows are left out.
+const MOST_SAMPLES: usize = 1 << 24;
+
+/// The share of the visible samples that may be lost on each side of a volume, as noise.
+const NOISE: f64 = 0.001;
+
+/// The optical depth of a tenth of a volume's diagonal from which on it is seen.
+const FAINT: f64 = 0.02;
+
+impl Clip {
+    /// Returns whether the clip keeps a point.
+    pub fn keeps(&self, point: DVec3) -> bool {
+        let inside = match self.shape {
+            ClipShape::HalfSpace { normal, offset } => normal.dot(point) <= offset,
+            ClipShape::Box(Bounds { min, max }) => (point.cmpge(min) & point.cmple(max)).all(),
+        };
+        inside == self.inside
+    }
+}
+
+impl Scene {
+    /// Returns points, in world coordinates, that span what a picture shows of the scene: of
+    /// splats, the outermost ones and their reach; of volumes, the outermost samples that the
+    /// transfer function shows. [`Camera::fit_points`](crate::math::Camera::fit_points) makes them
+    /// fill a picture.
+    ///
+    /// Up to a thousandth of the splats that lies far away on one side of all others, and of a
+    /// volume's visible samples that is scattered beyond the rest, is left out. The time is linear
+    /// in the number of splats and samples; of large hierarchies and bricks only coarse levels are
+    /// read. If an item shows nothing, or the clips remove it, the corners of its box stand for it.
+    ///
+    /// # Errors
+    /// Those of reading pages and bricks.
+    pub fn seen(&self, clips: &[Clip]) -> Result<Vec<DVec3>> {
+        let mut points = Vec::new();
+        for item in &self.items {
+            let own = match item {
+                Item::Radiance(set) => of_splats(set, |_| true, clips),
+                Item::Scalar(set, transfer) => of_samples(set, transfer, clips),
+                Item::Hierarchy(hierarchy) => of_splats(&coarse(hierarchy)?, |_| true, clips),
+                Item::Volume(volume, _, transfer) => of_volume(volume, transfer, clips),
+                Item::Bricks(bricks, _, transfer) => {
+                    of_volume(&bricks.volume(overview(bricks))?, transfer, clips)
+                }
+            };
+            points.extend(own);
+        }
+        if points.is_empty() {
+            points.extend(self.items.iter().flat_map(|item| item.bounds().corners()));
+        }
+        Ok(points)
+    }
+}
+
+/// Returns the outermost of the splats that `shows` chooses, with their reach.
+fn of_splats(set: &SplatSet, shows: impl Fn(&Splat) -> bool, clips: &[Clip]) -> Vec<DVec3> {
+    let world = |point: Vec3| set.origin + point.as_dvec3();
+    let kept = |point: Vec3| clips.iter().all(|clip| clip.keeps(world(point)));
+    let shown = set.splats.iter().filter(|splat| shows(splat) && kept(Vec3::from(splat.center)));
+    let mut splats: Vec<&Splat> = shown.collect();
+    let mut centers: Vec<Vec3> = splats.iter().map(|splat| Vec3::from(splat.center)).collect();
+    let Some([low, high]) = without_strays(&centers) else { return Vec::new() };
+    let is_near = |center: &Vec3| center.cmpge(low).all() && center.cmple(high).all();
+    splats.retain(|splat| is_near(&Vec3::from(splat.center)));
+    centers.retain(is_near);
+    let reach = |index: u32| {
+        let (center, reach) =
+            (centers[index as usize], REACH * splats[index as usize].deviations());
+        [(Vec3::X, reach.x), (Vec3::Y, reach.y), (Vec3::Z, reach.z)]
+            .into_iter()
+            .flat_map(move |(axis, reach)| [center - reach * axis, center + reach * axis])
+    };
+    outermost(&centers).into_iter().flat_map(reach).map(world).collect()
+}
+
+/// Returns the outermost samples that a transfer function shows.
+fn of_samples(set: &SplatSet, transfer: &TransferFunction, clips: &[Clip]) -> Vec<DVec3> {
+    let values = set.splats.iter().map(|splat| f64::from(splat.strength));
+    let sides = Sides::of(transfer, values);
+    of_splats(set, |splat| sides.show(transfer, f64::from(splat.strength)), clips)
+}
+
+/// Returns the leaves of a hierarchy, or, if it has many pages, the nodes of its coarse pages.
+fn coarse(hierarchy: &Hierarchy) -> Result<SplatSet> {
+    if hierarchy.pages().len() <= MOST_PAGES {
+        return hierarchy.leaves();
+    }
+    let read: Vec<u32> = hierarchy.coarse_first().into_iter().take(MOST_PAGES).collect();
+    let known: HashSet<u32> = read.iter().copied().collect();
+    let of_page = |&page: &u32| {
+        let page = hierarchy.read_page(page)?;
+        let last = |at: &usize| !known.contains(&page.child_pages[*at]);
+        let nodes = (0..page.nodes.len()).filter(last);
+        Ok(nodes.map(|at| page.nodes[at].splat).collect::<Vec<Splat>>())
+    };
+    let pages: Vec<Vec<Splat>> = read.par_iter().map(of_page).collect::<Result<_>>()?;
+    let header = hierarchy.header();
+    Ok(SplatSet {
+        origin: header.origin,
+        payload: crate::splat::Payload::Radiance,
+        splats: pages.concat(),
+        extent: header.extent,
+        overlap: 1.0,
+    })
+}
+
+/// Returns the finest level of bricks that is read quickly, or the coarsest.
+fn overview(bricks: &Bricks) -> usize {
+    const QUICK: usize = 1 << 22;
+    let is_quick = |level: &Level| level.dims.iter().product::<usize>() <= QUICK;
+    bricks.levels().iter().position(is_quick).unwrap_or(bricks.levels().len() - 1)
+}
+
+/// For each isosurface, its value and whether the values above it are the fewer: those inside.
+struct Sides(Vec<(f64, bool)>);
+
+impl Sides {
+    fn of(transfer: &TransferFunction, values: impl Iterator<Item = f64> + Clone) -> Self {
+        let side = |value: f64| {
+            let (all, above) = values.clone().fold((0usize, 0usize), |(all, above), v| {
+                (all + 1, above + usize::from(v >= value))
+            });
+            (value, 2 * above <= all)
+        };
+        Self(transfer.isosurfaces.iter().map(|surface| side(surface.value)).collect())
+    }
+
+    /// Returns whether a sample of this value is shown, or lies inside an isosurface.
+    fn show(&self, transfer: &TransferFunction, value: f64) -> bool {
+        let inside = |&(surface, above): &(f64, bool)| (value >= surface) == above;
+        transfer.opacity(value) > 0.0 || self.0.iter().any(inside)
+    }
+}
+
+/// The rows of a volume that are looked at, and what is seen in them.
+struct Rows<'a> {
+    volume: &'a Volume,
+    clips: &'a [Clip],
+    steps: Steps,
+    /// Whether samples in each step of 1/255 of the range are seen.
+    seen: [bool; 256],
+    /// Only every so many rows and slices are looked at.
+    stride: usize,
+}
+
+/// Returns the outermost samples of a volume that its transfer function shows.
+fn of_volume(volume: &Volume, transfer: &TransferFunction, clips: &[Clip]) -> Vec<DVec3> {
+    let rows = Rows::new(volume, transfer, clips);
+    let Some(limits) = rows.limits() else { return Vec::new() };
+    let lattice = &volume.lattice;
+    let middle = lattice.position(0.5 * (lattice.step_range()[0] + lattice.step_range()[1]));
+    let ends = rows.ends(&limits);
+    let places: Vec<Vec3> = ends
+        .iter()
+        .map(|&index| (lattice.position(lattice.steps(index)) - middle).as_vec3())
+        .collect();
+    let half = |index: [usize; 3]| 0.5 * (rows.stride as f64).min(2.0) * lattice.unit(index);
+    let reach = |at: u32| {
+        let index = ends[at as usize];
+        let (steps, half) = (lattice.steps(index), half(index));
+        DVec3::AXES.into_iter().flat_map(move |axis| {
+            [lattice.position(steps - half * axis), lattice.position(steps + half * axis)]
+        })
+    };
+    outermost(&places).into_iter().flat_map(reach).collect()
+}
+
+impl<'a> Rows<'a> {
+    fn new(volume: &'a Volume, transfer: &TransferFunction, clips: &'a [Clip]) -> Self {
+        let [low, high] = volume.range;
+        let value = |step: usize| low + (high - low) * step as f64 / 255.0;
+        let [first, last] = volume.bounds();
+        // What is fainter than this is seen only if nothing is more opaque.
+        let least = (FAINT / (0.1 * (last - first).length()))
+            .min(0.05 * (0..256).map(|step| transfer.extinction(value(step))).fold(0.0, f64::max));
+        let mut rows = Self {
+            volume,
+            clips,
+            steps: Steps::new(volume.samples.scalar(), volume.range),
+            seen: [false; 256],
+            stride: 1,
+        };
+        let [nx, ny, nz] = volume.lattice.dims;
+        while nx * ny.div_ceil(rows.stride) * nz.div_ceil(rows.stride) > MOST_SAMPLES {
+            rows.stride += 1;
+        }
+        let sides = rows.sides(transfer);
+        for step in 0..256 {
+            let extinction = transfer.extinction(value(step));
+            let inside = |&(surface, above): &(f64, bool)| (value(step) >= surface) == above;
+            rows.seen[step] =
+                (extinction > 0.0 && extinction >= least) || sides.0.iter().any(inside);
+        }
+        rows
+    }
+
+    /// Returns, for each isosurface, which side of it is inside.
+    fn sides(&self, transfer: &TransferFunction) -> Sides {
+        if transfer.isosurfaces.is_empty() {
+            return Sides(Vec::new());
+        }
+        let volume = self.volume;
+        let step = volume.len().div_ceil(1 << 20);
+        Sides::of(transfer, (0..volume.len()).step_by(step).map(|index| volume.value(index)))
+    }
+
+    /// Visits the seen samples of every row of a slice that is looked at.
+    fn visit(&self, k: usize, mut visit: impl FnMut([usize; 3])) {
+        let [nx, ny, _] = self.volume.lattice.dims;
+        let mut row = vec![[0u8; 2]; nx];
+        let samples = self.volume.samples.bytes();
+        for j in (0..ny).step_by(self.stride) {
+            self.steps.write(self.steps.from(samples, (k * ny + j) * nx), &mut row);
+            for (i, &[below, _]) in row.iter().enumerate() {
+                if self.seen[usize::from(below)] && self.is_kept([i, j, k]) {
+                    visit([i, j, k]);
+                }
+            }
+        }
+    }
+
+    fn is_kept(&self, index: [usize; 3]) -> bool {
+        let lattice: &Lattice = &self.volume.lattice;
+        self.clips.is_empty() || {
+            let place = lattice.position(lattice.steps(index));
+            self.clips.iter().all(|clip| clip.keeps(place))
+        }
+    }
+
+    /// Returns the slices that are looked at.
+    fn slices(&self) -> Vec<usize> {
+        (0..self.volume.lattice.dims[2]).step_by(self.stride).collect()
+    }
+
+    /// Returns the first and the last index along each axis between which nearly all of the seen
+    /// samples lie, with a tenth more on each side; `None` if none is seen.
+    fn limits(&self) -> Option<[[usize; 2]; 3]> {
+        let dims = self.volume.lattice.dims;
+        let count = |k: &usize| {
+            let mut counts = [0, 1, 2].map(|axis| vec![0u64; dims[axis]]);
+            self.visit(*k, |index| (0..3).for_each(|axis| counts[axis][index[axis]] += 1));
+            counts
+        };
+        let add = |mut sum: [Vec<u64>; 3], other: [Vec<u64>; 3]| {
+            for (sum, other) in sum.iter_mut().zip(other) {
+                sum.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
+            }
+            sum
+        };
+        let none = || [0, 1, 2].map(|axis| vec![0u64; dims[axis]]);
+        let slices = self.slices();
+        let counts = slices.par_iter().map(count).reduce(none, add);
+        let total: u64 = counts[0].iter().sum();
+        if total == 0 {
+            return None;
+        }
+        let most = (total as f64 * NOISE) as u64;
+        Some([0, 1, 2].map(|axis| {
+            let passed = |counts: &mut dyn Iterator<Item = (usize, &u64)>| {
+                let mut sum = 0;
+                let mut beyond = counts.skip_while(|(_, count)| {
+                    sum += **count;
+                    sum <= most
+                });
+                beyond.next().map_or(0, |(at, _)| at)
+            };
+            let first = passed(&mut counts[axis].iter().enumerate());
+            let last = passed(&mut counts[axis].iter().enumerate().rev());
+            let slack = (last - first).div_ceil(10);
+            [first.saturating_sub(slack), last + slack]
+        }))
+    }
+
+    /// Returns the first and the last seen sample of each row, between limits.
+    fn ends(&self, limits: &[[usize; 2]; 3]) -> Vec<[usize; 3]> {
+        let is_within = |index: &[usize; 3]| {
+            index.iter().zip(limits).all(|(at, [first, last])| first <= at && at <= last)
+        };
+        let of_slice = |k: &usize| {
+            let mut ends: Vec<[usize; 3]> = Vec::new();
+            self.visit(*k, |index| {
+                if !is_within(&index) {
+                    return;
+                }
+                match ends[..] {
+                    // The third sample of a row replaces the second.
+                    [.., [_, a, _], [_, b, _]] if a == index[1] && b == index[1] => {
+                        ends.pop();
+                    }
+                    _ => {}
+                }
+                ends.push(index);
+            });
+            ends
+        };
+        let slices = self.slices();
+        slices.par_iter().map(of_slice).collect::<Vec<_>>().concat()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        math::Kernel,
+        surface::{Mesh, SurfelOptions},
+        volume::{Isosurface, Samples},
+    };
+
+    fn ends(points: &[DVec3]) -> Bounds {
+        points
+            .iter()
+            .fold(Bounds::EMPTY, |all, &point| all.union(Bounds { min: point, max: point }))
+    }
+
+    /// A ball of radius 9 in a box of 32 samples along each side, and some noise in a corner.
+    fn ball() -> Volume {
+        let at = |index: usize| {
+            DVec3::new((index % 32) as f64, (index / 32 % 32) as f64, (index / 1024) as f64)
+        };
+        let value = |index: usize| {
+            let is_noise = index == 31 * 1024 + 40;
+            let ball = 9.0 - at(index).distance(DVec3::new(12.0, 13.0, 14.0));
+            if is_noise { 200 } else { (20.0 * ball.max(0.0)) as u8 }
+        };
+        let lattice = Lattice::with_spacing([32; 3], DVec3::ONE);
+        let volume = Volume::new(lattice, Samples::U8((0..32 * 1024).map(value).collect()));
+        volume.unwrap()
+    }
+
+    fn shown(transfer: TransferFunction, clips: &[Clip]) -> Bounds {
+        ends(&Scene::new().with_volume(ball(), Kernel::default(), transfer).seen(clips).unwrap())
+    }
+
+    #[test]
+    fn what_a_transfer_function_shows_is_seen() {
+        let opaque = |low: f64| TransferFunction {
+            opacity: vec![(low, 0.0), (low + 1.0, 0.9)],
+            ..TransferFunction::default()
+        };
+        let all = shown(opaque(0.0), &[]);
+        assert!((all.min - DVec3::new(3.0, 4.0, 5.0)).abs().max_element() < 1.1, "{all:?}");
+        assert!((all.max - DVec3::new(21.0, 22.0, 23.0)).abs().max_element() < 1.1, "{all:?}");
+        let inner = shown(opaque(100.0), &[]);
+        assert!((inner.max - DVec3::new(16.0, 17.0, 18.0)).abs().max_element() < 1.1, "{inner:?}");
+        let surface = Isosurface { value: 100.0, color: [1.0; 3], opacity: 1.0 };
+        let only = TransferFunction {
+            opacity: vec![(0.0, 0.0)],
+            isosurfaces: vec![surface],
+            ..TransferFunction::default()
+        };
+        let surface = shown(only, &[]);
+        assert!((surface.max - inner.max).abs().max_element() < 1.1, "{surface:?}");
+        let shape = ClipShape::HalfSpace { normal: DVec3::X, offset: 12.0 };
+        let half = shown(opaque(0.0), &[Clip { shape, inside: true }]);
+        assert!((half.max.x - 12.5).abs() < 0.6 && half.max.y > 14.0, "{half:?}");
+        // If nothing is seen, the box is.
+        assert!(shown(opaque(300.0), &[]).max.x > 31.0);
+    }
+
+    #[test]
+    fn splats_far_away_are_left_out() {
+        let mut mesh = Mesh::sphere(4);
+        let count = mesh.positions.len();
+        let options = SurfelOptions::default();
+        let seen = |mesh: &Mesh| {
+            ends(&Scene::new().with_splats(mesh.surfels(&options).unwrap()).seen(&[]).unwrap())
+        };
+        let whole = seen(&mesh);
+        assert!((whole.diagonal() - 12f64.sqrt()).abs() < 0.05, "{whole:?}");
+        mesh.triangles.clear();
+        let points = seen(&mesh);
+        assert!((points.diagonal() - 12f64.sqrt()).abs() < 0.4, "{points:?}");
+        mesh.positions.extend((0..count / 1000).map(|n| Vec3::splat(50.0 + n as f32)));
+        assert!((seen(&mesh).diagonal() - points.diagonal()).abs() < 0.1);
+        // More than a thousandth is a part of the scene.
+        mesh.positions.extend((0..count / 100).map(|n| Vec3::splat(80.0 + n as f32)));
+        assert!(seen(&mesh).diagonal() > 100.0);
+    }
+}
