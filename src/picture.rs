@@ -1,5 +1,9 @@
 //! A finished picture: colour, opacity and depth of every pixel.
 
+mod edges;
+
+pub use edges::Edges;
+
 use crate::{Error, Result, disk};
 use std::path::Path;
 

@@ -15,13 +15,7 @@ mod time;
 pub(super) use pieces::Pieces;
 
 use super::shared::cloud::{Cloud, colors_of_16_bits, greys};
-use crate::{
-    Result,
-    about::Stance,
-    input::Source,
-    parallel::prelude::*,
-    surface::Mesh,
-};
+use crate::{Result, about::Stance, input::Source, parallel::prelude::*, surface::Mesh};
 use attribute::Attribute;
 use glam::DVec3;
 

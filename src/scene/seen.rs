@@ -28,7 +28,7 @@ const MOST_SAMPLES: usize = 1 << 24;
 /// The share of the visible samples that may be lost on each side of a volume, as noise.
 const NOISE: f64 = 0.001;
 
-/// The optical depth of a tenth of a volume's diagonal from which on it is seen.
+/// The optical depth of a tenth of a volume's diagonal from which on a block of samples is seen.
 const FAINT: f64 = 0.02;
 
 impl Clip {
@@ -161,11 +161,16 @@ struct Rows<'a> {
     volume: &'a Volume,
     clips: &'a [Clip],
     steps: Steps,
-    /// Whether samples in each step of 1/255 of the range are seen.
-    seen: [bool; 256],
+    /// The extinction of samples in each step of 1/255 of the range; infinite inside isosurfaces.
+    extinction: [f32; 256],
     /// Only every so many rows and slices are looked at.
     stride: usize,
+    /// Whether anything is seen in each block of 4 × 4 × 4 of the samples that are looked at.
+    blocks: Vec<bool>,
 }
+
+/// Samples along each side of a block.
+const BLOCK: usize = 4;
 
 /// Returns the outermost samples of a volume that its transfer function shows.
 fn of_volume(volume: &Volume, transfer: &TransferFunction, clips: &[Clip]) -> Vec<DVec3> {
@@ -193,16 +198,13 @@ impl<'a> Rows<'a> {
     fn new(volume: &'a Volume, transfer: &TransferFunction, clips: &'a [Clip]) -> Self {
         let [low, high] = volume.range;
         let value = |step: usize| low + (high - low) * step as f64 / 255.0;
-        let [first, last] = volume.bounds();
-        // What is fainter than this is seen only if nothing is more opaque.
-        let least = (FAINT / (0.1 * (last - first).length()))
-            .min(0.05 * (0..256).map(|step| transfer.extinction(value(step))).fold(0.0, f64::max));
         let mut rows = Self {
             volume,
             clips,
             steps: Steps::new(volume.samples.scalar(), volume.range),
-            seen: [false; 256],
+            extinction: [0.0; 256],
             stride: 1,
+            blocks: Vec::new(),
         };
         let [nx, ny, nz] = volume.lattice.dims;
         while nx * ny.div_ceil(rows.stride) * nz.div_ceil(rows.stride) > MOST_SAMPLES {
@@ -210,12 +212,52 @@ impl<'a> Rows<'a> {
         }
         let sides = rows.sides(transfer);
         for step in 0..256 {
-            let extinction = transfer.extinction(value(step));
             let inside = |&(surface, above): &(f64, bool)| (value(step) >= surface) == above;
-            rows.seen[step] =
-                (extinction > 0.0 && extinction >= least) || sides.0.iter().any(inside);
+            let own = transfer.extinction(value(step)) as f32;
+            rows.extinction[step] = if sides.0.iter().any(inside) { f32::INFINITY } else { own };
         }
+        let [first, last] = volume.bounds();
+        let least = (FAINT / (0.1 * (last - first).length())) as f32;
+        let means = rows.block_means();
+        // What is fainter is seen only if nothing is more opaque.
+        let most = means.iter().copied().fold(0.0, f32::max);
+        let least = least.min(0.05 * most);
+        rows.blocks = means.into_iter().map(|mean| mean > 0.0 && mean >= least).collect();
         rows
+    }
+
+    /// Returns the numbers of blocks along the axes.
+    fn block_dims(&self) -> [usize; 3] {
+        let [nx, ny, nz] = self.volume.lattice.dims;
+        let looked_at = |count: usize| count.div_ceil(self.stride).div_ceil(BLOCK);
+        [nx.div_ceil(BLOCK), looked_at(ny), looked_at(nz)]
+    }
+
+    /// Returns the mean extinction of each block: single samples of noise are lost in it.
+    fn block_means(&self) -> Vec<f32> {
+        let [nx, ny, nz] = self.volume.lattice.dims;
+        let [columns, lines, layers] = self.block_dims();
+        let of_layer = |layer: usize| {
+            let mut sums = vec![0.0f32; columns * lines];
+            let mut row = vec![[0u8; 2]; nx];
+            let samples = self.volume.samples.bytes();
+            let slices = (layer * BLOCK..(layer + 1) * BLOCK).map(|k| k * self.stride);
+            for k in slices.filter(|k| *k < nz) {
+                for j in (0..ny).step_by(self.stride) {
+                    self.steps.write(self.steps.from(samples, (k * ny + j) * nx), &mut row);
+                    let line = &mut sums[j / self.stride / BLOCK * columns..][..columns];
+                    for (sum, samples) in line.iter_mut().zip(row.chunks(BLOCK)) {
+                        let own =
+                            samples.iter().map(|[step, _]| self.extinction[usize::from(*step)]);
+                        *sum += own.sum::<f32>();
+                    }
+                }
+            }
+            sums
+        };
+        let layers: Vec<Vec<f32>> = (0..layers).into_par_iter().map(of_layer).collect();
+        let count = (BLOCK * BLOCK * BLOCK) as f32;
+        layers.concat().into_iter().map(|sum| sum / count).collect()
     }
 
     /// Returns, for each isosurface, which side of it is inside.
@@ -231,12 +273,19 @@ impl<'a> Rows<'a> {
     /// Visits the seen samples of every row of a slice that is looked at.
     fn visit(&self, k: usize, mut visit: impl FnMut([usize; 3])) {
         let [nx, ny, _] = self.volume.lattice.dims;
+        let [columns, lines, _] = self.block_dims();
         let mut row = vec![[0u8; 2]; nx];
         let samples = self.volume.samples.bytes();
         for j in (0..ny).step_by(self.stride) {
+            let [line, layer] = [j, k].map(|at| at / self.stride / BLOCK);
+            let blocks = &self.blocks[(layer * lines + line) * columns..][..columns];
+            if !blocks.contains(&true) {
+                continue;
+            }
             self.steps.write(self.steps.from(samples, (k * ny + j) * nx), &mut row);
-            for (i, &[below, _]) in row.iter().enumerate() {
-                if self.seen[usize::from(below)] && self.is_kept([i, j, k]) {
+            for (i, &[step, _]) in row.iter().enumerate() {
+                let is_seen = blocks[i / BLOCK] && self.extinction[usize::from(step)] > 0.0;
+                if is_seen && self.is_kept([i, j, k]) {
                     visit([i, j, k]);
                 }
             }

@@ -280,12 +280,16 @@ impl Shape {
     /// viewer goes down by `drop` for each unit along the ground, and must leave the thing above
     /// the ground.
     fn seen_from(&self, toward: DVec3, drop: f64, (axis, sign): (usize, f64)) -> Vec<bool> {
-        let cells = ((self.samples.len() as f64).sqrt() / 4.0).clamp(8.0, 40.0);
+        let cells = ((self.samples.len() as f64).sqrt() / 3.5).clamp(8.0, 40.0);
         let (right, up) = toward.any_orthonormal_pair();
-        let reach = 0.5 * (self.high - self.low).length();
+        let middle = 0.5 * (self.high + self.low);
+        let offsets = self
+            .samples
+            .iter()
+            .map(|p| (*p - middle).dot(right).abs().max((*p - middle).dot(up).abs()));
+        let reach = offsets.fold(0.0, f64::max);
         let size = 2.0 * reach / cells;
         let width = cells as usize + 2;
-        let middle = 0.5 * (self.high + self.low);
         let cell = |p: DVec3| {
             let p = p - middle;
             let at =
@@ -337,8 +341,8 @@ fn parts(grid: &mut [bool], width: usize) -> usize {
         open.push(start);
         while let Some(at) = open.pop() {
             for row in [at - width, at, at + width] {
-                for next in row - 1..=row + 1 {
-                    if std::mem::replace(&mut grid[next], false) {
+                for (next, is_set) in (row - 1..).zip(&mut grid[row - 1..=row + 1]) {
+                    if std::mem::replace(is_set, false) {
                         open.push(next);
                     }
                 }

@@ -5,6 +5,7 @@ use crate::{
     describe,
     engine::EngineFlags,
     failure::Failure,
+    given::Given,
     output,
     progress::Progress,
     render::milliseconds,
@@ -53,7 +54,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+    pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
         if self.suite.suite {
             return self.suite.run(&self.engine, &self.effort, self.frames, self.json, progress);
         }
@@ -62,7 +63,7 @@ impl Bench {
         }
         self.engine.check()?;
         let frames = self.frames.unwrap_or(FRAMES);
-        let loaded = self.scene.load(progress)?;
+        let loaded = self.scene.load(given, progress)?;
         let settings = self.engine.settings(&loaded, Samples::Factor(1))?;
         progress.stage("Opening the device");
         let device = self.engine.device(&loaded.scene)?;

@@ -5,6 +5,7 @@ use crate::{
     camera::CameraFlags,
     engine::EngineFlags,
     failure::Failure,
+    given::Given,
     output,
     progress::Progress,
     render::{Drawer, milliseconds},
@@ -67,23 +68,23 @@ const SHOTS: [Shot; 4] = [
     Shot {
         name: "mesh.png",
         inputs: &[MESH],
-        arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3",
+        arguments: "--size 800x600 --azimuth 0 --elevation 20",
     },
     // Coarse enough to see what a hierarchy is made of.
     Shot {
         name: "hierarchy.png",
         inputs: &[TREE],
-        arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3 --cut 12",
+        arguments: "--size 800x600 --azimuth 0 --elevation 20 --cut 12",
     },
     Shot {
         name: "volume.png",
         inputs: &[VOLUME],
-        arguments: "--size 800x600 --up +Z --zoom 1.75 --azimuth 40 --elevation 30",
+        arguments: "--size 800x600 --up +Z --azimuth 40 --elevation 30",
     },
     Shot {
         name: "mixed.png",
         inputs: &[MESH, VOLUME],
-        arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3",
+        arguments: "--size 800x600 --azimuth 0 --elevation 20",
     },
 ];
 
@@ -145,9 +146,10 @@ impl Demo {
             arguments.extend(["--gpu".into(), gpu.into()]);
         }
         let flags = Flags::try_parse_from(&arguments).map_err(|e| Failure::Usage(e.to_string()))?;
-        let loaded = flags.scene.load(progress)?;
+        let mut loaded = flags.scene.load(&Given::default(), progress)?;
         let mut drawer = Drawer::engine(&flags.engine, &loaded, progress)?;
         let settings = flags.engine.settings(&loaded, Samples::Factor(1))?;
+        loaded.find_seen(&flags.camera, &settings)?;
         let camera = flags.camera.camera(&loaded.subject, settings.size)?;
         progress.stage(format!("Drawing {}", shot.name));
         let mut draw = || {

@@ -49,7 +49,7 @@ pub struct EngineFlags {
     #[arg(long, overrides_with = "no_shade")]
     shade: bool,
     /// Draw volumes and surfaces in their own colours, without light.
-    #[arg(long, overrides_with = "shade")]
+    #[arg(long, visible_alias = "flat", overrides_with = "shade")]
     no_shade: bool,
     /// Set the largest thickness of a sheet, in world units [default: 4/3 of a volume's sample
     /// spacing; half of that if the volume is sharp or its kernel is catmull-rom; half a spacing if
@@ -240,6 +240,18 @@ impl EngineFlags {
         settings.clips = self.clip.clips(&loaded.scene, &loaded.subject.bounds)?;
         loaded.scene.validate_settings(&settings)?;
         Ok(settings)
+    }
+
+    /// Returns a warning if the flags of light change nothing.
+    pub fn idle_light(&self, scene: &Scene) -> Option<&'static str> {
+        let fields = || scene.items.iter().filter_map(Item::transfer);
+        let has_surfaces = scene.items.iter().any(|item| item.transfer().is_none());
+        if self.shade && fields().count() > 0 && fields().all(|field| field.shade.is_some()) {
+            return Some("--shade has no effect: the transfer function has its own light");
+        }
+        let is_dark = !has_surfaces && fields().all(|field| field.shade.is_none());
+        (self.no_shade && is_dark)
+            .then_some("--no-shade (--flat) has no effect: nothing in the scene is lit")
     }
 
     /// Returns an error if a picture shows nothing.

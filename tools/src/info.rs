@@ -3,6 +3,7 @@
 use crate::{
     camera::direction_name,
     failure::Failure,
+    given::{Given, kinds_of},
     load::{Input, LoadFlags},
     output,
     progress::Progress,
@@ -22,6 +23,38 @@ use splatkit::{
 };
 use std::path::PathBuf;
 
+/// The facts in the order in which they are printed.
+const ORDER: &[&str] = &[
+    "file",
+    "kind",
+    "count",
+    "triangles",
+    "points",
+    "cells",
+    "dims",
+    "spacing",
+    "type",
+    "range",
+    "bounds",
+    "attributes",
+    "materials",
+    "textures",
+    "splats",
+    "nodes",
+    "levels",
+    "bricks",
+    "blocks",
+    "pages",
+    "closed",
+    "lossless",
+    "up",
+    "up_from",
+    "unit",
+    "source",
+    "bytes",
+    "bytes_per_point",
+];
+
 #[derive(Args, Debug)]
 pub struct Info {
     /// A mesh, point cloud, hierarchy, volume, volume in bricks, cells, or a set of scattered
@@ -35,10 +68,12 @@ pub struct Info {
 }
 
 impl Info {
-    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+    pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
         progress.stage(format!("Reading {}", self.file.display()));
         let input = self.load.open(&self.file)?;
         progress.clear();
+        let kinds = kinds_of(&input, self.load.is_raw(&self.file)?);
+        given.warn_of_file(&self.file, kinds, progress);
         let bytes = self.file.metadata().map_err(|e| Error::file(&self.file, "read", e))?.len();
         let (count, mut facts) = match &input {
             Input::Mesh(mesh) => (mesh.positions.len(), of_mesh(mesh)),
@@ -61,38 +96,8 @@ impl Info {
         if self.json {
             return output::json(&Value::Object(facts));
         }
-        let order = [
-            "file",
-            "kind",
-            "count",
-            "triangles",
-            "points",
-            "cells",
-            "dims",
-            "spacing",
-            "type",
-            "range",
-            "bounds",
-            "attributes",
-            "materials",
-            "textures",
-            "splats",
-            "nodes",
-            "levels",
-            "bricks",
-            "blocks",
-            "pages",
-            "closed",
-            "lossless",
-            "up",
-            "up_from",
-            "unit",
-            "source",
-            "bytes",
-            "bytes_per_point",
-        ];
-        for name in order {
-            if let Some(value) = facts.get(name) {
+        for name in ORDER {
+            if let Some(value) = facts.get(*name) {
                 output::line(format_args!("{:<16}{}", name.replace('_', " "), plain(value)))?;
             }
         }

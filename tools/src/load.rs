@@ -170,6 +170,13 @@ impl LoadFlags {
         Ok(Kind::of(path, &self.limits(), options)?.or(raw).ok_or_else(|| unknown(path))?)
     }
 
+    /// Returns whether the flags give the layout of a file, because it has no format of its own.
+    pub fn is_raw(&self, path: &Path) -> Result<bool, Failure> {
+        let options = ReadOptions { raw: None, ..self.options() };
+        let is_plain = || Ok(Kind::of(path, &self.limits(), &options)?.is_none());
+        if self.layout().is_some() { is_plain() } else { Ok(false) }
+    }
+
     /// Opens a volume that can be read slice by slice. Returns `None` for volumes that are read as
     /// a whole.
     pub fn stream(&self, path: &Path) -> Result<Option<VolumeStream>, Failure> {

@@ -18,6 +18,7 @@ mod failure;
 mod figures;
 mod formats;
 mod generate;
+mod given;
 mod gpus;
 mod info;
 mod interrupt;
@@ -42,10 +43,12 @@ mod terminal;
 mod threads;
 mod timing;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use failure::Failure;
+use given::Given;
 use progress::Progress;
 use std::{
+    ffi::OsString,
     io::{ErrorKind, IsTerminal, Write},
     path::Path,
     process::ExitCode,
@@ -113,8 +116,11 @@ enum Task {
 
 fn main() -> ExitCode {
     quiet_drivers();
-    let command = match Command::try_parse() {
-        Ok(command) => command,
+    let parsed = Command::command()
+        .try_get_matches_from(with_task(std::env::args_os().collect()))
+        .and_then(|matches| Ok((Given::of(&matches), Command::from_arg_matches(&matches)?)));
+    let (given, command) = match parsed {
+        Ok(parsed) => parsed,
         Err(answer) => return tell(&answer),
     };
     start_log(&command);
@@ -124,12 +130,12 @@ fn main() -> ExitCode {
     }
     let progress = Progress::new(!command.quiet);
     let result = match command.task {
-        Task::Render(task) => task.run(&progress),
-        Task::Info(task) => task.run(&progress),
+        Task::Render(task) => task.run(&given, &progress),
+        Task::Info(task) => task.run(&given, &progress),
         Task::Convert(task) => task.run(&progress),
         Task::Check(task) => task.run(&progress),
         Task::Compare(task) => task.run(),
-        Task::Bench(task) => task.run(&progress),
+        Task::Bench(task) => task.run(&given, &progress),
         Task::Demo(task) => task.run(&progress),
         Task::Generate(task) => task.run(&progress),
         Task::Figures(task) => task.run(&progress),
@@ -143,6 +149,24 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }
+}
+
+/// Adds `render` if the first argument is a file instead of a task, so that `splatkit FILE` draws
+/// it.
+fn with_task(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    let is_file = |argument: &OsString| {
+        let is_task = argument.to_str().is_some_and(|name| {
+            name == "help"
+                || name.starts_with('-')
+                || Command::command().find_subcommand(name).is_some()
+        });
+        let path = Path::new(argument);
+        !is_task && (path.exists() || path.extension().is_some())
+    };
+    if arguments.get(1).is_some_and(is_file) {
+        arguments.insert(1, "render".into());
+    }
+    arguments
 }
 
 /// Sets `XDG_RUNTIME_DIR`, the folder for a user's sockets, if it is unset, as on servers. Mesa's
@@ -210,12 +234,21 @@ fn start_log(command: &Command) {
 
 #[cfg(test)]
 mod tests {
-    use super::Command;
+    use super::{Command, with_task};
     use clap::CommandFactory;
 
     /// Only clap finds errors such as two groups that share a flag's name, and only in this test.
     #[test]
     fn the_flags_go_together() {
         Command::command().debug_assert();
+    }
+
+    #[test]
+    fn a_file_alone_is_drawn() {
+        let words = |text: &str| text.split(' ').map(Into::into).collect::<Vec<_>>();
+        assert_eq!(with_task(words("splatkit a.ply -q")), words("splatkit render a.ply -q"));
+        for text in ["splatkit", "splatkit render a.ply", "splatkit --version", "splatkit rendr"] {
+            assert_eq!(with_task(words(text)), words(text));
+        }
     }
 }

@@ -127,6 +127,12 @@ pub fn radius_scale(text: &str) -> Result<f32, String> {
     })
 }
 
+/// Degrees from 0 to 180.
+pub fn crease(text: &str) -> Result<f32, String> {
+    let fits = text.parse().ok().filter(|angle: &f32| (0.0..=180.0).contains(angle));
+    fits.ok_or_else(|| "an angle from 0 to 180 degrees is needed".into())
+}
+
 /// A number of neighbours of a sample.
 pub fn neighbours(text: &str) -> Result<usize, String> {
     text.parse()

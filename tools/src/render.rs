@@ -5,6 +5,7 @@ use crate::{
     describe,
     engine::EngineFlags,
     failure::Failure,
+    given::Given,
     output::{self, Target},
     overlay::OverlayFlags,
     parse::{self, Background},
@@ -27,9 +28,10 @@ pub struct Render {
     scene: SceneFlags,
     /// Write the picture to this .png or .jpg file, or to stdout as PNG if it is `-`. Frames of a
     /// turntable are numbered: out.png becomes out_0000.png, and {frame} or {frame:04} in the name
-    /// is replaced by the number.
+    /// is replaced by the number [default: beside the first input: bunny.png for bunny.ply, or
+    /// bunny_2.png if bunny.png exists]
     #[arg(short, long, value_name = "FILE", allow_hyphen_values = true)]
-    output: PathBuf,
+    output: Option<PathBuf>,
     /// Also write the depths to this file: a grey PNG of 16 bits, white for the nearest, black for
     /// nothing.
     #[arg(long, value_name = "FILE.png", conflicts_with = "turntable")]
@@ -113,23 +115,12 @@ struct Drawn {
 }
 
 impl Render {
-    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+    pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
+        let begun = Instant::now();
         let frames = self.turntable.unwrap_or(1);
-        let targets = self.targets(frames)?;
-        self.engine.check()?;
-        let mut loaded = self.scene.load(progress)?;
-        let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
-        files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
-        let settings = self.engine.settings(&loaded, self.samples)?;
-        if !self.camera.is_placed() {
-            progress.stage("Framing the scene");
-            loaded.subject.seen = loaded.scene.seen(&settings.clips)?;
-        }
-        let (stance, origin) = self.camera.stance(&loaded.subject);
-        let up = direction_name(stance.up);
-        if origin == Origin::Guess {
-            progress.note(format_args!("up: {up}, guessed from the shape; --up sets another"));
-        }
+        let output = self.output.clone().unwrap_or_else(|| self.beside());
+        let targets = self.targets(&output, frames)?;
+        let (loaded, settings) = self.prepare(&targets, given, progress)?;
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
@@ -148,8 +139,9 @@ impl Render {
             "drawn"
         );
         if self.json {
+            let (stance, origin) = self.camera.stance(&loaded.subject);
             output::json(&serde_json::json!({
-                "output": self.output.to_string_lossy(),
+                "output": output.to_string_lossy(),
                 "width": self.engine.size[0],
                 "height": self.engine.size[1],
                 "frames": frames,
@@ -166,12 +158,85 @@ impl Render {
                 "upload_ms": upload_ms,
                 "camera": crate::camera::to_json(&camera),
                 "overlay": overlay,
-                "up": up,
+                "up": direction_name(stance.up),
                 "up_from": origin.name(),
                 "settings": describe::settings(&loaded.scene, &settings),
             }))?;
         }
+        self.report(&targets, begun, progress);
         Ok(())
+    }
+
+    /// Loads the scene, and finds what the camera needs.
+    fn prepare(
+        &self,
+        targets: &[Target],
+        given: &Given,
+        progress: &Progress,
+    ) -> Result<(Loaded, Settings), Failure> {
+        self.engine.check()?;
+        let mut loaded = self.scene.load(given, progress)?;
+        let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
+        files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
+        let settings = self.engine.settings(&loaded, self.samples)?;
+        if let Some(warning) = self.engine.idle_light(&loaded.scene) {
+            progress.warn(warning);
+        }
+        progress.stage("Framing the scene");
+        loaded.find_seen(&self.camera, &settings)?;
+        let (stance, origin) = self.camera.stance(&loaded.subject);
+        if origin == Origin::Guess {
+            let up = direction_name(stance.up);
+            progress.note(format_args!("up: {up}, guessed from the shape; --up sets another"));
+        }
+        Ok((loaded, settings))
+    }
+
+    /// Returns the default name of the picture: that of the first input, with a number if there is
+    /// such a file already.
+    fn beside(&self) -> PathBuf {
+        let first = &self.scene.inputs[0];
+        let stem = first.file_stem().unwrap_or("picture".as_ref());
+        let named = |number: u32| {
+            let mut name = stem.to_owned();
+            if number > 1 {
+                name.push(format!("_{number}"));
+            }
+            name.push(".png");
+            first.with_file_name(name)
+        };
+        let is_free = |path: &PathBuf| {
+            let path = if self.turntable.is_some() { numbered(path, 0) } else { Ok(path.clone()) };
+            self.overwrite || path.is_ok_and(|path| path.symlink_metadata().is_err())
+        };
+        (1..).map(named).find(is_free).unwrap_or_else(|| named(1))
+    }
+
+    /// Prints what was written: path, size and time.
+    fn report(&self, targets: &[Target], begun: Instant, progress: &Progress) {
+        let [Some(first), Some(last)] =
+            [targets.first(), targets.last()].map(|target| target.and_then(Target::file))
+        else {
+            return;
+        };
+        let [width, height] = self.engine.size;
+        let seconds = begun.elapsed().as_secs_f64();
+        let bytes: u64 = targets
+            .iter()
+            .filter_map(|target| target.file()?.metadata().ok())
+            .map(|file| file.len())
+            .sum();
+        let size = format!("{width} × {height} pixels, {}", size_of_file(bytes));
+        if targets.len() == 1 {
+            progress.note(format_args!("{}: {size}, {seconds:.1} s", first.display()));
+        } else {
+            progress.note(format_args!(
+                "{} to {}: {} frames of {size} in all, {seconds:.1} s",
+                first.display(),
+                last.display(),
+                targets.len()
+            ));
+        }
     }
 
     /// Draws and writes one frame for each target.
@@ -199,6 +264,10 @@ impl Render {
             times.push(milliseconds(start));
             self.engine.require_content(&picture)?;
             let mut picture = if factor > 1 { picture.reduced(factor)? } else { picture };
+            let view = camera.view([picture.width, picture.height])?;
+            // A line is a pixel wide, and wider in large pictures.
+            let width = (f64::from(picture.height) / 720.0).max(1.0);
+            loaded.edges.iter().for_each(|edges| picture.draw_edges(edges, &view, width));
             progress.stage(format!("Writing {}", target.name()));
             if let Some(overlay) = &overlay {
                 texts = overlay.draw(&mut picture, &camera);
@@ -216,8 +285,8 @@ impl Render {
 
     /// Returns one target per frame. Fails if one of the files exists and may not be replaced, or
     /// if the first file cannot be written.
-    fn targets(&self, frames: u32) -> Result<Vec<Target>, Failure> {
-        let stdout = self.output.as_os_str() == "-";
+    fn targets(&self, output: &Path, frames: u32) -> Result<Vec<Target>, Failure> {
+        let stdout = output.as_os_str() == "-";
         if stdout && self.json {
             return Err(Failure::Usage("--json and a picture cannot both go to stdout".into()));
         }
@@ -235,9 +304,9 @@ impl Render {
             output::check(depth, self.overwrite)?;
         }
         let names: Vec<PathBuf> = match self.turntable {
-            None => vec![self.output.clone()],
+            None => vec![output.to_owned()],
             Some(_) => {
-                (0..frames).map(|frame| numbered(&self.output, frame)).collect::<Result<_, _>>()?
+                (0..frames).map(|frame| numbered(output, frame)).collect::<Result<_, _>>()?
             }
         };
         if let Some(depth) =
@@ -266,6 +335,15 @@ fn is_same(a: &Path, b: &Path) -> bool {
         folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
     };
     a.file_name() == b.file_name() && folder(a) == folder(b)
+}
+
+/// Returns a number of bytes as people read it.
+fn size_of_file(bytes: u64) -> String {
+    match bytes as f64 {
+        bytes if bytes < 1e3 => format!("{bytes} bytes"),
+        bytes if bytes < 1e6 => format!("{:.0} kB", bytes / 1e3),
+        bytes => format!("{:.1} MB", bytes / 1e6),
+    }
 }
 
 /// Returns the milliseconds since an instant.

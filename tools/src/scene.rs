@@ -1,9 +1,10 @@
 //! The flags of a scene, and loading the scene that they describe.
 
 use crate::{
-    camera::{Origin, Subject, direction_name},
+    camera::{CameraFlags, Origin, Subject, direction_name},
     color::titled,
     failure::{Failure, in_file},
+    given::{Given, Kinds, kinds_of},
     load::{Input, LoadFlags},
     overlay::Facts,
     progress::Progress,
@@ -18,8 +19,9 @@ use splatkit::{
     hierarchy::Hierarchy,
     math::Bounds,
     memory,
+    picture::Edges,
     scattered::Points,
-    scene::Scene,
+    scene::{Scene, Settings},
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
 };
@@ -52,6 +54,10 @@ pub struct Loaded {
     pub load_ms: f64,
     /// What the inputs say for the texts over a picture.
     pub facts: Facts,
+    /// The edges to be drawn over the picture.
+    pub edges: Vec<Edges>,
+    /// What each input is.
+    pub kinds: Vec<Kinds>,
     /// The files that were read: the inputs, the files that they refer to, and the files that flags
     /// name.
     pub read: Vec<PathBuf>,
@@ -59,7 +65,7 @@ pub struct Loaded {
 
 impl SceneFlags {
     /// Reads the inputs and makes a scene of them.
-    pub fn load(&self, progress: &Progress) -> Result<Loaded, Failure> {
+    pub fn load(&self, given: &Given, progress: &Progress) -> Result<Loaded, Failure> {
         let start = Instant::now();
         let show = self.show.open(&self.load.limits())?;
         let loaded = Loaded {
@@ -68,6 +74,8 @@ impl SceneFlags {
             count: 0,
             load_ms: 0.0,
             facts: Facts::default(),
+            edges: Vec::new(),
+            kinds: Vec::new(),
             read: self.show.files(),
         };
         let mut adding = Adding { flags: self, show, progress, loaded };
@@ -84,6 +92,7 @@ impl SceneFlags {
                 Input::Hierarchy(_) => unscaled = Some(path),
                 _ => {}
             }
+            adding.loaded.kinds.push(kinds_of(&input, self.load.is_raw(path)?));
             adding.add(path, input, deadline)?;
         }
         let mut loaded = adding.loaded;
@@ -100,6 +109,9 @@ impl SceneFlags {
         if is_one_place(&loaded.subject.bounds) {
             loaded.subject.bounds = loaded.scene.bounds();
         }
+        let paths = self.inputs.iter().map(PathBuf::as_path);
+        let inputs: Vec<_> = paths.zip(loaded.kinds.iter().copied()).collect();
+        given.warn(&inputs, progress);
         loaded.load_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(loaded)
     }
@@ -173,7 +185,14 @@ impl Adding<'_> {
         let mut options = SurfelOptions { deadline, ..SurfelOptions::default() };
         options.radius_scale *= self.flags.show.radius_scale.unwrap_or(1.0);
         options.color_by_normal = color.by_normal();
+        if let Some(crease) = self.flags.show.crease {
+            // Facets of one plane still join.
+            options.crease_angle_degrees = crease.max(0.01);
+        }
         let splats = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
+        if self.flags.show.edges && !mesh.triangles.is_empty() {
+            self.loaded.edges.push(Edges::of(&mesh));
+        }
         let bounds = mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
         self.loaded.count_in(bounds, splats.splats.len());
         self.change(|scene| scene.with_splats(splats));
@@ -299,6 +318,14 @@ impl Adding<'_> {
 }
 
 impl Loaded {
+    /// Finds the points that span what is seen, if the camera is fitted to them.
+    pub fn find_seen(&mut self, camera: &CameraFlags, settings: &Settings) -> splatkit::Result<()> {
+        if !camera.is_placed() {
+            self.subject.seen = self.scene.seen(&settings.clips)?;
+        }
+        Ok(())
+    }
+
     /// Adds the bounds and the number of splats or samples of an input.
     fn count_in(&mut self, bounds: Bounds, count: usize) {
         self.subject.bounds = self.subject.bounds.union(bounds);

@@ -27,8 +27,8 @@ pub struct ShowFlags {
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     opacity_unit: Option<f64>,
     /// Draw isosurfaces of these values, each as VALUE, VALUE:COLOR, VALUE:OPACITY or
-    /// VALUE:COLOR:OPACITY. A colour is a name, #rgb or #rrggbb. Without --transfer, nothing else
-    /// of the volume is drawn [default: opaque, in the transfer function's colour of the value]
+    /// VALUE:COLOR:OPACITY. 50% is the middle of the range of values. A colour is a name, #rgb or
+    /// #rrggbb. Without --transfer, nothing else of the volume is drawn [default: opaque, in the transfer function's colour of the value]
     #[arg(
         long,
         value_name = "VALUE,…",
@@ -45,6 +45,13 @@ pub struct ShowFlags {
     /// they were converted with.
     #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
     pub radius_scale: Option<f32>,
+    /// Meshes: split the normals where two triangles meet at more than this angle, so that the crease
+    /// looks sharp. 0 draws flat facets; from 60 on, creases are split at 60 degrees [default: 60]
+    #[arg(long, value_name = "DEGREES", value_parser = parse::crease)]
+    pub crease: Option<f32>,
+    /// Meshes: draw the edges of the triangles as thin dark lines.
+    #[arg(long)]
+    pub edges: bool,
     #[command(flatten)]
     pub color: ColorFlags,
     #[command(flatten)]
@@ -54,9 +61,17 @@ pub struct ShowFlags {
 /// An isosurface. Without a colour, it has the transfer function's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Surface {
-    value: f64,
+    /// A value, or its share of the range of values.
+    value: Value,
     color: Option<[f64; 3]>,
     opacity: f64,
+}
+
+/// The value of an isosurface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Value {
+    Own(f64),
+    Share(f64),
 }
 
 /// [`TransferFunction::gradient`].
@@ -176,7 +191,7 @@ impl Show<'_> {
         if let Some(Factors(factors)) = &self.flags.gradient_opacity {
             transfer.gradient.clone_from(factors);
         }
-        self.add_surfaces(&mut transfer);
+        self.add_surfaces(&mut transfer, values);
         if !transfer.visible(values) {
             let [low, high] = values;
             let shown = match transfer.shown_range() {
@@ -198,11 +213,15 @@ impl Show<'_> {
         Ok(transfer)
     }
 
-    fn add_surfaces(&self, transfer: &mut TransferFunction) {
+    fn add_surfaces(&self, transfer: &mut TransferFunction, [low, high]: [f64; 2]) {
         if self.flags.iso.is_empty() {
             return;
         }
         for &Surface { value, color, opacity } in &self.flags.iso {
+            let value = match value {
+                Value::Own(value) => value,
+                Value::Share(share) => low + share * (high - low),
+            };
             let color = color.unwrap_or_else(|| transfer.color(value));
             transfer.isosurfaces.push(Isosurface { value, color, opacity });
         }
@@ -213,12 +232,20 @@ impl Show<'_> {
 }
 
 impl Surface {
-    /// `80`, `80:orange`, `80:0.5` or `80:#ff8800:0.5`.
+    /// `80`, `50%`, `80:orange`, `80:0.5` or `80:#ff8800:0.5`.
     fn parse(text: &str) -> Result<Self, String> {
         let form = "the form is VALUE, VALUE:COLOR, VALUE:OPACITY or VALUE:COLOR:OPACITY, such \
                     as 400:orange:0.5";
         let mut parts = text.split(':').peekable();
-        let value = parse::finite(parts.next().unwrap_or_default().trim()).map_err(|_| form)?;
+        let text = parts.next().unwrap_or_default().trim();
+        let number = |text: &str| parse::finite(text).map_err(|_| form);
+        let value = match text.strip_suffix('%') {
+            None => Value::Own(number(text)?),
+            Some(share) => Value::Share(number(share)? / 100.0),
+        };
+        if matches!(value, Value::Share(share) if !(0.0..=1.0).contains(&share)) {
+            return Err("a share of the range of values lies between 0% and 100%".into());
+        }
         // A number is an opacity, although its digits may look like a colour.
         let is_color = |part: &&str| !part.is_empty() && parse::finite(part).is_err();
         let color = match parts.next_if(is_color) {
@@ -259,19 +286,27 @@ mod tests {
     #[test]
     fn surfaces_are_read() {
         let surface = |text| Surface::parse(text);
-        assert_eq!(surface("-500"), Ok(Surface { value: -500.0, color: None, opacity: 1.0 }));
-        assert_eq!(surface("0.5:0.25"), Ok(Surface { value: 0.5, color: None, opacity: 0.25 }));
+        assert_eq!(
+            surface("-500"),
+            Ok(Surface { value: Value::Own(-500.0), color: None, opacity: 1.0 })
+        );
+        assert_eq!(
+            surface("0.5:0.25"),
+            Ok(Surface { value: Value::Own(0.5), color: None, opacity: 0.25 })
+        );
         assert_eq!(
             surface("80:#ff0000"),
-            Ok(Surface { value: 80.0, color: Some([1.0, 0.0, 0.0]), opacity: 1.0 })
+            Ok(Surface { value: Value::Own(80.0), color: Some([1.0, 0.0, 0.0]), opacity: 1.0 })
         );
         assert_eq!(
             surface("80:#00ff00:0.5"),
-            Ok(Surface { value: 80.0, color: Some([0.0, 1.0, 0.0]), opacity: 0.5 })
+            Ok(Surface { value: Value::Own(80.0), color: Some([0.0, 1.0, 0.0]), opacity: 0.5 })
         );
         for text in ["80:lime:0.5", "80:0f0:0.5"] {
             assert_eq!(surface(text), surface("80:#00ff00:0.5"), "{text}");
         }
+        assert_eq!(surface("50%:0.5").map(|surface| surface.value), Ok(Value::Share(0.5)));
+        assert!(surface("150%").unwrap_err().contains("between 0% and 100%"));
         for bad in [
             "",
             "x",

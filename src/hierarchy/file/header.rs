@@ -194,8 +194,8 @@ fn turned_by(turn: [f32; 4]) -> Option<Result<Stance, &'static str>> {
         return None;
     }
     let turn = DQuat::from_array(turn.map(f64::from));
-    // NaN is refused too.
-    if !((turn.length() - 1.0).abs() < 1e-3) {
+    // The length of a NaN lies in no range.
+    if !(0.999..1.001).contains(&turn.length()) {
         return Some(Err("its rotation to the up axis does not have unit length"));
     }
     // Rounding to 32 bits moves the axes a little.

@@ -1,0 +1,225 @@
+//! Flags that have no effect on the inputs: a table of what each flag needs, and the warnings.
+
+use crate::{load::Input, progress::Progress};
+use clap::{ArgMatches, parser::ValueSource};
+use std::{collections::BTreeSet, path::Path};
+
+/// The flags that the user has given, by their names without dashes.
+#[derive(Debug, Clone, Default)]
+pub struct Given(BTreeSet<String>);
+
+/// What inputs are, and how a picture of them is drawn: a bit for each.
+pub type Kinds = u32;
+
+/// Triangles.
+pub const MESH: Kinds = 1;
+/// Points without triangles.
+pub const CLOUD: Kinds = 1 << 1;
+pub const HIERARCHY: Kinds = 1 << 2;
+/// Samples on a lattice.
+pub const VOLUME: Kinds = 1 << 3;
+pub const BRICKS: Kinds = 1 << 4;
+/// Samples at any places.
+pub const SAMPLES: Kinds = 1 << 5;
+/// A volume whose layout the flags give.
+pub const RAW: Kinds = 1 << 6;
+/// Cells of a mesh of volumes.
+pub const CELLS: Kinds = 1 << 7;
+
+/// All that have values which a transfer function shows.
+const FIELD: Kinds = VOLUME | BRICKS | SAMPLES | CELLS;
+const LATTICE: Kinds = VOLUME | BRICKS;
+
+/// What each flag is for. Flags that are for everything are not listed.
+const NEEDS: &[(&str, Kinds)] = &[
+    ("dims", RAW),
+    ("type", RAW),
+    ("spacing", RAW),
+    ("endian", RAW),
+    ("header", RAW),
+    ("scalar", MESH | CLOUD | VOLUME | SAMPLES | CELLS),
+    ("time", VOLUME | CELLS),
+    ("series", VOLUME),
+    ("dataset", VOLUME | CELLS),
+    ("missing", VOLUME | SAMPLES | CELLS),
+    ("radius", SAMPLES),
+    ("neighbours", SAMPLES),
+    ("no-slopes", SAMPLES),
+    ("transfer", FIELD),
+    ("opacity-unit", FIELD),
+    ("iso", FIELD),
+    ("gradient-opacity", FIELD),
+    ("kernel", LATTICE),
+    ("sigma", LATTICE),
+    ("extent", LATTICE),
+    ("sharp", LATTICE),
+    ("radius-scale", MESH | CLOUD),
+    ("crease", MESH),
+    ("edges", MESH),
+    ("gradient", FIELD),
+    ("evaluate", LATTICE),
+    ("shade", FIELD),
+    ("cut", HIERARCHY | BRICKS),
+    ("budget", HIERARCHY | BRICKS),
+    ("frame-time", HIERARCHY | BRICKS),
+    ("memory", HIERARCHY | BRICKS),
+    ("cull-backfaces", HIERARCHY),
+    ("classify", FIELD),
+    ("optics", FIELD),
+    ("mip", FIELD),
+    ("x-ray", FIELD),
+];
+
+/// The names of kinds, for messages.
+const NAMES: [(Kinds, &str, &str); 8] = [
+    (MESH, "meshes", "a mesh"),
+    (CLOUD, "point clouds", "a point cloud"),
+    (HIERARCHY, "hierarchies", "a hierarchy"),
+    (VOLUME, "volumes", "a volume"),
+    (BRICKS, "volumes in bricks", "a volume in bricks"),
+    (SAMPLES, "scattered samples", "a set of samples"),
+    (CELLS, "cells", "a set of cells"),
+    (RAW, "raw volumes", "a raw volume"),
+];
+
+/// Pairs of flags of which the first has no effect if the second is given, and why.
+const IDLE: &[(&str, &str, &str)] = &[
+    ("up", "view-up", "with --camera-position, --view-up says what is up in the picture"),
+    ("view-angle", "orthographic", "there is no perspective"),
+    ("gpu-timeout", "reference", "the reference draws on the processor"),
+    ("gpu-memory", "reference", "the reference draws on the processor"),
+    ("pass-entries", "reference", "the reference has no depth passes"),
+    ("no-occlusion", "reference", "the reference draws all parts in any case"),
+    ("evaluate", "reference", "the reference has its own sums"),
+    ("frame-time", "reference", "the reference takes as long as it takes"),
+    ("memory", "reference", "the reference keeps everything in memory"),
+];
+
+impl Given {
+    /// Takes the flags on the command line from what clap found there.
+    pub fn of(matches: &ArgMatches) -> Self {
+        let own = matches.subcommand().map_or(matches, |(_, own)| own);
+        let is_given = |id: &&str| own.value_source(id) == Some(ValueSource::CommandLine);
+        // Names of fields have underscores; one differs from its flag.
+        let name = |id: &str| match id {
+            "sample_type" => "type".to_owned(),
+            id => id.replace('_', "-"),
+        };
+        Self(own.ids().map(clap::Id::as_str).filter(is_given).map(name).collect())
+    }
+
+    pub fn has(&self, flag: &str) -> bool {
+        self.0.contains(flag)
+    }
+
+    /// Returns a warning for each given flag that has no effect on inputs of these kinds.
+    pub fn idle(&self, inputs: &[(&Path, Kinds)]) -> Vec<String> {
+        let all = inputs.iter().fold(0, |all, (_, kinds)| all | kinds);
+        let needless = NEEDS.iter().filter(|(flag, needs)| self.has(flag) && all & needs == 0);
+        let mut warnings: Vec<String> = needless
+            .map(|(flag, needs)| {
+                let (path, kinds) = inputs[0];
+                let found = match inputs.len() {
+                    1 => format!("{} is {}", path.display(), one_of(kinds)),
+                    _ => "no input is one".to_owned(),
+                };
+                format!("--{flag} has no effect: it is for {}, but {found}", plural_of(*needs))
+            })
+            .collect();
+        for (flag, other, why) in IDLE {
+            let is_placed = self.has("camera-position") || self.has("distance");
+            let counts = match *flag {
+                "up" => self.has("camera-position"),
+                // At a given distance, the angle sets the height of the picture.
+                "view-angle" => !is_placed,
+                _ => true,
+            };
+            if counts && self.has(flag) && self.has(other) {
+                warnings.push(format!("--{flag} has no effect: {why}"));
+            }
+        }
+        warnings
+    }
+
+    /// Prints the warnings for a file that is read and not drawn.
+    pub fn warn_of_file(&self, path: &Path, kinds: Kinds, progress: &Progress) {
+        for flag in ["radius", "neighbours", "no-slopes"].iter().filter(|flag| self.has(flag)) {
+            progress.warn(format_args!(
+                "--{flag} has no effect: it is for pictures of scattered samples"
+            ));
+        }
+        let drawn = ["radius", "neighbours", "no-slopes"];
+        let rest = Self(self.0.iter().filter(|flag| !drawn.contains(&&***flag)).cloned().collect());
+        rest.warn(&[(path, kinds)], progress);
+    }
+
+    /// Prints these warnings.
+    pub fn warn(&self, inputs: &[(&Path, Kinds)], progress: &Progress) {
+        self.idle(inputs).into_iter().for_each(|warning| progress.warn(warning));
+    }
+}
+
+/// Returns what an input is. `is_raw`: the flags give its layout.
+pub fn kinds_of(input: &Input, is_raw: bool) -> Kinds {
+    match input {
+        Input::Mesh(mesh) if mesh.triangles.is_empty() => CLOUD,
+        Input::Mesh(_) => MESH,
+        Input::Volume(_) if is_raw => VOLUME | RAW,
+        Input::Volume(_) => VOLUME,
+        Input::Samples(_) => SAMPLES,
+        Input::Hierarchy(_) => HIERARCHY,
+        Input::Bricks(_) => BRICKS,
+        Input::Cells(_) => CELLS,
+    }
+}
+
+fn one_of(kinds: Kinds) -> &'static str {
+    NAMES.iter().find(|(kind, ..)| kinds & kind != 0).map_or("something else", |(.., one)| one)
+}
+
+fn plural_of(kinds: Kinds) -> String {
+    let names: Vec<&str> =
+        NAMES.iter().filter(|(kind, ..)| kinds & kind != 0).map(|(_, many, _)| *many).collect();
+    match &names[..] {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn given(flags: &[&str]) -> Given {
+        Given(flags.iter().map(|flag| (*flag).to_owned()).collect())
+    }
+
+    #[test]
+    fn idle_flags_are_named() {
+        let mesh = (Path::new("a.ply"), MESH);
+        let volume = (Path::new("b.nrrd"), VOLUME);
+        let found = given(&["sigma", "size", "crease"]).idle(&[mesh]);
+        assert_eq!(
+            found,
+            ["--sigma has no effect: it is for volumes and volumes in bricks, but a.ply is a mesh"]
+        );
+        assert!(given(&["sigma", "crease"]).idle(&[mesh, volume]).is_empty());
+        let found = given(&["radius"]).idle(&[mesh, volume]);
+        assert_eq!(
+            found,
+            ["--radius has no effect: it is for scattered samples, but no input is one"]
+        );
+        assert_eq!(given(&["dims", "type"]).idle(&[volume]).len(), 2);
+        assert!(given(&["dims", "type"]).idle(&[(volume.0, VOLUME | RAW)]).is_empty());
+    }
+
+    #[test]
+    fn flags_that_others_replace_are_named() {
+        let mesh = [(Path::new("a.ply"), MESH)];
+        assert_eq!(given(&["up", "view-up", "camera-position"]).idle(&mesh).len(), 1);
+        assert!(given(&["up", "view-up"]).idle(&mesh).is_empty());
+        assert_eq!(given(&["view-angle", "orthographic"]).idle(&mesh).len(), 1);
+        assert!(given(&["view-angle", "orthographic", "distance"]).idle(&mesh).is_empty());
+    }
+}
