@@ -1,6 +1,6 @@
 //! What a row of the table of formats says, and how the row of a file is found.
 
-use super::{Array, Kind, RawLayout, ReadOptions, form::Form, shared::plain::Plain};
+use super::{Array, Kind, RawLayout, ReadOptions, Series, form::Form, shared::plain::Plain};
 use crate::{
     Result, cells::Cells, input::Source, scattered::Points, surface::Mesh, volume::Volume,
 };
@@ -22,6 +22,9 @@ pub struct Format {
     /// The cargo feature that brings the reader; `None` if every build has it.
     pub feature: Option<&'static str>,
     pub(super) magic: Magic,
+    /// Whether the files of a folder are together one input of this format. `None` if they never
+    /// are.
+    pub(super) folder: Option<fn(&Source) -> Result<bool>>,
     pub(super) kind: Which,
     pub(super) mesh: Option<fn(&Source, &ReadOptions) -> Result<Mesh>>,
     pub(super) volume: Option<VolumeReader>,
@@ -29,6 +32,7 @@ pub struct Format {
     pub(super) cells: Option<fn(&Source, &ReadOptions) -> Result<Cells>>,
     pub(super) pieces: InPieces,
     pub(super) arrays: Option<ListArrays>,
+    pub(super) series: Option<fn(&Source, &ReadOptions) -> Result<Vec<Series>>>,
 }
 
 /// Reads scattered samples.
@@ -128,6 +132,7 @@ impl Format {
         refers: false,
         feature: None,
         magic: Magic::None,
+        folder: None,
         kind: Which::Always(Kind::Mesh),
         mesh: None,
         volume: None,
@@ -135,6 +140,7 @@ impl Format {
         cells: None,
         pieces: InPieces::No,
         arrays: None,
+        series: None,
     };
 
     /// Returns the format that the extension of a path names.
@@ -163,9 +169,16 @@ impl Format {
         self.feature.is_some() && !is_read
     }
 
+    /// Returns whether a path ends with one of the extensions, which may have two parts
+    /// (`nii.gz`). A name that is nothing but an extension has none.
     fn is_for(&self, path: &Path) -> bool {
-        let named = path.extension();
-        named.is_some_and(|named| self.extensions.iter().any(|own| named.eq_ignore_ascii_case(own)))
+        let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase());
+        let ends = |name: &str, own: &str| {
+            name.strip_suffix(own)
+                .and_then(|rest| rest.strip_suffix('.'))
+                .is_some_and(|rest| !rest.is_empty())
+        };
+        name.is_some_and(|name| self.extensions.iter().any(|own| ends(&name, own)))
     }
 }
 
@@ -275,6 +288,9 @@ pub(super) fn find<'a>(
     may: impl Fn(&Format) -> bool,
 ) -> Result<Option<&'a Format>> {
     let may = |format: &Format| format.is_left_out() || may(format);
+    if source.folder().is_some() {
+        return by_folder(table, source, may);
+    }
     let found = by_extension(table, source.path, may);
     unless_left_out(found.or_else(|| by_magic(table, source.bytes(), may)), source)
 }
@@ -290,11 +306,28 @@ pub(super) fn find_volume<'a>(
     is_described: bool,
 ) -> Result<Option<&'a Format>> {
     let may = |format: &Format| format.is_left_out() || format.volume.is_some();
+    if source.folder().is_some() {
+        return by_folder(table, source, may);
+    }
     let needs_layout = |format: &&Format| matches!(format.volume, Some(VolumeReader::Described(_)));
     let found = by_extension(table, source.path, may)
         .or_else(|| table.iter().find(needs_layout).filter(|_| is_described))
         .or_else(|| by_magic(table, source.bytes(), may));
     unless_left_out(found, source)
+}
+
+/// Returns the format that the files of a folder have together, among those that `may` be read.
+fn by_folder<'a>(
+    table: &'a [Format],
+    source: &Source,
+    may: impl Fn(&Format) -> bool,
+) -> Result<Option<&'a Format>> {
+    for format in table.iter().filter(|format| may(format)) {
+        if format.folder.map_or(Ok(false), |holds| holds(source))? {
+            return unless_left_out(Some(format), source);
+        }
+    }
+    Ok(None)
 }
 
 /// Returns what was found, unless this build leaves it out.
@@ -494,6 +527,6 @@ mod tests {
         let message = with("a.raw", b"", |source| {
             told(volume_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
         });
-        assert!(message.contains("(VTR, VTI, VTK or NRRD)"), "{message}");
+        assert!(message.contains("(VTR, VTI, VTK, NRRD, NIfTI or DICOM)"), "{message}");
     }
 }

@@ -52,7 +52,7 @@ impl Kind {
         limits: &Limits,
         options: &ReadOptions,
     ) -> Result<Option<Self>> {
-        Self::of_source(&Source::open(path.as_ref(), limits)?, options)
+        Self::of_source(&Source::open_any(path.as_ref(), limits)?, options)
     }
 
     /// As [`of`](Self::of), but reads from an open source, which may be in memory

@@ -21,7 +21,7 @@ use std::path::Path;
 /// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file that is in no
 /// format of meshes or point clouds.
 pub fn load_mesh(path: impl AsRef<Path>, limits: &Limits, options: &ReadOptions) -> Result<Mesh> {
-    read_mesh(&Source::open(path.as_ref(), limits)?, options)
+    read_mesh(&Source::open_any(path.as_ref(), limits)?, options)
 }
 
 /// As [`load_mesh`], but reads from an open source, which may be in memory
@@ -59,7 +59,7 @@ pub fn load_volume(
     limits: &Limits,
     options: &ReadOptions,
 ) -> Result<Volume> {
-    read_volume(&Source::open(path.as_ref(), limits)?, options)
+    read_volume(&Source::open_any(path.as_ref(), limits)?, options)
 }
 
 /// As [`load_volume`], but reads from an open source, which may be in memory
@@ -105,7 +105,7 @@ pub fn load_samples(
     limits: &Limits,
     options: &ReadOptions,
 ) -> Result<Points> {
-    read_samples(&Source::open(path.as_ref(), limits)?, options)
+    read_samples(&Source::open_any(path.as_ref(), limits)?, options)
 }
 
 /// As [`load_samples`], but reads from an open source, which may be in memory

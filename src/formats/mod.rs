@@ -10,6 +10,8 @@
 
 mod array;
 pub mod csv;
+#[cfg(feature = "dicom")]
+pub mod dicom;
 #[cfg(feature = "e57")]
 pub mod e57;
 mod form;
@@ -20,6 +22,7 @@ mod kind;
 #[cfg(feature = "las")]
 pub mod las;
 mod load;
+pub mod nifti;
 pub mod npy;
 pub mod nrrd;
 #[cfg(feature = "obj")]
@@ -29,6 +32,7 @@ pub mod pcd;
 #[cfg(feature = "ply")]
 pub mod ply;
 pub mod raw;
+mod series;
 mod shared;
 pub mod stl;
 mod stream;
@@ -63,6 +67,7 @@ pub use load::{
 };
 pub use options::ReadOptions;
 pub use raw::RawLayout;
+pub use series::{Series, series};
 pub use shared::sample_type::{Endian, SampleType};
 pub(crate) use shared::texture::decode as decode_picture;
 pub use stream::Stream;

@@ -5,6 +5,8 @@
 //! much code or a crate of its own, it belongs to a cargo feature. Without the feature the row has
 //! no readers. It is still found, so that the error can name the feature.
 
+#[cfg(feature = "dicom")]
+use super::dicom;
 #[cfg(feature = "e57")]
 use super::e57;
 #[cfg(feature = "gltf")]
@@ -18,7 +20,7 @@ use super::ply;
 use super::{
     Kind, csv,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
-    npy, nrrd, pcd, raw, stl, xyz,
+    nifti, npy, nrrd, pcd, raw, stl, xyz,
 };
 #[cfg(feature = "vtk")]
 use super::{vti, vtk, vtr, vtu};
@@ -214,6 +216,35 @@ pub static FORMATS: &[Format] = &[
         kind: Which::Always(Kind::Volume),
         volume: Some(VolumeReader::Plain(nrrd::read)),
         pieces: InPieces::Volume { of: "files of raw encoding", find: nrrd::plain },
+        ..Format::ROW
+    },
+    Format {
+        name: "NIfTI",
+        extensions: &["nii", "nii.gz", "hdr", "hdr.gz", "img", "img.gz"],
+        holds: &[all(Content::Volume)],
+        refers: true,
+        magic: Magic::Rule(nifti::is_nifti),
+        kind: Which::Always(Kind::Volume),
+        volume: Some(VolumeReader::Plain(nifti::read)),
+        ..Format::ROW
+    },
+    Format {
+        name: "DICOM",
+        extensions: &["dcm", "dicom", "ima"],
+        holds: &[all(Content::Volume)],
+        refers: true,
+        feature: Some("dicom"),
+        #[cfg(feature = "dicom")]
+        magic: Magic::Rule(dicom::is_dicom),
+        #[cfg(not(feature = "dicom"))]
+        magic: Magic::Rule(|bytes| bytes.get(128..132) == Some(b"DICM")),
+        #[cfg(feature = "dicom")]
+        folder: Some(dicom::is_folder),
+        kind: Which::Always(Kind::Volume),
+        #[cfg(feature = "dicom")]
+        volume: Some(VolumeReader::Plain(dicom::read)),
+        #[cfg(feature = "dicom")]
+        series: Some(dicom::series),
         ..Format::ROW
     },
     Format {

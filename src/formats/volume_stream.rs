@@ -41,7 +41,7 @@ impl VolumeStream {
         raw: Option<&RawLayout>,
     ) -> Result<Option<Self>> {
         let path = path.as_ref();
-        let source = Source::open(path, limits)?;
+        let source = Source::open_any(path, limits)?;
         let format = find_volume(FORMATS, &source, raw.is_some())?;
         let plain = match (format.map(|format| format.pieces), raw) {
             (Some(InPieces::Volume { find, .. }), _) => find(&source)?,

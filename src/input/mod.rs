@@ -1,6 +1,6 @@
 //! What guards every input: how a file is opened, mapped and bounded.
 //!
-//! A [`Source`] is an open file, or bytes in memory. It checks each request against the [`Limits`]
+//! A [`Source`] is an open file, the files of a folder, or bytes in memory. It checks each request against the [`Limits`]
 //! and notices when the file changes while it is read. Readers of single formats are in
 //! [`formats`](crate::formats).
 
@@ -8,6 +8,7 @@
 
 mod budget;
 pub(crate) mod copy;
+mod folder;
 pub(crate) mod growing;
 pub(crate) mod isolate;
 mod limits;

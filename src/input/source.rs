@@ -21,6 +21,8 @@ enum Content<'a> {
     Mapped(Mapping),
     /// Bytes from the caller, instead of a file.
     Held(&'a [u8]),
+    /// The files of a folder.
+    Listed(Vec<PathBuf>),
 }
 
 /// An opened input: its path, its bytes (mapped) and the limits that apply to it.
@@ -60,6 +62,29 @@ impl<'a> Source<'a> {
         Ok(Self { path, limits, content, text: OnceLock::new(), budget })
     }
 
+    /// Creates the source of a folder with these files.
+    pub(super) fn of_folder(path: &'a Path, limits: &'a Limits, files: Vec<PathBuf>) -> Self {
+        let (content, budget) = (Content::Listed(files), Arc::new(Budget::new()));
+        Self { path, limits, content, text: OnceLock::new(), budget }
+    }
+
+    /// Creates the source of another file that is mapped already. Both share one budget.
+    pub(super) fn beside<'b>(&self, path: &'b Path, mapping: Mapping) -> Source<'b>
+    where
+        'a: 'b,
+    {
+        let (content, budget) = (Content::Mapped(mapping), self.budget.clone());
+        Source { path, limits: self.limits, content, text: OnceLock::new(), budget }
+    }
+
+    /// Returns the files of a folder, ordered by their paths; `None` for a file or bytes in memory.
+    pub fn folder(&self) -> Option<&[PathBuf]> {
+        match &self.content {
+            Content::Listed(files) => Some(files),
+            Content::Mapped(_) | Content::Held(_) => None,
+        }
+    }
+
     /// Maps a file as [`open`](Self::open) does, for callers that read from it later.
     pub(crate) fn map(path: &Path, limits: &Limits) -> Result<Mapping> {
         map_within(path, limits, &Budget::new())
@@ -94,11 +119,12 @@ impl<'a> Source<'a> {
         matches!(self.content, Content::Held(_))
     }
 
-    /// Returns all bytes of the file.
+    /// Returns all bytes of the file; none for a folder.
     pub fn bytes(&self) -> &[u8] {
         match &self.content {
             Content::Mapped(mapping) => mapping,
             Content::Held(bytes) => bytes,
+            Content::Listed(_) => &[],
         }
     }
 
@@ -111,7 +137,7 @@ impl<'a> Source<'a> {
     pub fn intact(&self) -> Result<()> {
         match &self.content {
             Content::Mapped(mapping) => intact(mapping, self.path),
-            Content::Held(_) => Ok(()),
+            Content::Held(_) | Content::Listed(_) => Ok(()),
         }
     }
 
@@ -155,11 +181,12 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Returns the mapping, for callers that read from it later; `None` for bytes from the caller.
+    /// Returns the mapping, for callers that read from it later; `None` for bytes from the caller
+    /// and for folders.
     pub(crate) fn into_mapping(self) -> Option<Mapping> {
         match self.content {
             Content::Mapped(mapping) => Some(mapping),
-            Content::Held(_) => None,
+            Content::Held(_) | Content::Listed(_) => None,
         }
     }
 

@@ -1,9 +1,11 @@
 //! Small valid files of every format, and a summary in words of what reading each returns.
 
 pub mod crafted;
+pub mod medical;
 
 use crate::testing::folder::Folder;
 use glam::Vec3;
+use medical::{dicom, nifti};
 use splatkit::{
     Error, Result, bricks,
     formats::{self, Endian, Kind, RawLayout, ReadOptions, SampleType},
@@ -476,6 +478,9 @@ fn formats_of_volumes() -> Vec<Format> {
             nrrd("2 2 1", "encoding: raw\ndata file: beside.raw", b""),
             but_for_spaces,
         ),
+        ("a.nii", nifti(|_| {}), never),
+        ("a.nii.gz", gzip(&nifti(|_| {})), never),
+        ("a.dcm", dicom(".1", &[1, 2, 3, 4]), never),
         ("a.raw", raw.clone(), never),
         ("a.gz", gzip(&raw), never),
     ]

@@ -49,6 +49,9 @@ pub const FORMATS: &[(&str, Look)] = &[
     ("csv", csv),
     ("npy", npy),
     ("nrrd", nrrd),
+    ("nifti", nifti),
+    ("dicom", dicom),
+    ("dicom_folder", dicom_folder),
     ("vti", vti),
     ("vtr", vtr),
     ("vtu", vtu),
@@ -327,6 +330,50 @@ pub fn nrrd(bytes: &[u8]) {
             whole.about.holes > 0 || samples.bytes() == whole.samples.bytes(),
             "the slices have other samples"
         );
+    }
+}
+
+/// A NIfTI file, or a pair: a line `#img` separates the header from the samples.
+pub fn nifti(bytes: &[u8]) {
+    let at = |time| ReadOptions { time, scalar: time.map(|_| ":1".into()), ..Default::default() };
+    let Some((header, image)) = cut(bytes, b"\n#img\n") else {
+        for options in [at(None), at(Some(1))] {
+            let volume = read("input.nii", bytes, |source| formats::nifti::read(source, &options));
+            volume.iter().for_each(sound_volume);
+        }
+        return;
+    };
+    let folder = Folder::new();
+    folder.write("input.img", image);
+    let path = folder.write("input.hdr", header);
+    let volume = accepted(formats::load_volume(&path, &limits(), &ReadOptions::default()));
+    volume.iter().for_each(sound_volume);
+}
+
+/// A DICOM file.
+pub fn dicom(bytes: &[u8]) {
+    for time in [None, Some(1)] {
+        let options = ReadOptions { time, ..ReadOptions::default() };
+        let volume = read("input.dcm", bytes, |source| formats::dicom::read(source, &options));
+        volume.iter().for_each(sound_volume);
+    }
+}
+
+/// A folder of DICOM files, which lines `#file` separate. The first may be a DICOMDIR.
+pub fn dicom_folder(bytes: &[u8]) {
+    let (folder, limits) = (Folder::new(), limits());
+    let (mut rest, mut number) = (bytes, 0);
+    while let Some((file, behind)) = cut(rest, b"\n#file\n").filter(|_| number < 16) {
+        folder.write(&number.to_string(), file);
+        (rest, number) = (behind, number + 1);
+    }
+    folder.write(&number.to_string(), rest);
+    let first = folder.path("0");
+    for path in [folder.as_ref(), &first] {
+        let Some(source) = accepted(Source::open_any(path, &limits)) else { continue };
+        accepted(formats::series(&source, &ReadOptions::default()));
+        let volume = accepted(formats::read_volume(&source, &ReadOptions::default()));
+        volume.iter().for_each(sound_volume);
     }
 }
 

@@ -16,12 +16,15 @@ use splatkit::{
     about::Stance,
     bricks::Bricks,
     cells::{CellKind, Cells, Place},
+    formats::{self, Series},
     hierarchy::Hierarchy,
+    input::Source,
+    memory,
     scattered::Points,
     surface::Mesh,
     volume::Volume,
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The facts in the order in which they are printed.
 const ORDER: &[&str] = &[
@@ -58,7 +61,7 @@ const ORDER: &[&str] = &[
 #[derive(Args, Debug)]
 pub struct Info {
     /// A mesh, point cloud, hierarchy, volume, volume in bricks, cells, or a set of scattered
-    /// samples.
+    /// samples; or a folder of DICOM files.
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,
@@ -70,11 +73,13 @@ pub struct Info {
 impl Info {
     pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
         progress.stage(format!("Reading {}", self.file.display()));
-        let input = self.load.open(&self.file)?;
+        let series = self.series()?;
+        let mut read = Vec::new();
+        let input = self.load.open_within(&self.file, memory::most(), &mut read)?;
         progress.clear();
         let kinds = kinds_of(&input, self.load.is_raw(&self.file)?);
         given.warn_of_file(&self.file, kinds, progress);
-        let bytes = self.file.metadata().map_err(|e| Error::file(&self.file, "read", e))?.len();
+        let bytes = size(&self.file, &read)?;
         let (count, mut facts) = match &input {
             Input::Mesh(mesh) => (mesh.positions.len(), of_mesh(mesh)),
             Input::Volume(volume) => (volume.len(), of_volume(volume)),
@@ -86,6 +91,9 @@ impl Info {
             Input::Bricks(bricks) => (bricks.header().lattice.len(), of_bricks(bricks)),
         };
         facts.insert("file".into(), json!(self.file.to_string_lossy()));
+        if !series.is_empty() {
+            facts.insert("series".into(), series.iter().map(of_series).collect());
+        }
         facts.insert("count".into(), json!(count));
         facts.insert("bytes".into(), json!(bytes));
         facts.insert("bytes_per_point".into(), json!(bytes as f64 / count.max(1) as f64));
@@ -96,6 +104,7 @@ impl Info {
         if self.json {
             return output::json(&Value::Object(facts));
         }
+        series.iter().try_for_each(|one| output::line(line_of_series(one)))?;
         for name in ORDER {
             if let Some(value) = facts.get(*name) {
                 output::line(format_args!("{:<16}{}", name.replace('_', " "), plain(value)))?;
@@ -103,6 +112,53 @@ impl Info {
         }
         Ok(())
     }
+}
+
+impl Info {
+    /// Returns the series of a folder of pictures; none for other inputs.
+    fn series(&self) -> Result<Vec<Series>, Failure> {
+        let limits = self.load.limits();
+        let source = Source::open_any(&self.file, &limits)?;
+        Ok(formats::series(&source, &self.load.options())?)
+    }
+}
+
+/// Returns the bytes of a file, or of the files of a folder that were read.
+fn size(path: &Path, read: &[PathBuf]) -> Result<u64, Failure> {
+    let of = |path: &Path| path.metadata().map_err(|e| Error::file(path, "read", e));
+    if !path.is_dir() {
+        return Ok(of(path)?.len());
+    }
+    let sizes: Result<Vec<u64>, Error> = read.iter().map(|path| Ok(of(path)?.len())).collect();
+    Ok(sizes?.into_iter().sum())
+}
+
+fn of_series(series: &Series) -> Value {
+    json!({
+        "number": series.number,
+        "uid": series.identifier,
+        "description": series.description,
+        "modality": series.modality,
+        "size": series.size,
+        "pictures": series.pictures,
+        "obstacle": series.obstacle,
+        "drawn": series.is_drawn,
+    })
+}
+
+/// Returns a line on a series: its number, what it is, its pictures, and its identifier.
+fn line_of_series(series: &Series) -> String {
+    let number = series.number.map_or("–".into(), |number| number.to_string());
+    let [columns, rows] = series.size;
+    let drawn = if series.is_drawn { ", drawn" } else { "" };
+    let obstacle = series.obstacle.as_ref().map_or(String::new(), |why| format!(", {}", safe(why)));
+    format!(
+        "series {number:<9}{} “{}”, {} of {columns} × {rows}, {}{drawn}{obstacle}",
+        safe(&series.modality),
+        safe(&series.description),
+        series.pictures,
+        safe(&series.identifier)
+    )
 }
 
 fn of_mesh(mesh: &Mesh) -> Map<String, Value> {

@@ -137,21 +137,21 @@ impl LoadFlags {
                 (Input::Hierarchy(Arc::new(Hierarchy::open(path, &limits)?)), vec![path.to_owned()])
             }
             Kind::Mesh => {
-                let source = Source::open(path, &whole)?;
+                let source = Source::open_any(path, &whole)?;
                 let mut options = self.options();
                 options.scalar = attribute.map(str::to_owned).or(options.scalar);
                 (Input::Mesh(formats::read_mesh(&source, &options)?), source.files())
             }
             Kind::Volume => {
-                let source = Source::open(path, &whole)?;
+                let source = Source::open_any(path, &whole)?;
                 (Input::Volume(formats::read_volume(&source, &self.options())?), source.files())
             }
             Kind::Samples => {
-                let source = Source::open(path, &whole)?;
+                let source = Source::open_any(path, &whole)?;
                 (Input::Samples(formats::read_samples(&source, &self.options())?), source.files())
             }
             Kind::Cells => {
-                let source = Source::open(path, &whole)?;
+                let source = Source::open_any(path, &whole)?;
                 (Input::Cells(formats::read_cells(&source, &self.options())?), source.files())
             }
         };
@@ -266,6 +266,11 @@ fn unknown(path: &Path) -> Error {
         format!("{}: {}{raw}", content.plural(), extensions.join(", "))
     });
     let lists = lists.join("; ");
+    if path.is_dir() {
+        let message = "is a folder in whose files no series of pictures was found";
+        let hint = "name one of its files, or a folder with the slices of a scan (DICOM)";
+        return Error::input(path, "path", message).hint(hint);
+    }
     Error::input(path, "file", "is in no format that can be read")
         .hint(format!("{lists}; `splatkit formats` says which file holds what"))
 }

@@ -2,6 +2,9 @@
 //! format, made by the library's own writers, by the writers of the formats' crates, or as text.
 //! With them a fuzzer need not guess headers.
 
+#[path = "../../../tests/inputs/medical.rs"]
+mod inputs;
+
 use flate2::{Compression, write::GzEncoder};
 use glam::{DVec3, Vec2, Vec3};
 use splatkit::{
@@ -37,6 +40,7 @@ fn main() -> Result<()> {
     pcd(&mut seeds)?;
     npy(&mut seeds)?;
     volumes(&mut seeds)?;
+    medical(&mut seeds)?;
     vti(&mut seeds)?;
     vtr_vtu(&mut seeds)?;
     vtk(&mut seeds)?;
@@ -480,6 +484,32 @@ fn volumes(seeds: &mut Seeds) -> Result<()> {
     let mut packer = GzEncoder::new(Vec::new(), Compression::default());
     packer.write_all(b"01234567")?;
     seeds.put("raw", [&[2, 2, 2, 0, 16, 0][..], &packer.finish()?].concat())
+}
+
+/// Files of NIfTI and DICOM.
+fn medical(seeds: &mut Seeds) -> Result<()> {
+    let file = inputs::nifti(|_| {});
+    seeds.known("nifti", &file)?;
+    seeds.known("nifti", inputs::nifti(|header| header[254] = 1))?;
+    seeds.known("nifti", inputs::nifti(|header| header[252] = 1))?;
+    seeds.known("nifti", inputs::nifti(|header| header[70] = 128))?;
+    let pair = inputs::nifti(|header| header[345] = b'i');
+    seeds.put("nifti", [&pair[..348], b"\n#img\n", &pair[352..]].concat())?;
+    let mut packer = GzEncoder::new(Vec::new(), Compression::default());
+    packer.write_all(&file)?;
+    seeds.known("nifti", packer.finish()?)?;
+    let slice = |z: &str| {
+        let file = inputs::dicom(".1", &[1, 2, 3, 4]);
+        let place = inputs::element(0x20, 0x32, "DS", z.as_bytes());
+        let at = file.windows(4).position(|tag| tag == [0x28, 0, 2, 0]).expect("the tag");
+        [&file[..at], &place, &file[at..]].concat()
+    };
+    for syntax in [".1", "", ".2", ".5", ".1.99", ".4.70", ".4.90"] {
+        seeds.known("dicom", inputs::dicom(syntax, &[1, 2, 3, 4]))?;
+    }
+    seeds.put("dicom", slice("0\\0\\1 "))?;
+    let several = [slice("0\\0\\1 "), slice("0\\0\\2 "), slice("0\\0\\4 ")];
+    seeds.put("dicom_folder", several.join(&b"\n#file\n"[..]))
 }
 
 fn vti(seeds: &mut Seeds) -> Result<()> {

@@ -1,0 +1,273 @@
+//! What the elements of a file say of its pixels and of its series.
+
+use super::{
+    element::{Set, Value},
+    file::File,
+    frames::{Frame, frames},
+    syntax::Packing,
+    tags,
+};
+use crate::{Result, about::Modality, input::Source};
+use std::path::PathBuf;
+
+/// A file of pictures, without its pixels.
+pub struct Head {
+    pub path: PathBuf,
+    pub series: SeriesName,
+    /// The identifier of this file's content.
+    pub instance: String,
+    pub layout: Layout,
+    pub frames: Vec<Frame>,
+    pub nature: Nature,
+}
+
+/// What tells a series from others.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SeriesName {
+    pub identifier: String,
+    pub number: Option<i64>,
+    pub description: String,
+    /// The code of what measured it (“CT”).
+    pub modality: String,
+}
+
+/// How the numbers of pixels are stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Numbers {
+    /// Whole numbers.
+    Whole {
+        allocated: u16,
+        stored: u16,
+        high: u16,
+        is_signed: bool,
+    },
+    F32,
+    F64,
+}
+
+const EIGHT_BITS: Numbers = Numbers::Whole { allocated: 8, stored: 8, high: 7, is_signed: false };
+
+/// What the values of pixels mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Colors {
+    Grey,
+    /// Low values are bright.
+    Inverted,
+    Palette,
+    Rgb,
+    /// Luminance comes first.
+    Luminance,
+    /// Luminance and colours, of which two pixels share the colours.
+    Halved,
+}
+
+/// How pixels are stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Layout {
+    pub columns: usize,
+    pub rows: usize,
+    /// Numbers per pixel.
+    pub channels: usize,
+    pub numbers: Numbers,
+    pub colors: Colors,
+    /// Whether the channels are stored one after the other.
+    pub is_planar: bool,
+    pub packing: Packing,
+    /// The lowest and the highest stored number that stand for no value.
+    pub padding: Option<[f64; 2]>,
+}
+
+/// What the values are.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Nature {
+    pub modality: Option<Modality>,
+    pub unit: String,
+    /// Whether the picture only shows where other slices lie.
+    pub is_localizer: bool,
+}
+
+impl Layout {
+    /// Numbers of one frame.
+    pub fn frame_numbers(&self) -> usize {
+        self.columns.saturating_mul(self.rows).saturating_mul(self.channels)
+    }
+}
+
+impl Head {
+    /// Reads the elements of a file.
+    pub fn read(source: &Source) -> Result<Self> {
+        let file = File::open(source)?;
+        let set = file.set()?;
+        let series = SeriesName {
+            identifier: set.text(tags::SERIES).unwrap_or_default(),
+            number: set.decimal(tags::SERIES_NUMBER).map(|number| number as i64),
+            description: set.text(tags::SERIES_DESCRIPTION).unwrap_or_default(),
+            modality: set.text(tags::MODALITY).unwrap_or_default(),
+        };
+        let layout = layout(&file, &set)?;
+        let nature = nature(&set, &series);
+        Ok(Self {
+            path: source.path.to_owned(),
+            series,
+            instance: set.text(tags::INSTANCE).unwrap_or_default(),
+            frames: frames(source, &set, pixel_bytes(&set))?,
+            layout,
+            nature,
+        })
+    }
+}
+
+/// Reads how pixels are stored.
+fn layout(file: &File, set: &Set) -> Result<Layout> {
+    let source = file.source;
+    let has = |tag| set.get(tag).is_some();
+    let numbers = if has(tags::FLOAT_PIXELS) {
+        Numbers::F32
+    } else if has(tags::DOUBLE_PIXELS) {
+        Numbers::F64
+    } else if has(tags::PIXEL_DATA) {
+        whole_numbers(source, set)?
+    } else {
+        return Err(without_pixels(source, set));
+    };
+    let need = |tag, name: &str| match set.short(tag) {
+        Some(number) if number > 0 => Ok(usize::from(number)),
+        found => {
+            let found = found.map_or("missing".into(), |number| number.to_string());
+            Err(source.error(name, format!("is {found}, but a number of pixels was expected")))
+        }
+    };
+    let channels = set.short(tags::SAMPLES_PER_PIXEL).unwrap_or(1);
+    let colors = colors(source, set, channels)?;
+    let is_deep = matches!(numbers, Numbers::Whole { stored: 8.., .. });
+    if channels > 1 && (!is_deep || colors == Colors::Halved && numbers != EIGHT_BITS) {
+        let message = "colours are read if they have 8 bits or more, and 8 if pixels share them";
+        return Err(source.error("Bits Stored", message));
+    }
+    let is_signed = matches!(numbers, Numbers::Whole { is_signed: true, .. });
+    let signed = |number: u16| if is_signed { f64::from(number as i16) } else { number.into() };
+    let padding = set.short(tags::PADDING).map(|first| {
+        let last = set.short(tags::PADDING_LIMIT).unwrap_or(first);
+        let [first, last] = [signed(first), signed(last)];
+        [first.min(last), first.max(last)]
+    });
+    if has(tags::MODALITY_TABLES) && set.decimal(tags::SLOPE).is_none() {
+        tracing::warn!("{}: its table of values is not applied", source.path.display());
+    }
+    Ok(Layout {
+        columns: need(tags::COLUMNS, "Columns")?,
+        rows: need(tags::ROWS, "Rows")?,
+        channels: channels.into(),
+        numbers,
+        colors,
+        is_planar: set.short(tags::PLANAR) == Some(1),
+        packing: file.syntax.packing,
+        padding,
+    })
+}
+
+fn whole_numbers(source: &Source, set: &Set) -> Result<Numbers> {
+    let allocated = set.short(tags::BITS_ALLOCATED).unwrap_or(0);
+    let stored = set.short(tags::BITS_STORED).unwrap_or(allocated);
+    let high = set.short(tags::HIGH_BIT).unwrap_or(stored.saturating_sub(1));
+    if ![1, 8, 16, 32].contains(&allocated) {
+        let message = format!("is {allocated}, but 1, 8, 16 or 32 was expected");
+        return Err(source.error("Bits Allocated", message));
+    }
+    if !(1..=allocated).contains(&stored) || high >= allocated || high + 1 < stored {
+        let message = format!(
+            "{stored} bits up to bit {high} do not lie in the {allocated} bits of a number"
+        );
+        return Err(source.error("Bits Stored", message));
+    }
+    let is_signed = set.short(tags::REPRESENTATION) == Some(1);
+    Ok(Numbers::Whole { allocated, stored, high, is_signed })
+}
+
+fn colors(source: &Source, set: &Set, channels: u16) -> Result<Colors> {
+    let name = set.text(tags::PHOTOMETRIC).unwrap_or_default();
+    Ok(match (name.as_str(), channels) {
+        ("MONOCHROME1", 1) => Colors::Inverted,
+        ("PALETTE COLOR", 1) => Colors::Palette,
+        (_, 1) => Colors::Grey,
+        ("RGB" | "YBR_RCT" | "YBR_ICT", 3) => Colors::Rgb,
+        ("YBR_FULL_422" | "YBR_PARTIAL_422", 3) => Colors::Halved,
+        ("YBR_FULL", 3) => Colors::Luminance,
+        _ => {
+            let name = super::shown(&name);
+            let message = format!("“{name}” of {channels} numbers a pixel is not read");
+            let hint = "grey values, palettes, RGB and YBR are read";
+            return Err(source.error("Photometric Interpretation", message).hint(hint));
+        }
+    })
+}
+
+/// Returns the error for a file without pixels.
+fn without_pixels(source: &Source, set: &Set) -> crate::Error {
+    let class = set.text(tags::CLASS).unwrap_or_default();
+    let what = match class.strip_prefix("1.2.840.10008.5.1.4.1.1.").unwrap_or_default() {
+        "481.3" => "outlines of radiotherapy (RT Structure Set)",
+        "481.5" | "481.8" => "a plan of radiotherapy",
+        "481.4" | "481.6" | "481.7" | "481.9" => "a record of radiotherapy",
+        "104.1" => "a PDF document",
+        "104.3" | "104.4" | "104.5" => "a surface (STL, OBJ or MTL) inside DICOM",
+        "66.5" => "a surface (Surface Segmentation)",
+        "66" => "raw data",
+        "66.1" | "66.3" => "a registration",
+        "88.11" | "88.22" | "88.33" | "88.34" | "88.67" => "a report",
+        "88.59" => "a selection of other files (Key Objects)",
+        "4.2" => "a spectrum",
+        other if other.starts_with("11.") => "a presentation of other pictures",
+        other if other.starts_with("9.") => "a waveform",
+        _ => "no pixels",
+    };
+    let modality = set.text(tags::MODALITY).unwrap_or_default();
+    let modality =
+        if modality.is_empty() { String::new() } else { format!(" (modality {modality})") };
+    let message = format!("holds {what}{}, no picture", super::shown(&modality));
+    source.error("data set", message).hint("name files of CT, MR, PET or other pictures")
+}
+
+/// Reads what the values are.
+fn nature(set: &Set, series: &SeriesName) -> Nature {
+    let has_scale = set.decimal(tags::SLOPE).is_some() || set.get(tags::SHARED_GROUPS).is_some();
+    let of_scale = set.text(tags::RESCALE_TYPE);
+    let modality = match series.modality.as_str() {
+        // Other values than Hounsfield units cannot be shown as these.
+        "CT" if has_scale && of_scale.as_deref().is_none_or(|unit| unit == "HU") => {
+            Some(Modality::Ct)
+        }
+        "MR" => Some(Modality::Mr),
+        "PT" | "NM" => Some(Modality::Emission),
+        "US" | "IVUS" => Some(Modality::Ultrasound),
+        "SM" | "GM" => Some(Modality::Microscopy),
+        _ => None,
+    };
+    let unit = match (modality, set.text(tags::UNITS), set.text(tags::DOSE_UNITS)) {
+        (Some(Modality::Ct), ..) => "HU".into(),
+        (_, Some(unit), _) if unit == "BQML" => "Bq/ml".into(),
+        (_, Some(unit), _) if unit == "CNTS" => "counts".into(),
+        (_, Some(unit), _) => unit,
+        (.., Some(unit)) if unit == "GY" => "Gy".into(),
+        _ => of_scale.filter(|unit| unit != "US" && unit != "normalized").unwrap_or_default(),
+    };
+    let is_localizer = set.words(tags::IMAGE_TYPE).iter().any(|word| word == "LOCALIZER");
+    Nature { modality, unit, is_localizer }
+}
+
+/// Returns the pixels of a set, as its elements hold them.
+pub fn pixels<'s, 'a>(set: &'s Set<'a>) -> Option<&'s Value<'a>> {
+    [tags::PIXEL_DATA, tags::FLOAT_PIXELS, tags::DOUBLE_PIXELS]
+        .iter()
+        .find_map(|&tag| set.get(tag))
+        .map(|element| &element.value)
+}
+
+/// Returns the bytes of the pixels that are there.
+fn pixel_bytes(set: &Set) -> usize {
+    match pixels(set) {
+        Some(Value::Bytes(bytes) | Value::Cut(bytes, _)) => bytes.len(),
+        Some(Value::Fragments(fragments)) => fragments.iter().map(|part| part.len()).sum(),
+        Some(Value::Items(..)) | None => 0,
+    }
+}

@@ -1,0 +1,428 @@
+//! Files are written by `Made`, a writer of its own; tests/medical.rs reads those of pydicom.
+
+mod made;
+mod series_of_files;
+
+use super::*;
+use crate::{
+    about::{Modality, Stance},
+    input::{
+        Limits,
+        testing::{Folder, every_cut, read_with},
+    },
+    volume::{Arrangement, Samples},
+};
+use glam::DVec3;
+use made::Made;
+
+fn read_made(made: &Made) -> Volume {
+    read_bytes(&made.file()).unwrap()
+}
+
+fn read_bytes(bytes: &[u8]) -> Result<Volume> {
+    let folder = Folder::new();
+    read_with(&folder.write("a.dcm", bytes), |source| read(source, &ReadOptions::default()))
+}
+
+fn told(bytes: &[u8]) -> String {
+    read_bytes(bytes).unwrap_err().to_string()
+}
+
+fn values(volume: &Volume) -> Vec<f64> {
+    (0..volume.len()).map(|i| volume.value(i)).collect()
+}
+
+const SYNTAXES: [&str; 4] = ["", ".1", ".2", ".1.99"];
+
+#[test]
+fn a_slice_in_every_coding() {
+    for syntax in SYNTAXES {
+        let mut made = Made::slice(syntax, 3, 2);
+        made.shorts(tags::PIXEL_DATA, "OW", &[0, 1, 2, 1000, 2000, 4095]);
+        made.text(tags::INTERCEPT, "-1024").text(tags::SLOPE, "1");
+        made.text(tags::PIXEL_SPACING, "0.5\\0.25").text(tags::SLICE_THICKNESS, "2");
+        made.text(tags::POSITION, "-10\\20\\30.5").text(tags::ORIENTATION, "1\\0\\0\\0\\1\\0");
+        made.text(tags::WINDOW_CENTER, "40\\300").text(tags::WINDOW_WIDTH, "400\\1500");
+        let volume = read_made(&made);
+        let expected = vec![-1024, -1023, -1022, -24, 976, 3071];
+        assert_eq!(volume.samples, Samples::I16(expected), "“{syntax}”");
+        assert_eq!(volume.lattice.dims, [3, 2, 1]);
+        assert_eq!(volume.lattice.origin, DVec3::new(-10.0, 20.0, 30.5));
+        let axes = [[0.25, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 2.0]];
+        assert_eq!(volume.lattice.axes.to_cols_array_2d(), axes);
+        let about = &volume.about;
+        assert_eq!((about.modality, about.window), (Some(Modality::Ct), Some([-160.0, 240.0])));
+        assert_eq!((&*about.unit, &*about.length), ("HU", "mm"));
+        // One slice is seen as on film.
+        let stance = Stance { up: DVec3::NEG_Y, front: DVec3::NEG_Z };
+        assert_eq!(about.stance, Some(stance));
+        assert!(is_dicom(&made.file()), "“{syntax}”");
+        // Without the preamble, and without the header.
+        assert_eq!(values(&read_bytes(&made.file()[128 + 4..]).unwrap()), values(&volume));
+        if syntax != ".1.99" {
+            assert!(is_dicom(&made.bare()), "“{syntax}”");
+            assert_eq!(values(&read_bytes(&made.bare()).unwrap()), values(&volume));
+        }
+    }
+}
+
+#[test]
+fn every_kind_of_number() {
+    for (allocated, stored, signed, words, expected) in [
+        // Bits that are not stored hold an overlay.
+        (16, 12, 0, [0xf123u16, 0x0fff], [0x123, 0xfff]),
+        (16, 12, 1, [0xf123, 0x0fff], [0x123, -1]),
+        (16, 16, 1, [0x8000, 0x7fff], [-32768, 32767]),
+        (16, 16, 0, [0x8000, 0xffff], [32768, 65535]),
+    ] {
+        for syntax in SYNTAXES {
+            let mut made = Made::slice(syntax, 2, 1);
+            made.bits(allocated, stored, signed).shorts(tags::PIXEL_DATA, "OW", &words);
+            assert_eq!(values(&read_made(&made)), expected.map(f64::from));
+        }
+    }
+    for (bits, signed, bytes, expected) in [
+        (8, 0, vec![200u8, 7], vec![200.0, 7.0]),
+        (8, 1, vec![200, 7], vec![-56.0, 7.0]),
+        (32, 0, vec![0, 0, 0, 0x80, 1, 0, 0, 0], vec![2_147_483_648.0, 1.0]),
+        (32, 1, vec![255, 255, 255, 255, 1, 0, 0, 0], vec![-1.0, 1.0]),
+        (1, 0, vec![0b10, 0], vec![0.0, 1.0]),
+    ] {
+        let mut made = Made::slice(".1", 2, 1);
+        made.bits(bits, bits, signed).bytes(tags::PIXEL_DATA, "OB", &bytes);
+        assert_eq!(values(&read_made(&made)), expected);
+    }
+    let mut made = Made::slice(".1", 2, 1);
+    made.bytes(tags::FLOAT_PIXELS, "OF", &[0, 0, 128, 63, 0, 0, 0, 64]).without(tags::PIXEL_DATA);
+    assert_eq!(values(&read_made(&made)), [1.0, 2.0]);
+    let doubles = [1.5f64, f64::NAN].map(f64::to_le_bytes).concat();
+    made.bytes(tags::DOUBLE_PIXELS, "OD", &doubles).without(tags::FLOAT_PIXELS);
+    let volume = read_made(&made);
+    assert_eq!((values(&volume), volume.about.holes), (vec![1.5, 1.5], 1));
+    // In words whose high byte comes first, the second byte is the first pixel.
+    let mut made = Made::slice(".2", 2, 1);
+    made.bits(8, 8, 0).shorts(tags::PIXEL_DATA, "OW", &[0x0201]);
+    assert_eq!(values(&read_made(&made)), [1.0, 2.0]);
+}
+
+#[test]
+fn colours_are_luminances_and_inverted_values_turned() {
+    let with = |name: &str, planar: u16, pixels: &[u8]| {
+        let mut made = Made::slice(".1", 2, 1);
+        made.bits(8, 8, 0).short(tags::SAMPLES_PER_PIXEL, 3).text(tags::PHOTOMETRIC, name);
+        made.short(tags::PLANAR, planar).bytes(tags::PIXEL_DATA, "OB", pixels);
+        values(&read_made(&made))
+    };
+    assert_eq!(with("RGB", 0, &[255, 0, 0, 9, 9, 9]), [76.0, 9.0]);
+    assert_eq!(with("RGB", 1, &[255, 9, 0, 9, 0, 9]), [76.0, 9.0]);
+    assert_eq!(with("YBR_FULL", 0, &[50, 1, 1, 60, 1, 1]), [50.0, 60.0]);
+    assert_eq!(with("YBR_FULL", 1, &[50, 60, 1, 1, 1, 1]), [50.0, 60.0]);
+    assert_eq!(with("YBR_FULL_422", 0, &[50, 60, 1, 1]), [50.0, 60.0]);
+    let mut made = Made::slice(".1", 4, 1);
+    made.bits(8, 8, 0).text(tags::PHOTOMETRIC, "PALETTE COLOR");
+    made.bytes(tags::PIXEL_DATA, "OB", &[4, 5, 6, 200]);
+    for at in 0..3 {
+        made.shorts(tags::PALETTE_RED_SHAPE + at, "US", &[3, 5, 16]);
+        made.shorts(tags::PALETTE_RED + at, "OW", &[0x1000, 0x2000, 0xff00]);
+    }
+    assert_eq!(values(&read_made(&made)), [16.0, 16.0, 32.0, 255.0]);
+    made.without(tags::PALETTE_RED + 1);
+    assert!(told(&made.file()).contains("palette: has fewer colours than its shape says"));
+    for (bits, pixels) in [(8, vec![10u8, 30]), (16, vec![10, 0, 30, 0])] {
+        let mut made = Made::slice(".1", 2, 1);
+        made.bits(bits, bits, 0).text(tags::PHOTOMETRIC, "MONOCHROME1");
+        made.text(tags::WINDOW_CENTER, "15").text(tags::WINDOW_WIDTH, "10");
+        made.bytes(tags::PIXEL_DATA, "OB", &pixels);
+        let volume = read_made(&made);
+        assert_eq!((values(&volume), volume.range), (vec![30.0, 10.0], [10.0, 30.0]));
+        assert_eq!(volume.about.window, Some([20.0, 30.0]));
+    }
+}
+
+#[test]
+fn padding_is_a_hole() {
+    let mut made = Made::slice(".1", 4, 1);
+    made.bits(16, 16, 1).shorts(tags::PIXEL_DATA, "OW", &[0xf830, 24, 1024, 0xf830]);
+    made.text(tags::SLOPE, "1").text(tags::INTERCEPT, "-24").shorts(tags::PADDING, "SS", &[0xf830]);
+    let volume = read_made(&made);
+    assert_eq!(volume.samples, Samples::I16(vec![0, 0, 1000, 0]));
+    assert_eq!(volume.about.holes, 2);
+    made.shorts(tags::PADDING_LIMIT, "SS", &[24]);
+    assert_eq!(read_made(&made).range, [1000.0, 1000.0]);
+    // If everything is padding, the mark is wrong.
+    made.shorts(tags::PADDING_LIMIT, "SS", &[2000]);
+    assert_eq!(read_made(&made).about.holes, 0);
+}
+
+#[test]
+fn run_lengths() {
+    // Literal bytes and runs; the high bytes come first.
+    let segments: [&[u8]; 2] = [&[253, 1], &[1, 5, 6, 255, 7]];
+    let mut frame = Vec::new();
+    [2u32, 64, 66].iter().for_each(|n| frame.extend(n.to_le_bytes()));
+    frame.resize(64, 0);
+    segments.iter().for_each(|part| frame.extend(*part));
+    frame.resize(frame.len().next_multiple_of(2), 0);
+    let mut made = Made::slice(".5", 4, 1);
+    made.fragments(&[&[], &frame]);
+    assert_eq!(values(&read_made(&made)), [261.0, 262.0, 263.0, 263.0]);
+    let mut change = |at: usize, byte: u8, message: &str| {
+        let mut frame = frame.clone();
+        frame[at] = byte;
+        made.fragments(&[&[], &frame]);
+        assert!(told(&made.file()).contains(message), "{}", told(&made.file()));
+    };
+    change(0, 3, "pixel data, frame 0: cannot be unpacked: 3 segments where 2 were expected");
+    change(64, 254, "segment 0 holds 3 of 4 bytes");
+    change(8, 250, "segment 0 lies outside the frame");
+    change(4, 3, "segment 0 lies outside the frame");
+}
+
+#[test]
+fn frames_are_found_in_fragments() {
+    // Uncompressed frames in fragments show which fragments a frame has.
+    let two = |fragments: &[&[u8]]| {
+        let mut made = Made::slice(".1.98", 2, 1);
+        made.bits(8, 8, 0).text(tags::FRAMES, "2").text(tags::SPACING_BETWEEN_SLICES, "3");
+        made.fragments(fragments);
+        read_bytes(&made.file()).map(|volume| values(&volume))
+    };
+    assert_eq!(two(&[&[], &[1, 2], &[3, 4]]).unwrap(), [1.0, 2.0, 3.0, 4.0]);
+    let table = [0u32, 20].map(u32::to_le_bytes).concat();
+    let parts: [&[u8]; 4] = [&table, &[1, 2], &[0, 0], &[3, 4]];
+    assert_eq!(two(&parts).unwrap(), [1.0, 2.0, 3.0, 4.0]);
+    let error = two(&[&[], &[1, 2], &[3, 4], &[5, 6]]).unwrap_err().to_string();
+    assert!(error.contains("frame 0 is missing: there are 3 fragments for 2 frames"), "{error}");
+}
+
+#[test]
+fn what_is_not_read_is_told() {
+    let mut made = Made::slice(".4.80", 2, 1);
+    made.fragments(&[&[], &[1, 2]]);
+    let message = told(&made.file());
+    assert!(
+        message.contains("packed by JPEG-LS (transfer syntax 1.2.840.10008.1.2.4.80)"),
+        "{message}"
+    );
+    let mut made = Made::slice(".4.70", 2, 1);
+    made.fragments(&[&[], &[0xff, 0xd8, 0xff, 0xc3, 0, 11, 8, 0, 9, 0, 9, 1, 1, 1, 1]]);
+    assert!(told(&made.file()).contains("a picture of 9 × 9 pixels, not of 2 × 1"));
+    made.fragments(&[&[], &[0xff, 0xd8, 0xff, 0xc3, 0, 11, 8, 0, 1, 0, 2, 1, 1, 1, 1]]);
+    assert!(told(&made.file()).contains("frame 0: cannot be"), "{}", told(&made.file()));
+    let mut made = Made::slice(".4.90", 2, 1);
+    made.fragments(&[&[], &[0xff, 0x4f, 1, 2]]);
+    assert!(told(&made.file()).contains("its header is damaged"));
+    let with = |change: &dyn Fn(&mut Made)| {
+        let mut made = Made::slice(".1", 2, 1);
+        made.shorts(tags::PIXEL_DATA, "OW", &[1, 2]);
+        change(&mut made);
+        told(&made.file())
+    };
+    for (found, message) in [
+        (
+            with(&|made: &mut Made| {
+                made.without(tags::ROWS);
+            }),
+            "Rows: is missing, but a number of pixels",
+        ),
+        (
+            with(&|made: &mut Made| {
+                made.short(tags::COLUMNS, 0);
+            }),
+            "Columns: is 0, but a number",
+        ),
+        (
+            with(&|made: &mut Made| {
+                made.bits(12, 12, 0);
+            }),
+            "Bits Allocated: is 12, but 1, 8, 16 or 32",
+        ),
+        (
+            with(&|made: &mut Made| {
+                made.bits(16, 17, 0);
+            }),
+            "17 bits up to bit 16 do not lie in the 16",
+        ),
+        (
+            with(&|made: &mut Made| {
+                made.short(tags::ROWS, 2);
+            }),
+            "2 × 2 pixels needs 8 bytes, but the",
+        ),
+        (
+            with(&|made: &mut Made| {
+                made.text(tags::FRAMES, "9");
+            }),
+            "Number of Frames: is 9, but",
+        ),
+        (
+            with(&|made: &mut Made| {
+                made.text(tags::FRAMES, "0");
+            }),
+            "Number of Frames: is 0, but",
+        ),
+        (
+            with(&|made: &mut Made| {
+                made.text(tags::PHOTOMETRIC, "ARGB").short(tags::SAMPLES_PER_PIXEL, 4);
+            }),
+            "“ARGB” of 4 numbers a pixel is not read",
+        ),
+        (
+            with(&|made: &mut Made| {
+                made.without(tags::PIXEL_DATA);
+            }),
+            "holds no pixels",
+        ),
+        (
+            with(&|made: &mut Made| {
+                made.without(tags::PIXEL_DATA).text(tags::CLASS, "1.2.840.10008.5.1.4.1.1.481.3");
+            }),
+            "holds outlines of radiotherapy",
+        ),
+    ] {
+        assert!(found.contains(message), "{found} / {message}");
+    }
+    assert!(told(b"no DICOM at all, but a file").contains("header: is not DICOM"));
+}
+
+#[test]
+fn damaged_files_are_told() {
+    let folder = Folder::new();
+    let read = |source: &Source| read(source, &ReadOptions::default());
+    for syntax in ["", ".1", ".2"] {
+        let mut made = Made::slice(syntax, 3, 1);
+        made.text(tags::POSITION, "1\\2\\3").shorts(tags::PIXEL_DATA, "OW", &[1, 2, 3]);
+        made.sequence(tags::ULTRASOUND_REGIONS, &[Made::new(syntax)]);
+        every_cut(&folder, "a.dcm", &made.file(), read);
+    }
+    let mut made = Made::slice(".5", 1, 1);
+    made.fragments(&[&[], &[1, 2]]);
+    let bytes = made.file();
+    for end in 0..bytes.len() {
+        assert!(read_bytes(&bytes[..end]).is_err());
+    }
+    // Lengths and nesting are claims.
+    let mut made = Made::slice(".1", 1, 1);
+    made.bytes(tags::PIXEL_DATA, "OW", &[1, 2]);
+    let mut bytes = made.file();
+    let end = bytes.len();
+    bytes[end - 6..end - 2].copy_from_slice(&0xffff_fffe_u32.to_le_bytes());
+    assert!(told(&bytes).contains("4294967294 bytes were expected, but the file ends after 2"));
+    let mut bytes = Made::new(".1").file();
+    let deep = [0x08, 0, 0x15, 0x11, b'S', b'Q', 0, 0, 255, 255, 255, 255];
+    let item = [0xfe, 0xff, 0, 0xe0, 255, 255, 255, 255];
+    for _ in 0..100_000 {
+        bytes.extend(deep);
+        bytes.extend(item);
+    }
+    let error = read_bytes(&bytes).unwrap_err();
+    assert!(matches!(error, Error::Limit { .. }), "{error}");
+    let mut bytes = made.file();
+    let at = bytes.len() - 14;
+    bytes[at + 4] = 7;
+    assert!(told(&bytes).contains("has no type of values"), "{}", told(&bytes));
+    // A small stream that unpacks to much.
+    let mut bomb = Made::slice(".1.99", 1, 1);
+    bomb.bytes(tags::PIXEL_DATA, "OB", &vec![0; 8 << 20]);
+    let limits = Limits { bytes: 1 << 20, ..Limits::default() };
+    let path = folder.write("bomb.dcm", bomb.file());
+    let source = Source::open(&path, &limits).unwrap();
+    assert!(matches!(read(&source), Err(Error::Limit { .. })));
+}
+
+#[test]
+fn one_file_of_many_frames() {
+    let pixels = [1, 2, 3, 4, 5, 6];
+    let film = |change: &dyn Fn(&mut Made)| {
+        let mut made = Made::slice(".1", 2, 1);
+        made.text(tags::FRAMES, "3").shorts(tags::PIXEL_DATA, "OW", &pixels);
+        change(&mut made);
+        made
+    };
+    // With a step, the frames are slices.
+    let made = film(&|made: &mut Made| {
+        made.text(tags::SPACING_BETWEEN_SLICES, "1.5").text(tags::POSITION, "0\\0\\9");
+        made.text(tags::ORIENTATION, "0\\1\\0\\0\\0\\-1");
+    });
+    let volume = read_made(&made);
+    assert_eq!((volume.lattice.dims, values(&volume)), ([2, 1, 3], pixels.map(f64::from).into()));
+    assert_eq!(volume.lattice.axes.z_axis, DVec3::new(-1.5, 0.0, 0.0));
+    // Those of ultrasound without one are times.
+    let made = film(&|made: &mut Made| {
+        made.text(tags::MODALITY, "US").text(tags::FRAME_TIME, "33");
+    });
+    let folder = Folder::new();
+    let path = folder.write("a.dcm", made.file());
+    for time in 0..3 {
+        let options = ReadOptions { time: Some(time), ..ReadOptions::default() };
+        let volume = read_with(&path, |source| read(source, &options)).unwrap();
+        assert_eq!(volume.lattice.dims, [2, 1, 1]);
+        assert_eq!(volume.value(0), f64::from(pixels[2 * time]));
+        assert_eq!(volume.about.modality, Some(Modality::Ultrasound));
+    }
+    let options = ReadOptions { time: Some(3), ..ReadOptions::default() };
+    let error = read_with(&path, |source| read(source, &options)).unwrap_err().to_string();
+    assert!(error.contains("has 3 times, but number 3 was asked for"), "{error}");
+    // Doses lie at offsets of their own, and have a scale.
+    let made = film(&|made: &mut Made| {
+        made.text(tags::GRID_OFFSETS, "0\\2\\7").text(tags::DOSE_SCALE, "0.5");
+        made.text(tags::POSITION, "0\\0\\100").text(tags::DOSE_UNITS, "GY");
+        made.text(tags::MODALITY, "RTDOSE");
+    });
+    let volume = read_made(&made);
+    assert_eq!((volume.range, &*volume.about.unit), ([0.5, 3.0], "Gy"));
+    let Arrangement::Rectilinear(places) = &volume.lattice.arrangement else { panic!() };
+    assert_eq!(places[2], [0.0, 2.0, 7.0]);
+}
+
+#[test]
+fn groups_of_functions_place_frames() {
+    for syntax in SYNTAXES {
+        let item = |change: &dyn Fn(&mut Made)| {
+            let mut made = Made::new(syntax);
+            change(&mut made);
+            made
+        };
+        let shared = item(&|made: &mut Made| {
+            let measures = item(&|made: &mut Made| {
+                made.text(tags::PIXEL_SPACING, "2\\3");
+            });
+            let planes = item(&|made: &mut Made| {
+                made.text(tags::ORIENTATION, "1\\0\\0\\0\\1\\0");
+            });
+            made.sequence(tags::PIXEL_MEASURES, &[measures]);
+            made.sequence(tags::PLANE_ORIENTATIONS, &[planes]);
+        });
+        // Frames in another order than their positions, of two times, with their own slopes.
+        let frame = |z: &str, time: u32, slope: &str| {
+            item(&|made: &mut Made| {
+                let place = item(&|made: &mut Made| {
+                    made.text(tags::POSITION, &format!("0\\0\\{z}"));
+                });
+                let content = item(&|made: &mut Made| {
+                    made.long(tags::TEMPORAL_INDEX, time);
+                });
+                let scale = item(&|made: &mut Made| {
+                    made.text(tags::SLOPE, slope);
+                });
+                made.sequence(tags::PLANE_POSITIONS, &[place]);
+                made.sequence(tags::FRAME_CONTENTS, &[content]);
+                made.sequence(tags::VALUE_TRANSFORMATIONS, &[scale]);
+            })
+        };
+        let groups =
+            [frame("5", 2, "1"), frame("5", 1, "2"), frame("0", 1, "0.5"), frame("0", 2, "1")];
+        let mut made = Made::slice(syntax, 1, 1);
+        made.text(tags::FRAMES, "4").shorts(tags::PIXEL_DATA, "OW", &[10, 20, 30, 40]);
+        made.sequence(tags::SHARED_GROUPS, &[shared]).sequence(tags::FRAME_GROUPS, &groups);
+        let folder = Folder::new();
+        let path = folder.write("a.dcm", made.file());
+        for (time, expected) in [[15.0, 40.0], [40.0, 10.0]].into_iter().enumerate() {
+            let options = ReadOptions { time: Some(time), ..ReadOptions::default() };
+            let volume = read_with(&path, |source| read(source, &options)).unwrap();
+            assert_eq!(values(&volume), expected, "“{syntax}”");
+            assert_eq!(volume.lattice.spacing(), DVec3::new(3.0, 2.0, 5.0));
+            assert_eq!(volume.about.stance, Some(Stance::LPS));
+        }
+    }
+}
