@@ -63,9 +63,9 @@
 //! # Features
 //!
 //! Cargo features leave out what a program does not need: `gpu` and its backends `vulkan`, `metal`,
-//! `dx12` and `webgpu`; the formats `ply`, `obj`, `gltf`, `las`, `e57` and `vtk`; `files` larger
-//! than memory; `rayon`; `reference`. All are on by default except `webgpu`. The README says what
-//! each brings.
+//! `dx12` and `webgpu`; the formats `ply`, `obj`, `gltf`, `las`, `e57`, `vtk` and `dicom`; `files`
+//! larger than memory; `rayon`; `reference`. All are on by default except `webgpu`. The README says
+//! what each brings.
 //!
 //! # Units and frames
 //!

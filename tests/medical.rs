@@ -17,7 +17,8 @@ use testing::folder::Folder;
 /// Runs a script in a folder. Returns its output, or `None` if a package is missing.
 fn python(folder: &Folder, script: &str) -> Option<Vec<serde_json::Value>> {
     let program = std::env::var_os("SPLATKIT_PYTHON").unwrap_or("python3".into());
-    let run = Command::new(program).args(["-W", "ignore", "-c", script]).current_dir(folder);
+    let mut run = Command::new(program);
+    run.args(["-W", "ignore", "-c", script]).current_dir(folder);
     let output = run.output().ok()?;
     let errors = String::from_utf8_lossy(&output.stderr);
     if errors.contains("ModuleNotFoundError") || errors.contains("ImportError") {

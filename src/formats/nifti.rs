@@ -74,7 +74,7 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
             own.unless_changed(volume(&own, source, &header, options))
         }
         // Many programs call raw samples an image.
-        (Err(_), Some(layout)) => raw::read(source, layout),
+        (Err(_), Some(layout)) => raw::read(source, layout, options),
         (Err(error), None) => Err(error.hint(
             "put the header beside it; if there is none, give the layout of the samples with \
              --dims and --type",

@@ -70,7 +70,12 @@ impl<'a> File<'a> {
         let meta = Set::read(source, &header[..end], Coding::PLAIN, |_| false)?;
         let rest = &header[end..];
         let identifier = meta.text(tags::TRANSFER_SYNTAX).unwrap_or_default();
-        let syntax = if identifier.is_empty() { guess(rest) } else { syntax(&identifier) };
+        let mut syntax = if identifier.is_empty() { guess(rest) } else { syntax(&identifier) };
+        // Some files with packed pixels have no types, whatever their syntax says.
+        if syntax.coding == Coding::PLAIN && !syntax.is_deflated && !guess(rest).coding.is_explicit
+        {
+            syntax.coding = Coding::IMPLICIT;
+        }
         let class = meta.text(tags::MEDIA_CLASS);
         let bytes = if syntax.is_deflated { inflated(source, rest)?.into() } else { rest.into() };
         let is_directory = class.as_deref() == Some(DIRECTORY);

@@ -171,7 +171,8 @@ fn whole_numbers(source: &Source, set: &Set) -> Result<Numbers> {
     let stored = set.short(tags::BITS_STORED).unwrap_or(allocated);
     let high = set.short(tags::HIGH_BIT).unwrap_or(stored.saturating_sub(1));
     if ![1, 8, 16, 32].contains(&allocated) {
-        let message = format!("is {allocated}, but 1, 8, 16 or 32 was expected");
+        let found = if allocated == 0 { "missing".into() } else { allocated.to_string() };
+        let message = format!("is {found}, but 1, 8, 16 or 32 was expected");
         return Err(source.error("Bits Allocated", message));
     }
     if !(1..=allocated).contains(&stored) || high >= allocated || high + 1 < stored {
@@ -219,12 +220,12 @@ fn without_pixels(source: &Source, set: &Set) -> crate::Error {
         "4.2" => "a spectrum",
         other if other.starts_with("11.") => "a presentation of other pictures",
         other if other.starts_with("9.") => "a waveform",
-        _ => "no pixels",
+        _ => "other data",
     };
     let modality = set.text(tags::MODALITY).unwrap_or_default();
     let modality =
         if modality.is_empty() { String::new() } else { format!(" (modality {modality})") };
-    let message = format!("holds {what}{}, no picture", super::shown(&modality));
+    let message = format!("holds {what}{}, not a picture", super::shown(&modality));
     source.error("data set", message).hint("name files of CT, MR, PET or other pictures")
 }
 

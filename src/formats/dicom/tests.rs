@@ -67,6 +67,16 @@ fn a_slice_in_every_coding() {
 }
 
 #[test]
+fn a_data_set_without_types_is_read_whatever_its_syntax_says() {
+    let mut made = Made::slice("", 2, 1);
+    made.shorts(tags::PIXEL_DATA, "OW", &[7, 8]);
+    let header = Made::slice(".1", 2, 1).file();
+    let start = header.windows(4).position(|tag| tag == [8, 0, 5, 0]).unwrap();
+    let volume = read_bytes(&[&header[..start], &made.bare()].concat()).unwrap();
+    assert_eq!(values(&volume), [7.0, 8.0]);
+}
+
+#[test]
 fn every_kind_of_number() {
     for (allocated, stored, signed, words, expected) in [
         // Bits that are not stored hold an overlay.
@@ -192,7 +202,7 @@ fn frames_are_found_in_fragments() {
     let parts: [&[u8]; 4] = [&table, &[1, 2], &[0, 0], &[3, 4]];
     assert_eq!(two(&parts).unwrap(), [1.0, 2.0, 3.0, 4.0]);
     let error = two(&[&[], &[1, 2], &[3, 4], &[5, 6]]).unwrap_err().to_string();
-    assert!(error.contains("frame 0 is missing: there are 3 fragments for 2 frames"), "{error}");
+    assert!(error.contains("is missing: there are 3 fragments for 2 frames"), "{error}");
 }
 
 #[test]
@@ -271,7 +281,7 @@ fn what_is_not_read_is_told() {
             with(&|made: &mut Made| {
                 made.without(tags::PIXEL_DATA);
             }),
-            "holds no pixels",
+            "holds other data",
         ),
         (
             with(&|made: &mut Made| {
