@@ -9,6 +9,7 @@ use glam::{DMat3, DVec3};
 use splatkit::{
     Error, Result,
     bricks::Bricks,
+    cells::{CellKind, CellOptions, Cells},
     cpu::CpuRenderer,
     gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{BuildOptions, Hierarchy, Tree},
@@ -156,6 +157,27 @@ fn samples(scene: Scene) -> Result<Scene> {
     Ok(scene.with_samples(points.to_splats(&SampleOptions::default())?, transfer()))
 }
 
+/// The samples of a lattice as the corners of hexahedra.
+fn cells() -> Result<Scene> {
+    let ball = bytes_on(cartesian(SIDE))?;
+    let points = (0..ball.len()).map(|i| ball.lattice.sample_position(i).as_vec3()).collect();
+    let values = (0..ball.len()).map(|i| ball.value(i) as f32).collect();
+    let mut cells = Cells { points, values, ..Cells::default() };
+    let side = SIDE as u32;
+    let inner = || 0..side - 1;
+    for (z, y, x) in
+        inner().flat_map(|z| inner().flat_map(move |y| inner().map(move |x| (z, y, x))))
+    {
+        let first = (z * side + y) * side + x;
+        let square = [0, 1, side + 1, side].map(|step| first + step);
+        cells.push(
+            CellKind::Hexahedron,
+            square.into_iter().chain(square.map(|at| at + side * side)),
+        );
+    }
+    Ok(Scene::new().with_cells(cells.tetrahedra(&CellOptions::default())?, transfer()))
+}
+
 fn surfels() -> Result<SplatSet> {
     Mesh::sphere(2).surfels(&SurfelOptions::default())
 }
@@ -195,6 +217,7 @@ fn rows_of_items() -> Vec<Row> {
             of_type(|v| Samples::F32((0..v.len()).map(|i| v.value(i) as f32).collect())),
         ),
         row("scattered samples", samples(Scene::new())),
+        row("cells", cells()),
         row("surfels", surface()),
         row("a hierarchy", hierarchy().map(|own| Scene::new().with_hierarchy(own))),
         row("surfels and a volume", surfels().and_then(|own| Ok(usual()?.with_splats(own)))),

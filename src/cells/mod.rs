@@ -1,10 +1,17 @@
 //! Cells: tetrahedra, hexahedra and their kin with a field inside, as solvers write them.
 
+mod basis;
+mod division;
 mod kind;
+mod phantom;
+mod split;
 #[cfg(test)]
 mod tests;
+mod tetrahedra;
 
 pub use kind::CellKind;
+pub use split::CellOptions;
+pub use tetrahedra::Tetrahedra;
 
 use crate::{
     about::About,
@@ -239,6 +246,26 @@ impl Cells {
             counts[(((f64::from(value) - low) * scale) as usize).min(bins - 1)] += 1;
         }
         counts
+    }
+
+    /// Returns the cells with values at the points: where there is one a cell, a point takes the
+    /// mean of those of its cells.
+    #[must_use]
+    pub fn with_values_of_points(self) -> Self {
+        if self.place == Place::Points {
+            return self;
+        }
+        let mut sums = vec![(0.0, 0u32); self.points.len()];
+        for (cell, value) in self.values.iter().enumerate().filter(|(_, value)| !value.is_nan()) {
+            for node in self.points_of(cell) {
+                let (sum, count) = &mut sums[node as usize];
+                *sum += f64::from(*value);
+                *count += 1;
+            }
+        }
+        // A point of no cell with a value has none.
+        let values = sums.into_iter().map(|(sum, count)| (sum / f64::from(count)) as f32).collect();
+        Self { values, place: Place::Points, ..self }
     }
 
     /// Derives a transfer function from the values.

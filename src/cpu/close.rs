@@ -99,13 +99,15 @@ pub struct Layer<S: Simd> {
     /// The value in the middle.
     pub middle: Lanes<S>,
     /// The sheet's start and thickness, and the part of the rays that counts.
-    pub start: f32,
-    pub thickness: f32,
+    pub start: Lanes<S>,
+    pub thickness: Lanes<S>,
     pub begin: Lanes<S>,
     pub end: Lanes<S>,
     /// The filled fraction of the sheet.
     pub filling: Lanes<S>,
     pub direction: [Lanes<S>; 3],
+    /// The gradients of the faces are whole, not only across the ray.
+    pub has_whole_gradients: bool,
 }
 
 /// The effect of a sheet on light.
@@ -138,6 +140,14 @@ struct Piece<S: Simd> {
 pub struct Visible(Vec<u32>);
 
 impl Visible {
+    /// Whether any value between two values, in entries of the table, is visible.
+    pub fn may_show_between(&self, plan: &Plan, low: f32, high: f32) -> bool {
+        let slack = 0.5 * NARROW + 1.0;
+        let [_, _, last, place] = plan.frame.transfer;
+        let at = |value: f32| (value + place).clamp(0.0, last) as usize;
+        self.0[at(high + slack) + 1] > self.0[at(low - slack)]
+    }
+
     pub fn new(plan: &Plan) -> Self {
         if !plan.has_field {
             return Self(Vec::new());
@@ -225,6 +235,17 @@ impl Plan<'_> {
             }),
         );
         [red * extinction, green * extinction, blue * extinction, extinction]
+    }
+
+    /// Returns the same for a value that is the same everywhere around.
+    #[inline(always)]
+    pub fn of_value<S: Simd>(&self, simd: S, value: Lanes<S>) -> [Lanes<S>; 4] {
+        let mut shown = self.one(simd, value);
+        if self.has_gradient_opacity {
+            let factor = self.gradient_factor(simd, Lanes::splat(simd, 0.0));
+            shown = four!(I => shown[I] * factor);
+        }
+        shown
     }
 
     /// Returns the factor on the extinction for a gradient's magnitude.
@@ -372,6 +393,31 @@ impl Plan<'_> {
         medium
     }
 
+    /// Returns the length of the rays between two distances that the clips leave.
+    #[inline(always)]
+    pub fn kept<S: Simd>(&self, simd: S, rays: &Rays<S>, [begin, end]: [Lanes<S>; 2]) -> Lanes<S> {
+        let none = Lanes::splat(simd, 0.0);
+        let (mut begin, end) = (begin.max(rays.inside[0]), end.min(rays.inside[1]));
+        let holes = &rays.holes[..self.holes];
+        let mut length = none;
+        for _ in 0..=holes.len() {
+            for _ in 0..holes.len() {
+                for [from, to] in holes {
+                    let is_inside = from.simd_le(begin) & begin.simd_lt(*to);
+                    begin = is_inside.select(*to, begin);
+                }
+            }
+            let mut next = end;
+            for [from, to] in holes {
+                let is_ahead = from.simd_gt(begin) & from.simd_lt(*to);
+                next = is_ahead.select(next.min(*from), next);
+            }
+            length += (next - begin).max(none);
+            begin = begin.max(next);
+        }
+        length
+    }
+
     /// Adds the part of a sheet between two distances, piece by piece.
     #[inline(always)]
     fn pass_between<S: Simd>(
@@ -386,7 +432,7 @@ impl Plan<'_> {
         let is_curved = self.is_integrated || self.isosurfaces > 0;
         let parts = if is_curved { PARTS } else { 1 };
         let step = length * (1.0 / parts as f32);
-        let per_thickness = 1.0 / layer.thickness;
+        let per_thickness = Lanes::splat(simd, 1.0) / layer.thickness;
         let mut place = (begin - layer.start) * per_thickness;
         let mut value = if is_curved { layer.parabola(place) } else { layer.mean() };
         if self.optics == Optics::Maximum {
@@ -504,10 +550,13 @@ impl Plan<'_> {
     /// Returns the gradient in view space, in entries per thickness of a sheet.
     #[inline(always)]
     fn gradient<S: Simd>(&self, layer: &Layer<S>, u: Lanes<S>) -> [Lanes<S>; 3] {
+        let (front, back) = (layer.front.across, layer.back.across);
+        if layer.has_whole_gradients {
+            return three!(I => (back[I] - front[I]).mul_add(u, front[I]));
+        }
         let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
         let slope = a * (u * 4.0 - 3.0) + b * (4.0 - u * 8.0) + c * (u * 4.0 - 1.0);
-        let along = slope * (self.frame.gradients[2] / layer.thickness);
-        let (front, back) = (layer.front.across, layer.back.across);
+        let along = slope * self.frame.gradients[2] / layer.thickness;
         three!(I => (back[I] - front[I]).mul_add(u, front[I]) + along * layer.direction[I])
     }
 }

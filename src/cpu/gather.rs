@@ -212,8 +212,18 @@ impl Gather<'_> {
         let middle = sum * 0.5 + bend * 0.125;
         let filling = Lanes::splat(simd, 1.0);
         let direction = rays.direction;
-        let mut layer =
-            Layer { front, back, middle, start, thickness, begin, end, filling, direction };
+        let mut layer = Layer {
+            front,
+            back,
+            middle,
+            start: Lanes::splat(simd, start),
+            thickness: Lanes::splat(simd, thickness),
+            begin,
+            end,
+            filling,
+            direction,
+            has_whole_gradients: false,
+        };
         if self.parts > 1 {
             let mask = mask & self.fill_thick(simd, rays, [front_weight, last.weight], &mut layer);
             return (self.may_show(simd, &layer) && mask.any_true()).then_some((layer, mask));
@@ -261,7 +271,7 @@ impl Gather<'_> {
             || {
                 let plan = self.plan;
                 let none = Lanes::splat(simd, 0.0);
-                let start = none + layer.start;
+                let start = layer.start;
                 let stop = start + layer.thickness;
                 let (mut from, mut to) = (start, stop);
                 if self.is_blended || self.ends.is_some() {
@@ -293,14 +303,14 @@ impl Gather<'_> {
                 } else if let Some(per_deviation) = self.ends {
                     let most = (LAST_VALUE / per_deviation).powi(2);
                     let ends = [layer.start, layer.start + layer.thickness];
-                    each!([0, 1], I => outside2(simd, plan, rays.place(ends[I])).simd_le(most))
+                    each!([0, 1], I => outside2(simd, plan, rays.places(ends[I])).simd_le(most))
                 } else {
                     [mask32x8::splat(simd, true); 2]
                 };
                 layer.front = front.or(simd, has_value[0], mean, &back, has_value[1]);
                 layer.back = back.or(simd, has_value[1], mean, &front, has_value[0]);
                 layer.middle = mean * 1.5 - (layer.front.value + layer.back.value) * 0.25;
-                let per_thickness = step * (0.5 / layer.thickness);
+                let per_thickness = step * 0.5 / layer.thickness;
                 if self.is_blended {
                     (all * per_thickness).simd_gt(least)
                 } else {

@@ -47,6 +47,8 @@ pub enum Prepared {
         listed: Option<(Box<[u16; 256]>, Vec<u32>)>,
     },
     Bricks(Box<BrickCache>),
+    /// Cells: all that a picture needs of them is made for it.
+    Cells,
 }
 
 impl Prepared {
@@ -65,6 +67,7 @@ impl Prepared {
             Item::Bricks(bricks, kernel, _) => {
                 Self::Bricks(Box::new(BrickCache::new(bricks, kernel)))
             }
+            Item::Cells(..) => Self::Cells,
         }
     }
 
@@ -80,7 +83,7 @@ impl Prepared {
     /// Returns the bytes of memory held for drawing, besides the scene's own.
     pub fn bytes(&self) -> u64 {
         match self {
-            Self::Set { .. } => 0,
+            Self::Set { .. } | Self::Cells => 0,
             Self::Hierarchy(pages) => pages.bytes(),
             Self::Volume { ranges, listed, .. } => {
                 let ranges = ranges.as_ref().map_or(0, |ranges| 2 * ranges.len() as u64);
@@ -135,6 +138,7 @@ impl Prepared {
                     records.extend(batch.iter().filter_map(own));
                 }))
             }
+            Self::Cells => Ok(Vec::new()),
             Self::Bricks(cache) => {
                 let records = |choice| brick_records(plan, cache, choice);
                 Ok(choice.as_ref().map_or_else(Vec::new, records))

@@ -3,6 +3,7 @@
 
 use super::{
     bins::Entry,
+    cells::{CellField, CellTile},
     close::{OPAQUE, Packet, Pixels, Visible},
     footprint::Record,
     gather::{Gather, Last},
@@ -11,7 +12,7 @@ use super::{
     scatter::{OpenTile, Window},
     skip::is_marked,
     sums::{Sums, WINDOW, differences},
-    vector::{each, three},
+    vector::{each, four, three},
 };
 use crate::{
     plan::TILE,
@@ -30,6 +31,7 @@ pub const EMPTY: Tile = [([0.0; 4], 0.0); TILE * TILE];
 pub struct March<'a> {
     pub plan: &'a Plan<'a>,
     pub gather: Option<Gather<'a>>,
+    pub cells: Option<CellField<'a>>,
     pub visible: &'a Visible,
     pub records: &'a [Vec<Record>],
 }
@@ -54,11 +56,12 @@ impl March<'_> {
         marks: &[u64],
         drawn: &mut u64,
     ) -> Tile {
-        if entries.is_empty() && marks.iter().all(|word| *word == 0) {
-            return EMPTY;
-        }
         let plan = self.plan;
         let corner = plan.corner(at);
+        let cells = self.cells.as_ref().and_then(|field| CellTile::new(simd, field, corner));
+        if entries.is_empty() && cells.is_none() && marks.iter().all(|word| *word == 0) {
+            return EMPTY;
+        }
         let packets = each!([0, 1, 2, 3, 4, 5, 6, 7], I => {
             let first = [corner[0] + (I % 2 * WIDE) as i32, corner[1] + (I / 2 * HIGH) as i32];
             Packet {
@@ -68,7 +71,7 @@ impl March<'_> {
                 is_done: false,
             }
         });
-        let mut tile = OpenTile { corner, packets, sums: Sums::new(simd) };
+        let mut tile = OpenTile { corner, packets, sums: Sums::new(simd), cells };
         match plan.single() {
             Some(order) => self.one_by_one(simd, entries, order, &mut tile, drawn),
             None => self.sheets(simd, entries, marks, &mut tile, drawn),
@@ -83,7 +86,7 @@ impl March<'_> {
         simd: S,
         entries: &[Entry],
         order: Order,
-        tile: &mut OpenTile<S>,
+        tile: &mut OpenTile<'_, S>,
         drawn: &mut u64,
     ) {
         for entry in entries {
@@ -107,7 +110,7 @@ impl March<'_> {
         simd: S,
         entries: &[Entry],
         marks: &[u64],
-        tile: &mut OpenTile<S>,
+        tile: &mut OpenTile<'_, S>,
         drawn: &mut u64,
     ) {
         let mut ahead = Ahead { entries, continued: std::array::from_fn(|_| Vec::new()) };
@@ -119,8 +122,13 @@ impl March<'_> {
             if open == 0 {
                 let entry = ahead.entries.first();
                 let entry = entry.map_or(usize::MAX, |entry| usize::from(entry.sheet));
-                let Some(first) = entry.min(next_mark(marks, sheet)).checked_add(1) else { return };
+                let next = entry.min(next_mark(marks, sheet));
+                let next = tile.cells.as_ref().map_or(next, |cells| next.min(cells.next(sheet)));
+                let Some(first) = next.checked_add(1) else { return };
                 sheet = first - 1;
+            }
+            if let Some(cells) = &mut tile.cells {
+                *drawn += cells.add(simd, self.plan, sheet, &tile.packets);
             }
             let added = self.add(simd, sheet, &mut ahead, tile);
             *drawn += added;
@@ -135,6 +143,9 @@ impl March<'_> {
                 }
             }
             tile.sums.clear(sheet);
+            if let Some(cells) = &mut tile.cells {
+                cells.clear(simd, sheet);
+            }
             open = open.saturating_sub(1);
             sheet += 1;
         }
@@ -147,7 +158,7 @@ impl March<'_> {
         simd: S,
         sheet: usize,
         ahead: &mut Ahead,
-        tile: &mut OpenTile<S>,
+        tile: &mut OpenTile<'_, S>,
     ) -> u64 {
         let mut continued = std::mem::take(&mut ahead.continued[sheet % WINDOW]);
         let begins = |entry: &&Entry| usize::from(entry.sheet) <= sheet;
@@ -179,7 +190,7 @@ impl March<'_> {
         simd: S,
         sheet: usize,
         marks: &[u64],
-        tile: &mut OpenTile<S>,
+        tile: &mut OpenTile<'_, S>,
         last: &mut [Last<S>; PACKETS],
     ) {
         let (plan, sums) = (self.plan, &mut tile.sums);
@@ -191,8 +202,20 @@ impl March<'_> {
             if packet.is_done {
                 continue;
             }
-            let radiance = sums.take_radiance(simd, plan, packet, sheet);
+            let mut radiance = sums.take_radiance(simd, plan, packet, sheet);
+            let own = tile.cells.as_ref().and_then(
+                #[inline(always)]
+                |cells| cells.radiance(simd, plan, packet, sheet),
+            );
+            if let Some(own) = own {
+                radiance = radiance.map_or(Some(own), |all| Some(four!(I => all[I] + own[I])));
+            }
+            let cells = tile.cells.as_mut().and_then(
+                #[inline(always)]
+                |cells| cells.layer(simd, plan, packet, sheet),
+            );
             let field = match &self.gather {
+                _ if cells.is_some() => cells,
                 Some(gather) if has_lattice => gather.layer(simd, packet, sheet, marks, last),
                 Some(_) => None,
                 None if has_sums => {

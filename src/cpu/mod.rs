@@ -20,6 +20,7 @@
 //! | `blend` | the same by sums over samples, for other kernels and lattices |
 //! | `radial`, `bells`, `rectilinear` | the weights of these sums |
 //! | `window` | loads the samples around eight places |
+//! | `cells` | tetrahedra with linear fields, integrated along the rays |
 //! | `close` | classifies, lights and composites a sheet |
 //! | `vector` | functions of eight numbers at once |
 
@@ -27,6 +28,7 @@ mod bells;
 mod bins;
 mod blend;
 mod brick_cache;
+mod cells;
 mod close;
 mod field;
 mod footprint;
@@ -71,6 +73,7 @@ use crate::{
 use bins::{BLOCK, Bins, TileLists};
 use blend::{Blend, Way};
 use brick_cache::{BrickCache, Grid};
+use cells::CellField;
 use close::{NO_VALUE, Visible};
 use fearless_simd::Level;
 use field::Typed;
@@ -203,7 +206,7 @@ impl CpuRenderer {
             match prepared {
                 Prepared::Hierarchy(pages) => stats.missing_pages += pages.missing as u64,
                 Prepared::Bricks(bricks) => stats.brick_bytes += bricks.bytes(),
-                Prepared::Set { .. } | Prepared::Volume { .. } => {}
+                Prepared::Set { .. } | Prepared::Volume { .. } | Prepared::Cells => {}
             }
         }
         stats.steps = clock.steps;
@@ -461,7 +464,12 @@ impl CpuRenderer {
         let marked =
             |own: &Vec<u64>| own.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
         let gathered = marks.iter().map(marked).sum();
-        let march = March { plan, gather, visible: &visible, records };
+        let cells = self.scene.items.iter().find_map(|item| match item {
+            Item::Cells(own, _) => Some(CellField::new(plan, own, &visible)),
+            _ => None,
+        });
+        let crossed = cells.as_ref().map_or(0, CellField::count);
+        let march = March { plan, gather, cells, visible: &visible, records };
         let mut bins = Bins::new(plan, records, &mut spare);
         clock.step("bin");
         let drawn = AtomicU64::new(0);
@@ -488,7 +496,7 @@ impl CpuRenderer {
         self.spare_bins = spare;
         let picture = Picture { width, height, color, depth };
         let stats = FrameStats {
-            splats: records.iter().map(|batch| batch.len() as u64).sum(),
+            splats: crossed + records.iter().map(|batch| batch.len() as u64).sum::<u64>(),
             gathered,
             entries: drawn.into_inner(),
             passes: u32::from(!records.is_empty()),

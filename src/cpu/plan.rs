@@ -116,6 +116,9 @@ impl<'a> Plan<'a> {
                     plan.has_slopes = true;
                     plan.set_field(sheets, settings, transfer, set.value_range(), None);
                 }
+                Item::Cells(cells, transfer) => {
+                    plan.set_field(sheets, settings, transfer, cells.range(), None);
+                }
                 Item::Volume(volume, kernel, transfer) => {
                     plan.on_lattice = true;
                     plan.has_slopes =

@@ -3,6 +3,7 @@
 //! explains the mathematics.
 
 use super::{
+    cells::CellTile,
     close::Packet,
     footprint::{Kind, Record},
     plan::Plan,
@@ -26,12 +27,13 @@ const RADII: usize = crate::plan::tables::RADII;
 const SECTIONS: usize = crate::plan::tables::SECTIONS;
 
 /// A tile while splats are added to it.
-pub struct OpenTile<S: Simd> {
+pub struct OpenTile<'a, S: Simd> {
     /// The first pixel, which may lie outside the picture.
     pub corner: [i32; 2],
     pub packets: [Packet<S>; PACKETS],
     /// The sums of the open sheets.
     pub sums: Sums<S>,
+    pub cells: Option<CellTile<'a, S>>,
 }
 
 /// A splat's window of four sheets in a tile.
@@ -400,7 +402,7 @@ fn near_normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
     x.mul_add(p, Lanes::splat(simd, 0.5))
 }
 
-impl<S: Simd> OpenTile<S> {
+impl<S: Simd> OpenTile<'_, S> {
     /// Adds a splat's window to all packets that it meets.
     #[inline(always)]
     pub fn add(&mut self, simd: S, plan: &Plan, record: &Record, window: Window) {

@@ -145,12 +145,13 @@ impl<S: Simd> Sums<S> {
             front,
             back,
             middle,
-            start,
-            thickness,
+            start: Lanes::splat(simd, start),
+            thickness: Lanes::splat(simd, thickness),
             begin,
             end,
             filling,
             direction: rays.direction,
+            has_whole_gradients: false,
         };
         Some((layer, has_value))
     }

@@ -54,6 +54,7 @@ mod vtk_xml;
 pub mod vtr;
 #[cfg(feature = "vtk")]
 pub mod vtu;
+mod vtu_write;
 pub mod xyz;
 
 pub use array::{Array, Place, arrays};
@@ -73,6 +74,7 @@ pub(crate) use shared::texture::decode as decode_picture;
 pub use stream::Stream;
 pub use table::FORMATS;
 pub use volume_stream::VolumeStream;
+pub use vtu_write::write_cells;
 
 use crate::input::Source;
 

@@ -38,6 +38,8 @@ pub fn variant(request: &Request<'_>) -> Variant {
                 variant.radiance = true;
                 variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
             }
+            // Not drawn: `PreparedScene::new` returns an error.
+            Item::Cells(..) => {}
             Item::Scalar(_, transfer)
             | Item::Volume(_, _, transfer)
             | Item::Bricks(_, _, transfer) => {

@@ -223,6 +223,7 @@ impl Frame {
                     frame.isotropic[3] = Kernel::default().least_sum() as f32;
                     transfer
                 }
+                Item::Cells(_, transfer) => transfer,
                 Item::Volume(volume, kernel, transfer) => {
                     frame.set_field(view, &volume.lattice);
                     frame.set_kernel(&volume.lattice, kernel);

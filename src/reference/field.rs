@@ -29,6 +29,8 @@ pub(super) struct Layer {
     /// The values at the faces.
     pub faces: [Option<f64>; 2],
     pub gradients: [Option<DVec3>; 2],
+    /// The gradients at the faces are whole, not only across the ray.
+    pub has_whole_gradients: bool,
     /// Factor on the extinction.
     pub filling: f64,
 }
@@ -49,6 +51,12 @@ impl Field<'_> {
     /// Whether gradients affect the picture.
     pub fn needs_gradients(&self) -> bool {
         self.shade.is_some() || !self.classifier.transfer.gradient.is_empty()
+    }
+
+    /// Whether any value between two values is visible.
+    pub fn shows(&self, [low, high]: [f64; 2]) -> bool {
+        let is_met = |surface: &Isosurface| low <= surface.value && surface.value <= high;
+        self.classifier.between(low, high).0 > 0.0 || self.surfaces.iter().any(is_met)
     }
 
     /// Returns the surfaces that a part crosses, each with its share of the part, in the order of
@@ -86,6 +94,9 @@ impl Layer {
             [Some(only), None] | [None, Some(only)] => only,
             [None, None] => DVec3::ZERO,
         };
+        if self.has_whole_gradients {
+            return mixed;
+        }
         let [front, back] = self.faces.map(|face| face.unwrap_or(self.mean));
         let middle = 1.5 * self.mean - 0.25 * (front + back);
         let slope = front * (4.0 * u - 3.0) + middle * (4.0 - 8.0 * u) + back * (4.0 * u - 1.0);
@@ -187,7 +198,14 @@ mod tests {
     use crate::volume::TransferFunction;
 
     fn layer(faces: [Option<f64>; 2], mean: f64) -> Layer {
-        Layer { span: [3.0, 5.0], mean, faces, gradients: [None; 2], filling: 1.0 }
+        Layer {
+            span: [3.0, 5.0],
+            mean,
+            faces,
+            gradients: [None; 2],
+            has_whole_gradients: false,
+            filling: 1.0,
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) 
             Item::Radiance(set) => kernels
                 .extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view))),
             // A hierarchy's cut has become a set by now, and bricks a volume.
-            Item::Hierarchy(_) | Item::Bricks(..) => {}
+            Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => {}
             Item::Scalar(set, transfer) => {
                 let before = before.map(|before| (before, transfer));
                 kernels.extend(

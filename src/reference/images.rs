@@ -101,6 +101,9 @@ impl Frame<'_> {
         let Some(field) = &self.field else {
             return self.composite(&sheets, ray, |_| None);
         };
+        if let Some(solids) = &self.solids {
+            return self.pixel_of_cells(solids, field, ray, &sheets, &allowed);
+        }
         let faces = self.faces(ray, kernels);
         let gradients = self.gradients(ray, &faces, around);
         let held = match field.lattice {
@@ -124,6 +127,7 @@ impl Frame<'_> {
                 mean: mean.value(self.least_sum, to - from)?,
                 faces: [&faces[k], &faces[k + 1]].map(|face| face.value(self.least_sum)),
                 gradients: [gradients[k], gradients[k + 1]],
+                has_whole_gradients: false,
                 filling,
             };
             Some((layer, pieces))
@@ -161,7 +165,7 @@ impl Frame<'_> {
 
     /// Composites the sheets of a ray, front to back: the radiance in each, and the medium of the
     /// field with its steps of optical depth.
-    fn composite(
+    pub(super) fn composite(
         &self,
         sheets: &[Sheet],
         ray: &Ray,
@@ -182,7 +186,7 @@ impl Frame<'_> {
     }
 
     /// Returns the colour of the largest value on a ray.
-    fn largest(&self, field: &Field, value: f64) -> Composite {
+    pub(super) fn largest(&self, field: &Field, value: f64) -> Composite {
         let transfer = field.classifier.transfer;
         let opacity = transfer.opacity(value);
         Composite {

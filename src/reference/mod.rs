@@ -67,6 +67,16 @@
 //! between the gradients of the faces. (If one face has none, g(u) is that of the other; if neither
 //! has one, it is 0.) Along the ray, the gradient is the derivative of the parabola.
 //!
+//! **Cells.** A field of tetrahedra is linear inside each, between the values of its corners. Those
+//! with a visible value count (all in a maximum intensity picture). A ray crosses a tetrahedron
+//! where no barycentric coordinate is negative. In a sheet, L is the sum of the lengths of these
+//! crossings and V the sum of their integrals; f̄ = V/L. If L ≤ 10⁻⁴ of the sheet's thickness, the
+//! sheet holds no field. The faces of the sheet then are the first place where a crossing begins
+//! and the last where one ends, with the values and gradients there, and extinction is multiplied
+//! by min(1, L/distance between them). A gradient is linear between those of the corners, and is
+//! taken whole: not only across the ray. If each tetrahedron has one value, it adds the optical
+//! depth κ·ℓ of its crossing, unlit, to the sheet; optical depths add, colours mix in proportion.
+//!
 //! **Parts.** The field exists where the sheet lies inside the box of the samples and inside what
 //! the clips leave. The box is that of the volume's lattice, not of the drawn one. An axis on which
 //! all samples lie at one place extends half a kernel unit to either side; scattered samples have
@@ -131,6 +141,7 @@
 //! kernels whose optical depth is zero or negative, are left out. A kernel's depth is at its s*. In
 //! both modes, perspective views leave out kernels with s* behind the eye.
 
+mod cells;
 mod classify;
 mod clip;
 mod composite;
@@ -163,6 +174,7 @@ use crate::{
     scene::{Classification, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
     volume::{Lattice, Shade},
 };
+use cells::Solids;
 use classify::Classifier;
 use composite::{Composite, Medium};
 use field::Field;
@@ -259,6 +271,8 @@ struct Frame<'a> {
     field: Option<Field<'a>>,
     /// The same field, if its kernels are tensor products.
     product: Option<Product<'a>>,
+    /// The same field, if it is that of cells.
+    solids: Option<Solids>,
     /// The lattice of a volume's samples.
     lattice: Option<&'a Lattice>,
     /// The shading of radiance.
@@ -273,7 +287,7 @@ impl<'a> Frame<'a> {
         let samples = flat.items.iter().find_map(|item| match item {
             // Bricks have become a volume by now.
             Item::Radiance(_) | Item::Hierarchy(_) | Item::Bricks(..) => None,
-            Item::Scalar(_, transfer) => Some((transfer, None)),
+            Item::Scalar(_, transfer) | Item::Cells(_, transfer) => Some((transfer, None)),
             Item::Volume(volume, _, transfer) => Some((transfer, Some(&volume.lattice))),
         });
         let dark = settings.optics == Optics::XRay;
@@ -291,7 +305,9 @@ impl<'a> Frame<'a> {
             Item::Volume(_, kernel, _) => Some(kernel.clone()),
             _ => None,
         });
+        let all = settings.optics == Optics::Maximum;
         Self {
+            solids: Solids::of(flat, &view, field.as_ref(), all),
             least_sum: kernel.unwrap_or_default().least_sum(),
             mode: settings.mode,
             optics: settings.optics,

@@ -4,6 +4,7 @@ use super::numbers;
 use crate::{
     Result,
     bricks::Bricks,
+    cells::Tetrahedra,
     hierarchy::Hierarchy,
     math::{Bounds, Kernel},
     splat::SplatSet,
@@ -28,6 +29,8 @@ pub enum Item {
     /// ([`Settings::detail`](super::Settings::detail),
     /// [`Settings::page_memory`](super::Settings::page_memory)).
     Bricks(Arc<Bricks>, Kernel, TransferFunction),
+    /// Tetrahedra with a linear field inside, shown by a transfer function.
+    Cells(Arc<Tetrahedra>, TransferFunction),
 }
 
 impl Item {
@@ -47,7 +50,8 @@ impl Item {
         match self {
             Self::Scalar(_, transfer)
             | Self::Volume(_, _, transfer)
-            | Self::Bricks(_, _, transfer) => Some(transfer),
+            | Self::Bricks(_, _, transfer)
+            | Self::Cells(_, transfer) => Some(transfer),
             Self::Radiance(_) | Self::Hierarchy(_) => None,
         }
     }
@@ -57,7 +61,8 @@ impl Item {
         match self {
             Self::Scalar(_, transfer)
             | Self::Volume(_, _, transfer)
-            | Self::Bricks(_, _, transfer) => Some(transfer),
+            | Self::Bricks(_, _, transfer)
+            | Self::Cells(_, transfer) => Some(transfer),
             Self::Radiance(_) | Self::Hierarchy(_) => None,
         }
     }
@@ -66,7 +71,7 @@ impl Item {
     pub fn kernel(&self) -> Option<&Kernel> {
         match self {
             Self::Volume(_, kernel, _) | Self::Bricks(_, kernel, _) => Some(kernel),
-            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) => None,
+            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) | Self::Cells(..) => None,
         }
     }
 
@@ -75,7 +80,7 @@ impl Item {
         match self {
             Self::Volume(volume, ..) => Some(&volume.lattice),
             Self::Bricks(bricks, ..) => Some(&bricks.header().lattice),
-            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) => None,
+            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) | Self::Cells(..) => None,
         }
     }
 
@@ -86,6 +91,7 @@ impl Item {
             Self::Scalar(set, _) => Some(set.value_range()),
             Self::Volume(volume, ..) => Some(volume.range),
             Self::Bricks(bricks, ..) => Some(bricks.header().range),
+            Self::Cells(cells, _) => Some(cells.range()),
             Self::Radiance(_) | Self::Hierarchy(_) => None,
         }
     }
@@ -95,6 +101,7 @@ impl Item {
         match self {
             Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
             Self::Hierarchy(hierarchy) => hierarchy.bounds(),
+            Self::Cells(cells, _) => cells.bounds(),
             Self::Volume(volume, kernel, _) => reached(&volume.lattice, kernel),
             // Kernels of coarser levels reach further, but nothing is drawn outside the field's
             // box.

@@ -17,6 +17,7 @@ pub(crate) use sheets::MOST_GATHERED;
 use crate::{
     Result,
     bricks::Bricks,
+    cells::Tetrahedra,
     hierarchy::Hierarchy,
     math::{Bounds, Kernel, Tensor},
     splat::SplatSet,
@@ -82,6 +83,18 @@ impl Scene {
         self
     }
 
+    /// Adds cells, as the tetrahedra that are made of them
+    /// ([`Cells::tetrahedra`](crate::cells::Cells::tetrahedra)). Only the CPU engine draws them.
+    #[must_use]
+    pub fn with_cells(
+        mut self,
+        tetrahedra: impl Into<Arc<Tetrahedra>>,
+        transfer: TransferFunction,
+    ) -> Self {
+        self.items.push(Item::Cells(tetrahedra.into(), transfer));
+        self
+    }
+
     /// Adds a volume.
     #[must_use]
     pub fn with_volume(
@@ -122,9 +135,17 @@ impl Scene {
     }
 
     /// Returns the scene's kernel if it is a tensor product: the function along each axis of the
-    /// lattice. The GPU engine does not draw tensor products.
+    /// lattice.
     pub fn tensor(&self) -> Option<Tensor> {
         self.items.iter().find_map(|item| item.kernel()?.as_tensor())
+    }
+
+    /// Returns what of the scene only the CPU engine draws (“the kernel linear”, “cells”); `None` if
+    /// the GPU engine draws all of it.
+    pub fn beyond_gpu(&self) -> Option<String> {
+        let tensor = self.tensor().map(|tensor| format!("the kernel {}", tensor.name()));
+        let has_cells = self.items.iter().any(|item| matches!(item, Item::Cells(..)));
+        tensor.or_else(|| has_cells.then(|| "cells".into()))
     }
 
     /// Returns the box around everything that can be seen, footprints included.
@@ -135,7 +156,9 @@ impl Scene {
     /// Whether the scene contains explicit splats (surfaces or scattered samples). These are
     /// widened by [`FOOTPRINT_BLUR`](crate::splat::FOOTPRINT_BLUR) and have edges.
     pub fn has_splats(&self) -> bool {
-        self.items.iter().any(|item| item.lattice().is_none())
+        let is_of_splats =
+            |item: &Item| item.lattice().is_none() && !matches!(item, Item::Cells(..));
+        self.items.iter().any(is_of_splats)
     }
 
     /// Whether any part can become opaque enough to hide what lies behind it. Surfaces can. A field

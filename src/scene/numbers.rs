@@ -56,7 +56,8 @@ pub(super) fn check_item(item: &Item) -> Result<()> {
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(Error::Argument)?,
         Item::Volume(volume, ..) => volume.validate().map_err(Error::Argument)?,
-        Item::Hierarchy(_) | Item::Bricks(..) => {}
+        // Tetrahedra are checked as they are made.
+        Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => {}
     }
     check_field(item)?;
     let Bounds { min, max } = item.bounds();

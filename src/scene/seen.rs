@@ -4,6 +4,7 @@ use super::{Clip, ClipShape, Item, Scene};
 use crate::{
     Result,
     bricks::{Bricks, Level},
+    cells::Tetrahedra,
     hierarchy::Hierarchy,
     math::{
         Bounds,
@@ -44,8 +45,8 @@ impl Clip {
 
 impl Scene {
     /// Returns points, in world coordinates, that span what a picture shows of the scene: of
-    /// splats, the outermost ones and their reach; of volumes, the outermost samples that the
-    /// transfer function shows. [`Camera::fit_points`](crate::math::Camera::fit_points) makes them
+    /// splats, the outermost ones and their reach; of volumes and cells, the outermost samples that
+    /// the transfer function shows. [`Camera::fit_points`](crate::math::Camera::fit_points) makes them
     /// fill a picture.
     ///
     /// Up to a thousandth of the splats that lies far away on one side of all others, and of a
@@ -62,6 +63,7 @@ impl Scene {
                 Item::Radiance(set) => of_splats(set, |_| true, clips),
                 Item::Scalar(set, transfer) => of_samples(set, transfer, clips),
                 Item::Hierarchy(hierarchy) => of_splats(&coarse(hierarchy)?, |_| true, clips),
+                Item::Cells(cells, transfer) => of_cells(cells, transfer, clips),
                 Item::Volume(volume, _, transfer) => of_volume(volume, transfer, clips),
                 Item::Bricks(bricks, _, transfer) => {
                     of_volume(&bricks.volume(overview(bricks))?, transfer, clips)
@@ -102,6 +104,22 @@ fn of_samples(set: &SplatSet, transfer: &TransferFunction, clips: &[Clip]) -> Ve
     let values = set.splats.iter().map(|splat| f64::from(splat.strength));
     let sides = Sides::of(transfer, values);
     of_splats(set, |splat| sides.show(transfer, f64::from(splat.strength)), clips)
+}
+
+/// Returns the outermost corners of the tetrahedra that a transfer function shows.
+fn of_cells(cells: &Tetrahedra, transfer: &TransferFunction, clips: &[Clip]) -> Vec<DVec3> {
+    let mut is_seen = vec![false; cells.points.len()];
+    for (number, corners) in cells.corners.iter().enumerate() {
+        if transfer.visible(cells.range_of(number)) {
+            corners.iter().for_each(|corner| is_seen[*corner as usize] = true);
+        }
+    }
+    let world = |point: Vec3| cells.origin + point.as_dvec3();
+    let kept = |point: Vec3| clips.iter().all(|clip| clip.keeps(world(point)));
+    let seen =
+        cells.points.iter().zip(is_seen).filter(|(point, is_seen)| *is_seen && kept(**point));
+    let seen: Vec<Vec3> = seen.map(|(point, _)| *point).collect();
+    outermost(&seen).into_iter().map(|index| world(seen[index as usize])).collect()
 }
 
 /// Returns the leaves of a hierarchy, or, if it has many pages, the nodes of its coarse pages.

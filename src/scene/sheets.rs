@@ -3,6 +3,7 @@
 use super::{Item, Mode, Scene, Settings};
 use crate::{
     bricks::Choice,
+    cells::Place,
     math::{Bounds, Sheets, Tensor, View},
     splat::{FOOTPRINT_BLUR, STEP_BACK},
     volume::{Arrangement, Lattice},
@@ -13,6 +14,13 @@ use glam::{DMat3, DVec3};
 /// thicker sheets a parabola misses details of the field.
 pub(crate) const MOST_GATHERED: f64 = 2.2;
 
+/// Thickness of sheets of tetrahedra, in typical edges: with values of points, and with values of
+/// tetrahedra, which do not mix in a sheet.
+const CELL_SHEETS: [f64; 2] = [0.5, 0.2];
+
+/// The thinnest sheets of tetrahedra, as a share of the depth of the scene.
+const LEAST_CELL_SHEET: f64 = 1e-3;
+
 impl Scene {
     /// Returns how far a splat of the scene can reach from its centre, in the standard deviations
     /// that widening adds. Returns 0 if there are no explicit splats.
@@ -21,7 +29,7 @@ impl Scene {
             Item::Radiance(set) => f64::from(set.extent) + STEP_BACK,
             Item::Scalar(set, _) => f64::from(set.extent),
             Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent) + STEP_BACK,
-            Item::Volume(..) | Item::Bricks(..) => 0.0,
+            Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => 0.0,
         });
         reaches.fold(0.0, f64::max)
     }
@@ -32,6 +40,7 @@ impl Scene {
     /// - Volumes: 4/3 of the sample spacing, and at most 2/3 of the kernel's extent. A kernel of
     ///   extent 2 meets at most four sheets. Sheets are half as thick if the field passes through
     ///   the samples, and half a spacing thick if the kernel is linear.
+    /// - Cells: half a typical edge, and a fifth if each has one value.
     /// - Surfaces: a few pixels.
     /// - Both: the finer of the two.
     /// - Volumes in bricks: as for volumes, with the spacing of the drawn levels. Between two
@@ -93,7 +102,16 @@ impl Scene {
                     let step = (4.0f64 / 3.0).min(2.0 / 3.0 * kernel.extent) * spacing;
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
-                Item::Volume(..) | Item::Bricks(..) => {}
+                Item::Cells(cells, _) if settings.sheet_thickness.is_none() => {
+                    let step =
+                        CELL_SHEETS[usize::from(cells.place() == Place::Cells)] * cells.spacing();
+                    // Thinner sheets would not be seen.
+                    let middle = 0.5 * (near + far);
+                    let pixel = if view.perspective { middle } else { 1.0 } / view.scale;
+                    let step = step.max(LEAST_CELL_SHEET * (far - near)).max(0.5 * pixel);
+                    thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
+                }
+                Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {}
                 Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => {
                     pixels = Some(settings.sheet_pixels);
                 }

@@ -1,8 +1,9 @@
 //! Whether the engines can draw a scene, and with which settings.
 
-use super::{ClipShape, Item, Optics, Scene, Settings, numbers};
+use super::{ClipShape, Gradient, Item, Mode, Optics, Scene, Settings, numbers};
 use crate::{
     Error, Result,
+    cells::{Place, Tetrahedra},
     math::{Bounds, Kernel, Profile, Tensor},
     splat::{Payload, SplatSet},
     volume::{Arrangement, Lattice, TransferFunction, Volume},
@@ -41,7 +42,7 @@ impl Scene {
                 Item::Radiance(set) => (set, Payload::Radiance),
                 Item::Scalar(set, _) => (set, Payload::Scalar),
                 Item::Hierarchy(_) => continue,
-                Item::Volume(..) | Item::Bricks(..) => {
+                Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {
                     fields += 1;
                     continue;
                 }
@@ -66,7 +67,7 @@ impl Scene {
         }
         if fields > 1 {
             return Err(Error::Argument(format!(
-                "a picture can show one volume or sample set; the scene has {fields}"
+                "a picture can show one volume, sample set or set of cells; the scene has {fields}"
             )));
         }
         if self.bounds().is_empty() {
@@ -121,6 +122,7 @@ fn check_item(item: &Item, settings: &Settings) -> Result<()> {
         }
         Item::Radiance(_) | Item::Hierarchy(_) => Ok(()),
         Item::Scalar(_, transfer) => check_classified(transfer, settings),
+        Item::Cells(cells, transfer) => check_cells(cells, transfer, settings),
         Item::Volume(volume, kernel, transfer) => {
             check_volume(volume, kernel, settings)?;
             check_classified(transfer, settings)
@@ -161,6 +163,22 @@ fn check_bricks(kernel: &Kernel, settings: &Settings) -> Result<()> {
     if settings.classifies_samples() {
         return wrong(
             "a volume in bricks must be classified after interpolation, in image-aligned sheets",
+        );
+    }
+    Ok(())
+}
+
+/// Returns an error if the method is none for cells.
+fn check_cells(cells: &Tetrahedra, transfer: &TransferFunction, settings: &Settings) -> Result<()> {
+    if settings.classifies_samples() || settings.mode != Mode::Sheets {
+        return wrong("cells are classified after interpolation, in image-aligned sheets");
+    }
+    if settings.gradient == Gradient::Central {
+        return wrong("the gradient of cells is that of their nodes, not of neighbouring pixels");
+    }
+    if cells.place() == Place::Cells && !transfer.isosurfaces.is_empty() {
+        return wrong(
+            "isosurfaces need values at the points of cells, but there is one value for each cell",
         );
     }
     Ok(())

@@ -53,7 +53,7 @@ pub fn settings(scene: &Scene, settings: &Settings) -> Value {
             field["kernel"] = kernel(shape);
             Some(field)
         }
-        Item::Scalar(_, transfer) => Some(shown(transfer)),
+        Item::Scalar(_, transfer) | Item::Cells(_, transfer) => Some(shown(transfer)),
         Item::Radiance(_) | Item::Hierarchy(_) => None,
     });
     json!({

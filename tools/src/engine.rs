@@ -133,9 +133,8 @@ impl EngineFlags {
     pub fn device(&self, scene: &Scene) -> splatkit::Result<Device> {
         match self.engine {
             Engine::Cpu => Ok(Device::Cpu),
-            // The GPU engine draws no tensor products. If an adapter is named, that engine reports
-            // so.
-            Engine::Auto if !self.asks_gpu() && scene.tensor().is_some() => Ok(Device::Cpu),
+            // If an adapter is named, the GPU engine reports what it does not draw.
+            Engine::Auto if !self.asks_gpu() && scene.beyond_gpu().is_some() => Ok(Device::Cpu),
             Engine::Auto if !self.asks_gpu() => Ok(match Device::automatic() {
                 Device::Gpu(gpu, _) => Device::Gpu(gpu, self.passes()),
                 Device::Cpu => Device::Cpu,
@@ -222,7 +221,8 @@ impl EngineFlags {
             let own = loaded.scene.items.iter().find_map(|item| match item {
                 Item::Scalar(_, transfer)
                 | Item::Volume(_, _, transfer)
-                | Item::Bricks(_, _, transfer) => transfer.shade,
+                | Item::Bricks(_, _, transfer)
+                | Item::Cells(_, transfer) => transfer.shade,
                 Item::Radiance(_) | Item::Hierarchy(_) => None,
             });
             settings.volume_shade = Some(Some(own.unwrap_or_default()));

@@ -4,7 +4,9 @@ use crate::{failure::Failure, limits::LimitFlags, output, parse, progress::Progr
 use clap::{Args, ValueEnum};
 use glam::{DMat3, DVec3};
 use splatkit::{
-    Error, disk, formats,
+    Error,
+    cells::{CellKind, Cells},
+    disk, formats,
     input::{Limits, Source},
     memory,
     volume::{Arrangement, Lattice, Volume, phantoms::Phantom},
@@ -14,11 +16,12 @@ use std::{io::Write, path::PathBuf};
 #[derive(Args, Debug)]
 pub struct Generate {
     /// Choose the content: the phantom marschner-lobb, ball, specimen, slabs or head (in Hounsfield
-    /// units; a length of 1 stands for 100 mm), or scan for a mesh.
+    /// units; a length of 1 stands for 100 mm), scan for a mesh, or a tube of tetrahedra,
+    /// hexahedra, wedges, pyramids, quadratic-tetrahedra or quadratic-hexahedra.
     #[arg(value_parser = what)]
     what: What,
     /// Write to this file: a volume as .nrrd, or as .vtr on a rectilinear lattice that is densest
-    /// in the middle; scattered samples as .csv; a scan as .ply.
+    /// in the middle; scattered samples as .csv; a scan as .ply; a tube as .vtu.
     #[arg(short, long, value_name = "FILE", value_parser = target)]
     output: PathBuf,
     /// Set the number of samples along each axis of the cube from −1 to 1.
@@ -32,6 +35,15 @@ pub struct Generate {
     /// written uncompressed, slice by slice, so that the volume may be larger than memory.
     #[arg(long = "type", value_enum, default_value_t = Type::F32)]
     sample_type: Type,
+    /// Set the number of cubes through the wall of a tube. There are 18 times as many as the cube
+    /// of this number, each of 1 to 6 cells.
+    #[arg(
+        long,
+        value_name = "COUNT",
+        default_value_t = 8,
+        value_parser = clap::value_parser!(u32).range(1..=64)
+    )]
+    parts: u32,
     /// Make a scan from this mesh: subdivide its triangles into four again and again, and displace
     /// its surface by waves.
     #[arg(long, value_name = "MESH", required_if_eq("what", "scan"))]
@@ -68,22 +80,46 @@ enum Type {
 enum What {
     Phantom(Phantom),
     Scan,
+    Tube(CellKind),
 }
+
+/// The kinds of cells of a tube.
+const TUBES: [CellKind; 6] = [
+    CellKind::Tetrahedron,
+    CellKind::Hexahedron,
+    CellKind::Wedge,
+    CellKind::Pyramid,
+    CellKind::QuadraticTetrahedron,
+    CellKind::QuadraticHexahedron,
+];
+
+/// The names of the tubes, in the same order.
+const TUBE_NAMES: [&str; 6] = [
+    "tetrahedra",
+    "hexahedra",
+    "wedges",
+    "pyramids",
+    "quadratic-tetrahedra",
+    "quadratic-hexahedra",
+];
 
 fn what(name: &str) -> Result<What, String> {
     if name == "scan" {
         return Ok(What::Scan);
     }
-    Phantom::named(name)
-        .map(What::Phantom)
-        .ok_or_else(|| format!("use {} or scan", Phantom::NAMES.join(", ")))
+    let tube = TUBE_NAMES.iter().position(|own| *own == name);
+    if let Some(tube) = tube {
+        return Ok(What::Tube(TUBES[tube]));
+    }
+    let names = || [&Phantom::NAMES[..], &TUBE_NAMES].concat().join(", ");
+    Phantom::named(name).map(What::Phantom).ok_or_else(|| format!("use {} or scan", names()))
 }
 
 fn target(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|extension| extension.to_str()) {
-        Some("nrrd" | "vtr" | "csv" | "ply") => Ok(path),
-        _ => Err("the file's name must end in .nrrd, .vtr, .csv or .ply".into()),
+        Some("nrrd" | "vtr" | "csv" | "ply" | "vtu") => Ok(path),
+        _ => Err("the file's name must end in .nrrd, .vtr, .csv, .ply or .vtu".into()),
     }
 }
 
@@ -109,6 +145,14 @@ impl Generate {
             (What::Scan, ..) => {
                 return Err(Failure::Usage(
                     "a scan is made from a mesh (--from) and written as .ply".into(),
+                ));
+            }
+            (What::Tube(kind), _, "vtu") => {
+                formats::write_cells(&Cells::tube(kind, self.parts)?, &self.output)?;
+            }
+            (What::Tube(_), ..) | (_, _, "vtu") => {
+                return Err(Failure::Usage(
+                    "a tube of cells is written as .vtu, and nothing else is".into(),
                 ));
             }
             (_, _, "ply") => {

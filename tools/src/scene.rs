@@ -16,6 +16,7 @@ use splatkit::{
     Deadline, Error,
     about::Stance,
     bricks::{Bricks, Level},
+    cells::{CellOptions, Cells},
     hierarchy::Hierarchy,
     math::Bounds,
     memory,
@@ -163,9 +164,7 @@ impl Adding<'_> {
             Input::Bricks(bricks) => self.add_bricks(path, bricks),
             Input::Volume(volume) => self.add_volume(path, volume),
             Input::Samples(points) => self.add_samples(path, &points, deadline),
-            Input::Cells(_) => {
-                Err(Error::input(path, "content", "holds cells, which are not drawn yet").into())
-            }
+            Input::Cells(cells) => self.add_cells(path, cells),
         }
     }
 
@@ -263,6 +262,24 @@ impl Adding<'_> {
         self.loaded.count_in(Bounds { min, max }.union(splats.bounds()), points.len());
         self.stand_as_told(path, points.about.stance);
         self.change(|scene| scene.with_samples(splats, transfer));
+        Ok(())
+    }
+
+    fn add_cells(&mut self, path: &Path, mut cells: Cells) -> Result<(), Failure> {
+        let automatic = || cells.automatic_transfer();
+        let transfer = self.show.transfer(path, cells.range(), automatic)?;
+        let title = titled(&cells.about.name, &cells.about.unit);
+        self.add_bar(&transfer, cells.range(), title);
+        self.add_unit(&cells.about.length);
+        self.progress.stage(format!("Dividing the cells of {}", path.display()));
+        if !transfer.isosurfaces.is_empty() {
+            cells = cells.with_values_of_points();
+        }
+        let options = CellOptions::default();
+        let tetrahedra = cells.tetrahedra(&options).map_err(|e| in_file(path, e))?;
+        self.loaded.count_in(tetrahedra.bounds(), cells.len());
+        self.stand_as_told(path, cells.about.stance);
+        self.change(|scene| scene.with_cells(tetrahedra, transfer));
         Ok(())
     }
 

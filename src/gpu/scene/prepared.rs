@@ -87,10 +87,9 @@ impl PreparedScene {
     /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
     pub(crate) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.validate()?;
-        if let Some(tensor) = scene.tensor() {
-            let name = tensor.name();
+        if let Some(what) = scene.beyond_gpu() {
             return Err(Error::Argument(format!(
-                "the GPU engine does not draw the kernel {name} yet; the CPU engine does"
+                "the GPU engine does not draw {what} yet; the CPU engine does"
             )));
         }
         let mut prepared = Self {
@@ -125,7 +124,7 @@ impl PreparedScene {
                 Item::Volume(volume, kernel, _) if unsuited(volume, kernel).is_some() => {
                     prepared.add_volume(gpu, volume, kernel.clone())?;
                 }
-                Item::Volume(..) => {}
+                Item::Volume(..) | Item::Cells(..) => {}
                 Item::Bricks(bricks, kernel, _) => {
                     prepared.brick_cache = Some(BrickCache::new(bricks, kernel));
                 }
@@ -599,7 +598,7 @@ fn bytes_of(item: &Item) -> u64 {
                 volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
             volume.drawn_lattice().len() as u64 * (sample + 2)
         }
-        Item::Hierarchy(_) | Item::Bricks(..) => 0,
+        Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => 0,
     }
 }
 

@@ -1,0 +1,259 @@
+//! Cells, divided into tetrahedra.
+
+use super::{
+    CellKind, Cells, Place, Tetrahedra,
+    basis::Basis,
+    division::{Block, Division, faces_of},
+    kind::faces,
+    tetrahedra::Builder,
+};
+use crate::{Result, parallel::prelude::*};
+use glam::DVec4;
+use std::collections::HashMap;
+
+/// How cells become tetrahedra.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CellOptions {
+    /// How far linear tetrahedra may deviate from a cell: in its shape, as a part of its size; in
+    /// its field, as a part of the range of all values. Cells that deviate more are divided more
+    /// often, along each edge into up to eight parts. The default is 1/100.
+    pub tolerance: f64,
+    /// The most tetrahedra: cells are divided less if there would be more. The default is 2²⁶, for
+    /// which 1 GiB of memory is enough.
+    pub most: usize,
+}
+
+impl Default for CellOptions {
+    fn default() -> Self {
+        Self { tolerance: 0.01, most: 1 << 26 }
+    }
+}
+
+/// The parts into which the edges of a cell may be divided.
+const PARTS: [usize; 4] = [1, 2, 4, 8];
+
+impl Cells {
+    /// Divides the cells into tetrahedra with linear fields. Neighbours divide the faces that they
+    /// share in the same way, by the numbers of their points (Dompierre et al. 1999). Where one
+    /// neighbour is divided more often than the other, they fit within the tolerance.
+    ///
+    /// Left out are cells with a hole at a node, and tetrahedra without a volume.
+    ///
+    /// # Errors
+    /// Those of [`validate`](Self::validate), and [`Error::Argument`](crate::Error::Argument) if
+    /// nothing is left.
+    pub fn tetrahedra(&self, options: &CellOptions) -> Result<Tetrahedra> {
+        self.validate()?;
+        let divisions = Divisions::new(self);
+        let levels = self.levels(&divisions, options);
+        let mut made = Made { cells: self, points: HashMap::new(), builder: Builder::new(self) };
+        for (cell, level) in levels.iter().enumerate() {
+            if let Some(level) = level {
+                made.add(cell, divisions.of(self, cell, usize::from(*level)));
+            }
+        }
+        made.builder.finish()
+    }
+
+    /// Returns the level of each cell's division; `None` for cells that are not drawn.
+    fn levels(&self, divisions: &Divisions, options: &CellOptions) -> Vec<Option<u8>> {
+        let [low, high] = self.range();
+        let (shape, field) = (options.tolerance, options.tolerance * (high - low));
+        let level = |cell: usize| {
+            if !self.is_shown(cell) {
+                return None;
+            }
+            let own = divisions.levels(self, cell);
+            let fits = |level: &usize| {
+                let division = divisions.of(self, cell, *level);
+                division.is_none_or(|division| self.fits(cell, division, shape, field))
+            };
+            // The finest level is taken as it is.
+            Some((0..own.saturating_sub(1)).find(fits).unwrap_or(own.saturating_sub(1)) as u8)
+        };
+        let mut levels: Vec<Option<u8>> = (0..self.len()).into_par_iter().map(level).collect();
+        // Blocks of a cell grow with the cube of the parts; a block holds up to six tetrahedra.
+        let blocks = |level: u8| PARTS[usize::from(level)].pow(3) * 6;
+        for most in (0..PARTS.len() as u8).rev() {
+            let count: usize = levels.iter().flatten().map(|level| blocks(*level)).sum();
+            if count <= options.most {
+                break;
+            }
+            levels.iter_mut().flatten().for_each(|level| *level = (*level).min(most));
+        }
+        levels
+    }
+
+    /// Whether a cell has values at all of its nodes.
+    fn is_shown(&self, cell: usize) -> bool {
+        match self.place {
+            Place::Points => self.points_of(cell).all(|node| !self.values[node as usize].is_nan()),
+            Place::Cells => !self.values[cell].is_nan(),
+        }
+    }
+
+    /// Whether the linear blocks of a division are as close to a cell as wanted.
+    fn fits(&self, cell: usize, division: &Division, shape: f64, field: f64) -> bool {
+        let nodes = self.nodes_of(cell);
+        let corners: Vec<DVec4> = nodes.iter().map(|node| self.node(*node)).collect();
+        let of = |weights: &[f64]| -> DVec4 {
+            weights.iter().zip(&corners).map(|(weight, corner)| *weight * *corner).sum()
+        };
+        let low = corners.iter().copied().fold(DVec4::INFINITY, DVec4::min);
+        let high = corners.iter().copied().fold(DVec4::NEG_INFINITY, DVec4::max);
+        let shape = shape * (high - low).truncate().length();
+        let points: Vec<DVec4> = division.points.iter().map(|weights| of(weights)).collect();
+        division.middles.iter().all(|([a, b], weights)| {
+            let away = of(weights) - 0.5 * (points[*a] + points[*b]);
+            away.truncate().length() <= shape && away.w.abs() <= field
+        })
+    }
+
+    /// Returns a node's place and value. Values of cells count as 0.
+    fn node(&self, node: u32) -> DVec4 {
+        let value = match self.place {
+            Place::Points => f64::from(self.values[node as usize]),
+            Place::Cells => 0.0,
+        };
+        self.points[node as usize].as_dvec3().extend(value)
+    }
+}
+
+/// The divisions of all kinds of cells of a mesh, by kind and number of nodes, at each level.
+struct Divisions(HashMap<(CellKind, usize), Vec<Division>>);
+
+impl Divisions {
+    fn new(cells: &Cells) -> Self {
+        let mut found: HashMap<_, Vec<Division>> = HashMap::new();
+        for (cell, kind) in cells.kinds.iter().enumerate() {
+            let nodes = cells.nodes_of(cell).len();
+            let Some(form) = kind.form() else { continue };
+            found.entry((*kind, nodes)).or_insert_with(|| {
+                let Some(basis) = Basis::of(*kind, nodes) else { return Vec::new() };
+                // A linear tetrahedron is what it is.
+                let levels = if *kind == CellKind::Tetrahedron { 1 } else { PARTS.len() };
+                let parts = PARTS[..levels].iter();
+                parts.map(|parts| Division::new(form, &basis, *parts)).collect()
+            });
+        }
+        Self(found)
+    }
+
+    fn all(&self, cells: &Cells, cell: usize) -> &[Division] {
+        let key = (cells.kinds[cell], cells.nodes_of(cell).len());
+        self.0.get(&key).map_or(&[], Vec::as_slice)
+    }
+
+    fn levels(&self, cells: &Cells, cell: usize) -> usize {
+        self.all(cells, cell).len()
+    }
+
+    fn of(&self, cells: &Cells, cell: usize, level: usize) -> Option<&Division> {
+        self.all(cells, cell).get(level)
+    }
+}
+
+/// Tetrahedra that are being made.
+struct Made<'a> {
+    cells: &'a Cells,
+    /// The points that are no nodes, by the weights of the nodes that make them.
+    points: HashMap<u128, u32>,
+    builder: Builder,
+}
+
+/// A smaller weight is one of rounding.
+const LEAST_WEIGHT: f64 = 1e-9;
+
+impl Made<'_> {
+    fn add(&mut self, cell: usize, division: Option<&Division>) {
+        let nodes = self.cells.nodes_of(cell);
+        let value = match self.cells.place {
+            Place::Points => 0.0,
+            Place::Cells => self.cells.values[cell],
+        };
+        let Some(division) = division else {
+            return match faces_of(self.cells.kinds[cell]) {
+                Some(faces) => self.cone(&faces, nodes, value),
+                None => self.polyhedron(nodes, value),
+            };
+        };
+        let points: Vec<u32> =
+            division.points.iter().map(|weights| self.point(nodes, weights)).collect();
+        for block in &division.blocks {
+            match block {
+                Block::Tetrahedron(corners) => {
+                    self.builder.add(corners.map(|corner| points[corner]), value);
+                }
+                Block::Solid(faces) => self.cone(faces, &points, value),
+            }
+        }
+    }
+
+    /// Returns the number of the point with these weights of the nodes.
+    fn point(&mut self, nodes: &[u32], weights: &[f64]) -> u32 {
+        let parts = nodes.iter().zip(weights).filter(|(_, weight)| weight.abs() > LEAST_WEIGHT);
+        if let Some((node, _)) = parts.clone().find(|(_, weight)| **weight > 1.0 - LEAST_WEIGHT) {
+            return *node;
+        }
+        // A point of a face has weights of the nodes of this face only, in all of its cells. The
+        // sum does not depend on their order.
+        let key = parts.clone().fold(0u128, |sum, (node, weight)| {
+            sum.wrapping_add(mixed(*node, (weight * 65536.0).round() as i64))
+        });
+        if let Some(point) = self.points.get(&key) {
+            return *point;
+        }
+        let at: DVec4 = parts.map(|(node, weight)| *weight * self.cells.node(*node)).sum();
+        let point = self.builder.point(at.truncate().as_vec3(), at.w as f32);
+        self.points.insert(key, point);
+        point
+    }
+
+    /// Adds a convex solid: the cone from its point with the least number over the faces that do
+    /// not have this point. Faces are fans around their point with the least number, so that both
+    /// sides of a face agree.
+    fn cone(&mut self, faces: &[Vec<usize>], points: &[u32], value: f32) {
+        let Some(apex) = faces.iter().flatten().map(|corner| points[*corner]).min() else { return };
+        for face in faces {
+            let face: Vec<u32> = face.iter().map(|corner| points[*corner]).collect();
+            if !face.contains(&apex) {
+                self.fan(&face, apex, value);
+            }
+        }
+    }
+
+    fn fan(&mut self, face: &[u32], apex: u32, value: f32) {
+        let least = (0..face.len()).min_by_key(|corner| face[*corner]).unwrap_or(0);
+        let at = |step: usize| face[(least + step) % face.len()];
+        for step in 1..face.len().saturating_sub(1) {
+            self.builder.add([apex, at(0), at(step), at(step + 1)], value);
+        }
+    }
+
+    /// Adds a polyhedron: the cone from its middle over all faces.
+    fn polyhedron(&mut self, stream: &[u32], value: f32) {
+        let mut corners: Vec<u32> =
+            faces(stream).filter_map(Result::ok).flatten().copied().collect();
+        corners.sort_unstable();
+        corners.dedup();
+        let sum: DVec4 = corners.iter().map(|corner| self.cells.node(*corner)).sum();
+        let middle = sum / corners.len() as f64;
+        let apex = self.builder.point(middle.truncate().as_vec3(), middle.w as f32);
+        for face in faces(stream).filter_map(Result::ok) {
+            self.fan(face, apex, value);
+        }
+    }
+}
+
+/// Mixes a node and its weight into a number that others are not likely to have (Steele, Lea &
+/// Flood 2014).
+fn mixed(node: u32, weight: i64) -> u128 {
+    let mix = |seed: u64| {
+        let mut z = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    };
+    let first = mix(u64::from(node) ^ mix(weight as u64 ^ 0x5851_f42d));
+    u128::from(first) << 64 | u128::from(mix(first ^ u64::from(node).rotate_left(17)))
+}
