@@ -219,7 +219,8 @@ fn volumes_are_filled() {
             view_up: DVec3::Z,
             projection: Projection::Orthographic { height: 0.05 },
         };
-        let worst = case.drawn().color.iter().map(|own| {
+        let picture = case.drawn();
+        let worst = picture.color.iter().map(|own| {
             let length = -(1.0 - f64::from(own[3])).ln() / 2f64.ln();
             (length - 0.55).abs()
         });
