@@ -16,7 +16,7 @@ pub use tetrahedra::Tetrahedra;
 use crate::{
     about::About,
     parallel::prelude::*,
-    volume::{BINS, TransferFunction, Volume},
+    volume::{TransferFunction, Volume},
 };
 use glam::{DVec3, Vec3};
 
@@ -268,11 +268,51 @@ impl Cells {
         Self { values, place: Place::Points, ..self }
     }
 
-    /// Derives a transfer function from the values.
+    /// Derives a transfer function from the values. Colours span all but the outermost hundredths
+    /// of the values, from dark blue over green to yellow (viridis: Smith & van der Walt 2015).
+    /// Higher values are more opaque; the lowest remain visible, so that the whole body is seen.
     pub fn automatic_transfer(&self) -> TransferFunction {
+        const COLORS: [[f64; 3]; 5] = [
+            [0.267, 0.005, 0.329],
+            [0.230, 0.322, 0.546],
+            [0.128, 0.567, 0.551],
+            [0.369, 0.789, 0.383],
+            [0.993, 0.906, 0.144],
+        ];
         let [first, last] = self.bounds();
         let diagonal = (last - first).length();
-        let unit = if diagonal > 0.0 { diagonal / 100.0 } else { 1.0 };
-        TransferFunction::of_histogram(self.counts(BINS), self.range(), unit, false)
+        let unit = if diagonal > 0.0 { diagonal / 20.0 } else { 1.0 };
+        let ends = self.inner_range();
+        let Some([low, high]) = ends.filter(|[low, high]| low < high) else {
+            let value = ends.map_or(0.0, |[low, _]| low);
+            return TransferFunction {
+                color: vec![(value, COLORS[2])],
+                opacity: vec![(value, 0.3)],
+                unit,
+                ..TransferFunction::default()
+            };
+        };
+        let place = |part: usize| low + (high - low) * part as f64 / (COLORS.len() - 1) as f64;
+        let color = COLORS.iter().enumerate().map(|(part, color)| (place(part), *color));
+        TransferFunction {
+            color: color.collect(),
+            opacity: vec![(low, 0.06), (place(2), 0.15), (high, 0.6)],
+            unit,
+            ..TransferFunction::default()
+        }
+    }
+
+    /// Returns the range of the values without the lowest and the highest hundredth; `None` if
+    /// there is no value. If they are the same, returns the whole range.
+    fn inner_range(&self) -> Option<[f64; 2]> {
+        let mut values: Vec<f32> =
+            self.values.iter().copied().filter(|value| !value.is_nan()).collect();
+        let last = values.len().checked_sub(1)?;
+        let mut at = |share: f64| {
+            let place = (share * last as f64).round() as usize;
+            f64::from(*values.select_nth_unstable_by(place, f32::total_cmp).1)
+        };
+        let inner = [at(0.01), at(0.99)];
+        Some(if inner[0] < inner[1] { inner } else { self.range() })
     }
 }
