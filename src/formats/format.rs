@@ -494,8 +494,10 @@ mod tests {
             ("# vtk DataFile Version 3.0", "VTK"),
             ("<?xml?><VTKFile type='ImageData'>", "VTI"),
             ("<VTKFile type='RectilinearGrid'>", "VTR"),
-            ("<VTKFile type='UnstructuredGrid'>", "VTU, VTP"),
-            ("<VTKFile type='PolyData'>", "VTU, VTP"),
+            ("<VTKFile type='UnstructuredGrid'>", "VTU"),
+            ("<VTKFile type='StructuredGrid'>", "VTS"),
+            ("<VTKFile type='vtkMultiBlockDataSet'>", "VTK in several files"),
+            ("<VTKFile type='PolyData'>", "VTP"),
             ("NRRD0004", "NRRD"),
             // A comment of a header is no sign of another format.
             ("NRRD0004\n# from <VTKFile type='PolyData'>", "NRRD"),
@@ -527,6 +529,7 @@ mod tests {
         let message = with("a.raw", b"", |source| {
             told(volume_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
         });
-        assert!(message.contains("(VTR, VTI, VTK, NRRD, NIfTI or DICOM)"), "{message}");
+        let list = "(VTR, VTI, VTK, VTK in several files, NRRD, NIfTI or DICOM)";
+        assert!(message.contains(list), "{message}");
     }
 }

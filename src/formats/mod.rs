@@ -41,19 +41,7 @@ mod table;
 mod vanishing;
 mod volume_stream;
 #[cfg(feature = "vtk")]
-pub mod vti;
-#[cfg(feature = "vtk")]
 pub mod vtk;
-#[cfg(feature = "vtk")]
-mod vtk_array;
-#[cfg(feature = "vtk")]
-mod vtk_cells;
-#[cfg(feature = "vtk")]
-mod vtk_xml;
-#[cfg(feature = "vtk")]
-pub mod vtr;
-#[cfg(feature = "vtk")]
-pub mod vtu;
 mod vtu_write;
 pub mod xyz;
 

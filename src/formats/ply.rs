@@ -73,9 +73,7 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
                 gaussians::warn(source);
             }
             read_vertices(source, element, &rows, &mut mesh)?;
-            if options.scalar.is_some() {
-                read_values(source, element, &rows, options, &mut mesh)?;
-            }
+            read_values(source, element, &rows, options, &mut mesh)?;
         } else if is_face {
             // Faces are read last, because their vertices may come after them.
             faces.push((element, rows));
@@ -159,7 +157,7 @@ fn column_named(source: &Source, element: &Element, name: &str) -> Result<usize>
     Ok(samples::named_column(source, element, name)?.1)
 }
 
-/// Gives the mesh the values of a property. `options` names it.
+/// Gives the mesh the values of the property that is named, if one is.
 fn read_values(
     source: &Source,
     element: &Element,
@@ -167,7 +165,7 @@ fn read_values(
     options: &ReadOptions,
     mesh: &mut Mesh,
 ) -> Result<()> {
-    let name = options.scalar.as_deref().unwrap_or_default();
+    let Some(name) = options.scalar.as_deref() else { return Ok(()) };
     let (name, values) = samples::named_values(source, element, rows, name)?;
     let value = |value: f64| if is_hole(value, options.missing) { f32::NAN } else { value as f32 };
     mesh.values = values.into_iter().map(value).collect();

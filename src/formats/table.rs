@@ -17,13 +17,13 @@ use super::las;
 use super::obj;
 #[cfg(feature = "ply")]
 use super::ply;
+#[cfg(feature = "vtk")]
+use super::vtk;
 use super::{
     Kind, csv,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
     nifti, npy, nrrd, pcd, raw, stl, xyz,
 };
-#[cfg(feature = "vtk")]
-use super::{vti, vtk, vtr, vtu};
 
 /// Every format, in the order of messages: surfaces, volumes, scattered samples.
 pub static FORMATS: &[Format] = &[
@@ -151,60 +151,71 @@ pub static FORMATS: &[Format] = &[
         ..Format::ROW
     },
     Format {
-        name: "VTU, VTP",
-        extensions: &["vtu", "vtp"],
-        holds: &[all(Content::Samples)],
-        feature: Some("vtk"),
-        magic: Magic::Rule(|bytes| {
-            let has = |word| has_word(bytes, word);
-            is_vtk_xml(bytes) && (has(b"UnstructuredGrid") || has(b"PolyData"))
-        }),
-        kind: Which::Always(Kind::Samples),
-        #[cfg(feature = "vtk")]
-        samples: Some(vtu::read),
-        ..Format::ROW
+        name: "VTP",
+        extensions: &["vtp"],
+        holds: &[
+            some(Content::Mesh, "with faces"),
+            some(Content::PointCloud, "without faces"),
+            some(Content::Samples, "without faces, if a scalar is named"),
+        ],
+        magic: Magic::Rule(|bytes| is_vtk_xml(bytes) && has_word(bytes, b"PolyData")),
+        cells: None,
+        volume: None,
+        ..VTK
+    },
+    Format {
+        name: "VTU",
+        extensions: &["vtu"],
+        holds: &VTK_CELLS,
+        magic: Magic::Rule(|bytes| is_vtk_xml(bytes) && has_word(bytes, b"UnstructuredGrid")),
+        volume: None,
+        ..VTK
+    },
+    Format {
+        name: "VTS",
+        extensions: &["vts"],
+        holds: &VTK_CELLS,
+        magic: Magic::Rule(|bytes| is_vtk_xml(bytes) && has_word(bytes, b"StructuredGrid")),
+        volume: None,
+        ..VTK
     },
     Format {
         name: "VTR",
         extensions: &["vtr"],
         holds: &[all(Content::Volume)],
-        feature: Some("vtk"),
         magic: Magic::Rule(|bytes| is_vtk_xml(bytes) && has_word(bytes, b"RectilinearGrid")),
         kind: Which::Always(Kind::Volume),
-        #[cfg(feature = "vtk")]
-        volume: Some(VolumeReader::Plain(vtr::read)),
-        ..Format::ROW
+        mesh: None,
+        cells: None,
+        samples: None,
+        ..VTK
     },
     Format {
         name: "VTI",
         extensions: &["vti"],
         holds: &[all(Content::Volume)],
-        feature: Some("vtk"),
-        // Comes after the rows of VTK's other data sets, because these begin like that too.
-        magic: Magic::Rule(is_vtk_xml),
+        magic: Magic::Rule(|bytes| is_vtk_xml(bytes) && has_word(bytes, b"ImageData")),
         kind: Which::Always(Kind::Volume),
-        #[cfg(feature = "vtk")]
-        volume: Some(VolumeReader::Plain(vti::read)),
-        ..Format::ROW
+        mesh: None,
+        cells: None,
+        samples: None,
+        ..VTK
     },
     Format {
         name: "VTK",
         extensions: &["vtk"],
-        holds: &[
-            some(Content::Volume, "structured points, rectilinear grids"),
-            some(Content::Samples, "other data sets"),
-        ],
-        feature: Some("vtk"),
+        holds: &VTK_ANY,
         magic: Magic::Prefix(b"# vtk DataFile"),
-        #[cfg(feature = "vtk")]
-        kind: Which::Rule(|source, _| {
-            Ok(if vtk::holds_volume(source)? { Kind::Volume } else { Kind::Samples })
-        }),
-        #[cfg(feature = "vtk")]
-        volume: Some(VolumeReader::Plain(vtk::read_volume)),
-        #[cfg(feature = "vtk")]
-        samples: Some(vtk::read_samples),
-        ..Format::ROW
+        ..VTK
+    },
+    Format {
+        name: "VTK in several files",
+        extensions: &["pvti", "pvtr", "pvts", "pvtu", "pvtp", "vtm", "vtpc", "vtpd", "pvd"],
+        holds: &VTK_ANY,
+        refers: true,
+        // Comes after the rows of single data sets, because these begin like that too.
+        magic: Magic::Rule(is_vtk_xml),
+        ..VTK
     },
     Format {
         name: "NRRD",
@@ -311,6 +322,39 @@ const fn all(content: Content) -> Holding {
 const fn some(content: Content, when: &'static str) -> Holding {
     Holding { content, when }
 }
+
+/// What all rows of VTK's files have in common.
+const VTK: Format = Format {
+    feature: Some("vtk"),
+    #[cfg(feature = "vtk")]
+    kind: Which::Rule(vtk::kind),
+    #[cfg(feature = "vtk")]
+    mesh: Some(vtk::read_mesh),
+    #[cfg(feature = "vtk")]
+    volume: Some(VolumeReader::Plain(vtk::read_volume)),
+    #[cfg(feature = "vtk")]
+    cells: Some(vtk::read_cells),
+    #[cfg(feature = "vtk")]
+    samples: Some(vtk::read_samples),
+    #[cfg(feature = "vtk")]
+    arrays: Some(vtk::arrays),
+    ..Format::ROW
+};
+
+const VTK_CELLS: [Holding; 4] = [
+    some(Content::Cells, "that fill space, with values"),
+    some(Content::Mesh, "cells that are surfaces; the boundary of cells without values"),
+    some(Content::PointCloud, "without cells"),
+    some(Content::Samples, "without cells, if a scalar is named"),
+];
+
+const VTK_ANY: [Holding; 5] = [
+    some(Content::Volume, "image data, rectilinear grids"),
+    some(Content::Cells, "that fill space, with values"),
+    some(Content::Mesh, "polygons; the boundary of cells without values"),
+    some(Content::PointCloud, "without cells"),
+    some(Content::Samples, "without cells, if a scalar is named"),
+];
 
 fn is_vtk_xml(bytes: &[u8]) -> bool {
     has_word(bytes, b"<VTKFile")

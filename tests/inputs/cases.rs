@@ -1106,7 +1106,40 @@
         (
             "lz4.vti",
             binary(" compressor='vtkLZ4DataCompressor'", &[]),
-            "lz4.vti: VTKFile: compressor=“vtkLZ4DataCompressor” is not supported",
+            "lz4.vti: DataArray “v”: ends inside the sizes of its blocks",
+        ),
+        (
+            "other.vti",
+            binary(" compressor='vtkOtherDataCompressor'", &[]),
+            "other.vti: VTKFile: compressor=“vtkOtherDataCompressor” is not supported",
+        ),
+        (
+            "lzma.vti",
+            binary(" compressor='vtkLZMADataCompressor'", &counts(&[1, 4, 0, 4, 7])),
+            "lzma.vti: DataArray “v”: block 0 cannot be unpacked: failed to fill whole buffer",
+        ),
+        (
+            "ids.vti",
+            vtk_xml("ImageData", "", &vti_piece("").replace("</Po", &format!("{}</Po", {
+                array("format='ascii'", "1 2 3 4").replace("Name='v'", "Name='PointIds'")
+            })))
+            .into(),
+            "ids.vti: file: contains only identifiers and values that are not numbers",
+        ),
+        (
+            "above.pvti",
+            vtk_xml("PImageData", "", "<Piece Extent='0 1 0 1 0 0' Source='../a.vti'/>").into(),
+            "above.pvti: reference: refers to “../a.vti”, which leads out of the file's own folder",
+        ),
+        (
+            "none.vtm",
+            vtk_xml("vtkMultiBlockDataSet", "", "<DataSet index='0'/>").into(),
+            "none.vtm: XML: refers to no files with data",
+        ),
+        (
+            "table.vtu",
+            vtk_xml("Table", "", "<Piece NumberOfRows='1'/>").into(),
+            "table.vtu: VTKFile: type=“Table” is not supported",
         ),
         (
             "corner.vtu",
@@ -1148,22 +1181,22 @@
              0 0 0 1 0 0\nCELLS 1 3\n2 0 1\nPOINTS 1 float\n0 0 0\nCELL_DATA 1\nSCALARS c float\n\
              LOOKUP_TABLE d\n5\n"
                 .into(),
-            "twice.vtk: byte 104: POINTS are given twice, or after the cells",
+            "twice.vtk: byte 104: POINTS are given twice",
         ),
         (
             "dims.vtk",
             vtk().replace("DIMENSIONS 2 2 1", "DIMENSIONS 4294967296 4294967296 4294967296").into(),
-            "dims.vtk: POINT_DATA: claims 4 points, but the data set has 18446744073709551615",
+            "dims.vtk: the number of points is 18446744073709551615, over the limit of 34359738368",
         ),
         (
             "minus.vtk",
             vtk().replace("DIMENSIONS 2 2 1", "DIMENSIONS -2 2 1").into(),
-            "minus.vtk: byte 65: needs three numbers",
+            "minus.vtk: extent: 0 to -3 is not a valid range of indices",
         ),
         (
             "spacing.vtk",
             vtk().replace("SPACING 1 1 1", "SPACING 0 1 1").into(),
-            "spacing.vtk: samples: the spacing is 0 × 1 × 1, but every step needs a length",
+            "spacing.vtk: ImageData: the spacing is 0 × 1 × 1, but every step needs a length",
         ),
         ("crlf.vtk", vtk().replace('\n', "\r\n").into(), "volume [2, 2, 1] [1.0, 4.0]"),
         // Raw volumes of 4 × 4 × 4 bytes.

@@ -378,20 +378,33 @@ pub fn dicom_folder(bytes: &[u8]) {
 }
 
 pub fn vti(bytes: &[u8]) {
-    volume("input.vti", bytes, formats::vti::read);
+    of_vtk("input.vti", bytes);
 }
 
 pub fn vtr(bytes: &[u8]) {
-    volume("input.vtr", bytes, formats::vtr::read);
+    of_vtk("input.vtr", bytes);
 }
 
 pub fn vtu(bytes: &[u8]) {
-    samples("input.vtu", bytes, formats::vtu::read);
+    of_vtk("input.vtu", bytes);
 }
 
 pub fn vtk(bytes: &[u8]) {
-    volume("input.vtk", bytes, formats::vtk::read_volume);
-    samples("input.vtk", bytes, formats::vtk::read_samples);
+    of_vtk("input.vtk", bytes);
+}
+
+/// A file of VTK, read as every kind of data.
+fn of_vtk(name: &str, bytes: &[u8]) {
+    volume(name, bytes, formats::vtk::read_volume);
+    samples(name, bytes, formats::vtk::read_samples);
+    for options in options() {
+        let mesh = read(name, bytes, |source| formats::vtk::read_mesh(source, &options));
+        mesh.iter().for_each(sound_mesh);
+        let cells = read(name, bytes, |source| formats::vtk::read_cells(source, &options));
+        cells.iter().for_each(sound_cells);
+        let list = read(name, bytes, |source| formats::vtk::arrays(source, &options));
+        assert!(list.is_none_or(|list| list.iter().filter(|array| array.is_drawn).count() <= 1));
+    }
 }
 
 /// A raw volume. Six bytes describe it (three sizes, type, spacing, bytes to skip); its samples

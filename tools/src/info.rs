@@ -1,6 +1,7 @@
 //! `splatkit info`.
 
 use crate::{
+    arrays,
     camera::direction_name,
     failure::Failure,
     given::{Given, kinds_of},
@@ -38,6 +39,7 @@ const ORDER: &[&str] = &[
     "spacing",
     "type",
     "range",
+    "missing",
     "bounds",
     "attributes",
     "materials",
@@ -97,11 +99,21 @@ impl Info {
         facts.insert("count".into(), json!(count));
         facts.insert("bytes".into(), json!(bytes));
         facts.insert("bytes_per_point".into(), json!(bytes as f64 / count.max(1) as f64));
+        if holes(&input) > 0 {
+            facts.insert("missing".into(), json!(holes(&input)));
+        }
+        let arrays = match &input {
+            Input::Hierarchy(_) | Input::Bricks(_) => Vec::new(),
+            _ => self.load.arrays(&self.file)?,
+        };
         // Bricks state their own levels. The leaves of a hierarchy lie at different depths.
         if !matches!(input, Input::Hierarchy(_)) {
             facts.entry("levels").or_insert(json!(1));
         }
         if self.json {
+            if !arrays.is_empty() {
+                facts.insert("arrays".into(), arrays::facts(&arrays));
+            }
             return output::json(&Value::Object(facts));
         }
         series.iter().try_for_each(|one| output::line(line_of_series(one)))?;
@@ -110,7 +122,7 @@ impl Info {
                 output::line(format_args!("{:<16}{}", name.replace('_', " "), plain(value)))?;
             }
         }
-        Ok(())
+        arrays::print(&arrays)
     }
 }
 
@@ -159,6 +171,17 @@ fn line_of_series(series: &Series) -> String {
         series.pictures,
         safe(&series.identifier)
     )
+}
+
+/// Returns the number of values that are missing.
+fn holes(input: &Input) -> u64 {
+    match input {
+        Input::Mesh(mesh) => mesh.about.holes,
+        Input::Volume(volume) => volume.about.holes,
+        Input::Samples(points) => points.about.holes,
+        Input::Cells(cells) => cells.about.holes,
+        Input::Hierarchy(_) | Input::Bricks(_) => 0,
+    }
 }
 
 fn of_mesh(mesh: &Mesh) -> Map<String, Value> {

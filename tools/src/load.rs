@@ -160,6 +160,12 @@ impl LoadFlags {
         Ok(input)
     }
 
+    /// Returns the arrays of a file that holds several.
+    pub fn arrays(&self, path: &Path) -> Result<Vec<formats::Array>, Failure> {
+        let whole = self.limits.whole(memory::most());
+        Ok(formats::arrays(&Source::open_any(path, &whole)?, &self.options())?)
+    }
+
     /// Returns the kind of a file, even if the file is damaged.
     pub fn kind(&self, path: &Path) -> Result<Kind, Failure> {
         self.kind_with(path, &self.options())
@@ -233,7 +239,12 @@ fn warn_of_holes(path: &Path, input: &Input) {
             let holes = points.about.holes;
             (holes, points.len() as u64 + holes, "were left out")
         }
-        _ => return,
+        Input::Cells(cells) => {
+            let done = "nothing is drawn in the cells around them";
+            (cells.about.holes, cells.values.len() as u64, done)
+        }
+        Input::Mesh(mesh) => (mesh.about.holes, mesh.values.len() as u64, "have no colour"),
+        Input::Hierarchy(_) | Input::Bricks(_) => return,
     };
     if holes > 0 {
         let (holes, all) = (grouped(holes), grouped(all));

@@ -3,6 +3,7 @@
 
 #![deny(unsafe_code)]
 
+mod arrays;
 mod bench;
 mod camera;
 mod check;

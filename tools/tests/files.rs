@@ -95,7 +95,7 @@ fn scattered_samples_are_told_from_clouds_and_volumes() {
     );
     assert_eq!(
         folder.json(&format!("info {} --json", folder.put("points.vtk", points)))["kind"],
-        "samples"
+        "cloud"
     );
     folder.run("info a.csv --neighbours 3").fails(2, &["4 to 64"]);
 }

@@ -84,6 +84,11 @@ impl Candidate {
         self.role == Role::Identifiers || is_identifier(&self.name)
     }
 
+    /// Returns whether its values are normals, by its name.
+    pub fn is_normals(&self) -> bool {
+        self.components == 3 && self.name.to_ascii_lowercase().contains("normal")
+    }
+
     fn is_geometry(&self) -> bool {
         let name = self.name.to_ascii_lowercase();
         let is_tuple = |most: usize| (2..=most).contains(&self.components);

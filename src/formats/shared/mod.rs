@@ -2,7 +2,6 @@
 //! samples, polygons, textures, sample types.
 
 pub(super) mod attribute;
-#[allow(dead_code)]
 pub(super) mod choice;
 pub(super) mod cloud;
 pub(super) mod found;

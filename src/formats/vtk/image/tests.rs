@@ -7,7 +7,7 @@ use flate2::{Compression, write::ZlibEncoder};
 use std::io::Write;
 
 fn read(source: &Source) -> Result<Volume> {
-    super::read(source, &ReadOptions::default())
+    super::super::read_volume(source, &ReadOptions::default())
 }
 
 const VALUES: [i16; 12] = [0, 1, -2, 300, -4000, 5, 6, 7, 8, 9, 10, 32767];
@@ -228,14 +228,14 @@ fn types_and_the_choice_of_the_array() {
     let vector =
         "<DataArray type='UInt8' Name='v' NumberOfComponents='3' format='ascii'>0</DataArray>";
     let scalar = "<DataArray type='UInt8' Name='s' format='ascii'>1 2 3 4</DataArray>";
-    let volume = load(&format!("<PointData>{vector}{scalar}</PointData>")).unwrap();
+    let mixed = scalar.replace("1 2 3 4", "4 2 3 1");
+    let volume = load(&format!("<PointData>{vector}{mixed}</PointData>")).unwrap();
     assert_eq!((volume.range, volume.lattice.dims), ([1.0, 4.0], [2, 1, 2]));
     for (points, word) in [
-        (format!("<PointData Scalars='v'>{vector}{scalar}</PointData>"), "“v”: has 3 components"),
-        (format!("<PointData>{vector}</PointData>"), "no array"),
-        (format!("<CellData>{scalar}</CellData>"), "no array"),
-        ("<PointData/>".into(), "no array"),
-        (format!("<PointData>{}</PointData>", scalar.replace("UInt8", "String")), "String"),
+        (format!("<PointData Scalars='v'>{vector}</PointData>"), "1 numbers where 12"),
+        (format!("<CellData>{scalar}</CellData>"), "more than the 1 numbers"),
+        ("<PointData/>".into(), "no values that can be drawn"),
+        (format!("<PointData>{}</PointData>", scalar.replace("UInt8", "String")), "only ident"),
         (format!("<PointData>{}</PointData>", scalar.replace("4<", "4 5<")), "more than the 4"),
         (format!("<PointData>{}</PointData>", scalar.replace("4<", "<")), "3 numbers"),
         (
@@ -273,8 +273,9 @@ fn wrong_heads_are_told() {
     };
     let (head, image) = ("type='ImageData'", "WholeExtent='0 1 0 0 0 1'");
     for (head, image, word) in [
-        ("type='PolyData'", image, "PolyData"),
-        ("type='ImageData' compressor='vtkLZ4DataCompressor'", image, "vtkLZ4DataCompressor"),
+        ("type='PolyData'", image, "no points"),
+        ("type='Table'", image, "Table"),
+        ("type='ImageData' compressor='vtkZstdDataCompressor'", image, "vtkZstdDataCompressor"),
         ("type='ImageData' byte_order='Middle'", image, "Middle"),
         ("type='ImageData' header_type='UInt16'", image, "UInt16"),
         (head, "", "WholeExtent"),

@@ -1,6 +1,9 @@
 //! Parses the lines and arrays of legacy VTK files.
 
-use super::super::{Endian, SampleType, vtk_xml::Part};
+use super::super::{
+    super::{Endian, SampleType},
+    xml::Part,
+};
 use crate::{
     Error, Result,
     input::{Source, copy},
@@ -21,8 +24,8 @@ pub(super) struct Parser<'a> {
 }
 
 impl<'a> Parser<'a> {
-    /// Reads the header. Also returns the kind of the data set.
-    pub fn open(source: &'a Source) -> Result<(Self, String)> {
+    /// Reads the header. Also returns the kind of the data set, by its index among the `known` ones.
+    pub fn open(source: &'a Source, known: &[&str]) -> Result<(Self, usize)> {
         let mut parser = Self { source, at: 0, binary: false };
         let cut = |parser: &Self| source.error(parser.place(), "the file ends inside its header");
         if !source.bytes().starts_with(b"# vtk DataFile Version") {
@@ -48,19 +51,9 @@ impl<'a> Parser<'a> {
             match words[..] {
                 [keyword, kind] if keyword.eq_ignore_ascii_case("DATASET") => {
                     let kind = kind.to_ascii_uppercase();
-                    let known = [
-                        "STRUCTURED_POINTS",
-                        "RECTILINEAR_GRID",
-                        "UNSTRUCTURED_GRID",
-                        "POLYDATA",
-                        "STRUCTURED_GRID",
-                    ];
-                    if !known.contains(&kind.as_str()) {
-                        return Err(
-                            source.error(place, format!("the data set {kind} is not supported"))
-                        );
-                    }
-                    return Ok((parser, kind));
+                    let found = known.iter().position(|known| *known == kind);
+                    let message = format!("the data set {kind} is not supported");
+                    return Ok((parser, found.ok_or_else(|| source.error(place, message))?));
                 }
                 // Data of the whole file may come first.
                 [keyword, _, count] if keyword.eq_ignore_ascii_case("FIELD") => {
@@ -114,13 +107,15 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Skips the next line, which must begin with this word.
-    pub fn expect(&mut self, word: &str) -> Result<()> {
-        match self.line()? {
-            Some((_, line)) if line.split_ascii_whitespace().next() == Some(word) => Ok(()),
-            _ => Err(self
-                .source
-                .error(self.place(), format!("there is no line “{word}” where it was expected"))),
+    /// Skips the next line if it begins with this word.
+    pub fn skip_line_of(&mut self, word: &str) -> Result<()> {
+        let rest = self.rest().trim_ascii_start();
+        match rest
+            .get(..word.len())
+            .is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes()))
+        {
+            true => self.line().map(drop),
+            false => Ok(()),
         }
     }
 
@@ -138,30 +133,73 @@ impl<'a> Parser<'a> {
         self.source.check_points("a count of points or cells", count)
     }
 
-    /// Returns three numbers of a keyword's line.
-    pub fn three<T: std::str::FromStr>(&self, place: &str, words: &[&str]) -> Result<[T; 3]> {
+    /// Returns the numbers of a keyword's line.
+    pub fn numbers<const N: usize, T: std::str::FromStr>(
+        &self,
+        place: &str,
+        words: &[&str],
+    ) -> Result<[T; N]> {
         let numbers: Option<Vec<T>> = words.iter().map(|word| word.parse().ok()).collect();
-        let wrong = |_| self.source.error(place, "needs three numbers");
+        let wrong = |_| self.source.error(place, format!("needs {N} numbers"));
         numbers.unwrap_or_default().try_into().map_err(wrong)
+    }
+
+    /// Reads the values of an attribute. Returns `None` for bits and strings, which are skipped. In
+    /// text files, values of any other type are skipped too.
+    pub fn values(&mut self, place: &str, count: usize, kind: &str) -> Result<Option<Part<'a>>> {
+        match kind.to_ascii_lowercase().as_str() {
+            "bit" if self.binary => self.skip(place, count.div_ceil(8))?,
+            "string" | "utf8_string" if self.binary => {
+                for _ in 0..count {
+                    self.skip_string(place)?;
+                }
+            }
+            "string" | "utf8_string" => {
+                for _ in 0..count {
+                    self.raw_line()?;
+                }
+            }
+            other if self.binary || sample_type(other).is_some() => {
+                return self.array(place, count, kind).map(Some);
+            }
+            _ => {
+                let length = self.length_of(place, count)?;
+                self.at += length;
+            }
+        }
+        Ok(None)
+    }
+
+    /// Skips bytes that must be there.
+    fn skip(&mut self, place: &str, size: usize) -> Result<()> {
+        let left = self.rest().len();
+        if left < size {
+            let message = format!("there are {left} bytes where {size} were expected");
+            return Err(self.source.error(place, format!("{message}: the file ends")));
+        }
+        self.at += size;
+        Ok(())
+    }
+
+    /// Skips a string of a binary file. The upper two bits of its first byte tell how many bytes
+    /// its length has: 3 for one, 2 for two, 1 for four, 0 for eight.
+    fn skip_string(&mut self, place: &str) -> Result<()> {
+        let Some(&first) = self.rest().first() else { return self.skip(place, 1) };
+        let bytes = 8 >> (first >> 6);
+        let Some(head) = self.rest().get(..bytes) else { return self.skip(place, bytes) };
+        let start = usize::from(first & 0x3f);
+        let length = head[1..].iter().try_fold(start, |length, &byte| {
+            length.checked_mul(256).map(|length| length + usize::from(byte))
+        });
+        self.skip(place, length.unwrap_or(usize::MAX).saturating_add(bytes))
     }
 
     /// Reads the array that begins here.
     pub fn array(&mut self, place: &str, count: usize, kind: &str) -> Result<Part<'a>> {
         let wrong = |message: String| -> Error { self.source.error(place, message) };
-        // On the machines that write these files, long has 8 bytes. Indices are written as int.
-        let kind = match kind.to_ascii_lowercase().as_str() {
-            "unsigned_char" | "vtktypeuint8" => SampleType::U8,
-            "char" | "signed_char" | "vtktypeint8" => SampleType::I8,
-            "unsigned_short" | "vtktypeuint16" => SampleType::U16,
-            "short" | "vtktypeint16" => SampleType::I16,
-            "unsigned_int" | "vtktypeuint32" => SampleType::U32,
-            "int" | "vtkidtype" | "vtktypeint32" => SampleType::I32,
-            "unsigned_long" | "vtktypeuint64" => SampleType::U64,
-            "long" | "vtktypeint64" => SampleType::I64,
-            "float" => SampleType::F32,
-            "double" => SampleType::F64,
-            other => return Err(wrong(format!("has the type {other}, which is not supported"))),
-        };
+        let lower = kind.to_ascii_lowercase();
+        let kind = sample_type(&lower)
+            .ok_or_else(|| wrong(format!("has the type {lower}, which is not supported")))?;
         let rest = self.rest();
         let (bytes, endian, length) = if self.binary {
             let size = count.saturating_mul(kind.bytes());
@@ -173,11 +211,7 @@ impl<'a> Parser<'a> {
             })?;
             (bytes.into(), Endian::Big, size)
         } else {
-            let length = length_of_words(rest, count).map_err(|found| {
-                wrong(format!(
-                    "there are {found} numbers where {count} were expected: the file ends"
-                ))
-            })?;
+            let length = self.length_of(place, count)?;
             self.source.room::<u8>("the text", length)?;
             let text = copy::text(&rest[..length])
                 .map_err(|_| wrong("is followed by bytes that are not text".into()))?;
@@ -237,8 +271,17 @@ impl<'a> Parser<'a> {
         Ok((corners, ends))
     }
 
-    /// Reads an array of a field: its name, components and numbers.
-    pub fn field(&mut self) -> Result<(String, usize, Part<'a>)> {
+    /// Returns the bytes of the next `count` words of a text file.
+    fn length_of(&self, place: &str, count: usize) -> Result<usize> {
+        length_of_words(self.rest(), count).map_err(|found| {
+            let message =
+                format!("there are {found} numbers where {count} were expected: the file ends");
+            self.source.error(place, message)
+        })
+    }
+
+    /// Reads an array of a field.
+    pub fn field(&mut self) -> Result<FieldArray<'a>> {
         let Some((mut place, mut line)) = self.line()? else {
             return Err(self.source.error(self.place(), "the file ends inside a FIELD"));
         };
@@ -254,15 +297,48 @@ impl<'a> Parser<'a> {
         };
         self.source.spend("the size of the names in bytes", FIELD + 2 * name.len() as u64)?;
         let (components, tuples) = (self.count(&place, components)?, self.count(&place, tuples)?);
-        let part = self.array(&place, components.saturating_mul(tuples), kind)?;
-        Ok((unescaped(name), components, part))
+        let part = self.values(&place, components.saturating_mul(tuples), kind)?;
+        let kind = kind.to_ascii_lowercase();
+        Ok(FieldArray { name: unescaped(name), components, tuples, kind, part })
     }
 
-    /// Skips colours, which are bytes in binary files and fractions in text files.
-    pub fn skip_colors(&mut self, place: &str, count: usize, components: usize) -> Result<()> {
-        let kind = if self.binary { "unsigned_char" } else { "float" };
-        self.array(place, count.saturating_mul(components), kind).map(drop)
+    /// Reads colours as bytes, which they are in binary files. In text files they are fractions.
+    pub fn colors(&mut self, place: &str, count: usize, components: usize) -> Result<Part<'a>> {
+        let count = count.saturating_mul(components);
+        if self.binary {
+            return self.array(place, count, "unsigned_char");
+        }
+        let fractions = self.array(place, count, "float")?.doubles(self.source)?;
+        let bytes: Vec<u8> = fractions.iter().map(|part| (part * 255.0).round() as u8).collect();
+        Ok(Part { kind: SampleType::U8, endian: Endian::Little, bytes: bytes.into() })
     }
+}
+
+/// An array of a field: `part` is `None` if its values are not numbers that can be read.
+pub(super) struct FieldArray<'a> {
+    pub name: String,
+    pub components: usize,
+    pub tuples: usize,
+    pub kind: String,
+    pub part: Option<Part<'a>>,
+}
+
+/// Returns the type with a name in lower case. On the machines that write these files, long has 8
+/// bytes. Indices are written as int.
+fn sample_type(name: &str) -> Option<SampleType> {
+    Some(match name {
+        "unsigned_char" | "vtktypeuint8" => SampleType::U8,
+        "char" | "signed_char" | "vtktypeint8" => SampleType::I8,
+        "unsigned_short" | "vtktypeuint16" => SampleType::U16,
+        "short" | "vtktypeint16" => SampleType::I16,
+        "unsigned_int" | "vtktypeuint32" => SampleType::U32,
+        "int" | "vtkidtype" | "vtktypeint32" => SampleType::I32,
+        "unsigned_long" | "unsigned_long_long" | "vtktypeuint64" => SampleType::U64,
+        "long" | "long_long" | "vtktypeint64" => SampleType::I64,
+        "float" => SampleType::F32,
+        "double" => SampleType::F64,
+        _ => return None,
+    })
 }
 
 /// Returns the bytes up to the end of the `count`-th word. If there are fewer words, the error is

@@ -1,10 +1,10 @@
 //! VTK's XML files of any data set: pieces, their sections, and the arrays in them. Arrays may be
-//! text, base64 in place, or appended (raw or base64), compressed by zlib or not. Follows the
-//! description of the file formats in the VTK User's Guide.
+//! text, base64 in place, or appended (raw or base64), compressed or not. Follows the description
+//! of the file formats in the VTK User's Guide.
 
 use super::{
-    Endian, SampleType,
-    vtk_array::{ArrayEncoding, from_base64},
+    super::{Endian, SampleType},
+    array::{ArrayEncoding, Packing, from_base64},
 };
 use crate::{
     Error, Result,
@@ -27,10 +27,14 @@ pub type Attributes = HashMap<String, String>;
 
 /// The content of the XML.
 pub struct Document<'a> {
-    source: &'a Source<'a>,
+    pub source: &'a Source<'a>,
+    /// The kind of data set (`ImageData`, `PPolyData`, `vtkMultiBlockDataSet`, …).
+    pub kind: String,
     /// The attributes of the data set's element.
     pub attributes: Attributes,
     pub pieces: Vec<Piece<'a>>,
+    /// The attributes of the data sets of a collection, which lie in other files.
+    pub references: Vec<Attributes>,
     encoding: ArrayEncoding,
     /// Offsets of appended arrays, in ascending order.
     offsets: Vec<usize>,
@@ -52,6 +56,7 @@ pub struct Section<'a> {
     pub arrays: Vec<Array<'a>>,
 }
 
+/// An array; its `type` may be one that is not read, as `String` and `Bit`.
 pub struct Array<'a> {
     attributes: Attributes,
     text: Cow<'a, str>,
@@ -85,12 +90,12 @@ impl Part<'_> {
 }
 
 impl<'a> Document<'a> {
-    /// Reads the XML of a file that contains a data set of one `kind` (`ImageData`, …).
+    /// Reads the XML of a file.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that does not contain it, is compressed by anything but zlib, or
-    /// is cut off.
-    pub fn read(source: &'a Source<'a>, kind: &str) -> Result<Self> {
+    /// [`Error::Input`] for a file that is not XML of VTK, has an unknown compressor, or is cut
+    /// off.
+    pub fn read(source: &'a Source<'a>) -> Result<Self> {
         let bytes = source.bytes();
         let end = b"</VTKFile>";
         if !bytes[bytes.len().saturating_sub(1024)..].windows(end.len()).any(|w| w == end) {
@@ -102,21 +107,24 @@ impl<'a> Document<'a> {
         let xml = source.keep_text(xml, "the XML")?;
         let mut document = Self {
             source,
+            kind: String::new(),
             attributes: Attributes::new(),
             pieces: Vec::new(),
-            encoding: ArrayEncoding { endian: Endian::Little, wide_counts: false, packed: false },
+            references: Vec::new(),
+            encoding: ArrayEncoding { endian: Endian::Little, wide_counts: false, packed: None },
             offsets: Vec::new(),
             appended,
         };
-        document.walk(xml, kind)?;
+        document.walk(xml)?;
         document.offsets.sort_unstable();
-        if document.pieces.is_empty() {
+        if document.pieces.is_empty() && document.references.is_empty() {
+            let kind = &document.kind;
             return Err(source.error("XML", format!("contains no piece of {kind}")));
         }
         Ok(document)
     }
 
-    fn walk(&mut self, xml: &'a str, kind: &str) -> Result<()> {
+    fn walk(&mut self, xml: &'a str) -> Result<()> {
         let source = self.source;
         let mut reader = Reader::from_str(xml);
         reader.config_mut().expand_empty_elements = true;
@@ -138,7 +146,7 @@ impl<'a> Document<'a> {
             match event
                 .map_err(|e| source.error(format!("byte {at}"), format!("is not valid XML: {e}")))?
             {
-                Event::Start(tag) => self.start(&mut open, &tag, at, kind)?,
+                Event::Start(tag) => self.start(&mut open, &tag, at)?,
                 Event::End(tag) => self.end(&mut open, tag.name().as_ref()),
                 // Elements inside an array (its statistics) have text of their own.
                 Event::Text(text) => match &mut open.array {
@@ -153,19 +161,19 @@ impl<'a> Document<'a> {
     }
 
     /// Opens an element: an array, a section, or one of the document.
-    fn start(&mut self, open: &mut Open<'a>, tag: &BytesStart, at: u64, kind: &str) -> Result<()> {
+    fn start(&mut self, open: &mut Open<'a>, tag: &BytesStart, at: u64) -> Result<()> {
         if let Some((_, depth)) = &mut open.array {
             *depth += 1;
             return Ok(());
         }
         let attributes = attributes(self.source, at, tag)?;
         let name = tag.name();
-        if name.as_ref() == "DataArray" {
+        if matches!(name.as_ref(), "DataArray" | "Array") {
             if let Some(offset) = attributes.get("offset") {
                 self.offsets.push(number(self.source, "offset", offset)?);
             }
             open.array = Some((Array { attributes, text: Cow::Borrowed("") }, 0));
-        } else if open.section.is_none() && !self.element(name.as_ref(), kind, &attributes)? {
+        } else if open.section.is_none() && !self.element(name.as_ref(), &attributes)? {
             open.section =
                 Some(Section { name: name.as_ref().into(), attributes, arrays: Vec::new() });
         }
@@ -191,15 +199,20 @@ impl<'a> Document<'a> {
     }
 
     /// Stores an element that is not a section. Returns whether it was one of these.
-    fn element(&mut self, name: &str, kind: &str, attributes: &Attributes) -> Result<bool> {
+    fn element(&mut self, name: &str, attributes: &Attributes) -> Result<bool> {
         match name {
-            "VTKFile" => self.encoding = encoding(self.source, kind, attributes)?,
+            "VTKFile" => {
+                self.encoding = encoding(self.source, attributes)?;
+                self.kind = attributes.get("type").cloned().unwrap_or_default();
+            }
             "Piece" => self.pieces.push(Piece {
                 attributes: attributes.clone(),
                 sections: Vec::new(),
                 empty: Section::default(),
             }),
-            _ if name == kind => self.attributes = attributes.clone(),
+            "DataSet" => self.references.push(attributes.clone()),
+            "Block" | "Partitions" => {}
+            _ if name == self.kind => self.attributes = attributes.clone(),
             _ => return Ok(false),
         }
         Ok(true)
@@ -267,13 +280,6 @@ impl<'a> Section<'a> {
     pub fn array(&self, name: &str) -> Option<&Array<'a>> {
         self.arrays.iter().find(|array| array.get("Name") == Some(name))
     }
-
-    /// Returns the active scalars: the array that `Scalars` names, else the first with one
-    /// component.
-    pub fn scalars(&self) -> Option<&Array<'a>> {
-        let named = self.attributes.get("Scalars").and_then(|name| self.array(name));
-        named.or_else(|| self.arrays.iter().find(|array| array.components() == "1"))
-    }
 }
 
 impl Array<'_> {
@@ -281,8 +287,14 @@ impl Array<'_> {
         self.attributes.get(name).map(String::as_str)
     }
 
-    pub fn components(&self) -> &str {
-        self.get("NumberOfComponents").map_or("1", str::trim)
+    /// Returns the number of components; 0 if that is no number.
+    pub fn components(&self) -> usize {
+        self.get("NumberOfComponents").map_or(1, |text| text.trim().parse().unwrap_or(0))
+    }
+
+    /// Returns the type of its numbers; `None` for a type that is not read.
+    pub fn sample_type(&self) -> Option<SampleType> {
+        sample_type(self.get("type").unwrap_or_default())
     }
 
     /// Returns its name, for errors.
@@ -291,15 +303,12 @@ impl Array<'_> {
     }
 }
 
-fn encoding(source: &Source, kind: &str, attributes: &Attributes) -> Result<ArrayEncoding> {
+fn encoding(source: &Source, attributes: &Attributes) -> Result<ArrayEncoding> {
     let get = |name: &str| attributes.get(name).map_or("", String::as_str);
     let wrong = |name: &str| {
         let message = format!("{name}=“{}” is not supported", get(name));
         Err(source.error("VTKFile", message))
     };
-    if get("type") != kind {
-        return wrong("type");
-    }
     Ok(ArrayEncoding {
         endian: match get("byte_order") {
             "" | "LittleEndian" => Endian::Little,
@@ -312,12 +321,14 @@ fn encoding(source: &Source, kind: &str, attributes: &Attributes) -> Result<Arra
             _ => return wrong("header_type"),
         },
         packed: match get("compressor") {
-            "" => false,
-            "vtkZLibDataCompressor" => true,
-            _ => {
-                let hint = "write the file with the compressor vtkZLibDataCompressor, or none";
-                return wrong("compressor").map_err(|e| e.hint(hint));
-            }
+            "" => None,
+            name => match Packing::from_name(name) {
+                Some(packing) => Some(packing),
+                None => {
+                    let hint = "write the file with the compressor vtkZLibDataCompressor, or none";
+                    return wrong("compressor").map_err(|e| e.hint(hint));
+                }
+            },
         },
     })
 }

@@ -1,9 +1,15 @@
-//! The bytes of an array in a VTK XML file: base64, a leading count, and blocks compressed by zlib.
+//! The bytes of an array in a VTK XML file: base64, a leading count, and blocks compressed by zlib,
+//! LZ4 or LZMA.
 
-use super::Endian;
-use crate::{Result, input::Source, parallel::prelude::*};
+use super::super::Endian;
+use crate::{
+    Result,
+    input::{Source, isolate::isolated},
+    parallel::prelude::*,
+};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::read::ZlibDecoder;
+use lzma_rust2::XzReader;
 use std::{borrow::Cow, io::Read};
 
 /// How the arrays of a file are encoded.
@@ -12,12 +18,64 @@ pub struct ArrayEncoding {
     pub endian: Endian,
     /// Counts have 8 bytes instead of 4.
     pub wide_counts: bool,
-    /// Arrays are split into blocks, each compressed by zlib.
-    pub packed: bool,
+    /// Arrays are split into blocks, each compressed by this; `None` if they are not.
+    pub packed: Option<Packing>,
 }
 
-/// Maximum compression ratio of deflate, 1032 bytes per byte; a block that claims more is invalid.
-const DEFLATE_RATIO: u64 = 1032;
+/// What compresses the blocks of an array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Packing {
+    /// zlib streams.
+    Zlib,
+    /// LZ4 blocks without a frame.
+    Lz4,
+    /// LZMA2 in xz streams.
+    Lzma,
+}
+
+impl Packing {
+    /// Returns the packing with VTK's name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Some(match name {
+            "vtkZLibDataCompressor" => Self::Zlib,
+            "vtkLZ4DataCompressor" => Self::Lz4,
+            "vtkLZMADataCompressor" => Self::Lzma,
+            _ => return None,
+        })
+    }
+
+    /// Maximum compression ratio, in bytes per byte; a block that claims more is invalid. LZMA needs
+    /// at least 0.3 bits for a match of 273 bytes.
+    fn ratio(self) -> u64 {
+        match self {
+            Self::Zlib => 1032,
+            Self::Lz4 => 256,
+            Self::Lzma => 1 << 13,
+        }
+    }
+
+    /// Unpacks a block that must fill `part`. The error is a message.
+    fn unpack(self, packed: &[u8], part: &mut [u8]) -> Result<(), String> {
+        let stream = |stream: &mut dyn Read, part: &mut [u8]| {
+            stream.read_exact(part).map_err(|e| format!("cannot be unpacked: {e}"))?;
+            match stream.read(&mut [0]) {
+                Ok(0) => Ok(()),
+                Ok(_) => Err(format!("unpacks to more than its {} bytes", part.len())),
+                Err(e) => Err(format!("cannot be unpacked: {e}")),
+            }
+        };
+        match self {
+            Self::Zlib => stream(&mut ZlibDecoder::new(packed), part),
+            // The decoder's own memory is limited to that of VTK's highest level.
+            Self::Lzma => stream(&mut XzReader::new_mem_limit(packed, false, 128 << 10), part),
+            Self::Lz4 => match lz4_flex::block::decompress_into(packed, part) {
+                Ok(size) if size == part.len() => Ok(()),
+                Ok(size) => Err(format!("unpacks to {size} bytes instead of {}", part.len())),
+                Err(e) => Err(format!("cannot be unpacked: {e}")),
+            },
+        }
+    }
+}
 
 impl ArrayEncoding {
     /// Returns the array of `size` bytes at the start of `bytes`, which begins with its counts.
@@ -29,8 +87,8 @@ impl ArrayEncoding {
         bytes: Cow<'b, [u8]>,
         size: usize,
     ) -> Result<Cow<'b, [u8]>> {
-        if self.packed {
-            return self.unpack(source, place, &bytes, size).map(Cow::Owned);
+        if let Some(packing) = self.packed {
+            return self.unpack(source, place, &bytes, (packing, size)).map(Cow::Owned);
         }
         let claim = self
             .count(&bytes, 0)
@@ -59,7 +117,13 @@ impl ArrayEncoding {
     /// Unpacks an array of blocks. It begins with the number of blocks, the unpacked size of each
     /// but the last, that of the last (0: as the others), and the packed size of each. Then the
     /// blocks follow.
-    fn unpack(&self, source: &Source, place: &str, bytes: &[u8], size: usize) -> Result<Vec<u8>> {
+    fn unpack(
+        &self,
+        source: &Source,
+        place: &str,
+        bytes: &[u8],
+        (packing, size): (Packing, usize),
+    ) -> Result<Vec<u8>> {
         let wrong = |message: String| source.error(place, message);
         let cut = || wrong("ends inside the sizes of its blocks".into());
         let head = |i| self.count(bytes, i).ok_or_else(cut);
@@ -93,7 +157,7 @@ impl ArrayEncoding {
             rest = after;
         }
         let present: u64 = packed.iter().map(|block| block.len() as u64).sum();
-        if present.saturating_mul(DEFLATE_RATIO) < size as u64 {
+        if present.saturating_mul(packing.ratio()) < size as u64 {
             return Err(wrong(format!(
                 "claims {size} bytes, more than {present} compressed bytes can hold"
             )));
@@ -105,18 +169,11 @@ impl ArrayEncoding {
         unpacked.par_chunks_mut(block as usize).zip(packed).enumerate().try_for_each(
             |(i, (part, packed))| {
                 source.check_time()?;
-                let mut stream = ZlibDecoder::new(packed);
-                stream
-                    .read_exact(part)
-                    .map_err(|e| wrong(format!("block {i} cannot be unpacked: {e}")))?;
-                match stream.read(&mut [0]) {
-                    Ok(0) => Ok(()),
-                    Ok(_) => Err(wrong(format!(
-                        "block {i} unpacks to more than its {} bytes",
-                        part.len()
-                    ))),
-                    Err(e) => Err(wrong(format!("block {i} cannot be unpacked: {e}"))),
-                }
+                isolated(source, place, || {
+                    packing
+                        .unpack(packed, part)
+                        .map_err(|message| wrong(format!("block {i} {message}")))
+                })
             },
         )?;
         Ok(unpacked)

@@ -1,0 +1,112 @@
+//! Cells that fill space with their values, and samples at points or at the centres of cells.
+
+use super::{
+    super::{
+        Place, ReadOptions,
+        shared::{
+            gather::{Columns, gather},
+            holes::all_missing,
+        },
+    },
+    grid::{Grid, POLYHEDRON},
+    surface::centre,
+    survey::Wanted,
+};
+use crate::{
+    Result,
+    cells::{self, CellKind, Cells},
+    input::{Source, positions},
+    scattered::Points,
+};
+
+/// Radius of a cell's sample, in units of the root mean square distance of its corners from its
+/// centre: 1.2 edges for a cube. With two standard deviations per radius, that is the default
+/// kernel of lattices.
+const REACH: f64 = 1.4;
+
+/// Returns the cells of a grid that fill space. Points that they do not need are left out.
+pub fn cells(
+    source: &Source,
+    grid: &Grid,
+    wanted: &Wanted,
+    options: &ReadOptions,
+) -> Result<Cells> {
+    let of_cells = wanted.array.place == Place::Cells;
+    source.room::<[u32; 2]>("the corners of the cells", grid.corners.len())?;
+    source.room::<(usize, CellKind, f32)>("the cells", grid.types.len())?;
+    source.room::<(u32, u32, f32)>("the points", grid.points.len())?;
+    let mut cells = Cells::default();
+    // The number of each point among those that are used, and their numbers in the grid.
+    let mut numbers = vec![u32::MAX; grid.points.len()];
+    let mut used: Vec<u32> = Vec::new();
+    let mut number = |point: u32| {
+        let own = &mut numbers[point as usize];
+        if *own == u32::MAX {
+            *own = used.len() as u32;
+            used.push(point);
+        }
+        *own
+    };
+    for cell in 0..grid.types.len() {
+        let Some(kind) = CellKind::of_vtk(grid.types[cell].into()) else { continue };
+        let corners = grid.corners_of(cell);
+        if grid.types[cell] == POLYHEDRON {
+            let faces = super::grid::faces(corners).flat_map(|face| {
+                let points: Vec<u32> = face.iter().map(|&point| number(point)).collect();
+                std::iter::once(face.len() as u32).chain(points)
+            });
+            let stream: Vec<u32> = corners.first().copied().into_iter().chain(faces).collect();
+            cells.push(kind, stream);
+        } else {
+            cells.push(kind, corners.iter().map(|&point| number(point)).collect::<Vec<u32>>());
+        }
+        if of_cells {
+            cells.values.push(grid.values[cell] as f32);
+        }
+    }
+    if !of_cells {
+        cells.values = used.iter().map(|&point| grid.values[point as usize] as f32).collect();
+    }
+    let holes = cells.values.iter().filter(|value| value.is_nan()).count();
+    if holes == cells.values.len() {
+        return Err(source.error("samples", all_missing(holes, options.missing)));
+    }
+    let position = |row: usize| grid.points[used[row] as usize];
+    (cells.origin, cells.points) =
+        positions::settle(source, used.len(), position, |row| format!("point {}", used[row]))?;
+    cells.place = if of_cells { cells::Place::Cells } else { cells::Place::Points };
+    cells.about.holes = holes as u64;
+    cells.validate().map_err(|error| source.error("Cells", error.to_string()))?;
+    Ok(cells)
+}
+
+/// Returns samples at the points of a grid, or at the centres of its cells. Ghosts are left out.
+/// If any cell has no size, there are no radii.
+pub fn samples(
+    source: &Source,
+    grid: Grid,
+    wanted: &Wanted,
+    options: &ReadOptions,
+) -> Result<Points> {
+    if wanted.array.place != Place::Cells {
+        let kept: Vec<usize> =
+            (0..grid.points.len()).filter(|&point| !grid.ghosts[point]).collect();
+        let values = kept.iter().map(|&point| grid.values[point]).collect();
+        let columns = Columns { values, ..Columns::default() };
+        let place = |row: usize| format!("point {}", kept[row]);
+        return gather(source, kept.len(), |row| grid.points[kept[row]], place, columns, options);
+    }
+    let count = grid.types.len();
+    source.room::<(glam::DVec3, f32, f64)>("the samples", count)?;
+    let (mut centres, mut radii) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    for cell in 0..count {
+        let (at, distance) = centre(&grid, cell);
+        centres.push(at);
+        radii.push((REACH * distance) as f32);
+    }
+    if !radii.iter().all(|radius| radius.is_normal()) {
+        radii.clear();
+    }
+    let columns = Columns { values: grid.values, radii, ..Columns::default() };
+    gather(source, count, |row| centres[row], |row| format!("cell {row}"), columns, options)
+}
