@@ -19,11 +19,11 @@ pub struct Splat {
     /// B row by row: b00, b10, b11, b20, b21, b22, in world units.
     pub factor: [f32; 6],
     /// Radiance: red, green, blue and opacity, 8 bits each, red in the lowest bits. Scalar: the
-    /// weight and the first component of the slope, as 16-bit floats ([`Splat::sample`]).
+    /// weight as a 16-bit float, and a part of the slope ([`Splat::sample`]).
     pub color: u32,
     /// Radiance: the unit normal, octahedral, two signed 16-bit components ([`encode_normal`]);
-    /// [`NO_NORMAL`] if there is none, which draws the splat unshaded. Scalar: the other two
-    /// components of the slope.
+    /// [`NO_NORMAL`] if there is none, which draws the splat unshaded. Scalar: the rest of the
+    /// slope.
     pub normal: u32,
 }
 
@@ -33,25 +33,61 @@ impl Splat {
     ///
     /// The kernel carries value + slope·x′, where x′ is the position in whitened space. With the
     /// right slopes, a linear field is reproduced exactly (Franke & Nielson 1980).
+    ///
+    /// The weight is a 16-bit float. The components of the slope are integers of 13 bits with a
+    /// common exponent of 9 bits (as colours of Ward 1991), so that slopes of any unit keep 12 bits
+    /// of their largest component.
     pub fn sample(center: Vec3, value: f32, factor: [f32; 6], weight: f32, slope: Vec3) -> Self {
-        let pack = |low: f32, high: f32| {
-            u32::from(f16::from_f32(low).to_bits()) | u32::from(f16::from_f32(high).to_bits()) << 16
-        };
+        let (parts, exponent) = encode_slope(slope);
+        let [x, y, z] = parts.map(|part| part as u32 & SLOPE_MASK);
         Self {
             center: center.to_array(),
             strength: value,
             factor,
-            color: pack(weight, slope.x),
-            normal: pack(slope.y, slope.z),
+            color: u32::from(f16::from_f32(weight).to_bits()) | x << 16 | exponent >> 6 << 29,
+            normal: y | z << 13 | exponent << 26,
         }
     }
 
     /// The weight and the slope of a [`sample`](Self::sample).
     pub fn weight_and_slope(&self) -> (f32, Vec3) {
-        let [weight, x, y, z] = [self.color, self.color >> 16, self.normal, self.normal >> 16]
-            .map(|bits| f16::from_bits(bits as u16).to_f32());
-        (weight, Vec3::new(x, y, z))
+        let weight = f16::from_bits(self.color as u16).to_f32();
+        let exponent = self.color >> 29 << 6 | self.normal >> 26;
+        if exponent == NO_SLOPE {
+            return (weight, Vec3::NAN);
+        }
+        let unit = 2f64.powi(exponent as i32 - SLOPE_BIAS);
+        // Shifted to the top and back as a signed number, to extend the sign.
+        let parts = [self.color >> 16, self.normal, self.normal >> 13]
+            .map(|bits| ((bits << 19) as i32 >> 19) as f32);
+        (weight, Vec3::from(parts.map(|part| (f64::from(part) * unit) as f32)))
     }
+}
+
+/// The bits of one component of a slope: a signed integer.
+const SLOPE_MASK: u32 = 0x1fff;
+/// The largest component of a slope.
+const SLOPE_MOST: f64 = 4095.0;
+/// A component of 1 with the exponent 0 is 2⁻²⁰⁰. splats.wgsl has the same number.
+const SLOPE_BIAS: i32 = 200;
+/// The exponent of a slope that is not finite.
+const NO_SLOPE: u32 = 511;
+
+/// Returns the components of a slope as integers, and their common exponent.
+fn encode_slope(slope: Vec3) -> ([i32; 3], u32) {
+    let largest = f64::from(slope.abs().max_element());
+    if !slope.is_finite() {
+        return ([0; 3], NO_SLOPE);
+    }
+    if largest == 0.0 {
+        return ([0; 3], 0);
+    }
+    // The smallest power of two by which the largest component fits. 32-bit floats reach from 2⁻¹⁴⁹
+    // to 2¹²⁸, so exponents lie far inside 0 … 510.
+    let exponent = (largest / SLOPE_MOST).log2().ceil() as i32;
+    let unit = 2f64.powi(exponent);
+    let parts = slope.to_array().map(|part| (f64::from(part) / unit).round() as i32);
+    (parts, (exponent + SLOPE_BIAS) as u32)
 }
 
 /// The [`Splat::normal`] of a splat that has none.
@@ -202,6 +238,32 @@ impl SplatSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slopes_of_any_unit_keep_their_digits() {
+        let direction = Vec3::new(0.3, -1.0, 0.7);
+        for power in (-130..=127).step_by(3) {
+            for stretch in [1.0, 1.3, 1.999_9] {
+                let slope = direction * (2f64.powi(power) * stretch).min(3e38) as f32;
+                let sample = Splat::sample(Vec3::ZERO, 1.0, [1.0; 6], 0.37, slope);
+                let (weight, found) = sample.weight_and_slope();
+                assert!((weight - 0.37).abs() < 2e-4, "{weight}");
+                let error = (found.as_dvec3() - slope.as_dvec3()).abs().max_element();
+                let largest = f64::from(slope.abs().max_element());
+                assert!(error <= 2.5e-4 * largest, "{slope} {found}");
+            }
+        }
+        for (slope, expected) in [
+            (Vec3::ZERO, Vec3::ZERO),
+            (Vec3::new(-4095.0, 4095.0, 1.0), Vec3::new(-4095.0, 4095.0, 1.0)),
+            (Vec3::new(-65_536.0, 16.0, 15.0), Vec3::new(-65_536.0, 32.0, 0.0)),
+        ] {
+            let sample = Splat::sample(Vec3::ZERO, 1.0, [1.0; 6], 1.0, slope);
+            assert_eq!(sample.weight_and_slope(), (1.0, expected));
+        }
+        let broken = Splat::sample(Vec3::ZERO, 1.0, [1.0; 6], 1.0, Vec3::X * f32::NAN);
+        assert!(broken.weight_and_slope().1.is_nan());
+    }
 
     #[test]
     fn places_hold_while_the_origin_moves() {

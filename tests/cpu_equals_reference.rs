@@ -94,6 +94,7 @@ fn volumes() {
         methods::orthographic(methods::post_classified()),
         methods::pre_classified(),
         methods::gradient_opacity(),
+        methods::uncertain_light(),
         methods::one_isosurface(),
         methods::isosurfaces_in_fog(),
         methods::orthographic(methods::isosurfaces_in_fog()),

@@ -118,6 +118,7 @@ fn what_is_gathered_and_what_is_not() {
         methods::maximum(),
         methods::x_ray(),
         methods::gradient_opacity(),
+        methods::uncertain_light(),
         methods::isosurfaces_in_fog(),
         methods::clipped_volume(),
         methods::clipped_surface_in_a_volume(),
@@ -462,6 +463,7 @@ fn thick_sheets() {
 #[test]
 fn gradient_opacity() {
     assert_matches(methods::gradient_opacity(), 50.0);
+    assert_matches(methods::uncertain_light(), 50.0);
 }
 
 #[test]

@@ -34,6 +34,9 @@ struct Frame {
     // Ambient, diffuse, specular, power.
     volume_shade: vec4<f32>,
     surface_shade: vec4<f32>,
+    // The magnitude of a field's gradient up to which its direction does not count, and one over
+    // the magnitudes from there to where it counts in full; in entries of the table per thickness.
+    certain: vec4<f32>,
     // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared
     // extent in standard deviations; the minimum sum of kernels for which a value exists.
     isotropic: vec4<f32>,

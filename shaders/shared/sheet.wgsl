@@ -7,14 +7,34 @@ const LEAST_DEPTH: f32 = 1e-5;
 // Optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
 
-// Returns a lit colour: Blinn's model (1977) with a light at the eye, on both sides.
-fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f32>) -> vec3<f32> {
+// Returns a lit colour: Blinn's model (1977) with a light at the eye, on both sides. `certain` is a
+// magnitude up to which the normal does not count, and one over the magnitudes over which it comes
+// to count in full.
+fn lit_from(
+    color: vec3<f32>,
+    normal: vec3<f32>,
+    direction: vec3<f32>,
+    shade: vec4<f32>,
+    certain: vec2<f32>,
+) -> vec3<f32> {
     let size = length(normal);
     if !(size > 1e-20) {
         return color * (shade.x + shade.y);
     }
     let facing = min(abs(dot(normal, direction)) / size, 1.0);
-    return min(color * (shade.x + shade.y * facing) + shade.z * pow(facing, shade.w), vec3(1.0));
+    let share = clamp((size - certain.x) * certain.y, 0.0, 1.0);
+    let diffuse = shade.x + shade.y * (1.0 - share * (1.0 - facing));
+    return min(color * diffuse + share * shade.z * pow(facing, shade.w), vec3(1.0));
+}
+
+// The same for a normal of any length.
+fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f32>) -> vec3<f32> {
+    return lit_from(color, normal, direction, shade, vec2(0.0, 1e30));
+}
+
+// The same for the gradient of the field.
+fn lit_field(r: u32, color: vec3<f32>, gradient: vec3<f32>) -> vec3<f32> {
+    return lit_from(color, gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
@@ -137,7 +157,7 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
             let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
             var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
             if VOLUME_SHADED {
-                color = lit(color, normal, direction_of(r), frame.volume_shade);
+                color = lit_field(r, color, normal);
             }
             var done = 0.0;
             for (var i = 0u; i < ISOSURFACES; i++) {
@@ -205,7 +225,7 @@ fn pass_surface(
     }
     var color = surface.color.xyz;
     if VOLUME_SHADED {
-        color = lit(color, gradient_at(r, *medium, place), direction_of(r), frame.volume_shade);
+        color = lit_field(r, color, gradient_at(r, *medium, place));
     }
     (*medium).color += share * color;
 }

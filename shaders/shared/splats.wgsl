@@ -6,6 +6,20 @@ const FOOTPRINT_BLUR: f32 = 0.35;
 // Opaque surfaces must not grow through the blur: see splat.rs.
 const STEP_BACK: f32 = 2.4;
 
+// The exponents of slopes begin at −SLOPE_BIAS: see splat.rs.
+const SLOPE_BIAS: i32 = 200;
+
+// Returns the slope of a sample, in its own whitened space: three integers of 13 bits, and their
+// common exponent in the highest bits (Splat::sample in splat.rs).
+fn slope_of(color: u32, normal: u32) -> vec3<f32> {
+    let exponent = i32((color >> 29u) << 6u | normal >> 26u) - SLOPE_BIAS;
+    // Shifted to the top and back as signed numbers, to extend the signs.
+    let parts = vec3<i32>(vec3(color >> 16u, normal, normal >> 13u) << vec3(19u)) >> vec3(19u);
+    // In two steps, so that no power of two leaves 32 bits before the product does.
+    let half = exponent / 2;
+    return vec3<f32>(parts) * exp2(f32(half)) * exp2(f32(exponent - half));
+}
+
 // Returns a splat in view space, widened.
 fn splat_at(index: u32) -> Candidate {
     let own = splats[index];
@@ -36,8 +50,8 @@ fn splat_at(index: u32) -> Candidate {
     splat.normal = own.normal;
     if SAMPLES && (source.flags & RADIANCE) == 0u {
         // The slope is in the splat's own whitened space; B⁻ᵀ maps it to the set's space.
-        let low = unpack2x16float(splat.color);
-        let high = unpack2x16float(splat.normal);
+        let weight = unpack2x16float(splat.color).x;
+        let slope = slope_of(splat.color, splat.normal);
         // A widened sample keeps its weight over space. Otherwise a sample far smaller than a pixel
         // would drown its surroundings. Both determinants are in units of the splat's own size, so
         // that they fit 32 bits.
@@ -47,10 +61,10 @@ fn splat_at(index: u32) -> Candidate {
         let y = vec3(s.xy, s.yy, s.yz) * unit * unit;
         let z = vec3(s.xz, s.yz, s.zz) * unit * unit;
         let before = abs(b.x * unit * b.z * unit * d.y * unit);
-        splat.weight = low.x * before * inverseSqrt(max(dot(x, cross(y, z)), 1e-37));
-        let slope_z = high.y / d.y;
-        let slope_y = (high.x - d.x * slope_z) / b.z;
-        let slope_x = (low.y - b.y * slope_y - b.w * slope_z) / b.x;
+        splat.weight = weight * before * inverseSqrt(max(dot(x, cross(y, z)), 1e-37));
+        let slope_z = slope.z / d.y;
+        let slope_y = (slope.y - d.x * slope_z) / b.z;
+        let slope_x = (slope.x - b.y * slope_y - b.w * slope_z) / b.x;
         splat.gradient = to_view * vec3(slope_x, slope_y, slope_z) * frame.transfer.y;
         splat.strength = counted(splat.strength);
     }

@@ -287,6 +287,32 @@ impl Plan<'_> {
         three!(I => color[I].mul_add(share, highlight).min(one))
     }
 
+    /// Returns a lit colour of the field. The gradient counts from the magnitudes on that are
+    /// certain, in entries per thickness of a sheet; others are lit the less the shorter they are.
+    #[inline(always)]
+    fn lit_field<S: Simd>(
+        &self,
+        simd: S,
+        color: [Lanes<S>; 3],
+        gradient: [Lanes<S>; 3],
+        direction: [Lanes<S>; 3],
+    ) -> [Lanes<S>; 3] {
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let [ambient, diffuse, specular, power] = self.frame.volume_shade;
+        let [low, per_magnitude, ..] = self.frame.certain;
+        let size = dot(gradient, gradient).sqrt();
+        let certainty = ((size - low) * per_magnitude).max(none).min(one);
+        let has_direction = size.simd_gt(LEAST_GRADIENT);
+        let certainty = has_direction.select(certainty, none);
+        let facing = (dot(gradient, direction).abs()
+            / size.max(Lanes::splat(simd, LEAST_GRADIENT)))
+        .min(one);
+        let highlight = vector::power(simd, facing.max(Lanes::splat(simd, 1e-6)), power);
+        let highlight = highlight * certainty * specular;
+        let share = (one - certainty * (one - facing)) * diffuse + ambient;
+        three!(I => color[I].mul_add(share, highlight).min(one))
+    }
+
     /// Adds a sheet to a packet's pixels: the field in it, at the pixels of a mask, and its
     /// radiance (colour times optical depth, and optical depth).
     #[inline(always)]
@@ -502,7 +528,7 @@ impl Plan<'_> {
             let mut surface = [0, 1, 2].map(|channel| own(1, channel));
             if self.is_lit {
                 let normal = self.gradient(layer, place + (next_place - place) * share);
-                surface = self.lit(simd, surface, normal, layer.direction, self.frame.volume_shade);
+                surface = self.lit_field(simd, surface, normal, layer.direction);
             }
             for (sum, channel) in medium.color.iter_mut().zip(surface) {
                 *sum = taken.mul_add(channel, *sum);
@@ -542,7 +568,7 @@ impl Plan<'_> {
         let inverse = one / shown[3].max(Lanes::splat(simd, 1e-20));
         let mut color = three!(I => (shown[I] * inverse).max(none).min(one));
         if self.is_lit {
-            color = self.lit(simd, color, normal, layer.direction, self.frame.volume_shade);
+            color = self.lit_field(simd, color, normal, layer.direction);
         }
         Some((color, depth))
     }

@@ -3,14 +3,14 @@
 
 use crate::{
     bricks::Choice,
-    math::{Kernel, Profile, Sheets, View},
+    math::{Profile, Sheets, View},
     plan::{
         TILE,
         tables::Tables,
         uniforms::{Frame, clip_counts},
     },
     scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
-    volume::{Arrangement, TransferFunction},
+    volume::Arrangement,
 };
 
 /// The place of a plane in front of or behind all others.
@@ -112,38 +112,26 @@ impl<'a> Plan<'a> {
                     plan.has_radiance = true;
                     plan.lit_surfaces |= emits && settings.surface_shade.is_some();
                 }
-                Item::Scalar(set, transfer) => {
-                    plan.has_slopes = true;
-                    plan.set_field(sheets, settings, transfer, set.value_range(), None);
-                }
-                Item::Cells(cells, transfer) => {
-                    plan.set_field(sheets, settings, transfer, cells.range(), None);
-                }
-                Item::Volume(volume, kernel, transfer) => {
+                Item::Scalar(..) => plan.has_slopes = true,
+                Item::Cells(..) => {}
+                Item::Volume(volume, ..) => {
                     plan.on_lattice = true;
                     plan.has_slopes =
                         matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
-                    plan.set_field(sheets, settings, transfer, volume.range, Some(kernel));
                 }
-                Item::Bricks(bricks, kernel, transfer) => {
-                    plan.on_lattice = true;
-                    plan.set_field(sheets, settings, transfer, bricks.header().range, Some(kernel));
-                }
+                Item::Bricks(..) => plan.on_lattice = true,
             }
+            plan.set_field(sheets, settings, item);
         }
         plan
     }
 
-    fn set_field(
-        &mut self,
-        sheets: &Sheets,
-        settings: &Settings,
-        transfer: &TransferFunction,
-        range: [f64; 2],
-        kernel: Option<&Kernel>,
-    ) {
+    /// Sets what an item's field needs, if it has one.
+    fn set_field(&mut self, sheets: &Sheets, settings: &Settings, item: &Item) {
+        let (Some(transfer), Some(range)) = (item.transfer(), item.value_range()) else { return };
+        let kernel = item.kernel();
         self.tables = Tables::new(transfer, range, kernel);
-        self.frame.set_tables(&self.tables, transfer, self.view, sheets);
+        self.frame.set_tables(&self.tables, transfer, item.light(settings), self.view, sheets);
         self.table_kernel =
             kernel.is_some_and(|kernel| !matches!(kernel.profile, Profile::Gaussian(_)));
         let emits = settings.optics == Optics::EmissionAbsorption;

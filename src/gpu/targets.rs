@@ -174,7 +174,7 @@ impl Request<'_> {
         self.check(gpu, prepared.runs)?;
         let (budget, tiles) = (self.budget.within(gpu), self.tiles());
         let mut frame = self.frame(prepared, budget);
-        let table = tables_of(prepared, self.view, self.sheets, &mut frame);
+        let table = tables_of(prepared, self.settings, self.view, self.sheets, &mut frame);
         let gathered = self.gathered(gpu, prepared, &table, &mut frame);
         let uniform = |label, bytes: &[u8]| filled_buffer(gpu, label, bytes, Usage::UNIFORM);
         let sizes = Sizes::of(self, gpu, budget, prepared.runs);
@@ -338,6 +338,7 @@ pub fn gathered_word(tiles: u32) -> u64 {
 /// Returns the tables of the scene's field, or unused placeholders if it has no field.
 fn tables_of(
     prepared: &PreparedScene,
+    settings: &Settings,
     view: &View,
     sheets: &Sheets,
     frame: &mut Frame,
@@ -346,10 +347,10 @@ fn tables_of(
         .scene
         .items
         .iter()
-        .find_map(|item| Some((item.transfer()?, item.value_range()?, item.kernel())));
-    let Some((transfer, range, kernel)) = field else { return vec![[0.0; 4]; 2] };
-    let tables = Tables::new(transfer, range, kernel);
-    frame.set_tables(&tables, transfer, view, sheets);
+        .find_map(|item| Some((item, item.transfer()?, item.value_range()?)));
+    let Some((item, transfer, range)) = field else { return vec![[0.0; 4]; 2] };
+    let tables = Tables::new(transfer, range, item.kernel());
+    frame.set_tables(&tables, transfer, item.light(settings), view, sheets);
     tables.entries
 }
 

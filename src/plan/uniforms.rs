@@ -37,6 +37,7 @@ pub struct Frame {
     pub field_high: [f32; 4],
     pub volume_shade: [f32; 4],
     pub surface_shade: [f32; 4],
+    pub certain: [f32; 4],
     pub isotropic: [f32; 4],
     pub transfer: [f32; 4],
     pub gradients: [f32; 4],
@@ -253,11 +254,13 @@ impl Frame {
         frame
     }
 
-    /// Sets how values are looked up in the tables. Gradients are per thickness of a sheet.
+    /// Sets how values are looked up in the tables, and which gradients of a field with this light
+    /// are certain. Gradients are per thickness of a sheet.
     pub fn set_tables(
         &mut self,
         tables: &Tables,
         transfer: &TransferFunction,
+        light: Option<Shade>,
         view: &View,
         sheets: &Sheets,
     ) {
@@ -269,6 +272,9 @@ impl Frame {
         // 32 bits.
         let per_own = (per_magnitude / to_own).min(1e30);
         self.gradients = [first * to_own, per_own, length, view.scale * length].map(|v| v as f32);
+        let [low, high] =
+            light.and_then(|light| light.certain).unwrap_or_default().map(|end| end * to_own);
+        self.certain = [low, (1.0 / (high - low)).min(1e30), 0.0, 0.0].map(|v| v as f32);
         self.table_starts = tables.starts;
         [self.before, self.behind] = tables.beyond;
         let mut surfaces = transfer.isosurfaces.clone();

@@ -218,7 +218,7 @@ mod tests {
         sphere.colors = vec![[255, 128, 0, 255]; sphere.positions.len()];
         let camera = camera(Projection::Orthographic { height: 3.0 });
         let mut settings = Settings::new([48, 36]);
-        let shade = Shade { ambient: 0.1, diffuse: 0.6, specular: 0.2, power: 8.0 };
+        let shade = Shade { ambient: 0.1, diffuse: 0.6, specular: 0.2, power: 8.0, certain: None };
         settings.surface_shade = Some(shade);
         let picture = trace(&sphere, 60.0, &camera, &settings, 1).unwrap();
         for (at, pixel) in picture.color.iter().enumerate() {

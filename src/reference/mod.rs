@@ -112,7 +112,11 @@
 //! isosurface.
 //!
 //! **Light** is that of Blinn and Phong with the light at the eye, on both sides; colours are
-//! clamped to 1. If the gradient is 0, the ambient and diffuse parts count in full.
+//! clamped to 1. If the gradient is 0, the ambient and diffuse parts count in full. A field's
+//! gradient g counts with the certainty c = (|g| − g₀)/(g₁ − g₀), clamped to 0 … 1 (`certain` of
+//! [`Shade`], in value per world length): the diffuse part is multiplied by 1 − c·(1 − cos), the
+//! highlight by c. So what is flat, or as noisy as a flat region, is drawn as if it faced the eye.
+//! Normals of radiance are certain.
 //!
 //! # Other ways
 //! **Optics.** The above is emission and absorption (Max 1995). [`Optics::XRay`] uses the same
@@ -293,7 +297,7 @@ impl<'a> Frame<'a> {
         let dark = settings.optics == Optics::XRay;
         let before =
             settings.mode != Mode::Sheets || settings.classification == Classification::Pre;
-        let shade = samples.and_then(|(transfer, _)| settings.shade_of(transfer)).filter(|_| !dark);
+        let shade = flat.items.iter().find_map(|item| item.light(settings)).filter(|_| !dark);
         let field = samples.filter(|_| !before).map(|(transfer, lattice)| Field {
             classifier: Classifier::new(transfer),
             lattice,
@@ -319,7 +323,9 @@ impl<'a> Frame<'a> {
             field,
             product: Product::of(flat, &view),
             lattice: samples.and_then(|(_, lattice)| lattice),
-            shade: if before && samples.is_some() { shade } else { settings.surface_shade },
+            // Normals are as certain as their splats.
+            shade: if before && samples.is_some() { shade } else { settings.surface_shade }
+                .map(|shade| Shade { certain: None, ..shade }),
             view,
         }
     }

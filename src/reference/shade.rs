@@ -5,19 +5,28 @@ use glam::DVec3;
 
 /// Returns a lit colour by Blinn and Phong's reflection (Blinn 1977) with a light at the eye, on
 /// both sides of a surface. `normal` may have any length. If it has none, the ambient and diffuse
-/// parts of the colour count in full.
+/// parts of the colour count in full. If the shade says which gradients are certain, `normal` is a
+/// gradient in value per world length, and others are lit the less the shorter they are.
 pub(super) fn lit(color: DVec3, normal: DVec3, ray: DVec3, shade: &Shade) -> DVec3 {
-    let Shade { ambient, diffuse, specular, power } = *shade;
+    let Shade { ambient, diffuse, specular, power, certain } = *shade;
+    let certainty = certain.map_or(1.0, |certain| certainty(normal.length(), certain));
     let lit = match normal.try_normalize() {
         // The light comes from the eye, so the half vector is the light's own direction. Turning
         // the normal towards the light gives the cosine's magnitude.
         Some(normal) => {
             let cosine = normal.dot(ray).abs().min(1.0);
-            color * (ambient + diffuse * cosine) + DVec3::splat(specular * cosine.powf(power))
+            let facing = 1.0 - certainty * (1.0 - cosine);
+            let highlight = certainty * specular * cosine.powf(power);
+            color * (ambient + diffuse * facing) + DVec3::splat(highlight)
         }
         None => color * (ambient + diffuse),
     };
     lit.min(DVec3::ONE)
+}
+
+/// Returns how far a gradient counts, 0 … 1: linear between two magnitudes.
+fn certainty(magnitude: f64, [low, high]: [f64; 2]) -> f64 {
+    if magnitude >= high { 1.0 } else { ((magnitude - low) / (high - low)).max(0.0) }
 }
 
 #[cfg(test)]
@@ -26,7 +35,7 @@ mod tests {
 
     #[test]
     fn light_by_hand() {
-        let shade = Shade { ambient: 0.1, diffuse: 0.5, specular: 0.2, power: 2.0 };
+        let shade = Shade { ambient: 0.1, diffuse: 0.5, specular: 0.2, power: 2.0, certain: None };
         let color = DVec3::new(1.0, 0.5, 0.0);
         let close = |normal: DVec3, expected: [f64; 3]| {
             let found = lit(color, normal, DVec3::Z, &shade);
@@ -42,5 +51,26 @@ mod tests {
         close(DVec3::ZERO, [0.6, 0.3, 0.0]);
         let bright = Shade { specular: 3.0, ..shade };
         assert_eq!(lit(color, DVec3::Z, DVec3::Z, &bright), DVec3::ONE);
+    }
+
+    #[test]
+    fn light_fades_with_the_certainty_of_the_gradient() {
+        let plain = Shade { ambient: 0.1, diffuse: 0.5, specular: 0.2, power: 2.0, certain: None };
+        let shade = Shade { certain: Some([2.0, 4.0]), ..plain };
+        let color = DVec3::new(1.0, 0.5, 0.0);
+        let of = |normal: DVec3, shade: &Shade| lit(color, normal, DVec3::Z, shade);
+        let (across, slanted) = (DVec3::X, DVec3::new(0.0, 0.6, 0.8));
+        for direction in [across, slanted] {
+            let (full, none) = (of(direction, &plain), of(DVec3::ZERO, &plain));
+            for (length, share) in [(1.0, 0.0), (2.0, 0.0), (2.5, 0.25), (4.0, 1.0), (9.0, 1.0)] {
+                let expected = none + share * (full - none);
+                let found = of(direction * length, &shade);
+                assert!((found - expected).length() < 1e-12, "{length}: {found} {expected}");
+            }
+        }
+        // A step.
+        let step = Shade { certain: Some([3.0, 3.0]), ..plain };
+        assert_eq!(of(across * 2.9, &step), of(DVec3::ZERO, &plain));
+        assert_eq!(of(across * 3.0, &step), of(across, &plain));
     }
 }

@@ -72,7 +72,8 @@ pub fn integrate(
     }
     let view = camera.view(settings.size)?;
     view.validate_for(&scene.bounds())?;
-    let field = Pointwise::new(volume, kernel, transfer, &view, settings.shade_of(transfer));
+    let light = scene.items.iter().find_map(|item| item.light(settings));
+    let field = Pointwise::new(volume, kernel, transfer, &view, light);
     let near = nearest(scene, &view, settings);
     let [width, height] = settings.size;
     let row = |row: u32| {

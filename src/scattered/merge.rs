@@ -1,7 +1,7 @@
 //! Samples within a cell of space, merged into one: levels of detail for pictures that cannot
 //! resolve the separate samples.
 
-use super::splats::{LARGEST_SLOPE, factor};
+use super::splats::{WEIGHTS, factor};
 use crate::{
     parallel::prelude::*,
     splat::{Splat, SplatSet},
@@ -69,9 +69,8 @@ fn one_of(set: &SplatSet, cell: &[(u64, u32)]) -> Splat {
     let x = rise.x / b00;
     let y = (rise.y - b10 * x) / b11;
     let z = (rise.z - b20 * x - b21 * y) / b22;
-    let slope =
-        DVec3::new(x, y, z).clamp(DVec3::splat(-LARGEST_SLOPE), DVec3::splat(LARGEST_SLOPE));
-    let weight = (mass / (b00 * b11 * b22)).clamp(1e-4, LARGEST_SLOPE);
+    let slope = DVec3::new(x, y, z);
+    let weight = (mass / (b00 * b11 * b22)).clamp(WEIGHTS[0], WEIGHTS[1]);
     let factor = [b00, b10, b11, b20, b21, b22].map(|term| term as f32);
     Splat::sample(middle.as_vec3(), value as f32, factor, weight as f32, slope.as_vec3())
 }

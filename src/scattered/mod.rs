@@ -17,7 +17,7 @@ pub use splats::SampleOptions;
 use crate::{
     about::About,
     parallel::prelude::*,
-    volume::{BINS, TransferFunction, Volume},
+    volume::{TransferFunction, Volume},
 };
 use glam::{DVec3, Vec3};
 
@@ -174,11 +174,10 @@ impl Points {
     }
 
     /// Derives a transfer function from the samples, as [`TransferFunction::automatic`] does from a
-    /// volume. The low values count as background.
+    /// volume ([`TransferFunction::of_values`]).
     pub fn automatic_transfer(&self) -> TransferFunction {
         let [first, last] = self.bounds();
         let diagonal = (last - first).length();
-        let unit = if diagonal > 0.0 { diagonal / 100.0 } else { 1.0 };
-        TransferFunction::of_histogram(self.counts(BINS), self.range(), unit, false)
+        TransferFunction::of_values(&self.values, diagonal, &self.about)
     }
 }

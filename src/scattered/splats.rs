@@ -20,12 +20,10 @@ const SPREAD: f64 = 0.7;
 /// The range of weights, whose median is 1 or more. Samples outside it count for more or less than
 /// their volume. In this range, 16 bits hold weights with all their digits. A smaller weight would
 /// be invisible beside others of weight 1.
-const WEIGHTS: [f64; 2] = [1e-4, 6e4];
+pub(super) const WEIGHTS: [f64; 2] = [1e-4, 6e4];
 /// Over the whole extent of its kernel, a sample's value changes by at most this many widths of the
 /// range of its neighbours.
 const LARGEST_RISE: f64 = 2.5;
-/// The largest magnitude of a slope in 16 bits.
-pub(super) const LARGEST_SLOPE: f64 = 65_504.0;
 
 /// Bytes of temporary memory per sample: the tree, its neighbourhood twice, its kernel and its
 /// splat.
@@ -81,13 +79,11 @@ impl Points {
     /// there is their mean.
     ///
     /// **Slopes** are fitted to the neighbours by weighted least squares and limited by the range
-    /// of their values. They are 0 in directions in which the samples have no extent. Slopes of
-    /// 6·10⁻⁵ and less lose digits in 16 bits; those under 6·10⁻⁸ are 0.
+    /// of their values. They are 0 in directions in which the samples have no extent.
     ///
     /// # Errors
-    /// - [`Error::Argument`] for what [`validate`](Self::validate) finds, for options outside their
-    ///   ranges, and for values that change by more than 65,504 within a kernel, unless slopes are
-    ///   off.
+    /// - [`Error::Argument`] for what [`validate`](Self::validate) finds, and for options outside
+    ///   their ranges.
     /// - [`Error::Timeout`] after the deadline.
     /// - [`Error::Memory`] if there is too little.
     pub fn to_splats(&self, options: &SampleOptions) -> Result<SplatSet> {
@@ -107,16 +103,6 @@ impl Points {
         settle_weights(&mut shapes);
         let slope = |index: usize| slope(&shapes[index].factor, &place(index));
         let slope = |index: usize| if options.slopes { slope(index) } else { DVec3::ZERO };
-        if let Some(index) = (0..self.len())
-            .into_par_iter()
-            .find_first(|&index| slope(index).abs().max_element() > LARGEST_SLOPE)
-        {
-            return Err(Error::Argument(format!(
-                "around sample {index} the values change by {:.3e} within a kernel, but 16 bits \
-                 hold slopes up to {LARGEST_SLOPE}; scale the values down, or leave the slopes out",
-                slope(index).length()
-            )));
-        }
         let splat = |index: usize| {
             let Shape { factor, weight } = &shapes[index];
             let factor = factor.map(|term| term as f32);

@@ -98,7 +98,7 @@ fn no_place_inside_is_left_out() {
 }
 
 /// A linear field is reproduced, at the border and beyond it too. The remaining error comes from
-/// rounding slopes to 2⁻¹² in 16 bits: over the extent of the widest kernel here, at a corner, 2⁻¹²
+/// rounding slopes to 2⁻¹² of their largest component: over the extent of the widest kernel here, at a corner, 2⁻¹²
 /// · 3 · 0.45.
 #[test]
 fn linear_fields_are_exact() {
@@ -266,13 +266,23 @@ fn covariances_become_factors() {
     assert_eq!(deviation(&round, 0), 0.5);
 }
 
+/// The field is the same in any unit of values, and with large values alone.
 #[test]
-fn slopes_too_steep_for_16_bits_are_told() {
-    let steep = random(100, |p| 1e8 * p.x);
-    let message = steep.to_splats(&SampleOptions::default()).unwrap_err().to_string();
-    assert!(message.contains("16 bits") && message.contains("leave the slopes out"), "{message}");
-    steep.to_splats(&SampleOptions { slopes: false, ..SampleOptions::default() }).unwrap();
-    // Large values alone are no problem.
+fn slopes_of_any_unit_are_no_trouble() {
+    let places = |set: &SplatSet| {
+        let mut random = Random(9);
+        (0..50).map(|_| field(set, random.place()).1).collect::<Vec<f64>>()
+    };
+    let expected = places(&splats(&random(100, |p| p.x)));
+    for unit in [1e-30, 1e-12, 1e8, 1e12, 1e30] {
+        let found = places(&splats(&random(100, |p| unit * p.x)));
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!(
+                (found / f64::from(unit) - expected).abs() < 1e-3,
+                "{unit}: {found} {expected}"
+            );
+        }
+    }
     let set = splats(&random(100, |p| 1e6 + p.x));
     assert!((field(&set, Vec3::splat(0.5)).1 - 1e6 - 0.5).abs() < 0.1);
 }

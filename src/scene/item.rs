@@ -1,6 +1,6 @@
 //! The items of a scene.
 
-use super::numbers;
+use super::{Settings, numbers};
 use crate::{
     Result,
     bricks::Bricks,
@@ -8,7 +8,7 @@ use crate::{
     hierarchy::Hierarchy,
     math::{Bounds, Kernel},
     splat::SplatSet,
-    volume::{Lattice, TransferFunction, Volume},
+    volume::{Lattice, Shade, TransferFunction, Volume},
 };
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -94,6 +94,23 @@ impl Item {
             Self::Cells(cells, _) => Some(cells.range()),
             Self::Radiance(_) | Self::Hierarchy(_) => None,
         }
+    }
+
+    /// Returns how the item's field is lit, with the gradients that are certain
+    /// ([`Shade::certain`]). `None` if the field is not lit, or the item has no field. Scattered
+    /// samples are searched for their range and bounds.
+    pub(crate) fn light(&self, settings: &Settings) -> Option<Shade> {
+        let transfer = self.transfer()?;
+        let shade = settings.shade_of(transfer)?;
+        let bounds = self.lattice().map_or_else(
+            || self.bounds(),
+            |lattice| {
+                let [min, max] = lattice.bounds();
+                Bounds { min, max }
+            },
+        );
+        let certain = shade.certain_in(transfer, self.value_range()?, bounds.diagonal());
+        Some(Shade { certain: Some(certain), ..shade })
     }
 
     /// Returns the box around the item, footprints included.

@@ -9,7 +9,7 @@ use crate::{
     math::{Bounds, Kernel},
     parallel::prelude::*,
     splat::{Payload, Splat, SplatSet},
-    volume::{Shade, TransferFunction},
+    volume::TransferFunction,
 };
 
 /// Number of values that a transfer function can distinguish over the range of its data. In a sum
@@ -151,12 +151,7 @@ pub(super) fn check_settings(settings: &Settings) -> Result<()> {
         _ => {}
     }
     for shade in [settings.surface_shade, settings.volume_shade.flatten()].into_iter().flatten() {
-        let Shade { ambient, diffuse, specular, power } = shade;
-        if ![ambient, diffuse, specular, power].iter().all(|v| *v >= 0.0 && v.is_finite()) {
-            return wrong(format!(
-                "the light's coefficients must be finite and not negative, found {shade:?}"
-            ));
-        }
+        shade.check().map_err(Error::Argument)?;
     }
     Ok(())
 }

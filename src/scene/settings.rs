@@ -170,7 +170,13 @@ impl Settings {
             gradient: Gradient::default(),
             evaluate: Evaluate::default(),
             volume_shade: None,
-            surface_shade: Some(Shade { ambient: 0.2, diffuse: 0.75, specular: 0.15, power: 24.0 }),
+            surface_shade: Some(Shade {
+                ambient: 0.2,
+                diffuse: 0.75,
+                specular: 0.15,
+                power: 24.0,
+                certain: None,
+            }),
             sheet_thickness: None,
             sheet_pixels: 8.0,
             occlusion: true,
@@ -201,8 +207,13 @@ impl Settings {
         self.cull_backfaces.unwrap_or_else(|| closed && self.clips.is_empty() && is_outside())
     }
 
-    /// Returns the lighting of a volume that `transfer` shows.
+    /// Returns the lighting of a volume that `transfer` shows. Gradients are certain from the
+    /// magnitudes on that the settings give, else from the transfer function's own.
     pub fn shade_of(&self, transfer: &TransferFunction) -> Option<Shade> {
-        self.volume_shade.unwrap_or(transfer.shade)
+        let own = transfer.shade.and_then(|shade| shade.certain);
+        match self.volume_shade {
+            None => transfer.shade,
+            Some(shade) => shade.map(|shade| Shade { certain: shade.certain.or(own), ..shade }),
+        }
     }
 }

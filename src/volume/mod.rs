@@ -1,5 +1,6 @@
 //! Volumes: samples on a lattice, and the transfer functions that give them colour and opacity.
 
+mod automatic;
 #[cfg(test)]
 mod contradictions;
 mod grid;
@@ -14,15 +15,16 @@ mod reconstruct;
 mod resample;
 mod samples;
 mod scalar;
+mod shade;
 mod sharp;
 pub(crate) mod steps;
 mod transfer;
 
 pub use lattice::{Arrangement, Lattice};
-pub(crate) use presets::BINS;
 pub use reconstruct::Reconstruction;
 pub use resample::body_centred;
 pub(crate) use samples::each_type;
 pub use samples::{Coefficients, Samples, Volume};
 pub use scalar::Scalar;
-pub use transfer::{Isosurface, Shade, TransferFunction};
+pub use shade::Shade;
+pub use transfer::{Isosurface, TransferFunction};

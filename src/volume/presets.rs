@@ -1,7 +1,6 @@
-//! Transfer functions that need no file: presets by name, and one derived from a volume's
-//! histogram.
+//! Transfer functions by name.
 
-use super::{Shade, TransferFunction, Volume, each_type};
+use super::{Shade, TransferFunction};
 use crate::{Error, Result};
 
 /// The points of a preset: value, red, green, blue, opacity.
@@ -50,17 +49,17 @@ const GENERIC: Points = &[
     [1.00, 1.00, 0.98, 0.92, 0.7],
 ];
 
-/// Bins of the histogram that [`TransferFunction::automatic`] analyses.
-pub const BINS: usize = 256;
+/// The diagonal of a scan of a head, in millimetres.
+const HEAD: f64 = 350.0;
 
 impl TransferFunction {
     /// The names that [`named`](Self::named) accepts.
     pub const NAMES: [&'static str; 6] =
         ["ct-bone", "ct-soft-tissue", "ct-lung", "ct-angiography", "mri", "generic"];
 
-    /// Returns a preset. The CT presets expect Hounsfield units and millimetres. "mri" and
-    /// "generic" spread over `range`, and their opacity is per world unit. For these two, set
-    /// `unit` if the world units are neither millimetres nor voxels.
+    /// Returns a preset. The CT presets expect Hounsfield units. "mri" and "generic" spread over
+    /// `range`. Opacities hold for a world length of 1, as for a scan of a body in millimetres;
+    /// [`for_size`](Self::for_size) fits them to other data.
     ///
     /// # Errors
     /// [`Error::Argument`] if `name` is not one of [`NAMES`](Self::NAMES), or if `range` is not
@@ -95,160 +94,22 @@ impl TransferFunction {
         })
     }
 
-    /// Derives a transfer function for any volume from its histogram. Otsu's threshold (1979, "A
-    /// threshold selection method from gray-level histograms") splits the values in two. The
-    /// background is the high side if at least nine tenths of the volume's border lie there, and
-    /// the low side otherwise. Opacity begins three standard deviations from the background's mode
-    /// and rises over the threshold and the quantiles above it. The opacities hold for a hundredth
-    /// of the volume's diagonal. Thin structures therefore show and thick ones do not turn into
-    /// fog, whatever the sampling.
-    ///
-    /// A constant volume is shown as a faint haze. So is a volume that was built by hand and is
-    /// inconsistent: whatever draws that volume returns the error.
-    pub fn automatic(volume: &Volume) -> Self {
-        if volume.validate().is_err() {
-            return Self::of_histogram(Vec::new(), [0.0; 2], 1.0, false);
+    /// Returns the same function with opacities for data of another size: `diagonal` is that of
+    /// the box around them, in world units. For a [`named`](Self::named) one, opacities then hold
+    /// for 1/350 of the diagonal, which is about a millimetre of a head. The picture is the same in
+    /// any unit of length. A diagonal that is not above 0 changes nothing.
+    #[must_use]
+    pub fn for_size(mut self, diagonal: f64) -> Self {
+        if diagonal > 0.0 && diagonal.is_finite() {
+            self.unit *= diagonal / HEAD;
         }
-        let [first, last] = volume.bounds();
-        let diagonal = (last - first).length();
-        let unit =
-            if diagonal > 0.0 { diagonal / 100.0 } else { volume.lattice.spacing().max_element() };
-        let counts = volume.counts(BINS);
-        let bright = bright_border(volume, otsu(&counts));
-        Self::of_histogram(counts, volume.range, unit, bright)
+        self
     }
-
-    /// Builds the function from a histogram: counts of values in equal parts of their range. The
-    /// background's values are the low ones, or the high ones if `bright`.
-    pub(crate) fn of_histogram(
-        mut counts: Vec<u64>,
-        range: [f64; 2],
-        unit: f64,
-        bright: bool,
-    ) -> Self {
-        let shade = Some(Shade::default());
-        let [low, high] = range;
-        if low >= high {
-            return Self {
-                color: vec![(low, [0.9, 0.8, 0.7])],
-                opacity: vec![(low, 0.05)],
-                unit,
-                shade,
-                ..Self::default()
-            };
-        }
-        // A bright background is a dark one seen from the other end of the range.
-        if bright {
-            counts.reverse();
-        }
-        let mut points: Vec<(f64, f64)> = ramp(&counts)
-            .into_iter()
-            .map(|(bin, opacity)| {
-                let share = bin / BINS as f64;
-                (low + (high - low) * if bright { 1.0 - share } else { share }, opacity)
-            })
-            .collect();
-        let colors =
-            [[0.25, 0.06, 0.05], [0.70, 0.28, 0.15], [0.92, 0.66, 0.36], [1.0, 0.98, 0.92]];
-        let mut color: Vec<_> = points.iter().zip(colors).map(|(p, rgb)| (p.0, rgb)).collect();
-        if bright {
-            points.reverse();
-            color.reverse();
-        }
-        Self { color, opacity: points, unit, shade, ..Self::default() }
-    }
-}
-
-/// Returns the bin above which Otsu's method separates best: the one with the largest variance
-/// between the two classes.
-fn otsu(counts: &[u64]) -> usize {
-    let total: f64 = counts.iter().map(|&n| n as f64).sum();
-    let sum: f64 = counts.iter().enumerate().map(|(i, &n)| i as f64 * n as f64).sum();
-    let (mut below, mut sum_below, mut best, mut best_at) = (0.0, 0.0, -1.0, 0);
-    for (i, &n) in counts.iter().enumerate() {
-        below += n as f64;
-        sum_below += i as f64 * n as f64;
-        let above = total - below;
-        if below > 0.0 && above > 0.0 {
-            let between = below * above * (sum_below / below - (sum - sum_below) / above).powi(2);
-            if between > best {
-                (best, best_at) = (between, i);
-            }
-        }
-    }
-    best_at
-}
-
-/// Returns whether at least nine tenths of the samples on the volume's faces lie above a bin.
-fn bright_border(volume: &Volume, threshold: usize) -> bool {
-    let [nx, ny, nz] = volume.lattice.dims;
-    let (mut above, mut total) = (0u64, 0u64);
-    let mut count = |index: usize| {
-        let value = each_type!(&volume.samples, values => f64::from(values[index]));
-        above += u64::from(volume.bin(value, BINS) > threshold);
-        total += 1;
-    };
-    for k in 0..nz {
-        for j in 0..ny {
-            let row = (k * ny + j) * nx;
-            if k == 0 || k == nz - 1 || j == 0 || j == ny - 1 {
-                (row..row + nx).for_each(&mut count);
-            } else {
-                [row, row + nx - 1].into_iter().for_each(&mut count);
-            }
-        }
-    }
-    above * 10 >= total * 9
-}
-
-/// Returns four points (bin, opacity), ascending, for a background in the low bins.
-fn ramp(counts: &[u64]) -> [(f64, f64); 4] {
-    let threshold = otsu(counts);
-    let (background, rest) = counts.split_at(threshold + 1);
-    let total = background.iter().sum::<u64>() as f64;
-    let mean =
-        background.iter().enumerate().map(|(i, &n)| i as f64 * n as f64).sum::<f64>() / total;
-    let variance = background
-        .iter()
-        .enumerate()
-        .map(|(i, &n)| (i as f64 - mean).powi(2) * n as f64)
-        .sum::<f64>()
-        / total;
-    let mode = background.iter().enumerate().max_by_key(|&(_, &n)| n).map_or(0, |(i, _)| i);
-    // At least one bin above the mode, so that the background itself is clear, and at most the
-    // threshold's upper edge.
-    let start = (mode as f64 + 1.0 + 3.0 * variance.sqrt()).min(threshold as f64 + 1.0);
-    let quantile = |share: f64| {
-        let wanted = share * rest.iter().sum::<u64>() as f64;
-        let mut seen = 0.0;
-        let at = rest.iter().position(|&n| {
-            seen += n as f64;
-            seen >= wanted
-        });
-        (threshold + 1 + at.unwrap_or(0)) as f64 + 0.5
-    };
-    let (half, top) = (quantile(0.5), quantile(0.99));
-    [(start, 0.0), (threshold as f64 + 1.0, 0.08), (half, 0.4), (top, 0.85)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::{Lattice, Samples};
-    use glam::DVec3;
-
-    /// A ball of one value inside another value, with deterministic noise.
-    fn ball(inside: u8, outside: u8) -> Volume {
-        let n = 24usize;
-        let value = |i: usize| {
-            let p = DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64)
-                - DVec3::splat(11.5);
-            let noise = (i.wrapping_mul(2_654_435_761) >> 13) % 7;
-            (if p.length() < 8.0 { inside } else { outside }) + noise as u8
-        };
-        let lattice = Lattice::with_spacing([n; 3], DVec3::splat(0.5));
-        Volume::new(lattice, Samples::U8((0..n * n * n).map(value).collect())).unwrap()
-    }
 
     #[test]
     fn every_preset_is_valid() {
@@ -270,40 +131,15 @@ mod tests {
     }
 
     #[test]
-    fn the_background_is_found_on_either_side() {
-        for (inside, outside) in [(200, 20), (20, 200), (120, 100)] {
-            let t = TransferFunction::automatic(&ball(inside, outside));
-            t.validate().unwrap();
-            let of = |base: u8| (0..7).map(|n| t.opacity(f64::from(base + n))).fold(0.0, f64::max);
-            assert_eq!(of(outside), 0.0, "{inside} in {outside}: {t:?}");
-            assert!(of(inside) > 0.1, "{inside} in {outside}: {t:?}");
+    fn opacities_follow_the_size_of_the_data() {
+        for name in TransferFunction::NAMES {
+            let transfer = TransferFunction::named(name, [0.0, 1.0]).unwrap();
+            for (diagonal, unit) in [(350.0, 1.0), (0.35, 1e-3), (3.5e8, 1e6)] {
+                let fitted = transfer.clone().for_size(diagonal);
+                assert!((fitted.unit / unit - 1.0).abs() < 1e-12);
+                assert_eq!(TransferFunction { unit: 1.0, ..fitted }, transfer);
+            }
+            assert_eq!(transfer.clone().for_size(0.0), transfer);
         }
-    }
-
-    #[test]
-    fn opacity_follows_the_world_size() {
-        let mut volume = ball(200, 20);
-        let before = TransferFunction::automatic(&volume);
-        volume.lattice.axes *= 1000.0;
-        let after = TransferFunction::automatic(&volume);
-        assert!((after.unit / before.unit - 1000.0).abs() < 1e-6);
-        assert_eq!(after.opacity, before.opacity);
-    }
-
-    #[test]
-    fn constants_and_single_samples_have_one_too() {
-        for dims in [[3, 3, 3], [1, 1, 1]] {
-            let lattice = Lattice::with_spacing(dims, DVec3::ONE);
-            let count = lattice.len();
-            let t = TransferFunction::automatic(
-                &Volume::new(lattice, Samples::I16(vec![-5; count])).unwrap(),
-            );
-            t.validate().unwrap();
-            assert!(t.visible([-5.0, -5.0]));
-        }
-        let lattice = Lattice::with_spacing([2, 1, 1], DVec3::ONE);
-        TransferFunction::automatic(&Volume::new(lattice, Samples::U8(vec![0, 1])).unwrap())
-            .validate()
-            .unwrap();
     }
 }

@@ -1,5 +1,6 @@
 //! Transfer functions: the colour and the opacity that a value is drawn with.
 
+use super::Shade;
 use crate::{
     Error, Result,
     input::{Limits, Source},
@@ -74,26 +75,6 @@ impl Default for TransferFunction {
             gradient: Vec::new(),
             isosurfaces: Vec::new(),
         }
-    }
-}
-
-/// Phong's coefficients: ambient + diffuse·cos + specular·cosᵖᵒʷᵉʳ.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Shade {
-    /// Light that reaches every surface, whatever its direction.
-    pub ambient: f64,
-    /// Light that depends on the angle between the surface's normal and the light.
-    pub diffuse: f64,
-    /// The highlight's brightness.
-    pub specular: f64,
-    /// How small the highlight is. Larger powers make smaller highlights.
-    pub power: f64,
-}
-
-impl Default for Shade {
-    fn default() -> Self {
-        Self { ambient: 0.2, diffuse: 0.7, specular: 0.3, power: 10.0 }
     }
 }
 
@@ -272,12 +253,7 @@ impl TransferFunction {
                 self.unit
             ));
         }
-        if let Some(Shade { ambient, diffuse, specular, power }) = self.shade
-            && ![ambient, diffuse, specular, power].iter().all(|v| v.is_finite() && *v >= 0.0)
-        {
-            return Err("the coefficients of the shade must be finite and not negative".into());
-        }
-        Ok(())
+        self.shade.as_ref().map_or(Ok(()), Shade::check)
     }
 
     /// Returns the same function stretched so that its points reach from one end of `range` to the
@@ -530,7 +506,7 @@ mod tests {
                     opacity,
                     ", \"shade\": {\"ambient\": -1, \"diffuse\": 0, \"specular\": 0, \"power\": 1}",
                 ),
-                "shade",
+                "light's coefficients",
             ),
         ] {
             assert!(message.to_string().contains(word), "{message}");

@@ -233,6 +233,17 @@ pub fn gradient_opacity() -> Case {
     case("gradient_opacity", volume_scene(cubic(), Kernel::default(), transfer), settings())
 }
 
+/// Light fades in over most of the field's gradients. A clip cuts through it, and an isosurface is
+/// lit as the rest.
+pub fn uncertain_light() -> Case {
+    let shade = Shade { certain: Some([0.3, 1.6]), ..Shade::default() };
+    let isosurfaces = surfaces(&[(0.7, [0.2, 0.3, 0.9], 0.5)]).isosurfaces;
+    let transfer = TransferFunction { isosurfaces, ..transfer(1.0, Some(shade)) };
+    let shape = ClipShape::HalfSpace { normal: -DVec3::Y, offset: 0.2 - ORIGIN.y };
+    let settings = Settings { clips: vec![Clip { shape, inside: true }], ..settings() };
+    case("uncertain_light", volume_scene(cubic(), Kernel::default(), transfer), settings)
+}
+
 pub fn one_isosurface() -> Case {
     let transfer = surfaces(&[(0.3, [0.9, 0.7, 0.4], 1.0)]);
     case("one_isosurface", volume_scene(cubic(), Kernel::default(), transfer), settings())

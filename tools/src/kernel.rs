@@ -40,6 +40,17 @@ const NAMES: [&str; 6] =
 const MOST_BYTES: usize = 4 << 20;
 
 impl KernelFlags {
+    /// Returns the first of these flags that was given.
+    pub fn first(&self) -> Option<&'static str> {
+        let given = [
+            ("--kernel", self.kernel.is_some()),
+            ("--sigma", self.sigma.is_some()),
+            ("--extent", self.extent.is_some()),
+            ("--sharp", self.sharp),
+        ];
+        given.into_iter().find(|(_, is_given)| *is_given).map(|(flag, _)| flag)
+    }
+
     pub fn kernel(&self, limits: &Limits) -> Result<Kernel, Failure> {
         let name = self.kernel.as_deref().unwrap_or("gaussian");
         if self.sigma.is_some() && name != "gaussian" {

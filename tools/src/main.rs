@@ -43,6 +43,7 @@ mod sweep;
 mod terminal;
 mod threads;
 mod timing;
+mod transfer;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use failure::Failure;
@@ -105,6 +106,9 @@ enum Task {
     Generate(generate::Generate),
     /// Measure the quality of pictures: the tables of docs/volumes.md.
     Figures(figures::Figures),
+    /// Write the transfer function that a volume or scattered samples would be drawn with, as JSON
+    /// to start from.
+    Transfer(Box<transfer::Transfer>),
     /// List the adapters that can draw, and their limits.
     Gpus(gpus::Gpus),
     /// List the formats of files: what they hold, and whether they are read in pieces and written.
@@ -140,6 +144,7 @@ fn main() -> ExitCode {
         Task::Demo(task) => task.run(&progress),
         Task::Generate(task) => task.run(&progress),
         Task::Figures(task) => task.run(&progress),
+        Task::Transfer(task) => task.run(&progress),
         Task::Gpus(task) => task.run(),
         Task::Formats(task) => task.run(),
         Task::Completions(task) => task.run(Command::command()),

@@ -15,7 +15,7 @@ use glam::DVec3;
 use splatkit::{
     Deadline, Error,
     about::Stance,
-    bricks::{Bricks, Level},
+    bricks::Bricks,
     cells::{CellOptions, Cells},
     hierarchy::Hierarchy,
     math::Bounds,
@@ -214,9 +214,7 @@ impl Adding<'_> {
             let error = Error::input(path, "content", "a volume in bricks cannot be sharpened");
             return Err(error.hint("leave out --sharp, or draw the original volume").into());
         }
-        let overview = bricks.volume(overview(&bricks))?;
-        let automatic = || TransferFunction::automatic(&overview);
-        let transfer = self.show.transfer(path, bricks.header().range, automatic)?;
+        let transfer = self.show.of_bricks(path, &bricks)?;
         let values = bricks.header().range;
         self.add_bar(&transfer, values, titled("", ""));
         self.add_unit(&bricks.header().unit);
@@ -228,8 +226,7 @@ impl Adding<'_> {
     }
 
     fn add_volume(&mut self, path: &Path, mut volume: Volume) -> Result<(), Failure> {
-        let automatic = || TransferFunction::automatic(&volume);
-        let transfer = self.show.transfer(path, volume.range, automatic)?;
+        let transfer = self.show.of_volume(path, &volume)?;
         let title = titled(&volume.about.name, &volume.about.unit);
         self.add_bar(&transfer, volume.range, title);
         self.add_unit(&volume.about.length);
@@ -252,8 +249,7 @@ impl Adding<'_> {
         points: &Points,
         deadline: Deadline,
     ) -> Result<(), Failure> {
-        let automatic = || points.automatic_transfer();
-        let transfer = self.show.transfer(path, points.range(), automatic)?;
+        let transfer = self.show.of_samples(path, points)?;
         self.add_bar(&transfer, points.range(), titled(&points.about.name, &points.about.unit));
         self.progress.stage(format!("Making splats of {}", path.display()));
         let options = self.flags.load.sample_options(deadline);
@@ -266,8 +262,7 @@ impl Adding<'_> {
     }
 
     fn add_cells(&mut self, path: &Path, mut cells: Cells) -> Result<(), Failure> {
-        let automatic = || cells.automatic_transfer();
-        let transfer = self.show.transfer(path, cells.range(), automatic)?;
+        let transfer = self.show.of_cells(path, &cells)?;
         let title = titled(&cells.about.name, &cells.about.unit);
         self.add_bar(&transfer, cells.range(), title);
         self.add_unit(&cells.about.length);
@@ -353,11 +348,4 @@ impl Loaded {
 /// Whether a box is no larger than the rounding error of its coordinates.
 fn is_one_place(bounds: &Bounds) -> bool {
     bounds.diagonal() <= 1e-13 * bounds.center().abs().max_element()
-}
-
-/// Returns the finest level of a volume that can be read quickly as a whole, or the coarsest level.
-fn overview(bricks: &Bricks) -> usize {
-    const QUICK: usize = 1 << 24;
-    let is_quick = |level: &Level| level.dims.iter().product::<usize>() <= QUICK;
-    bricks.levels().iter().position(is_quick).unwrap_or(bricks.levels().len() - 1)
 }

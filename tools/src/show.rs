@@ -4,9 +4,11 @@ use crate::{color::ColorFlags, failure::Failure, kernel::KernelFlags, parse};
 use clap::Args;
 use splatkit::{
     Error,
+    bricks::{Bricks, Level},
     input::Limits,
     math::Kernel,
-    volume::{Isosurface, TransferFunction},
+    scattered::Points,
+    volume::{Isosurface, Shade, TransferFunction, Volume},
 };
 use std::path::{Path, PathBuf};
 
@@ -15,7 +17,8 @@ use std::path::{Path, PathBuf};
 #[command(next_help_heading = "Appearance")]
 pub struct ShowFlags {
     /// Choose how the values of a volume or of samples are shown: ct-bone, ct-soft-tissue, ct-lung,
-    /// ct-angiography, mri, generic, or a JSON file [default: made from their histogram]
+    /// ct-angiography, mri, generic, or a JSON file [default: made for the values, as `splatkit
+    /// transfer` writes it]
     #[arg(long, value_name = "NAME|FILE.json")]
     transfer: Option<String>,
     /// Spread the transfer function over these values instead of its own, and the colour map of
@@ -23,7 +26,8 @@ pub struct ShowFlags {
     /// percentile of a point cloud]
     #[arg(long, value_name = "LOW,HIGH", value_parser = parse::range, allow_hyphen_values = true)]
     pub range: Option<[f64; 2]>,
-    /// Set the length that the transfer function's opacities hold for, in world units.
+    /// Set the length that the transfer function's opacities hold for, in world units [default: that
+    /// of the JSON file, else a part of the data's diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     opacity_unit: Option<f64>,
     /// Draw isosurfaces of these values, each as VALUE, VALUE:COLOR, VALUE:OPACITY or
@@ -115,6 +119,11 @@ impl ShowFlags {
         self.transfer.as_ref().filter(named).filter(|_| !is_changed).map(Path::new)
     }
 
+    /// Returns a flag that was given and does not change how values are shown.
+    pub fn unused_by_values(&self) -> Option<&'static str> {
+        self.radius_scale.map(|_| "--radius-scale").or_else(|| self.kernel.first())
+    }
+
     /// Returns the files that flags name.
     pub fn files(&self) -> Vec<PathBuf> {
         let transfer =
@@ -166,18 +175,58 @@ fn is_file(text: &str) -> bool {
     Path::new(text).extension().is_some() || Path::new(text).exists()
 }
 
+/// Values that a transfer function shows.
+pub struct Values {
+    /// The smallest and the largest one.
+    pub range: [f64; 2],
+    /// The diagonal of the box around them, in world units.
+    pub diagonal: f64,
+}
+
 impl Show<'_> {
-    /// Returns the transfer function for values of a range. If it shows none of the values, that is
-    /// an error.
+    /// Returns the transfer function of a volume.
+    pub fn of_volume(&self, path: &Path, volume: &Volume) -> Result<TransferFunction, Failure> {
+        let [first, last] = volume.bounds();
+        let values = Values { range: volume.range, diagonal: (last - first).length() };
+        self.transfer(path, values, || TransferFunction::automatic(volume))
+    }
+
+    /// Returns the transfer function of scattered samples.
+    pub fn of_samples(&self, path: &Path, points: &Points) -> Result<TransferFunction, Failure> {
+        let [first, last] = points.bounds();
+        let values = Values { range: points.range(), diagonal: (last - first).length() };
+        self.transfer(path, values, || points.automatic_transfer())
+    }
+
+    /// Returns the transfer function of a volume in bricks. The automatic one is that of a level
+    /// which can be read quickly.
+    pub fn of_bricks(&self, path: &Path, bricks: &Bricks) -> Result<TransferFunction, Failure> {
+        let overview = bricks.volume(overview(bricks))?;
+        let [first, last] = bricks.header().lattice.bounds();
+        let values = Values { range: bricks.header().range, diagonal: (last - first).length() };
+        self.transfer(path, values, || TransferFunction::automatic(&overview))
+    }
+
+    /// Returns the transfer function for values. If it shows none of them, that is an error. So is
+    /// an automatic one for values that are all the same.
     pub fn transfer(
         &self,
         path: &Path,
-        values: [f64; 2],
+        Values { range: values, diagonal }: Values,
         automatic: impl FnOnce() -> TransferFunction,
     ) -> Result<TransferFunction, Failure> {
         let transfer = match &self.transfer {
+            Transfer::Automatic if values[0] >= values[1] && self.flags.iso.is_empty() => {
+                return Err(same(path, values[0]).into());
+            }
             Transfer::Automatic => automatic(),
-            Transfer::Named(name) => TransferFunction::named(name, values)?,
+            Transfer::Named(name) => {
+                let mut named = TransferFunction::named(name, values)?.for_size(diagonal);
+                // Light fades where the gradient is noise, whatever the colours are.
+                let certain = automatic().shade.and_then(|shade| shade.certain);
+                named.shade = named.shade.map(|shade| Shade { certain, ..shade });
+                named
+            }
             Transfer::Read(transfer) => transfer.clone(),
         };
         let mut transfer = match self.flags.range {
@@ -229,6 +278,22 @@ impl Show<'_> {
             transfer.opacity = vec![(0.0, 0.0)];
         }
     }
+}
+
+/// Returns the error for values that are all the same.
+fn same(path: &Path, value: f64) -> Error {
+    Error::NothingToDraw(format!(
+        "all values of {} are {value}, so that nothing can be told apart; --transfer gives them a \
+         colour and an opacity",
+        path.display()
+    ))
+}
+
+/// Returns the finest level of a volume that can be read quickly as a whole, or the coarsest level.
+fn overview(bricks: &Bricks) -> usize {
+    const QUICK: usize = 1 << 24;
+    let is_quick = |level: &Level| level.dims.iter().product::<usize>() <= QUICK;
+    bricks.levels().iter().position(is_quick).unwrap_or(bricks.levels().len() - 1)
 }
 
 impl Surface {

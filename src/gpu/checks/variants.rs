@@ -99,7 +99,8 @@ fn bricks(pixels: f64) -> Case {
 /// The settings of a case, and those that differ from them in one point.
 fn neighbours(case: &Case) -> Vec<Settings> {
     let own = || case.settings.clone();
-    let shade = Some(Shade { ambient: 0.1, diffuse: 0.8, specular: 0.1, power: 8.0 });
+    let shade =
+        Some(Shade { ambient: 0.1, diffuse: 0.8, specular: 0.1, power: 8.0, certain: None });
     let mut all = vec![
         own(),
         Settings { optics: Optics::EmissionAbsorption, ..own() },

@@ -17,7 +17,7 @@ fn ball(opacity: f64, shade: Option<Shade>) -> Scene {
 
 #[test]
 fn a_ball_has_its_depth_and_its_normals() {
-    let shade = Shade { ambient: 0.0, diffuse: 1.0, specular: 0.0, power: 1.0 };
+    let shade = Shade { ambient: 0.0, diffuse: 1.0, specular: 0.0, power: 1.0, certain: None };
     let scene = ball(1.0, Some(shade));
     for projection in PROJECTIONS {
         for classification in [scene::Classification::PreIntegrated, scene::Classification::Post] {

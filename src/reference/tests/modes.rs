@@ -111,7 +111,7 @@ fn single_splats_are_composited_by_distance() {
 fn samples_classified_before_are_lit_by_their_field() {
     // The slope is at 45° to the view: the cosine is √½.
     let lattice = centered([9; 3], DMat3::from_diagonal(DVec3::splat(0.25)));
-    let shade = Shade { ambient: 0.1, diffuse: 0.4, specular: 0.0, power: 4.0 };
+    let shade = Shade { ambient: 0.1, diffuse: 0.4, specular: 0.0, power: 4.0, certain: None };
     let transfer = TransferFunction { shade: Some(shade), ..uniform([1.0; 3], 0.8) };
     for slope in [DVec3::new(1.0, 0.0, 1.0), DVec3::new(0.0, 1.0, -1.0)] {
         let field = volume(lattice.clone(), |p| 5.0 * slope.dot(p));
@@ -135,7 +135,7 @@ fn the_near_side_of_a_wall_hides_its_far_side() {
     let transfer = TransferFunction {
         color: vec![(0.4, [1.0, 0.0, 0.0]), (0.6, [0.0, 0.0, 1.0])],
         opacity: vec![(0.3, 0.0), (0.3, 0.5), (0.7, 0.5), (0.7, 0.0)],
-        shade: Some(Shade { ambient: 1.0, diffuse: 0.0, specular: 0.0, power: 1.0 }),
+        shade: Some(Shade { ambient: 1.0, diffuse: 0.0, specular: 0.0, power: 1.0, certain: None }),
         ..TransferFunction::default()
     };
     let scene = Scene::new().with_volume(field, Shape::default(), transfer);

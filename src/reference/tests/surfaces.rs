@@ -48,7 +48,7 @@ fn opacity_scales_the_strength_and_normals_catch_the_light() {
         ..round(Vec3::ZERO, 3.0, 5.0)
     };
     let scene = Scene::new().with_splats(set(Payload::Radiance, vec![splat]));
-    let shade = Shade { ambient: 0.1, diffuse: 0.4, specular: 0.2, power: 4.0 };
+    let shade = Shade { ambient: 0.1, diffuse: 0.4, specular: 0.2, power: 4.0, certain: None };
     // An odd number of pixels: one lies in the middle.
     let settings = Settings { surface_shade: Some(shade), ..Settings::new([1, 1]) };
     let [red, .., opacity] = render(&scene, &camera, &settings).unwrap().color[0];
