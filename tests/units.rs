@@ -9,7 +9,8 @@ use splatkit::{
     math::{Camera, Kernel, Projection},
     picture::Picture,
     reference,
-    scene::{Evaluate, Scene, Settings},
+    scattered::{Points, SampleOptions},
+    scene::{Clip, ClipShape, Evaluate, Scene, Settings},
     splat::{Payload, Splat, SplatSet, encode_normal},
     volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
 };
@@ -102,6 +103,18 @@ impl Units {
         Scene::new().with_volume(volume, Kernel::default(), self.transfer())
     }
 
+    /// The same field at scattered places.
+    fn scattered(self) -> Scene {
+        let lattice = self.lattice();
+        let values = self.samples();
+        let kept = (0..lattice.len()).filter(|sample| sample % 5 == 0);
+        let (positions, values) =
+            kept.map(|i| (lattice.sample_position(i).as_vec3(), values[i] as f32)).unzip();
+        let points = Points { positions, values, ..Points::default() };
+        let splats = points.to_splats(&SampleOptions::default()).expect("splats");
+        Scene::new().with_samples(splats, self.transfer())
+    }
+
     fn splats(self) -> Scene {
         let splats = (0..300u16).map(|i| {
             let angle = f64::from(i) * 2.4;
@@ -137,6 +150,11 @@ fn drawn(scene: &Scene, camera: &Camera, settings: &Settings) -> Picture {
     renderer.render(&mut prepared, camera, settings).expect("a picture").0
 }
 
+fn drawn_on_cpu(scene: &Scene, camera: &Camera, settings: &Settings) -> Picture {
+    let mut renderer = splatkit::Renderer::new(&splatkit::Device::Cpu, scene).expect("a scene");
+    renderer.render(camera, settings).expect("a picture").0
+}
+
 /// Peak signal-to-noise ratio of colour and opacity, in dB. Panics if picture `a` is nearly empty.
 fn psnr(a: &Picture, b: &Picture) -> f64 {
     assert!(
@@ -167,6 +185,81 @@ fn values_of_any_unit_and_zero() {
     let agreement = psnr(&expected, &drawn(&units.volume(samples), &camera, &settings()));
     println!("whole values from 2e9 on: {agreement:.1} dB");
     assert!(agreement > 70.0, "{agreement:.1} dB");
+}
+
+/// Neither engine has a limit on the values of scattered samples, nor on their slopes.
+#[test]
+fn scattered_values_of_any_unit() {
+    let camera = USUAL.camera(PERSPECTIVE, false);
+    let pictures = |units: Units| {
+        let scene = units.scattered();
+        [drawn(&scene, &camera, &settings()), drawn_on_cpu(&scene, &camera, &settings())]
+    };
+    let expected = pictures(USUAL);
+    for (value, zero) in [(1e12, 0.0), (1e-12, 0.0), (1e25, 0.0), (1e-25, 0.0), (1.0, 1e5)] {
+        let found = pictures(Units { value, zero, ..USUAL });
+        for (engine, (expected, found)) in ["GPU", "CPU"].iter().zip(expected.iter().zip(&found)) {
+            let agreement = psnr(expected, found);
+            println!("{engine}, values times {value:e}, from {zero:e} on: {agreement:.1} dB");
+            assert!(agreement > 50.0, "{engine}, {value:e}, {zero:e}: {agreement:.1} dB");
+        }
+    }
+}
+
+/// The automatic function draws the same picture in any unit. Light is that of the noise, which has
+/// the same unit.
+#[test]
+fn automatic_functions_in_any_unit() {
+    let picture = |units: Units| {
+        let values = units.samples().iter().map(|v| *v as f32).collect();
+        let volume = Volume::new(units.lattice(), Samples::F32(values)).expect("a volume");
+        let transfer = TransferFunction::automatic(&volume);
+        let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
+        drawn_on_cpu(&scene, &units.camera(PERSPECTIVE, false), &settings())
+    };
+    let expected = picture(USUAL);
+    for (length, value, zero) in
+        [(1e-6, 1.0, 0.0), (1e6, 1.0, 0.0), (1.0, 1e12, 0.0), (1.0, 1e-12, 0.0), (1e-3, 1.0, 1e5)]
+    {
+        let agreement = psnr(&expected, &picture(Units { length, value, zero }));
+        println!("lengths times {length:e}, values times {value:e}, {zero:e}: {agreement:.1} dB");
+        assert!(agreement > 45.0, "{length:e}, {value:e}, {zero:e}: {agreement:.1} dB");
+    }
+}
+
+/// The cut face of a noisy ball has next to no grain with the light that the automatic function
+/// gives, and much with light from every gradient.
+#[test]
+fn cut_faces_of_noise_have_no_grain() {
+    let lattice = USUAL.lattice();
+    let noise = |sample: usize| f64::from((sample as u32).wrapping_mul(2_654_435_761) >> 24) / 32.0;
+    let inside = |sample: usize| lattice.sample_position(sample).length() < 0.8;
+    let value = |sample| (if inside(sample) { 200.0 } else { 20.0 } + noise(sample)) as u8;
+    let volume = Volume::new(USUAL.lattice(), Samples::U8((0..lattice.len()).map(value).collect()))
+        .expect("the samples fill the lattice");
+    let automatic = TransferFunction::automatic(&volume);
+    let shape = ClipShape::HalfSpace { normal: -DVec3::Y, offset: 0.1 };
+    let settings = Settings { clips: vec![Clip { shape, inside: true }], ..settings() };
+    let camera = Camera {
+        position: DVec3::new(0.0, -4.0, 0.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Z,
+        projection: ORTHOGRAPHIC,
+    };
+    let grain = |certain: Option<[f64; 2]>| {
+        let shade = automatic.shade.map(|shade| Shade { certain, ..shade });
+        let transfer = TransferFunction { shade, ..automatic.clone() };
+        let scene = Scene::new().with_volume(volume.clone(), Kernel::default(), transfer);
+        let picture = drawn_on_cpu(&scene, &camera, &settings);
+        let red = |row: usize, column: usize| f64::from(picture.color[row * 48 + column][0]);
+        let beside = (15..25).flat_map(|row| (19..29).map(move |column| (row, column)));
+        let steps = beside.map(|(row, column)| (red(row, column) - red(row, column + 1)).abs());
+        steps.sum::<f64>() / 100.0
+    };
+    let (none, all) =
+        (grain(automatic.shade.and_then(|shade| shade.certain)), grain(Some([0.0; 2])));
+    println!("mean step between pixels: {none:.4}; with light from every gradient {all:.4}");
+    assert!(none < 0.01 && all > 4.0 * none, "{none} {all}");
 }
 
 /// Constant surroundings have no slope that rounding could leave and light could show.
