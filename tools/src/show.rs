@@ -5,6 +5,7 @@ use clap::Args;
 use splatkit::{
     Error,
     bricks::{Bricks, Level},
+    cells::Cells,
     input::Limits,
     math::Kernel,
     scattered::Points,
@@ -196,6 +197,13 @@ impl Show<'_> {
         let [first, last] = points.bounds();
         let values = Values { range: points.range(), diagonal: (last - first).length() };
         self.transfer(path, values, || points.automatic_transfer())
+    }
+
+    /// Returns the transfer function of cells.
+    pub fn of_cells(&self, path: &Path, cells: &Cells) -> Result<TransferFunction, Failure> {
+        let [first, last] = cells.bounds();
+        let values = Values { range: cells.range(), diagonal: (last - first).length() };
+        self.transfer(path, values, || cells.automatic_transfer())
     }
 
     /// Returns the transfer function of a volume in bricks. The automatic one is that of a level

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Transfer {
-    /// Make it for this volume, volume in bricks, or set of scattered samples.
+    /// Make it for this volume, volume in bricks, set of cells, or set of scattered samples.
     #[arg(value_name = "FILE")]
     input: PathBuf,
     /// Write to this .json file, or to stdout if it is `-`. `render --transfer` reads it.
@@ -71,6 +71,7 @@ impl Transfer {
         match input {
             Input::Volume(volume) => show.of_volume(path, volume),
             Input::Samples(points) => show.of_samples(path, points),
+            Input::Cells(cells) => show.of_cells(path, cells),
             Input::Bricks(bricks) => show.of_bricks(path, bricks),
             Input::Mesh(_) | Input::Hierarchy(_) => {
                 let message = "has colours of its own, and no values for a transfer function";

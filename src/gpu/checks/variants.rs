@@ -66,6 +66,7 @@ fn cases() -> Vec<Case> {
         methods::samples_with_slopes(Classification::Post),
         methods::samples_with_slopes(Classification::Pre),
         methods::gradient_opacity(),
+        methods::uncertain_light(),
         methods::one_isosurface(),
         methods::isosurfaces_in_fog(),
         methods::maximum(),
