@@ -83,7 +83,7 @@ impl TransferFunction {
         let range = finite
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
         let unit = if diagonal > 0.0 && diagonal.is_finite() { diagonal / 100.0 } else { 1.0 };
-        if !(range[0] < range[1]) {
+        if range[0] >= range[1] {
             return haze(if range[0].is_finite() { range[0] } else { 0.0 }, unit);
         }
         let survey = Survey::of_values(values, range, window(about, range), unit * 100.0);
