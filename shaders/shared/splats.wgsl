@@ -12,7 +12,7 @@ const SLOPE_BIAS: i32 = 200;
 // Returns the slope of a sample, in its own whitened space: three integers of 13 bits, and their
 // common exponent in the highest bits (Splat::sample in splat.rs).
 fn slope_of(color: u32, normal: u32) -> vec3<f32> {
-    let exponent = i32((color >> 29u) << 6u | normal >> 26u) - SLOPE_BIAS;
+    let exponent = i32(((color >> 29u) << 6u) | (normal >> 26u)) - SLOPE_BIAS;
     // Shifted to the top and back as signed numbers, to extend the signs.
     let parts = vec3<i32>(vec3(color >> 16u, normal, normal >> 13u) << vec3(19u)) >> vec3(19u);
     // In two steps, so that no power of two leaves 32 bits before the product does.

@@ -44,7 +44,7 @@ impl Shade {
         let Self { ambient, diffuse, specular, power, certain } = self;
         if ![ambient, diffuse, specular, power].iter().all(|v| v.is_finite() && **v >= 0.0) {
             return Err(format!(
-                "the light's coefficients must be finite and not negative, found {self:?}"
+                "the shade's coefficients of light must be finite and not negative, found {self:?}"
             ));
         }
         if let Some([low, high]) = certain

@@ -506,7 +506,7 @@ mod tests {
                     opacity,
                     ", \"shade\": {\"ambient\": -1, \"diffuse\": 0, \"specular\": 0, \"power\": 1}",
                 ),
-                "light's coefficients",
+                "coefficients of light",
             ),
         ] {
             assert!(message.to_string().contains(word), "{message}");
