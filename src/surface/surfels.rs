@@ -215,20 +215,8 @@ impl Mesh {
                 self.origin
             )));
         }
+        self.validate_lengths()?;
         let count = self.positions.len();
-        for (name, length, wanted) in [
-            ("normals", self.normals.len(), count),
-            ("colors", self.colors.len(), count),
-            ("uvs", self.uvs.len(), count),
-            ("values", self.values.len(), count),
-            ("triangle_materials", self.triangle_materials.len(), self.triangles.len()),
-        ] {
-            if length != 0 && length != wanted {
-                return Err(Error::Argument(format!(
-                    "the mesh has {length} {name} where {wanted} are needed"
-                )));
-            }
-        }
         if u32::try_from(count).is_err() || self.triangles.len() > u32::MAX as usize / 3 {
             return Err(Error::Argument(
                 "the mesh has more vertices or corners than 32 bits can name".into(),
@@ -269,6 +257,25 @@ impl Mesh {
             return Err(Error::Argument(format!(
                 "the texture coordinates {uv} of vertex {vertex} are not finite"
             )));
+        }
+        Ok(())
+    }
+
+    /// Refuses attributes that are not as long as what they belong to.
+    fn validate_lengths(&self) -> Result<()> {
+        let count = self.positions.len();
+        for (name, length, wanted) in [
+            ("normals", self.normals.len(), count),
+            ("colors", self.colors.len(), count),
+            ("uvs", self.uvs.len(), count),
+            ("values", self.values.len(), count),
+            ("triangle_materials", self.triangle_materials.len(), self.triangles.len()),
+        ] {
+            if length != 0 && length != wanted {
+                return Err(Error::Argument(format!(
+                    "the mesh has {length} {name} where {wanted} are needed"
+                )));
+            }
         }
         Ok(())
     }

@@ -270,11 +270,11 @@ mod tests {
                 which[2] |= one == 0;
                 let own = drawn(which, size, None);
                 let ruler = drawn([false, false, true, false], size, None);
-                for at in 0..taken.len() {
+                for (at, taken) in taken.iter_mut().enumerate() {
                     let is_ruler = one == 0 && ruler.color[at][3] > 0.0;
                     if own.color[at][3] > 0.05 && !is_ruler {
-                        assert!(!taken[at], "{size:?}: {one} covers another at {at}");
-                        taken[at] = true;
+                        assert!(!*taken, "{size:?}: {one} covers another at {at}");
+                        *taken = true;
                     }
                 }
             }

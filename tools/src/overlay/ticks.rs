@@ -71,7 +71,7 @@ pub fn labels(values: &[f64]) -> Vec<String> {
     let step = values.windows(2).map(apart).fold(f64::INFINITY, f64::min);
     let step = if step.is_finite() && step > 0.0 { step } else { largest.max(1e-300) };
     let is_spread = largest > 1e3 * step;
-    if largest != 0.0 && (largest >= 1e6 || largest < 1e-3) || is_spread && step < 1e-4 {
+    if largest != 0.0 && !(1e-3..1e6).contains(&largest) || is_spread && step < 1e-4 {
         return values.iter().map(|value| scientific(*value, step, largest)).collect();
     }
     let decimals = (-(step * (1.0 + 1e-9)).log10().floor()).clamp(0.0, 9.0) as usize;
