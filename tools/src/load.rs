@@ -125,7 +125,7 @@ impl LoadFlags {
         let (limits, whole) = (self.limits(), self.limits.whole(memory));
         // An attribute colours points. It does not make samples of them, as --scalar does.
         let kind = match attribute {
-            Some(_) => self.kind_with(path, &ReadOptions { scalar: None, ..self.options() })?,
+            Some(_) => self.colored_kind(path)?,
             None => self.kind(path)?,
         };
         let (input, files) = match kind {
@@ -169,6 +169,17 @@ impl LoadFlags {
     /// Returns the kind of a file, even if the file is damaged.
     pub fn kind(&self, path: &Path) -> Result<Kind, Failure> {
         self.kind_with(path, &self.options())
+    }
+
+    /// Returns the kind of a file of which an attribute is named to colour it: a point cloud, if it
+    /// can be read as one.
+    fn colored_kind(&self, path: &Path) -> Result<Kind, Failure> {
+        let kind = self.kind_with(path, &ReadOptions { scalar: None, ..self.options() })?;
+        let holds_cloud = |format: &Format| {
+            format.holds.iter().any(|holding| holding.content == Content::PointCloud)
+        };
+        let may_be_cloud = Format::of_path(path).is_some_and(holds_cloud);
+        Ok(if kind == Kind::Samples && may_be_cloud { Kind::Mesh } else { kind })
     }
 
     fn kind_with(&self, path: &Path, options: &ReadOptions) -> Result<Kind, Failure> {

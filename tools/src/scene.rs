@@ -170,7 +170,8 @@ impl Adding<'_> {
 
     fn add_mesh(&mut self, path: &Path, mut mesh: Mesh, deadline: Deadline) -> Result<(), Failure> {
         self.stand_mesh(path, &mesh);
-        let color = &self.flags.show.color;
+        let flags = self.flags;
+        let color = &flags.show.color;
         let up = self.loaded.subject.stance.up;
         let named = self.flags.load.scalar().is_some();
         self.loaded.facts.bars.extend(color.paint(
@@ -181,6 +182,7 @@ impl Adding<'_> {
             named,
         )?);
         self.progress.stage(format!("Making surfels of {}", path.display()));
+        self.add_unit(&mesh.about.length);
         let mut options = SurfelOptions { deadline, ..SurfelOptions::default() };
         options.radius_scale *= self.flags.show.radius_scale.unwrap_or(1.0);
         options.color_by_normal = color.by_normal();
@@ -201,7 +203,7 @@ impl Adding<'_> {
     fn add_hierarchy(&mut self, path: &Path, hierarchy: Arc<Hierarchy>) {
         let header = hierarchy.header();
         self.loaded.count_in(header.bounds, header.leaves as usize);
-        self.add_unit(&header.unit.clone());
+        self.add_unit(&header.unit);
         if let Some(stance) = header.stance {
             let origin = if header.is_guessed { Origin::Guess } else { Origin::File };
             self.stand(path, stance, origin);

@@ -161,7 +161,7 @@ impl Canvas<'_> {
         };
         let edge = self.edge_width();
         let mask =
-            self.face.mask(text, DVec2::new(left, at.y), self.size, edge.ceil() as usize + 1);
+            self.face.mask(text, DVec2::new(left, at.y), self.size, 2 * edge.ceil() as usize + 2);
         let around = mask.widened(edge);
         self.stamp(&around, self.ink.edge, EDGE);
         self.stamp(&mask, color, 1.0);
