@@ -57,6 +57,7 @@ impl Scene {
     /// # Errors
     /// Those of reading pages and bricks.
     pub fn seen(&self, clips: &[Clip]) -> Result<Vec<DVec3>> {
+        let _span = tracing::info_span!("seen").entered();
         let mut points = Vec::new();
         for item in &self.items {
             let own = match item {

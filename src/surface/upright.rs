@@ -17,7 +17,7 @@
 //!   bowl hides its inside, a table shows its underside to a viewer below its edge.
 //!
 //! Units, names and the order of vertices do not count. Between poses that are about equal, +Y and
-//! +Z are preferred to +X, and these to the negative axes.
+//! +Z are preferred to +X, and these to the negative axes, most of all for flat sheets.
 
 use super::Mesh;
 use crate::{
@@ -68,6 +68,7 @@ impl Mesh {
     ///
     /// Source: Fu, Cohen-Or, Dror & Sheffer (2008), with other measures of stability.
     pub fn guess_stance(&self) -> Option<Stance> {
+        let _span = tracing::info_span!("stance").entered();
         let samples = if self.triangles.is_empty() { self.thinned() } else { self.spread() };
         guess(samples)
     }
@@ -108,7 +109,8 @@ impl Mesh {
     /// Returns points that are no denser in one place than in another, if there are many: one of
     /// each cell of a grid.
     fn thinned(&self) -> Vec<Vec3> {
-        const CELLS: usize = 96;
+        // The box is twice as long as the shape along each axis.
+        const CELLS: usize = 192;
         let finite = || self.positions.iter().copied().filter(|point| point.is_finite());
         let Some([low, high]) = without_strays(&finite().collect::<Vec<_>>()) else {
             return Vec::new();
@@ -142,7 +144,7 @@ fn guess(samples: Vec<Vec3>) -> Option<Stance> {
         if best.is_some_and(|(best, _)| best >= score) {
             break;
         }
-        let score = score * shape.openness(axis, sign).powi(3);
+        let score = score * shape.openness(axis, sign).powi(4);
         if best.is_none_or(|(best, _)| score > best) {
             best = Some((score, sign * DVec3::AXES[axis]));
         }
@@ -216,13 +218,16 @@ impl Shape {
         let best = self.skew.iter().copied().fold(f64::INFINITY, f64::min);
         let symmetry = 1.0 / (1.0 + (self.skew[u].min(self.skew[v]) - best) / 0.02);
         let low = 1.0 - center / (self.high - self.low).length();
+        // A flat sheet, such as a terrain, may be turned over without a difference.
+        let is_sheet = height < 0.25 * (self.high - self.low).length();
         let habit = match (axis, sign > 0.0) {
             (1, true) => 1.0,
             (2, true) => 0.99,
             (0, true) => 0.9,
+            _ if is_sheet => 0.3,
             _ => 0.8,
         };
-        flat.sqrt() * balance * (1.0 + 2.5 * feet) * symmetry * low * habit
+        flat.sqrt() * balance * (1.0 + 3.0 * feet) * symmetry * low * habit
     }
 
     /// Returns how much of a base is empty, if what touches the ground has three parts or more.

@@ -242,8 +242,11 @@ impl EngineFlags {
         Ok(settings)
     }
 
-    /// Returns a warning if the flags of light change nothing.
-    pub fn idle_light(&self, scene: &Scene) -> Option<&'static str> {
+    /// Returns a warning if the flags of light or of optics change nothing.
+    pub fn idle(&self, scene: &Scene) -> Option<&'static str> {
+        if self.method.is_maximum() && scene.items.iter().all(|item| item.transfer().is_none()) {
+            return Some("--optics maximum (--mip) has no effect: it is for values");
+        }
         let fields = || scene.items.iter().filter_map(Item::transfer);
         let has_surfaces = scene.items.iter().any(|item| item.transfer().is_none());
         if self.shade && fields().count() > 0 && fields().all(|field| field.shade.is_some()) {

@@ -2,6 +2,7 @@
 
 use crate::{load::Input, progress::Progress};
 use clap::{ArgMatches, parser::ValueSource};
+use splatkit::formats::Format;
 use std::{collections::BTreeSet, path::Path};
 
 /// The flags that the user has given, by their names without dashes.
@@ -26,6 +27,9 @@ pub const RAW: Kinds = 1 << 6;
 /// Cells of a mesh of volumes.
 pub const CELLS: Kinds = 1 << 7;
 
+/// Any input.
+pub const ALL: Kinds = Kinds::MAX;
+
 /// All that have values which a transfer function shows.
 const FIELD: Kinds = VOLUME | BRICKS | SAMPLES | CELLS;
 const LATTICE: Kinds = VOLUME | BRICKS;
@@ -38,9 +42,6 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("endian", RAW),
     ("header", RAW),
     ("scalar", MESH | CLOUD | VOLUME | SAMPLES | CELLS),
-    ("time", VOLUME | CELLS),
-    ("series", VOLUME),
-    ("dataset", VOLUME | CELLS),
     ("missing", VOLUME | SAMPLES | CELLS),
     ("radius", SAMPLES),
     ("neighbours", SAMPLES),
@@ -65,9 +66,14 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("memory", HIERARCHY | BRICKS),
     ("cull-backfaces", HIERARCHY),
     ("classify", FIELD),
-    ("optics", FIELD),
-    ("mip", FIELD),
-    ("x-ray", FIELD),
+];
+
+/// Flags that some formats read, and the words by which their names in the table of formats are
+/// known. Folders hold series and slices.
+const READ_BY: &[(&str, &[&str])] = &[
+    ("time", &["NIfTI", "MetaImage", "MRC", "NPY", "NPZ", "TIFF", "HDF", "DICOM", "several files"]),
+    ("series", &["DICOM"]),
+    ("dataset", &["HDF", "NPZ"]),
 ];
 
 /// The names of kinds, for messages.
@@ -81,6 +87,9 @@ const NAMES: [(Kinds, &str, &str); 8] = [
     (CELLS, "cells", "a set of cells"),
     (RAW, "raw volumes", "a raw volume"),
 ];
+
+/// Flags of reading that matter when a picture is drawn.
+const DRAWN: [&str; 3] = ["radius", "neighbours", "no-slopes"];
 
 /// Pairs of flags of which the first has no effect if the second is given, and why.
 const IDLE: &[(&str, &str, &str)] = &[
@@ -126,6 +135,7 @@ impl Given {
                 format!("--{flag} has no effect: it is for {}, but {found}", plural_of(*needs))
             })
             .collect();
+        warnings.extend(self.unread(inputs));
         for (flag, other, why) in IDLE {
             let is_placed = self.has("camera-position") || self.has("distance");
             let counts = match *flag {
@@ -141,16 +151,30 @@ impl Given {
         warnings
     }
 
+    /// Returns a warning for each given flag that no input's format reads.
+    fn unread(&self, inputs: &[(&Path, Kinds)]) -> impl Iterator<Item = String> {
+        let is_unread = |words: &[&str]| {
+            inputs.iter().all(|(path, _)| {
+                let name = Format::of_path(path).map_or("", |format| format.name);
+                let reads = words.iter().any(|word| name.contains(word));
+                !(reads || name.is_empty() || path.is_dir())
+            })
+        };
+        let given = READ_BY.iter().filter(|(flag, _)| self.has(flag));
+        given.filter(move |(_, words)| is_unread(words)).map(|(flag, words)| {
+            format!("--{flag} has no effect: only files of these have one: {}", words.join(", "))
+        })
+    }
+
     /// Prints the warnings for a file that is read and not drawn.
     pub fn warn_of_file(&self, path: &Path, kinds: Kinds, progress: &Progress) {
-        for flag in ["radius", "neighbours", "no-slopes"].iter().filter(|flag| self.has(flag)) {
+        for flag in DRAWN.iter().filter(|flag| self.has(flag)) {
             progress.warn(format_args!(
                 "--{flag} has no effect: it is for pictures of scattered samples"
             ));
         }
-        let drawn = ["radius", "neighbours", "no-slopes"];
-        let rest = Self(self.0.iter().filter(|flag| !drawn.contains(&&***flag)).cloned().collect());
-        rest.warn(&[(path, kinds)], progress);
+        let rest = self.0.iter().filter(|flag| !DRAWN.contains(&flag.as_str())).cloned().collect();
+        Self(rest).warn(&[(path, kinds)], progress);
     }
 
     /// Prints these warnings.

@@ -137,7 +137,7 @@ fn main() -> ExitCode {
     let result = match command.task {
         Task::Render(task) => task.run(&given, &progress),
         Task::Info(task) => task.run(&given, &progress),
-        Task::Convert(task) => task.run(&progress),
+        Task::Convert(task) => task.run(&given, &progress),
         Task::Check(task) => task.run(&progress),
         Task::Compare(task) => task.run(),
         Task::Bench(task) => task.run(&given, &progress),

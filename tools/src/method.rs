@@ -73,6 +73,11 @@ impl MethodFlags {
         Ok(())
     }
 
+    /// Returns whether rays take the largest value.
+    pub fn is_maximum(&self) -> bool {
+        self.mip || matches!(self.optics, Optics::Maximum)
+    }
+
     pub fn apply(&self, settings: &mut Settings) {
         let order = if self.back_to_front { Order::BackToFront } else { Order::FrontToBack };
         settings.mode = match self.mode {

@@ -179,7 +179,7 @@ impl Render {
         let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
         files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
         let settings = self.engine.settings(&loaded, self.samples)?;
-        if let Some(warning) = self.engine.idle_light(&loaded.scene) {
+        if let Some(warning) = self.engine.idle(&loaded.scene) {
             progress.warn(warning);
         }
         progress.stage("Framing the scene");

@@ -113,6 +113,9 @@ impl SceneFlags {
         let paths = self.inputs.iter().map(PathBuf::as_path);
         let inputs: Vec<_> = paths.zip(loaded.kinds.iter().copied()).collect();
         given.warn(&inputs, progress);
+        if self.show.range.is_some() && loaded.facts.bars.is_empty() {
+            progress.warn("--range has no effect: nothing here is coloured or shown by values");
+        }
         loaded.load_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(loaded)
     }

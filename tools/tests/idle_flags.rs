@@ -10,6 +10,8 @@ use std::fs;
 const FLAGS: &[&str] = &[
     "--transfer generic",
     "--range 50,200",
+    "--colormap turbo",
+    "--color orange",
     "--opacity-unit 3",
     "--iso 50%",
     "--gradient-opacity 0,0:50,1",
@@ -44,6 +46,9 @@ const FLAGS: &[&str] = &[
     "--clip x<50%",
     "--cut-out x<30%",
 ];
+
+/// Flags that apply to an input, but leave this one as it is: its bricks have one level.
+const ALIKE: [(&str, &str); 2] = [("a.splv", "--cut"), ("a.splv", "--budget")];
 
 const INPUTS: [&str; 6] = ["a.ply", "a.xyz", "a.splk", "a.nrrd", "a.splv", "a.csv"];
 
@@ -84,10 +89,9 @@ fn no_flag_is_without_effect_in_silence() {
         for flag in FLAGS {
             let (code, told, picture) = draw(&folder, input, flag);
             let name = flag.split(' ').next().expect("a name");
-            let is_idle = told.contains("has no effect") || code != Some(0);
-            let says = is_idle && told.contains(name);
+            let says = code != Some(0) || (told.contains("has no effect") && told.contains(name));
             let changes = code == Some(0) && picture != plain;
-            if says == changes {
+            if says == changes && !ALIKE.contains(&(input, name)) {
                 wrong.push(format!("{input} {flag}: {code:?}, changes: {changes}: {told}"));
             }
         }

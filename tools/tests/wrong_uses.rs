@@ -61,13 +61,13 @@ const USES: &[(&str, &str, i32, &str)] = &[
         "a window beside the values",
         "render a.nrrd -o out.png --transfer ct-bone --range 900,1200",
         3,
-        "but the values of a.nrrd lie between 0 and 255",
+        "but the values of a.nrrd lie between 0 and 223",
     ),
     (
         "a surface beside the values",
         "render a.nrrd -o out.png --iso 900",
         3,
-        "shows only the value 900, but the values of a.nrrd lie between 0 and 255",
+        "shows only the value 900, but the values of a.nrrd lie between 0 and 223",
     ),
     (
         "a share beyond the values",
@@ -91,7 +91,7 @@ const USES: &[(&str, &str, i32, &str)] = &[
     ("two volumes", "render a.nrrd b.nrrd -o out.png", 2, "volume"),
     (
         "a volume as a hierarchy",
-        "convert a.nrrd -o a.splk",
+        "convert a.nrrd -o b.splk",
         2,
         "hierarchies are built from meshes and point clouds",
     ),

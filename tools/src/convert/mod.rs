@@ -8,7 +8,12 @@ mod surface;
 mod volume;
 
 use crate::{
-    color::ColorFlags, failure::Failure, load::LoadFlags, output, parse, progress::Progress,
+    color::ColorFlags,
+    failure::Failure,
+    given::{self, Given},
+    load::LoadFlags,
+    output, parse,
+    progress::Progress,
 };
 use clap::Args;
 use std::path::PathBuf;
@@ -59,7 +64,7 @@ pub struct Convert {
 const WRITTEN: [&str; 4] = ["splk", "ply", "nrrd", "splv"];
 
 impl Convert {
-    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+    pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
         let extension = self
             .output
             .extension()
@@ -78,6 +83,7 @@ impl Convert {
                 "{flag} colours meshes and point clouds, which become .splk or .ply"
             )));
         }
+        self.warn(given, progress);
         if !self.dry_run {
             output::check(&self.output, self.overwrite)?;
             output::try_writing(&self.output, &self.files)?;
@@ -87,6 +93,14 @@ impl Convert {
             "splv" => self.bricks(progress),
             _ => self.surface(&extension, progress),
         }
+    }
+
+    /// Warns of flags that change nothing in any conversion of these files.
+    fn warn(&self, given: &Given, progress: &Progress) {
+        // What cannot be read fails later.
+        let is_raw = |path: &PathBuf| self.load.is_raw(path).unwrap_or(true);
+        let raw = if self.files.iter().any(is_raw) { 0 } else { given::RAW };
+        given.warn_of_file(&self.files[0], given::ALL & !raw, progress);
     }
 
     /// Refuses to replace a file that was read.
