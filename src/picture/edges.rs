@@ -1,11 +1,7 @@
 //! The edges of meshes, drawn as thin dark lines over a picture.
 
 use super::Picture;
-use crate::{
-    math::{Bounds, View},
-    parallel::prelude::*,
-    surface::Mesh,
-};
+use crate::{math::View, parallel::prelude::*, surface::Mesh};
 use glam::{DVec2, DVec3, Vec3};
 
 /// The edges of a mesh's triangles, each once, to be drawn over a picture of the mesh
@@ -22,15 +18,17 @@ pub struct Edges {
     origin: DVec3,
     positions: Vec<Vec3>,
     pairs: Vec<[u32; 2]>,
-    bounds: Bounds,
+    /// For each edge of a solid, the normals of its two triangles, of any length: an edge between
+    /// two that face away is hidden. Empty for other meshes.
+    sides: Vec<[Vec3; 2]>,
 }
 
 /// How much of the light a line takes.
 const DARKNESS: f32 = 0.8;
 
-/// Lines may lie this far from the surface that a pixel shows, as a share of the mesh's diagonal.
-/// Surfels of curved surfaces lie beside the edges by about as much.
-const BESIDE: f64 = 0.004;
+/// Lines may lie this far from the surface that a pixel shows, in pixels. The depth of a pixel is
+/// known to about a sheet, and sheets are 8 pixels thick.
+const BESIDE: f64 = 8.0;
 
 /// Lines shorter than this, in pixels, fade, because many of them would darken everything.
 const SHORT: f64 = 6.0;
@@ -44,18 +42,28 @@ impl Edges {
             let corner = |index: &u32| mesh.positions.get(*index as usize);
             triangle.iter().all(|index| corner(index).is_some_and(|place| place.is_finite()))
         };
-        let mut pairs: Vec<[u32; 2]> = mesh
+        let mut all: Vec<([u32; 2], u32)> = mesh
             .triangles
             .par_iter()
-            .filter(is_whole)
-            .flat_map_iter(|&[a, b, c]| [[a, b], [b, c], [c, a]])
-            .map(|[a, b]| [a.min(b), a.max(b)])
+            .zip(0..mesh.triangles.len() as u32)
+            .filter(|(triangle, _)| is_whole(triangle))
+            .flat_map_iter(|(&[a, b, c], at)| [([a, b], at), ([b, c], at), ([c, a], at)])
+            .map(|([a, b], at)| ([a.min(b), a.max(b)], at))
             .collect();
-        pairs.par_sort_unstable();
-        pairs.dedup();
-        let [min, max] = mesh.bounds().unwrap_or([mesh.origin; 2]);
-        let bounds = Bounds { min, max };
-        Self { origin: mesh.origin, positions: mesh.positions.clone(), pairs, bounds }
+        all.par_sort_unstable();
+        let own = all.chunk_by(|a, b| a.0 == b.0);
+        let pairs = own.clone().map(|triangles| triangles[0].0).collect();
+        let normal = |at: u32| {
+            let [a, b, c] = mesh.triangles[at as usize].map(|at| mesh.positions[at as usize]);
+            (b - a).cross(c - a)
+        };
+        let sides = |triangles: &[([u32; 2], u32)]| match *triangles {
+            [(_, a), (_, b)] => [normal(a), normal(b)],
+            // Nothing is known of other edges.
+            _ => [Vec3::NAN; 2],
+        };
+        let sides = if mesh.is_solid() { own.map(sides).collect() } else { Vec::new() };
+        Self { origin: mesh.origin, positions: mesh.positions.clone(), pairs, sides }
     }
 
     /// Returns the number of edges.
@@ -82,12 +90,13 @@ impl Picture {
     /// smooth; those shorter than a few pixels fade. Transparent pixels, which have no depth, get
     /// no lines.
     pub fn draw_edges(&mut self, edges: &Edges, view: &View, width: f64) {
-        let surface = Surface::new(self, BESIDE * edges.bounds.diagonal());
+        let surface = Surface { picture: self, view };
+        let shown = (0..edges.len()).into_par_iter().filter(|edge| edges.may_be_seen(*edge, view));
         let lines: Vec<Line> =
-            edges.pairs.par_iter().filter_map(|pair| edges.line(*pair, view)).collect();
+            shown.filter_map(|edge| edges.line(edges.pairs[edge], view)).collect();
         let mut shares = vec![0.0f32; self.color.len()];
         for line in &lines {
-            surface.trace(line, view.perspective, width, &mut shares);
+            surface.trace(line, width, &mut shares);
         }
         for (pixel, share) in self.color.iter_mut().zip(shares) {
             let left = 1.0 - DARKNESS * share;
@@ -97,6 +106,14 @@ impl Picture {
 }
 
 impl Edges {
+    /// Returns whether a triangle beside an edge may face the viewer.
+    fn may_be_seen(&self, edge: usize, view: &View) -> bool {
+        let Some(normals) = self.sides.get(edge) else { return true };
+        let place = self.origin + self.positions[self.pairs[edge][0] as usize].as_dvec3();
+        let toward = if view.perspective { view.position - place } else { -view.rotation.row(2) };
+        normals.iter().any(|normal| normal.is_nan() || normal.as_dvec3().dot(toward) >= 0.0)
+    }
+
     /// Returns an edge in the picture; `None` if it lies outside, or behind the eye.
     fn line(&self, pair: [u32; 2], view: &View) -> Option<Line> {
         let world = pair.map(|at| self.origin + self.positions[at as usize].as_dvec3());
@@ -153,14 +170,10 @@ impl Line {
 /// The depths of a picture, and how far from them a line may lie.
 struct Surface<'a> {
     picture: &'a Picture,
-    beside: f64,
+    view: &'a View,
 }
 
-impl<'a> Surface<'a> {
-    fn new(picture: &'a Picture, beside: f64) -> Self {
-        Self { picture, beside }
-    }
-
+impl Surface<'_> {
     fn depth(&self, x: i64, y: i64) -> f64 {
         let Picture { width, height, depth, .. } = self.picture;
         let is_inside = (0..i64::from(*width)).contains(&x) && (0..i64::from(*height)).contains(&y);
@@ -189,11 +202,13 @@ impl<'a> Surface<'a> {
         };
         let slope = step(near[1], near[2]) + step(near[3], near[4]);
         // A steep step is the border between two surfaces.
-        (depth - own).abs() <= self.beside + slope.min(4.0 * self.beside)
+        let pixel = if self.view.perspective { depth } else { 1.0 } / self.view.scale;
+        let beside = BESIDE * pixel;
+        (depth - own).abs() <= beside + slope.min(beside)
     }
 
     /// Adds the shares of the pixels that a line covers.
-    fn trace(&self, line: &Line, perspective: bool, width: f64, shares: &mut [f32]) {
+    fn trace(&self, line: &Line, width: f64, shares: &mut [f32]) {
         let [a, b] = line.ends;
         let along = b - a;
         let length = along.length();
@@ -212,7 +227,7 @@ impl<'a> Surface<'a> {
             let t = if t.is_finite() { t } else { 0.0 };
             let center = a[other] + t * along[other];
             let depth = line.depths[0] + t * (line.depths[1] - line.depths[0]);
-            let depth = if perspective { 1.0 / depth } else { depth };
+            let depth = if self.view.perspective { 1.0 / depth } else { depth };
             for cross in ((center - span).floor() as i64)..=((center + span).floor() as i64) {
                 let (x, y) = if axis == 0 { (main, cross) } else { (cross, main) };
                 if !(0..wide).contains(&x) || !(0..high).contains(&y) {
@@ -274,7 +289,7 @@ mod tests {
     #[test]
     fn hidden_edges_are_not_drawn() {
         let (mesh, view, whole) = square();
-        for depth in [4.0, 6.0] {
+        for depth in [2.0, 8.0] {
             let mut picture = whole.clone();
             picture.depth.iter_mut().for_each(|own| *own = depth);
             picture.draw_edges(&Edges::of(&mesh), &view, 1.0);
