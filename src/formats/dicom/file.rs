@@ -96,8 +96,14 @@ impl<'a> File<'a> {
             "the pixels are packed by {name} (transfer syntax {}), which is not read",
             super::shown(&self.identifier)
         );
-        let hint = "convert the files with `gdcmconv --raw IN OUT` or `dcmdjpls IN OUT`; packed by \
-                    RLE, JPEG or JPEG 2000, they are read too";
+        let hint = match name {
+            "JPEG XL" | "an unknown method" => {
+                "convert the files to an uncompressed transfer syntax; RLE, JPEG, JPEG-LS and \
+                 JPEG 2000 are read too"
+            }
+            "JPIP references" => "the pixels are on a server; ask it for the files with pixels",
+            _ => "it is a video; extract its frames, for example with ffmpeg",
+        };
         Err(self.source.error("pixel data", message).hint(hint))
     }
 }

@@ -1,5 +1,6 @@
 //! The pixels of a frame: unpacked, and as one number a pixel.
 
+mod jpeg_ls;
 mod packed;
 
 use super::{

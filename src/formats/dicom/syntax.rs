@@ -10,6 +10,7 @@ pub enum Packing {
     Native,
     Rle,
     Jpeg,
+    JpegLs,
     Jpeg2000,
     /// By the method of this name, which is not read.
     Other(&'static str),
@@ -35,7 +36,7 @@ pub fn syntax(identifier: &str) -> Syntax {
         ".2" => Syntax { coding: Coding { is_explicit: true, endian: Endian::Big }, ..native },
         ".5" => packed(Packing::Rle),
         ".4.50" | ".4.51" | ".4.57" | ".4.70" => packed(Packing::Jpeg),
-        ".4.80" | ".4.81" => packed(Packing::Other("JPEG-LS")),
+        ".4.80" | ".4.81" => packed(Packing::JpegLs),
         ".4.90" | ".4.91" | ".4.92" | ".4.93" | ".4.201" | ".4.202" | ".4.203" => {
             packed(Packing::Jpeg2000)
         }

@@ -188,6 +188,25 @@ fn run_lengths() {
     change(4, 3, "segment 0 lies outside the frame");
 }
 
+/// The example of ITU-T T.87, annex H.3: 4 × 4 numbers.
+#[test]
+fn jpeg_ls() {
+    let stream = [
+        0xff, 0xd8, 0xff, 0xf7, 0, 11, 8, 0, 4, 0, 4, 1, 1, 0x11, 0, 0xff, 0xda, 0, 8, 1, 1, 0, 0,
+        0, 0, 0xc0, 0, 0, 0x6c, 0x80, 0x20, 0x8e, 0x01, 0xc0, 0, 0, 0x57, 0x40, 0, 0, 0x6e, 0xe6,
+        0, 0, 0x01, 0xbc, 0x18, 0, 0, 0x05, 0xd8, 0, 0, 0x91, 0x60, 0xff, 0xd9,
+    ];
+    let mut made = Made::slice(".4.80", 4, 4);
+    made.bits(8, 8, 0).fragments(&[&[], &stream]);
+    let expected =
+        [0, 0, 90, 74, 68, 50, 43, 205, 64, 145, 145, 145, 100, 145, 145, 145].map(f64::from);
+    assert_eq!(values(&read_made(&made)), expected);
+    for end in 0..stream.len() - 2 {
+        made.fragments(&[&[], &stream[..end]]);
+        assert!(told(&made.file()).contains("frame 0"), "{end}");
+    }
+}
+
 #[test]
 fn frames_are_found_in_fragments() {
     // Uncompressed frames in fragments show which fragments a frame has.
@@ -207,11 +226,11 @@ fn frames_are_found_in_fragments() {
 
 #[test]
 fn what_is_not_read_is_told() {
-    let mut made = Made::slice(".4.80", 2, 1);
+    let mut made = Made::slice(".4.110", 2, 1);
     made.fragments(&[&[], &[1, 2]]);
     let message = told(&made.file());
     assert!(
-        message.contains("packed by JPEG-LS (transfer syntax 1.2.840.10008.1.2.4.80)"),
+        message.contains("packed by JPEG XL (transfer syntax 1.2.840.10008.1.2.4.110)"),
         "{message}"
     );
     let mut made = Made::slice(".4.70", 2, 1);

@@ -1,6 +1,6 @@
-//! Frames that are packed: by run lengths (PS3.5, annex G), JPEG or JPEG 2000.
+//! Frames that are packed: by run lengths (PS3.5, annex G), JPEG, JPEG-LS or JPEG 2000.
 
-use super::{Colors, Decoder, Packing, Plain};
+use super::{Colors, Decoder, Packing, Plain, jpeg_ls};
 use crate::{Error, Result, formats::Endian, formats::dicom::tags, input::isolate::isolated};
 use jpeg_decoder::{ColorTransform, PixelFormat};
 use std::borrow::Cow;
@@ -76,6 +76,7 @@ pub fn unpack<'a>(
     source.spend("the size of an unpacked frame in bytes", size as u64)?;
     let plain = match packing {
         Packing::Rle => rle(decoder, bytes, place)?,
+        Packing::JpegLs => unpacked_ls(decoder, bytes, place)?,
         Packing::Jpeg => isolated(source, place, || jpeg(decoder, bytes, place))?,
         _ => isolated(source, place, || jpeg_2000(decoder, bytes, place))?,
     };
@@ -186,6 +187,22 @@ fn jpeg<'a>(decoder: &Decoder, bytes: &[u8], place: &str) -> Result<Plain<'a>> {
     };
     let colors = if layout.channels == 3 { Colors::Rgb } else { layout.colors };
     Ok(Plain { bytes: bytes.into(), endian: Endian::Little, is_planar: false, colors })
+}
+
+/// Unpacks JPEG-LS.
+fn unpacked_ls<'a>(decoder: &Decoder, bytes: &[u8], place: &str) -> Result<Plain<'a>> {
+    let layout = &decoder.layout;
+    let picture = jpeg_ls::decode(bytes, [layout.columns, layout.rows], layout.channels)
+        .map_err(|message| refuse(decoder, place, message))?;
+    let width = layout.sample_type().bytes();
+    if usize::from(picture.bits) > 8 * width || width > 2 {
+        let message = format!("{} bits where {} were expected", picture.bits, 8 * width);
+        return Err(refuse(decoder, place, message));
+    }
+    let low = |number: u16| number.to_le_bytes().into_iter().take(width);
+    let bytes = picture.numbers.into_iter().flat_map(low).collect();
+    let colors = colors(decoder);
+    Ok(Plain { bytes: Cow::Owned(bytes), endian: Endian::Little, is_planar: true, colors })
 }
 
 /// Returns the columns and rows that a JPEG stream begins with.
