@@ -213,7 +213,8 @@ fn chosen_time(source: &Source, times: u64, wanted: Option<usize>) -> Result<u64
         }
         return Ok(time);
     }
-    let message = format!("has {times} times, but number {time} was asked for");
+    let are = if times == 1 { "time" } else { "times" };
+    let message = format!("has {times} {are}, but number {time} was asked for");
     let hint = match times {
         1 => "leave out --time".into(),
         _ => format!("choose a time from 0 to {}", times - 1),

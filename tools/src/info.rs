@@ -14,7 +14,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 use splatkit::{
     Error,
-    about::Stance,
+    about::{About, Modality, Stance},
     bricks::Bricks,
     cells::{CellKind, Cells, Place},
     formats::{self, Series},
@@ -40,6 +40,9 @@ const ORDER: &[&str] = &[
     "type",
     "range",
     "missing",
+    "modality",
+    "window",
+    "value_unit",
     "bounds",
     "attributes",
     "materials",
@@ -217,8 +220,32 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     facts.insert("range".into(), json!(volume.range));
     facts.insert("attributes".into(), json!(["value"]));
     stand(&mut facts, volume.about.stance);
+    say(&mut facts, &volume.about);
     facts.insert("bounds".into(), bounds(Some(volume.bounds())));
     facts
+}
+
+/// Adds what the file says of its values and lengths.
+fn say(facts: &mut Map<String, Value>, about: &About) {
+    let modality = about.modality.and_then(|modality| match modality {
+        Modality::Ct => Some("CT"),
+        Modality::Mr => Some("MR"),
+        Modality::Emission => Some("emission tomography"),
+        Modality::Ultrasound => Some("ultrasound"),
+        Modality::Microscopy => Some("microscopy"),
+        _ => None,
+    });
+    if let Some(modality) = modality {
+        facts.insert("modality".into(), json!(modality));
+    }
+    if let Some(window) = about.window {
+        facts.insert("window".into(), json!(window));
+    }
+    for (name, text) in [("value_unit", &about.unit), ("unit", &about.length)] {
+        if !text.is_empty() {
+            facts.insert(name.into(), json!(text));
+        }
+    }
 }
 
 fn of_bricks(bricks: &Bricks) -> Map<String, Value> {

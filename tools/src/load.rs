@@ -289,7 +289,8 @@ fn unknown(path: &Path) -> Error {
     });
     let lists = lists.join("; ");
     if path.is_dir() {
-        let message = "is a folder in whose files no series of pictures was found";
+        let message =
+            "is not a regular file but a folder, in which no series of pictures was found";
         let hint = "name one of its files, or a folder with the slices of a scan (DICOM)";
         return Error::input(path, "path", message).hint(hint);
     }

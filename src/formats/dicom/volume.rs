@@ -79,7 +79,8 @@ fn chosen(source: &Source, heads: &[Head], options: &ReadOptions) -> Result<Stac
     let first = sizes().position(|size| size == most).unwrap_or(0);
     let at = options.time.unwrap_or(first);
     if at >= count {
-        let message = format!("has {count} times, but number {at} was asked for");
+        let are = if count == 1 { "time" } else { "times" };
+        let message = format!("has {count} {are}, but number {at} was asked for");
         let hint = match count {
             1 => "leave out --time".into(),
             _ => format!("choose a time from 0 to {}", count - 1),
