@@ -32,7 +32,7 @@ pub struct Format {
     pub(super) cells: Option<fn(&Source, &ReadOptions) -> Result<Cells>>,
     pub(super) pieces: InPieces,
     pub(super) arrays: Option<ListArrays>,
-    pub(super) series: Option<fn(&Source, &ReadOptions) -> Result<Vec<Series>>>,
+    pub(super) series: Option<ListSeries>,
 }
 
 /// Reads scattered samples.
@@ -40,6 +40,9 @@ pub(super) type SamplesReader = fn(&Source, &ReadOptions) -> Result<Points>;
 
 /// Lists the arrays of a file.
 pub(super) type ListArrays = fn(&Source, &ReadOptions) -> Result<Vec<Array>>;
+
+/// Lists the series of a folder.
+pub(super) type ListSeries = fn(&Source, &ReadOptions) -> Result<Vec<Series>>;
 
 /// Locates the points of a file; `None` if it can only be read as a whole.
 pub(super) type FindPieces = fn(&Source) -> Result<Option<Box<dyn Form>>>;

@@ -174,9 +174,8 @@ fn volume(own: &Source, image: &Source, header: &Header, options: &ReadOptions) 
     let wide = kind.bytes_of(claimed).and_then(|bytes| bytes.checked_mul(numbers as u64));
     let size = image.check_bytes("the size of the samples in bytes", wide.unwrap_or(u64::MAX))?;
     let time = chosen_time(own, times, options.time)?;
-    let wanted = wanted(own, header, options)?;
     let mut parts = Vec::new();
-    for component in wanted.clone() {
+    for component in wanted(own, header, options)? {
         let number = u64::from(component) * times + time;
         let is_last = number + 1 == times.saturating_mul(components);
         let at = start(own, header)?.saturating_add(number.saturating_mul(size as u64));
@@ -293,12 +292,12 @@ fn bytes<'a>(source: &'a Source, at: u64, size: usize, is_last: bool) -> Result<
         left -= portion;
     }
     let unpacked = source.unpack(place, stream.by_ref().take(size as u64), size)?;
-    while is_last {
+    let mut is_over = !is_last;
+    while !is_over {
         source.check_time()?;
         let read = io::copy(&mut stream.by_ref().take(PORTION), &mut io::sink());
-        if read.map_err(|e| source.error(place, format!("is damaged at its end: {e}")))? == 0 {
-            break;
-        }
+        let read = read.map_err(|e| source.error(place, format!("is damaged at its end: {e}")))?;
+        is_over = read == 0;
     }
     Ok(unpacked.into())
 }

@@ -216,7 +216,7 @@ fn inverted(source: &Source, mut volume: Volume) -> Result<Volume> {
     source.room::<f32>("the inverted samples", volume.len())?;
     volume.samples = match &volume.samples {
         Samples::U8(values) => {
-            let sum = low as u8 as u16 + high as u8 as u16;
+            let sum = (low + high) as u16;
             Samples::U8(values.iter().map(|&value| (sum - u16::from(value)) as u8).collect())
         }
         other => rescaled(rescaled(other.clone(), -1.0, 0.0), 1.0, low + high),
