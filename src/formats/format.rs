@@ -532,7 +532,7 @@ mod tests {
         let message = with("a.raw", b"", |source| {
             told(volume_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
         });
-        let list = "(VTR, VTI, VTK, VTK in several files, NRRD, NIfTI or DICOM)";
-        assert!(message.contains(list), "{message}");
+        assert!(message.contains("VTI, "), "{message}");
+        assert!(message.contains(" NRRD, "), "{message}");
     }
 }

@@ -2,10 +2,11 @@
 
 use super::{
     FORMATS, ReadOptions,
+    foreign::advice,
     format::{Format, VolumeReader, extensions, find, find_volume, listed},
 };
 use crate::{
-    Result,
+    Error, Result,
     cells::Cells,
     input::{Limits, Source},
     scattered::Points,
@@ -40,9 +41,12 @@ pub(super) fn mesh_of(table: &[Format], source: &Source, options: &ReadOptions) 
     let may = |format: &Format| format.mesh.is_some();
     match find(table, source, may)?.and_then(|format| format.mesh) {
         Some(read) => read(source, options),
-        None => Err(source
-            .error("path", format!("“.{}” is not a mesh format that can be read", named(source)))
-            .hint(format!("meshes and point clouds are read from {}", extensions(table, may)))),
+        None => Err(foreign(table, source).unwrap_or_else(|| {
+            let message = format!("“.{}” is not a mesh format that can be read", named(source));
+            source
+                .error("path", message)
+                .hint(format!("meshes and point clouds are read from {}", extensions(table, may)))
+        })),
     }
 }
 
@@ -80,9 +84,12 @@ pub(super) fn volume_of(
 ) -> Result<Volume> {
     let format = find_volume(table, source, options.raw.is_some())?;
     match (format.and_then(|format| format.volume), &options.raw) {
-        (Some(VolumeReader::Plain(read)), _) => read(source, options),
+        (Some(VolumeReader::Plain(read)), _) => spaced(source, read(source, options)?, options),
         (Some(VolumeReader::Described(read)), Some(layout)) => read(source, layout, options),
         _ => {
+            if let Some(error) = foreign(table, source) {
+                return Err(error);
+            }
             let describes_itself =
                 |format: &&Format| matches!(format.volume, Some(VolumeReader::Plain(_)));
             let names = table.iter().filter(describes_itself).map(|format| format.name.into());
@@ -92,6 +99,15 @@ pub(super) fn volume_of(
                 .hint("to read a raw file, give its dimensions and its sample type"))
         }
     }
+}
+
+/// Sets the distances between samples that the options give.
+fn spaced(source: &Source, mut volume: Volume, options: &ReadOptions) -> Result<Volume> {
+    if let Some(spacing) = options.spacing {
+        let lattice = volume.lattice.with_steps_of(spacing);
+        volume.lattice = lattice.map_err(|message| source.error("spacing", message))?;
+    }
+    Ok(volume)
 }
 
 /// Reads scattered samples. The file's extension selects the format; for other extensions, the
@@ -129,6 +145,9 @@ pub(super) fn samples_of(
     match find(table, source, may)?.and_then(|format| format.samples) {
         Some(read) => read(source, options),
         None => {
+            if let Some(error) = foreign(table, source) {
+                return Err(error);
+            }
             let named = named(source);
             Err(source
                 .error(
@@ -173,6 +192,15 @@ pub(super) fn cells_of(table: &[Format], source: &Source, options: &ReadOptions)
             )
             .hint(format!("cells are read from {}", extensions(table, may)))),
     }
+}
+
+/// Returns the error for a file of a kind that is known, but not read. Files of a format of the
+/// table, of which another function reads them, are none.
+fn foreign(table: &[Format], source: &Source) -> Option<Error> {
+    let is_read = find(table, source, |_| true).ok().flatten().is_some();
+    let advice = advice(source).filter(|_| !is_read)?;
+    let message = format!("is {}, which is not read", advice.what);
+    Some(source.error("file", message).hint(advice.hint))
 }
 
 /// Returns a file's extension in lower case, for messages.

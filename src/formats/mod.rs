@@ -14,16 +14,23 @@ pub mod csv;
 pub mod dicom;
 #[cfg(feature = "e57")]
 pub mod e57;
+mod foreign;
 mod form;
 mod format;
 #[cfg(feature = "gltf")]
 pub mod gltf;
+#[cfg(feature = "hdf5")]
+pub mod hdf5;
 mod kind;
 #[cfg(feature = "las")]
 pub mod las;
 mod load;
+pub mod mhd;
+pub mod mrc;
 pub mod nifti;
 pub mod npy;
+#[cfg(feature = "npz")]
+pub mod npz;
 pub mod nrrd;
 #[cfg(feature = "obj")]
 pub mod obj;
@@ -37,6 +44,8 @@ mod shared;
 pub mod stl;
 mod stream;
 mod table;
+#[cfg(feature = "tiff")]
+pub mod tiff;
 #[cfg(all(test, any(target_os = "linux", target_os = "macos")))]
 mod vanishing;
 mod volume_stream;
@@ -46,6 +55,7 @@ mod vtu_write;
 pub mod xyz;
 
 pub use array::{Array, Place, arrays};
+pub use foreign::{Advice, advice, folder_advice};
 pub use form::Counts;
 pub(crate) use form::StreamPoint;
 pub use format::{Content, Format, Holding};

@@ -1,16 +1,42 @@
-//! NumPy arrays (`.npy`, versions 1 to 3) of samples: n rows of 4, 5 or 10 floats in C order.
-//! Follows the format's description in NumPy Enhancement Proposal 1.
+//! NumPy arrays (`.npy`, versions 1 to 3): volumes, points, and samples at any positions. Follows
+//! the format's description in NumPy Enhancement Proposal 1.
+
+mod header;
+mod volume;
+
+pub(super) use header::Header;
+pub use volume::read_volume;
+pub(super) use volume::{Shaped, plain, shaped, volume_of};
 
 use super::{
-    Endian, ReadOptions, SampleType,
-    shared::gather::{Columns, gather},
+    Kind, ReadOptions,
+    shared::{
+        gather::{Columns, gather},
+        grid::too_few,
+    },
 };
 use crate::{
     Result,
-    input::{Source, copy},
+    input::{Source, positions},
     scattered::Points,
+    surface::Mesh,
 };
 use glam::DVec3;
+
+/// Returns the kind of data in an array: a point cloud (n × 3), samples (n × 4, n × 5 or n × 10), or
+/// a volume (three axes and more).
+///
+/// # Errors
+/// As [`read`], for the header; [`Error::Input`](crate::Error::Input) for any other shape.
+pub fn kind(source: &Source) -> Result<Kind> {
+    let header = Header::of(source)?;
+    match header.shape[..] {
+        [_, 3] => Ok(Kind::Mesh),
+        [_, 4 | 5 | 10] => Ok(Kind::Samples),
+        [_, _, _, ..] => Ok(Kind::Volume),
+        _ => Err(header.wrong_shape(source)),
+    }
+}
 
 /// Reads rows of x, y, z and value, followed by nothing, a radius, or the six terms xx, xy, xz, yy,
 /// yz, zz of a covariance.
@@ -20,20 +46,10 @@ use glam::DVec3;
 /// than the header claims, and for numbers that are not finite, with the row;
 /// [`Error::Limit`](crate::Error::Limit) for more rows than the limits allow points.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Points> {
-    let bytes = source.bytes();
-    let (header, start) = header(bytes).ok_or_else(|| {
-        source.error("header", "is cut off, is longer than 1 MiB, or is not a NumPy header")
-    })?;
-    let Array { kind, endian, rows, width } = Array::of(source, &header)?;
-    let size = kind.bytes_of([rows, width, 1]).unwrap_or(u64::MAX);
-    let data = &bytes[start..];
-    if data.len() as u64 != size {
-        return Err(source
-            .error("data", format!("there are {} bytes where {size} were expected", data.len())));
-    }
-    source.room::<f64>("the numbers", rows.saturating_mul(width))?;
+    let header = Header::of(source)?;
+    let [_, 4 | 5 | 10] = header.shape[..] else { return Err(header.wrong_shape(source)) };
+    let (numbers, rows, width) = rows(source, &header)?;
     source.spend("the size of the samples in bytes", Columns::ROW * rows as u64)?;
-    let numbers = kind.doubles(data, endian);
     let row = |row: usize| &numbers[row * width..][..width];
     let columns = Columns {
         values: (0..rows).map(|index| row(index)[3]).collect(),
@@ -58,91 +74,51 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Points> {
     )
 }
 
-/// The type and shape of the array, from the header.
-struct Array {
-    kind: SampleType,
-    endian: Endian,
-    rows: usize,
-    /// Numbers per row: 4, 5 or 10.
-    width: usize,
-}
-
-impl Array {
-    fn of(source: &Source, header: &str) -> Result<Self> {
-        let wrong = |message: String| source.error("header", message);
-        let field =
-            |name: &str| field(header, name).ok_or_else(|| wrong(format!("has no “{name}”")));
-        let (kind, endian) = match field("descr")? {
-            "'<f4'" => (SampleType::F32, Endian::Little),
-            "'>f4'" => (SampleType::F32, Endian::Big),
-            "'<f8'" => (SampleType::F64, Endian::Little),
-            "'>f8'" => (SampleType::F64, Endian::Big),
-            other => {
-                return Err(wrong(format!(
-                    "has the type {other}, but samples are floats, f4 or f8"
-                )));
-            }
-        };
-        if field("fortran_order")? != "False" {
-            return Err(wrong("is in Fortran order".into()).hint("write the array in C order"));
-        }
-        let shape = field("shape")?;
-        let Some(&[rows, width @ (4 | 5 | 10)]) = sizes(shape).as_deref() else {
-            return Err(wrong(format!(
-                "has the shape {shape}, but (n, 4), (n, 5) or (n, 10) was expected"
-            ))
-            .hint(
-                "a sample is a row of x, y, z, value and then nothing, a radius, or xx, xy, xz, \
-                 yy, yz, zz",
-            ));
-        };
-        let rows = source.check_points("the number of rows", rows)?;
-        Ok(Self { kind, endian, rows, width: width as usize })
+/// Reads rows of x, y and z as a point cloud.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_cloud(source: &Source) -> Result<Mesh> {
+    let header = Header::of(source)?;
+    let [_, 3] = header.shape[..] else { return Err(header.wrong_shape(source)) };
+    let (numbers, rows, _) = rows(source, &header)?;
+    if rows == 0 {
+        return Err(source.error("header", "contains no points"));
     }
+    let places = numbers.as_chunks().0;
+    let (origin, positions) = positions::settle(
+        source,
+        rows,
+        |row| DVec3::from_array(places[row]),
+        |row| format!("row {row}"),
+    )?;
+    Ok(Mesh { origin, positions, ..Mesh::default() })
 }
 
-/// Returns the numbers of a Python tuple.
-fn sizes(shape: &str) -> Option<Vec<u64>> {
-    let inside = shape.strip_prefix('(')?.strip_suffix(')')?.trim_end_matches([',', ' ']);
-    inside.split(',').map(|size| size.trim().parse().ok()).collect()
-}
-
-/// Returns the header's text, and the offset of the data.
-fn header(bytes: &[u8]) -> Option<(String, usize)> {
-    let version = bytes.strip_prefix(b"\x93NUMPY")?.first()?;
-    let (length, start) = match version {
-        1 => (usize::from(u16::from_le_bytes(*bytes.get(8..)?.first_chunk()?)), 10),
-        2 | 3 => (u32::from_le_bytes(*bytes.get(8..)?.first_chunk()?) as usize, 12),
-        _ => return None,
-    };
-    // Headers of real files are far shorter than this.
-    let text = bytes.get(start..)?.get(..length).filter(|text| text.len() <= 1 << 20)?;
-    Some((copy::lossy(text), start + length))
-}
-
-/// Returns the value of a name in the header, a Python dictionary: the text up to the next comma
-/// outside brackets.
-fn field<'a>(header: &'a str, name: &str) -> Option<&'a str> {
-    let rest = header
-        .split_once(&format!("'{name}':"))
-        .or_else(|| header.split_once(&format!("\"{name}\":")))?
-        .1;
-    let mut depth = 0;
-    let end = rest.find(|c| {
-        match c {
-            '(' | '[' => depth += 1,
-            ')' | ']' => depth -= 1,
-            _ => {}
-        }
-        depth == 0 && matches!(c, ',' | '}')
-    })?;
-    Some(rest[..end].trim())
+/// Returns the numbers of an array of two axes, rows one after the other.
+fn rows(source: &Source, header: &Header) -> Result<(Vec<f64>, usize, usize)> {
+    let rows = source.check_points("the number of rows", header.shape[0])?;
+    let width = header.shape[1] as usize;
+    let numbers = rows.saturating_mul(width);
+    let size = (numbers as u64).saturating_mul(header.element.bytes() as u64);
+    let data = &source.bytes()[header.start..];
+    if data.len() as u64 != size {
+        return Err(too_few(source, data.len(), size as usize));
+    }
+    source.room::<f64>("the numbers", numbers)?;
+    let mut values = header.element.doubles(data, header.endian);
+    if header.is_fortran {
+        source.room::<f64>("the numbers", numbers)?;
+        let index = |at: usize| at / width + at % width * rows;
+        values = (0..numbers).map(|at| values[index(at)]).collect();
+    }
+    Ok((values, rows, width))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Error, input::testing::*};
+    use crate::{Error, input::testing::*, volume::Volume};
     use glam::Vec3;
 
     fn read(source: &Source) -> Result<Points> {
@@ -198,18 +174,96 @@ mod tests {
         }
     }
 
+    fn volume(content: &[u8], options: &ReadOptions) -> Result<Volume> {
+        let folder = Folder::new();
+        let path = folder.write("a.npy", content);
+        assert_eq!(read_with(&path, kind)?, Kind::Volume);
+        read_with(&path, |source| read_volume(source, options))
+    }
+
+    fn values(volume: &Volume) -> Vec<f64> {
+        (0..volume.len()).map(|index| volume.value(index)).collect()
+    }
+
+    #[test]
+    fn arrays_of_three_axes_are_volumes() {
+        let data: Vec<u8> = (0..6).collect();
+        // Whatever the order, the fastest axis is x.
+        for (order, shape) in [("False", "(1, 2, 3)"), ("True", "(3, 2, 1)")] {
+            let file = file(1, "'|u1'", order, shape, &data);
+            let read = volume(&file, &ReadOptions::default()).unwrap();
+            assert_eq!(read.lattice.dims, [3, 2, 1], "{order}");
+            assert_eq!(values(&read), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        }
+        let half: Vec<u8> =
+            [1.0, -0.5].iter().flat_map(|&v| half::f16::from_f32(v).to_be_bytes()).collect();
+        let complex: Vec<u8> =
+            [3.0, 4.0, 0.0, 1.0f64].iter().flat_map(|v| v.to_le_bytes()).collect();
+        for (descr, data, expected) in [
+            ("'|b1'", vec![0, 1], [0.0, 1.0]),
+            ("'>f2'", half, [1.0, -0.5]),
+            ("'<c16'", complex, [5.0, 1.0]),
+            ("'>i2'", vec![1, 0, 255, 255], [256.0, -1.0]),
+            ("'=u8'", [3u64, 4].iter().flat_map(|v| v.to_le_bytes()).collect(), [3.0, 4.0]),
+        ] {
+            let file = file(2, descr, "False", "(1, 1, 2)", &data);
+            assert_eq!(
+                values(&volume(&file, &ReadOptions::default()).unwrap()),
+                expected,
+                "{descr}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_fourth_axis_has_components_or_times() {
+        let data: Vec<u8> = vec![3, 4, 0, 1];
+        let default = ReadOptions::default();
+        let vectors = file(1, "'|u1'", "False", "(1, 1, 2, 2)", &data);
+        assert_eq!(values(&volume(&vectors, &default).unwrap()), [5.0, 1.0]);
+        let second = ReadOptions::scalar(Some("v:1"));
+        assert_eq!(values(&volume(&vectors, &second).unwrap()), [4.0, 1.0]);
+        let at = |time| ReadOptions { time: Some(time), ..ReadOptions::default() };
+        let times = file(1, "'|u1'", "False", "(2, 1, 1, 2)", &data);
+        assert_eq!(values(&volume(&times, &at(1)).unwrap()), [0.0, 1.0]);
+        assert!(volume(&times, &at(2)).unwrap_err().to_string().contains("has 2 volumes"));
+        let squeezed = file(1, "'|u1'", "False", "(1, 2, 2, 1, 1)", &data);
+        assert_eq!(volume(&squeezed, &default).unwrap().lattice.dims, [1, 2, 2]);
+        let unclear = file(1, "'|u1'", "False", "(1, 2, 2, 9)", &[0; 36]);
+        assert_eq!(volume(&unclear, &default).unwrap().lattice.dims, [9, 2, 2]);
+        let unclear = file(1, "'|u1'", "False", "(2, 2, 2, 9)", &[0; 72]);
+        let error = volume(&unclear, &default).unwrap_err();
+        assert!(error.to_string().contains("the shape (2, 2, 2, 9), but (z, y, x)"), "{error}");
+    }
+
+    #[test]
+    fn arrays_of_three_columns_are_points() {
+        let data: Vec<u8> =
+            [1.0, 2.0, 3.0, 5.0, 2.0, 3.0f64].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let folder = Folder::new();
+        let path = folder.write("a.npy", file(1, "'<f8'", "False", "(2, 3)", &data));
+        assert_eq!(read_with(&path, kind).unwrap(), Kind::Mesh);
+        let cloud = read_with(&path, read_cloud).unwrap();
+        assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(5.0, 2.0, 3.0)]);
+        let order = folder.write("b.npy", file(1, "'<f8'", "True", "(2, 3)", &data));
+        let cloud = read_with(&order, read_cloud).unwrap();
+        assert_eq!(cloud.origin + cloud.positions[1].as_dvec3(), DVec3::new(2.0, 5.0, 3.0));
+        let empty = folder.write("c.npy", file(1, "'<f8'", "True", "(0, 3)", &[]));
+        assert!(read_with(&empty, read_cloud).is_err());
+    }
+
     #[test]
     fn cuts_lies_and_other_arrays_are_errors() {
         let data: Vec<u8> = [1f32, 2.0, 3.0, 4.0].iter().flat_map(|v| v.to_le_bytes()).collect();
         let folder = Folder::new();
         every_cut(&folder, "a.npy", &file(1, "'<f4'", "False", "(1, 4)", &data), read);
         for (content, word) in [
-            (file(1, "'<i4'", "False", "(1, 4)", &data), "'<i4'"),
+            (file(1, "'<M8[s]'", "False", "(1, 4)", &data), "'<M8[s]'"),
             (file(1, "[('x', '<f4'), ('y', '<f4')]", "False", "(1,)", &data), "('y', '<f4')"),
-            (file(1, "'<f4'", "True", "(1, 4)", &data), "Fortran"),
+            (file(1, "'<f4'", "maybe", "(1, 4)", &data), "the order “maybe”"),
             (file(1, "'<f4'", "False", "(4,)", &data), "shape (4,)"),
             (file(1, "'<f4'", "False", "(1, 6)", &data), "shape (1, 6)"),
-            (file(1, "'<f4'", "False", "(-1, 4)", &data), "shape"),
+            (file(1, "'<f4'", "False", "(-1, 4)", &data), "the shape (-1, 4), but a tuple"),
             (file(1, "'<f4'", "False", "(2, 4)", &data), "16 bytes where 32"),
             (file(1, "'<f4'", "False", "(0, 4)", &[]), "no samples"),
             (file(4, "'<f4'", "False", "(1, 4)", &data), "not a NumPy header"),

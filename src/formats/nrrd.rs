@@ -1,7 +1,7 @@
 //! NRRD volumes (Teem's format, versions 1 to 5), attached and detached. Follows the definition at
 //! <https://teem.sourceforge.net/nrrd/format.html>.
 
-mod files;
+pub(super) mod files;
 mod write;
 
 use super::{

@@ -1,6 +1,7 @@
 //! What a caller chooses when a file is read.
 
 use super::RawLayout;
+use glam::DVec3;
 
 /// Which of a file's data to read, and what its bytes mean if it does not say so itself. A format
 /// ignores what does not concern it.
@@ -25,6 +26,10 @@ pub struct ReadOptions {
     pub series: Option<String>,
     /// Which data set of an HDF5 file, or which array of an NPZ archive, to read.
     pub dataset: Option<String>,
+    /// The distances between samples along the axes of a volume on a Cartesian lattice, in world
+    /// units. They replace those of the file, for files that say none or wrong ones; directions
+    /// and the position of the first sample stay. A raw volume has them in its layout.
+    pub spacing: Option<DVec3>,
     /// A value that stands for “no value”. Samples of this value are holes, as samples that are
     /// not numbers are.
     pub missing: Option<f64>,

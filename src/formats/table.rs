@@ -11,18 +11,24 @@ use super::dicom;
 use super::e57;
 #[cfg(feature = "gltf")]
 use super::gltf;
+#[cfg(feature = "hdf5")]
+use super::hdf5;
 #[cfg(feature = "las")]
 use super::las;
+#[cfg(feature = "npz")]
+use super::npz;
 #[cfg(feature = "obj")]
 use super::obj;
 #[cfg(feature = "ply")]
 use super::ply;
+#[cfg(feature = "tiff")]
+use super::tiff;
 #[cfg(feature = "vtk")]
 use super::vtk;
 use super::{
     Kind, csv,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
-    nifti, npy, nrrd, pcd, raw, stl, xyz,
+    mhd, mrc, nifti, npy, nrrd, pcd, raw, stl, xyz,
 };
 
 /// Every format, in the order of messages: surfaces, volumes, scattered samples.
@@ -259,6 +265,72 @@ pub static FORMATS: &[Format] = &[
         ..Format::ROW
     },
     Format {
+        name: "MetaImage",
+        extensions: &["mha", "mhd"],
+        holds: &[all(Content::Volume)],
+        refers: true,
+        magic: Magic::Rule(mhd::is_header),
+        kind: Which::Always(Kind::Volume),
+        volume: Some(VolumeReader::Plain(mhd::read)),
+        pieces: InPieces::Volume { of: "one file, not compressed", find: mhd::plain },
+        ..Format::ROW
+    },
+    Format {
+        name: "MRC, CCP4",
+        extensions: &["mrc", "map", "ccp4", "rec", "st", "mrcs"],
+        holds: &[all(Content::Volume)],
+        magic: Magic::Rule(mrc::is_map),
+        kind: Which::Always(Kind::Volume),
+        volume: Some(VolumeReader::Plain(mrc::read)),
+        pieces: InPieces::Volume { of: "files of real numbers", find: mrc::plain },
+        ..Format::ROW
+    },
+    Format {
+        name: "TIFF",
+        extensions: &["tif", "tiff", "btf", "tf8"],
+        holds: &[some(Content::Volume, "of several pages")],
+        feature: Some("tiff"),
+        magic: Magic::Rule(|bytes| {
+            matches!(
+                bytes.first_chunk(),
+                Some(b"II\x2a\0" | b"MM\0\x2a" | b"II\x2b\0" | b"MM\0\x2b")
+            )
+        }),
+        kind: Which::Always(Kind::Volume),
+        #[cfg(feature = "tiff")]
+        folder: Some(tiff::is_folder),
+        #[cfg(feature = "tiff")]
+        volume: Some(VolumeReader::Plain(tiff::read)),
+        ..Format::ROW
+    },
+    Format {
+        name: "HDF5, NetCDF-4, VTKHDF",
+        extensions: &["h5", "hdf5", "hdf", "he5", "nc4", "ims", "vtkhdf"],
+        holds: &[
+            some(Content::Volume, "data sets of three dimensions, image data of VTKHDF"),
+            some(Content::Cells, "unstructured grids of VTKHDF"),
+            some(Content::Mesh, "surfaces of VTKHDF"),
+        ],
+        feature: Some("hdf5"),
+        // A block of the user's may stand before the signature, as in MATLAB's files.
+        magic: Magic::Rule(|bytes| {
+            [0, 512, 1024, 2048]
+                .iter()
+                .any(|&at| bytes.get(at..at + 8) == Some(b"\x89HDF\r\n\x1a\n"))
+        }),
+        #[cfg(feature = "hdf5")]
+        kind: Which::Rule(|source, _| hdf5::kind(source)),
+        #[cfg(feature = "hdf5")]
+        mesh: Some(hdf5::read_mesh),
+        #[cfg(feature = "hdf5")]
+        cells: Some(hdf5::read_cells),
+        #[cfg(feature = "hdf5")]
+        volume: Some(VolumeReader::Plain(hdf5::read)),
+        #[cfg(feature = "hdf5")]
+        arrays: Some(hdf5::arrays),
+        ..Format::ROW
+    },
+    Format {
         name: "raw",
         holds: &[some(Content::Volume, "if its layout is given")],
         kind: Which::Always(Kind::Volume),
@@ -279,10 +351,29 @@ pub static FORMATS: &[Format] = &[
     Format {
         name: "NPY",
         extensions: &["npy"],
-        holds: &[all(Content::Samples)],
+        holds: &[
+            some(Content::Volume, "of three axes"),
+            some(Content::PointCloud, "of three columns"),
+            some(Content::Samples, "of 4, 5 or 10 columns"),
+        ],
         magic: Magic::Prefix(b"\x93NUMPY"),
-        kind: Which::Always(Kind::Samples),
+        kind: Which::Rule(|source, _| npy::kind(source)),
+        mesh: Some(|source, _| npy::read_cloud(source)),
+        volume: Some(VolumeReader::Plain(npy::read_volume)),
         samples: Some(npy::read),
+        pieces: InPieces::Volume { of: "volumes", find: npy::plain },
+        ..Format::ROW
+    },
+    Format {
+        name: "NPZ",
+        extensions: &["npz"],
+        holds: &[all(Content::Volume)],
+        feature: Some("npz"),
+        kind: Which::Always(Kind::Volume),
+        #[cfg(feature = "npz")]
+        volume: Some(VolumeReader::Plain(npz::read)),
+        #[cfg(feature = "npz")]
+        arrays: Some(npz::arrays),
         ..Format::ROW
     },
     Format {

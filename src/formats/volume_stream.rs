@@ -11,6 +11,7 @@ use crate::{
     progress::{Watch, tell},
     volume::{Lattice, Samples, Scalar},
 };
+use glam::DVec3;
 use std::{ops::Range, path::Path};
 
 /// A volume whose samples are stored uncompressed: a raw file, or an NRRD file with raw encoding.
@@ -66,6 +67,19 @@ impl VolumeStream {
             .and_then(|bytes| bytes.checked_add(plain.start as u64));
         let is_whole = bytes.is_some_and(|bytes| bytes <= map.len() as u64) && !map.is_empty();
         Ok(is_whole.then_some(Self { plain, scalar, map }))
+    }
+
+    /// Replaces the distances between samples along the axes ([`ReadOptions::spacing`]).
+    ///
+    /// # Errors
+    /// [`Error::Input`] for distances that are not positive and finite.
+    ///
+    /// [`ReadOptions::spacing`]: super::ReadOptions::spacing
+    pub fn with_spacing(mut self, spacing: DVec3) -> Result<Self> {
+        let lattice = self.plain.lattice.with_steps_of(spacing);
+        self.plain.lattice =
+            lattice.map_err(|message| Error::input(&self.plain.path, "spacing", message))?;
+        Ok(self)
     }
 
     /// Returns the file that contains the samples. For a detached header, this is not the header's

@@ -53,6 +53,22 @@ impl Lattice {
         Self { dims, origin, axes: edges, arrangement: Arrangement::BodyCentred }
     }
 
+    /// Returns this lattice with other distances between neighbouring samples along its axes, whose
+    /// directions stay. The error is a message: only Cartesian lattices have such distances, and
+    /// each must be positive and finite.
+    pub(crate) fn with_steps_of(&self, spacing: DVec3) -> Result<Self, String> {
+        if self.arrangement != Arrangement::Cartesian {
+            return Err("applies only to samples at equal distances along each axis; this volume \
+                        has positions of its own"
+                .into());
+        }
+        let axes = [0, 1, 2].map(|axis| self.axes.col(axis).normalize() * spacing[axis]);
+        let axes = DMat3::from_cols(axes[0], axes[1], axes[2]);
+        let lattice = Self::cartesian(self.dims, self.origin, axes);
+        lattice.check()?;
+        Ok(lattice)
+    }
+
     /// Number of samples. If that exceeds `usize::MAX`, returns `usize::MAX`.
     pub fn len(&self) -> usize {
         self.dims.iter().fold(1, |all, &n| all.saturating_mul(n))

@@ -882,6 +882,56 @@
             "nan.npy: row 0: the position [NaN, 2, 3] is not finite",
         ),
         ("shape.npy", npy("((((((", &[]), "shape.npy: header: has no “shape”"),
+        (
+            "five.npy",
+            npy("(2, 3, 4, 5, 6)", &[]),
+            "five.npy: header: has the shape (2, 3, 4, 5, 6), but (z, y, x) was expected for a \
+             volume",
+        ),
+        (
+            "huge.npy",
+            npy("(1048576, 1048576, 1048576)", &[1.0]),
+            "huge.npy: the size of the samples in bytes is 4611686018427387904, over the limit of \
+             34359738368",
+        ),
+        // MetaImage, MRC, TIFF and HDF5.
+        (
+            "size.mha",
+            mha("100 100 100", "", b"1234"),
+            "size.mha: data: there are 4 bytes where 1000000 were expected",
+        ),
+        ("none.mha", mha("0 4 4", "", b""), "none.mha: header: a volume of 0 × 4 × 4 samples holds none"),
+        (
+            "bomb.mha",
+            mha("1 1 1", "CompressedData = True\n", &zlib(&[7; 1 << 20])),
+            "volume [1, 1, 1] [7.0, 7.0]",
+        ),
+        (
+            "lie.mha",
+            mha("100 100 100", "CompressedData = True\n", &zlib(&[7; 1000])),
+            "lie.mha: data: unpacks to 1000 bytes where 1000000 were expected",
+        ),
+        (
+            "mode.mrc",
+            mrc([1, 1, 1], 99, &[0]),
+            "mode.mrc: header, mode: is 99, but 0, 1, 2, 3, 4, 6, 12, 16 or 101 was expected",
+        ),
+        (
+            "size.mrc",
+            mrc([1000, 1000, 1000], 0, &[0]),
+            "size.mrc: data: there are 1 bytes where 1000000000 were expected",
+        ),
+        (
+            "one.tif",
+            tiff(1),
+            "one.tif: pages: there is one page of 2 × 1 pixels: this is a picture, or one slice of \
+             a volume",
+        ),
+        (
+            "flat.h5",
+            hdf5(&[2, 2]),
+            "flat.h5: file: has no numbers of three dimensions; it has “v”, u8 (2, 2)",
+        ),
         // NRRD.
         (
             "size.nrrd",

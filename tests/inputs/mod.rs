@@ -287,6 +287,56 @@ pub fn nrrd(sizes: &str, fields: &str, data: &[u8]) -> Vec<u8> {
         .concat()
 }
 
+/// A MetaImage file of bytes.
+pub fn mha(sizes: &str, fields: &str, data: &[u8]) -> Vec<u8> {
+    let header = format!(
+        "NDims = 3\n{fields}DimSize = {sizes}\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
+    );
+    [header.as_bytes(), data].concat()
+}
+
+/// An MRC map of signed bytes.
+pub fn mrc(dims: [i32; 3], mode: i32, data: &[u8]) -> Vec<u8> {
+    let mut map = vec![0; 1024];
+    for (axis, size) in dims.into_iter().enumerate() {
+        for (word, value) in [(axis, size), (7 + axis, size), (16 + axis, axis as i32 + 1)] {
+            map[4 * word..][..4].copy_from_slice(&value.to_le_bytes());
+        }
+    }
+    map[12..16].copy_from_slice(&mode.to_le_bytes());
+    map[208..214].copy_from_slice(b"MAP \x44\x44");
+    map.extend(data);
+    map
+}
+
+/// An NPZ archive of two volumes.
+pub fn npz() -> Vec<u8> {
+    use zip::{ZipWriter, write::SimpleFileOptions};
+    let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
+    for name in ["a.npy", "b.npy"] {
+        writer.start_file(name, SimpleFileOptions::default()).expect("a file");
+        writer.write_all(&npy("(1, 2, 2)", &[1.0, 2.0, 3.0, 4.0])).expect("bytes");
+    }
+    writer.finish().expect("an archive").into_inner()
+}
+
+/// A TIFF file of this many pages of 2 × 1 pixels.
+pub fn tiff(pages: u8) -> Vec<u8> {
+    use tiff::encoder::{TiffEncoder, colortype::Gray8};
+    let mut file = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut file).expect("a file");
+    (0..pages).for_each(|page| encoder.write_image::<Gray8>(2, 1, &[page, 9]).expect("a page"));
+    file.into_inner()
+}
+
+/// An HDF5 file of one data set.
+pub fn hdf5(shape: &[u64]) -> Vec<u8> {
+    let mut file = hdf5_pure::FileBuilder::new();
+    let data: Vec<u8> = (0..shape.iter().product::<u64>() as u8).collect();
+    file.create_dataset("v").with_u8_data(&data).with_shape(shape);
+    file.finish().expect("a file")
+}
+
 /// An XML file of VTK: `kind` around `pieces`.
 pub fn vtk_xml(kind: &str, attributes: &str, pieces: &str) -> String {
     format!(
@@ -468,6 +518,12 @@ fn formats_of_volumes() -> Vec<Format> {
     let raw: Vec<u8> = (0..64).collect();
     vec![
         ("raw.nrrd", nrrd("4 4 4", "encoding: raw", &raw), never),
+        ("a.mha", mha("2 1 2", "", &[1, 2, 3, 4]), never),
+        ("a.mrc", mrc([2, 1, 2], 0, &[1, 2, 3, 4]), never),
+        ("volume.npy", npy("(1, 1, 2)", &[1.0, 2.0]), never),
+        ("a.npz", npz(), never),
+        ("a.tif", tiff(2), never),
+        ("a.h5", hdf5(&[1, 2, 2]), anywhere),
         ("gzip.nrrd", nrrd("4 4 4", "encoding: gzip", &gzip(&raw)), never),
         ("ascii.nrrd", nrrd("2 2 1", "encoding: ascii", b"1 2 3 44\n"), last_number),
         ("hex.nrrd", nrrd("2 2 1", "encoding: hex", b"01020304\n"), but_for_spaces),

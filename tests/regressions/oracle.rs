@@ -48,10 +48,15 @@ pub const FORMATS: &[(&str, Look)] = &[
     ("pcd", pcd),
     ("csv", csv),
     ("npy", npy),
+    ("npz", npz),
     ("nrrd", nrrd),
     ("nifti", nifti),
     ("dicom", dicom),
     ("dicom_folder", dicom_folder),
+    ("mhd", mhd),
+    ("mrc", mrc),
+    ("tiff", tiff),
+    ("hdf5", hdf5),
     ("vti", vti),
     ("vtr", vtr),
     ("vtu", vtu),
@@ -296,6 +301,77 @@ pub fn csv(bytes: &[u8]) {
 
 pub fn npy(bytes: &[u8]) {
     samples("input.npy", bytes, formats::npy::read);
+    read("input.npy", bytes, formats::npy::read_cloud).iter().for_each(sound_mesh);
+    volumes("input.npy", bytes, formats::npy::read_volume);
+}
+
+/// Reads a volume with several choices of its component and time.
+fn volumes(name: &str, bytes: &[u8], reader: fn(&Source, &ReadOptions) -> Result<Volume>) {
+    let second = ReadOptions { time: Some(1), ..ReadOptions::scalar(Some("value:1")) };
+    for options in [ReadOptions::default(), second] {
+        read(name, bytes, |source| reader(source, &options)).iter().for_each(sound_volume);
+    }
+}
+
+/// Lists the arrays of a file, and reads the first three of them.
+fn arrays(name: &str, bytes: &[u8]) {
+    let list = read(name, bytes, |source| formats::arrays(source, &ReadOptions::default()));
+    for array in list.unwrap_or_default().into_iter().take(3) {
+        let options = ReadOptions { dataset: Some(array.name), ..ReadOptions::default() };
+        let volume = read(name, bytes, |source| formats::read_volume(source, &options));
+        volume.iter().for_each(sound_volume);
+    }
+}
+
+pub fn npz(bytes: &[u8]) {
+    volumes("input.npz", bytes, formats::npz::read);
+    arrays("input.npz", bytes);
+}
+
+/// A MetaImage file. A line `#data` may separate a file that it refers to, `0.raw`. It is also read
+/// slice by slice.
+pub fn mhd(bytes: &[u8]) {
+    let Some((header, data)) = cut(bytes, b"\n#data\n") else {
+        volumes("input.mha", bytes, formats::mhd::read);
+        return;
+    };
+    let folder = Folder::new();
+    folder.write("0.raw", data);
+    slices(&folder.write("input.mhd", header));
+}
+
+pub fn mrc(bytes: &[u8]) {
+    volumes("input.mrc", bytes, formats::mrc::read);
+}
+
+pub fn tiff(bytes: &[u8]) {
+    volumes("input.tif", bytes, formats::tiff::read);
+}
+
+pub fn hdf5(bytes: &[u8]) {
+    volumes("input.h5", bytes, formats::hdf5::read);
+    arrays("input.h5", bytes);
+    let options = ReadOptions::default();
+    let cells = read("input.h5", bytes, |source| formats::hdf5::read_cells(source, &options));
+    cells.iter().for_each(sound_cells);
+    mesh("input.h5", bytes, |source| formats::hdf5::read_mesh(source, &ReadOptions::default()));
+}
+
+/// Reads a volume as a whole and slice by slice: both have the same samples.
+fn slices(path: &Path) {
+    let limits = limits();
+    let whole = accepted(formats::load_volume(path, &limits, &ReadOptions::default()));
+    whole.iter().for_each(sound_volume);
+    let stream = accepted(VolumeStream::open(path, &limits, None)).flatten();
+    if let (Some(whole), Some(stream)) = (whole, stream) {
+        assert_eq!((stream.lattice(), stream.scalar()), (&whole.lattice, whole.samples.scalar()));
+        let samples = stream.slices(0..whole.lattice.dims[2]).expect("what was read as a whole");
+        // Holes are filled in what is read as a whole.
+        assert!(
+            whole.about.holes > 0 || samples.bytes() == whole.samples.bytes(),
+            "the slices have other samples"
+        );
+    }
 }
 
 /// An NRRD file. Lines `#data` may separate the files that it refers to: `0.raw`, `1.raw` and so
@@ -317,20 +393,7 @@ pub fn nrrd(bytes: &[u8]) {
         .iter()
         .enumerate()
         .for_each(|(number, data)| drop(folder.write(&format!("{number}.raw"), data)));
-    let path = folder.write("input.nhdr", header);
-    let limits = limits();
-    let whole = accepted(formats::load_volume(&path, &limits, &ReadOptions::default()));
-    whole.iter().for_each(sound_volume);
-    let stream = accepted(VolumeStream::open(&path, &limits, None)).flatten();
-    if let (Some(whole), Some(stream)) = (whole, stream) {
-        assert_eq!((stream.lattice(), stream.scalar()), (&whole.lattice, whole.samples.scalar()));
-        let samples = stream.slices(0..whole.lattice.dims[2]).expect("what was read as a whole");
-        // Holes are filled in what is read as a whole.
-        assert!(
-            whole.about.holes > 0 || samples.bytes() == whole.samples.bytes(),
-            "the slices have other samples"
-        );
-    }
+    slices(&folder.write("input.nhdr", header));
 }
 
 /// A NIfTI file, or a pair: a line `#img` separates the header from the samples.
@@ -457,7 +520,7 @@ pub fn any(bytes: &[u8]) {
             }
             Some(Kind::Hierarchy) => splk(bytes),
             Some(Kind::Bricks) => splv(bytes),
-            None => {}
+            None => drop(read("input", bytes, |source| Ok(formats::advice(source)))),
         }
     }
 }

@@ -38,7 +38,7 @@ const LATTICE: Kinds = VOLUME | BRICKS;
 const NEEDS: &[(&str, Kinds)] = &[
     ("dims", RAW),
     ("type", RAW),
-    ("spacing", RAW),
+    ("spacing", VOLUME | RAW),
     ("endian", RAW),
     ("header", RAW),
     ("scalar", MESH | CLOUD | VOLUME | SAMPLES | CELLS),

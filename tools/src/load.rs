@@ -50,8 +50,9 @@ pub struct LoadFlags {
         requires = "dims"
     )]
     sample_type: Option<SampleType>,
-    /// Raw volumes: set the distance between samples, in world units [default: 1]
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse::spacing, requires = "dims")]
+    /// Volumes: set the distance between samples along each axis, in world units [default: that of
+    /// the file, or 1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::spacing)]
     spacing: Option<DVec3>,
     /// Raw volumes: set the byte order, little or big [default: little]
     #[arg(long, value_name = "ORDER", value_parser = parse::endian, requires = "dims")]
@@ -184,7 +185,20 @@ impl LoadFlags {
 
     fn kind_with(&self, path: &Path, options: &ReadOptions) -> Result<Kind, Failure> {
         let raw = self.layout().map(|_| Kind::Volume);
-        Ok(Kind::of(path, &self.limits(), options)?.or(raw).ok_or_else(|| unknown(path))?)
+        let kind = Kind::of(path, &self.limits(), options)?.or(raw);
+        Ok(kind.ok_or_else(|| self.foreign(path).unwrap_or_else(|| unknown(path)))?)
+    }
+
+    /// Returns the error for a file of a kind that is known, but not read.
+    fn foreign(&self, path: &Path) -> Option<Error> {
+        let limits = self.limits();
+        let advice = if path.is_dir() {
+            formats::folder_advice(path)?
+        } else {
+            formats::advice(&Source::open(path, &limits).ok()?)?
+        };
+        let message = format!("is {}, which is not read", advice.what);
+        Some(Error::input(path, "file", message).hint(advice.hint))
     }
 
     /// Returns whether the flags give the layout of a file, because it has no format of its own.
@@ -197,7 +211,11 @@ impl LoadFlags {
     /// Opens a volume that can be read slice by slice. Returns `None` for volumes that are read as
     /// a whole.
     pub fn stream(&self, path: &Path) -> Result<Option<VolumeStream>, Failure> {
-        Ok(VolumeStream::open(path, &self.limits(), self.layout().as_ref())?)
+        let stream = VolumeStream::open(path, &self.limits(), self.layout().as_ref())?;
+        Ok(match (stream, self.spacing) {
+            (Some(stream), Some(spacing)) => Some(stream.with_spacing(spacing)?),
+            (stream, _) => stream,
+        })
     }
 
     /// Returns the name of the values to read, if the user named them.
@@ -213,6 +231,7 @@ impl LoadFlags {
             time: self.time,
             series: self.series.clone(),
             dataset: self.dataset.clone(),
+            spacing: self.spacing,
             missing: self.missing,
         }
     }
@@ -291,7 +310,7 @@ fn unknown(path: &Path) -> Error {
     if path.is_dir() {
         let message =
             "is not a regular file but a folder, in which no series of pictures was found";
-        let hint = "name one of its files, or a folder with the slices of a scan (DICOM)";
+        let hint = "name one of its files, or a folder with slices as DICOM or TIFF files";
         return Error::input(path, "path", message).hint(hint);
     }
     Error::input(path, "file", "is in no format that can be read")

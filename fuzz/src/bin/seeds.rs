@@ -16,6 +16,10 @@ use splatkit::{
     surface::Mesh,
     volume::{Lattice, Samples, Volume},
 };
+use tiff::{
+    encoder::{Compression as Compress, TiffEncoder, colortype},
+    tags::Tag,
+};
 use std::{
     error::Error,
     fs,
@@ -41,6 +45,7 @@ fn main() -> Result<()> {
     npy(&mut seeds)?;
     volumes(&mut seeds)?;
     medical(&mut seeds)?;
+    of_laboratories(&mut seeds)?;
     vti(&mut seeds)?;
     vtr_vtu(&mut seeds)?;
     vtk(&mut seeds)?;
@@ -448,6 +453,87 @@ fn npy(seeds: &mut Seeds) -> Result<()> {
         }
         seeds.known("npy", bytes)?;
     }
+    Ok(())
+}
+
+/// MetaImage, MRC, NPZ, TIFF and HDF5 files of a few samples.
+fn of_laboratories(seeds: &mut Seeds) -> Result<()> {
+    let header = |fields: &str, data: &str| {
+        format!(
+            "ObjectType = Image\nNDims = 3\n{fields}DimSize = 2 2 2\nElementType = MET_UCHAR\n\
+             ElementDataFile = {data}\n"
+        )
+    };
+    seeds.known("mhd", header("", "LOCAL") + "01234567")?;
+    seeds.known("mhd", header("BinaryData = False\nHeaderSize = -1\n", "LOCAL") + "1 2 3 4 5 6 7 8")?;
+    let channels = "ElementNumberOfChannels = 3\nBinaryDataByteOrderMSB = True\nTransformMatrix = 0 1 \
+                    0 1 0 0 0 0 1\nOffset = 1 2 3\nElementSpacing = 1 2 3\n";
+    seeds.known("mhd", header(channels, "LOCAL") + "0123456789abcdef01234567")?;
+    seeds.put("mhd", header("", "0.raw") + "\n#data\n01234567")?;
+    seeds.put("mhd", header("", "LIST\n0.raw\n0.raw") + "\n#data\n0123")?;
+    let mut packed = flate2::write::ZlibEncoder::new(Vec::new(), Compression::default());
+    packed.write_all(b"01234567")?;
+    let text = header("CompressedData = True\n", "LOCAL").into_bytes();
+    seeds.known("mhd", [text, packed.finish()?].concat())?;
+    for (mode, big) in [(0i32, false), (1, true), (2, false), (4, true), (12, false), (16, false), (101, false)] {
+        let mut map = vec![0; 1024];
+        let mut put = |word: usize, value: i32| {
+            let bytes = if big { value.to_be_bytes() } else { value.to_le_bytes() };
+            map[4 * (word - 1)..][..4].copy_from_slice(&bytes);
+        };
+        for axis in 1..=3 {
+            put(axis, 2);
+            put(7 + axis, 2);
+            put(10 + axis, 2f32.to_bits() as i32);
+            put(13 + axis, 90f32.to_bits() as i32);
+            put(16 + axis, axis as i32);
+        }
+        put(4, mode);
+        map[208..212].copy_from_slice(b"MAP ");
+        map[212..214].copy_from_slice(if big { &[0x11, 0x11] } else { &[0x44, 0x44] });
+        map.extend([1; 64]);
+        seeds.known("mrc", map)?;
+    }
+    arrays_and_pages(seeds)
+}
+
+fn arrays_and_pages(seeds: &mut Seeds) -> Result<()> {
+    let text = "{'descr': '|u1', 'fortran_order': False, 'shape': (2, 2, 2), }\n";
+    let mut array = b"\x93NUMPY\x01\0".to_vec();
+    array.extend((text.len() as u16).to_le_bytes());
+    array.extend([text.as_bytes(), b"01234567"].concat());
+    seeds.known("npy", &array)?;
+    for method in [zip::CompressionMethod::Stored, zip::CompressionMethod::Deflated] {
+        let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        for name in ["a.npy", "b.npy"] {
+            let options = zip::write::SimpleFileOptions::default().compression_method(method);
+            writer.start_file(name, options)?;
+            writer.write_all(&array)?;
+        }
+        seeds.known("npz", writer.finish()?.into_inner())?;
+    }
+    for (packed, text) in [
+        (Compress::Uncompressed, "ImageJ=1.53t\nimages=4\nchannels=2\nslices=2\nunit=um\n"),
+        (Compress::Lzw, "<OME><Pixels SizeZ='2' SizeC='1' SizeT='2' DimensionOrder='XYZCT'></OME>"),
+        (Compress::Packbits, "{\"shape\": [2, 2, 2, 3]}"),
+    ] {
+        let mut file = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut file)?.with_compression(packed);
+        for page in 0..4 {
+            let mut image = encoder.new_image::<colortype::Gray8>(3, 2)?;
+            if page == 0 {
+                image.encoder().write_tag(Tag::ImageDescription, text)?;
+            }
+            image.write_data(&[page, 1, 2, 3, 4, 5])?;
+        }
+        seeds.known("tiff", file.into_inner())?;
+    }
+    let mut file = hdf5_pure::FileBuilder::new();
+    file.create_dataset("small").with_u8_data(&[1, 2]).with_shape(&[1, 1, 2]);
+    let data: Vec<i16> = (0..60).collect();
+    let set = file.create_dataset("chunks").with_i16_data(&data).with_shape(&[3, 4, 5]);
+    set.with_chunks(&[2, 2, 2]).with_shuffle().with_deflate(6);
+    seeds.known("hdf5", file.finish()?)?;
     Ok(())
 }
 

@@ -6,6 +6,7 @@ pub(super) mod choice;
 pub(super) mod cloud;
 pub(super) mod found;
 pub(super) mod gather;
+pub(super) mod grid;
 pub(super) mod holes;
 pub(super) mod luminance;
 pub(super) mod plain;
@@ -13,3 +14,19 @@ pub(super) mod polygon;
 pub(super) mod rescale;
 pub(super) mod sample_type;
 pub(super) mod texture;
+
+/// Names that a message lists at most.
+const MOST_LISTED: usize = 20;
+
+/// Returns names as a list for messages: the first of them, and the number of the others.
+pub(super) fn listing(names: impl ExactSizeIterator<Item = String>) -> String {
+    let count = names.len();
+    let shown: Vec<String> = names.take(MOST_LISTED).collect();
+    match count {
+        0 => "nothing that can be read".into(),
+        _ if count > MOST_LISTED => {
+            format!("{} and {} more", shown.join("; "), count - MOST_LISTED)
+        }
+        _ => shown.join("; "),
+    }
+}

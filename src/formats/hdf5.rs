@@ -1,0 +1,226 @@
+//! HDF5 files: a data set of numbers as a volume. NetCDF-4, Imaris, ilastik and BigDataViewer write
+//! HDF5 as well.
+
+mod attributes;
+mod file;
+mod vtkhdf;
+
+use super::{
+    Endian, Kind, ReadOptions, SampleType,
+    array::{Array, Place},
+    npy::{self, Shaped},
+    shared::{grid::Element, listing},
+};
+use crate::{Result, cells::Cells, input::Source, surface::Mesh, volume::Volume};
+use attributes::Attributes;
+use file::{File, Found};
+use hdf5_pure::{Datatype, DatatypeByteOrder};
+use vtkhdf::DataSet;
+
+/// A byte of a compressed data set unpacks to fewer bytes than this. Parts that were never written
+/// take no bytes, so a false size could make any number of them.
+const MOST_UNPACKED: u64 = 1 << 13;
+
+/// Returns the kind of data: cells or a surface for these data sets of VTKHDF, else a volume.
+///
+/// # Errors
+/// As [`read`], for the file.
+pub fn kind(source: &Source) -> Result<Kind> {
+    let file = File::open(source)?;
+    DataSet::of(source, &file)?.map_or(Ok(Kind::Volume), |data| data.kind())
+}
+
+/// Reads an unstructured grid of VTKHDF. [`ReadOptions::scalar`] names its values.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_cells(source: &Source, options: &ReadOptions) -> Result<Cells> {
+    let file = File::open(source)?;
+    match DataSet::of(source, &file)? {
+        Some(data) if data.kind()? == Kind::Cells => data.cells(options),
+        _ => Err(vtkhdf::other_kind(source)),
+    }
+}
+
+/// Reads a surface of VTKHDF. [`ReadOptions::scalar`] names its values.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
+    let file = File::open(source)?;
+    match DataSet::of(source, &file)? {
+        Some(data) if data.kind()? == Kind::Mesh => data.mesh(options),
+        _ => Err(vtkhdf::other_kind(source)),
+    }
+}
+
+/// Reads the data set that [`ReadOptions::dataset`] names (`group/name`), as a volume; otherwise the
+/// largest of three dimensions. Its last dimension is x ([`npy::read_volume`] says what a fourth
+/// one means). Storage may be contiguous, compact or in chunks, with the filters deflate, shuffle,
+/// Fletcher-32, LZF and scale-offset.
+///
+/// Image data of VTKHDF are read as such: with their origin, spacing and directions, and the array
+/// that [`ReadOptions::scalar`] names.
+///
+/// Attributes of the data set that name the distance between samples along its dimensions are
+/// followed: `element_size_um` (ilastik, Fiji), `voxel_size`, `spacing`. `scale_factor`,
+/// `add_offset`, `_FillValue` and `missing_value` have the meaning of NetCDF: values are scaled, and
+/// samples of these values are holes. `units` and `long_name` name the values.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a malformed file, for a name that it does not contain,
+/// with those that it does, for data sets that are no numbers, and for a filter that is not known,
+/// with its number; [`Error::Limit`](crate::Error::Limit) for a data set over the limits.
+pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
+    let file = File::open(source)?;
+    if options.dataset.is_none()
+        && let Some(data) = DataSet::of(source, &file)?
+    {
+        return match data.kind()? {
+            Kind::Volume => data.volume(options),
+            _ => Err(vtkhdf::other_kind(source)),
+        };
+    }
+    let found = file.data_sets()?;
+    let chosen = chosen(source, &found, options)?;
+    let shaped = shaped(source, chosen)?;
+    let data = file.bytes(chosen, shaped.bytes())?;
+    let attributes = Attributes::of(&chosen.attributes);
+    let missing = options.missing.or(attributes.missing);
+    let options = ReadOptions { missing, ..options.clone() };
+    let mut volume = npy::volume_of(source, &shaped, data.into(), &options)?;
+    attributes.apply(source, &mut volume)?;
+    Ok(volume)
+}
+
+/// Lists the data sets.
+///
+/// # Errors
+/// As [`read`], for the file.
+pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
+    let file = File::open(source)?;
+    if options.dataset.is_none()
+        && let Some(data) = DataSet::of(source, &file)?
+    {
+        return data.list(options);
+    }
+    let found = file.data_sets()?;
+    let drawn = chosen(source, &found, options).ok().map(|chosen| chosen.path.clone());
+    let array = |found: &Found| Array {
+        name: found.path.clone(),
+        place: Place::Points,
+        kind: described(found),
+        components: 1,
+        range: None,
+        is_drawn: drawn.as_ref() == Some(&found.path),
+    };
+    Ok(found.iter().map(array).collect())
+}
+
+/// Returns the type and the shape of a data set.
+fn described(found: &Found) -> String {
+    let shape: Vec<String> = found.shape.iter().map(ToString::to_string).collect();
+    let kind = number_type(&found.datatype)
+        .map_or_else(|| found.datatype.to_string(), |(element, ..)| element.name());
+    format!("{} ({})", kind.chars().take(40).collect::<String>(), shape.join(", "))
+}
+
+/// Returns the data set to draw.
+fn chosen<'a>(source: &Source, found: &'a [Found], options: &ReadOptions) -> Result<&'a Found> {
+    let list = || listing(found.iter().map(|set| format!("“{}”, {}", set.path, described(set))));
+    if let Some(name) = &options.dataset {
+        let name = name.trim_matches('/');
+        return found.iter().find(|set| set.path == name).ok_or_else(|| {
+            source
+                .error("file", format!("has no data set “{name}”; it has {}", list()))
+                .hint("name one of these with --dataset")
+        });
+    }
+    let is_volume = |set: &&Found| shaped(source, set).is_ok_and(|shaped| shaped.is_volume());
+    let samples = |set: &&Found| set.shape.iter().fold(1u64, |all, &n| all.saturating_mul(n));
+    // Of several that are as large, the first.
+    let volumes = found.iter().filter(is_volume).rev();
+    volumes.max_by_key(samples).ok_or_else(|| {
+        source
+            .error("file", format!("has no numbers of three dimensions; it has {}", list()))
+            .hint("choose a data set with --dataset, and one of several times with --time")
+    })
+}
+
+/// Returns what is known of the dimensions of a data set.
+fn shaped(source: &Source, found: &Found) -> Result<Shaped> {
+    let place = format!("data set “{}”", found.path);
+    let (element, endian, inner) = number_type(&found.datatype).ok_or_else(|| {
+        let shown: String = found.datatype.to_string().chars().take(80).collect();
+        source.error(&place, format!("holds values of the type {shown}, which are not numbers"))
+    })?;
+    let sizes = found.shape.iter().copied().chain(inner).collect();
+    Ok(Shaped { element, endian, sizes, shown: described(found), place })
+}
+
+/// Returns the type of numbers, their byte order, and the dimensions that each value has itself.
+fn number_type(datatype: &Datatype) -> Option<(Element, Endian, Vec<u64>)> {
+    let order = |order: &DatatypeByteOrder| match order {
+        DatatypeByteOrder::LittleEndian => Some(Endian::Little),
+        DatatypeByteOrder::BigEndian => Some(Endian::Big),
+        _ => None,
+    };
+    match datatype {
+        Datatype::FixedPoint { size, byte_order, layout } if layout.bit_offset == 0 => {
+            let kind = match (size, layout.signed) {
+                (1, false) => SampleType::U8,
+                (1, true) => SampleType::I8,
+                (2, false) => SampleType::U16,
+                (2, true) => SampleType::I16,
+                (4, false) => SampleType::U32,
+                (4, true) => SampleType::I32,
+                (8, false) => SampleType::U64,
+                (8, true) => SampleType::I64,
+                _ => return None,
+            };
+            Some((Element::Real(kind), order(byte_order)?, Vec::new()))
+        }
+        Datatype::FloatingPoint { size, byte_order, layout } if layout.bit_offset == 0 => {
+            let element = match (size, layout.exponent_size) {
+                (2, 5) => Element::Half,
+                (4, 8) => Element::Real(SampleType::F32),
+                (8, 11) => Element::Real(SampleType::F64),
+                _ => return None,
+            };
+            Some((element, order(byte_order)?, Vec::new()))
+        }
+        Datatype::BitField { size: 1, .. } => {
+            Some((Element::Real(SampleType::U8), Endian::Little, Vec::new()))
+        }
+        // Truth values are an enumeration of bytes.
+        Datatype::Enumeration { base_type, .. } => number_type(base_type),
+        Datatype::Array { base_type, dimensions } => {
+            let (element, endian, inner) = number_type(base_type)?;
+            let own = dimensions.iter().map(|&size| u64::from(size));
+            Some((element, endian, own.chain(inner).collect()))
+        }
+        Datatype::Compound { size, members } => complex(*size, members),
+        _ => None,
+    }
+}
+
+/// Returns the type of complex numbers: two floats, one after the other.
+fn complex(
+    size: u32,
+    members: &[hdf5_pure::CompoundMember],
+) -> Option<(Element, Endian, Vec<u64>)> {
+    let [real, imaginary] = members else { return None };
+    let (Element::Real(part), endian, inner) = number_type(&real.datatype)? else { return None };
+    let bytes = part.bytes() as u64;
+    let is_pair = real.byte_offset == 0
+        && imaginary.byte_offset == bytes
+        && u64::from(size) == 2 * bytes
+        && number_type(&imaginary.datatype)? == (Element::Real(part), endian, inner.clone());
+    let is_float = matches!(part, SampleType::F32 | SampleType::F64);
+    (is_pair && is_float && inner.is_empty()).then_some((Element::Complex(part), endian, inner))
+}
+
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod vtkhdf_tests;

@@ -1,0 +1,203 @@
+//! TIFF stacks: the pages of a file are the slices of a volume, as ImageJ, Bio-Formats (OME-TIFF),
+//! tifffile and microscopes write them. Follows TIFF 6.0, and the OME data model (2016) and ImageJ's
+//! own notes for the meaning of the pages.
+
+mod meaning;
+mod pages;
+
+use super::{
+    ReadOptions,
+    shared::{
+        grid::{Component, Grid},
+        holes,
+    },
+};
+use crate::{
+    Result,
+    about::Modality,
+    input::Source,
+    volume::{Lattice, Volume},
+};
+use glam::DVec3;
+use meaning::Meaning;
+use pages::{Layout, Pages, Read};
+use std::{borrow::Cow, path::PathBuf};
+
+/// Reads the pages of a file as the slices of a volume, in their order; of a folder, its TIFF files of
+/// one page each, in the order of the numbers in their names (`s9.tif` before `s10.tif`). Rows run along x, columns
+/// along y and pages along z. Pages are strips or tiles of 1 to 64 bits, uncompressed or compressed by
+/// LZW, deflate, PackBits or JPEG. BigTIFF files are read too, and ImageJ's files of one directory
+/// for all slices. Previews of lower resolution are skipped.
+///
+/// ImageJ's and OME's descriptions give the order of slices, channels and times, the distance
+/// between samples and its unit. [`ReadOptions::scalar`] chooses a channel (`channel:1`), and
+/// [`ReadOptions::time`] a time; the first is the default. Colours are read as their brightness.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a malformed file, for a single page, which is a
+/// picture and no volume, and for pages of different sizes, with the page;
+/// [`Error::Limit`](crate::Error::Limit) for sizes over the limits.
+pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
+    if let Some(files) = source.folder() {
+        return read_folder(source, files, options);
+    }
+    let mut pages = Pages::open(source)?;
+    let meaning = Meaning::of(pages.description(), pages.resolution());
+    let stack = pages.stack(&meaning)?;
+    let planes = meaning.planes(source, stack.count(), options)?;
+    let [slices, times] = [planes.len(), meaning.times(stack.count())];
+    if stack.count() == 1 {
+        return Err(picture(source, &stack));
+    }
+    tracing::debug!("{slices} of {} pages at one of {times} times", stack.count());
+    let is_stored = stack.contiguous.is_some();
+    let layout = if is_stored { stack.layout } else { stack.layout.decoded() };
+    let grid = layout.grid(slices);
+    let component = component(source, options, &layout, meaning.channels > 1)?;
+    let size = grid.check(source)?;
+    let data = match stack.contiguous {
+        Some(start) => joined(source, &grid, start, &planes)?,
+        None => {
+            source.spend("the size of the pages in bytes", size as u64)?;
+            pages.read(&stack, &planes)?.into()
+        }
+    };
+    let samples = grid.samples(source, data, component)?;
+    let mut volume = holes::volume(source, lattice(source, &grid, &meaning)?, samples, options)?;
+    volume.about.length = meaning.unit;
+    volume.about.modality = meaning.is_microscopy.then_some(Modality::Microscopy);
+    Ok(volume)
+}
+
+fn lattice(source: &Source, grid: &Grid, meaning: &Meaning) -> Result<Lattice> {
+    let lattice = Lattice::with_spacing(grid.dims, DVec3::from(meaning.spacing));
+    lattice.check().map_err(|message| source.error("pages", message))?;
+    Ok(lattice)
+}
+
+/// Returns the error for a file of one page.
+fn picture(source: &Source, stack: &pages::Stack) -> crate::Error {
+    let [width, height] = stack.layout.size;
+    let message = format!(
+        "there is one page of {width} × {height} pixels: this is a picture, or one slice of a \
+         volume"
+    );
+    source.error("pages", message).hint(
+        "if the other slices are in files beside it, name their folder: splatkit render FOLDER -o \
+         out.png",
+    )
+}
+
+/// Returns which component of the pixels to read. If the pages themselves are channels, the name
+/// has chosen one already.
+fn component(
+    source: &Source,
+    options: &ReadOptions,
+    layout: &Layout,
+    is_chosen: bool,
+) -> Result<Component> {
+    let options = if is_chosen { &ReadOptions::default() } else { options };
+    let chosen = Component::chosen(source, options, layout.components, layout.are_colors)?;
+    if options.scalar.is_some() || layout.components == 1 {
+        return Ok(chosen);
+    }
+    let name = source.path.display();
+    if layout.are_colors {
+        tracing::warn!("{name}: colours are read as their brightness; --scalar red reads one");
+        return Ok(chosen);
+    }
+    tracing::warn!(
+        "{name}: the first of {} channels is read; --scalar channel:1 reads the second",
+        layout.components
+    );
+    Ok(Component::One(0))
+}
+
+/// Returns the bytes of planes that follow one another in the file without compression.
+fn joined<'a>(
+    source: &'a Source,
+    grid: &Grid,
+    start: usize,
+    planes: &[usize],
+) -> Result<Cow<'a, [u8]>> {
+    let size = grid.check(source)?;
+    let plane = size / planes.len().max(1);
+    let bytes = |index: usize| {
+        let at = index.checked_mul(plane)?.checked_add(start)?;
+        source.bytes().get(at..)?.get(..plane)
+    };
+    let cut = |index: usize| {
+        let message = format!("slice {index} is cut off: {plane} bytes were expected");
+        source.error("pages", message)
+    };
+    let is_run = planes.windows(2).all(|pair| pair[1] == pair[0] + 1);
+    if let (true, [first, .., last]) = (is_run, planes) {
+        bytes(*last).ok_or_else(|| cut(*last))?;
+        let start = start + first * plane;
+        return Ok(Cow::Borrowed(&source.bytes()[start..start + size]));
+    }
+    source.spend("the size of the pages in bytes", size as u64)?;
+    let mut all = Vec::with_capacity(size.min(source.bytes().len()));
+    for &index in planes {
+        all.extend_from_slice(bytes(index).ok_or_else(|| cut(index))?);
+    }
+    Ok(all.into())
+}
+
+/// Returns whether the first bytes are of a TIFF or BigTIFF file, in either byte order.
+pub(super) fn is_tiff(bytes: &[u8]) -> bool {
+    matches!(bytes.first_chunk(), Some(b"II\x2a\0" | b"MM\0\x2a" | b"II\x2b\0" | b"MM\0\x2b"))
+}
+
+/// Returns the TIFF files among those of a folder, by their names.
+fn pages_of(files: &[PathBuf]) -> Vec<PathBuf> {
+    let is_page = |file: &&PathBuf| {
+        let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        matches!(extension.as_deref(), Some("tif" | "tiff"))
+    };
+    files.iter().filter(is_page).cloned().collect()
+}
+
+/// Returns whether a folder has several TIFF files, which are the slices of a volume.
+///
+/// # Errors
+/// None: the files are not opened.
+pub(super) fn is_folder(source: &Source) -> Result<bool> {
+    Ok(source.folder().is_some_and(|files| pages_of(files).len() > 1))
+}
+
+/// Reads the files of a folder as the slices of a volume, in the order of the numbers in their
+/// names (`s9.tif` before `s10.tif`). Each has one page, and all have the same size.
+///
+/// # Errors
+/// As [`read`], with the file.
+fn read_folder(source: &Source, files: &[PathBuf], options: &ReadOptions) -> Result<Volume> {
+    let mut files = pages_of(files);
+    files.sort_by_cached_key(|file| meaning::natural(&file.to_string_lossy()));
+    let mut all = Vec::new();
+    let mut first: Option<(Layout, Meaning)> = None;
+    for path in &files {
+        source.check_time()?;
+        let file = source.open_beside(path)?;
+        let Read { layout, data, meaning } = pages::one(&file)?;
+        let (expected, _) = first.get_or_insert((layout, meaning));
+        if *expected != layout {
+            return Err(file.error("page", layout.differs(expected)));
+        }
+        source.spend("the size of the pages in bytes", data.len() as u64)?;
+        all.extend_from_slice(&data);
+        file.intact()?;
+    }
+    let Some((layout, meaning)) = first else {
+        return Err(source.error("path", "holds no TIFF files"));
+    };
+    let grid = layout.grid(files.len());
+    let component = component(source, options, &layout, false)?;
+    let samples = grid.samples(source, all.into(), component)?;
+    let mut volume = holes::volume(source, lattice(source, &grid, &meaning)?, samples, options)?;
+    volume.about.length = meaning.unit;
+    Ok(volume)
+}
+
+#[cfg(test)]
+mod tests;
