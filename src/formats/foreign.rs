@@ -296,7 +296,7 @@ const FOREIGN: &[Foreign] = &[
         hint: "export it as CSV with the columns x, y, z and value",
     },
     Foreign {
-        extensions: &["pvd", "case", "encas", "pvsm", "foam", "xdmf", "xmf"],
+        extensions: &["case", "encas", "pvsm", "foam", "xdmf", "xmf"],
         magic: &[b"FORMAT\ntype:"],
         what: "a list of files of a solver, for ParaView",
         hint: "name one of the files that it lists, or save the data from ParaView as VTU",
