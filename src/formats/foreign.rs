@@ -82,13 +82,13 @@ const FOREIGN: &[Foreign] = &[
         extensions: &["dwg", "dxf"],
         magic: &[b"AC10"],
         what: "an AutoCAD drawing",
-        hint: "export its surfaces as STL from the CAD program, or convert it in Blender or FreeCAD",
+        hint: "export its surfaces as STL from the CAD program, or convert it in FreeCAD",
     },
     Foreign {
         extensions: &["fbx"],
         magic: &[b"Kaydara FBX Binary"],
         what: "an FBX scene",
-        hint: "convert with assimp export SCENE.fbx scene.glb, or open it in Blender and export glTF",
+        hint: "convert with assimp export SCENE.fbx scene.glb, or export glTF from Blender",
     },
     Foreign {
         extensions: &["blend"],
@@ -180,8 +180,8 @@ const FOREIGN: &[Foreign] = &[
         extensions: &["mat"],
         magic: &[b"MATLAB 5.0 MAT-file", b"MATLAB 4.0"],
         what: "a MATLAB file of version 4 to 7",
-        hint: "save it in MATLAB with save(FILE, '-v7.3'), and name the array with --dataset; or use \
-               scipy.io.loadmat and numpy.save in Python",
+        hint: "save it in MATLAB with save(FILE, '-v7.3'), and name the array with --dataset; or \
+               use scipy.io.loadmat and numpy.save in Python",
     },
     Foreign {
         extensions: &["grib", "grb", "grib2", "grb2"],

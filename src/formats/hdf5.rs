@@ -54,18 +54,18 @@ pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     }
 }
 
-/// Reads the data set that [`ReadOptions::dataset`] names (`group/name`), as a volume; otherwise the
-/// largest of three dimensions. Its last dimension is x ([`npy::read_volume`] says what a fourth
-/// one means). Storage may be contiguous, compact or in chunks, with the filters deflate, shuffle,
-/// Fletcher-32, LZF and scale-offset.
+/// Reads the data set that [`ReadOptions::dataset`] names (`group/name`), as a volume; otherwise
+/// the largest of three dimensions. Its last dimension is x ([`npy::read_volume`] says what a
+/// fourth one means). Storage may be contiguous, compact or in chunks, with the filters deflate,
+/// shuffle, Fletcher-32, LZF and scale-offset.
 ///
 /// Image data of VTKHDF are read as such: with their origin, spacing and directions, and the array
 /// that [`ReadOptions::scalar`] names.
 ///
 /// Attributes of the data set that name the distance between samples along its dimensions are
 /// followed: `element_size_um` (ilastik, Fiji), `voxel_size`, `spacing`. `scale_factor`,
-/// `add_offset`, `_FillValue` and `missing_value` have the meaning of NetCDF: values are scaled, and
-/// samples of these values are holes. `units` and `long_name` name the values.
+/// `add_offset`, `_FillValue` and `missing_value` have the meaning of NetCDF: values are scaled,
+/// and samples of these values are holes. `units` and `long_name` name the values.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed file, for a name that it does not contain,

@@ -30,7 +30,8 @@ const DATA: &str = "ElementDataFile";
 /// Reads an image of two to four axes; the fourth is time ([`ReadOptions::time`]). World positions
 /// are those of ITK: the rows of `TransformMatrix` are the directions of the axes, `Offset` is the
 /// position of the first sample, and `CenterOfRotation` has no effect. If the file gives an
-/// anatomical orientation, the world is that of DICOM (x to the left, y to the back, z to the head).
+/// anatomical orientation, the world is that of DICOM (x to the left, y to the back, z to the
+/// head).
 ///
 /// Samples may have several channels ([`ReadOptions::scalar`]): without a choice, three or four of
 /// unsigned bytes are a colour, of which the brightness is read, and others a vector, of which the

@@ -1,5 +1,6 @@
-//! Density maps of electron microscopy and crystallography (`.mrc`, `.map`, `.ccp4`, `.rec`, `.st`).
-//! Follows the definition of MRC2014 (Cheng et al., Journal of Structural Biology 192, 2015).
+//! Density maps of electron microscopy and crystallography (`.mrc`, `.map`, `.ccp4`, `.rec`,
+//! `.st`). Follows the definition of MRC2014 (Cheng et al., Journal of Structural Biology 192,
+//! 2015).
 
 use super::{
     Endian, ReadOptions, SampleType,
@@ -27,13 +28,13 @@ const MARK: usize = 208;
 const PACKED: i32 = 101;
 
 /// Reads a map. The world's axes are those of the cell's frame: x along a, and y in the plane of a
-/// and b (as the Protein Data Bank has it). Lengths are in ångström; without a cell, samples are one
-/// unit apart. Columns, rows and sections may be any of the axes (`MAPC`, `MAPR`, `MAPS`). The
+/// and b (as the Protein Data Bank has it). Lengths are in ångström; without a cell, samples are
+/// one unit apart. Columns, rows and sections may be any of the axes (`MAPC`, `MAPR`, `MAPS`). The
 /// position of the first sample is `ORIGIN`, or the number of its column, row and section if that
 /// is zero.
 ///
-/// Samples are of mode 0 (signed bytes; unsigned ones if IMOD wrote the file and says so), 1, 2, 3, 4
-/// (complex ones become their magnitude), 6, 12, 16 (colours) and 101. A stack of volumes (space
+/// Samples are of mode 0 (signed bytes; unsigned ones if IMOD wrote the file and says so), 1, 2, 3,
+/// 4 (complex ones become their magnitude), 6, 12, 16 (colours) and 101. A stack of volumes (space
 /// group 401 to 630) is read at [`ReadOptions::time`].
 ///
 /// # Errors

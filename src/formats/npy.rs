@@ -23,8 +23,8 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Returns the kind of data in an array: a point cloud (n × 3), samples (n × 4, n × 5 or n × 10), or
-/// a volume (three axes and more).
+/// Returns the kind of data in an array: a point cloud (n × 3), samples (n × 4, n × 5 or n × 10),
+/// or a volume (three axes and more).
 ///
 /// # Errors
 /// As [`read`], for the header; [`Error::Input`](crate::Error::Input) for any other shape.

@@ -900,7 +900,11 @@
             mha("100 100 100", "", b"1234"),
             "size.mha: data: there are 4 bytes where 1000000 were expected",
         ),
-        ("none.mha", mha("0 4 4", "", b""), "none.mha: header: a volume of 0 × 4 × 4 samples holds none"),
+        (
+            "none.mha",
+            mha("0 4 4", "", b""),
+            "none.mha: header: a volume of 0 × 4 × 4 samples holds none",
+        ),
         (
             "bomb.mha",
             mha("1 1 1", "CompressedData = True\n", &zlib(&[7; 1 << 20])),

@@ -16,15 +16,15 @@ use splatkit::{
     surface::Mesh,
     volume::{Lattice, Samples, Volume},
 };
-use tiff::{
-    encoder::{Compression as Compress, TiffEncoder, colortype},
-    tags::Tag,
-};
 use std::{
     error::Error,
     fs,
     io::{Cursor, Write},
     path::{Path, PathBuf},
+};
+use tiff::{
+    encoder::{Compression as Compress, TiffEncoder, colortype},
+    tags::Tag,
 };
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
@@ -465,9 +465,12 @@ fn of_laboratories(seeds: &mut Seeds) -> Result<()> {
         )
     };
     seeds.known("mhd", header("", "LOCAL") + "01234567")?;
-    seeds.known("mhd", header("BinaryData = False\nHeaderSize = -1\n", "LOCAL") + "1 2 3 4 5 6 7 8")?;
-    let channels = "ElementNumberOfChannels = 3\nBinaryDataByteOrderMSB = True\nTransformMatrix = 0 1 \
-                    0 1 0 0 0 0 1\nOffset = 1 2 3\nElementSpacing = 1 2 3\n";
+    seeds.known(
+        "mhd",
+        header("BinaryData = False\nHeaderSize = -1\n", "LOCAL") + "1 2 3 4 5 6 7 8",
+    )?;
+    let channels = "ElementNumberOfChannels = 3\nBinaryDataByteOrderMSB = True\nTransformMatrix = \
+                    0 1 0 1 0 0 0 0 1\nOffset = 1 2 3\nElementSpacing = 1 2 3\n";
     seeds.known("mhd", header(channels, "LOCAL") + "0123456789abcdef01234567")?;
     seeds.put("mhd", header("", "0.raw") + "\n#data\n01234567")?;
     seeds.put("mhd", header("", "LIST\n0.raw\n0.raw") + "\n#data\n0123")?;
@@ -475,7 +478,9 @@ fn of_laboratories(seeds: &mut Seeds) -> Result<()> {
     packed.write_all(b"01234567")?;
     let text = header("CompressedData = True\n", "LOCAL").into_bytes();
     seeds.known("mhd", [text, packed.finish()?].concat())?;
-    for (mode, big) in [(0i32, false), (1, true), (2, false), (4, true), (12, false), (16, false), (101, false)] {
+    for (mode, big) in
+        [(0i32, false), (1, true), (2, false), (4, true), (12, false), (16, false), (101, false)]
+    {
         let mut map = vec![0; 1024];
         let mut put = |word: usize, value: i32| {
             let bytes = if big { value.to_be_bytes() } else { value.to_le_bytes() };
@@ -720,11 +725,8 @@ fn hierarchies(seeds: &mut Seeds) -> Result<()> {
     for (count, block_splats) in [(1, 64), (7, 64), (150, 64)] {
         let splats: Vec<_> = whole.splats.iter().copied().take(count).collect();
         let set = splatkit::splat::SplatSet { splats, ..whole.clone() };
-        let tree = Tree::build(
-            &set,
-            &BuildOptions { block_splats, ..BuildOptions::default() },
-            None,
-        )?;
+        let tree =
+            Tree::build(&set, &BuildOptions { block_splats, ..BuildOptions::default() }, None)?;
         for lossless in [false, true] {
             let options = WriteOptions {
                 lossless,

@@ -314,8 +314,8 @@ fn number(value: Value) -> Option<f64> {
     }
 }
 
-/// Returns the type of samples by their bits and TIFF's number of their format: 1 unsigned, 2 signed,
-/// 3 floats, 4 unknown.
+/// Returns the type of samples by their bits and TIFF's number of their format: 1 unsigned, 2
+/// signed, 3 floats, 4 unknown.
 fn number_type(bits: u8, format: u16) -> Option<Element> {
     Some(match (bits, format) {
         (16, 3) => Element::Half,
