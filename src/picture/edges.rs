@@ -10,8 +10,8 @@ use glam::{DVec2, DVec3, Vec3};
 /// ```
 /// use splatkit::{picture::Edges, surface::Mesh};
 ///
-/// // An octahedron: eight triangles, twelve edges.
-/// assert_eq!(Edges::of(&Mesh::sphere(0)).len(), 12);
+/// // An icosahedron: twenty triangles, thirty edges.
+/// assert_eq!(Edges::of(&Mesh::sphere(0)).len(), 30);
 /// ```
 #[derive(Debug, Clone)]
 pub struct Edges {
