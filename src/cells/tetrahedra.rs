@@ -115,7 +115,7 @@ impl Builder {
         let longest = edges.x_axis.length_squared().max(edges.y_axis.length_squared());
         let longest = longest.max(edges.z_axis.length_squared());
         let volume = edges.determinant();
-        if !(volume.abs() > LEAST_VOLUME * longest * longest.sqrt()) {
+        if volume.abs() <= LEAST_VOLUME * longest * longest.sqrt() {
             return;
         }
         self.made.corners.push(if volume > 0.0 { [a, b, c, d] } else { [a, c, b, d] });

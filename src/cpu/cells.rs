@@ -310,6 +310,15 @@ impl<S: Simd> Sum<S> {
     }
 }
 
+/// A tetrahedron that is added to sheets.
+struct Crossed<S: Simd> {
+    linear: Linear,
+    /// Its extinction times colour, and its extinction, if its value is the same everywhere.
+    light: Option<[Lanes<S>; 4]>,
+    /// The first and the last of the sheets.
+    sheets: [usize; 2],
+}
+
 /// The tetrahedra of a tile that is being drawn.
 pub struct CellTile<'a, S: Simd> {
     field: &'a CellField<'a>,
@@ -412,6 +421,7 @@ impl<'a, S: Simd> CellTile<'a, S> {
                     Place::Cells => Some(self.field.light(simd, plan, shot.number)),
                 };
                 let last = usize::from(shot.sheets[1]).min(sheet + OPEN - 1);
+                let crossed = Crossed { linear, light, sheets: [sheet, last] };
                 let [columns, rows] = each!([0, 1], AXIS => {
                     let [first, last] = shot.pixels[AXIS];
                     let side = [WIDE, HIGH][AXIS] as i32;
@@ -423,7 +433,7 @@ impl<'a, S: Simd> CellTile<'a, S> {
                     for column in columns.clone() {
                         let packet = &packets[row * (TILE / WIDE) + column];
                         if !packet.is_done {
-                            self.add_to(simd, plan, packet, &linear, light, [sheet, last]);
+                            self.add_to(simd, plan, packet, &crossed);
                         }
                     }
                 }
@@ -431,18 +441,10 @@ impl<'a, S: Simd> CellTile<'a, S> {
         );
     }
 
-    /// Adds a tetrahedron to the sheets of a packet. `light` is its extinction times colour, and
-    /// its extinction, if its value is the same everywhere.
+    /// Adds a tetrahedron to the sheets of a packet.
     #[inline(always)]
-    fn add_to(
-        &mut self,
-        simd: S,
-        plan: &Plan,
-        packet: &Packet<S>,
-        linear: &Linear,
-        light: Option<[Lanes<S>; 4]>,
-        [first, last]: [usize; 2],
-    ) {
+    fn add_to(&mut self, simd: S, plan: &Plan, packet: &Packet<S>, crossed: &Crossed<S>) {
+        let Crossed { linear, light, sheets: [first, last] } = crossed;
         let rays = &packet.rays;
         let [enter, leave] = linear.part(simd, plan, packet);
         let is_in = enter.simd_lt(leave) & packet.pixels.through.simd_ge(OPAQUE);
@@ -459,7 +461,7 @@ impl<'a, S: Simd> CellTile<'a, S> {
         let gradient =
             if has_gradients { three!(I => along(linear.gradient[I])) } else { [value; 3] };
         let [low, high] = linear.range;
-        for sheet in first..=last {
+        for sheet in *first..=*last {
             let begin = enter.max(Lanes::splat(simd, plan.planes[sheet]));
             let end = leave.min(Lanes::splat(simd, plan.planes[sheet + 1]));
             let mask = is_in & begin.simd_lt(end);
@@ -469,7 +471,8 @@ impl<'a, S: Simd> CellTile<'a, S> {
             let sum = &mut self.sums[sheet % OPEN][packet.number];
             self.has_sums[sheet % OPEN] |= packet.bit();
             if let Some(light) = light {
-                sum.add_light(simd, plan, packet, [begin, end], mask, light);
+                let end = mask.select(end, begin);
+                sum.add_light(simd, plan, packet, [begin, end], *light);
                 continue;
             }
             let none = Lanes::splat(simd, 0.0);
@@ -628,11 +631,9 @@ impl<S: Simd> Sum<S> {
         plan: &Plan,
         packet: &Packet<S>,
         [begin, end]: [Lanes<S>; 2],
-        mask: mask32x8<S>,
         light: [Lanes<S>; 4],
     ) {
-        let none = Lanes::splat(simd, 0.0);
-        let length = mask.select(plan.kept(simd, &packet.rays, [begin, end]), none);
+        let length = plan.kept(simd, &packet.rays, [begin, end]);
         if plan.optics == Optics::Maximum {
             let value = length.simd_gt(0.0).select(light[3], Lanes::splat(simd, -BEHIND));
             self.end = self.end.max(value);

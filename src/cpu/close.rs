@@ -588,6 +588,30 @@ impl Plan<'_> {
 }
 
 impl<S: Simd> Layer<S> {
+    /// Returns the field of a sheet that is filled, with a value in the middle.
+    #[inline(always)]
+    pub fn new(
+        simd: S,
+        direction: [Lanes<S>; 3],
+        [front, back]: [Face<S>; 2],
+        middle: Lanes<S>,
+        [start, thickness]: [Lanes<S>; 2],
+        [begin, end]: [Lanes<S>; 2],
+    ) -> Self {
+        Self {
+            front,
+            back,
+            middle,
+            start,
+            thickness,
+            begin,
+            end,
+            filling: Lanes::splat(simd, 1.0),
+            direction,
+            has_whole_gradients: false,
+        }
+    }
+
     #[inline(always)]
     fn parabola(&self, u: Lanes<S>) -> Lanes<S> {
         let v = 1.0 - u;

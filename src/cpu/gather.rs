@@ -210,20 +210,9 @@ impl Gather<'_> {
         // slopes there.
         let bend = (front_along - back_along) * thickness;
         let middle = sum * 0.5 + bend * 0.125;
-        let filling = Lanes::splat(simd, 1.0);
-        let direction = rays.direction;
-        let mut layer = Layer {
-            front,
-            back,
-            middle,
-            start: Lanes::splat(simd, start),
-            thickness: Lanes::splat(simd, thickness),
-            begin,
-            end,
-            filling,
-            direction,
-            has_whole_gradients: false,
-        };
+        let of_sheet = [Lanes::splat(simd, start), Lanes::splat(simd, thickness)];
+        let mut layer =
+            Layer::new(simd, rays.direction, [front, back], middle, of_sheet, [begin, end]);
         if self.parts > 1 {
             let mask = mask & self.fill_thick(simd, rays, [front_weight, last.weight], &mut layer);
             return (self.may_show(simd, &layer) && mask.any_true()).then_some((layer, mask));

@@ -431,6 +431,30 @@ impl CpuRenderer {
         self.scene.items.iter().find_map(own).unwrap_or_default()
     }
 
+    /// Returns a bit for each sheet of each tile in which the gathered field may be visible.
+    fn marks(&self, plan: &Plan, outline: &Outline, gather: &Gather) -> Vec<Vec<u64>> {
+        let mut marks: Vec<Vec<u64>> = Vec::new();
+        for (level, lattice) in gather.levels.iter().zip(self.lattices(outline)) {
+            let own = level.shown.sheets_of_tiles(&lattice, plan.view, &outline.sheets);
+            if marks.is_empty() {
+                marks = own;
+                continue;
+            }
+            for (tile, other) in marks.iter_mut().zip(own) {
+                tile.iter_mut().zip(other).for_each(|(a, b)| *a |= b);
+            }
+        }
+        marks
+    }
+
+    /// Returns the scene's cells as a view shows them.
+    fn cells<'a>(&'a self, plan: &Plan, visible: &Visible) -> Option<CellField<'a>> {
+        self.scene.items.iter().find_map(|item| match item {
+            Item::Cells(own, _) => Some(CellField::new(plan, own, visible)),
+            _ => None,
+        })
+    }
+
     fn draw(
         &mut self,
         plan: &Plan,
@@ -441,33 +465,21 @@ impl CpuRenderer {
     ) -> (Picture, FrameStats) {
         let mut spare = std::mem::take(&mut self.spare_bins);
         let visible = Visible::new(plan);
-        let mut marks = Vec::new();
         let mut gather = None;
         if gathers {
             self.prepare_gather(plan, outline);
             gather = self.gather(plan, outline, &visible);
             clock.step("skip");
         }
-        if let Some(gather) = &gather {
-            for (level, lattice) in gather.levels.iter().zip(self.lattices(outline)) {
-                let own = level.shown.sheets_of_tiles(&lattice, plan.view, &outline.sheets);
-                if marks.is_empty() {
-                    marks = own;
-                    continue;
-                }
-                for (tile, other) in marks.iter_mut().zip(own) {
-                    tile.iter_mut().zip(other).for_each(|(a, b)| *a |= b);
-                }
-            }
+        let marks = gather.as_ref().map_or_else(Vec::new, |gather| {
+            let marks = self.marks(plan, outline, gather);
             clock.step("skip");
-        }
+            marks
+        });
         let marked =
             |own: &Vec<u64>| own.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
         let gathered = marks.iter().map(marked).sum();
-        let cells = self.scene.items.iter().find_map(|item| match item {
-            Item::Cells(own, _) => Some(CellField::new(plan, own, &visible)),
-            _ => None,
-        });
+        let cells = self.cells(plan, &visible);
         let crossed = cells.as_ref().map_or(0, CellField::count);
         let march = March { plan, gather, cells, visible: &visible, records };
         let mut bins = Bins::new(plan, records, &mut spare);

@@ -70,9 +70,6 @@ impl<'a> Plan<'a> {
         settings: &Settings,
         choice: Option<&Choice>,
     ) -> Self {
-        let mut planes = vec![-NOWHERE];
-        planes.extend(sheets.planes.iter().map(|plane| *plane as f32));
-        planes.extend([NOWHERE; 4]);
         let [clips, holes] = clip_counts(settings).map(|count| count as usize);
         let empty = Tables {
             entries: Vec::new(),
@@ -85,7 +82,7 @@ impl<'a> Plan<'a> {
             view,
             frame: Frame::new(scene, view, sheets, settings, choice),
             tables: empty,
-            planes,
+            planes: planes_of(sheets),
             sheets: sheets.count(),
             mode: settings.mode,
             optics: settings.optics,
@@ -208,4 +205,12 @@ impl<'a> Plan<'a> {
         }
         sheet
     }
+}
+
+/// Returns the planes between all sheets: one before the first sheet, and four behind the last.
+fn planes_of(sheets: &Sheets) -> Vec<f32> {
+    let mut planes = vec![-NOWHERE];
+    planes.extend(sheets.planes.iter().map(|plane| *plane as f32));
+    planes.extend([NOWHERE; 4]);
+    planes
 }
