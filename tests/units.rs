@@ -232,7 +232,13 @@ fn automatic_functions_in_any_unit() {
 #[test]
 fn cut_faces_of_noise_have_no_grain() {
     let lattice = USUAL.lattice();
-    let noise = |sample: usize| f64::from((sample as u32).wrapping_mul(2_654_435_761) >> 24) / 32.0;
+    // From 0 to 12 (SplitMix64: Steele, Lea & Flood 2014).
+    let noise = |sample: usize| {
+        let z = (sample as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        12.0 * ((z ^ (z >> 31)) >> 40) as f64 / f64::from(1u32 << 24)
+    };
     let inside = |sample: usize| lattice.sample_position(sample).length() < 0.8;
     let value = |sample| (if inside(sample) { 200.0 } else { 20.0 } + noise(sample)) as u8;
     let volume = Volume::new(USUAL.lattice(), Samples::U8((0..lattice.len()).map(value).collect()))
