@@ -54,6 +54,8 @@ impl TransferFunction {
     /// - Hounsfield units, of a file that says so or as the values look, show skin and bone. Other
     ///   modalities have colours and light of their own. The file's window limits the values.
     /// - Light fades where the gradient may be noise ([`Shade::certain`]).
+    /// - A single slice is a picture: opaque, and grey from the lowest value of the file's window to
+    ///   the highest, or of the values.
     ///
     /// Opacities hold for a hundredth of the volume's diagonal, so the picture depends neither on
     /// the unit of length nor on the sampling. A constant volume is shown as a faint haze. So is a
@@ -62,6 +64,9 @@ impl TransferFunction {
     pub fn automatic(volume: &Volume) -> Self {
         if volume.validate().is_err() {
             return haze(0.0, 1.0);
+        }
+        if let Some(slice) = slice(volume) {
+            return slice;
         }
         let survey = Survey::of_volume(volume, window(&volume.about, volume.range));
         let (dims, spacing) = (volume.lattice.dims, volume.lattice.spacing());
@@ -100,6 +105,25 @@ fn window(about: &About, [low, high]: [f64; 2]) -> Option<[f64; 2]> {
     let [from, to] = about.window?;
     let window = [from.max(low), to.min(high)];
     (window[1] - window[0] > 0.01 * (high - low).min(to - from)).then_some(window)
+}
+
+/// Returns the function of a volume of one slice; `None` for other volumes.
+fn slice(volume: &Volume) -> Option<TransferFunction> {
+    let (dims, [low, high]) = (volume.lattice.dims, volume.range);
+    let axis = dims.iter().position(|&count| count == 1)?;
+    let is_slice = dims.iter().filter(|&&count| count > 1).count() == 2;
+    let [from, to] = volume.about.window.unwrap_or([low, high]);
+    // A window beside the values would show nothing of them.
+    let window = [from.max(low), to.min(high)];
+    let window = if window[0] < window[1] { [from, to] } else { [low, high] };
+    (is_slice && low < high).then(|| TransferFunction {
+        color: vec![(window[0], [0.0; 3]), (window[1], [1.0; 3])],
+        opacity: vec![(low, 1.0), (high, 1.0)],
+        // Far less than the slice's thickness, so that it hides what is behind it.
+        unit: 0.1 * volume.lattice.spacing()[axis],
+        shade: None,
+        ..TransferFunction::default()
+    })
 }
 
 /// A function that shows a single value.

@@ -248,3 +248,20 @@ fn every_field_gets_a_valid_function() {
     let holes = TransferFunction::of_values(&[f32::NAN, 1.0, 2.0, 3.0], 1.0, &About::default());
     assert!(holes.visible([1.0, 3.0]));
 }
+
+#[test]
+fn a_single_slice_is_a_picture() {
+    let lattice = Lattice::with_spacing([3, 2, 1], DVec3::new(1.0, 1.0, 5.0));
+    let samples = Samples::I16(vec![-1000, -20, 0, 40, 80, 1000]);
+    let mut volume = Volume::new(lattice, samples).unwrap();
+    let grey = |volume: &Volume| TransferFunction::automatic(volume).color(0.0);
+    assert_eq!(grey(&volume), [0.5; 3]);
+    volume.about.window = Some([-100.0, 300.0]);
+    assert_eq!(grey(&volume), [0.25; 3]);
+    // A window beside the values is not that of these values.
+    volume.about.window = Some([2000.0, 3000.0]);
+    assert_eq!(grey(&volume), [0.5; 3]);
+    let transfer = TransferFunction::automatic(&volume);
+    assert!(transfer.shade.is_none() && transfer.opacity(-1000.0) == 1.0);
+    assert_eq!(transfer.unit, 0.5);
+}
