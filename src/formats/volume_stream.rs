@@ -3,7 +3,7 @@
 use super::{
     FORMATS, RawLayout, SampleType,
     format::{InPieces, find_volume},
-    shared::plain::Plain,
+    shared::{holes, plain::Plain},
 };
 use crate::{
     Error, Result,
@@ -12,7 +12,7 @@ use crate::{
     volume::{Lattice, Samples, Scalar},
 };
 use glam::DVec3;
-use std::{ops::Range, path::Path};
+use std::{ops::Range, path::Path, sync::OnceLock};
 
 /// A volume whose samples are stored uncompressed: a raw file, or an NRRD file with raw encoding.
 /// It yields the same data as [`load_volume`](super::load_volume). It regularly returns the pages
@@ -21,6 +21,10 @@ pub struct VolumeStream {
     plain: Plain,
     scalar: Scalar,
     map: Mapping,
+    missing: Option<f64>,
+    /// The number of samples without a value, and the value that they are read as. Known once all
+    /// samples were looked at.
+    holes: OnceLock<(u64, f64)>,
 }
 
 /// Slices that are read together.
@@ -66,7 +70,20 @@ impl VolumeStream {
             .bytes_of(plain.lattice.dims)
             .and_then(|bytes| bytes.checked_add(plain.start as u64));
         let is_whole = bytes.is_some_and(|bytes| bytes <= map.len() as u64) && !map.is_empty();
-        Ok(is_whole.then_some(Self { plain, scalar, map }))
+        let (missing, holes) = (None, OnceLock::new());
+        Ok(is_whole.then_some(Self { plain, scalar, map, missing, holes }))
+    }
+
+    /// Takes samples of a value as holes, too ([`ReadOptions::missing`](super::ReadOptions)).
+    #[must_use]
+    pub fn with_missing(mut self, missing: Option<f64>) -> Self {
+        self.missing = missing;
+        self
+    }
+
+    /// Returns the number of samples without a value, once [`range`](Self::range) has counted them.
+    pub fn holes(&self) -> u64 {
+        self.holes.get().map_or(0, |(count, _)| *count)
     }
 
     /// Replaces the distances between samples along the axes ([`ReadOptions::spacing`]).
@@ -98,7 +115,8 @@ impl VolumeStream {
         self.scalar
     }
 
-    /// Returns the samples of a range of slices across the last axis.
+    /// Returns the samples of a range of slices across the last axis. Once [`range`](Self::range)
+    /// has looked at all samples, those without a value are read as the lowest value.
     ///
     /// # Errors
     /// [`Error::Input`] if the file has changed since it was opened.
@@ -108,9 +126,14 @@ impl VolumeStream {
     pub fn slices(&self, z: Range<usize>) -> Result<Samples> {
         let Plain { start, sample_type, endian, ref lattice, .. } = self.plain;
         let slice = lattice.dims[0] * lattice.dims[1] * sample_type.bytes();
-        let samples = sample_type
+        let mut samples = sample_type
             .decode(self.map[start + z.start * slice..start + z.end * slice].into(), endian);
         self.map.release();
+        if let Some(&(count, lowest)) = self.holes.get()
+            && count > 0
+        {
+            holes::fill_with(&mut samples, self.missing, lowest);
+        }
         intact(&self.map, &self.plain.path).map(|()| samples)
     }
 
@@ -118,19 +141,25 @@ impl VolumeStream {
     /// with the number of slices visited so far and their total.
     ///
     /// # Errors
-    /// [`Error::Input`] for samples that are not finite.
+    /// [`Error::Input`] if no sample has a value.
     pub fn range(&self, watch: Watch<'_>) -> Result<[f64; 2]> {
         let count = self.plain.lattice.dims[2];
         let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut holes = 0;
         for first in (0..count).step_by(PIECE) {
             tell(watch, first as u64, count as u64);
             let z = first..(first + PIECE).min(count);
-            let [low, high] = self.slices(z.clone())?.range().map_err(|message| {
-                let place = format!("samples of the slices {} to {}", z.start, z.end - 1);
-                Error::input(&self.plain.path, place, message)
-            })?;
-            range = [range[0].min(low), range[1].max(high)];
+            let (count, found) = holes::measure(&self.slices(z)?, self.missing);
+            holes += count;
+            if let Some([low, high]) = found {
+                range = [range[0].min(low), range[1].max(high)];
+            }
         }
+        if range[0] > range[1] {
+            let message = holes::all_missing(self.plain.lattice.len(), self.missing);
+            return Err(Error::input(&self.plain.path, "samples", message));
+        }
+        self.holes.get_or_init(|| (holes, range[0]));
         Ok(range)
     }
 }
@@ -216,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_packed_wrong_or_not_finite_is_told() {
+    fn what_is_packed_or_wrong_is_told_and_holes_are_filled() {
         let folder = Folder::new();
         let limits = Limits::default();
         let layout = |sample_type| RawLayout {
@@ -246,12 +275,15 @@ mod tests {
         );
         assert!(VolumeStream::open(&cut, &limits, None).unwrap().is_none());
         let path = folder.write("a.raw", [1f32, 2.0, f32::NAN, 3.0].map(f32::to_le_bytes).concat());
-        let stream =
-            VolumeStream::open(&path, &limits, Some(&layout(SampleType::F32))).unwrap().unwrap();
-        let message = stream.range(None).unwrap_err().to_string();
-        assert!(
-            message.contains("a.raw: samples of the slices 0 to 1: 1 of 4 samples are not finite"),
-            "{message}"
-        );
+        let open = |missing| {
+            let stream = VolumeStream::open(&path, &limits, Some(&layout(SampleType::F32)));
+            stream.unwrap().unwrap().with_missing(missing)
+        };
+        let stream = open(Some(1.0));
+        assert_eq!((stream.range(None).unwrap(), stream.holes()), ([2.0, 3.0], 2));
+        assert_eq!(stream.slices(0..2).unwrap(), Samples::F32(vec![2.0, 2.0, 2.0, 3.0]));
+        folder.write("a.raw", [f32::NAN; 4].map(f32::to_le_bytes).concat());
+        let message = open(None).range(None).unwrap_err().to_string();
+        assert!(message.contains("a.raw: samples: none of the 4 samples has"), "{message}");
     }
 }

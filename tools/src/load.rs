@@ -212,6 +212,7 @@ impl LoadFlags {
     /// a whole.
     pub fn stream(&self, path: &Path) -> Result<Option<VolumeStream>, Failure> {
         let stream = VolumeStream::open(path, &self.limits(), self.layout().as_ref())?;
+        let stream = stream.map(|stream| stream.with_missing(self.missing));
         Ok(match (stream, self.spacing) {
             (Some(stream), Some(spacing)) => Some(stream.with_spacing(spacing)?),
             (stream, _) => stream,

@@ -691,6 +691,36 @@ fn vtr_vtu(seeds: &mut Seeds) -> Result<()> {
              {cells}</Polys></Piece></PolyData></VTKFile>",
             array("Float32", "value", 1, "1 2 3 4")
         ),
+    )?;
+    let values = array("Float32", "value", 1, "1 2 3 4 5 6 7 nan")
+        + &array("UInt8", "vtkGhostType", 1, "0 0 0 0 0 0 0 1");
+    let corners = "0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1";
+    seeds.known(
+        "vtu",
+        format!(
+            "<VTKFile type='StructuredGrid'><StructuredGrid WholeExtent='0 1 0 1 0 1'><Piece \
+             Extent='0 1 0 1 0 1'><PointData>{values}</PointData><Points>{}</Points></Piece>\
+             </StructuredGrid></VTKFile>",
+            array("Float32", "points", 3, corners)
+        ),
+    )?;
+    let polyhedron = [
+        ("connectivity", "0 1 2 3"),
+        ("offsets", "4"),
+        ("types", "42"),
+        ("faces", "4 3 0 2 1 3 0 1 3 3 1 2 3 3 2 0 3"),
+        ("faceoffsets", "17"),
+    ]
+    .map(|(name, text)| array("Int64", name, 1, text))
+    .concat();
+    seeds.known(
+        "vtu",
+        format!(
+            "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='4' \
+             NumberOfCells='1'><CellData>{}</CellData><Points>{points}</Points><Cells>{polyhedron}\
+             </Cells></Piece></UnstructuredGrid></VTKFile>",
+            array("Float32", "value", 3, "1 2 3")
+        ),
     )
 }
 
@@ -711,6 +741,9 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
          CELL_TYPES 1\n10\nCELL_DATA 1\nSCALARS c int 1\nLOOKUP_TABLE default\n5\n",
         "DATASET POLYDATA\nPOINTS 3 float\n0 0 0 2 0 0 0 2 0\nPOLYGONS 1 4\n3 0 1 2\nPOINT_DATA 3\n\
          SCALARS value float\nLOOKUP_TABLE default\n1 2 3\n",
+        "DATASET STRUCTURED_GRID\nDIMENSIONS 2 2 1\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 1 1 0\n\
+         POINT_DATA 4\nSCALARS b bit\nLOOKUP_TABLE default\n0 1 0 1\nFIELD f 2\ns 1 4 string\na\n\
+         b\nc\nd\nv 3 4 float\n1 2 3 4 5 6 7 8 9 10 11 12\n",
     ] {
         seeds.known("vtk", format!("{}{rest}", head("ASCII")))?;
     }

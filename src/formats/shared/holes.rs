@@ -45,35 +45,56 @@ fn fill(samples: &mut Samples, missing: Option<f64>) -> Result<u64, String> {
     if missing.is_none() && !matches!(samples, Samples::F32(_)) {
         return Ok(0);
     }
-    each_type!(samples, values => fill_values(values, missing))
+    let (holes, range) = measure(samples, missing);
+    if holes > 0 {
+        let [lowest, _] = range.ok_or_else(|| all_missing(samples.len(), missing))?;
+        fill_with(samples, missing, lowest);
+    }
+    Ok(holes)
 }
 
-fn fill_values<T: Copy + PartialOrd + Send + Sync + Into<f64>>(
-    values: &mut [T],
+/// Returns the number of samples without a value, and the range of the others.
+pub(crate) fn measure(samples: &Samples, missing: Option<f64>) -> (u64, Option<[f64; 2]>) {
+    each_type!(samples, values => measure_values(values, missing))
+}
+
+/// Replaces samples without a value by a value of the samples.
+pub(crate) fn fill_with(samples: &mut Samples, missing: Option<f64>, value: f64) {
+    match samples {
+        Samples::U8(values) => replace(values, missing, value as u8),
+        Samples::U16(values) => replace(values, missing, value as u16),
+        Samples::I16(values) => replace(values, missing, value as i16),
+        Samples::I32(values) => replace(values, missing, value as i32),
+        Samples::F32(values) => replace(values, missing, value as f32),
+    }
+}
+
+fn replace<T: Copy + Send + Sync + Into<f64>>(values: &mut [T], missing: Option<f64>, by: T) {
+    values.par_chunks_mut(CHUNK).for_each(|chunk| {
+        let holes = chunk.iter_mut().filter(|value| is_hole((**value).into(), missing));
+        holes.for_each(|value| *value = by);
+    });
+}
+
+fn measure_values<T: Copy + Send + Sync + Into<f64>>(
+    values: &[T],
     missing: Option<f64>,
-) -> Result<u64, String> {
-    let is_hole = |value: T| is_hole(value.into(), missing);
-    let lower = |a: Option<T>, b: Option<T>| match (a, b) {
-        (Some(a), Some(b)) => Some(if b < a { b } else { a }),
+) -> (u64, Option<[f64; 2]>) {
+    let join = |a: Option<[f64; 2]>, b: Option<[f64; 2]>| match (a, b) {
+        (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
         (a, b) => a.or(b),
     };
     let of_chunk = |chunk: &[T]| {
-        chunk.iter().fold((0u64, None), |(holes, lowest), &value| {
-            if is_hole(value) { (holes + 1, lowest) } else { (holes, lower(lowest, Some(value))) }
+        chunk.iter().fold((0u64, None), |(holes, range), &value| {
+            let value: f64 = value.into();
+            if is_hole(value, missing) {
+                (holes + 1, range)
+            } else {
+                (holes, join(range, Some([value, value])))
+            }
         })
     };
-    let (holes, lowest) = values
-        .par_chunks(CHUNK)
-        .map(of_chunk)
-        .reduce(|| (0, None), |a, b| (a.0 + b.0, lower(a.1, b.1)));
-    if holes == 0 {
-        return Ok(0);
-    }
-    let lowest = lowest.ok_or_else(|| all_missing(values.len(), missing))?;
-    values.par_chunks_mut(CHUNK).for_each(|chunk| {
-        chunk.iter_mut().filter(|value| is_hole(**value)).for_each(|value| *value = lowest);
-    });
-    Ok(holes)
+    values.par_chunks(CHUNK).map(of_chunk).reduce(|| (0, None), |a, b| (a.0 + b.0, join(a.1, b.1)))
 }
 
 /// Returns the message for samples of which none has a value.

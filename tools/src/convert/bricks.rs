@@ -45,6 +45,13 @@ impl Convert {
             Source::Stream(stream) => {
                 let range =
                     stream.range(Some(&|done, all| stages.set("Scanning the input", done, all)))?;
+                if stream.holes() > 0 {
+                    let (holes, all) = (stream.holes(), lattice.len());
+                    let file = file.display();
+                    tracing::warn!(
+                        "{file}: {holes} of {all} values are missing and were read as the lowest"
+                    );
+                }
                 bricks::convert(stream, range, &self.output, &options, Some(&watch))
             }
         }
