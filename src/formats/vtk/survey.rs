@@ -178,11 +178,8 @@ impl Survey {
                     let field = block.field(about.place, &about.name);
                     let field = field.filter(|own| own.about.components == about.components);
                     if let Some(numbers) = field.and_then(|field| field.numbers.as_ref()) {
-                        let part =
-                            if about.components == 1 { Part::Whole } else { Part::Magnitude };
-                        let values = numbers.doubles(set.source)?;
-                        let values = part.values(values, about.components.max(1));
-                        widen(array, &values, options.missing);
+                        widen(array, numbers, options.missing)?;
+                        set.source.check_time()?;
                     }
                 }
             }
@@ -267,11 +264,21 @@ fn first_numbers(source: &Source, numbers: &Numbers) -> Result<Vec<f64>> {
     part.doubles(source)
 }
 
-fn widen(array: &mut Array, values: &[f64], missing: Option<f64>) {
-    for &value in values.iter().filter(|&&value| !is_hole(value, missing)) {
-        let [low, high] = array.range.unwrap_or([value, value]);
-        array.range = Some([low.min(value), high.max(value)]);
+/// Widens the range of an array by numbers, which are decoded a few at a time.
+fn widen(array: &mut Array, numbers: &Numbers, missing: Option<f64>) -> Result<()> {
+    /// Tuples that are decoded together.
+    const TUPLES: usize = 1 << 14;
+    let components = array.components.max(1);
+    let part = if components == 1 { Part::Whole } else { Part::Magnitude };
+    let found = numbers.part()?;
+    for bytes in found.bytes.chunks(TUPLES * components * found.kind.bytes()) {
+        let values = part.values(found.kind.doubles(bytes, found.endian), components);
+        for value in values.into_iter().filter(|&value| !is_hole(value, missing)) {
+            let [low, high] = array.range.unwrap_or([value, value]);
+            array.range = Some([low.min(value), high.max(value)]);
+        }
     }
+    Ok(())
 }
 
 /// Returns the number of axes along which a cell of one of VTK's types extends; `None` for types
