@@ -147,6 +147,9 @@ impl Layout {
             at(name).ok_or_else(|| source.error(&place, format!("has no column “{name}”")))
         };
         let position = [need("x")?, need("y")?, need("z")?];
+        if text.len() == 0 {
+            return Err(source.error("file", "contains no samples"));
+        }
         let radius = at("radius");
         let terms = COVARIANCE.map(|term| at(term).or_else(|| at(&format!("cov_{term}"))));
         let covariance =

@@ -51,7 +51,9 @@ struct Walk<'l, 'f> {
 impl Walk<'_, '_> {
     /// Shows the data sets of a file, which may be a piece of a whole. Returns whether to go on.
     fn file(&mut self, source: &Source, depth: usize, whole: Option<usize>) -> Result<bool> {
-        if legacy::is_legacy(source.bytes()) {
+        let is_named = source.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtk"));
+        let is_xml = source.bytes().trim_ascii_start().starts_with(b"<");
+        if legacy::is_legacy(source.bytes()) || (is_named && !is_xml) {
             return self.show(source, vec![legacy::block(source)?], whole);
         }
         let document = Document::read(source)?;

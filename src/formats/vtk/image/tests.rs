@@ -273,7 +273,7 @@ fn wrong_heads_are_told() {
     };
     let (head, image) = ("type='ImageData'", "WholeExtent='0 1 0 0 0 1'");
     for (head, image, word) in [
-        ("type='PolyData'", image, "no points"),
+        ("type='PolyData'", image, "PolyData"),
         ("type='Table'", image, "Table"),
         ("type='ImageData' compressor='vtkZstdDataCompressor'", image, "vtkZstdDataCompressor"),
         ("type='ImageData' byte_order='Middle'", image, "Middle"),

@@ -107,7 +107,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Skips the next line if it begins with this word.
+    /// Skips the next line if it begins with this word. In binary files it must.
     pub fn skip_line_of(&mut self, word: &str) -> Result<()> {
         let rest = self.rest().trim_ascii_start();
         match rest
@@ -115,6 +115,9 @@ impl<'a> Parser<'a> {
             .is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes()))
         {
             true => self.line().map(drop),
+            false if self.binary => Err(self
+                .source
+                .error(self.place(), format!("there is no line “{word}” where it was expected"))),
             false => Ok(()),
         }
     }
