@@ -237,6 +237,9 @@ impl ColorFlags {
     pub fn bar(&self, transfer: &TransferFunction, values: [f64; 2], title: String) -> Bar {
         let ends = transfer.color.first().zip(transfer.color.last());
         let range = match ends.map(|(first, last)| [first.0, last.0]) {
+            // A map spans what the user or the function asks for; a function's own points may lie
+            // far beyond the values.
+            Some(span) if self.colormap.is_some() => span,
             Some([low, high]) if low < high => [low.max(values[0]), high.min(values[1])],
             _ => values,
         };
