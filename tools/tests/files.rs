@@ -239,7 +239,6 @@ fn wrong_usage_is_told() {
         "",
         "paint",
         "render",
-        "render a.ply",
         "render a.ply -o a.png --size 10",
         "render a.ply -o a.png --samples 3",
         "render a.ply -o a.png --engine cpu --gpu 0",
