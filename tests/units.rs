@@ -285,12 +285,12 @@ fn flat_surroundings_are_flat() {
         Volume::new(USUAL.lattice(), Samples::U8(samples)).expect("the samples fill the lattice");
     let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
     let camera = USUAL.camera(PERSPECTIVE, false);
-    let expected = reference::render(&scene, &camera, &settings()).expect("a picture");
     // Gathering cuts kernels off at a cube of four samples a side, not at the ball inside it. The
     // edge of this ball of samples is as hard as can be, so that costs 2 dB.
     for (evaluate, least) in [(Evaluate::Scatter, 40.0), (Evaluate::Gather, 38.0)] {
-        let agreement =
-            psnr(&expected, &drawn(&scene, &camera, &Settings { evaluate, ..settings() }));
+        let settings = Settings { evaluate, ..settings() };
+        let expected = reference::render(&scene, &camera, &settings).expect("a picture");
+        let agreement = psnr(&expected, &drawn(&scene, &camera, &settings));
         println!("flat surroundings, {evaluate:?}: {agreement:.1} dB");
         assert!(agreement > least, "{evaluate:?}: {agreement:.1} dB");
     }

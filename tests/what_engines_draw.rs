@@ -368,10 +368,15 @@ impl Engines {
 /// Asserts that the pictures show the scene; other pictures do not count as drawn.
 fn check_likeness(row: &Row, pictures: &[(&str, &Picture)]) {
     let (Ok(scene), false) = (&row.scene, pictures.is_empty()) else { return };
-    let truth = reference::render(scene, &row.camera, &row.settings).expect(row.name);
-    assert!(truth.color.iter().any(|pixel| pixel[3] > 0.3), "{}: an empty picture", row.name);
+    let truth = |evaluate| {
+        let settings = Settings { evaluate, ..row.settings.clone() };
+        reference::render(scene, &row.camera, &settings).expect(row.name)
+    };
+    let [gathered, scattered] = [Evaluate::Gather, Evaluate::Scatter].map(truth);
+    assert!(gathered.color.iter().any(|pixel| pixel[3] > 0.3), "{}: an empty picture", row.name);
     for (column, picture) in pictures {
-        let psnr = measured(picture, &truth);
+        let truth = if column.ends_with("gather") { &gathered } else { &scattered };
+        let psnr = measured(picture, truth);
         assert!(psnr > LIKENESS, "{}, {column}: {psnr:.1} dB", row.name);
     }
 }

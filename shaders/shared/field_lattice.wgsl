@@ -195,17 +195,27 @@ fn field_at(r: u32, distance: f32) -> Face {
     return face;
 }
 
+// Sheets whose field differs from a straight line by fewer entries of the table have the gradients
+// of the cubic between their faces.
+const STRAIGHT: f32 = 64.0;
+
 // Returns the mean of a sheet: that of the cubic with the values and slopes along the ray of both
-// faces (Hermite). If only the mean is classified, the value in the middle makes it exact to the
-// fifth degree (Simpson's rule with slopes).
-fn mean_of(r: u32, sheet: u32, front: Face, back: Face) -> f32 {
-    let bend = (front.along - back.along) * (planes[sheet + 1u] - planes[sheet]);
-    if POST {
-        let middle = field_at(r, 0.5 * (planes[sheet] + planes[sheet + 1u])).value;
-        return ((front.value + back.value) * 7.0 + middle * 16.0) * (1.0 / 30.0)
-            + bend * (1.0 / 60.0);
+// faces (Hermite). With the value in the middle it is exact to the fifth degree (Simpson's rule
+// with slopes).
+fn mean_of(r: u32, sheet: u32, own: ptr<function, Sheet>) -> f32 {
+    let front = (*own).front;
+    let back = (*own).back;
+    let thickness = planes[sheet + 1u] - planes[sheet];
+    let sum = front.value + back.value;
+    let bend = (front.along - back.along) * thickness;
+    let skew = back.value - front.value - 0.5 * (front.along + back.along) * thickness;
+    if POST || (GRADIENTS && max(abs(bend), abs(skew)) > STRAIGHT) {
+        (*own).inside = field_at(r, 0.5 * (planes[sheet] + planes[sheet + 1u]));
+        return (sum * 7.0 + (*own).inside.value * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
     }
-    return 0.5 * (front.value + back.value) + bend * (1.0 / 12.0);
+    (*own).inside.slope = 0.5 * (front.slope + back.slope);
+    (*own).inside.along = 0.5 * (front.along + back.along) + 1.5 * skew / thickness;
+    return 0.5 * sum + bend * (1.0 / 12.0);
 }
 
 fn sample_shows(place: vec3<f32>) -> bool {
@@ -271,5 +281,5 @@ fn resolve_field(r: u32, sheet: u32, own: ptr<function, Sheet>) {
     (*own).filling = 1.0;
     (*own).front = pixels[r].front;
     (*own).back = pixels[r].behind;
-    (*own).value = mean_of(r, sheet, (*own).front, (*own).back);
+    (*own).value = mean_of(r, sheet, own);
 }

@@ -18,6 +18,8 @@ struct Sheet {
     filling: f32,
     front: Face,
     back: Face,
+    // A gathered lattice: the field in the middle.
+    inside: Face,
     // Radiance payload: colour times optical depth, and optical depth.
     radiance: vec4<f32>,
 }

@@ -102,6 +102,10 @@ struct Medium {
     // The slopes across the picture at both faces.
     front: vec2<f32>,
     back: vec2<f32>,
+    // A gathered lattice: the slope across the picture in the middle, and the derivatives along the
+    // ray at the front, in the middle and at the back.
+    inside: vec2<f32>,
+    along: vec3<f32>,
     // The largest value.
     peak: f32,
     // Whether an isosurface absorbed half of the light.
@@ -110,9 +114,19 @@ struct Medium {
 
 const NO_VALUE: f32 = -3e38;
 
-// Returns the gradient at a place: across the picture interpolated between the faces, along the ray
-// the parabola's derivative, which knows more of the inside.
+// Returns the gradient at a place. That of a gathered lattice is known at the faces and in the
+// middle, and a parabola in between. Otherwise it is interpolated between the faces across the
+// picture; along the ray it is the derivative of the values' parabola, which knows more of the
+// inside.
 fn gradient_at(r: u32, medium: Medium, u: f32) -> vec3<f32> {
+    if GATHER {
+        let shares = vec3((1.0 - u) * (1.0 - 2.0 * u), 4.0 * u * (1.0 - u), u * (2.0 * u - 1.0));
+        return gradient(
+            r,
+            shares.x * medium.front + shares.y * medium.inside + shares.z * medium.back,
+            dot(shares, medium.along) * frame.gradients.z,
+        );
+    }
     let curve = medium.curve;
     let along = curve.x * (4.0 * u - 3.0) + curve.y * (4.0 - 8.0 * u) + curve.z * (4.0 * u - 1.0);
     return gradient(
@@ -242,6 +256,10 @@ fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
     if GRADIENTS && (own.front.has_value || own.back.has_value) {
         medium.front = select(own.back.slope, own.front.slope, own.front.has_value);
         medium.back = select(own.front.slope, own.back.slope, own.back.has_value);
+        if GATHER {
+            medium.inside = own.inside.slope;
+            medium.along = vec3(own.front.along, own.inside.along, own.back.along);
+        }
     }
     var begin = max(planes[sheet], pixels[r].inside.x);
     let last = min(planes[sheet + 1u], pixels[r].inside.y);

@@ -525,6 +525,8 @@ impl<'a, S: Simd> CellTile<'a, S> {
         front.value = sum.begin.simd_eq(end).select(value, front.value);
         let mean = sum.integral / sum.covered.max(Lanes::splat(simd, least));
         self.last[packet.number] = [sum.end, sum.back.value];
+        // The gradients of the faces are whole, not only across the ray.
+        let middle = three!(I => (front.across[I] + sum.back.across[I]) * 0.5);
         let layer = Layer {
             front,
             back: sum.back,
@@ -535,7 +537,7 @@ impl<'a, S: Simd> CellTile<'a, S> {
             end: sum.end.min(rays.inside[1]),
             filling: (sum.covered / thickness).min(one),
             direction: rays.direction,
-            has_whole_gradients: true,
+            sections: Some([front.across, middle, sum.back.across]),
         };
         Some((layer, has_value))
     }

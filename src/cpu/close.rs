@@ -106,9 +106,13 @@ pub struct Layer<S: Simd> {
     /// The filled fraction of the sheet.
     pub filling: Lanes<S>,
     pub direction: [Lanes<S>; 3],
-    /// The gradients of the faces are whole, not only across the ray.
-    pub has_whole_gradients: bool,
+    /// The gradients in view space at the front, in the middle and at the back, in entries per
+    /// thickness of a sheet; `None` where only those of the faces are known, and only across.
+    pub sections: Option<Sections<S>>,
 }
+
+/// Gradients at three places of a sheet.
+pub type Sections<S> = [[Lanes<S>; 3]; 3];
 
 /// The effect of a sheet on light.
 struct Medium<S: Simd> {
@@ -576,13 +580,25 @@ impl Plan<'_> {
     /// Returns the gradient in view space, in entries per thickness of a sheet.
     #[inline(always)]
     fn gradient<S: Simd>(&self, layer: &Layer<S>, u: Lanes<S>) -> [Lanes<S>; 3] {
-        let (front, back) = (layer.front.across, layer.back.across);
-        if layer.has_whole_gradients {
-            return three!(I => (back[I] - front[I]).mul_add(u, front[I]));
+        if let Some([front, middle, back]) = &layer.sections {
+            let v = 1.0 - u;
+            let w = v - u;
+            let shares = [v * w, u * v * 4.0, u * w];
+            return three!(I => {
+                front[I] * shares[0] + middle[I] * shares[1] - back[I] * shares[2]
+            });
         }
+        self.gradient_of_faces(layer, u)
+    }
+
+    /// Returns the gradient from those of the faces: across the ray linear between them, along the
+    /// ray the derivative of the parabola.
+    #[inline(always)]
+    pub fn gradient_of_faces<S: Simd>(&self, layer: &Layer<S>, u: Lanes<S>) -> [Lanes<S>; 3] {
         let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
         let slope = a * (u * 4.0 - 3.0) + b * (4.0 - u * 8.0) + c * (u * 4.0 - 1.0);
         let along = slope * self.frame.gradients[2] / layer.thickness;
+        let (front, back) = (layer.front.across, layer.back.across);
         three!(I => (back[I] - front[I]).mul_add(u, front[I]) + along * layer.direction[I])
     }
 }
@@ -608,7 +624,7 @@ impl<S: Simd> Layer<S> {
             end,
             filling: Lanes::splat(simd, 1.0),
             direction,
-            has_whole_gradients: false,
+            sections: None,
         }
     }
 

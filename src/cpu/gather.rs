@@ -4,7 +4,7 @@
 use super::{
     blend::Way,
     brick_cache::Grid,
-    close::{Face, Layer, OPAQUE, Packet, Visible},
+    close::{Face, Layer, OPAQUE, Packet, Sections, Visible},
     field::{BEYOND, Typed},
     kernel_sums::{MOST_TAPS, Point},
     plan::Plan,
@@ -117,6 +117,8 @@ const LOOKED_UP: usize = 8;
 pub struct Last<S: Simd> {
     plane: usize,
     face: Face<S>,
+    /// The gradient in view space, in entries per thickness of a sheet.
+    gradient: [Lanes<S>; 3],
     along: Lanes<S>,
     weight: Lanes<S>,
     /// The first of the looked-up sheets, and for each sheet a bit for each ray on which something
@@ -133,6 +135,7 @@ impl<S: Simd> Last<S> {
         Self {
             plane: usize::MAX,
             face,
+            gradient: [none; 3],
             along: none,
             weight: none,
             first: usize::MAX - LOOKED_UP,
@@ -201,7 +204,8 @@ impl Gather<'_> {
         if last.plane != sheet {
             self.face(simd, rays, sheet, last);
         }
-        let (front, front_along, front_weight) = (last.face, last.along, last.weight);
+        let before = *last;
+        let (front, front_along, front_weight) = (before.face, before.along, before.weight);
         self.face(simd, rays, sheet + 1, last);
         let (back, back_along) = (last.face, last.along);
         let thickness = stop - start;
@@ -222,14 +226,20 @@ impl Gather<'_> {
         if !has_gaps && !self.may_show(simd, &layer) {
             return None;
         }
-        if !has_gaps && !bend.abs().simd_gt(STRAIGHT).any_true() {
+        if !has_gaps && !self.is_bent([&before, last], bend, thickness) {
             return Some((layer, mask));
         }
         let inside = self.at(simd, rays, 0.5 * (start + stop));
+        let sections = [before.gradient, self.gradient(inside.slopes), last.gradient];
         if self.is_blended {
-            let has_field = layer.blend(simd, plan, bend, [front_weight, last.weight], &inside);
+            let weights = [front_weight, last.weight];
+            let has_field = layer.blend(simd, plan, bend, weights, &inside);
+            layer.set_sections(simd, plan, sections, [front_weight, inside.weight, last.weight]);
             let mask = mask & has_field;
             return (self.may_show(simd, &layer) && mask.any_true()).then_some((layer, mask));
+        }
+        if plan.has_gradients() {
+            layer.sections = Some(sections);
         }
         // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with
         // slopes).
@@ -237,6 +247,27 @@ impl Gather<'_> {
         let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
         layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
+    }
+
+    /// Whether the field in a sheet differs from what its faces show. `bend` is the difference of
+    /// the slopes at the faces, in entries of the table per sheet.
+    #[inline(always)]
+    fn is_bent<S: Simd>(
+        &self,
+        [front, back]: [&Last<S>; 2],
+        bend: Lanes<S>,
+        thickness: f32,
+    ) -> bool {
+        let mut most = bend.abs();
+        if self.plan.has_gradients() {
+            // A step in the middle of the sheet has equal slopes at both faces.
+            let chord = back.face.value - front.face.value;
+            most = most.max((chord - (front.along + back.along) * (0.5 * thickness)).abs());
+            // Gradients are per thickness of a sheet.
+            let turn = three!(I => (back.gradient[I] - front.gradient[I]).abs());
+            most = most.max(turn[0].max(turn[1]).max(turn[2]));
+        }
+        most.simd_gt(STRAIGHT).any_true()
     }
 
     /// Whether any value that a sheet may have counts in the picture.
@@ -440,20 +471,51 @@ impl Gather<'_> {
         let frame = &self.plan.frame;
         let per_value = frame.transfer[1];
         let Point { value, slopes, weight } = self.at(simd, rays, self.plan.planes[plane]);
-        // From steps of the lattice to view space.
-        let axes = frame.field_axes();
-        let gradient = three!(I => {
-            (slopes[0] * axes[0][I] + slopes[1] * axes[1][I] + slopes[2] * axes[2][I]) * per_value
-        });
+        let gradient = self.gradient(slopes);
         let along = dot(gradient, rays.direction);
-        let length = frame.gradients[2];
-        let across = three!(I => (gradient[I] - along * rays.direction[I]) * length);
-        (last.plane, last.along, last.weight) = (plane, along, weight);
+        let across = three!(I => gradient[I] - along * rays.direction[I]);
+        (last.plane, last.gradient, last.weight) = (plane, gradient, weight);
+        last.along = along * (1.0 / frame.gradients[2]);
         last.face = Face { value: value * per_value, across };
+    }
+
+    /// Converts the field's change per step of the lattice to a gradient in view space, in entries
+    /// per thickness of a sheet.
+    #[inline(always)]
+    fn gradient<S: Simd>(&self, slopes: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        let frame = &self.plan.frame;
+        let (axes, scale) = (frame.field_axes(), frame.transfer[1] * frame.gradients[2]);
+        three!(I => {
+            (slopes[0] * axes[0][I] + slopes[1] * axes[1][I] + slopes[2] * axes[2][I]) * scale
+        })
     }
 }
 
 impl<S: Simd> Layer<S> {
+    /// Sets the gradients at the front, in the middle and at the back. Pixels without a value at
+    /// one of these places keep those of the faces.
+    #[inline(always)]
+    fn set_sections(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        sections: Sections<S>,
+        weights: [Lanes<S>; 3],
+    ) {
+        if !plan.has_gradients() {
+            return;
+        }
+        let [front, middle, back] = weights;
+        let has_all = front.min(middle).min(back).simd_gt(0.0);
+        let of_faces = three!(I => {
+            plan.gradient_of_faces(self, Lanes::splat(simd, [0.0, 0.5, 1.0][I]))
+        });
+        let exact = sections;
+        self.sections = Some(three!(P => {
+            three!(I => has_all.select(exact[P][I], of_faces[P][I]))
+        }));
+    }
+
     /// Sets the mean of the sheet, weighting the field by the sum of the kernels. Missing values
     /// are replaced by the others. Returns where there is a field. `weights` are those at the
     /// faces, `inside` is the field in the middle, `bend` the difference of the slopes at the

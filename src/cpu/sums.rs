@@ -151,7 +151,7 @@ impl<S: Simd> Sums<S> {
             end,
             filling,
             direction: rays.direction,
-            has_whole_gradients: false,
+            sections: None,
         };
         Some((layer, has_value))
     }

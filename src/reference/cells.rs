@@ -147,7 +147,7 @@ fn layer(parts: &[Part], thickness: f64) -> Option<Layer> {
         mean: integral / covered,
         faces: [Some(first.values[0]), Some(last.values[1])],
         gradients: [Some(first.gradients[0]), Some(last.gradients[1])],
-        has_whole_gradients: true,
+        middle: Some(0.5 * (first.gradients[0] + last.gradients[1])),
         filling: (covered / (span[1] - span[0])).min(1.0),
     })
 }

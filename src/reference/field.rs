@@ -29,8 +29,8 @@ pub(super) struct Layer {
     /// The values at the faces.
     pub faces: [Option<f64>; 2],
     pub gradients: [Option<DVec3>; 2],
-    /// The gradients at the faces are whole, not only across the ray.
-    pub has_whole_gradients: bool,
+    /// The gradient in the middle, in fields that have one there.
+    pub middle: Option<DVec3>,
     /// Factor on the extinction.
     pub filling: f64,
 }
@@ -86,17 +86,20 @@ impl Layer {
             + back * u * (2.0 * u - 1.0)
     }
 
-    /// Returns the gradient at a place: interpolated between the faces' gradients across the ray,
-    /// and the parabola's derivative along it.
+    /// Returns the gradient at a place: the parabola through those at the faces and in the middle,
+    /// if there are all three. Otherwise interpolated between the faces' gradients across the ray,
+    /// and the derivative of the values' parabola along it.
     fn gradient(&self, u: f64, direction: DVec3) -> DVec3 {
+        if let ([Some(front), Some(back)], Some(middle)) = (self.gradients, self.middle) {
+            return (1.0 - u) * (1.0 - 2.0 * u) * front
+                + 4.0 * u * (1.0 - u) * middle
+                + u * (2.0 * u - 1.0) * back;
+        }
         let mixed = match self.gradients {
             [Some(front), Some(back)] => (1.0 - u) * front + u * back,
             [Some(only), None] | [None, Some(only)] => only,
             [None, None] => DVec3::ZERO,
         };
-        if self.has_whole_gradients {
-            return mixed;
-        }
         let [front, back] = self.faces.map(|face| face.unwrap_or(self.mean));
         let middle = 1.5 * self.mean - 0.25 * (front + back);
         let slope = front * (4.0 * u - 3.0) + middle * (4.0 - 8.0 * u) + back * (4.0 * u - 1.0);
@@ -198,14 +201,7 @@ mod tests {
     use crate::volume::TransferFunction;
 
     fn layer(faces: [Option<f64>; 2], mean: f64) -> Layer {
-        Layer {
-            span: [3.0, 5.0],
-            mean,
-            faces,
-            gradients: [None; 2],
-            has_whole_gradients: false,
-            filling: 1.0,
-        }
+        Layer { span: [3.0, 5.0], mean, faces, gradients: [None; 2], middle: None, filling: 1.0 }
     }
 
     #[test]

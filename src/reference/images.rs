@@ -32,7 +32,7 @@ impl Frame<'_> {
                     (column, row + 1, below),
                 ];
                 neighbours.map(|(column, row, kernels)| {
-                    self.faces(&self.ray(column, row), kernels)
+                    self.faces(&self.ray(column, row), kernels, &self.planes)
                         .iter()
                         .map(|face| face.value(self.least_sum))
                         .collect()
@@ -67,26 +67,41 @@ impl Frame<'_> {
         sheets
     }
 
-    /// Sums the samples at the faces of a ray's sheets.
-    pub(super) fn faces(&self, ray: &Ray, kernels: &[&Kernel]) -> Vec<Face> {
-        let mut faces = vec![Face::default(); self.planes.len()];
+    /// Sums the samples at distances along a ray, in ascending order: the faces of its sheets, or
+    /// their middles.
+    pub(super) fn faces(&self, ray: &Ray, kernels: &[&Kernel], planes: &[f64]) -> Vec<Face> {
+        let mut faces = vec![Face::default(); planes.len()];
         if self.field.is_none() {
             return faces;
         }
         if let Some(product) = &self.product {
-            return self.planes.iter().map(|&plane| product.face(ray, plane)).collect();
+            return planes.iter().map(|&plane| product.face(ray, plane)).collect();
         }
         for kernel in kernels {
             let Load::Sample(sample) = &kernel.load else { continue };
             let Some(crossing) = kernel.cross(ray) else { continue };
             let [from, to] = crossing.span();
-            let first = self.planes.partition_point(|&plane| plane < from);
-            let past = self.planes.partition_point(|&plane| plane <= to);
-            for (face, &plane) in faces.iter_mut().zip(&self.planes).take(past).skip(first) {
+            let first = planes.partition_point(|&plane| plane < from);
+            let past = planes.partition_point(|&plane| plane <= to);
+            for (face, &plane) in faces.iter_mut().zip(planes).take(past).skip(first) {
                 face.add(sample, kernel.center, &crossing, ray, plane);
             }
         }
         faces
+    }
+
+    /// Sums the samples in the middles of a ray's sheets, if their gradients count there.
+    fn middles(&self, ray: &Ray, kernels: &[&Kernel]) -> Vec<Face> {
+        if !self.has_middles || !self.field.as_ref().is_some_and(Field::needs_gradients) {
+            return Vec::new();
+        }
+        let places: Vec<f64> = (0..self.count())
+            .map(|sheet| {
+                let [from, to] = self.span(sheet);
+                0.5 * (from + to)
+            })
+            .collect();
+        self.faces(ray, kernels, &places)
     }
 
     /// Colours a pixel's sheets and composites them.
@@ -104,7 +119,8 @@ impl Frame<'_> {
         if let Some(solids) = &self.solids {
             return self.pixel_of_cells(solids, field, ray, &sheets, &allowed);
         }
-        let faces = self.faces(ray, kernels);
+        let faces = self.faces(ray, kernels, &self.planes);
+        let middles = self.middles(ray, kernels);
         let gradients = self.gradients(ray, &faces, around);
         let held = match field.lattice {
             Some(lattice) => {
@@ -127,7 +143,7 @@ impl Frame<'_> {
                 mean: mean.value(self.least_sum, to - from)?,
                 faces: [&faces[k], &faces[k + 1]].map(|face| face.value(self.least_sum)),
                 gradients: [gradients[k], gradients[k + 1]],
-                has_whole_gradients: false,
+                middle: middles.get(k).and_then(|face| face.gradient(self.least_sum)),
                 filling,
             };
             Some((layer, pieces))

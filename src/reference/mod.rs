@@ -63,9 +63,14 @@
 //!
 //! **Values.** u runs from 0 at the front face to 1 at the back face. With
 //! [`Classification::PreIntegrated`], f(u) is the parabola with the values of the faces and the
-//! mean f̄. With [`Classification::Post`], f(u) = f̄. The gradient g(u) across the ray is linear
-//! between the gradients of the faces. (If one face has none, g(u) is that of the other; if neither
-//! has one, it is 0.) Along the ray, the gradient is the derivative of the parabola.
+//! mean f̄. With [`Classification::Post`], f(u) = f̄. The gradient g(u) of a lattice's field is the
+//! parabola through the gradients at the faces and in the middle of the sheet (at u = ½, defined as
+//! at a face). There are four exceptions: fields without a lattice, central differences, sheets
+//! thicker than 2.2 of the smallest sample spacings, and
+//! [`Evaluate::Scatter`](crate::scene::Evaluate::Scatter), because splats are added to sheets and
+//! faces only. For these, and where one of the three gradients is missing, g(u) across the ray is
+//! linear between the gradients of the faces. (If one face has none, g(u) is that of the other; if
+//! neither has one, it is 0.) Along the ray, it is then the derivative of the values' parabola.
 //!
 //! **Cells.** A field of tetrahedra is linear inside each, between the values of its corners. Those
 //! with a visible value count (all in a maximum intensity picture). A ray crosses a tetrahedron
@@ -172,10 +177,13 @@ pub use truth::integrate;
 
 use crate::{
     Result,
-    math::{Camera, View},
+    math::{Camera, Sheets, View},
     parallel::prelude::*,
     picture::Picture,
-    scene::{Classification, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
+    scene::{
+        Classification, Clip, Evaluate, Gradient, Item, MOST_GATHERED, Mode, Optics, Scene,
+        Settings,
+    },
     volume::{Lattice, Shade},
 };
 use cells::Solids;
@@ -257,6 +265,11 @@ fn nearest(scene: &Scene, view: &View, settings: &Settings) -> f64 {
     if view.perspective { settings.near.unwrap_or_else(usual) } else { f64::NEG_INFINITY }
 }
 
+/// Whether sheets are so thin that the field in one is known from its faces and its middle.
+fn is_thin(sheets: &Sheets, lattice: &Lattice) -> bool {
+    sheets.step <= MOST_GATHERED * lattice.least_kernel_spacing() * (1.0 + 1e-9)
+}
+
 /// Sheets with an optical depth below this are left out. They cannot be seen, and 32-bit sums of
 /// sections leave remainders of this size.
 const LEAST_DEPTH: f64 = 1e-5;
@@ -267,6 +280,8 @@ struct Frame<'a> {
     mode: Mode,
     optics: Optics,
     gradient: Gradient,
+    /// Whether gradients are known in the middles of sheets: those of gathered fields.
+    has_middles: bool,
     clips: Vec<Clip>,
     planes: Vec<f64>,
     near: f64,
@@ -288,6 +303,7 @@ struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// `flat` is the scene with its hierarchies cut.
     fn new(scene: &Scene, flat: &'a Scene, view: View, settings: &Settings) -> Self {
+        let sheets = scene.sheets(&view, settings);
         let samples = flat.items.iter().find_map(|item| match item {
             // Bricks have become a volume by now.
             Item::Radiance(_) | Item::Hierarchy(_) | Item::Bricks(..) => None,
@@ -316,8 +332,13 @@ impl<'a> Frame<'a> {
             mode: settings.mode,
             optics: settings.optics,
             gradient: settings.gradient,
+            has_middles: settings.evaluate != Evaluate::Scatter
+                && settings.gradient == Gradient::Analytic
+                && samples.is_some_and(|(_, lattice)| {
+                    lattice.is_some_and(|lattice| is_thin(&sheets, lattice))
+                }),
             clips: settings.clips.clone(),
-            planes: scene.sheets(&view, settings).planes,
+            planes: sheets.planes,
             near: nearest(scene, &view, settings),
             kernels: gather::gather(flat, &view, before.then_some(Before { lit: shade.is_some() })),
             field,

@@ -102,7 +102,7 @@ fn assert_linear(
     let mut met = 0;
     for (column, row) in [(15, 11), (17, 14), (14, 13)] {
         let ray = frame.ray(column, row);
-        let faces = |column, row| frame.faces(&frame.ray(column, row), &everywhere);
+        let faces = |column, row| frame.faces(&frame.ray(column, row), &everywhere, &frame.planes);
         let around = [(-1, 0), (1, 0), (0, -1), (0, 1)].map(|(x, y)| faces(column + x, row + y));
         for (k, (face, &plane)) in faces(column, row).iter().zip(&frame.planes).enumerate() {
             let world = frame.view.rotation.transpose() * ray.point(plane) + frame.view.position;
@@ -260,7 +260,7 @@ fn heavier_samples_count_more() {
     let settings = unshaded([1, 1]);
     let frame = Frame::new(&scene, &scene, from_above(5.0, 0.1).view([1, 1]).unwrap(), &settings);
     let everywhere: Vec<&Kernel> = frame.kernels.iter().collect();
-    let faces = frame.faces(&frame.ray(0, 0), &everywhere);
+    let faces = frame.faces(&frame.ray(0, 0), &everywhere, &frame.planes);
     close(faces[faces.len() / 2].value(1e-4).unwrap(), 2.0, 1e-9);
 }
 
