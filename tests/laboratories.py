@@ -178,7 +178,7 @@ def h5py():
     says("a.h5", byte, dataset="scan/1/vector", scalar="v:1")
     says("a.h5", byte[:2], dataset="small")
     with lib.File("new.h5", "w", libver=("v110", "v110")) as file:
-        free = dict(chunks=(2, 4, 4), maxshape=(None, None, 9), compression="gzip")
+        free = dict(chunks=(2, 4, 4), maxshape=(None, 6, 7), compression="gzip")
         file.create_dataset("v", data=base, **free)
     says("new.h5", base)
     with lib.File("image.vtkhdf", "w") as file:

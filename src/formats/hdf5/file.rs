@@ -183,6 +183,11 @@ fn told(source: &Source, place: &str, error: &hdf5_pure::Error) -> Error {
         hdf5_pure::Error::Format(
             FormatError::UnsupportedExternalStorage | FormatError::UnsupportedVirtualLayout,
         ) => found.hint("the data are in other files; copy them into one: h5copy or h5repack"),
+        hdf5_pure::Error::Format(FormatError::SignatureNotFound) => found,
+        hdf5_pure::Error::Format(_) => found.hint(
+            "if other programs read the file, write it again in an older form: h5py.File(OUT, \
+             'w', libver='earliest')",
+        ),
         _ => found,
     }
 }
