@@ -34,8 +34,8 @@ const PARTS: [usize; 4] = [1, 2, 4, 8];
 
 impl Cells {
     /// Divides the cells into tetrahedra with linear fields. Neighbours divide the faces that they
-    /// share in the same way, by the numbers of their points (Dompierre et al. 1999). Where one
-    /// neighbour is divided more often than the other, they fit within the tolerance.
+    /// share in the same way, by the numbers of their points (Dompierre et al. 1999). All curved
+    /// cells are divided equally often; those with straight edges are not divided further.
     ///
     /// Left out are cells with a hole at a node, and tetrahedra without a volume.
     ///
@@ -49,7 +49,8 @@ impl Cells {
         let mut made = Made { cells: self, points: HashMap::new(), builder: Builder::new(self) };
         for (cell, level) in levels.iter().enumerate() {
             if let Some(level) = level {
-                made.add(cell, divisions.of(self, cell, usize::from(*level)));
+                let finest = divisions.levels(self, cell).saturating_sub(1);
+                made.add(cell, divisions.of(self, cell, usize::from(*level).min(finest)));
             }
         }
         made.builder.finish()
@@ -72,6 +73,9 @@ impl Cells {
             Some((0..own.saturating_sub(1)).find(fits).unwrap_or(own.saturating_sub(1)) as u8)
         };
         let mut levels: Vec<Option<u8>> = (0..self.len()).into_par_iter().map(level).collect();
+        // Curved cells are divided alike, so that the faces between them fit.
+        let finest = levels.iter().flatten().copied().max().unwrap_or(0);
+        levels.iter_mut().flatten().for_each(|level| *level = finest);
         // Blocks of a cell grow with the cube of the parts; a block holds up to six tetrahedra.
         let blocks = |level: u8| PARTS[usize::from(level)].pow(3) * 6;
         for most in (0..PARTS.len() as u8).rev() {
@@ -130,8 +134,9 @@ impl Divisions {
             let Some(form) = kind.form() else { continue };
             found.entry((*kind, nodes)).or_insert_with(|| {
                 let Some(basis) = Basis::of(*kind, nodes) else { return Vec::new() };
-                // A linear tetrahedron is what it is.
-                let levels = if *kind == CellKind::Tetrahedron { 1 } else { PARTS.len() };
+                // Cells with straight edges are divided once: their faces then fit each other.
+                let is_straight = nodes <= 8 && kind.order(nodes).is_none();
+                let levels = if is_straight { 1 } else { PARTS.len() };
                 let parts = PARTS[..levels].iter();
                 parts.map(|parts| Division::new(form, &basis, *parts)).collect()
             });
