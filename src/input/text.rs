@@ -114,7 +114,7 @@ impl<'a> Text<'a> {
                 for word in words(line, self.separator) {
                     let want = want(count);
                     if let Some(slot) = row.get_mut(count).filter(|_| want != Want::Nothing) {
-                        *slot = parsed(source, &place, without_quotes(word), (count, want))?;
+                        *slot = parsed(source, place, without_quotes(word), (count, want))?;
                     }
                     count += 1;
                 }

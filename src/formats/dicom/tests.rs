@@ -241,69 +241,84 @@ fn what_is_not_read_is_told() {
     let mut made = Made::slice(".4.90", 2, 1);
     made.fragments(&[&[], &[0xff, 0x4f, 1, 2]]);
     assert!(told(&made.file()).contains("its header is damaged"));
-    let with = |change: &dyn Fn(&mut Made)| {
-        let mut made = Made::slice(".1", 2, 1);
-        made.shorts(tags::PIXEL_DATA, "OW", &[1, 2]);
-        change(&mut made);
-        told(&made.file())
-    };
+    assert!(told(b"no DICOM at all, but a file").contains("header: is not DICOM"));
+}
+
+/// The error of a file of two pixels, changed.
+fn told_of(change: impl FnOnce(&mut Made)) -> String {
+    let mut made = Made::slice(".1", 2, 1);
+    made.shorts(tags::PIXEL_DATA, "OW", &[1, 2]);
+    change(&mut made);
+    told(&made.file())
+}
+
+#[test]
+fn pixels_that_do_not_fit_are_told() {
     for (found, message) in [
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.without(tags::ROWS);
             }),
             "Rows: is missing, but a number of pixels",
         ),
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.short(tags::COLUMNS, 0);
             }),
             "Columns: is 0, but a number",
         ),
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.bits(12, 12, 0);
             }),
             "Bits Allocated: is 12, but 1, 8, 16 or 32",
         ),
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.bits(16, 17, 0);
             }),
             "17 bits up to bit 16 do not lie in the 16",
         ),
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.short(tags::ROWS, 2);
             }),
             "2 × 2 pixels needs 8 bytes, but the",
         ),
+    ] {
+        assert!(found.contains(message), "{found} / {message}");
+    }
+}
+
+#[test]
+fn files_without_usable_pixels_are_told() {
+    for (found, message) in [
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.text(tags::FRAMES, "9");
             }),
             "Number of Frames: is 9, but",
         ),
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.text(tags::FRAMES, "0");
             }),
             "Number of Frames: is 0, but",
         ),
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.text(tags::PHOTOMETRIC, "ARGB").short(tags::SAMPLES_PER_PIXEL, 4);
             }),
             "“ARGB” of 4 numbers a pixel is not read",
         ),
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.without(tags::PIXEL_DATA);
             }),
             "holds other data",
         ),
         (
-            with(&|made: &mut Made| {
+            told_of(|made| {
                 made.without(tags::PIXEL_DATA).text(tags::CLASS, "1.2.840.10008.5.1.4.1.1.481.3");
             }),
             "holds outlines of radiotherapy",
@@ -311,7 +326,6 @@ fn what_is_not_read_is_told() {
     ] {
         assert!(found.contains(message), "{found} / {message}");
     }
-    assert!(told(b"no DICOM at all, but a file").contains("header: is not DICOM"));
 }
 
 #[test]

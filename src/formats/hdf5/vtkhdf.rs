@@ -186,7 +186,7 @@ impl<'a> DataSet<'a> {
         numbers
             .into_iter()
             .map(|number| {
-                if number >= 0.0 && number < 9e15 && number.fract() == 0.0 {
+                if (0.0..9e15).contains(&number) && number.fract() == 0.0 {
                     return Ok(number as u64);
                 }
                 let message = format!("contains {number}, but whole numbers were expected");

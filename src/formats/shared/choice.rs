@@ -236,7 +236,7 @@ pub(crate) fn automatic(
     for array in order {
         let candidate = &candidates[array];
         let is_integer = candidate.components == 1 && !candidate.kind.starts_with('f');
-        if !candidate.is_geometry() && !(is_integer && counts(array)?) {
+        if !(candidate.is_geometry() || is_integer && counts(array)?) {
             return Ok(Some(Chosen { array, part: candidate.whole() }));
         }
     }

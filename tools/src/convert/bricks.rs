@@ -12,7 +12,15 @@ use splatkit::{
     Error,
     bricks::{self, WriteOptions},
 };
-use std::time::Instant;
+use std::{path::Path, time::Instant};
+
+/// Warns that some of all values of a file are missing.
+fn warn_of_holes(file: &Path, holes: u64, all: usize) {
+    if holes > 0 {
+        let file = file.display();
+        tracing::warn!("{file}: {holes} of {all} values are missing and were read as the lowest");
+    }
+}
 
 impl Convert {
     /// Writes the volume as .splv.
@@ -45,13 +53,7 @@ impl Convert {
             Source::Stream(stream) => {
                 let range =
                     stream.range(Some(&|done, all| stages.set("Scanning the input", done, all)))?;
-                if stream.holes() > 0 {
-                    let (holes, all) = (stream.holes(), lattice.len());
-                    let file = file.display();
-                    tracing::warn!(
-                        "{file}: {holes} of {all} values are missing and were read as the lowest"
-                    );
-                }
+                warn_of_holes(file, stream.holes(), lattice.len());
                 bricks::convert(stream, range, &self.output, &options, Some(&watch))
             }
         }
