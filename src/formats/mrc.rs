@@ -319,10 +319,10 @@ mod tests {
     impl Map {
         fn new(dims: [i32; 3], mode: i32, big: bool) -> Self {
             let mut map = Self(vec![0; HEADER], big);
-            for (axis, &count) in dims.iter().enumerate() {
-                map = map.int(1 + axis, count).int(8 + axis, count);
+            for (axis, size) in dims.into_iter().enumerate() {
+                map = map.int(1 + axis, size).int(8 + axis, size);
                 map = map.int(17 + axis, axis as i32 + 1).float(14 + axis, 90.0);
-                map = map.float(11 + axis, count as f32 * 2.0);
+                map = map.float(11 + axis, size as f32 * 2.0);
             }
             map = map.int(4, mode);
             map.0[MARK..MARK + 4].copy_from_slice(b"MAP ");
