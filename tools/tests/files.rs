@@ -332,8 +332,11 @@ fn formats_are_listed() {
         &[
             "a.bin: file: is in no format that can be read",
             "hierarchies: .splk; volumes in bricks: .splv; meshes: .ply, .obj, .gltf, .glb, .stl;",
-            "volumes: .vtr, .vti, .vtk, .nrrd, .nhdr, and raw samples",
-            "--dims and --type; scattered samples: .ply, .xyz,",
+            "volumes: .vtr, .vti, .vtk,",
+            ".nrrd, .nhdr,",
+            "and raw samples",
+            "--dims and --type;",
+            "scattered samples: .ply, .xyz,",
         ],
     );
 }
