@@ -66,6 +66,7 @@ pub trait ParallelSlice<T> {
     fn par_windows(&self, size: usize) -> Alone<slice::Windows<'_, T>>;
     fn par_sort_by_key<K: Ord>(&mut self, key: impl Fn(&T) -> K);
     fn par_sort_unstable_by_key<K: Ord>(&mut self, key: impl Fn(&T) -> K);
+    fn par_sort_unstable_by(&mut self, compare: impl FnMut(&T, &T) -> Ordering);
     fn par_sort_unstable(&mut self)
     where
         T: Ord;
@@ -94,6 +95,10 @@ impl<T> ParallelSlice<T> for [T] {
 
     fn par_sort_unstable_by_key<K: Ord>(&mut self, key: impl Fn(&T) -> K) {
         self.sort_unstable_by_key(key);
+    }
+
+    fn par_sort_unstable_by(&mut self, compare: impl FnMut(&T, &T) -> Ordering) {
+        self.sort_unstable_by(compare);
     }
 
     fn par_sort_unstable(&mut self)
@@ -169,7 +174,6 @@ impl<I: Iterator> Alone<I> {
         Alone(self.0.rev())
     }
 
-    #[cfg(test)]
     pub fn step_by(self, step: usize) -> Alone<iter::StepBy<I>> {
         Alone(self.0.step_by(step))
     }
