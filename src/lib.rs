@@ -3,8 +3,8 @@
 //! Data flows through these modules:
 //!
 //! - [`input`] opens a file and guards against damaged ones; [`formats`] decodes it.
-//! - [`volume`], [`scattered`], [`cells`] and [`surface`] interpret its content. Meshes, points and scattered
-//!   samples become splats ([`splat`]).
+//! - [`volume`], [`scattered`], [`cells`] and [`surface`] interpret its content. Meshes, points and
+//!   scattered samples become splats ([`splat`]).
 //! - A [`Scene`](scene::Scene) holds splats, hierarchies and volumes, and the transfer functions
 //!   that show them.
 //! - A [`Renderer`] draws the scene into a [`Picture`](picture::Picture), with the GPU engine
@@ -52,7 +52,8 @@
 //! |---|---|
 //! | read a file of any known format, or bytes in memory | [`formats`] |
 //! | limit what a file may take: memory, points, time | [`input::Limits`] |
-//! | work with meshes, volumes, samples and cells | [`surface`], [`volume`], [`scattered`], [`cells`] |
+//! | work with meshes and volumes | [`surface`], [`volume`] |
+//! | work with scattered samples and cells | [`scattered`], [`cells`] |
 //! | colour them by a named map | [`color`] |
 //! | draw data larger than memory | [`hierarchy`], [`bricks`] |
 //! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |

@@ -160,8 +160,8 @@ def slice_of(position, a, series, number, syntax, intercept=-1024):
     if syntax == RLELossless:
         d.compress(RLELossless, generate_instance_uid=False)
     return d
-for name, syntax, tilt in [('plain', ExplicitVRLittleEndian, 0), ('tilt', ImplicitVRLittleEndian, 0.4),
-                           ('rle', RLELossless, 0)]:
+for name, syntax, tilt in [('plain', ExplicitVRLittleEndian, 0),
+                           ('tilt', ImplicitVRLittleEndian, 0.4), ('rle', RLELossless, 0)]:
     os.mkdir(name)
     series, n = generate_uid(), 5
     a = rng.integers(0, 4096, (6, 4, n))

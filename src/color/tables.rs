@@ -69,8 +69,9 @@ pub(super) const TWILIGHT: [u32; 52] = [
 ];
 
 /// Colours of the classes of airborne scans, in the order of the LAS specification 1.4 R15: never
-/// classified, unclassified, ground, low, medium and high vegetation, building, low noise, reserved,
-/// water, rail, road, reserved, wire guard, wire conductor, tower, connector, bridge, high noise.
+/// classified, unclassified, ground, low, medium and high vegetation, building, low noise,
+/// reserved, water, rail, road, reserved, wire guard, wire conductor, tower, connector, bridge,
+/// high noise.
 pub(super) const CLASSES: [u32; 19] = [
     0x808080, 0xb8b8b8, 0xa0703c, 0xb4d878, 0x5cb040, 0x1e7a32, 0xe05038, 0xff40c0, 0xd0c8b0,
     0x3878d8, 0x705898, 0x505860, 0x98d0d0, 0xf0d030, 0xf0a020, 0xb060d0, 0xd090e0, 0xc0a080,

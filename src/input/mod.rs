@@ -1,8 +1,8 @@
 //! What guards every input: how a file is opened, mapped and bounded.
 //!
-//! A [`Source`] is an open file, the files of a folder, or bytes in memory. It checks each request against the [`Limits`]
-//! and notices when the file changes while it is read. Readers of single formats are in
-//! [`formats`](crate::formats).
+//! A [`Source`] is an open file, the files of a folder, or bytes in memory. It checks each request
+//! against the [`Limits`] and notices when the file changes while it is read. Readers of single
+//! formats are in [`formats`](crate::formats).
 
 #![deny(clippy::disallowed_methods)]
 

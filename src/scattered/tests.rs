@@ -98,8 +98,8 @@ fn no_place_inside_is_left_out() {
 }
 
 /// A linear field is reproduced, at the border and beyond it too. The remaining error comes from
-/// rounding slopes to 2⁻¹² of their largest component: over the extent of the widest kernel here, at a corner, 2⁻¹²
-/// · 3 · 0.45.
+/// rounding slopes to 2⁻¹² of their largest component: over the extent of the widest kernel here,
+/// at a corner, 2⁻¹² · 3 · 0.45.
 #[test]
 fn linear_fields_are_exact() {
     let truth = |p: Vec3| 3.0 + 2.0 * p.x - 5.0 * p.y + 0.5 * p.z;

@@ -140,8 +140,8 @@ impl Scene {
         self.items.iter().find_map(|item| item.kernel()?.as_tensor())
     }
 
-    /// Returns what of the scene only the CPU engine draws (“the kernel linear”, “cells”); `None` if
-    /// the GPU engine draws all of it.
+    /// Returns what of the scene only the CPU engine draws (“the kernel linear”, “cells”); `None`
+    /// if the GPU engine draws all of it.
     pub fn beyond_gpu(&self) -> Option<String> {
         let tensor = self.tensor().map(|tensor| format!("the kernel {}", tensor.name()));
         let has_cells = self.items.iter().any(|item| matches!(item, Item::Cells(..)));

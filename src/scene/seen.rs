@@ -46,8 +46,8 @@ impl Clip {
 impl Scene {
     /// Returns points, in world coordinates, that span what a picture shows of the scene: of
     /// splats, the outermost ones and their reach; of volumes and cells, the outermost samples that
-    /// the transfer function shows. [`Camera::fit_points`](crate::math::Camera::fit_points) makes them
-    /// fill a picture.
+    /// the transfer function shows. [`Camera::fit_points`](crate::math::Camera::fit_points) makes
+    /// them fill a picture.
     ///
     /// Up to a thousandth of the splats that lies far away on one side of all others, and of a
     /// volume's visible samples that is scattered beyond the rest, is left out. The time is linear

@@ -7,7 +7,8 @@
 //! because files are nearly always drawn or scanned along one of them. A pose is judged by
 //!
 //! - its **base**: the convex hull of the lowest samples, as a share of the shadow from above;
-//! - its **balance**: by how many degrees it may be tilted until the centre of mass leaves the base;
+//! - its **balance**: by how many degrees it may be tilted until the centre of mass leaves the
+//!   base;
 //! - its **feet**: three or more separate contacts that fill little of a base are legs, hooves or
 //!   wheels, if they are as flat as feet are, not pointed as wings or fingers;
 //! - **symmetry**: things that stand are alike on both sides of an upright plane, so the best of

@@ -1440,7 +1440,7 @@
         ),
         (
             "huge.nii",
-            medical::nifti(|header| header[42..48].copy_from_slice(&[255, 127, 255, 127, 255, 127])),
+            medical::nifti(|header| header[42..48].copy_from_slice(&[255, 127].repeat(3))),
             "huge.nii: the size of the samples in bytes is 35181150961663, over the limit of \
              34359738368",
         ),

@@ -37,8 +37,8 @@ pub struct CameraFlags {
     /// Set the vertical view angle at a zoom of 1 [default: 30]
     #[arg(long, value_name = "DEGREES", value_parser = parse::view_angle)]
     view_angle: Option<f64>,
-    /// Set the distance of the camera from its focal point, in world units [default: the scene fills
-    /// the picture]
+    /// Set the distance of the camera from its focal point, in world units [default: the scene
+    /// fills the picture]
     #[arg(
         long,
         value_name = "LENGTH",

@@ -106,8 +106,8 @@ enum Task {
     Generate(generate::Generate),
     /// Measure the quality of pictures: the tables of docs/volumes.md.
     Figures(figures::Figures),
-    /// Write the transfer function that a volume, cells or scattered samples would be drawn with, as
-    /// JSON to start from.
+    /// Write the transfer function that a volume, cells or scattered samples would be drawn with,
+    /// as JSON to start from.
     Transfer(Box<transfer::Transfer>),
     /// List the adapters that can draw, and their limits.
     Gpus(gpus::Gpus),

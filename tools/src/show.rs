@@ -27,13 +27,14 @@ pub struct ShowFlags {
     /// percentile of a point cloud]
     #[arg(long, value_name = "LOW,HIGH", value_parser = parse::range, allow_hyphen_values = true)]
     pub range: Option<[f64; 2]>,
-    /// Set the length that the transfer function's opacities hold for, in world units [default: that
-    /// of the JSON file, else a part of the data's diagonal]
+    /// Set the length that the transfer function's opacities hold for, in world units [default:
+    /// that of the JSON file, else a part of the data's diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     opacity_unit: Option<f64>,
     /// Draw isosurfaces of these values, each as VALUE, VALUE:COLOR, VALUE:OPACITY or
     /// VALUE:COLOR:OPACITY. 50% is the middle of the range of values. A colour is a name, #rgb or
-    /// #rrggbb. Without --transfer, nothing else of the volume is drawn [default: opaque, in the transfer function's colour of the value]
+    /// #rrggbb. Without --transfer, nothing else of the volume is drawn [default: opaque, in the
+    /// transfer function's colour of the value]
     #[arg(
         long,
         value_name = "VALUE,…",
@@ -50,8 +51,9 @@ pub struct ShowFlags {
     /// they were converted with.
     #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
     pub radius_scale: Option<f32>,
-    /// Meshes: split the normals where two triangles meet at more than this angle, so that the crease
-    /// looks sharp. 0 draws flat facets; from 60 on, creases are split at 60 degrees [default: 60]
+    /// Meshes: split the normals where two triangles meet at more than this angle, so that the
+    /// crease looks sharp. 0 draws flat facets; from 60 on, creases are split at 60 degrees
+    /// [default: 60]
     #[arg(long, value_name = "DEGREES", value_parser = parse::crease)]
     pub crease: Option<f32>,
     /// Meshes: draw the edges of the triangles as thin dark lines.

@@ -1,5 +1,5 @@
-//! Each flag that is meant to change a picture, on each kind of input: it changes the picture, or the
-//! command says that it does not.
+//! Each flag that is meant to change a picture, on each kind of input: it changes the picture, or
+//! the command says that it does not.
 
 mod common;
 

@@ -44,8 +44,8 @@ impl Packing {
         })
     }
 
-    /// Maximum compression ratio, in bytes per byte; a block that claims more is invalid. LZMA needs
-    /// at least 0.3 bits for a match of 273 bytes.
+    /// Maximum compression ratio, in bytes per byte; a block that claims more is invalid. LZMA
+    /// needs at least 0.3 bits for a match of 273 bytes.
     fn ratio(self) -> u64 {
         match self {
             Self::Zlib => 1032,

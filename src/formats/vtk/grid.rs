@@ -218,7 +218,8 @@ impl Grid {
         for (cell_number, &end) in ends.iter().enumerate() {
             if !(end >= start as f64 && end <= corners.len() as f64 && end.fract() == 0.0) {
                 let message = format!(
-                    "cell {cell_number} ends at corner {end}, but must end after {start} and at most at {}",
+                    "cell {cell_number} ends at corner {end}, but must end after {start} and at \
+                     most at {}",
                     corners.len()
                 );
                 return Err(source.error("Cells", message));

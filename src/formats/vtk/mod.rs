@@ -3,8 +3,8 @@
 //!
 //! `files` walks over the data sets of a file and of those it refers to. `legacy` and `xml` with
 //! `pieces` describe each data set as blocks (`data`) whose arrays are decoded on demand. `survey`
-//! looks at all blocks and decides what is drawn, and by which array. Then `image` makes a volume of
-//! them, or `grid` joins their cells and `surface` makes a mesh.
+//! looks at all blocks and decides what is drawn, and by which array. Then `image` makes a volume
+//! of them, or `grid` joins their cells and `surface` makes a mesh.
 
 mod array;
 mod data;

@@ -460,8 +460,8 @@ fn other_compressors() {
 }
 
 /// Six floats, as Python's lzma module packs them.
-const LZMA: &str = "AQAAABgAAAAAAAAAUAAAAA==/Td6WFoAAAFpIt42AgAhARYAAAB0L+Wj4AAXABVdAABoDj/KBNJrLwQC\
-    zWwiVAr8XdwAAAAAAAB6fTkbAAEtGJJ3wBOQQpkNAQAAAAABWVo=";
+const LZMA: &str = "AQAAABgAAAAAAAAAUAAAAA==/Td6WFoAAAFpIt42AgAhARYAAAB0L+Wj4AAXABVdAABoDj\
+    /KBNJrLwQCzWwiVAr8XdwAAAAAAAB6fTkbAAEtGJJ3wBOQQpkNAQAAAAABWVo=";
 
 /// Pieces in other files, without the cells that several have.
 #[test]

@@ -120,7 +120,8 @@ impl Stored {
         Self::fields(cursor, text, unit).ok_or(Refusal::Incomplete)?
     }
 
-    /// Reads the fields from a cursor behind the version. `text` is the header without its checksum.
+    /// Reads the fields from a cursor behind the version. `text` is the header without its
+    /// checksum.
     fn fields(mut cursor: Cursor, text: &[u8], unit: usize) -> Option<Result<Self, Refusal>> {
         let (fixed, texts) = text.split_at_checked(FIXED)?;
         let flags = cursor.u32()?;

@@ -4,12 +4,13 @@ use crate::volume::{Volume, each_type};
 
 /// Rays along each side of a face of the volume's box.
 const RAYS: usize = 48;
-/// Samples of a material before what is inside it that come from the border of what is inside alone.
+/// Samples of a material before what is inside it that come from the border of what is inside
+/// alone.
 const BORDER: usize = 3;
 
-/// Returns the share of the rays to what lies beyond the second value that pass more than the border
-/// of what lies beyond the first one. Values lie beyond if they are larger, or smaller if the second
-/// value is. Rays run along the axes, from all six sides. Without any such ray, 0.
+/// Returns the share of the rays to what lies beyond the second value that pass more than the
+/// border of what lies beyond the first one. Values lie beyond if they are larger, or smaller if
+/// the second value is. Rays run along the axes, from all six sides. Without any such ray, 0.
 pub fn share(volume: &Volume, outer: f64, inner: f64) -> f64 {
     each_type!(&volume.samples, values => {
         let beyond = |at: usize, limit: f64| {

@@ -54,8 +54,8 @@ impl TransferFunction {
     /// - Hounsfield units, of a file that says so or as the values look, show skin and bone. Other
     ///   modalities have colours and light of their own. The file's window limits the values.
     /// - Light fades where the gradient may be noise ([`Shade::certain`]).
-    /// - A single slice is a picture: opaque, and grey from the lowest value of the file's window to
-    ///   the highest, or of the values.
+    /// - A single slice is a picture: opaque, and grey from the lowest value of the file's window
+    ///   to the highest, or of the values.
     ///
     /// Opacities hold for a hundredth of the volume's diagonal, so the picture depends neither on
     /// the unit of length nor on the sampling. A constant volume is shown as a faint haze. So is a

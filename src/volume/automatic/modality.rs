@@ -53,8 +53,8 @@ fn are_hounsfield(survey: &Survey, materials: &Materials) -> bool {
     (-5000.0..=-700.0).contains(&low) && (300.0..=40_000.0).contains(&high) && is_air && tissue
 }
 
-/// Shows computed tomography: skin as a shell, vessels with a contrast agent, and bone. Without bone
-/// the skin is solid. A window of the lungs shows those.
+/// Shows computed tomography: skin as a shell, vessels with a contrast agent, and bone. Without
+/// bone the skin is solid. A window of the lungs shows those.
 fn tomography(survey: &Survey, about: &About, hidden: &Hidden) -> Option<(Points, bool)> {
     let all: f64 = survey.counts.iter().sum();
     let beyond = |from: f64, to: f64| {

@@ -235,8 +235,8 @@ impl Convert {
             Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) | Input::Cells(_) => {
                 let file = path.display();
                 return Err(Failure::Usage(format!(
-                    "{file} holds a volume, cells or samples; hierarchies are built from meshes and point \
-                     clouds"
+                    "{file} holds a volume, cells or samples; hierarchies are built from meshes \
+                     and point clouds"
                 )));
             }
         };

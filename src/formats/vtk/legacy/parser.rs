@@ -24,7 +24,8 @@ pub(super) struct Parser<'a> {
 }
 
 impl<'a> Parser<'a> {
-    /// Reads the header. Also returns the kind of the data set, by its index among the `known` ones.
+    /// Reads the header. Also returns the kind of the data set, by its index among the `known`
+    /// ones.
     pub fn open(source: &'a Source, known: &[&str]) -> Result<(Self, usize)> {
         let mut parser = Self { source, at: 0, binary: false };
         let cut = |parser: &Self| source.error(parser.place(), "the file ends inside its header");
