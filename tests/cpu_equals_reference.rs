@@ -56,11 +56,13 @@ fn assert_matches(case: &Case, least: f64) {
 
 /// Minimum agreement of a gathered case, in dB. Gathering cuts kernels off at a cube of four
 /// samples a side, the reference at the ball inside that cube. Up to 1 % of the weight lies between
-/// the two. Steep functions and sharp surfaces on so coarse a lattice show this difference. A
-/// broken sample, a hundred thousand times as large as the others, shows it most of all.
+/// the two. Steep functions and sharp surfaces on so coarse a lattice show this difference, and so
+/// does light where gradients turn within a sheet. A broken sample, a hundred thousand times as
+/// large as the others, shows it most of all.
 fn least(name: &str) -> f64 {
     match name {
         "post_classified" | "isosurfaces_in_fog" => 48.0,
+        "camera_inside_a_volume" | "clipped_volume" => 48.0,
         "points_far_off" => 35.0,
         _ => 50.0,
     }

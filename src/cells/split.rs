@@ -16,7 +16,7 @@ use std::collections::HashMap;
 pub struct CellOptions {
     /// How far linear tetrahedra may deviate from a cell: in its shape, as a part of its size; in
     /// its field, as a part of the range of all values. Cells that deviate more are divided more
-    /// often, along each edge into up to eight parts. The default is 1/50.
+    /// often, along each edge into up to eight parts. The default is 1/100.
     pub tolerance: f64,
     /// The most tetrahedra: cells are divided less if there would be more. The default is 2²⁶, for
     /// which 1 GiB of memory is enough.
@@ -25,7 +25,7 @@ pub struct CellOptions {
 
 impl Default for CellOptions {
     fn default() -> Self {
-        Self { tolerance: 0.02, most: 1 << 26 }
+        Self { tolerance: 0.01, most: 1 << 26 }
     }
 }
 

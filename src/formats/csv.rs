@@ -150,6 +150,12 @@ impl Layout {
         if text.len() == 0 {
             return Err(source.error("file", "contains no samples"));
         }
+        // Decimal commas, for example, are told by their line.
+        for column in position {
+            if !text.is_numeric(column) {
+                of_column(source, text, column)?;
+            }
+        }
         let radius = at("radius");
         let terms = COVARIANCE.map(|term| at(term).or_else(|| at(&format!("cov_{term}"))));
         let covariance =

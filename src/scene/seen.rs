@@ -413,7 +413,7 @@ mod tests {
         let value = |index: usize| {
             let is_noise = index == 31 * 1024 + 40;
             let ball = 9.0 - at(index).distance(DVec3::new(12.0, 13.0, 14.0));
-            if is_noise { 200 } else { (20.0 * ball.max(0.0)) as u8 }
+            if is_noise { 90 } else { (20.0 * ball.max(0.0)) as u8 }
         };
         let lattice = Lattice::with_spacing([32; 3], DVec3::ONE);
         let volume = Volume::new(lattice, Samples::U8((0..32 * 1024).map(value).collect()));
