@@ -209,7 +209,10 @@ fn mean_of(r: u32, sheet: u32, own: ptr<function, Sheet>) -> f32 {
     let sum = front.value + back.value;
     let bend = (front.along - back.along) * thickness;
     let skew = back.value - front.value - 0.5 * (front.along + back.along) * thickness;
-    if POST || (GRADIENTS && max(abs(bend), abs(skew)) > STRAIGHT) {
+    // Slopes are per thickness of a sheet.
+    let turn = abs(back.slope - front.slope);
+    let bent = max(max(abs(bend), abs(skew)), max(turn.x, turn.y)) > STRAIGHT;
+    if POST || (GRADIENTS && bent) {
         (*own).inside = field_at(r, 0.5 * (planes[sheet] + planes[sheet + 1u]));
         return (sum * 7.0 + (*own).inside.value * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
     }
