@@ -63,7 +63,7 @@ fn least(name: &str) -> f64 {
     match name {
         "post_classified" | "isosurfaces_in_fog" => 48.0,
         "camera_inside_a_volume" | "clipped_volume" => 48.0,
-        "points_far_off" => 35.0,
+        "points_far_off" => 33.0,
         _ => 50.0,
     }
 }
