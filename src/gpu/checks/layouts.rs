@@ -121,7 +121,8 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
         step_inverse, z_near, tile_shift, record_capacity, entry_capacity, field_axis_x,
         field_axis_y, field_axis_z, field_origin, field_low, field_high, volume_shade,
         surface_shade, certain, isotropic, transfer, gradients, table_starts, before, behind,
-        kernel, levels, sheet_normal, lattice, taps, shown, world_x, world_y, world_z, clips, holes, isosurfaces,
+        kernel, levels, sheet_normal, lattice, taps, shown, world_x, world_y, world_z, clips,
+        holes, isosurfaces,
     );
     let source = layout!(Source:
         axis_x, axis_y, axis_z, origin, covariance_a, covariance_b, lattice, slices, extent, count,
