@@ -13,7 +13,7 @@ use splatkit::{
     picture::Picture,
     scene::{Evaluate, Scene, Settings},
     surface::{Mesh, SurfelOptions},
-    volume::{Lattice, Samples, TransferFunction, Volume, phantoms::Phantom},
+    volume::{Lattice, Samples, Shade, TransferFunction, Volume, phantoms::Phantom},
 };
 use std::{sync::Arc, time::Duration};
 use testing::psnr::measured;
@@ -309,7 +309,11 @@ fn wide_slices_are_drawn_in_thin_chunks() {
         let samples = Samples::U8((0..9 * side * side).map(value).collect());
         let volume =
             Volume::new(Lattice::with_spacing([side, side, 9], DVec3::ONE), samples).unwrap();
-        let transfer = TransferFunction::automatic(&volume);
+        let transfer = TransferFunction {
+            opacity: vec![(0.0, 0.0), (255.0, 0.9)],
+            shade: Some(Shade::default()),
+            ..TransferFunction::default()
+        };
         Scene::new().with_volume(volume, Kernel::default(), transfer)
     };
     let wide = scene(300);
