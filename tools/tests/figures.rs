@@ -17,7 +17,7 @@ fn phantoms_become_files() {
     folder.run("generate ball -o ball.csv --points 12").ok();
     assert_eq!(std::fs::read_to_string(folder.path("ball.csv")).unwrap().lines().count(), 13);
     folder.run("generate ball -o ball.csv").fails(1, &["ball.csv", "exists", "--overwrite"]);
-    folder.run("generate ball -o ball.vti").fails(2, &[".nrrd, .vtr, .csv or .ply"]);
+    folder.run("generate ball -o ball.vti").fails(2, &[".nrrd, .vtr, .csv, .ply or .vtu"]);
     folder.run("generate egg -o egg.nrrd").fails(2, &["marschner-lobb", "head"]);
     folder.run("generate ball -o none.nrrd --dims 0x2x2").fails(2, &["holds none"]);
 }
