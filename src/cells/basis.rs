@@ -56,8 +56,8 @@ impl CellKind {
 }
 
 /// The edges of the forms, as pairs of corners, in the order of their middle nodes.
-const TETRAHEDRON: &[[usize; 2]] = &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
-const CUBE: &[[usize; 2]] = &[
+pub(super) const TETRAHEDRON: &[[usize; 2]] = &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
+pub(super) const CUBE: &[[usize; 2]] = &[
     [0, 1],
     [1, 2],
     [2, 3],

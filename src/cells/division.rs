@@ -25,12 +25,13 @@ pub(super) struct Division {
 }
 
 /// The faces of a hexahedron, a wedge and a pyramid.
-pub(super) const HEXAHEDRON: &[&[usize]] =
+const HEXAHEDRON: &[&[usize]] =
     &[&[0, 4, 7, 3], &[1, 2, 6, 5], &[0, 1, 5, 4], &[3, 7, 6, 2], &[0, 3, 2, 1], &[4, 5, 6, 7]];
 const WEDGE: &[&[usize]] = &[&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]];
 const PYRAMID: &[&[usize]] = &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
 
-/// Returns the faces of a kind without a reference cell or with linear edges, by its corners.
+/// Returns the faces of a prism over a pentagon or a hexagon, by its corners; `None` for other
+/// kinds.
 pub(super) fn faces_of(kind: CellKind) -> Option<Vec<Vec<usize>>> {
     let prism = |sides: usize| {
         let mut faces = vec![(0..sides).collect(), (sides..2 * sides).collect()];

@@ -142,9 +142,8 @@ impl Cells {
             (0..range).into_par_iter().find_first(|&index| is_bad(index))
         };
         if let Some(point) = find(points, &|point| !self.points[point].is_finite()) {
-            return Err(format!("the position {} of point {point} is not finite", {
-                self.points[point]
-            }));
+            let at = self.points[point];
+            return Err(format!("the position {at} of point {point} is not finite"));
         }
         if let Some(index) = find(self.values.len(), &|index| self.values[index].is_infinite()) {
             let of = if self.place == Place::Points { "point" } else { "cell" };
@@ -248,8 +247,8 @@ impl Cells {
         counts
     }
 
-    /// Returns the cells with values at the points: where there is one a cell, a point takes the
-    /// mean of those of its cells.
+    /// Returns the cells with one value for each point. If there is one for each cell, a point
+    /// takes the mean of the values of its cells.
     #[must_use]
     pub fn with_values_of_points(self) -> Self {
         if self.place == Place::Points {
@@ -302,8 +301,8 @@ impl Cells {
         }
     }
 
-    /// Returns the range of the values without the lowest and the highest hundredth; `None` if
-    /// there is no value. If they are the same, returns the whole range.
+    /// Returns the range of the values without the lowest and the highest hundredth, or the whole
+    /// range if the other values are all equal; `None` if there is no value.
     fn inner_range(&self) -> Option<[f64; 2]> {
         let mut values: Vec<f32> =
             self.values.iter().copied().filter(|value| !value.is_nan()).collect();

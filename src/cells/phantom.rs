@@ -1,6 +1,9 @@
 //! Cells to try things on: a bent tube of cells of one kind, with a smooth field.
 
-use super::{CellKind, Cells};
+use super::{
+    CellKind, Cells,
+    basis::{CUBE, TETRAHEDRON},
+};
 use crate::{Error, Result};
 use glam::Vec3;
 use std::{collections::HashMap, f32::consts::TAU};
@@ -13,20 +16,6 @@ const TETRAHEDRA: [[usize; 4]; 6] =
 /// The quadrilaterals of a cube, seen from inside.
 const FACES: [[usize; 4]; 6] =
     [[0, 1, 2, 3], [4, 7, 6, 5], [0, 4, 5, 1], [3, 2, 6, 7], [0, 3, 7, 4], [1, 5, 6, 2]];
-const EDGES: [[usize; 2]; 12] = [
-    [0, 1],
-    [1, 2],
-    [2, 3],
-    [3, 0],
-    [4, 5],
-    [5, 6],
-    [6, 7],
-    [7, 4],
-    [0, 4],
-    [1, 5],
-    [2, 6],
-    [3, 7],
-];
 
 /// A place in half steps of the grid.
 type Place = [u32; 3];
@@ -73,13 +62,15 @@ impl Grid {
         let square = [[0, 0], [1, 0], [1, 1], [0, 1]];
         let corners: Vec<Place> =
             [0, 1].into_iter().flat_map(|up| square.map(|at| corner(at, up))).collect();
-        let middle = |a: Place, b: Place| [0, 1, 2].map(|axis| (a[axis] + b[axis]) / 2);
+        let with_middles = |corners: &[Place], edges: &[[usize; 2]]| {
+            let middle = |[a, b]: &[usize; 2]| {
+                [0, 1, 2].map(|axis| (corners[*a][axis] + corners[*b][axis]) / 2)
+            };
+            corners.iter().copied().chain(edges.iter().map(middle)).collect::<Vec<Place>>()
+        };
         match kind {
             CellKind::Hexahedron => self.push(kind, corners),
-            CellKind::QuadraticHexahedron => {
-                let middles = EDGES.map(|[a, b]| middle(corners[a], corners[b]));
-                self.push(kind, [corners, middles.to_vec()].concat());
-            }
+            CellKind::QuadraticHexahedron => self.push(kind, with_middles(&corners, CUBE)),
             CellKind::Wedge => {
                 for wedge in WEDGES {
                     self.push(kind, wedge.map(|at| corners[at]).to_vec());
@@ -98,10 +89,8 @@ impl Grid {
             }
             CellKind::QuadraticTetrahedron => {
                 for tetrahedron in TETRAHEDRA {
-                    let [a, b, c, d] = tetrahedron.map(|at| corners[at]);
-                    let pairs = [(a, b), (b, c), (c, a), (a, d), (b, d), (c, d)];
-                    let middles = pairs.map(|(from, to)| middle(from, to));
-                    self.push(kind, [vec![a, b, c, d], middles.to_vec()].concat());
+                    let own = tetrahedron.map(|at| corners[at]);
+                    self.push(kind, with_middles(&own, TETRAHEDRON));
                 }
             }
             other => {

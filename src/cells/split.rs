@@ -29,7 +29,7 @@ impl Default for CellOptions {
     }
 }
 
-/// The parts into which the edges of a cell may be divided.
+/// The parts into which the edges of a cell may be divided, by level.
 const PARTS: [usize; 4] = [1, 2, 4, 8];
 
 impl Cells {
@@ -45,47 +45,39 @@ impl Cells {
     pub fn tetrahedra(&self, options: &CellOptions) -> Result<Tetrahedra> {
         self.validate()?;
         let divisions = Divisions::new(self);
-        let levels = self.levels(&divisions, options);
+        let shown: Vec<bool> =
+            (0..self.len()).into_par_iter().map(|cell| self.is_shown(cell)).collect();
+        let level = self.level(&divisions, &shown, options);
         let mut made = Made { cells: self, points: HashMap::new(), builder: Builder::new(self) };
-        for (cell, level) in levels.iter().enumerate() {
-            if let Some(level) = level {
-                let finest = divisions.levels(self, cell).saturating_sub(1);
-                made.add(cell, divisions.of(self, cell, usize::from(*level).min(finest)));
-            }
+        for cell in (0..self.len()).filter(|cell| shown[*cell]) {
+            let own = divisions.of(self, cell);
+            made.add(cell, own.get(level).or(own.last()));
         }
         made.builder.finish()
     }
 
-    /// Returns the level of each cell's division; `None` for cells that are not drawn.
-    fn levels(&self, divisions: &Divisions, options: &CellOptions) -> Vec<Option<u8>> {
+    /// Returns the level to which the shown cells are divided, if they have as many. All have the
+    /// same, so that the faces between curved cells fit.
+    fn level(&self, divisions: &Divisions, shown: &[bool], options: &CellOptions) -> usize {
         let [low, high] = self.range();
         let (shape, field) = (options.tolerance, options.tolerance * (high - low));
-        let level = |cell: usize| {
-            if !self.is_shown(cell) {
-                return None;
-            }
-            let own = divisions.levels(self, cell);
-            let fits = |level: &usize| {
-                let division = divisions.of(self, cell, *level);
-                division.is_none_or(|division| self.fits(cell, division, shape, field))
-            };
+        let cells = || (0..self.len()).into_par_iter().filter(|cell| shown[*cell]);
+        let wanted = |cell: usize| {
             // The finest level is taken as it is.
-            Some((0..own.saturating_sub(1)).find(fits).unwrap_or(own.saturating_sub(1)) as u8)
+            let coarser = divisions.of(self, cell).split_last().map_or(&[][..], |(_, rest)| rest);
+            let fits = |division: &Division| self.fits(cell, division, shape, field);
+            coarser.iter().position(fits).unwrap_or(coarser.len())
         };
-        let mut levels: Vec<Option<u8>> = (0..self.len()).into_par_iter().map(level).collect();
-        // Curved cells are divided alike, so that the faces between them fit.
-        let finest = levels.iter().flatten().copied().max().unwrap_or(0);
-        levels.iter_mut().flatten().for_each(|level| *level = finest);
+        let wanted = cells().map(wanted).reduce(|| 0, usize::max);
         // Blocks of a cell grow with the cube of the parts; a block holds up to six tetrahedra.
-        let blocks = |level: u8| PARTS[usize::from(level)].pow(3) * 6;
-        for most in (0..PARTS.len() as u8).rev() {
-            let count: usize = levels.iter().flatten().map(|level| blocks(*level)).sum();
-            if count <= options.most {
-                break;
-            }
-            levels.iter_mut().flatten().for_each(|level| *level = (*level).min(most));
-        }
-        levels
+        let count = |level: usize| -> usize {
+            let of_cell = |cell: usize| {
+                let finest = divisions.of(self, cell).len().saturating_sub(1);
+                6 * PARTS[level.min(finest)].pow(3)
+            };
+            cells().map(of_cell).sum()
+        };
+        (1..=wanted).rev().find(|level| count(*level) <= options.most).unwrap_or(0)
     }
 
     /// Whether a cell has values at all of its nodes.
@@ -144,17 +136,10 @@ impl Divisions {
         Self(found)
     }
 
-    fn all(&self, cells: &Cells, cell: usize) -> &[Division] {
+    /// Returns the divisions of a cell, the coarsest first; none for prisms and polyhedra.
+    fn of(&self, cells: &Cells, cell: usize) -> &[Division] {
         let key = (cells.kinds[cell], cells.nodes_of(cell).len());
         self.0.get(&key).map_or(&[], Vec::as_slice)
-    }
-
-    fn levels(&self, cells: &Cells, cell: usize) -> usize {
-        self.all(cells, cell).len()
-    }
-
-    fn of(&self, cells: &Cells, cell: usize, level: usize) -> Option<&Division> {
-        self.all(cells, cell).get(level)
     }
 }
 
@@ -197,7 +182,9 @@ impl Made<'_> {
     /// Returns the number of the point with these weights of the nodes.
     fn point(&mut self, nodes: &[u32], weights: &[f64]) -> u32 {
         let parts = nodes.iter().zip(weights).filter(|(_, weight)| weight.abs() > LEAST_WEIGHT);
-        if let Some((node, _)) = parts.clone().find(|(_, weight)| **weight > 1.0 - LEAST_WEIGHT) {
+        // Weights add up to 1. Between the nodes, polynomials of a high order may exceed 1.
+        let mut found = parts.clone();
+        if let (Some((node, _)), None) = (found.next(), found.next()) {
             return *node;
         }
         // A point of a face has weights of the nodes of this face only, in all of its cells. The
