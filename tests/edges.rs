@@ -22,7 +22,6 @@ fn parts() -> [(&'static str, Mesh); 5] {
         ("slivers", Mesh::slivers(360)),
         ("sheet", Mesh::folded_sheet(7)),
     ]
-    .map(|(name, mesh)| (name, Mesh { z_is_up: true, ..mesh }))
 }
 
 fn size() -> ([u32; 2], bool) {

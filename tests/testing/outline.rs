@@ -1,6 +1,7 @@
 //! Pictures of a mesh compared with its triangles, traced with 16 rays a pixel: where it is drawn
 //! beside its outline, how large it is, and how alike its inside is.
 
+use glam::DVec3;
 use splatkit::{
     math::{Bounds, Camera},
     picture::Picture,
@@ -36,16 +37,15 @@ pub struct Found {
 }
 
 impl Truth {
-    /// The view from the right and from above that shows the whole mesh, `nearer` times as near.
+    /// The view from the right and from above that shows the whole mesh, with +Z up, or from
+    /// `nearer` times as near.
     pub fn new(mesh: &Mesh, size: [u32; 2], nearer: f64) -> Self {
         let [min, max] = mesh.bounds().expect("bounds");
         let bounds = Bounds { min, max };
-        let up = if mesh.z_is_up { glam::DVec3::Z } else { glam::DVec3::Y };
-        let front = if mesh.z_is_up { glam::DVec3::Y } else { glam::DVec3::NEG_Z };
         let mut camera = Camera::framing_with(
             &bounds,
-            front,
-            up,
+            DVec3::Y,
+            DVec3::Z,
             f64::from(size[0]) / f64::from(size[1]),
             Camera::DEFAULT_VIEW_ANGLE,
         );
