@@ -99,6 +99,7 @@ pub mod cpu;
 pub mod deadline;
 pub mod disk;
 pub mod error;
+pub mod facet;
 pub mod formats;
 #[cfg(feature = "gpu")]
 pub mod gpu;

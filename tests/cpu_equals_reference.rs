@@ -238,3 +238,10 @@ fn threads_change_nothing() {
 fn scenes_without_anything_are_refused() {
     assert!(CpuRenderer::new(&Scene::new()).is_err());
 }
+
+#[test]
+fn facets() {
+    for case in scenes::facets::all() {
+        assert_matches(&case, 50.0);
+    }
+}

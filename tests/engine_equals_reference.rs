@@ -280,6 +280,13 @@ fn ellipsoids_without_normals() {
 }
 
 #[test]
+fn facets() {
+    for case in scenes::facets::all() {
+        assert_matches(case, 50.0);
+    }
+}
+
+#[test]
 fn huge_among_small() {
     assert_matches(scenes::huge_among_small(), 50.0);
 }

@@ -9,7 +9,7 @@ use std::{
 use syn::{Attribute, Item, ItemMod, ItemUse, Meta, UseTree, visit::Visit};
 
 /// The rooms of src. Each imports only from rooms before it.
-const ROOMS: [&str; 27] = [
+const ROOMS: [&str; 28] = [
     "error",
     "parallel",
     "deadline",
@@ -22,6 +22,7 @@ const ROOMS: [&str; 27] = [
     "about",
     "color",
     "splat",
+    "facet",
     "volume",
     "surface",
     "scattered",

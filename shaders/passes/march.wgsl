@@ -133,6 +133,8 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
                     }
                 }
                 add_isotropic(at, taken, front, first_pixel);
+            } else if HAS_FACETS && (entry & ENTRY_COARSE) != 0u {
+                add_facet(entry, front, first_pixel);
             } else if GENERAL_RECORDS {
                 add_general(entry, front, first_pixel);
             }
@@ -228,6 +230,9 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
                 pixels[r].front = own.back;
             }
             composite(r, sheet, own);
+            if HAS_FACETS {
+                cover(r, sheet);
+            }
         }
         if CENTRAL {
             workgroupBarrier();

@@ -90,14 +90,21 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
         let splat = candidate(start + bit);
         if words == 1u {
             records[at] = vec4(splat.center, splat.strength);
+        } else if (source.flags & FACETS) != 0u {
+            var parts = facet_record(start + bit);
+            for (var word = 0u; word < 4u; word++) {
+                records[at + word] = parts[word];
+            }
         } else {
             write_general(at, splat);
         }
         var box = box_of(locate(splat.center, splat.covariance, splat.extent));
         box.first_tile |= select(0u, BOX_ISOTROPIC, words == 1u);
         if TWO_LEVELS {
-            box.first_tile |= select(0u, BOX_COARSE, (source.flags & COARSE) != 0u);
+            let is_coarse = words == 1u && (source.flags & COARSE) != 0u;
+            box.first_tile |= select(0u, BOX_COARSE, is_coarse);
         }
+        box.first_tile |= select(0u, BOX_COARSE, (source.flags & FACETS) != 0u);
         boxes[at] = box;
         for (var word = 1u; word < words; word++) {
             boxes[at + word].sheets = NO_BOX;

@@ -149,8 +149,10 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
     // Pixels whose centres lie in the box, with a margin for rounding; clamped as floats, so that
     // no infinity is cast.
     let limit = vec2<f32>(frame.size) + f32(APRON);
-    let low = frame.center + frame.scale * vec2(bounds_x.x, bounds_y.x) - 0.51;
-    let high = frame.center + frame.scale * vec2(bounds_x.y, bounds_y.y) - 0.49;
+    // A facet fills parts of pixels whose centres lie beside it.
+    let margin = select(0.51, 1.01, (source.flags & FACETS) != 0u);
+    let low = frame.center + frame.scale * vec2(bounds_x.x, bounds_y.x) - margin;
+    let high = frame.center + frame.scale * vec2(bounds_x.y, bounds_y.y) + margin - 1.0;
     let first = vec2<i32>(ceil(clamp(low, vec2(-f32(APRON)), limit)));
     let last = vec2<i32>(floor(clamp(high, vec2(-f32(APRON) - 1.0), limit - 1.0)));
     if !(first.x <= last.x) || !(first.y <= last.y) {

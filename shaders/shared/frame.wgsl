@@ -127,7 +127,7 @@ struct Source {
     count: u32,
     // First batch of this chunk in the frame's list of batches.
     first_run: u32,
-    // RADIANCE, ISOTROPIC, ENDS, NODES, COARSE.
+    // RADIANCE, ISOTROPIC, ENDS, NODES, COARSE, FACETS, CULLED, MIXED.
     flags: u32,
 }
 
@@ -139,6 +139,10 @@ const ENDS: u32 = 4u;
 const NODES: u32 = 8u;
 // Samples are those of the coarser of two levels.
 const COARSE: u32 = 16u;
+// Candidates are facets. Their backs are left out; all of them count as fronts.
+const FACETS: u32 = 32u;
+const CULLED: u32 = 64u;
+const MIXED: u32 = 128u;
 
 // Returns the number of words of a splat's record.
 fn record_words(flags: u32) -> u32 {
@@ -188,7 +192,8 @@ const RUN: u32 = 16u;
 const ONE_SPLAT: u32 = 0x10000u;
 
 // An entry: sheet within its group (7 bits), window after the splat's first (1), isotropic record
-// (1), record of the coarser level (1), place of the record (22).
+// (1), isotropic record of the coarser level, or general record of a facet (1), place of the record
+// (22).
 const ENTRY_SHEET_SHIFT: u32 = 25u;
 const ENTRY_CONTINUED: u32 = 0x1000000u;
 const ENTRY_ISOTROPIC: u32 = 0x800000u;

@@ -3,8 +3,9 @@
 // slot when it first stops, and frees the slot when it is finished. The sums are saved exactly, so
 // a tile that stops draws the same as without a stop.
 
-// Vectors of a pixel: the position of its invocation, then 16 of sums.
-const SAVED_VECTORS: u32 = 17u;
+// Vectors of a pixel: the position of its invocation, then 16 of sums, then those of facets.
+const FIRST_FACET_VECTOR: u32 = 17u;
+const SAVED_VECTORS: u32 = FIRST_FACET_VECTOR + FACET_VECTORS;
 const NO_SLOT: u32 = 0xffffffffu;
 
 fn saved_at(slot: u32, lane: vec2<u32>, r: u32) -> u32 {
@@ -64,6 +65,7 @@ fn save(slot: u32, lane: vec2<u32>, walk: vec4<u32>) {
             colors[at + 15u] = pixels[r].normal_y;
             colors[at + 16u] = pixels[r].normal_z;
         }
+        save_facets(r, at + FIRST_FACET_VECTOR);
     }
 }
 
@@ -101,6 +103,7 @@ fn restore(slot: u32, lane: vec2<u32>) -> vec4<u32> {
             pixels[r].normal_y = colors[at + 15u];
             pixels[r].normal_z = colors[at + 16u];
         }
+        restore_facets(r, at + FIRST_FACET_VECTOR);
     }
     return bitcast<vec4<u32>>(colors[saved_at(slot, lane, 0u)]);
 }

@@ -43,6 +43,10 @@ pub enum Kind {
     Classified,
     /// A value. Payload: weight, and slope in whitened space.
     Scalar,
+    /// A facet. The centre is its first corner, and `whitening` has the other two. The strength is
+    /// 1 for a front and −1 for a back. Payload: the normals and the colours at the corners, as
+    /// bits.
+    Facet,
 }
 
 /// The data of a splat that tiles need.

@@ -3,6 +3,7 @@
 use super::{
     bins::BATCH,
     brick_cache::{BESIDE, BrickCache, SLOT, SLOT_SIDE},
+    facets::FacetProjector,
     footprint::{Candidate, Carried, Record, counted, origin, record, to_view, widened},
     page_cache::PageCache,
     plan::{Outline, Plan},
@@ -13,6 +14,7 @@ use super::{
 use crate::{
     Error, Result,
     bricks::{BLOCK, BLOCKS, Choice, SIDE},
+    facet::FacetSet,
     hierarchy::{Cut, Levels},
     math::{Kernel, View},
     parallel::prelude::*,
@@ -37,6 +39,7 @@ pub enum Prepared {
         levels: Option<Box<Levels>>,
         drawn: Arc<SplatSet>,
     },
+    Facets(Arc<FacetSet>),
     Hierarchy(Box<PageCache>),
     /// A volume. If it is scattered, also the extremes around each sample, and the list of visible
     /// samples for a transfer function.
@@ -57,6 +60,7 @@ impl Prepared {
             Item::Radiance(set) | Item::Scalar(set, _) => {
                 Self::Set { levels: Levels::new(set).map(Box::new), drawn: set.clone() }
             }
+            Item::Facets(set) => Self::Facets(set.clone()),
             Item::Hierarchy(hierarchy) => Self::Hierarchy(Box::new(PageCache::new(hierarchy))),
             Item::Volume(volume, kernel, _) => Self::Volume {
                 volume: volume.clone(),
@@ -83,7 +87,7 @@ impl Prepared {
     /// Returns the bytes of memory held for drawing, besides the scene's own.
     pub fn bytes(&self) -> u64 {
         match self {
-            Self::Set { .. } | Self::Cells => 0,
+            Self::Set { .. } | Self::Facets(_) | Self::Cells => 0,
             Self::Hierarchy(pages) => pages.bytes(),
             Self::Volume { ranges, listed, .. } => {
                 let ranges = ranges.as_ref().map_or(0, |ranges| 2 * ranges.len() as u64);
@@ -119,6 +123,12 @@ impl Prepared {
                 let own = |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
                 Ok(batches(&drawn.splats, spare, |batch, records| {
                     records.extend(batch.iter().filter_map(own));
+                }))
+            }
+            Self::Facets(set) => {
+                let projector = FacetProjector::new(plan, set, settings);
+                Ok(batches(&set.facets, spare, |batch, records| {
+                    records.extend(batch.iter().filter_map(|facet| projector.record(facet)));
                 }))
             }
             Self::Hierarchy(pages) => {

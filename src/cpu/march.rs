@@ -71,7 +71,7 @@ impl March<'_> {
                 is_done: false,
             }
         });
-        let mut tile = OpenTile { corner, packets, sums: Sums::new(simd), cells };
+        let mut tile = OpenTile { corner, packets, sums: Sums::new(simd, plan), cells };
         match plan.single() {
             Some(order) => self.one_by_one(simd, entries, order, &mut tile, drawn),
             None => self.sheets(simd, entries, marks, &mut tile, drawn),
@@ -230,11 +230,17 @@ impl March<'_> {
                 }
                 None => None,
             };
-            if field.is_none() && radiance.is_none() {
+            let facets = sums.take_facets(simd, packet, sheet);
+            if field.is_none() && radiance.is_none() && facets.is_none() {
                 continue;
             }
             let field = field.as_ref().map(|(layer, mask)| (layer, *mask));
-            plan.close(simd, sheet, packet, field, radiance);
+            if field.is_some() || radiance.is_some() {
+                plan.close(simd, sheet, packet, field, radiance);
+            }
+            if let Some(facets) = &facets {
+                packet.pixels.cover(simd, facets);
+            }
             packet.is_done =
                 plan.optics != Optics::Maximum && !packet.pixels.through.simd_ge(OPAQUE).any_true();
         }

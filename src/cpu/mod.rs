@@ -16,6 +16,7 @@
 //! | `march` | draws the sheets of a tile in order |
 //! | `rays` | the rays of eight pixels |
 //! | `scatter`, `sums` | adds splats to the open sheets |
+//! | `facets` | the same for splats whose footprint is a triangle |
 //! | `gather`, `field` | the field of a lattice at a place, and its gradient |
 //! | `blend` | the same by sums over samples, for other kernels and lattices |
 //! | `radial`, `bells`, `rectilinear` | the weights of these sums |
@@ -30,6 +31,7 @@ mod blend;
 mod brick_cache;
 mod cells;
 mod close;
+mod facets;
 mod field;
 mod footprint;
 mod gather;
@@ -206,7 +208,10 @@ impl CpuRenderer {
             match prepared {
                 Prepared::Hierarchy(pages) => stats.missing_pages += pages.missing as u64,
                 Prepared::Bricks(bricks) => stats.brick_bytes += bricks.bytes(),
-                Prepared::Set { .. } | Prepared::Volume { .. } | Prepared::Cells => {}
+                Prepared::Set { .. }
+                | Prepared::Facets(_)
+                | Prepared::Volume { .. }
+                | Prepared::Cells => {}
             }
         }
         stats.steps = clock.steps;

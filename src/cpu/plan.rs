@@ -56,6 +56,8 @@ pub struct Plan<'a> {
     pub isosurfaces: usize,
     /// The scene has splats of radiance.
     pub has_radiance: bool,
+    /// The scene has facets.
+    pub has_facets: bool,
     pub lit_surfaces: bool,
     /// The number of convex regions that are kept, and of boxes that are cut out.
     pub clips: usize,
@@ -97,6 +99,7 @@ impl<'a> Plan<'a> {
             is_integrated: settings.classification == Classification::PreIntegrated,
             isosurfaces: 0,
             has_radiance: false,
+            has_facets: false,
             lit_surfaces: false,
             clips,
             holes,
@@ -105,8 +108,9 @@ impl<'a> Plan<'a> {
         let emits = settings.optics == Optics::EmissionAbsorption;
         for item in &scene.items {
             match item {
-                Item::Radiance(_) | Item::Hierarchy(_) => {
-                    plan.has_radiance = true;
+                Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) => {
+                    plan.has_facets |= matches!(item, Item::Facets(_));
+                    plan.has_radiance |= !matches!(item, Item::Facets(_));
                     plan.lit_surfaces |= emits && settings.surface_shade.is_some();
                 }
                 Item::Scalar(..) => plan.has_slopes = true,

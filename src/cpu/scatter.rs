@@ -406,11 +406,18 @@ impl<S: Simd> OpenTile<'_, S> {
     /// Adds a splat's window to all packets that it meets.
     #[inline(always)]
     pub fn add(&mut self, simd: S, plan: &Plan, record: &Record, window: Window) {
-        let splat = Projected::new(plan, record, window);
         let [first, last] = record.pixels;
         let inside = |pixel: [i32; 2]| [0, 1].map(|axis| pixel[axis] - self.corner[axis]);
         let from = inside(first).map(|at| at.max(0) as usize);
         let to = inside(last).map(|at| at.min(crate::plan::TILE as i32 - 1) as usize);
+        if record.kind == Kind::Facet {
+            let rows = from[1] / HIGH..=to[1] / HIGH;
+            let columns = from[0] / WIDE..=to[0] / WIDE;
+            let packets = rows.flat_map(|row| columns.clone().map(move |column| row * 2 + column));
+            self.add_facet(simd, plan, record, window, packets);
+            return;
+        }
+        let splat = Projected::new(plan, record, window);
         for row in from[1] / HIGH..=to[1] / HIGH {
             for column in from[0] / WIDE..=to[0] / WIDE {
                 let packet = &mut self.packets[row * 2 + column];
@@ -477,7 +484,7 @@ fn single<S: Simd>(
 
 /// Whether the clips keep a place on each ray.
 #[inline(always)]
-fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask32x8<S> {
+pub fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask32x8<S> {
     let mut kept = distance.simd_ge(rays.kept[0]) & distance.simd_le(rays.kept[1]);
     for [from, to] in &rays.holes[..plan.holes] {
         kept &= !(distance.simd_gt(*from) & distance.simd_lt(*to));

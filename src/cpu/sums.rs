@@ -37,6 +37,27 @@ pub struct FaceSums<S: Simd> {
     pub value_slope: [Lanes<S>; 2],
 }
 
+/// Sums of the facets in a sheet at eight pixels.
+#[derive(Clone, Copy)]
+pub struct FacetSums<S: Simd> {
+    /// The shares of the pixels that fronts and backs fill.
+    pub shares: [Lanes<S>; 2],
+    /// Lit colours times shares.
+    pub color: [Lanes<S>; 3],
+    /// Shares that count less the farther a facet is; distances and lit colours times these.
+    pub weight: Lanes<S>,
+    pub distance: Lanes<S>,
+    pub nearest: [Lanes<S>; 3],
+}
+
+/// The facets of a sheet at eight pixels: the share of the pixels that they fill, and their mean
+/// distance and colour.
+pub struct Cover<S: Simd> {
+    pub share: Lanes<S>,
+    pub distance: Lanes<S>,
+    pub color: [Lanes<S>; 3],
+}
+
 pub struct Sums<S: Simd> {
     pub radiance: [[Radiance<S>; PACKETS]; WINDOW],
     /// The packets that have radiance, as bits.
@@ -44,6 +65,9 @@ pub struct Sums<S: Simd> {
     pub field: [[FieldSums<S>; PACKETS]; WINDOW],
     pub faces: [[FaceSums<S>; PACKETS]; WINDOW],
     pub has_field: [u8; WINDOW],
+    /// Empty in a scene without facets.
+    pub facets: Vec<[FacetSums<S>; PACKETS]>,
+    pub has_facets: [u8; WINDOW],
     none: Lanes<S>,
 }
 
@@ -53,10 +77,24 @@ struct Resolved<S: Simd> {
     has_value: mask32x8<S>,
 }
 
+impl<S: Simd> FacetSums<S> {
+    #[inline(always)]
+    fn none(none: Lanes<S>) -> Self {
+        Self {
+            shares: [none; 2],
+            color: [none; 3],
+            weight: none,
+            distance: none,
+            nearest: [none; 3],
+        }
+    }
+}
+
 impl<S: Simd> Sums<S> {
     #[inline(always)]
-    pub fn new(simd: S) -> Self {
+    pub fn new(simd: S, plan: &Plan) -> Self {
         let none = Lanes::splat(simd, 0.0);
+        let no_facets = [FacetSums::none(none); PACKETS];
         Self {
             radiance: [[[none; 8]; PACKETS]; WINDOW],
             has_radiance: [0; WINDOW],
@@ -68,6 +106,8 @@ impl<S: Simd> Sums<S> {
                 value_slope: [none; 2],
             }; PACKETS]; WINDOW],
             has_field: [0; WINDOW],
+            facets: if plan.has_facets { vec![no_facets; WINDOW] } else { Vec::new() },
+            has_facets: [0; WINDOW],
             none,
         }
     }
@@ -104,6 +144,33 @@ impl<S: Simd> Sums<S> {
         let counts = depth.simd_ge(LEAST_DEPTH);
         let depth = counts.select(depth, self.none);
         Some([color[0] * depth, color[1] * depth, color[2] * depth, depth])
+    }
+
+    /// Takes the facets of a sheet at a packet. Returns `None` if none were added.
+    #[inline(always)]
+    pub fn take_facets(&mut self, simd: S, packet: &Packet<S>, sheet: usize) -> Option<Cover<S>> {
+        let slot = sheet % WINDOW;
+        if self.has_facets[slot] & packet.bit() == 0 {
+            return None;
+        }
+        self.has_facets[slot] &= !packet.bit();
+        let none = FacetSums::none(self.none);
+        let sums = std::mem::replace(&mut self.facets[slot][packet.number], none);
+        let [front, back] = sums.shares;
+        let one = Lanes::splat(simd, 1.0);
+        let inverse = one / sums.weight.max(Lanes::splat(simd, 1e-37));
+        let all = front + back;
+        let per_share = one / all.max(Lanes::splat(simd, 1e-37));
+        // What is more than the whole pixel lies behind something.
+        let hidden = (all - one).max(self.none).min(one);
+        let part = hidden * hidden;
+        let color = three!(I => {
+            let (mean, nearest) = (sums.color[I] * per_share, sums.nearest[I] * inverse);
+            part.mul_add(nearest - mean, mean).max(self.none).min(one)
+        });
+        // At a fold, both sides fill the same part of a pixel.
+        let share = front.max(back).min(one);
+        Some(Cover { share, distance: sums.distance * inverse, color })
     }
 
     /// Returns the field of a sheet at a packet, or `None` if none was added. `slopes` are those
@@ -208,6 +275,10 @@ impl<S: Simd> Sums<S> {
                 }
             }
             self.has_radiance[slot] = 0;
+        }
+        if self.has_facets[slot] != 0 {
+            self.facets[slot] = [FacetSums::none(self.none); PACKETS];
+            self.has_facets[slot] = 0;
         }
         if self.has_field[slot] != 0 {
             let none = self.none;

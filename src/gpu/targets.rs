@@ -56,8 +56,8 @@ pub fn most_rows(width: u32, sheets: usize) -> u64 {
 /// have a bit for each).
 const SLOTS: u64 = 1024;
 
-/// Bytes of a tile's saved sums (`SAVED_VECTORS` in saved.wgsl).
-const SLOT_BYTES: u64 = 64 * 17 * 16;
+/// Bytes of a tile's saved sums (`SAVED_VECTORS` in saved.wgsl, with facets).
+const SLOT_BYTES: u64 = 64 * 27 * 16;
 
 /// Returns the maximum bytes of the slots. They lie behind the colours of a picture, in the same
 /// binding.

@@ -34,6 +34,10 @@ pub fn variant(request: &Request<'_>) -> Variant {
     let mut variant = without_items(request);
     for item in &scene.items {
         match item {
+            Item::Facets(_) => {
+                variant.facets = true;
+                variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
+            }
             Item::Radiance(_) | Item::Hierarchy(_) => {
                 variant.radiance = true;
                 variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
@@ -81,6 +85,7 @@ fn without_items(request: &Request<'_>) -> Variant {
         sample_kind: 0,
         two_levels: false,
         radiance: false,
+        facets: false,
         isotropic: false,
         table_kernel: false,
         beyond: false,

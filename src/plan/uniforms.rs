@@ -3,6 +3,7 @@
 
 use crate::{
     bricks::Choice,
+    facet::{FacetSet, Sides},
     math::{Bounds, Kernel, Profile, Sheets, View},
     plan::tables::Tables,
     scene::{Clip, ClipShape, Item, Mode, Scene, Settings},
@@ -103,6 +104,12 @@ pub const NODES: u32 = 8;
 
 pub const COARSE: u32 = 16;
 
+pub const FACETS: u32 = 32;
+
+pub const CULLED: u32 = 64;
+
+pub const MIXED: u32 = 128;
+
 fn wide(v: DVec3, w: f32) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, w]
 }
@@ -130,6 +137,13 @@ impl Source {
     pub fn of_splats(view: &View, set: &SplatSet, radiance: bool) -> Self {
         let flags = if radiance { RADIANCE } else { 0 };
         Self { flags, ..Self::of_radiance(view, set.origin, set.extent) }
+    }
+
+    /// Returns the source of a chunk of facets. `is_culled` says whether backs are left out.
+    pub fn of_facets(view: &View, set: &FacetSet, is_culled: bool) -> Self {
+        let culled = if is_culled { CULLED } else { 0 };
+        let mixed = if set.sides == Sides::Mixed { MIXED } else { 0 };
+        Self { flags: FACETS | culled | mixed, ..Self::of_radiance(view, set.origin, 1.0) }
     }
 
     /// Returns the source of a chunk of radiance splats around an origin in the world.
@@ -218,7 +232,7 @@ impl Frame {
         }
         for item in &scene.items {
             let transfer = match item {
-                Item::Radiance(_) | Item::Hierarchy(_) => continue,
+                Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) => continue,
                 Item::Scalar(set, transfer) => {
                     frame.kernel[2] = 1.0 / set.overlap;
                     frame.isotropic[3] = Kernel::default().least_sum() as f32;

@@ -3,6 +3,7 @@
 use super::{
     Frame,
     composite::{Composite, Medium, Step},
+    facets::Cover,
     field::{Field, Layer},
     ray::Ray,
     sheet::Sheet,
@@ -154,13 +155,13 @@ fn layer(parts: &[Part], thickness: f64) -> Option<Layer> {
 
 impl Frame<'_> {
     /// Colours and composites the sheets of a pixel in a scene with cells. `sheets` have the
-    /// radiance; the clips leave the parts `allowed` of the ray.
+    /// radiance, `covers` the facets; the clips leave the parts `allowed` of the ray.
     pub(super) fn pixel_of_cells(
         &self,
         solids: &Solids,
         field: &Field,
         ray: &Ray,
-        sheets: &[Sheet],
+        (sheets, covers): (&[Sheet], &[Cover]),
         allowed: &[[f64; 2]],
     ) -> Composite {
         let parts = solids.parts(ray);
@@ -186,7 +187,7 @@ impl Frame<'_> {
                 .reduce(f64::max)
                 .map_or(Composite::EMPTY, |value| self.largest(field, value));
         }
-        self.composite(sheets, ray, |k| {
+        self.composite(sheets, covers, ray, |k| {
             let (mut medium, steps) = match solids.place {
                 Place::Points => {
                     let layer = layer(&of_sheet(k), thickness(k))?;

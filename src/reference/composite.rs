@@ -54,6 +54,19 @@ impl Composite {
         self.pass_in_steps(medium, &[Step { depth: medium.depth, span }]);
     }
 
+    /// Adds an opaque surface at a distance, which fills a share of the pixel: it absorbs that share
+    /// of the light, or as much as is left.
+    pub fn cover(&mut self, share: f64, distance: f64, color: DVec3) {
+        let before = self.opacity;
+        let share = share.min(1.0 - before);
+        self.color += share * color;
+        self.opacity += share;
+        if before < 0.5 && self.opacity >= 0.5 {
+            self.half = distance;
+        }
+        self.depth = self.depth.max(-(-self.opacity).ln_1p());
+    }
+
     /// Adds a medium whose optical depth grows by these steps.
     pub fn pass_in_steps(&mut self, medium: Medium, steps: &[Step]) {
         let alpha = -(-medium.depth).exp_m1();

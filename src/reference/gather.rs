@@ -27,8 +27,9 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) 
         match item {
             Item::Radiance(set) => kernels
                 .extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view))),
-            // A hierarchy's cut has become a set by now, and bricks a volume.
-            Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => {}
+            // Facets are no kernels. A hierarchy's cut has become a set by now, and bricks a
+            // volume.
+            Item::Facets(_) | Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => {}
             Item::Scalar(set, transfer) => {
                 let before = before.map(|before| (before, transfer));
                 kernels.extend(

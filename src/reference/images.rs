@@ -4,6 +4,7 @@ use super::{
     Frame, LEAST_DEPTH, clip,
     composite::{Composite, Medium, Step},
     face::Face,
+    facets::{Cover, Facet},
     field::{Field, Layer},
     kernel::{Kernel, Load},
     ray::Ray,
@@ -19,6 +20,7 @@ impl Frame<'_> {
     /// Draws a row.
     pub(super) fn row_of_sheets(&self, row: i64) -> Vec<Composite> {
         let kernels = self.kernels_of_row(row);
+        let facets: Vec<&Facet> = self.facets.iter().filter(|facet| facet.meets_row(row)).collect();
         let central = self.gradient == Gradient::Central
             && self.field.as_ref().is_some_and(Field::needs_gradients);
         let beside = central.then(|| [row - 1, row + 1].map(|row| self.kernels_of_row(row)));
@@ -38,7 +40,8 @@ impl Frame<'_> {
                         .collect()
                 })
             });
-            self.pixel_of_sheets(&ray, &kernels, around)
+            let covers = self.covers([column, row], &facets);
+            self.pixel_of_sheets(&ray, &kernels, around, &covers)
         };
         (0..i64::from(self.view.size[0])).map(pixel).collect()
     }
@@ -110,14 +113,15 @@ impl Frame<'_> {
         ray: &Ray,
         kernels: &[&Kernel],
         around: Option<Around>,
+        covers: &[Cover],
     ) -> Composite {
         let allowed = clip::allowed(ray, &self.view, &self.clips);
         let sheets = self.sheets(ray, kernels, &allowed);
         let Some(field) = &self.field else {
-            return self.composite(&sheets, ray, |_| None);
+            return self.composite(&sheets, covers, ray, |_| None);
         };
         if let Some(solids) = &self.solids {
-            return self.pixel_of_cells(solids, field, ray, &sheets, &allowed);
+            return self.pixel_of_cells(solids, field, ray, (&sheets, covers), &allowed);
         }
         let faces = self.faces(ray, kernels, &self.planes);
         let middles = self.middles(ray, kernels);
@@ -155,7 +159,7 @@ impl Frame<'_> {
                 .reduce(f64::max)
                 .map_or(Composite::EMPTY, |value| self.largest(field, value));
         }
-        self.composite(&sheets, ray, |k| {
+        self.composite(&sheets, covers, ray, |k| {
             let (layer, pieces) = layer(k)?;
             let (mut medium, steps) = layer.shine(field, ray.direction, &pieces);
             if self.optics == Optics::XRay {
@@ -184,6 +188,7 @@ impl Frame<'_> {
     pub(super) fn composite(
         &self,
         sheets: &[Sheet],
+        covers: &[Cover],
         ray: &Ray,
         medium: impl Fn(usize) -> Option<(Medium, Vec<Step>)>,
     ) -> Composite {
@@ -196,6 +201,9 @@ impl Frame<'_> {
                 }
                 Some((medium, steps)) => composite.pass_in_steps(medium, &steps),
                 None => composite.pass(surface, self.span(k)),
+            }
+            if let Some((share, distance, color)) = covers.get(k).and_then(Cover::mean) {
+                composite.cover(share, distance, color);
             }
         }
         composite

@@ -5,6 +5,7 @@ use crate::{
     Result,
     bricks::Bricks,
     cells::Tetrahedra,
+    facet::FacetSet,
     hierarchy::Hierarchy,
     math::{Bounds, Kernel},
     splat::SplatSet,
@@ -18,7 +19,9 @@ use std::sync::Arc;
 pub enum Item {
     /// Surfels or 3D Gaussians: splats that carry their own colour and optical depth.
     Radiance(Arc<SplatSet>),
-    /// A hierarchy of these splats. A picture shows a cut of it
+    /// Facets: splats whose footprint is a triangle.
+    Facets(Arc<FacetSet>),
+    /// A hierarchy of surfels. A picture shows a cut of it
     /// ([`Settings::detail`](super::Settings::detail)).
     Hierarchy(Arc<Hierarchy>),
     /// Scattered samples: splats that carry a value, shown by a transfer function.
@@ -52,7 +55,7 @@ impl Item {
             | Self::Volume(_, _, transfer)
             | Self::Bricks(_, _, transfer)
             | Self::Cells(_, transfer) => Some(transfer),
-            Self::Radiance(_) | Self::Hierarchy(_) => None,
+            Self::Radiance(_) | Self::Facets(_) | Self::Hierarchy(_) => None,
         }
     }
 
@@ -63,7 +66,7 @@ impl Item {
             | Self::Volume(_, _, transfer)
             | Self::Bricks(_, _, transfer)
             | Self::Cells(_, transfer) => Some(transfer),
-            Self::Radiance(_) | Self::Hierarchy(_) => None,
+            Self::Radiance(_) | Self::Facets(_) | Self::Hierarchy(_) => None,
         }
     }
 
@@ -71,7 +74,11 @@ impl Item {
     pub fn kernel(&self) -> Option<&Kernel> {
         match self {
             Self::Volume(_, kernel, _) | Self::Bricks(_, kernel, _) => Some(kernel),
-            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) | Self::Cells(..) => None,
+            Self::Radiance(_)
+            | Self::Facets(_)
+            | Self::Hierarchy(_)
+            | Self::Scalar(..)
+            | Self::Cells(..) => None,
         }
     }
 
@@ -80,7 +87,11 @@ impl Item {
         match self {
             Self::Volume(volume, ..) => Some(&volume.lattice),
             Self::Bricks(bricks, ..) => Some(&bricks.header().lattice),
-            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) | Self::Cells(..) => None,
+            Self::Radiance(_)
+            | Self::Facets(_)
+            | Self::Hierarchy(_)
+            | Self::Scalar(..)
+            | Self::Cells(..) => None,
         }
     }
 
@@ -92,7 +103,7 @@ impl Item {
             Self::Volume(volume, ..) => Some(volume.range),
             Self::Bricks(bricks, ..) => Some(bricks.header().range),
             Self::Cells(cells, _) => Some(cells.range()),
-            Self::Radiance(_) | Self::Hierarchy(_) => None,
+            Self::Radiance(_) | Self::Facets(_) | Self::Hierarchy(_) => None,
         }
     }
 
@@ -117,6 +128,7 @@ impl Item {
     pub fn bounds(&self) -> Bounds {
         match self {
             Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
+            Self::Facets(set) => set.bounds(),
             Self::Hierarchy(hierarchy) => hierarchy.bounds(),
             Self::Cells(cells, _) => cells.bounds(),
             Self::Volume(volume, kernel, _) => reached(&volume.lattice, kernel),

@@ -18,6 +18,7 @@ use crate::{
     Result,
     bricks::Bricks,
     cells::Tetrahedra,
+    facet::FacetSet,
     hierarchy::Hierarchy,
     math::{Bounds, Kernel, Tensor},
     splat::SplatSet,
@@ -62,6 +63,13 @@ impl Scene {
     #[must_use]
     pub fn with_splats(mut self, set: impl Into<Arc<SplatSet>>) -> Self {
         self.items.push(Item::Radiance(set.into()));
+        self
+    }
+
+    /// Adds splats whose footprint is a triangle.
+    #[must_use]
+    pub fn with_facets(mut self, set: impl Into<Arc<FacetSet>>) -> Self {
+        self.items.push(Item::Facets(set.into()));
         self
     }
 

@@ -5,6 +5,7 @@
 use super::{Item, Settings};
 use crate::{
     Error, Result,
+    facet::{Facet, FacetSet},
     hierarchy::Detail,
     math::{Bounds, Kernel},
     parallel::prelude::*,
@@ -55,6 +56,7 @@ pub(super) fn check_item(item: &Item) -> Result<()> {
     item.kernel().map_or(Ok(()), Kernel::validate)?;
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(Error::Argument)?,
+        Item::Facets(set) => check_facets(set).map_err(Error::Argument)?,
         Item::Volume(volume, ..) => volume.validate().map_err(Error::Argument)?,
         // Tetrahedra are checked as they are made.
         Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => {}
@@ -63,14 +65,29 @@ pub(super) fn check_item(item: &Item) -> Result<()> {
     let Bounds { min, max } = item.bounds();
     let holds = |v: f64| v.abs() <= f64::from(f32::MAX);
     // The bounds of an empty set are not finite. That is no error.
-    let is_none =
-        matches!(item, Item::Radiance(set) | Item::Scalar(set, _) if set.splats.is_empty());
+    let is_none = matches!(item, Item::Radiance(set) | Item::Scalar(set, _) if set.splats.is_empty())
+        || matches!(item, Item::Facets(set) if set.facets.is_empty());
     if !is_none && ![min, max, max - min].iter().all(|v| v.to_array().into_iter().all(holds)) {
         return Err(Error::Argument(format!(
             "it reaches from {min} to {max}, beyond what 32-bit numbers hold"
         )));
     }
     Ok(())
+}
+
+fn check_facets(set: &FacetSet) -> Result<(), String> {
+    if !set.origin.is_finite() {
+        return Err(format!("the origin {} is not finite", set.origin));
+    }
+    let is_finite =
+        |facet: &Facet| facet.corners.iter().flatten().all(|v| v.is_finite() && v.abs() <= 1e18);
+    match set.facets.par_iter().position_first(|facet| !is_finite(facet)) {
+        Some(index) => {
+            let corners = set.facets[index].corners;
+            Err(format!("facet {index}: the corners {corners:?} are not finite, or beyond 1e18"))
+        }
+        None => Ok(()),
+    }
 }
 
 fn check_set(set: &SplatSet) -> Result<(), String> {

@@ -5,6 +5,7 @@ use crate::{
     Result,
     bricks::{Bricks, Level},
     cells::Tetrahedra,
+    facet::FacetSet,
     hierarchy::Hierarchy,
     math::{
         Bounds,
@@ -63,6 +64,7 @@ impl Scene {
             let own = match item {
                 Item::Radiance(set) => of_splats(set, |_| true, clips),
                 Item::Scalar(set, transfer) => of_samples(set, transfer, clips),
+                Item::Facets(set) => of_facets(set, clips),
                 Item::Hierarchy(hierarchy) => of_splats(&coarse(hierarchy)?, |_| true, clips),
                 Item::Cells(cells, transfer) => of_cells(cells, transfer, clips),
                 Item::Volume(volume, _, transfer) => of_volume(volume, transfer, clips),
@@ -98,6 +100,17 @@ fn of_splats(set: &SplatSet, shows: impl Fn(&Splat) -> bool, clips: &[Clip]) -> 
             .flat_map(move |(axis, reach)| [center - reach * axis, center + reach * axis])
     };
     outermost(&centers).into_iter().flat_map(reach).map(world).collect()
+}
+
+/// Returns the outermost corners of facets.
+fn of_facets(set: &FacetSet, clips: &[Clip]) -> Vec<DVec3> {
+    let world = |point: Vec3| set.origin + point.as_dvec3();
+    let kept = |point: &Vec3| clips.iter().all(|clip| clip.keeps(world(*point)));
+    let corners = set.facets.iter().flat_map(|facet| facet.corners.map(Vec3::from));
+    let mut corners: Vec<Vec3> = corners.filter(kept).collect();
+    let Some([low, high]) = without_strays(&corners) else { return Vec::new() };
+    corners.retain(|corner| corner.cmpge(low).all() && corner.cmple(high).all());
+    outermost(&corners).into_iter().map(|index| world(corners[index as usize])).collect()
 }
 
 /// Returns the outermost samples that a transfer function shows.

@@ -21,6 +21,9 @@ const CELL_SHEETS: [f64; 2] = [0.5, 0.2];
 /// The thinnest sheets of tetrahedra, as a share of the depth of the scene.
 const LEAST_CELL_SHEET: f64 = 1e-3;
 
+/// How far the pixel that a facet fills in part reaches beyond it, in the same unit as splats.
+const FACET_REACH: f64 = 1.5 / FOOTPRINT_BLUR;
+
 impl Scene {
     /// Returns how far a splat of the scene can reach from its centre, in the standard deviations
     /// that widening adds. Returns 0 if there are no explicit splats.
@@ -28,6 +31,7 @@ impl Scene {
         let reaches = self.items.iter().map(|item| match item {
             Item::Radiance(set) => f64::from(set.extent) + STEP_BACK,
             Item::Scalar(set, _) => f64::from(set.extent),
+            Item::Facets(_) => FACET_REACH,
             Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent) + STEP_BACK,
             Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => 0.0,
         });
@@ -112,7 +116,7 @@ impl Scene {
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {}
-                Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => {
+                Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) | Item::Scalar(..) => {
                     pixels = Some(settings.sheet_pixels);
                 }
             }

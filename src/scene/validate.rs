@@ -41,7 +41,7 @@ impl Scene {
             let (set, payload) = match item {
                 Item::Radiance(set) => (set, Payload::Radiance),
                 Item::Scalar(set, _) => (set, Payload::Scalar),
-                Item::Hierarchy(_) => continue,
+                Item::Facets(_) | Item::Hierarchy(_) => continue,
                 Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {
                     fields += 1;
                     continue;
@@ -120,7 +120,15 @@ fn check_item(item: &Item, settings: &Settings) -> Result<()> {
         Item::Radiance(_) | Item::Hierarchy(_) if settings.optics == Optics::Maximum => {
             wrong("a maximum intensity picture takes a volume or samples alone, without surfaces")
         }
-        Item::Radiance(_) | Item::Hierarchy(_) => Ok(()),
+        Item::Facets(_)
+            if settings.mode != Mode::Sheets || settings.optics != Optics::EmissionAbsorption =>
+        {
+            wrong(
+                "facets are drawn in image-aligned sheets that emit and absorb light; \
+                 draw the surfels of the mesh instead",
+            )
+        }
+        Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) => Ok(()),
         Item::Scalar(_, transfer) => check_classified(transfer, settings),
         Item::Cells(cells, transfer) => check_cells(cells, transfer, settings),
         Item::Volume(volume, kernel, transfer) => {

@@ -192,7 +192,7 @@ impl Mesh {
     }
 
     /// Returns whether all materials that triangles use are opaque.
-    fn has_opaque_materials(&self) -> bool {
+    pub(super) fn has_opaque_materials(&self) -> bool {
         let mut is_used = vec![false; self.materials.len()];
         for &material in &self.triangle_materials {
             if let Some(used) = is_used.get_mut(material as usize) {

@@ -46,6 +46,10 @@ pub struct SurfelOptions {
     /// Whether the directions of normals are their colours: x, y and z from −1 to 1 become red,
     /// green and blue.
     pub color_by_normal: bool,
+    /// Most triangles of a mesh that is drawn as facets ([`Mesh::facets`]), which have its outline
+    /// exactly. In pictures of usual sizes, the triangles of a larger mesh are no larger than
+    /// pixels. 0 draws surfels always.
+    pub most_facets: usize,
     /// When the surfels must be ready.
     pub deadline: Deadline,
 }
@@ -72,6 +76,7 @@ impl Default for SurfelOptions {
             largest_spacing: 1.0 / 128.0,
             most_triangles: 1 << 23,
             color_by_normal: false,
+            most_facets: 1 << 20,
             deadline: Deadline::NEVER,
         }
     }
@@ -137,7 +142,7 @@ impl Mesh {
 
     /// Like [`bounds`](Self::bounds), relative to the origin. Added to a distant origin, the size
     /// could vanish by rounding.
-    fn local_bounds(&self) -> Option<[Vec3; 2]> {
+    pub(super) fn local_bounds(&self) -> Option<[Vec3; 2]> {
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let with = |(low, high): (Vec3, Vec3), place: &Vec3| (low.min(*place), high.max(*place));
         let union = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
@@ -155,7 +160,7 @@ impl Mesh {
     }
 
     /// Returns the area of all triangles. Their indices must be within the positions.
-    fn area(&self) -> f64 {
+    pub(super) fn area(&self) -> f64 {
         let area = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize].as_dvec3());
             (b - a).cross(c - a).length() * 0.5

@@ -1,6 +1,7 @@
 //! Small scenes of every kind, to compare renderers with each other. They are the same in every
 //! run, and the reference draws each in about a second.
 
+pub mod facets;
 pub mod methods;
 
 use glam::{DMat3, DVec3, Vec3};

@@ -143,6 +143,16 @@ impl EngineFlags {
         }
     }
 
+    /// Whether meshes can be drawn as facets: by the CPU engine, in sheets that emit and absorb
+    /// light.
+    pub fn draws_facets(&self) -> splatkit::Result<bool> {
+        let mut settings = Settings::new([1, 1]);
+        self.method.apply(&mut settings);
+        let is_usual = settings.mode == scene::Mode::Sheets
+            && settings.optics == scene::Optics::EmissionAbsorption;
+        Ok(is_usual && matches!(self.device(&Scene::new())?, Device::Cpu))
+    }
+
     /// Opens the adapter that the flags choose.
     fn gpu(&self) -> splatkit::Result<Gpu> {
         // Every text is a valid choice, so the conversion cannot fail.
@@ -223,7 +233,7 @@ impl EngineFlags {
                 | Item::Volume(_, _, transfer)
                 | Item::Bricks(_, _, transfer)
                 | Item::Cells(_, transfer) => transfer.shade,
-                Item::Radiance(_) | Item::Hierarchy(_) => None,
+                Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) => None,
             });
             settings.volume_shade = Some(Some(own.unwrap_or_default()));
         }

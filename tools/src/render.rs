@@ -175,7 +175,8 @@ impl Render {
         progress: &Progress,
     ) -> Result<(Loaded, Settings), Failure> {
         self.engine.check()?;
-        let mut loaded = self.scene.load(given, progress)?;
+        let facets = self.engine.draws_facets()?;
+        let mut loaded = self.scene.load_with(facets, given, progress)?;
         let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
         files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
         let settings = self.engine.settings(&loaded, self.samples)?;

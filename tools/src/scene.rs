@@ -65,8 +65,19 @@ pub struct Loaded {
 }
 
 impl SceneFlags {
-    /// Reads the inputs and makes a scene of them.
+    /// Reads the inputs and makes a scene of them. Meshes become surfels.
     pub fn load(&self, given: &Given, progress: &Progress) -> Result<Loaded, Failure> {
+        self.load_with(false, given, progress)
+    }
+
+    /// Like [`load`](Self::load). With `facets`, meshes whose triangles can be larger than pixels
+    /// become facets.
+    pub fn load_with(
+        &self,
+        facets: bool,
+        given: &Given,
+        progress: &Progress,
+    ) -> Result<Loaded, Failure> {
         let start = Instant::now();
         let show = self.show.open(&self.load.limits())?;
         let loaded = Loaded {
@@ -79,7 +90,7 @@ impl SceneFlags {
             kinds: Vec::new(),
             read: self.show.files(),
         };
-        let mut adding = Adding { flags: self, show, progress, loaded };
+        let mut adding = Adding { flags: self, show, facets, progress, loaded };
         let (mut is_scaled, mut unscaled) = (false, None);
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
@@ -151,6 +162,7 @@ impl SceneFlags {
 struct Adding<'a> {
     flags: &'a SceneFlags,
     show: Show<'a>,
+    facets: bool,
     progress: &'a Progress,
     loaded: Loaded,
 }
@@ -184,22 +196,31 @@ impl Adding<'_> {
             up,
             named,
         )?);
-        self.progress.stage(format!("Making surfels of {}", path.display()));
+        self.progress.stage(format!("Making splats of {}", path.display()));
         self.add_unit(&mesh.about.length);
         let mut options = SurfelOptions { deadline, ..SurfelOptions::default() };
         options.radius_scale *= self.flags.show.radius_scale.unwrap_or(1.0);
         options.color_by_normal = color.by_normal();
         if let Some(crease) = self.flags.show.crease {
-            // Facets of one plane still join.
+            // Triangles of one plane still join.
             options.crease_angle_degrees = crease.max(0.01);
         }
-        let splats = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
         if self.flags.show.edges && !mesh.triangles.is_empty() {
             self.loaded.edges.push(Edges::of(&mesh));
         }
-        let bounds = mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
-        self.loaded.count_in(bounds, splats.splats.len());
-        self.change(|scene| scene.with_splats(splats));
+        // Radii are for surfels; facets have none.
+        if !self.facets || self.flags.show.radius_scale.is_some() {
+            options.most_facets = 0;
+        }
+        let bounds = mesh.bounds().map(|[min, max]| Bounds { min, max });
+        if let Some(facets) = mesh.facets(&options).map_err(|e| in_file(path, e))? {
+            self.loaded.count_in(bounds.unwrap_or(facets.bounds()), facets.facets.len());
+            self.change(|scene| scene.with_facets(facets));
+        } else {
+            let splats = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
+            self.loaded.count_in(bounds.unwrap_or(splats.bounds()), splats.splats.len());
+            self.change(|scene| scene.with_splats(splats));
+        }
         Ok(())
     }
 

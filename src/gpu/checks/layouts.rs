@@ -2,6 +2,7 @@
 
 use super::{recipes, variants::usual};
 use crate::{
+    facet::Facet,
     gpu::{
         passes::present::Present,
         pipeline::state::{
@@ -129,6 +130,10 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
         first_run, flags,
     );
     let splat = layout!(Splat: center, strength, factor, color, normal);
+    let facet = layout!(Facet: corners, normals, colors)
+        .split("corners", &[("corners", 0, "array<f32, 9>")])
+        .split("normals", &[("normals", 0, "array<u32, 3>")])
+        .split("colors", &[("colors", 0, "array<u32, 3>")]);
     let node = layout!(GpuNode:
         center, radius, size, cone, child_page, parent_size, parent_center, parent_radius,
     );
@@ -149,6 +154,8 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
             "Splat",
             splat.split("factor", &[("factor_a", 0, "vec4<f32>"), ("factor_b", 16, "vec2<f32>")]),
         ),
+        // WGSL would align three numbers to 16 bytes.
+        ("Facet", facet),
         ("Node", node),
         // WGSL pads the end of a structure by itself, and has no three numbers without alignment.
         ("Bounds", layout!(GpuBounds: center, radius, size, unused).without_padding("unused")),

@@ -77,6 +77,7 @@ fn cases() -> Vec<Case> {
         methods::sharp_body_centred(),
     ];
     all.extend([0.25, 9.0, 20.0].map(bricks));
+    all.extend(scenes::facets::all());
     all
 }
 

@@ -32,6 +32,7 @@ impl March {
             shaders::PIXEL,
             shaders::KERNELS,
             shaders::SHEET,
+            if variant.facets { shaders::FACETS } else { shaders::NO_FACETS },
             shaders::PICTURE,
             shaders::PROGRESS,
             shaders::SAVED,

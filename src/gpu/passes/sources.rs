@@ -1,6 +1,7 @@
-//! The sources of candidates. A pass that reads candidates has a stage for each of the four kinds:
+//! The sources of candidates. A pass that reads candidates has a stage for each of the five kinds:
 //! explicit splats (shaders/sources/splats.wgsl), hierarchies (shaders/sources/nodes.wgsl),
-//! lattices (shaders/sources/lattice.wgsl) and volumes in bricks (shaders/sources/bricks.wgsl).
+//! lattices (shaders/sources/lattice.wgsl), volumes in bricks (shaders/sources/bricks.wgsl) and
+//! facets (shaders/sources/facets.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -19,21 +20,23 @@ pub struct Sources<T> {
     nodes: T,
     lattice: T,
     bricks: T,
+    facets: T,
 }
 
 impl<T> Sources<T> {
     #[cfg(test)]
-    pub fn into_array(self) -> [T; 4] {
-        [self.splats, self.nodes, self.lattice, self.bricks]
+    pub fn into_array(self) -> [T; 5] {
+        [self.splats, self.nodes, self.lattice, self.bricks, self.facets]
     }
 
     pub fn map<U>(self, make: impl Fn(T) -> U) -> Sources<U> {
-        let Self { splats, nodes, lattice, bricks } = self;
+        let Self { splats, nodes, lattice, bricks, facets } = self;
         Sources {
             splats: make(splats),
             nodes: make(nodes),
             lattice: make(lattice),
             bricks: make(bricks),
+            facets: make(facets),
         }
     }
 }
@@ -42,21 +45,16 @@ impl<T> Sources<T> {
 /// source's shader and the bindings of its group.
 pub fn per_source(make: impl Fn(&str, &str, &[Binding]) -> Recipe) -> Sources<Recipe> {
     use Binding::{Read, Uniform};
-    let lattice = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
-    let bricks = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_BRICKS].concat();
+    let others = shaders::SOURCE_NO_FACETS;
+    let lattice = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_LATTICE, others].concat();
+    let bricks = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_BRICKS, others].concat();
+    let splats = [shaders::VALUE, shaders::SPLAT, shaders::SPLATS, others].concat();
     Sources {
-        splats: make(
-            "splats",
-            &[shaders::VALUE, shaders::SPLAT, shaders::SPLATS, shaders::SOURCE_SPLATS].concat(),
-            &[Uniform, Read],
-        ),
-        nodes: make(
-            "nodes",
-            &[shaders::VALUE, shaders::SPLAT, shaders::SPLATS, shaders::SOURCE_NODES].concat(),
-            &[Uniform, Read, Read],
-        ),
+        splats: make("splats", &[&splats, shaders::SOURCE_SPLATS].concat(), &[Uniform, Read]),
+        nodes: make("nodes", &[&splats, shaders::SOURCE_NODES].concat(), &[Uniform, Read, Read]),
         lattice: make("lattice", &lattice, &[Uniform, Read, Read, Uniform]),
         bricks: make("bricks", &bricks, &[Uniform, Read, Read, Uniform]),
+        facets: make("facets", shaders::SOURCE_FACETS, &[Uniform, Read]),
     }
 }
 
@@ -103,6 +101,7 @@ impl Sources<Stage> {
     ) -> (&Stage, [wgpu::BindGroup; 2]) {
         let (stage, own) = match &chunk.origin {
             Origin::Splats { .. } => (&self.splats, vec![&chunk.uniform, &chunk.data]),
+            Origin::Facets { .. } => (&self.facets, vec![&chunk.uniform, &chunk.data]),
             Origin::Nodes { slots, .. } => {
                 (&self.nodes, vec![&chunk.uniform, &chunk.data, &slots.selected])
             }

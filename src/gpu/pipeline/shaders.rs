@@ -26,6 +26,8 @@ pub const SOURCE_NODES: &str = include_str!("../../../shaders/sources/nodes.wgsl
 pub const SOURCE_SPLATS: &str = include_str!("../../../shaders/sources/splats.wgsl");
 pub const SOURCE_LATTICE: &str = include_str!("../../../shaders/sources/lattice.wgsl");
 pub const SOURCE_BRICKS: &str = include_str!("../../../shaders/sources/bricks.wgsl");
+pub const SOURCE_FACETS: &str = include_str!("../../../shaders/sources/facets.wgsl");
+pub const SOURCE_NO_FACETS: &str = include_str!("../../../shaders/sources/no_facets.wgsl");
 
 pub const FRAME: &str = include_str!("../../../shaders/shared/frame.wgsl");
 pub const NORMAL: &str = include_str!("../../../shaders/shared/normal.wgsl");
@@ -46,6 +48,8 @@ pub const STATE: &str = include_str!("../../../shaders/shared/state.wgsl");
 pub const TABLES: &str = include_str!("../../../shaders/shared/tables.wgsl");
 pub const PIXEL: &str = include_str!("../../../shaders/shared/pixel.wgsl");
 pub const KERNELS: &str = include_str!("../../../shaders/shared/kernels.wgsl");
+pub const FACETS: &str = include_str!("../../../shaders/shared/facets.wgsl");
+pub const NO_FACETS: &str = include_str!("../../../shaders/shared/no_facets.wgsl");
 pub const SHEET: &str = include_str!("../../../shaders/shared/sheet.wgsl");
 pub const FIELD_SUMS: &str = include_str!("../../../shaders/shared/field_sums.wgsl");
 pub const FIELD_LATTICE: &str = include_str!("../../../shaders/shared/field_lattice.wgsl");

@@ -34,6 +34,8 @@ pub struct Variant {
     /// Two levels of a volume in bricks are drawn together, each with its weight.
     pub two_levels: bool,
     pub radiance: bool,
+    /// The scene has facets.
+    pub facets: bool,
     /// Lattice samples are drawn with sections that do not depend on the pixel.
     pub isotropic: bool,
     /// The field's kernel has no closed form.
@@ -90,7 +92,7 @@ impl Variant {
 
     /// Whether splats are scattered.
     pub fn scatters(&self) -> bool {
-        !self.gather || self.radiance
+        !self.gather || self.radiance || self.facets
     }
 
     /// Whether march may stop a tile among its entries.
@@ -118,7 +120,7 @@ impl Variant {
     }
 
     /// The constants that are true or false.
-    fn flags(&self) -> [(&'static str, bool); 33] {
+    fn flags(&self) -> [(&'static str, bool); 34] {
         let radiance = self.radiance || self.classified;
         let samples = (self.scalar || self.classified) && !self.lattice;
         [
@@ -137,7 +139,8 @@ impl Variant {
             ("SAMPLE_NORMALS", self.classified && self.surface_shaded),
             ("RADIANCE_PAYLOAD", radiance),
             ("ISOTROPIC_RECORDS", self.isotropic),
-            ("GENERAL_RECORDS", radiance || !self.isotropic),
+            ("GENERAL_RECORDS", radiance || self.facets || !self.isotropic),
+            ("HAS_FACETS", self.facets),
             ("TABLE_KERNEL", self.table_kernel),
             ("BEYOND", self.beyond),
             ("VOLUME_SHADED", self.volume_shaded),

@@ -2,6 +2,7 @@
 
 use crate::{
     bricks::Bricks,
+    facet::FacetSet,
     gpu::{
         device::{Gpu, buffers::buffer},
         scene::{
@@ -33,6 +34,13 @@ pub enum Origin {
         /// The index of the item in the scene.
         item: usize,
     },
+    Facets {
+        set: Arc<FacetSet>,
+        /// Whether the view leaves out backs.
+        is_culled: bool,
+        /// The index of the item in the scene.
+        item: usize,
+    },
     /// Slots for pages of the hierarchy with this number.
     Nodes { page_cache: usize, slots: Box<Slots> },
     Lattice {
@@ -52,7 +60,7 @@ pub enum Origin {
 #[derive(Debug)]
 pub struct Chunk {
     pub origin: Origin,
-    /// Splats (48 bytes each) or samples in their own type.
+    /// Splats (48 bytes each), facets (60 bytes), or samples in their own type.
     pub data: wgpu::Buffer,
     pub uniform: wgpu::Buffer,
     /// The span of every candidate: the tiles and sheets that it meets (8 bytes each, see
@@ -79,7 +87,7 @@ impl Chunk {
             Origin::Lattice { selection, .. } => selection.selected.size(),
             Origin::Bricks { slab, .. } => slab.selected.size(),
             Origin::Nodes { slots, .. } => slots.bytes(),
-            Origin::Splats { .. } => 0,
+            Origin::Splats { .. } | Origin::Facets { .. } => 0,
         };
         selected + self.spans.size()
     }
@@ -92,6 +100,7 @@ impl Chunk {
                 Source::of_radiance(view, header.origin, header.extent)
             }
             Origin::Splats { set, radiance, .. } => Source::of_splats(view, set, *radiance),
+            Origin::Facets { set, is_culled, .. } => Source::of_facets(view, set, *is_culled),
             Origin::Bricks { bricks, kernel, slab, level } => {
                 let lattice = bricks.lattice(*level);
                 let [width, height, depth] = lattice.dims.map(|n| n as u32);

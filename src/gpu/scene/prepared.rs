@@ -5,6 +5,7 @@ use super::chunk::{Chunk, Origin, SPAN_BYTES, list_bytes, runs_of, spans};
 use crate::{
     Error, Result,
     bricks::Choice,
+    facet::{Facet, FacetSet, Sides},
     gpu::{
         device::{
             Gpu,
@@ -116,6 +117,7 @@ impl PreparedScene {
             gpu.check_memory(prepared.bytes + bytes_of(item))?;
             match item {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true, number),
+                Item::Facets(set) => prepared.add_facets(gpu, set, number),
                 Item::Hierarchy(hierarchy) => {
                     prepared.page_caches.push(PageCache::new(gpu, hierarchy));
                 }
@@ -217,7 +219,7 @@ impl PreparedScene {
     /// views.
     fn order_chunks(&mut self) {
         self.chunks.sort_by_key(|chunk| match &chunk.origin {
-            Origin::Splats { item, .. } => *item,
+            Origin::Splats { item, .. } | Origin::Facets { item, .. } => *item,
             Origin::Lattice { .. } => usize::MAX - 1,
             _ => usize::MAX,
         });
@@ -306,7 +308,7 @@ impl PreparedScene {
         let held = self.chunks.iter().map(|chunk| match &chunk.origin {
             Origin::Nodes { .. } => chunk.data.size() + chunk.list_bytes(),
             Origin::Bricks { slab, .. } => slab.slots.size() + chunk.list_bytes(),
-            Origin::Splats { .. } | Origin::Lattice { .. } => 0,
+            Origin::Splats { .. } | Origin::Facets { .. } | Origin::Lattice { .. } => 0,
         });
         let slots = self.brick_cache.as_ref().map_or(0, BrickCache::bytes);
         let readers = self.page_caches.len() + usize::from(self.brick_cache.is_some());
@@ -419,6 +421,23 @@ impl PreparedScene {
         for splats in in_space_order(&set.splats).chunks(most) {
             let origin = Origin::Splats { set: set.clone(), radiance, item };
             self.add_chunk(gpu, origin, bytemuck::cast_slice(splats), splats.len() as u32);
+        }
+    }
+
+    fn add_facets(&mut self, gpu: &Gpu, set: &Arc<FacetSet>, item: usize) {
+        let most = (gpu.binding_size() / size_of::<Facet>() as u64) as usize;
+        for facets in set.facets.chunks(most) {
+            let origin = Origin::Facets { set: set.clone(), is_culled: false, item };
+            self.add_chunk(gpu, origin, bytemuck::cast_slice(facets), facets.len() as u32);
+        }
+    }
+
+    /// Decides for each set of facets whether a view leaves out backs.
+    pub(crate) fn update_facets(&mut self, view: &View, settings: &Settings) {
+        for chunk in &mut self.chunks {
+            if let Origin::Facets { set, is_culled, .. } = &mut chunk.origin {
+                *is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
+            }
         }
     }
 
@@ -598,6 +617,7 @@ fn bytes_of(item: &Item) -> u64 {
                 volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
             volume.drawn_lattice().len() as u64 * (sample + 2)
         }
+        Item::Facets(set) => set.facets.len() as u64 * (size_of::<Facet>() as u64 + SPAN_BYTES),
         Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => 0,
     }
 }

@@ -1,0 +1,90 @@
+// Candidates from facets.
+
+@group(1) @binding(0) var<uniform> source: Source;
+@group(1) @binding(1) var<storage, read> facets: array<Facet>;
+
+// A facet as it is stored. Mirrors src/facet.rs.
+struct Facet {
+    // The corners one after another.
+    corners: array<f32, 9>,
+    normals: array<u32, 3>,
+    colors: array<u32, 3>,
+}
+
+fn candidate_count() -> u32 {
+    return source.count;
+}
+
+// Returns a corner in view space.
+fn corner_of(index: u32, corner: u32) -> vec3<f32> {
+    let at = 3u * corner;
+    let own = vec3(
+        facets[index].corners[at],
+        facets[index].corners[at + 1u],
+        facets[index].corners[at + 2u],
+    );
+    return source.axis_x.xyz * own.x + source.axis_y.xyz * own.y + source.axis_z.xyz * own.z
+        + source.origin.xyz;
+}
+
+// Positive if the back of a facet is seen.
+fn away_of(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> f32 {
+    let across = cross(b - a, c - a);
+    return select(across.z, dot(across, a), frame.perspective != 0u);
+}
+
+// Returns a flat ellipsoid around a facet: the ellipse through its corners with the same centroid
+// (Steiner), widened by a pixel.
+fn candidate(index: u32) -> Candidate {
+    let a = corner_of(index, 0u);
+    let b = corner_of(index, 1u);
+    let c = corner_of(index, 2u);
+    var splat: Candidate;
+    splat.center = (a + b + c) / 3.0;
+    splat.extent = 1.0;
+    let f = a - splat.center;
+    let g = (b - c) * 0.57735027;
+    var pixel = 1.0 / frame.scale;
+    if frame.perspective != 0u {
+        pixel = pixel * (length(splat.center) + length(f) + length(g));
+    }
+    splat.covariance.xx = f.x * f.x + g.x * g.x + pixel * pixel;
+    splat.covariance.xy = f.x * f.y + g.x * g.y;
+    splat.covariance.xz = f.x * f.z + g.x * g.z;
+    splat.covariance.yy = f.y * f.y + g.y * g.y + pixel * pixel;
+    splat.covariance.yz = f.y * f.z + g.y * g.z;
+    splat.covariance.zz = f.z * f.z + g.z * g.z + pixel * pixel;
+    splat.normal = NO_NORMAL;
+    if (source.flags & CULLED) != 0u && away_of(a, b, c) >= 0.0 {
+        // Behind everything that is drawn.
+        splat.center = vec3(0.0, 0.0, -1e18);
+    }
+    return splat;
+}
+
+// Returns the four vectors of a facet's record, which add_facet reads: the corners with their
+// normals, then the colours and the side.
+fn facet_record(index: u32) -> array<vec4<f32>, 4> {
+    let a = corner_of(index, 0u);
+    let b = corner_of(index, 1u);
+    let c = corner_of(index, 2u);
+    let to_view = mat3x3<f32>(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz);
+    var normals: array<f32, 3>;
+    for (var i = 0u; i < 3u; i++) {
+        let normal = to_view * decode_normal(facets[index].normals[i]);
+        normals[i] = bitcast<f32>(encode_normal(normal));
+    }
+    // On a set that winds in any way, all facets count as fronts.
+    let is_front = away_of(a, b, c) < 0.0 || (source.flags & MIXED) != 0u;
+    return array<vec4<f32>, 4>(
+        vec4(a, normals[0]),
+        vec4(b, normals[1]),
+        vec4(c, normals[2]),
+        vec4(
+            bitcast<f32>(facets[index].colors[0]),
+            bitcast<f32>(facets[index].colors[1]),
+            bitcast<f32>(facets[index].colors[2]),
+            select(-1.0, 1.0, is_front),
+        ),
+    );
+}

@@ -1,0 +1,329 @@
+//! Facets: the pixels and sheets that they cover, and their shares of pixels
+//! (shaders/shared/facets.wgsl).
+
+use super::{
+    close::Packet,
+    footprint::{Kind, Record, origin, to_view},
+    plan::Plan,
+    scatter::{OpenTile, Window, is_kept},
+    sums::{Sums, WINDOW},
+    vector::{Lanes, exp, three},
+};
+use crate::{
+    facet::{Facet, FacetSet, NEARER, Sides},
+    plan::uniforms::Source,
+    scene::Settings,
+    splat::{decode_normal, encode_normal},
+};
+use fearless_simd::{Simd, mask32x8, prelude::*};
+use glam::{Vec2, Vec3};
+
+/// A facet further behind the front of its sheet than this, over the length by which nearness is
+/// measured, counts as this far.
+const FARTHEST: f32 = 60.0;
+/// Smaller shares of a pixel are not added.
+const LEAST_SHARE: f32 = 1e-6;
+
+/// Facets of a set in a view.
+pub struct FacetProjector<'a> {
+    plan: &'a Plan<'a>,
+    source: Source,
+    sides: Sides,
+    is_culled: bool,
+}
+
+impl<'a> FacetProjector<'a> {
+    pub fn new(plan: &'a Plan<'a>, set: &FacetSet, settings: &Settings) -> Self {
+        let view = plan.view;
+        let is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
+        let source = Source::of_radiance(view, set.origin, 0.0);
+        Self { plan, source, sides: set.sides, is_culled }
+    }
+
+    /// Returns the record of a facet, or `None` if it meets no pixel or no sheet, or faces away and
+    /// its back is never seen.
+    pub fn record(&self, facet: &Facet) -> Option<Record> {
+        let plan = self.plan;
+        let turn = to_view(&self.source);
+        let corners = facet.corners.map(|corner| turn * Vec3::from(corner) + origin(&self.source));
+        let [a, b, c] = corners;
+        let across = (b - a).cross(c - a);
+        let away = if plan.view.perspective { across.dot(a) } else { across.z };
+        if self.is_culled && away >= 0.0 {
+            return None;
+        }
+        let pixels = pixels(plan, corners)?;
+        let sheets = sheets(plan, corners)?;
+        // On a set that winds in any way, all facets count as fronts.
+        let is_front = away < 0.0 || self.sides == Sides::Mixed;
+        let normals = facet.normals.map(|normal| {
+            let normal = decode_normal(normal).unwrap_or(Vec3::Z);
+            f32::from_bits(encode_normal(turn * normal))
+        });
+        let colors = facet.colors.map(f32::from_bits);
+        Some(Record {
+            center: a.to_array(),
+            strength: if is_front { 1.0 } else { -1.0 },
+            whitening: [b.x, b.y, b.z, c.x, c.y, c.z],
+            extent2: 0.0,
+            kind: Kind::Facet,
+            payload: [
+                normals[0], normals[1], normals[2], colors[0], colors[1], colors[2], 0.0, 0.0,
+            ],
+            pixels,
+            sheets,
+        })
+    }
+}
+
+/// Returns the first and the last pixel that a facet may cover in part.
+fn pixels(plan: &Plan, corners: [Vec3; 3]) -> Option<[[i32; 2]; 2]> {
+    let frame = &plan.frame;
+    let (low, high) = if plan.view.perspective && corners.iter().any(|p| p.z <= frame.z_near) {
+        let (low, high) = around(corners);
+        if high.z <= frame.z_near {
+            return None;
+        }
+        // Bounds of x/z over the part of the box beyond the nearest visible z.
+        let z = [frame.z_near.max(low.z), high.z];
+        let least = |v: f32| v / if v < 0.0 { z[0] } else { z[1] };
+        let most = |v: f32| v / if v < 0.0 { z[1] } else { z[0] };
+        (Vec2::new(least(low.x), least(low.y)), Vec2::new(most(high.x), most(high.y)))
+    } else {
+        let places =
+            corners.map(|p| if plan.view.perspective { p.truncate() / p.z } else { p.truncate() });
+        let [a, b, c] = places;
+        (a.min(b).min(c), a.max(b).max(c))
+    };
+    let apron = plan.apron() as f32;
+    let mut pixels = [[0; 2]; 2];
+    for axis in 0..2 {
+        let limit = frame.size[axis] as f32 + apron;
+        let first = low[axis] * frame.scale + frame.center[axis] - 0.01;
+        let last = high[axis] * frame.scale + frame.center[axis] + 0.01;
+        let first = first.clamp(-apron, limit).floor();
+        let last = last.clamp(-apron - 1.0, limit - 1.0).floor();
+        // NaN fails.
+        let is_some = first <= last;
+        if !is_some {
+            return None;
+        }
+        (pixels[0][axis], pixels[1][axis]) = (first as i32, last as i32);
+    }
+    Some(pixels)
+}
+
+fn around([a, b, c]: [Vec3; 3]) -> (Vec3, Vec3) {
+    (a.min(b).min(c), a.max(b).max(c))
+}
+
+/// Returns the first and the last sheet that a facet may meet.
+fn sheets(plan: &Plan, corners: [Vec3; 3]) -> Option<[u16; 2]> {
+    let [mut near, mut far] = [f32::INFINITY, f32::NEG_INFINITY];
+    if plan.view.perspective {
+        let center = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let reach = corners.iter().map(|p| p.distance(center)).fold(0.0, f32::max);
+        let distance = center.length();
+        // A pixel's ray is up to a pixel beside the facet.
+        (near, far) = (distance - reach, distance + reach);
+        let pixel = far / plan.frame.scale;
+        (near, far) = (near - pixel, far + pixel);
+    } else {
+        for corner in corners {
+            (near, far) = (near.min(corner.z), far.max(corner.z));
+        }
+    }
+    // NaN fails.
+    let meets = far >= plan.planes[1] && near < plan.planes[plan.sheets + 1];
+    meets.then(|| [plan.sheet_of(near) as u16, plan.sheet_of(far).max(1) as u16])
+}
+
+/// A facet on its way to the pixels of a tile.
+struct Shown {
+    corners: [Vec3; 3],
+    /// The corners in the picture, in pixels, if all lie in front of the eye.
+    places: Option<[Vec2; 3]>,
+    /// One over the corners' z in perspective; 1 otherwise.
+    nearness: [f32; 3],
+    normals: [Vec3; 3],
+    colors: [[f32; 3]; 3],
+    is_front: bool,
+    /// Factor that makes the area in the picture positive.
+    turn: f32,
+}
+
+impl Shown {
+    #[inline(always)]
+    fn new(plan: &Plan, record: &Record) -> Self {
+        let [bx, by, bz, cx, cy, cz] = record.whitening;
+        let corners = [Vec3::from(record.center), Vec3::new(bx, by, bz), Vec3::new(cx, cy, cz)];
+        let frame = &plan.frame;
+        let center = Vec2::from(frame.center);
+        let is_before = !plan.view.perspective || corners.iter().all(|p| p.z > frame.z_near);
+        let nearness = corners.map(|p| if plan.view.perspective { 1.0 / p.z } else { 1.0 });
+        let places = is_before.then(|| {
+            [0, 1, 2].map(|i| center + corners[i].truncate() * (frame.scale * nearness[i]))
+        });
+        let unpack = |bits: f32| {
+            let [red, green, blue, _] = bits.to_bits().to_le_bytes();
+            [red, green, blue].map(|part| f32::from(part) * (1.0 / 255.0))
+        };
+        let [a, b, c, d, e, f, ..] = record.payload;
+        let [p, q, r] = corners;
+        let across = (q - p).cross(r - p);
+        let away = if plan.view.perspective { across.dot(p) } else { across.z };
+        Self {
+            corners,
+            places,
+            nearness,
+            normals: [a, b, c].map(|bits| decode_normal(bits.to_bits()).unwrap_or(Vec3::Z)),
+            colors: [d, e, f].map(unpack),
+            is_front: record.strength > 0.0,
+            turn: if away < 0.0 { -1.0 } else { 1.0 },
+        }
+    }
+
+    /// Returns the share of each pixel that the facet fills, and the weights of its corners at the
+    /// pixel's centre or near it. The weights of corners are not negative, and add up to 1.
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, packet: &Packet<S>) -> (Lanes<S>, [Lanes<S>; 3]) {
+        let none = Lanes::splat(simd, 0.0);
+        let rays = &packet.rays;
+        let (share, mut weights) = match &self.places {
+            Some(places) => {
+                let to: [[Lanes<S>; 2]; 3] = three!(I => [
+                    Lanes::splat(simd, places[I].x) - rays.pixel[0],
+                    Lanes::splat(simd, places[I].y) - rays.pixel[1],
+                ]);
+                let area = part_left(simd, to[0], to[1])
+                    + part_left(simd, to[1], to[2])
+                    + part_left(simd, to[2], to[0]);
+                let weights = three!(I => {
+                    let (from, next) = (to[(I + 1) % 3], to[(I + 2) % 3]);
+                    (from[0] * next[1] - from[1] * next[0]) * (self.turn * self.nearness[I])
+                });
+                (area * self.turn, weights)
+            }
+            None => {
+                // A corner beside or behind the eye has no place in the picture: whether the ray
+                // through the pixel's centre meets the facet (Olano & Greer 1997).
+                let weights = three!(I => {
+                    let edge =
+                        self.corners[(I + 1) % 3].cross(self.corners[(I + 2) % 3]) * self.turn;
+                    rays.aside[0] * edge.x + rays.aside[1] * edge.y + edge.z
+                });
+                let inside =
+                    weights[0].simd_ge(none) & weights[1].simd_ge(none) & weights[2].simd_ge(none);
+                (inside.select(Lanes::splat(simd, 1.0), none), weights)
+            }
+        };
+        weights = three!(I => weights[I].max(none));
+        let sum = weights[0] + weights[1] + weights[2];
+        let has_sum = sum.simd_gt(1e-30);
+        let inverse = Lanes::splat(simd, 1.0) / has_sum.select(sum, Lanes::splat(simd, 1.0));
+        let third = Lanes::splat(simd, 1.0 / 3.0);
+        (share, three!(I => has_sum.select(weights[I] * inverse, third)))
+    }
+}
+
+/// Returns the integral of the part of pixels to the left of an edge, over the edge's rise inside
+/// them: positive if the edge goes down. Added up over a polygon's edges it is the area of the
+/// pixel inside the polygon. Places are relative to the pixels' centres.
+#[inline(always)]
+fn part_left<S: Simd>(simd: S, from: [Lanes<S>; 2], to: [Lanes<S>; 2]) -> Lanes<S> {
+    let (low, high) = (Lanes::splat(simd, -0.5), Lanes::splat(simd, 0.5));
+    let none = Lanes::splat(simd, 0.0);
+    let one = Lanes::splat(simd, 1.0);
+    let y = [from[1].max(low).min(high), to[1].max(low).min(high)];
+    let rise = to[1] - from[1];
+    let rises = rise.abs().simd_gt(1e-20);
+    let inverse = one / rises.select(rise, one);
+    let x: [Lanes<S>; 2] = super::vector::each!([0, 1], I => {
+        let part = ((y[I] - from[1]) * inverse).max(none).min(one);
+        part.mul_add(to[0] - from[0], from[0])
+    });
+    // The mean of the edge's place between the pixel's sides, from 0 to 1.
+    let (least, most) = (x[0].min(x[1]), x[0].max(x[1]));
+    let (a, b) = (least.max(low).min(high), most.max(low).min(high));
+    let width = most - least;
+    let is_steep = width.simd_lt(1e-5);
+    let wide = is_steep.select(one, width);
+    let sum = (b - a) * ((a + b) * 0.5 + 0.5) + (most - least.max(high)).max(none);
+    let mean = is_steep.select(a + 0.5, sum / wide);
+    rises.select((y[1] - y[0]) * mean, none)
+}
+
+impl<S: Simd> OpenTile<'_, S> {
+    /// Adds a facet's window to a packet.
+    #[inline(always)]
+    fn add_facet_to(
+        simd: S,
+        plan: &Plan,
+        facet: &Shown,
+        window: Window,
+        packet: &Packet<S>,
+        sums: &mut Sums<S>,
+    ) {
+        let (share, weights) = facet.at(simd, packet);
+        let rays = &packet.rays;
+        let mut covers = share.simd_gt(LEAST_SHARE);
+        if !covers.any_true() {
+            return;
+        }
+        let of =
+            |parts: [f32; 3]| weights[0] * parts[0] + weights[1] * parts[1] + weights[2] * parts[2];
+        let distance = of(facet.corners.map(|corner| corner.z)) / rays.cosine;
+        if plan.clips + plan.holes > 0 {
+            covers &= is_kept(plan, rays, distance);
+        }
+        let mut color = three!(I => of(facet.colors.map(|color| color[I])));
+        if plan.lit_surfaces {
+            let normal = three!(I => of(facet.normals.map(|normal| normal[I])));
+            color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_shade);
+        }
+        let none = Lanes::splat(simd, 0.0);
+        for own in usize::from(window.is_continued)..WINDOW {
+            let [front, back] = [0, 1].map(|next| plan.planes[window.front + own + next]);
+            let mut inside: mask32x8<S> = distance.simd_lt(back) & covers;
+            if own > 0 {
+                inside &= distance.simd_ge(front);
+            }
+            if !inside.any_true() {
+                continue;
+            }
+            let share = inside.select(share, none);
+            let pixel = if plan.view.perspective { front.max(1e-30) } else { 1.0 };
+            let per_pixel = NEARER as f32 * plan.frame.scale / pixel;
+            let behind =
+                ((distance - front) * per_pixel).max(none).min(Lanes::splat(simd, FARTHEST));
+            let weight = share * exp(simd, none - behind);
+            let slot = (window.front + own) % WINDOW;
+            sums.has_facets[slot] |= packet.bit();
+            let sums = &mut sums.facets[slot][packet.number];
+            sums.shares[usize::from(!facet.is_front)] += share;
+            sums.weight += weight;
+            sums.distance = weight.mul_add(distance, sums.distance);
+            sums.color = three!(I => share.mul_add(color[I], sums.color[I]));
+            sums.nearest = three!(I => weight.mul_add(color[I], sums.nearest[I]));
+        }
+    }
+
+    /// Adds a facet's window to all packets that it meets.
+    #[inline(always)]
+    pub fn add_facet(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        record: &Record,
+        window: Window,
+        packets: impl Iterator<Item = usize>,
+    ) {
+        let facet = Shown::new(plan, record);
+        for number in packets {
+            let packet = &self.packets[number];
+            if !packet.is_done || plan.central {
+                Self::add_facet_to(simd, plan, &facet, window, packet, &mut self.sums);
+            }
+        }
+    }
+}

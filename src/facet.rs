@@ -1,0 +1,164 @@
+//! Splats with a polygonal footprint: triangles whose outline is exact at any distance.
+
+use crate::{
+    Error, Result,
+    math::Bounds,
+    parallel::prelude::*,
+    splat::{NO_NORMAL, decode_normal, encode_normal},
+};
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+
+/// A triangle as stored in memory and on the GPU (60 bytes): a splat whose footprint in the picture
+/// is the triangle itself. Round splats approximate flat faces, creases and boundaries; a facet has
+/// them exactly.
+///
+/// A pixel is covered by the share of its area that the triangle fills. The shares of neighbouring
+/// facets add up, so that no edge between them shows, and outlines are smooth.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Facet {
+    /// World positions of the corners, relative to the set's origin, counter-clockwise from
+    /// outside.
+    pub corners: [[f32; 3]; 3],
+    /// The unit normals at the corners, by which the facet is lit; octahedral
+    /// ([`encode_normal`]). Between the corners they are interpolated (Phong 1975).
+    pub normals: [u32; 3],
+    /// The colours at the corners: red, green and blue, 8 bits each, red in the lowest bits. The
+    /// highest 8 bits are not used: a facet is opaque.
+    pub colors: [u32; 3],
+}
+
+impl Facet {
+    /// Makes a facet. Normals without a length become that of the triangle.
+    pub fn new(corners: [Vec3; 3], normals: [Vec3; 3], colors: [[u8; 3]; 3]) -> Self {
+        let [a, b, c] = corners;
+        let own = (b - a).cross(c - a).normalize_or(Vec3::Z);
+        Self {
+            corners: corners.map(|corner| corner.to_array()),
+            normals: normals.map(|normal| match encode_normal(normal) {
+                NO_NORMAL => encode_normal(own),
+                normal => normal,
+            }),
+            colors: colors.map(|[red, green, blue]| u32::from_le_bytes([red, green, blue, 255])),
+        }
+    }
+
+    /// Returns the unit normals at the corners.
+    pub fn decoded_normals(&self) -> [Vec3; 3] {
+        self.normals.map(|normal| decode_normal(normal).unwrap_or(Vec3::Z))
+    }
+}
+
+/// Which sides of facets are seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Sides {
+    /// The facets enclose something: their backs are never seen from outside.
+    Closed,
+    /// Neighbouring facets wind the same way. At a fold, fronts and backs cover the same pixels and
+    /// count once.
+    Oriented,
+    /// Facets wind in any way.
+    #[default]
+    Mixed,
+}
+
+/// Facets around a common origin.
+#[derive(Debug, Clone, Default)]
+pub struct FacetSet {
+    /// World position that the corners are relative to.
+    pub origin: DVec3,
+    /// The facets, in any order.
+    pub facets: Vec<Facet>,
+    /// Which of their sides are seen.
+    pub sides: Sides,
+}
+
+impl FacetSet {
+    /// Changes the origin of the set; all facets stay where they are in the world.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the origin is not finite, or if 32-bit coordinates around it are
+    /// coarser than a ten-thousandth of the mean edge.
+    pub fn move_origin(&mut self, origin: DVec3) -> Result<()> {
+        if !origin.is_finite() {
+            return Err(Error::Argument(format!(
+                "the new origin {origin} of the facets is not finite"
+            )));
+        }
+        let shift = self.origin - origin;
+        self.origin = origin;
+        if shift == DVec3::ZERO || self.facets.is_empty() {
+            return Ok(());
+        }
+        let move_one = |facet: &mut Facet| {
+            let [a, b, _] = facet.corners.map(Vec3::from);
+            let edge = f64::from(a.distance(b));
+            let mut farthest: f64 = 0.0;
+            for corner in &mut facet.corners {
+                let moved = (Vec3::from(*corner).as_dvec3() + shift).as_vec3();
+                *corner = moved.to_array();
+                farthest = farthest.max(f64::from(moved.abs().max_element()));
+            }
+            (farthest, edge)
+        };
+        let both = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1 + b.1);
+        let (farthest, edges) =
+            self.facets.par_iter_mut().map(move_one).reduce(|| (0.0, 0.0), both);
+        let (step, edge) = (farthest * f64::from(f32::EPSILON), edges / self.facets.len() as f64);
+        if step > 1e-4 * edge {
+            return Err(Error::Argument(format!(
+                "facets are up to {farthest:.0} from the first input, where 32-bit coordinates \
+                 have steps of {step:.3}, but their mean edge is {edge:.3}; convert inputs this \
+                 far apart to separate files"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Returns the box around all facets, in world coordinates.
+    pub fn bounds(&self) -> Bounds {
+        let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let grow = |all: (Vec3, Vec3), facet: &Facet| {
+            facet
+                .corners
+                .iter()
+                .fold(all, |(low, high), &corner| (low.min(corner.into()), high.max(corner.into())))
+        };
+        let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+        let (low, high) = self.facets.par_iter().fold(|| none, grow).reduce(|| none, both);
+        Bounds { min: self.origin + low.as_dvec3(), max: self.origin + high.as_dvec3() }
+    }
+}
+
+/// Of surfaces behind each other in one sheet, each counts less by the factor e to the power of
+/// minus this for every pixel that another is nearer.
+pub(crate) const NEARER: f64 = 4.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set() -> FacetSet {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let facet = Facet::new(corners, [Vec3::ZERO; 3], [[255, 0, 7]; 3]);
+        FacetSet { origin: DVec3::Y, facets: vec![facet], sides: Sides::Oriented }
+    }
+
+    #[test]
+    fn a_facet_without_normals_has_that_of_its_triangle() {
+        assert_eq!(set().facets[0].decoded_normals(), [Vec3::Z; 3]);
+        assert_eq!(set().facets[0].colors[0].to_le_bytes(), [255, 0, 7, 255]);
+    }
+
+    #[test]
+    fn places_hold_while_the_origin_moves() {
+        let mut set = set();
+        let before = set.bounds();
+        set.move_origin(DVec3::new(100.0, 0.0, 0.0)).unwrap();
+        assert_eq!((set.bounds().min, set.bounds().max), (before.min, before.max));
+        let error = set.move_origin(DVec3::new(4e6, 0.0, 0.0)).unwrap_err().to_string();
+        assert!(error.contains("their mean edge is 1.000"), "{error}");
+        assert!(set.move_origin(DVec3::NAN).is_err());
+    }
+}

@@ -1,0 +1,220 @@
+//! Facets: the part of a pixel that each fills, and what they add to its sheets.
+
+use super::{Frame, clip, ray::Ray, shade};
+use crate::{
+    facet::{FacetSet, NEARER, Sides},
+    math::View,
+    scene::{Item, Scene, Settings},
+};
+use glam::{DVec2, DVec3};
+
+/// Within a sheet, facets further behind its front than this, over the length by which nearness is
+/// measured, count as this far.
+const FARTHEST: f64 = 60.0;
+
+/// A facet in view space.
+pub(super) struct Facet {
+    corners: [DVec3; 3],
+    normals: [DVec3; 3],
+    colors: [DVec3; 3],
+    is_front: bool,
+    /// The area of the triangle of the directions to the corners, or its sign: negative if the
+    /// front is seen.
+    turn: f64,
+    /// The first and the last row of pixels that it meets.
+    rows: [f64; 2],
+}
+
+/// The facets of one sheet of one pixel.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Cover {
+    /// The shares that fronts and backs fill.
+    shares: [f64; 2],
+    /// Lit colours times shares.
+    color: DVec3,
+    /// Weights; distances and lit colours times weights.
+    weight: f64,
+    distance: f64,
+    nearest: DVec3,
+}
+
+impl Cover {
+    /// Returns the share of the pixel that is filled, at most all of it, and the mean distance and
+    /// colour; `None` without facets.
+    pub fn mean(&self) -> Option<(f64, f64, DVec3)> {
+        let [front, back] = self.shares;
+        let all = front + back;
+        let hidden = (all - 1.0).clamp(0.0, 1.0);
+        let color = (self.color / all).lerp(self.nearest / self.weight, hidden * hidden);
+        (self.weight > 0.0).then(|| (front.max(back).min(1.0), self.distance / self.weight, color))
+    }
+}
+
+/// Returns the facets of a scene that a view shows.
+pub(super) fn gather(scene: &Scene, view: &View, settings: &Settings) -> Vec<Facet> {
+    let mut facets = Vec::new();
+    for item in &scene.items {
+        let Item::Facets(set) = item else { continue };
+        let is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
+        let seen = set.facets.iter().filter_map(|facet| Facet::new(facet, set, view));
+        facets.extend(seen.filter(|facet| facet.turn < 0.0 || !is_culled));
+    }
+    facets
+}
+
+impl Facet {
+    fn new(facet: &crate::facet::Facet, set: &FacetSet, view: &View) -> Option<Self> {
+        let corners = facet
+            .corners
+            .map(|corner| view.to_view(set.origin + DVec3::from(corner.map(f64::from))));
+        let [a, b, c] = corners;
+        let across = (b - a).cross(c - a);
+        let turn = if view.perspective { across.dot(a) } else { across.z };
+        let rows = polygon(view, corners)?.into_iter().map(|place| place.y);
+        let rows = rows
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)]);
+        Some(Self {
+            corners,
+            normals: facet.decoded_normals().map(|normal| view.rotation * normal.as_dvec3()),
+            colors: facet.colors.map(|color| {
+                let [red, green, blue, _] = color.to_le_bytes().map(|byte| f64::from(byte) / 255.0);
+                DVec3::new(red, green, blue)
+            }),
+            is_front: turn < 0.0 || set.sides == Sides::Mixed,
+            turn: if turn < 0.0 { -1.0 } else { 1.0 },
+            rows,
+        })
+    }
+
+    /// Whether the facet may fill a part of a pixel of a row.
+    pub fn meets_row(&self, row: i64) -> bool {
+        self.rows[0] <= row as f64 + 1.0 && self.rows[1] >= row as f64
+    }
+
+    /// Returns the weights of the corners where a ray meets the facet's plane. If that is outside
+    /// the facet, weights below 0 count as 0.
+    fn weights(&self, ray: &Ray, view: &View) -> [f64; 3] {
+        let place = |i: usize| {
+            let corner = self.corners[i % 3];
+            if view.perspective { corner } else { corner - ray.origin }
+        };
+        let edge = |i: usize| {
+            let cross = place(i + 1).cross(place(i + 2));
+            let own = if view.perspective { cross.dot(ray.direction) } else { cross.z };
+            (own * self.turn).max(0.0)
+        };
+        let weights = [edge(0), edge(1), edge(2)];
+        let sum: f64 = weights.iter().sum();
+        if sum > 0.0 { weights.map(|weight| weight / sum) } else { [1.0 / 3.0; 3] }
+    }
+}
+
+/// Returns the outline of a triangle in the picture, in pixels; `None` if nothing of it lies in
+/// front of the eye.
+fn polygon(view: &View, corners: [DVec3; 3]) -> Option<Vec<DVec2>> {
+    let project = |place: DVec3| {
+        let z = if view.perspective { place.z } else { 1.0 };
+        view.center + place.truncate() * (view.scale / z)
+    };
+    if !view.perspective {
+        return Some(corners.map(project).to_vec());
+    }
+    let near = 1e-9 * corners.iter().map(|place| place.length()).fold(0.0, f64::max);
+    let ahead = cut(&corners, |place| place.z - near, |a, b, part| a.lerp(b, part));
+    (!ahead.is_empty()).then(|| ahead.into_iter().map(project).collect())
+}
+
+/// Cuts a convex polygon at a line: the part where `inside` is not negative (Sutherland & Hodgman
+/// 1974).
+fn cut<P: Copy>(
+    polygon: &[P],
+    inside: impl Fn(P) -> f64,
+    between: impl Fn(P, P, f64) -> P,
+) -> Vec<P> {
+    let mut rest = Vec::new();
+    for (at, &from) in polygon.iter().enumerate() {
+        let to = polygon[(at + 1) % polygon.len()];
+        let (a, b) = (inside(from), inside(to));
+        if a >= 0.0 {
+            rest.push(from);
+        }
+        if (a >= 0.0) != (b >= 0.0) {
+            rest.push(between(from, to, a / (a - b)));
+        }
+    }
+    rest
+}
+
+/// Returns the share of a pixel that a polygon fills.
+fn share(polygon: &[DVec2], column: i64, row: i64) -> f64 {
+    let [left, top] = [column as f64, row as f64];
+    let lerp = |a: DVec2, b: DVec2, part: f64| a.lerp(b, part);
+    let part = cut(polygon, |p| p.x - left, lerp);
+    let part = cut(&part, |p| left + 1.0 - p.x, lerp);
+    let part = cut(&part, |p| p.y - top, lerp);
+    let part = cut(&part, |p| top + 1.0 - p.y, lerp);
+    let corner = DVec2::new(left, top);
+    let twice: f64 = (0..part.len())
+        .map(|at| (part[at] - corner).perp_dot(part[(at + 1) % part.len()] - corner))
+        .sum();
+    twice.abs() / 2.0
+}
+
+impl Frame<'_> {
+    /// Sums the facets over the sheets of a pixel.
+    pub(super) fn covers(&self, [column, row]: [i64; 2], facets: &[&Facet]) -> Vec<Cover> {
+        let mut covers = vec![Cover::default(); self.count()];
+        if facets.is_empty() {
+            return covers;
+        }
+        let view = &self.view;
+        let ray = self.ray(column, row);
+        let allowed = clip::allowed(&ray, view, &self.clips);
+        for facet in facets {
+            let Some(polygon) = polygon(view, facet.corners) else { continue };
+            let share = share(&polygon, column, row);
+            let weights = facet.weights(&ray, view);
+            let of = |parts: [DVec3; 3]| {
+                parts.iter().zip(weights).map(|(part, weight)| *part * weight).sum::<DVec3>()
+            };
+            let distance = of(facet.corners).z / ray.direction.z;
+            let sheet = self.planes.partition_point(|&plane| plane <= distance);
+            let within = 1..self.planes.len();
+            if share <= 0.0 || !within.contains(&sheet) || !clip::contains(&allowed, distance) {
+                continue;
+            }
+            let front = self.planes[sheet - 1];
+            let pixel = if view.perspective { front } else { 1.0 } / view.scale;
+            let behind = (NEARER * (distance - front) / pixel).clamp(0.0, FARTHEST);
+            let weight = share * (-behind).exp();
+            let color = of(facet.colors);
+            let color = match &self.shade {
+                Some(shade) => shade::lit(color, of(facet.normals), ray.direction, shade),
+                None => color,
+            };
+            let cover = &mut covers[sheet - 1];
+            cover.shares[usize::from(!facet.is_front)] += share;
+            cover.weight += weight;
+            cover.distance += weight * distance;
+            cover.color += share * color;
+            cover.nearest += weight * color;
+        }
+        covers
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_of_a_triangle_are_its_area() {
+        let polygon = [DVec2::new(1.3, 0.2), DVec2::new(6.1, 2.4), DVec2::new(2.2, 5.7)];
+        let area = (polygon[1] - polygon[0]).perp_dot(polygon[2] - polygon[0]) / 2.0;
+        let pixels = (0..8).flat_map(|row| (0..8).map(move |column| (column, row)));
+        let shares: Vec<f64> = pixels.map(|(column, row)| share(&polygon, column, row)).collect();
+        assert!((shares.iter().sum::<f64>() - area).abs() < 1e-12);
+        assert!(shares.iter().all(|share| (0.0..=1.0 + 1e-12).contains(share)));
+        assert!((shares[2 * 8 + 3] - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,142 @@
+//! From meshes to facets: splats whose footprint is a triangle.
+
+use super::{
+    Mesh, SurfelOptions,
+    adjacency::{Connected, is_split},
+    paint::{corner_color, of_normal},
+    refine::{Origin, Refined, refine},
+    smooth::corner_normals,
+    surfels::largest_edge,
+};
+use crate::{
+    Result,
+    facet::{Facet, FacetSet, Sides},
+    memory,
+    parallel::prelude::*,
+    splat::encode_normal,
+};
+use glam::Vec3;
+
+/// Facets may be this many times as long as the triangles that surfels are made of: the sheets that
+/// a facet meets, not its outline, limit its size.
+const LONGER: f32 = 3.0;
+
+/// The name of this module's work in errors.
+const WORK: &str = "making facets";
+
+/// The normal at each corner of a mesh's triangles.
+enum Normals<'a> {
+    Own(Vec<[Vec3; 3]>),
+    Interpolated(Origin<'a>),
+}
+
+impl Mesh {
+    /// Makes facets of the triangles, which have their outlines exactly. Returns `None` for what
+    /// surfels draw better: a point cloud, a mesh of more than
+    /// [`most_facets`](SurfelOptions::most_facets) triangles, and one that is not opaque. Lengths
+    /// are in world units and corners are relative to the mesh's origin. The order depends on the
+    /// input only.
+    ///
+    /// Colours are vertex colour × material × texture, normals the file's, or those that
+    /// [`surfels`](Self::surfels) have, interpolated over each triangle. Long triangles and
+    /// textured ones are cut. If the mesh is [solid](Self::is_solid), facets are turned outward.
+    ///
+    /// # Errors
+    /// As [`surfels`](Self::surfels), but for [`Error::NothingToDraw`](crate::Error::NothingToDraw):
+    /// a mesh without area gives no facets.
+    pub fn facets(&self, options: &SurfelOptions) -> Result<Option<FacetSet>> {
+        let _span = tracing::info_span!("facets").entered();
+        self.check(options)?;
+        let count = self.triangles.len();
+        let is_opaque =
+            || self.colors.par_iter().all(|color| color[3] == 255) && self.has_opaque_materials();
+        if count == 0 || count > options.most_facets || !is_opaque() {
+            return Ok(None);
+        }
+        let Some(bounds) = self.local_bounds() else { return Ok(None) };
+        let is_textured =
+            !self.uvs.is_empty() && self.materials.iter().any(|own| own.texture.is_some());
+        let largest = largest_edge(bounds, self.area(), options);
+        let longest = if is_textured { largest } else { largest * LONGER };
+        let Refined { mesh, sources } =
+            refine(self, longest, options.most_triangles, options.deadline)?;
+        let crease = options.crease_angle_degrees;
+        let normals = match sources {
+            Some(sources) => {
+                Normals::Interpolated(Origin::new(self, sources, crease, options.deadline)?)
+            }
+            None => Normals::Own(corner_normals(self, crease, options.deadline)?),
+        };
+        let sides = self.sides()?;
+        let is_turned = sides == Sides::Closed && self.is_inside_out();
+        let traits = [is_turned, options.color_by_normal];
+        memory::room(WORK, (size_of::<Facet>() * mesh.triangles.len()) as u64)?;
+        let facets: Vec<Facet> = (0..mesh.triangles.len())
+            .into_par_iter()
+            .filter_map(|number| facet(&mesh, number, &normals, traits))
+            .collect();
+        options.deadline.check(WORK)?;
+        Ok((!facets.is_empty()).then_some(FacetSet { origin: self.origin, facets, sides }))
+    }
+
+    /// Returns which sides of the mesh's triangles are seen.
+    fn sides(&self) -> Result<Sides> {
+        if self.is_solid() {
+            return Ok(Sides::Closed);
+        }
+        let places = Connected::new(self, is_split(self))?.places;
+        memory::room(WORK, 24 * self.triangles.len() as u64)?;
+        // Where neighbours wind the same way, no edge is passed twice in the same direction.
+        let mut edges: Vec<u64> = places
+            .par_iter()
+            .flat_map_iter(|&[a, b, c]| {
+                [[a, b], [b, c], [c, a]].map(|[from, to]| u64::from(from) << 32 | u64::from(to))
+            })
+            .collect();
+        edges.par_sort_unstable();
+        let is_mixed = edges.par_windows(2).any(|pair| pair[0] == pair[1]);
+        Ok(if is_mixed { Sides::Mixed } else { Sides::Oriented })
+    }
+
+    /// Whether the triangles of a closed mesh wind clockwise, seen from outside.
+    fn is_inside_out(&self) -> bool {
+        let volume = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize].as_dvec3());
+            a.cross(b).dot(c)
+        };
+        self.triangles.par_iter().with_min_len(1 << 12).map(volume).sum::<f64>() < 0.0
+    }
+}
+
+/// Returns the facet of a triangle, turned and coloured by its normals as `traits` say, or `None` if the triangle has no area.
+fn facet(
+    mesh: &Mesh,
+    number: usize,
+    normals: &Normals,
+    [is_turned, by_normal]: [bool; 2],
+) -> Option<Facet> {
+    let corners = mesh.triangles[number].map(|vertex| mesh.positions[vertex as usize]);
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+    let has_area = (b - a).cross(c - a).length_squared() > 0.0;
+    if !has_area {
+        return None;
+    }
+    let own = match normals {
+        Normals::Own(normals) => normals[number],
+        Normals::Interpolated(origin) => {
+            [0, 1, 2].map(|corner| origin.normal(mesh, (3 * number + corner) as u32))
+        }
+    };
+    let own = own.map(|normal| normal.normalize_or_zero());
+    let colors = [0, 1, 2].map(|corner| {
+        if by_normal {
+            let outward = if is_turned { -own[corner] } else { own[corner] };
+            let [red, green, blue, _] = of_normal(encode_normal(outward)).to_le_bytes();
+            return [red, green, blue];
+        }
+        let [red, green, blue, _] = corner_color(mesh, number, corner);
+        [red, green, blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8)
+    });
+    let order = if is_turned { [0, 2, 1] } else { [0, 1, 2] };
+    Some(Facet::new(order.map(|i| corners[i]), order.map(|i| own[i]), order.map(|i| colors[i])))
+}

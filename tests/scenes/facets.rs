@@ -1,0 +1,74 @@
+//! Scenes of facets: closed, open, seen from within, clipped, and beside other items.
+
+use super::{
+    Case, ORIGIN, ORTHOGRAPHIC, PERSPECTIVE, SLANT, camera, methods, mixed_scene, settings,
+};
+use glam::Vec3;
+use splatkit::{
+    facet::{FacetSet, Sides},
+    math::Projection,
+    scene::{Scene, Settings},
+    surface::{Mesh, SurfelOptions},
+};
+
+/// The facets of a mesh around the origin of the scenes, coloured by place.
+fn facets(mesh: Mesh, sides: Sides) -> FacetSet {
+    let part = |value: f32| (127.5 + 120.0 * value).clamp(0.0, 255.0) as u8;
+    let colors = mesh.positions.iter().map(|p| [part(p.x), part(p.y), part(p.z), 255]).collect();
+    let mesh = Mesh { origin: ORIGIN, colors, ..mesh };
+    let options = SurfelOptions { largest_spacing: 1.0 / 24.0, ..SurfelOptions::default() };
+    let set = mesh.facets(&options).expect("facets").expect("a mesh of facets");
+    assert_eq!(set.sides, sides);
+    set
+}
+
+fn case(name: &'static str, scene: Scene, projection: Projection) -> Case {
+    Case { name, scene, camera: camera(SLANT, projection), settings: settings() }
+}
+
+/// A closed part with bevels.
+pub fn gear() -> Case {
+    let set = facets(Mesh::gear(9), Sides::Closed);
+    case("gear", Scene::new().with_facets(set), PERSPECTIVE)
+}
+
+/// A sheet of which both sides are seen, without light.
+pub fn folded_sheet() -> Case {
+    let set = facets(Mesh::folded_sheet(5), Sides::Oriented);
+    let case = case("folded_sheet", Scene::new().with_facets(set), ORTHOGRAPHIC);
+    Case { settings: Settings { surface_shade: None, ..settings() }, ..case }
+}
+
+/// A box whose sides wind in any way, from within: corners lie beside and behind the eye.
+pub fn inside_a_box() -> Case {
+    let mut mesh = Mesh::cube(1.9);
+    mesh.triangles[0].swap(0, 1);
+    mesh.triangles[5].swap(1, 2);
+    let mut case = case(
+        "inside_a_box",
+        Scene::new().with_facets(facets(mesh, Sides::Mixed)),
+        Projection::Perspective { view_angle: 80.0 },
+    );
+    case.camera.position = ORIGIN + glam::DVec3::new(0.3, -0.2, 0.1);
+    case.camera.focal_point = ORIGIN + glam::DVec3::new(-1.0, 0.5, 0.2);
+    case
+}
+
+/// Cut open: then the backs are seen.
+pub fn clipped_gear() -> Case {
+    let clips = methods::clipped_surface_in_a_volume().settings.clips;
+    let case = gear();
+    Case { name: "clipped_gear", settings: Settings { clips, ..settings() }, ..case }
+}
+
+/// Facets, surfels and a volume in the same sheets.
+pub fn facets_in_a_volume() -> Case {
+    let mut mesh = Mesh::slivers(24);
+    mesh.positions.iter_mut().for_each(|p| *p = *p * 0.8 + Vec3::new(0.2, 0.0, 0.1));
+    let scene = mixed_scene().with_facets(facets(mesh, Sides::Closed));
+    case("facets_in_a_volume", scene, PERSPECTIVE)
+}
+
+pub fn all() -> [Case; 5] {
+    [gear(), folded_sheet(), inside_a_box(), clipped_gear(), facets_in_a_volume()]
+}
