@@ -13,8 +13,7 @@ pub struct Tetrahedra {
     /// By `place`.
     pub(crate) values: Vec<f32>,
     pub(crate) place: Place,
-    /// Corners, oriented so that the edges from the first to the other three have a positive
-    /// determinant.
+    /// Corners, in ascending order: both tetrahedra at a face have its corners in the same order.
     pub(crate) corners: Vec<[u32; 4]>,
     /// The field's gradient at each point; empty for values of tetrahedra.
     pub(crate) gradients: Vec<Vec3>,
@@ -110,15 +109,16 @@ impl Builder {
     }
 
     /// Adds a tetrahedron, unless it has no volume. `value` counts if there is one a tetrahedron.
-    pub fn add(&mut self, [a, b, c, d]: [u32; 4], value: f32) {
-        let edges = edges(&self.made.points, [a, b, c, d]);
+    pub fn add(&mut self, mut corners: [u32; 4], value: f32) {
+        corners.sort_unstable();
+        let edges = edges(&self.made.points, corners);
         let longest = edges.x_axis.length_squared().max(edges.y_axis.length_squared());
         let longest = longest.max(edges.z_axis.length_squared());
         let volume = edges.determinant();
         if volume.abs() <= LEAST_VOLUME * longest * longest.sqrt() {
             return;
         }
-        self.made.corners.push(if volume > 0.0 { [a, b, c, d] } else { [a, c, b, d] });
+        self.made.corners.push(corners);
         if self.made.place == Place::Cells {
             self.made.values.push(value);
         }
@@ -183,7 +183,8 @@ impl Tetrahedra {
             Bounds { min: self.origin + low.as_dvec3(), max: self.origin + high.as_dvec3() };
         // The edge of a regular tetrahedron of the same volume is (√2·determinant)^⅓.
         let size = |corners: &[u32; 4]| {
-            (std::f64::consts::SQRT_2 * edges(&self.points, *corners).determinant()).cbrt() as f32
+            let volume = edges(&self.points, *corners).determinant().abs();
+            (std::f64::consts::SQRT_2 * volume).cbrt() as f32
         };
         let mut sizes: Vec<f32> = self.corners.par_iter().map(size).collect();
         let typical = (SMALLER * (sizes.len() - 1) as f64) as usize;
@@ -198,7 +199,7 @@ impl Tetrahedra {
             let edges = edges(&self.points, *corners);
             let [a, b, c, d] = corners.map(|corner| f64::from(self.values[corner as usize]));
             let gradient = edges.inverse().transpose() * DVec3::new(b - a, c - a, d - a);
-            let volume = edges.determinant();
+            let volume = edges.determinant().abs();
             for corner in corners {
                 let sum = &mut sums[*corner as usize];
                 sum.0 += volume * gradient;

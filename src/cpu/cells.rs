@@ -28,7 +28,7 @@ const BATCH: usize = 16384;
 const LEAST_PART: f32 = 1e-4;
 /// The same, as a share of the distance from the eye: rounding takes the rest.
 const LEAST_LENGTH: f32 = 1e-6;
-/// A ray whose barycentric coordinate changes less runs along the face.
+/// A ray whose distance from a face changes less runs along the face.
 const PARALLEL: f32 = 1e-30;
 /// A place behind all others.
 const BEHIND: f32 = 3e38;
@@ -60,10 +60,13 @@ struct Shot {
     pixels: [[i32; 2]; 2],
 }
 
-/// The barycentric coordinates of a tetrahedron, each as three factors and a constant, and its
-/// field in the same way.
+/// The linear functions of a tetrahedron, each as three factors and a constant.
 struct Linear {
-    coordinates: [[f32; 4]; 4],
+    /// Functions that are 0 on the faces and positive inside. Those of two tetrahedra at a face
+    /// differ in their sign only, to the last bit, so that no ray passes between the two.
+    faces: [[f32; 4]; 4],
+    /// Which of the two tetrahedra at a face this is: it has the rays that run in the face.
+    has_face: [bool; 4],
     value: [f32; 4],
     /// The smallest and the largest value.
     range: [f32; 2],
@@ -248,10 +251,14 @@ impl<'a> CellField<'a> {
         let factors = [-(one + two + three), one, two, three];
         // From the middle, the constants lose the fewest digits.
         let middle = 0.25 * (places[0] + places[1] + places[2] + places[3]);
-        let coordinates = factors.map(|factor| {
-            let [x, y, z] = factor.to_array();
-            [x, y, z, 0.25 - factor.dot(middle)]
+        let faces = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]].map(|face| {
+            let [a, b, c] = face.map(|corner| places[corner]);
+            let normal = (b - a).cross(c - a);
+            normal.extend(-normal.dot((a + b + c) / 3.0))
         });
+        let has_face = [false, true, false, true].map(|is_odd| is_odd == (volume > 0.0));
+        let faces =
+            [0, 1, 2, 3].map(|at| (if has_face[at] { faces[at] } else { -faces[at] }).into());
         let mean = 0.25 * (points[0][3] + points[1][3] + points[2][3] + points[3][3]);
         let slope = [0, 1, 2, 3].into_iter().map(|at| (points[at][3] - mean) * factors[at]);
         let slope: Vec3 = slope.sum();
@@ -262,6 +269,10 @@ impl<'a> CellField<'a> {
         };
         let mut gradient = [[0.0; 4]; 3];
         if !self.gradients.is_empty() {
+            let coordinates = factors.map(|factor| {
+                let [x, y, z] = factor.to_array();
+                [x, y, z, 0.25 - factor.dot(middle)]
+            });
             let own = corners.map(|corner| self.gradients[corner as usize]);
             for (axis, gradient) in gradient.iter_mut().enumerate() {
                 for (own, factors) in own.iter().zip(&coordinates) {
@@ -272,7 +283,8 @@ impl<'a> CellField<'a> {
             }
         }
         Some(Linear {
-            coordinates,
+            faces,
+            has_face,
             value: [slope.x, slope.y, slope.z, mean - slope.dot(middle)],
             range: ends(values),
             depths: ends(depths),
@@ -595,14 +607,15 @@ impl Linear {
         let per_depth = Lanes::splat(simd, 1.0) / rays.cosine;
         let mut enter = (per_depth * self.depths[0]).max(Lanes::splat(simd, plan.planes[1]));
         let mut leave = per_depth * self.depths[1];
-        for of in &self.coordinates {
+        for (of, has_face) in self.faces.iter().zip(self.has_face) {
             let mut base = Lanes::splat(simd, of[3]);
             if !plan.view.perspective {
                 base += rays.aside[0] * of[0] + rays.aside[1] * of[1];
             }
             let rate = dot_with(*of, rays.direction);
             let is_parallel = rate.abs().simd_lt(PARALLEL);
-            let rate = is_parallel.select(Lanes::splat(simd, PARALLEL), rate);
+            let least = if has_face { PARALLEL } else { -PARALLEL };
+            let rate = is_parallel.select(Lanes::splat(simd, least), rate);
             let place = -base / rate;
             let enters = rate.simd_gt(0.0);
             enter = enters.select(enter.max(place), enter);

@@ -264,27 +264,27 @@ impl LoadFlags {
 fn warn_of_holes(path: &Path, input: &Input) {
     let (holes, all, done) = match input {
         Input::Volume(volume) => {
-            (volume.about.holes, volume.len() as u64, "were read as the lowest value")
+            (volume.about.holes, volume.len() as u64, "read as the lowest value")
         }
         Input::Samples(points) => {
             let holes = points.about.holes;
-            (holes, points.len() as u64 + holes, "were left out")
+            (holes, points.len() as u64 + holes, "left out")
         }
         Input::Cells(cells) => {
             let done = "nothing is drawn in the cells around them";
             (cells.about.holes, cells.values.len() as u64, done)
         }
-        Input::Mesh(mesh) => (mesh.about.holes, mesh.values.len() as u64, "have no colour"),
+        Input::Mesh(mesh) => (mesh.about.holes, mesh.values.len() as u64, "drawn without a colour"),
         Input::Hierarchy(_) | Input::Bricks(_) => return,
     };
     if holes > 0 {
         let (holes, all) = (grouped(holes), grouped(all));
-        tracing::warn!("{}: {holes} of {all} values are missing and {done}", path.display());
+        tracing::warn!("{}: {holes} of {all} values missing: {done}", path.display());
     }
 }
 
 /// Formats a count in groups of three digits: 1,234,567.
-fn grouped(count: u64) -> String {
+pub fn grouped(count: u64) -> String {
     let digits = count.to_string();
     let groups: Vec<&[u8]> = digits.as_bytes().rchunks(3).rev().collect();
     groups.into_iter().map(String::from_utf8_lossy).collect::<Vec<_>>().join(",")

@@ -14,7 +14,7 @@ fn folder() -> Folder {
     let folder = Folder::new();
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.put("flat.nrrd", nrrd("uint8", &[7; 4096]));
-    folder.put("nan.nrrd", floats(|i| if i % 100 == 7 { f32::NAN } else { i as f32 }));
+    folder.put("nan.nrrd", floats(|_| f32::NAN));
     folder.put("a.ply", PLY);
     folder.put("far.nrrd", floats(|i| if i == 7 { 1e30 } else { i as f32 }));
     folder.put("clear.json", r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [255, 0]]}"#);
@@ -80,11 +80,7 @@ const WRONG: &[(&str, i32, &str)] = &[
          opacity is 0",
     ),
     ("a.nrrd --transfer steep.json", 3, "gradient point 1 is at 2, before the previous one at 5"),
-    (
-        "nan.nrrd",
-        3,
-        "nan.nrrd: samples: 41 of 4096 samples are not finite, the first is sample 7 (NaN)",
-    ),
+    ("nan.nrrd", 3, "nan.nrrd: samples: none of the 4096 samples has a value: all are not finite"),
     (
         "flat.nrrd --transfer ct-bone",
         3,
@@ -309,10 +305,15 @@ const WRONG: &[(&str, i32, &str)] = &[
 #[test]
 fn each_wrong_input_has_its_message() {
     let folder = folder();
+    let mut others = Vec::new();
     for (arguments, code, message) in WRONG {
-        folder.run(&format!("render {arguments} -o out.png")).fails(*code, &[message]);
+        let run = folder.run(&format!("render {arguments} -o out.png"));
+        let is_told = run.code() == Some(*code) && run.stderr().contains(message);
+        if !is_told || folder.path("out.png").exists() {
+            others.push(format!("{arguments}: {:?}, {}", run.code(), run.stderr()));
+        }
     }
-    assert!(!folder.path("out.png").exists());
+    assert!(others.is_empty(), "{}", others.join("\n"));
 }
 
 #[test]
@@ -587,7 +588,7 @@ fn hostile_files(folder: &Folder) {
                 "NRRD0004\ntype: {HOSTILE}\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n12345678"
             ),
         ),
-        ("a.csv", format!("x,y,z,value\n1,2,3,{HOSTILE}\n")),
+        ("a.csv", format!("x,y,z,value\n1,2,{HOSTILE},3\n")),
         (
             "a.vtk",
             format!(
@@ -707,7 +708,7 @@ fn points_at_one_place_draw() {
         "one.nrrd",
         "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: raw\n\n\x07",
     );
-    for name in ["one.xyz", "three.xyz", "far.xyz", "one.nrrd"] {
+    for name in ["one.xyz", "three.xyz", "far.xyz", "one.nrrd --transfer generic"] {
         let found = folder
             .json(&format!("render {name} -o out.png --overwrite --json --size 32x24 --reference"));
         let number = |vector: &serde_json::Value, axis: usize| vector[axis].as_f64().unwrap();

@@ -27,7 +27,7 @@ fn slice(series: &str, number: &str, words: &str, z: u8) -> Vec<u8> {
     .concat()
 }
 
-/// A folder of a series of three slices, one of which is missing, and one of two.
+/// A folder of a series of three slices, not evenly spaced, and one of two.
 fn study() -> Folder {
     let folder = Folder::new();
     std::fs::create_dir_all(folder.path("study/inner")).unwrap();
@@ -54,7 +54,7 @@ fn a_folder_is_described_and_drawn() {
     assert!(printed.stdout().contains("series 4        CT “Chest thin”, 3 of 2 × 2, 1.2.3, drawn"));
     let warnings = printed.stderr();
     assert!(warnings.contains("of 2 series, number 4 “Chest thin” has the most pictures"));
-    assert!(warnings.contains("1 slice is missing, between 1.00 and 3.00"), "{warnings}");
+    assert!(warnings.contains("the distances between slices are 1.00 to 2.00"), "{warnings}");
     for flags in ["", " --series 9", " --series thick"] {
         let arguments =
             format!("render study{flags} -o a.png --engine cpu --overwrite --size 64x64");

@@ -3,6 +3,7 @@
 use super::{Convert, memory, source::Source};
 use crate::{
     failure::{Failure, in_file},
+    load::grouped,
     output,
     progress::Progress,
     render::milliseconds,
@@ -17,8 +18,9 @@ use std::{path::Path, time::Instant};
 /// Warns that some of all values of a file are missing.
 fn warn_of_holes(file: &Path, holes: u64, all: usize) {
     if holes > 0 {
+        let (holes, all) = (grouped(holes), grouped(all as u64));
         let file = file.display();
-        tracing::warn!("{file}: {holes} of {all} values are missing and were read as the lowest");
+        tracing::warn!("{file}: {holes} of {all} values missing: read as the lowest value");
     }
 }
 
