@@ -1,6 +1,6 @@
 //! Creases, bevels, thin parts and slivers, drawn by the CPU engine and compared with their
 //! triangles, traced with 16 rays a pixel. `SPLATKIT_EDGES=800x600` measures pictures of that size,
-//! and surfels too.
+//! and surfels too; `SPLATKIT_MESHES` names more meshes to measure, separated by colons.
 
 mod testing;
 
@@ -11,7 +11,7 @@ use splatkit::{
     surface::{Mesh, SurfelOptions},
 };
 use std::time::Instant;
-use testing::outline::{Found, Truth};
+use testing::outline::{Found, Truth, given_meshes};
 
 /// The parts, standing on +Z.
 fn parts() -> [(&'static str, Mesh); 5] {
@@ -54,6 +54,16 @@ fn parts_have_their_outlines() {
     println!("| part | dB inside | dB | area, % | outside | holes | s |");
     println!("|---|---:|---:|---:|---:|---:|---:|");
     let options = SurfelOptions::default();
+    for (name, mesh) in given_meshes() {
+        for nearer in [1.0, 4.0] {
+            let truth = Truth::new(&mesh, size, nearer);
+            if let Some(set) = mesh.facets(&options).expect(&name) {
+                row(&name, nearer, &truth, &Scene::new().with_facets(set), "facets");
+            }
+            let surfels = Scene::new().with_splats(mesh.surfels(&options).expect(&name));
+            row(&name, nearer, &truth, &surfels, "surfels");
+        }
+    }
     for (name, mesh) in parts() {
         for nearer in [1.0, 4.0] {
             let truth = Truth::new(&mesh, size, nearer);

@@ -2,8 +2,8 @@
 // so that counting and filling visit the same windows and tiles.
 
 // The tiles and sheets of a record: first and last tile (column in the low 16 bits, row in the high
-// ones), then first and last sheet. The top bits of the first tile mark an isotropic record, and one
-// of the coarser of two levels, or a general record of a facet.
+// ones), then first and last sheet. The top bits of the first tile mark an isotropic record, and
+// one of the coarser of two levels, or a general record of a facet.
 const BOX_ISOTROPIC: u32 = 0x80000000u;
 const BOX_COARSE: u32 = 0x40000000u;
 const BOX_MARKS: u32 = 0xc0000000u;

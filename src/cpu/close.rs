@@ -5,7 +5,6 @@
 use super::{
     plan::Plan,
     rays::Rays,
-    sums::Cover,
     vector::{self, Lanes, dot, each, exp, four, log2, three, words},
 };
 use crate::{plan::uniforms::FrameIsosurface, scene::Optics};
@@ -43,19 +42,6 @@ impl<S: Simd> Pixels<S> {
         let none = Lanes::splat(simd, 0.0);
         let hit = if plan.optics == Optics::Maximum { Lanes::splat(simd, NO_VALUE) } else { none };
         Self { color: [none; 3], through: Lanes::splat(simd, 1.0), hit }
-    }
-
-    /// Adds the facets of a sheet. They absorb the light of the share that they fill, from the
-    /// light that is left: neighbours in another sheet fill the rest, without a gap between them.
-    #[inline(always)]
-    pub fn cover(&mut self, simd: S, facets: &Cover<S>) {
-        let before = self.through;
-        let share = facets.share.min(before);
-        self.color = three!(I => share.mul_add(facets.color[I], self.color[I]));
-        self.through = before - share;
-        let half = Lanes::splat(simd, 0.5);
-        let passes = before.simd_gt(half) & self.through.simd_le(half);
-        self.hit = passes.select(facets.distance, self.hit);
     }
 
     /// Records where half of the light is absorbed, if that is in a sheet with optical depth and

@@ -239,7 +239,7 @@ impl March<'_> {
                 plan.close(simd, sheet, packet, field, radiance);
             }
             if let Some(facets) = &facets {
-                packet.pixels.cover(simd, facets);
+                facets.absorb(simd, &mut packet.pixels);
             }
             packet.is_done =
                 plan.optics != Optics::Maximum && !packet.pixels.through.simd_ge(OPAQUE).any_true();

@@ -4,7 +4,7 @@
 //! use slot n mod 4.
 
 use super::{
-    close::{Face, Layer, Packet},
+    close::{Face, Layer, Packet, Pixels},
     plan::Plan,
     rays::{PACKETS, Rays},
     vector::{Lanes, three},
@@ -56,6 +56,21 @@ pub struct Cover<S: Simd> {
     pub share: Lanes<S>,
     pub distance: Lanes<S>,
     pub color: [Lanes<S>; 3],
+}
+
+impl<S: Simd> Cover<S> {
+    /// Adds the facets to pixels. They absorb the light of the share that they fill, from the light
+    /// that is left: neighbours in another sheet fill the rest, without a gap between them.
+    #[inline(always)]
+    pub fn absorb(&self, simd: S, pixels: &mut Pixels<S>) {
+        let before = pixels.through;
+        let share = self.share.min(before);
+        pixels.color = three!(I => share.mul_add(self.color[I], pixels.color[I]));
+        pixels.through = before - share;
+        let half = Lanes::splat(simd, 0.5);
+        let passes = before.simd_gt(half) & pixels.through.simd_le(half);
+        pixels.hit = passes.select(self.distance, pixels.hit);
+    }
 }
 
 pub struct Sums<S: Simd> {

@@ -54,8 +54,8 @@ impl Composite {
         self.pass_in_steps(medium, &[Step { depth: medium.depth, span }]);
     }
 
-    /// Adds an opaque surface at a distance, which fills a share of the pixel: it absorbs that share
-    /// of the light, or as much as is left.
+    /// Adds an opaque surface at a distance, which fills a share of the pixel: it absorbs that
+    /// share of the light, or as much as is left.
     pub fn cover(&mut self, share: f64, distance: f64, color: DVec3) {
         let before = self.opacity;
         let share = share.min(1.0 - before);

@@ -110,22 +110,22 @@
 //! average is lit once if some splat has a normal. Sheets with an optical depth below 10⁻⁵ have no
 //! radiance. Splats whose closest approach s* is clipped away do not count.
 //!
-//! **Facets** are triangles. A facet fills a share of a pixel: the area of the pixel's square inside
-//! the triangle's perspective image. At a pixel it has the place, the normal and the colour of its
-//! corners' mean. Their weights are the barycentric coordinates at which the pixel's ray meets the
-//! facet's plane. Negative ones are set to 0, and the rest is scaled to add up to 1. The facet's
-//! distance s is that of this place, z/b̂_z, and the facet belongs to the sheet that contains s. In
-//! a sheet the shares of fronts add up, and those of backs; the larger sum counts, and 1 at most.
-//! (If the set is [`Mixed`](crate::facet::Sides), all count as fronts. If it is closed, its backs
-//! may be left out as those of hierarchies.) Each facet is lit by itself. The sheet's colour is the
-//! mean weighted by shares, mixed with the mean weighted by share·exp(−min(60, 4·p)), in which the
-//! nearest counts most. Here p is the distance from the sheet's front face in pixels; a pixel's size
-//! is planes\[k\]/f (orthographic: as for splats). With S the sum of all shares, the second mean
-//! counts by x² with x = S − 1, clamped to 0 … 1. So facets side by side mix by their shares, and a
-//! surface that fills a part x of the pixel in front of another shows by x. A facet whose place is
-//! clipped away does not count. Behind the rest of its sheet, a share a adds min(a, 1 − A)·c to C,
-//! and min(a, 1 − A) to A: what fills the rest of a pixel in another sheet leaves no gap. Other
-//! modes and optics draw no facets.
+//! **Facets** are triangles. A facet fills a share of a pixel: the area of the pixel's square
+//! inside the triangle's perspective image. At a pixel it has the place, the normal and the colour
+//! of its corners' mean. Their weights are the barycentric coordinates at which the pixel's ray
+//! meets the facet's plane. Negative ones are set to 0, and the rest is scaled to add up to 1. The
+//! facet's distance s is that of this place, z/b̂_z, and the facet belongs to the sheet that
+//! contains s. In a sheet the shares of fronts add up, and those of backs; the larger sum counts,
+//! and 1 at most. (If the set is [`Mixed`](crate::facet::Sides), all count as fronts. If it is
+//! closed, its backs may be left out as those of hierarchies.) Each facet is lit by itself. The
+//! sheet's colour is the mean weighted by shares, mixed with the mean weighted by
+//! share·exp(−min(60, 4·p)), in which the nearest counts most. Here p is the distance from the
+//! sheet's front face in pixels; a pixel's size is planes\[k\]/f (orthographic: as for splats).
+//! With S the sum of all shares, the second mean counts by x² with x = S − 1, clamped to 0 … 1. So
+//! facets side by side mix by their shares, and a surface that fills a part x of the pixel in front
+//! of another shows by x. A facet whose place is clipped away does not count. Behind the rest of
+//! its sheet, a share a adds min(a, 1 − A)·c to C, and min(a, 1 − A) to A: what fills the rest of a
+//! pixel in another sheet leaves no gap. Other modes and optics draw no facets.
 //!
 //! **Compositing.** The optical depths of surface and field add, and their colours mix in
 //! proportion to them. Front to back, with α = 1 − exp(−τ): C += (1 − A)·α·c, A += (1 − A)·α. The

@@ -65,8 +65,11 @@ pub(super) fn check_item(item: &Item) -> Result<()> {
     let Bounds { min, max } = item.bounds();
     let holds = |v: f64| v.abs() <= f64::from(f32::MAX);
     // The bounds of an empty set are not finite. That is no error.
-    let is_none = matches!(item, Item::Radiance(set) | Item::Scalar(set, _) if set.splats.is_empty())
-        || matches!(item, Item::Facets(set) if set.facets.is_empty());
+    let is_none = match item {
+        Item::Radiance(set) | Item::Scalar(set, _) => set.splats.is_empty(),
+        Item::Facets(set) => set.facets.is_empty(),
+        _ => false,
+    };
     if !is_none && ![min, max, max - min].iter().all(|v| v.to_array().into_iter().all(holds)) {
         return Err(Error::Argument(format!(
             "it reaches from {min} to {max}, beyond what 32-bit numbers hold"

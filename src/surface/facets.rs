@@ -42,8 +42,8 @@ impl Mesh {
     /// textured ones are cut. If the mesh is [solid](Self::is_solid), facets are turned outward.
     ///
     /// # Errors
-    /// As [`surfels`](Self::surfels), but for [`Error::NothingToDraw`](crate::Error::NothingToDraw):
-    /// a mesh without area gives no facets.
+    /// As [`surfels`](Self::surfels), except
+    /// [`Error::NothingToDraw`](crate::Error::NothingToDraw): a mesh without area gives no facets.
     pub fn facets(&self, options: &SurfelOptions) -> Result<Option<FacetSet>> {
         let _span = tracing::info_span!("facets").entered();
         self.check(options)?;
@@ -57,6 +57,7 @@ impl Mesh {
         let is_textured =
             !self.uvs.is_empty() && self.materials.iter().any(|own| own.texture.is_some());
         let largest = largest_edge(bounds, self.area(), options);
+        self.check_extent(largest)?;
         let longest = if is_textured { largest } else { largest * LONGER };
         let Refined { mesh, sources } =
             refine(self, longest, options.most_triangles, options.deadline)?;
@@ -108,7 +109,8 @@ impl Mesh {
     }
 }
 
-/// Returns the facet of a triangle, turned and coloured by its normals as `traits` say, or `None` if the triangle has no area.
+/// Returns the facet of a triangle, turned and coloured by its normals as `traits` say; `None` if
+/// the triangle has no area.
 fn facet(
     mesh: &Mesh,
     number: usize,

@@ -71,7 +71,7 @@ impl Default for SurfelOptions {
     fn default() -> Self {
         Self {
             radius_scale: 1.0,
-            optical_depth: 8.0,
+            optical_depth: 14.0,
             crease_angle_degrees: 75.0,
             largest_spacing: 1.0 / 128.0,
             most_triangles: 1 << 23,
@@ -287,7 +287,7 @@ impl Mesh {
 
     /// Refuses a mesh if all its triangles would vanish when measured in `unit`, the longest edge
     /// that is not cut. This is known before any triangle is cut.
-    fn check_extent(&self, unit: f32) -> Result<()> {
+    pub(super) fn check_extent(&self, unit: f32) -> Result<()> {
         let unit = f64::from(unit);
         let [least_area, least_ratio] =
             [LEAST_SQUARE, LEAST_RATIO_SQUARED].map(|square| f64::from(square).sqrt());

@@ -28,7 +28,9 @@ fn case(name: &'static str, scene: Scene, projection: Projection) -> Case {
 
 /// A closed part with bevels.
 pub fn gear() -> Case {
-    let set = facets(Mesh::gear(9), Sides::Closed);
+    let mut mesh = Mesh::gear(9);
+    mesh.positions.iter_mut().for_each(|p| *p *= 1.3);
+    let set = facets(mesh, Sides::Closed);
     case("gear", Scene::new().with_facets(set), PERSPECTIVE)
 }
 

@@ -3,12 +3,22 @@
 
 use glam::DVec3;
 use splatkit::{
+    formats::{ReadOptions, load_mesh},
+    input::Limits,
     math::{Bounds, Camera},
     picture::Picture,
     reference::trace,
     scene::Settings,
     surface::{Mesh, SurfelOptions},
 };
+
+/// Reads the meshes that `SPLATKIT_MESHES` names, separated by colons.
+pub fn given_meshes() -> Vec<(String, Mesh)> {
+    let paths = std::env::var("SPLATKIT_MESHES").unwrap_or_default();
+    let read = |path: &str| load_mesh(path, &Limits::default(), &ReadOptions::default());
+    let paths = paths.split(':').filter(|path| !path.is_empty());
+    paths.map(|path| (path.to_owned(), read(path).expect(path))).collect()
+}
 
 /// Rays along each side of a pixel of the true picture.
 const RAYS: u32 = 4;
@@ -57,6 +67,23 @@ impl Truth {
         let crease = SurfelOptions::default().crease_angle_degrees;
         let picture = trace(mesh, crease, &camera, &settings, RAYS).expect("a traced picture");
         Self { camera, settings, picture }
+    }
+
+    /// Returns the pixels that the mesh fills, and all around them, those of them with less opacity
+    /// than `least`, and the smallest opacity there.
+    pub fn opacity_inside(&self, picture: &Picture, least: f32) -> (usize, usize, f32) {
+        let [width, height] = self.settings.size.map(|side| side as usize);
+        let is_inside = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            (y.saturating_sub(1)..(y + 2).min(height)).all(|row| {
+                let columns = x.saturating_sub(1)..(x + 2).min(width);
+                columns.clone().all(|column| self.picture.color[row * width + column][3] >= 1.0)
+            })
+        };
+        let inside = (0..picture.color.len()).filter(|&at| is_inside(at));
+        let opacities: Vec<f32> = inside.map(|at| picture.color[at][3]).collect();
+        let below = opacities.iter().filter(|&&opacity| opacity < least).count();
+        (opacities.len(), below, opacities.iter().copied().fold(1.0, f32::min))
     }
 
     pub fn compare(&self, picture: &Picture) -> Found {

@@ -109,7 +109,7 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("open.stl", 3, "open.stl: line 4: the file ends before “endsolid”: it is cut"),
     ("short.pts", 3, "short.pts: line 1: counts 3 points, but there are 2"),
     ("five.xyz", 3, "five.xyz: line 1: has 5 columns without names"),
-    ("gone.csv", 3, "gone.csv: line 1: has 2 scalars to choose from"),
+    ("gone.csv", 3, "nothing to draw: all values of gone.csv are 4"),
     ("many.pcd", 3, "many.pcd: the number of points is 4294967295, over the limit"),
     (
         "many.pcd --limit-points 5000000000",
