@@ -109,7 +109,7 @@ fn sides_are_known() {
 fn what_is_not_opaque_or_too_large_has_no_facets() {
     let facets = |mesh: &Mesh, options: &SurfelOptions| mesh.facets(options).expect("facets");
     let usual = SurfelOptions::default();
-    let few = SurfelOptions { most_facets: 11, ..usual.clone() };
+    let few = SurfelOptions { most_facets: 11, ..SurfelOptions::default() };
     let cube = Mesh::cube(1.0);
     assert!(facets(&cube, &usual).is_some() && facets(&cube, &few).is_none());
     let mut glass = cube.clone();

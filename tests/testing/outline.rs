@@ -76,8 +76,8 @@ impl Truth {
         let is_inside = |at: usize| {
             let (x, y) = (at % width, at / width);
             (y.saturating_sub(1)..(y + 2).min(height)).all(|row| {
-                let columns = x.saturating_sub(1)..(x + 2).min(width);
-                columns.clone().all(|column| self.picture.color[row * width + column][3] >= 1.0)
+                let mut columns = x.saturating_sub(1)..(x + 2).min(width);
+                columns.all(|column| self.picture.color[row * width + column][3] >= 1.0)
             })
         };
         let inside = (0..picture.color.len()).filter(|&at| is_inside(at));
