@@ -6,6 +6,7 @@ mod numbers;
 mod seen;
 mod settings;
 mod sheets;
+mod specks;
 mod validate;
 
 pub use item::Item;

@@ -1,6 +1,6 @@
 //! Points that span what a picture shows of a scene, for cameras that are fitted to it.
 
-use super::{Clip, ClipShape, Item, Scene};
+use super::{Clip, ClipShape, Item, Scene, specks::take_specks};
 use crate::{
     Result,
     bricks::{Bricks, Level},
@@ -33,6 +33,9 @@ const NOISE: f64 = 0.001;
 /// The optical depth of a tenth of a volume's diagonal from which on a block of samples is seen.
 const FAINT: f64 = 0.02;
 
+/// The optical depth of a block of samples that is opaque.
+const OPAQUE: f64 = 3.0;
+
 impl Clip {
     /// Returns whether the clip keeps a point.
     pub fn keeps(&self, point: DVec3) -> bool {
@@ -50,8 +53,8 @@ impl Scene {
     /// the transfer function shows. [`Camera::fit_points`](crate::math::Camera::fit_points) makes
     /// them fill a picture.
     ///
-    /// Up to a thousandth of the splats that lies far away on one side of all others, and of a
-    /// volume's visible samples that is scattered beyond the rest, is left out. The time is linear
+    /// Up to a thousandth of the splats that lies far away on one side of all others, and of what
+    /// is seen of a volume in specks apart from the rest, is left out. The time is linear
     /// in the number of splats and samples; of large hierarchies and bricks only coarse levels are
     /// read. If an item shows nothing, or the clips remove it, the corners of its box stand for it.
     ///
@@ -254,7 +257,12 @@ impl<'a> Rows<'a> {
         // What is fainter is seen only if nothing is more opaque.
         let most = means.iter().copied().fold(0.0, f32::max);
         let least = least.min(0.05 * most);
-        rows.blocks = means.into_iter().map(|mean| mean > 0.0 && mean >= least).collect();
+        rows.blocks = means.iter().map(|mean| *mean > 0.0 && *mean >= least).collect();
+        // More than what makes a block opaque does not count.
+        let side = (last - first).length() * BLOCK as f64 / nx.max(ny).max(nz) as f64;
+        let weights: Vec<f32> = means.iter().map(|mean| mean.min((OPAQUE / side) as f32)).collect();
+        let dims = rows.block_dims();
+        take_specks(&mut rows.blocks, dims, &weights, NOISE);
         rows
     }
 

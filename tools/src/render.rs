@@ -253,9 +253,13 @@ impl Render {
         let overlay = self.overlay.open(&loaded.facts, self.background.0)?;
         let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
+        // The camera is fitted to the middle of the picture, beside the bars.
+        let room = overlay.as_ref().map_or(0, |overlay| overlay.room(self.engine.size));
+        let [width, height] = settings.size;
+        let free = [width.saturating_sub(2 * factor * room).max(1), height];
         let cameras = match self.turntable {
-            Some(frames) => self.camera.turntable(&loaded.subject, settings.size, frames)?,
-            None => vec![self.camera.camera(&loaded.subject, settings.size)?],
+            Some(frames) => self.camera.turntable(&loaded.subject, free, frames)?,
+            None => vec![self.camera.camera(&loaded.subject, free)?],
         };
         let mut last = (FrameStats::default(), cameras[0].clone());
         for (target, camera) in targets.iter().zip(cameras) {

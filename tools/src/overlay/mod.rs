@@ -60,6 +60,10 @@ pub struct Overlay<'a> {
 
 /// Most scalar bars; more would hide the picture.
 const MOST_BARS: usize = 3;
+/// The space between bars, in heights of letters.
+const BETWEEN: f64 = 1.2;
+/// The most of a picture's width that is left free at each side.
+const MOST_ROOM: f64 = 0.25;
 
 impl OverlayFlags {
     /// Returns the texts to draw over pictures with a background; `None` if no flag asks for any.
@@ -86,14 +90,33 @@ impl OverlayFlags {
 }
 
 impl Overlay<'_> {
-    /// Draws the texts over a picture, and returns what was drawn.
-    pub fn draw(&self, picture: &mut Picture, camera: &Camera) -> Value {
+    /// Returns how many pixels at its left and at its right a scene that is fitted to a picture
+    /// leaves free, so that bars do not hide it.
+    pub fn room(&self, [width, height]: [u32; 2]) -> u32 {
+        if !self.flags.scalar_bar {
+            return 0;
+        }
+        let mut blank = Picture { width, height, color: Vec::new(), depth: Vec::new() };
+        let (canvas, area) = self.canvas(&mut blank);
+        let (bars, _) = self.laid(&canvas, area);
+        let bars: f64 = bars.iter().map(|bar| bar.width + BETWEEN * canvas.size).sum();
+        (bars + area.left).min(MOST_ROOM * f64::from(width)) as u32
+    }
+
+    /// Returns a picture to draw on, and its area without a margin.
+    fn canvas<'a>(&'a self, picture: &'a mut Picture) -> (Canvas<'a>, Area) {
         let (width, height) = (f64::from(picture.width), f64::from(picture.height));
         let size = (width.min(height) / 34.0).max(8.5);
         let margin = (0.9 * size).min(0.1 * width.min(height));
-        let mut area = Area { left: 0.0, top: 0.0, right: width, bottom: height }.grown(-margin);
+        let area = Area { left: 0.0, top: 0.0, right: width, bottom: height }.grown(-margin);
+        (Canvas { picture, face: &self.face, ink: self.ink, size }, area)
+    }
+
+    /// Draws the texts over a picture, and returns what was drawn.
+    pub fn draw(&self, picture: &mut Picture, camera: &Camera) -> Value {
         let pixels = picture.height;
-        let mut canvas = Canvas { picture, face: &self.face, ink: self.ink, size };
+        let (mut canvas, mut area) = self.canvas(picture);
+        let size = canvas.size;
         let mut drawn = json!({});
         if let Some(text) = &self.flags.caption {
             drawn["caption"] = json!(text);
@@ -147,21 +170,27 @@ impl Overlay<'_> {
         (1.3 * lines.len() as f64 + 0.4) * canvas.size
     }
 
+    /// Lays out the bars, and returns their height, too.
+    fn laid(&self, canvas: &Canvas, area: Area) -> (Vec<Laid<'_>>, f64) {
+        let size = canvas.size;
+        let height = (0.62 * area.height()).max(8.0 * size).min(area.height());
+        let shown = self.facts.bars.len().min(MOST_BARS);
+        let most = (0.5 * area.width() / shown as f64).max(5.0 * size);
+        let bars = self.facts.bars.iter().take(MOST_BARS);
+        (bars.map(|bar| Laid::new(canvas, bar, height, most)).collect(), height)
+    }
+
     /// Draws the bars from right to left.
     fn bars(&self, canvas: &mut Canvas, area: Area) -> Value {
         let size = canvas.size;
-        let height = (0.62 * area.height()).max(8.0 * size).min(area.height());
+        let (laid, height) = self.laid(canvas, area);
         let top = area.top + 0.5 * (area.height() - height);
-        let shown = self.facts.bars.len().min(MOST_BARS);
-        let most = (0.5 * area.width() / shown as f64).max(5.0 * size);
-        let laid = self.facts.bars.iter().take(MOST_BARS);
-        let laid: Vec<Laid> = laid.map(|bar| Laid::new(canvas, bar, height, most)).collect();
         let lines = laid.iter().map(Laid::title_lines).max().unwrap_or(0);
         let mut right = area.right;
         for bar in laid.iter().rev() {
             let own = Area { left: area.left, top, right, bottom: top + height };
             bar.draw(canvas, own, lines);
-            right -= bar.width + 1.2 * size;
+            right -= bar.width + BETWEEN * size;
         }
         laid.iter().map(Laid::to_json).collect()
     }
@@ -278,6 +307,24 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn bars_lie_in_the_room_that_is_left_to_them() {
+        let (flags, facts) = (flags([true, false, false, false]), facts(None));
+        let overlay = flags.open(&facts, None).unwrap().unwrap();
+        for size in SIZES {
+            let room = overlay.room(size);
+            assert!(room > 20 && room <= size[0] / 4, "{size:?}: {room}");
+            if room == size[0] / 4 {
+                continue;
+            }
+            let picture = drawn([true, false, false, false], size, None);
+            let is_drawn = |at: &usize| picture.color[*at][3] > 0.05;
+            let columns = (0..picture.color.len()).filter(is_drawn).map(|at| at as u32 % size[0]);
+            let first = columns.min().unwrap();
+            assert!(first >= size[0] - room, "{size:?}: {first} with a room of {room}");
         }
     }
 
