@@ -1,5 +1,5 @@
-//! Hierarchies seen from near: inside the outline of a mesh, no light passes. `SPLATKIT_MESHES` with
-//! paths of meshes, separated by colons, measures these, too.
+//! Hierarchies seen from near: inside the outline of a mesh, no light passes. `SPLATKIT_MESHES`
+//! with paths of meshes, separated by colons, measures these, too.
 
 mod testing;
 

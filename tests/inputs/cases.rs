@@ -1286,7 +1286,7 @@
         (
             "tail.splk",
             [splk(true), vec![0]].concat(),
-            "tail.splk: byte 560: the file has 1 bytes after its end",
+            "tail.splk: byte 561: the file has 1 bytes after its end",
         ),
         (
             "tail.splv",
@@ -1340,12 +1340,12 @@
         (
             "swapped.splk",
             crafted::swapped(false),
-            "swapped.splk: page 1 (byte 130709): its checksum does not match",
+            "swapped.splk: page 1 (byte 131060): its checksum does not match",
         ),
         (
             "swappedtold.splk",
             crafted::swapped(true),
-            "swappedtold.splk: page 1 (byte 130709): it unpacks to 312880 bytes where 327680 were \
+            "swappedtold.splk: page 1 (byte 131060): it unpacks to 312880 bytes where 327680 were \
              expected",
         ),
         (

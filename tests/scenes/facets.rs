@@ -1,8 +1,6 @@
 //! Scenes of facets: closed, open, seen from within, clipped, and beside other items.
 
-use super::{
-    Case, ORIGIN, ORTHOGRAPHIC, PERSPECTIVE, SLANT, camera, methods, mixed_scene, settings,
-};
+use super::{Case, ORIGIN, PERSPECTIVE, SLANT, camera, methods, mixed_scene, settings};
 use glam::Vec3;
 use splatkit::{
     facet::{FacetSet, Sides},
@@ -29,7 +27,7 @@ fn case(name: &'static str, scene: Scene, projection: Projection) -> Case {
 /// A closed part with bevels.
 pub fn gear() -> Case {
     let mut mesh = Mesh::gear(9);
-    mesh.positions.iter_mut().for_each(|p| *p *= 1.3);
+    mesh.positions.iter_mut().for_each(|p| *p *= 1.6);
     let set = facets(mesh, Sides::Closed);
     case("gear", Scene::new().with_facets(set), PERSPECTIVE)
 }
@@ -37,7 +35,8 @@ pub fn gear() -> Case {
 /// A sheet of which both sides are seen, without light.
 pub fn folded_sheet() -> Case {
     let set = facets(Mesh::folded_sheet(5), Sides::Oriented);
-    let case = case("folded_sheet", Scene::new().with_facets(set), ORTHOGRAPHIC);
+    let near = Projection::Orthographic { height: 1.6 };
+    let case = case("folded_sheet", Scene::new().with_facets(set), near);
     Case { settings: Settings { surface_shade: None, ..settings() }, ..case }
 }
 
@@ -59,8 +58,8 @@ pub fn inside_a_box() -> Case {
 /// Cut open: then the backs are seen.
 pub fn clipped_gear() -> Case {
     let clips = methods::clipped_surface_in_a_volume().settings.clips;
-    let case = gear();
-    Case { name: "clipped_gear", settings: Settings { clips, ..settings() }, ..case }
+    let camera = camera(0.6 * SLANT, PERSPECTIVE);
+    Case { name: "clipped_gear", camera, settings: Settings { clips, ..settings() }, ..gear() }
 }
 
 /// Facets, surfels and a volume in the same sheets.
