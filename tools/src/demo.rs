@@ -127,7 +127,13 @@ impl Demo {
             source_points: Some(mesh.positions.len() as u64),
             ..BuildOptions::default()
         };
-        let write = WriteOptions { source: MESH.into(), ..WriteOptions::default() };
+        let stance = mesh.guess_stance();
+        let write = WriteOptions {
+            stance,
+            is_guessed: stance.is_some(),
+            source: MESH.into(),
+            ..WriteOptions::default()
+        };
         let splats = mesh.surfels(&SurfelOptions::default())?;
         build_file(&splats, self.folder.join(TREE), &build, &write, None)?;
         formats::nrrd::write(&specimen, self.folder.join(VOLUME))?;
@@ -146,7 +152,8 @@ impl Demo {
             arguments.extend(["--gpu".into(), gpu.into()]);
         }
         let flags = Flags::try_parse_from(&arguments).map_err(|e| Failure::Usage(e.to_string()))?;
-        let mut loaded = flags.scene.load(&Given::default(), progress)?;
+        let facets = flags.engine.draws_facets()?;
+        let mut loaded = flags.scene.load_with(facets, &Given::default(), progress)?;
         let mut drawer = Drawer::engine(&flags.engine, &loaded, progress)?;
         let settings = flags.engine.settings(&loaded, Samples::Factor(1))?;
         loaded.find_seen(&flags.camera, &settings)?;
