@@ -1,7 +1,6 @@
 //! Splats with a polygonal footprint: triangles whose outline is exact at any distance.
 
 use crate::{
-    Error, Result,
     math::Bounds,
     parallel::prelude::*,
     splat::{NO_NORMAL, decode_normal, encode_normal},
@@ -75,47 +74,6 @@ pub struct FacetSet {
 }
 
 impl FacetSet {
-    /// Changes the origin of the set; all facets stay where they are in the world.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] if the origin is not finite, or if 32-bit coordinates around it are
-    /// coarser than a ten-thousandth of the mean edge.
-    pub fn move_origin(&mut self, origin: DVec3) -> Result<()> {
-        if !origin.is_finite() {
-            return Err(Error::Argument(format!(
-                "the new origin {origin} of the facets is not finite"
-            )));
-        }
-        let shift = self.origin - origin;
-        self.origin = origin;
-        if shift == DVec3::ZERO || self.facets.is_empty() {
-            return Ok(());
-        }
-        let move_one = |facet: &mut Facet| {
-            let [a, b, _] = facet.corners.map(Vec3::from);
-            let edge = f64::from(a.distance(b));
-            let mut farthest: f64 = 0.0;
-            for corner in &mut facet.corners {
-                let moved = (Vec3::from(*corner).as_dvec3() + shift).as_vec3();
-                *corner = moved.to_array();
-                farthest = farthest.max(f64::from(moved.abs().max_element()));
-            }
-            (farthest, edge)
-        };
-        let both = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1 + b.1);
-        let (farthest, edges) =
-            self.facets.par_iter_mut().map(move_one).reduce(|| (0.0, 0.0), both);
-        let (step, edge) = (farthest * f64::from(f32::EPSILON), edges / self.facets.len() as f64);
-        if step > 1e-4 * edge {
-            return Err(Error::Argument(format!(
-                "facets are up to {farthest:.0} from the first input, where 32-bit coordinates \
-                 have steps of {step:.3}, but their mean edge is {edge:.3}; convert inputs this \
-                 far apart to separate files"
-            )));
-        }
-        Ok(())
-    }
-
     /// Returns the box around all facets, in world coordinates.
     pub fn bounds(&self) -> Bounds {
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
@@ -149,16 +107,5 @@ mod tests {
     fn a_facet_without_normals_has_that_of_its_triangle() {
         assert_eq!(set().facets[0].decoded_normals(), [Vec3::Z; 3]);
         assert_eq!(set().facets[0].colors[0].to_le_bytes(), [255, 0, 7, 255]);
-    }
-
-    #[test]
-    fn places_hold_while_the_origin_moves() {
-        let mut set = set();
-        let before = set.bounds();
-        set.move_origin(DVec3::new(100.0, 0.0, 0.0)).unwrap();
-        assert_eq!((set.bounds().min, set.bounds().max), (before.min, before.max));
-        let error = set.move_origin(DVec3::new(4e6, 0.0, 0.0)).unwrap_err().to_string();
-        assert!(error.contains("their mean edge is 1.000"), "{error}");
-        assert!(set.move_origin(DVec3::NAN).is_err());
     }
 }
