@@ -77,3 +77,38 @@ fn a_lit_ridge_looks_as_in_thin_sheets() {
     println!("a lit ridge: {agreement:.1} dB");
     assert!(agreement > 40.0, "{agreement:.1} dB");
 }
+
+/// A lit ball whose material becomes opaque within a few sheets: thicker sheets change no pixel
+/// visibly against its neighbours.
+#[test]
+fn an_opaque_ball_has_no_contours() {
+    let middle = 0.5 * (SIDE - 1) as f64;
+    let values = (0..SIDE.pow(3)).map(|at| {
+        let place = [at % SIDE, at / SIDE % SIDE, at / SIDE.pow(2)].map(|i| i as f64 - middle);
+        let radius = DVec3::from(place).length();
+        (255.0 * (1.2 - radius / 12.0).clamp(0.0, 1.0)) as u8
+    });
+    let samples = Samples::U8(values.collect());
+    let volume = Volume::new(Lattice::with_spacing([SIDE; 3], DVec3::ONE), samples);
+    let transfer = TransferFunction {
+        color: vec![(100.0, [0.9, 0.5, 0.2]), (200.0, [0.9, 0.9, 1.0])],
+        opacity: vec![(100.0, 0.0), (160.0, 0.6), (255.0, 0.9)],
+        shade: Some(Shade::default()),
+        ..TransferFunction::default()
+    };
+    let scene = Scene::new().with_volume(volume.expect("valid"), Kernel::default(), transfer);
+    let (default, thin) = (drawn(&scene, None), drawn(&scene, Some(1.0 / 6.0)));
+    let width = default.width as usize;
+    let step = |picture: &Picture, at: usize| {
+        let red = |at: usize| picture.color[at][0];
+        red(at) - 0.5 * (red(at - 1) + red(at + 1))
+    };
+    let inner = (0..default.color.len()).filter(|at| (1..width - 1).contains(&(at % width)));
+    let mut differences: Vec<f32> =
+        inner.map(|at| (step(&default, at) - step(&thin, at)).abs()).collect();
+    differences.sort_by(f32::total_cmp);
+    let contour = differences[differences.len() * 99 / 100];
+    let agreement = measured(&default, &thin);
+    println!("an opaque ball: {agreement:.1} dB, contours of {:.2} / 255", 255.0 * contour);
+    assert!(255.0 * contour < 1.0, "{:.2} / 255", 255.0 * contour);
+}

@@ -6,6 +6,9 @@
 const LEAST_DEPTH: f32 = 1e-5;
 // Optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
+// A part of a sheet with more optical depth is divided, because what lies in front covers what lies
+// behind.
+const MOST_PART_DEPTH: f32 = 0.0625;
 
 // Returns a lit colour: Blinn's model (1977) with a light at the eye, on both sides. `certain` is a
 // magnitude up to which the normal does not count, and one over the magnitudes over which it comes
@@ -152,49 +155,80 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
         if MAXIMUM {
             (*medium).peak = max((*medium).peak, max(value, next));
         } else {
-            var shown: vec4<f32>;
-            if POST {
-                shown = classify(own.value);
-                shown = vec4(shown.xyz * shown.w, shown.w);
-            } else {
-                shown = classify_between(value, next);
+            // Adds the part in slices of equal length, the more the deeper it is.
+            var count = 1.0;
+            if !POST {
+                let depth = classify_between(value, next).w * step * filling_of(own);
+                count = clamp(ceil(depth / MOST_PART_DEPTH), 1.0, f32(MOST_SLICES));
             }
-            var normal: vec3<f32>;
-            if GRADIENTS {
-                normal = gradient_at(r, *medium, 0.5 * (place + next_place));
-            }
-            if GRADIENT_OPACITY {
-                shown *= gradient_factor(length(normal));
-            }
-            // Differences of integrals: rounding remainders, where nothing is visible, must stay a
-            // colour.
-            let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
-            var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
-            if VOLUME_SHADED {
-                color = lit_field(r, color, normal);
-            }
-            var done = 0.0;
-            for (var i = 0u; i < ISOSURFACES; i++) {
-                let surface = frame.isosurfaces[select(ISOSURFACES - 1u - i, i, next > value)];
-                let level = surface.value.x;
-                if (value < level) != (next < level) {
-                    let share = (level - value) / (next - value);
-                    pass_part(depth * (share - done), color, medium);
-                    done = share;
-                    pass_surface(
-                        r,
-                        surface,
-                        mix(place, next_place, share),
-                        near + step * share,
-                        medium,
-                    );
+            let span = step / count;
+            var from = vec2(place, value);
+            var slice = 0.0;
+            loop {
+                let until = mix(place, next_place, (slice + 1.0) / count);
+                let to = vec2(until, parabola(curve, until));
+                pass_slice(r, own, near + slice * span, span, from, to, medium);
+                from = to;
+                slice += 1.0;
+                if slice >= count {
+                    break;
                 }
             }
-            pass_part(depth * (1.0 - done), color, medium);
         }
         place = next_place;
         value = next;
     }
+}
+
+fn filling_of(own: Sheet) -> f32 {
+    return select(own.filling, 1.0, LATTICE);
+}
+
+// Adds a slice of a part, which begins at a distance. Its ends are places in the sheet, each with
+// the value there.
+fn pass_slice(
+    r: u32,
+    own: Sheet,
+    begin: f32,
+    span: f32,
+    from: vec2<f32>,
+    to: vec2<f32>,
+    medium: ptr<function, Medium>,
+) {
+    let value = from.y;
+    let next = to.y;
+    var shown: vec4<f32>;
+    if POST {
+        shown = classify(own.value);
+        shown = vec4(shown.xyz * shown.w, shown.w);
+    } else {
+        shown = classify_between(value, next);
+    }
+    var normal: vec3<f32>;
+    if GRADIENTS {
+        normal = gradient_at(r, *medium, 0.5 * (from.x + to.x));
+    }
+    if GRADIENT_OPACITY {
+        shown *= gradient_factor(length(normal));
+    }
+    // Differences of integrals: rounding remainders, where nothing is visible, must stay a colour.
+    let depth = max(shown.w, 0.0) * span * filling_of(own);
+    var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
+    if VOLUME_SHADED {
+        color = lit_field(r, color, normal);
+    }
+    var done = 0.0;
+    for (var i = 0u; i < ISOSURFACES; i++) {
+        let surface = frame.isosurfaces[select(ISOSURFACES - 1u - i, i, next > value)];
+        let level = surface.value.x;
+        if (value < level) != (next < level) {
+            let share = (level - value) / (next - value);
+            pass_part(depth * (share - done), color, medium);
+            done = share;
+            pass_surface(r, surface, mix(from.x, to.x, share), begin + span * share, medium);
+        }
+    }
+    pass_part(depth * (1.0 - done), color, medium);
 }
 
 fn parabola(curve: vec3<f32>, u: f32) -> f32 {

@@ -12,6 +12,10 @@ use fearless_simd::{Simd, f32x4, i32x8, mask32x8, prelude::*};
 
 /// Number of parts of a sheet in which the transfer function is integrated.
 const PARTS: usize = 3;
+/// A part with more optical depth is divided, because what lies in front covers what lies behind.
+const MOST_PART_DEPTH: f32 = 1.0 / 16.0;
+/// Largest number of slices that a part is divided into.
+const MOST_SLICES: f32 = 1.0;
 /// Values closer together than this, in entries of the table, are taken as this far apart.
 const NARROW: f32 = 8.0;
 /// The same for values far beyond the table, as a fraction of the value.
@@ -128,7 +132,7 @@ struct Medium<S: Simd> {
     peak: Lanes<S>,
 }
 
-/// A part of a sheet in which the transfer function is integrated at once.
+/// A part of a sheet, or a slice of one, in which the transfer function is integrated at once.
 struct Piece<S: Simd> {
     /// The pixels whose rays meet it.
     mask: mask32x8<S>,
@@ -480,13 +484,58 @@ impl Plan<'_> {
             let next = if is_curved { layer.parabola(next_place) } else { value };
             let places = [place, next_place];
             let piece = Piece { mask, begin, length: step, places, values: [value, next] };
+            if self.is_integrated {
+                self.pass_slices(simd, layer, &piece, medium);
+            } else {
+                self.pass_piece(simd, layer, &piece, medium);
+            }
+            place = next_place;
+            value = next;
+        }
+    }
+
+    /// Adds a part of a sheet in slices of equal length, the more the deeper it is.
+    #[inline(always)]
+    fn pass_slices<S: Simd>(
+        &self,
+        simd: S,
+        layer: &Layer<S>,
+        part: &Piece<S>,
+        medium: &mut Medium<S>,
+    ) {
+        let none = Lanes::splat(simd, 0.0);
+        let [from, to] = part.places;
+        let extinction = self.between(simd, part.values[0], part.values[1])[3];
+        let depth = part.mask.select(extinction * part.length * layer.filling, none);
+        if !(depth.simd_gt(0.0).any_true() || self.isosurfaces > 0) {
+            return;
+        }
+        let count = (depth * (1.0 / MOST_PART_DEPTH)).ceil();
+        let count = count.max(Lanes::splat(simd, 1.0)).min(Lanes::splat(simd, MOST_SLICES));
+        let counts: [f32; 8] = count.into();
+        let most = counts.into_iter().fold(1.0, f32::max) as usize;
+        if most == 1 {
+            self.pass_piece(simd, layer, part, medium);
+            return;
+        }
+        let share = Lanes::splat(simd, 1.0) / count;
+        let length = part.length * share;
+        let (mut place, mut value) = (from, part.values[0]);
+        for slice in 0..most {
+            let slice = slice as f32;
+            let mask = part.mask & count.simd_gt(slice);
+            let next_place = (to - from).mul_add(share * (slice + 1.0), from);
+            let next = layer.parabola(next_place);
+            let begin = length.mul_add(slice, part.begin);
+            let places = [place, next_place];
+            let piece = Piece { mask, begin, length, places, values: [value, next] };
             self.pass_piece(simd, layer, &piece, medium);
             place = next_place;
             value = next;
         }
     }
 
-    /// Adds a piece of a sheet: what the transfer function shows in it, and the isosurfaces.
+    /// Adds a piece of a part: what the transfer function shows in it, and the isosurfaces.
     #[inline(always)]
     fn pass_piece<S: Simd>(
         &self,

@@ -35,7 +35,7 @@ pub(super) struct Layer {
     pub filling: f64,
 }
 
-/// A part of a sheet: the places of its ends, and the values there.
+/// A part of a sheet, or a slice of one: the places of its ends, and the values there.
 struct Part {
     places: [f64; 2],
     values: [f64; 2],
@@ -43,6 +43,10 @@ struct Part {
 
 /// Number of parts of a piece; values are taken as linear within a part.
 const PARTS: u32 = 3;
+/// A part with more optical depth is divided, because what lies in front covers what lies behind.
+const MOST_PART_DEPTH: f64 = 1.0 / 16.0;
+/// Largest number of slices that a part is divided into.
+const MOST_SLICES: f64 = 4.0;
 
 /// Less light than this counts as this much, so that optical depths stay finite.
 const LEAST_LIGHT: f64 = 1e-9;
@@ -111,6 +115,24 @@ impl Layer {
         self.span[0] + u * (self.span[1] - self.span[0])
     }
 
+    /// Divides parts into slices of equal length, the more the deeper they are.
+    fn slices(&self, field: &Field, parts: Vec<Part>) -> Vec<Part> {
+        if !field.inside {
+            return parts;
+        }
+        let slices = parts.into_iter().flat_map(|Part { places: [start, end], values: [a, b] }| {
+            let length = self.distance(end) - self.distance(start);
+            let depth = field.classifier.between(a, b).0 * length * self.filling;
+            let count = (depth / MOST_PART_DEPTH).ceil().clamp(1.0, MOST_SLICES);
+            let place = move |i: u32| start + f64::from(i) / count * (end - start);
+            (0..count as u32).map(move |i| {
+                let places = [place(i), place(i + 1)];
+                Part { places, values: places.map(|u| self.value(u)) }
+            })
+        });
+        slices.collect()
+    }
+
     /// Divides pieces of the ray into parts.
     fn parts(&self, field: &Field, pieces: &[[f64; 2]]) -> Vec<Part> {
         let count = if field.inside || !field.surfaces.is_empty() { PARTS } else { 1 };
@@ -149,7 +171,9 @@ impl Layer {
         let mut light = 1.0;
         // Lit colours, weighted by opacity.
         let mut color = DVec3::ZERO;
-        for Part { places: [start, end], values: [a, b] } in self.parts(field, pieces) {
+        for Part { places: [start, end], values: [a, b] } in
+            self.slices(field, self.parts(field, pieces))
+        {
             let gradient = self.gradient(0.5 * (start + end), direction);
             let (extinction, medium) = if field.inside {
                 field.classifier.between(a, b)
