@@ -162,13 +162,13 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
                 count = clamp(ceil(depth / MOST_PART_DEPTH), 1.0, f32(MOST_SLICES));
             }
             let span = step / count;
-            var from = vec2(place, value);
+            var enter = vec2(place, value);
             var slice = 0.0;
             loop {
                 let until = mix(place, next_place, (slice + 1.0) / count);
-                let to = vec2(until, parabola(curve, until));
-                pass_slice(r, own, near + slice * span, span, from, to, medium);
-                from = to;
+                let leave = vec2(until, parabola(curve, until));
+                pass_slice(r, own, near + slice * span, span, enter, leave, medium);
+                enter = leave;
                 slice += 1.0;
                 if slice >= count {
                     break;
@@ -191,12 +191,12 @@ fn pass_slice(
     own: Sheet,
     begin: f32,
     span: f32,
-    from: vec2<f32>,
-    to: vec2<f32>,
+    enter: vec2<f32>,
+    leave: vec2<f32>,
     medium: ptr<function, Medium>,
 ) {
-    let value = from.y;
-    let next = to.y;
+    let value = enter.y;
+    let next = leave.y;
     var shown: vec4<f32>;
     if POST {
         shown = classify(own.value);
@@ -206,7 +206,7 @@ fn pass_slice(
     }
     var normal: vec3<f32>;
     if GRADIENTS {
-        normal = gradient_at(r, *medium, 0.5 * (from.x + to.x));
+        normal = gradient_at(r, *medium, 0.5 * (enter.x + leave.x));
     }
     if GRADIENT_OPACITY {
         shown *= gradient_factor(length(normal));
@@ -225,7 +225,7 @@ fn pass_slice(
             let share = (level - value) / (next - value);
             pass_part(depth * (share - done), color, medium);
             done = share;
-            pass_surface(r, surface, mix(from.x, to.x, share), begin + span * share, medium);
+            pass_surface(r, surface, mix(enter.x, leave.x, share), begin + span * share, medium);
         }
     }
     pass_part(depth * (1.0 - done), color, medium);

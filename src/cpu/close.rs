@@ -15,7 +15,7 @@ const PARTS: usize = 3;
 /// A part with more optical depth is divided, because what lies in front covers what lies behind.
 const MOST_PART_DEPTH: f32 = 1.0 / 16.0;
 /// Largest number of slices that a part is divided into.
-const MOST_SLICES: f32 = 1.0;
+const MOST_SLICES: f32 = 4.0;
 /// Values closer together than this, in entries of the table, are taken as this far apart.
 const NARROW: f32 = 8.0;
 /// The same for values far beyond the table, as a fraction of the value.

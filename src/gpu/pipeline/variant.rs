@@ -173,8 +173,9 @@ impl Variant {
         let parts = if self.parabola() { PARTS } else { 1 };
         // The cost of closing a sheet, in entries, against the driver's limit on iterations (see
         // docs/engine.md).
-        let closing = (2 + self.rows * parts * self.slices() * (1 + self.isosurfaces) * (1 + self.holes))
-            .div_ceil(ENTRY_ITERATIONS);
+        let closing =
+            (2 + self.rows * parts * self.slices() * (1 + self.isosurfaces) * (1 + self.holes))
+                .div_ceil(ENTRY_ITERATIONS);
         let closing = closing + u32::from(self.gather);
         [
             ("ISOSURFACES", self.isosurfaces),
