@@ -90,6 +90,10 @@ pub enum Error {
     #[error("nothing to draw: {0}")]
     NothingToDraw(String),
 
+    /// Drawing was stopped ([`Stop`](crate::Stop)).
+    #[error("the picture was stopped before it was finished")]
+    Stopped,
+
     /// There is no adapter, or none with the requested name.
     #[error("no usable GPU: {0}")]
     NoAdapter(String),

@@ -58,6 +58,7 @@
 //! | draw data larger than memory | [`hierarchy`], [`bricks`] |
 //! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |
 //! | use the device of a host application | [`gpu::Gpu::from_wgpu`] |
+//! | move a camera by hand, keep a pace, read and write scene files | [`interaction`] |
 //! | compare pictures | [`compare`] |
 //! | look up what a picture is, exactly | [`mod@reference`] |
 //!
@@ -105,6 +106,7 @@ pub mod formats;
 pub mod gpu;
 pub mod hierarchy;
 pub mod input;
+pub mod interaction;
 pub mod math;
 pub mod memory;
 pub(crate) mod parallel;
@@ -117,6 +119,7 @@ mod renderer;
 pub mod scattered;
 pub mod scene;
 pub mod splat;
+mod stop;
 pub mod surface;
 pub mod volume;
 
@@ -129,3 +132,4 @@ pub use deadline::Deadline;
 pub use error::{Error, Result};
 pub use plan::FrameStats;
 pub use renderer::{Device, Renderer};
+pub use stop::Stop;

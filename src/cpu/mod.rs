@@ -53,7 +53,7 @@ mod vector;
 mod window;
 
 use crate::{
-    Error, Result,
+    Error, Result, Stop,
     bricks::{Bricks, Choice},
     hierarchy::Detail,
     math::{Camera, Kernel, View},
@@ -194,8 +194,12 @@ impl CpuRenderer {
         }
         items::check_count(&records)?;
         clock.step("project");
-        let (picture, mut stats) = self.draw(&plan, &outline, &records, gathers, &mut clock);
+        let drawn = self.draw(&plan, &outline, &records, gathers, &settings.stop, &mut clock);
         self.spare = records;
+        if settings.stop.is_requested() {
+            return Err(Error::Stopped);
+        }
+        let (picture, mut stats) = drawn;
         if let Detail::Milliseconds(wanted) = settings.detail {
             self.pace.took(start.elapsed().as_secs_f64() * 1e3, wanted);
         }
@@ -466,6 +470,7 @@ impl CpuRenderer {
         outline: &Outline,
         records: &[Vec<Record>],
         gathers: bool,
+        stop: &Stop,
         clock: &mut Clock,
     ) -> (Picture, FrameStats) {
         let mut spare = std::mem::take(&mut self.spare_bins);
@@ -502,6 +507,9 @@ impl CpuRenderer {
             let parts = color[from..].par_chunks_mut(band).zip(depth[from..].par_chunks_mut(band));
             parts.zip(rows).for_each(|((color, depth), row)| {
                 let block = |column: usize| {
+                    if stop.is_requested() {
+                        return vec![EMPTY; BLOCK * BLOCK];
+                    }
                     let entries = lists.of_tiles(column, row, columns);
                     draw_block(self.level, &march, [column, row], &entries, &marks, &drawn)
                 };

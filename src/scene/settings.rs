@@ -1,6 +1,7 @@
 //! The settings of a picture: its size and the methods that draw it.
 
 use crate::{
+    Stop,
     hierarchy::Detail,
     math::{Bounds, View},
     volume::{Shade, TransferFunction},
@@ -151,6 +152,8 @@ pub struct Settings {
     /// Nearest distance that perspective views show, in world units; at least a millionth of the
     /// scene's size. `None` is a thousandth of that size.
     pub near: Option<f64>,
+    /// Whether drawing is to end before the picture is finished.
+    pub stop: Stop,
 }
 
 impl Settings {
@@ -184,6 +187,7 @@ impl Settings {
             cull_backfaces: None,
             page_memory: 1 << 30,
             near: None,
+            stop: Stop::default(),
         }
     }
 

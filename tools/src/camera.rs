@@ -5,7 +5,8 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 use splatkit::{
     about::Stance,
-    math::{Bounds, Camera, Projection},
+    interaction::CameraEntry,
+    math::{Bounds, Camera},
 };
 
 /// Share of the picture that is left free around a scene that the camera is fitted to.
@@ -20,6 +21,17 @@ const ELEVATION: f64 = 20.0;
 #[derive(Args, Debug, Clone, Default)]
 #[command(next_help_heading = "Camera")]
 pub struct CameraFlags {
+    /// Use this camera, as JSON: what --json prints. The scene is not fitted to the picture then.
+    #[arg(
+        long,
+        value_name = "JSON",
+        value_parser = given_camera,
+        conflicts_with_all = [
+            "view", "camera_position", "focal_point", "view_up", "view_angle", "distance",
+            "azimuth", "elevation", "orthographic",
+        ]
+    )]
+    camera: Option<Camera>,
     /// Look from this side. right is at the right of a viewer who looks at the front; iso is a
     /// corner of the box around the scene. --azimuth and --elevation turn the view further
     /// [default: from the front, 30 degrees to the right and 20 upwards]
@@ -214,7 +226,7 @@ impl CameraFlags {
 
     /// Whether the flags set the camera's distance, so that it is not fitted to the scene.
     pub fn is_placed(&self) -> bool {
-        self.camera_position.is_some() || self.distance.is_some()
+        self.camera.is_some() || self.camera_position.is_some() || self.distance.is_some()
     }
 
     /// Returns how the scene stands in the picture, and where that comes from.
@@ -244,6 +256,10 @@ impl CameraFlags {
     /// Returns the camera before it is fitted and enlarged: the sphere around what is seen, or the
     /// scene's box, fills the picture.
     fn aimed(&self, subject: &Subject, size: [u32; 2], turn: f64) -> Camera {
+        if let Some(mut camera) = self.camera.clone() {
+            camera.azimuth(turn);
+            return camera;
+        }
         let (stance, _) = self.stance(subject);
         let view_up = self.view_up.unwrap_or(stance.up);
         let view_angle = self.view_angle.unwrap_or(Camera::DEFAULT_VIEW_ANGLE);
@@ -272,18 +288,17 @@ impl CameraFlags {
     }
 }
 
+/// Parses a camera that [`to_json`] has written.
+fn given_camera(text: &str) -> Result<Camera, String> {
+    let form = "the form is {\"position\": [x, y, z], \"focal_point\": [x, y, z], \"view_up\": \
+                [x, y, z], \"view_angle\": 30}, or with \"height\" without perspective";
+    let entry: CameraEntry = serde_json::from_str(text).map_err(|e| format!("{e}; {form}"))?;
+    entry.camera()
+}
+
 /// Returns the camera with the flags' names as keys.
 pub fn to_json(camera: &Camera) -> serde_json::Value {
-    let (name, value) = match camera.projection {
-        Projection::Perspective { view_angle } => ("view_angle", view_angle),
-        Projection::Orthographic { height } => ("height", height),
-    };
-    serde_json::json!({
-        "position": camera.position.to_array(),
-        "focal_point": camera.focal_point.to_array(),
-        "view_up": camera.view_up.to_array(),
-        name: value,
-    })
+    serde_json::json!(CameraEntry::from(camera))
 }
 
 /// Returns the name of a direction: of an axis if it is one.

@@ -72,7 +72,7 @@ impl Failure {
         }
     }
 
-    fn hint(&self) -> Option<Cow<'_, str>> {
+    pub fn hint(&self) -> Option<Cow<'_, str>> {
         let hint = match self {
             Self::Library(Error::Input { hint, .. }) => hint.as_deref(),
             Self::Library(Error::Output { source, .. }) => room(source),

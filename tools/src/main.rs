@@ -37,6 +37,7 @@ mod report;
 mod samples;
 mod scan;
 mod scene;
+mod scene_file;
 mod show;
 mod suite;
 mod sweep;
@@ -44,6 +45,8 @@ mod terminal;
 mod threads;
 mod timing;
 mod transfer;
+#[cfg(feature = "window")]
+mod view;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use failure::Failure;
@@ -88,6 +91,9 @@ struct Command {
 enum Task {
     /// Draw meshes, point clouds and volumes in one picture.
     Render(Box<render::Render>),
+    /// Show a scene in a window: turn it, edit its transfer function, cut it open, save pictures.
+    #[cfg(feature = "window")]
+    View(Box<view::View>),
     /// Print what a file contains.
     Info(info::Info),
     /// Build a hierarchy of splats from meshes and point clouds, or write 3D Gaussians; write a
@@ -121,11 +127,21 @@ enum Task {
 
 fn main() -> ExitCode {
     quiet_drivers();
-    let parsed = Command::command()
-        .try_get_matches_from(with_task(std::env::args_os().collect()))
-        .and_then(|matches| Ok((Given::of(&matches), Command::from_arg_matches(&matches)?)));
-    let (given, command) = match parsed {
-        Ok(parsed) => parsed,
+    let arguments = with_task(std::env::args_os().collect());
+    let mut matches = match Command::command().try_get_matches_from(&arguments) {
+        Ok(matches) => matches,
+        Err(answer) => return tell(&answer),
+    };
+    match scene_file::expanded(&arguments, &matches, &Command::command()) {
+        Ok(None) => {}
+        Ok(Some(expanded)) => match Command::command().try_get_matches_from(expanded) {
+            Ok(own) => matches = own,
+            Err(answer) => return tell(&answer),
+        },
+        Err(failure) => return failure.report(),
+    }
+    let (given, command) = match Command::from_arg_matches(&matches) {
+        Ok(command) => (Given::of(&matches), command),
         Err(answer) => return tell(&answer),
     };
     start_log(&command);
@@ -136,6 +152,8 @@ fn main() -> ExitCode {
     let progress = Progress::new(!command.quiet);
     let result = match command.task {
         Task::Render(task) => task.run(&given, &progress),
+        #[cfg(feature = "window")]
+        Task::View(task) => task.run(&matches, &progress),
         Task::Info(task) => task.run(&given, &progress),
         Task::Convert(task) => task.run(&given, &progress),
         Task::Check(task) => task.run(&progress),

@@ -16,12 +16,15 @@ pub struct Progress {
     bar: ProgressBar,
     /// Whether notes are printed.
     talks: bool,
+    /// The notes, if they are kept for a window instead.
+    #[cfg(feature = "window")]
+    kept: Option<Mutex<Vec<String>>>,
 }
 
 impl Progress {
     pub fn new(wanted: bool) -> Self {
         if !wanted || !std::io::stderr().is_terminal() {
-            return Self { bar: ProgressBar::hidden(), talks: wanted };
+            return Self::with(ProgressBar::hidden(), wanted);
         }
         let bar = ProgressBar::new_spinner();
         // The spinner turns on its own thread, and starting that panics if the system gives no
@@ -29,9 +32,39 @@ impl Progress {
         if threads::is_available() {
             bar.enable_steady_tick(Duration::from_millis(100));
         }
-        let progress = Self { bar, talks: true };
+        let progress = Self::with(bar, true);
         progress.spin();
         progress
+    }
+
+    fn with(bar: ProgressBar, talks: bool) -> Self {
+        Self {
+            bar,
+            talks,
+            #[cfg(feature = "window")]
+            kept: None,
+        }
+    }
+
+    /// Keeps notes and stages for a window, and prints nothing.
+    #[cfg(feature = "window")]
+    pub fn kept() -> Self {
+        Self { kept: Some(Mutex::default()), ..Self::with(ProgressBar::hidden(), false) }
+    }
+
+    /// Takes the notes that were kept.
+    #[cfg(feature = "window")]
+    pub fn take_notes(&self) -> Vec<String> {
+        let kept = self.kept.as_ref().and_then(|kept| kept.lock().ok());
+        kept.map_or_else(Vec::new, |mut kept| std::mem::take(&mut *kept))
+    }
+
+    /// Returns the name of the current stage, and how much of it is done: 0 to 1, if that is known.
+    #[cfg(feature = "window")]
+    pub fn current(&self) -> (String, Option<f32>) {
+        let share = self.bar.length().filter(|length| *length > 0);
+        let share = share.map(|length| self.bar.position() as f32 / length as f32);
+        (self.bar.message(), share)
     }
 
     fn spin(&self) {
@@ -42,6 +75,11 @@ impl Progress {
 
     /// Prints a line to stderr, unless only errors are printed.
     pub fn note(&self, text: impl std::fmt::Display) {
+        #[cfg(feature = "window")]
+        if let Some(mut kept) = self.kept.as_ref().and_then(|kept| kept.lock().ok()) {
+            kept.push(text.to_string());
+            return;
+        }
         if self.talks {
             let line = safe_lines(&text.to_string()).into_owned();
             // If stderr is closed, nobody reads notes.

@@ -7,7 +7,7 @@ use crate::{
     failure::Failure,
     given::Given,
     output::{self, Target},
-    overlay::OverlayFlags,
+    overlay::{Overlay, OverlayFlags},
     parse::{self, Background},
     progress::Progress,
     samples::Samples,
@@ -105,6 +105,59 @@ impl Drawer {
     }
 }
 
+/// A scene that is ready to be drawn, and how its pictures are finished.
+pub struct Ready {
+    pub loaded: Loaded,
+    /// The settings of a picture before it is averaged down.
+    pub settings: Settings,
+    finish: Finish,
+}
+
+/// How a drawn picture becomes the final one.
+pub struct Finish {
+    /// Pixels drawn along each side of a pixel of the picture.
+    pub factor: u32,
+    pub background: Option<[f32; 3]>,
+    overlay: Option<Overlay>,
+}
+
+impl Finish {
+    /// Averages a picture down and draws edges over it. The statistics of the texts are for
+    /// `--json`.
+    fn reduced(
+        &self,
+        picture: Picture,
+        camera: &Camera,
+        loaded: &Loaded,
+    ) -> splatkit::Result<Picture> {
+        let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
+        let view = camera.view([picture.width, picture.height])?;
+        // A line is a pixel wide, and wider in large pictures.
+        let width = (f64::from(picture.height) / 720.0).max(1.0);
+        loaded.edges.iter().for_each(|edges| picture.draw_edges(edges, &view, width));
+        Ok(picture)
+    }
+
+    /// Draws the texts over a picture, and returns what they say.
+    fn overlaid(&self, picture: &mut Picture, camera: &Camera) -> serde_json::Value {
+        let overlay = self.overlay.as_ref();
+        overlay.map_or(serde_json::Value::Null, |overlay| overlay.draw(picture, camera))
+    }
+
+    /// Returns the final picture of a drawn one.
+    #[cfg(feature = "window")]
+    pub fn finished(
+        &self,
+        picture: Picture,
+        camera: &Camera,
+        loaded: &Loaded,
+    ) -> splatkit::Result<Picture> {
+        let mut picture = self.reduced(picture, camera, loaded)?;
+        self.overlaid(&mut picture, camera);
+        Ok(picture)
+    }
+}
+
 /// The last frame, and the median time of all.
 struct Drawn {
     stats: FrameStats,
@@ -120,14 +173,15 @@ impl Render {
         let frames = self.turntable.unwrap_or(1);
         let output = self.output.clone().unwrap_or_else(|| self.beside());
         let targets = self.targets(&output, frames)?;
-        let (loaded, settings) = self.prepare(&targets, given, progress)?;
+        let ready = self.prepare(&targets, given, progress)?;
+        let (loaded, settings) = (&ready.loaded, &ready.settings);
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
-            false => Drawer::engine(&self.engine, &loaded, progress)?,
+            false => Drawer::engine(&self.engine, loaded, progress)?,
         };
         let upload_ms = milliseconds(start);
-        let drawn = self.draw_frames(&mut drawer, &loaded, &settings, &targets, progress)?;
+        let drawn = self.draw_frames(&mut drawer, &ready, &targets, progress)?;
         progress.clear();
         let Drawn { stats, camera, frame_ms, overlay } = drawn;
         tracing::info!(
@@ -160,7 +214,7 @@ impl Render {
                 "overlay": overlay,
                 "up": direction_name(stance.up),
                 "up_from": origin.name(),
-                "settings": describe::settings(&loaded.scene, &settings),
+                "settings": describe::settings(&loaded.scene, settings),
             }))?;
         }
         self.report(&targets, begun, progress);
@@ -173,10 +227,8 @@ impl Render {
         targets: &[Target],
         given: &Given,
         progress: &Progress,
-    ) -> Result<(Loaded, Settings), Failure> {
-        self.engine.check()?;
-        let facets = self.engine.draws_facets()?;
-        let mut loaded = self.scene.load_with(facets, given, progress)?;
+    ) -> Result<Ready, Failure> {
+        let mut loaded = self.load(given, progress)?;
         let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
         files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
         let settings = self.engine.settings(&loaded, self.samples)?;
@@ -190,7 +242,71 @@ impl Render {
             let up = direction_name(stance.up);
             progress.note(format_args!("up: {up}, guessed from the shape; --up sets another"));
         }
-        Ok((loaded, settings))
+        let finish = self.finish(&loaded)?;
+        Ok(Ready { loaded, settings, finish })
+    }
+
+    /// Loads the scene.
+    pub fn load(&self, given: &Given, progress: &Progress) -> Result<Loaded, Failure> {
+        self.engine.check()?;
+        let facets = self.engine.draws_facets()?;
+        self.scene.load_with(facets, given, progress)
+    }
+
+    /// Returns how pictures of a scene are finished.
+    pub fn finish(&self, loaded: &Loaded) -> Result<Finish, Failure> {
+        let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
+        let overlay = self.overlay.open(&loaded.facts, self.background.0)?;
+        Ok(Finish { factor, background: self.background.0, overlay })
+    }
+
+    /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,
+    /// beside the bars.
+    fn free(&self, settings: &Settings, finish: &Finish) -> [u32; 2] {
+        let room = finish.overlay.as_ref().map_or(0, |overlay| overlay.room(self.engine.size));
+        let [width, height] = settings.size;
+        [width.saturating_sub(2 * finish.factor * room).max(1), height]
+    }
+
+    /// Returns the camera of a single picture.
+    #[cfg(feature = "window")]
+    pub fn camera(
+        &self,
+        loaded: &Loaded,
+        settings: &Settings,
+        finish: &Finish,
+    ) -> splatkit::Result<Camera> {
+        self.camera.camera(&loaded.subject, self.free(settings, finish))
+    }
+
+    /// Sets the size of the picture in pixels.
+    #[cfg(feature = "window")]
+    pub fn set_size(&mut self, size: [u32; 2]) {
+        self.engine.size = size;
+    }
+
+    /// Returns the settings of a picture of a scene before it is averaged down.
+    #[cfg(feature = "window")]
+    pub fn settings(&self, loaded: &Loaded) -> splatkit::Result<Settings> {
+        self.engine.settings(loaded, self.samples)
+    }
+
+    /// Finds the points that the camera is fitted to.
+    #[cfg(feature = "window")]
+    pub fn find_seen(&self, loaded: &mut Loaded, settings: &Settings) -> splatkit::Result<()> {
+        loaded.find_seen(&self.camera, settings)
+    }
+
+    /// Opens the device that draws a scene.
+    #[cfg(feature = "window")]
+    pub fn device(&self, loaded: &Loaded) -> splatkit::Result<splatkit::Device> {
+        self.engine.device(&loaded.scene)
+    }
+
+    /// Returns the scene's way up.
+    #[cfg(feature = "window")]
+    pub fn up(&self, loaded: &Loaded) -> glam::DVec3 {
+        self.camera.stance(&loaded.subject).0.up
     }
 
     /// Returns the default name of the picture: that of the first input, with a number if there is
@@ -244,19 +360,14 @@ impl Render {
     fn draw_frames(
         &self,
         drawer: &mut Drawer,
-        loaded: &Loaded,
-        settings: &Settings,
+        ready: &Ready,
         targets: &[Target],
         progress: &Progress,
     ) -> Result<Drawn, Failure> {
-        let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
-        let overlay = self.overlay.open(&loaded.facts, self.background.0)?;
+        let Ready { loaded, settings, finish } = ready;
         let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
-        // The camera is fitted to the middle of the picture, beside the bars.
-        let room = overlay.as_ref().map_or(0, |overlay| overlay.room(self.engine.size));
-        let [width, height] = settings.size;
-        let free = [width.saturating_sub(2 * factor * room).max(1), height];
+        let free = self.free(settings, finish);
         let cameras = match self.turntable {
             Some(frames) => self.camera.turntable(&loaded.subject, free, frames)?,
             None => vec![self.camera.camera(&loaded.subject, free)?],
@@ -268,15 +379,9 @@ impl Render {
             let (picture, stats) = drawer.draw(loaded, &camera, settings)?;
             times.push(milliseconds(start));
             self.engine.require_content(&picture)?;
-            let mut picture = if factor > 1 { picture.reduced(factor)? } else { picture };
-            let view = camera.view([picture.width, picture.height])?;
-            // A line is a pixel wide, and wider in large pictures.
-            let width = (f64::from(picture.height) / 720.0).max(1.0);
-            loaded.edges.iter().for_each(|edges| picture.draw_edges(edges, &view, width));
+            let mut picture = finish.reduced(picture, &camera, loaded)?;
             progress.stage(format!("Writing {}", target.name()));
-            if let Some(overlay) = &overlay {
-                texts = overlay.draw(&mut picture, &camera);
-            }
+            texts = finish.overlaid(&mut picture, &camera);
             target.write(&picture.encode(target.format(), self.background.0)?)?;
             if let Some(depth) = &self.depth {
                 disk::write(depth, &picture.encode_depth()?)?;

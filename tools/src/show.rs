@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 #[command(next_help_heading = "Appearance")]
 pub struct ShowFlags {
     /// Choose how the values of a volume or of samples are shown: ct-bone, ct-soft-tissue, ct-lung,
-    /// ct-angiography, mri, generic, or a JSON file [default: made for the values, as `splatkit
-    /// transfer` writes it]
+    /// ct-angiography, mri, generic, a JSON file, or its text [default: made for the values,
+    /// as `splatkit transfer` writes it]
     #[arg(long, value_name = "NAME|FILE.json")]
     transfer: Option<String>,
     /// Spread the transfer function over these values instead of its own, and the colour map of
@@ -137,6 +137,7 @@ impl ShowFlags {
     pub fn open(&self, limits: &Limits) -> Result<Show<'_>, Failure> {
         let transfer = match &self.transfer {
             None => Transfer::Automatic,
+            Some(text) if is_json(text) => Transfer::Read(TransferFunction::from_json(text)?),
             Some(file) if !TransferFunction::NAMES.contains(&file.as_str()) && is_file(file) => {
                 Transfer::Read(TransferFunction::read(Path::new(file), limits)?)
             }
@@ -174,8 +175,13 @@ fn plain(value: f64) -> String {
     }
 }
 
+/// Whether a text is a transfer function itself, rather than the name of one.
+fn is_json(text: &str) -> bool {
+    text.trim_start().starts_with('{')
+}
+
 fn is_file(text: &str) -> bool {
-    Path::new(text).extension().is_some() || Path::new(text).exists()
+    !is_json(text) && (Path::new(text).extension().is_some() || Path::new(text).exists())
 }
 
 /// Values that a transfer function shows.

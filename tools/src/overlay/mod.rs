@@ -51,9 +51,9 @@ pub struct Facts {
 }
 
 /// The texts of a run's pictures.
-pub struct Overlay<'a> {
-    flags: &'a OverlayFlags,
-    facts: &'a Facts,
+pub struct Overlay {
+    flags: OverlayFlags,
+    facts: Facts,
     face: Face,
     ink: Ink,
 }
@@ -68,11 +68,11 @@ const MOST_ROOM: f64 = 0.25;
 impl OverlayFlags {
     /// Returns the texts to draw over pictures with a background; `None` if no flag asks for any.
     /// A flag that has nothing to draw is an error.
-    pub fn open<'a>(
-        &'a self,
-        facts: &'a Facts,
+    pub fn open(
+        &self,
+        facts: &Facts,
         background: Option<[f32; 3]>,
-    ) -> Result<Option<Overlay<'a>>, Failure> {
+    ) -> Result<Option<Overlay>, Failure> {
         if !(self.scalar_bar || self.axes || self.scale_bar || self.caption.is_some()) {
             return Ok(None);
         }
@@ -85,11 +85,12 @@ impl OverlayFlags {
         }
         let face = Face::open();
         let face = face.ok_or_else(|| Error::Argument("the built-in font is damaged".into()))?;
-        Ok(Some(Overlay { flags: self, facts, face, ink: Ink::over(background) }))
+        let (flags, facts) = (self.clone(), facts.clone());
+        Ok(Some(Overlay { flags, facts, face, ink: Ink::over(background) }))
     }
 }
 
-impl Overlay<'_> {
+impl Overlay {
     /// Returns how many pixels at its left and at its right a scene that is fitted to a picture
     /// leaves free, so that bars do not hide it.
     pub fn room(&self, [width, height]: [u32; 2]) -> u32 {

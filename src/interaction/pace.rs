@@ -1,0 +1,179 @@
+//! How much effort a frame takes: little while the view moves, more and more while it rests, up to
+//! the exact picture.
+
+use crate::{hierarchy::Detail, scene::Settings};
+
+/// Widest pixels of a moving picture, in pixels of the exact one.
+const WIDEST: f64 = 8.0;
+/// Largest factor on the width of splats and the thickness of sheets.
+const COARSEST: f64 = 4.0;
+/// A frame within these shares of the wanted time changes nothing.
+const STEADY: [f64; 2] = [0.7, 1.0];
+/// Largest change of the effort from one moving frame to the next.
+const CHANGE: [f64; 2] = [0.5, 3.0];
+/// Ratio of the pixel widths of two steps of a resting view.
+const FINER: f64 = 2.0;
+
+/// How much less than the exact picture a frame is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// The width of a pixel, in pixels of the exact picture; 1 or more.
+    pub pixel: f64,
+    /// A factor on the width of splats and on the thickness of sheets; 1 or more.
+    pub coarseness: f64,
+}
+
+impl Effort {
+    /// That of the exact picture.
+    pub const EXACT: Self = Self { pixel: 1.0, coarseness: 1.0 };
+
+    /// Returns the settings of a frame from those of the exact picture. With
+    /// [`EXACT`](Self::EXACT), they are the same. `sheet` is the thickness of the exact picture's
+    /// sheets, in world units, if the scene's fields decide it.
+    pub fn settings(self, exact: &Settings, sheet: Option<f64>) -> Settings {
+        let mut settings = exact.clone();
+        if self == Self::EXACT {
+            return settings;
+        }
+        settings.size =
+            exact.size.map(|side| ((f64::from(side) / self.pixel).round() as u32).max(1));
+        // Where pixels are wide, thin sheets show nothing more.
+        let thicker = self.coarseness * self.pixel.min(2.0);
+        settings.sheet_thickness = sheet.map(|sheet| sheet * thicker);
+        if let Detail::Pixels(pixels) = exact.detail {
+            settings.detail = Detail::Pixels(pixels * self.coarseness);
+        }
+        settings
+    }
+
+    /// The effort that takes about this many times less than the exact picture.
+    fn faster(factor: f64) -> Self {
+        let pixel = factor.sqrt().clamp(1.0, WIDEST);
+        let coarseness = (factor / (WIDEST * WIDEST)).clamp(1.0, COARSEST);
+        Self { pixel, coarseness }
+    }
+}
+
+/// Chooses the effort of each frame. It has no clock: the caller tells it what a frame took, so it
+/// does the same again for the same times.
+#[derive(Debug, Clone)]
+pub struct Pace {
+    /// The wanted time of a moving frame, in milliseconds.
+    wanted: f64,
+    /// How many times faster than the exact picture a moving frame must be, as far as known.
+    factor: f64,
+    /// What is shown of the current view.
+    shown: Option<Effort>,
+}
+
+impl Pace {
+    /// A pace that keeps moving frames within a time in milliseconds.
+    pub fn new(wanted: f64) -> Self {
+        // The first frame is coarse. If it was faster than wanted, the next ones are finer.
+        Self { wanted: wanted.max(1.0), factor: 16.0, shown: None }
+    }
+
+    /// Something changed: what is shown is no longer the current view.
+    pub fn changed(&mut self) {
+        self.shown = None;
+    }
+
+    /// Returns the effort of the next frame. `None`: the exact picture is shown.
+    pub fn next(&self) -> Option<Effort> {
+        match self.shown {
+            None => Some(Effort::faster(self.factor)),
+            Some(Effort::EXACT) => None,
+            // Finer in every respect than what is shown.
+            Some(shown) => {
+                let pixel = shown.pixel / FINER;
+                Some(if pixel < FINER.sqrt() {
+                    Effort::EXACT
+                } else {
+                    Effort { pixel, coarseness: 1.0 }
+                })
+            }
+        }
+    }
+
+    /// Records a frame of the current view, and the time it took in milliseconds.
+    pub fn took(&mut self, effort: Effort, milliseconds: f64) {
+        if self.shown.is_none() {
+            let share = milliseconds / self.wanted;
+            if !(STEADY[0]..=STEADY[1]).contains(&share) {
+                // A little below the wanted time.
+                let change = (share / 0.85).clamp(CHANGE[0], CHANGE[1]);
+                let most = WIDEST * WIDEST * COARSEST;
+                self.factor = (self.factor * change).clamp(1.0, most);
+            }
+        }
+        self.shown = Some(effort);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The time of a frame on a machine that takes this long for the exact picture, with a part
+    /// that no effort changes.
+    fn time(effort: Effort, exact: f64) -> f64 {
+        3.0 + exact / (effort.pixel * effort.pixel * effort.coarseness)
+    }
+
+    #[test]
+    fn moving_frames_come_to_take_the_wanted_time() {
+        for exact in [1.0, 40.0, 400.0, 4000.0] {
+            let mut pace = Pace::new(40.0);
+            let mut last = 0.0;
+            for frame in 0..20 {
+                pace.changed();
+                let effort = pace.next().expect("a moving view needs a frame");
+                last = time(effort, exact);
+                pace.took(effort, last);
+                assert!(frame < 6 || last <= 40.0, "{exact}: frame {frame} took {last}");
+            }
+            // No coarser than it must be.
+            assert!(last > 20.0 || pace.factor == 1.0, "{exact}: {last}");
+        }
+    }
+
+    #[test]
+    fn a_resting_view_becomes_exact_and_no_step_is_worse() {
+        let mut pace = Pace::new(40.0);
+        pace.factor = 200.0;
+        let mut steps = Vec::new();
+        while let Some(effort) = pace.next() {
+            pace.took(effort, time(effort, 5000.0));
+            steps.push(effort);
+            assert!(steps.len() < 10);
+        }
+        assert_eq!(steps.last(), Some(&Effort::EXACT));
+        assert!(steps.windows(2).all(|pair| {
+            pair[1].pixel < pair[0].pixel && pair[1].coarseness <= pair[0].coarseness
+        }));
+        assert_eq!(pace.next(), None);
+        pace.changed();
+        assert!(pace.next().is_some_and(|effort| effort.pixel > 4.0));
+    }
+
+    #[test]
+    fn a_fast_machine_moves_in_exact_pictures() {
+        let mut pace = Pace::new(40.0);
+        for _ in 0..10 {
+            pace.changed();
+            let effort = pace.next().expect("a frame");
+            pace.took(effort, time(effort, 5.0));
+        }
+        pace.changed();
+        assert_eq!(pace.next(), Some(Effort::EXACT));
+    }
+
+    #[test]
+    fn the_exact_effort_changes_no_setting() {
+        let exact = Settings { sheet_thickness: Some(0.5), ..Settings::new([300, 200]) };
+        let same = Effort::EXACT.settings(&exact, Some(7.0));
+        assert_eq!(format!("{same:?}"), format!("{exact:?}"));
+        let coarse = Effort { pixel: 4.0, coarseness: 2.0 }.settings(&exact, Some(0.5));
+        assert_eq!((coarse.size, coarse.sheet_thickness), ([75, 50], Some(2.0)));
+    }
+}

@@ -1,0 +1,341 @@
+//! Scene files: what a window shows, as one JSON file from which every front end draws the same
+//! picture.
+
+use crate::{
+    Error, Result,
+    input::{Limits, Source},
+    math::{Bounds, Camera, Projection},
+    scene::{Clip, ClipShape},
+    volume::TransferFunction,
+};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
+
+/// The size limit of a scene file. A larger file is something else.
+const MOST_BYTES: usize = 16 << 20;
+
+/// A scene file (docs/scene-files.md, docs/scene.schema.json).
+///
+/// `options` holds everything else that the command's `render` can be told, by the names of its
+/// flags.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// The version of the layout, [`VERSION`](Self::VERSION).
+    pub splatkit_scene: u32,
+    /// What is drawn, in this order.
+    pub inputs: Vec<InputEntry>,
+    /// Width and height of the picture in pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u32; 2]>,
+    /// Where the picture is taken from. Without it, the camera is fitted to the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraEntry>,
+    /// The transfer function of the field, in the layout of its own files. Without it, it is made
+    /// for the values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transfer: Option<Value>,
+    /// The clips that cut the scene.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub clips: Vec<ClipEntry>,
+    /// Flags of `render` by their names, without dashes: a text, a number, or true for a flag
+    /// without a value. A list gives a flag several times.
+    #[serde(default, skip_serializing_if = "Map::is_empty")]
+    pub options: Map<String, Value>,
+}
+
+/// An input of a scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputEntry {
+    /// The path of the file. In a scene file it is relative to the scene file's folder.
+    pub file: PathBuf,
+    /// Whether the input is drawn.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub visible: bool,
+}
+
+/// A camera, in world units.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraEntry {
+    /// [`Camera::position`].
+    pub position: [f64; 3],
+    /// [`Camera::focal_point`].
+    pub focal_point: [f64; 3],
+    /// [`Camera::view_up`].
+    pub view_up: [f64; 3],
+    /// The full vertical view angle in degrees, in perspective.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub view_angle: Option<f64>,
+    /// The world height that the picture shows, without perspective.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height: Option<f64>,
+}
+
+/// A clip: a shape in world coordinates, and what is kept. It has one shape.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClipEntry {
+    /// The half-space of the points x with normal·x ≤ offset: normal, then offset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plane: Option<[f64; 4]>,
+    /// A box along the world's axes: the lower and the upper corner.
+    #[serde(default, skip_serializing_if = "Option::is_none", rename = "box")]
+    pub cuboid: Option<[[f64; 3]; 2]>,
+    /// Whether what is inside the shape is kept, or what is outside.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub inside: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn is_yes(value: &bool) -> bool {
+    *value
+}
+
+impl SceneFile {
+    /// The version of the layout.
+    pub const VERSION: u32 = 1;
+
+    /// A scene of these inputs, with nothing else set.
+    pub fn new(inputs: impl IntoIterator<Item = PathBuf>) -> Self {
+        Self {
+            splatkit_scene: Self::VERSION,
+            inputs: inputs.into_iter().map(|file| InputEntry { file, visible: true }).collect(),
+            size: None,
+            camera: None,
+            transfer: None,
+            clips: Vec::new(),
+            options: Map::new(),
+        }
+    }
+
+    /// Reads a scene file. The paths of its inputs are joined with its folder.
+    ///
+    /// # Errors
+    /// [`Error::File`] and [`Error::Limit`] as for every input; [`Error::Input`] if the file is not
+    /// a scene: the message names the line, the column and the field.
+    pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
+        let text = Source::open(path, limits)?.small_text("a scene file", MOST_BYTES)?;
+        let mut scene = Self::parse(&text).map_err(|message| {
+            Error::input(path, "scene", message).hint(
+                "the form is {\"splatkit_scene\": 1, \"inputs\": [{\"file\": \"scan.ply\"}], …}; \
+                 docs/scene-files.md lists all fields",
+            )
+        })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        scene.inputs.iter_mut().for_each(|input| input.file = folder.join(&input.file));
+        Ok(scene)
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let scene: Self = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        if scene.splatkit_scene != Self::VERSION {
+            return Err(format!(
+                "the version is {}, but this program reads version {}",
+                scene.splatkit_scene,
+                Self::VERSION
+            ));
+        }
+        if scene.inputs.is_empty() {
+            return Err("there is no input".into());
+        }
+        if let Some(camera) = &scene.camera {
+            camera.camera()?;
+        }
+        scene.transfer_function()?;
+        scene.clips.iter().try_for_each(|clip| clip.clip().map(|_| ()))?;
+        Ok(scene)
+    }
+
+    /// Returns the transfer function, if the scene has one.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn transfer_function(&self) -> Result<Option<TransferFunction>, String> {
+        let read = |value: &Value| TransferFunction::from_json(&value.to_string());
+        self.transfer.as_ref().map(read).transpose().map_err(|error| format!("transfer: {error}"))
+    }
+
+    /// Sets the transfer function.
+    pub fn set_transfer(&mut self, transfer: &TransferFunction) {
+        // What `to_json` writes is JSON.
+        self.transfer = serde_json::from_str(&transfer.to_json()).ok();
+    }
+
+    /// Returns the text of a scene file in a folder. Inputs below the folder get relative paths.
+    pub fn to_json(&self, folder: &Path) -> String {
+        let mut own = self.clone();
+        for input in &mut own.inputs {
+            input.file = relative(&input.file, folder);
+        }
+        // Maps with text keys and numbers always become JSON.
+        let mut text = serde_json::to_string_pretty(&own).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// Writes a scene file.
+    ///
+    /// # Errors
+    /// [`Error::Output`]; a file that was there before is then unchanged.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        crate::disk::write(path, self.to_json(folder).as_bytes())
+    }
+}
+
+/// Returns a path as seen from a folder, if it lies below the folder or beside it.
+fn relative(path: &Path, folder: &Path) -> PathBuf {
+    let whole = |path: &Path| {
+        let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
+        path.canonicalize().ok()
+    };
+    let (Some(own), Some(folder)) = (whole(path), whole(folder)) else {
+        return path.to_owned();
+    };
+    let mut up = PathBuf::new();
+    for above in folder.ancestors() {
+        if let Ok(rest) = own.strip_prefix(above) {
+            // Two files that share no folder but the root have no common place to move with.
+            return if above.parent().is_none() { own } else { up.join(rest) };
+        }
+        up.push("..");
+    }
+    own
+}
+
+impl CameraEntry {
+    /// Returns the camera.
+    ///
+    /// # Errors
+    /// If there is neither a view angle nor a height, or both.
+    pub fn camera(&self) -> Result<Camera, String> {
+        let projection = match (self.view_angle, self.height) {
+            (Some(view_angle), None) => Projection::Perspective { view_angle },
+            (None, Some(height)) => Projection::Orthographic { height },
+            _ => return Err("a camera has either a view_angle or a height".into()),
+        };
+        let [position, focal_point, view_up] =
+            [self.position, self.focal_point, self.view_up].map(DVec3::from_array);
+        let camera = Camera { position, focal_point, view_up, projection };
+        camera.view([1, 1]).map_err(|error| error.to_string())?;
+        Ok(camera)
+    }
+}
+
+impl From<&Camera> for CameraEntry {
+    fn from(camera: &Camera) -> Self {
+        let [position, focal_point, view_up] =
+            [camera.position, camera.focal_point, camera.view_up].map(|v| v.to_array());
+        let (view_angle, height) = match camera.projection {
+            Projection::Perspective { view_angle } => (Some(view_angle), None),
+            Projection::Orthographic { height } => (None, Some(height)),
+        };
+        Self { position, focal_point, view_up, view_angle, height }
+    }
+}
+
+impl ClipEntry {
+    /// Returns the clip.
+    ///
+    /// # Errors
+    /// If there is no shape, or more than one.
+    pub fn clip(&self) -> Result<Clip, String> {
+        let shape = match (self.plane, self.cuboid) {
+            (Some([x, y, z, offset]), None) => {
+                ClipShape::HalfSpace { normal: DVec3::new(x, y, z), offset }
+            }
+            (None, Some(corners)) => {
+                let [min, max] = corners.map(DVec3::from_array);
+                ClipShape::Box(Bounds { min, max })
+            }
+            _ => return Err("a clip has either a plane or a box".into()),
+        };
+        Ok(Clip { shape, inside: self.inside })
+    }
+}
+
+impl From<&Clip> for ClipEntry {
+    fn from(clip: &Clip) -> Self {
+        let (plane, cuboid) = match clip.shape {
+            ClipShape::HalfSpace { normal: DVec3 { x, y, z }, offset } => {
+                (Some([x, y, z, offset]), None)
+            }
+            ClipShape::Box(Bounds { min, max }) => (None, Some([min.to_array(), max.to_array()])),
+        };
+        Self { plane, cuboid, inside: clip.inside }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene() -> SceneFile {
+        SceneFile::parse(
+            r#"{"splatkit_scene": 1, "inputs": [{"file": "a.nrrd"}, {"file": "b.ply", "visible": false}],
+                "size": [640, 480],
+                "camera": {"position": [0.1, 2, 3], "focal_point": [0, 0, 0], "view_up": [0, 0, 1],
+                           "view_angle": 30},
+                "transfer": {"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [5, 0.1]]},
+                "clips": [{"plane": [1, 0, 0, 2.5]}, {"box": [[0, 0, 0], [1, 1, 1]], "inside": false}],
+                "options": {"background": "white", "no-shade": true}}"#,
+        )
+        .expect("a scene")
+    }
+
+    #[test]
+    fn a_scene_is_written_as_it_is_read() {
+        let scene = scene();
+        assert_eq!(scene.clips[1].cuboid, Some([[0.0; 3], [1.0; 3]]));
+        let clip = scene.clips[0].clip().expect("valid");
+        assert_eq!(ClipEntry::from(&clip), scene.clips[0]);
+        assert!(!scene.clips[1].inside && scene.clips[0].inside && !scene.inputs[1].visible);
+        let again = SceneFile::parse(&scene.to_json(Path::new(""))).expect("its own text");
+        assert_eq!(again, scene);
+        let camera = scene.camera.expect("a camera").camera().expect("valid");
+        assert_eq!(CameraEntry::from(&camera), scene.camera.unwrap());
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let wrong = |from: &str, to: &str| {
+            let text = scene().to_json(Path::new("")).replace(from, to);
+            SceneFile::parse(&text).expect_err(to)
+        };
+        assert!(wrong("\"inputs\"", "\"input\"").contains("`input`"));
+        assert!(wrong("\"visible\"", "\"visable\"").contains("visable"));
+        assert!(wrong("\"splatkit_scene\": 1", "\"splatkit_scene\": 2").contains("version 1"));
+        assert!(wrong("\"view_angle\": 30.0", "\"view_angle\": 0.0").contains("angle"));
+        assert!(wrong("\"view_angle\": 30.0", "\"angle\": 30.0").contains("angle"));
+        assert!(wrong("\"plane\"", "\"plan\"").contains("plan"));
+        assert!(wrong("0.1", "7.5").contains("transfer"), "an opacity above 1");
+    }
+
+    #[test]
+    fn paths_are_relative_to_the_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let data = folder.path().join("data");
+        std::fs::create_dir(&data).expect("a folder");
+        std::fs::write(data.join("a.ply"), "ply").expect("a file");
+        let scenes = folder.path().join("scenes");
+        std::fs::create_dir(&scenes).expect("a folder");
+        let file = scenes.join("s.json");
+        SceneFile::new([data.join("a.ply")]).write(&file).expect("written");
+        let text = std::fs::read_to_string(&file).expect("text");
+        assert!(text.contains("../data/a.ply"), "{text}");
+        let read = SceneFile::read(&file, &Limits::default()).expect("read");
+        assert_eq!(
+            read.inputs[0].file.canonicalize().unwrap(),
+            data.join("a.ply").canonicalize().unwrap()
+        );
+    }
+}

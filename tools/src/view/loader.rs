@@ -1,0 +1,87 @@
+//! Loading a scene in the background.
+
+use super::painter::Stage;
+use crate::{failure::Failure, given::Given, progress::Progress, render::Render};
+use splatkit::scene::{Item, Scene};
+use std::{
+    sync::{
+        Arc,
+        mpsc::{Receiver, TryRecvError, channel},
+    },
+    time::Instant,
+};
+
+/// A scene that is being loaded. Dropping it forgets the scene: the thread ends after the step that
+/// it is at.
+pub struct Loading {
+    progress: Arc<Progress>,
+    result: Receiver<Result<Stage, String>>,
+    pub since: Instant,
+}
+
+impl Loading {
+    /// Starts to load. `tell` is called at the end.
+    pub fn start(
+        given: Given,
+        render: Render,
+        tell: impl Fn() + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let progress = Arc::new(Progress::kept());
+        let (send, result) = channel();
+        let own = Arc::clone(&progress);
+        std::thread::Builder::new().name("loader".into()).spawn(move || {
+            let loaded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+                load(&given, &render, &own).map_err(|failure| text_of(&failure))
+            }));
+            let loaded = loaded.unwrap_or_else(|_| Err("the file could not be read".into()));
+            // Nobody waits any more if loading was cancelled.
+            send.send(loaded).ok();
+            tell();
+        })?;
+        Ok(Self { progress, result, since: Instant::now() })
+    }
+
+    /// Returns the name of the current step, and the share of it that is done, if it is known.
+    pub fn step(&self) -> (String, Option<f32>) {
+        self.progress.current()
+    }
+
+    /// Takes the result, once there is one.
+    pub fn take(&self) -> Option<Result<Stage, String>> {
+        match self.result.try_recv() {
+            Ok(result) => Some(result),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => Some(Err("the file could not be read".into())),
+        }
+    }
+
+    /// Takes the notes and warnings of loading.
+    pub fn take_notes(&self) -> Vec<String> {
+        self.progress.take_notes()
+    }
+}
+
+fn load(given: &Given, render: &Render, progress: &Progress) -> Result<Stage, Failure> {
+    let mut loaded = render.load(given, progress)?;
+    progress.stage("Framing the scene");
+    let settings = render.settings(&loaded)?;
+    render.find_seen(&mut loaded, &settings)?;
+    progress.stage("Opening the device");
+    let device = render.device(&loaded)?;
+    let sheet = sheet_of(&loaded.scene);
+    Ok(Stage { loaded, device, sheet })
+}
+
+/// Returns the thickness of a volume's sheets, about as [`Scene::sheets`] chooses it.
+fn sheet_of(scene: &Scene) -> Option<f64> {
+    scene.items.iter().find_map(|item| match item {
+        Item::Volume(volume, ..) => Some(4.0 / 3.0 * volume.lattice.kernel_spacing()),
+        _ => None,
+    })
+}
+
+/// Returns a failure as a message, with its hint.
+pub fn text_of(failure: &Failure) -> String {
+    let message = failure.to_string();
+    failure.hint().map_or(message.clone(), |hint| format!("{message}\n{hint}"))
+}

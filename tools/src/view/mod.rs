@@ -1,0 +1,79 @@
+//! `splatkit view`: a window.
+//!
+//! A [`Document`] says what is shown, as a scene file. The [`Window`](window::Window) loads it in
+//! the background ([`loader`]), gives orders to the [`painter`], and shows its frames and the
+//! [`panels`]. What it shows is what `splatkit render` draws from the same scene file.
+
+mod document;
+mod loader;
+mod painter;
+mod panels;
+#[cfg(test)]
+mod tests;
+mod window;
+
+use crate::{failure::Failure, progress::Progress, render::Render};
+use clap::{ArgMatches, Args};
+use document::Document;
+use eframe::egui;
+use splatkit::Error;
+use window::Window;
+
+/// The size of the window at first, in points.
+const SIZE: [f32; 2] = [1280.0, 800.0];
+
+#[derive(Args, Debug)]
+// A window may open without anything; the flags that write files are `render`'s.
+#[command(
+    mut_arg("inputs", |inputs| inputs.required(false)),
+    mut_arg("output", |flag| flag.hide(true)),
+    mut_arg("depth", |flag| flag.hide(true)),
+    mut_arg("overwrite", |flag| flag.hide(true)),
+    mut_arg("turntable", |flag| flag.hide(true)),
+    mut_arg("reference", |flag| flag.hide(true)),
+    mut_arg("json", |flag| flag.hide(true)),
+)]
+pub struct View {
+    #[command(flatten)]
+    _scene: Render,
+}
+
+impl View {
+    pub fn run(self, matches: &ArgMatches, progress: &Progress) -> Result<(), Failure> {
+        let own = matches.subcommand().map_or(matches, |(_, own)| own);
+        let document = Document::of_command(own, "view")?;
+        progress.clear();
+        open(document)
+    }
+}
+
+/// Opens the window and waits until it is closed.
+fn open(document: Document) -> Result<(), Failure> {
+    let size = document.scene().size.map_or(SIZE, |size| size.map(|side| side as f32));
+    let options = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("splatkit")
+            .with_inner_size(size)
+            .with_drag_and_drop(true),
+        ..eframe::NativeOptions::default()
+    };
+    let create = |context: &eframe::CreationContext<'_>| {
+        let window = Window::new(document, &context.egui_ctx)?;
+        Ok(Box::new(App(window)) as Box<dyn eframe::App>)
+    };
+    eframe::run_native("splatkit", options, Box::new(create)).map_err(|error| {
+        Error::NoAdapter(format!(
+            "a window cannot be opened: {error}; `splatkit render` draws without one"
+        ))
+        .into()
+    })
+}
+
+/// The window as an application.
+struct App(Window);
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        self.0.ui(ui);
+    }
+}

@@ -1,0 +1,257 @@
+//! The thread that draws: a coarse frame at once, then finer ones, up to the exact picture.
+
+use crate::{render::Finish, scene::Loaded};
+use splatkit::{
+    Device, Error, FrameStats, Renderer, Stop,
+    interaction::{Effort, Pace},
+    math::Camera,
+    picture::Picture,
+    scene::{Item, Settings},
+    volume::TransferFunction,
+};
+use std::{
+    sync::{Arc, Condvar, Mutex, MutexGuard},
+    thread::JoinHandle,
+    time::Instant,
+};
+
+/// The wanted time of a moving frame, in milliseconds: 25 frames a second, with some for the
+/// window.
+const MOVING: f64 = 32.0;
+
+/// A loaded scene, and the device that draws it.
+pub struct Stage {
+    pub loaded: Loaded,
+    pub device: Device,
+    /// The thickness of a sheet that the volume's spacing asks for, in world units.
+    pub sheet: Option<f64>,
+}
+
+/// What is to be drawn.
+#[derive(Clone)]
+pub struct Order {
+    pub stage: Arc<Stage>,
+    pub camera: Camera,
+    /// The settings of the exact picture, before it is averaged down.
+    pub settings: Settings,
+    pub finish: Arc<Finish>,
+    /// The transfer function of the field, if there is one.
+    pub transfer: Option<TransferFunction>,
+}
+
+/// A frame that was drawn.
+pub struct Frame {
+    /// The number of its order.
+    pub number: u64,
+    /// The finished picture. A frame that is not exact has fewer pixels and no texts.
+    pub picture: Picture,
+    pub camera: Camera,
+    pub effort: Effort,
+    pub stats: FrameStats,
+    pub milliseconds: f64,
+    /// From the order to this frame, in milliseconds.
+    pub delay: f64,
+}
+
+impl Frame {
+    pub fn is_exact(&self) -> bool {
+        self.effort == Effort::EXACT
+    }
+}
+
+/// The thread that draws.
+pub struct Painter {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+struct Shared {
+    state: Mutex<State>,
+    wake: Condvar,
+    /// Called when there is a frame or an error.
+    tell: Box<dyn Fn() + Send + Sync>,
+}
+
+#[derive(Default)]
+struct State {
+    order: Option<Order>,
+    /// The number of the order, and when it came.
+    number: u64,
+    since: Option<Instant>,
+    /// Stops the frame that is drawn now, if it only refines.
+    refining: Option<Stop>,
+    frame: Option<Frame>,
+    error: Option<String>,
+    /// Whether the current order is drawn exactly, or failed.
+    rests: bool,
+    ends: bool,
+}
+
+impl Shared {
+    /// Nothing panics while it holds the lock.
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+impl Painter {
+    /// Starts the thread. `tell` is called when there is something new.
+    pub fn start(tell: impl Fn() + Send + Sync + 'static) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared {
+            state: Mutex::default(),
+            wake: Condvar::new(),
+            tell: Box::new(tell),
+        });
+        let own = Arc::clone(&shared);
+        let thread = std::thread::Builder::new().name("painter".into()).spawn(move || run(&own))?;
+        Ok(Self { shared, thread: Some(thread) })
+    }
+
+    /// Gives an order, which replaces the one before. Returns its number.
+    pub fn order(&self, order: Order) -> u64 {
+        let mut state = self.shared.lock();
+        state.order = Some(order);
+        state.number += 1;
+        state.since = Some(Instant::now());
+        state.rests = false;
+        if let Some(stop) = &state.refining {
+            stop.request();
+        }
+        self.shared.wake.notify_one();
+        state.number
+    }
+
+    /// Forgets the order: nothing is drawn.
+    pub fn clear(&self) {
+        let mut state = self.shared.lock();
+        (state.order, state.frame) = (None, None);
+        state.number += 1;
+        state.rests = true;
+    }
+
+    /// Takes the newest frame, if there is a new one.
+    pub fn take_frame(&self) -> Option<Frame> {
+        self.shared.lock().frame.take()
+    }
+
+    /// Takes the error of the last order.
+    pub fn take_error(&self) -> Option<String> {
+        self.shared.lock().error.take()
+    }
+}
+
+impl Drop for Painter {
+    fn drop(&mut self) {
+        {
+            let mut state = self.shared.lock();
+            state.ends = true;
+            if let Some(stop) = &state.refining {
+                stop.request();
+            }
+        }
+        self.shared.wake.notify_one();
+        if let Some(thread) = self.thread.take() {
+            thread.join().ok();
+        }
+    }
+}
+
+/// A renderer, the scene that it draws, and the transfer function that it has.
+struct Prepared {
+    stage: Arc<Stage>,
+    renderer: Renderer,
+    transfer: Option<TransferFunction>,
+}
+
+fn run(shared: &Shared) {
+    let mut pace = Pace::new(MOVING);
+    let mut prepared: Option<Prepared> = None;
+    let mut drawn = 0;
+    loop {
+        let mut state = shared.lock();
+        while !state.ends && (state.order.is_none() || state.rests) {
+            if state.order.is_none() {
+                prepared = None;
+            }
+            state = shared.wake.wait(state).unwrap_or_else(std::sync::PoisonError::into_inner);
+        }
+        if state.ends {
+            return;
+        }
+        let (Some(order), number, since) = (state.order.clone(), state.number, state.since) else {
+            continue;
+        };
+        let is_new = number != drawn;
+        if is_new {
+            pace.changed();
+            drawn = number;
+        }
+        let Some(effort) = pace.next() else {
+            state.rests = true;
+            continue;
+        };
+        let stop = Stop::default();
+        state.refining = (!is_new).then(|| stop.clone());
+        drop(state);
+        let start = Instant::now();
+        let done = draw(&mut prepared, &order, effort, stop);
+        let milliseconds = start.elapsed().as_secs_f64() * 1e3;
+        let mut state = shared.lock();
+        state.refining = None;
+        match done {
+            Ok((picture, stats)) => {
+                pace.took(effort, milliseconds);
+                let delay = since.map_or(0.0, |since| since.elapsed().as_secs_f64() * 1e3);
+                let camera = order.camera;
+                state.frame =
+                    Some(Frame { number, picture, camera, effort, stats, milliseconds, delay });
+                state.rests = state.number == number && effort == Effort::EXACT;
+            }
+            Err(Error::Stopped) => continue,
+            Err(error) => {
+                if state.number == number {
+                    state.error = Some(error.to_string());
+                    state.rests = true;
+                }
+                if matches!(error, Error::DeviceLost(_)) {
+                    prepared = None;
+                }
+            }
+        }
+        drop(state);
+        (shared.tell)();
+    }
+}
+
+/// Draws a frame.
+fn draw(
+    prepared: &mut Option<Prepared>,
+    order: &Order,
+    effort: Effort,
+    stop: Stop,
+) -> splatkit::Result<(Picture, FrameStats)> {
+    let is_other = |own: &mut Prepared| !Arc::ptr_eq(&own.stage, &order.stage);
+    prepared.take_if(is_other);
+    let own = match prepared {
+        Some(own) => own,
+        none => {
+            let renderer = Renderer::new(&order.stage.device, &order.stage.loaded.scene)?;
+            let transfer = order.stage.loaded.scene.items.iter().find_map(Item::transfer).cloned();
+            none.insert(Prepared { stage: Arc::clone(&order.stage), renderer, transfer })
+        }
+    };
+    if let Some(transfer) = &order.transfer
+        && own.transfer.as_ref() != Some(transfer)
+    {
+        own.renderer.set_transfer(transfer)?;
+        own.transfer = Some(transfer.clone());
+    }
+    let mut exact = order.settings.clone();
+    exact.stop = stop;
+    let settings = effort.settings(&exact, exact.sheet_thickness.or(order.stage.sheet));
+    let (picture, stats) = own.renderer.render(&order.camera, &settings)?;
+    if effort != Effort::EXACT {
+        return Ok((picture, stats));
+    }
+    Ok((order.finish.finished(picture, &order.camera, &order.stage.loaded)?, stats))
+}

@@ -1,0 +1,660 @@
+//! The window: what it shows, and what a hand does in it.
+
+use super::{
+    document::Document,
+    loader::{Loading, text_of},
+    painter::{Frame, Order, Painter, Stage},
+    panels,
+};
+use crate::{render::Finish, scene_file};
+use eframe::egui::{
+    self, Align2, CentralPanel, Color32, ColorImage, Context, CursorIcon, FontId, Key, Modifiers,
+    Panel, PointerButton, Pos2, Rect, Sense, TextureHandle, TextureOptions, Ui, Vec2,
+};
+use glam::{DVec2, DVec3};
+use serde_json::Value;
+use splatkit::{
+    interaction::{CameraEntry, ClipEntry, Orbit, SceneFile, point_at},
+    picture::PictureFormat,
+    scene::{Item, Settings},
+    volume::TransferFunction,
+};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// The largest picture that is drawn for a window, in pixels along a side.
+const MOST_SIDE: u32 = 8192;
+
+/// The scene that is shown, and how.
+pub struct Shown {
+    pub stage: Arc<Stage>,
+    pub orbit: Orbit,
+    settings: Settings,
+    finish: Arc<Finish>,
+    /// The transfer function that the scene was loaded with.
+    own_transfer: Option<TransferFunction>,
+}
+
+/// What the window is used for when a point is clicked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tool {
+    Look,
+    Measure,
+}
+
+/// The window's state.
+pub struct Window {
+    pub document: Document,
+    pub shown: Option<Shown>,
+    pub tool: Tool,
+    /// Points that were picked to be measured, in world units.
+    pub measured: Vec<DVec3>,
+    /// The last frame, and its texture.
+    pub frame: Option<(Frame, TextureHandle)>,
+    /// Messages, the newest last, and whether each is an error.
+    pub messages: Vec<(String, bool)>,
+    pub panels: panels::State,
+    painter: Painter,
+    loading: Option<Loading>,
+    /// What the shown scene, or the one that is being loaded, was loaded by.
+    loaded_by: Option<(Vec<PathBuf>, serde_json::Map<String, Value>)>,
+    /// What the settings were made for, and what was ordered last.
+    set_for: Option<(SceneFile, [u32; 2], bool)>,
+    ordered: Option<SceneFile>,
+    last_order: u64,
+    /// The size of the picture in pixels.
+    size: [u32; 2],
+    /// The picture is saved here as soon as it is exact.
+    save_to: Option<PathBuf>,
+    context: Context,
+}
+
+impl Window {
+    pub fn new(document: Document, context: &Context) -> std::io::Result<Self> {
+        let repaint = context.clone();
+        Ok(Self {
+            document,
+            shown: None,
+            tool: Tool::Look,
+            measured: Vec::new(),
+            frame: None,
+            messages: Vec::new(),
+            panels: panels::State::default(),
+            painter: Painter::start(move || repaint.request_repaint())?,
+            loading: None,
+            loaded_by: None,
+            set_for: None,
+            ordered: None,
+            last_order: 0,
+            size: [0; 2],
+            save_to: None,
+            context: context.clone(),
+        })
+    }
+
+    /// Shows the whole window.
+    pub fn ui(&mut self, ui: &mut Ui) {
+        self.take_dropped(ui);
+        self.take_keys(ui);
+        Panel::top("menu").show(ui, |ui| panels::menu(self, ui));
+        Panel::bottom("status").show(ui, |ui| panels::status(self, ui));
+        if self.panels.shows_side {
+            Panel::right("side").default_size(330.0).show(ui, |ui| {
+                egui::ScrollArea::vertical().show(ui, |ui| panels::side(self, ui));
+            });
+        }
+        CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
+        panels::windows(self, ui);
+        self.refresh();
+    }
+
+    /// Whether the exact picture of the current scene is shown.
+    pub fn rests(&self) -> bool {
+        let is_exact = self
+            .frame
+            .as_ref()
+            .is_some_and(|(frame, _)| frame.is_exact() && frame.number == self.last_order);
+        self.loading.is_none() && (self.shown.is_none() || is_exact)
+    }
+
+    /// Returns the step that loading is at, and how much of it is done.
+    pub fn loading_step(&self) -> Option<(String, Option<f32>, f32)> {
+        let loading = self.loading.as_ref()?;
+        let (name, share) = loading.step();
+        Some((name, share, loading.since.elapsed().as_secs_f32()))
+    }
+
+    pub fn say(&mut self, text: impl Into<String>, is_error: bool) {
+        const MOST: usize = 100;
+        self.messages.push((text.into(), is_error));
+        let surplus = self.messages.len().saturating_sub(MOST);
+        self.messages.drain(..surplus);
+    }
+
+    /// Adds files to the scene, or opens a scene file in place of it.
+    pub fn open(&mut self, files: Vec<PathBuf>) {
+        let is_scene = |path: &PathBuf| path.extension().is_some_and(|own| own == "json");
+        if let Some(path) = files.iter().find(|path| is_scene(path)) {
+            match SceneFile::read(path, &splatkit::input::Limits::default()) {
+                Ok(scene) => {
+                    self.document = Document::new(scene);
+                    self.document.path = Some(path.clone());
+                    self.loaded_by = None;
+                }
+                Err(error) => self.say(error.to_string(), true),
+            }
+            return;
+        }
+        let entries = SceneFile::new(files).inputs;
+        self.document.change(|scene| scene.inputs.extend(entries));
+    }
+
+    /// Gives up the scene that is being loaded, and goes back to the one before.
+    pub fn cancel(&mut self) {
+        self.loading = None;
+        if self.document.can_undo() {
+            self.document.undo();
+            self.loaded_by = Some(self.document.loaded_by());
+        }
+        self.say("loading was cancelled", false);
+    }
+
+    /// Saves the exact picture as soon as it is drawn.
+    pub fn save_picture(&mut self, path: PathBuf) {
+        match PictureFormat::of(&path) {
+            Ok(_) => self.save_to = Some(path),
+            Err(error) => self.say(error.to_string(), true),
+        }
+    }
+
+    /// Saves the scene as it is shown, with its camera and its size.
+    pub fn save_scene(&mut self, path: &Path) {
+        self.fix_view();
+        match self.document.save(path) {
+            Ok(()) => self.say(format!("{}: saved", path.display()), false),
+            Err(error) => self.say(error.to_string(), true),
+        }
+    }
+
+    /// Copies the command that draws what is shown.
+    pub fn copy_command(&mut self) {
+        self.fix_view();
+        match self.document.command_line() {
+            Ok(line) => {
+                self.context.copy_text(line);
+                self.say("the command is in the clipboard", false);
+            }
+            Err(failure) => self.say(text_of(&failure), true),
+        }
+    }
+
+    /// Writes the camera and the size that are shown into the scene.
+    fn fix_view(&mut self) {
+        let Some(shown) = &self.shown else { return };
+        let (camera, size) = (CameraEntry::from(shown.orbit.camera()), self.size);
+        self.document.set_camera(camera);
+        self.document.adjust(|scene| scene.size = Some(size));
+    }
+
+    /// Looks at the whole scene from a side, by its name.
+    pub fn look_from(&mut self, side: &str) {
+        self.document.adjust(|scene| {
+            scene.camera = None;
+            scene_file::CAMERA.iter().for_each(|flag| {
+                scene.options.remove(*flag);
+            });
+            if !side.is_empty() {
+                scene.options.insert("view".into(), side.into());
+            }
+        });
+        self.set_for = None;
+    }
+
+    /// Moves the camera.
+    pub fn move_camera(&mut self, change: impl FnOnce(&mut Orbit)) {
+        let Some(shown) = &mut self.shown else { return };
+        change(&mut shown.orbit);
+        let camera = CameraEntry::from(shown.orbit.camera());
+        self.document.set_camera(camera);
+    }
+
+    /// Returns the transfer function that is shown, if the scene has a field.
+    pub fn transfer(&self) -> Option<TransferFunction> {
+        let shown = self.shown.as_ref()?;
+        let own = self.document.scene().transfer.as_ref().filter(|own| own.is_object());
+        let edited = own.and_then(|_| self.document.scene().transfer_function().ok().flatten());
+        edited.or_else(|| shown.own_transfer.clone())
+    }
+
+    /// Sets the transfer function, without a step that can be undone.
+    pub fn set_transfer(&mut self, transfer: &TransferFunction) {
+        let has_surfaces = self.shown.as_ref().is_some_and(|shown| {
+            shown.stage.loaded.scene.items.iter().any(|item| item.transfer().is_none())
+        });
+        self.document.set_transfer(transfer, has_surfaces);
+        // What was loaded stays loaded.
+        if self.loading.is_none() && self.shown.is_some() {
+            self.loaded_by = Some(self.document.loaded_by());
+        }
+    }
+
+    /// Takes files that were dropped onto the window.
+    fn take_dropped(&mut self, ui: &Ui) {
+        let dropped = ui.input(|input| input.raw.dropped_files.clone());
+        let files: Vec<PathBuf> = dropped.into_iter().map(|file| file.path().to_owned()).collect();
+        if !files.is_empty() {
+            self.open(files);
+        }
+    }
+
+    fn take_keys(&mut self, ui: &Ui) {
+        if ui.ctx().egui_wants_keyboard_input() {
+            return;
+        }
+        let pressed = |modifiers, key| ui.input_mut(|input| input.consume_key(modifiers, key));
+        if pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::C) {
+            self.copy_command();
+        }
+        if pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z)
+            || pressed(Modifiers::COMMAND, Key::Y)
+        {
+            self.document.redo();
+        }
+        if pressed(Modifiers::COMMAND, Key::Z) {
+            self.document.undo();
+        }
+        if pressed(Modifiers::COMMAND, Key::O) {
+            self.panels.ask(panels::Ask::Open);
+        }
+        if pressed(Modifiers::COMMAND, Key::S) {
+            self.panels.ask(panels::Ask::SaveScene);
+        }
+        if pressed(Modifiers::COMMAND, Key::P) {
+            self.panels.ask(panels::Ask::SavePicture);
+        }
+        let sides = [
+            (Key::Num1, "front", "back"),
+            (Key::Num3, "right", "left"),
+            (Key::Num7, "top", "bottom"),
+        ];
+        for (key, side, other) in sides {
+            if pressed(Modifiers::COMMAND, key) {
+                self.look_from(other);
+            } else if pressed(Modifiers::NONE, key) {
+                self.look_from(side);
+            }
+        }
+        if pressed(Modifiers::NONE, Key::Num0) {
+            self.look_from("iso");
+        }
+        if pressed(Modifiers::NONE, Key::Home) {
+            self.look_from("");
+        }
+        if pressed(Modifiers::NONE, Key::O) {
+            self.move_camera(|orbit| {
+                let is_perspective = matches!(
+                    orbit.camera().projection,
+                    splatkit::math::Projection::Perspective { .. }
+                );
+                orbit.set_orthographic(is_perspective);
+            });
+        }
+        if pressed(Modifiers::NONE, Key::M) {
+            self.tool = if self.tool == Tool::Measure { Tool::Look } else { Tool::Measure };
+            self.measured.clear();
+        }
+        if pressed(Modifiers::NONE, Key::F1) || pressed(Modifiers::NONE, Key::H) {
+            self.panels.shows_help = !self.panels.shows_help;
+        }
+        if pressed(Modifiers::NONE, Key::Tab) {
+            self.panels.shows_side = !self.panels.shows_side;
+        }
+        self.fly(ui);
+    }
+
+    /// Flies while keys are held.
+    fn fly(&mut self, ui: &Ui) {
+        let (held, time) = ui.input(|input| {
+            let held = |key, back| {
+                f64::from(u8::from(input.key_down(key))) - f64::from(u8::from(input.key_down(back)))
+            };
+            let is_plain = !input.modifiers.any();
+            let step = DVec3::new(held(Key::D, Key::A), held(Key::E, Key::Q), held(Key::W, Key::S));
+            (if is_plain { step } else { DVec3::ZERO }, f64::from(input.stable_dt.min(0.1)))
+        });
+        if held != DVec3::ZERO
+            && let Some(shown) = &self.shown
+        {
+            // Across the distance of the focal point in two seconds.
+            let camera = shown.orbit.camera();
+            let speed = 0.5 * (camera.focal_point - camera.position).length();
+            self.move_camera(|orbit| orbit.fly(held * speed * time));
+            ui.ctx().request_repaint();
+        }
+    }
+
+    /// Shows the picture and answers the hand.
+    fn picture(&mut self, ui: &mut Ui) {
+        let (area, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        let scale = ui.ctx().pixels_per_point();
+        self.size = [area.width(), area.height()]
+            .map(|side| ((side * scale).round() as u32).clamp(1, MOST_SIDE));
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "The picture"));
+        if let Some((_, texture)) = &self.frame {
+            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+            ui.painter().image(texture.id(), area, whole, Color32::WHITE);
+        }
+        if self.shown.is_some() {
+            self.answer(ui, &response, area, scale);
+            self.draw_measured(ui, area, scale);
+        } else if self.loading.is_none() {
+            let hint = "Drop a scan, a volume or a scene here, or open one (Ctrl+O)";
+            let color = ui.visuals().weak_text_color();
+            let font = FontId::proportional(16.0);
+            ui.painter().text(area.center(), Align2::CENTER_CENTER, hint, font, color);
+        }
+    }
+
+    /// Moves the camera as the hand moves.
+    fn answer(&mut self, ui: &Ui, response: &egui::Response, area: Rect, scale: f32) {
+        let size = self.size;
+        let pixel = |at: Pos2| {
+            let at = (at - area.min) * scale;
+            DVec2::new(f64::from(at.x), f64::from(at.y))
+        };
+        let drag = response.drag_delta() * scale;
+        let moved = DVec2::new(f64::from(drag.x), f64::from(drag.y));
+        let modifiers = ui.input(|input| input.modifiers);
+        let by = |button| response.dragged_by(button);
+        let pans = by(PointerButton::Middle)
+            || by(PointerButton::Secondary)
+            || (by(PointerButton::Primary) && modifiers.shift);
+        if response.drag_started() {
+            let start = response.interact_pointer_pos().map(pixel);
+            self.panels.grabbed = start.and_then(|at| self.depth_at(at));
+            self.panels.before_drag = Some(self.document.scene().clone());
+        }
+        if pans && moved != DVec2::ZERO {
+            let depth = self.panels.grabbed;
+            self.move_camera(|orbit| {
+                orbit.pan(moved, size, depth).ok();
+            });
+        } else if by(PointerButton::Primary) && modifiers.command && moved != DVec2::ZERO {
+            panels::window_level(self, Vec2::new(drag.x, drag.y));
+        } else if by(PointerButton::Primary) && modifiers.alt {
+            self.move_camera(|orbit| orbit.look_around(moved, size));
+        } else if by(PointerButton::Primary) && moved != DVec2::ZERO {
+            self.move_camera(|orbit| orbit.turn(moved, size));
+        }
+        if response.drag_stopped()
+            && let Some(mut before) = self.panels.before_drag.take()
+        {
+            // Moving the camera is no step.
+            before.camera = self.document.scene().camera;
+            before.options.clone_from(&self.document.scene().options);
+            self.document.keep(before);
+        }
+        let Some(at) = response.hover_pos() else { return };
+        let cursor = pixel(at);
+        let scroll = ui.input(|input| f64::from(input.smooth_scroll_delta().y));
+        let pinch = ui.input(|input| f64::from(input.zoom_delta()));
+        let factor = (scroll / 200.0).exp() * if scroll == 0.0 { pinch } else { 1.0 };
+        if factor != 1.0 {
+            let depth = self.depth_at(cursor);
+            self.move_camera(|orbit| {
+                orbit.zoom(factor, cursor, size, depth).ok();
+            });
+        }
+        self.panels.under_cursor = self.point_under(cursor);
+        if response.double_clicked() {
+            if let Some(point) = self.panels.under_cursor {
+                self.move_camera(|orbit| orbit.center(point));
+            }
+        } else if response.clicked()
+            && self.tool == Tool::Measure
+            && let Some(point) = self.panels.under_cursor
+        {
+            if self.measured.len() >= 2 {
+                self.measured.clear();
+            }
+            self.measured.push(point);
+        }
+        if self.tool == Tool::Measure {
+            ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
+        }
+    }
+
+    /// Returns the view-space depth of the picture at a pixel of the window.
+    fn depth_at(&self, cursor: DVec2) -> Option<f64> {
+        let (frame, _) = self.frame.as_ref()?;
+        let picture = &frame.picture;
+        let [x, y] =
+            [(cursor.x, picture.width, self.size[0]), (cursor.y, picture.height, self.size[1])]
+                .map(|(at, pixels, side)| at * f64::from(pixels) / f64::from(side));
+        if x < 0.0 || y < 0.0 || x >= f64::from(picture.width) || y >= f64::from(picture.height) {
+            return None;
+        }
+        let depth = picture.depth.get(y as usize * picture.width as usize + x as usize)?;
+        depth.is_finite().then(|| f64::from(*depth))
+    }
+
+    /// Returns the world point under the cursor.
+    fn point_under(&self, cursor: DVec2) -> Option<DVec3> {
+        let depth = self.depth_at(cursor)?;
+        let (frame, _) = self.frame.as_ref()?;
+        let view = frame.camera.view(self.size).ok()?;
+        Some(point_at(&view, cursor, depth))
+    }
+
+    /// Draws the points that were picked, and the distance between them.
+    fn draw_measured(&self, ui: &Ui, area: Rect, scale: f32) {
+        let (Some(shown), true) = (&self.shown, !self.measured.is_empty()) else { return };
+        let Ok(view) = shown.orbit.camera().view(self.size) else { return };
+        let on_screen = |point: &DVec3| {
+            let p = view.to_view(*point);
+            let depth = if view.perspective { p.z } else { 1.0 };
+            let at = p.truncate() * view.scale / depth + view.center;
+            (depth > 0.0).then(|| area.min + Vec2::new(at.x as f32, at.y as f32) / scale)
+        };
+        let points: Vec<Pos2> = self.measured.iter().filter_map(on_screen).collect();
+        let ink = Color32::from_rgb(255, 210, 60);
+        for point in &points {
+            ui.painter().circle_stroke(*point, 4.0, egui::Stroke::new(1.5, ink));
+        }
+        if let ([a, b], [first, second]) = (&points[..], &self.measured[..]) {
+            ui.painter().line_segment([*a, *b], egui::Stroke::new(1.5, ink));
+            let unit = &shown.stage.loaded.facts.length;
+            let text = format!("{:.4} {unit}", (*second - *first).length());
+            let at = a.lerp(*b, 0.5);
+            let font = FontId::proportional(14.0);
+            let back = ui.painter().text(at, Align2::CENTER_BOTTOM, &text, font.clone(), ink);
+            ui.painter().rect_filled(back.expand(3.0), 3.0, Color32::from_black_alpha(170));
+            ui.painter().text(at, Align2::CENTER_BOTTOM, text, font, ink);
+        }
+    }
+
+    /// Loads, draws and saves what has changed.
+    fn refresh(&mut self) {
+        self.take_loaded();
+        self.start_loading();
+        self.take_frame();
+        if let Some(error) = self.painter.take_error() {
+            self.save_to = None;
+            self.say(error, true);
+        }
+        if let Err(message) = self.order() {
+            self.say(message, true);
+        }
+        self.save_if_exact();
+    }
+
+    fn start_loading(&mut self) {
+        let wanted = self.document.loaded_by();
+        if self.loaded_by.as_ref() == Some(&wanted) {
+            return;
+        }
+        self.loading = None;
+        self.loaded_by = Some(wanted.clone());
+        if wanted.0.is_empty() {
+            self.clear();
+            return;
+        }
+        let repaint = self.context.clone();
+        let started = self.document.render().map_err(|failure| text_of(&failure)).and_then(
+            |(given, mut render)| {
+                render.set_size(self.size.map(|side| side.max(1)));
+                Loading::start(given, render, move || repaint.request_repaint())
+                    .map_err(|error| error.to_string())
+            },
+        );
+        match started {
+            Ok(loading) => self.loading = Some(loading),
+            Err(message) => self.say(message, true),
+        }
+    }
+
+    /// Shows nothing.
+    fn clear(&mut self) {
+        (self.shown, self.frame, self.set_for, self.ordered) = (None, None, None, None);
+        self.painter.clear();
+    }
+
+    fn take_loaded(&mut self) {
+        let Some(loading) = &self.loading else { return };
+        let Some(result) = loading.take() else {
+            // The bar moves.
+            self.context.request_repaint_after(std::time::Duration::from_millis(100));
+            return;
+        };
+        let notes = loading.take_notes();
+        let seconds = loading.since.elapsed().as_secs_f64();
+        self.loading = None;
+        notes.into_iter().for_each(|note| self.say(note, false));
+        match result {
+            Ok(stage) => {
+                self.say(format!("loaded in {seconds:.1} s"), false);
+                self.show(stage);
+            }
+            Err(message) => self.say(message, true),
+        }
+    }
+
+    /// Shows a loaded scene.
+    fn show(&mut self, stage: Stage) {
+        let made = self.document.render().map_err(|failure| text_of(&failure)).and_then(
+            |(_, mut render)| {
+                render.set_size(self.size.map(|side| side.max(1)));
+                let settings = render.settings(&stage.loaded).map_err(|e| e.to_string())?;
+                let finish = render.finish(&stage.loaded).map_err(|f| text_of(&f))?;
+                let camera =
+                    render.camera(&stage.loaded, &settings, &finish).map_err(|e| e.to_string())?;
+                let up = render.up(&stage.loaded);
+                Ok((settings, finish, camera, up))
+            },
+        );
+        let (settings, finish, camera, up) = match made {
+            Ok(made) => made,
+            Err(message) => return self.say(message, true),
+        };
+        self.document.take_clips(&settings.clips);
+        self.loaded_by = Some(self.document.loaded_by());
+        let size = stage.loaded.subject.bounds.diagonal();
+        let own_transfer = stage.loaded.scene.items.iter().find_map(Item::transfer).cloned();
+        self.panels.scene_changed(&stage);
+        self.shown = Some(Shown {
+            stage: Arc::new(stage),
+            orbit: Orbit::new(camera, up, size),
+            settings,
+            finish: Arc::new(finish),
+            own_transfer,
+        });
+        (self.set_for, self.ordered) = (None, None);
+        self.measured.clear();
+    }
+
+    /// Makes the settings anew if they changed, and orders a picture if anything did.
+    fn order(&mut self) -> Result<(), String> {
+        let Some(shown) = &mut self.shown else { return Ok(()) };
+        if self.size.contains(&0) {
+            return Ok(());
+        }
+        let mut look = self.document.scene().clone();
+        let is_fitted = look.camera.is_none();
+        (look.camera, look.transfer) = (None, None);
+        // A fitted camera follows from the settings.
+        let wanted = (look, self.size, is_fitted);
+        let is_set = self.set_for.as_ref() == Some(&wanted);
+        if !is_set {
+            self.set_for = Some(wanted);
+            let (_, mut render) = self.document.render().map_err(|failure| text_of(&failure))?;
+            render.set_size(self.size);
+            let loaded = &shown.stage.loaded;
+            shown.settings = render.settings(loaded).map_err(|error| error.to_string())?;
+            shown.finish = Arc::new(render.finish(loaded).map_err(|failure| text_of(&failure))?);
+            let camera = render.camera(loaded, &shown.settings, &shown.finish);
+            shown.orbit.set_camera(camera.map_err(|error| error.to_string())?);
+        } else if let Some(camera) = &self.document.scene().camera {
+            shown.orbit.set_camera(camera.camera()?);
+        }
+        if is_set && self.ordered.as_ref() == Some(self.document.scene()) {
+            return Ok(());
+        }
+        self.ordered = Some(self.document.scene().clone());
+        let transfer = self.transfer();
+        let Some(shown) = &self.shown else { return Ok(()) };
+        self.last_order = self.painter.order(Order {
+            stage: Arc::clone(&shown.stage),
+            camera: shown.orbit.camera().clone(),
+            settings: shown.settings.clone(),
+            finish: Arc::clone(&shown.finish),
+            transfer,
+        });
+        Ok(())
+    }
+
+    fn take_frame(&mut self) {
+        let (Some(frame), Some(shown)) = (self.painter.take_frame(), &self.shown) else { return };
+        // Where the picture is transparent, the window is black.
+        let background = shown.finish.background.unwrap_or_default();
+        let size = [frame.picture.width as usize, frame.picture.height as usize];
+        let bytes = frame.picture.to_rgba8(Some(background));
+        let image = ColorImage::from_rgba_unmultiplied(size, &bytes);
+        let options =
+            if frame.is_exact() { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
+        self.panels.count_frame(&frame);
+        let texture = match self.frame.take() {
+            Some((_, mut texture)) => {
+                texture.set(image, options);
+                texture
+            }
+            None => self.context.load_texture("picture", image, options),
+        };
+        self.frame = Some((frame, texture));
+    }
+
+    /// Saves the picture if it is wanted and exact.
+    fn save_if_exact(&mut self) {
+        if self.save_to.is_none() || !self.rests() {
+            return;
+        }
+        let (Some(path), Some((frame, _)), Some(shown)) =
+            (self.save_to.take(), &self.frame, &self.shown)
+        else {
+            return;
+        };
+        let written = PictureFormat::of(&path)
+            .and_then(|format| frame.picture.encode(format, shown.finish.background))
+            .and_then(|bytes| splatkit::disk::write(&path, &bytes));
+        match written {
+            Ok(()) => self.say(format!("{}: saved", path.display()), false),
+            Err(error) => self.say(error.to_string(), true),
+        }
+    }
+
+    /// Adds a clip through the middle of the scene, or removes one.
+    pub fn change_clips(&mut self, change: impl FnOnce(&mut Vec<ClipEntry>)) {
+        self.document.change(|scene| change(&mut scene.clips));
+    }
+}
