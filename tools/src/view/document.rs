@@ -45,11 +45,6 @@ pub struct Document {
 }
 
 impl Document {
-    /// A document without anything.
-    pub fn empty() -> Self {
-        Self::new(SceneFile::new([]))
-    }
-
     pub fn new(now: SceneFile) -> Self {
         Self { now, undone: Vec::new(), done: Vec::new(), pending: Vec::new(), path: None }
     }

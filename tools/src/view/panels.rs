@@ -33,6 +33,8 @@ pub enum Ask {
 struct Asked {
     ask: Ask,
     text: String,
+    /// Whether the field has not been shown yet: it is then where the keys go.
+    is_new: bool,
     /// The files that were chosen in the system's own dialog.
     chosen: Option<Receiver<Vec<PathBuf>>>,
 }
@@ -74,7 +76,7 @@ impl State {
             Ask::SaveScene => "scene.json",
             Ask::SavePicture => "picture.png",
         };
-        self.asked = Some(Asked { ask, text: text.to_owned(), chosen: None });
+        self.asked = Some(Asked { ask, text: text.to_owned(), is_new: true, chosen: None });
     }
 
     /// Forgets what belonged to the scene before.
@@ -203,7 +205,7 @@ fn inputs(window: &mut Window, ui: &mut Ui) {
             {
                 window.document.change(|scene| scene.inputs[number].visible = visible);
             }
-            if ui.small_button("✖").on_hover_text(format!("Remove {name}")).clicked() {
+            if ui.small_button("×").on_hover_text(format!("Remove {name}")).clicked() {
                 window.document.change(|scene| {
                     scene.inputs.remove(number);
                 });
@@ -319,7 +321,7 @@ fn clips(window: &mut Window, ui: &mut Ui) {
             ui.horizontal(|ui| {
                 let label = if clip.inside { "keeps the inside" } else { "keeps the outside" };
                 is_changed |= ui.checkbox(&mut clip.inside, label).changed();
-                if ui.small_button("✖").on_hover_text("Remove the clip").clicked() {
+                if ui.small_button("×").on_hover_text("Remove the clip").clicked() {
                     removed = Some(number);
                 }
             });
@@ -455,7 +457,7 @@ fn asked(window: &mut Window, ui: &mut Ui) {
         let field = ui.add(
             egui::TextEdit::singleline(&mut asked.text).hint_text("a path").desired_width(360.0),
         );
-        if asked.chosen.is_none() && !ui.ctx().memory(|memory| memory.focused().is_some()) {
+        if std::mem::take(&mut asked.is_new) {
             field.request_focus();
         }
         let enters = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));

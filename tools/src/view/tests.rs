@@ -18,7 +18,7 @@ fn harness(folder: &Path) -> Harness<'static, Option<Window>> {
         move |ui, window: &mut Option<Window>| {
             let context = ui.ctx().clone();
             let own = window.get_or_insert_with(|| {
-                let document = document.take().unwrap_or_else(Document::empty);
+                let document = document.take().expect("one window");
                 Window::new(document, &context).expect("a window")
             });
             own.ui(ui);

@@ -400,7 +400,7 @@ impl Window {
         let cursor = pixel(at);
         let scroll = ui.input(|input| f64::from(input.smooth_scroll_delta().y));
         let pinch = ui.input(|input| f64::from(input.zoom_delta()));
-        let factor = (scroll / 200.0).exp() * if scroll == 0.0 { pinch } else { 1.0 };
+        let factor = (scroll / 400.0).exp() * if scroll == 0.0 { pinch } else { 1.0 };
         if factor != 1.0 {
             let depth = self.depth_at(cursor);
             self.move_camera(|orbit| {
