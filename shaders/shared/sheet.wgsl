@@ -6,9 +6,6 @@
 const LEAST_DEPTH: f32 = 1e-5;
 // Optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
-// A part of a sheet with more optical depth is divided, because what lies in front covers what lies
-// behind.
-const MOST_PART_DEPTH: f32 = 0.0625;
 
 // Returns a lit colour: Blinn's model (1977) with a light at the eye, on both sides. `certain` is a
 // magnitude up to which the normal does not count, and one over the magnitudes over which it comes
@@ -20,14 +17,25 @@ fn lit_from(
     shade: vec4<f32>,
     certain: vec2<f32>,
 ) -> vec3<f32> {
+    let light = light_of(normal, direction, shade, certain);
+    return min(color * light.x + light.y, vec3(1.0));
+}
+
+// Returns the factor on a colour, and the highlight that is added to it.
+fn light_of(
+    normal: vec3<f32>,
+    direction: vec3<f32>,
+    shade: vec4<f32>,
+    certain: vec2<f32>,
+) -> vec2<f32> {
     let size = length(normal);
     if !(size > 1e-20) {
-        return color * (shade.x + shade.y);
+        return vec2(shade.x + shade.y, 0.0);
     }
     let facing = min(abs(dot(normal, direction)) / size, 1.0);
     let share = clamp((size - certain.x) * certain.y, 0.0, 1.0);
     let diffuse = shade.x + shade.y * (1.0 - share * (1.0 - facing));
-    return min(color * diffuse + share * shade.z * pow(facing, shade.w), vec3(1.0));
+    return vec2(diffuse, share * shade.z * pow(facing, shade.w));
 }
 
 // The same for a normal of any length.
@@ -38,6 +46,22 @@ fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f3
 // The same for the gradient of the field.
 fn lit_field(r: u32, color: vec3<f32>, gradient: vec3<f32>) -> vec3<f32> {
     return lit_from(color, gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
+}
+
+// Number of places in a part of a sheet at which its light is taken.
+const LIGHTS: u32 = 4u;
+
+// The same for a part of a sheet, in its mean light: gradients change more within a part than values
+// do.
+fn lit_piece(r: u32, medium: Medium, color: vec3<f32>, place: f32, next_place: f32) -> vec3<f32> {
+    var light: vec2<f32>;
+    for (var i = 0u; i < LIGHTS; i++) {
+        let at = mix(place, next_place, (f32(i) + 0.5) / f32(LIGHTS));
+        let gradient = gradient_at(r, medium, at);
+        light += light_of(gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
+    }
+    light /= f32(LIGHTS);
+    return min(color * light.x + light.y, vec3(1.0));
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
@@ -155,80 +179,47 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
         if MAXIMUM {
             (*medium).peak = max((*medium).peak, max(value, next));
         } else {
-            // Adds the part in slices of equal length, the more the deeper it is.
-            var count = 1.0;
-            if !POST {
-                let depth = classify_between(value, next).w * step * filling_of(own);
-                count = clamp(ceil(depth / MOST_PART_DEPTH), 1.0, f32(MOST_SLICES));
+            var shown: vec4<f32>;
+            if POST {
+                shown = classify(own.value);
+                shown = vec4(shown.xyz * shown.w, shown.w);
+            } else {
+                shown = classify_between(value, next);
             }
-            let span = step / count;
-            var enter = vec2(place, value);
-            var slice = 0.0;
-            loop {
-                let until = mix(place, next_place, (slice + 1.0) / count);
-                let leave = vec2(until, parabola(curve, until));
-                pass_slice(r, own, near + slice * span, span, enter, leave, medium);
-                enter = leave;
-                slice += 1.0;
-                if slice >= count {
-                    break;
+            var normal: vec3<f32>;
+            if GRADIENT_OPACITY {
+                normal = gradient_at(r, *medium, 0.5 * (place + next_place));
+                shown *= gradient_factor(length(normal));
+            }
+            // Differences of integrals: rounding remainders, where nothing is visible, must stay a
+            // colour.
+            let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
+            var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
+            if VOLUME_SHADED {
+                color = lit_piece(r, *medium, color, place, next_place);
+            }
+            var done = 0.0;
+            for (var i = 0u; i < ISOSURFACES; i++) {
+                let surface = frame.isosurfaces[select(ISOSURFACES - 1u - i, i, next > value)];
+                let level = surface.value.x;
+                if (value < level) != (next < level) {
+                    let share = (level - value) / (next - value);
+                    pass_part(depth * (share - done), color, medium);
+                    done = share;
+                    pass_surface(
+                        r,
+                        surface,
+                        mix(place, next_place, share),
+                        near + step * share,
+                        medium,
+                    );
                 }
             }
+            pass_part(depth * (1.0 - done), color, medium);
         }
         place = next_place;
         value = next;
     }
-}
-
-fn filling_of(own: Sheet) -> f32 {
-    return select(own.filling, 1.0, LATTICE);
-}
-
-// Adds a slice of a part, which begins at a distance. Its ends are places in the sheet, each with
-// the value there.
-fn pass_slice(
-    r: u32,
-    own: Sheet,
-    begin: f32,
-    span: f32,
-    enter: vec2<f32>,
-    leave: vec2<f32>,
-    medium: ptr<function, Medium>,
-) {
-    let value = enter.y;
-    let next = leave.y;
-    var shown: vec4<f32>;
-    if POST {
-        shown = classify(own.value);
-        shown = vec4(shown.xyz * shown.w, shown.w);
-    } else {
-        shown = classify_between(value, next);
-    }
-    var normal: vec3<f32>;
-    if GRADIENTS {
-        normal = gradient_at(r, *medium, 0.5 * (enter.x + leave.x));
-    }
-    if GRADIENT_OPACITY {
-        shown *= gradient_factor(length(normal));
-    }
-    // Differences of integrals: rounding remainders, where nothing is visible, must stay a colour.
-    let depth = max(shown.w, 0.0) * span * filling_of(own);
-    var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
-    if VOLUME_SHADED {
-        color = lit_field(r, color, normal);
-    }
-    var done = 0.0;
-    for (var i = 0u; i < ISOSURFACES; i++) {
-        let surface = frame.isosurfaces[select(ISOSURFACES - 1u - i, i, next > value)];
-        let level = surface.value.x;
-        if (value < level) != (next < level) {
-            let share = (level - value) / (next - value);
-            pass_part(depth * (share - done), color, medium);
-            done = share;
-            pass_surface(r, surface, mix(enter.x, leave.x, share), begin + span * share, medium);
-        }
-    }
-    pass_part(depth * (1.0 - done), color, medium);
 }
 
 fn parabola(curve: vec3<f32>, u: f32) -> f32 {

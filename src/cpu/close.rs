@@ -12,10 +12,8 @@ use fearless_simd::{Simd, f32x4, i32x8, mask32x8, prelude::*};
 
 /// Number of parts of a sheet in which the transfer function is integrated.
 const PARTS: usize = 3;
-/// A part with more optical depth is divided, because what lies in front covers what lies behind.
-const MOST_PART_DEPTH: f32 = 1.0 / 16.0;
-/// Largest number of slices that a part is divided into.
-const MOST_SLICES: f32 = 4.0;
+/// Number of places in a part at which its light is taken.
+const LIGHTS: usize = 4;
 /// Values closer together than this, in entries of the table, are taken as this far apart.
 const NARROW: f32 = 8.0;
 /// The same for values far beyond the table, as a fraction of the value.
@@ -132,7 +130,7 @@ struct Medium<S: Simd> {
     peak: Lanes<S>,
 }
 
-/// A part of a sheet, or a slice of one, in which the transfer function is integrated at once.
+/// A part of a sheet in which the transfer function is integrated at once.
 struct Piece<S: Simd> {
     /// The pixels whose rays meet it.
     mask: mask32x8<S>,
@@ -305,6 +303,18 @@ impl Plan<'_> {
         gradient: [Lanes<S>; 3],
         direction: [Lanes<S>; 3],
     ) -> [Lanes<S>; 3] {
+        let [share, highlight] = self.light_of(simd, gradient, direction);
+        with_light(simd, color, share, highlight)
+    }
+
+    /// Returns the factor on a colour of the field and the highlight that is added to it.
+    #[inline(always)]
+    fn light_of<S: Simd>(
+        &self,
+        simd: S,
+        gradient: [Lanes<S>; 3],
+        direction: [Lanes<S>; 3],
+    ) -> [Lanes<S>; 2] {
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let [ambient, diffuse, specular, power] = self.frame.volume_shade;
         let [low, per_magnitude, ..] = self.frame.certain;
@@ -317,8 +327,29 @@ impl Plan<'_> {
         .min(one);
         let highlight = vector::power(simd, facing.max(Lanes::splat(simd, 1e-6)), power);
         let highlight = highlight * certainty * specular;
-        let share = (one - certainty * (one - facing)) * diffuse + ambient;
-        three!(I => color[I].mul_add(share, highlight).min(one))
+        [(one - certainty * (one - facing)) * diffuse + ambient, highlight]
+    }
+
+    /// Returns the colour of a piece in its mean light: gradients change more within a piece than
+    /// values do.
+    #[inline(always)]
+    fn lit_piece<S: Simd>(
+        &self,
+        simd: S,
+        color: [Lanes<S>; 3],
+        layer: &Layer<S>,
+        [place, next_place]: [Lanes<S>; 2],
+    ) -> [Lanes<S>; 3] {
+        let none = Lanes::splat(simd, 0.0);
+        let mut sums = [none; 2];
+        for number in 0..LIGHTS {
+            let share = (number as f32 + 0.5) / LIGHTS as f32;
+            let at = (next_place - place) * share + place;
+            let light = self.light_of(simd, self.gradient(layer, at), layer.direction);
+            sums = [sums[0] + light[0], sums[1] + light[1]];
+        }
+        let [share, highlight] = sums.map(|sum| sum * (1.0 / LIGHTS as f32));
+        with_light(simd, color, share, highlight)
     }
 
     /// Adds a sheet to a packet's pixels: the field in it, at the pixels of a mask, and its
@@ -484,58 +515,13 @@ impl Plan<'_> {
             let next = if is_curved { layer.parabola(next_place) } else { value };
             let places = [place, next_place];
             let piece = Piece { mask, begin, length: step, places, values: [value, next] };
-            if self.is_integrated {
-                self.pass_slices(simd, layer, &piece, medium);
-            } else {
-                self.pass_piece(simd, layer, &piece, medium);
-            }
-            place = next_place;
-            value = next;
-        }
-    }
-
-    /// Adds a part of a sheet in slices of equal length, the more the deeper it is.
-    #[inline(always)]
-    fn pass_slices<S: Simd>(
-        &self,
-        simd: S,
-        layer: &Layer<S>,
-        part: &Piece<S>,
-        medium: &mut Medium<S>,
-    ) {
-        let none = Lanes::splat(simd, 0.0);
-        let [from, to] = part.places;
-        let extinction = self.between(simd, part.values[0], part.values[1])[3];
-        let depth = part.mask.select(extinction * part.length * layer.filling, none);
-        if !(depth.simd_gt(0.0).any_true() || self.isosurfaces > 0) {
-            return;
-        }
-        let count = (depth * (1.0 / MOST_PART_DEPTH)).ceil();
-        let count = count.max(Lanes::splat(simd, 1.0)).min(Lanes::splat(simd, MOST_SLICES));
-        let counts: [f32; 8] = count.into();
-        let most = counts.into_iter().fold(1.0, f32::max) as usize;
-        if most == 1 {
-            self.pass_piece(simd, layer, part, medium);
-            return;
-        }
-        let share = Lanes::splat(simd, 1.0) / count;
-        let length = part.length * share;
-        let (mut place, mut value) = (from, part.values[0]);
-        for slice in 0..most {
-            let slice = slice as f32;
-            let mask = part.mask & count.simd_gt(slice);
-            let next_place = (to - from).mul_add(share * (slice + 1.0), from);
-            let next = layer.parabola(next_place);
-            let begin = length.mul_add(slice, part.begin);
-            let places = [place, next_place];
-            let piece = Piece { mask, begin, length, places, values: [value, next] };
             self.pass_piece(simd, layer, &piece, medium);
             place = next_place;
             value = next;
         }
     }
 
-    /// Adds a piece of a part: what the transfer function shows in it, and the isosurfaces.
+    /// Adds a piece of a sheet: what the transfer function shows in it, and the isosurfaces.
     #[inline(always)]
     fn pass_piece<S: Simd>(
         &self,
@@ -607,7 +593,7 @@ impl Plan<'_> {
             self.one(simd, layer.mean())
         };
         let mut normal = [none; 3];
-        if self.is_lit || self.has_gradient_opacity {
+        if self.has_gradient_opacity {
             normal = self.gradient(layer, (place + next_place) * 0.5);
         }
         if self.has_gradient_opacity {
@@ -621,7 +607,7 @@ impl Plan<'_> {
         let inverse = one / shown[3].max(Lanes::splat(simd, 1e-20));
         let mut color = three!(I => (shown[I] * inverse).max(none).min(one));
         if self.is_lit {
-            color = self.lit_field(simd, color, normal, layer.direction);
+            color = self.lit_piece(simd, color, layer, piece.places);
         }
         Some((color, depth))
     }
@@ -700,6 +686,17 @@ impl<S: Simd> Medium<S> {
         self.through -= share;
         self.depth += depth;
     }
+}
+
+/// Returns a colour times a share of light, and a highlight.
+#[inline(always)]
+fn with_light<S: Simd>(
+    simd: S,
+    color: [Lanes<S>; 3],
+    share: Lanes<S>,
+    highlight: Lanes<S>,
+) -> [Lanes<S>; 3] {
+    three!(I => color[I].mul_add(share, highlight).min(Lanes::splat(simd, 1.0)))
 }
 
 /// Transposes eight pixels with four channels into four channels with eight pixels.

@@ -35,7 +35,7 @@ pub(super) struct Layer {
     pub filling: f64,
 }
 
-/// A part of a sheet, or a slice of one: the places of its ends, and the values there.
+/// A part of a sheet: the places of its ends, and the values there.
 struct Part {
     places: [f64; 2],
     values: [f64; 2],
@@ -43,10 +43,9 @@ struct Part {
 
 /// Number of parts of a piece; values are taken as linear within a part.
 const PARTS: u32 = 3;
-/// A part with more optical depth is divided, because what lies in front covers what lies behind.
-const MOST_PART_DEPTH: f64 = 1.0 / 16.0;
-/// Largest number of slices that a part is divided into.
-const MOST_SLICES: f64 = 4.0;
+
+/// Number of places in a part at which its light is taken.
+const LIGHTS: u32 = 4;
 
 /// Less light than this counts as this much, so that optical depths stay finite.
 const LEAST_LIGHT: f64 = 1e-9;
@@ -111,26 +110,22 @@ impl Layer {
         mixed + (along - mixed.dot(direction)) * direction
     }
 
-    fn distance(&self, u: f64) -> f64 {
-        self.span[0] + u * (self.span[1] - self.span[0])
+    /// Returns the colour of a part between two places in its mean light: gradients change more
+    /// within a part than values do.
+    fn lit(&self, field: &Field, color: DVec3, [start, end]: [f64; 2], direction: DVec3) -> DVec3 {
+        let Some(shade) = &field.shade else { return color };
+        let mut sums = [0.0; 2];
+        for number in 0..LIGHTS {
+            let share = (f64::from(number) + 0.5) / f64::from(LIGHTS);
+            let gradient = self.gradient(start + share * (end - start), direction);
+            let light = shade::light(gradient, direction, shade);
+            (0..2).for_each(|i| sums[i] += light[i] / f64::from(LIGHTS));
+        }
+        shade::with_light(color, sums)
     }
 
-    /// Divides parts into slices of equal length, the more the deeper they are.
-    fn slices(&self, field: &Field, parts: Vec<Part>) -> Vec<Part> {
-        if !field.inside {
-            return parts;
-        }
-        let slices = parts.into_iter().flat_map(|Part { places: [start, end], values: [a, b] }| {
-            let length = self.distance(end) - self.distance(start);
-            let depth = field.classifier.between(a, b).0 * length * self.filling;
-            let count = (depth / MOST_PART_DEPTH).ceil().clamp(1.0, MOST_SLICES);
-            let place = move |i: u32| start + f64::from(i) / count * (end - start);
-            (0..count as u32).map(move |i| {
-                let places = [place(i), place(i + 1)];
-                Part { places, values: places.map(|u| self.value(u)) }
-            })
-        });
-        slices.collect()
+    fn distance(&self, u: f64) -> f64 {
+        self.span[0] + u * (self.span[1] - self.span[0])
     }
 
     /// Divides pieces of the ray into parts.
@@ -171,9 +166,7 @@ impl Layer {
         let mut light = 1.0;
         // Lit colours, weighted by opacity.
         let mut color = DVec3::ZERO;
-        for Part { places: [start, end], values: [a, b] } in
-            self.slices(field, self.parts(field, pieces))
-        {
+        for Part { places: [start, end], values: [a, b] } in self.parts(field, pieces) {
             let gradient = self.gradient(0.5 * (start + end), direction);
             let (extinction, medium) = if field.inside {
                 field.classifier.between(a, b)
@@ -181,7 +174,7 @@ impl Layer {
                 field.classifier.at(self.mean)
             };
             let factor = field.classifier.transfer.gradient_factor(gradient.length());
-            let medium = field.lit(medium, gradient, direction);
+            let medium = self.lit(field, medium, [start, end], direction);
             let length = self.distance(end) - self.distance(start);
             let depth = extinction * factor * length * self.filling;
             let at = |share: f64| start + share * (end - start);

@@ -64,8 +64,6 @@ pub struct Variant {
 
 /// Parts of a sheet in which the transfer function is integrated. docs/engine.md has measurements.
 const PARTS: u32 = 3;
-/// Largest number of slices that a part is divided into.
-const MOST_SLICES: u32 = 4;
 
 /// Maximum number of loop iterations of an entry.
 const ENTRY_ITERATIONS: u32 = 6;
@@ -82,16 +80,11 @@ impl Variant {
         self.scalar && (self.volume_shaded || self.gradient_opacity)
     }
 
-    /// Returns the largest number of slices of a part.
-    fn slices(&self) -> u32 {
-        if self.classification == Classification::Post { 1 } else { MOST_SLICES }
-    }
-
     /// Returns the number of sheets that one dispatch of gather draws: as many as a driver's limit
     /// on iterations allows.
     pub fn gathered_sheets(&self) -> u32 {
         // Iterations that close a sheet; six more find it and evaluate its planes.
-        let pieces = PARTS * self.slices() * (1 + self.isosurfaces) * (1 + self.holes)
+        let pieces = PARTS * (1 + self.isosurfaces) * (1 + self.holes)
             + (1 + self.holes) * self.holes * self.holes;
         let most = self.most_entries.saturating_mul(ENTRY_ITERATIONS);
         if self.can_stop() { (most / (6 + pieces)).max(1) } else { u32::MAX }
@@ -169,18 +162,16 @@ impl Variant {
     }
 
     /// The constants that are whole numbers.
-    fn counts(&self) -> [(&'static str, u32); 14] {
+    fn counts(&self) -> [(&'static str, u32); 13] {
         let parts = if self.parabola() { PARTS } else { 1 };
         // The cost of closing a sheet, in entries, against the driver's limit on iterations (see
         // docs/engine.md).
-        let closing =
-            (2 + self.rows * parts * self.slices() * (1 + self.isosurfaces) * (1 + self.holes))
-                .div_ceil(ENTRY_ITERATIONS);
+        let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes))
+            .div_ceil(ENTRY_ITERATIONS);
         let closing = closing + u32::from(self.gather);
         [
             ("ISOSURFACES", self.isosurfaces),
             ("PARTS", parts),
-            ("MOST_SLICES", self.slices()),
             ("CLIPS", self.clips),
             ("HOLES", self.holes),
             ("HOLES_OR_ONE", self.holes.max(1)),
