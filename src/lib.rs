@@ -59,6 +59,7 @@
 //! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |
 //! | use the device of a host application | [`gpu::Gpu::from_wgpu`] |
 //! | compare pictures | [`compare`] |
+//! | count values, look under a cursor, cut slices: what windows need | [`interaction`] |
 //! | look up what a picture is, exactly | [`mod@reference`] |
 //!
 //! # Features
@@ -105,6 +106,7 @@ pub mod formats;
 pub mod gpu;
 pub mod hierarchy;
 pub mod input;
+pub mod interaction;
 pub mod math;
 pub mod memory;
 pub(crate) mod parallel;

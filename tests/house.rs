@@ -9,7 +9,7 @@ use std::{
 use syn::{Attribute, Item, ItemMod, ItemUse, Meta, UseTree, visit::Visit};
 
 /// The rooms of src. Each imports only from rooms before it.
-const ROOMS: [&str; 28] = [
+const ROOMS: [&str; 29] = [
     "error",
     "parallel",
     "deadline",
@@ -33,6 +33,7 @@ const ROOMS: [&str; 28] = [
     "hierarchy",
     "compare",
     "scene",
+    "interaction",
     "plan",
     "cpu",
     "gpu",
