@@ -44,6 +44,12 @@ mod terminal;
 mod threads;
 mod timing;
 mod transfer;
+#[cfg(feature = "window")]
+#[cfg_attr(
+    not(test),
+    expect(dead_code, unused_imports, reason = "the window that shows these parts comes next")
+)]
+mod view;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use failure::Failure;

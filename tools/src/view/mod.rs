@@ -1,0 +1,4 @@
+//! The window of `splatkit view`.
+
+pub mod curve;
+pub mod slices;
