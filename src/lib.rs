@@ -60,6 +60,7 @@
 //! | use the device of a host application | [`gpu::Gpu::from_wgpu`] |
 //! | move a camera by hand, keep a pace, read and write scene files | [`interaction`] |
 //! | compare pictures | [`compare`] |
+//! | count values, look under a cursor, cut slices: what windows need | [`interaction`] |
 //! | look up what a picture is, exactly | [`mod@reference`] |
 //!
 //! # Features

@@ -9,10 +9,11 @@ use std::{
 use syn::{Attribute, Item, ItemMod, ItemUse, Meta, UseTree, visit::Visit};
 
 /// The rooms of src. Each imports only from rooms before it.
-const ROOMS: [&str; 28] = [
+const ROOMS: [&str; 30] = [
     "error",
     "parallel",
     "deadline",
+    "stop",
     "progress",
     "memory",
     "disk",
@@ -33,6 +34,7 @@ const ROOMS: [&str; 28] = [
     "hierarchy",
     "compare",
     "scene",
+    "interaction",
     "plan",
     "cpu",
     "gpu",

@@ -29,6 +29,12 @@ impl<'a> Reconstruction<'a> {
     /// - The volume or the kernel was built by hand and is inconsistent.
     pub fn new(volume: &'a Volume, kernel: &'a Kernel) -> Result<Self> {
         volume.validate().map_err(Error::Argument)?;
+        Self::of_checked(volume, kernel)
+    }
+
+    /// Like [`new`](Self::new), for a volume that was checked before. Its samples are not looked
+    /// at, so that a large volume is prepared at once.
+    pub(crate) fn of_checked(volume: &'a Volume, kernel: &'a Kernel) -> Result<Self> {
         kernel.validate()?;
         if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) {
             return Err(Error::Argument(

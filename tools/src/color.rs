@@ -264,7 +264,7 @@ impl ColorFlags {
 
 /// Returns the values that a transfer function distinguishes: those that it shows, up to the last
 /// value at which it changes.
-fn shown_of(transfer: &TransferFunction, [low, high]: [f64; 2]) -> [f64; 2] {
+pub fn shown_of(transfer: &TransferFunction, [low, high]: [f64; 2]) -> [f64; 2] {
     let [from, to] = transfer.shown_range().unwrap_or([low, high]);
     let last = transfer.opacity.iter().map(|point| point.0).fold(f64::NEG_INFINITY, f64::max);
     let last_color = transfer.color.iter().map(|point| point.0).fold(last, f64::max);

@@ -82,7 +82,7 @@ fn a_camera_that_was_printed_is_taken_again() {
 #[test]
 fn wrong_scenes_name_what_is_wrong() {
     let folder = folder();
-    let mut wrong = |text: &str, words: &[&str]| {
+    let wrong = |text: &str, words: &[&str]| {
         folder.put("s.json", text);
         folder.run("render s.json -o x.png").fails(3, &[&["s.json"], words].concat());
     };

@@ -2,7 +2,10 @@
 
 use super::painter::Stage;
 use crate::{failure::Failure, given::Given, progress::Progress, render::Render};
-use splatkit::scene::{Item, Scene};
+use splatkit::{
+    interaction::Histogram,
+    scene::{Item, Scene},
+};
 use std::{
     sync::{
         Arc,
@@ -68,8 +71,10 @@ fn load(given: &Given, render: &Render, progress: &Progress) -> Result<Stage, Fa
     render.find_seen(&mut loaded, &settings)?;
     progress.stage("Opening the device");
     let device = render.device(&loaded)?;
+    progress.stage("Counting values");
+    let histogram = loaded.scene.items.iter().find_map(Histogram::of_item);
     let sheet = sheet_of(&loaded.scene);
-    Ok(Stage { loaded, device, sheet })
+    Ok(Stage { loaded, device, histogram, sheet })
 }
 
 /// Returns the thickness of a volume's sheets, about as [`Scene::sheets`] chooses it.

@@ -4,10 +4,12 @@
 //! the background ([`loader`]), gives orders to the [`painter`], and shows its frames and the
 //! [`panels`]. What it shows is what `splatkit render` draws from the same scene file.
 
+mod curve;
 mod document;
 mod loader;
 mod painter;
 mod panels;
+mod slices;
 #[cfg(test)]
 mod tests;
 mod window;

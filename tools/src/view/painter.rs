@@ -3,7 +3,7 @@
 use crate::{render::Finish, scene::Loaded};
 use splatkit::{
     Device, Error, FrameStats, Renderer, Stop,
-    interaction::{Effort, Pace},
+    interaction::{Effort, Histogram, Pace},
     math::Camera,
     picture::Picture,
     scene::{Item, Settings},
@@ -23,6 +23,8 @@ const MOVING: f64 = 32.0;
 pub struct Stage {
     pub loaded: Loaded,
     pub device: Device,
+    /// How often the values of the field are.
+    pub histogram: Option<Histogram>,
     /// The thickness of a sheet that the volume's spacing asks for, in world units.
     pub sheet: Option<f64>,
 }

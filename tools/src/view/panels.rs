@@ -1,19 +1,25 @@
 //! The menu, the panels beside the picture, and the windows over it.
 
 use super::{
+    curve::{self, CurveEditor, Edit},
     painter::{Frame, Stage},
+    slices::SlicePanes,
     window::{Tool, Window},
 };
 use eframe::egui::{self, Color32, Grid, Ui, Vec2};
 use glam::DVec3;
 use serde_json::Value;
 use splatkit::{
-    interaction::{ClipEntry, SceneFile},
+    interaction::{ClipEntry, Probe, SceneFile},
     math::Bounds,
+    scene::Item,
 };
 use std::{
     path::PathBuf,
-    sync::mpsc::{Receiver, channel},
+    sync::{
+        Arc,
+        mpsc::{Receiver, channel},
+    },
 };
 
 /// Frames whose times are shown.
@@ -46,12 +52,17 @@ pub struct State {
     /// The depth of the point where a drag began.
     pub grabbed: Option<f64>,
     pub before_drag: Option<SceneFile>,
+    /// The scene before a point of the transfer function was dragged.
+    before_edit: Option<SceneFile>,
     /// The world point under the cursor.
     pub under_cursor: Option<DVec3>,
     asked: Option<Asked>,
     /// Times of moving frames in milliseconds, and their delays behind the hand.
     times: Vec<[f64; 2]>,
     bounds: Option<Bounds>,
+    curve: Option<CurveEditor>,
+    slices: Option<SlicePanes>,
+    shows_slices: bool,
 }
 
 impl Default for State {
@@ -61,10 +72,14 @@ impl Default for State {
             shows_help: false,
             grabbed: None,
             before_drag: None,
+            before_edit: None,
             under_cursor: None,
             asked: None,
             times: Vec::new(),
             bounds: None,
+            curve: None,
+            slices: None,
+            shows_slices: false,
         }
     }
 }
@@ -81,7 +96,10 @@ impl State {
 
     /// Forgets what belonged to the scene before.
     pub fn scene_changed(&mut self, stage: &Stage) {
-        self.bounds = Some(stage.loaded.subject.bounds);
+        let bounds = stage.loaded.subject.bounds;
+        self.bounds = Some(bounds);
+        self.curve = Some(CurveEditor::new(bounds.diagonal()));
+        self.slices = Some(SlicePanes::default());
         (self.under_cursor, self.grabbed) = (None, None);
     }
 
@@ -143,6 +161,7 @@ pub fn menu(window: &mut Window, ui: &mut Ui) {
             window.tool = if measures { Tool::Look } else { Tool::Measure };
             window.measured.clear();
         }
+        ui.toggle_value(&mut window.panels.shows_slices, "Slices");
         if ui.button("Help").clicked() {
             window.panels.shows_help = !window.panels.shows_help;
         }
@@ -162,6 +181,12 @@ pub fn status(window: &mut Window, ui: &mut Ui) {
     ui.horizontal(|ui| {
         if let Some(DVec3 { x, y, z }) = window.panels.under_cursor {
             ui.label(format!("{x:.4}, {y:.4}, {z:.4}"));
+            if let Some(shown) = &window.shown
+                && let Some(value) =
+                    Probe::new(&shown.stage.loaded.scene).value_at(DVec3 { x, y, z })
+            {
+                ui.label(format!("value {value:.4}"));
+            }
             ui.separator();
         }
         if let Some((frame, _)) = &window.frame {
@@ -180,6 +205,11 @@ pub fn status(window: &mut Window, ui: &mut Ui) {
 /// The panels beside the picture.
 pub fn side(window: &mut Window, ui: &mut Ui) {
     egui::CollapsingHeader::new("Inputs").default_open(true).show(ui, |ui| inputs(window, ui));
+    if window.transfer().is_some() {
+        egui::CollapsingHeader::new("Transfer function")
+            .default_open(true)
+            .show(ui, |ui| transfer_function(window, ui));
+    }
     egui::CollapsingHeader::new("Look").default_open(true).show(ui, |ui| look(window, ui));
     egui::CollapsingHeader::new("Clips").default_open(false).show(ui, |ui| clips(window, ui));
     egui::CollapsingHeader::new("Frame").default_open(false).show(ui, |ui| frame(window, ui));
@@ -215,6 +245,58 @@ fn inputs(window: &mut Window, ui: &mut Ui) {
     if ui.button("Add…").clicked() {
         window.panels.ask(Ask::Open);
     }
+}
+
+fn transfer_function(window: &mut Window, ui: &mut Ui) {
+    let (Some(mut transfer), Some(stage), Some(mut curve)) = (
+        window.transfer(),
+        window.shown.as_ref().map(|shown| Arc::clone(&shown.stage)),
+        window.panels.curve.take(),
+    ) else {
+        return;
+    };
+    let values = stage.loaded.scene.items.iter().find_map(Item::value_range);
+    let histogram = stage.histogram.as_ref();
+    let edit = curve.show(ui, histogram, &mut transfer, values.unwrap_or([0.0, 1.0]));
+    window.panels.curve = Some(curve);
+    if edit == Edit::Unchanged {
+        return;
+    }
+    // A drag is one step.
+    let before = window.panels.before_edit.take();
+    let before = before.unwrap_or_else(|| window.document.scene().clone());
+    window.set_transfer(&transfer);
+    match edit {
+        Edit::Committed => window.document.keep(before),
+        _ => window.panels.before_edit = Some(before),
+    }
+}
+
+/// Shows three slices of the volume in a window of their own.
+fn slices(window: &mut Window, ui: &mut Ui) {
+    let (Some(stage), Some(transfer), Some(mut panes)) = (
+        window.shown.as_ref().map(|shown| Arc::clone(&shown.stage)),
+        window.transfer(),
+        window.panels.slices.take(),
+    ) else {
+        return;
+    };
+    let mut shows = window.panels.shows_slices;
+    let volume = stage.loaded.scene.items.iter().find_map(|item| match item {
+        Item::Volume(volume, kernel, _) => Some((volume, kernel)),
+        _ => None,
+    });
+    egui::Window::new("Slices").open(&mut shows).default_width(720.0).show(ui.ctx(), |ui| {
+        match volume {
+            Some((volume, kernel)) => {
+                panes.show(ui, volume, kernel, &transfer);
+            }
+            None => {
+                ui.label("slices are for volumes on a lattice in memory");
+            }
+        }
+    });
+    (window.panels.slices, window.panels.shows_slices) = (Some(panes), shows);
 }
 
 /// Returns an option as a text.
@@ -392,25 +474,23 @@ fn frame(window: &mut Window, ui: &mut Ui) {
 
 /// Moves and widens the transfer function as a hand drags.
 pub fn window_level(window: &mut Window, drag: Vec2) {
-    let Some(transfer) = window.transfer() else { return };
-    let points = || transfer.opacity.iter().map(|point| point.0);
-    let [low, high] = points()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], value| [a.min(value), b.max(value)]);
-    let width = high - low;
-    if !(width > 0.0) {
-        return;
-    }
-    let level = 0.5 * (low + high) - f64::from(drag.y) / 400.0 * width;
-    let width = width * (f64::from(drag.x) / 300.0).exp();
-    let moved = transfer.spread_over([level - 0.5 * width, level + 0.5 * width]);
-    if moved.validate().is_ok() {
-        window.set_transfer(&moved);
+    let Some(mut transfer) = window.transfer() else { return };
+    let values = window
+        .shown
+        .as_ref()
+        .and_then(|shown| shown.stage.loaded.scene.items.iter().find_map(Item::value_range));
+    if let Some(values) = values {
+        curve::window_level(&mut transfer, drag, values);
+        window.set_transfer(&transfer);
     }
 }
 
 /// The windows over the picture: paths that are asked for, and help.
 pub fn windows(window: &mut Window, ui: &mut Ui) {
     asked(window, ui);
+    if window.panels.shows_slices {
+        slices(window, ui);
+    }
     let mut shows = window.panels.shows_help;
     egui::Window::new("Help").open(&mut shows).show(ui.ctx(), |ui| {
         Grid::new("help").num_columns(2).show(ui, |ui| {
