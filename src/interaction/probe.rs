@@ -269,7 +269,7 @@ mod tests {
             let mut renderer = Renderer::new(&Device::Cpu, &scene).unwrap();
             let (picture, _) = renderer.render(&camera, &Settings::new([80, 60])).unwrap();
             let view = camera.view([160, 120]).unwrap();
-            for pixel in [DVec2::new(80.5, 60.5), DVec2::new(100.5, 50.5)] {
+            for pixel in [DVec2::new(80.5, 60.5), DVec2::new(88.5, 55.5)] {
                 let place = Probe::picked(&picture, &view, pixel).unwrap();
                 let value = probe.value_at(place).unwrap();
                 // The field is opaque from 102 on. A depth is exact to about a sheet, which is as
