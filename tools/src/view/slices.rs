@@ -222,7 +222,10 @@ fn picture(ui: &mut Ui, axis: usize, pane: &Pane) -> Response {
     let scale = (room[0] / size[0]).min(room[1] / size[1]);
     // A slice of a single sample's thickness is still seen.
     let [width, height] = size.map(|length| ((length * scale) as f32).max(4.0));
-    let (rect, area) = ui.allocate_exact_size(vec2(width, height), Sense::click_and_drag());
+    let size = vec2(width, height);
+    // In a row, because columns stretch what they hold.
+    let row = ui.horizontal(|ui| ui.allocate_exact_size(size, Sense::click_and_drag()));
+    let (rect, area) = row.inner;
     let name = format!("Picture across the {}", AXES[axis]);
     area.widget_info(|| WidgetInfo::labeled(Role::Image, ui.is_enabled(), &name));
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));

@@ -38,6 +38,8 @@ fn harness_of(transfer: TransferFunction) -> Harness<'static, State> {
     };
     let mut harness = Harness::builder()
         .with_size(vec2(520.0, 700.0))
+        // The font of the tests has no sign for the clipboard, which the colour picker shows.
+        .allow_missing_glyphs()
         // Two clicks are a double click.
         .with_step_dt(0.02)
         .with_max_steps(100)
@@ -63,6 +65,8 @@ fn button(harness: &Harness<'_, State>, pos: Pos2, button: PointerButton, presse
 }
 
 fn double_click(harness: &mut Harness<'_, State>, at: Pos2) {
+    // A click shortly before would make it a triple click.
+    harness.run_steps(60);
     harness.hover_at(at);
     for pressed in [true, false, true, false] {
         button(harness, at, PointerButton::Primary, pressed);
@@ -246,12 +250,16 @@ fn colour_stops_are_added_dragged_coloured_and_removed() {
     drag(&mut harness, from, to);
     near(stops(&harness)[1].0, 60.0, 0.2);
     assert_eq!(stops(&harness)[1].1, added.1);
-    // The picker opens, and a click in it changes the colour.
+    let from_value = stops(&harness)[1].0;
+    // In the picker, the colour is chosen by a click into its square.
     harness.get_by_label("Colour").click();
     harness.run();
-    let fields: Vec<_> = harness.get_all_by_role(Role::SpinButton).collect();
-    let blue = fields.iter().filter(|field| field.rect().top() > bar.bottom()).count();
-    assert!(blue > 0);
+    let well = harness.get_by_label("Colour").rect();
+    let before = stops(&harness)[1].1;
+    let at = well.left_bottom() + vec2(60.0, 150.0);
+    drag(&mut harness, at, at + vec2(30.0, 20.0));
+    assert_ne!(stops(&harness)[1].1, before);
+    assert_eq!(stops(&harness)[1].0, from_value);
     harness.key_press(Key::Escape);
     harness.run();
     harness.get_by_label("Colour stop 2").click_secondary();
@@ -275,7 +283,7 @@ fn colours_and_functions_by_name() {
     harness.get_by_label("viridis").click();
     harness.run();
     let colors = &harness.state().transfer.color;
-    assert!(colors.len() > 100 && colors[0].0 == named.shown_range().unwrap()[0], "{colors:?}");
+    assert!(colors.len() > 40 && colors[0].0 == named.shown_range().unwrap()[0], "{colors:?}");
     assert_eq!(harness.state().edits, [Edit::Committed; 2]);
 }
 
