@@ -48,20 +48,21 @@ fn lit_field(r: u32, color: vec3<f32>, gradient: vec3<f32>) -> vec3<f32> {
     return lit_from(color, gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
 }
 
-// Number of places in a part of a sheet at which its light is taken.
-const LIGHTS: u32 = 4u;
-
 // The same for a part of a sheet, in its mean light: gradients change more within a part than values
-// do.
+// do. The light is taken at four places, without a loop, which march would pay for.
 fn lit_piece(r: u32, medium: Medium, color: vec3<f32>, place: f32, next_place: f32) -> vec3<f32> {
-    var light: vec2<f32>;
-    for (var i = 0u; i < LIGHTS; i++) {
-        let at = mix(place, next_place, (f32(i) + 0.5) / f32(LIGHTS));
-        let gradient = gradient_at(r, medium, at);
-        light += light_of(gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
-    }
-    light /= f32(LIGHTS);
+    let step = 0.125 * (next_place - place);
+    let light = 0.25 * (light_at(r, medium, place + step)
+        + light_at(r, medium, place + 3.0 * step)
+        + light_at(r, medium, place + 5.0 * step)
+        + light_at(r, medium, place + 7.0 * step));
     return min(color * light.x + light.y, vec3(1.0));
+}
+
+// Returns the light of the field at a place in a sheet.
+fn light_at(r: u32, medium: Medium, place: f32) -> vec2<f32> {
+    let gradient = gradient_at(r, medium, place);
+    return light_of(gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients

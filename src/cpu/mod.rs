@@ -53,7 +53,7 @@ mod vector;
 mod window;
 
 use crate::{
-    Error, Result, Stop,
+    Error, Result,
     bricks::{Bricks, Choice},
     hierarchy::Detail,
     math::{Camera, Kernel, View},
@@ -194,7 +194,7 @@ impl CpuRenderer {
         }
         items::check_count(&records)?;
         clock.step("project");
-        let drawn = self.draw(&plan, &outline, &records, gathers, &settings.stop, &mut clock);
+        let drawn = self.draw(&plan, &outline, &records, gathers, &mut clock);
         self.spare = records;
         if settings.stop.is_requested() {
             return Err(Error::Stopped);
@@ -270,7 +270,8 @@ impl CpuRenderer {
         {
             shown = first_visible(transfer, volume.range);
         }
-        Ok(Outline { cut_pixels, choice, sheets, shown })
+        let stop = settings.stop.clone();
+        Ok(Outline { cut_pixels, choice, sheets, shown, stop })
     }
 
     /// Whether the field of the scene's volume is gathered.
@@ -470,7 +471,6 @@ impl CpuRenderer {
         outline: &Outline,
         records: &[Vec<Record>],
         gathers: bool,
-        stop: &Stop,
         clock: &mut Clock,
     ) -> (Picture, FrameStats) {
         let mut spare = std::mem::take(&mut self.spare_bins);
@@ -507,7 +507,7 @@ impl CpuRenderer {
             let parts = color[from..].par_chunks_mut(band).zip(depth[from..].par_chunks_mut(band));
             parts.zip(rows).for_each(|((color, depth), row)| {
                 let block = |column: usize| {
-                    if stop.is_requested() {
+                    if outline.stop.is_requested() {
                         return vec![EMPTY; BLOCK * BLOCK];
                     }
                     let entries = lists.of_tiles(column, row, columns);

@@ -2,6 +2,7 @@
 //! drawing.
 
 use crate::{
+    Stop,
     bricks::Choice,
     math::{Profile, Sheets, View},
     plan::{
@@ -24,6 +25,8 @@ pub struct Outline {
     pub sheets: Sheets,
     /// The ranges of values that are visible.
     pub shown: [u16; 256],
+    /// Whether drawing is to end.
+    pub stop: Stop,
 }
 
 /// The plan of a picture. Sheets are numbered from 1; sheet n lies between planes n and n + 1.

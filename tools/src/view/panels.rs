@@ -103,6 +103,13 @@ impl State {
         (self.under_cursor, self.grabbed) = (None, None);
     }
 
+    /// Sets the place at which slices cross.
+    pub fn set_place(&mut self, place: DVec3) {
+        if let Some(slices) = &mut self.slices {
+            slices.set_place(place);
+        }
+    }
+
     pub fn count_frame(&mut self, frame: &Frame) {
         self.times.push([frame.milliseconds, frame.delay]);
         let surplus = self.times.len().saturating_sub(FRAMES);
@@ -110,26 +117,44 @@ impl State {
     }
 }
 
+fn file_menu(window: &mut Window, ui: &mut Ui) {
+    if ui.button("Open… (Ctrl+O)").clicked() {
+        window.panels.ask(Ask::Open);
+        ui.close();
+    }
+    if ui.button("Save picture… (Ctrl+P)").clicked() {
+        window.panels.ask(Ask::SavePicture);
+        ui.close();
+    }
+    if ui.button("Save scene… (Ctrl+S)").clicked() {
+        window.panels.ask(Ask::SaveScene);
+        ui.close();
+    }
+    if ui.button("Copy command (Ctrl+Shift+C)").clicked() {
+        window.copy_command();
+        ui.close();
+    }
+}
+
+fn view_menu(window: &mut Window, ui: &mut Ui) {
+    for side in ["front", "back", "left", "right", "top", "bottom", "iso"] {
+        if ui.button(side).clicked() {
+            window.look_from(side);
+            ui.close();
+        }
+    }
+    if ui.button("whole scene (Home)").clicked() {
+        window.look_from("");
+        ui.close();
+    }
+    ui.separator();
+    ui.checkbox(&mut window.panels.shows_side, "panels (Tab)");
+    egui::global_theme_preference_buttons(ui);
+}
+
 pub fn menu(window: &mut Window, ui: &mut Ui) {
     egui::MenuBar::new().ui(ui, |ui| {
-        ui.menu_button("File", |ui| {
-            if ui.button("Open… (Ctrl+O)").clicked() {
-                window.panels.ask(Ask::Open);
-                ui.close();
-            }
-            if ui.button("Save picture… (Ctrl+P)").clicked() {
-                window.panels.ask(Ask::SavePicture);
-                ui.close();
-            }
-            if ui.button("Save scene… (Ctrl+S)").clicked() {
-                window.panels.ask(Ask::SaveScene);
-                ui.close();
-            }
-            if ui.button("Copy command (Ctrl+Shift+C)").clicked() {
-                window.copy_command();
-                ui.close();
-            }
-        });
+        ui.menu_button("File", |ui| file_menu(window, ui));
         ui.menu_button("Edit", |ui| {
             let can_undo = window.document.can_undo();
             if ui.add_enabled(can_undo, egui::Button::new("Undo (Ctrl+Z)")).clicked() {
@@ -140,22 +165,7 @@ pub fn menu(window: &mut Window, ui: &mut Ui) {
                 window.document.redo();
             }
         });
-        ui.menu_button("View", |ui| {
-            let sides = ["front", "back", "left", "right", "top", "bottom", "iso"];
-            for side in sides {
-                if ui.button(side).clicked() {
-                    window.look_from(side);
-                    ui.close();
-                }
-            }
-            if ui.button("whole scene (Home)").clicked() {
-                window.look_from("");
-                ui.close();
-            }
-            ui.separator();
-            ui.checkbox(&mut window.panels.shows_side, "panels (Tab)");
-            egui::global_theme_preference_buttons(ui);
-        });
+        ui.menu_button("View", |ui| view_menu(window, ui));
         let measures = window.tool == Tool::Measure;
         if ui.selectable_label(measures, "Measure").clicked() {
             window.tool = if measures { Tool::Look } else { Tool::Measure };
@@ -407,27 +417,7 @@ fn clips(window: &mut Window, ui: &mut Ui) {
                     removed = Some(number);
                 }
             });
-            if let Some(plane) = &mut clip.plane {
-                let normal = DVec3::new(plane[0], plane[1], plane[2]);
-                let ends = bounds.corners().map(|corner| corner.dot(normal));
-                let [low, high] = ends
-                    .iter()
-                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
-                let slider = egui::Slider::new(&mut plane[3], low..=high).text("offset");
-                is_changed |= ui.add(slider).changed();
-            }
-            if let Some([first, last]) = &mut clip.cuboid {
-                for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                    let range = bounds.min[axis]..=bounds.max[axis];
-                    for (end, value) in [("from", &mut first[axis]), ("to", &mut last[axis])] {
-                        let slider = egui::Slider::new(value, range.clone());
-                        is_changed |= ui.add(slider.text(format!("{name} {end}"))).changed();
-                    }
-                    // A box has an inside.
-                    let least = 1e-3 * (bounds.max[axis] - bounds.min[axis]);
-                    last[axis] = last[axis].max(first[axis] + least);
-                }
-            }
+            is_changed |= clip_sliders(clip, &bounds, ui);
         });
     }
     if let Some(number) = removed {
@@ -446,6 +436,33 @@ fn clips(window: &mut Window, ui: &mut Ui) {
     {
         window.document.keep(before);
     }
+}
+
+/// Shows the sliders of a clip, and says whether one was moved.
+fn clip_sliders(clip: &mut ClipEntry, bounds: &Bounds, ui: &mut Ui) -> bool {
+    let mut is_changed = false;
+    if let Some(plane) = &mut clip.plane {
+        let normal = DVec3::new(plane[0], plane[1], plane[2]);
+        let ends = bounds.corners().map(|corner| corner.dot(normal));
+        let [low, high] = ends
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+        let slider = egui::Slider::new(&mut plane[3], low..=high).text("offset");
+        is_changed |= ui.add(slider).changed();
+    }
+    if let Some([first, last]) = &mut clip.cuboid {
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let range = bounds.min[axis]..=bounds.max[axis];
+            for (end, value) in [("from", &mut first[axis]), ("to", &mut last[axis])] {
+                let slider = egui::Slider::new(value, range.clone());
+                is_changed |= ui.add(slider.text(format!("{name} {end}"))).changed();
+            }
+            // A box has an inside.
+            let least = 1e-3 * (bounds.max[axis] - bounds.min[axis]);
+            last[axis] = last[axis].max(first[axis] + least);
+        }
+    }
+    is_changed
 }
 
 fn frame(window: &mut Window, ui: &mut Ui) {

@@ -274,6 +274,23 @@ impl Window {
         if pressed(Modifiers::COMMAND, Key::P) {
             self.panels.ask(panels::Ask::SavePicture);
         }
+        self.take_sides(ui);
+        if pressed(Modifiers::NONE, Key::M) {
+            self.tool = if self.tool == Tool::Measure { Tool::Look } else { Tool::Measure };
+            self.measured.clear();
+        }
+        if pressed(Modifiers::NONE, Key::F1) || pressed(Modifiers::NONE, Key::H) {
+            self.panels.shows_help = !self.panels.shows_help;
+        }
+        if pressed(Modifiers::NONE, Key::Tab) {
+            self.panels.shows_side = !self.panels.shows_side;
+        }
+        self.fly(ui);
+    }
+
+    /// Takes the keys that set the view.
+    fn take_sides(&mut self, ui: &Ui) {
+        let pressed = |modifiers, key| ui.input_mut(|input| input.consume_key(modifiers, key));
         let sides = [
             (Key::Num1, "front", "back"),
             (Key::Num3, "right", "left"),
@@ -301,17 +318,6 @@ impl Window {
                 orbit.set_orthographic(is_perspective);
             });
         }
-        if pressed(Modifiers::NONE, Key::M) {
-            self.tool = if self.tool == Tool::Measure { Tool::Look } else { Tool::Measure };
-            self.measured.clear();
-        }
-        if pressed(Modifiers::NONE, Key::F1) || pressed(Modifiers::NONE, Key::H) {
-            self.panels.shows_help = !self.panels.shows_help;
-        }
-        if pressed(Modifiers::NONE, Key::Tab) {
-            self.panels.shows_side = !self.panels.shows_side;
-        }
-        self.fly(ui);
     }
 
     /// Flies while keys are held.
@@ -396,8 +402,14 @@ impl Window {
             before.options.clone_from(&self.document.scene().options);
             self.document.keep(before);
         }
-        let Some(at) = response.hover_pos() else { return };
-        let cursor = pixel(at);
+        if let Some(at) = response.hover_pos() {
+            self.point_at(ui, response, pixel(at));
+        }
+    }
+
+    /// Answers the wheel and clicks at a pixel.
+    fn point_at(&mut self, ui: &Ui, response: &egui::Response, cursor: DVec2) {
+        let size = self.size;
         let scroll = ui.input(|input| f64::from(input.smooth_scroll_delta().y));
         let pinch = ui.input(|input| f64::from(input.zoom_delta()));
         let factor = (scroll / 400.0).exp() * if scroll == 0.0 { pinch } else { 1.0 };
@@ -411,6 +423,7 @@ impl Window {
         if response.double_clicked() {
             if let Some(point) = self.panels.under_cursor {
                 self.move_camera(|orbit| orbit.center(point));
+                self.panels.set_place(point);
             }
         } else if response.clicked()
             && self.tool == Tool::Measure
