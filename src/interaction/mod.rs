@@ -6,8 +6,8 @@
 //! says that the exact picture is shown. A [`SceneFile`] keeps what is shown.
 //!
 //! All ask the same questions. How often is each value ([`Histogram`])? What lies under the cursor
-//! ([`Probe`])? What does a cut across a volume look like ([`Slice`])? The answers are plain numbers
-//! and bytes.
+//! ([`Probe`])? What does a cut across a volume look like ([`Slice`])? The answers are plain
+//! numbers and bytes.
 
 mod field;
 mod histogram;

@@ -58,7 +58,7 @@ impl Orbit {
 
     /// Turns the camera about its own position by a drag, as one looks around.
     pub fn look_around(&mut self, drag: DVec2, size: [u32; 2]) {
-        let turn = self.turned_by(-drag, size);
+        let turn = self.turned_by(drag, size);
         let camera = &mut self.camera;
         camera.focal_point = camera.position + turn * (camera.focal_point - camera.position);
         camera.view_up = self.up;

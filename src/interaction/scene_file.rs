@@ -281,12 +281,14 @@ mod tests {
 
     fn scene() -> SceneFile {
         SceneFile::parse(
-            r#"{"splatkit_scene": 1, "inputs": [{"file": "a.nrrd"}, {"file": "b.ply", "visible": false}],
+            r#"{"splatkit_scene": 1,
+                "inputs": [{"file": "a.nrrd"}, {"file": "b.ply", "visible": false}],
                 "size": [640, 480],
                 "camera": {"position": [0.1, 2, 3], "focal_point": [0, 0, 0], "view_up": [0, 0, 1],
                            "view_angle": 30},
                 "transfer": {"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [5, 0.1]]},
-                "clips": [{"plane": [1, 0, 0, 2.5]}, {"box": [[0, 0, 0], [1, 1, 1]], "inside": false}],
+                "clips": [{"plane": [1, 0, 0, 2.5]},
+                          {"box": [[0, 0, 0], [1, 1, 1]], "inside": false}],
                 "options": {"background": "white", "no-shade": true}}"#,
         )
         .expect("a scene")

@@ -382,7 +382,7 @@ impl Render {
             let mut picture = finish.reduced(picture, &camera, loaded)?;
             progress.stage(format!("Writing {}", target.name()));
             texts = finish.overlaid(&mut picture, &camera);
-            target.write(&picture.encode(target.format(), self.background.0)?)?;
+            target.write(&picture.encode(target.format(), finish.background)?)?;
             if let Some(depth) = &self.depth {
                 disk::write(depth, &picture.encode_depth()?)?;
             }

@@ -267,7 +267,7 @@ mod tests {
         assert!(wrong(r#"{"output": "x.png"}"#).contains("options.output"));
         assert!(wrong(r#"{"size": "3x3"}"#).contains("field of its own"));
         assert!(wrong(r#"{"bakground": "red"}"#).contains("no such flag"));
-        assert!(wrong(r#"{"no-shade": false}"#).contains("true"));
+        assert!(wrong(r#"{"axes": false}"#).contains("true"));
         assert!(wrong(r#"{"background": "nocolour"}"#).contains("nocolour"));
     }
 
