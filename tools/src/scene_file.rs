@@ -239,12 +239,14 @@ mod tests {
     #[test]
     fn a_scene_file_stands_for_flags() {
         let words = scene(
-            r#"{"splatkit_scene": 1, "inputs": [{"file": "-a.ply"}, {"file": "b.ply", "visible": false}],
+            r#"{"splatkit_scene": 1,
+                "inputs": [{"file": "-a.ply"}, {"file": "b.ply", "visible": false}],
                 "size": [64, 48],
                 "camera": {"position": [1, 2, 3], "focal_point": [0, 0, 0], "view_up": [0, 0, 1],
                            "height": 2.5},
                 "transfer": {"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [5, 0.1]]},
-                "clips": [{"plane": [-1, 0, 0, 2.5]}, {"box": [[0, 0, 0], [1, 1, 1]], "inside": false}],
+                "clips": [{"plane": [-1, 0, 0, 2.5]},
+                          {"box": [[0, 0, 0], [1, 1, 1]], "inside": false}],
                 "options": {"background": "white", "no-shade": true, "iso": [1, "2:red"]}}"#,
         )
         .expect("flags");

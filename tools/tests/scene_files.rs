@@ -14,15 +14,18 @@ fn folder() -> Folder {
 #[test]
 fn a_scene_file_draws_what_its_flags_draw() {
     let folder = folder();
-    let camera = r#"{"position": [40, -20.1, 25], "focal_point": [7, 7.3, 7], "view_up": [0, 0, 1], "view_angle": 31.7}"#;
-    let transfer = r#"{"color": [[0, 0.9, 0.5, 0.1]], "opacity": [[60, 0], [200, 0.7]], "unit": 1.5, "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}"#;
+    let camera = r#"{"position": [40, -20.1, 25], "focal_point": [7, 7.3, 7], "view_up": [0, 0, 1],
+        "view_angle": 31.7}"#;
+    let transfer = r#"{"color": [[0, 0.9, 0.5, 0.1]], "opacity": [[60, 0], [200, 0.7]],
+        "unit": 1.5, "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}"#;
     std::fs::create_dir(folder.path("scenes")).unwrap();
     folder.put(
         "scenes/s.json",
         format!(
             r#"{{"splatkit_scene": 1, "inputs": [{{"file": "../a.nrrd"}}, {{"file": "../a.ply"}}],
                 "size": [64, 48], "camera": {camera}, "transfer": {transfer},
-                "clips": [{{"plane": [1, 0, 0, 9.5]}}], "options": {{"background": "white", "engine": "cpu"}}}}"#
+                "clips": [{{"plane": [1, 0, 0, 9.5]}}],
+                "options": {{"background": "white", "engine": "cpu"}}}}"#
         ),
     );
     folder

@@ -343,8 +343,9 @@ fn field(window: &mut Window, ui: &mut Ui, name: &str, label: &str, hint: &str) 
     let id = ui.scope_id().with(name);
     let own = text_option(window, name);
     let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| own.clone());
-    ui.label(label);
+    let label = ui.label(label);
     let response = ui.add(egui::TextEdit::singleline(&mut text).hint_text(hint));
+    let response = response.labelled_by(label.id);
     if response.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, text));
     } else {
@@ -359,16 +360,18 @@ fn field(window: &mut Window, ui: &mut Ui, name: &str, label: &str, hint: &str) 
 
 fn look(window: &mut Window, ui: &mut Ui) {
     ui.horizontal(|ui| {
-        ui.label("Background");
+        let label = ui.label("Background");
         let own = text_option(window, "background");
         let own = if own.is_empty() { "black".to_owned() } else { own };
-        egui::ComboBox::from_id_salt("background").selected_text(&own).show_ui(ui, |ui| {
+        let choice = egui::ComboBox::from_id_salt("background").selected_text(&own);
+        let shown = choice.show_ui(ui, |ui| {
             for name in BACKGROUNDS {
                 if ui.selectable_label(own == name, name).clicked() {
                     set_option(window, "background", Some(Value::String(name.into())));
                 }
             }
         });
+        shown.response.labelled_by(label.id);
     });
     switch(window, ui, "no-shade", "Without light");
     switch(window, ui, "axes", "Axes");
