@@ -33,8 +33,8 @@ pub struct SceneFile {
     /// Where the picture is taken from. Without it, the camera is fitted to the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraEntry>,
-    /// The transfer function of the field, in the layout of its own files. Without it, it is made
-    /// for the values.
+    /// The transfer function of the field, in the layout of its own files, or the name of one, or
+    /// the path of its file. Without it, it is made for the values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transfer: Option<Value>,
     /// The clips that cut the scene.
@@ -131,6 +131,9 @@ impl SceneFile {
         })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         scene.inputs.iter_mut().for_each(|input| input.file = folder.join(&input.file));
+        if let Some(file) = scene.transfer_file() {
+            scene.transfer = Some(folder.join(file).to_string_lossy().into());
+        }
         Ok(scene)
     }
 
@@ -154,13 +157,21 @@ impl SceneFile {
         Ok(scene)
     }
 
-    /// Returns the transfer function, if the scene has one.
+    /// Returns the file of the transfer function, if the scene names one.
+    fn transfer_file(&self) -> Option<PathBuf> {
+        let name = self.transfer.as_ref()?.as_str()?;
+        (!TransferFunction::NAMES.contains(&name)).then(|| name.into())
+    }
+
+    /// Returns the transfer function, if the scene has one of its own, rather than a name or a
+    /// file.
     ///
     /// # Errors
     /// What is wrong with it.
     pub fn transfer_function(&self) -> Result<Option<TransferFunction>, String> {
         let read = |value: &Value| TransferFunction::from_json(&value.to_string());
-        self.transfer.as_ref().map(read).transpose().map_err(|error| format!("transfer: {error}"))
+        let own = self.transfer.as_ref().filter(|transfer| !transfer.is_string());
+        own.map(read).transpose().map_err(|error| format!("transfer: {error}"))
     }
 
     /// Sets the transfer function.
@@ -174,6 +185,9 @@ impl SceneFile {
         let mut own = self.clone();
         for input in &mut own.inputs {
             input.file = relative(&input.file, folder);
+        }
+        if let Some(file) = own.transfer_file() {
+            own.transfer = Some(relative(&file, folder).to_string_lossy().into());
         }
         // Maps with text keys and numbers always become JSON.
         let mut text = serde_json::to_string_pretty(&own).unwrap_or_default();
@@ -331,10 +345,14 @@ mod tests {
         let scenes = folder.path().join("scenes");
         std::fs::create_dir(&scenes).expect("a folder");
         let file = scenes.join("s.json");
-        SceneFile::new([data.join("a.ply")]).write(&file).expect("written");
+        std::fs::write(data.join("t.json"), "{}").expect("a file");
+        let mut scene = SceneFile::new([data.join("a.ply")]);
+        scene.transfer = Some(data.join("t.json").to_string_lossy().into());
+        scene.write(&file).expect("written");
         let text = std::fs::read_to_string(&file).expect("text");
-        assert!(text.contains("../data/a.ply"), "{text}");
+        assert!(text.contains("../data/a.ply") && text.contains("../data/t.json"), "{text}");
         let read = SceneFile::read(&file, &Limits::default()).expect("read");
+        assert!(read.transfer_file().is_some_and(|file| file.exists()));
         assert_eq!(
             read.inputs[0].file.canonicalize().unwrap(),
             data.join("a.ply").canonicalize().unwrap()

@@ -8,7 +8,6 @@ use splatkit::{
     Error,
     input::Limits,
     interaction::{ClipEntry, SceneFile},
-    volume::TransferFunction,
 };
 use std::{
     ffi::{OsStr, OsString},
@@ -134,10 +133,7 @@ pub fn flags(
     if let Some(transfer) = scene.transfer.as_ref().filter(|_| !given.has("transfer")) {
         let mut flag = OsString::from("--transfer=");
         match transfer {
-            Value::String(name) if TransferFunction::NAMES.contains(&name.as_str()) => {
-                flag.push(name);
-            }
-            Value::String(file) => flag.push(path.parent().unwrap_or(Path::new("")).join(file)),
+            Value::String(name) => flag.push(name),
             whole => flag.push(whole.to_string()),
         }
         flags.push(flag);

@@ -52,6 +52,12 @@ fn a_scene_file_draws_what_its_flags_draw() {
     // Flags beside the scene count more.
     folder.run("render scenes/s.json -o other.png --size 32x32 --azimuth 70").ok();
     assert!(is_png(&read("other.png"), 32, 32));
+    // A transfer function in a file of its own, seen from the scene's folder.
+    folder.put("scenes/t.json", transfer);
+    let named = std::fs::read_to_string(folder.path("scenes/s.json")).unwrap();
+    folder.put("scenes/n.json", named.replace(transfer, "\"t.json\""));
+    folder.run("render scenes/n.json -o named.png").ok();
+    assert_eq!(read("named.png"), read("scene.png"));
     // The file itself draws beside itself.
     folder.run("scenes/s.json -o same.png").ok();
     assert_eq!(read("same.png"), read("scene.png"));

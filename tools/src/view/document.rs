@@ -228,16 +228,7 @@ impl Document {
 
     /// Saves the scene, and remembers the file.
     pub fn save(&mut self, path: &Path) -> splatkit::Result<()> {
-        let mut scene = self.now.clone();
-        // A transfer function's file is named as seen from the scene's folder.
-        if let (Some(Value::String(name)), Some(folder)) = (&scene.transfer, path.parent())
-            && !TransferFunction::NAMES.contains(&name.as_str())
-        {
-            let file = Path::new(name).canonicalize().unwrap_or_else(|_| name.into());
-            let file = file.strip_prefix(folder).unwrap_or(&file).to_string_lossy().into_owned();
-            scene.transfer = Some(Value::String(file));
-        }
-        scene.write(path)?;
+        self.now.write(path)?;
         self.path = Some(path.to_owned());
         Ok(())
     }
