@@ -122,8 +122,7 @@ pub struct Finish {
 }
 
 impl Finish {
-    /// Averages a picture down and draws edges over it. The statistics of the texts are for
-    /// `--json`.
+    /// Averages a picture down and draws edges over it.
     fn reduced(
         &self,
         picture: Picture,

@@ -32,9 +32,6 @@ const NOT_OF_PICTURES: &[&str] = &[
     "overwrite",
     "json",
     "turntable",
-    "path",
-    "fps",
-    "raw",
     "help",
     "version",
     "verbose",
@@ -55,7 +52,6 @@ pub const CAMERA: &[&str] = &[
     "azimuth",
     "elevation",
     "orthographic",
-    "path",
 ];
 
 /// Returns the arguments with a scene file replaced by what it stands for; `None` if there is none.

@@ -51,6 +51,12 @@ impl View {
 
 /// Opens the window and waits until it is closed.
 fn open(document: Document) -> Result<(), Failure> {
+    let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    if cfg!(target_os = "linux") && !["DISPLAY", "WAYLAND_DISPLAY"].into_iter().any(is_set) {
+        let message = "a window needs a display, but neither DISPLAY nor WAYLAND_DISPLAY is set; \
+                       `splatkit render` draws without one";
+        return Err(Failure::Usage(message.into()));
+    }
     let size = document.scene().size.map_or(SIZE, |size| size.map(|side| side as f32));
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()

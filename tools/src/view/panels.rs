@@ -2,7 +2,7 @@
 
 use super::{
     curve::{self, CurveEditor, Edit},
-    painter::{Frame, Stage},
+    painter::Stage,
     slices::SlicePanes,
     window::{Tool, Window},
 };
@@ -22,8 +22,6 @@ use std::{
     },
 };
 
-/// Frames whose times are shown.
-const FRAMES: usize = 120;
 /// Backgrounds to choose from.
 const BACKGROUNDS: [&str; 5] = ["black", "white", "#10141c", "gray", "none"];
 
@@ -57,8 +55,6 @@ pub struct State {
     /// The world point under the cursor.
     pub under_cursor: Option<DVec3>,
     asked: Option<Asked>,
-    /// Times of moving frames in milliseconds, and their delays behind the hand.
-    times: Vec<[f64; 2]>,
     bounds: Option<Bounds>,
     curve: Option<CurveEditor>,
     slices: Option<SlicePanes>,
@@ -75,7 +71,6 @@ impl Default for State {
             before_edit: None,
             under_cursor: None,
             asked: None,
-            times: Vec::new(),
             bounds: None,
             curve: None,
             slices: None,
@@ -108,12 +103,6 @@ impl State {
         if let Some(slices) = &mut self.slices {
             slices.set_place(place);
         }
-    }
-
-    pub fn count_frame(&mut self, frame: &Frame) {
-        self.times.push([frame.milliseconds, frame.delay]);
-        let surplus = self.times.len().saturating_sub(FRAMES);
-        self.times.drain(..surplus);
     }
 }
 

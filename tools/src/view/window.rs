@@ -14,7 +14,7 @@ use eframe::egui::{
 use glam::{DVec2, DVec3};
 use serde_json::Value;
 use splatkit::{
-    interaction::{CameraEntry, ClipEntry, Orbit, SceneFile, point_at},
+    interaction::{CameraEntry, ClipEntry, Orbit, Probe, SceneFile},
     picture::PictureFormat,
     scene::{Item, Settings},
     volume::TransferFunction,
@@ -455,10 +455,9 @@ impl Window {
 
     /// Returns the world point under the cursor.
     fn point_under(&self, cursor: DVec2) -> Option<DVec3> {
-        let depth = self.depth_at(cursor)?;
         let (frame, _) = self.frame.as_ref()?;
         let view = frame.camera.view(self.size).ok()?;
-        Some(point_at(&view, cursor, depth))
+        Probe::picked(&frame.picture, &view, cursor)
     }
 
     /// Draws the points that were picked, and the distance between them.
@@ -636,7 +635,6 @@ impl Window {
         let image = ColorImage::from_rgba_unmultiplied(size, &bytes);
         let options =
             if frame.is_exact() { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
-        self.panels.count_frame(&frame);
         let texture = match self.frame.take() {
             Some((_, mut texture)) => {
                 texture.set(image, options);
