@@ -126,7 +126,7 @@ fn a_film_has_the_frames_of_the_numbered_pictures() {
                 drawn.flat_map(|(pixel, _)| pixel[..3].to_vec()).collect()
             };
             let quality = psnr(&colors(found), &colors(still));
-            assert!(quality > 38.0, "{back}: {quality} dB");
+            assert!(quality > 36.0, "{back}: {quality} dB");
         }
         let clear = stills[0].chunks_exact(4).filter(|pixel| pixel[3] == 0).count();
         assert_eq!(clear > PIXELS / 10, background == "none", "{clear}");

@@ -154,7 +154,10 @@ fn arguments(container: Container, film: Film) -> Vec<String> {
         Container::Webm => ("yuva420p", VP9),
     };
     // Colours by ITU-R BT.709, as players expect them of films of this time.
-    let mut filter = format!("scale=out_color_matrix=bt709:out_range=tv,format={layout}");
+    let mut filter = format!(
+        "scale=out_color_matrix=bt709:out_range=tv,format={layout},setparams=range=tv:\
+         colorspace=bt709:color_primaries=bt709:color_trc=bt709"
+    );
     if codec == H264 {
         // Two by two pixels share a colour, so sides are even.
         let [red, green, blue] =
@@ -163,7 +166,6 @@ fn arguments(container: Container, film: Film) -> Vec<String> {
             "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=0x{red:02x}{green:02x}{blue:02x},{filter}"
         );
     }
-    let tags = "-colorspace bt709 -color_primaries bt709 -color_trc bt709 -color_range tv";
     let mut arguments: Vec<String> = input.split(' ').map(str::to_owned).collect();
     arguments.extend(["-vf".to_owned(), filter]);
     let container = match container {
@@ -171,7 +173,7 @@ fn arguments(container: Container, film: Film) -> Vec<String> {
         Container::Mov => "-movflags +faststart -f mov",
         Container::Webm => "-f webm",
     };
-    let rest = [codec, tags, container].join(" ");
+    let rest = format!("{codec} {container}");
     arguments.extend(rest.split(' ').map(str::to_owned));
     arguments
 }
