@@ -8,7 +8,7 @@ use super::{
 use crate::{Error, Result};
 use std::{
     fs::File,
-    io::{self, BufWriter, Write},
+    io::{self, BufWriter, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
@@ -43,6 +43,12 @@ impl AtomicFile {
         let target = target(wanted).map_err(fail)?;
         let part = Part::create(&target).map_err(fail)?;
         Ok(Self { wanted: wanted.to_owned(), target, part })
+    }
+
+    /// Returns the path of the temporary file, for another program that writes it. The program must
+    /// keep the file and not put another one in its place.
+    pub fn part(&self) -> &Path {
+        self.part.path()
     }
 
     /// Gives the file its name, once its whole content is on disk.
@@ -99,6 +105,12 @@ impl Write for AtomicFile {
     fn flush(&mut self) -> io::Result<()> {
         step(Step::Flush)?;
         self.part.file().flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, place: SeekFrom) -> io::Result<u64> {
+        self.part.file().seek(place)
     }
 }
 

@@ -107,6 +107,10 @@ impl Part {
         &self.file
     }
 
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Renames the file to the requested path.
     pub fn rename(self, wanted: &Path) -> io::Result<()> {
         let mut live = live();

@@ -1,4 +1,5 @@
-//! Pure functions that the rest builds on: the camera, the sheets, the kernel, and points in space.
+//! Pure functions that the rest builds on: the camera and its path, the sheets, the kernel, and
+//! points in space.
 
 mod camera;
 pub(crate) mod cosine;
@@ -7,10 +8,12 @@ mod fit;
 pub(crate) mod hull;
 mod kernel;
 pub(crate) mod neighbours;
+mod path;
 mod sheets;
 pub(crate) mod weld;
 
 pub use camera::{Bounds, Camera, Projection, View};
 pub(crate) use eigen::eigen;
 pub use kernel::{Kernel, Profile, Tensor};
+pub use path::{CameraPath, Keyframe};
 pub use sheets::Sheets;

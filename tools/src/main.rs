@@ -18,6 +18,7 @@ mod engine;
 mod failure;
 mod figures;
 mod formats;
+mod frames;
 mod generate;
 mod given;
 mod gpus;
@@ -28,6 +29,7 @@ mod limits;
 mod load;
 mod man;
 mod method;
+mod motion;
 mod output;
 mod overlay;
 mod parse;
@@ -45,6 +47,7 @@ mod terminal;
 mod threads;
 mod timing;
 mod transfer;
+mod video;
 #[cfg(feature = "window")]
 mod view;
 

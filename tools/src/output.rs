@@ -112,12 +112,16 @@ fn folder(path: &Path) -> &Path {
 
 /// Writes to stdout. It is no error if the reader has closed it.
 pub fn stdout(bytes: &[u8]) -> Result<(), Failure> {
+    offer(bytes).map(drop)
+}
+
+/// Writes to stdout. Returns whether somebody still reads it.
+pub fn offer(bytes: &[u8]) -> Result<bool, Failure> {
     let mut out = std::io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure::output(Path::new("stdout"), e))
-        }
-        _ => Ok(()),
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(false),
+        Err(error) => Err(Failure::output(Path::new("stdout"), error)),
     }
 }
 

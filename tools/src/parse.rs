@@ -170,6 +170,12 @@ pub fn finite(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| "a number is needed".into())
 }
 
+/// Frames per second.
+pub fn rate(text: &str) -> Result<f64, String> {
+    let fits = text.parse().ok().filter(|rate: &f64| (0.1..=1000.0).contains(rate));
+    fits.ok_or_else(|| "a number from 0.1 to 1000 is needed".into())
+}
+
 /// Degrees between 0 and 180.
 pub fn view_angle(text: &str) -> Result<f64, String> {
     positive(text)

@@ -5,17 +5,24 @@ use crate::{
     describe,
     engine::EngineFlags,
     failure::Failure,
+    frames::{Frames, numbered},
     given::Given,
-    output::{self, Target},
+    motion::{Motion, MotionFlags},
+    output,
     overlay::{Overlay, OverlayFlags},
     parse::{self, Background},
     progress::Progress,
     samples::Samples,
     scene::{Loaded, SceneFlags},
+    video::{Film, Format},
 };
 use clap::Args;
 use splatkit::{
-    FrameStats, Renderer, disk, math::Camera, picture::Picture, reference, scene::Settings,
+    FrameStats, Renderer, disk,
+    math::Camera,
+    picture::{Picture, PictureFormat},
+    reference,
+    scene::Settings,
 };
 use std::{
     path::{Path, PathBuf},
@@ -26,29 +33,35 @@ use std::{
 pub struct Render {
     #[command(flatten)]
     scene: SceneFlags,
-    /// Write the picture to this .png or .jpg file, or to stdout as PNG if it is `-`. Frames of a
-    /// turntable are numbered: out.png becomes out_0000.png, and {frame} or {frame:04} in the name
-    /// is replaced by the number [default: beside the first input: bunny.png for bunny.ply, or
-    /// bunny_2.png if bunny.png exists]
+    /// Write the picture to this .png or .jpg file, or to stdout as PNG if it is `-`. With
+    /// --turntable or --path, write an animation to this .gif, .webp or .apng file, or with ffmpeg,
+    /// if it is installed, to this .mp4, .webm or .mov file. Or write numbered pictures: out.png
+    /// becomes out_0000.png, and {frame} or {frame:04} in the name is replaced by the number
+    /// [default: beside the first input: bunny.png for bunny.ply, or bunny_2.png if bunny.png
+    /// exists]
     #[arg(short, long, value_name = "FILE", allow_hyphen_values = true)]
     output: Option<PathBuf>,
+    /// Write raw frames to stdout (-o -), for another program: rows from the top, and a byte each
+    /// for red, green, blue and opacity.
+    #[arg(long, requires = "output")]
+    raw: bool,
     /// Also write the depths to this file: a grey PNG of 16 bits, white for the nearest, black for
     /// nothing.
-    #[arg(long, value_name = "FILE.png", conflicts_with = "turntable")]
+    #[arg(long, value_name = "FILE.png", conflicts_with_all = ["turntable", "path"])]
     depth: Option<PathBuf>,
     /// Replace existing files.
     #[arg(long)]
     overwrite: bool,
-    /// Set the background colour: a name, '#rgb', '#rrggbb', or none for a transparent PNG.
+    /// Set the background colour: a name, '#rgb', '#rrggbb', or none for transparent pixels: of
+    /// .png, .gif, .webp, .apng, .webm and .mov files.
     #[arg(long, value_name = "COLOR", value_parser = parse::background, default_value = "#000000")]
     background: Background,
     /// Draw this many pixels for each pixel of the picture and average them: 1, 4, 9, 16 or 64.
     /// auto draws as many as fit into 512x512 pixels in all, at most 16 for volumes.
     #[arg(long, value_name = "N|auto", default_value = "auto")]
     samples: Samples,
-    /// Draw this many frames while the camera turns once around the up axis.
-    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    turntable: Option<u32>,
+    #[command(flatten)]
+    motion: MotionFlags,
     #[command(flatten)]
     overlay: OverlayFlags,
     #[command(flatten)]
@@ -157,6 +170,14 @@ impl Finish {
     }
 }
 
+/// What is drawn, and where it goes.
+struct Run<'a> {
+    ready: &'a Ready,
+    motion: Motion,
+    film: Film,
+    frames: Frames,
+}
+
 /// The last frame, and the median time of all.
 struct Drawn {
     stats: FrameStats,
@@ -169,10 +190,16 @@ struct Drawn {
 impl Render {
     pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
         let begun = Instant::now();
-        let frames = self.turntable.unwrap_or(1);
         let output = self.output.clone().unwrap_or_else(|| self.beside());
-        let targets = self.targets(&output, frames)?;
-        let ready = self.prepare(&targets, given, progress)?;
+        let motion = self.motion.open(&self.scene.limits())?;
+        let film = Film {
+            size: self.engine.size,
+            frames: motion.frames(),
+            rate: self.motion.rate(),
+            background: self.background.0,
+        };
+        let frames = self.frames(&output, &film, progress)?;
+        let ready = self.prepare(&frames, &motion, given, progress)?;
         let (loaded, settings) = (&ready.loaded, &ready.settings);
         let start = Instant::now();
         let mut drawer = match self.reference {
@@ -180,7 +207,8 @@ impl Render {
             false => Drawer::engine(&self.engine, loaded, progress)?,
         };
         let upload_ms = milliseconds(start);
-        let drawn = self.draw_frames(&mut drawer, &ready, &targets, progress)?;
+        let run = Run { ready: &ready, motion, film, frames };
+        let drawn = self.draw_frames(&mut drawer, &run, progress)?;
         progress.clear();
         let Drawn { stats, camera, frame_ms, overlay } = drawn;
         tracing::info!(
@@ -197,7 +225,8 @@ impl Render {
                 "output": output.to_string_lossy(),
                 "width": self.engine.size[0],
                 "height": self.engine.size[1],
-                "frames": frames,
+                "frames": film.frames,
+                "fps": run.frames.is_film().then_some(film.rate),
                 "adapter": drawer.adapter(),
                 "splats": stats.splats,
                 "hidden": stats.hidden,
@@ -216,30 +245,34 @@ impl Render {
                 "settings": describe::settings(&loaded.scene, settings),
             }))?;
         }
-        self.report(&targets, begun, progress);
+        self.report(&run, begun, progress);
         Ok(())
     }
 
     /// Loads the scene, and finds what the camera needs.
     fn prepare(
         &self,
-        targets: &[Target],
+        frames: &Frames,
+        motion: &Motion,
         given: &Given,
         progress: &Progress,
     ) -> Result<Ready, Failure> {
         let mut loaded = self.load(given, progress)?;
-        let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
-        files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
+        loaded.read.extend(self.motion.file().map(Path::to_owned));
+        let mut files = frames.files().into_iter().chain(self.depth.as_deref());
+        files.try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
         let settings = self.engine.settings(&loaded, self.samples)?;
         if let Some(warning) = self.engine.idle(&loaded.scene) {
             progress.warn(warning);
         }
-        progress.stage("Framing the scene");
-        loaded.find_seen(&self.camera, &settings)?;
-        let (stance, origin) = self.camera.stance(&loaded.subject);
-        if origin == Origin::Guess {
-            let up = direction_name(stance.up);
-            progress.note(format_args!("up: {up}, guessed from the shape; --up sets another"));
+        if motion.is_fitted() {
+            progress.stage("Framing the scene");
+            loaded.find_seen(&self.camera, &settings)?;
+            let (stance, origin) = self.camera.stance(&loaded.subject);
+            if origin == Origin::Guess {
+                let up = direction_name(stance.up);
+                progress.note(format_args!("up: {up}, guessed from the shape; --up sets another"));
+            }
         }
         let finish = self.finish(&loaded)?;
         Ok(Ready { loaded, settings, finish })
@@ -322,116 +355,145 @@ impl Render {
             first.with_file_name(name)
         };
         let is_free = |path: &PathBuf| {
-            let path = if self.turntable.is_some() { numbered(path, 0) } else { Ok(path.clone()) };
+            let path = match self.motion.is_moving() {
+                true => numbered(path, 0),
+                false => Ok(path.clone()),
+            };
             self.overwrite || path.is_ok_and(|path| path.symlink_metadata().is_err())
         };
         (1..).map(named).find(is_free).unwrap_or_else(|| named(1))
     }
 
     /// Prints what was written: path, size and time.
-    fn report(&self, targets: &[Target], begun: Instant, progress: &Progress) {
-        let [Some(first), Some(last)] =
-            [targets.first(), targets.last()].map(|target| target.and_then(Target::file))
-        else {
-            return;
-        };
+    fn report(&self, run: &Run, begun: Instant, progress: &Progress) {
+        let files = run.frames.files();
+        let [Some(first), Some(last)] = [files.first(), files.last()] else { return };
         let [width, height] = self.engine.size;
         let seconds = begun.elapsed().as_secs_f64();
-        let bytes: u64 = targets
-            .iter()
-            .filter_map(|target| target.file()?.metadata().ok())
-            .map(|file| file.len())
-            .sum();
-        let size = format!("{width} × {height} pixels, {}", size_of_file(bytes));
-        if targets.len() == 1 {
-            progress.note(format_args!("{}: {size}, {seconds:.1} s", first.display()));
+        let bytes = files.iter().filter_map(|file| file.metadata().ok()).map(|file| file.len());
+        let size = format!("{width} × {height} pixels, {}", size_of_file(bytes.sum()));
+        let (first, last) = (first.display(), last.display());
+        let count = run.film.frames;
+        if run.frames.is_film() {
+            progress.note(format_args!("{first}: {count} frames of {size}, {seconds:.1} s"));
+        } else if count == 1 {
+            progress.note(format_args!("{first}: {size}, {seconds:.1} s"));
         } else {
             progress.note(format_args!(
-                "{} to {}: {} frames of {size} in all, {seconds:.1} s",
-                first.display(),
-                last.display(),
-                targets.len()
+                "{first} to {last}: {count} frames of {size} in all, {seconds:.1} s"
             ));
         }
     }
 
-    /// Draws and writes one frame for each target.
+    /// Draws and writes the frames.
     fn draw_frames(
         &self,
         drawer: &mut Drawer,
-        ready: &Ready,
-        targets: &[Target],
+        run: &Run,
         progress: &Progress,
     ) -> Result<Drawn, Failure> {
-        let Ready { loaded, settings, finish } = ready;
+        let Run { ready: Ready { loaded, settings, finish }, motion, film, frames } = run;
         let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
         let free = self.free(settings, finish);
-        let cameras = match self.turntable {
-            Some(frames) => self.camera.turntable(&loaded.subject, free, frames)?,
-            None => vec![self.camera.camera(&loaded.subject, free)?],
-        };
+        let cameras = motion.cameras(&self.camera, &loaded.subject, free)?;
         let mut last = (FrameStats::default(), cameras[0].clone());
-        for (target, camera) in targets.iter().zip(cameras) {
-            progress.stage(format!("Drawing {}", target.name()));
+        let mut is_shown = false;
+        let mut writer = frames.open(*film)?;
+        let count = cameras.len();
+        for (frame, camera) in cameras.into_iter().enumerate() {
+            progress.stage(format!("Drawing {}", frames.name(frame)));
             let start = Instant::now();
             let (picture, stats) = drawer.draw(loaded, &camera, settings)?;
             times.push(milliseconds(start));
-            self.engine.require_content(&picture)?;
+            match self.engine.require_content(&picture) {
+                Ok(()) => is_shown = true,
+                // A camera on a path may look past the scene for a while.
+                Err(_) if !motion.is_fitted() && (is_shown || frame + 1 < count) => {}
+                Err(failure) => return Err(failure),
+            }
             let mut picture = finish.reduced(picture, &camera, loaded)?;
-            progress.stage(format!("Writing {}", target.name()));
+            progress.stage(format!("Writing {}", frames.name(frame)));
             texts = finish.overlaid(&mut picture, &camera);
-            target.write(&picture.encode(target.format(), finish.background)?)?;
+            let is_wanted = writer.add(&picture)?;
             if let Some(depth) = &self.depth {
                 disk::write(depth, &picture.encode_depth()?)?;
             }
             last = (stats, camera);
+            if !is_wanted {
+                break;
+            }
         }
+        writer.finish()?;
         times.sort_by(f64::total_cmp);
         let (stats, camera) = last;
         Ok(Drawn { stats, camera, frame_ms: times[times.len() / 2], overlay: texts })
     }
 
-    /// Returns one target per frame. Fails if one of the files exists and may not be replaced, or
+    /// Returns where the frames go. Fails if one of the files exists and may not be replaced, or
     /// if the first file cannot be written.
-    fn targets(&self, output: &Path, frames: u32) -> Result<Vec<Target>, Failure> {
-        let stdout = output.as_os_str() == "-";
-        if stdout && self.json {
-            return Err(Failure::Usage("--json and a picture cannot both go to stdout".into()));
+    fn frames(&self, output: &Path, film: &Film, progress: &Progress) -> Result<Frames, Failure> {
+        let frames = self.unchecked_frames(output, film)?;
+        if let Frames::Film(path, format) = &frames {
+            format.check(path, film)?;
+            if let Some(warning) = format.loss(film) {
+                progress.warn(warning);
+            }
         }
-        if stdout && self.turntable.is_some() {
-            return Err(Failure::Usage("the frames of a turntable cannot go to stdout".into()));
+        let is_played = matches!(&frames, Frames::Film(_, format) if *format != Format::Raw);
+        if let Some(warning) = self.motion.idle(is_played) {
+            progress.warn(warning);
         }
         if let Some(depth) = &self.depth {
-            if splatkit::picture::PictureFormat::of(depth)? != splatkit::picture::PictureFormat::Png
-            {
-                return Err(Failure::Usage(format!(
-                    "{}: depths are written as .png",
-                    depth.display()
-                )));
-            }
-            output::check(depth, self.overwrite)?;
+            self.check_depth(depth, &frames)?;
         }
-        let names: Vec<PathBuf> = match self.turntable {
-            None => vec![output.to_owned()],
-            Some(_) => {
-                (0..frames).map(|frame| numbered(output, frame)).collect::<Result<_, _>>()?
-            }
-        };
-        if let Some(depth) =
-            self.depth.as_ref().filter(|depth| names.iter().any(|name| is_same(name, depth)))
-        {
-            let message =
-                format!("{}: the picture and its depths would be one file", depth.display());
-            return Err(Failure::Usage(message));
-        }
-        let targets: Vec<Target> =
-            names.iter().map(|name| Target::new(name, self.overwrite)).collect::<Result<_, _>>()?;
-        // All frames of a turntable go to the same folder, so the first one is enough.
-        for file in names.first().filter(|_| !stdout).into_iter().chain(&self.depth) {
+        // All numbered pictures go to the same folder, so the first one is enough.
+        let files = frames.files();
+        for file in files.first().copied().into_iter().chain(self.depth.as_deref()) {
             output::try_writing(file, &self.scene.inputs)?;
         }
-        Ok(targets)
+        Ok(frames)
+    }
+
+    /// Returns where `-o` says that the frames go.
+    fn unchecked_frames(&self, output: &Path, film: &Film) -> Result<Frames, Failure> {
+        let is_stdout = output.as_os_str() == "-";
+        let refuse = |message: &str| Err(Failure::Usage(message.into()));
+        if is_stdout && self.json {
+            return refuse("--json and a picture cannot both go to stdout");
+        }
+        if self.raw && !is_stdout {
+            return refuse("--raw writes to stdout: give -o -");
+        }
+        if self.raw {
+            return Ok(Frames::Film(output.to_owned(), Format::Raw));
+        }
+        if is_stdout && self.motion.is_moving() {
+            return refuse("the frames of an animation can go to stdout only with --raw");
+        }
+        match Format::of(output).filter(|_| self.motion.is_moving()) {
+            Some(format) => {
+                output::check(output, self.overwrite)?;
+                Ok(Frames::Film(output.to_owned(), format))
+            }
+            None => {
+                let count = self.motion.is_moving().then_some(film.frames);
+                Frames::pictures(output, count, self.overwrite)
+            }
+        }
+    }
+
+    /// Refuses a file of depths that cannot be written, or that is also the picture's.
+    fn check_depth(&self, depth: &Path, frames: &Frames) -> Result<(), Failure> {
+        let refuse = |message: &str| Err(Failure::Usage(format!("{}: {message}", depth.display())));
+        if PictureFormat::of(depth)? != PictureFormat::Png {
+            return refuse("depths are written as .png");
+        }
+        output::check(depth, self.overwrite)?;
+        if frames.files().into_iter().any(|file| is_same(file, depth)) {
+            return refuse("the picture and its depths would be one file");
+        }
+        Ok(())
     }
 }
 
@@ -458,59 +520,4 @@ fn size_of_file(bytes: u64) -> String {
 /// Returns the milliseconds since an instant.
 pub fn milliseconds(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
-}
-
-/// Returns the name of a turntable's frame.
-fn numbered(path: &Path, frame: u32) -> Result<PathBuf, Failure> {
-    // A name that is not valid Unicode has no placeholder, but can be numbered.
-    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    let Some(start) = name.find("{frame") else {
-        let mut name = path.file_stem().unwrap_or_default().to_owned();
-        name.push(format!("_{frame:04}."));
-        name.push(path.extension().unwrap_or_default());
-        return Ok(path.with_file_name(name));
-    };
-    let (before, rest) = name.split_at(start);
-    let parts = rest.strip_prefix("{frame").and_then(|rest| rest.split_once('}'));
-    let width = parts.and_then(|(format, _)| match format.strip_prefix(':') {
-        None => format.is_empty().then_some(0),
-        Some(digits) => digits.parse().ok().filter(|width| *width <= 20),
-    });
-    match (parts, width) {
-        (Some((_, after)), Some(width)) => {
-            Ok(path.with_file_name(format!("{before}{frame:0width$}{after}")))
-        }
-        _ => Err(Failure::Usage(format!(
-            "{}: the placeholder must be {{frame}} or {{frame:04}}",
-            path.display()
-        ))),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_are_numbered() {
-        let name =
-            |text: &str| numbered(Path::new(text), 7).map(|path| path.display().to_string()).ok();
-        assert_eq!(name("a/out.png").as_deref(), Some("a/out_0007.png"));
-        assert_eq!(name("a/{frame}.png").as_deref(), Some("a/7.png"));
-        assert_eq!(name("a/x{frame:03}y.jpg").as_deref(), Some("a/x007y.jpg"));
-        assert!(
-            name("{frame:x}.png").is_none()
-                && name("{frames}.png").is_none()
-                && name("{frame.png").is_none()
-        );
-        assert!(name("{frame:99999}.png").is_none());
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn names_that_are_no_text_are_numbered() {
-        use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
-        let path = |bytes: &'static [u8]| Path::new(OsStr::from_bytes(bytes));
-        assert_eq!(numbered(path(b"a/\xff.png"), 7).unwrap(), path(b"a/\xff_0007.png"));
-    }
 }

@@ -18,6 +18,7 @@ use splatkit::{
     bricks::Bricks,
     cells::{CellOptions, Cells},
     hierarchy::Hierarchy,
+    input::Limits,
     math::Bounds,
     memory,
     picture::Edges,
@@ -65,6 +66,11 @@ pub struct Loaded {
 }
 
 impl SceneFlags {
+    /// Returns the limits of every file that is read.
+    pub fn limits(&self) -> Limits {
+        self.load.limits()
+    }
+
     /// Reads the inputs and makes a scene of them. Meshes become surfels.
     pub fn load(&self, given: &Given, progress: &Progress) -> Result<Loaded, Failure> {
         self.load_with(false, given, progress)

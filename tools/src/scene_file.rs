@@ -32,6 +32,9 @@ const NOT_OF_PICTURES: &[&str] = &[
     "overwrite",
     "json",
     "turntable",
+    "path",
+    "fps",
+    "raw",
     "help",
     "version",
     "verbose",
@@ -52,6 +55,7 @@ pub const CAMERA: &[&str] = &[
     "azimuth",
     "elevation",
     "orthographic",
+    "path",
 ];
 
 /// Returns the arguments with a scene file replaced by what it stands for; `None` if there is none.

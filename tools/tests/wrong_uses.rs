@@ -29,6 +29,24 @@ const USES: &[(&str, &str, i32, &str)] = &[
     ("an empty file", "render empty.ply -o out.png", 3, "empty.ply"),
     ("a file that was cut off", "render cut.ply -o out.png", 3, "cut.ply"),
     ("a picture in another format", "render a.ply -o out.tga", 2, "out.tga"),
+    (
+        "an animation of a camera that stands still",
+        "render a.ply -o out.gif",
+        2,
+        "an animation needs --turntable or --path",
+    ),
+    (
+        "an animation in another format",
+        "render a.ply -o out.avi --turntable 9",
+        2,
+        "use .gif, .webp, .apng, .mp4, .webm or .mov, or .png or .jpg for numbered pictures",
+    ),
+    (
+        "an animation as a picture on stdout",
+        "render a.ply -o - --turntable 9",
+        2,
+        "the frames of an animation can go to stdout only with --raw",
+    ),
     ("a folder that is not there", "render a.ply -o gone/out.png", 1, "its folder does not exist"),
     ("a picture that is there", "render a.ply -o old.png", 1, "old.png: exists already"),
     (

@@ -32,6 +32,9 @@ const SIZE: [f32; 2] = [1280.0, 800.0];
     mut_arg("depth", |flag| flag.hide(true)),
     mut_arg("overwrite", |flag| flag.hide(true)),
     mut_arg("turntable", |flag| flag.hide(true)),
+    mut_arg("path", |flag| flag.hide(true)),
+    mut_arg("fps", |flag| flag.hide(true)),
+    mut_arg("raw", |flag| flag.hide(true)),
     mut_arg("reference", |flag| flag.hide(true)),
     mut_arg("json", |flag| flag.hide(true)),
 )]

@@ -26,16 +26,14 @@ impl Folder {
     }
 
     pub fn run_with(&self, arguments: &[impl AsRef<OsStr>]) -> Run {
+        Run::of(&mut self.command(), arguments)
+    }
+
+    /// Returns `splatkit` in the folder, without arguments.
+    pub fn command(&self) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
-        let output = command
-            .args(arguments)
-            .current_dir(self)
-            .env("NO_COLOR", "1")
-            .env_remove("RUST_LOG")
-            .output();
-        let told: Vec<_> =
-            arguments.iter().map(|argument| argument.as_ref().to_string_lossy()).collect();
-        Run(told.join(" "), output.unwrap())
+        command.current_dir(self).env("NO_COLOR", "1").env_remove("RUST_LOG");
+        command
     }
 
     /// Runs a command that must succeed, with a JSON result.
@@ -48,6 +46,14 @@ impl Folder {
 pub struct Run(String, Output);
 
 impl Run {
+    /// Runs a command with these arguments.
+    pub fn of(command: &mut Command, arguments: &[impl AsRef<OsStr>]) -> Self {
+        let output = command.args(arguments).output();
+        let told: Vec<_> =
+            arguments.iter().map(|argument| argument.as_ref().to_string_lossy()).collect();
+        Self(told.join(" "), output.unwrap())
+    }
+
     pub fn code(&self) -> Option<i32> {
         self.1.status.code()
     }

@@ -1,0 +1,175 @@
+//! How the camera moves from frame to frame.
+
+use crate::{
+    camera::{CameraFlags, Subject},
+    failure::Failure,
+    parse,
+};
+use clap::Args;
+use splatkit::{
+    Error,
+    input::{Limits, Source},
+    math::{Camera, CameraPath},
+};
+use std::path::{Path, PathBuf};
+
+/// Most frames of a film.
+const MOST_FRAMES: u32 = 100_000;
+
+/// Largest size of a path's file, in bytes.
+const MOST_BYTES: usize = 16 << 20;
+
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Animation")]
+pub struct MotionFlags {
+    /// Draw this many frames while the camera turns once around the up axis.
+    #[arg(
+        long,
+        value_name = "FRAMES",
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES))
+    )]
+    turntable: Option<u32>,
+    /// Move the camera smoothly through the keyframes of a JSON file (docs/video.md describes it).
+    /// The frames are as many as --fps and the times of the keyframes say.
+    #[arg(long, value_name = "FILE.json", conflicts_with_all = ["turntable", "CameraFlags"])]
+    path: Option<PathBuf>,
+    /// Set the frames per second of an animation [default: 30]
+    #[arg(long, value_name = "NUMBER", value_parser = parse::rate)]
+    fps: Option<f64>,
+}
+
+/// How the camera moves.
+pub enum Motion {
+    /// A single picture.
+    Still,
+    /// Once around, in this number of frames.
+    Turntable(u32),
+    /// Along a path, in this number of frames.
+    Path(CameraPath, u32),
+}
+
+impl MotionFlags {
+    /// Returns whether there may be several frames.
+    pub fn is_moving(&self) -> bool {
+        self.turntable.is_some() || self.path.is_some()
+    }
+
+    /// Returns the file of the path.
+    pub fn file(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
+    /// Returns the frames per second.
+    pub fn rate(&self) -> f64 {
+        self.fps.unwrap_or(30.0)
+    }
+
+    /// Returns a warning if the rate has no effect. `is_film`: the frames go to one file that is
+    /// played.
+    pub fn idle(&self, is_film: bool) -> Option<&'static str> {
+        let counts = self.path.is_some() || self.turntable.is_some() && is_film;
+        (self.fps.is_some() && !counts)
+            .then_some("--fps has no effect: it is for animations, and pictures have no rate")
+    }
+
+    /// Reads the path, if there is one.
+    pub fn open(&self, limits: &Limits) -> Result<Motion, Failure> {
+        let Some(file) = &self.path else {
+            return Ok(self.turntable.map_or(Motion::Still, Motion::Turntable));
+        };
+        let text = Source::open(file, limits)?.small_text("a path of a camera", MOST_BYTES)?;
+        let path = CameraPath::from_json(&text).map_err(|error| {
+            Error::input(file, "path of a camera", error.to_string()).hint(
+                "the form is {\"splatkit_path\": 1, \"keyframes\": [{\"time\": 0, \"camera\": \
+                 {\"position\": [x, y, z], \"focal_point\": [x, y, z], \"view_up\": [x, y, z], \
+                 \"view_angle\": 30}}, …]}",
+            )
+        })?;
+        let moves = (path.duration() * self.rate()).round();
+        if moves >= f64::from(MOST_FRAMES) {
+            return Err(Failure::Usage(format!(
+                "{}: {} s at {} frames per second are too many frames; {MOST_FRAMES} are the most",
+                file.display(),
+                path.duration(),
+                self.rate()
+            )));
+        }
+        Ok(Motion::Path(path, moves as u32 + 1))
+    }
+}
+
+impl Motion {
+    /// Returns the number of pictures.
+    pub fn frames(&self) -> u32 {
+        match self {
+            Self::Still => 1,
+            Self::Turntable(frames) | Self::Path(_, frames) => *frames,
+        }
+    }
+
+    /// Returns whether the camera is fitted to what is seen, unless the camera's flags place it.
+    pub fn is_fitted(&self) -> bool {
+        !matches!(self, Self::Path(..))
+    }
+
+    /// Returns the camera of each frame. `size` is the part of the picture that a camera is fitted
+    /// to.
+    pub fn cameras(
+        &self,
+        flags: &CameraFlags,
+        subject: &Subject,
+        size: [u32; 2],
+    ) -> splatkit::Result<Vec<Camera>> {
+        match self {
+            Self::Still => Ok(vec![flags.camera(subject, size)?]),
+            Self::Turntable(frames) => flags.turntable(subject, size, *frames),
+            Self::Path(path, frames) => {
+                // The last frame is the last keyframe.
+                let step = path.duration() / f64::from((frames - 1).max(1));
+                let last = path.start() + path.duration();
+                let time = |frame: u32| path.start() + step * f64::from(frame);
+                let mut cameras: Vec<Camera> =
+                    (0..frames - 1).map(|frame| path.at(time(frame))).collect();
+                cameras.push(path.at(last));
+                Ok(cameras)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writes a path of two seconds and returns its frames at a rate.
+    fn frames(folder: &Path, rate: f64) -> Result<(Motion, Vec<Camera>), Failure> {
+        let keyframe = |time: f64, x: f64| {
+            format!(
+                r#"{{"time":{time},"camera":{{"position":[{x},0,9],"focal_point":[{x},0,0],
+                "view_up":[0,1,0],"view_angle":30}}}}"#
+            )
+        };
+        let keyframes = [keyframe(1.0, 0.0), keyframe(3.0, 4.0)].join(",");
+        let file = folder.join("path.json");
+        std::fs::write(&file, format!(r#"{{"splatkit_path":1,"keyframes":[{keyframes}]}}"#))
+            .unwrap();
+        let flags = MotionFlags { turntable: None, path: Some(file), fps: Some(rate) };
+        let motion = flags.open(&Limits::default())?;
+        let subject = Subject::new(splatkit::math::Bounds::EMPTY, glam::DVec3::Y);
+        let cameras = motion.cameras(&CameraFlags::default(), &subject, [4, 3])?;
+        Ok((motion, cameras))
+    }
+
+    #[test]
+    fn a_path_has_a_frame_at_each_end() {
+        let folder = tempfile::tempdir().unwrap();
+        // Also if the rate and the duration do not go together.
+        for (rate, count) in [(30.0, 61), (0.5, 2), (0.9, 3), (0.1, 1)] {
+            let (motion, cameras) = frames(folder.path(), rate).unwrap();
+            assert_eq!((motion.frames(), cameras.len()), (count, count as usize), "{rate}");
+            assert_eq!(cameras[cameras.len() - 1].focal_point.x, 4.0);
+            assert!(count == 1 || cameras[0].focal_point.x == 0.0);
+        }
+        assert!(frames(folder.path(), 60_000.0).is_err());
+    }
+}

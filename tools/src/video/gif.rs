@@ -1,0 +1,115 @@
+//! Animated GIF: 256 colours a frame, chosen for each frame and dithered; a pixel is opaque or
+//! transparent.
+
+use super::{Encoder, Film, Out, commit, create};
+use crate::failure::Failure;
+use gif::{DisposalMethod, EncodingError, Frame, Repeat};
+use quantette::{
+    ImageRef, PaletteSize, Pipeline, QuantizeMethod, deps::palette::Srgb, dither::FloydSteinberg,
+};
+use splatkit::Error;
+use std::path::{Path, PathBuf};
+
+/// Most pixels of a side.
+pub const MOST: u32 = u16::MAX as u32;
+/// Most frames a second. Browsers show frames that are to be shown for less than 0.02 s for 0.1 s.
+pub const FASTEST: f64 = 50.0;
+
+/// The least opacity of a pixel that is drawn.
+const OPAQUE: u8 = 128;
+
+pub struct Gif {
+    path: PathBuf,
+    film: Film,
+    encoder: gif::Encoder<Out>,
+    /// The number of frames so far.
+    count: u32,
+}
+
+impl Gif {
+    pub fn open(path: &Path, film: Film) -> Result<Self, Failure> {
+        let [width, height] = film.size.map(|side| side as u16);
+        let begun = gif::Encoder::new(create(path)?, width, height, &[]).and_then(|mut encoder| {
+            encoder.set_repeat(Repeat::Infinite)?;
+            Ok(encoder)
+        });
+        let encoder = begun.map_err(|error| failure(path, error))?;
+        Ok(Self { path: path.to_owned(), film, encoder, count: 0 })
+    }
+}
+
+impl Encoder for Gif {
+    fn add(&mut self, rgba: &[u8]) -> Result<bool, Failure> {
+        let is_transparent = self.film.background.is_none();
+        let (palette, indices, transparent) = indexed(rgba, self.film.size, is_transparent);
+        let [width, height] = self.film.size.map(|side| side as u16);
+        let shown = self.film.shown(self.count, 100.0).max(2);
+        self.count += 1;
+        let frame = Frame {
+            // At most 10 s, because of the least frame rate.
+            delay: shown as u16,
+            // Otherwise the frame before would show through.
+            dispose: if is_transparent { DisposalMethod::Background } else { DisposalMethod::Keep },
+            transparent,
+            width,
+            height,
+            palette: Some(palette),
+            buffer: indices.into(),
+            ..Frame::default()
+        };
+        self.encoder.write_frame(&frame).map_err(|error| failure(&self.path, error))?;
+        Ok(true)
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), Failure> {
+        let out = self.encoder.into_inner().map_err(|error| failure(&self.path, error))?;
+        commit(out, &self.path)
+    }
+}
+
+/// Returns the palette, the index of each pixel, and the index of transparent pixels.
+fn indexed(
+    rgba: &[u8],
+    [width, height]: [u32; 2],
+    is_transparent: bool,
+) -> (Vec<u8>, Vec<u8>, Option<u8>) {
+    let is_seen = |pixel: &[u8]| pixel[3] >= OPAQUE;
+    // Pixels that are not drawn have the colour that their neighbours fade to.
+    let color = |pixel: &[u8]| match is_seen(pixel) {
+        true => Srgb::new(pixel[0], pixel[1], pixel[2]),
+        false => Srgb::new(0, 0, 0),
+    };
+    let colors: Vec<Srgb<u8>> = rgba.chunks_exact(4).map(color).collect();
+    // The last index is left for transparent pixels.
+    let most = PaletteSize::from_u16_clamped(if is_transparent { 255 } else { 256 });
+    let image = ImageRef::new(width, height, &*colors).expect("a colour for each pixel");
+    let found = Pipeline::new()
+        .palette_size(most)
+        .quantize_method(QuantizeMethod::kmeans())
+        .ditherer(FloydSteinberg::new())
+        .parallel(true)
+        .input_image(image)
+        .output_srgb8_indexed_image();
+    let (palette, mut indices) = found.into_parts();
+    let mut palette: Vec<u8> =
+        palette.into_iter().flat_map(|color| [color.red, color.green, color.blue]).collect();
+    let mut transparent = None;
+    if is_transparent {
+        let index = (palette.len() / 3) as u8;
+        palette.extend([0; 3]);
+        for (at, pixel) in indices.iter_mut().zip(rgba.chunks_exact(4)) {
+            if !is_seen(pixel) {
+                *at = index;
+            }
+        }
+        transparent = Some(index);
+    }
+    (palette, indices, transparent)
+}
+
+fn failure(path: &Path, error: EncodingError) -> Failure {
+    match error {
+        EncodingError::Io(error) => Error::output(path, error).into(),
+        error => Failure::output(path, error),
+    }
+}
