@@ -8,7 +8,7 @@ use splatkit::{
     math::{Camera, Kernel, Projection},
     picture::Picture,
     scene::{Scene, Settings},
-    volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
+    volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume, phantoms::Phantom},
 };
 use testing::psnr::measured;
 
@@ -76,4 +76,47 @@ fn a_lit_ridge_looks_as_in_thin_sheets() {
     let agreement = measured(&drawn(&scene, None), &drawn(&scene, Some(1.0 / 6.0)));
     println!("a lit ridge: {agreement:.1} dB");
     assert!(agreement > 40.0, "{agreement:.1} dB");
+}
+
+/// The specimen's material turns opaque within a few sheets. Lines that thinner sheets do not have
+/// are contours: they follow the places where sheets cut the material.
+#[test]
+fn lit_materials_that_turn_opaque_have_no_contours() {
+    const SIDE: usize = 64;
+    let volume = Phantom::Specimen.sample([SIDE; 3]).expect("a volume");
+    let transfer = TransferFunction {
+        color: vec![(0.4, [0.8, 0.36, 0.16]), (0.75, [0.96, 0.72, 0.36]), (1.0, [0.9, 0.95, 1.0])],
+        opacity: vec![(0.36, 0.03), (0.45, 0.03), (0.65, 0.35), (0.8, 0.6), (1.0, 0.8)],
+        unit: 0.02,
+        shade: Some(Shade {
+            ambient: 0.3,
+            diffuse: 0.7,
+            specular: 0.3,
+            power: 24.0,
+            certain: None,
+        }),
+        ..TransferFunction::default()
+    };
+    let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
+    let mut camera = Camera::framing(&scene.bounds(), DVec3::Y, DVec3::Z, 1.0);
+    camera.azimuth(40.0);
+    camera.elevation(30.0);
+    let drawn = |sheet_thickness| {
+        let settings = Settings { sheet_thickness, ..Settings::new([256, 256]) };
+        let mut renderer = CpuRenderer::new(&scene).expect("a scene");
+        renderer.render(&camera, &settings).expect("a picture").0
+    };
+    let (default, thin) = (drawn(None), drawn(Some(0.25 / SIDE as f64)));
+    let line = |picture: &Picture, at: usize| {
+        let green = |at: usize| 255.0 * picture.color[at][1];
+        green(at) - 0.5 * (green(at - 1) + green(at + 1))
+    };
+    let inner = (0..default.color.len()).filter(|at| (1..255).contains(&(at % 256)));
+    let mut lines: Vec<f32> =
+        inner.map(|at| (line(&default, at) - line(&thin, at)).abs()).collect();
+    lines.sort_by(f32::total_cmp);
+    let strongest = lines[lines.len() * 99 / 100];
+    let agreement = measured(&default, &thin);
+    println!("an opaque material: {agreement:.1} dB, lines of {strongest:.2} / 255");
+    assert!(strongest < 4.0, "{strongest:.2} / 255");
 }

@@ -31,6 +31,8 @@
 // Values on the plane behind the sheet that is being closed, for differences between neighbouring
 // pixels.
 var<workgroup> neighbours: array<f32, 64>;
+// The slopes of these values, per pixel.
+var<private> slopes: array<vec2<f32>, ROWS>;
 // Whether an invocation of the tile stopped, and the tile's slot.
 var<workgroup> any_stopped: atomic<u32>;
 var<workgroup> own_slot: u32;
@@ -218,13 +220,13 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
     var sheet = front;
     loop {
         if CENTRAL {
-            share_faces(lane);
+            find_slopes(lane);
         }
         others += open_field(sheet);
         for (var r = 0u; r < ROWS; r++) {
             var own = resolve(r, sheet);
             if CENTRAL {
-                own.back.slope = slope_on_plane(r, difference(lane, r), planes[sheet + 1u]);
+                own.back.slope = slope_on_plane(r, slopes[r], planes[sheet + 1u]);
             }
             if SUMS {
                 pixels[r].front = own.back;
@@ -234,9 +236,6 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
                 cover(r, sheet);
             }
         }
-        if CENTRAL {
-            workgroupBarrier();
-        }
         sheet++;
         if sheet >= front + count {
             break;
@@ -245,8 +244,10 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
     return others;
 }
 
-// Shares the values on the plane behind the sheet being closed with the tile's neighbouring pixels.
-fn share_faces(lane: vec2<u32>) {
+// Finds the slopes on the plane behind the sheet being closed, from the values of the tile's
+// neighbouring pixels. Both barriers are here, and the sheet is closed behind them: with a barrier
+// behind the code that closes it, Mesa's software Vulkan loses the slopes once that code is long.
+fn find_slopes(lane: vec2<u32>) {
     for (var r = 0u; r < ROWS; r++) {
         let weight = pixels[r].face_weight.x;
         let at = (lane.y * ROWS + r) * 8u + lane.x;
@@ -255,6 +256,10 @@ fn share_faces(lane: vec2<u32>) {
             pixels[r].face_value.x / max(weight, 1e-37),
             weight > frame.isotropic.w,
         );
+    }
+    workgroupBarrier();
+    for (var r = 0u; r < ROWS; r++) {
+        slopes[r] = difference(lane, r);
     }
     workgroupBarrier();
 }

@@ -17,14 +17,25 @@ fn lit_from(
     shade: vec4<f32>,
     certain: vec2<f32>,
 ) -> vec3<f32> {
+    let light = light_of(normal, direction, shade, certain);
+    return min(color * light.x + light.y, vec3(1.0));
+}
+
+// Returns the factor on a colour, and the highlight that is added to it.
+fn light_of(
+    normal: vec3<f32>,
+    direction: vec3<f32>,
+    shade: vec4<f32>,
+    certain: vec2<f32>,
+) -> vec2<f32> {
     let size = length(normal);
     if !(size > 1e-20) {
-        return color * (shade.x + shade.y);
+        return vec2(shade.x + shade.y, 0.0);
     }
     let facing = min(abs(dot(normal, direction)) / size, 1.0);
     let share = clamp((size - certain.x) * certain.y, 0.0, 1.0);
     let diffuse = shade.x + shade.y * (1.0 - share * (1.0 - facing));
-    return min(color * diffuse + share * shade.z * pow(facing, shade.w), vec3(1.0));
+    return vec2(diffuse, share * shade.z * pow(facing, shade.w));
 }
 
 // The same for a normal of any length.
@@ -35,6 +46,23 @@ fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f3
 // The same for the gradient of the field.
 fn lit_field(r: u32, color: vec3<f32>, gradient: vec3<f32>) -> vec3<f32> {
     return lit_from(color, gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
+}
+
+// The same for a part of a sheet, in its mean light: gradients change more within a part than values
+// do. The light is taken at four places, without a loop, which march would pay for.
+fn lit_piece(r: u32, medium: Medium, color: vec3<f32>, place: f32, next_place: f32) -> vec3<f32> {
+    let step = 0.125 * (next_place - place);
+    let light = 0.25 * (light_at(r, medium, place + step)
+        + light_at(r, medium, place + 3.0 * step)
+        + light_at(r, medium, place + 5.0 * step)
+        + light_at(r, medium, place + 7.0 * step));
+    return min(color * light.x + light.y, vec3(1.0));
+}
+
+// Returns the light of the field at a place in a sheet.
+fn light_at(r: u32, medium: Medium, place: f32) -> vec2<f32> {
+    let gradient = gradient_at(r, medium, place);
+    return light_of(gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
@@ -160,10 +188,8 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
                 shown = classify_between(value, next);
             }
             var normal: vec3<f32>;
-            if GRADIENTS {
-                normal = gradient_at(r, *medium, 0.5 * (place + next_place));
-            }
             if GRADIENT_OPACITY {
+                normal = gradient_at(r, *medium, 0.5 * (place + next_place));
                 shown *= gradient_factor(length(normal));
             }
             // Differences of integrals: rounding remainders, where nothing is visible, must stay a
@@ -171,7 +197,7 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
             let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
             var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
             if VOLUME_SHADED {
-                color = lit_field(r, color, normal);
+                color = lit_piece(r, *medium, color, place, next_place);
             }
             var done = 0.0;
             for (var i = 0u; i < ISOSURFACES; i++) {

@@ -12,6 +12,8 @@ use fearless_simd::{Simd, f32x4, i32x8, mask32x8, prelude::*};
 
 /// Number of parts of a sheet in which the transfer function is integrated.
 const PARTS: usize = 3;
+/// Number of places in a part at which its light is taken.
+const LIGHTS: usize = 4;
 /// Values closer together than this, in entries of the table, are taken as this far apart.
 const NARROW: f32 = 8.0;
 /// The same for values far beyond the table, as a fraction of the value.
@@ -301,6 +303,18 @@ impl Plan<'_> {
         gradient: [Lanes<S>; 3],
         direction: [Lanes<S>; 3],
     ) -> [Lanes<S>; 3] {
+        let [share, highlight] = self.light_of(simd, gradient, direction);
+        with_light(simd, color, share, highlight)
+    }
+
+    /// Returns the factor on a colour of the field and the highlight that is added to it.
+    #[inline(always)]
+    fn light_of<S: Simd>(
+        &self,
+        simd: S,
+        gradient: [Lanes<S>; 3],
+        direction: [Lanes<S>; 3],
+    ) -> [Lanes<S>; 2] {
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let [ambient, diffuse, specular, power] = self.frame.volume_shade;
         let [low, per_magnitude, ..] = self.frame.certain;
@@ -313,8 +327,29 @@ impl Plan<'_> {
         .min(one);
         let highlight = vector::power(simd, facing.max(Lanes::splat(simd, 1e-6)), power);
         let highlight = highlight * certainty * specular;
-        let share = (one - certainty * (one - facing)) * diffuse + ambient;
-        three!(I => color[I].mul_add(share, highlight).min(one))
+        [(one - certainty * (one - facing)) * diffuse + ambient, highlight]
+    }
+
+    /// Returns the colour of a piece in its mean light: gradients change more within a piece than
+    /// values do.
+    #[inline(always)]
+    fn lit_piece<S: Simd>(
+        &self,
+        simd: S,
+        color: [Lanes<S>; 3],
+        layer: &Layer<S>,
+        [place, next_place]: [Lanes<S>; 2],
+    ) -> [Lanes<S>; 3] {
+        let none = Lanes::splat(simd, 0.0);
+        let mut sums = [none; 2];
+        for number in 0..LIGHTS {
+            let share = (number as f32 + 0.5) / LIGHTS as f32;
+            let at = (next_place - place) * share + place;
+            let light = self.light_of(simd, self.gradient(layer, at), layer.direction);
+            sums = [sums[0] + light[0], sums[1] + light[1]];
+        }
+        let [share, highlight] = sums.map(|sum| sum * (1.0 / LIGHTS as f32));
+        with_light(simd, color, share, highlight)
     }
 
     /// Adds a sheet to a packet's pixels: the field in it, at the pixels of a mask, and its
@@ -558,7 +593,7 @@ impl Plan<'_> {
             self.one(simd, layer.mean())
         };
         let mut normal = [none; 3];
-        if self.is_lit || self.has_gradient_opacity {
+        if self.has_gradient_opacity {
             normal = self.gradient(layer, (place + next_place) * 0.5);
         }
         if self.has_gradient_opacity {
@@ -572,7 +607,7 @@ impl Plan<'_> {
         let inverse = one / shown[3].max(Lanes::splat(simd, 1e-20));
         let mut color = three!(I => (shown[I] * inverse).max(none).min(one));
         if self.is_lit {
-            color = self.lit_field(simd, color, normal, layer.direction);
+            color = self.lit_piece(simd, color, layer, piece.places);
         }
         Some((color, depth))
     }
@@ -651,6 +686,17 @@ impl<S: Simd> Medium<S> {
         self.through -= share;
         self.depth += depth;
     }
+}
+
+/// Returns a colour times a share of light, and a highlight.
+#[inline(always)]
+fn with_light<S: Simd>(
+    simd: S,
+    color: [Lanes<S>; 3],
+    share: Lanes<S>,
+    highlight: Lanes<S>,
+) -> [Lanes<S>; 3] {
+    three!(I => color[I].mul_add(share, highlight).min(Lanes::splat(simd, 1.0)))
 }
 
 /// Transposes eight pixels with four channels into four channels with eight pixels.

@@ -44,6 +44,9 @@ struct Part {
 /// Number of parts of a piece; values are taken as linear within a part.
 const PARTS: u32 = 3;
 
+/// Number of places in a part at which its light is taken.
+const LIGHTS: u32 = 4;
+
 /// Less light than this counts as this much, so that optical depths stay finite.
 const LEAST_LIGHT: f64 = 1e-9;
 
@@ -107,6 +110,20 @@ impl Layer {
         mixed + (along - mixed.dot(direction)) * direction
     }
 
+    /// Returns the colour of a part between two places in its mean light: gradients change more
+    /// within a part than values do.
+    fn lit(&self, field: &Field, color: DVec3, [start, end]: [f64; 2], direction: DVec3) -> DVec3 {
+        let Some(shade) = &field.shade else { return color };
+        let mut sums = [0.0; 2];
+        for number in 0..LIGHTS {
+            let share = (f64::from(number) + 0.5) / f64::from(LIGHTS);
+            let gradient = self.gradient(start + share * (end - start), direction);
+            let light = shade::light(gradient, direction, shade);
+            (0..2).for_each(|i| sums[i] += light[i] / f64::from(LIGHTS));
+        }
+        shade::with_light(color, sums)
+    }
+
     fn distance(&self, u: f64) -> f64 {
         self.span[0] + u * (self.span[1] - self.span[0])
     }
@@ -157,7 +174,7 @@ impl Layer {
                 field.classifier.at(self.mean)
             };
             let factor = field.classifier.transfer.gradient_factor(gradient.length());
-            let medium = field.lit(medium, gradient, direction);
+            let medium = self.lit(field, medium, [start, end], direction);
             let length = self.distance(end) - self.distance(start);
             let depth = extinction * factor * length * self.filling;
             let at = |share: f64| start + share * (end - start);

@@ -8,20 +8,29 @@ use glam::DVec3;
 /// parts of the colour count in full. If the shade says which gradients are certain, `normal` is a
 /// gradient in value per world length, and others are lit the less the shorter they are.
 pub(super) fn lit(color: DVec3, normal: DVec3, ray: DVec3, shade: &Shade) -> DVec3 {
+    with_light(color, light(normal, ray, shade))
+}
+
+/// Returns a colour in light: a factor on it, and the highlight that is added to it.
+pub(super) fn with_light(color: DVec3, [factor, highlight]: [f64; 2]) -> DVec3 {
+    (color * factor + DVec3::splat(highlight)).min(DVec3::ONE)
+}
+
+/// Returns the factor on a colour and the highlight of [`lit`].
+pub(super) fn light(normal: DVec3, ray: DVec3, shade: &Shade) -> [f64; 2] {
     let Shade { ambient, diffuse, specular, power, certain } = *shade;
     let certainty = certain.map_or(1.0, |certain| certainty(normal.length(), certain));
-    let lit = match normal.try_normalize() {
+    match normal.try_normalize() {
         // The light comes from the eye, so the half vector is the light's own direction. Turning
         // the normal towards the light gives the cosine's magnitude.
         Some(normal) => {
             let cosine = normal.dot(ray).abs().min(1.0);
             let facing = 1.0 - certainty * (1.0 - cosine);
             let highlight = certainty * specular * cosine.powf(power);
-            color * (ambient + diffuse * facing) + DVec3::splat(highlight)
+            [ambient + diffuse * facing, highlight]
         }
-        None => color * (ambient + diffuse),
-    };
-    lit.min(DVec3::ONE)
+        None => [ambient + diffuse, 0.0],
+    }
 }
 
 /// Returns how far a gradient counts, 0 … 1: linear between two magnitudes.
