@@ -11,6 +11,13 @@ const COARSEST: f64 = 4.0;
 const STEADY: [f64; 2] = [0.7, 1.0];
 /// Largest change of the effort from one moving frame to the next.
 const CHANGE: [f64; 2] = [0.5, 3.0];
+/// A frame that takes this many times the wanted time marks its effort as too fine.
+const TOO_SLOW: f64 = 1.5;
+/// How much coarser than such an effort the next frames stay, and the share of that bound which
+/// remains after each of them: it is tried again after about 40 frames. A cut of a hierarchy may
+/// have ten times the splats of the next coarser one, and trying it all the time would stutter.
+const COARSER: f64 = 1.25;
+const FORGOTTEN: f64 = 0.995;
 /// Ratio of the pixel widths of two steps of a resting view.
 const FINER: f64 = 2.0;
 
@@ -62,6 +69,8 @@ pub struct Pace {
     wanted: f64,
     /// How many times faster than the exact picture a moving frame must be, as far as known.
     factor: f64,
+    /// The least factor for now, because a smaller one was too slow.
+    least: f64,
     /// What is shown of the current view.
     shown: Option<Effort>,
 }
@@ -70,7 +79,7 @@ impl Pace {
     /// A pace that keeps moving frames within a time in milliseconds.
     pub fn new(wanted: f64) -> Self {
         // The first frame is coarse. If it was faster than wanted, the next ones are finer.
-        Self { wanted: wanted.max(1.0), factor: 16.0, shown: None }
+        Self { wanted: wanted.max(1.0), factor: 16.0, least: 1.0, shown: None }
     }
 
     /// Something changed: what is shown is no longer the current view.
@@ -99,11 +108,15 @@ impl Pace {
     pub fn took(&mut self, effort: Effort, milliseconds: f64) {
         if self.shown.is_none() {
             let share = milliseconds / self.wanted;
+            self.least = (self.least * FORGOTTEN).max(1.0);
+            if share > TOO_SLOW {
+                self.least = self.least.max(self.factor * COARSER);
+            }
             if !(STEADY[0]..=STEADY[1]).contains(&share) {
                 // A little below the wanted time.
                 let change = (share / 0.85).clamp(CHANGE[0], CHANGE[1]);
                 let most = WIDEST * WIDEST * COARSEST;
-                self.factor = (self.factor * change).clamp(1.0, most);
+                self.factor = (self.factor * change).clamp(self.least.min(most), most);
             }
         }
         self.shown = Some(effort);
@@ -135,6 +148,21 @@ mod tests {
             // No coarser than it must be.
             assert!(last > 20.0 || pace.factor == 1.0, "{exact}: {last}");
         }
+    }
+
+    #[test]
+    fn a_jump_of_the_time_is_not_tried_all_the_time() {
+        let mut pace = Pace::new(30.0);
+        let mut slow = 0;
+        for frame in 0..200 {
+            pace.changed();
+            let effort = pace.next().expect("a frame");
+            // A finer cut takes ten times as long.
+            let took = if effort.pixel < 4.5 { 90.0 } else { 9.0 };
+            pace.took(effort, took);
+            slow += usize::from(took > 30.0 && frame > 20);
+        }
+        assert!((1..=6).contains(&slow), "{slow} slow frames");
     }
 
     #[test]

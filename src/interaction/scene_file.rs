@@ -55,6 +55,19 @@ pub struct InputEntry {
     /// Whether the input is drawn.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub visible: bool,
+    /// What colours the surfaces of this input: a colour, an attribute, height, …
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color: Option<String>,
+    /// The share of the light that a surface of this input absorbs, above 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub opacity: Option<f64>,
+}
+
+impl InputEntry {
+    /// A visible input with nothing else set.
+    pub fn new(file: PathBuf) -> Self {
+        Self { file, visible: true, color: None, opacity: None }
+    }
 }
 
 /// A camera, in world units.
@@ -106,7 +119,7 @@ impl SceneFile {
     pub fn new(inputs: impl IntoIterator<Item = PathBuf>) -> Self {
         Self {
             splatkit_scene: Self::VERSION,
-            inputs: inputs.into_iter().map(|file| InputEntry { file, visible: true }).collect(),
+            inputs: inputs.into_iter().map(InputEntry::new).collect(),
             size: None,
             camera: None,
             transfer: None,
@@ -151,6 +164,11 @@ impl SceneFile {
         }
         if let Some(camera) = &scene.camera {
             camera.camera()?;
+        }
+        let is_opacity = |opacity: &f64| *opacity > 0.0 && *opacity <= 1.0;
+        if let Some(input) = scene.inputs.iter().find(|i| !i.opacity.iter().all(is_opacity)) {
+            let file = input.file.display();
+            return Err(format!("inputs: the opacity of {file} must be above 0 and at most 1"));
         }
         scene.transfer_function()?;
         scene.clips.iter().try_for_each(|clip| clip.clip().map(|_| ()))?;

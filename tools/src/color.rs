@@ -1,6 +1,6 @@
 //! The flags that colour values and surfaces.
 
-use crate::{failure::Failure, parse};
+use crate::{failure::Failure, own::Own, parse};
 use clap::Args;
 use splatkit::{
     Error,
@@ -9,7 +9,7 @@ use splatkit::{
     surface::{Mesh, Paint, Values},
     volume::TransferFunction,
 };
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How values become colours, and by what surfaces are coloured.
 #[derive(Args, Debug, Clone)]
@@ -23,10 +23,11 @@ pub struct ColorFlags {
     colormap: Option<ColorMap>,
     /// Colour meshes and point clouds by an attribute of the file (intensity, classification,
     /// confidence, …), by values (those of --scalar), height or normal, or in one colour. file
-    /// keeps the file's own colours [default: by the values if --scalar names them or if there are
-    /// no colours, else file]
-    #[arg(long, value_name = "NAME|COLOR", value_parser = SurfaceColor::parse)]
-    color: Option<SurfaceColor>,
+    /// keeps the file's own colours. FILE=COLOR is for one input, and the flag can be given
+    /// several times [default: by the values if --scalar names them or if there are no colours,
+    /// else file]
+    #[arg(long, value_name = "[FILE=]NAME|COLOR", value_parser = SurfaceColor::own)]
+    color: Vec<Own<SurfaceColor>>,
     /// Set the colour of what has no value.
     #[arg(long, value_name = "COLOR", value_parser = parse::color)]
     nan_color: Option<[f32; 3]>,
@@ -60,6 +61,10 @@ pub struct Bar {
 const COLORS: usize = 1024;
 
 impl SurfaceColor {
+    fn own(text: &str) -> Result<Own<Self>, String> {
+        Own::parse(text, Self::parse)
+    }
+
     fn parse(text: &str) -> Result<Self, String> {
         match text.trim().to_ascii_lowercase().as_str() {
             "" => Err("name an attribute or a colour, such as intensity or orange".into()),
@@ -74,9 +79,25 @@ impl SurfaceColor {
 }
 
 impl ColorFlags {
+    /// Returns the flags of one input.
+    pub fn of(&self, path: &Path) -> Self {
+        let own = Own::of(&self.color, path).cloned();
+        Self { color: own.map(Own::of_all).into_iter().collect(), ..self.clone() }
+    }
+
+    /// Checks the names of inputs.
+    pub fn check(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
+        Own::check(&self.color, "color", inputs)
+    }
+
+    /// Returns what colours the surfaces that have no colour of their own here.
+    fn surface(&self) -> Option<&SurfaceColor> {
+        Own::shared(&self.color)
+    }
+
     /// Returns the attribute of a surface to read, if the flags name one.
     pub fn attribute(&self) -> Option<&str> {
-        match &self.color {
+        match self.surface() {
             Some(SurfaceColor::Attribute(name)) => Some(name),
             _ => None,
         }
@@ -93,14 +114,14 @@ impl ColorFlags {
 
     /// Returns the first of the flags that is given.
     pub fn given(&self) -> Option<&'static str> {
-        let color = [("--color", self.color.is_some())];
+        let color = [("--color", !self.color.is_empty())];
         let all = color.into_iter().chain(self.of_values());
         all.into_iter().find_map(|(name, is_given)| is_given.then_some(name))
     }
 
     /// Refuses flags without effect on a scene, which may have a mesh or point cloud, and values.
     pub fn check_effect(&self, has_mesh: bool, has_values: bool) -> Result<(), Failure> {
-        if self.color.is_some() && !has_mesh {
+        if !self.color.is_empty() && !has_mesh {
             return Err(Failure::Usage(
                 "--color colours meshes and point clouds, but there are none; volumes and samples \
                  take --colormap, and hierarchies keep the colours that they were converted with"
@@ -118,7 +139,7 @@ impl ColorFlags {
 
     /// Returns whether surfaces are coloured by their normals.
     pub fn by_normal(&self) -> bool {
-        self.color == Some(SurfaceColor::Normal)
+        self.surface() == Some(&SurfaceColor::Normal)
     }
 
     /// Returns what colours a surface instead of the file's colours. `named` says whether the user
@@ -130,7 +151,7 @@ impl ColorFlags {
         up: DVec3,
         [named, plain, is_cloud]: [bool; 3],
     ) -> Option<Paint> {
-        let of = match &self.color {
+        let of = match self.surface() {
             Some(SurfaceColor::File | SurfaceColor::Normal) => return None,
             Some(SurfaceColor::Plain(color)) => return Some(Paint::Plain(*color)),
             Some(SurfaceColor::Height) => Values::Height(up),
@@ -198,7 +219,7 @@ impl ColorFlags {
     }
 
     fn no_values(&self, path: &Path) -> Failure {
-        let message = match &self.color {
+        let message = match self.surface() {
             Some(SurfaceColor::Attribute(name)) => {
                 format!("“{name}” is neither a colour nor an attribute of this file")
             }
@@ -325,7 +346,7 @@ mod tests {
         let json = r#"{"color": [[0, 0, 0, 0]], "opacity": [[40, 0], [80, 0.5], [200, 0.5]]}"#;
         let flags = ColorFlags {
             colormap: Some(ColorMap::GRAY),
-            color: None,
+            color: Vec::new(),
             nan_color: None,
             log_colors: false,
         };

@@ -60,6 +60,11 @@ impl Frames {
         matches!(self, Self::Film(..))
     }
 
+    /// Whether a player shows the frames at a rate of the file's own.
+    pub fn is_played(&self) -> bool {
+        matches!(self, Self::Film(_, format) if *format != Format::Raw)
+    }
+
     /// Begins to write.
     pub fn open(&self, film: Film) -> Result<Writer<'_>, Failure> {
         let (background, way) = match self {

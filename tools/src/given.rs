@@ -55,6 +55,7 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("extent", LATTICE),
     ("sharp", LATTICE),
     ("radius-scale", MESH | CLOUD),
+    ("opacity", MESH | CLOUD),
     ("crease", MESH),
     ("edges", MESH),
     ("gradient", FIELD),

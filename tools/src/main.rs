@@ -32,6 +32,7 @@ mod method;
 mod motion;
 mod output;
 mod overlay;
+mod own;
 mod parse;
 mod progress;
 mod render;

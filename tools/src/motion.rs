@@ -85,20 +85,25 @@ impl MotionFlags {
                  \"view_angle\": 30}}, …]}",
             )
         })?;
-        let moves = (path.duration() * self.rate()).round();
-        if moves >= f64::from(MOST_FRAMES) {
-            return Err(Failure::Usage(format!(
-                "{}: {} s at {} frames per second are too many frames; {MOST_FRAMES} are the most",
-                file.display(),
-                path.duration(),
-                self.rate()
-            )));
-        }
-        Ok(Motion::Path(path, moves as u32 + 1))
+        Motion::along(path, self.rate(), file)
     }
 }
 
 impl Motion {
+    /// Moves along a path at a rate in frames per second. `file` is what an error names.
+    pub fn along(path: CameraPath, rate: f64, file: &Path) -> Result<Self, Failure> {
+        let moves = (path.duration() * rate).round();
+        if moves >= f64::from(MOST_FRAMES) {
+            return Err(Failure::Usage(format!(
+                "{}: {} s at {rate} frames per second are too many frames; {MOST_FRAMES} are the \
+                 most",
+                file.display(),
+                path.duration()
+            )));
+        }
+        Ok(Self::Path(path, moves as u32 + 1))
+    }
+
     /// Returns the number of pictures.
     pub fn frames(&self) -> u32 {
         match self {

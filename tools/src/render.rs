@@ -18,12 +18,14 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    FrameStats, Renderer, disk,
+    Error, FrameStats, Renderer, disk,
     math::Camera,
     picture::{Picture, PictureFormat},
     reference,
     scene::Settings,
 };
+#[cfg(feature = "window")]
+use splatkit::{Stop, math::CameraPath, volume::TransferFunction};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -102,6 +104,15 @@ impl Drawer {
         }
     }
 
+    /// Sets the transfer function of the field.
+    #[cfg(feature = "window")]
+    fn set_transfer(&mut self, transfer: &TransferFunction) -> splatkit::Result<()> {
+        match self {
+            Self::Engine(renderer) => renderer.set_transfer(transfer),
+            Self::Reference => Ok(()),
+        }
+    }
+
     /// Draws a picture. The statistics of the reference are all 0.
     pub fn draw(
         &mut self,
@@ -119,11 +130,25 @@ impl Drawer {
 }
 
 /// A scene that is ready to be drawn, and how its pictures are finished.
-pub struct Ready {
-    pub loaded: Loaded,
+struct Ready<'a> {
+    loaded: &'a Loaded,
     /// The settings of a picture before it is averaged down.
-    pub settings: Settings,
+    settings: Settings,
     finish: Finish,
+}
+
+/// A film of a scene that a window shows.
+#[cfg(feature = "window")]
+pub struct Export<'a> {
+    pub loaded: &'a Loaded,
+    /// The transfer function of the field, if there is one.
+    pub transfer: Option<&'a TransferFunction>,
+    pub path: CameraPath,
+    /// Frames per second.
+    pub rate: f64,
+    /// A film, or a picture's name for numbered pictures.
+    pub output: &'a Path,
+    pub stop: Stop,
 }
 
 /// How a drawn picture becomes the final one.
@@ -156,6 +181,12 @@ impl Finish {
         overlay.map_or(serde_json::Value::Null, |overlay| overlay.draw(picture, camera))
     }
 
+    /// Returns the colours of the scalar bars.
+    #[cfg(all(test, feature = "window"))]
+    pub fn bar_colors(&self) -> Vec<[f32; 3]> {
+        self.overlay.as_ref().map_or(Vec::new(), Overlay::bar_colors)
+    }
+
     /// Returns the final picture of a drawn one.
     #[cfg(feature = "window")]
     pub fn finished(
@@ -172,7 +203,7 @@ impl Finish {
 
 /// What is drawn, and where it goes.
 struct Run<'a> {
-    ready: &'a Ready,
+    ready: &'a Ready<'a>,
     motion: Motion,
     film: Film,
     frames: Frames,
@@ -198,9 +229,14 @@ impl Render {
             rate: self.motion.rate(),
             background: self.background.0,
         };
-        let frames = self.frames(&output, &film, progress)?;
-        let ready = self.prepare(&frames, &motion, given, progress)?;
-        let (loaded, settings) = (&ready.loaded, &ready.settings);
+        let frames = self.frames(&output, &motion, &film, progress)?;
+        if let Some(warning) = self.motion.idle(frames.is_played()) {
+            progress.warn(warning);
+        }
+        let mut loaded = self.load(given, progress)?;
+        let (settings, finish) = self.prepare(&mut loaded, &frames, &motion, progress)?;
+        let ready = Ready { loaded: &loaded, settings, finish };
+        let (loaded, settings) = (ready.loaded, &ready.settings);
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
@@ -249,19 +285,46 @@ impl Render {
         Ok(())
     }
 
-    /// Loads the scene, and finds what the camera needs.
+    /// Draws and writes a film of a scene that is loaded already. Existing files are replaced.
+    #[cfg(feature = "window")]
+    pub fn export(&self, export: Export<'_>, progress: &Progress) -> Result<(), Failure> {
+        let Export { loaded, transfer, path, rate, output, stop } = export;
+        let begun = Instant::now();
+        let motion = Motion::along(path, rate, output)?;
+        let film = Film {
+            size: self.engine.size,
+            frames: motion.frames(),
+            rate,
+            background: self.background.0,
+        };
+        let frames = self.frames(output, &motion, &film, progress)?;
+        let files = frames.files();
+        files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
+        let settings = Settings { stop, ..self.engine.settings(loaded, self.samples)? };
+        let ready = Ready { loaded, settings, finish: self.finish(loaded)? };
+        let mut drawer = Drawer::engine(&self.engine, loaded, progress)?;
+        if let Some(transfer) = transfer {
+            drawer.set_transfer(transfer)?;
+        }
+        let run = Run { ready: &ready, motion, film, frames };
+        self.draw_frames(&mut drawer, &run, progress)?;
+        self.report(&run, begun, progress);
+        Ok(())
+    }
+
+    /// Finds what the camera of a loaded scene needs. Returns the settings and how pictures are
+    /// finished.
     fn prepare(
         &self,
+        loaded: &mut Loaded,
         frames: &Frames,
         motion: &Motion,
-        given: &Given,
         progress: &Progress,
-    ) -> Result<Ready, Failure> {
-        let mut loaded = self.load(given, progress)?;
+    ) -> Result<(Settings, Finish), Failure> {
         loaded.read.extend(self.motion.file().map(Path::to_owned));
         let mut files = frames.files().into_iter().chain(self.depth.as_deref());
         files.try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
-        let settings = self.engine.settings(&loaded, self.samples)?;
+        let settings = self.engine.settings(loaded, self.samples)?;
         if let Some(warning) = self.engine.idle(&loaded.scene) {
             progress.warn(warning);
         }
@@ -274,8 +337,8 @@ impl Render {
                 progress.note(format_args!("up: {up}, guessed from the shape; --up sets another"));
             }
         }
-        let finish = self.finish(&loaded)?;
-        Ok(Ready { loaded, settings, finish })
+        let finish = self.finish(loaded)?;
+        Ok((settings, finish))
     }
 
     /// Loads the scene.
@@ -290,6 +353,20 @@ impl Render {
         let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
         let overlay = self.overlay.open(&loaded.facts, self.background.0)?;
         Ok(Finish { factor, background: self.background.0, overlay })
+    }
+
+    /// The same, if another transfer function shows the scene's field, whose values lie between
+    /// these.
+    #[cfg(feature = "window")]
+    pub fn finish_with(
+        &self,
+        loaded: &Loaded,
+        transfer: &TransferFunction,
+        values: [f64; 2],
+    ) -> Result<Finish, Failure> {
+        let facts = self.scene.facts_with(loaded, transfer, values);
+        let overlay = self.overlay.open(&facts, self.background.0)?;
+        Ok(Finish { overlay, ..self.finish(loaded)? })
     }
 
     /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,
@@ -402,6 +479,9 @@ impl Render {
         let mut writer = frames.open(*film)?;
         let count = cameras.len();
         for (frame, camera) in cameras.into_iter().enumerate() {
+            if settings.stop.is_requested() {
+                return Err(Error::Stopped.into());
+            }
             progress.stage(format!("Drawing {}", frames.name(frame)));
             let start = Instant::now();
             let (picture, stats) = drawer.draw(loaded, &camera, settings)?;
@@ -432,17 +512,19 @@ impl Render {
 
     /// Returns where the frames go. Fails if one of the files exists and may not be replaced, or
     /// if the first file cannot be written.
-    fn frames(&self, output: &Path, film: &Film, progress: &Progress) -> Result<Frames, Failure> {
-        let frames = self.unchecked_frames(output, film)?;
+    fn frames(
+        &self,
+        output: &Path,
+        motion: &Motion,
+        film: &Film,
+        progress: &Progress,
+    ) -> Result<Frames, Failure> {
+        let frames = self.unchecked_frames(output, motion, film)?;
         if let Frames::Film(path, format) = &frames {
             format.check(path, film)?;
             if let Some(warning) = format.loss(film) {
                 progress.warn(warning);
             }
-        }
-        let is_played = matches!(&frames, Frames::Film(_, format) if *format != Format::Raw);
-        if let Some(warning) = self.motion.idle(is_played) {
-            progress.warn(warning);
         }
         if let Some(depth) = &self.depth {
             self.check_depth(depth, &frames)?;
@@ -456,7 +538,13 @@ impl Render {
     }
 
     /// Returns where `-o` says that the frames go.
-    fn unchecked_frames(&self, output: &Path, film: &Film) -> Result<Frames, Failure> {
+    fn unchecked_frames(
+        &self,
+        output: &Path,
+        motion: &Motion,
+        film: &Film,
+    ) -> Result<Frames, Failure> {
+        let is_moving = !matches!(motion, Motion::Still);
         let is_stdout = output.as_os_str() == "-";
         let refuse = |message: &str| Err(Failure::Usage(message.into()));
         if is_stdout && self.json {
@@ -468,16 +556,16 @@ impl Render {
         if self.raw {
             return Ok(Frames::Film(output.to_owned(), Format::Raw));
         }
-        if is_stdout && self.motion.is_moving() {
+        if is_stdout && is_moving {
             return refuse("the frames of an animation can go to stdout only with --raw");
         }
-        match Format::of(output).filter(|_| self.motion.is_moving()) {
+        match Format::of(output).filter(|_| is_moving) {
             Some(format) => {
                 output::check(output, self.overwrite)?;
                 Ok(Frames::Film(output.to_owned(), format))
             }
             None => {
-                let count = self.motion.is_moving().then_some(film.frames);
+                let count = is_moving.then_some(film.frames);
                 Frames::pictures(output, count, self.overwrite)
             }
         }

@@ -85,6 +85,7 @@ impl SceneFlags {
         progress: &Progress,
     ) -> Result<Loaded, Failure> {
         let start = Instant::now();
+        self.show.check_inputs(&self.inputs)?;
         let show = self.show.open(&self.load.limits())?;
         let loaded = Loaded {
             scene: Scene::new(),
@@ -102,8 +103,9 @@ impl SceneFlags {
             progress.stage(format!("Reading {}", path.display()));
             // One deadline covers reading the input and making its splats.
             let deadline = self.load.limits().deadline();
-            let attribute = self.show.color.attribute();
+            let color = self.show.color.of(path);
             let read = &mut adding.loaded.read;
+            let attribute = color.attribute();
             let input = self.load.open_colored(path, attribute, memory::most(), read)?;
             match &input {
                 Input::Mesh(_) => is_scaled = true,
@@ -158,6 +160,24 @@ impl SceneFlags {
         }
     }
 
+    /// Returns what a loaded scene says for texts if another transfer function shows its field,
+    /// whose values lie between these.
+    #[cfg(feature = "window")]
+    pub fn facts_with(
+        &self,
+        loaded: &Loaded,
+        transfer: &TransferFunction,
+        values: [f64; 2],
+    ) -> Facts {
+        let mut facts = loaded.facts.clone();
+        if let Some(bar) = facts.field.and_then(|field| facts.bars.get_mut(field)) {
+            // The colours are the function's own by now, also those of a map.
+            let title = std::mem::take(&mut bar.title);
+            *bar = self.show.color.bar(transfer, values, title);
+        }
+        facts
+    }
+
     /// Returns the inputs as a line of text.
     pub fn name(&self) -> String {
         self.inputs.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
@@ -192,7 +212,7 @@ impl Adding<'_> {
     fn add_mesh(&mut self, path: &Path, mut mesh: Mesh, deadline: Deadline) -> Result<(), Failure> {
         self.stand_mesh(path, &mesh);
         let flags = self.flags;
-        let color = &flags.show.color;
+        let color = flags.show.color.of(path);
         let up = self.loaded.subject.stance.up;
         let named = self.flags.load.scalar().is_some();
         self.loaded.facts.bars.extend(color.paint(
@@ -214,8 +234,10 @@ impl Adding<'_> {
         if self.flags.show.edges && !mesh.triangles.is_empty() {
             self.loaded.edges.push(Edges::of(&mesh));
         }
-        // Radii are for surfels; facets have none.
-        if !self.facets || self.flags.show.radius_scale.is_some() {
+        let depth = self.flags.show.optical_depth(path);
+        options.optical_depth = depth.unwrap_or(options.optical_depth);
+        // Radii are for surfels, and facets are opaque.
+        if !self.facets || self.flags.show.radius_scale.is_some() || depth.is_some() {
             options.most_facets = 0;
         }
         let bounds = mesh.bounds().map(|[min, max]| Bounds { min, max });
@@ -317,6 +339,7 @@ impl Adding<'_> {
     }
 
     fn add_bar(&mut self, transfer: &TransferFunction, values: [f64; 2], title: String) {
+        self.loaded.facts.field = Some(self.loaded.facts.bars.len());
         self.loaded.facts.bars.push(self.flags.show.color.bar(transfer, values, title));
     }
 

@@ -144,6 +144,15 @@ pub fn flags(
     for input in scene.inputs.iter().filter(|input| input.visible) {
         let is_like_flag = input.file.as_os_str().as_encoded_bytes().starts_with(b"-");
         let file = if is_like_flag { Path::new(".").join(&input.file) } else { input.file.clone() };
+        let opacity = input.opacity.map(|opacity| opacity.to_string());
+        for (name, value) in [("color", input.color.clone()), ("opacity", opacity)] {
+            if let Some(value) = value.filter(|_| !given.has(name)) {
+                let mut flag = OsString::from(format!("--{name}="));
+                flag.push(&file);
+                flag.push(format!("={value}"));
+                flags.push(flag);
+            }
+        }
         flags.push(file.into());
     }
     if scene.inputs.iter().all(|input| !input.visible) {

@@ -1,6 +1,6 @@
 //! The flags that set how values and surfaces are shown.
 
-use crate::{color::ColorFlags, failure::Failure, kernel::KernelFlags, parse};
+use crate::{color::ColorFlags, failure::Failure, kernel::KernelFlags, own::Own, parse};
 use clap::Args;
 use splatkit::{
     Error,
@@ -59,6 +59,11 @@ pub struct ShowFlags {
     /// Meshes: draw the edges of the triangles as thin dark lines.
     #[arg(long)]
     pub edges: bool,
+    /// Meshes and point clouds: let this share of the light be absorbed where a ray meets a
+    /// surface once, above 0 to 1. FILE=OPACITY is for one input, and the flag can be given
+    /// several times [default: 1]
+    #[arg(long, value_name = "[FILE=]OPACITY", value_parser = opacity)]
+    opacity: Vec<Own<f32>>,
     #[command(flatten)]
     pub color: ColorFlags,
     #[command(flatten)]
@@ -124,7 +129,20 @@ impl ShowFlags {
 
     /// Returns a flag that was given and does not change how values are shown.
     pub fn unused_by_values(&self) -> Option<&'static str> {
-        self.radius_scale.map(|_| "--radius-scale").or_else(|| self.kernel.first())
+        let opacity = (!self.opacity.is_empty()).then_some("--opacity");
+        self.radius_scale.map(|_| "--radius-scale").or(opacity).or_else(|| self.kernel.first())
+    }
+
+    /// Returns the optical depth of a surface, if it is not opaque.
+    pub fn optical_depth(&self, path: &Path) -> Option<f32> {
+        let opacity = *Own::of(&self.opacity, path)?;
+        (opacity < 1.0).then(|| -(1.0 - opacity).ln())
+    }
+
+    /// Checks the names of inputs in flags.
+    pub fn check_inputs(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
+        self.color.check(inputs)?;
+        Own::check(&self.opacity, "opacity", inputs)
     }
 
     /// Returns the files that flags name.
@@ -164,6 +182,14 @@ impl ShowFlags {
             transfer,
         })
     }
+}
+
+/// Parses an opacity.
+fn opacity(text: &str) -> Result<Own<f32>, String> {
+    Own::parse(text, |text| match parse::finite(text)? {
+        opacity if opacity > 0.0 && opacity <= 1.0 => Ok(opacity as f32),
+        _ => Err("an opacity lies above 0, up to 1".into()),
+    })
 }
 
 /// Formats a number as people type it.

@@ -83,7 +83,7 @@ impl Transfer {
 }
 
 /// Returns the JSON with one line for each point.
-fn text(transfer: &TransferFunction) -> String {
+pub fn text(transfer: &TransferFunction) -> String {
     let json = transfer.to_json();
     let Ok(serde_json::Value::Object(parts)) = serde_json::from_str(&json) else { return json };
     let lines = parts.iter().map(|(name, value)| {

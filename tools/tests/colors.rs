@@ -118,3 +118,33 @@ fn flags_without_effect_are_told() {
     }
     folder.run("convert a.nrrd -o b.nrrd --colormap hot").fails(2, &["--colormap colours meshes"]);
 }
+
+/// An input's own colour and opacity count more than those of all inputs.
+#[test]
+fn each_input_has_its_colour_and_opacity() {
+    let folder = folder();
+    let view = "--camera-position 10,10,60 --focal-point 10,10,0 --view-up 0,1,0 --no-shade";
+    // The mean of 40 × 40 pixels in the middle of the sheet.
+    let middle = |flags: &str| {
+        let raw = format!("render sheet.ply {flags} -o - --raw --size 600x600 {view} --engine cpu");
+        let pixels = folder.run(&raw).ok().stdout;
+        let rows = pixels.chunks_exact(4 * 600).skip(280).take(40);
+        let inside = rows.flat_map(|row| row.chunks_exact(4).skip(280).take(40));
+        let sums = inside
+            .fold([0; 4], |sums, pixel| [0, 1, 2, 3].map(|at| sums[at] + u32::from(pixel[at])));
+        sums.map(|sum| sum / 1600)
+    };
+    let opaque = middle("--color orange --background none");
+    assert!(opaque[3] == 255 && opaque[0] > opaque[2], "{opaque:?}");
+    let half = middle("--color sheet.ply=orange --opacity sheet.ply=0.5 --background none");
+    assert!((120..136).contains(&half[3]) && half[0] > half[2], "{half:?}");
+    let shared = middle("--color orange --color sheet.ply=blue --background none");
+    assert!(shared[2] > shared[0], "{shared:?}");
+    for (flags, word) in [
+        ("--color gone.ply=red", "no input has this name"),
+        ("--opacity 0.5 --opacity 0.2", "given twice"),
+        ("--opacity 0", "above 0"),
+    ] {
+        folder.run(&format!("render sheet.ply -o y.png {flags}")).fails(2, &[word]);
+    }
+}

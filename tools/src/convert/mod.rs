@@ -64,7 +64,7 @@ pub struct Convert {
 const WRITTEN: [&str; 4] = ["splk", "ply", "nrrd", "splv"];
 
 impl Convert {
-    pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
+    pub fn run(mut self, given: &Given, progress: &Progress) -> Result<(), Failure> {
         let extension = self
             .output
             .extension()
@@ -83,6 +83,8 @@ impl Convert {
                 "{flag} colours meshes and point clouds, which become .splk or .ply"
             )));
         }
+        self.color.check(&self.files)?;
+        self.color = self.color.of(&self.files[0]);
         self.warn(given, progress);
         if !self.dry_run {
             output::check(&self.output, self.overwrite)?;

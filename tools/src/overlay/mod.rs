@@ -44,6 +44,8 @@ pub struct OverlayFlags {
 pub struct Facts {
     /// The colours of values, in the order of the inputs.
     pub bars: Vec<Bar>,
+    /// The bar of the field, by its number: it follows the transfer function.
+    pub field: Option<usize>,
     /// The unit of lengths; empty if no file says it.
     pub length: String,
     /// How a patient stands.
@@ -102,6 +104,11 @@ impl Overlay {
         let (bars, _) = self.laid(&canvas, area);
         let bars: f64 = bars.iter().map(|bar| bar.width + BETWEEN * canvas.size).sum();
         (bars + area.left).min(MOST_ROOM * f64::from(width)) as u32
+    }
+
+    #[cfg(all(test, feature = "window"))]
+    pub fn bar_colors(&self) -> Vec<[f32; 3]> {
+        self.facts.bars.iter().flat_map(|bar| bar.colors.clone()).collect()
     }
 
     /// Returns a picture to draw on, and its area without a margin.
@@ -255,7 +262,7 @@ mod tests {
         let color = |i: usize| scale.color(scale.value(i as f64 / 255.0));
         let colors: Vec<[f32; 3]> = (0..256).map(color).collect();
         let bar = Bar { title: titled("Radiodensity", "HU"), scale, colors };
-        Facts { bars: vec![bar], length: "mm".into(), patient }
+        Facts { bars: vec![bar], length: "mm".into(), patient, ..Facts::default() }
     }
 
     fn flags(which: [bool; 4]) -> OverlayFlags {

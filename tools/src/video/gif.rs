@@ -1,5 +1,5 @@
-//! Animated GIF: 256 colours a frame, chosen for each frame and dithered; a pixel is opaque or
-//! transparent.
+//! Animated GIF: 256 colours a frame: all of them, if a frame has no more, or else chosen for the
+//! frame and dithered. A pixel is opaque or transparent.
 
 use super::{Encoder, Film, Out, commit, create};
 use crate::failure::Failure;
@@ -8,7 +8,10 @@ use quantette::{
     ImageRef, PaletteSize, Pipeline, QuantizeMethod, deps::palette::Srgb, dither::FloydSteinberg,
 };
 use splatkit::Error;
-use std::path::{Path, PathBuf};
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+};
 
 /// Most pixels of a side.
 pub const MOST: u32 = u16::MAX as u32;
@@ -74,23 +77,20 @@ fn indexed(
     is_transparent: bool,
 ) -> (Vec<u8>, Vec<u8>, Option<u8>) {
     let is_seen = |pixel: &[u8]| pixel[3] >= OPAQUE;
-    // Pixels that are not drawn have the colour that their neighbours fade to.
-    let color = |pixel: &[u8]| match is_seen(pixel) {
-        true => Srgb::new(pixel[0], pixel[1], pixel[2]),
-        false => Srgb::new(0, 0, 0),
+    // A pixel that is not drawn takes the colour of the last one that is: a colour of its own would
+    // claim a part of the palette.
+    let mut last = Srgb::new(0, 0, 0);
+    let color = |pixel: &[u8]| {
+        if is_seen(pixel) {
+            last = Srgb::new(pixel[0], pixel[1], pixel[2]);
+        }
+        last
     };
     let colors: Vec<Srgb<u8>> = rgba.chunks_exact(4).map(color).collect();
     // The last index is left for transparent pixels.
-    let most = PaletteSize::from_u16_clamped(if is_transparent { 255 } else { 256 });
-    let image = ImageRef::new(width, height, &*colors).expect("a colour for each pixel");
-    let found = Pipeline::new()
-        .palette_size(most)
-        .quantize_method(QuantizeMethod::kmeans())
-        .ditherer(FloydSteinberg::new())
-        .parallel(true)
-        .input_image(image)
-        .output_srgb8_indexed_image();
-    let (palette, mut indices) = found.into_parts();
+    let most = if is_transparent { 255 } else { 256 };
+    let (palette, mut indices) =
+        exact(&colors, most).unwrap_or_else(|| chosen(&colors, most, [width, height]));
     let mut palette: Vec<u8> =
         palette.into_iter().flat_map(|color| [color.red, color.green, color.blue]).collect();
     let mut transparent = None;
@@ -105,6 +105,39 @@ fn indexed(
         transparent = Some(index);
     }
     (palette, indices, transparent)
+}
+
+/// Returns all colours and the index of each pixel, if there are at most so many colours.
+fn exact(colors: &[Srgb<u8>], most: u16) -> Option<(Vec<Srgb<u8>>, Vec<u8>)> {
+    let mut palette = Vec::new();
+    let mut known = HashMap::new();
+    let mut indices = Vec::with_capacity(colors.len());
+    for color in colors {
+        let index = *known.entry((color.red, color.green, color.blue)).or_insert(palette.len());
+        if index == palette.len() {
+            palette.push(*color);
+        }
+        if palette.len() > usize::from(most) {
+            return None;
+        }
+        indices.push(index as u8);
+    }
+    Some((palette, indices))
+}
+
+/// Returns colours for all pixels and the index of each pixel, dithered.
+fn chosen(colors: &[Srgb<u8>], most: u16, size: [u32; 2]) -> (Vec<Srgb<u8>>, Vec<u8>) {
+    let most = PaletteSize::from_u16_clamped(most);
+    let [width, height] = size;
+    let image = ImageRef::new(width, height, colors).expect("a colour for each pixel");
+    let found = Pipeline::new()
+        .palette_size(most)
+        .quantize_method(QuantizeMethod::kmeans())
+        .ditherer(FloydSteinberg::new())
+        .parallel(true)
+        .input_image(image)
+        .output_srgb8_indexed_image();
+    found.into_parts()
 }
 
 fn failure(path: &Path, error: EncodingError) -> Failure {

@@ -4,7 +4,7 @@ use crate::{Command, Task, failure::Failure, given::Given, render::Render, scene
 use clap::{ArgAction, ArgMatches, CommandFactory, FromArgMatches};
 use serde_json::{Map, Value};
 use splatkit::{
-    interaction::{CameraEntry, SceneFile},
+    interaction::{CameraEntry, InputEntry, SceneFile},
     scene::Clip,
     volume::TransferFunction,
 };
@@ -32,6 +32,9 @@ const LOOK: &[&str] = &[
 const OF_TRANSFER: &[&str] = &["range", "opacity-unit", "iso", "gradient-opacity"];
 /// Most steps that can be undone.
 const MOST_STEPS: usize = 200;
+
+/// What decides what is loaded: the inputs and the options.
+pub type LoadedBy = (Vec<InputEntry>, Map<String, Value>);
 
 /// A scene file that changes, with its history.
 pub struct Document {
@@ -93,6 +96,7 @@ impl Document {
                 self.pending.extend(flags);
             }
             "quiet" | "verbose" | "threads" => {}
+            "color" | "opacity" => self.take_own(name, values),
             _ if scene_file::is_option(name) => {
                 let value = match &values[..] {
                     _ if is_switch => Value::Bool(true),
@@ -108,6 +112,25 @@ impl Document {
             }
         }
         Ok(())
+    }
+
+    /// Takes colours or opacities, of which each may be that of one input: `FILE=VALUE`.
+    fn take_own(&mut self, name: &str, values: Vec<String>) {
+        let mut rest = Vec::new();
+        for value in values {
+            let own = value.rsplit_once('=').and_then(|(file, own)| {
+                let input = self.now.inputs.iter_mut().find(|i| i.file == Path::new(file))?;
+                Some((input, own))
+            });
+            match own {
+                Some((input, own)) if name == "color" => input.color = Some(own.to_owned()),
+                Some((input, own)) => input.opacity = own.parse().ok(),
+                None => rest.push(Value::String(value)),
+            }
+        }
+        if !rest.is_empty() {
+            self.now.options.insert(name.to_owned(), Value::Array(rest));
+        }
     }
 
     pub fn scene(&self) -> &SceneFile {
@@ -193,7 +216,7 @@ impl Document {
 
     /// Returns the options and inputs that decide what is loaded. Scenes for which they are equal
     /// need not be loaded again.
-    pub fn loaded_by(&self) -> (Vec<PathBuf>, Map<String, Value>) {
+    pub fn loaded_by(&self) -> LoadedBy {
         let inputs = self.now.inputs.iter().filter(|input| input.visible);
         let mut options = self.now.options.clone();
         options.retain(|name, _| {
@@ -203,17 +226,31 @@ impl Document {
         if let Some(Value::String(name)) = &self.now.transfer {
             options.insert("transfer".into(), name.clone().into());
         }
-        (inputs.map(|input| input.file.clone()).collect(), options)
+        (inputs.cloned().collect(), options)
     }
 
     /// Returns the command that draws this scene.
     pub fn render(&self) -> Result<(Given, Render), Failure> {
+        self.render_of(&self.now, &[])
+    }
+
+    /// Returns the command that draws a film of this scene, whose camera follows a path. Existing
+    /// files are replaced.
+    pub fn render_of_film(&self, size: [u32; 2]) -> Result<Render, Failure> {
+        let mut scene = self.now.clone();
+        (scene.camera, scene.size) = (None, Some(size));
+        scene_file::CAMERA.iter().for_each(|flag| drop(scene.options.remove(*flag)));
+        Ok(self.render_of(&scene, &["--overwrite"])?.1)
+    }
+
+    fn render_of(&self, scene: &SceneFile, more: &[&str]) -> Result<(Given, Render), Failure> {
         let command = Command::command();
         let path = self.path.clone().unwrap_or_default();
         let given = Given::default();
-        let flags = scene_file::flags(&self.now, &path, &command, "render", &given)?;
+        let flags = scene_file::flags(scene, &path, &command, "render", &given)?;
         let words = ["splatkit".into(), "render".into()].into_iter();
-        let words = words.chain(self.pending.iter().cloned()).chain(flags);
+        let more = more.iter().map(OsString::from);
+        let words = words.chain(more).chain(self.pending.iter().cloned()).chain(flags);
         let matches = command.try_get_matches_from(words).map_err(usage)?;
         match Command::from_arg_matches(&matches).map_err(usage)?.task {
             Task::Render(render) => Ok((Given::of(&matches), *render)),

@@ -4,11 +4,16 @@
 //! the background ([`loader`]), gives orders to the [`painter`], and shows its frames and the
 //! [`panels`]. What it shows is what `splatkit render` draws from the same scene file.
 
+mod canvas;
 mod curve;
 mod document;
+mod export;
+mod files;
+mod handles;
 mod loader;
 mod painter;
 mod panels;
+mod screen;
 mod slices;
 #[cfg(test)]
 mod tests;
@@ -66,10 +71,12 @@ fn open(document: Document) -> Result<(), Failure> {
             .with_title("splatkit")
             .with_inner_size(size)
             .with_drag_and_drop(true),
+        // It would cost a processor without a GPU much, and a picture must not be changed.
+        dithering: false,
         ..eframe::NativeOptions::default()
     };
     let create = |context: &eframe::CreationContext<'_>| {
-        let window = Window::new(document, &context.egui_ctx)?;
+        let window = Window::new(document, &context.egui_ctx, context.wgpu_render_state.as_ref())?;
         Ok(Box::new(App(window)) as Box<dyn eframe::App>)
     };
     eframe::run_native("splatkit", options, Box::new(create)).map_err(|error| {

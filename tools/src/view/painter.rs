@@ -12,12 +12,16 @@ use splatkit::{
 use std::{
     sync::{Arc, Condvar, Mutex, MutexGuard},
     thread::JoinHandle,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
-/// The wanted time of a moving frame, in milliseconds: 25 frames a second, with some for the
-/// window.
-const MOVING: f64 = 32.0;
+/// The wanted time of a moving frame, in milliseconds. An input waits for the frame before it, and
+/// without a GPU the window itself takes about 15 ms of both processors: together 50 ms.
+const MOVING: f64 = 17.0;
+
+/// A view that changed less than this ago may still move: it is not refined yet. A finer frame would
+/// delay the next moving one.
+const CALM: Duration = Duration::from_millis(70);
 
 /// A loaded scene, and the device that draws it.
 pub struct Stage {
@@ -27,6 +31,14 @@ pub struct Stage {
     pub histogram: Option<Histogram>,
     /// The thickness of a sheet that the volume's spacing asks for, in world units.
     pub sheet: Option<f64>,
+}
+
+impl Stage {
+    /// Returns the smallest and the largest value of the field; 0 and 1 if there is none.
+    pub fn values(&self) -> [f64; 2] {
+        let values = self.loaded.scene.items.iter().find_map(Item::value_range);
+        values.unwrap_or([0.0, 1.0])
+    }
 }
 
 /// What is to be drawn.
@@ -51,8 +63,8 @@ pub struct Frame {
     pub effort: Effort,
     pub stats: FrameStats,
     pub milliseconds: f64,
-    /// From the order to this frame, in milliseconds.
-    pub delay: f64,
+    /// When it was ordered.
+    pub ordered: Instant,
 }
 
 impl Frame {
@@ -192,6 +204,12 @@ fn run(shared: &Shared) {
             state.rests = true;
             continue;
         };
+        let calm = since.map_or(CALM, |since| since.elapsed());
+        if !is_new && calm < CALM {
+            let wait = shared.wake.wait_timeout(state, CALM - calm);
+            drop(wait.unwrap_or_else(std::sync::PoisonError::into_inner));
+            continue;
+        }
         let stop = Stop::default();
         state.refining = (!is_new).then(|| stop.clone());
         drop(state);
@@ -203,10 +221,9 @@ fn run(shared: &Shared) {
         match done {
             Ok((picture, stats)) => {
                 pace.took(effort, milliseconds);
-                let delay = since.map_or(0.0, |since| since.elapsed().as_secs_f64() * 1e3);
-                let camera = order.camera;
+                let (camera, ordered) = (order.camera, since.unwrap_or(start));
                 state.frame =
-                    Some(Frame { number, picture, camera, effort, stats, milliseconds, delay });
+                    Some(Frame { number, picture, camera, effort, stats, milliseconds, ordered });
                 state.rests = state.number == number && effort == Effort::EXACT;
             }
             Err(Error::Stopped) => continue,

@@ -19,7 +19,7 @@ fn harness(folder: &Path) -> Harness<'static, Option<Window>> {
             let context = ui.ctx().clone();
             let own = window.get_or_insert_with(|| {
                 let document = document.take().expect("one window");
-                Window::new(document, &context).expect("a window")
+                Window::new(document, &context, None).expect("a window")
             });
             own.ui(ui);
         },
@@ -45,9 +45,17 @@ fn rest(harness: &mut Harness<'static, Option<Window>>) {
     panic!("no exact picture; messages: {:?}", window(harness).messages);
 }
 
+/// Opens a part of the side panel.
+fn unfold(harness: &mut Harness<'static, Option<Window>>, name: &str) {
+    harness.get_by_label(name).click();
+    for _ in 0..30 {
+        harness.step();
+    }
+}
+
 fn picture_of(harness: &mut Harness<'static, Option<Window>>) -> Vec<[f32; 4]> {
     rest(harness);
-    window(harness).frame.as_ref().expect("a frame").0.picture.color.clone()
+    window(harness).frame.as_ref().expect("a frame").picture.color.clone()
 }
 
 #[test]
@@ -88,14 +96,32 @@ fn a_clip_is_added_and_cuts() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut harness = harness(folder.path());
     let before = picture_of(&mut harness);
-    harness.get_by_label("Clips").click();
-    for _ in 0..30 {
-        harness.step();
-    }
+    unfold(&mut harness, "Clips");
     harness.get_by_label("Plane x").click();
     harness.step();
-    assert!(picture_of(&mut harness) != before, "nothing is cut");
+    let cut = picture_of(&mut harness);
+    assert!(cut != before, "nothing is cut");
     assert_eq!(window(&mut harness).document.scene().clips.len(), 1);
+    // Its handle moves it, as one step.
+    let offset = |harness: &mut Harness<'static, Option<Window>>| {
+        window(harness).document.scene().clips[0].plane.expect("a plane")[3]
+    };
+    let old = offset(&mut harness);
+    let at = harness.get_by_label("Handle of clip 1").rect().center();
+    harness.hover_at(at);
+    harness.step();
+    harness.drag_at(at);
+    harness.step();
+    for step in 1..5 {
+        harness.hover_at(at + egui::vec2(8.0, 3.0) * step as f32);
+        harness.step();
+    }
+    harness.drop_at(at + egui::vec2(32.0, 12.0));
+    harness.step();
+    assert_ne!(offset(&mut harness), old);
+    assert!(picture_of(&mut harness) != cut, "the clip was not moved");
+    window(&mut harness).document.undo();
+    assert_eq!(offset(&mut harness), old);
 }
 
 #[test]
@@ -140,4 +166,144 @@ fn pictures_and_scenes_are_saved() {
     assert!(own.camera.is_some() && own.size.is_some());
     let text = std::fs::read_to_string(&scene).expect("text");
     assert!(text.contains("\"v.nrrd\""), "{text}");
+}
+
+#[test]
+fn a_path_of_the_camera_is_played_saved_and_exported() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    unfold(&mut harness, "Camera path");
+    harness.get_by_label("Turn around").click();
+    harness.step();
+    assert_eq!(window(&mut harness).panels.flight.keyframes.len(), 5);
+    let before = window(&mut harness).document.scene().camera;
+    harness.get_by_label("Play").click();
+    for _ in 0..10 {
+        harness.step();
+    }
+    harness.get_by_label("Pause").click();
+    harness.step();
+    let camera = window(&mut harness).document.scene().camera;
+    assert!(camera.is_some() && camera != before, "the camera stood still");
+    let (path, film) = (folder.path().join("path.json"), folder.path().join("film.gif"));
+    window(&mut harness).save_path(&path);
+    window(&mut harness).panels.flight.keyframes.clear();
+    window(&mut harness).load_path(&path);
+    assert_eq!(window(&mut harness).panels.flight.keyframes.len(), 5);
+    window(&mut harness).panels.flight.rate = 1.0;
+    window(&mut harness).size = [40, 30];
+    window(&mut harness).export(film.clone());
+    for _ in 0..2000 {
+        harness.step();
+        if window(&mut harness).panels.flight.exporting.is_none() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(film.exists(), "{:?}", window(&mut harness).messages);
+}
+
+#[test]
+fn transfer_functions_are_saved_and_loaded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    let before = picture_of(&mut harness);
+    let path = folder.path().join("t.json");
+    window(&mut harness).save_transfer(&path);
+    let text = std::fs::read_to_string(&path).expect("a file");
+    let mut transfer = splatkit::volume::TransferFunction::from_json(&text).expect("JSON");
+    transfer.color = vec![(0.0, [0.0, 0.0, 1.0])];
+    std::fs::write(&path, transfer.to_json()).expect("written");
+    window(&mut harness).load_transfer(&path);
+    harness.step();
+    assert!(picture_of(&mut harness) != before, "the colours are the same");
+    // The bar shows the new colours.
+    let unlit = picture_of(&mut harness);
+    harness.get_by_label("Scalar bar").click();
+    harness.step();
+    assert!(picture_of(&mut harness) != unlit, "there is no bar");
+    let facts = window(&mut harness).shown.as_ref().expect("a scene").finish.clone();
+    assert!(facts.bar_colors().iter().all(|color| color[2] > 0.9), "the bar is an old one");
+    window(&mut harness).document.undo();
+    window(&mut harness).document.undo();
+    harness.step();
+    assert!(picture_of(&mut harness) == before);
+}
+
+#[test]
+fn surfaces_have_a_colour_and_an_opacity() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+        property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let file = folder.path().join("t.ply");
+    std::fs::write(&file, ply).expect("written");
+    window(&mut harness).document.change(|scene| scene.inputs.clear());
+    window(&mut harness).open(vec![file]);
+    let gray = picture_of(&mut harness);
+    harness.get_by_label("Own colour").focus();
+    harness.step();
+    harness.get_by_label("Own colour").type_text("red");
+    harness.step();
+    harness.key_press(egui::Key::Enter);
+    harness.step();
+    let color = window(&mut harness).document.scene().inputs[0].color.clone();
+    assert_eq!(color.as_deref(), Some("red"));
+    let red = picture_of(&mut harness);
+    assert!(red != gray, "the colour is the same");
+    window(&mut harness).document.change(|scene| scene.inputs[0].opacity = Some(0.3));
+    harness.step();
+    let faint = picture_of(&mut harness);
+    let most = |picture: &[[f32; 4]]| picture.iter().map(|c| c[3]).fold(0.0, f32::max);
+    assert!(most(&faint) < 0.6 && most(&red) > 0.99, "{} {}", most(&faint), most(&red));
+}
+
+#[test]
+fn slices_stand_beside_the_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    let width = window(&mut harness).size[0];
+    harness.get_by_label("Slices").click();
+    rest(&mut harness);
+    harness.get_by_label("Picture across the third axis");
+    assert!(window(&mut harness).size[0] < width);
+}
+
+#[test]
+fn a_window_without_room_draws_nothing_and_comes_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    let before = picture_of(&mut harness);
+    for size in [[1.0, 1.0], [0.0, 0.0], [3840.0, 2160.0], [800.0, 1600.0]] {
+        harness.set_size(egui::vec2(size[0], size[1]));
+        rest(&mut harness);
+    }
+    assert!(picture_of(&mut harness) == before, "another picture");
+}
+
+/// The file may go while its scene is shown: it is in memory.
+#[test]
+fn a_deleted_file_does_no_harm() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    let before = picture_of(&mut harness);
+    std::fs::remove_file(folder.path().join("v.nrrd")).expect("removed");
+    harness.get_by_label("Axes").click();
+    harness.step();
+    assert!(picture_of(&mut harness) != before);
+    // What must be read again says so, and the picture stays.
+    window(&mut harness).document.change(|scene| {
+        scene.options.insert("sharp".into(), true.into());
+    });
+    for _ in 0..200 {
+        harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    let messages = &window(&mut harness).messages;
+    assert!(messages.iter().any(|(text, is_error)| *is_error && text.contains("v.nrrd")));
+    assert!(window(&mut harness).frame.is_some());
 }

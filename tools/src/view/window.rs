@@ -1,28 +1,29 @@
 //! The window: what it shows, and what a hand does in it.
 
 use super::{
-    document::Document,
+    canvas::Canvas,
+    document::{Document, LoadedBy},
+    handles::{self, Moved},
     loader::{Loading, text_of},
     painter::{Frame, Order, Painter, Stage},
     panels,
+    screen::Screen,
 };
 use crate::{render::Finish, scene_file};
-use eframe::egui::{
-    self, Align2, CentralPanel, Color32, ColorImage, Context, CursorIcon, FontId, Key, Modifiers,
-    Panel, PointerButton, Pos2, Rect, Sense, TextureHandle, TextureOptions, Ui, Vec2,
+use eframe::{
+    egui::{
+        self, Align2, CentralPanel, Color32, Context, CursorIcon, FontId, Key, Modifiers, Panel,
+        PointerButton, Pos2, Rect, Sense, Ui, Vec2,
+    },
+    egui_wgpu::RenderState,
 };
 use glam::{DVec2, DVec3};
-use serde_json::Value;
 use splatkit::{
     interaction::{CameraEntry, ClipEntry, Orbit, Probe, SceneFile},
-    picture::PictureFormat,
     scene::{Item, Settings},
     volume::TransferFunction,
 };
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{path::PathBuf, sync::Arc};
 
 /// The largest picture that is drawn for a window, in pixels along a side.
 const MOST_SIDE: u32 = 8192;
@@ -32,7 +33,7 @@ pub struct Shown {
     pub stage: Arc<Stage>,
     pub orbit: Orbit,
     settings: Settings,
-    finish: Arc<Finish>,
+    pub finish: Arc<Finish>,
     /// The transfer function that the scene was loaded with.
     own_transfer: Option<TransferFunction>,
 }
@@ -44,6 +45,18 @@ pub enum Tool {
     Measure,
 }
 
+/// What the settings of a picture follow from.
+#[derive(PartialEq)]
+struct SetFor {
+    /// The scene without its camera and its transfer function.
+    look: SceneFile,
+    size: [u32; 2],
+    /// Whether the camera is fitted to the scene.
+    is_fitted: bool,
+    /// The edited transfer function, if a bar shows its colours.
+    bar: Option<TransferFunction>,
+}
+
 /// The window's state.
 pub struct Window {
     pub document: Document,
@@ -51,28 +64,36 @@ pub struct Window {
     pub tool: Tool,
     /// Points that were picked to be measured, in world units.
     pub measured: Vec<DVec3>,
-    /// The last frame, and its texture.
-    pub frame: Option<(Frame, TextureHandle)>,
+    /// The last frame.
+    pub frame: Option<Frame>,
+    canvas: Canvas,
+    /// How long after its order the last frame was here, in milliseconds.
+    pub delay: f64,
     /// Messages, the newest last, and whether each is an error.
     pub messages: Vec<(String, bool)>,
     pub panels: panels::State,
     painter: Painter,
     loading: Option<Loading>,
     /// What the shown scene, or the one that is being loaded, was loaded by.
-    loaded_by: Option<(Vec<PathBuf>, serde_json::Map<String, Value>)>,
+    loaded_by: Option<LoadedBy>,
     /// What the settings were made for, and what was ordered last.
-    set_for: Option<(SceneFile, [u32; 2], bool)>,
+    set_for: Option<SetFor>,
     ordered: Option<SceneFile>,
     last_order: u64,
     /// The size of the picture in pixels.
-    size: [u32; 2],
+    pub size: [u32; 2],
     /// The picture is saved here as soon as it is exact.
-    save_to: Option<PathBuf>,
-    context: Context,
+    pub save_to: Option<PathBuf>,
+    pub context: Context,
 }
 
 impl Window {
-    pub fn new(document: Document, context: &Context) -> std::io::Result<Self> {
+    /// `state`: the window's device, if it has one.
+    pub fn new(
+        document: Document,
+        context: &Context,
+        state: Option<&RenderState>,
+    ) -> std::io::Result<Self> {
         let repaint = context.clone();
         Ok(Self {
             document,
@@ -80,6 +101,8 @@ impl Window {
             tool: Tool::Look,
             measured: Vec::new(),
             frame: None,
+            canvas: Canvas::new(state),
+            delay: 0.0,
             messages: Vec::new(),
             panels: panels::State::default(),
             painter: Painter::start(move || repaint.request_repaint())?,
@@ -96,6 +119,8 @@ impl Window {
 
     /// Shows the whole window.
     pub fn ui(&mut self, ui: &mut Ui) {
+        // Before the picture is painted, so that a frame is seen at once.
+        self.take_frame();
         self.take_dropped(ui);
         self.take_keys(ui);
         Panel::top("menu").show(ui, |ui| panels::menu(self, ui));
@@ -103,6 +128,11 @@ impl Window {
         if self.panels.shows_side {
             Panel::right("side").default_size(330.0).show(ui, |ui| {
                 egui::ScrollArea::vertical().show(ui, |ui| panels::side(self, ui));
+            });
+        }
+        if self.panels.shows_slices {
+            Panel::left("slices").default_size(280.0).show(ui, |ui| {
+                egui::ScrollArea::vertical().show(ui, |ui| panels::slices(self, ui));
             });
         }
         CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
@@ -115,7 +145,7 @@ impl Window {
         let is_exact = self
             .frame
             .as_ref()
-            .is_some_and(|(frame, _)| frame.is_exact() && frame.number == self.last_order);
+            .is_some_and(|frame| frame.is_exact() && frame.number == self.last_order);
         self.loading.is_none() && (self.shown.is_none() || is_exact)
     }
 
@@ -161,43 +191,6 @@ impl Window {
         self.say("loading was cancelled", false);
     }
 
-    /// Saves the exact picture as soon as it is drawn.
-    pub fn save_picture(&mut self, path: PathBuf) {
-        match PictureFormat::of(&path) {
-            Ok(_) => self.save_to = Some(path),
-            Err(error) => self.say(error.to_string(), true),
-        }
-    }
-
-    /// Saves the scene as it is shown, with its camera and its size.
-    pub fn save_scene(&mut self, path: &Path) {
-        self.fix_view();
-        match self.document.save(path) {
-            Ok(()) => self.say(format!("{}: saved", path.display()), false),
-            Err(error) => self.say(error.to_string(), true),
-        }
-    }
-
-    /// Copies the command that draws what is shown.
-    pub fn copy_command(&mut self) {
-        self.fix_view();
-        match self.document.command_line() {
-            Ok(line) => {
-                self.context.copy_text(line);
-                self.say("the command is in the clipboard", false);
-            }
-            Err(failure) => self.say(text_of(&failure), true),
-        }
-    }
-
-    /// Writes the camera and the size that are shown into the scene.
-    fn fix_view(&mut self) {
-        let Some(shown) = &self.shown else { return };
-        let (camera, size) = (CameraEntry::from(shown.orbit.camera()), self.size);
-        self.document.set_camera(camera);
-        self.document.adjust(|scene| scene.size = Some(size));
-    }
-
     /// Looks at the whole scene from a side, by its name.
     pub fn look_from(&mut self, side: &str) {
         self.document.adjust(|scene| {
@@ -223,9 +216,13 @@ impl Window {
     /// Returns the transfer function that is shown, if the scene has a field.
     pub fn transfer(&self) -> Option<TransferFunction> {
         let shown = self.shown.as_ref()?;
+        self.edited_transfer().or_else(|| shown.own_transfer.clone())
+    }
+
+    /// Returns the transfer function, if it is another one than the scene was loaded with.
+    fn edited_transfer(&self) -> Option<TransferFunction> {
         let own = self.document.scene().transfer.as_ref().filter(|own| own.is_object());
-        let edited = own.and_then(|_| self.document.scene().transfer_function().ok().flatten());
-        edited.or_else(|| shown.own_transfer.clone())
+        own.and_then(|_| self.document.scene().transfer_function().ok().flatten())
     }
 
     /// Sets the transfer function, without a step that can be undone.
@@ -348,13 +345,10 @@ impl Window {
         self.size = [area.width(), area.height()]
             .map(|side| ((side * scale).round() as u32).clamp(1, MOST_SIDE));
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "The picture"));
-        if let Some((_, texture)) = &self.frame {
-            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-            ui.painter().image(texture.id(), area, whole, Color32::WHITE);
-        }
+        self.canvas.paint(ui, area);
         if self.shown.is_some() {
             self.answer(ui, &response, area, scale);
-            self.draw_measured(ui, area, scale);
+            self.draw_over(ui, area, scale);
         } else if self.loading.is_none() {
             let hint = "Drop a scan, a volume or a scene here, or open one (Ctrl+O)";
             let color = ui.visuals().weak_text_color();
@@ -441,36 +435,47 @@ impl Window {
 
     /// Returns the view-space depth of the picture at a pixel of the window.
     fn depth_at(&self, cursor: DVec2) -> Option<f64> {
-        let (frame, _) = self.frame.as_ref()?;
-        let picture = &frame.picture;
-        let [x, y] =
-            [(cursor.x, picture.width, self.size[0]), (cursor.y, picture.height, self.size[1])]
-                .map(|(at, pixels, side)| at * f64::from(pixels) / f64::from(side));
-        if x < 0.0 || y < 0.0 || x >= f64::from(picture.width) || y >= f64::from(picture.height) {
-            return None;
-        }
-        let depth = picture.depth.get(y as usize * picture.width as usize + x as usize)?;
-        depth.is_finite().then(|| f64::from(*depth))
+        let frame = self.frame.as_ref()?;
+        let view = frame.camera.view(self.size).ok()?;
+        Some(view.to_view(self.point_under(cursor)?).z)
     }
 
     /// Returns the world point under the cursor.
     fn point_under(&self, cursor: DVec2) -> Option<DVec3> {
-        let (frame, _) = self.frame.as_ref()?;
+        let frame = self.frame.as_ref()?;
         let view = frame.camera.view(self.size).ok()?;
         Probe::picked(&frame.picture, &view, cursor)
     }
 
-    /// Draws the points that were picked, and the distance between them.
-    fn draw_measured(&self, ui: &Ui, area: Rect, scale: f32) {
-        let (Some(shown), true) = (&self.shown, !self.measured.is_empty()) else { return };
+    /// Draws clips, and the points that were picked, over the picture.
+    fn draw_over(&mut self, ui: &Ui, area: Rect, scale: f32) {
+        let Some(shown) = &self.shown else { return };
         let Ok(view) = shown.orbit.camera().view(self.size) else { return };
-        let on_screen = |point: &DVec3| {
-            let p = view.to_view(*point);
-            let depth = if view.perspective { p.z } else { 1.0 };
-            let at = p.truncate() * view.scale / depth + view.center;
-            (depth > 0.0).then(|| area.min + Vec2::new(at.x as f32, at.y as f32) / scale)
+        let screen = Screen { view, area, scale };
+        self.draw_measured(ui, &screen);
+        let mut clips = self.document.scene().clips.clone();
+        let (true, Some(bounds), false) =
+            (self.panels.shows_handles, self.panels.bounds, clips.is_empty())
+        else {
+            return;
         };
-        let points: Vec<Pos2> = self.measured.iter().filter_map(on_screen).collect();
+        let moved = handles::show(ui, &screen, &bounds, &mut clips);
+        if moved == Moved::Begun {
+            self.panels.before_drag = Some(self.document.scene().clone());
+        }
+        self.document.adjust(|scene| scene.clips = clips);
+        if moved == Moved::Ended
+            && let Some(before) = self.panels.before_drag.take()
+        {
+            self.document.keep(before);
+        }
+    }
+
+    /// Draws the points that were picked, and the distance between them.
+    fn draw_measured(&self, ui: &Ui, screen: &Screen) {
+        let (Some(shown), false) = (&self.shown, self.measured.is_empty()) else { return };
+        let points: Vec<Pos2> =
+            self.measured.iter().filter_map(|point| screen.place(*point)).collect();
         let ink = Color32::from_rgb(255, 210, 60);
         for point in &points {
             ui.painter().circle_stroke(*point, 4.0, egui::Stroke::new(1.5, ink));
@@ -491,7 +496,6 @@ impl Window {
     fn refresh(&mut self) {
         self.take_loaded();
         self.start_loading();
-        self.take_frame();
         if let Some(error) = self.painter.take_error() {
             self.save_to = None;
             self.say(error, true);
@@ -499,6 +503,7 @@ impl Window {
         if let Err(message) = self.order() {
             self.say(message, true);
         }
+        self.take_film();
         self.save_if_exact();
     }
 
@@ -530,6 +535,7 @@ impl Window {
     /// Shows nothing.
     fn clear(&mut self) {
         (self.shown, self.frame, self.set_for, self.ordered) = (None, None, None, None);
+        self.canvas.clear();
         self.painter.clear();
     }
 
@@ -588,15 +594,17 @@ impl Window {
 
     /// Makes the settings anew if they changed, and orders a picture if anything did.
     fn order(&mut self) -> Result<(), String> {
-        let Some(shown) = &mut self.shown else { return Ok(()) };
-        if self.size.contains(&0) {
+        if self.shown.is_none() || self.size.contains(&0) {
             return Ok(());
         }
         let mut look = self.document.scene().clone();
         let is_fitted = look.camera.is_none();
         (look.camera, look.transfer) = (None, None);
+        let shows_bar = look.options.contains_key("scalar-bar");
+        let bar = if shows_bar { self.edited_transfer() } else { None };
+        let Some(shown) = &mut self.shown else { return Ok(()) };
         // A fitted camera follows from the settings.
-        let wanted = (look, self.size, is_fitted);
+        let wanted = SetFor { look, size: self.size, is_fitted, bar: bar.clone() };
         let is_set = self.set_for.as_ref() == Some(&wanted);
         if !is_set {
             self.set_for = Some(wanted);
@@ -604,7 +612,12 @@ impl Window {
             render.set_size(self.size);
             let loaded = &shown.stage.loaded;
             shown.settings = render.settings(loaded).map_err(|error| error.to_string())?;
-            shown.finish = Arc::new(render.finish(loaded).map_err(|failure| text_of(&failure))?);
+            let values = shown.stage.values();
+            let finish = match &bar {
+                Some(transfer) => render.finish_with(loaded, transfer, values),
+                None => render.finish(loaded),
+            };
+            shown.finish = Arc::new(finish.map_err(|failure| text_of(&failure))?);
             let camera = render.camera(loaded, &shown.settings, &shown.finish);
             shown.orbit.set_camera(camera.map_err(|error| error.to_string())?);
         } else if let Some(camera) = &self.document.scene().camera {
@@ -630,38 +643,20 @@ impl Window {
         let (Some(frame), Some(shown)) = (self.painter.take_frame(), &self.shown) else { return };
         // Where the picture is transparent, the window is black.
         let background = shown.finish.background.unwrap_or_default();
-        let size = [frame.picture.width as usize, frame.picture.height as usize];
+        let size = [frame.picture.width, frame.picture.height];
         let bytes = frame.picture.to_rgba8(Some(background));
-        let image = ColorImage::from_rgba_unmultiplied(size, &bytes);
-        let options =
-            if frame.is_exact() { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
-        let texture = match self.frame.take() {
-            Some((_, mut texture)) => {
-                texture.set(image, options);
-                texture
-            }
-            None => self.context.load_texture("picture", image, options),
-        };
-        self.frame = Some((frame, texture));
-    }
-
-    /// Saves the picture if it is wanted and exact.
-    fn save_if_exact(&mut self) {
-        if self.save_to.is_none() || !self.rests() {
-            return;
-        }
-        let (Some(path), Some((frame, _)), Some(shown)) =
-            (self.save_to.take(), &self.frame, &self.shown)
-        else {
-            return;
-        };
-        let written = PictureFormat::of(&path)
-            .and_then(|format| frame.picture.encode(format, shown.finish.background))
-            .and_then(|bytes| splatkit::disk::write(&path, &bytes));
-        match written {
-            Ok(()) => self.say(format!("{}: saved", path.display()), false),
-            Err(error) => self.say(error.to_string(), true),
-        }
+        self.canvas.set(&self.context, size, &bytes, frame.is_exact());
+        self.delay = frame.ordered.elapsed().as_secs_f64() * 1e3;
+        // tools/window reads this line.
+        tracing::debug!(
+            number = frame.number,
+            pixel = frame.effort.pixel,
+            drawn_in = frame.milliseconds,
+            delay = self.delay,
+            exact = frame.is_exact(),
+            "frame"
+        );
+        self.frame = Some(frame);
     }
 
     /// Adds a clip through the middle of the scene, or removes one.
