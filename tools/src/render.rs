@@ -236,17 +236,16 @@ impl Render {
         let mut loaded = self.load(given, progress)?;
         let (settings, finish) = self.prepare(&mut loaded, &frames, &motion, progress)?;
         let ready = Ready { loaded: &loaded, settings, finish };
-        let (loaded, settings) = (ready.loaded, &ready.settings);
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
-            false => Drawer::engine(&self.engine, loaded, progress)?,
+            false => Drawer::engine(&self.engine, ready.loaded, progress)?,
         };
         let upload_ms = milliseconds(start);
         let run = Run { ready: &ready, motion, film, frames };
         let drawn = self.draw_frames(&mut drawer, &run, progress)?;
         progress.clear();
-        let Drawn { stats, camera, frame_ms, overlay } = drawn;
+        let stats = &drawn.stats;
         tracing::info!(
             splats = stats.splats,
             hidden = stats.hidden,
@@ -256,33 +255,41 @@ impl Render {
             "drawn"
         );
         if self.json {
-            let (stance, origin) = self.camera.stance(&loaded.subject);
-            output::json(&serde_json::json!({
-                "output": output.to_string_lossy(),
-                "width": self.engine.size[0],
-                "height": self.engine.size[1],
-                "frames": film.frames,
-                "fps": run.frames.is_film().then_some(film.rate),
-                "adapter": drawer.adapter(),
-                "splats": stats.splats,
-                "hidden": stats.hidden,
-                "bricks": describe::bricks(&stats),
-                "entries": stats.entries,
-                "gathered": stats.gathered,
-                "passes": stats.passes,
-                "gpu_bytes": stats.gpu_bytes,
-                "frame_ms": frame_ms,
-                "load_ms": loaded.load_ms,
-                "upload_ms": upload_ms,
-                "camera": crate::camera::to_json(&camera),
-                "overlay": overlay,
-                "up": direction_name(stance.up),
-                "up_from": origin.name(),
-                "settings": describe::settings(&loaded.scene, settings),
-            }))?;
+            let mut facts = self.facts(&run, &drawn);
+            facts["output"] = output.to_string_lossy().into();
+            facts["adapter"] = drawer.adapter().into();
+            facts["upload_ms"] = upload_ms.into();
+            output::json(&facts)?;
         }
         self.report(&run, begun, progress);
         Ok(())
+    }
+
+    /// Returns what `--json` prints about the frames.
+    fn facts(&self, run: &Run, drawn: &Drawn) -> serde_json::Value {
+        let Run { ready: Ready { loaded, settings, .. }, film, frames, .. } = run;
+        let Drawn { stats, camera, frame_ms, overlay } = drawn;
+        let (stance, origin) = self.camera.stance(&loaded.subject);
+        serde_json::json!({
+            "width": self.engine.size[0],
+            "height": self.engine.size[1],
+            "frames": film.frames,
+            "fps": frames.is_film().then_some(film.rate),
+            "splats": stats.splats,
+            "hidden": stats.hidden,
+            "bricks": describe::bricks(stats),
+            "entries": stats.entries,
+            "gathered": stats.gathered,
+            "passes": stats.passes,
+            "gpu_bytes": stats.gpu_bytes,
+            "frame_ms": frame_ms,
+            "load_ms": loaded.load_ms,
+            "camera": crate::camera::to_json(camera),
+            "overlay": overlay,
+            "up": direction_name(stance.up),
+            "up_from": origin.name(),
+            "settings": describe::settings(&loaded.scene, settings),
+        })
     }
 
     /// Draws and writes a film of a scene that is loaded already. Existing files are replaced.

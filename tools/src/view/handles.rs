@@ -108,9 +108,9 @@ fn handles(clips: &[ClipEntry], bounds: &Bounds) -> Vec<Handle> {
             let ends = cuboid.map(DVec3::from_array);
             let middle = 0.5 * (ends[0] + ends[1]);
             for axis in 0..3 {
-                for end in 0..2 {
+                for (end, place) in ends.iter().enumerate() {
                     let mut at = middle;
-                    at[axis] = ends[end][axis];
+                    at[axis] = place[axis];
                     let part = Part::End(axis, end);
                     handles.push(Handle { clip: number, part, at, axis: DVec3::AXES[axis] });
                 }

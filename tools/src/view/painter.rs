@@ -177,42 +177,21 @@ struct Prepared {
     transfer: Option<TransferFunction>,
 }
 
+/// A frame that is to be drawn.
+struct Step {
+    order: Order,
+    number: u64,
+    ordered: Instant,
+    effort: Effort,
+    stop: Stop,
+}
+
 fn run(shared: &Shared) {
     let mut pace = Pace::new(MOVING);
     let mut prepared: Option<Prepared> = None;
     let mut drawn = 0;
-    loop {
-        let mut state = shared.lock();
-        while !state.ends && (state.order.is_none() || state.rests) {
-            if state.order.is_none() {
-                prepared = None;
-            }
-            state = shared.wake.wait(state).unwrap_or_else(std::sync::PoisonError::into_inner);
-        }
-        if state.ends {
-            return;
-        }
-        let (Some(order), number, since) = (state.order.clone(), state.number, state.since) else {
-            continue;
-        };
-        let is_new = number != drawn;
-        if is_new {
-            pace.changed();
-            drawn = number;
-        }
-        let Some(effort) = pace.next() else {
-            state.rests = true;
-            continue;
-        };
-        let calm = since.map_or(CALM, |since| since.elapsed());
-        if !is_new && calm < CALM {
-            let wait = shared.wake.wait_timeout(state, CALM - calm);
-            drop(wait.unwrap_or_else(std::sync::PoisonError::into_inner));
-            continue;
-        }
-        let stop = Stop::default();
-        state.refining = (!is_new).then(|| stop.clone());
-        drop(state);
+    while let Some(step) = next(shared, &mut pace, &mut drawn, &mut prepared) {
+        let Step { order, number, ordered, effort, stop } = step;
         let start = Instant::now();
         let done = draw(&mut prepared, &order, effort, stop);
         let milliseconds = start.elapsed().as_secs_f64() * 1e3;
@@ -221,7 +200,7 @@ fn run(shared: &Shared) {
         match done {
             Ok((picture, stats)) => {
                 pace.took(effort, milliseconds);
-                let (camera, ordered) = (order.camera, since.unwrap_or(start));
+                let camera = order.camera;
                 state.frame =
                     Some(Frame { number, picture, camera, effort, stats, milliseconds, ordered });
                 state.rests = state.number == number && effort == Effort::EXACT;
@@ -239,6 +218,49 @@ fn run(shared: &Shared) {
         }
         drop(state);
         (shared.tell)();
+    }
+}
+
+/// Waits for the next frame that is to be drawn; `None` at the end. `drawn` is the number of the
+/// last order of which a frame was begun.
+fn next(
+    shared: &Shared,
+    pace: &mut Pace,
+    drawn: &mut u64,
+    prepared: &mut Option<Prepared>,
+) -> Option<Step> {
+    let mut state = shared.lock();
+    loop {
+        while !state.ends && (state.order.is_none() || state.rests) {
+            if state.order.is_none() {
+                *prepared = None;
+            }
+            state = shared.wake.wait(state).unwrap_or_else(std::sync::PoisonError::into_inner);
+        }
+        if state.ends {
+            return None;
+        }
+        let number = state.number;
+        let is_new = number != *drawn;
+        if is_new {
+            pace.changed();
+            *drawn = number;
+        }
+        let ordered = state.since.unwrap_or_else(Instant::now);
+        let calm = ordered.elapsed();
+        let Some(effort) = pace.next() else {
+            state.rests = true;
+            continue;
+        };
+        if !is_new && calm < CALM {
+            let wait = shared.wake.wait_timeout(state, CALM - calm);
+            state = wait.unwrap_or_else(std::sync::PoisonError::into_inner).0;
+            continue;
+        }
+        let stop = Stop::default();
+        state.refining = (!is_new).then(|| stop.clone());
+        let order = state.order.clone()?;
+        return Some(Step { order, number, ordered, effort, stop });
     }
 }
 
