@@ -127,12 +127,14 @@ impl Window {
         Panel::bottom("status").show(ui, |ui| panels::status(self, ui));
         if self.panels.shows_side {
             Panel::right("side").default_size(330.0).show(ui, |ui| {
-                egui::ScrollArea::vertical().show(ui, |ui| panels::side(self, ui));
+                let area = egui::ScrollArea::vertical().auto_shrink([false, true]);
+                area.show(ui, |ui| panels::side(self, ui));
             });
         }
         if self.panels.shows_slices {
             Panel::left("slices").default_size(280.0).show(ui, |ui| {
-                egui::ScrollArea::vertical().show(ui, |ui| panels::slices(self, ui));
+                let area = egui::ScrollArea::vertical().auto_shrink([false, true]);
+                area.show(ui, |ui| panels::slices(self, ui));
             });
         }
         CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
