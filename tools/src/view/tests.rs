@@ -146,6 +146,7 @@ fn a_broken_file_is_a_message_and_the_scene_stays() {
         .expect("an error")
         .clone();
     assert!(text.contains("b.ply"), "{text}");
+    assert_eq!(window(&mut harness).document.scene().inputs.len(), 1);
     assert!(picture_of(&mut harness) == before, "the scene is gone");
 }
 

@@ -183,14 +183,19 @@ impl Window {
         self.document.change(|scene| scene.inputs.extend(entries));
     }
 
-    /// Gives up the scene that is being loaded, and goes back to the one before.
+    /// Gives up the scene that is being loaded.
     pub fn cancel(&mut self) {
+        self.give_up();
+        self.say("loading was cancelled", false);
+    }
+
+    /// Goes back to the scene that is shown, which can be redone.
+    fn give_up(&mut self) {
         self.loading = None;
-        if self.document.can_undo() {
+        if self.shown.is_some() && self.document.can_undo() {
             self.document.undo();
             self.loaded_by = Some(self.document.loaded_by());
         }
-        self.say("loading was cancelled", false);
     }
 
     /// Looks at the whole scene from a side, by its name.
@@ -530,7 +535,10 @@ impl Window {
         );
         match started {
             Ok(loading) => self.loading = Some(loading),
-            Err(message) => self.say(message, true),
+            Err(message) => {
+                self.give_up();
+                self.say(message, true);
+            }
         }
     }
 
@@ -557,7 +565,10 @@ impl Window {
                 self.say(format!("loaded in {seconds:.1} s"), false);
                 self.show(stage);
             }
-            Err(message) => self.say(message, true),
+            Err(message) => {
+                self.give_up();
+                self.say(message, true);
+            }
         }
     }
 
