@@ -48,8 +48,8 @@ fn lit_field(r: u32, color: vec3<f32>, gradient: vec3<f32>) -> vec3<f32> {
     return lit_from(color, gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
 }
 
-// The same for a part of a sheet, in its mean light: gradients change more within a part than values
-// do. The light is taken at four places, without a loop, which march would pay for.
+// The same for a part of a sheet, in its mean light: gradients change more within a part than
+// values do. The light is taken at four places, without a loop, which march would pay for.
 fn lit_piece(r: u32, medium: Medium, color: vec3<f32>, place: f32, next_place: f32) -> vec3<f32> {
     let step = 0.125 * (next_place - place);
     let light = 0.25 * (light_at(r, medium, place + step)

@@ -187,8 +187,9 @@ fn a_path_passes_through_its_keyframes() {
     );
     folder.run(&format!("render a.ply -o away.gif --path away.json --fps 2 {SMALL}")).ok();
     assert_eq!(gif(&folder.path("away.gif")).frames.len(), 5);
-    let always = r#"{"splatkit_path": 1, "keyframes": [{"time": 0, "camera": {"position": [0, 0, 90],
-        "focal_point": [0, 0, 99], "view_up": [0, 1, 0], "view_angle": 30}}]}"#;
+    let always = r#"{"splatkit_path": 1, "keyframes": [{"time": 0, "camera": {
+        "position": [0, 0, 90], "focal_point": [0, 0, 99], "view_up": [0, 1, 0],
+        "view_angle": 30}}]}"#;
     folder.put("always.json", always);
     folder
         .run(&format!("render a.ply -o always.gif --path always.json {SMALL}"))

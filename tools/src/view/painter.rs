@@ -19,8 +19,8 @@ use std::{
 /// without a GPU the window itself takes about 15 ms of both processors: together 50 ms.
 const MOVING: f64 = 17.0;
 
-/// A view that changed less than this ago may still move: it is not refined yet. A finer frame would
-/// delay the next moving one.
+/// A view that changed less than this ago may still move: it is not refined yet. A finer frame
+/// would delay the next moving one.
 const CALM: Duration = Duration::from_millis(70);
 
 /// A loaded scene, and the device that draws it.
