@@ -77,16 +77,20 @@ impl MotionFlags {
         let Some(file) = &self.path else {
             return Ok(self.turntable.map_or(Motion::Still, Motion::Turntable));
         };
-        let text = Source::open(file, limits)?.small_text("a path of a camera", MOST_BYTES)?;
-        let path = CameraPath::from_json(&text).map_err(|error| {
-            Error::input(file, "path of a camera", error.to_string()).hint(
-                "the form is {\"splatkit_path\": 1, \"keyframes\": [{\"time\": 0, \"camera\": \
-                 {\"position\": [x, y, z], \"focal_point\": [x, y, z], \"view_up\": [x, y, z], \
-                 \"view_angle\": 30}}, …]}",
-            )
-        })?;
-        Motion::along(path, self.rate(), file)
+        Motion::along(read_path(file, limits)?, self.rate(), file)
     }
+}
+
+/// Reads the file of a path.
+pub fn read_path(file: &Path, limits: &Limits) -> splatkit::Result<CameraPath> {
+    let text = Source::open(file, limits)?.small_text("a path of a camera", MOST_BYTES)?;
+    CameraPath::from_json(&text).map_err(|error| {
+        Error::input(file, "path of a camera", error.to_string()).hint(
+            "the form is {\"splatkit_path\": 1, \"keyframes\": [{\"time\": 0, \"camera\": \
+             {\"position\": [x, y, z], \"focal_point\": [x, y, z], \"view_up\": [x, y, z], \
+             \"view_angle\": 30}}, …]}",
+        )
+    })
 }
 
 impl Motion {

@@ -6,21 +6,14 @@ use super::{
     loader::text_of,
     window::Window,
 };
+use crate::motion::read_path;
 use splatkit::{
-    Error,
-    input::{Limits, Source},
-    interaction::CameraEntry,
-    math::CameraPath,
-    picture::PictureFormat,
-    volume::TransferFunction,
+    input::Limits, interaction::CameraEntry, picture::PictureFormat, volume::TransferFunction,
 };
 use std::{
     path::{Path, PathBuf},
     sync::Arc,
 };
-
-/// Largest file of a path of the camera, in bytes.
-const MOST_BYTES: usize = 16 << 20;
 
 impl Window {
     /// Saves the exact picture as soon as it is drawn.
@@ -86,13 +79,7 @@ impl Window {
 
     /// Takes the keyframes of a file.
     pub fn load_path(&mut self, path: &Path) {
-        let read = Source::open(path, &Limits::default())
-            .and_then(|source| source.small_text("a path of a camera", MOST_BYTES))
-            .and_then(|text| {
-                CameraPath::from_json(&text)
-                    .map_err(|error| Error::input(path, "path of a camera", error.to_string()))
-            });
-        match read {
+        match read_path(path, &Limits::default()) {
             Ok(path) => self.panels.flight.keyframes = path.keyframes().to_vec(),
             Err(error) => self.say(error.to_string(), true),
         }

@@ -125,10 +125,7 @@ fn change(clip: &mut ClipEntry, part: Part, step: f64, bounds: &Bounds) {
     match (part, &mut clip.plane, &mut clip.cuboid) {
         (Part::Offset, Some(plane), _) => {
             let normal = normal_of(*plane);
-            let ends = bounds.corners().map(|corner| corner.dot(normal));
-            let [low, high] = ends
-                .iter()
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+            let [low, high] = offsets(bounds, normal);
             plane[3] = (plane[3] + step * normal.length()).clamp(low, high);
         }
         (Part::End(axis, end), _, Some(cuboid)) => {
@@ -143,6 +140,12 @@ fn change(clip: &mut ClipEntry, part: Part, step: f64, bounds: &Bounds) {
         }
         _ => {}
     }
+}
+
+/// Returns the offsets of the first and the last plane with a normal that meet a box.
+pub fn offsets(bounds: &Bounds, normal: DVec3) -> [f64; 2] {
+    let ends = bounds.corners().map(|corner| corner.dot(normal));
+    ends.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)])
 }
 
 fn normal_of([x, y, z, _]: [f64; 4]) -> DVec3 {

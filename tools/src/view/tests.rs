@@ -1,6 +1,8 @@
 //! The window without a screen: it is driven by events, and draws on the CPU engine.
 
 use super::{document::Document, window::Window};
+use crate::{Command, Task, given::Given, progress::Progress, scene_file};
+use clap::{CommandFactory, FromArgMatches};
 use eframe::egui;
 use egui_kittest::{Harness, kittest::Queryable};
 use splatkit::interaction::SceneFile;
@@ -150,8 +152,7 @@ fn a_broken_file_is_a_message_and_the_scene_stays() {
     assert!(picture_of(&mut harness) == before, "the scene is gone");
 }
 
-/// The saved picture is the one that `splatkit render scene.json` draws: the command's own test
-/// compares the bytes (tools/tests/view.rs); this one saves both.
+/// The saved picture is the one that `splatkit render scene.json` draws, byte for byte.
 #[test]
 fn pictures_and_scenes_are_saved() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -167,6 +168,19 @@ fn pictures_and_scenes_are_saved() {
     assert!(own.camera.is_some() && own.size.is_some());
     let text = std::fs::read_to_string(&scene).expect("text");
     assert!(text.contains("\"v.nrrd\""), "{text}");
+    let again = folder.path().join("again.png");
+    let words = ["splatkit".into(), "render".into(), scene, "-o".into(), again.clone()];
+    let words = words.map(std::path::PathBuf::into_os_string);
+    let command = Command::command();
+    let matches = command.clone().try_get_matches_from(&words).expect("arguments");
+    let words = scene_file::expanded(&words, &matches, &command).expect("a scene");
+    let matches = command.try_get_matches_from(words.expect("a scene")).expect("arguments");
+    let Task::Render(render) = Command::from_arg_matches(&matches).expect("a command").task else {
+        panic!("another task");
+    };
+    render.run(&Given::of(&matches), &Progress::kept()).expect("a picture");
+    let bytes = [again, picture].map(|file| std::fs::read(file).expect("a picture"));
+    assert!(bytes[0] == bytes[1], "the command draws another picture");
 }
 
 #[test]

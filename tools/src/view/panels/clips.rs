@@ -1,6 +1,6 @@
 //! Clips, as numbers.
 
-use crate::view::window::Window;
+use crate::view::{handles::offsets, window::Window};
 use eframe::egui::{self, Ui};
 use glam::DVec3;
 use splatkit::{interaction::ClipEntry, math::Bounds};
@@ -63,10 +63,7 @@ fn clip_sliders(clip: &mut ClipEntry, bounds: &Bounds, ui: &mut Ui) -> bool {
     let mut is_changed = false;
     if let Some(plane) = &mut clip.plane {
         let normal = DVec3::new(plane[0], plane[1], plane[2]);
-        let ends = bounds.corners().map(|corner| corner.dot(normal));
-        let [low, high] = ends
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+        let [low, high] = offsets(bounds, normal);
         let slider = egui::Slider::new(&mut plane[3], low..=high).text("offset");
         is_changed |= ui.add(slider).changed();
     }

@@ -6,7 +6,6 @@ use crate::view::{
     window::Window,
 };
 use eframe::egui::{Ui, Vec2};
-use splatkit::scene::Item;
 use std::sync::Arc;
 
 pub fn show(window: &mut Window, ui: &mut Ui) {
@@ -44,12 +43,7 @@ pub fn show(window: &mut Window, ui: &mut Ui) {
 /// Moves and widens the transfer function as a hand drags.
 pub fn window_level(window: &mut Window, drag: Vec2) {
     let Some(mut transfer) = window.transfer() else { return };
-    let values = window
-        .shown
-        .as_ref()
-        .and_then(|shown| shown.stage.loaded.scene.items.iter().find_map(Item::value_range));
-    if let Some(values) = values {
-        curve::window_level(&mut transfer, drag, values);
-        window.set_transfer(&transfer);
-    }
+    let Some(values) = window.shown.as_ref().map(|shown| shown.stage.values()) else { return };
+    curve::window_level(&mut transfer, drag, values);
+    window.set_transfer(&transfer);
 }
