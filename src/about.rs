@@ -61,6 +61,9 @@ impl Stance {
     /// The frame of glTF and of most tools for animation: y up, z to the front.
     pub const Y_UP: Self = Self { up: DVec3::Y, front: DVec3::Z };
 
+    /// The frame of a camera, which trainers of Gaussian scenes keep: y down, seen along +z.
+    pub const Y_DOWN: Self = Self { up: DVec3::NEG_Y, front: DVec3::NEG_Z };
+
     /// Returns the stance with this direction up, and the front that is usual for it: −Y if Z or −Z
     /// is nearest to the direction, otherwise +Z; made perpendicular to it.
     ///

@@ -54,6 +54,7 @@
 //! | limit what a file may take: memory, points, time | [`input::Limits`] |
 //! | work with meshes and volumes | [`surface`], [`volume`] |
 //! | work with scattered samples and cells | [`scattered`], [`cells`] |
+//! | work with trained 3D Gaussians | [`gaussians`] |
 //! | colour them by a named map | [`color`] |
 //! | draw data larger than memory | [`hierarchy`], [`bricks`] |
 //! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |
@@ -103,6 +104,7 @@ pub mod disk;
 pub mod error;
 pub mod facet;
 pub mod formats;
+pub mod gaussians;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod hierarchy;

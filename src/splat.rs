@@ -102,6 +102,37 @@ pub const FOOTPRINT_BLUR: f64 = 0.35;
 /// this many standard deviations from their centres, so the shift keeps silhouettes in place.
 pub const STEP_BACK: f64 = 2.4;
 
+/// Standard deviation, in pixels, by which trained Gaussians are widened: their trainer adds 0.3 to
+/// the variances in the picture (Kerbl et al. 2023).
+pub const TRAINED_BLUR: f64 = 0.547_722_557_505_166_1;
+
+/// A trained Gaussian covers at most the second of these shares of a pixel. Where it covers less
+/// than the first, it is not drawn (Kerbl et al. 2023).
+pub const TRAINED_OPACITIES: [f64; 2] = [1.0 / 255.0, 0.99];
+
+/// The colours of trained Gaussians are numbers of 16 bits in this unit. They may exceed 1, up to
+/// almost 8. kernels.wgsl and splats.wgsl have the same number.
+pub const TRAINED_COLOR: f32 = 1.0 / 8192.0;
+
+/// The largest part of such a colour.
+pub const BRIGHTEST_TRAINED: f32 = 65535.0 * TRAINED_COLOR;
+
+/// Packs a colour of a trained Gaussian into the fields `color` and `normal` of its splat: red and
+/// the high byte of green, then blue and the low byte of green. The highest byte of both makes them
+/// usual 32-bit floats, which no device changes as it copies them.
+pub fn encode_trained_color(color: [f32; 3]) -> [u32; 2] {
+    const FLOAT: u32 = 0x4000_0000;
+    let [red, green, blue] =
+        color.map(|part| (part / TRAINED_COLOR).round().clamp(0.0, 65535.0) as u32);
+    [FLOAT | (green >> 8) << 16 | red, FLOAT | (green & 255) << 16 | blue]
+}
+
+/// Unpacks the colour of a splat with the payload [`Payload::Trained`].
+pub fn decode_trained_color(splat: &Splat) -> [f32; 3] {
+    let green = (splat.color >> 16 & 255) << 8 | splat.normal >> 16 & 255;
+    [splat.color & 0xffff, green, splat.normal & 0xffff].map(|part| part as f32 * TRAINED_COLOR)
+}
+
 /// What the splats of a set carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Payload {
@@ -109,6 +140,9 @@ pub enum Payload {
     Radiance,
     /// A sample value, classified after interpolation by the scene's transfer function.
     Scalar,
+    /// Colour and opacity of a trained Gaussian ([`crate::gaussians`]). The strength is what it
+    /// covers at its centre; the colour is that of [`decode_trained_color`].
+    Trained,
 }
 
 /// Splats with the same payload around a common origin.
@@ -263,6 +297,21 @@ mod tests {
         }
         let broken = Splat::sample(Vec3::ZERO, 1.0, [1.0; 6], 1.0, Vec3::X * f32::NAN);
         assert!(broken.weight_and_slope().1.is_nan());
+    }
+
+    #[test]
+    fn trained_colours_keep_their_digits() {
+        for color in [[0.0, 0.5, 1.0], [7.9, 0.003, 0.25], [0.123, 1.456, 2.789]] {
+            let [packed, rest] = encode_trained_color(color);
+            assert!([packed, rest].map(f32::from_bits).iter().all(|v| v.is_normal()));
+            let splat = Splat { color: packed, normal: rest, ..Splat::zeroed() };
+            for (found, wanted) in decode_trained_color(&splat).iter().zip(color) {
+                assert!((found - wanted).abs() <= 0.51 * TRAINED_COLOR, "{found} {wanted}");
+            }
+        }
+        let [packed, rest] = encode_trained_color([-1.0, 100.0, f32::NAN]);
+        let splat = Splat { color: packed, normal: rest, ..Splat::zeroed() };
+        assert_eq!(decode_trained_color(&splat), [0.0, 65535.0 * TRAINED_COLOR, 0.0]);
     }
 
     #[test]

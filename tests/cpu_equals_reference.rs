@@ -240,6 +240,13 @@ fn scenes_without_anything_are_refused() {
 }
 
 #[test]
+fn gaussians() {
+    for case in scenes::gaussians::all() {
+        assert_matches(&case, 50.0);
+    }
+}
+
+#[test]
 fn facets() {
     for case in scenes::facets::all() {
         assert_matches(&case, 50.0);

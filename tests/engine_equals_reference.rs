@@ -280,6 +280,13 @@ fn ellipsoids_without_normals() {
 }
 
 #[test]
+fn gaussians() {
+    for case in scenes::gaussians::all() {
+        assert_matches(case, 50.0);
+    }
+}
+
+#[test]
 fn facets() {
     for case in scenes::facets::all() {
         assert_matches(case, 50.0);

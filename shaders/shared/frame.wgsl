@@ -127,7 +127,7 @@ struct Source {
     count: u32,
     // First batch of this chunk in the frame's list of batches.
     first_run: u32,
-    // RADIANCE, ISOTROPIC, ENDS, NODES, COARSE, FACETS, CULLED, MIXED.
+    // RADIANCE, ISOTROPIC, ENDS, NODES, COARSE, FACETS, CULLED, MIXED, TRAINED_FLAG.
     flags: u32,
 }
 
@@ -143,6 +143,7 @@ const COARSE: u32 = 16u;
 const FACETS: u32 = 32u;
 const CULLED: u32 = 64u;
 const MIXED: u32 = 128u;
+const TRAINED_FLAG: u32 = 256u;
 
 // Returns the number of words of a splat's record.
 fn record_words(flags: u32) -> u32 {

@@ -160,6 +160,23 @@ fn facing_weight(normal: vec3<f32>, center: vec3<f32>) -> f32 {
     return clamp(0.5 - 4.0 * away, 1.0 / 255.0, 1.0);
 }
 
+// The colours of trained Gaussians are in this unit; what they cover of a pixel is at least the
+// first share, and at most the second: see splat.rs.
+const TRAINED_COLOR: f32 = 1.0 / 8192.0;
+const BRIGHTEST_TRAINED: f32 = 65535.0 * TRAINED_COLOR;
+const TRAINED_OPACITIES: vec2<f32> = vec2(1.0 / 255.0, 0.99);
+
+// Returns the optical depth with which a trained Gaussian covers a share of a pixel: −ln(1 − α) =
+// 2·artanh(α/(2 − α)). For small shares its series is more precise than a logarithm.
+fn trained_depth(share: f32) -> f32 {
+    let alpha = min(share, TRAINED_OPACITIES.y);
+    let y = alpha / (2.0 - alpha);
+    let y2 = y * y;
+    let series = y * (2.0 + y2 * (2.0 / 3.0 + y2 * (0.4 + y2 * (2.0 / 7.0 + y2 * (2.0 / 9.0)))));
+    let depth = select(-log(1.0 - alpha), series, alpha < 0.5);
+    return select(0.0, depth, alpha >= TRAINED_OPACITIES.x);
+}
+
 // A general record, unpacked.
 struct Loaded {
     center: vec3<f32>,
@@ -184,7 +201,12 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
     splat.facing = 1.0;
     // The sign of the squared extent says which payload it is.
     splat.is_radiance = RADIANCE_PAYLOAD && (!(SUMS || CLASSIFIED) || c.z > 0.0);
-    if RADIANCE_PAYLOAD {
+    if TRAINED && a.w < 0.0 {
+        let first = bitcast<u32>(d.x);
+        let second = bitcast<u32>(d.y);
+        let green = (((first >> 16u) & 255u) << 8u) | ((second >> 16u) & 255u);
+        splat.color = vec3<f32>(vec3(first & 65535u, green, second & 65535u)) * TRAINED_COLOR;
+    } else if RADIANCE_PAYLOAD {
         splat.color = unpack4x8unorm(bitcast<u32>(d.x)).xyz;
         let packed = bitcast<u32>(d.y);
         if packed != NO_NORMAL {
@@ -300,6 +322,9 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
         let length_of = inverse / pixels[r].cosine;
         if RADIANCE_PAYLOAD && (splat.is_radiance || CLASSIFIED) {
             var strength = splat.strength;
+            if TRAINED && strength < 0.0 {
+                strength = trained_depth(-strength * e) / max(e, 1e-30);
+            }
             if CLASSIFIED && !splat.is_radiance {
                 strength *= length_of;
             }

@@ -95,7 +95,8 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
         let sum = vec3(pixels[r].red.x, pixels[r].green.x, pixels[r].blue.x);
         // If next to nothing faces the eye, rounding may have left a weight of any sign; the result
         // must stay a colour.
-        var color = clamp(sum / max(pixels[r].facing.x, 1e-12), vec3(0.0), vec3(1.0));
+        let brightest = vec3(select(1.0, BRIGHTEST_TRAINED, TRAINED));
+        var color = clamp(sum / max(pixels[r].facing.x, 1e-12), vec3(0.0), brightest);
         if SURFACE_SHADED {
             let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
             // Splats without a normal keep their colours.

@@ -3,6 +3,8 @@
 // The picture is sampled at pixel centres. A blur of this many pixels keeps small splats from
 // falling between them.
 const FOOTPRINT_BLUR: f32 = 0.35;
+// Trained Gaussians are widened by their trainer's √0.3 pixels.
+const TRAINED_BLUR: f32 = 0.54772256;
 // Opaque surfaces must not grow through the blur: see splat.rs.
 const STEP_BACK: f32 = 2.4;
 
@@ -36,7 +38,8 @@ fn splat_at(index: u32) -> Candidate {
     if frame.perspective != 0u {
         pixel = pixel * length(splat.center);
     }
-    let blur = FOOTPRINT_BLUR * pixel;
+    let is_trained = TRAINED && (source.flags & TRAINED_FLAG) != 0u;
+    let blur = select(FOOTPRINT_BLUR, TRAINED_BLUR, is_trained) * pixel;
     let blur2 = blur * blur;
     splat.covariance.xx = c0.x * c0.x + c1.x * c1.x + c2.x * c2.x + blur2;
     splat.covariance.xy = c0.x * c0.y + c1.x * c1.y + c2.x * c2.y;
@@ -68,7 +71,10 @@ fn splat_at(index: u32) -> Candidate {
         splat.gradient = to_view * vec3(slope_x, slope_y, slope_z) * frame.transfer.y;
         splat.strength = counted(splat.strength);
     }
-    if (source.flags & RADIANCE) != 0u {
+    if is_trained {
+        // A record with a negative strength is that of a trained Gaussian.
+        splat.strength = -splat.strength;
+    } else if (source.flags & RADIANCE) != 0u {
         splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;
         if splat.normal != NO_NORMAL {
             let normal = to_view * decode_normal(splat.normal);

@@ -3,9 +3,9 @@
 
 use super::plan::Plan;
 use crate::{
-    plan::uniforms::{ENDS, ISOTROPIC, RADIANCE, Source},
+    plan::uniforms::{ENDS, ISOTROPIC, RADIANCE, Source, TRAINED},
     scene::{Mode, Order},
-    splat::{FOOTPRINT_BLUR, STEP_BACK, Splat, decode_normal},
+    splat::{STEP_BACK, Splat, decode_normal, decode_trained_color},
 };
 use glam::{Mat3, Vec3};
 
@@ -17,7 +17,8 @@ const LEAST_GRADIENT: f32 = 1e-20;
 /// The payload of a splat.
 #[derive(Debug, Clone, Copy)]
 pub enum Carried {
-    /// Colour and a normal, or a zero vector for none. `strength` is an optical depth.
+    /// Colour and a normal, or a zero vector for none. `strength` is an optical depth, or minus the
+    /// opacity of a trained Gaussian.
     Radiance { color: [f32; 3], normal: Vec3 },
     /// A value of the field: its weight, and the change of the value per world unit.
     Scalar { weight: f32, gradient: Vec3 },
@@ -36,8 +37,8 @@ pub struct Candidate {
 /// The meaning of a record's strength and payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Optical depth through the centre. Payload: 1, the facing weight, and colour and normal times
-    /// that weight.
+    /// Optical depth through the centre, or minus what a trained Gaussian covers there. Payload: 1,
+    /// the facing weight, and colour and normal times that weight.
     Radiance,
     /// The same for a classified sample, whose strength is an extinction.
     Classified,
@@ -84,10 +85,13 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
     );
     let turned = to_view * factor;
     let pixel = if plan.view.perspective { center.length() } else { 1.0 } / plan.frame.scale;
-    let blur2 = (FOOTPRINT_BLUR as f32 * pixel).powi(2);
+    let blur2 = (source.blur() * pixel).powi(2);
     let covariance = turned * turned.transpose() + Mat3::from_diagonal(Vec3::splat(blur2));
     let mut strength = splat.strength;
-    let carried = if source.flags & RADIANCE != 0 {
+    let carried = if source.flags & TRAINED != 0 {
+        strength = -strength;
+        Carried::Radiance { color: decode_trained_color(splat), normal: Vec3::ZERO }
+    } else if source.flags & RADIANCE != 0 {
         let [red, green, blue, opacity] =
             splat.color.to_le_bytes().map(|part| f32::from(part) / 255.0);
         strength *= opacity;

@@ -15,6 +15,7 @@ use crate::{
     Error, Result,
     bricks::{BLOCK, BLOCKS, Choice, SIDE},
     facet::FacetSet,
+    gaussians::{Eye, Gaussians},
     hierarchy::{Cut, Levels},
     math::{Kernel, View},
     parallel::prelude::*,
@@ -40,6 +41,11 @@ pub enum Prepared {
         drawn: Arc<SplatSet>,
     },
     Facets(Arc<FacetSet>),
+    /// Trained Gaussians, and the splats that the eye of the last view saw.
+    Gaussians {
+        set: Arc<Gaussians>,
+        seen: Option<(Eye, SplatSet)>,
+    },
     Hierarchy(Box<PageCache>),
     /// A volume. If it is scattered, also the extremes around each sample, and the list of visible
     /// samples for a transfer function.
@@ -61,6 +67,7 @@ impl Prepared {
                 Self::Set { levels: Levels::new(set).map(Box::new), drawn: set.clone() }
             }
             Item::Facets(set) => Self::Facets(set.clone()),
+            Item::Gaussians(set) => Self::Gaussians { set: set.clone(), seen: None },
             Item::Hierarchy(hierarchy) => Self::Hierarchy(Box::new(PageCache::new(hierarchy))),
             Item::Volume(volume, kernel, _) => Self::Volume {
                 volume: volume.clone(),
@@ -88,6 +95,9 @@ impl Prepared {
     pub fn bytes(&self) -> u64 {
         match self {
             Self::Set { .. } | Self::Facets(_) | Self::Cells => 0,
+            Self::Gaussians { seen, .. } => {
+                seen.as_ref().map_or(0, |(_, seen)| size_of_val(&seen.splats[..]) as u64)
+            }
             Self::Hierarchy(pages) => pages.bytes(),
             Self::Volume { ranges, listed, .. } => {
                 let ranges = ranges.as_ref().map_or(0, |ranges| 2 * ranges.len() as u64);
@@ -109,17 +119,22 @@ impl Prepared {
         let Outline { cut_pixels, choice, shown, .. } = outline;
         match self {
             Self::Set { drawn, .. } if drawn.payload == Payload::Radiance => {
-                let projector = Projector::new(plan, Source::of_splats(view, drawn, true));
-                Ok(batches(&drawn.splats, spare, |batch: &[Splat], records| {
-                    lanes!(Level::new(), simd => projector.add(
-                        simd,
-                        batch.iter().map(|splat| (splat, 1.0)),
-                        records,
-                    ));
-                }))
+                Ok(radiance(plan, drawn, spare))
+            }
+            Self::Gaussians { set, seen } => {
+                let eye = Eye::of(view);
+                match seen {
+                    Some((last, _)) if *last == eye || !set.depends_on_eye() => {}
+                    Some((last, splats)) => {
+                        *last = eye;
+                        set.recolor(eye, &mut splats.splats);
+                    }
+                    None => *seen = Some((eye, set.seen_from(eye))),
+                }
+                Ok(seen.as_ref().map_or_else(Vec::new, |(_, seen)| radiance(plan, seen, spare)))
             }
             Self::Set { drawn, .. } => {
-                let source = Source::of_splats(view, drawn, false);
+                let source = Source::of_splats(view, drawn);
                 let own = |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
                 Ok(batches(&drawn.splats, spare, |batch, records| {
                     records.extend(batch.iter().filter_map(own));
@@ -155,6 +170,18 @@ impl Prepared {
             }
         }
     }
+}
+
+/// Returns the records of splats that carry their own colour.
+fn radiance(plan: &Plan, set: &SplatSet, spare: &mut Spare) -> Vec<Vec<Record>> {
+    let projector = Projector::new(plan, Source::of_splats(plan.view, set));
+    batches(&set.splats, spare, |batch: &[Splat], records| {
+        lanes!(Level::new(), simd => projector.add(
+            simd,
+            batch.iter().map(|splat| (splat, 1.0)),
+            records,
+        ));
+    })
 }
 
 /// Returns the records of candidates; `add` appends those of a batch.

@@ -214,6 +214,7 @@ impl CpuRenderer {
                 Prepared::Bricks(bricks) => stats.brick_bytes += bricks.bytes(),
                 Prepared::Set { .. }
                 | Prepared::Facets(_)
+                | Prepared::Gaussians { .. }
                 | Prepared::Volume { .. }
                 | Prepared::Cells => {}
             }

@@ -111,7 +111,7 @@ impl<'a> Plan<'a> {
         let emits = settings.optics == Optics::EmissionAbsorption;
         for item in &scene.items {
             match item {
-                Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) => {
+                Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
                     plan.has_facets |= matches!(item, Item::Facets(_));
                     plan.has_radiance |= !matches!(item, Item::Facets(_));
                     plan.lit_surfaces |= emits && settings.surface_shade.is_some();

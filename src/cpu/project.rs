@@ -7,8 +7,8 @@ use super::{
     vector::{Lanes, dot, each, log2, three},
 };
 use crate::{
-    plan::uniforms::Source,
-    splat::{FOOTPRINT_BLUR, NO_NORMAL, STEP_BACK, Splat},
+    plan::uniforms::{Source, TRAINED},
+    splat::{NO_NORMAL, STEP_BACK, Splat, TRAINED_COLOR},
 };
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
 
@@ -57,6 +57,10 @@ impl<'a> Projector<'a> {
         let axes = [turn.x_axis, turn.y_axis, turn.z_axis].map(|axis| axis.to_array());
         let origin = origin(&source).to_array();
         Self { plan, source, axes, origin }
+    }
+
+    fn is_trained(&self) -> bool {
+        self.source.flags & TRAINED != 0
     }
 
     /// Adds the records of splats, each with a share of its strength.
@@ -161,7 +165,7 @@ impl<'a> Projector<'a> {
         ];
         let pixel = if plan.view.perspective { dot(center, center).sqrt() } else { one }
             * (1.0 / plan.frame.scale);
-        let blur = pixel * FOOTPRINT_BLUR as f32;
+        let blur = pixel * self.source.blur();
         let blur2 = blur * blur;
         let [x, y, z]: [[Lanes<S>; 3]; 3] = three!(I => three!(J => columns[J][I]));
         let covariance = [
@@ -172,7 +176,10 @@ impl<'a> Projector<'a> {
             dot(y, z),
             dot(z, z) + blur2,
         ];
-        let (normal, has_normal) = normals(simd, eight.normal.simd_into(simd));
+        let (normal, mut has_normal) = normals(simd, eight.normal.simd_into(simd));
+        if self.is_trained() {
+            has_normal = mask32x8::splat(simd, false);
+        }
         let normal = self.turned(normal);
         let normal = three!(I => has_normal.select(normal[I], none));
         // Opaque splats must not grow through widening, so they step back.
@@ -187,7 +194,16 @@ impl<'a> Projector<'a> {
     #[inline(always)]
     fn payload<S: Simd>(&self, simd: S, eight: &Eight, splats: &Widened<S>) -> [Lanes<S>; 8] {
         let Widened { center, normal, has_normal, .. } = *splats;
-        let one = Lanes::splat(simd, 1.0);
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        if self.is_trained() {
+            let first: i32x8<S> = eight.color.simd_into(simd);
+            let second: i32x8<S> = eight.normal.simd_into(simd);
+            let green = (((first >> 16) & 0xff) << 8) | ((second >> 16) & 0xff);
+            let parts = [first & 0xffff, green, second & 0xffff];
+            let [red, green, blue] = three!(I => Lanes::<S>::float_from(parts[I]) * TRAINED_COLOR);
+            let strength: Lanes<S> = eight.strength.simd_into(simd);
+            return [-strength, one, red, green, blue, none, none, none];
+        }
         // Within a sheet, splats that face the eye hide those that face away.
         let mut away = normal[2];
         if self.plan.view.perspective {

@@ -9,9 +9,12 @@ use super::{
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
     sums::{Sums, WINDOW},
-    vector::{Lanes, dot, each, exp, three},
+    vector::{Lanes, dot, each, exp, log2, three},
 };
-use crate::scene::{Optics, Order};
+use crate::{
+    scene::{Optics, Order},
+    splat::TRAINED_OPACITIES,
+};
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// The integral of exp(−x²/2).
@@ -214,6 +217,9 @@ impl<'a> Projected<'a> {
         if !from_table {
             strength *= exp(simd, along.rho2 * -0.5);
         }
+        if record.strength < 0.0 {
+            strength = trained_depth(simd, -strength);
+        }
         if record.kind == Kind::Classified {
             // Whitened length to world length along the ray.
             strength = strength * along.inverse / rays.cosine;
@@ -362,6 +368,24 @@ impl<'a> Projected<'a> {
             }
         })
     }
+}
+
+/// Returns the optical depth with which a trained Gaussian covers shares of pixels: −ln(1 − α).
+#[inline(always)]
+fn trained_depth<S: Simd>(simd: S, share: Lanes<S>) -> Lanes<S> {
+    let [least, most] = TRAINED_OPACITIES.map(|share| share as f32);
+    let alpha = share.min(Lanes::splat(simd, most));
+    // −ln(1 − α) = 2·artanh(α/(2 − α)). For small shares its series is more precise than a
+    // logarithm.
+    let y = alpha / (2.0 - alpha);
+    let y2 = y * y;
+    let mut series = Lanes::splat(simd, 2.0 / 9.0);
+    for term in [2.0 / 7.0, 2.0 / 5.0, 2.0 / 3.0, 2.0] {
+        series = series.mul_add(y2, Lanes::splat(simd, term));
+    }
+    let log = log2(simd, 1.0 - alpha) * -std::f32::consts::LN_2;
+    let depth = alpha.simd_lt(0.5).select(series * y, log);
+    alpha.simd_ge(least).select(depth, Lanes::splat(simd, 0.0))
 }
 
 fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {

@@ -165,7 +165,9 @@ fn other_files_are_whole_or_not_there() {
     let lattice = Lattice::with_spacing([30, 3, 9], DVec3::ONE);
     let stops = [
         stop_everywhere("a.ply", |path| ply::write(&mesh, path)),
-        stop_everywhere("gaussians.ply", |path| ply::write_gaussians(&set, path)),
+        stop_everywhere("gaussians.ply", |path| {
+            ply::write_gaussians(&crate::gaussians::Gaussians::from_splats(&set)?, path)
+        }),
         stop_everywhere("a.nrrd", |path| nrrd::write(&volume, path)),
         stop_everywhere("bytes.nrrd", |path| {
             nrrd::write_bytes(&lattice, path, |k| vec![k as u8; 90])

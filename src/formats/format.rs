@@ -2,7 +2,8 @@
 
 use super::{Array, Kind, RawLayout, ReadOptions, Series, form::Form, shared::plain::Plain};
 use crate::{
-    Result, cells::Cells, input::Source, scattered::Points, surface::Mesh, volume::Volume,
+    Result, cells::Cells, gaussians::Gaussians, input::Source, scattered::Points, surface::Mesh,
+    volume::Volume,
 };
 use std::{fmt, path::Path};
 
@@ -30,6 +31,7 @@ pub struct Format {
     pub(super) volume: Option<VolumeReader>,
     pub(super) samples: Option<SamplesReader>,
     pub(super) cells: Option<fn(&Source, &ReadOptions) -> Result<Cells>>,
+    pub(super) gaussians: Option<fn(&Source) -> Result<Gaussians>>,
     pub(super) pieces: InPieces,
     pub(super) arrays: Option<ListArrays>,
     pub(super) series: Option<ListSeries>,
@@ -61,6 +63,8 @@ pub enum Content {
     Samples,
     /// Cells with a field inside.
     Cells,
+    /// Trained 3D Gaussians.
+    Gaussians,
     /// A hierarchy of splats.
     Hierarchy,
     /// A volume in bricks.
@@ -141,6 +145,7 @@ impl Format {
         volume: None,
         samples: None,
         cells: None,
+        gaussians: None,
         pieces: InPieces::No,
         arrays: None,
         series: None,
@@ -168,7 +173,8 @@ impl Format {
         let is_read = self.mesh.is_some()
             || self.volume.is_some()
             || self.samples.is_some()
-            || self.cells.is_some();
+            || self.cells.is_some()
+            || self.gaussians.is_some();
         self.feature.is_some() && !is_read
     }
 
@@ -187,11 +193,12 @@ impl Format {
 
 impl Content {
     /// Every content, in the order of messages.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Hierarchy,
         Self::Bricks,
         Self::Mesh,
         Self::PointCloud,
+        Self::Gaussians,
         Self::Volume,
         Self::Cells,
         Self::Samples,
@@ -205,6 +212,7 @@ impl Content {
             Self::Volume => "volume",
             Self::Samples => "scattered samples",
             Self::Cells => "cells",
+            Self::Gaussians => "trained Gaussians",
             Self::Hierarchy => "hierarchy",
             Self::Bricks => "volume in bricks",
         }
@@ -218,6 +226,7 @@ impl Content {
             Self::Volume => "volumes",
             Self::Samples => "scattered samples",
             Self::Cells => "cells",
+            Self::Gaussians => "trained Gaussians",
             Self::Hierarchy => "hierarchies",
             Self::Bricks => "volumes in bricks",
         }
@@ -230,6 +239,7 @@ impl Content {
             Self::Volume => Kind::Volume,
             Self::Samples => Kind::Samples,
             Self::Cells => Kind::Cells,
+            Self::Gaussians => Kind::Gaussians,
             Self::Hierarchy => Kind::Hierarchy,
             Self::Bricks => Kind::Bricks,
         }
@@ -473,6 +483,7 @@ mod tests {
             assert_eq!(format.volume.is_some(), holds(Kind::Volume), "{name}");
             assert_eq!(format.samples.is_some(), holds(Kind::Samples), "{name}");
             assert_eq!(format.cells.is_some(), holds(Kind::Cells), "{name}");
+            assert_eq!(format.gaussians.is_some(), holds(Kind::Gaussians), "{name}");
             let is_opened = matches!(format.pieces, InPieces::Opened);
             assert_eq!(is_opened, holds(Kind::Hierarchy) || holds(Kind::Bricks), "{name}");
             match format.kind {
@@ -490,6 +501,7 @@ mod tests {
             ("\n ply\n", "PLY"),
             ("glTF", "glTF"),
             (" {\"asset\": 1}", "glTF"),
+            ("NGSP", "SPZ"),
             ("solid of one", "STL"),
             ("LASF", "LAS"),
             ("ASTM-E57", "E57"),

@@ -1,4 +1,5 @@
-//! glTF 2.0 and GLB: the meshes of the default scene, with base colours and pictures.
+//! glTF 2.0 and GLB: the meshes of the default scene, with base colours and pictures, or its
+//! trained 3D Gaussians.
 //!
 //! The JSON is read into the types of the gltf crate without its validation, which panics on some
 //! broken files and accepts others (cycles, counts without bytes). Every index is looked up and
@@ -6,10 +7,13 @@
 
 mod accessor;
 mod buffers;
+mod gaussians;
 mod materials;
 mod nodes;
 #[cfg(test)]
 mod tests;
+
+pub use gaussians::{holds_gaussians, read_gaussians, write_gaussians};
 
 use crate::{
     Result,
@@ -19,15 +23,29 @@ use crate::{
 };
 use ::gltf::json::{self, mesh::Mode, mesh::Semantic, validation::Checked};
 use buffers::Buffers;
+use gaussians::Marks;
 use glam::{DMat3, DMat4, DVec3, Mat2, Vec2, Vec3};
 use materials::{Alpha, Base};
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
 /// Extensions that a file may require, by prefix: those that are read (among them
-/// `KHR_materials_pbrSpecularGlossiness`), and those that only change the look of a material in
-/// ways that splats do not show.
-const KNOWN: [&str; 4] =
-    ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "KHR_materials_"];
+/// `KHR_materials_pbrSpecularGlossiness`), those that only change the look of a material in ways
+/// that splats do not show, and those of Gaussians, which are checked at each primitive.
+const KNOWN: [&str; 5] = [
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "KHR_lights_punctual",
+    "KHR_materials_",
+    gaussians::NAME,
+];
+
+/// A file whose JSON is read.
+struct Opened<'a> {
+    root: json::Root,
+    text: String,
+    /// The binary chunk of a GLB.
+    binary: Option<&'a [u8]>,
+}
 
 /// Reads a glTF or GLB file: the triangles of the default scene in its world frame, or its points
 /// if it has no triangles. Reads vertex colours, base colours and textures, with opacities as the
@@ -39,6 +57,35 @@ const KNOWN: [&str; 4] =
 /// required extensions that are not supported (among them Draco and meshopt compression);
 /// [`Error::Limit`](crate::Error::Limit) for counts over the limits.
 pub fn read(source: &Source) -> Result<Mesh> {
+    let Opened { root, text, binary } = open(source)?;
+    let marks = if root.extensions_used.iter().any(|name| name == gaussians::NAME) {
+        Marks::read(source, &text)?
+    } else {
+        Marks::default()
+    };
+    drop(text);
+    let buffers = Buffers::open(source, &root, binary)?;
+    let mut builder = Builder {
+        source,
+        root: &root,
+        buffers: &buffers,
+        marks: &marks,
+        has_gaussians: false,
+        positions: Vec::new(),
+        mesh: Mesh::default(),
+        material_of: HashMap::new(),
+        pictures: HashMap::new(),
+    };
+    let meshes = nodes::meshes(source, &root)?;
+    builder.make_room(&meshes)?;
+    for (transform, mesh) in meshes {
+        builder.add_mesh(transform, mesh)?;
+    }
+    builder.finish()
+}
+
+/// Reads the JSON, and checks that no extension is required that is not supported.
+fn open<'a>(source: &'a Source) -> Result<Opened<'a>> {
     let (text, binary) = buffers::split(source)?;
     // The copy of the text counts too.
     source.spend(
@@ -59,22 +106,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
                 ));
         }
     }
-    let buffers = Buffers::open(source, &root, binary)?;
-    let mut builder = Builder {
-        source,
-        root: &root,
-        buffers: &buffers,
-        positions: Vec::new(),
-        mesh: Mesh::default(),
-        material_of: HashMap::new(),
-        pictures: HashMap::new(),
-    };
-    let meshes = nodes::meshes(source, &root)?;
-    builder.make_room(&meshes)?;
-    for (transform, mesh) in meshes {
-        builder.add_mesh(transform, mesh)?;
-    }
-    builder.finish()
+    Ok(Opened { root, text, binary })
 }
 
 /// Returns an upper bound on the bytes that the tree of a JSON text takes: for each object the
@@ -134,6 +166,10 @@ struct Builder<'a> {
     source: &'a Source<'a>,
     root: &'a json::Root,
     buffers: &'a Buffers<'a>,
+    /// Says which primitives are Gaussians.
+    marks: &'a Marks,
+    /// Whether the scene has Gaussians, which are left out.
+    has_gaussians: bool,
     positions: Vec<DVec3>,
     mesh: Mesh,
     /// Index in the mesh's materials, by index in the file (`None`: the default material).
@@ -166,7 +202,12 @@ impl Builder<'_> {
             .root
             .meshes
             .iter()
-            .map(|mesh| mesh.primitives.iter().map(of_primitive).fold([0; 3], add))
+            .enumerate()
+            .map(|(index, mesh)| {
+                let primitives = mesh.primitives.iter().enumerate();
+                let own = primitives.filter(|(at, _)| !self.marks.are_gaussians(index, *at));
+                own.map(|(_, primitive)| of_primitive(primitive)).fold([0; 3], add)
+            })
             .collect();
         let all = meshes.iter().filter_map(|(_, mesh)| sizes.get(*mesh)).copied().fold([0; 3], add);
         let [vertices, corners, triangles] = all;
@@ -186,6 +227,10 @@ impl Builder<'_> {
         };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             self.source.check_time()?;
+            if self.marks.are_gaussians(index, number) {
+                self.has_gaussians = true;
+                continue;
+            }
             self.add_primitive(transform, primitive, &format!("mesh {index}, primitive {number}"))?;
         }
         Ok(())
@@ -318,8 +363,20 @@ impl Builder<'_> {
 
     fn finish(mut self) -> Result<Mesh> {
         let count = self.positions.len();
+        if count == 0 && self.has_gaussians {
+            return Err(self
+                .source
+                .error("scene", "contains trained 3D Gaussians, and no meshes")
+                .hint("read the file as Gaussians"));
+        }
         if count == 0 {
             return Err(self.source.error("scene", "contains no meshes with positions"));
+        }
+        if self.has_gaussians {
+            tracing::warn!(
+                "{}: contains meshes and trained 3D Gaussians; the Gaussians are left out",
+                self.source.path.display()
+            );
         }
         let positions = &self.positions;
         (self.mesh.origin, self.mesh.positions) = positions::settle(

@@ -22,6 +22,8 @@ pub enum Kind {
     Samples,
     /// [`load_cells`](super::load_cells)
     Cells,
+    /// [`load_gaussians`](super::load_gaussians)
+    Gaussians,
     /// [`Hierarchy::open`](crate::hierarchy::Hierarchy::open)
     Hierarchy,
     /// [`Bricks::open`](crate::bricks::Bricks::open)
@@ -31,7 +33,8 @@ pub enum Kind {
 impl Kind {
     /// Returns the kind of a file, or `None` if neither its name nor its first bytes determine it.
     /// A PLY file with faces is a mesh. A PLY file without faces is a point cloud, or samples if
-    /// the caller asks for a scalar ([`ReadOptions::scalar`]). Legacy VTK files are volumes or
+    /// the caller asks for a scalar ([`ReadOptions::scalar`]), or trained Gaussians if it has their
+    /// properties and the caller asks for none. Legacy VTK files are volumes or
     /// samples, depending on their data set.
     ///
     /// Text tables (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`) are samples if the caller asks for a

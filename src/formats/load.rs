@@ -1,4 +1,5 @@
-//! The entry points for all formats: meshes and point clouds, volumes, scattered samples, cells.
+//! The entry points for all formats: meshes and point clouds, volumes, scattered samples, cells,
+//! trained Gaussians.
 
 use super::{
     FORMATS, ReadOptions,
@@ -8,6 +9,7 @@ use super::{
 use crate::{
     Error, Result,
     cells::Cells,
+    gaussians::Gaussians,
     input::{Limits, Source},
     scattered::Points,
     surface::Mesh,
@@ -191,6 +193,41 @@ pub(super) fn cells_of(table: &[Format], source: &Source, options: &ReadOptions)
                 format!("“.{}” is not a format of cells that can be read", named(source)),
             )
             .hint(format!("cells are read from {}", extensions(table, may)))),
+    }
+}
+
+/// Reads trained 3D Gaussians. The file's extension selects the format; for other extensions, the
+/// first bytes do. [`FORMATS`] lists the formats.
+///
+/// # Errors
+/// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file that is in no
+/// format of Gaussians.
+pub fn load_gaussians(path: impl AsRef<Path>, limits: &Limits) -> Result<Gaussians> {
+    read_gaussians(&Source::open(path.as_ref(), limits)?)
+}
+
+/// As [`load_gaussians`], but reads from an open source, which may be in memory
+/// ([`Source::from_bytes`]).
+///
+/// # Errors
+/// Those of [`load_gaussians`], except those of opening the file.
+pub fn read_gaussians(source: &Source) -> Result<Gaussians> {
+    let _span = tracing::info_span!("load_gaussians", file = %source.path.display()).entered();
+    source.unless_changed(gaussians_of(FORMATS, source))
+}
+
+/// As [`read_gaussians`], in the formats of a table, but does not check whether the file changed
+/// meanwhile.
+pub(super) fn gaussians_of(table: &[Format], source: &Source) -> Result<Gaussians> {
+    let may = |format: &Format| format.gaussians.is_some();
+    match find(table, source, may)?.and_then(|format| format.gaussians) {
+        Some(read) => read(source),
+        None => {
+            let named = named(source);
+            let message = format!("“.{named}” is not a format of trained Gaussians");
+            let hint = format!("trained Gaussians are read from {}", extensions(table, may));
+            Err(source.error("path", message).hint(hint))
+        }
     }
 }
 

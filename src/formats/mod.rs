@@ -1,10 +1,11 @@
 //! Readers and writers of files, one module per format. [`FORMATS`] is the table of all formats.
 //!
-//! [`load_mesh`], [`load_volume`], [`load_samples`] and [`load_cells`] look at the name and the
-//! first bytes, and return a mesh (or point cloud), a volume, scattered samples or cells; [`Kind`]
-//! says which of them a file needs. [`read_mesh`], [`read_volume`], [`read_samples`] and
-//! [`read_cells`] do the same with bytes in memory ([`Source::from_bytes`]). All of them read
-//! through a [`Source`], within its [`Limits`](crate::input::Limits).
+//! [`load_mesh`], [`load_volume`], [`load_samples`], [`load_cells`] and [`load_gaussians`] look at
+//! the name and the first bytes, and return a mesh (or point cloud), a volume, scattered samples,
+//! cells or trained Gaussians; [`Kind`] says which of them a file needs. [`read_mesh`],
+//! [`read_volume`], [`read_samples`], [`read_cells`] and [`read_gaussians`] do the same with bytes
+//! in memory ([`Source::from_bytes`]). All of them read through a [`Source`], within its
+//! [`Limits`](crate::input::Limits).
 
 #![deny(clippy::disallowed_methods)]
 
@@ -41,6 +42,10 @@ pub mod ply;
 pub mod raw;
 mod series;
 mod shared;
+#[cfg(feature = "sog")]
+pub mod sog;
+pub mod splat;
+pub mod spz;
 pub mod stl;
 mod stream;
 mod table;
@@ -61,8 +66,8 @@ pub(crate) use form::StreamPoint;
 pub use format::{Content, Format, Holding};
 pub use kind::Kind;
 pub use load::{
-    load_cells, load_mesh, load_samples, load_volume, read_cells, read_mesh, read_samples,
-    read_volume,
+    load_cells, load_gaussians, load_mesh, load_samples, load_volume, read_cells, read_gaussians,
+    read_mesh, read_samples, read_volume,
 };
 pub use options::ReadOptions;
 pub use raw::RawLayout;

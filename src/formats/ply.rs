@@ -1,5 +1,5 @@
 //! PLY, in text and binary of either byte order: meshes and point clouds, with normals, colours and
-//! texture coordinates.
+//! texture coordinates, and trained 3D Gaussians.
 //!
 //! The header lists every element's columns (`header`). The rows are located without decoding them
 //! (`rows`). Then the relevant columns are decoded in parallel. Other elements and columns are
@@ -28,7 +28,7 @@ use crate::{
     surface::{Material, Mesh},
 };
 use faces::Faces;
-pub use gaussians::write_gaussians;
+pub use gaussians::{holds_gaussians, read_gaussians, write_compressed_gaussians, write_gaussians};
 use glam::{DVec3, Vec2, Vec3};
 use header::Element;
 pub(super) use pieces::Pieces;
@@ -47,14 +47,16 @@ const CHUNK: usize = 1 << 14;
 /// coordinates are those of the vertices, or else those that faces have for their corners
 /// (`texcoord`, with a `texnumber`). Colours are bytes, 16-bit numbers or fractions of 1. In wider
 /// types, they are bytes if the largest value of the file shows it. The property of the vertices
-/// that [`ReadOptions::scalar`] names becomes the mesh's values.
+/// that [`ReadOptions::scalar`] names becomes the mesh's values. Of trained Gaussians, the centres
+/// are read as points.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed header, a file that ends before its last
-/// row, positions that are not finite, and face indices without a vertex;
+/// row, positions that are not finite, face indices without a vertex, and compressed Gaussians;
 /// [`Error::Limit`](crate::Error::Limit) for more vertices or faces than the limits allow.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     let header = header::read(source)?;
+    gaussians::refuse_compressed(source, &header)?;
     let vertices = header.elements.iter().find(|element| element.name == "vertex");
     let mut mesh = Mesh::default();
     let mut faces = Vec::new();

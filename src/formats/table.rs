@@ -21,6 +21,8 @@ use super::npz;
 use super::obj;
 #[cfg(feature = "ply")]
 use super::ply;
+#[cfg(feature = "sog")]
+use super::sog;
 #[cfg(feature = "tiff")]
 use super::tiff;
 #[cfg(feature = "vtk")]
@@ -28,7 +30,7 @@ use super::vtk;
 use super::{
     Kind, csv,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
-    mhd, mrc, nifti, npy, nrrd, pcd, raw, stl, xyz,
+    mhd, mrc, nifti, npy, nrrd, pcd, raw, splat, spz, stl, xyz,
 };
 
 /// Every format, in the order of messages: surfaces, volumes, scattered samples.
@@ -50,14 +52,19 @@ pub static FORMATS: &[Format] = &[
             some(Content::Mesh, "with faces"),
             some(Content::PointCloud, "without faces"),
             some(Content::Samples, "without faces, if a scalar is named"),
+            some(Content::Gaussians, "as trainers write them, also compressed"),
         ],
         written: Some("ply"),
         feature: Some("ply"),
         magic: Magic::Rule(|bytes| bytes.trim_ascii_start().starts_with(b"ply")),
         #[cfg(feature = "ply")]
         kind: Which::Rule(|source, options| {
-            let samples = options.scalar.is_some() && !ply::has_faces(source)?;
-            Ok(if samples { Kind::Samples } else { Kind::Mesh })
+            let named = options.scalar.is_some();
+            Ok(match named {
+                false if ply::holds_gaussians(source)? => Kind::Gaussians,
+                true if !ply::has_faces(source)? => Kind::Samples,
+                _ => Kind::Mesh,
+            })
         }),
         #[cfg(feature = "ply")]
         mesh: Some(ply::read),
@@ -66,10 +73,44 @@ pub static FORMATS: &[Format] = &[
         #[cfg(feature = "ply")]
         samples: Some(ply::read_samples),
         #[cfg(feature = "ply")]
+        gaussians: Some(ply::read_gaussians),
+        #[cfg(feature = "ply")]
         pieces: InPieces::Points {
             of: "binary files",
             find: |source| Ok(ply::Pieces::find(source)?.map(|pieces| Box::new(pieces) as _)),
         },
+        ..Format::ROW
+    },
+    Format {
+        name: "splat",
+        extensions: &["splat"],
+        holds: &[all(Content::Gaussians)],
+        written: Some("splat"),
+        kind: Which::Always(Kind::Gaussians),
+        gaussians: Some(splat::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "SPZ",
+        extensions: &["spz"],
+        holds: &[all(Content::Gaussians)],
+        written: Some("spz"),
+        magic: Magic::Rule(spz::is_spz),
+        kind: Which::Always(Kind::Gaussians),
+        gaussians: Some(spz::read),
+        ..Format::ROW
+    },
+    Format {
+        name: "SOG",
+        extensions: &["sog"],
+        holds: &[all(Content::Gaussians)],
+        refers: true,
+        feature: Some("sog"),
+        #[cfg(feature = "sog")]
+        magic: Magic::Rule(|bytes| sog::is_sog(bytes) || sog::is_meta(bytes)),
+        kind: Which::Always(Kind::Gaussians),
+        #[cfg(feature = "sog")]
+        gaussians: Some(sog::read),
         ..Format::ROW
     },
     Format {
@@ -86,16 +127,26 @@ pub static FORMATS: &[Format] = &[
     Format {
         name: "glTF",
         extensions: &["gltf", "glb"],
-        holds: &WITH_OR_WITHOUT_FACES,
+        holds: &[
+            some(Content::Mesh, "with faces"),
+            some(Content::PointCloud, "without faces"),
+            some(Content::Gaussians, "with KHR_gaussian_splatting"),
+        ],
+        written: Some("glb"),
         refers: true,
         feature: Some("gltf"),
         magic: Magic::Rule(|bytes| {
             let text = bytes.trim_ascii_start();
             text.starts_with(b"glTF") || text.starts_with(b"{")
         }),
-        kind: Which::Always(Kind::Mesh),
+        #[cfg(feature = "gltf")]
+        kind: Which::Rule(|source, _| {
+            Ok(if gltf::holds_gaussians(source)? { Kind::Gaussians } else { Kind::Mesh })
+        }),
         #[cfg(feature = "gltf")]
         mesh: Some(|source, _| gltf::read(source)),
+        #[cfg(feature = "gltf")]
+        gaussians: Some(gltf::read_gaussians),
         ..Format::ROW
     },
     Format {

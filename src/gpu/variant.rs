@@ -38,8 +38,9 @@ pub fn variant(request: &Request<'_>) -> Variant {
                 variant.facets = true;
                 variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
             }
-            Item::Radiance(_) | Item::Hierarchy(_) => {
+            Item::Radiance(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
                 variant.radiance = true;
+                variant.trained |= matches!(item, Item::Gaussians(_));
                 variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
             }
             // Not drawn: `PreparedScene::new` returns an error.
@@ -85,6 +86,7 @@ fn without_items(request: &Request<'_>) -> Variant {
         sample_kind: 0,
         two_levels: false,
         radiance: false,
+        trained: false,
         facets: false,
         isotropic: false,
         table_kernel: false,

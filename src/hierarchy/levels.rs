@@ -50,7 +50,11 @@ impl Levels {
     pub fn new(set: &Arc<SplatSet>) -> Option<Self> {
         let count = set.splats.len();
         let bytes = 2 * (count * size_of::<Node>()) as u64;
-        let is_refused = set.payload == Payload::Radiance && check_splats(set).is_err();
+        let is_refused = match set.payload {
+            Payload::Scalar => false,
+            Payload::Radiance => check_splats(set).is_err(),
+            Payload::Trained => true,
+        };
         if count < FEWEST || is_refused || memory::most().is_some_and(|most| bytes > most / 2) {
             return None;
         }
@@ -76,6 +80,7 @@ impl Levels {
         match self.set.payload {
             Payload::Radiance => self.nodes(cut),
             Payload::Scalar => Ok(self.cells(cut)),
+            Payload::Trained => Ok(self.set.clone()),
         }
     }
 

@@ -7,7 +7,7 @@ use crate::{
     math::{Bounds, Kernel, Profile, Sheets, View},
     plan::tables::Tables,
     scene::{Clip, ClipShape, Item, Mode, Scene, Settings},
-    splat::SplatSet,
+    splat::{FOOTPRINT_BLUR, Payload, SplatSet, TRAINED_BLUR},
     volume::{Arrangement, Isosurface, Lattice, Shade, TransferFunction},
 };
 use bytemuck::{Pod, Zeroable};
@@ -110,6 +110,8 @@ pub const CULLED: u32 = 64;
 
 pub const MIXED: u32 = 128;
 
+pub const TRAINED: u32 = 256;
+
 fn wide(v: DVec3, w: f32) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, w]
 }
@@ -129,13 +131,22 @@ impl Source {
         [self.axis_x, self.axis_y, self.axis_z]
     }
 
+    /// Returns the standard deviation, in pixels, by which splats are widened.
+    pub fn blur(&self) -> f32 {
+        (if self.flags & TRAINED != 0 { TRAINED_BLUR } else { FOOTPRINT_BLUR }) as f32
+    }
+
     pub fn covariance(&self) -> [[f32; 4]; 2] {
         [self.covariance_a, self.covariance_b]
     }
 
     /// Returns the source of a chunk of explicit splats.
-    pub fn of_splats(view: &View, set: &SplatSet, radiance: bool) -> Self {
-        let flags = if radiance { RADIANCE } else { 0 };
+    pub fn of_splats(view: &View, set: &SplatSet) -> Self {
+        let flags = match set.payload {
+            Payload::Scalar => 0,
+            Payload::Radiance => RADIANCE,
+            Payload::Trained => RADIANCE | TRAINED,
+        };
         Self { flags, ..Self::of_radiance(view, set.origin, set.extent) }
     }
 
@@ -232,7 +243,9 @@ impl Frame {
         }
         for item in &scene.items {
             let transfer = match item {
-                Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) => continue,
+                Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
+                    continue;
+                }
                 Item::Scalar(set, transfer) => {
                     frame.kernel[2] = 1.0 / set.overlap;
                     frame.isotropic[3] = Kernel::default().least_sum() as f32;

@@ -7,7 +7,10 @@ use super::{
 use crate::{
     math::{self, View},
     scene::{Item, Scene},
-    splat::{FOOTPRINT_BLUR, Payload, STEP_BACK, Splat, SplatSet, decode_normal},
+    splat::{
+        FOOTPRINT_BLUR, Payload, STEP_BACK, Splat, SplatSet, TRAINED_BLUR, decode_normal,
+        decode_trained_color,
+    },
     volume::{Arrangement, Lattice, TransferFunction, Volume},
 };
 use glam::{DMat3, DVec3};
@@ -27,9 +30,13 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) 
         match item {
             Item::Radiance(set) => kernels
                 .extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view))),
-            // Facets are no kernels. A hierarchy's cut has become a set by now, and bricks a
-            // volume.
-            Item::Facets(_) | Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => {}
+            // Facets are no kernels. A hierarchy's cut and Gaussians have become sets by now, and
+            // bricks a volume.
+            Item::Facets(_)
+            | Item::Gaussians(_)
+            | Item::Hierarchy(_)
+            | Item::Bricks(..)
+            | Item::Cells(..) => {}
             Item::Scalar(set, transfer) => {
                 let before = before.map(|before| (before, transfer));
                 kernels.extend(
@@ -88,7 +95,8 @@ fn from_splat<'a>(
     let columns = [DVec3::new(b00, b10, b20), DVec3::new(0.0, b11, b21), DVec3::new(0.0, 0.0, b22)];
     let sharp = view.rotation * DMat3::from_cols(columns[0], columns[1], columns[2]);
     let pixel = if view.perspective { center.length() } else { 1.0 } / view.scale;
-    let blur = DMat3::from_diagonal(DVec3::splat((FOOTPRINT_BLUR * pixel).powi(2)));
+    let blur = if set.payload == Payload::Trained { TRAINED_BLUR } else { FOOTPRINT_BLUR };
+    let blur = DMat3::from_diagonal(DVec3::splat((blur * pixel).powi(2)));
     let factor = cholesky(sharp * sharp.transpose() + blur)?;
     let mut center = center;
     let load = match set.payload {
@@ -109,6 +117,12 @@ fn from_splat<'a>(
                 None => Load::Sample(Sample { value, weight, slope }),
             }
         }
+        Payload::Trained => Load::Radiance(Radiance {
+            amount: Amount::Opacity(splat.strength.into()),
+            color: DVec3::from(decode_trained_color(splat).map(f64::from)),
+            normal: None,
+            facing: 1.0,
+        }),
         Payload::Radiance => {
             let [red, green, blue, opacity] =
                 splat.color.to_le_bytes().map(|byte| f64::from(byte) / 255.0);

@@ -1,6 +1,7 @@
 //! A kernel in view space, and its intersection with a ray.
 
 use super::{profile::Profile, ray::Ray};
+use crate::splat::TRAINED_OPACITIES;
 use glam::{DMat3, DVec3};
 use std::f64::consts::PI;
 
@@ -29,6 +30,8 @@ pub(super) enum Amount {
     Depth(f64),
     /// Optical depth per length of the kernel's line integral.
     Extinction(f64),
+    /// This share of a pixel through the centre, as trained.
+    Opacity(f64),
 }
 
 /// A sample of a field: it carries value + slope·(x − centre) and has a weight.
@@ -143,6 +146,14 @@ impl Crossing<'_> {
             // The length of a Gaussian through its centre is √(2π)/|β|.
             Amount::Depth(depth) => depth * length * self.density / (2.0 * PI).sqrt(),
             Amount::Extinction(extinction) => extinction * length,
+            Amount::Opacity(opacity) => {
+                let [whole, _] = self.moments([f64::NEG_INFINITY, f64::INFINITY]);
+                let alpha = opacity * whole * self.density / (2.0 * PI).sqrt();
+                let [least, most] = TRAINED_OPACITIES;
+                let depth = if alpha < least { 0.0 } else { -(-alpha.min(most)).ln_1p() };
+                // The part of the kernel's line integral.
+                depth * length / whole
+            }
         }
     }
 }

@@ -22,6 +22,12 @@
 //!   number of pixels per world unit. Opaque surfaces must not grow through this widening. So a
 //!   splat of radiance with a normal n steps back along n, to c − 2.4·(σ′ − σ)·n. Here σ and σ′ are
 //!   the splat's standard deviations along n before and after widening.
+//! - A trained Gaussian ([`Gaussians`](crate::gaussians::Gaussians)) is a splat without a normal,
+//!   with the colour of its harmonics in the direction from the eye to its centre. It is widened by
+//!   (√0.3 pixel)², and covers the share α = min(0.99, o·exp(−ρ²/2)) of a ray that passes it at ρ,
+//!   with o its opacity. If α < 1/255 it covers nothing. Its optical depth on the ray is
+//!   −ln(1 − α), spread like its line integral (Kerbl et al. 2023 draw whole Gaussians; [`trained`]
+//!   draws by their formulas).
 //! - A sample of a lattice has the profile of its volume's kernel, and B = A·U·u. A holds the steps
 //!   of the lattice, U is the sample's unit in steps, u the kernel's unit. Lattice samples are not
 //!   widened. Their lattice is `drawn_lattice` and their values are `drawn_value`: the volume's
@@ -184,6 +190,7 @@ mod quadrature;
 mod ray;
 mod shade;
 mod sheet;
+mod trained;
 mod truth;
 mod whole;
 
@@ -191,10 +198,12 @@ mod whole;
 mod tests;
 
 pub use mesh::trace;
+pub use trained::trained;
 pub use truth::integrate;
 
 use crate::{
     Result,
+    gaussians::Eye,
     math::{Camera, Sheets, View},
     parallel::prelude::*,
     picture::Picture,
@@ -202,6 +211,7 @@ use crate::{
         Classification, Clip, Evaluate, Gradient, Item, MOST_GATHERED, Mode, Optics, Scene,
         Settings,
     },
+    splat::BRIGHTEST_TRAINED,
     volume::{Lattice, Shade},
 };
 use cells::Solids;
@@ -243,7 +253,8 @@ fn without_bricks(scene: &Scene) -> Result<Scene> {
     Ok(Scene { items: scene.items.iter().map(whole).collect::<Result<_>>()? })
 }
 
-/// Returns the scene with hierarchies replaced by the splats of their cuts.
+/// Returns the scene with hierarchies replaced by the splats of their cuts, and Gaussians by those
+/// that are seen.
 fn with_cuts(scene: &Scene, view: &View, settings: &Settings) -> Result<Scene> {
     let flat = |item: &Item| match item {
         Item::Hierarchy(hierarchy) => {
@@ -252,6 +263,7 @@ fn with_cuts(scene: &Scene, view: &View, settings: &Settings) -> Result<Scene> {
             let cut = hierarchy.read_tree()?.cut(view, settings.detail, Some(culls))?;
             Ok(Item::Radiance(cut.into()))
         }
+        Item::Gaussians(set) => Ok(Item::Radiance(set.seen_from(Eye::of(view)).into())),
         other => Ok(other.clone()),
     };
     Ok(Scene { items: scene.items.iter().map(flat).collect::<Result<_>>()? })
@@ -315,6 +327,8 @@ struct Frame<'a> {
     lattice: Option<&'a Lattice>,
     /// The shading of radiance.
     shade: Option<Shade>,
+    /// The largest channel of a colour of radiance.
+    brightest: f64,
     /// The minimum sum of kernels for which a value exists.
     least_sum: f64,
 }
@@ -325,7 +339,11 @@ impl<'a> Frame<'a> {
         let sheets = scene.sheets(&view, settings);
         let samples = flat.items.iter().find_map(|item| match item {
             // Bricks have become a volume by now.
-            Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) | Item::Bricks(..) => None,
+            Item::Radiance(_)
+            | Item::Facets(_)
+            | Item::Gaussians(_)
+            | Item::Hierarchy(_)
+            | Item::Bricks(..) => None,
             Item::Scalar(_, transfer) | Item::Cells(_, transfer) => Some((transfer, None)),
             Item::Volume(volume, _, transfer) => Some((transfer, Some(&volume.lattice))),
         });
@@ -347,6 +365,11 @@ impl<'a> Frame<'a> {
         let all = settings.optics == Optics::Maximum;
         Self {
             solids: Solids::of(flat, &view, field.as_ref(), all),
+            brightest: if scene.items.iter().any(|item| matches!(item, Item::Gaussians(_))) {
+                f64::from(BRIGHTEST_TRAINED)
+            } else {
+                1.0
+            },
             least_sum: kernel.unwrap_or_default().least_sum(),
             mode: settings.mode,
             optics: settings.optics,
@@ -428,6 +451,6 @@ impl<'a> Frame<'a> {
             }
             _ => light.color / light.facing,
         };
-        Medium { depth: light.depth, color: color.clamp(DVec3::ZERO, DVec3::ONE) }
+        Medium { depth: light.depth, color: color.clamp(DVec3::ZERO, DVec3::splat(self.brightest)) }
     }
 }

@@ -6,6 +6,7 @@ use crate::{
     bricks::Bricks,
     cells::Tetrahedra,
     facet::FacetSet,
+    gaussians::Gaussians,
     hierarchy::Hierarchy,
     math::{Bounds, Kernel},
     splat::SplatSet,
@@ -21,6 +22,8 @@ pub enum Item {
     Radiance(Arc<SplatSet>),
     /// Facets: splats whose footprint is a triangle.
     Facets(Arc<FacetSet>),
+    /// A trained scene of 3D Gaussians, whose colours depend on the view.
+    Gaussians(Arc<Gaussians>),
     /// A hierarchy of surfels. A picture shows a cut of it
     /// ([`Settings::detail`](super::Settings::detail)).
     Hierarchy(Arc<Hierarchy>),
@@ -55,7 +58,7 @@ impl Item {
             | Self::Volume(_, _, transfer)
             | Self::Bricks(_, _, transfer)
             | Self::Cells(_, transfer) => Some(transfer),
-            Self::Radiance(_) | Self::Facets(_) | Self::Hierarchy(_) => None,
+            Self::Radiance(_) | Self::Facets(_) | Self::Gaussians(_) | Self::Hierarchy(_) => None,
         }
     }
 
@@ -66,7 +69,7 @@ impl Item {
             | Self::Volume(_, _, transfer)
             | Self::Bricks(_, _, transfer)
             | Self::Cells(_, transfer) => Some(transfer),
-            Self::Radiance(_) | Self::Facets(_) | Self::Hierarchy(_) => None,
+            Self::Radiance(_) | Self::Facets(_) | Self::Gaussians(_) | Self::Hierarchy(_) => None,
         }
     }
 
@@ -76,6 +79,7 @@ impl Item {
             Self::Volume(_, kernel, _) | Self::Bricks(_, kernel, _) => Some(kernel),
             Self::Radiance(_)
             | Self::Facets(_)
+            | Self::Gaussians(_)
             | Self::Hierarchy(_)
             | Self::Scalar(..)
             | Self::Cells(..) => None,
@@ -89,6 +93,7 @@ impl Item {
             Self::Bricks(bricks, ..) => Some(&bricks.header().lattice),
             Self::Radiance(_)
             | Self::Facets(_)
+            | Self::Gaussians(_)
             | Self::Hierarchy(_)
             | Self::Scalar(..)
             | Self::Cells(..) => None,
@@ -103,7 +108,7 @@ impl Item {
             Self::Volume(volume, ..) => Some(volume.range),
             Self::Bricks(bricks, ..) => Some(bricks.header().range),
             Self::Cells(cells, _) => Some(cells.range()),
-            Self::Radiance(_) | Self::Facets(_) | Self::Hierarchy(_) => None,
+            Self::Radiance(_) | Self::Facets(_) | Self::Gaussians(_) | Self::Hierarchy(_) => None,
         }
     }
 
@@ -129,6 +134,7 @@ impl Item {
         match self {
             Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
             Self::Facets(set) => set.bounds(),
+            Self::Gaussians(set) => set.bounds(),
             Self::Hierarchy(hierarchy) => hierarchy.bounds(),
             Self::Cells(cells, _) => cells.bounds(),
             Self::Volume(volume, kernel, _) => reached(&volume.lattice, kernel),

@@ -20,6 +20,7 @@ use crate::{
     bricks::Bricks,
     cells::Tetrahedra,
     facet::FacetSet,
+    gaussians::Gaussians,
     hierarchy::Hierarchy,
     math::{Bounds, Kernel, Tensor},
     splat::SplatSet,
@@ -71,6 +72,13 @@ impl Scene {
     #[must_use]
     pub fn with_facets(mut self, set: impl Into<Arc<FacetSet>>) -> Self {
         self.items.push(Item::Facets(set.into()));
+        self
+    }
+
+    /// Adds a trained scene of 3D Gaussians.
+    #[must_use]
+    pub fn with_gaussians(mut self, set: impl Into<Arc<Gaussians>>) -> Self {
+        self.items.push(Item::Gaussians(set.into()));
         self
     }
 

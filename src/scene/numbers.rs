@@ -57,6 +57,7 @@ pub(super) fn check_item(item: &Item) -> Result<()> {
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(Error::Argument)?,
         Item::Facets(set) => check_facets(set).map_err(Error::Argument)?,
+        Item::Gaussians(set) => set.validate().map_err(Error::Argument)?,
         Item::Volume(volume, ..) => volume.validate().map_err(Error::Argument)?,
         // Tetrahedra are checked as they are made.
         Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => {}
@@ -68,6 +69,7 @@ pub(super) fn check_item(item: &Item) -> Result<()> {
     let is_none = match item {
         Item::Radiance(set) | Item::Scalar(set, _) => set.splats.is_empty(),
         Item::Facets(set) => set.facets.is_empty(),
+        Item::Gaussians(set) => set.is_empty(),
         _ => false,
     };
     if !is_none && ![min, max, max - min].iter().all(|v| v.to_array().into_iter().all(holds)) {
@@ -135,7 +137,8 @@ fn fault(splat: &Splat, payload: Payload) -> Option<String> {
             let is_sound = weight >= 0.0 && weight.is_finite() && slope.is_finite();
             (!is_sound).then(|| format!("the weight is {weight} and the slope {slope}"))
         }
-        Payload::Radiance => None,
+        // Gaussians are checked before they become splats.
+        Payload::Radiance | Payload::Trained => None,
     }
 }
 

@@ -6,13 +6,14 @@ use crate::{
     bricks::{Bricks, Level},
     cells::Tetrahedra,
     facet::FacetSet,
+    gaussians::{Eye, Gaussians},
     hierarchy::Hierarchy,
     math::{
         Bounds,
         hull::{outermost, without_strays},
     },
     parallel::prelude::*,
-    splat::{Splat, SplatSet},
+    splat::{Splat, SplatSet, TRAINED_OPACITIES},
     volume::{Lattice, TransferFunction, Volume, steps::Steps},
 };
 use glam::{DVec3, Vec3};
@@ -68,6 +69,7 @@ impl Scene {
                 Item::Radiance(set) => of_splats(set, |_| true, clips),
                 Item::Scalar(set, transfer) => of_samples(set, transfer, clips),
                 Item::Facets(set) => of_facets(set, clips),
+                Item::Gaussians(set) => of_gaussians(set, clips),
                 Item::Hierarchy(hierarchy) => of_splats(&coarse(hierarchy)?, |_| true, clips),
                 Item::Cells(cells, transfer) => of_cells(cells, transfer, clips),
                 Item::Volume(volume, _, transfer) => of_volume(volume, transfer, clips),
@@ -103,6 +105,12 @@ fn of_splats(set: &SplatSet, shows: impl Fn(&Splat) -> bool, clips: &[Clip]) -> 
             .flat_map(move |(axis, reach)| [center - reach * axis, center + reach * axis])
     };
     outermost(&centers).into_iter().flat_map(reach).map(world).collect()
+}
+
+/// Returns the outermost of the Gaussians that can be seen, with their reach.
+fn of_gaussians(set: &Gaussians, clips: &[Clip]) -> Vec<DVec3> {
+    let splats = set.seen_from(Eye::Along(DVec3::Z));
+    of_splats(&splats, |splat| f64::from(splat.strength) >= TRAINED_OPACITIES[0], clips)
 }
 
 /// Returns the outermost corners of facets.

@@ -4,8 +4,9 @@ use super::{Item, Mode, Scene, Settings};
 use crate::{
     bricks::Choice,
     cells::Place,
+    gaussians::EXTENT,
     math::{Bounds, Sheets, Tensor, View},
-    splat::{FOOTPRINT_BLUR, STEP_BACK},
+    splat::{FOOTPRINT_BLUR, STEP_BACK, TRAINED_BLUR},
     volume::{Arrangement, Lattice},
 };
 use glam::{DMat3, DVec3};
@@ -32,6 +33,7 @@ impl Scene {
             Item::Radiance(set) => f64::from(set.extent) + STEP_BACK,
             Item::Scalar(set, _) => f64::from(set.extent),
             Item::Facets(_) => FACET_REACH,
+            Item::Gaussians(_) => f64::from(EXTENT) * TRAINED_BLUR / FOOTPRINT_BLUR,
             Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent) + STEP_BACK,
             Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => 0.0,
         });
@@ -116,7 +118,11 @@ impl Scene {
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {}
-                Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) | Item::Scalar(..) => {
+                Item::Radiance(_)
+                | Item::Facets(_)
+                | Item::Gaussians(_)
+                | Item::Hierarchy(_)
+                | Item::Scalar(..) => {
                     pixels = Some(settings.sheet_pixels);
                 }
             }

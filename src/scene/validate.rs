@@ -41,7 +41,7 @@ impl Scene {
             let (set, payload) = match item {
                 Item::Radiance(set) => (set, Payload::Radiance),
                 Item::Scalar(set, _) => (set, Payload::Scalar),
-                Item::Facets(_) | Item::Hierarchy(_) => continue,
+                Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => continue,
                 Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {
                     fields += 1;
                     continue;
@@ -117,7 +117,9 @@ fn check_clips(settings: &Settings) -> Result<()> {
 /// Returns an error if an item cannot be drawn with the settings.
 fn check_item(item: &Item, settings: &Settings) -> Result<()> {
     match item {
-        Item::Radiance(_) | Item::Hierarchy(_) if settings.optics == Optics::Maximum => {
+        Item::Radiance(_) | Item::Gaussians(_) | Item::Hierarchy(_)
+            if settings.optics == Optics::Maximum =>
+        {
             wrong("a maximum intensity picture takes a volume or samples alone, without surfaces")
         }
         Item::Facets(_)
@@ -128,7 +130,7 @@ fn check_item(item: &Item, settings: &Settings) -> Result<()> {
                  draw the surfels of the mesh instead",
             )
         }
-        Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) => Ok(()),
+        Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => Ok(()),
         Item::Scalar(_, transfer) => check_classified(transfer, settings),
         Item::Cells(cells, transfer) => check_cells(cells, transfer, settings),
         Item::Volume(volume, kernel, transfer) => {

@@ -118,7 +118,7 @@ pub enum Origin {
     Default,
     /// Guessed from the shape.
     Guess,
-    /// The convention for volumes and samples.
+    /// The convention for volumes, samples and trained Gaussians.
     Convention,
     /// The file, or the convention of its format.
     File,

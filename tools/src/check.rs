@@ -13,6 +13,7 @@ use splatkit::{
     Deadline, Error, bricks,
     container::{Finding, Severity},
     formats::Kind,
+    gaussians::Gaussians,
     hierarchy::file,
     surface::{Mesh, SurfelOptions},
 };
@@ -46,6 +47,7 @@ impl Check {
                 Input::Mesh(mesh) => {
                     of_mesh(&mesh, deadline).map_err(|error| in_file(&self.file, error))?
                 }
+                Input::Gaussians(set) => of_gaussians(&set),
                 // Errors in other inputs are reported when they are read.
                 _ => Vec::new(),
             },
@@ -85,6 +87,23 @@ fn as_json(finding: &Finding) -> serde_json::Value {
         "where": finding.place,
         "message": finding.message,
     })
+}
+
+/// Returns the oddities of trained Gaussians.
+fn of_gaussians(set: &Gaussians) -> Vec<Finding> {
+    let (survey, all) = (set.survey(), set.len() as u64 + set.broken.all());
+    let of = |count: u64, what: &str| (count > 0).then(|| format!("{count} of {all} {what}"));
+    let found = [
+        ("not-finite", of(set.broken.not_finite, "have numbers that are not finite; left out")),
+        ("no-rotation", of(set.broken.without_rotation, "have a zero quaternion; left out")),
+        ("invisible", of(survey.invisible, "cover less than 1/255 of any pixel")),
+        ("needles", of(survey.needles, "are at least 25 times as long as they are wide")),
+    ];
+    let finding = |(code, message): (_, Option<String>)| {
+        let (severity, place) = (Severity::Warning, "Gaussians".into());
+        Some(Finding { code, severity, place, message: message? })
+    };
+    found.into_iter().filter_map(finding).collect()
 }
 
 /// Returns findings on a mesh or point cloud: parts that draw nothing, or that are drawn

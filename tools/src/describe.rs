@@ -54,7 +54,7 @@ pub fn settings(scene: &Scene, settings: &Settings) -> Value {
             Some(field)
         }
         Item::Scalar(_, transfer) | Item::Cells(_, transfer) => Some(shown(transfer)),
-        Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) => None,
+        Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => None,
     });
     json!({
         "mode": mode,

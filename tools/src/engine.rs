@@ -233,7 +233,9 @@ impl EngineFlags {
                 | Item::Volume(_, _, transfer)
                 | Item::Bricks(_, _, transfer)
                 | Item::Cells(_, transfer) => transfer.shade,
-                Item::Radiance(_) | Item::Facets(_) | Item::Hierarchy(_) => None,
+                Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
+                    None
+                }
             });
             settings.volume_shade = Some(Some(own.unwrap_or_default()));
         }

@@ -27,6 +27,9 @@ pub const RAW: Kinds = 1 << 6;
 /// Cells of a mesh of volumes.
 pub const CELLS: Kinds = 1 << 7;
 
+/// Trained 3D Gaussians.
+pub const GAUSSIANS: Kinds = 1 << 8;
+
 /// Any input.
 pub const ALL: Kinds = Kinds::MAX;
 
@@ -78,7 +81,7 @@ const READ_BY: &[(&str, &[&str])] = &[
 ];
 
 /// The names of kinds, for messages.
-const NAMES: [(Kinds, &str, &str); 8] = [
+const NAMES: [(Kinds, &str, &str); 9] = [
     (MESH, "meshes", "a mesh"),
     (CLOUD, "point clouds", "a point cloud"),
     (HIERARCHY, "hierarchies", "a hierarchy"),
@@ -86,6 +89,7 @@ const NAMES: [(Kinds, &str, &str); 8] = [
     (BRICKS, "volumes in bricks", "a volume in bricks"),
     (SAMPLES, "scattered samples", "a set of samples"),
     (CELLS, "cells", "a set of cells"),
+    (GAUSSIANS, "trained Gaussians", "a set of trained Gaussians"),
     (RAW, "raw volumes", "a raw volume"),
 ];
 
@@ -195,6 +199,7 @@ pub fn kinds_of(input: &Input, is_raw: bool) -> Kinds {
         Input::Hierarchy(_) => HIERARCHY,
         Input::Bricks(_) => BRICKS,
         Input::Cells(_) => CELLS,
+        Input::Gaussians(_) => GAUSSIANS,
     }
 }
 

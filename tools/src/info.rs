@@ -18,8 +18,10 @@ use splatkit::{
     bricks::Bricks,
     cells::{CellKind, Cells, Place},
     formats::{self, Series},
+    gaussians::Gaussians,
     hierarchy::Hierarchy,
     input::Source,
+    math::Bounds,
     memory,
     scattered::Points,
     surface::Mesh,
@@ -39,6 +41,11 @@ const ORDER: &[&str] = &[
     "spacing",
     "type",
     "range",
+    "degree",
+    "scales",
+    "opacities",
+    "invisible",
+    "broken",
     "missing",
     "modality",
     "window",
@@ -65,8 +72,8 @@ const ORDER: &[&str] = &[
 
 #[derive(Args, Debug)]
 pub struct Info {
-    /// A mesh, point cloud, hierarchy, volume, volume in bricks, cells, or a set of scattered
-    /// samples; or a folder of DICOM files.
+    /// A mesh, point cloud, hierarchy, volume, volume in bricks, cells, trained Gaussians, or a set
+    /// of scattered samples; or a folder of DICOM files.
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,
@@ -90,6 +97,7 @@ impl Info {
             Input::Volume(volume) => (volume.len(), of_volume(volume)),
             Input::Samples(points) => (points.len(), of_samples(points)),
             Input::Cells(cells) => (cells.len(), of_cells(cells)),
+            Input::Gaussians(set) => (set.len(), of_gaussians(set)),
             Input::Hierarchy(hierarchy) => {
                 (hierarchy.header().source_points as usize, of_hierarchy(hierarchy))
             }
@@ -106,7 +114,7 @@ impl Info {
             facts.insert("missing".into(), json!(holes(&input)));
         }
         let arrays = match &input {
-            Input::Hierarchy(_) | Input::Bricks(_) => Vec::new(),
+            Input::Gaussians(_) | Input::Hierarchy(_) | Input::Bricks(_) => Vec::new(),
             _ => self.load.arrays(&self.file)?,
         };
         // Bricks state their own levels. The leaves of a hierarchy lie at different depths.
@@ -183,7 +191,7 @@ fn holes(input: &Input) -> u64 {
         Input::Volume(volume) => volume.about.holes,
         Input::Samples(points) => points.about.holes,
         Input::Cells(cells) => cells.about.holes,
-        Input::Hierarchy(_) | Input::Bricks(_) => 0,
+        Input::Gaussians(_) | Input::Hierarchy(_) | Input::Bricks(_) => 0,
     }
 }
 
@@ -336,6 +344,21 @@ fn of_cells(cells: &Cells) -> Map<String, Value> {
     facts
 }
 
+fn of_gaussians(set: &Gaussians) -> Map<String, Value> {
+    let survey = set.survey();
+    let mut facts = Map::new();
+    facts.insert("kind".into(), json!("trained Gaussians"));
+    facts.insert("degree".into(), json!(set.degree));
+    facts.insert("scales".into(), json!(survey.scales));
+    facts.insert("opacities".into(), json!(survey.opacities));
+    facts.insert("invisible".into(), json!(survey.invisible));
+    facts.insert("broken".into(), json!(set.broken.all()));
+    facts.insert("attributes".into(), json!(["position", "covariance", "opacity", "color"]));
+    stand(&mut facts, set.about.stance);
+    facts.insert("bounds".into(), bounds_of(set.bounds()));
+    facts
+}
+
 /// Adds the direction that is up, if the file says so.
 fn stand(facts: &mut Map<String, Value>, stance: Option<Stance>) {
     if let Some(stance) = stance {
@@ -350,6 +373,10 @@ fn up(stance: &Stance) -> Value {
 
 fn bounds(bounds: Option<[glam::DVec3; 2]>) -> Value {
     bounds.map_or(Value::Null, |[min, max]| json!({ "min": min.to_array(), "max": max.to_array() }))
+}
+
+fn bounds_of(own: Bounds) -> Value {
+    bounds(Some([own.min, own.max]))
 }
 
 /// Returns a value as readable text.

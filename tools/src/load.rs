@@ -11,6 +11,7 @@ use splatkit::{
         self, Content, Endian, FORMATS, Format, Kind, RawLayout, ReadOptions, SampleType,
         VolumeStream,
     },
+    gaussians::Gaussians,
     hierarchy::Hierarchy,
     input::{Limits, Source},
     memory,
@@ -29,6 +30,7 @@ pub enum Input {
     Volume(Volume),
     Samples(Points),
     Cells(Cells),
+    Gaussians(Gaussians),
     Hierarchy(Arc<Hierarchy>),
     Bricks(Arc<Bricks>),
 }
@@ -155,6 +157,10 @@ impl LoadFlags {
                 let source = Source::open_any(path, &whole)?;
                 (Input::Cells(formats::read_cells(&source, &self.options())?), source.files())
             }
+            Kind::Gaussians => {
+                let source = Source::open_any(path, &whole)?;
+                (Input::Gaussians(formats::read_gaussians(&source)?), source.files())
+            }
         };
         read.extend(files);
         warn_of_holes(path, &input);
@@ -275,7 +281,8 @@ fn warn_of_holes(path: &Path, input: &Input) {
             (cells.about.holes, cells.values.len() as u64, done)
         }
         Input::Mesh(mesh) => (mesh.about.holes, mesh.values.len() as u64, "drawn without a colour"),
-        Input::Hierarchy(_) | Input::Bricks(_) => return,
+        // Their reader has said how many are left out.
+        Input::Gaussians(_) | Input::Hierarchy(_) | Input::Bricks(_) => return,
     };
     if holes > 0 {
         let (holes, all) = (grouped(holes), grouped(all));

@@ -17,6 +17,7 @@ use splatkit::{
     about::Stance,
     bricks::Bricks,
     cells::{CellOptions, Cells},
+    gaussians::Gaussians,
     hierarchy::Hierarchy,
     input::Limits,
     math::Bounds,
@@ -206,6 +207,10 @@ impl Adding<'_> {
             Input::Volume(volume) => self.add_volume(path, volume),
             Input::Samples(points) => self.add_samples(path, &points, deadline),
             Input::Cells(cells) => self.add_cells(path, cells),
+            Input::Gaussians(set) => {
+                self.add_gaussians(path, set);
+                Ok(())
+            }
         }
     }
 
@@ -250,6 +255,16 @@ impl Adding<'_> {
             self.change(|scene| scene.with_splats(splats));
         }
         Ok(())
+    }
+
+    fn add_gaussians(&mut self, path: &Path, set: Gaussians) {
+        self.loaded.count_in(set.bounds(), set.len());
+        match set.about.stance {
+            Some(stance) => self.stand(path, stance, Origin::File),
+            None => self.stand(path, Stance::Y_DOWN, Origin::Convention),
+        }
+        self.add_unit(&set.about.length);
+        self.change(|scene| scene.with_gaussians(set));
     }
 
     fn add_hierarchy(&mut self, path: &Path, hierarchy: Arc<Hierarchy>) {

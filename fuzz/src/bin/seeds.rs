@@ -121,6 +121,7 @@ fn ply(seeds: &mut Seeds) -> Result<()> {
     seeds.known("ply", cloud)?;
     let set = tetrahedron().surfels(&Default::default())?;
     let few = splatkit::splat::SplatSet { splats: set.splats[..3].to_vec(), ..set };
+    let few = splatkit::gaussians::Gaussians::from_splats(&few)?;
     let gaussians = seeds.written(|path| formats::ply::write_gaussians(&few, path))?;
     seeds.known("ply", gaussians)?;
     seeds.known(

@@ -18,11 +18,11 @@ fn load_json(value: &Value) -> Result<Mesh> {
     load("a.gltf", value.to_string())
 }
 
-fn data_uri(bytes: &[u8]) -> String {
+pub(super) fn data_uri(bytes: &[u8]) -> String {
     format!("data:application/octet-stream;base64,{}", STANDARD.encode(bytes))
 }
 
-fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
+pub(super) fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut binary = binary.to_vec();
@@ -39,7 +39,7 @@ fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
     out
 }
 
-fn bytes(values: &[f32]) -> Vec<u8> {
+pub(super) fn bytes(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 

@@ -14,6 +14,7 @@ pub(super) mod polygon;
 pub(super) mod rescale;
 pub(super) mod sample_type;
 pub(super) mod texture;
+pub(super) mod trained;
 
 /// Names that a message lists at most.
 const MOST_LISTED: usize = 20;

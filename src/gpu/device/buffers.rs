@@ -39,5 +39,5 @@ pub fn filled_buffer(
 
 /// Returns a read-only storage buffer that contains these bytes.
 pub fn upload(gpu: &Gpu, label: &str, bytes: &[u8]) -> wgpu::Buffer {
-    filled_buffer(gpu, label, bytes, wgpu::BufferUsages::STORAGE)
+    filled_buffer(gpu, label, bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
 }

@@ -28,8 +28,14 @@ impl Gather {
     pub fn recipe(variant: &Variant) -> Recipe {
         use Binding::{Read, Uniform, Write};
         // An invocation draws one pixel, and only the field.
-        let own =
-            Variant { rows: 1, radiance: false, facets: false, surface_shaded: false, ..*variant };
+        let own = Variant {
+            rows: 1,
+            radiance: false,
+            trained: false,
+            facets: false,
+            surface_shaded: false,
+            ..*variant
+        };
         let sources = [
             &own.constants(),
             shaders::FRAME,

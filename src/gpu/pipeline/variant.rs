@@ -34,6 +34,8 @@ pub struct Variant {
     /// Two levels of a volume in bricks are drawn together, each with its weight.
     pub two_levels: bool,
     pub radiance: bool,
+    /// The scene has trained Gaussians.
+    pub trained: bool,
     /// The scene has facets.
     pub facets: bool,
     /// Lattice samples are drawn with sections that do not depend on the pixel.
@@ -120,7 +122,7 @@ impl Variant {
     }
 
     /// The constants that are true or false.
-    fn flags(&self) -> [(&'static str, bool); 34] {
+    fn flags(&self) -> [(&'static str, bool); 35] {
         let radiance = self.radiance || self.classified;
         let samples = (self.scalar || self.classified) && !self.lattice;
         [
@@ -138,6 +140,7 @@ impl Variant {
             ("WEIGHTS", self.scalar && (samples || self.rectilinear || self.two_levels)),
             ("SAMPLE_NORMALS", self.classified && self.surface_shaded),
             ("RADIANCE_PAYLOAD", radiance),
+            ("TRAINED", self.trained),
             ("ISOTROPIC_RECORDS", self.isotropic),
             ("GENERAL_RECORDS", radiance || self.facets || !self.isotropic),
             ("HAS_FACETS", self.facets),

@@ -30,7 +30,6 @@ pub const WORKGROUP_CANDIDATES: u32 = 64 * RUN;
 pub enum Origin {
     Splats {
         set: Arc<SplatSet>,
-        radiance: bool,
         /// The index of the item in the scene.
         item: usize,
     },
@@ -99,7 +98,7 @@ impl Chunk {
                 let header = page_caches[*page_cache].hierarchy.header();
                 Source::of_radiance(view, header.origin, header.extent)
             }
-            Origin::Splats { set, radiance, .. } => Source::of_splats(view, set, *radiance),
+            Origin::Splats { set, .. } => Source::of_splats(view, set),
             Origin::Facets { set, is_culled, .. } => Source::of_facets(view, set, *is_culled),
             Origin::Bricks { bricks, kernel, slab, level } => {
                 let lattice = bricks.lattice(*level);

@@ -6,6 +6,7 @@ use crate::{
     Error, Result,
     bricks::Choice,
     facet::{Facet, FacetSet, Sides},
+    gaussians::{Eye, Gaussians},
     gpu::{
         device::{
             Gpu,
@@ -24,14 +25,14 @@ use crate::{
     parallel::prelude::*,
     plan::uniforms::Source,
     scene::{Item, Optics, Scene, Settings},
-    splat::{Payload, Splat, SplatSet},
+    splat::{Splat, SplatSet},
     volume::{
         Arrangement, Lattice, Samples, TransferFunction, Volume,
         reach::{EVERYTHING, first_visible},
     },
 };
 use glam::{UVec3, Vec3};
-use std::{borrow::Cow, sync::Arc};
+use std::sync::Arc;
 
 /// Maximum number of voxels in a chunk, apart from those of its neighbours. The spans of all its
 /// voxels then fit a binding of 128 MiB.
@@ -56,6 +57,24 @@ struct LevelledSet {
     set: Option<Arc<SplatSet>>,
 }
 
+/// Trained Gaussians. The GPU holds the splats that the eye of the last view saw.
+#[derive(Debug)]
+struct SeenSet {
+    item: usize,
+    set: Arc<Gaussians>,
+    /// The numbers of the Gaussians, in the order of the splats on the GPU.
+    order: Vec<u32>,
+    eye: Option<Eye>,
+    /// The splats with the colours of the first view.
+    drawn: Option<Arc<SplatSet>>,
+}
+
+impl SeenSet {
+    fn new(item: usize, set: &Arc<Gaussians>) -> Self {
+        Self { item, set: set.clone(), order: Vec::new(), eye: None, drawn: None }
+    }
+}
+
 /// A scene whose splats and samples lie on the GPU. Cameras, settings and transfer functions may
 /// change between frames.
 #[derive(Debug)]
@@ -64,6 +83,8 @@ pub struct PreparedScene {
     pub(crate) chunks: Vec<Chunk>,
     /// The sets that pictures may show in levels of detail.
     levels: Vec<LevelledSet>,
+    /// The trained Gaussians.
+    seen: Vec<SeenSet>,
     /// The hierarchies, in the scene's order.
     pub(crate) page_caches: Vec<PageCache>,
     /// The brick cache of the scene's volume in bricks.
@@ -97,6 +118,7 @@ impl PreparedScene {
             scene: scene.clone(),
             chunks: Vec::new(),
             levels: Vec::new(),
+            seen: Vec::new(),
             page_caches: Vec::new(),
             brick_cache: None,
             field: None,
@@ -116,12 +138,15 @@ impl PreparedScene {
             }
             gpu.check_memory(prepared.bytes + bytes_of(item))?;
             match item {
-                Item::Radiance(set) => prepared.add_splats(gpu, set, true, number),
+                Item::Radiance(set) | Item::Scalar(set, _) => {
+                    prepared.add_splats(gpu, &in_space_order(set), number);
+                }
+                // They are uploaded as the first picture sees them.
+                Item::Gaussians(set) => prepared.seen.push(SeenSet::new(number, set)),
                 Item::Facets(set) => prepared.add_facets(gpu, set, number),
                 Item::Hierarchy(hierarchy) => {
                     prepared.page_caches.push(PageCache::new(gpu, hierarchy));
                 }
-                Item::Scalar(set, _) => prepared.add_splats(gpu, set, false, number),
                 // Other volumes are uploaded when a picture first gathers or scatters them.
                 Item::Volume(volume, kernel, _) if unsuited(volume, kernel).is_some() => {
                     prepared.add_volume(gpu, volume, kernel.clone())?;
@@ -411,15 +436,59 @@ impl PreparedScene {
         self.chunks.retain(|chunk| !is_old(chunk));
         own.set = None;
         gpu.check_memory(self.bytes + splat_bytes(&set))?;
-        self.add_splats(gpu, &set, set.payload == Payload::Radiance, own.item);
+        self.add_splats(gpu, &in_space_order(&set), own.item);
         own.set = Some(set);
         Ok(())
     }
 
-    fn add_splats(&mut self, gpu: &Gpu, set: &Arc<SplatSet>, radiance: bool, item: usize) {
+    /// Gives Gaussians the colours for a view's eye.
+    pub(crate) fn update_seen(&mut self, gpu: &Gpu, view: &View) -> Result<()> {
+        let eye = Eye::of(view);
+        let mut seen = std::mem::take(&mut self.seen);
+        let done = seen.iter_mut().try_for_each(|own| self.update_seen_set(gpu, own, eye));
+        self.seen = seen;
+        self.order_chunks();
+        self.number_runs();
+        done
+    }
+
+    fn update_seen_set(&mut self, gpu: &Gpu, own: &mut SeenSet, eye: Eye) -> Result<()> {
+        let Some(last) = own.eye else {
+            let set = own.set.seen_from(eye);
+            gpu.check_memory(self.bytes + splat_bytes(&set))?;
+            own.order = space_order(&set.splats);
+            let set = Arc::new(ordered(&set, &own.order));
+            self.add_splats(gpu, &set, own.item);
+            (own.eye, own.drawn) = (Some(eye), Some(set));
+            return Ok(());
+        };
+        let (Some(drawn), true) = (&own.drawn, last != eye && own.set.depends_on_eye()) else {
+            return Ok(());
+        };
+        own.eye = Some(eye);
+        let colored = |(splat, index): (&Splat, &u32)| {
+            let [color, normal] = own.set.color(*index as usize, eye);
+            Splat { color, normal, ..*splat }
+        };
+        let splats: Vec<Splat> = drawn.splats.par_iter().zip(&own.order).map(colored).collect();
+        let mut rest = &splats[..];
+        for chunk in &self.chunks {
+            let (Origin::Splats { item, .. }, count) = (&chunk.origin, chunk.count as usize) else {
+                continue;
+            };
+            if *item == own.item {
+                let (part, behind) = rest.split_at(count);
+                gpu.queue.write_buffer(&chunk.data, 0, bytemuck::cast_slice(part));
+                rest = behind;
+            }
+        }
+        Ok(())
+    }
+
+    fn add_splats(&mut self, gpu: &Gpu, set: &Arc<SplatSet>, item: usize) {
         let most = (gpu.binding_size() / size_of::<Splat>() as u64) as usize;
-        for splats in in_space_order(&set.splats).chunks(most) {
-            let origin = Origin::Splats { set: set.clone(), radiance, item };
+        for splats in set.splats.chunks(most) {
+            let origin = Origin::Splats { set: set.clone(), item };
             self.add_chunk(gpu, origin, bytemuck::cast_slice(splats), splats.len() as u32);
         }
     }
@@ -562,11 +631,22 @@ impl PreparedScene {
 /// Sorts splats along the curve of Morton (1966), so that neighbours in the list are neighbours in
 /// space. The splats of a batch then meet the same tiles and sheets, and are hidden together. Short
 /// lists keep their order.
-fn in_space_order(splats: &[Splat]) -> Cow<'_, [Splat]> {
+fn in_space_order(set: &Arc<SplatSet>) -> Arc<SplatSet> {
     const FEW: usize = 1 << 15;
-    if splats.len() <= FEW {
-        return Cow::Borrowed(splats);
+    if set.splats.len() <= FEW {
+        return set.clone();
     }
+    Arc::new(ordered(set, &space_order(&set.splats)))
+}
+
+/// Returns the set with its splats in an order of their numbers.
+fn ordered(set: &SplatSet, order: &[u32]) -> SplatSet {
+    let splats = order.par_iter().map(|index| set.splats[*index as usize]).collect();
+    SplatSet { splats, ..set.empty() }
+}
+
+/// Returns the numbers of splats along the curve of Morton.
+fn space_order(splats: &[Splat]) -> Vec<u32> {
     let centers = || splats.par_iter().map(|splat| Vec3::from_array(splat.center));
     let low = centers().reduce(|| Vec3::INFINITY, Vec3::min);
     let size = centers().reduce(|| Vec3::NEG_INFINITY, Vec3::max) - low;
@@ -581,7 +661,7 @@ fn in_space_order(splats: &[Splat]) -> Cow<'_, [Splat]> {
     let mut order: Vec<(u32, u32)> =
         splats.par_iter().zip(0u32..splats.len() as u32).map(|(s, i)| (code(s), i)).collect();
     order.par_sort_unstable();
-    Cow::Owned(order.into_par_iter().map(|(_, index)| splats[index as usize]).collect())
+    order.into_par_iter().map(|(_, index)| index).collect()
 }
 
 /// Returns the coordinate and the unit of every sample along x, then y, then z, relative to the
@@ -612,6 +692,7 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
 fn bytes_of(item: &Item) -> u64 {
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => splat_bytes(set),
+        Item::Gaussians(set) => set.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES),
         Item::Volume(volume, ..) => {
             let sample =
                 volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);

@@ -18,13 +18,12 @@ impl Convert {
     /// Converts inputs that need more than the `most` bytes of memory that may be used.
     pub(super) fn in_regions(
         &self,
-        extension: &str,
         need: Need,
         most: u64,
         progress: &Progress,
     ) -> Result<(), Failure> {
         let [wanted, most_mib] = [need.bytes, most].map(|bytes| bytes >> 20);
-        if !need.in_pieces? || extension != "splk" {
+        if !need.in_pieces? {
             return Err(Failure::Usage(format!(
                 "converting this takes about {wanted} MiB, but only {most_mib} MiB may be used; \
                  only binary PLY of points or triangles, LAS and LAZ become hierarchies in less; \

@@ -2,6 +2,7 @@
 
 mod bricks;
 mod external;
+mod gaussians;
 mod memory;
 mod source;
 mod surface;
@@ -20,12 +21,13 @@ use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Convert {
-    /// Meshes, point clouds and hierarchies, which are merged into one; or a single volume.
+    /// Meshes, point clouds, hierarchies and trained Gaussians, which are merged into one; or a
+    /// single volume.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// Write to this file. Meshes, point clouds and hierarchies become .splk, a hierarchy of
-    /// splats, or .ply, the splats of the finest level as 3D Gaussians for other viewers. A volume
-    /// becomes .nrrd, or .splv, levels of bricks that are read one by one.
+    /// Write to this file. Meshes, point clouds, hierarchies and trained Gaussians become .splk, a
+    /// hierarchy of splats; or 3D Gaussians for other viewers: .ply, .compressed.ply, .splat, .spz
+    /// or .glb. A volume becomes .nrrd, or .splv, levels of bricks that are read one by one.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
@@ -61,7 +63,10 @@ pub struct Convert {
 }
 
 /// The extensions of outputs; `run` has an arm for each.
-const WRITTEN: [&str; 4] = ["splk", "ply", "nrrd", "splv"];
+const WRITTEN: [&str; 7] = ["splk", "ply", "splat", "spz", "glb", "nrrd", "splv"];
+
+/// Those that hold surfaces.
+const SURFACES: [&str; 5] = ["splk", "ply", "splat", "spz", "glb"];
 
 impl Convert {
     pub fn run(mut self, given: &Given, progress: &Progress) -> Result<(), Failure> {
@@ -73,14 +78,14 @@ impl Convert {
         if !WRITTEN.contains(&extension.as_str()) {
             let file = self.output.display();
             return Err(Failure::Usage(format!(
-                "{file}: only .splk, .ply, .nrrd and .splv files can be written"
+                "{file}: only .splk, .ply, .splat, .spz, .glb, .nrrd and .splv files can be written"
             )));
         }
         self.surface.check(&extension)?;
         let flag = self.color.given().or(self.range.map(|_| "--range"));
-        if let Some(flag) = flag.filter(|_| !matches!(extension.as_str(), "splk" | "ply")) {
+        if let Some(flag) = flag.filter(|_| !SURFACES.contains(&extension.as_str())) {
             return Err(Failure::Usage(format!(
-                "{flag} colours meshes and point clouds, which become .splk or .ply"
+                "{flag} colours meshes and point clouds, not volumes"
             )));
         }
         self.color.check(&self.files)?;

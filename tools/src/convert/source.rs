@@ -47,7 +47,7 @@ impl Convert {
                     "{name} holds cells; only volumes on a lattice can be converted"
                 )));
             }
-            Kind::Mesh | Kind::Hierarchy => return Err(none(file)),
+            Kind::Mesh | Kind::Gaussians | Kind::Hierarchy => return Err(none(file)),
         }
         if let Some(stream) = self.load.stream(file)? {
             self.check_unneeded(&[stream.path().to_owned()])?;
@@ -83,6 +83,7 @@ impl Convert {
 fn none(file: &Path) -> Failure {
     let file = file.display();
     Failure::Usage(format!(
-        "{file} holds no volume; write meshes, point clouds and hierarchies as .splk or .ply"
+        "{file} holds no volume; meshes, point clouds, Gaussians and hierarchies are written in other formats: \
+         .splk, .ply, .splat, .spz, .glb"
     ))
 }

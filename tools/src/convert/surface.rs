@@ -1,6 +1,6 @@
-//! Meshes, point clouds and hierarchies: converted to a hierarchy, or to 3D Gaussians.
+//! Meshes, point clouds and hierarchies: converted to a hierarchy.
 
-use super::{Convert, memory};
+use super::{Convert, SURFACES, memory};
 use crate::{
     failure::{Failure, in_file},
     load::Input,
@@ -53,6 +53,10 @@ pub struct SurfaceFlags {
     /// converted hierarchy]
     #[arg(long, value_name = "NAME")]
     pub(super) unit: Option<String>,
+    /// Keep the colours of trained Gaussians up to this degree of spherical harmonics, 0 to 3
+    /// [default: that of the file]
+    #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=3))]
+    pub(super) degree: Option<u32>,
     /// Limit the memory of the conversion, such as 8GiB. Binary PLY of points or triangles, LAS and
     /// LAZ that need more are converted region by region, with temporary files of about their size
     /// beside the output. Raw volumes and NRRD files of raw encoding become .splv slice by slice.
@@ -108,10 +112,13 @@ impl Frame {
 const SAMPLE: usize = 1 << 17;
 
 impl Convert {
-    /// Writes a hierarchy (`splk`) or 3D Gaussians (`ply`).
+    /// Writes a hierarchy (`splk`) or 3D Gaussians.
     pub(super) fn surface(self, extension: &str, progress: &Progress) -> Result<(), Failure> {
         if self.lattice.is_some() {
             return Err(Failure::Usage("--lattice is for volumes written as .nrrd".into()));
+        }
+        if extension != "splk" {
+            return self.gaussians(progress);
         }
         let most = self.most_memory();
         let limits = self.load.limits();
@@ -122,27 +129,22 @@ impl Convert {
             most,
         );
         if need.bytes > most {
-            return self.in_regions(extension, need, most, progress);
+            return self.in_regions(need, most, progress);
         }
         let gathered = self.gather(progress)?;
         if self.dry_run {
             return self.expect(&gathered, need.bytes, progress);
         }
         let start = Instant::now();
-        if extension == "ply" {
-            progress.stage(format!("Writing {}", self.output.display()));
-            splatkit::formats::ply::write_gaussians(&gathered.set, &self.output)?;
-        } else {
-            let bar = progress.bar("Building the hierarchy", gathered.set.splats.len() as u64);
-            let watch = |done: u64, _: u64| bar.set(done);
-            let (build, write) = (
-                self.surface.build_options(&gathered, limits.deadline()),
-                self.surface.write_options(&self.files, &gathered.frame),
-            );
-            let built =
-                hierarchy::build_file(&gathered.set, &self.output, &build, &write, Some(&watch));
-            built.map_err(|error| error.in_file(&self.files[0]))?;
-        }
+        let bar = progress.bar("Building the hierarchy", gathered.set.splats.len() as u64);
+        let watch = |done: u64, _: u64| bar.set(done);
+        let (build, write) = (
+            self.surface.build_options(&gathered, limits.deadline()),
+            self.surface.write_options(&self.files, &gathered.frame),
+        );
+        let built =
+            hierarchy::build_file(&gathered.set, &self.output, &build, &write, Some(&watch));
+        built.map_err(|error| error.in_file(&self.files[0]))?;
         progress.clear();
         let build_ms = milliseconds(start);
         let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
@@ -168,6 +170,17 @@ impl Convert {
         output::line(format_args!(
             "time            {read:.2} s reading, {splats:.2} s splats, {build:.2} s tree and file"
         ))
+    }
+
+    /// Returns the splats of an input that is no trained scene, and the number of its points.
+    pub(super) fn surfels_of(
+        &self,
+        path: &Path,
+        progress: &Progress,
+    ) -> Result<(SplatSet, u64), Failure> {
+        let own = self.splats_of(path, 0, progress)?;
+        hierarchy::check_splats(&own.set).map_err(|error| in_file(path, error))?;
+        Ok((own.set, own.points))
     }
 
     /// Reads all inputs and makes splats of them, relative to the first input's origin.
@@ -231,6 +244,13 @@ impl Convert {
                 let unit = header.unit.clone();
                 let frame = Frame { stance: header.stance, is_guessed: header.is_guessed, unit };
                 (set, header.closed, frame, header.source_points)
+            }
+            Input::Gaussians(_) => {
+                let file = path.display();
+                return Err(Failure::Usage(format!(
+                    "{file} holds trained Gaussians, of which no hierarchy is built yet; write \
+                     .ply, .compressed.ply, .splat, .spz or .glb"
+                )));
             }
             Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) | Input::Cells(_) => {
                 let file = path.display();
@@ -333,7 +353,8 @@ impl SurfaceFlags {
             ("--lossless", self.lossless, &["splk"]),
             ("--up", self.up.is_some(), &["splk"]),
             ("--unit", self.unit.is_some(), &["splk", "splv"]),
-            ("--radius-scale", self.radius_scale.is_some(), &["splk", "ply"]),
+            ("--radius-scale", self.radius_scale.is_some(), &SURFACES),
+            ("--degree", self.degree.is_some(), &SURFACES),
         ];
         match flags.into_iter().find(|(_, is_given, of)| *is_given && !of.contains(&extension)) {
             Some((flag, _, of)) => {
@@ -366,7 +387,7 @@ impl SurfaceFlags {
         self.up.unwrap_or(own)
     }
 
-    fn radius_scale(&self) -> f32 {
+    pub(super) fn radius_scale(&self) -> f32 {
         self.radius_scale.unwrap_or(1.0)
     }
 

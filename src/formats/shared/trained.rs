@@ -1,0 +1,198 @@
+//! Makes a set of trained Gaussians from the numbers of a file.
+
+use crate::{
+    Result,
+    gaussians::{Broken, Gaussians, harmonics::terms},
+    input::{Source, positions},
+    parallel::prelude::*,
+};
+use glam::{DVec3, Quat, Vec3};
+
+/// One Gaussian as a reader finds it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Trained {
+    pub center: DVec3,
+    /// Standard deviations along its axes.
+    pub scale: Vec3,
+    /// Of any length; [`settle`] gives it the length 1.
+    pub rotation: Quat,
+    /// From 0 to 1.
+    pub opacity: f32,
+}
+
+impl Trained {
+    /// Returns why it cannot be drawn, if so. Trainers leave Gaussians with numbers that are not
+    /// finite in their files; every viewer shows nothing there.
+    fn fault(&self, color: &[[f32; 3]]) -> Option<Fault> {
+        // The squares of larger numbers do not fit in 32 bits.
+        const LARGEST: f64 = 1e18;
+        const LEAST_ROTATION: f32 = 1e-24;
+        let length = self.rotation.length_squared();
+        let is_finite = self.center.abs().max_element() <= LARGEST
+            && self.center.is_finite()
+            && f64::from(self.scale.max_element()) <= LARGEST
+            && self.scale.is_finite()
+            && self.scale.min_element() >= 0.0
+            && length.is_finite()
+            && (0.0..=1.0).contains(&self.opacity)
+            && color.as_flattened().iter().all(|v| v.is_finite());
+        match is_finite {
+            false => Some(Fault::NotFinite),
+            true => (length <= LEAST_ROTATION).then_some(Fault::WithoutRotation),
+        }
+    }
+}
+
+/// Why a Gaussian cannot be drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    NotFinite,
+    WithoutRotation,
+}
+
+/// Gaussians per parallel task.
+const CHUNK: usize = 1 << 12;
+
+/// Makes the set of `count` Gaussians. `one` returns a Gaussian by its number, and fills in the
+/// coefficients of its colour, in the order of [`Gaussians::harmonics`]. Those that cannot be drawn
+/// are left out and counted.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) if none is left; [`Error::Limit`](crate::Error::Limit) and
+/// [`Error::Memory`](crate::Error::Memory) for too many; those of `one`.
+pub(crate) fn settle(
+    source: &Source,
+    count: usize,
+    degree: u32,
+    one: impl Fn(usize, &mut [[f32; 3]]) -> Result<Trained> + Sync,
+) -> Result<Gaussians> {
+    let terms = terms(degree);
+    source.room::<[f32; 3]>("the colours", count.saturating_mul(terms))?;
+    source.room::<(Trained, [Vec3; 2], Quat, f32)>("the Gaussians", count)?;
+    let mut colors = vec![[0.0; 3]; count * terms];
+    let parts: Vec<Vec<Trained>> = colors
+        .par_chunks_mut(CHUNK * terms)
+        .enumerate()
+        .map(|(part, colors)| {
+            source.check_time()?;
+            let each = colors.chunks_exact_mut(terms).enumerate();
+            each.map(|(at, color)| one(part * CHUNK + at, color)).collect()
+        })
+        .collect::<Result<_>>()?;
+    let mut all = parts.concat();
+    drop(parts);
+    let broken = leave_out_broken(source, &mut all, &mut colors, terms)?;
+    let place = |index| format!("Gaussian {index}");
+    let (origin, centers) = positions::settle(source, all.len(), |i| all[i].center, place)?;
+    Ok(Gaussians {
+        origin,
+        centers,
+        scales: all.par_iter().map(|one| one.scale).collect(),
+        rotations: all.par_iter().map(|one| one.rotation.normalize()).collect(),
+        opacities: all.par_iter().map(|one| one.opacity).collect(),
+        degree,
+        harmonics: colors,
+        broken,
+        about: Default::default(),
+    })
+}
+
+/// Leaves out the Gaussians that cannot be drawn, and counts them.
+fn leave_out_broken(
+    source: &Source,
+    all: &mut Vec<Trained>,
+    colors: &mut Vec<[f32; 3]>,
+    terms: usize,
+) -> Result<Broken> {
+    let faults: Vec<Option<Fault>> = (all.par_iter().zip(colors.par_chunks_exact(terms)))
+        .map(|(one, color)| one.fault(color))
+        .collect();
+    let count = |fault| faults.iter().filter(|own| **own == Some(fault)).count() as u64;
+    let broken = Broken {
+        not_finite: count(Fault::NotFinite),
+        without_rotation: count(Fault::WithoutRotation),
+    };
+    let total = all.len();
+    if broken.all() == total as u64 {
+        let message = if total == 0 {
+            "contains no Gaussians".into()
+        } else {
+            format!("none of the {total} Gaussians has finite numbers and a rotation")
+        };
+        return Err(source.error("file", message));
+    }
+    if broken.all() > 0 {
+        tracing::warn!(
+            "{}: {} of {total} Gaussians have numbers that are not finite, or no rotation; they \
+             are left out",
+            source.path.display(),
+            broken.all()
+        );
+        let mut own = faults.iter();
+        all.retain(|_| own.next().is_some_and(Option::is_none));
+        let mut each = faults.iter().flat_map(|fault| std::iter::repeat_n(fault, terms));
+        colors.retain(|_| each.next().is_some_and(Option::is_none));
+    }
+    Ok(broken)
+}
+
+/// Returns the opacity of a logit. ±∞ are 0 and 1.
+pub(crate) fn opacity_of_logit(logit: f32) -> f32 {
+    (1.0 / (1.0 + (-f64::from(logit)).exp())) as f32
+}
+
+/// Returns the logit of an opacity from 0 to 1, at most 16 from 0.
+pub(crate) fn logit_of_opacity(opacity: f32) -> f32 {
+    let opacity = f64::from(opacity);
+    (opacity / (1.0 - opacity)).ln().clamp(-16.0, 16.0) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::Limits;
+    use std::path::Path;
+
+    #[test]
+    fn broken_ones_are_left_out() {
+        let limits = Limits::default();
+        let source = Source::from_bytes(Path::new("a.ply"), &[], &limits).unwrap();
+        let good = Trained {
+            center: DVec3::X,
+            scale: Vec3::ONE,
+            rotation: Quat::from_xyzw(0.0, 0.0, 0.0, 2.0),
+            opacity: 0.5,
+        };
+        let mut all = vec![good; 9];
+        all[1].center.x = f64::NAN;
+        all[2].scale.x = f32::INFINITY;
+        all[3].rotation = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+        all[4].opacity = f32::NAN;
+        all[8].scale = Vec3::ZERO;
+        let set = settle(&source, 9, 1, |i, color| {
+            color.fill([i as f32; 3]);
+            if i == 5 {
+                color[3][2] = f32::NAN;
+            }
+            Ok(all[i])
+        })
+        .unwrap();
+        assert_eq!(set.broken, Broken { not_finite: 4, without_rotation: 1 });
+        assert_eq!((set.len(), set.validate()), (4, Ok(())));
+        let first: Vec<f32> = set.harmonics.chunks_exact(4).map(|terms| terms[0][0]).collect();
+        assert_eq!(first, [0.0, 6.0, 7.0, 8.0]);
+        assert_eq!(set.rotations[0], Quat::IDENTITY);
+        let none = settle(&source, 1, 0, |_, _| Ok(all[1])).unwrap_err();
+        assert!(none.to_string().contains("none of the 1"), "{none}");
+    }
+
+    #[test]
+    fn logits() {
+        for opacity in [0.0f32, 0.001, 0.5, 0.99] {
+            assert!((opacity_of_logit(logit_of_opacity(opacity)) - opacity).abs() < 1e-6);
+        }
+        assert_eq!(opacity_of_logit(f32::INFINITY), 1.0);
+        assert_eq!(opacity_of_logit(f32::NEG_INFINITY), 0.0);
+        assert!(opacity_of_logit(f32::NAN).is_nan());
+    }
+}
