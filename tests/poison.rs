@@ -175,6 +175,7 @@ fn scene_of(set: SplatSet) -> Scene {
     match set.payload {
         Payload::Radiance => Scene::new().with_splats(set),
         Payload::Scalar => Scene::new().with_samples(set, transfer()),
+        Payload::Trained => unreachable!("Gaussians are no set of splats"),
     }
 }
 
@@ -219,6 +220,7 @@ fn splats_that_are_not_finite_are_named() {
                     Payload::Scalar => {
                         Scene::new().with_splats(ball()).with_samples(set, transfer())
                     }
+                    Payload::Trained => unreachable!("Gaussians are no set of splats"),
                 };
                 assert_refused(&scene, &camera(), &settings(), &["item 1", "splat 17", name]);
             }

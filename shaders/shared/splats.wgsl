@@ -71,10 +71,7 @@ fn splat_at(index: u32) -> Candidate {
         splat.gradient = to_view * vec3(slope_x, slope_y, slope_z) * frame.transfer.y;
         splat.strength = counted(splat.strength);
     }
-    if is_trained {
-        // A record with a negative strength is that of a trained Gaussian.
-        splat.strength = -splat.strength;
-    } else if (source.flags & RADIANCE) != 0u {
+    if !is_trained && (source.flags & RADIANCE) != 0u {
         splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;
         if splat.normal != NO_NORMAL {
             let normal = to_view * decode_normal(splat.normal);

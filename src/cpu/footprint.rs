@@ -89,7 +89,6 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
     let covariance = turned * turned.transpose() + Mat3::from_diagonal(Vec3::splat(blur2));
     let mut strength = splat.strength;
     let carried = if source.flags & TRAINED != 0 {
-        strength = -strength;
         Carried::Radiance { color: decode_trained_color(splat), normal: Vec3::ZERO }
     } else if source.flags & RADIANCE != 0 {
         let [red, green, blue, opacity] =

@@ -6,13 +6,16 @@ use super::{
     vector::{Lanes, dot, each, three},
 };
 use crate::{
+    gaussians::{Colors, Eye},
     hierarchy::{
         BLEND_BAND, Cut, MOST_PIXELS, SHARE_UNIT, cone_margin,
         file::{CutSphere, NO_PAGE, Page},
+        trained,
     },
     splat::Splat,
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
+use glam::{DVec3, Vec3};
 
 /// Number of nodes whose parents are tested together.
 const RUN: usize = 64;
@@ -57,6 +60,8 @@ impl Spheres {
 #[derive(Debug)]
 pub struct Nodes {
     pub splats: Vec<Splat>,
+    /// The colours of trained Gaussians.
+    pub colors: Option<Colors>,
     spheres: Spheres,
     cones: Vec<f32>,
     /// The index of each node's parent. The root of the tree has no parent; its index lies after
@@ -88,6 +93,7 @@ impl Nodes {
         };
         Self {
             splats: page.nodes.iter().map(|node| node.splat).collect(),
+            colors: page.colors.clone(),
             spheres: Spheres::new(spheres, page.nodes.len()),
             cones: page.nodes.iter().map(|node| node.cone).collect(),
             runs: parent.chunks(RUN).map(ends).collect(),
@@ -97,14 +103,28 @@ impl Nodes {
         }
     }
 
-    /// Returns the bytes of memory of a number of nodes, without their parents.
-    pub fn bytes_of(nodes: usize) -> u64 {
-        (nodes * (size_of::<Splat>() + size_of::<CutSphere>() + 12)) as u64
+    /// Returns the bytes of memory of a number of nodes, without their parents, with colours of a
+    /// degree if they have one.
+    pub fn bytes_of(nodes: usize, degree: Option<u32>) -> u64 {
+        let colors = degree.map_or(0, |degree| Colors::bytes_of(degree, nodes));
+        (nodes * (size_of::<Splat>() + size_of::<CutSphere>() + 12)) as u64 + colors
     }
 
     pub fn bytes(&self) -> u64 {
-        Self::bytes_of(self.splats.len())
+        Self::bytes_of(self.splats.len(), self.colors.as_ref().map(Colors::degree))
             + (self.parents.0[0].len() * size_of::<CutSphere>()) as u64
+    }
+
+    /// Returns a node of a trained scene as an eye sees it, with its share.
+    pub fn seen(&self, (node, share): Drawn, eye: Eye, origin: DVec3) -> Splat {
+        let splat = &self.splats[node as usize];
+        let place = origin + Vec3::from(splat.center).as_dvec3();
+        let color = self
+            .colors
+            .as_ref()
+            .map_or([0.0; 3], |colors| colors.seen(node as usize, eye.toward(place)));
+        let is_leaf = self.child_pages[node as usize] == NO_PAGE;
+        trained::drawn(splat, is_leaf, share / SHARE_UNIT as f32, color)
     }
 
     /// Returns the nodes that a cut draws, in order. `is_active` returns whether a page takes part.

@@ -10,11 +10,13 @@ use super::{
 };
 use crate::{
     Result,
+    gaussians::Eye,
     hierarchy::{Cut, Hierarchy, SHARE_UNIT, needed::Needed},
     math::View,
     parallel::prelude::*,
     plan::uniforms::Source,
     scene::Settings,
+    splat::Splat,
 };
 use fearless_simd::{Level, Simd};
 use std::{collections::HashMap, sync::Arc};
@@ -70,7 +72,8 @@ impl PageCache {
         let cut = self.cut(view, settings, pixels);
         let mut needed = self.needed.of(&self.hierarchy, &cut);
         let entries = self.hierarchy.pages();
-        let bytes_of = |page: u32| Nodes::bytes_of(entries[page as usize].nodes as usize);
+        let degree = self.hierarchy.header().degree;
+        let bytes_of = |page: u32| Nodes::bytes_of(entries[page as usize].nodes as usize, degree);
         let mut room = settings.page_memory;
         let mut most = 0;
         for &page in &needed {
@@ -145,16 +148,23 @@ impl PageCache {
     ) -> Vec<Vec<Record>> {
         let (level, cut) = (Level::new(), self.cut(plan.view, settings, pixels));
         let header = self.hierarchy.header();
-        let projector =
-            Projector::new(plan, Source::of_radiance(plan.view, header.origin, header.extent));
+        let source = Source::of_nodes(plan.view, header);
+        let (projector, eye) = (Projector::new(plan, source), Eye::of(plan.view));
         let mut records = spare_for(spare, self.active.len());
         records.par_iter_mut().zip(&self.active).for_each(|(records, page)| {
             let Some(Held { nodes, .. }) = self.held.get(page) else { return };
-            lanes!(level, simd => {
-                let splat = |(node, share): &Drawn|
-                    (&nodes.splats[*node as usize], *share * (1.0 / SHARE_UNIT as f32));
-                projector.add(simd, self.drawn_of(simd, &cut, nodes).iter().map(splat), records);
-            });
+            let drawn: Vec<Drawn> = lanes!(level, simd => self.drawn_of(simd, &cut, nodes));
+            if nodes.colors.is_some() {
+                let seen = |own: &Drawn| nodes.seen(*own, eye, header.origin);
+                let seen: Vec<Splat> = drawn.iter().map(seen).collect();
+                let whole = seen.iter().map(|splat| (splat, 1.0));
+                lanes!(level, simd => projector.add(simd, whole, records));
+                return;
+            }
+            let splat = |(node, share): &Drawn| {
+                (&nodes.splats[*node as usize], *share * (1.0 / SHARE_UNIT as f32))
+            };
+            lanes!(level, simd => projector.add(simd, drawn.iter().map(splat), records));
         });
         records
     }

@@ -202,7 +202,7 @@ impl<'a> Projector<'a> {
             let parts = [first & 0xffff, green, second & 0xffff];
             let [red, green, blue] = three!(I => Lanes::<S>::float_from(parts[I]) * TRAINED_COLOR);
             let strength: Lanes<S> = eight.strength.simd_into(simd);
-            return [-strength, one, red, green, blue, none, none, none];
+            return [strength, one, red, green, blue, none, none, none];
         }
         // Within a sheet, splats that face the eye hide those that face away.
         let mut away = normal[2];

@@ -117,7 +117,7 @@ mod tests {
         let folder = Folder::new();
         let path = folder.write("a.splat", bytes());
         let set = read_with(&path, read).unwrap();
-        assert_eq!((set.len(), set.degree, set.broken, set.validate()), (1, 0, 0, Ok(())));
+        assert_eq!((set.len(), set.degree, set.broken.all(), set.validate()), (1, 0, 0, Ok(())));
         let center = set.origin + set.centers[0].as_dvec3();
         assert_eq!(center, DVec3::new(1.5, -2.0, 0.25));
         assert_eq!(set.scales[0], Vec3::new(0.5, 1.0, 2.0));
@@ -153,7 +153,7 @@ mod tests {
         broken[..4].copy_from_slice(&f32::NAN.to_le_bytes());
         let path = folder.write("a.splat", [bytes(), broken, still].concat());
         let set = read_with(&path, read).unwrap();
-        assert_eq!((set.len(), set.broken, set.rotations[1]), (2, 1, Quat::IDENTITY));
+        assert_eq!((set.len(), set.broken.all(), set.rotations[1]), (2, 1, Quat::IDENTITY));
     }
 
     #[test]

@@ -5,17 +5,20 @@
 //! Gaussian covers a pixel by its opacity times its projection there. So an opacity is no density.
 //! The engines keep the rule and turn what is covered into an optical depth, −ln(1 − α).
 
+mod colors;
 pub mod harmonics;
 mod seen;
 mod surfels;
 mod survey;
 pub mod turn;
 
+pub use colors::Colors;
 pub use seen::{EXTENT, Eye};
 pub use survey::Survey;
 
 use crate::{Error, Result, about::About, math::Bounds, parallel::prelude::*};
 use glam::{DVec3, Mat3, Quat, Vec3};
+use std::ops::Range;
 
 /// The highest degree of the spherical harmonics.
 pub const MOST_DEGREE: u32 = 3;
@@ -117,6 +120,25 @@ impl Gaussians {
         self.broken.not_finite += other.broken.not_finite;
         self.broken.without_rotation += other.broken.without_rotation;
         Ok(())
+    }
+
+    /// Returns some of the Gaussians, of the same scene.
+    ///
+    /// # Panics
+    /// If the range reaches beyond them.
+    pub fn part(&self, range: Range<usize>) -> Self {
+        let terms = harmonics::terms(self.degree);
+        Self {
+            origin: self.origin,
+            centers: self.centers[range.clone()].to_vec(),
+            scales: self.scales[range.clone()].to_vec(),
+            rotations: self.rotations[range.clone()].to_vec(),
+            opacities: self.opacities[range.clone()].to_vec(),
+            degree: self.degree,
+            harmonics: self.harmonics[range.start * terms..range.end * terms].to_vec(),
+            broken: self.broken,
+            about: self.about.clone(),
+        }
     }
 
     /// Gives the colours this degree. Added terms are 0; those above it are dropped.

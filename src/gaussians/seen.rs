@@ -32,7 +32,7 @@ impl Eye {
     }
 
     /// Returns the direction in which a place is seen, of unit length; zero at the eye itself.
-    fn toward(self, place: DVec3) -> Vec3 {
+    pub(crate) fn toward(self, place: DVec3) -> Vec3 {
         match self {
             Self::At(position) => (place - position).normalize_or_zero().as_vec3(),
             Self::Along(direction) => direction.as_vec3(),
@@ -48,7 +48,7 @@ impl Gaussians {
             let [color, normal] = self.color(index, eye);
             Splat {
                 center: self.centers[index].to_array(),
-                strength: self.opacities[index],
+                strength: -self.opacities[index],
                 factor: lower(self.axes(index).as_dmat3()),
                 color,
                 normal,
@@ -133,7 +133,7 @@ mod tests {
             let miss = b * b.transpose() - axes * axes.transpose();
             let miss = miss.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
             assert!(miss < 1e-7, "{miss}");
-            assert_eq!(splat.strength, scene.opacities[index]);
+            assert_eq!(splat.strength, -scene.opacities[index]);
         }
     }
 

@@ -88,7 +88,7 @@ mod tests {
         let set = Mesh::sphere(2).surfels(&Default::default()).unwrap();
         let found = Gaussians::from_splats(&set).unwrap();
         assert_eq!((found.len(), found.validate()), (set.splats.len(), Ok(())));
-        assert_eq!((found.origin, found.degree, found.broken), (set.origin, 0, 0));
+        assert_eq!((found.origin, found.degree, found.broken.all()), (set.origin, 0, 0));
         for (index, splat) in set.splats.iter().enumerate() {
             assert_eq!(found.centers[index].to_array(), splat.center);
             let depth = f64::from(splat.strength) * f64::from(splat.color >> 24) / 255.0;

@@ -8,9 +8,12 @@ use super::{
     merge::Mass,
     partition,
     sphere::{Sphere, enclosing, nest, raise},
+    trained::{Harmonics, LeafColors},
 };
 use crate::{
-    Deadline, Error, Result, memory,
+    Deadline, Error, Result,
+    gaussians::harmonics::MOST_TERMS,
+    memory,
     parallel::{self, prelude::*},
     progress::{Watch, tell},
     splat::{Payload, Splat, SplatSet},
@@ -72,43 +75,62 @@ impl Tree {
     /// Those of [`check_splats`]; [`Error::Timeout`] after the deadline; [`Error::Memory`] if there
     /// is too little memory.
     pub fn build(set: &SplatSet, options: &BuildOptions, watch: Watch<'_>) -> Result<Self> {
-        let _span = tracing::info_span!("build").entered();
-        check_splats(set)?;
-        // There are at most a quarter more nodes than leaves.
-        let nodes = (set.splats.len() * size_of::<Node>()) as u64 / 4 * 5;
-        memory::room(WORK, nodes + order_bytes(set) + at_work(options.block_splats))?;
-        let parts = partition::blocks(&set.splats, options.block_splats.max(64));
-        let outer = enclosing(&set.splats, set.extent);
-        let built = AtomicU64::new(0);
-        let blocks: Result<Vec<Block>> = parts
-            .into_par_iter()
-            .map(|part| {
-                options.deadline.check(WORK)?;
-                let block = block_of(set, &part, options.preset, outer);
-                let count = part.len() as u64;
-                let done = built.fetch_add(count, Ordering::Relaxed) + count;
-                tell(watch, done, set.splats.len() as u64);
-                Ok(block)
-            })
-            .collect();
-        let mut blocks = blocks?;
-        if blocks.len() > 1 {
-            let roots: Vec<Node> = blocks.iter().map(|block| block.nodes[0]).collect();
-            let (top, portals) = join(&roots, options.preset, outer);
-            for (block, portal) in blocks.iter_mut().zip(portals) {
-                block.portal = Some(portal);
-            }
-            blocks.insert(0, top);
-        }
-        Ok(Self {
-            origin: set.origin,
-            extent: set.extent,
-            closed: options.closed,
-            bounds: set.bounds(),
-            source_points: options.source_points.unwrap_or(set.splats.len() as u64),
-            blocks,
-        })
+        tree_colored(set, options, watch, None)
     }
+}
+
+/// Builds the tree of a set whose splats have these colours, if any.
+pub(super) fn tree_colored(
+    set: &SplatSet,
+    options: &BuildOptions,
+    watch: Watch<'_>,
+    colors: Option<&LeafColors>,
+) -> Result<Tree> {
+    let _span = tracing::info_span!("build").entered();
+    check_splats(set)?;
+    // There are at most a quarter more nodes than leaves.
+    let nodes = (set.splats.len() * size_of::<Node>()) as u64 / 4 * 5;
+    memory::room(WORK, nodes + order_bytes(set) + at_work(options.block_splats))?;
+    let parts = partition::blocks(&set.splats, options.block_splats.max(64));
+    let outer = enclosing(&set.splats, set.extent);
+    let built = AtomicU64::new(0);
+    let blocks: Result<Vec<Block>> = parts
+        .into_par_iter()
+        .map(|part| {
+            options.deadline.check(WORK)?;
+            let block = colored_block_of(set, &part, options.preset, outer, colors);
+            let count = part.len() as u64;
+            let done = built.fetch_add(count, Ordering::Relaxed) + count;
+            tell(watch, done, set.splats.len() as u64);
+            Ok(block)
+        })
+        .collect();
+    let mut blocks = blocks?;
+    if blocks.len() > 1 {
+        let roots: Vec<Node> = blocks.iter().map(|block| block.nodes[0]).collect();
+        let (mut top, portals) = join(&roots, options.preset, outer);
+        if let Some(colors) = colors {
+            let roots: Vec<Harmonics> = blocks.iter().map(root_color).collect();
+            top.colors = Some(colors.of_top(&top, &portals, &roots));
+        }
+        for (block, portal) in blocks.iter_mut().zip(portals) {
+            block.portal = Some(portal);
+        }
+        blocks.insert(0, top);
+    }
+    Ok(Tree {
+        origin: set.origin,
+        extent: set.extent,
+        closed: options.closed,
+        bounds: set.bounds(),
+        source_points: options.source_points.unwrap_or(set.splats.len() as u64),
+        blocks,
+    })
+}
+
+/// Returns the colour of a block's root; 0 without colours.
+fn root_color(block: &Block) -> Harmonics {
+    block.colors.as_ref().map_or([[0.0; 3]; MOST_TERMS], |colors| colors.harmonics(0))
 }
 
 /// Builds the tree of a set and writes it a few blocks at a time, so that only these blocks are in
@@ -124,34 +146,42 @@ pub fn build_file(
     write: &WriteOptions,
     watch: Watch<'_>,
 ) -> Result<()> {
+    build_colored(set, path.as_ref(), build, write, watch, None)
+}
+
+/// As [`build_file`], of a set whose splats have these colours, if any.
+pub(super) fn build_colored(
+    set: &SplatSet,
+    path: &Path,
+    build: &BuildOptions,
+    write: &WriteOptions,
+    watch: Watch<'_>,
+    colors: Option<&LeafColors>,
+) -> Result<()> {
     let _span = tracing::info_span!("build").entered();
     check_splats(set)?;
     memory::room(WORK, order_bytes(set) + at_work(build.block_splats))?;
     let parts = partition::blocks(&set.splats, build.block_splats.max(64));
-    let mut builder = Builder::new(
-        path.as_ref(),
-        set.extent,
-        enclosing(&set.splats, set.extent),
-        build.preset,
-        write,
-    )?;
+    let mut builder =
+        Builder::new(path, set.extent, enclosing(&set.splats, set.extent), build.preset, write)?;
     let mut built = 0;
     for parts in parts.chunks(2 * parallel::current_num_threads()) {
         let block = |part: &Vec<u32>| {
             build.deadline.check(WORK)?;
-            Ok(block_of(set, part, build.preset, builder.outer))
+            Ok(colored_block_of(set, part, build.preset, builder.outer, colors))
         };
         let blocks: Result<Vec<Block>> = parts.par_iter().map(block).collect();
         builder.add(blocks?)?;
         built += parts.iter().map(|part| part.len() as u64).sum::<u64>();
         tell(watch, built, set.splats.len() as u64);
     }
-    builder.finish(&Whole {
+    let whole = Whole {
         origin: set.origin,
         bounds: set.bounds(),
         closed: build.closed,
         source_points: build.source_points.unwrap_or(set.splats.len() as u64),
-    })
+    };
+    builder.finish_colored(&whole, colors)
 }
 
 /// The name of this module's work in errors.
@@ -177,6 +207,7 @@ pub(crate) struct Builder {
     pub outer: Sphere,
     preset: Preset,
     roots: Vec<Node>,
+    root_colors: Vec<Harmonics>,
 }
 
 impl Builder {
@@ -187,34 +218,53 @@ impl Builder {
         preset: Preset,
         options: &WriteOptions,
     ) -> Result<Self> {
-        Ok(Self { writer: Writer::new(path, extent, options)?, outer, preset, roots: Vec::new() })
+        let writer = Writer::new(path, extent, options)?;
+        Ok(Self { writer, outer, preset, roots: Vec::new(), root_colors: Vec::new() })
     }
 
     pub fn add(&mut self, blocks: Vec<Block>) -> Result<()> {
-        let nodes: Vec<&[Node]> = blocks.iter().map(|block| &block.nodes[..]).collect();
-        self.roots.extend(self.writer.blocks(&nodes)?);
+        self.roots.extend(self.writer.blocks(&blocks.iter().collect::<Vec<_>>())?);
+        self.root_colors.extend(blocks.iter().map(root_color));
         Ok(())
     }
 
     pub fn finish(self, whole: &Whole) -> Result<()> {
+        self.finish_colored(whole, None)
+    }
+
+    fn finish_colored(self, whole: &Whole, colors: Option<&LeafColors>) -> Result<()> {
         if self.roots.len() == 1 {
             return self.writer.finish(None, whole);
         }
-        let (top, portals) = join(&self.roots, self.preset, self.outer);
-        self.writer.finish(Some(Top { nodes: &top.nodes, portals: &portals }), whole)
+        let (mut top, portals) = join(&self.roots, self.preset, self.outer);
+        top.colors = colors.map(|colors| colors.of_top(&top, &portals, &self.root_colors));
+        self.writer.finish(Some(Top { block: &top, portals: &portals }), whole)
     }
 }
 
 /// Builds the block of the splats with the indices `part`. Its root's sphere lies in `outer`.
 pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Sphere) -> Block {
+    colored_block_of(set, part, preset, outer, None)
+}
+
+/// As [`block_of`], of splats with these colours, if any.
+fn colored_block_of(
+    set: &SplatSet,
+    part: &[u32],
+    preset: Preset,
+    outer: Sphere,
+    colors: Option<&LeafColors>,
+) -> Block {
     let splat = |i: u32| &set.splats[part[i as usize] as usize];
     let measures = Measures::of(&set.splats, part);
     let boxes: Vec<_> = (0..).zip(&measures).map(|(i, own)| own.box_of(splat(i))).collect();
     let leaf = |i: u32| measures[i as usize].leaf(splat(i), set.extent);
     let mass = |i: u32| measures[i as usize].mass(splat(i));
-    let (mut block, _) = cluster(&boxes, leaf, mass, preset);
+    let (mut block, sources) = cluster(&boxes, leaf, mass, preset);
     let heights = raise(&mut block);
     nest(&mut block, &heights, outer);
+    let number = |leaf: usize| part[sources[leaf] as usize];
+    block.colors = colors.map(|colors| colors.of_block(&block.nodes, number));
     block
 }
 

@@ -25,7 +25,7 @@ pub(super) fn cluster(
     preset: Preset,
 ) -> (Block, Vec<u32>) {
     if boxes.len() == 1 {
-        return (Block { nodes: vec![leaf(0)], portal: None }, vec![0]);
+        return (Block { nodes: vec![leaf(0)], ..Block::default() }, vec![0]);
     }
     let pairs = pairs(&apart(boxes), preset);
     let groups = groups(&pairs);
@@ -74,7 +74,7 @@ pub(super) fn cluster(
         nodes[index] = Node { first_child, ..node };
         masses[index] = mass;
     }
-    (Block { nodes, portal: None }, sources)
+    (Block { nodes, ..Block::default() }, sources)
 }
 
 /// The box by which a splat finds its neighbours. Its position counts, and its size where sizes

@@ -15,6 +15,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    gaussians::Eye,
     math::View,
     parallel::prelude::*,
     splat::{Payload, Splat, SplatSet, decode_normal},
@@ -233,7 +234,10 @@ impl Tree {
                 step(coarse)
             }
         };
-        Ok(self.at_cut(&cut))
+        Ok(match self.degree() {
+            Some(_) => self.seen_at_cut(&cut, Eye::of(view)),
+            None => self.at_cut(&cut),
+        })
     }
 
     /// Returns the splats of a cut, as [`Self::cut`] does, of a tree whose nodes are in order.
@@ -255,21 +259,15 @@ impl Tree {
     /// If the nodes of a block are not in order. [`cut`](Self::cut) returns an error for such
     /// trees, and [`validate`](super::validate()) a finding.
     pub fn selected(&self, cut: &Cut) -> Vec<(&Node, u32)> {
-        let own = self
-            .blocks
-            .par_iter()
-            .enumerate()
-            .map(|(index, block)| self.selected_of(index, block, cut));
+        let own = self.blocks.par_iter().enumerate().map(|(index, block)| {
+            let own = self.selected_of(index, block, cut).into_iter();
+            own.map(|(node, share)| (&block.nodes[node as usize], share)).collect::<Vec<_>>()
+        });
         own.collect::<Vec<_>>().concat()
     }
 
-    /// The selected nodes of one block.
-    fn selected_of<'a>(
-        &'a self,
-        index: usize,
-        block: &'a Block,
-        cut: &Cut,
-    ) -> Vec<(&'a Node, u32)> {
+    /// The selected nodes of one block, by their numbers.
+    pub(super) fn selected_of(&self, index: usize, block: &Block, cut: &Cut) -> Vec<(u32, u32)> {
         let above = block.portal.zip(self.blocks.first()).and_then(|(portal, top)| {
             let holds = |node: &&Node| {
                 (node.first_child..node.first_child + node.children).contains(&portal)
@@ -287,13 +285,13 @@ impl Tree {
         }
         parents[0] = above;
         let mut selected = Vec::new();
-        for (node, parent) in block.nodes.iter().zip(&parents) {
+        for (number, (node, parent)) in (0..).zip(block.nodes.iter().zip(&parents)) {
             // A portal is replaced by the root of its block.
             let is_portal = self.is_joined() && index == 0 && node.is_leaf();
             let share =
                 if is_portal { 0 } else { cut.share(node, parent.as_ref(), !node.is_leaf()) };
             if share > 0 {
-                selected.push((node, share));
+                selected.push((number, share));
             }
         }
         selected

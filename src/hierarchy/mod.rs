@@ -17,6 +17,7 @@ mod partition;
 mod sphere;
 #[cfg(test)]
 pub(crate) mod testing;
+pub(crate) mod trained;
 mod validate;
 
 pub use build::{BuildOptions, Preset, build_file, check_splats};
@@ -25,4 +26,5 @@ pub(crate) use cut::{MOST_PIXELS, cone_margin};
 pub use file::{CutSphere, Hierarchy};
 pub(crate) use levels::Levels;
 pub use node::{Block, MOST_CHILDREN, Node, Tree};
+pub use trained::build_gaussians;
 pub use validate::validate;

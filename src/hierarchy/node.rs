@@ -1,6 +1,6 @@
 //! The parts of a hierarchy: nodes in blocks, blocks in a tree.
 
-use crate::{math::Bounds, splat::Splat};
+use crate::{gaussians::Colors, math::Bounds, splat::Splat};
 use glam::{DVec3, Vec3};
 
 /// The maximum number of children of a node.
@@ -50,6 +50,9 @@ pub struct Block {
     pub nodes: Vec<Node>,
     /// The leaf of block 0 that this block's root replaces; `None` for block 0 itself.
     pub portal: Option<u32>,
+    /// The colours of all nodes, if they are trained Gaussians: then all blocks of a tree have
+    /// some, of one degree. The nodes' own colours do not count.
+    pub colors: Option<Colors>,
 }
 
 /// A hierarchy of splats in memory. A large one consists of several blocks, each built on its own.

@@ -238,7 +238,7 @@ fn merge(leaves: &[Node]) -> Node {
 /// Builds a tree of one block.
 pub fn tree(splats: &[Splat]) -> Tree {
     let nodes = grow(splats.iter().copied().map(leaf).collect());
-    whole(vec![Block { nodes, portal: None }], splats.len())
+    whole(vec![Block { nodes, ..Block::default() }], splats.len())
 }
 
 /// Builds a tree of `count` blocks below one that joins them.
@@ -254,9 +254,10 @@ pub fn joined(splats: &[Splat], count: usize) -> Tree {
         place.map(|place| place as u32)
     };
     let portals: Vec<Option<u32>> = below.iter().map(portal_of).collect();
-    let below = below.into_iter().zip(portals).map(|(nodes, portal)| Block { nodes, portal });
+    let below =
+        below.into_iter().zip(portals).map(|(nodes, portal)| Block { nodes, portal, colors: None });
     whole(
-        std::iter::once(Block { nodes: top.clone(), portal: None }).chain(below).collect(),
+        std::iter::once(Block { nodes: top.clone(), ..Block::default() }).chain(below).collect(),
         splats.len(),
     )
 }

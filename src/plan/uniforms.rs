@@ -4,6 +4,7 @@
 use crate::{
     bricks::Choice,
     facet::{FacetSet, Sides},
+    hierarchy::file::Header,
     math::{Bounds, Kernel, Profile, Sheets, View},
     plan::tables::Tables,
     scene::{Clip, ClipShape, Item, Mode, Scene, Settings},
@@ -155,6 +156,12 @@ impl Source {
         let culled = if is_culled { CULLED } else { 0 };
         let mixed = if set.sides == Sides::Mixed { MIXED } else { 0 };
         Self { flags: FACETS | culled | mixed, ..Self::of_radiance(view, set.origin, 1.0) }
+    }
+
+    /// Returns the source of nodes of a hierarchy.
+    pub fn of_nodes(view: &View, header: &Header) -> Self {
+        let trained = if header.degree.is_some() { TRAINED } else { 0 };
+        Self { flags: RADIANCE | trained, ..Self::of_radiance(view, header.origin, header.extent) }
     }
 
     /// Returns the source of a chunk of radiance splats around an origin in the world.

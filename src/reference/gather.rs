@@ -118,7 +118,10 @@ fn from_splat<'a>(
             }
         }
         Payload::Trained => Load::Radiance(Radiance {
-            amount: Amount::Opacity(splat.strength.into()),
+            amount: match f64::from(splat.strength) {
+                opacity if opacity < 0.0 => Amount::Opacity(-opacity),
+                depth => Amount::Depth(depth),
+            },
             color: DVec3::from(decode_trained_color(splat).map(f64::from)),
             normal: None,
             facing: 1.0,

@@ -365,7 +365,7 @@ impl<'a> Frame<'a> {
         let all = settings.optics == Optics::Maximum;
         Self {
             solids: Solids::of(flat, &view, field.as_ref(), all),
-            brightest: if scene.items.iter().any(|item| matches!(item, Item::Gaussians(_))) {
+            brightest: if scene.items.iter().any(Item::is_trained) {
                 f64::from(BRIGHTEST_TRAINED)
             } else {
                 1.0

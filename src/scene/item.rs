@@ -73,6 +73,15 @@ impl Item {
         }
     }
 
+    /// Returns whether the item consists of trained Gaussians.
+    pub fn is_trained(&self) -> bool {
+        match self {
+            Self::Gaussians(_) => true,
+            Self::Hierarchy(hierarchy) => hierarchy.header().degree.is_some(),
+            _ => false,
+        }
+    }
+
     /// Returns the kernel of the samples of a lattice; `None` for splats.
     pub fn kernel(&self) -> Option<&Kernel> {
         match self {

@@ -110,7 +110,7 @@ fn of_splats(set: &SplatSet, shows: impl Fn(&Splat) -> bool, clips: &[Clip]) -> 
 /// Returns the outermost of the Gaussians that can be seen, with their reach.
 fn of_gaussians(set: &Gaussians, clips: &[Clip]) -> Vec<DVec3> {
     let splats = set.seen_from(Eye::Along(DVec3::Z));
-    of_splats(&splats, |splat| f64::from(splat.strength) >= TRAINED_OPACITIES[0], clips)
+    of_splats(&splats, |splat| f64::from(-splat.strength) >= TRAINED_OPACITIES[0], clips)
 }
 
 /// Returns the outermost corners of facets.

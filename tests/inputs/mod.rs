@@ -4,11 +4,12 @@ pub mod crafted;
 pub mod medical;
 
 use crate::testing::folder::Folder;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use medical::{dicom, nifti};
 use splatkit::{
     Error, Result, bricks,
     formats::{self, Endian, Kind, RawLayout, ReadOptions, SampleType},
+    gaussians::Gaussians,
     hierarchy::{BuildOptions, Hierarchy, Tree, file},
     input::Limits,
     surface::{Mesh, SurfelOptions},
@@ -81,6 +82,14 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
         }
         Some(Kind::Cells) => {
             format!("cells {}", formats::load_cells(path, limits, &ReadOptions::default())?.len())
+        }
+        Some(Kind::Gaussians) => {
+            let set = formats::load_gaussians(path, limits)?;
+            format!("Gaussians {} {}", set.len(), set.degree)
+        }
+        Some(Kind::Gaussians) => {
+            let set = formats::load_gaussians(path, limits)?;
+            format!("Gaussians {} of degree {}", set.len(), set.degree)
         }
         Some(Kind::Hierarchy) => {
             let tree = Hierarchy::open(path, limits)?.read_tree()?;
@@ -421,6 +430,51 @@ pub fn splv(folder: &Folder) -> Vec<u8> {
     bytes
 }
 
+/// Returns the file of two trained Gaussians with colours of degree 1, as `write` writes it.
+pub fn trained(folder: &Folder, write: impl Fn(&Gaussians, &Path) -> Result<()>) -> Vec<u8> {
+    let set = Gaussians {
+        centers: vec![Vec3::ZERO, Vec3::new(1.0, -2.0, 0.5)],
+        scales: vec![Vec3::splat(0.1), Vec3::new(0.2, 0.1, 0.4)],
+        rotations: vec![Quat::IDENTITY, Quat::from_rotation_x(1.0)],
+        opacities: vec![0.9, 0.4],
+        degree: 1,
+        harmonics: (0..8).map(|term| [0.1, -0.2, 0.05 * term as f32]).collect(),
+        ..Gaussians::default()
+    };
+    let path = folder.path("written");
+    write(&set, &path).expect("a file");
+    let bytes = std::fs::read(&path).expect("bytes");
+    std::fs::remove_file(&path).ok();
+    bytes
+}
+
+/// A SOG archive of two Gaussians.
+pub fn sog() -> Vec<u8> {
+    use image_webp::{ColorType, WebPEncoder};
+    use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
+    let meta = r#"{"version": 2, "count": 2, "means": {"mins": [0, -1, 0], "maxs": [1, 0, 1],
+        "files": ["l.webp", "u.webp"]}, "scales": {"codebook": [-2, -1, 0], "files": ["s.webp"]},
+        "quats": {"files": ["q.webp"]}, "sh0": {"codebook": [-1, 0, 1], "files": ["c.webp"]}}"#;
+    let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
+    let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+    writer.start_file("meta.json", stored).expect("a file");
+    writer.write_all(meta.as_bytes()).expect("bytes");
+    for (name, texels) in [
+        ("l.webp", [[16, 239, 7, 255], [0, 255, 7, 255]]),
+        ("u.webp", [[39, 216, 0, 255], [0, 255, 0, 255]]),
+        ("s.webp", [[0, 1, 2, 255], [2, 2, 0, 255]]),
+        ("q.webp", [[51, 204, 153, 252], [51, 204, 153, 254]]),
+        ("c.webp", [[0, 1, 2, 51], [2, 0, 0, 255]]),
+    ] {
+        let mut plane = Vec::new();
+        let encoder = WebPEncoder::new(&mut plane);
+        encoder.encode(texels.as_flattened(), 2, 1, ColorType::Rgba8).expect("a picture");
+        writer.start_file(name, stored).expect("a file");
+        writer.write_all(&plane).expect("bytes");
+    }
+    writer.finish().expect("an archive").into_inner()
+}
+
 pub const TRANSFER: &str = r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [9, 0.5]]}"#;
 pub const OBJ: &str =
     "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
@@ -455,11 +509,60 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
     folder.write("a.mtl", MTL);
     folder.write("a.png", png(2, 2));
     let mut formats = formats_of_meshes();
+    formats.extend(formats_of_gaussians(folder));
     formats.extend(formats_of_points());
     formats.extend(formats_of_volumes());
     formats.extend(formats_of_vtk());
+    formats.extend(formats_of_gaussians(folder));
     formats.extend(formats_of_splatkit(folder));
     formats
+}
+
+/// Two trained Gaussians of degree 1.
+pub fn gaussians() -> Gaussians {
+    let harmonics = (0..8).map(|term| [0, 1, 2].map(|c| 0.1 * (term + c) as f32 - 0.3));
+    Gaussians {
+        centers: vec![Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)],
+        scales: vec![Vec3::splat(0.5), Vec3::new(0.5, 0.2, 0.1)],
+        rotations: vec![glam::Quat::IDENTITY, glam::Quat::from_rotation_x(0.5)],
+        opacities: vec![0.9, 0.5],
+        degree: 1,
+        harmonics: harmonics.collect(),
+        ..Gaussians::default()
+    }
+}
+
+fn formats_of_gaussians(folder: &Folder) -> Vec<Format> {
+    let set = gaussians();
+    let written = |name: &str, write: &dyn Fn(&Gaussians, &Path) -> Result<()>| {
+        let path = folder.path(name);
+        write(&set, &path).expect("Gaussians are written");
+        std::fs::read(&path).expect("they were written")
+    };
+    // Without a header, whole Gaussians are missed by nobody.
+    let of_whole = |_: &[u8], at: usize| at > 0 && at.is_multiple_of(32);
+    let tree = Tree::of_gaussians(&set, &BuildOptions::default(), None).expect("a tree");
+    let hierarchy = file::to_bytes(&tree, &file::WriteOptions::default()).expect("a file");
+    vec![
+        (
+            "trained.ply",
+            written("g.ply", &|set, path| formats::ply::write_gaussians(set, path)),
+            never,
+        ),
+        (
+            "packed.ply",
+            written("h.ply", &|set, path| formats::ply::write_compressed_gaussians(set, path)),
+            never,
+        ),
+        ("a.splat", written("g.splat", &|set, path| formats::splat::write(set, path)), of_whole),
+        ("a.spz", written("g.spz", &|set, path| formats::spz::write(set, path)), never),
+        (
+            "trained.glb",
+            written("g.glb", &|set, path| formats::gltf::write_gaussians(set, path)),
+            never,
+        ),
+        ("trained.splk", hierarchy, never),
+    ]
 }
 
 /// Hierarchies, bricks and transfer functions.
@@ -491,6 +594,29 @@ fn formats_of_meshes() -> Vec<Format> {
         ("a.gltf", gltf().into(), never),
         ("beside.gltf", gltf_with("beside.bin", r#"{"mesh":0}"#).into(), never),
         ("a.glb", glb(), never),
+    ]
+}
+
+fn formats_of_gaussians(folder: &Folder) -> Vec<Format> {
+    let packed = |set: &Gaussians, path: &Path| formats::ply::write_compressed_gaussians(set, path);
+    vec![
+        (
+            "trained.ply",
+            trained(folder, |set, path| formats::ply::write_gaussians(set, path)),
+            never,
+        ),
+        ("packed.ply", trained(folder, packed), never),
+        (
+            "trained.glb",
+            trained(folder, |set, path| formats::gltf::write_gaussians(set, path)),
+            never,
+        ),
+        // A record has 32 bytes.
+        ("a.splat", trained(folder, |set, path| formats::splat::write(set, path)), |_, at| {
+            at == 32
+        }),
+        ("a.spz", trained(folder, |set, path| formats::spz::write(set, path)), never),
+        ("a.sog", sog(), never),
     ]
 }
 

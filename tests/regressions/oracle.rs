@@ -16,6 +16,7 @@ use splatkit::{
     bricks::Bricks,
     cells::Cells,
     formats::{self, Endian, Kind, RawLayout, ReadOptions, SampleType, Stream, VolumeStream},
+    gaussians::{Eye, Gaussians},
     hierarchy::{
         BuildOptions, Hierarchy, Preset, Tree,
         external::{self, ExternalOptions},
@@ -38,6 +39,9 @@ pub type Look = fn(&[u8]);
 /// All entry points, by name.
 pub const FORMATS: &[(&str, Look)] = &[
     ("ply", ply),
+    ("splat", splat),
+    ("spz", spz),
+    ("sog", sog),
     ("obj", obj),
     ("stl", stl),
     ("gltf", gltf),
@@ -173,6 +177,27 @@ fn sound_cells(cells: &Cells) {
     assert!(cells.range().iter().all(|end| !end.is_nan()));
 }
 
+/// Trained Gaussians are valid, and so are the facts that `info` prints of them and the splats that
+/// an eye sees.
+fn sound_gaussians(set: &Gaussians) {
+    set.validate().expect("what was read is sound");
+    assert!(!set.is_empty() && set.len() as u64 <= limits().points, "{} Gaussians", set.len());
+    let bounds = set.bounds();
+    assert!(bounds.min.is_finite() && bounds.max.is_finite(), "bounds {bounds:?}");
+    let survey = set.survey();
+    assert!(survey.scales.iter().chain(&survey.opacities).all(|v| v.is_finite()), "{survey:?}");
+    let seen = set.seen_from(Eye::At(bounds.center()));
+    assert_eq!(seen.splats.len(), set.len());
+    for splat in &seen.splats {
+        let numbers = splat.center.iter().chain(&splat.factor).chain([&splat.strength]);
+        assert!(numbers.copied().all(f32::is_finite), "{splat:?} is not finite");
+    }
+}
+
+fn gaussians(name: &str, bytes: &[u8], reader: fn(&Source) -> Result<Gaussians>) {
+    read(name, bytes, reader).iter().for_each(sound_gaussians);
+}
+
 /// What a caller may ask for: nothing, an array by name, an array of the cells, a missing value.
 fn options() -> [ReadOptions; 4] {
     let missing = ReadOptions { missing: Some(1.0), ..ReadOptions::default() };
@@ -211,6 +236,42 @@ pub fn ply(bytes: &[u8]) {
         mesh("input.ply", bytes, |source| formats::ply::read(source, &ReadOptions::default()));
     stream("input.ply", bytes, whole.as_ref());
     samples("input.ply", bytes, formats::read_samples);
+    read("input.ply", bytes, formats::ply::holds_gaussians);
+    gaussians("input.ply", bytes, formats::ply::read_gaussians);
+}
+
+pub fn splat(bytes: &[u8]) {
+    gaussians("input.splat", bytes, formats::splat::read);
+}
+
+pub fn spz(bytes: &[u8]) {
+    formats::spz::is_spz(bytes);
+    gaussians("input.spz", bytes, formats::spz::read);
+}
+
+/// A SOG archive or a `meta.json`. Lines `#webp` may separate the planes that it refers to:
+/// `0.webp`, `1.webp` and so on. An archive has checksums; these planes have none.
+pub fn sog(bytes: &[u8]) {
+    const PLANE: &[u8] = b"\n#webp\n";
+    let Some((meta, mut rest)) = cut(bytes, PLANE) else {
+        assert!(!(formats::sog::is_sog(bytes) && formats::sog::is_meta(bytes)));
+        gaussians("input.sog", bytes, formats::sog::read);
+        return;
+    };
+    let folder = Folder::new();
+    for number in 0.. {
+        let (plane, behind) = cut(rest, PLANE).unwrap_or((rest, &[]));
+        folder.write(&format!("{number}.webp"), plane);
+        rest = behind;
+        if rest.is_empty() {
+            break;
+        }
+    }
+    let path = folder.write("meta.json", meta);
+    let limits = limits();
+    accepted(Source::open(&path, &limits).and_then(|source| formats::sog::read(&source)))
+        .iter()
+        .for_each(sound_gaussians);
 }
 
 /// An OBJ file. A line `#mtl` may separate its materials, `input.mtl`, and a line `#png` after them
@@ -222,22 +283,20 @@ pub fn obj(bytes: &[u8]) {
     };
     let (materials, picture) = cut(rest, b"\n#png\n").unwrap_or((rest, &[]));
     let others = [("input.mtl", materials), ("input.png", picture)];
-    mesh_beside(("input.obj", model), &others, formats::obj::read);
+    beside(("input.obj", model), &others, formats::obj::read).iter().for_each(sound_mesh);
 }
 
-/// Reads a mesh whose file refers to other files beside it.
-fn mesh_beside(
+/// Reads a file that refers to other files beside it.
+fn beside<T>(
     (name, bytes): (&str, &[u8]),
     others: &[(&str, &[u8])],
-    reader: fn(&Source) -> Result<Mesh>,
-) {
+    reader: fn(&Source) -> Result<T>,
+) -> Option<T> {
     let folder = Folder::new();
     others.iter().for_each(|(name, bytes)| drop(folder.write(name, bytes)));
     let path = folder.write(name, bytes);
     let limits = limits();
     accepted(Source::open(&path, &limits).and_then(|source| reader(&source)))
-        .iter()
-        .for_each(sound_mesh);
 }
 
 fn cut<'a>(bytes: &'a [u8], mark: &[u8]) -> Option<(&'a [u8], &'a [u8])> {
@@ -254,11 +313,15 @@ pub fn stl(bytes: &[u8]) {
 pub fn gltf(bytes: &[u8]) {
     let Some((model, rest)) = cut(bytes, b"\n#bin\n") else {
         mesh("input.glb", bytes, formats::gltf::read);
+        read("input.glb", bytes, formats::gltf::holds_gaussians);
+        gaussians("input.glb", bytes, formats::gltf::read_gaussians);
         return;
     };
     let (buffer, picture) = cut(rest, b"\n#png\n").unwrap_or((rest, &[]));
     let others = [("input.bin", buffer), ("input.png", picture)];
-    mesh_beside(("input.gltf", model), &others, formats::gltf::read);
+    let gltf = ("input.gltf", model);
+    beside(gltf, &others, formats::gltf::read).iter().for_each(sound_mesh);
+    beside(gltf, &others, formats::gltf::read_gaussians).iter().for_each(sound_gaussians);
 }
 
 pub fn las(bytes: &[u8]) {
@@ -518,6 +581,7 @@ pub fn any(bytes: &[u8]) {
                     .iter()
                     .for_each(sound_cells);
             }
+            Some(Kind::Gaussians) => gaussians("input", bytes, formats::read_gaussians),
             Some(Kind::Hierarchy) => splk(bytes),
             Some(Kind::Bricks) => splv(bytes),
             None => drop(read("input", bytes, |source| Ok(formats::advice(source)))),

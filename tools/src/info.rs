@@ -294,6 +294,9 @@ fn of_hierarchy(hierarchy: &Hierarchy) -> Map<String, Value> {
     facts.insert("pages".into(), json!(hierarchy.pages().len()));
     facts.insert("closed".into(), json!(header.closed));
     facts.insert("lossless".into(), json!(header.lossless));
+    if let Some(degree) = header.degree {
+        facts.insert("degree".into(), json!(degree));
+    }
     facts.insert("up".into(), header.stance.map_or(Value::Null, |stance| up(&stance)));
     if header.is_guessed {
         facts.insert("up_from".into(), json!("guess"));

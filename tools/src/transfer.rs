@@ -73,7 +73,7 @@ impl Transfer {
             Input::Samples(points) => show.of_samples(path, points),
             Input::Cells(cells) => show.of_cells(path, cells),
             Input::Bricks(bricks) => show.of_bricks(path, bricks),
-            Input::Mesh(_) | Input::Hierarchy(_) => {
+            Input::Mesh(_) | Input::Gaussians(_) | Input::Hierarchy(_) => {
                 let message = "has colours of its own, and no values for a transfer function";
                 let error = Error::input(path, "content", message);
                 Err(error.hint("give a volume, or name a value with --scalar").into())

@@ -6,9 +6,11 @@
 mod inputs;
 
 use flate2::{Compression, write::GzEncoder};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Quat, Vec2, Vec3};
+use image_webp::{ColorType, WebPEncoder};
 use splatkit::{
     bricks, formats,
+    gaussians::{Gaussians, harmonics::terms},
     hierarchy::{
         BuildOptions, Tree,
         file::{WriteOptions, to_bytes},
@@ -35,6 +37,9 @@ fn main() -> Result<()> {
     };
     let mut seeds = Seeds { folder, count: 0 };
     ply(&mut seeds)?;
+    gaussians(&mut seeds)?;
+    spz(&mut seeds)?;
+    sog(&mut seeds)?;
     obj(&mut seeds)?;
     stl(&mut seeds)?;
     gltf(&mut seeds)?;
@@ -121,7 +126,7 @@ fn ply(seeds: &mut Seeds) -> Result<()> {
     seeds.known("ply", cloud)?;
     let set = tetrahedron().surfels(&Default::default())?;
     let few = splatkit::splat::SplatSet { splats: set.splats[..3].to_vec(), ..set };
-    let few = splatkit::gaussians::Gaussians::from_splats(&few)?;
+    let few = Gaussians::from_splats(&few)?;
     let gaussians = seeds.written(|path| formats::ply::write_gaussians(&few, path))?;
     seeds.known("ply", gaussians)?;
     seeds.known(
@@ -148,6 +153,146 @@ fn ply(seeds: &mut Seeds) -> Result<()> {
     turned.push(6);
     (0..6).for_each(|_| turned.extend(0.5f32.to_be_bytes()));
     seeds.known("ply", turned)
+}
+
+/// Three trained Gaussians with colours of a degree.
+fn trained(degree: u32) -> Gaussians {
+    Gaussians {
+        centers: vec![Vec3::ZERO, Vec3::X, Vec3::new(-1.0, 2.0, 0.5)],
+        scales: vec![Vec3::splat(0.1), Vec3::new(0.5, 0.1, 0.02), Vec3::new(0.2, 0.3, 0.0)],
+        rotations: vec![Quat::IDENTITY, Quat::from_rotation_x(1.0), Quat::from_rotation_z(-2.0)],
+        opacities: vec![0.9, 0.5, 0.1],
+        degree,
+        harmonics: (0..3 * terms(degree)).map(|at| [at as f32 / 100.0, 0.5, -0.25]).collect(),
+        ..Gaussians::default()
+    }
+}
+
+/// The files of trained Gaussians that the library writes.
+fn gaussians(seeds: &mut Seeds) -> Result<()> {
+    for degree in [0, 1, 3] {
+        let set = trained(degree);
+        let plain = seeds.written(|path| formats::ply::write_gaussians(&set, path))?;
+        seeds.known("ply", plain)?;
+        let packed = seeds.written(|path| formats::ply::write_compressed_gaussians(&set, path))?;
+        seeds.known("ply", packed)?;
+        let scene = seeds.written(|path| formats::gltf::write_gaussians(&set, path))?;
+        seeds.known("gltf", scene)?;
+        let packed = seeds.written(|path| formats::spz::write(&set, path))?;
+        seeds.known("spz", packed)?;
+    }
+    let records = seeds.written(|path| formats::splat::write(&trained(0), path))?;
+    seeds.put("splat", records)
+}
+
+/// SPZ of every version, without gzip and its checksum.
+fn spz(seeds: &mut Seeds) -> Result<()> {
+    const COUNT: u8 = 2;
+    const EXTENDED: u8 = 2;
+    let mut extensions = [0x1234_0001u32, 3].map(u32::to_le_bytes).concat();
+    extensions.extend(b"abc");
+    extensions.extend([0xadbe_0003u32, 4, 6].map(u32::to_le_bytes).as_flattened());
+    for (version, degree) in [(1, 0), (1, 1), (2, 0), (2, 2), (3, 0), (3, 1), (4, 0), (4, 1)] {
+        let position = if version == 1 { 6 } else { 9 };
+        let rotation = if version < 3 { 3 } else { 4 };
+        let harmonics = 3 * (terms(degree) - 1);
+        let sizes = [position, 1, 3, 3, rotation, harmonics];
+        let bytes = |size: usize| (0..size * usize::from(COUNT)).map(|at| (at * 29 + 60) as u8);
+        let attributes = sizes.map(|size| bytes(size).collect::<Vec<u8>>());
+        let mut file = b"NGSP".to_vec();
+        file.extend([version, 0, 0, 0, COUNT, 0, 0, 0, degree as u8, 12, EXTENDED, 0]);
+        if version < 4 {
+            seeds.known("spz", [file, attributes.concat(), extensions.clone()].concat())?;
+            continue;
+        }
+        let streams = attributes.iter().filter(|attribute| !attribute.is_empty());
+        let frames: Vec<Vec<u8>> = streams.clone().map(|content| zstd(content)).collect();
+        file[15] = frames.len() as u8;
+        file.extend((32 + extensions.len() as u32).to_le_bytes());
+        file.extend([0; 12]);
+        file.extend(&extensions);
+        for (frame, content) in frames.iter().zip(streams) {
+            let sizes = [frame.len(), content.len()].map(|size| (size as u64).to_le_bytes());
+            file.extend(sizes.as_flattened());
+        }
+        file.extend(frames.concat());
+        seeds.known("spz", file)?;
+    }
+    Ok(())
+}
+
+/// Returns a frame of zstd with its content as it is, of less than 256 bytes.
+fn zstd(content: &[u8]) -> Vec<u8> {
+    let size = content.len() as u32;
+    let [a, b, c, _] = (size << 3 | 1).to_le_bytes();
+    [&[0x28, 0xb5, 0x2f, 0xfd, 0x20, size as u8, a, b, c][..], content].concat()
+}
+
+fn webp(width: usize, texels: &[[u8; 4]]) -> Result<Vec<u8>> {
+    let (width, height) = (width as u32, (texels.len() / width) as u32);
+    let mut out = Vec::new();
+    let encoder = WebPEncoder::new(&mut out);
+    encoder.encode(texels.as_flattened(), width, height, ColorType::Rgba8)?;
+    Ok(out)
+}
+
+/// SOG of both versions, with planes beside the text, and in an archive.
+fn sog(seeds: &mut Seeds) -> Result<()> {
+    for (is_second, degree) in [(true, 0), (true, 1), (true, 3), (false, 0), (false, 2)] {
+        let mut planes = vec![
+            webp(2, &[[0x10, 0xef, 7, 255], [0, 0xff, 7, 255]])?,
+            webp(2, &[[0x27, 0xd8, 0, 255], [0, 0xff, 0, 255]])?,
+            webp(2, &[[51, 204, 153, 252], [51, 204, 153, 254]])?,
+            webp(2, &[[0, 1, 2, 255], [2, 2, 0, 255]])?,
+            webp(2, &[[0, 1, 2, 51], [2, 0, 0, 255]])?,
+        ];
+        if degree > 0 {
+            let width = 64 * (terms(degree) - 1);
+            planes.push(webp(width, &vec![[0, 1, 2, 255]; width])?);
+            planes.push(webp(2, &[[5, 0, 0, 255], [63, 0, 0, 255]])?);
+        }
+        let meta = sog_meta(is_second, degree).into_bytes();
+        let beside = |all: Vec<u8>, plane: &Vec<u8>| [&all[..], b"\n#webp\n", plane].concat();
+        seeds.put("sog", planes.iter().fold(meta.clone(), beside))?;
+        let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        let method = zip::CompressionMethod::Stored;
+        let options = zip::write::SimpleFileOptions::default().compression_method(method);
+        for (number, plane) in planes.iter().enumerate() {
+            let name = format!("{number}.webp");
+            archive.start_file(name.as_str(), options)?;
+            archive.write_all(plane)?;
+        }
+        archive.start_file("meta.json", options)?;
+        archive.write_all(&meta)?;
+        seeds.known("sog", archive.finish()?.into_inner())?;
+    }
+    Ok(())
+}
+
+/// Returns the `meta.json` of two Gaussians: codebooks in version 2, ranges in version 1.
+fn sog_meta(is_second: bool, degree: u32) -> String {
+    let (head, shape, codes) = if is_second {
+        ("'version':2,'count':2,", "", ["'codebook':[-1,0,0.5]"; 3])
+    } else {
+        let codes = [
+            "'mins':[-1,-2,0],'maxs':[0,0,2.5]",
+            "'mins':[-1,-1,0,-2],'maxs':[1.5,0,2.5,2]",
+            "'mins':0,'maxs':2.5",
+        ];
+        ("", "'shape':[2,3],", codes)
+    };
+    let [scales, constants, others] = codes;
+    let rest = if degree == 0 {
+        String::new()
+    } else {
+        format!(",'shN':{{'count':64,'bands':{degree},{others},'files':['5.webp','6.webp']}}")
+    };
+    let text = format!(
+        "{{{head}'means':{{{shape}'mins':[0,-6.5,0.5],'maxs':[6.5,0,0.5],'files':['0.webp',\
+         '1.webp']}},'quats':{{'files':['2.webp']}},'scales':{{{scales},'files':['3.webp']}},\
+         'sh0':{{{constants},'files':['4.webp']}}{rest}}}"
+    );
+    text.replace('\'', "\"")
 }
 
 fn picture(format: image::ImageFormat) -> Result<Vec<u8>> {

@@ -78,6 +78,7 @@ fn cases() -> Vec<Case> {
     ];
     all.extend([0.25, 9.0, 20.0].map(bricks));
     all.extend(scenes::facets::all());
+    all.extend(scenes::gaussians::all());
     all
 }
 

@@ -96,7 +96,7 @@ impl Chunk {
         let source = match &self.origin {
             Origin::Nodes { page_cache, .. } => {
                 let header = page_caches[*page_cache].hierarchy.header();
-                Source::of_radiance(view, header.origin, header.extent)
+                Source::of_nodes(view, header)
             }
             Origin::Splats { set, .. } => Source::of_splats(view, set),
             Origin::Facets { set, is_culled, .. } => Source::of_facets(view, set, *is_culled),

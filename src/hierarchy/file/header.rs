@@ -1,9 +1,10 @@
 //! The header: properties of the whole file.
 
-use super::{MAGIC, VERSION};
+use super::{MAGIC, TRAINED_VERSION, VERSION};
 use crate::container::{Cursor, Put};
 use crate::{
     about::Stance,
+    gaussians::MOST_DEGREE,
     hierarchy::validate::{fault_of_box, fault_of_extent},
     input::copy,
     math::Bounds,
@@ -25,6 +26,8 @@ pub struct Header {
     pub has_color: bool,
     /// Whether any leaf has a normal.
     pub has_normals: bool,
+    /// The degree of the colours of trained Gaussians; `None` for other splats.
+    pub degree: Option<u32>,
     /// Whether every bit of the nodes is stored.
     pub lossless: bool,
     /// Points in the source: vertices or samples.
@@ -69,8 +72,10 @@ impl Stored {
         let header = &self.header;
         let mut out = Vec::with_capacity(self.length());
         out.put(&MAGIC);
-        out.u32(VERSION);
-        let flags = [header.closed, header.has_color, header.has_normals, header.lossless];
+        out.u32(if header.degree.is_some() { TRAINED_VERSION } else { VERSION });
+        let is_trained = header.degree.is_some();
+        let flags =
+            [header.closed, header.has_color, header.has_normals, header.lossless, is_trained];
         out.u32(flags.iter().enumerate().map(|(bit, &flag)| u32::from(flag) << bit).sum());
         out.u64(self.file_bytes);
         out.dvec3(header.origin);
@@ -83,7 +88,7 @@ impl Stored {
         out.u32(self.blocks);
         out.u32(self.pages);
         let axis = header.stance.map_or(0, |stance| nearest_axis(stance.up));
-        out.put(&[axis, u8::from(header.is_guessed), 0, 0]);
+        out.put(&[axis, u8::from(header.is_guessed), header.degree.unwrap_or(0) as u8, 0]);
         out.u32(header.unit.len() as u32);
         out.u32(header.source.len() as u32);
         out.f32s(&header.stance.map_or([0.0; 4], turn_to));
@@ -105,7 +110,7 @@ impl Stored {
             return Err(Refusal::Foreign);
         }
         let version = cursor.u32().ok_or(Refusal::Incomplete)?;
-        if version != VERSION {
+        if ![VERSION, TRAINED_VERSION].contains(&version) {
             return Err(Refusal::Version(version));
         }
         // The lengths of the texts decide where the checksum is, and the checksum whether the
@@ -117,12 +122,17 @@ impl Stored {
         if stated != crc32fast::hash(text) {
             return Err(Refusal::Damaged("its checksum does not match"));
         }
-        Self::fields(cursor, text, unit).ok_or(Refusal::Incomplete)?
+        Self::fields(cursor, text, unit, version == TRAINED_VERSION).ok_or(Refusal::Incomplete)?
     }
 
     /// Reads the fields from a cursor behind the version. `text` is the header without its
     /// checksum.
-    fn fields(mut cursor: Cursor, text: &[u8], unit: usize) -> Option<Result<Self, Refusal>> {
+    fn fields(
+        mut cursor: Cursor,
+        text: &[u8],
+        unit: usize,
+        is_trained: bool,
+    ) -> Option<Result<Self, Refusal>> {
         let (fixed, texts) = text.split_at_checked(FIXED)?;
         let flags = cursor.u32()?;
         let file_bytes = cursor.u64()?;
@@ -137,6 +147,7 @@ impl Stored {
             _ => return Some(Err(Refusal::Damaged("its up axis is unknown"))),
         };
         let is_guessed = cursor.u8()? != 0;
+        let degree = is_trained.then_some(u32::from(cursor.u8()?));
         let mut turn = Cursor::new(fixed.get(TURN..FIXED)?);
         let stance = match turned_by(turn.f32s()?) {
             // Older files state an axis alone.
@@ -148,7 +159,9 @@ impl Stored {
         else {
             return Some(Err(Refusal::Damaged("its texts are not UTF-8")));
         };
-        let sound = flags < 16
+        let sound = flags < 32
+            && (flags >> 4 & 1 == 1) == is_trained
+            && degree.is_none_or(|degree| degree <= MOST_DEGREE)
             && fault_of_box(origin, &bounds).is_none()
             && fault_of_extent(extent).is_none()
             && (1..=nodes).contains(&leaves)
@@ -164,6 +177,7 @@ impl Stored {
             closed: flag(0),
             has_color: flag(1),
             has_normals: flag(2),
+            degree,
             lossless: flag(3),
             source_points,
             leaves,

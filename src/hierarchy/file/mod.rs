@@ -37,8 +37,11 @@ pub const PAGE_NODES: usize = 4096;
 /// The first bytes of a file: a name, and line ends that a transfer as text would change.
 const MAGIC: [u8; 8] = *b"SPLK\r\n\x1a\n";
 
-/// The version that is written, and the only one that is read.
+/// The version that is written.
 const VERSION: u32 = 1;
+
+/// The version of files of trained Gaussians, whose pages have colours of their own.
+const TRAINED_VERSION: u32 = 2;
 
 /// Bytes of the BLAKE3 hash at the end of a file.
 const HASH: usize = 32;

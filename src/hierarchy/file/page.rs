@@ -8,8 +8,10 @@ use super::{
     quantise::Shape,
 };
 use crate::{
+    container::pack,
+    gaussians::Colors,
     hierarchy::{
-        MOST_CHILDREN, Node,
+        Block, MOST_CHILDREN, Node,
         merge::{WIDTH, deviation},
         validate::fault,
     },
@@ -21,6 +23,11 @@ use std::io;
 /// The first byte of a page.
 const LOSSLESS: u8 = 0;
 const LOSSY: u8 = 1;
+/// A page of either code, and its colours.
+const COLORED: u8 = 2;
+
+/// The zstd level of colours.
+const LEVEL: i32 = 9;
 
 /// An encoded block, with its nodes as a reader will decode them.
 pub struct Coded {
@@ -30,14 +37,37 @@ pub struct Coded {
 }
 
 /// Encodes a block whose nodes are in order. Fails only without the feature `files`.
-pub fn encode(nodes: &[Node], extent: f32, is_lossless: bool) -> io::Result<Coded> {
+pub fn encode(block: &Block, extent: f32, is_lossless: bool) -> io::Result<Coded> {
+    let nodes = &block.nodes[..];
+    let order = if is_lossless { (0..nodes.len() as u32).collect() } else { line_up(nodes) };
+    let mut coded = encode_nodes(nodes, &order, extent, is_lossless)?;
+    if let Some(colors) = &block.colors {
+        let colors = colors.chosen(order.iter().map(|node| *node as usize));
+        let both = |(page, run): (&mut Vec<u8>, &Run)| -> io::Result<()> {
+            let packed = pack::compress(&colors.to_bytes(run.nodes.clone()), LEVEL)?;
+            let length = (page.len() as u32).to_le_bytes();
+            *page = [&[COLORED], &length[..], page, &packed].concat();
+            Ok(())
+        };
+        coded.pages.par_iter_mut().zip(&coded.runs).try_for_each(both)?;
+    }
+    Ok(coded)
+}
+
+/// Encodes the nodes of a block, in this order unless every bit is kept.
+fn encode_nodes(
+    nodes: &[Node],
+    order: &[u32],
+    extent: f32,
+    is_lossless: bool,
+) -> io::Result<Coded> {
     if is_lossless {
         let runs = pages(nodes);
         let page = |run: &Run| lossless_page(&nodes[run.nodes.clone()]);
         let pages = runs.par_iter().map(page).collect::<io::Result<_>>()?;
         return Ok(Coded { nodes: nodes.to_vec(), runs, pages });
     }
-    let mut nodes = line_up(nodes);
+    let mut nodes = lined_up(nodes, order);
     let runs = pages(&nodes);
     let levels = levels(&nodes);
     let fine = bounds::fine_from(&nodes[0]);
@@ -99,23 +129,21 @@ fn quantise(nodes: &mut [Node], runs: &[Run], extent: f32) -> Vec<PageCodes> {
     parts.into_par_iter().map(page).collect()
 }
 
-/// Returns the nodes with siblings in a different order, each near the one before, also from one
-/// group to the next. Nothing depends on the order of siblings, and short steps need fewer bits.
-fn line_up(nodes: &[Node]) -> Vec<Node> {
-    let mut out = Vec::with_capacity(nodes.len());
-    out.push(nodes[0]);
-    let mut last = Vec3::from(nodes[0].splat.center);
-    for index in 0..nodes.len() {
-        let Node { first_child, children, .. } = out[index];
-        if children == 0 {
-            continue;
-        }
-        let start = out.len();
-        out[index].first_child = start as u32;
-        out.extend_from_slice(&nodes[first_child as usize..(first_child + children) as usize]);
-        let mut left = &mut out[start..];
+/// Returns the numbers of the nodes with siblings in a different order, each near the one before,
+/// also from one group to the next. Nothing depends on the order of siblings, and short steps need
+/// fewer bits.
+fn line_up(nodes: &[Node]) -> Vec<u32> {
+    let mut order = Vec::with_capacity(nodes.len());
+    order.push(0);
+    let center = |node: u32| Vec3::from(nodes[node as usize].splat.center);
+    let mut last = center(0);
+    for place in 0..nodes.len() {
+        let Node { first_child, children, .. } = nodes[order[place] as usize];
+        let start = order.len();
+        order.extend(first_child..first_child + children);
+        let mut left = &mut order[start..];
         while !left.is_empty() {
-            let distance = |at: usize| Vec3::from(left[at].splat.center).distance_squared(last);
+            let distance = |at: usize| center(left[at]).distance_squared(last);
             let mut next = (0, distance(0));
             for at in 1..left.len() {
                 let away = distance(at);
@@ -124,11 +152,25 @@ fn line_up(nodes: &[Node]) -> Vec<Node> {
                 }
             }
             left.swap(0, next.0);
-            last = Vec3::from(left[0].splat.center);
+            last = center(left[0]);
             left = &mut left[1..];
         }
     }
-    out
+    order
+}
+
+/// Returns the nodes in an order of [`line_up`].
+fn lined_up(nodes: &[Node], order: &[u32]) -> Vec<Node> {
+    let mut next = 1;
+    let node = |number: &u32| {
+        let mut node = nodes[*number as usize];
+        if node.children > 0 {
+            node.first_child = next;
+            next += node.children;
+        }
+        node
+    };
+    order.iter().map(node).collect()
 }
 
 /// Gives all inner nodes bounds around their decoded children, level by level from below. A result
@@ -179,6 +221,31 @@ fn bound(
         }
     }
     out
+}
+
+/// Decodes a page as [`decode`], with its colours of this degree, if it has one.
+pub fn decode_colored(
+    bytes: &[u8],
+    count: usize,
+    first_child: u32,
+    extent: f32,
+    degree: Option<u32>,
+) -> Result<(Vec<Node>, Option<Colors>), String> {
+    let Some(degree) = degree else {
+        return Ok((decode(bytes, count, first_child, extent)?, None));
+    };
+    let (&code, rest) = bytes.split_first().ok_or("it is empty")?;
+    if code != COLORED {
+        return Err(format!("it has the code {code}, but pages with colours have {COLORED}"));
+    }
+    let parts = rest
+        .split_first_chunk()
+        .and_then(|(length, rest)| rest.split_at_checked(u32::from_le_bytes(*length) as usize));
+    let (nodes, packed) = parts.ok_or("it ends before its colours")?;
+    let nodes = decode(nodes, count, first_child, extent)?;
+    let colors = pack::decompress(packed, Colors::most_bytes(degree, count))
+        .map_err(|e| format!("its colours cannot be unpacked: {e}"))?;
+    Ok((nodes, Some(Colors::from_bytes(&colors, degree, count)?)))
 }
 
 /// Decodes a page of `count` nodes, whose children begin at `first_child`. An error says what is

@@ -12,6 +12,7 @@ use super::{
 use crate::{
     Error, Result,
     error::LimitKind,
+    gaussians::Colors,
     hierarchy::{
         Block, Node, Tree,
         validate::{fault_of_box, fault_of_extent},
@@ -48,11 +49,16 @@ impl CutSphere {
     }
 }
 
+/// The nodes of a page, and their colours.
+type Content = (Vec<Node>, Option<Colors>);
+
 /// A decoded page.
 #[derive(Debug, Clone)]
 pub struct Page {
     /// Its nodes, adjacent in their block; [`Node::first_child`] is an index in the block.
     pub nodes: Vec<Node>,
+    /// The colours of its nodes, if they are trained Gaussians.
+    pub colors: Option<Colors>,
     /// The parents of its nodes, each once, with exactly the values that they have in their own
     /// pages. The parent of a block's root is that of its portal.
     pub parents: Vec<CutSphere>,
@@ -177,6 +183,7 @@ impl Hierarchy {
             closed: tree.closed,
             has_color: true,
             has_normals: true,
+            degree: tree.degree(),
             lossless: true,
             source_points: tree.source_points,
             leaves: tree.leaf_count(),
@@ -258,7 +265,7 @@ impl Hierarchy {
     /// [`Error::Argument`] if there is no such page.
     pub fn read_page(&self, page: u32) -> Result<Page> {
         let entry = self.entry(page)?;
-        let nodes = self.read_nodes(page)?;
+        let (nodes, colors) = self.read_nodes(page)?;
         let own: Arc<[Family]> = families(&nodes).into();
         let is_first = entry.first_node == 0;
         let mut parents = Vec::new();
@@ -304,7 +311,7 @@ impl Hierarchy {
         self.families.lock().unwrap_or_else(|e| e.into_inner()).keep(page, own);
         let has_portals = self.is_joined() && entry.block == 0;
         let child_pages = self.child_pages(page, &nodes)?;
-        Ok(Page { nodes, parents, parent, child_pages, has_portals })
+        Ok(Page { nodes, colors, parents, parent, child_pages, has_portals })
     }
 
     /// Reads the whole tree.
@@ -345,12 +352,15 @@ impl Hierarchy {
         )?;
         let pages = entry.first_page..entry.first_page + entry.pages;
         // Reports the first of several damaged pages, whichever thread finds one first.
-        let pages: Vec<Result<Vec<Node>>> =
+        let pages: Vec<Result<Content>> =
             pages.into_par_iter().map(|page| self.read_nodes(page)).collect();
-        let pages: Vec<Vec<Node>> = pages.into_iter().collect::<Result<_>>()?;
+        let pages: Vec<Content> = pages.into_iter().collect::<Result<_>>()?;
+        let (nodes, colors): (Vec<Vec<Node>>, Vec<Option<Colors>>) = pages.into_iter().unzip();
+        let colors: Option<Vec<Colors>> = colors.into_iter().collect();
         Ok(Block {
-            nodes: pages.concat(),
+            nodes: nodes.concat(),
             portal: Some(entry.portal).filter(|&portal| portal != NO_PORTAL),
+            colors: self.header.degree.zip(colors).map(|(_, colors)| Colors::joined(&colors)),
         })
     }
 
@@ -371,14 +381,14 @@ impl Hierarchy {
             .ok_or_else(|| Error::Argument(format!("there is no page {page} among {count}")))
     }
 
-    /// Reads the nodes of a page without their parents.
-    fn read_nodes(&self, page: u32) -> Result<Vec<Node>> {
+    /// Reads the nodes of a page without their parents, and their colours.
+    fn read_nodes(&self, page: u32) -> Result<Content> {
         let entry = self.entry(page)?;
         if let Store::Blocks(blocks) = &self.store {
-            let nodes = self.directory.nodes(page);
-            return Ok(blocks[entry.block as usize].nodes
-                [nodes.start as usize..nodes.end as usize]
-                .to_vec());
+            let (block, nodes) = (&blocks[entry.block as usize], self.directory.nodes(page));
+            let range = nodes.start as usize..nodes.end as usize;
+            let colors = block.colors.as_ref().map(|colors| colors.chosen(range.clone()));
+            return Ok((block.nodes[range].to_vec(), colors));
         }
         let Place { offset, bytes: length, crc } = entry.place;
         let place = || format!("page {page} (byte {offset})");
@@ -396,9 +406,14 @@ impl Hierarchy {
             return Err(broken("its checksum does not match".into()));
         }
         let children = self.directory.children(page);
-        let nodes =
-            page::decode(&bytes, entry.nodes as usize, entry.first_child, self.header.extent)
-                .map_err(broken)?;
+        let (nodes, colors) = page::decode_colored(
+            &bytes,
+            entry.nodes as usize,
+            entry.first_child,
+            self.header.extent,
+            self.header.degree,
+        )
+        .map_err(broken)?;
         let counted: u64 = nodes.iter().map(|node| u64::from(node.children)).sum();
         if counted != u64::from(children.end - children.start) {
             let message = format!(
@@ -407,7 +422,7 @@ impl Hierarchy {
             );
             return Err(damaged(&self.path, place(), message));
         }
-        Ok(nodes)
+        Ok((nodes, colors))
     }
 
     /// Returns the nodes of a page that have children.
@@ -415,7 +430,7 @@ impl Hierarchy {
         if let Some(held) = self.families.lock().unwrap_or_else(|e| e.into_inner()).get(page) {
             return Ok(held);
         }
-        let read: Arc<[Family]> = families(&self.read_nodes(page)?).into();
+        let read: Arc<[Family]> = families(&self.read_nodes(page)?.0).into();
         self.families.lock().unwrap_or_else(|e| e.into_inner()).keep(page, read.clone());
         Ok(read)
     }
@@ -463,6 +478,10 @@ fn directory_of(tree: &Tree) -> Result<Directory> {
         let refuse =
             |message| Error::Argument(format!("block {number} of the hierarchy: {message}"));
         in_order(&block.nodes).and_then(|()| check_nodes(&block.nodes)).map_err(refuse)?;
+        let own = block.colors.as_ref().map(|colors| (colors.degree(), colors.len()));
+        if own != tree.degree().map(|degree| (degree, block.nodes.len())) {
+            return Err(refuse(format!("its colours are {own:?} for {} nodes", block.nodes.len())));
+        }
         let runs = pages(&block.nodes);
         let places = vec![Place::default(); runs.len()];
         directory.push_block(&runs, &arounds(&block.nodes, &runs), &places);
@@ -606,7 +625,7 @@ pub(super) fn refused(path: &Path, refusal: Refusal) -> Error {
         Refusal::Version(version) => Error::input(
             path,
             "header",
-            format!("has version {version}; only version {} can be read", super::VERSION),
+            format!("has version {version}; versions 1 and {} can be read", super::TRAINED_VERSION),
         )
         .hint("convert the source again, or use the release that wrote the file"),
         Refusal::Damaged(message) => damaged(path, "header", message),

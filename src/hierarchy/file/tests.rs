@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     about::Stance,
     hierarchy::{
-        Block, Detail, Tree,
+        Block, Detail, Node, Tree,
         testing::{cloud, joined, surface, tree},
         validate,
     },
@@ -51,6 +51,10 @@ fn trees() -> Vec<Tree> {
         tree(&cloud(5_000, 5)),
     ];
     small.into_iter().chain(large).collect()
+}
+
+fn block_of(nodes: &[Node]) -> Block {
+    Block { nodes: nodes.to_vec(), ..Block::default() }
 }
 
 #[test]
@@ -304,7 +308,8 @@ fn pages_of_noise_are_survived() {
         let nodes = &tree.blocks[0].nodes;
         let runs = pages::pages(nodes);
         for lossless in [true, false] {
-            let page = page::encode(nodes, tree.extent, lossless).unwrap().pages.swap_remove(0);
+            let page =
+                page::encode(&block_of(nodes), tree.extent, lossless).unwrap().pages.swap_remove(0);
             for _ in 0..3000 {
                 let mut broken = page.clone();
                 for _ in 0..1 + random.below(3) {
@@ -540,7 +545,8 @@ fn numbers_that_cannot_be_drawn_are_refused() {
         refused(&|tree| change(&mut tree.blocks[0].nodes[7]), &format!("has {message}"));
         let mut nodes = sound.blocks[0].nodes.clone();
         change(&mut nodes[7]);
-        let page = page::encode(&nodes, sound.extent, true).unwrap().pages.swap_remove(0);
+        let page =
+            page::encode(&block_of(&nodes), sound.extent, true).unwrap().pages.swap_remove(0);
         let error = page::decode(&page, nodes.len(), 1, sound.extent).unwrap_err();
         assert!(error.contains(&format!("its node 7 has {message}")), "{error}");
     }

@@ -10,8 +10,9 @@ use super::{
 use crate::{
     Error, Result,
     about::Stance,
+    gaussians::Colors,
     hierarchy::{
-        Node, Tree,
+        Block, Node, Tree,
         validate::{fault, fault_of_box, fault_of_extent},
     },
     math::Bounds,
@@ -58,8 +59,9 @@ pub struct Whole {
 /// The block that joins the others.
 #[derive(Debug, Clone, Copy)]
 pub struct Top<'a> {
-    /// Its nodes, breadth first. Its leaves are portals.
-    pub nodes: &'a [Node],
+    /// Its nodes, breadth first, and their colours if those of the others have some. Its leaves are
+    /// portals.
+    pub block: &'a Block,
     /// For each block, in the order of writing, the leaf that its root replaces.
     pub portals: &'a [u32],
 }
@@ -75,6 +77,8 @@ pub struct Writer {
     directory: Directory,
     roots: Vec<Node>,
     contents: Contents,
+    /// The degree of the first block's colours, if there is one already.
+    degree: Option<Option<u32>>,
 }
 
 impl Writer {
@@ -106,6 +110,7 @@ impl Writer {
             directory: Directory::default(),
             roots: Vec::new(),
             contents: Contents::default(),
+            degree: None,
         })
     }
 
@@ -116,26 +121,27 @@ impl Writer {
     /// [`Error::Argument`] if the nodes are not in the order that
     /// [`Block`](crate::hierarchy::Block) requires, or if values are not finite or cannot be drawn;
     /// [`Error::Output`] if the block cannot be written.
-    pub fn block(&mut self, nodes: &[Node]) -> Result<Node> {
-        Ok(self.blocks(&[nodes])?[0])
+    pub fn block(&mut self, block: &Block) -> Result<Node> {
+        Ok(self.blocks(&[block])?[0])
     }
 
     /// Writes several blocks in parallel, as [`block`](Self::block) writes one.
     ///
     /// # Errors
     /// Those of [`block`](Self::block).
-    pub fn blocks(&mut self, blocks: &[&[Node]]) -> Result<Vec<Node>> {
+    pub fn blocks(&mut self, blocks: &[&Block]) -> Result<Vec<Node>> {
         let written = self.roots.len();
-        for (number, nodes) in (written..).zip(blocks) {
+        for (number, block) in (written..).zip(blocks) {
             let refuse = |message: String| {
                 Error::Argument(format!("block {number} of the hierarchy: {message}"))
             };
-            in_order(nodes).map_err(refuse)?;
-            check_nodes(nodes).map_err(refuse)?;
+            in_order(&block.nodes).map_err(refuse)?;
+            check_nodes(&block.nodes).map_err(refuse)?;
+            self.check_colors(block).map_err(refuse)?;
         }
         let (extent, is_lossless) = (self.extent, self.options.lossless);
-        let encode = |nodes: &&[Node]| {
-            let coded = page::encode(nodes, extent, is_lossless)?;
+        let encode = |block: &&Block| {
+            let coded = page::encode(block, extent, is_lossless)?;
             let around = arounds(&coded.nodes, &coded.runs);
             Ok((coded, around))
         };
@@ -148,6 +154,21 @@ impl Writer {
             self.roots.push(coded.nodes[0]);
         }
         Ok(self.roots[written..].to_vec())
+    }
+
+    /// Returns an error unless all blocks have colours of one degree for all nodes, or none has.
+    fn check_colors(&mut self, block: &Block) -> Result<(), String> {
+        let own = block.colors.as_ref().map(Colors::degree);
+        let degree = *self.degree.get_or_insert(own);
+        let count = block.colors.as_ref().map_or(block.nodes.len(), Colors::len);
+        if degree != own || count != block.nodes.len() {
+            return Err(format!(
+                "it has {count} colours of the degree {own:?} for {} nodes, but the degree of the \
+                 first block is {degree:?}",
+                block.nodes.len()
+            ));
+        }
+        Ok(())
     }
 
     /// Finishes the file. A single block needs no `top`; several need the block that joins them.
@@ -222,8 +243,9 @@ impl Writer {
         let refuse = |message: String| {
             Error::Argument(format!("the block that joins the others: {message}"))
         };
-        in_order(top.nodes).map_err(refuse)?;
-        let mut nodes = top.nodes.to_vec();
+        in_order(&top.block.nodes).map_err(refuse)?;
+        self.check_colors(top.block).map_err(refuse)?;
+        let mut nodes = top.block.nodes.clone();
         let leaves = nodes.iter().filter(|node| node.is_leaf()).count();
         if top.portals.len() != self.roots.len() || leaves != self.roots.len() {
             let [portals, blocks] = [top.portals.len(), self.roots.len()];
@@ -245,7 +267,9 @@ impl Writer {
         }
         page::enclose(&mut nodes);
         check_nodes(&nodes).map_err(refuse)?;
-        let coded = page::encode(&nodes, self.extent, true).map_err(|e| self.fault(e))?;
+        let block = Block { nodes, colors: top.block.colors.clone(), portal: None };
+        let coded = page::encode(&block, self.extent, true).map_err(|e| self.fault(e))?;
+        let nodes = block.nodes;
         let places = self.push(&coded.pages)?;
         let mut directory = Directory::default();
         directory.push_block(&coded.runs, &arounds(&nodes, &coded.runs), &places);
@@ -276,6 +300,7 @@ impl Writer {
             closed: whole.closed,
             has_color: self.contents.has_color,
             has_normals: self.contents.has_normals,
+            degree: self.degree.flatten(),
             lossless: self.options.lossless,
             source_points: whole.source_points,
             leaves: self.contents.leaves,
@@ -353,7 +378,7 @@ fn all(
     let whole = Whole { origin, bounds, closed, source_points };
     let below = &tree.blocks[usize::from(tree.is_joined())..];
     for blocks in below.chunks(2 * parallel::current_num_threads()) {
-        writer.blocks(&blocks.iter().map(|block| &block.nodes[..]).collect::<Vec<_>>())?;
+        writer.blocks(&blocks.iter().collect::<Vec<_>>())?;
     }
     if !tree.is_joined() {
         return writer.end(None, &whole, target);
@@ -361,5 +386,5 @@ fn all(
     let portals: Option<Vec<u32>> = below.iter().map(|block| block.portal).collect();
     let portals =
         portals.ok_or_else(|| Error::Argument("a block of the hierarchy has no portal".into()))?;
-    writer.end(Some(Top { nodes: &tree.blocks[0].nodes, portals: &portals }), &whole, target)
+    writer.end(Some(Top { block: &tree.blocks[0], portals: &portals }), &whole, target)
 }

@@ -1,6 +1,6 @@
-//! Surfaces, hierarchies and trained scenes: converted to 3D Gaussians for other viewers.
+//! Trained scenes: converted to hierarchies; and all surfaces: to 3D Gaussians for other viewers.
 
-use super::Convert;
+use super::{Convert, surface::Frame};
 use crate::{
     failure::{Failure, in_file},
     load::Input,
@@ -10,9 +10,12 @@ use crate::{
 };
 use serde_json::json;
 use splatkit::{
-    Error, formats,
+    Error,
+    about::Stance,
+    formats,
     formats::Kind,
     gaussians::{Gaussians, harmonics},
+    hierarchy::{self, BuildOptions, Hierarchy, file::WriteOptions},
     memory,
 };
 use std::{
@@ -27,6 +30,18 @@ struct Gathered {
     points: u64,
     read_ms: f64,
 }
+
+/// What was written.
+struct Written<'a> {
+    set: &'a Gaussians,
+    points: u64,
+    bytes: u64,
+    read_ms: f64,
+    write_ms: f64,
+}
+
+/// Number of Gaussians that a dry run tries.
+const SAMPLE: usize = 1 << 17;
 
 /// A way to write Gaussians.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,17 +102,7 @@ impl Convert {
         if self.dry_run {
             let bytes = set.len() as u64 * target.bytes(set.degree);
             progress.clear();
-            if self.json {
-                return output::line(json!({
-                    "points": points,
-                    "splats": set.len(),
-                    "expected_bytes": bytes,
-                    "read_ms": read_ms,
-                }));
-            }
-            output::line(format_args!("points          {points}"))?;
-            output::line(format_args!("splats          {}", set.len()))?;
-            return output::line(format_args!("bytes           at most {bytes}"));
+            return self.say_expected(&set, points, bytes, "at most", read_ms);
         }
         progress.stage(format!("Writing {}", self.output.display()));
         let start = Instant::now();
@@ -105,6 +110,34 @@ impl Convert {
         progress.clear();
         let write_ms = milliseconds(start);
         let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
+        self.say(&Written { set: &set, points, bytes, read_ms, write_ms })
+    }
+
+    /// Prints what would be written.
+    fn say_expected(
+        &self,
+        set: &Gaussians,
+        points: u64,
+        bytes: u64,
+        how: &str,
+        read_ms: f64,
+    ) -> Result<(), Failure> {
+        if self.json {
+            return output::line(json!({
+                "points": points,
+                "splats": set.len(),
+                "expected_bytes": bytes,
+                "read_ms": read_ms,
+            }));
+        }
+        output::line(format_args!("points          {points}"))?;
+        output::line(format_args!("splats          {}", set.len()))?;
+        output::line(format_args!("bytes           {how} {bytes}"))
+    }
+
+    /// Prints what was written.
+    fn say(&self, written: &Written) -> Result<(), Failure> {
+        let &Written { set, points, bytes, read_ms, write_ms } = written;
         let per_splat = bytes as f64 / set.len().max(1) as f64;
         if self.json {
             return output::line(json!({
@@ -124,6 +157,65 @@ impl Convert {
         output::line(format_args!("bytes           {bytes} ({per_splat:.2} a splat)"))?;
         let [read, write] = [read_ms, write_ms].map(|ms| ms / 1e3);
         output::line(format_args!("time            {read:.2} s reading, {write:.2} s writing"))
+    }
+
+    /// Returns whether all inputs hold trained Gaussians, also in hierarchies.
+    pub(super) fn are_gaussians(&self) -> Result<bool, Failure> {
+        for path in &self.files {
+            let is_one = match self.load.kind(path)? {
+                Kind::Gaussians => true,
+                Kind::Hierarchy => {
+                    Hierarchy::open(path, &self.load.limits())?.header().degree.is_some()
+                }
+                _ => false,
+            };
+            if !is_one {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Builds a hierarchy of the Gaussians of all inputs.
+    pub(super) fn gaussian_hierarchy(self, progress: &Progress) -> Result<(), Failure> {
+        let Gathered { mut set, points, read_ms } = self.gather_gaussians(progress)?;
+        if let Some(degree) = self.surface.degree {
+            set.set_degree(degree.min(set.degree));
+        }
+        let start = Instant::now();
+        let bar = progress.bar("Building the hierarchy", set.len() as u64);
+        let watch = |done: u64, _: u64| bar.set(done);
+        let frame = Frame {
+            stance: set.about.stance.or(Some(Stance::Y_DOWN)),
+            is_guessed: set.about.stance.is_none(),
+            unit: set.about.length.clone(),
+        };
+        let build = self.surface.build_options_of(false, points, self.load.limits().deadline());
+        let write = self.surface.write_options(&self.files, &frame);
+        if self.dry_run {
+            return self.expect_gaussians(&set, points, &build, &write, read_ms);
+        }
+        let built = hierarchy::build_gaussians(&set, &self.output, &build, &write, Some(&watch));
+        built.map_err(|error| error.in_file(&self.files[0]))?;
+        progress.clear();
+        let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
+        self.say(&Written { set: &set, points, bytes, read_ms, write_ms: milliseconds(start) })
+    }
+
+    /// Prints what a hierarchy of Gaussians would take, extrapolated from a part of them.
+    fn expect_gaussians(
+        &self,
+        set: &Gaussians,
+        points: u64,
+        build: &BuildOptions,
+        write: &WriteOptions,
+        read_ms: f64,
+    ) -> Result<(), Failure> {
+        let part = set.part(0..set.len().min(SAMPLE));
+        let tree = hierarchy::Tree::of_gaussians(&part, build, None)?;
+        let share = set.len() as f64 / part.len() as f64;
+        let bytes = hierarchy::file::to_bytes(&tree, write)?.len() as f64 * share;
+        self.say_expected(set, points, bytes as u64, "about", read_ms)
     }
 
     /// Reads all inputs as Gaussians.
@@ -146,6 +238,15 @@ impl Convert {
     /// Returns the Gaussians of an input: its own, or those of its splats.
     fn gaussians_of(&self, path: &PathBuf, progress: &Progress) -> Result<Gathered, Failure> {
         let start = Instant::now();
+        if self.load.kind(path)? == Kind::Hierarchy
+            && let Some(mut set) = Hierarchy::open(path, &self.load.limits())?.gaussians()?
+        {
+            self.check_unneeded(std::slice::from_ref(path))?;
+            let scale = self.surface.radius_scale();
+            set.scales.iter_mut().for_each(|own| *own *= scale);
+            let points = set.len() as u64;
+            return Ok(Gathered { set, points, read_ms: milliseconds(start) });
+        }
         if self.load.kind(path)? != Kind::Gaussians {
             let (set, points) = self.surfels_of(path, progress)?;
             let set = Gaussians::from_splats(&set).map_err(|error| in_file(path, error))?;

@@ -120,6 +120,9 @@ impl Convert {
         if extension != "splk" {
             return self.gaussians(progress);
         }
+        if self.are_gaussians()? {
+            return self.gaussian_hierarchy(progress);
+        }
         let most = self.most_memory();
         let limits = self.load.limits();
         let need = memory::need(
@@ -248,8 +251,8 @@ impl Convert {
             Input::Gaussians(_) => {
                 let file = path.display();
                 return Err(Failure::Usage(format!(
-                    "{file} holds trained Gaussians, of which no hierarchy is built yet; write \
-                     .ply, .compressed.ply, .splat, .spz or .glb"
+                    "{file} holds trained Gaussians, and another input does not; a hierarchy is \
+                     built of either"
                 )));
             }
             Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) | Input::Cells(_) => {
@@ -396,13 +399,18 @@ impl SurfaceFlags {
     }
 
     fn build_options(&self, gathered: &Gathered, deadline: Deadline) -> BuildOptions {
-        BuildOptions {
-            preset: self.preset(),
-            closed: gathered.closed,
-            source_points: Some(gathered.points),
-            deadline,
-            ..BuildOptions::default()
-        }
+        self.build_options_of(gathered.closed, gathered.points, deadline)
+    }
+
+    pub(super) fn build_options_of(
+        &self,
+        closed: bool,
+        points: u64,
+        deadline: Deadline,
+    ) -> BuildOptions {
+        let preset = self.preset();
+        let source_points = Some(points);
+        BuildOptions { preset, closed, source_points, deadline, ..BuildOptions::default() }
     }
 
     /// Returns the options for writing. The `frame` counts unless a flag overrides it.

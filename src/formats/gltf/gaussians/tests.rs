@@ -104,7 +104,7 @@ fn numbers_are_those_of_the_file() {
         assert_eq!(set.harmonics_of(0)[term], values[..3]);
         assert_eq!(set.harmonics_of(1)[term], values[3..]);
     }
-    assert_eq!((set.about.stance, set.broken), (Some(Stance::Y_UP), 0));
+    assert_eq!((set.about.stance, set.broken.all()), (Some(Stance::Y_UP), 0));
     set.validate().expect("valid");
 }
 
@@ -326,7 +326,7 @@ fn numbers_that_are_not_finite_are_left_out() {
     let positions = bytes(&[f32::NAN, 0.0, 0.0, 1.0, 1.0, 1.0]);
     value["buffers"][0]["uri"] = json!(data_uri(&positions));
     let set = read_json(&value).expect("loads");
-    assert_eq!((set.len(), set.broken), (1, 1));
+    assert_eq!((set.len(), set.broken.all()), (1, 1));
     assert_eq!(set.opacities, [1.0]);
 }
 

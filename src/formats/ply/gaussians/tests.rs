@@ -191,7 +191,7 @@ fn what_is_wrong_is_named() {
         other => panic!("{other:?}"),
     }
     let nan = file.replacen(" -3 ", " nan ", 1);
-    assert_eq!(load(nan).unwrap().broken, 1);
+    assert_eq!(load(nan).unwrap().broken.all(), 1);
 }
 
 #[test]
@@ -369,7 +369,7 @@ fn what_is_written_reads_back() {
         let path = folder.path("own.ply");
         write_gaussians(&set, &path).unwrap();
         let read = read_with(&path, read_gaussians).unwrap();
-        assert_eq!((read.len(), read.degree, read.broken), (set.len(), degree, 0));
+        assert_eq!((read.len(), read.degree, read.broken.all()), (set.len(), degree, 0));
         assert!(read.scales[0].z < 1e-18);
         for index in 1..set.len() {
             let found = differences((&read, index), (&set, index));
@@ -378,7 +378,7 @@ fn what_is_written_reads_back() {
         let path = folder.path("compressed.ply");
         write_compressed_gaussians(&set, &path).unwrap();
         let read = read_with(&path, read_gaussians).unwrap();
-        assert_eq!((read.len(), read.degree, read.broken), (set.len(), degree, 0));
+        assert_eq!((read.len(), read.degree, read.broken.all()), (set.len(), degree, 0));
         // Their order is another one.
         for index in 1..set.len() {
             let far = |other: &usize| center(&read, *other).distance(center(&set, index));
