@@ -152,10 +152,10 @@ const FOREIGN: &[Foreign] = &[
         hint: "convert with meshio convert MESH.msh mesh.vtu (a Python package)",
     },
     Foreign {
-        extensions: &["spz", "splat", "ksplat"],
+        extensions: &["ksplat", "lcc"],
         magic: &[],
-        what: "a scene of 3D Gaussians in a packed form",
-        hint: "export it as PLY, for example from SuperSplat",
+        what: "a packed scene of trained 3D Gaussians",
+        hint: "convert with npx @playcanvas/splat-transform SCENE.ksplat scene.ply",
     },
     Foreign {
         extensions: &["rcp", "rcs", "ptx", "fls", "zfs"],

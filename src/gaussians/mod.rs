@@ -7,12 +7,14 @@
 
 mod colors;
 pub mod harmonics;
+mod phantom;
 mod seen;
 mod surfels;
 mod survey;
 pub mod turn;
 
 pub use colors::Colors;
+pub use phantom::phantom;
 pub use seen::{EXTENT, Eye};
 pub use survey::Survey;
 

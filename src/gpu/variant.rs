@@ -40,7 +40,7 @@ pub fn variant(request: &Request<'_>) -> Variant {
             }
             Item::Radiance(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
                 variant.radiance = true;
-                variant.trained |= matches!(item, Item::Gaussians(_));
+                variant.trained |= item.is_trained();
                 variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
             }
             // Not drawn: `PreparedScene::new` returns an error.

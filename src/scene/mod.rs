@@ -162,11 +162,7 @@ impl Scene {
     pub fn beyond_gpu(&self) -> Option<String> {
         let tensor = self.tensor().map(|tensor| format!("the kernel {}", tensor.name()));
         let has_cells = self.items.iter().any(|item| matches!(item, Item::Cells(..)));
-        let has_trained =
-            self.items.iter().any(|item| matches!(item, Item::Hierarchy(_)) && item.is_trained());
-        tensor
-            .or_else(|| has_cells.then(|| "cells".into()))
-            .or_else(|| has_trained.then(|| "hierarchies of trained Gaussians".into()))
+        tensor.or_else(|| has_cells.then(|| "cells".into()))
     }
 
     /// Returns the box around everything that can be seen, footprints included.

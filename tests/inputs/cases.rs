@@ -84,10 +84,10 @@
     let bricks = || splv(&Folder::new());
     // The header of SPZ without gzip, and bytes behind it.
     let spz = |version: u8, count: u32, degree: u8, more: usize| -> Vec<u8> {
-        let head = [b"NGSP", &[version, 0, 0, 0], &count.to_le_bytes(), &[degree, 12, 0, 0]];
+        let head = [&b"NGSP"[..], &[version, 0, 0, 0], &count.to_le_bytes(), &[degree, 12, 0, 0]];
         [head.concat(), vec![0; more]].concat()
     };
-    let trained = |properties: &str| -> Vec<u8> {
+    let trainer = |properties: &str| -> Vec<u8> {
         let each = properties.split(' ').map(|name| format!("property float {name}\n"));
         let each: String = each.collect();
         ply(&format!("element vertex 1\n{FLOATS}{each}"), &"0 ".repeat(60))
@@ -1440,12 +1440,12 @@
         // Trained Gaussians.
         (
             "scale.ply",
-            trained("opacity scale_0 rot_0 rot_1 rot_2 rot_3 f_dc_0"),
+            trainer("opacity scale_0 rot_0 rot_1 rot_2 rot_3 f_dc_0"),
             "scale.ply: header: the element “vertex” has no scalar property “scale_1”",
         ),
         (
             "rest.ply",
-            trained(
+            trainer(
                 "opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 f_dc_0 f_dc_1 f_dc_2 \
                  f_rest_0",
             ),
@@ -1492,7 +1492,11 @@
             spz(2, 1 << 24, 0, 20),
             "many.spz: positions: unpacks to 20 bytes where 150994944 were expected",
         ),
-        ("spz.bin", self::trained(&Folder::new(), |set, path| formats::spz::write(set, path)), "Gaussians 2 of degree 1"),
+        (
+            "spz.bin",
+            written(|path| splatkit::formats::spz::write(&trained(), path)),
+            "Gaussians 2 of degree 1",
+        ),
         (
             "version.sog",
             br#"{"version": 3}"#.to_vec(),

@@ -85,10 +85,6 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
         }
         Some(Kind::Gaussians) => {
             let set = formats::load_gaussians(path, limits)?;
-            format!("Gaussians {} {}", set.len(), set.degree)
-        }
-        Some(Kind::Gaussians) => {
-            let set = formats::load_gaussians(path, limits)?;
             format!("Gaussians {} of degree {}", set.len(), set.degree)
         }
         Some(Kind::Hierarchy) => {
@@ -430,9 +426,9 @@ pub fn splv(folder: &Folder) -> Vec<u8> {
     bytes
 }
 
-/// Returns the file of two trained Gaussians with colours of degree 1, as `write` writes it.
-pub fn trained(folder: &Folder, write: impl Fn(&Gaussians, &Path) -> Result<()>) -> Vec<u8> {
-    let set = Gaussians {
+/// Two trained Gaussians with colours of degree 1.
+pub fn trained() -> Gaussians {
+    Gaussians {
         centers: vec![Vec3::ZERO, Vec3::new(1.0, -2.0, 0.5)],
         scales: vec![Vec3::splat(0.1), Vec3::new(0.2, 0.1, 0.4)],
         rotations: vec![Quat::IDENTITY, Quat::from_rotation_x(1.0)],
@@ -440,12 +436,15 @@ pub fn trained(folder: &Folder, write: impl Fn(&Gaussians, &Path) -> Result<()>)
         degree: 1,
         harmonics: (0..8).map(|term| [0.1, -0.2, 0.05 * term as f32]).collect(),
         ..Gaussians::default()
-    };
+    }
+}
+
+/// Returns the bytes that `write` writes to a path.
+pub fn written(write: impl Fn(&Path) -> Result<()>) -> Vec<u8> {
+    let folder = Folder::new();
     let path = folder.path("written");
-    write(&set, &path).expect("a file");
-    let bytes = std::fs::read(&path).expect("bytes");
-    std::fs::remove_file(&path).ok();
-    bytes
+    write(&path).expect("a file");
+    std::fs::read(&path).expect("bytes")
 }
 
 /// A SOG archive of two Gaussians.
@@ -509,65 +508,22 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
     folder.write("a.mtl", MTL);
     folder.write("a.png", png(2, 2));
     let mut formats = formats_of_meshes();
-    formats.extend(formats_of_gaussians(folder));
+    formats.extend(formats_of_gaussians());
     formats.extend(formats_of_points());
     formats.extend(formats_of_volumes());
     formats.extend(formats_of_vtk());
-    formats.extend(formats_of_gaussians(folder));
     formats.extend(formats_of_splatkit(folder));
     formats
 }
 
-/// Two trained Gaussians of degree 1.
-pub fn gaussians() -> Gaussians {
-    let harmonics = (0..8).map(|term| [0, 1, 2].map(|c| 0.1 * (term + c) as f32 - 0.3));
-    Gaussians {
-        centers: vec![Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)],
-        scales: vec![Vec3::splat(0.5), Vec3::new(0.5, 0.2, 0.1)],
-        rotations: vec![glam::Quat::IDENTITY, glam::Quat::from_rotation_x(0.5)],
-        opacities: vec![0.9, 0.5],
-        degree: 1,
-        harmonics: harmonics.collect(),
-        ..Gaussians::default()
-    }
-}
-
-fn formats_of_gaussians(folder: &Folder) -> Vec<Format> {
-    let set = gaussians();
-    let written = |name: &str, write: &dyn Fn(&Gaussians, &Path) -> Result<()>| {
-        let path = folder.path(name);
-        write(&set, &path).expect("Gaussians are written");
-        std::fs::read(&path).expect("they were written")
-    };
-    // Without a header, whole Gaussians are missed by nobody.
-    let of_whole = |_: &[u8], at: usize| at > 0 && at.is_multiple_of(32);
-    let tree = Tree::of_gaussians(&set, &BuildOptions::default(), None).expect("a tree");
-    let hierarchy = file::to_bytes(&tree, &file::WriteOptions::default()).expect("a file");
-    vec![
-        (
-            "trained.ply",
-            written("g.ply", &|set, path| formats::ply::write_gaussians(set, path)),
-            never,
-        ),
-        (
-            "packed.ply",
-            written("h.ply", &|set, path| formats::ply::write_compressed_gaussians(set, path)),
-            never,
-        ),
-        ("a.splat", written("g.splat", &|set, path| formats::splat::write(set, path)), of_whole),
-        ("a.spz", written("g.spz", &|set, path| formats::spz::write(set, path)), never),
-        (
-            "trained.glb",
-            written("g.glb", &|set, path| formats::gltf::write_gaussians(set, path)),
-            never,
-        ),
-        ("trained.splk", hierarchy, never),
-    ]
-}
-
 /// Hierarchies, bricks and transfer functions.
 fn formats_of_splatkit(folder: &Folder) -> Vec<Format> {
+    let of_gaussians = written(|path| {
+        let (build, write) = (BuildOptions::default(), file::WriteOptions::default());
+        splatkit::hierarchy::build_gaussians(&trained(), path, &build, &write, None)
+    });
     vec![
+        ("trained.splk", of_gaussians, never),
         ("lossless.splk", splk(true), never),
         ("lossy.splk", splk(false), never),
         ("a.splv", splv(folder), never),
@@ -597,25 +553,16 @@ fn formats_of_meshes() -> Vec<Format> {
     ]
 }
 
-fn formats_of_gaussians(folder: &Folder) -> Vec<Format> {
-    let packed = |set: &Gaussians, path: &Path| formats::ply::write_compressed_gaussians(set, path);
+fn formats_of_gaussians() -> Vec<Format> {
+    let set = trained();
+    let packed = written(|path| formats::ply::write_compressed_gaussians(&set, path));
     vec![
-        (
-            "trained.ply",
-            trained(folder, |set, path| formats::ply::write_gaussians(set, path)),
-            never,
-        ),
-        ("packed.ply", trained(folder, packed), never),
-        (
-            "trained.glb",
-            trained(folder, |set, path| formats::gltf::write_gaussians(set, path)),
-            never,
-        ),
+        ("trained.ply", written(|path| formats::ply::write_gaussians(&set, path)), never),
+        ("packed.ply", packed, never),
+        ("trained.glb", written(|path| formats::gltf::write_gaussians(&set, path)), never),
         // A record has 32 bytes.
-        ("a.splat", trained(folder, |set, path| formats::splat::write(set, path)), |_, at| {
-            at == 32
-        }),
-        ("a.spz", trained(folder, |set, path| formats::spz::write(set, path)), never),
+        ("a.splat", written(|path| formats::splat::write(&set, path)), |_, at| at == 32),
+        ("a.spz", written(|path| formats::spz::write(&set, path)), never),
         ("a.sog", sog(), never),
     ]
 }

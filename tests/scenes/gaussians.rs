@@ -7,6 +7,7 @@ use super::{
 use glam::{DVec3, Quat, Vec3};
 use splatkit::{
     gaussians::{Gaussians, harmonics::terms},
+    hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
     math::Projection,
     scene::{Clip, ClipShape, Mode, Optics, Order, Scene, Settings},
 };
@@ -39,6 +40,16 @@ fn alone() -> Scene {
     Scene::new().with_gaussians(trained(400))
 }
 
+/// A hierarchy of them, drawn at a cut of some pixels.
+fn levels(name: &'static str, pixels: f64) -> Case {
+    let options = BuildOptions { block_splats: 100, ..BuildOptions::default() };
+    let tree = Tree::of_gaussians(&trained(400), &options, None).expect("a tree");
+    let hierarchy = Hierarchy::from_tree(tree).expect("a hierarchy");
+    let mut case = case(name, Scene::new().with_hierarchy(hierarchy), PERSPECTIVE);
+    case.settings.detail = Detail::Pixels(pixels);
+    case
+}
+
 pub fn all() -> Vec<Case> {
     let perspective = |name| case(name, alone(), PERSPECTIVE);
     let single = |order| Settings { mode: Mode::Splats(order), ..settings() };
@@ -61,6 +72,8 @@ pub fn all() -> Vec<Case> {
         Case { settings: xray, ..perspective("gaussians_in_x_rays") },
         Case { settings: single(Order::FrontToBack), ..perspective("whole_gaussians") },
         Case { settings: single(Order::BackToFront), ..perspective("whole_gaussians_from_behind") },
+        levels("levels_of_gaussians", 0.0),
+        levels("coarse_levels_of_gaussians", 6.0),
         case("gaussians_in_a_volume", mixed_scene().with_gaussians(trained(200)), PERSPECTIVE),
     ]
 }

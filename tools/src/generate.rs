@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use splatkit::{
     Error,
     cells::{CellKind, Cells},
-    disk, formats,
+    disk, formats, gaussians,
     input::{Limits, Source},
     memory,
     volume::{Arrangement, Lattice, Volume, phantoms::Phantom},
@@ -16,12 +16,13 @@ use std::{io::Write, path::PathBuf};
 #[derive(Args, Debug)]
 pub struct Generate {
     /// Choose the content: the phantom marschner-lobb, ball, specimen, slabs or head (in Hounsfield
-    /// units; a length of 1 stands for 100 mm), scan for a mesh, or a tube of tetrahedra,
-    /// hexahedra, wedges, pyramids, quadratic-tetrahedra or quadratic-hexahedra.
+    /// units; a length of 1 stands for 100 mm), scan for a mesh, gaussians for a trained scene, or
+    /// a tube of tetrahedra, hexahedra, wedges, pyramids, quadratic-tetrahedra or
+    /// quadratic-hexahedra.
     #[arg(value_parser = what)]
     what: What,
     /// Write to this file: a volume as .nrrd, or as .vtr on a rectilinear lattice that is densest
-    /// in the middle; scattered samples as .csv; a scan as .ply; a tube as .vtu.
+    /// in the middle; scattered samples as .csv; a scan or Gaussians as .ply; a tube as .vtu.
     #[arg(short, long, value_name = "FILE", value_parser = target)]
     output: PathBuf,
     /// Set the number of samples along each axis of the cube from −1 to 1.
@@ -48,7 +49,8 @@ pub struct Generate {
     /// its surface by waves.
     #[arg(long, value_name = "MESH", required_if_eq("what", "scan"))]
     from: Option<PathBuf>,
-    /// Set the number of scattered samples in a .csv, or the largest number of vertices of a scan.
+    /// Set the number of scattered samples in a .csv or of Gaussians, or the largest number of
+    /// vertices of a scan.
     #[arg(
         long,
         value_name = "COUNT",
@@ -80,6 +82,7 @@ enum Type {
 enum What {
     Phantom(Phantom),
     Scan,
+    Gaussians,
     Tube(CellKind),
 }
 
@@ -107,12 +110,17 @@ fn what(name: &str) -> Result<What, String> {
     if name == "scan" {
         return Ok(What::Scan);
     }
+    if name == "gaussians" {
+        return Ok(What::Gaussians);
+    }
     let tube = TUBE_NAMES.iter().position(|own| *own == name);
     if let Some(tube) = tube {
         return Ok(What::Tube(TUBES[tube]));
     }
     let names = || [&Phantom::NAMES[..], &TUBE_NAMES].concat().join(", ");
-    Phantom::named(name).map(What::Phantom).ok_or_else(|| format!("use {} or scan", names()))
+    Phantom::named(name)
+        .map(What::Phantom)
+        .ok_or_else(|| format!("use {}, gaussians or scan", names()))
 }
 
 fn target(text: &str) -> Result<PathBuf, String> {
@@ -146,6 +154,13 @@ impl Generate {
                 return Err(Failure::Usage(
                     "a scan is made from a mesh (--from) and written as .ply".into(),
                 ));
+            }
+            (What::Gaussians, _, "ply") => {
+                let set = gaussians::phantom(self.points as usize);
+                formats::ply::write_gaussians(&set, &self.output)?;
+            }
+            (What::Gaussians, ..) => {
+                return Err(Failure::Usage("trained Gaussians are made as .ply".into()));
             }
             (What::Tube(kind), _, "vtu") => {
                 formats::write_cells(&Cells::tube(kind, self.parts)?, &self.output)?;

@@ -6,6 +6,7 @@ use clap::{ArgMatches, Command};
 use serde_json::Value;
 use splatkit::{
     Error,
+    formats::{Kind, ReadOptions},
     input::Limits,
     interaction::{ClipEntry, SceneFile},
 };
@@ -58,6 +59,13 @@ pub const CAMERA: &[&str] = &[
     "path",
 ];
 
+/// Returns whether a file is a scene file, by its name. The `meta.json` of trained Gaussians (SOG)
+/// is none.
+pub fn is_scene(path: &Path) -> bool {
+    let kind = || Kind::of(path, &Limits::default(), &ReadOptions::default());
+    path.extension() == Some(OsStr::new("json")) && !matches!(kind(), Ok(Some(Kind::Gaussians)))
+}
+
 /// Returns the arguments with a scene file replaced by what it stands for; `None` if there is none.
 pub fn expanded(
     arguments: &[OsString],
@@ -69,8 +77,7 @@ pub fn expanded(
     };
     let inputs: Vec<&PathBuf> =
         own.get_many("inputs").map_or_else(Vec::new, |inputs| inputs.collect());
-    let is_scene = |path: &&&PathBuf| path.extension() == Some(OsStr::new("json"));
-    let Some(path) = inputs.iter().find(is_scene) else { return Ok(None) };
+    let Some(path) = inputs.iter().find(|path| is_scene(path)) else { return Ok(None) };
     if inputs.len() > 1 {
         return Err(Failure::Usage(format!(
             "{}: a scene file is drawn alone; add the other files to its inputs",

@@ -7,20 +7,27 @@
 
 use crate::{
     Result,
+    gaussians::{Colors, Eye},
     gpu::device::{Gpu, buffers::buffer},
     hierarchy::{
-        self, CutSphere, Hierarchy,
+        self, CutSphere, Hierarchy, Node,
         file::{PAGE_NODES, Page},
         needed::{Needed, parents_around},
+        trained,
     },
     math::View,
     parallel::prelude::*,
     scene::Settings,
+    splat::Splat,
 };
 use bytemuck::{Pod, Zeroable};
-use std::sync::{
-    Arc,
-    atomic::{AtomicU32, Ordering::Relaxed},
+use glam::{DVec3, Vec3};
+use std::{
+    collections::HashMap,
+    sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering::Relaxed},
+    },
 };
 use wgpu::BufferUsages as Usage;
 
@@ -171,6 +178,10 @@ pub struct PageCache {
     /// The slot of each page.
     slot_of: Vec<Option<u32>>,
     needed: Needed,
+    /// The pages in slots, of trained Gaussians: their colours change with the eye.
+    trained: HashMap<u32, Trained>,
+    /// The eye that the splats in the slots are coloured for.
+    eye: Option<Eye>,
     frame: u64,
     /// Pages that the last view needed but that found no slot.
     pub missing: usize,
@@ -186,6 +197,8 @@ impl PageCache {
             slots: Vec::new(),
             slot_of: vec![None; pages],
             needed: Needed::new(hierarchy),
+            trained: HashMap::new(),
+            eye: None,
             frame: 0,
             missing: 0,
         }
@@ -224,17 +237,19 @@ impl PageCache {
         gpu.queue.write_buffer(&self.cut, 0, bytemuck::bytes_of(&uniform));
     }
 
-    /// Brings the pages that a cut needs to the GPU, within `room` bytes. `chunks` are the chunks
-    /// of this hierarchy in order, each with its splats. Returns the chunks that were added.
+    /// Brings the pages that a cut needs to the GPU, within `room` bytes, as an eye sees them.
+    /// `chunks` are the chunks of this hierarchy in order, each with its splats. Returns the chunks
+    /// that were added.
     pub fn update(
         &mut self,
         gpu: &Gpu,
-        cut: &hierarchy::Cut,
+        (cut, eye): (&hierarchy::Cut, Eye),
         room: u64,
         chunks: &[(&Slots, &wgpu::Buffer)],
     ) -> Result<Vec<Growth>> {
         self.frame += 1;
         self.set_cut(gpu, cut);
+        let is_new_eye = self.eye.replace(eye) != Some(eye);
         let mut needed = self.needed(cut);
         let most = usize::try_from(room / SLOT_BYTES).unwrap_or(usize::MAX).max(1);
         self.missing = needed.len().saturating_sub(most);
@@ -245,6 +260,9 @@ impl PageCache {
                 Some(slot) => self.slots[slot as usize] = Some((page, self.frame)),
                 None => absent.push(page),
             }
+        }
+        if is_new_eye {
+            self.recolor(gpu, eye, chunks);
         }
         let free = self.slots.iter().filter(|slot| slot.is_none()).count();
         let held = self.slots.len();
@@ -258,7 +276,7 @@ impl PageCache {
             .copied()
             .chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats)))
             .collect();
-        if let Err(error) = self.load(gpu, &absent, &all) {
+        if let Err(error) = self.load(gpu, &absent, eye, &all) {
             // Drop the added chunks and the pages in them.
             for (page, _) in self.slots.drain(held..).flatten() {
                 self.slot_of[page as usize] = None;
@@ -301,6 +319,7 @@ impl PageCache {
         &mut self,
         gpu: &Gpu,
         absent: &[u32],
+        eye: Eye,
         chunks: &[(&Slots, &wgpu::Buffer)],
     ) -> Result<()> {
         let mut places: Vec<u32> = (0..self.slots.len() as u32).collect();
@@ -320,6 +339,7 @@ impl PageCache {
                 };
                 if let Some((old, _)) = self.slots[slot as usize] {
                     self.slot_of[old as usize] = None;
+                    self.trained.remove(&old);
                 }
                 self.slots[slot as usize] = Some((page, self.frame));
                 self.slot_of[page as usize] = Some(slot);
@@ -330,8 +350,14 @@ impl PageCache {
                 let place = (slot as usize - slots.first_slot) as u64;
                 let nodes: Vec<GpuNode> =
                     (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
-                let own: Vec<crate::splat::Splat> =
-                    content.nodes.iter().map(|node| node.splat).collect();
+                let own: Vec<Splat> = match Trained::of(content) {
+                    None => content.nodes.iter().map(|node| node.splat).collect(),
+                    Some(trained) => {
+                        let seen = trained.seen(eye, self.hierarchy.header().origin);
+                        self.trained.insert(page, trained);
+                        seen
+                    }
+                };
                 let runs = (0..content.nodes.len()).step_by(RUN_NODES as usize);
                 let bounds: Vec<GpuBounds> = runs.map(|first| run_bounds(content, first)).collect();
                 gpu.queue.write_buffer(
@@ -350,6 +376,26 @@ impl PageCache {
             gpu.queue.submit([]);
         }
         Ok(())
+    }
+
+    /// Uploads the pages of trained Gaussians that take part in this frame, as an eye sees them.
+    fn recolor(&self, gpu: &Gpu, eye: Eye, chunks: &[(&Slots, &wgpu::Buffer)]) {
+        let origin = self.hierarchy.header().origin;
+        for (slots, splats) in chunks {
+            let own = &self.slots[slots.first_slot..slots.first_slot + slots.count];
+            let taking_part = (0u64..).zip(own).filter_map(|(place, slot)| match slot {
+                Some((page, frame)) if *frame == self.frame => {
+                    Some((place, self.trained.get(page)?))
+                }
+                _ => None,
+            });
+            let taking_part: Vec<(u64, &Trained)> = taking_part.collect();
+            let seen = |(place, page): &(u64, &Trained)| (*place, page.seen(eye, origin));
+            let seen: Vec<(u64, Vec<Splat>)> = taking_part.par_iter().map(seen).collect();
+            for (place, own) in seen {
+                gpu.queue.write_buffer(splats, place * SLOT_HALF, bytemuck::cast_slice(&own));
+            }
+        }
     }
 
     /// Uploads which pages take part in this frame, and which are loaded.
@@ -375,6 +421,35 @@ impl PageCache {
             slots.active.store(active.len() as u32, Relaxed);
             gpu.queue.write_buffer(&slots.slots, 0, bytemuck::cast_slice(&active));
         }
+    }
+}
+
+/// The splats of a page of trained Gaussians, and their colours.
+#[derive(Debug)]
+struct Trained {
+    splats: Vec<Splat>,
+    are_leaves: Vec<bool>,
+    colors: Colors,
+}
+
+impl Trained {
+    /// Returns `None` for a page of other splats.
+    fn of(page: &Page) -> Option<Self> {
+        Some(Self {
+            splats: page.nodes.iter().map(|node| node.splat).collect(),
+            are_leaves: page.nodes.iter().map(Node::is_leaf).collect(),
+            colors: page.colors.clone()?,
+        })
+    }
+
+    /// Returns the splats as an eye sees them; `origin` is that of their positions.
+    fn seen(&self, eye: Eye, origin: DVec3) -> Vec<Splat> {
+        let both = self.splats.iter().zip(&self.are_leaves).enumerate();
+        both.map(|(index, (splat, is_leaf))| {
+            let place = origin + Vec3::from(splat.center).as_dvec3();
+            trained::drawn(splat, *is_leaf, 1.0, self.colors.seen(index, eye.toward(place)))
+        })
+        .collect()
     }
 }
 

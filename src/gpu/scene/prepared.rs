@@ -587,7 +587,7 @@ impl PreparedScene {
                     _ => None,
                 })
                 .collect();
-            let grown = self.page_caches[index].update(gpu, &cut, room, &own)?;
+            let grown = self.page_caches[index].update(gpu, (&cut, Eye::of(view)), room, &own)?;
             for Growth { slots, splats, capacity } in grown {
                 self.bytes += slots.bytes();
                 self.push_chunk(

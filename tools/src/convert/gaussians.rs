@@ -185,11 +185,8 @@ impl Convert {
         let start = Instant::now();
         let bar = progress.bar("Building the hierarchy", set.len() as u64);
         let watch = |done: u64, _: u64| bar.set(done);
-        let frame = Frame {
-            stance: set.about.stance.or(Some(Stance::Y_DOWN)),
-            is_guessed: set.about.stance.is_none(),
-            unit: set.about.length.clone(),
-        };
+        let frame =
+            Frame { stance: set.about.stance, is_guessed: false, unit: set.about.length.clone() };
         let build = self.surface.build_options_of(false, points, self.load.limits().deadline());
         let write = self.surface.write_options(&self.files, &frame);
         if self.dry_run {
@@ -248,8 +245,9 @@ impl Convert {
             return Ok(Gathered { set, points, read_ms: milliseconds(start) });
         }
         if self.load.kind(path)? != Kind::Gaussians {
-            let (set, points) = self.surfels_of(path, progress)?;
-            let set = Gaussians::from_splats(&set).map_err(|error| in_file(path, error))?;
+            let (set, points, stance) = self.surfels_of(path, progress)?;
+            let mut set = Gaussians::from_splats(&set).map_err(|error| in_file(path, error))?;
+            set.about.stance = stance;
             return Ok(Gathered { set, points, read_ms: milliseconds(start) });
         }
         progress.stage(format!("Reading {}", path.display()));
@@ -260,6 +258,8 @@ impl Convert {
         let Input::Gaussians(mut set) = input else {
             return Err(Error::input(path, "file", "holds no Gaussians").into());
         };
+        // Files of trainers do not say what is up: it is −y.
+        set.about.stance = set.about.stance.or(Some(Stance::Y_DOWN));
         let scale = self.surface.radius_scale();
         set.scales.iter_mut().for_each(|own| *own *= scale);
         let points = set.len() as u64;

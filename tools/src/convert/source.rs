@@ -83,7 +83,7 @@ impl Convert {
 fn none(file: &Path) -> Failure {
     let file = file.display();
     Failure::Usage(format!(
-        "{file} holds no volume; meshes, point clouds, Gaussians and hierarchies are written in other formats: \
-         .splk, .ply, .splat, .spz, .glb"
+        "{file} holds no volume; meshes, point clouds, hierarchies and trained Gaussians are \
+         written as .splk, .ply, .splat, .spz or .glb"
     ))
 }

@@ -175,15 +175,16 @@ impl Convert {
         ))
     }
 
-    /// Returns the splats of an input that is no trained scene, and the number of its points.
+    /// Returns the splats of an input that is no trained scene, the number of its points, and how it
+    /// stands.
     pub(super) fn surfels_of(
         &self,
         path: &Path,
         progress: &Progress,
-    ) -> Result<(SplatSet, u64), Failure> {
+    ) -> Result<(SplatSet, u64, Option<Stance>), Failure> {
         let own = self.splats_of(path, 0, progress)?;
         hierarchy::check_splats(&own.set).map_err(|error| in_file(path, error))?;
-        Ok((own.set, own.points))
+        Ok((own.set, own.points, own.frame.stance))
     }
 
     /// Reads all inputs and makes splats of them, relative to the first input's origin.

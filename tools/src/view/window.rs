@@ -167,8 +167,7 @@ impl Window {
 
     /// Adds files to the scene, or opens a scene file in place of it.
     pub fn open(&mut self, files: Vec<PathBuf>) {
-        let is_scene = |path: &PathBuf| path.extension().is_some_and(|own| own == "json");
-        if let Some(path) = files.iter().find(|path| is_scene(path)) {
+        if let Some(path) = files.iter().find(|path| scene_file::is_scene(path)) {
             match SceneFile::read(path, &splatkit::input::Limits::default()) {
                 Ok(scene) => {
                     self.document = Document::new(scene);

@@ -3,13 +3,15 @@
 
 use super::NAME;
 use crate::{
-    Error, Result, disk,
+    Error, Result,
+    about::Stance,
+    disk,
     gaussians::{
         Gaussians,
         harmonics::{CONSTANT, terms},
     },
 };
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DQuat, DVec3, Vec3};
 use serde_json::{Map, Value, json};
 use std::{
     io::{self, Write},
@@ -21,8 +23,9 @@ const UNSIGNED_SHORT: u32 = 5123;
 const ARRAY_BUFFER: u32 = 34962;
 
 /// Writes Gaussians as a GLB with the extension `KHR_gaussian_splatting`. Positions are relative to
-/// the origin, which is the translation of the node. Programs without the extension show points
-/// with the constant part of the colours.
+/// the origin, which is the translation of the node. A scene with a stance stands upright in
+/// viewers: a node turns it, without which −y would be up in scenes of trainers. Programs without
+/// the extension show points with the constant part of the colours.
 ///
 /// # Errors
 /// [`Error::Argument`] for a set that is empty or not valid, or that does not fit the 4 GiB of a
@@ -32,7 +35,7 @@ pub fn write_gaussians(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     if set.is_empty() {
         return Err(Error::Argument("a glTF file needs at least one Gaussian".into()));
     }
-    let nodes = nodes(set.origin)?;
+    let nodes = nodes(set.origin, set.about.stance.unwrap_or(Stance::Y_UP))?;
     let columns = columns(set.degree);
     let (json, binary) = scene(set, &columns, &nodes);
     let mut text = json.to_string().into_bytes();
@@ -140,16 +143,23 @@ fn columns(degree: u32) -> Vec<Column> {
 }
 
 /// Returns the nodes. Their translations are read in 32 bits, so a second node adds what one of
-/// them does not hold.
-fn nodes(origin: DVec3) -> Result<Value> {
+/// them does not hold. A scene that does not stand as glTF's do is turned by a node above them.
+fn nodes(origin: DVec3, Stance { up, front }: Stance) -> Result<Value> {
     let shift = origin.as_vec3();
     if !shift.is_finite() {
         return Err(Error::Argument(format!("the origin {origin} is too far for a glTF file")));
     }
     let rest = (origin - shift.as_dvec3()).as_vec3();
     let mut nodes = Vec::new();
+    if (up, front) != (DVec3::Y, DVec3::Z) {
+        // The inverse turns the scene's up to y, and its front to z.
+        let turn = DQuat::from_mat3(&DMat3::from_cols(up.cross(front), up, front)).inverse();
+        let turn = turn.normalize().to_array().map(|part| part as f32);
+        nodes.push(json!({"rotation": turn, "children": [1]}));
+    }
     if rest != Vec3::ZERO {
-        nodes.push(json!({"translation": shift.to_array(), "children": [1]}));
+        let below = nodes.len() + 1;
+        nodes.push(json!({"translation": shift.to_array(), "children": [below]}));
         nodes.push(json!({"translation": rest.to_array(), "mesh": 0}));
     } else if shift != Vec3::ZERO {
         nodes.push(json!({"translation": shift.to_array(), "mesh": 0}));
