@@ -4,6 +4,7 @@ mod bleeding;
 mod dense;
 mod detail;
 mod files;
+mod gaussians;
 mod marschner_lobb;
 mod popping;
 mod ripple;
@@ -43,8 +44,8 @@ pub struct Figures {
         conflicts_with_all = ["files", "only"]
     )]
     surfaces: Vec<surfaces::Source>,
-    /// Write the pictures of surfaces to this folder.
-    #[arg(long, value_name = "FOLDER", requires = "surfaces")]
+    /// Write the pictures of surfaces or Gaussians to this folder.
+    #[arg(long, value_name = "FOLDER")]
     pictures: Option<PathBuf>,
     /// Replace existing pictures.
     #[arg(long, requires = "pictures")]
@@ -59,6 +60,15 @@ pub struct Figures {
         conflicts_with_all = ["files", "only"]
     )]
     detail: Vec<surfaces::Source>,
+    /// Measure trained Gaussians only: a made scene, and those of these files. With --pictures,
+    /// write the pictures of a view of 120°.
+    #[arg(
+        long,
+        value_name = "FILE",
+        num_args = 0..,
+        conflicts_with_all = ["files", "only", "surfaces", "detail"]
+    )]
+    gaussians: Option<Vec<PathBuf>>,
     /// Measure these parts only.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,…")]
     only: Vec<Part>,
@@ -122,6 +132,9 @@ impl Figures {
             .map(|path| Block::open(path, "figures", "figures"))
             .transpose()?;
         self.look_at_inputs()?;
+        if self.pictures.is_some() && self.surfaces.is_empty() && self.gaussians.is_none() {
+            return Err(Failure::Usage("--pictures is for --surfaces and --gaussians".into()));
+        }
         let pictures = match &self.pictures {
             Some(folder) => surfaces::pictures(&self.surfaces, folder, self.overwrite)?,
             None => Vec::new(),
@@ -162,6 +175,14 @@ impl Figures {
             let open = |path: &Path| self.load.open(path);
             report.tables.extend(detail::tables(&mut stage, &self.detail, open, progress)?);
         }
+        if let Some(files) = &self.gaussians {
+            let mut cases = vec![gaussians::Case::made()];
+            for file in files {
+                cases.push(self.case_of_gaussians(file)?);
+            }
+            let folder = self.pictures.as_deref();
+            report.tables.extend(gaussians::tables(&mut stage, &cases, folder, progress)?);
+        }
         progress.clear();
         let text = report.markdown();
         // Printed first: if the file cannot be written after all, nothing has to be measured again.
@@ -170,15 +191,26 @@ impl Figures {
         } else {
             output::line(text.trim_end())?;
         }
-        let is_all = self.only.is_empty() && self.surfaces.is_empty() && self.detail.is_empty();
+        let is_all = self.only.is_empty() && self.are_generated();
         let page = |old: &str| if is_all { text } else { report.among(old) };
         block.map_or(Ok(()), |block| block.replace(page))
     }
 
     fn measures(&self, part: Part) -> bool {
-        self.surfaces.is_empty()
-            && self.detail.is_empty()
-            && (self.only.is_empty() || self.only.contains(&part))
+        self.are_generated() && (self.only.is_empty() || self.only.contains(&part))
+    }
+
+    /// Returns whether the parts with generated data are measured.
+    fn are_generated(&self) -> bool {
+        self.surfaces.is_empty() && self.detail.is_empty() && self.gaussians.is_none()
+    }
+
+    fn case_of_gaussians(&self, file: &Path) -> Result<gaussians::Case, Failure> {
+        let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        match self.load.open(file)? {
+            crate::load::Input::Gaussians(set) => Ok(gaussians::Case { name, set }),
+            _ => Err(Error::input(file, "file", gaussians::OTHER).into()),
+        }
     }
 
     /// Refuses files that cannot be measured, before any file is.

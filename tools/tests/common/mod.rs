@@ -4,6 +4,7 @@
 
 #[path = "../../../tests/testing/folder.rs"]
 mod folder;
+pub mod trained;
 
 pub use folder::Folder;
 
