@@ -15,7 +15,7 @@ pub struct Picture {
     /// Height in pixels.
     pub height: u32,
     /// Red, green and blue multiplied by opacity, then opacity; 0 … 1, as displayed (not linear
-    /// light).
+    /// light). Trained Gaussians may be brighter than 1; pictures are saved with at most 1.
     pub color: Vec<[f32; 4]>,
     /// View-space z, in world units, at which half of the light is absorbed; infinite if less than
     /// half is absorbed along the ray.

@@ -140,9 +140,9 @@ pub enum Payload {
     Radiance,
     /// A sample value, classified after interpolation by the scene's transfer function.
     Scalar,
-    /// Colour and opacity of a trained Gaussian ([`crate::gaussians`]). A negative strength is minus
-    /// what it covers at its centre. A positive one is an optical depth: such a splat stands for
-    /// several Gaussians, seen from afar. The colour is that of [`decode_trained_color`].
+    /// Colour and opacity of a trained Gaussian ([`crate::gaussians`]). A negative strength is
+    /// minus what it covers at its centre. A positive one is an optical depth: such a splat stands
+    /// for several Gaussians, seen from afar. The colour is that of [`decode_trained_color`].
     Trained,
 }
 

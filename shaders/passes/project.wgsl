@@ -41,7 +41,8 @@ fn write_general(at: u32, splat: Candidate) {
     let extent2 = splat.extent * splat.extent * select(-1.0, 1.0, (source.flags & RADIANCE) != 0u);
     records[at] = vec4(splat.center, splat.strength);
     records[at + 1u] = vec4(i00, i10, i20, i11);
-    records[at + 2u] = vec4(i21, i22, extent2, 0.0);
+    let is_trained = TRAINED && (source.flags & TRAINED_FLAG) != 0u;
+    records[at + 2u] = vec4(i21, i22, extent2, select(0.0, 1.0, is_trained));
     var payload = vec4(bitcast<f32>(splat.color), bitcast<f32>(splat.normal), 0.0, splat.weight);
     if (source.flags & RADIANCE) == 0u {
         if SAMPLE_NORMALS {

@@ -163,7 +163,6 @@ fn facing_weight(normal: vec3<f32>, center: vec3<f32>) -> f32 {
 // The colours of trained Gaussians are in this unit; what they cover of a pixel is at least the
 // first share, and at most the second: see splat.rs.
 const TRAINED_COLOR: f32 = 1.0 / 8192.0;
-const BRIGHTEST_TRAINED: f32 = 65535.0 * TRAINED_COLOR;
 const TRAINED_OPACITIES: vec2<f32> = vec2(1.0 / 255.0, 0.99);
 
 // Returns the optical depth with which a trained Gaussian covers a share of a pixel: −ln(1 − α) =
@@ -201,7 +200,7 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
     splat.facing = 1.0;
     // The sign of the squared extent says which payload it is.
     splat.is_radiance = RADIANCE_PAYLOAD && (!(SUMS || CLASSIFIED) || c.z > 0.0);
-    if TRAINED && a.w < 0.0 {
+    if TRAINED && c.w > 0.0 {
         let first = bitcast<u32>(d.x);
         let second = bitcast<u32>(d.y);
         let green = (((first >> 16u) & 255u) << 8u) | ((second >> 16u) & 255u);

@@ -7,6 +7,12 @@ const LEAST_DEPTH: f32 = 1e-5;
 // Optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
 
+// The largest channel of a trained Gaussian: see splat.rs.
+const BRIGHTEST_TRAINED: f32 = 65535.0 / 8192.0;
+
+// Beside trained Gaussians, a sheet is fully lit from the inverse of this share of normals on.
+const LIT_BY: f32 = 2.0;
+
 // Returns a lit colour: Blinn's model (1977) with a light at the eye, on both sides. `certain` is a
 // magnitude up to which the normal does not count, and one over the magnitudes over which it comes
 // to count in full.
@@ -101,7 +107,10 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
             let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
             // Splats without a normal keep their colours.
             if dot(normal, normal) > 0.0 {
-                color = lit(color, normal, direction_of(r), frame.surface_shade);
+                let shown = lit(color, normal, direction_of(r), frame.surface_shade);
+                // The share of what is lit: Gaussians are not.
+                let share = LIT_BY * length(normal) / max(pixels[r].facing.x, 1e-12);
+                color = mix(color, shown, select(1.0, min(share, 1.0), TRAINED));
             }
             pixels[r].normal_x = shift(pixels[r].normal_x);
             pixels[r].normal_y = shift(pixels[r].normal_y);

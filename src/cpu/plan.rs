@@ -62,6 +62,10 @@ pub struct Plan<'a> {
     /// The scene has facets.
     pub has_facets: bool,
     pub lit_surfaces: bool,
+    /// The scene has trained Gaussians, which are not lit.
+    pub has_trained: bool,
+    /// The largest channel of a colour of radiance.
+    pub brightest: f32,
     /// The number of convex regions that are kept, and of boxes that are cut out.
     pub clips: usize,
     pub holes: usize,
@@ -104,6 +108,8 @@ impl<'a> Plan<'a> {
             has_radiance: false,
             has_facets: false,
             lit_surfaces: false,
+            has_trained: scene.items.iter().any(Item::is_trained),
+            brightest: scene.brightest(),
             clips,
             holes,
         };

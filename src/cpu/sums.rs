@@ -16,6 +16,8 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 pub const WINDOW: usize = 4;
 /// A sheet with less optical depth than this has no colour: the sum may be a rounding remainder.
 const LEAST_DEPTH: f32 = 1e-5;
+/// Beside trained Gaussians, a sheet is fully lit from the inverse of this share of normals on.
+const LIT_BY: f32 = 2.0;
 
 /// The radiance sums of eight pixels: optical depth; then the facing weights, colours and normals,
 /// each weighted by optical depth.
@@ -148,13 +150,21 @@ impl<S: Simd> Sums<S> {
         // If next to nothing faces the eye, rounding may have left a weight of any sign.
         let inverse = one / facing.max(Lanes::splat(simd, 1e-12));
         let sum = [red, green, blue];
-        let mut color = three!(I => (sum[I] * inverse).max(self.none).min(one));
+        let most = Lanes::splat(simd, plan.brightest);
+        let mut color = three!(I => (sum[I] * inverse).max(self.none).min(most));
         if plan.lit_surfaces {
             let normal = [x, y, z];
             let direction = packet.rays.direction;
             let lit = plan.lit(simd, color, normal, direction, plan.frame.surface_shade);
-            let has_normal = (x * x + y * y + z * z).simd_gt(0.0);
-            color = three!(I => has_normal.select(lit[I], color[I]));
+            let size2 = x * x + y * y + z * z;
+            let has_normal = size2.simd_gt(0.0);
+            if plan.has_trained {
+                // The share of what is lit: Gaussians are not.
+                let share = (size2.sqrt() * inverse * LIT_BY).min(one);
+                color = three!(I => share.mul_add(lit[I] - color[I], color[I]));
+            } else {
+                color = three!(I => has_normal.select(lit[I], color[I]));
+            }
         }
         let counts = depth.simd_ge(LEAST_DEPTH);
         let depth = counts.select(depth, self.none);

@@ -26,8 +26,8 @@
 //!   with the colour of its harmonics in the direction from the eye to its centre. It is widened by
 //!   (√0.3 pixel)², and covers the share α = min(0.99, o·exp(−ρ²/2)) of a ray that passes it at ρ,
 //!   with o its opacity. If α < 1/255 it covers nothing. Its optical depth on the ray is
-//!   −ln(1 − α), spread like its line integral (Kerbl et al. 2023 draw whole Gaussians; [`trained`]
-//!   draws by their formulas).
+//!   −ln(1 − α), spread like its line integral. Its colour may exceed 1. (Kerbl et al. 2023 draw
+//!   whole Gaussians; [`trained`] draws by their formulas.)
 //! - A sample of a lattice has the profile of its volume's kernel, and B = A·U·u. A holds the steps
 //!   of the lattice, U is the sample's unit in steps, u the kernel's unit. Lattice samples are not
 //!   widened. Their lattice is `drawn_lattice` and their values are `drawn_value`: the volume's
@@ -113,7 +113,8 @@
 //! share is the sheet's share of the Gaussian along the ray (Zwicker et al. 2001 take the whole
 //! kernel). In a sheet the optical depths add. Colours and normals are averaged, weighted by
 //! optical depth and by how much the splats face the eye: 0.5 − 4·n·ĉ, clamped to 1/255 … 1. The
-//! average is lit once if some splat has a normal. Sheets with an optical depth below 10⁻⁵ have no
+//! average is lit once if some splat has a normal. In a scene with trained Gaussians, which are not
+//! lit, the lit colour counts by min(1, 2·|n̄|), with n̄ the average normal. Sheets with an optical depth below 10⁻⁵ have no
 //! radiance. Splats whose closest approach s* is clipped away do not count.
 //!
 //! **Facets** are triangles. A facet fills a share of a pixel: the area of the pixel's square
@@ -211,7 +212,6 @@ use crate::{
         Classification, Clip, Evaluate, Gradient, Item, MOST_GATHERED, Mode, Optics, Scene,
         Settings,
     },
-    splat::BRIGHTEST_TRAINED,
     volume::{Lattice, Shade},
 };
 use cells::Solids;
@@ -327,6 +327,8 @@ struct Frame<'a> {
     lattice: Option<&'a Lattice>,
     /// The shading of radiance.
     shade: Option<Shade>,
+    /// Whether the scene has trained Gaussians.
+    has_trained: bool,
     /// The largest channel of a colour of radiance.
     brightest: f64,
     /// The minimum sum of kernels for which a value exists.
@@ -365,11 +367,8 @@ impl<'a> Frame<'a> {
         let all = settings.optics == Optics::Maximum;
         Self {
             solids: Solids::of(flat, &view, field.as_ref(), all),
-            brightest: if scene.items.iter().any(Item::is_trained) {
-                f64::from(BRIGHTEST_TRAINED)
-            } else {
-                1.0
-            },
+            has_trained: scene.items.iter().any(Item::is_trained),
+            brightest: scene.brightest().into(),
             least_sum: kernel.unwrap_or_default().least_sum(),
             mode: settings.mode,
             optics: settings.optics,
@@ -447,7 +446,11 @@ impl<'a> Frame<'a> {
         let color = match &self.shade {
             _ if self.optics == Optics::XRay => DVec3::ONE,
             Some(shade) if light.has_normal => {
-                shade::lit(light.color / light.facing, light.normal, ray.direction, shade)
+                let color = light.color / light.facing;
+                let lit = shade::lit(color, light.normal, ray.direction, shade);
+                let share = light.normal.length() / light.facing;
+                // Gaussians are not lit.
+                if self.has_trained { color.lerp(lit, (2.0 * share).min(1.0)) } else { lit }
             }
             _ => light.color / light.facing,
         };

@@ -23,7 +23,7 @@ use crate::{
     gaussians::Gaussians,
     hierarchy::Hierarchy,
     math::{Bounds, Kernel, Tensor},
-    splat::SplatSet,
+    splat::{BRIGHTEST_TRAINED, SplatSet},
     volume::{TransferFunction, Volume},
 };
 use std::sync::Arc;
@@ -176,6 +176,12 @@ impl Scene {
         let is_of_splats =
             |item: &Item| item.lattice().is_none() && !matches!(item, Item::Cells(..));
         self.items.iter().any(is_of_splats)
+    }
+
+    /// Returns the largest channel of a colour in the scene: 1, but trained Gaussians are brighter
+    /// where their trainer made them so.
+    pub(crate) fn brightest(&self) -> f32 {
+        if self.items.iter().any(Item::is_trained) { BRIGHTEST_TRAINED } else { 1.0 }
     }
 
     /// Whether any part can become opaque enough to hide what lies behind it. Surfaces can. A field

@@ -73,7 +73,8 @@ pub struct CameraFlags {
     #[arg(long)]
     orthographic: bool,
     /// Set the scene's up axis: +X, -X, +Y, -Y, +Z, -Z or X,Y,Z [default: as the first input says
-    /// that does; +Z for volumes and samples; otherwise guessed from the shape]
+    /// that does; +Z for volumes and samples, -Y for trained Gaussians; otherwise guessed from the
+    /// shape]
     #[arg(
         long,
         value_name = "AXIS",

@@ -731,16 +731,25 @@ fn trained_gaussians_are_told() {
     let folder = Folder::new();
     folder.put("a.ply", PLY);
     folder.run("convert a.ply -o gaussians.ply").ok();
-    let warning = "gaussians.ply: contains trained 3D Gaussians, whose shapes and colours are not \
-                   read yet; their centres are drawn as points";
-    for arguments in ["info gaussians.ply", "convert gaussians.ply -o a.splk"] {
-        let run = folder.run(arguments);
-        assert!(
-            run.code() == Some(0) && run.stderr().matches(warning).count() == 1,
-            "{arguments}: {}",
-            run.stderr()
-        );
-    }
+    let facts = folder.json("info gaussians.ply --json");
+    assert_eq!(facts["kind"].as_str(), Some("trained Gaussians"));
+    // Whoever names an array asks for points.
+    let run = folder.run("info gaussians.ply --scalar opacity");
+    let text = run.stdout();
+    assert!(text.contains("kind            samples"), "{text}{}", run.stderr());
+    folder
+        .run("transfer gaussians.ply -o t.json")
+        .fails(3, &["gaussians.ply", "colours of its own"]);
+    folder
+        .run("convert gaussians.ply -o a.nrrd")
+        .fails(2, &["gaussians.ply holds no volume", "trained Gaussians"]);
+    folder
+        .run("render gaussians.ply -o a.png --color red")
+        .fails(2, &["--color colours meshes and point clouds, but there are none"]);
+    folder.put("a.ksplat", [0; 4096]);
+    folder
+        .run("render a.ksplat -o a.png")
+        .fails(3, &["a packed scene of trained 3D Gaussians", "splat-transform"]);
     assert!(!folder.run("info a.ply").stderr().contains("Gaussians"));
 }
 

@@ -98,15 +98,16 @@ fn what_cannot_be_converted_is_told() {
     folder.run("convert a.nrrd -o a.nrrd").fails(1, &["exists already", "--overwrite"]);
     folder.run("convert a.nrrd -o none/b.nrrd").fails(1, &["folder does not exist"]);
     folder.run("convert a.ply -o b.nrrd").fails(2, &["a.ply", "holds no volume"]);
-    for output in ["b.splk", "b.ply"] {
+    for output in ["b.splk", "b.ply", "b.compressed.ply", "b.splat", "b.spz", "b.glb"] {
         folder
             .run(&format!("convert a.nrrd -o {output}"))
             .fails(2, &["hierarchies are built from meshes and point clouds"]);
     }
     for output in ["b", "-"] {
-        folder
-            .run(&format!("convert a.nrrd -o {output}"))
-            .fails(2, &["only .splk, .ply, .nrrd and .splv files can be written"]);
+        folder.run(&format!("convert a.nrrd -o {output}")).fails(
+            2,
+            &["only .splk, .ply, .splat, .spz, .glb, .nrrd and .splv files can be written"],
+        );
     }
     folder.put("samples.csv", "x,y,z,value\n1,2,3,4\n5,6,7,8\n");
     folder.run("convert samples.csv -o b.nrrd").fails(
@@ -136,7 +137,8 @@ fn flags_are_for_some_formats() {
         ("a.ply -o b.ply --preset best", "--preset is for .splk files"),
         ("a.ply -o b.ply --unit mm", "--unit is for .splk and .splv files"),
         ("a.nrrd -o b.splv --up z", "--up is for .splk files"),
-        ("a.nrrd -o b.nrrd --radius-scale 1", "--radius-scale is for .splk and .ply files"),
+        ("a.nrrd -o b.nrrd --radius-scale 1", "--radius-scale is for .splk and .ply and .splat"),
+        ("a.nrrd -o b.splv --degree 1", "--degree is for .splk and .ply and .splat"),
     ] {
         folder.run(&format!("convert {arguments}")).fails(2, &[flag]);
     }

@@ -175,8 +175,8 @@ impl Convert {
         ))
     }
 
-    /// Returns the splats of an input that is no trained scene, the number of its points, and how it
-    /// stands.
+    /// Returns the splats of an input that is no trained scene, the number of its points, and how
+    /// it stands.
     pub(super) fn surfels_of(
         &self,
         path: &Path,

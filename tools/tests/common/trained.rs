@@ -134,8 +134,8 @@ impl Apart {
         widen(&mut self.opacity, f64::from((a.opacities[i] - b.opacities[j]).abs()));
         let pairs = a.harmonics_of(i).iter().zip(b.harmonics_of(j));
         for (term, (a, b)) in pairs.enumerate() {
-            let most = if term == 0 { &mut self.constant } else { &mut self.rest };
-            a.iter().zip(b).for_each(|(a, b)| widen(most, f64::from((a - b).abs())));
+            let miss = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            widen(if term == 0 { &mut self.constant } else { &mut self.rest }, miss.into());
         }
     }
 
@@ -238,7 +238,6 @@ impl Codebook {
 /// Writes a scene as SOG, version 2: a text of this name, and planes beside it.
 pub fn sog(folder: &Folder, name: &str, set: &Gaussians) {
     let path = folder.path(name);
-    let each = || 0..set.len();
     let means = positions(&path, set);
     let [scales, constants] = [LOGS, [-CONSTANT, CONSTANT]].map(Codebook);
     let of_scale = |scale: &Vec3| {
@@ -251,7 +250,7 @@ pub fn sog(folder: &Folder, name: &str, set: &Gaussians) {
         let [r, g, b] = set.harmonics_of(index)[0].map(|term| constants.byte(term));
         [r, g, b, (set.opacities[index] * 255.0).round() as u8]
     };
-    plane(&path, "c.webp", WIDTH, each().map(of_color).collect());
+    plane(&path, "c.webp", WIDTH, (0..set.len()).map(of_color).collect());
     let mut meta = json!({
         "version": 2,
         "count": set.len(),
