@@ -98,8 +98,7 @@ fn ball(index: usize, count: usize) -> Made {
 
 fn ring(index: usize, count: usize) -> Made {
     const RADII: [f32; 2] = [0.55, 0.2];
-    let [around, across, _] = random::<3>(index);
-    let (u, v) = (TAU * around, TAU * across);
+    let (u, v) = (golden(index), TAU * (index as f32 + 0.5) / count as f32);
     let outward = Vec3::new(u.cos(), 0.0, u.sin());
     let normal = outward * v.cos() + Vec3::Y * v.sin();
     let middle = Vec3::new(0.9, 0.6, -0.2) + RADII[0] * outward;

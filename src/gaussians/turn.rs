@@ -4,8 +4,9 @@
 //! the integral of the products of turned and unturned terms over the sphere. A few directions with
 //! weights give these integrals exactly.
 
-use super::{MOST_DEGREE, harmonics::terms};
-use glam::{DMat3, DVec3};
+use super::{Gaussians, MOST_DEGREE, harmonics::terms};
+use crate::{about::Stance, parallel::prelude::*};
+use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::PI;
 
 /// Most terms.
@@ -68,6 +69,29 @@ impl Turn {
                 });
             }
         }
+    }
+}
+
+impl Gaussians {
+    /// Turns a scene of a known stance in the world, so that it has another one.
+    pub fn stand(&mut self, wanted: Stance) {
+        let axes = |stance: Stance| {
+            DMat3::from_cols(stance.up.cross(stance.front), stance.up, stance.front)
+        };
+        let Some(own) = self.about.stance.replace(wanted).filter(|own| *own != wanted) else {
+            return;
+        };
+        let rotation = axes(wanted) * axes(own).transpose();
+        let (quat, colors) = (DQuat::from_mat3(&rotation), turn(self.degree, rotation));
+        self.origin = rotation * self.origin;
+        self.centers.par_iter_mut().for_each(|center| {
+            *center = (rotation * center.as_dvec3()).as_vec3();
+        });
+        self.rotations.par_iter_mut().for_each(|own| {
+            *own = (quat * own.as_dquat()).normalize().as_quat();
+        });
+        let terms = terms(self.degree);
+        self.harmonics.par_chunks_exact_mut(terms).for_each(|own| colors.apply(own));
     }
 }
 
@@ -149,6 +173,40 @@ fn basis(DVec3 { x, y, z }: DVec3) -> [f64; MOST_TERMS] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::{Quat, Vec3};
+
+    #[test]
+    fn a_scene_stands_anew_and_looks_the_same() {
+        let mut set = Gaussians {
+            origin: DVec3::new(10.0, 20.0, 30.0),
+            centers: vec![Vec3::new(1.0, 2.0, 3.0)],
+            scales: vec![Vec3::new(0.1, 0.2, 0.3)],
+            rotations: vec![Quat::from_rotation_x(0.7)],
+            opacities: vec![0.5],
+            degree: 1,
+            harmonics: vec![[0.0; 3], [0.1; 3], [0.2; 3], [0.3; 3]],
+            ..Gaussians::default()
+        };
+        set.about.stance = Some(Stance::Y_UP);
+        let before = set.clone();
+        set.stand(Stance::Y_DOWN);
+        assert_eq!(set.about.stance, Some(Stance::Y_DOWN));
+        assert_eq!(set.origin, DVec3::new(10.0, -20.0, -30.0));
+        assert!((set.centers[0] - Vec3::new(1.0, -2.0, -3.0)).length() < 1e-6);
+        let seen = |set: &Gaussians, from: Vec3| {
+            super::super::harmonics::color(1, set.harmonics_of(0), from.normalize())
+        };
+        let [old, new] =
+            [seen(&before, Vec3::new(1.0, 2.0, -3.0)), seen(&set, Vec3::new(1.0, -2.0, 3.0))];
+        assert!(old.iter().zip(new).all(|(a, b)| (a - b).abs() < 1e-5), "{old:?} {new:?}");
+        set.stand(Stance::Y_UP);
+        assert!((set.axes(0) - before.axes(0)).to_cols_array().iter().all(|v| v.abs() < 1e-6));
+        // Without a stance there is nothing to turn from.
+        set.about.stance = None;
+        let centers = set.centers.clone();
+        set.stand(Stance::Y_DOWN);
+        assert_eq!(set.centers, centers);
+    }
     use crate::gaussians::harmonics::{self, color, constant_of};
     use glam::DQuat;
 

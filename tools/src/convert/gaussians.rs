@@ -95,9 +95,14 @@ impl Convert {
     /// Writes the Gaussians of all inputs, in the format that the output's name asks for.
     pub(super) fn gaussians(self, progress: &Progress) -> Result<(), Failure> {
         let target = Target::of(&self.output);
+        let is_trained = self.are_gaussians()?;
         let Gathered { mut set, points, read_ms } = self.gather_gaussians(progress)?;
         if let Some(degree) = self.surface.degree {
             set.set_degree(degree.min(set.degree));
+        }
+        if is_trained && target != Target::Glb {
+            // Viewers expect the frame of trainers in these files.
+            set.stand(Stance::Y_DOWN);
         }
         if self.dry_run {
             let bytes = set.len() as u64 * target.bytes(set.degree);

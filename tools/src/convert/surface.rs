@@ -362,11 +362,10 @@ impl SurfaceFlags {
         ];
         match flags.into_iter().find(|(_, is_given, of)| *is_given && !of.contains(&extension)) {
             Some((flag, _, of)) => {
-                let of = of
-                    .iter()
-                    .map(|extension| format!(".{extension}"))
-                    .collect::<Vec<_>>()
-                    .join(" and ");
+                let mut of: Vec<String> =
+                    of.iter().map(|extension| format!(".{extension}")).collect();
+                let last = of.pop().unwrap_or_default();
+                let of = if of.is_empty() { last } else { format!("{} and {last}", of.join(", ")) };
                 Err(Failure::Usage(format!(
                     "{flag} is for {of} files; it has no effect on .{extension} files"
                 )))
