@@ -32,11 +32,11 @@ struct Made {
 /// −y up, and reaches 3 from the middle. The same count gives the same scene.
 pub fn phantom(count: usize) -> Gaussians {
     let quarter = count.div_ceil(4).max(1);
-    let of_part = |part: fn(usize, usize) -> Made| {
-        (0..quarter).into_par_iter().map(move |index| part(index, quarter))
+    let of_part = |part: fn(usize, usize) -> Made| -> Vec<Made> {
+        (0..quarter).into_par_iter().map(|index| part(index, quarter)).collect()
     };
-    let made: Vec<Made> =
-        of_part(floor).chain(of_part(ball)).chain(of_part(ring)).chain(of_part(needle)).collect();
+    let made = [of_part(floor), of_part(ball), of_part(ring), of_part(needle)];
+    let made: Vec<Made> = made.into_iter().flatten().collect();
     let mut set = Gaussians { degree: DEGREE, ..Gaussians::default() };
     set.centers = made.iter().map(|own| own.center).collect();
     set.scales = made.iter().map(|own| own.scale).collect();
