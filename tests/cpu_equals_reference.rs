@@ -252,3 +252,10 @@ fn facets() {
         assert_matches(&case, 50.0);
     }
 }
+
+#[test]
+fn several_fields() {
+    for case in scenes::fields::all() {
+        assert_matches(&case, 50.0);
+    }
+}

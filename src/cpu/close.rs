@@ -426,13 +426,7 @@ impl Plan<'_> {
 
     /// Adds a sheet to a packet's pixels.
     #[inline(always)]
-    pub fn close<S: Simd>(
-        &self,
-        simd: S,
-        sheet: usize,
-        packet: &mut Packet<S>,
-        media: &Media<S>,
-    ) {
+    pub fn close<S: Simd>(&self, simd: S, sheet: usize, packet: &mut Packet<S>, media: &Media<S>) {
         let pixels = &mut packet.pixels;
         let none = Lanes::splat(simd, 0.0);
         let planes = [self.planes[sheet], self.planes[sheet + 1]];

@@ -178,7 +178,8 @@ impl March<'_> {
     /// Returns a packet of the tile with a first pixel.
     #[inline(always)]
     fn packet<S: Simd>(&self, simd: S, corner: [i32; 2], number: usize) -> Packet<S> {
-        let first = [corner[0] + (number % 2 * WIDE) as i32, corner[1] + (number / 2 * HIGH) as i32];
+        let first =
+            [corner[0] + (number % 2 * WIDE) as i32, corner[1] + (number / 2 * HIGH) as i32];
         let mut others = Vec::new();
         for plan in &self.plans[1..] {
             others.push(Rays::new(simd, plan, first));

@@ -201,12 +201,7 @@ impl CpuRenderer {
     }
 
     /// Returns a plan for each field, or the only plan of a scene without one.
-    fn plans<'a>(
-        &self,
-        view: &'a View,
-        settings: &Settings,
-        outline: &Outline,
-    ) -> Vec<Plan<'a>> {
+    fn plans<'a>(&self, view: &'a View, settings: &Settings, outline: &Outline) -> Vec<Plan<'a>> {
         let sheets = &outline.sheets;
         let own = |(field, own): (&FieldState, &FieldOutline)| {
             Plan::new(&field.scene, view, sheets, settings, own.choice.as_ref())

@@ -87,10 +87,9 @@ impl<'a> Drawn<'a> {
         let has_middles = settings.evaluate != Evaluate::Scatter
             && settings.gradient == Gradient::Analytic
             && lattice.is_some_and(|lattice| is_thin(sheets, lattice));
-        let least_sum = item.kernel().map_or_else(
-            || math::Kernel::default().least_sum(),
-            math::Kernel::least_sum,
-        );
+        let least_sum = item
+            .kernel()
+            .map_or_else(|| math::Kernel::default().least_sum(), math::Kernel::least_sum);
         let kernels = gather::samples(item, view);
         Some(Self { field, kernels, product, solids, has_middles, least_sum })
     }

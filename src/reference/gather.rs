@@ -53,8 +53,10 @@ fn add_item<'a>(
     view: &View,
 ) {
     match item {
-        Item::Radiance(set) => kernels
-            .extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view))),
+        Item::Radiance(set) => {
+            let own = |splat| from_splat(set, splat, None, view);
+            kernels.extend(set.splats.iter().filter_map(own));
+        }
         // Facets are no kernels. A hierarchy's cut and Gaussians have become sets by now, and
         // bricks a volume.
         Item::Facets(_)
@@ -64,9 +66,8 @@ fn add_item<'a>(
         | Item::Cells(..) => {}
         Item::Scalar(set, transfer) => {
             let before = before.map(|before| (before, transfer));
-            kernels.extend(
-                set.splats.iter().filter_map(|splat| from_splat(set, splat, before, view)),
-            );
+            let own = |splat| from_splat(set, splat, before, view);
+            kernels.extend(set.splats.iter().filter_map(own));
         }
         // Tensor products are not radial functions: their field is evaluated point by point
         // (product.rs).

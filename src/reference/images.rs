@@ -80,12 +80,7 @@ impl Frame<'_> {
     }
 
     /// Returns the values beside a pixel's faces, if gradients are their differences.
-    fn around(
-        &self,
-        drawn: &Drawn,
-        own: &FieldRow,
-        [column, row]: [i64; 2],
-    ) -> Option<Around> {
+    fn around(&self, drawn: &Drawn, own: &FieldRow, [column, row]: [i64; 2]) -> Option<Around> {
         let [above, below] = own.beside.as_ref()?;
         let neighbours = [
             (column - 1, row, &own.kernels),

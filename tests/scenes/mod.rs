@@ -2,6 +2,7 @@
 //! run, and the reference draws each in about a second.
 
 pub mod facets;
+pub mod fields;
 pub mod gaussians;
 pub mod methods;
 
