@@ -178,8 +178,9 @@ impl ShowFlags {
     }
 
     pub fn open(&self, limits: &Limits) -> Result<Show<'_>, Failure> {
-        let open = |own: &'_ Own<String>| own.try_map(|text| Transfer::open(text, limits));
-        let transfers = self.transfer.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+        let own = self.transfer.iter();
+        let own = own.map(|own| own.try_map(|text| Transfer::open(text, limits)));
+        let transfers = own.collect::<Result<Vec<_>, _>>()?;
         self.check_surfaces(&transfers)?;
         Ok(Show {
             flags: self,
