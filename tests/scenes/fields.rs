@@ -8,6 +8,7 @@ use glam::{DMat3, DVec3, Vec3};
 use splatkit::{
     bricks::Bricks,
     cells::{CellKind, CellOptions, Cells, Place, Tetrahedra},
+    hierarchy::Detail,
     math::{Kernel, Projection, Tensor},
     scene::{Classification, Evaluate, Gradient, Optics, Scene, Settings},
     volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
@@ -132,6 +133,8 @@ pub fn all() -> Vec<Case> {
     let clips = methods::clipped_volume().settings.clips;
     let clipped = Settings { clips, ..settings() };
     let xray = Settings { optics: Optics::XRay, ..settings() };
+    // The reference draws the finest level of bricks.
+    let finest = Settings { detail: Detail::Pixels(0.0), ..settings() };
     let post = Settings { classification: Classification::Post, ..settings() };
     let with_isosurfaces =
         || blob_scene().with_volume(other_volume(), Kernel::default(), with_surfaces());
@@ -164,7 +167,7 @@ pub fn all() -> Vec<Case> {
         ),
         case("a_volume_and_cells", beside_cells(Place::Points), PERSPECTIVE),
         case("a_volume_and_values_of_cells", beside_cells(Place::Cells), ORTHOGRAPHIC),
-        case("four_fields", four(), PERSPECTIVE),
+        Case { settings: finest, ..case("four_fields", four(), PERSPECTIVE) },
     ];
     all.extend(scattered_fields());
     all

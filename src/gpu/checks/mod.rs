@@ -4,7 +4,6 @@
 mod layouts;
 mod pipelines;
 mod recipes;
-#[allow(dead_code, reason = "the GPU engine draws one field")]
 #[path = "../../../tests/scenes/mod.rs"]
 mod scenes;
 mod variants;
