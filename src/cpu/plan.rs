@@ -37,8 +37,10 @@ pub struct FieldOutline {
     pub gathers: bool,
 }
 
-/// The plan of a picture for one of its fields, and for what carries colours of its own. Sheets are numbered from 1; sheet n lies between planes n and n + 1.
-/// Sheet 0 is everything in front of the first plane and is not drawn.
+/// The plan of a picture for one of its fields, and for what carries colours of its own.
+///
+/// Sheets are numbered from 1; sheet n lies between planes n and n + 1. Sheet 0 is everything in
+/// front of the first plane and is not drawn.
 pub struct Plan<'a> {
     /// The number of the field.
     pub number: u8,

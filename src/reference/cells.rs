@@ -2,9 +2,8 @@
 
 use super::{
     Frame, clip,
-    composite::{Medium, Step},
-    field::{Field, Layer},
-    fields::{Added, Found, Through},
+    composite::{Added, Medium, Step},
+    field::{Field, Found, Layer},
     ray::Ray,
 };
 use crate::{
@@ -152,11 +151,6 @@ fn layer(parts: &[Part], thickness: f64) -> Option<Layer> {
     })
 }
 
-/// Returns what the clips leave of a part of a ray.
-fn pieces(on: &Through, span: [f64; 2]) -> Vec<[f64; 2]> {
-    clip::intersection(on.allowed, Some(span))
-}
-
 impl Solids {
     /// Returns the parts of a ray in each sheet.
     fn parts_of_sheets(&self, frame: &Frame, ray: &Ray) -> Vec<Vec<Part>> {
@@ -166,35 +160,44 @@ impl Solids {
         (0..frame.count()).map(of_sheet).collect()
     }
 
-    /// Returns the field in each sheet of a ray, with values at the points.
-    pub fn layers(&self, frame: &Frame, on: &Through) -> Vec<Option<Found>> {
+    /// Returns the field in each sheet of a ray of which the clips leave parts, with values at the
+    /// points.
+    pub fn layers(&self, frame: &Frame, ray: &Ray, allowed: &[[f64; 2]]) -> Vec<Option<Found>> {
         let own = |(k, parts): (usize, Vec<Part>)| {
             let [from, to] = frame.span(k);
             let layer = layer(&parts, to - from)?;
-            Some((layer, pieces(on, layer.span)))
+            Some((layer, clip::intersection(allowed, Some(layer.span))))
         };
-        self.parts_of_sheets(frame, on.ray).into_iter().enumerate().map(own).collect()
+        self.parts_of_sheets(frame, ray).into_iter().enumerate().map(own).collect()
     }
 
     /// Returns what tetrahedra that have one value each add to the sheets of a ray.
-    pub fn media(&self, frame: &Frame, field: &Field, on: &Through) -> Vec<Option<Added>> {
+    pub fn media(
+        &self,
+        frame: &Frame,
+        field: &Field,
+        ray: &Ray,
+        allowed: &[[f64; 2]],
+    ) -> Vec<Option<Added>> {
         let own = |(k, parts): (usize, Vec<Part>)| {
             let mut medium = Medium::default();
             for part in parts {
                 let (extinction, color) = field.classifier.at(part.values[0]);
                 let factor = field.classifier.transfer.gradient_factor(0.0);
-                let length: f64 = pieces(on, part.span).iter().map(|[from, to]| to - from).sum();
+                let pieces = clip::intersection(allowed, Some(part.span));
+                let length: f64 = pieces.iter().map(|[from, to]| to - from).sum();
                 medium = medium.with(Medium { depth: extinction * factor * length, color });
             }
             Some((medium, vec![Step { depth: medium.depth, span: frame.span(k) }]))
         };
-        self.parts_of_sheets(frame, on.ray).into_iter().enumerate().map(own).collect()
+        self.parts_of_sheets(frame, ray).into_iter().enumerate().map(own).collect()
     }
 
     /// Returns the largest value on a ray of tetrahedra that have one value each.
-    pub fn largest(&self, frame: &Frame, on: &Through) -> Option<f64> {
-        let parts = self.parts_of_sheets(frame, on.ray).into_iter().flatten();
-        let seen = parts.filter(|part| !pieces(on, part.span).is_empty());
+    pub fn largest(&self, frame: &Frame, ray: &Ray, allowed: &[[f64; 2]]) -> Option<f64> {
+        let parts = self.parts_of_sheets(frame, ray).into_iter().flatten();
+        let is_seen = |part: &Part| !clip::intersection(allowed, Some(part.span)).is_empty();
+        let seen = parts.filter(is_seen);
         seen.map(|part| part.values[0]).reduce(f64::max)
     }
 }

@@ -5,9 +5,9 @@ use super::{
     cells::Solids,
     classify::Classifier,
     clip,
-    composite::{Medium, Step},
+    composite::Added,
     face::Face,
-    field::{Field, Layer},
+    field::{Field, Found, Layer},
     gather,
     kernel::{Kernel, Load},
     product::Product,
@@ -24,12 +24,6 @@ use glam::DVec3;
 
 /// The values at a pixel's faces in the pixels to the left, right, above and below.
 pub(super) type Around = [Vec<Option<f64>>; 4];
-
-/// The field in a sheet, and the parts of the ray where it counts.
-pub(super) type Found = (Layer, Vec<[f64; 2]>);
-
-/// What a field adds to a sheet, and its steps of optical depth.
-pub(super) type Added = (Medium, Vec<Step>);
 
 /// A field in a picture that is being drawn, classified after interpolation.
 pub(super) struct Drawn<'a> {
@@ -157,7 +151,7 @@ impl<'a> Drawn<'a> {
     /// Returns the field in each sheet of a ray.
     fn layers(&self, frame: &Frame, on: &Through) -> Vec<Option<Found>> {
         if let Some(solids) = &self.solids {
-            return solids.layers(frame, on);
+            return solids.layers(frame, on.ray, on.allowed);
         }
         let Through { ray, kernels, allowed, .. } = *on;
         let means = self.means(frame, ray, kernels);
@@ -196,7 +190,9 @@ impl<'a> Drawn<'a> {
     pub fn media(&self, frame: &Frame, on: &Through) -> Vec<Option<Added>> {
         let shine = |(layer, pieces): Found| layer.shine(&self.field, on.ray.direction, &pieces);
         let mut media: Vec<Option<Added>> = match &self.solids {
-            Some(solids) if solids.place() == Place::Cells => solids.media(frame, &self.field, on),
+            Some(solids) if solids.place() == Place::Cells => {
+                solids.media(frame, &self.field, on.ray, on.allowed)
+            }
             _ => self.layers(frame, on).into_iter().map(|found| found.map(shine)).collect(),
         };
         if frame.optics == Optics::XRay {
@@ -208,7 +204,9 @@ impl<'a> Drawn<'a> {
     /// Returns the largest value on a ray.
     pub fn largest(&self, frame: &Frame, on: &Through) -> Option<f64> {
         match &self.solids {
-            Some(solids) if solids.place() == Place::Cells => solids.largest(frame, on),
+            Some(solids) if solids.place() == Place::Cells => {
+                solids.largest(frame, on.ray, on.allowed)
+            }
             _ => {
                 let layers = self.layers(frame, on).into_iter().flatten();
                 let largest = |(layer, pieces): Found| layer.largest(&self.field, &pieces);

@@ -2,10 +2,10 @@
 
 use super::{
     Frame, LEAST_DEPTH, clip,
-    composite::{Composite, Medium},
+    composite::{Added, Composite, Medium},
     facets::{Cover, Facet},
     field::Field,
-    fields::{Added, Around, Drawn, Through},
+    fields::{Around, Drawn, Through},
     kernel::{Kernel, Load},
     ray::Ray,
     sheet::Light,

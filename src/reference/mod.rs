@@ -154,14 +154,14 @@
 //! # Other ways
 //! **Optics.** The above is emission and absorption (Max 1995). [`Optics::XRay`] uses the same
 //! optical depths, without isosurfaces; all colours are white and unlit. [`Optics::Maximum`] is for
-//! one field. It shows the colour and the opacity, unscaled by length, of the largest f(u) at the ends of all parts of
-//! the ray. A ray without parts shows nothing. This picture has no depth.
+//! one field. It shows the colour and the opacity, unscaled by length, of the largest f(u) at the
+//! ends of all parts of the ray. A ray without parts shows nothing. This picture has no depth.
 //!
 //! **Samples classified before interpolation** ([`Classification::Pre`], and always in the modes
-//! below; of one field only) are radiance (Westover 1989). They have the colour c(f) and, over a part of the ray, the
-//! optical depth κ(f)·w/o·∫h ds. Here o is the average sum of the kernels. On a lattice, o is ∫h
-//! over kernel space (body-centred: times 2^(−3/2)/½, unit over cell). Scattered sets store their
-//! own. Slopes do not count. If the field is lit, a sample has a normal, against the gradient g
+//! below; of one field only) are radiance (Westover 1989). They have the colour c(f) and, over a
+//! part of the ray, the optical depth κ(f)·w/o·∫h ds. Here o is the average sum of the kernels. On
+//! a lattice, o is ∫h over kernel space (body-centred: times 2^(−3/2)/½, unit over cell). Scattered
+//! sets store their own. Slopes do not count. If the field is lit, a sample has a normal, against the gradient g
 //! that is defined as on a rectilinear lattice. (On body-centred lattices g uses the next samples
 //! of the same cubic lattice; scattered samples have their own slope.) A sample with g = 0 has no
 //! normal. One shade lights the whole picture: the field's. There is no box. Kernels with negative

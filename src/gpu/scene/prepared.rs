@@ -184,8 +184,9 @@ impl PreparedScene {
     /// rebuilt on the CPU.
     ///
     /// # Errors
-    /// [`Error::Argument`] if the item has no field, and if [`Renderer::prepare`](crate::gpu::Renderer::prepare) would refuse the
-    /// function; the scene then keeps its old one.
+    /// [`Error::Argument`] if the item has no field; [`Error::Transfer`] if
+    /// [`Renderer::prepare`](crate::gpu::Renderer::prepare) would refuse the function. The scene
+    /// then keeps its old one.
     pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
         self.scene = self.scene.shown_by(item, transfer)?;
         Ok(())
