@@ -161,11 +161,11 @@
 //! below; of one field only) are radiance (Westover 1989). They have the colour c(f) and, over a
 //! part of the ray, the optical depth κ(f)·w/o·∫h ds. Here o is the average sum of the kernels. On
 //! a lattice, o is ∫h over kernel space (body-centred: times 2^(−3/2)/½, unit over cell). Scattered
-//! sets store their own. Slopes do not count. If the field is lit, a sample has a normal, against the gradient g
-//! that is defined as on a rectilinear lattice. (On body-centred lattices g uses the next samples
-//! of the same cubic lattice; scattered samples have their own slope.) A sample with g = 0 has no
-//! normal. One shade lights the whole picture: the field's. There is no box. Kernels with negative
-//! lobes can take light back within a sheet; colours are clamped to 0 … 1.
+//! sets store their own. Slopes do not count. If the field is lit, a sample has a normal, against
+//! the gradient g that is defined as on a rectilinear lattice. (On body-centred lattices g uses the
+//! next samples of the same cubic lattice; scattered samples have their own slope.) A sample with g
+//! = 0 has no normal. One shade lights the whole picture: the field's. There is no box. Kernels
+//! with negative lobes can take light back within a sheet; colours are clamped to 0 … 1.
 //!
 //! **[`Mode::AxisSheets`]** (Westover 1990). n is a unit vector perpendicular to two of the
 //! lattice's axes (the world's axes without a lattice). Of the three such vectors it is the one
