@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             ..transfer.clone()
         };
         let start = Instant::now();
-        renderer.set_transfer(&window)?;
+        renderer.set_transfer(0, &window)?;
         let (picture, _) = renderer.render(&camera, &settings)?;
         let milliseconds = start.elapsed().as_secs_f64() * 1e3;
         let path = format!("transfer-{step}.png");

@@ -174,17 +174,18 @@ impl Renderer {
         }
     }
 
-    /// Sets the transfer function of the scene's volume or sample set.
+    /// Sets the transfer function of the field of an item, by its number in the scene
+    /// ([`Scene::fields`]).
     ///
     /// # Errors
-    /// [`Error::Argument`] if [`new`](Self::new) would refuse the function; the scene then keeps
-    /// its old one.
-    pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
-        self.scene = self.scene.shown_by(transfer)?;
+    /// [`Error::Argument`] if the item has no field; [`Error::Transfer`] if [`new`](Self::new)
+    /// would refuse the function. The scene then keeps its old one.
+    pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
+        self.scene = self.scene.shown_by(item, transfer)?;
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Drawer::Gpu(_, prepared) => prepared.set_transfer(transfer),
-            Drawer::Cpu(renderer) => renderer.set_transfer(transfer),
+            Drawer::Gpu(_, prepared) => prepared.set_transfer(item, transfer),
+            Drawer::Cpu(renderer) => renderer.set_transfer(item, transfer),
         }
     }
 

@@ -278,7 +278,7 @@ fn bricks_are_read_once() {
     let mut turned = camera.clone();
     turned.position += DVec3::X;
     assert_eq!(frame(&mut prepared, &turned).1.read_bricks, 0);
-    prepared.set_transfer(&other).unwrap();
+    prepared.set_transfer(0, &other).unwrap();
     let (third, stats) = frame(&mut prepared, camera);
     assert_eq!(stats.read_bricks, 0);
     assert!(measured(&third, &expected) > 60.0 && measured(&third, &first) < 40.0);

@@ -63,6 +63,8 @@ fn least(name: &str) -> f64 {
     match name {
         "post_classified" | "isosurfaces_in_fog" => 48.0,
         "camera_inside_a_volume" | "clipped_volume" => 48.0,
+        "two_volumes_post" | "two_volumes_with_isosurfaces" | "two_clipped_volumes" => 48.0,
+        "surfels_in_two_volumes" | "clipped_surfels_in_two_volumes" => 48.0,
         "points_far_off" => 33.0,
         _ => 50.0,
     }
@@ -250,5 +252,12 @@ fn gaussians() {
 fn facets() {
     for case in scenes::facets::all() {
         assert_matches(&case, 50.0);
+    }
+}
+
+#[test]
+fn several_fields() {
+    for case in scenes::fields::all() {
+        assert_matches(&case, least(case.name));
     }
 }

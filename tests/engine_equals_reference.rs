@@ -771,7 +771,7 @@ fn a_new_transfer_function_needs_no_new_upload() {
         let expected = reference::render(&scene, &case.camera, &settings).expect(case.name);
         let mut prepared = renderer.prepare(&case.scene).expect(case.name);
         renderer.render(&mut prepared, &case.camera, &settings).expect(case.name);
-        prepared.set_transfer(&other).unwrap();
+        prepared.set_transfer(0, &other).unwrap();
         let (found, _) = renderer.render(&mut prepared, &case.camera, &settings).expect(case.name);
         assert!(psnr(&found, &expected) > 50.0, "{evaluate:?}: {:.1} dB", psnr(&found, &expected));
     }

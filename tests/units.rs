@@ -368,7 +368,7 @@ fn transfer_functions_are_checked_when_they_change() {
         color: vec![(10.0, [1.0; 3])],
         ..USUAL.transfer()
     };
-    let message = prepared.set_transfer(&narrow).expect_err("too narrow").to_string();
+    let message = prepared.set_transfer(0, &narrow).expect_err("too narrow").to_string();
     assert!(message.contains("too close together"), "{message}");
-    prepared.set_transfer(&USUAL.transfer()).expect("as before");
+    prepared.set_transfer(0, &USUAL.transfer()).expect("as before");
 }

@@ -139,6 +139,12 @@ fn usual() -> Result<Scene> {
     on(cartesian(SIDE))
 }
 
+/// Two volumes on different lattices, with different colours.
+fn two_volumes() -> Result<Scene> {
+    let other = TransferFunction { color: vec![(0.0, [0.1, 0.9, 0.2])], ..transfer() };
+    Ok(usual()?.with_volume(bytes_on(sheared())?, Kernel::default(), other))
+}
+
 fn bricks(scene: Scene, kernel: Result<Kernel>) -> Result<Scene> {
     Ok(scene.with_bricks(
         Bricks::from_volume(Arc::new(bytes_on(cartesian(SIDE))?))?,
@@ -230,6 +236,7 @@ fn rows_of_items() -> Vec<Row> {
             surface().and_then(|scene| bricks(scene, Ok(Kernel::default()))),
         ),
         row("surfels and scattered samples", surface().and_then(samples)),
+        row("several fields", two_volumes()),
     ]
 }
 

@@ -6,6 +6,7 @@ use crate::{
     bricks::{BRICK_BLOCKS, Bricks, Choice, SIDE},
     math::Kernel,
     parallel::prelude::*,
+    scene::Settings,
     volume::{Samples, each_type},
 };
 use bytemuck::AnyBitPattern;
@@ -46,6 +47,11 @@ pub struct BrickCache {
 /// Returns the bytes of memory of a slot.
 pub fn slot_bytes(bricks: &Bricks) -> u64 {
     (SLOT * bricks.header().scalar.bytes() + 2 * BRICK_BLOCKS) as u64
+}
+
+/// Returns the number of bricks that fit into the settings' memory, at least one.
+pub fn most_bricks(bricks: &Bricks, settings: &Settings) -> usize {
+    usize::try_from(settings.page_memory / slot_bytes(bricks)).unwrap_or(usize::MAX).max(1)
 }
 
 impl BrickCache {

@@ -525,7 +525,7 @@ impl<'a, S: Simd> CellTile<'a, S> {
             return None;
         }
         let sum = &self.sums[sheet % OPEN][packet.number];
-        let rays = &packet.rays;
+        let rays = packet.rays_in(plan);
         let [start, stop] = [plan.planes[sheet], plan.planes[sheet + 1]];
         let least = ((stop - start) * LEAST_PART).max(stop.abs() * LEAST_LENGTH);
         let has_value = sum.covered.simd_gt(least);
@@ -648,7 +648,7 @@ impl<S: Simd> Sum<S> {
         [begin, end]: [Lanes<S>; 2],
         light: [Lanes<S>; 4],
     ) {
-        let length = plan.kept(simd, &packet.rays, [begin, end]);
+        let length = plan.kept(simd, packet.rays_in(plan), [begin, end]);
         if plan.optics == Optics::Maximum {
             let value = length.simd_gt(0.0).select(light[3], Lanes::splat(simd, -BEHIND));
             self.end = self.end.max(value);

@@ -28,6 +28,8 @@ const LEAST_GRADIENT: f32 = 1e-20;
 pub const OPAQUE: f32 = 0.0005;
 /// A pixel without a value.
 pub const NO_VALUE: f32 = -3e38;
+/// A distance behind all others.
+const BEHIND: f32 = 3e38;
 
 /// Eight pixels of the picture, composited so far.
 #[derive(Clone, Copy)]
@@ -72,13 +74,25 @@ impl<S: Simd> Pixels<S> {
 pub struct Packet<S: Simd> {
     /// Its place among the packets of the tile, row by row.
     pub number: usize,
+    /// The rays, in the steps of the first field's lattice.
     pub rays: Rays<S>,
+    /// The same rays in the steps of the other fields' lattices.
+    pub others: Vec<Rays<S>>,
     pub pixels: Pixels<S>,
     /// No light gets through any of its pixels.
     pub is_done: bool,
 }
 
 impl<S: Simd> Packet<S> {
+    /// Returns the rays in the steps of the lattice of a plan's field.
+    #[inline(always)]
+    pub fn rays_in(&self, plan: &Plan) -> &Rays<S> {
+        match plan.number {
+            0 => &self.rays,
+            number => &self.others[usize::from(number) - 1],
+        }
+    }
+
     /// Returns the bit of this packet in masks of a tile's packets.
     #[inline(always)]
     pub fn bit(&self) -> u8 {
@@ -128,6 +142,34 @@ struct Medium<S: Simd> {
     has_hit: mask32x8<S>,
     /// The largest value.
     peak: Lanes<S>,
+}
+
+/// What lies in a sheet at eight pixels: radiance, and the media of fields.
+pub struct Media<S: Simd> {
+    /// A field, if there is nothing else.
+    only: Option<Medium<S>>,
+    /// Everything together otherwise: colours times optical depth, and optical depth.
+    mixed: Option<[Lanes<S>; 4]>,
+    /// The nearest distance at which isosurfaces of a field absorbed half of the light.
+    hit: Lanes<S>,
+    has_hit: mask32x8<S>,
+}
+
+impl<S: Simd> Media<S> {
+    /// Returns the radiance of a sheet: colour times optical depth, and optical depth.
+    #[inline(always)]
+    pub fn new(simd: S, radiance: Option<[Lanes<S>; 4]>) -> Self {
+        Self {
+            only: None,
+            mixed: radiance,
+            hit: Lanes::splat(simd, BEHIND),
+            has_hit: mask32x8::splat(simd, false),
+        }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.only.is_none() && self.mixed.is_none()
+    }
 }
 
 /// A part of a sheet in which the transfer function is integrated at once.
@@ -352,48 +394,53 @@ impl Plan<'_> {
         with_light(simd, color, share, highlight)
     }
 
-    /// Adds a sheet to a packet's pixels: the field in it, at the pixels of a mask, and its
-    /// radiance (colour times optical depth, and optical depth).
+    /// Adds the field in a sheet, at the pixels of a mask, to what lies in the sheet. In a maximum
+    /// intensity picture, its largest value counts at once.
     #[inline(always)]
-    pub fn close<S: Simd>(
+    pub fn add_field<S: Simd>(
         &self,
         simd: S,
-        sheet: usize,
+        (layer, mask): (&Layer<S>, mask32x8<S>),
         packet: &mut Packet<S>,
-        field: Option<(&Layer<S>, mask32x8<S>)>,
-        radiance: Option<[Lanes<S>; 4]>,
+        media: &mut Media<S>,
     ) {
         let Packet { rays, pixels, .. } = packet;
-        let none = Lanes::splat(simd, 0.0);
-        let one = Lanes::splat(simd, 1.0);
-        let planes = [self.planes[sheet], self.planes[sheet + 1]];
-        let before = pixels.through;
-        let [red, green, blue, mut depth] = radiance.unwrap_or([none; 4]);
-        let mut premultiplied = [red, green, blue];
-        let mut has_hit = mask32x8::splat(simd, false);
-        if let Some((layer, mask)) = field {
-            let medium = self.pass(simd, layer, rays, mask, before);
-            if self.optics == Optics::Maximum {
-                pixels.hit = pixels.hit.max(medium.peak);
-                return;
-            }
-            has_hit = medium.has_hit;
-            pixels.hit = has_hit.select(medium.hit, pixels.hit);
-            if radiance.is_none() && self.optics != Optics::XRay {
-                // The field's colour is already composited within the sheet, so it is added as it
-                // is.
-                pixels.color = three!(I => before.mul_add(medium.color[I], pixels.color[I]));
-                pixels.through = before * medium.through;
-                pixels.note_half(simd, planes, before, medium.depth, has_hit);
-                return;
-            }
-            let own = medium.depth.min(Lanes::splat(simd, MOST_DEPTH));
-            // Converts opacity to optical depth: τ / (1 − e^−τ). For small τ that ratio would lose
-            // its digits.
-            let ratio = own.simd_lt(1e-2).select(own * 0.5 + 1.0, own / (one - exp(simd, -own)));
-            premultiplied = three!(I => ratio.mul_add(medium.color[I], premultiplied[I]));
-            depth += own;
+        let medium = self.pass(simd, layer, rays, mask, pixels.through);
+        if self.optics == Optics::Maximum {
+            pixels.hit = pixels.hit.max(medium.peak);
+            return;
         }
+        media.hit = medium.has_hit.select(medium.hit.min(media.hit), media.hit);
+        media.has_hit |= medium.has_hit;
+        let before = media.only.take();
+        if before.is_none() && media.mixed.is_none() && self.optics != Optics::XRay {
+            media.only = Some(medium);
+            return;
+        }
+        let mut all = media.mixed.unwrap_or([Lanes::splat(simd, 0.0); 4]);
+        if let Some(before) = &before {
+            all = before.mixed_with(simd, all);
+        }
+        media.mixed = Some(medium.mixed_with(simd, all));
+    }
+
+    /// Adds a sheet to a packet's pixels.
+    #[inline(always)]
+    pub fn close<S: Simd>(&self, simd: S, sheet: usize, packet: &mut Packet<S>, media: &Media<S>) {
+        let pixels = &mut packet.pixels;
+        let none = Lanes::splat(simd, 0.0);
+        let planes = [self.planes[sheet], self.planes[sheet + 1]];
+        let (before, has_hit) = (pixels.through, media.has_hit);
+        pixels.hit = has_hit.select(media.hit, pixels.hit);
+        if let Some(medium) = &media.only {
+            // The field's colour is already composited within the sheet, so it is added as it is.
+            pixels.color = three!(I => before.mul_add(medium.color[I], pixels.color[I]));
+            pixels.through = before * medium.through;
+            pixels.note_half(simd, planes, before, medium.depth, has_hit);
+            return;
+        }
+        let Some([red, green, blue, depth]) = media.mixed else { return };
+        let mut premultiplied = [red, green, blue];
         if self.optics == Optics::XRay {
             premultiplied = [depth; 3];
         }
@@ -677,6 +724,22 @@ impl<S: Simd> Layer<S> {
 }
 
 impl<S: Simd> Medium<S> {
+    /// Adds the medium to others in the same sheet: colours times optical depth, and optical depth.
+    #[inline(always)]
+    fn mixed_with(&self, simd: S, [red, green, blue, depth]: [Lanes<S>; 4]) -> [Lanes<S>; 4] {
+        let one = Lanes::splat(simd, 1.0);
+        let own = self.depth.min(Lanes::splat(simd, MOST_DEPTH));
+        // Converts opacity to optical depth: τ / (1 − e^−τ). For small τ that ratio would lose its
+        // digits.
+        let ratio = own.simd_lt(1e-2).select(own * 0.5 + 1.0, own / (one - exp(simd, -own)));
+        let [red, green, blue] = [
+            ratio.mul_add(self.color[0], red),
+            ratio.mul_add(self.color[1], green),
+            ratio.mul_add(self.color[2], blue),
+        ];
+        [red, green, blue, depth + own]
+    }
+
     #[inline(always)]
     fn pass(&mut self, simd: S, depth: Lanes<S>, color: [Lanes<S>; 3]) {
         let share = self.through * taken(simd, depth);

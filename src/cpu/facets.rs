@@ -72,6 +72,7 @@ impl<'a> FacetProjector<'a> {
             ],
             pixels,
             sheets,
+            field: self.plan.number,
         })
     }
 }

@@ -64,6 +64,8 @@ pub struct Record {
     /// The first and the last pixel that the splat covers, and the first and the last sheet.
     pub pixels: [[i32; 2]; 2],
     pub sheets: [u16; 2],
+    /// The number of the sample's field.
+    pub field: u8,
 }
 
 /// The pixels and sheets of a footprint.
@@ -185,6 +187,7 @@ pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record>
         payload,
         pixels,
         sheets: sheets.map(|sheet| sheet as u16),
+        field: plan.number,
     })
 }
 

@@ -184,8 +184,8 @@ impl Gather<'_> {
         marks: &[u64],
         last: &mut Last<S>,
     ) -> Option<(Layer<S>, mask32x8<S>)> {
-        let Packet { rays, pixels, .. } = packet;
         let plan = self.plan;
+        let (rays, pixels) = (packet.rays_in(plan), &packet.pixels);
         let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
         let begin = rays.inside[0].max(Lanes::splat(simd, start));
         let end = rays.inside[1].min(Lanes::splat(simd, stop));

@@ -6,7 +6,7 @@ use super::{
     facets::FacetProjector,
     footprint::{Candidate, Carried, Record, counted, origin, record, to_view, widened},
     page_cache::PageCache,
-    plan::{Outline, Plan},
+    plan::{FieldOutline, Outline, Plan},
     project::Projector,
     spare::{Spare, spare_for},
     vector::lanes,
@@ -22,7 +22,7 @@ use crate::{
     plan::uniforms::Source,
     scene::{Item, Scene, Settings},
     splat::{Payload, Splat, SplatSet},
-    volume::{Arrangement, Lattice, Samples, TransferFunction, Volume},
+    volume::{Arrangement, Lattice, Samples, TransferFunction, Volume, reach::EVERYTHING},
 };
 use fearless_simd::Level;
 use glam::{Mat3, Vec3};
@@ -108,15 +108,19 @@ impl Prepared {
     }
 
     /// Returns the records of all splats that meet the picture, in batches of [`BATCH`] candidates.
+    /// `field` is what the picture draws of the item's field, if it has one.
     pub fn records(
         &mut self,
         plan: &Plan,
         settings: &Settings,
         outline: &Outline,
+        field: Option<&FieldOutline>,
         spare: &mut Spare,
     ) -> Result<Vec<Vec<Record>>> {
         let view = plan.view;
-        let Outline { cut_pixels, choice, shown, .. } = outline;
+        let cut_pixels = &outline.cut_pixels;
+        let choice = field.and_then(|field| field.choice.as_ref());
+        let shown = field.map_or(&EVERYTHING, |field| &field.shown);
         match self {
             Self::Set { drawn, .. } if drawn.payload == Payload::Radiance => {
                 Ok(radiance(plan, drawn, spare))
@@ -166,7 +170,7 @@ impl Prepared {
             Self::Cells => Ok(Vec::new()),
             Self::Bricks(cache) => {
                 let records = |choice| brick_records(plan, cache, choice);
-                Ok(choice.as_ref().map_or_else(Vec::new, records))
+                Ok(choice.map_or_else(Vec::new, records))
             }
         }
     }
@@ -414,7 +418,7 @@ fn sample(plan: &Plan, samples: &Samples, index: usize) -> f32 {
     }
 }
 
-/// Returns the transfer function of a scene's field, or `None` without a field.
+/// Returns the transfer function of a scene's first field, or `None` without a field.
 pub fn transfer_of(scene: &Scene) -> Option<&TransferFunction> {
     scene.items.iter().find_map(Item::transfer)
 }

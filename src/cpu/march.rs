@@ -1,24 +1,24 @@
-//! Draws the sheets of a tile front to back: splats and the lattice are added to a sheet, then it
-//! is closed.
+//! Draws the sheets of a tile front to back: splats and fields are added to a sheet, then it is
+//! closed.
 
 use super::{
     bins::Entry,
     cells::{CellField, CellTile},
-    close::{OPAQUE, Packet, Pixels, Visible},
+    close::{Layer, Media, OPAQUE, Packet, Pixels, Visible},
     footprint::Record,
     gather::{Gather, Last},
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
-    scatter::{OpenTile, Window},
+    scatter::{OpenField, OpenTile, Window},
     skip::is_marked,
-    sums::{Sums, WINDOW, differences},
+    sums::{ScalarSums, Sums, WINDOW, differences},
     vector::{each, four, three},
 };
 use crate::{
     plan::TILE,
     scene::{Mode, Optics, Order},
 };
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// A tile's pixels, row by row: premultiplied colour and opacity, and the depth of the hit or the
 /// largest value.
@@ -29,11 +29,35 @@ pub const EMPTY: Tile = [([0.0; 4], 0.0); TILE * TILE];
 
 /// The input of all tiles.
 pub struct March<'a> {
-    pub plan: &'a Plan<'a>,
-    pub gather: Option<Gather<'a>>,
-    pub cells: Option<CellField<'a>>,
-    pub visible: &'a Visible,
+    /// The plans of the fields, or the only plan. The first also is that of what carries colours of
+    /// its own.
+    pub plans: &'a [Plan<'a>],
+    pub fields: Vec<DrawnField<'a>>,
     pub records: &'a [Vec<Record>],
+}
+
+/// A field of the scene.
+pub struct DrawnField<'a> {
+    pub plan: &'a Plan<'a>,
+    pub means: Means<'a>,
+    pub visible: &'a Visible,
+    /// Of a gathered field: for each tile, a bit for each sheet in which it may be visible.
+    pub marks: Vec<Vec<u64>>,
+}
+
+/// How a field comes to the sheets.
+pub enum Means<'a> {
+    Gathered(Gather<'a>),
+    Cells(CellField<'a>),
+    Scattered,
+    /// Nothing of it is visible, or it comes as radiance.
+    Nothing,
+}
+
+/// A gathered field in a tile.
+struct Seen<'a, S: Simd> {
+    marks: &'a [u64],
+    last: Option<Box<[Last<S>; PACKETS]>>,
 }
 
 /// The windows of a tile's splats that are still to be added.
@@ -44,39 +68,132 @@ struct Ahead<'a> {
     continued: [Vec<u32>; WINDOW],
 }
 
+impl DrawnField<'_> {
+    /// Returns the number of pairs of a tile and a sheet in which a gathered field may be visible.
+    pub fn marked(&self) -> u64 {
+        let words = self.marks.iter().flatten();
+        words.map(|word| u64::from(word.count_ones())).sum()
+    }
+
+    /// Returns the number of tetrahedra in the picture.
+    pub fn crossed(&self) -> u64 {
+        if let Means::Cells(cells) = &self.means { cells.count() } else { 0 }
+    }
+
+    /// Returns the field of a sheet at a packet and the rays on which it counts, or `None` if it is
+    /// invisible.
+    #[inline(always)]
+    fn layer<S: Simd>(
+        &self,
+        simd: S,
+        packet: &Packet<S>,
+        sheet: usize,
+        open: &mut OpenField<'_, S>,
+        seen: &mut Seen<'_, S>,
+    ) -> Option<(Layer<S>, mask32x8<S>)> {
+        let (plan, number) = (self.plan, packet.number);
+        match &self.means {
+            Means::Gathered(gather) => {
+                let last = &mut seen.last.as_mut()?[number];
+                if !is_marked(seen.marks, sheet) {
+                    return None;
+                }
+                gather.layer(simd, packet, sheet, seen.marks, last)
+            }
+            Means::Cells(_) => open.cells.as_mut()?.layer(simd, plan, packet, sheet),
+            Means::Scattered => {
+                let sums = open.sums.as_ref()?;
+                let slopes = open
+                    .values
+                    .as_ref()
+                    .map(|values| values.each_ref().map(|on| differences(simd, on, number)));
+                let found = sums.resolve(simd, plan, packet, sheet, slopes)?;
+                let is_maximum = plan.optics == Optics::Maximum;
+                (is_maximum || self.visible.may_show(simd, plan, &found.0)).then_some(found)
+            }
+            Means::Nothing => None,
+        }
+    }
+}
+
+impl<S: Simd> OpenField<'_, S> {
+    /// Finds the values around a sheet, if gradients are their differences.
+    #[inline(always)]
+    fn find_values(&mut self, simd: S, plan: &Plan, sheet: usize) {
+        let sums = self.sums.as_ref().filter(|sums| sums.has_field[sheet % WINDOW] != 0);
+        self.values = match sums {
+            Some(sums) if plan.central => {
+                Some([sums.values_on(simd, plan, sheet), sums.values_on(simd, plan, sheet + 1)])
+            }
+            _ => None,
+        };
+    }
+}
+
 impl March<'_> {
-    /// Draws a tile. `entries` are its splats, sorted by first sheet. `marks` has a bit for each
-    /// sheet in which the lattice may be visible.
+    /// Draws a tile. `entries` are its splats, sorted by first sheet.
     #[inline(always)]
     pub fn tile<S: Simd>(
         &self,
         simd: S,
         at: [usize; 2],
         entries: &[Entry],
-        marks: &[u64],
         drawn: &mut u64,
     ) -> Tile {
-        let plan = self.plan;
+        let plan = &self.plans[0];
         let corner = plan.corner(at);
-        let cells = self.cells.as_ref().and_then(|field| CellTile::new(simd, field, corner));
-        if entries.is_empty() && cells.is_none() && marks.iter().all(|word| *word == 0) {
+        let number = at[1] * plan.tiles()[0] + at[0];
+        let mut fields = Vec::with_capacity(self.fields.len());
+        let mut seen = Vec::with_capacity(self.fields.len());
+        let mut is_empty = entries.is_empty();
+        for field in &self.fields {
+            let marks = field.marks.get(number).map_or(&[][..], Vec::as_slice);
+            let mut cells = None;
+            if let Means::Cells(own) = &field.means {
+                cells = CellTile::new(simd, own, corner);
+            }
+            is_empty &= cells.is_none() && marks.iter().all(|word| *word == 0);
+            fields.push(OpenField { sums: None, values: None, cells });
+            seen.push(Seen { marks, last: None });
+        }
+        if is_empty {
             return EMPTY;
         }
-        let packets = each!([0, 1, 2, 3, 4, 5, 6, 7], I => {
-            let first = [corner[0] + (I % 2 * WIDE) as i32, corner[1] + (I / 2 * HIGH) as i32];
-            Packet {
-                number: I,
-                rays: Rays::new(simd, plan, first),
-                pixels: Pixels::new(simd, plan),
-                is_done: false,
+        for ((field, open), seen) in self.fields.iter().zip(&mut fields).zip(&mut seen) {
+            match field.means {
+                Means::Scattered => open.sums = Some(Box::new(ScalarSums::new(simd))),
+                Means::Gathered(_) => seen.last = Some(Box::new([Last::new(simd); PACKETS])),
+                Means::Cells(_) | Means::Nothing => {}
             }
-        });
-        let mut tile = OpenTile { corner, packets, sums: Sums::new(simd, plan), cells };
+        }
+        let packets = each!([0, 1, 2, 3, 4, 5, 6, 7], I => self.packet(simd, corner, I));
+        let mut tile = OpenTile { corner, packets, sums: Sums::new(simd, plan), fields };
         match plan.single() {
             Some(order) => self.one_by_one(simd, entries, order, &mut tile, drawn),
-            None => self.sheets(simd, entries, marks, &mut tile, drawn),
+            None => self.sheets(simd, entries, &mut seen, &mut tile, drawn),
         }
         self.finished(simd, &tile.packets)
+    }
+
+    /// Returns a packet of the tile with a first pixel.
+    #[inline(always)]
+    fn packet<S: Simd>(&self, simd: S, corner: [i32; 2], number: usize) -> Packet<S> {
+        let first =
+            [corner[0] + (number % 2 * WIDE) as i32, corner[1] + (number / 2 * HIGH) as i32];
+        let mut others = Vec::new();
+        for plan in &self.plans[1..] {
+            others.push(Rays::new(simd, plan, first));
+        }
+        let plan = &self.plans[0];
+        let (rays, pixels) = (Rays::new(simd, plan, first), Pixels::new(simd, plan));
+        Packet { number, rays, others, pixels, is_done: false }
+    }
+
+    /// Returns a record and the plan of its field.
+    #[inline(always)]
+    fn planned(&self, number: u32) -> (&Record, &Plan<'_>) {
+        let record = record_of(self.records, number);
+        (record, &self.plans[usize::from(record.field)])
     }
 
     /// Adds the splats one by one.
@@ -91,7 +208,8 @@ impl March<'_> {
     ) {
         for entry in entries {
             let window = Window { front: usize::from(entry.sheet), is_continued: false };
-            tile.add(simd, self.plan, record_of(self.records, entry.record), window);
+            let (record, plan) = self.planned(entry.record);
+            tile.add(simd, plan, record, window);
             *drawn += 1;
             if order == Order::FrontToBack {
                 for packet in &mut tile.packets {
@@ -109,26 +227,30 @@ impl March<'_> {
         &self,
         simd: S,
         entries: &[Entry],
-        marks: &[u64],
+        seen: &mut [Seen<'_, S>],
         tile: &mut OpenTile<'_, S>,
         drawn: &mut u64,
     ) {
+        let plan = &self.plans[0];
         let mut ahead = Ahead { entries, continued: std::array::from_fn(|_| Vec::new()) };
-        let mut last = [Last::new(simd); PACKETS];
         let mut sheet = 0;
         // Number of sheets with sums, from `sheet` on.
         let mut open = 0;
-        while sheet <= self.plan.sheets {
+        while sheet <= plan.sheets {
             if open == 0 {
                 let entry = ahead.entries.first();
-                let entry = entry.map_or(usize::MAX, |entry| usize::from(entry.sheet));
-                let next = entry.min(next_mark(marks, sheet));
-                let next = tile.cells.as_ref().map_or(next, |cells| next.min(cells.next(sheet)));
+                let mut next = entry.map_or(usize::MAX, |entry| usize::from(entry.sheet));
+                for (own, seen) in tile.fields.iter().zip(seen.iter()) {
+                    next = next.min(next_mark(seen.marks, sheet));
+                    next = own.cells.as_ref().map_or(next, |cells| next.min(cells.next(sheet)));
+                }
                 let Some(first) = next.checked_add(1) else { return };
                 sheet = first - 1;
             }
-            if let Some(cells) = &mut tile.cells {
-                *drawn += cells.add(simd, self.plan, sheet, &tile.packets);
+            for (field, own) in self.fields.iter().zip(&mut tile.fields) {
+                if let Some(cells) = &mut own.cells {
+                    *drawn += cells.add(simd, field.plan, sheet, &tile.packets);
+                }
             }
             let added = self.add(simd, sheet, &mut ahead, tile);
             *drawn += added;
@@ -136,15 +258,20 @@ impl March<'_> {
                 open = WINDOW;
             }
             if sheet > 0 {
-                self.close(simd, sheet, marks, tile, &mut last);
+                self.close(simd, sheet, tile, seen);
                 let is_done = tile.packets.iter().all(|packet| packet.is_done);
-                if is_done && self.plan.optics != Optics::Maximum {
+                if is_done && plan.optics != Optics::Maximum {
                     return;
                 }
             }
             tile.sums.clear(sheet);
-            if let Some(cells) = &mut tile.cells {
-                cells.clear(simd, sheet);
+            for own in &mut tile.fields {
+                if let Some(sums) = &mut own.sums {
+                    sums.clear(sheet);
+                }
+                if let Some(cells) = &mut own.cells {
+                    cells.clear(simd, sheet);
+                }
             }
             open = open.saturating_sub(1);
             sheet += 1;
@@ -168,10 +295,10 @@ impl March<'_> {
         let begun = begun.iter().map(|entry| (entry.record, false));
         let mut added = 0;
         for (number, is_continued) in continued.iter().map(|number| (*number, true)).chain(begun) {
-            let record = record_of(self.records, number);
-            tile.add(simd, self.plan, record, Window { front: sheet, is_continued });
+            let (record, plan) = self.planned(number);
+            tile.add(simd, plan, record, Window { front: sheet, is_continued });
             added += 1;
-            if usize::from(record.sheets[1]) >= sheet + WINDOW && !self.plan.is_whole() {
+            if usize::from(record.sheets[1]) >= sheet + WINDOW && !plan.is_whole() {
                 ahead.continued[(sheet + WINDOW - 1) % WINDOW].push(number);
             }
         }
@@ -189,54 +316,40 @@ impl March<'_> {
         &self,
         simd: S,
         sheet: usize,
-        marks: &[u64],
         tile: &mut OpenTile<'_, S>,
-        last: &mut [Last<S>; PACKETS],
+        seen: &mut [Seen<'_, S>],
     ) {
-        let (plan, sums) = (self.plan, &mut tile.sums);
-        let has_lattice = is_marked(marks, sheet);
-        let has_sums = plan.has_field && sums.has_field[sheet % WINDOW] != 0;
-        let values = (plan.central && has_sums)
-            .then(|| [sums.values_on(simd, plan, sheet), sums.values_on(simd, plan, sheet + 1)]);
-        for (packet, last) in tile.packets.iter_mut().zip(last) {
+        let plan = &self.plans[0];
+        for (field, own) in self.fields.iter().zip(&mut tile.fields) {
+            own.find_values(simd, field.plan, sheet);
+        }
+        let OpenTile { packets, sums, fields, .. } = tile;
+        for packet in packets {
             if packet.is_done {
                 continue;
             }
             let mut radiance = sums.take_radiance(simd, plan, packet, sheet);
-            let own = tile.cells.as_ref().and_then(
-                #[inline(always)]
-                |cells| cells.radiance(simd, plan, packet, sheet),
-            );
-            if let Some(own) = own {
-                radiance = radiance.map_or(Some(own), |all| Some(four!(I => all[I] + own[I])));
+            for (field, own) in self.fields.iter().zip(fields.iter()) {
+                let Some(cells) = &own.cells else { continue };
+                let Some(own) = cells.radiance(simd, field.plan, packet, sheet) else { continue };
+                radiance = match radiance {
+                    Some(all) => Some(four!(I => all[I] + own[I])),
+                    None => Some(own),
+                };
             }
-            let cells = tile.cells.as_mut().and_then(
-                #[inline(always)]
-                |cells| cells.layer(simd, plan, packet, sheet),
-            );
-            let field = match &self.gather {
-                _ if cells.is_some() => cells,
-                Some(gather) if has_lattice => gather.layer(simd, packet, sheet, marks, last),
-                Some(_) => None,
-                None if has_sums => {
-                    let number = packet.number;
-                    let slopes = values
-                        .as_ref()
-                        .map(|values| values.each_ref().map(|on| differences(simd, on, number)));
-                    let layer = sums.resolve(simd, plan, packet, sheet, slopes);
-                    let is_maximum = plan.optics == Optics::Maximum;
-                    layer
-                        .filter(|(layer, _)| is_maximum || self.visible.may_show(simd, plan, layer))
+            let mut media = Media::new(simd, radiance);
+            for ((field, own), seen) in self.fields.iter().zip(fields.iter_mut()).zip(&mut *seen) {
+                let found = field.layer(simd, packet, sheet, own, seen);
+                if let Some((layer, mask)) = &found {
+                    field.plan.add_field(simd, (layer, *mask), packet, &mut media);
                 }
-                None => None,
-            };
+            }
             let facets = sums.take_facets(simd, packet, sheet);
-            if field.is_none() && radiance.is_none() && facets.is_none() {
+            if media.is_empty() && facets.is_none() {
                 continue;
             }
-            let field = field.as_ref().map(|(layer, mask)| (layer, *mask));
-            if field.is_some() || radiance.is_some() {
-                plan.close(simd, sheet, packet, field, radiance);
+            if !media.is_empty() {
+                plan.close(simd, sheet, packet, &media);
             }
             if let Some(facets) = &facets {
                 facets.absorb(simd, &mut packet.pixels);
@@ -248,22 +361,22 @@ impl March<'_> {
 
     #[inline(always)]
     fn finished<S: Simd>(&self, simd: S, packets: &[Packet<S>; PACKETS]) -> Tile {
-        let mut tile = EMPTY;
+        let (plan, mut tile) = (&self.plans[0], EMPTY);
         for (number, Packet { rays, pixels, .. }) in packets.iter().enumerate() {
             let through: [f32; 8] = pixels.through.into();
             let [red, green, blue]: [[f32; 8]; 3] = three!(I => pixels.color[I].into());
             let mut hit = pixels.hit;
-            if self.plan.mode == Mode::AxisSheets {
+            if plan.mode == Mode::AxisSheets {
                 // Convert the place along the sheets' normal to the distance along the ray.
-                let normal = self.plan.frame.sheet_normal;
+                let normal = plan.frame.sheet_normal;
                 let slope = super::vector::dot_with(normal, rays.direction);
-                hit = if self.plan.view.perspective {
+                hit = if plan.view.perspective {
                     hit / slope.abs().max(fearless_simd::f32x8::splat(simd, 1e-6))
                 } else {
                     (hit - rays.aside[0] * normal[0] - rays.aside[1] * normal[1]) / slope
                 };
             }
-            if self.plan.optics != Optics::Maximum {
+            if plan.optics != Optics::Maximum {
                 // Convert the distance to the view's z.
                 hit *= rays.cosine;
             }

@@ -6,10 +6,15 @@
 //! composited (`close`). The GPU engine does the same in shaders; tests/cpu_equals_reference.rs
 //! compares both with the reference.
 //!
+//! A scene may have several *fields*. Each has a plan of its own: its tables, its lattice and its
+//! light, with the view and the sheets that all share. In a sheet, each field is classified by
+//! itself; then all of them and the radiance are mixed by their optical depths.
+//!
 //! | module | purpose |
 //! |---|---|
 //! | `plan` | data that all tiles of a picture share |
 //! | `items`, `page_cache`, `nodes`, `brick_cache` | which splats of the scene a view needs |
+//! | `fields` | what is kept of each field between pictures, and what a view needs of it |
 //! | `footprint`, `project` | the pixels and sheets that splats cover, one or eight at a time |
 //! | `bins` | which splats meet which tiles |
 //! | `skip` | in which tiles and sheets a lattice may be visible |
@@ -33,6 +38,7 @@ mod cells;
 mod close;
 mod facets;
 mod field;
+mod fields;
 mod footprint;
 mod gather;
 mod items;
@@ -54,36 +60,24 @@ mod window;
 
 use crate::{
     Error, Result,
-    bricks::{Bricks, Choice},
+    bricks::Choice,
     hierarchy::Detail,
-    math::{Camera, Kernel, View},
+    math::{Camera, View},
     parallel::prelude::*,
     picture::Picture,
-    plan::{
-        FrameStats, TILE, gathering,
-        pace::Pace,
-        shown::{self, Shown},
-        uniforms::Frame,
-        weighting::{Weighting, deviation, weighting},
-    },
-    scene::{Evaluate, Item, Optics, Scene, Settings},
-    volume::{
-        Lattice, TransferFunction, Volume,
-        reach::{EVERYTHING, first_visible},
-    },
+    plan::{FrameStats, TILE, pace::Pace, uniforms::Frame},
+    scene::{Optics, Scene, Settings},
+    volume::TransferFunction,
 };
 use bins::{BLOCK, Bins, TileLists};
-use blend::{Blend, Way};
-use brick_cache::{BrickCache, Grid};
-use cells::CellField;
+use brick_cache::most_bricks;
 use close::{NO_VALUE, Visible};
 use fearless_simd::Level;
-use field::Typed;
+use fields::FieldState;
 use footprint::Record;
-use gather::Gather;
 use items::Prepared;
-use march::{EMPTY, March, Tile};
-use plan::{Outline, Plan};
+use march::{DrawnField, EMPTY, March, Tile};
+use plan::{FieldOutline, Outline, Plan};
 use spare::Spare;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use vector::lanes;
@@ -94,16 +88,9 @@ use web_time::Instant;
 #[derive(Debug)]
 pub struct CpuRenderer {
     scene: Scene,
+    /// One for each item.
     prepared: Vec<Prepared>,
-    /// The ranges of the field around the samples of a gathered lattice.
-    ranges: Option<Vec<[u8; 2]>>,
-    /// The kernel sums of a gathered lattice, if four weights an axis do not suffice.
-    blend: Option<Blend>,
-    /// The visible samples of a gathered lattice, and the transfer function's visibility table for
-    /// which they were found.
-    shown: Option<([u16; 256], Shown)>,
-    /// The levels of a gathered volume in bricks, for the bricks of the last picture.
-    levels: Option<(Choice, Vec<(Grid, Shown)>)>,
+    fields: Vec<FieldState>,
     pace: Pace,
     level: Level,
     /// Memory to reuse.
@@ -139,10 +126,7 @@ impl CpuRenderer {
         Ok(Self {
             scene: scene.clone(),
             prepared: scene.items.iter().map(Prepared::new).collect(),
-            ranges: None,
-            blend: None,
-            shown: None,
-            levels: None,
+            fields: FieldState::all(scene),
             pace: Pace::default(),
             level: Level::new(),
             spare: Spare::new(),
@@ -150,13 +134,17 @@ impl CpuRenderer {
         })
     }
 
-    /// Replaces the transfer function of the scene's volume or sample set.
+    /// Replaces the transfer function of the field of an item, by its number in the scene
+    /// ([`Scene::fields`]).
     ///
     /// # Errors
-    /// [`Error::Argument`] for a transfer function that [`CpuRenderer::new`] would refuse. The
-    /// scene then keeps the old one.
-    pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
-        self.scene = self.scene.shown_by(transfer)?;
+    /// [`Error::Argument`] if the item has no field; [`Error::Transfer`] for a transfer function
+    /// that [`CpuRenderer::new`] would refuse. The scene then keeps the old one.
+    pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
+        self.scene = self.scene.shown_by(item, transfer)?;
+        for field in &mut self.fields {
+            field.scene = self.scene.with_one_field(field.item);
+        }
         Ok(())
     }
 
@@ -177,24 +165,12 @@ impl CpuRenderer {
         view.validate_for(&bounds)?;
         let mut clock = Clock { last: start, steps: Vec::new() };
         let outline = self.outline(&view, settings)?;
-        let plan =
-            Plan::new(&self.scene, &view, &outline.sheets, settings, outline.choice.as_ref());
+        let plans = self.plans(&view, settings, &outline);
         clock.step("plan");
-        let gathers = self.gathers(settings, &outline)?;
         let before: u64 = self.brick_reads();
-        let mut records = Vec::new();
-        let mut spare = std::mem::take(&mut self.spare);
-        for (item, prepared) in self.scene.items.iter().zip(&mut self.prepared) {
-            if let (Prepared::Bricks(cache), Some(choice)) = (&mut *prepared, &outline.choice) {
-                cache.update(choice, most_bricks(&cache.bricks, settings))?;
-            }
-            if !(gathers && matches!(item, Item::Volume(..) | Item::Bricks(..))) {
-                records.extend(prepared.records(&plan, settings, &outline, &mut spare)?);
-            }
-        }
-        items::check_count(&records)?;
+        let records = self.records(&plans, settings, &outline)?;
         clock.step("project");
-        let drawn = self.draw(&plan, &outline, &records, gathers, &mut clock);
+        let drawn = self.draw(&plans, &outline, &records, &mut clock);
         self.spare = records;
         if settings.stop.is_requested() {
             return Err(Error::Stopped);
@@ -205,8 +181,9 @@ impl CpuRenderer {
         }
         stats.cut_pixels = outline.cut_pixels;
         stats.read_bricks = self.brick_reads() - before;
-        if let Some(choice) = &outline.choice {
-            (stats.lambda, stats.bricks) = (choice.lambda, choice.bricks.len() as u64);
+        for choice in outline.fields.iter().filter_map(|field| field.choice.as_ref()) {
+            stats.lambda = stats.lambda.max(choice.lambda);
+            stats.bricks += choice.bricks.len() as u64;
         }
         for prepared in &self.prepared {
             match prepared {
@@ -223,11 +200,50 @@ impl CpuRenderer {
         Ok((picture, stats))
     }
 
+    /// Returns a plan for each field, or the only plan of a scene without one.
+    fn plans<'a>(&self, view: &'a View, settings: &Settings, outline: &Outline) -> Vec<Plan<'a>> {
+        let sheets = &outline.sheets;
+        let own = |(field, own): (&FieldState, &FieldOutline)| {
+            Plan::new(&field.scene, view, sheets, settings, own.choice.as_ref())
+        };
+        let mut plans: Vec<_> = self.fields.iter().zip(&outline.fields).map(own).collect();
+        if plans.is_empty() {
+            plans.push(Plan::new(&self.scene, view, sheets, settings, None));
+        }
+        Plan::join(&mut plans);
+        plans
+    }
+
+    /// Returns the records of all splats that meet the picture.
+    fn records(
+        &mut self,
+        plans: &[Plan],
+        settings: &Settings,
+        outline: &Outline,
+    ) -> Result<Vec<Vec<Record>>> {
+        let mut records = Vec::new();
+        let mut spare = std::mem::take(&mut self.spare);
+        for (number, prepared) in self.prepared.iter_mut().enumerate() {
+            let field = self.fields.iter().position(|field| field.item == number);
+            let own = field.map(|field| &outline.fields[field]);
+            if let (Prepared::Bricks(cache), Some(choice)) =
+                (&mut *prepared, own.and_then(|own| own.choice.as_ref()))
+            {
+                cache.update(choice, most_bricks(&cache.bricks, settings))?;
+            }
+            if !own.is_some_and(|own| own.gathers) {
+                let plan = &plans[field.unwrap_or(0)];
+                records.extend(prepared.records(plan, settings, outline, own, &mut spare)?);
+            }
+        }
+        items::check_count(&records)?;
+        Ok(records)
+    }
+
     /// Bytes of memory held for drawing, besides the scene's own.
     fn bytes(&self) -> u64 {
-        let shown = self.shown.as_ref().map_or(0, |(_, shown)| shown.bytes());
-        let ranges = self.ranges.as_ref().map_or(0, |ranges| size_of_val(ranges.as_slice()) as u64);
-        shown + ranges + self.prepared.iter().map(Prepared::bytes).sum::<u64>()
+        let fields: u64 = self.fields.iter().map(FieldState::bytes).sum();
+        fields + self.prepared.iter().map(Prepared::bytes).sum::<u64>()
     }
 
     fn brick_reads(&self) -> u64 {
@@ -258,241 +274,56 @@ impl CpuRenderer {
         let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
         self.prepared.iter_mut().try_for_each(|prepared| prepared.update_levels(view, pixels))?;
         let bounds = self.scene.bounds();
-        let most = self.scene.items.iter().find_map(|item| match item {
-            Item::Bricks(bricks, ..) => Some(most_bricks(bricks, settings)),
-            _ => None,
-        });
-        let choice = self.scene.choice(view, settings, detail, most.unwrap_or(usize::MAX), &bounds);
-        let sheets = self.scene.sheets_of(view, settings, choice.as_ref(), &bounds);
-        let mut shown = EVERYTHING;
-        if let Some(Item::Volume(volume, _, transfer)) =
-            self.scene.items.iter().find(|i| matches!(i, Item::Volume(..)))
-            && !self.scene.mixes_afar(settings, &sheets, choice.as_ref())
-        {
-            shown = first_visible(transfer, volume.range);
-        }
+        let choice = |field: &FieldState| field.choice(view, settings, detail, &bounds);
+        let choices: Vec<Option<Choice>> = self.fields.iter().map(choice).collect();
+        let in_bricks: Vec<Choice> = choices.iter().flatten().cloned().collect();
+        let sheets = self.scene.sheets_of(view, settings, &in_bricks, &bounds);
+        let own = self.fields.iter().zip(choices);
+        let own = own.map(|(field, choice)| field.outline(settings, &sheets, choice));
+        let fields = own.collect::<Result<Vec<_>>>()?;
         let stop = settings.stop.clone();
-        Ok(Outline { cut_pixels, choice, sheets, shown, stop })
+        Ok(Outline { cut_pixels, sheets, fields, stop })
     }
 
-    /// Whether the field of the scene's volume is gathered.
-    fn gathers(&self, settings: &Settings, outline: &Outline) -> Result<bool> {
-        if settings.evaluate == Evaluate::Scatter {
-            // The sections of tensor products have no known form.
-            return self.scene.tensor().map_or(Ok(false), |tensor| {
-                let name = tensor.name();
-                Err(Error::Argument(format!(
-                    "the kernel {name} can't be scattered; gather instead, \
-                     or leave it to the engine"
-                )))
-            });
-        }
-        let parts = gathering::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
-        match gathering::obstacle(&self.scene, settings, parts, gather::unsuited) {
-            Some(what) if settings.evaluate == Evaluate::Gather => Err(Error::Argument(format!(
-                "{what} can't be gathered; scatter instead, or leave it to the engine"
-            ))),
-            Some(what) if let Some(tensor) = self.scene.tensor() => {
-                Err(Error::Argument(format!("the kernel {} does not draw {what}", tensor.name())))
-            }
-            obstacle => Ok(obstacle.is_none()),
-        }
-    }
-
-    fn prepare_gather(&mut self, plan: &Plan, outline: &Outline) {
-        for (item, prepared) in self.scene.items.iter().zip(&self.prepared) {
-            match (item, prepared, &outline.choice) {
-                (Item::Volume(volume, kernel, transfer), ..) => {
-                    let first = match plan.optics {
-                        Optics::Maximum => EVERYTHING,
-                        _ => first_visible(transfer, volume.range),
-                    };
-                    if let (None, Ok(Way::Blend(taps))) = (&self.blend, Way::of(volume, kernel)) {
-                        self.blend = Some(Blend::new(volume, kernel, taps));
-                    }
-                    let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
-                        Some(blend) => blend.ranges(volume, kernel),
-                        None => shown::field_ranges(volume, kernel),
-                    });
-                    let dims =
-                        self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
-                    self.shown.take_if(|(own, _)| *own != first);
-                    self.shown.get_or_insert_with(|| (first, Shown::new(dims, ranges, &first)));
-                }
-                (_, Prepared::Bricks(cache), Some(choice))
-                    if self.levels.as_ref().is_none_or(|(own, _)| own != choice) =>
-                {
-                    let level = |(level, _): &(usize, f64)| {
-                        (Grid::new(cache, choice, *level), Shown::of_bricks(cache, choice, *level))
-                    };
-                    self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
-                }
-                _ => {}
+    fn prepare_gather(&mut self, plans: &[Plan], outline: &Outline) {
+        for ((field, plan), own) in self.fields.iter_mut().zip(plans).zip(&outline.fields) {
+            if own.gathers {
+                field.prepare_gather(plan, own, &self.prepared[field.item]);
             }
         }
     }
 
-    /// Returns the gathered field, or `None` if none of its bricks is visible.
-    fn gather<'a>(
+    /// Returns the fields as all tiles of a picture need them.
+    fn drawn_fields<'a>(
         &'a self,
-        plan: &'a Plan,
+        plans: &'a [Plan<'a>],
         outline: &Outline,
-        visible: &'a Visible,
-    ) -> Option<Gather<'a>> {
-        let zero = plan.tables.values[0];
-        let mut levels = Vec::new();
-        for (item, prepared) in self.scene.items.iter().zip(&self.prepared) {
-            match (item, prepared) {
-                (Item::Volume(volume, kernel, _), _) => {
-                    levels.push(self.whole_level(volume, kernel, zero)?);
-                }
-                (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache))
-                    if !cache.samples().is_empty() =>
-                {
-                    levels = self.levels_of_bricks(bricks, cache, weighting(kernel)?, zero)?;
-                }
-                _ => {}
-            }
-        }
-        let [finest, _] = levels.first()?.cells;
-        let steps = (0..3).map(|axis| {
-            let [x, y, z, _] = plan.frame.field_axes()[axis];
-            f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis])
-        });
-        let steps = steps.fold(0.0, f64::max) * outline.sheets.step;
-        let looks =
-            if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
-        let parts = gathering::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
-        let deviation = self.scene.items.iter().find_map(|item| deviation(item.kernel()?));
-        let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
-        let is_blended = self.blend.is_some();
-        Some(Gather { plan, levels, parts, ends, looks, is_blended, visible, zero: zero as f32 })
-    }
-
-    /// Returns a volume in memory as the only level. Values are relative to `zero`.
-    fn whole_level<'a>(
-        &'a self,
-        volume: &'a Volume,
-        kernel: &Kernel,
-        zero: f64,
-    ) -> Option<gather::Level<'a>> {
-        let (_, shown) = self.shown.as_ref()?;
-        let field = match &self.blend {
-            Some(blend) => Typed::blended(volume, blend, zero),
-            None => Typed::new(volume, weighting(kernel)?, zero),
-        };
-        // Coefficients begin before the samples.
-        let drawn = volume.drawn_lattice();
-        let before = volume.lattice.axes.inverse() * (volume.lattice.origin - drawn.origin);
-        let shift = before.as_vec3().to_array();
-        let to_cells = |blend: &Blend| blend.to_cells(shift);
-        Some(gather::Level {
-            field,
-            dims: drawn.dims,
-            grid: None,
-            shown,
-            share: 1.0,
-            scale: [1.0; 3],
-            shift,
-            cells: self.blend.as_ref().map_or([[1.0; 3], shift], to_cells),
+        visible: &'a [Visible],
+    ) -> Vec<DrawnField<'a>> {
+        let all = self.fields.iter().zip(plans).zip(&outline.fields).zip(visible);
+        all.map(|(((field, plan), own), visible)| {
+            field.drawn(plan, &outline.sheets, own, &self.prepared[field.item], visible)
         })
-    }
-
-    /// Returns the levels of a volume in bricks, the finer first.
-    fn levels_of_bricks<'a>(
-        &'a self,
-        bricks: &Bricks,
-        cache: &'a BrickCache,
-        weighting: Weighting,
-        zero: f64,
-    ) -> Option<Vec<gather::Level<'a>>> {
-        let (choice, found) = self.levels.as_ref()?;
-        let fine = &bricks.header().lattice;
-        let level = |((level, share), (grid, shown)): (&(usize, f64), &'a (Grid, Shown))| {
-            let (own, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
-            let to_own = own.axes.inverse();
-            let scale = (to_own * fine.axes).to_cols_array_2d();
-            let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
-            let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
-            gather::Level {
-                field: Typed::of_bricks(cache.samples(), dims, grid, weighting, zero),
-                dims,
-                grid: Some(grid),
-                shown,
-                share: *share as f32,
-                scale,
-                shift,
-                cells: [scale, shift],
-            }
-        };
-        Some(choice.levels.iter().zip(found).map(level).collect())
-    }
-
-    /// Returns the lattices of the gathered levels.
-    fn lattices(&self, outline: &Outline) -> Vec<Lattice> {
-        let own = |item: &Item| match (item, &outline.choice) {
-            (Item::Volume(volume, ..), _) => {
-                Some(vec![self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).clone()])
-            }
-            (Item::Bricks(bricks, ..), Some(choice)) => {
-                Some(choice.levels.iter().map(|(level, _)| bricks.lattice(*level)).collect())
-            }
-            _ => None,
-        };
-        self.scene.items.iter().find_map(own).unwrap_or_default()
-    }
-
-    /// Returns a bit for each sheet of each tile in which the gathered field may be visible.
-    fn marks(&self, plan: &Plan, outline: &Outline, gather: &Gather) -> Vec<Vec<u64>> {
-        let mut marks: Vec<Vec<u64>> = Vec::new();
-        for (level, lattice) in gather.levels.iter().zip(self.lattices(outline)) {
-            let own = level.shown.sheets_of_tiles(&lattice, plan.view, &outline.sheets);
-            if marks.is_empty() {
-                marks = own;
-                continue;
-            }
-            for (tile, other) in marks.iter_mut().zip(own) {
-                tile.iter_mut().zip(other).for_each(|(a, b)| *a |= b);
-            }
-        }
-        marks
-    }
-
-    /// Returns the scene's cells as a view shows them.
-    fn cells<'a>(&'a self, plan: &Plan, visible: &Visible) -> Option<CellField<'a>> {
-        self.scene.items.iter().find_map(|item| match item {
-            Item::Cells(own, _) => Some(CellField::new(plan, own, visible)),
-            _ => None,
-        })
+        .collect()
     }
 
     fn draw(
         &mut self,
-        plan: &Plan,
+        plans: &[Plan],
         outline: &Outline,
         records: &[Vec<Record>],
-        gathers: bool,
         clock: &mut Clock,
     ) -> (Picture, FrameStats) {
         let mut spare = std::mem::take(&mut self.spare_bins);
-        let visible = Visible::new(plan);
-        let mut gather = None;
-        if gathers {
-            self.prepare_gather(plan, outline);
-            gather = self.gather(plan, outline, &visible);
+        let visible: Vec<Visible> = plans.iter().map(Visible::new).collect();
+        self.prepare_gather(plans, outline);
+        let fields = self.drawn_fields(plans, outline, &visible);
+        if outline.fields.iter().any(|field| field.gathers) {
             clock.step("skip");
         }
-        let marks = gather.as_ref().map_or_else(Vec::new, |gather| {
-            let marks = self.marks(plan, outline, gather);
-            clock.step("skip");
-            marks
-        });
-        let marked =
-            |own: &Vec<u64>| own.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
-        let gathered = marks.iter().map(marked).sum();
-        let cells = self.cells(plan, &visible);
-        let crossed = cells.as_ref().map_or(0, CellField::count);
-        let march = March { plan, gather, cells, visible: &visible, records };
+        let gathered = fields.iter().map(DrawnField::marked).sum();
+        let crossed: u64 = fields.iter().map(DrawnField::crossed).sum();
+        let (plan, march) = (&plans[0], March { plans, fields, records });
         let mut bins = Bins::new(plan, records, &mut spare);
         clock.step("bin");
         let drawn = AtomicU64::new(0);
@@ -512,7 +343,7 @@ impl CpuRenderer {
                         return vec![EMPTY; BLOCK * BLOCK];
                     }
                     let entries = lists.of_tiles(column, row, columns);
-                    draw_block(self.level, &march, [column, row], &entries, &marks, &drawn)
+                    draw_block(self.level, &march, [column, row], &entries, &drawn)
                 };
                 let blocks: Vec<Vec<Tile>> = (0..columns).into_par_iter().map(block).collect();
                 write_band(plan, transfer, &blocks, color, depth);
@@ -537,33 +368,22 @@ fn record_bytes(records: &[Vec<Record>]) -> u64 {
     records.iter().map(|batch| size_of_val(batch.as_slice()) as u64).sum()
 }
 
-/// Returns the number of bricks that fit into the settings' memory, at least one.
-fn most_bricks(bricks: &Bricks, settings: &Settings) -> usize {
-    usize::try_from(settings.page_memory / brick_cache::slot_bytes(bricks))
-        .unwrap_or(usize::MAX)
-        .max(1)
-}
-
 /// Draws the tiles of a block, row by row.
 fn draw_block(
     level: Level,
     march: &March,
     [column, row]: [usize; 2],
     entries: &TileLists,
-    marks: &[Vec<u64>],
     drawn: &AtomicU64,
 ) -> Vec<Tile> {
-    let tiles = march.plan.tiles();
+    let tiles = march.plans[0].tiles();
     let mut found = vec![EMPTY; BLOCK * BLOCK];
     let mut count = 0;
     for (number, tile) in found.iter_mut().enumerate() {
         let at = [column * BLOCK + number % BLOCK, row * BLOCK + number / BLOCK];
         if at[0] < tiles[0] && at[1] < tiles[1] {
-            let (entries, marks) = (
-                entries.of(number),
-                marks.get(at[1] * tiles[0] + at[0]).map_or(&[][..], Vec::as_slice),
-            );
-            *tile = lanes!(level, simd => march.tile(simd, at, entries, marks, &mut count));
+            let entries = entries.of(number);
+            *tile = lanes!(level, simd => march.tile(simd, at, entries, &mut count));
         }
     }
     drawn.fetch_add(count, Relaxed);

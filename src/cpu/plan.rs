@@ -21,17 +21,29 @@ const NOWHERE: f32 = 3e38;
 pub struct Outline {
     /// The cut of hierarchies, in pixels.
     pub cut_pixels: f64,
-    pub choice: Option<Choice>,
     pub sheets: Sheets,
-    /// The ranges of values that are visible.
-    pub shown: [u16; 256],
+    /// In the order of the scene.
+    pub fields: Vec<FieldOutline>,
     /// Whether drawing is to end.
     pub stop: Stop,
 }
 
-/// The plan of a picture. Sheets are numbered from 1; sheet n lies between planes n and n + 1.
-/// Sheet 0 is everything in front of the first plane and is not drawn.
+/// What a picture draws of a field.
+pub struct FieldOutline {
+    pub choice: Option<Choice>,
+    /// The ranges of values that are visible.
+    pub shown: [u16; 256],
+    /// Whether the field is gathered.
+    pub gathers: bool,
+}
+
+/// The plan of a picture for one of its fields, and for what carries colours of its own.
+///
+/// Sheets are numbered from 1; sheet n lies between planes n and n + 1. Sheet 0 is everything in
+/// front of the first plane and is not drawn.
 pub struct Plan<'a> {
+    /// The number of the field.
+    pub number: u8,
     pub view: &'a View,
     pub frame: Frame,
     pub tables: Tables,
@@ -54,6 +66,8 @@ pub struct Plan<'a> {
     pub has_gradient_opacity: bool,
     /// Gradients across the picture are differences of neighbouring pixels.
     pub central: bool,
+    /// Tiles share pixels with their neighbours, because some field needs them.
+    has_apron: bool,
     /// The transfer function is integrated between values, not looked up at the mean of a sheet.
     pub is_integrated: bool,
     pub isosurfaces: usize,
@@ -72,6 +86,7 @@ pub struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
+    /// Returns the plan of a scene with one field, or without any.
     pub fn new(
         scene: &Scene,
         view: &'a View,
@@ -88,6 +103,7 @@ impl<'a> Plan<'a> {
             beyond: [[0.0; 4]; 2],
         };
         let mut plan = Self {
+            number: 0,
             view,
             frame: Frame::new(scene, view, sheets, settings, choice),
             tables: empty,
@@ -103,6 +119,7 @@ impl<'a> Plan<'a> {
             is_lit: false,
             has_gradient_opacity: false,
             central: false,
+            has_apron: false,
             is_integrated: settings.classification == Classification::PreIntegrated,
             isosurfaces: 0,
             has_radiance: false,
@@ -133,7 +150,17 @@ impl<'a> Plan<'a> {
             }
             plan.set_field(sheets, settings, item);
         }
+        plan.has_apron = plan.central;
         plan
+    }
+
+    /// Numbers the plans of the fields of one picture, whose tiles are the same.
+    pub fn join(plans: &mut [Self]) {
+        let has_apron = plans.iter().any(|plan| plan.central);
+        for (number, plan) in plans.iter_mut().enumerate() {
+            // There are at most `Scene::MAX_FIELDS`.
+            (plan.number, plan.has_apron) = (number as u8, has_apron);
+        }
     }
 
     /// Sets what an item's field needs, if it has one.
@@ -177,12 +204,12 @@ impl<'a> Plan<'a> {
 
     /// Returns the number of pixels that tiles share with each neighbour.
     pub fn apron(&self) -> i32 {
-        i32::from(self.central)
+        i32::from(self.has_apron)
     }
 
     /// Returns the number of pixels from a tile to the next one.
     pub fn tile_step(&self) -> usize {
-        TILE - 2 * usize::from(self.central)
+        TILE - 2 * usize::from(self.has_apron)
     }
 
     /// Returns the number of columns and rows of tiles.

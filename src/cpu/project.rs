@@ -144,6 +144,7 @@ impl<'a> Projector<'a> {
                 payload: [1.0, facing, red, green, blue, nx, ny, nz],
                 pixels: [[left[lane], top[lane]], [right[lane], bottom[lane]]],
                 sheets: [sheets[0][lane], sheets[1][lane].max(1)],
+                field: self.plan.number,
             });
         }
     }

@@ -8,10 +8,11 @@ use super::{
     footprint::{Kind, Record},
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
-    sums::{Sums, WINDOW},
+    sums::{ScalarSums, Sums, WINDOW},
     vector::{Lanes, dot, each, exp, log2, three},
 };
 use crate::{
+    plan::TILE,
     scene::{Optics, Order},
     splat::TRAINED_OPACITIES,
 };
@@ -36,6 +37,16 @@ pub struct OpenTile<'a, S: Simd> {
     pub packets: [Packet<S>; PACKETS],
     /// The sums of the open sheets.
     pub sums: Sums<S>,
+    pub fields: Vec<OpenField<'a, S>>,
+}
+
+/// A field in a tile while splats and tetrahedra are added to the tile.
+pub struct OpenField<'a, S: Simd> {
+    /// The sums of the open sheets, if the field is scattered.
+    pub sums: Option<Box<ScalarSums<S>>>,
+    /// The values on the planes in front of and behind a sheet, if gradients are differences of
+    /// neighbouring pixels.
+    pub values: Option<[[[f32; TILE]; TILE]; 2]>,
     pub cells: Option<CellTile<'a, S>>,
 }
 
@@ -262,7 +273,13 @@ impl<'a> Projected<'a> {
 
     /// Adds the value of the splat to the sheets, and to the planes between them.
     #[inline(always)]
-    fn add_scalar<S: Simd>(&self, simd: S, plan: &Plan, packet: &Packet<S>, sums: &mut Sums<S>) {
+    fn add_scalar<S: Simd>(
+        &self,
+        simd: S,
+        plan: &Plan,
+        packet: &Packet<S>,
+        sums: &mut ScalarSums<S>,
+    ) {
         let (front, rays) = (self.window.front, &packet.rays);
         let Some(along) = self.along(simd, plan, rays) else { return };
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
@@ -427,13 +444,13 @@ fn near_normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
 }
 
 impl<S: Simd> OpenTile<'_, S> {
-    /// Adds a splat's window to all packets that it meets.
+    /// Adds a splat's window to all packets that it meets. `plan` is that of the splat's field.
     #[inline(always)]
     pub fn add(&mut self, simd: S, plan: &Plan, record: &Record, window: Window) {
         let [first, last] = record.pixels;
         let inside = |pixel: [i32; 2]| [0, 1].map(|axis| pixel[axis] - self.corner[axis]);
         let from = inside(first).map(|at| at.max(0) as usize);
-        let to = inside(last).map(|at| at.min(crate::plan::TILE as i32 - 1) as usize);
+        let to = inside(last).map(|at| at.min(TILE as i32 - 1) as usize);
         if record.kind == Kind::Facet {
             let rows = from[1] / HIGH..=to[1] / HIGH;
             let columns = from[0] / WIDE..=to[0] / WIDE;
@@ -442,6 +459,8 @@ impl<S: Simd> OpenTile<'_, S> {
             return;
         }
         let splat = Projected::new(plan, record, window);
+        let field = self.fields.get_mut(usize::from(record.field));
+        let mut scalar = field.and_then(|field| field.sums.as_deref_mut());
         for row in from[1] / HIGH..=to[1] / HIGH {
             for column in from[0] / WIDE..=to[0] / WIDE {
                 let packet = &mut self.packets[row * 2 + column];
@@ -449,10 +468,10 @@ impl<S: Simd> OpenTile<'_, S> {
                 if packet.is_done && !plan.central {
                     continue;
                 }
-                if record.kind == Kind::Scalar {
-                    splat.add_scalar(simd, plan, packet, &mut self.sums);
-                } else {
-                    splat.add_radiance(simd, plan, packet, &mut self.sums);
+                match (record.kind, &mut scalar) {
+                    (Kind::Scalar, Some(sums)) => splat.add_scalar(simd, plan, packet, sums),
+                    (Kind::Scalar, None) => {}
+                    _ => splat.add_radiance(simd, plan, packet, &mut self.sums),
                 }
             }
         }

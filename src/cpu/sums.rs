@@ -75,16 +75,23 @@ impl<S: Simd> Cover<S> {
     }
 }
 
+/// The sums of splats that carry their own colour.
 pub struct Sums<S: Simd> {
     pub radiance: [[Radiance<S>; PACKETS]; WINDOW],
     /// The packets that have radiance, as bits.
     pub has_radiance: [u8; WINDOW],
-    pub field: [[FieldSums<S>; PACKETS]; WINDOW],
-    pub faces: [[FaceSums<S>; PACKETS]; WINDOW],
-    pub has_field: [u8; WINDOW],
     /// Empty in a scene without facets.
     pub facets: Vec<[FacetSums<S>; PACKETS]>,
     pub has_facets: [u8; WINDOW],
+    none: Lanes<S>,
+}
+
+/// The sums of a scattered field.
+pub struct ScalarSums<S: Simd> {
+    pub field: [[FieldSums<S>; PACKETS]; WINDOW],
+    pub faces: [[FaceSums<S>; PACKETS]; WINDOW],
+    /// The packets that have a field, as bits.
+    pub has_field: [u8; WINDOW],
     none: Lanes<S>,
 }
 
@@ -115,14 +122,6 @@ impl<S: Simd> Sums<S> {
         Self {
             radiance: [[[none; 8]; PACKETS]; WINDOW],
             has_radiance: [0; WINDOW],
-            field: [[FieldSums { weight: none, value: none }; PACKETS]; WINDOW],
-            faces: [[FaceSums {
-                weight: none,
-                value: none,
-                weight_slope: [none; 2],
-                value_slope: [none; 2],
-            }; PACKETS]; WINDOW],
-            has_field: [0; WINDOW],
             facets: if plan.has_facets { vec![no_facets; WINDOW] } else { Vec::new() },
             has_facets: [0; WINDOW],
             none,
@@ -198,6 +197,43 @@ impl<S: Simd> Sums<S> {
         Some(Cover { share, distance: sums.distance * inverse, color })
     }
 
+    /// Clears the slot of a sheet, for the sheet four further on.
+    #[inline(always)]
+    pub fn clear(&mut self, sheet: usize) {
+        let slot = sheet % WINDOW;
+        if self.has_radiance[slot] != 0 {
+            // Not taken yet: the sheet is not drawn, or a packet is done.
+            for (packet, own) in self.radiance[slot].iter_mut().enumerate() {
+                if self.has_radiance[slot] & (1 << packet) != 0 {
+                    *own = [self.none; 8];
+                }
+            }
+            self.has_radiance[slot] = 0;
+        }
+        if self.has_facets[slot] != 0 {
+            self.facets[slot] = [FacetSums::none(self.none); PACKETS];
+            self.has_facets[slot] = 0;
+        }
+    }
+}
+
+impl<S: Simd> ScalarSums<S> {
+    #[inline(always)]
+    pub fn new(simd: S) -> Self {
+        let none = Lanes::splat(simd, 0.0);
+        Self {
+            field: [[FieldSums { weight: none, value: none }; PACKETS]; WINDOW],
+            faces: [[FaceSums {
+                weight: none,
+                value: none,
+                weight_slope: [none; 2],
+                value_slope: [none; 2],
+            }; PACKETS]; WINDOW],
+            has_field: [0; WINDOW],
+            none,
+        }
+    }
+
     /// Returns the field of a sheet at a packet, or `None` if none was added. `slopes` are those
     /// per pixel to the right and down, on the planes in front of and behind the sheet, if they are
     /// differences of neighbouring pixels.
@@ -210,7 +246,7 @@ impl<S: Simd> Sums<S> {
         sheet: usize,
         slopes: Option<[[Lanes<S>; 2]; 2]>,
     ) -> Option<(Layer<S>, mask32x8<S>)> {
-        let (slot, rays) = (sheet % WINDOW, &packet.rays);
+        let (slot, rays) = (sheet % WINDOW, packet.rays_in(plan));
         if self.has_field[slot] & packet.bit() == 0 {
             return None;
         }
@@ -292,19 +328,6 @@ impl<S: Simd> Sums<S> {
     #[inline(always)]
     pub fn clear(&mut self, sheet: usize) {
         let slot = sheet % WINDOW;
-        if self.has_radiance[slot] != 0 {
-            // Not taken yet: the sheet is not drawn, or a packet is done.
-            for (packet, own) in self.radiance[slot].iter_mut().enumerate() {
-                if self.has_radiance[slot] & (1 << packet) != 0 {
-                    *own = [self.none; 8];
-                }
-            }
-            self.has_radiance[slot] = 0;
-        }
-        if self.has_facets[slot] != 0 {
-            self.facets[slot] = [FacetSums::none(self.none); PACKETS];
-            self.has_facets[slot] = 0;
-        }
         if self.has_field[slot] != 0 {
             let none = self.none;
             self.field[slot] = [FieldSums { weight: none, value: none }; PACKETS];

@@ -63,7 +63,7 @@ impl Request<'_> {
         prepared.update_facets(view, settings);
         prepared.update_forests(gpu, view, settings, cut_pixels)?;
         let choice = self.bring_bricks(gpu, passes, prepared)?;
-        let sheets = prepared.scene.sheets_of(view, settings, choice.as_ref(), &prepared.bounds);
+        let sheets = prepared.scene.sheets_of(view, settings, choice.as_slice(), &prepared.bounds);
         let gather = gathers(gpu, prepared, settings, &sheets)?;
         if gather {
             prepared.update_field(gpu, settings)?;

@@ -33,8 +33,8 @@ pub struct SceneFile {
     /// Where the picture is taken from. Without it, the camera is fitted to the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraEntry>,
-    /// The transfer function of the field, in the layout of its own files, or the name of one, or
-    /// the path of its file. Without it, it is made for the values.
+    /// The transfer function of the fields that have none of their own, in the layout of its own
+    /// files, or the name of one, or the path of its file. Without it, it is made for the values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transfer: Option<Value>,
     /// The clips that cut the scene.
@@ -61,12 +61,29 @@ pub struct InputEntry {
     /// The share of the light that a surface of this input absorbs, above 0 to 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opacity: Option<f64>,
+    /// The transfer function of this input's field, like [`SceneFile::transfer`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transfer: Option<Value>,
+    /// The values that the transfer function or the colour map of this input is spread over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range: Option<[f64; 2]>,
+    /// The isosurfaces of this input's field, as `render --iso` takes them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iso: Option<String>,
 }
 
 impl InputEntry {
     /// A visible input with nothing else set.
     pub fn new(file: PathBuf) -> Self {
-        Self { file, visible: true, color: None, opacity: None }
+        Self {
+            file,
+            visible: true,
+            color: None,
+            opacity: None,
+            transfer: None,
+            range: None,
+            iso: None,
+        }
     }
 }
 
@@ -144,9 +161,7 @@ impl SceneFile {
         })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         scene.inputs.iter_mut().for_each(|input| input.file = folder.join(&input.file));
-        if let Some(file) = scene.transfer_file() {
-            scene.transfer = Some(folder.join(file).to_string_lossy().into());
-        }
+        scene.change_transfer_files(|file| folder.join(file));
         Ok(scene)
     }
 
@@ -171,14 +186,22 @@ impl SceneFile {
             return Err(format!("inputs: the opacity of {file} must be above 0 and at most 1"));
         }
         scene.transfer_function()?;
+        for input in &scene.inputs {
+            let file = input.file.display();
+            function_of(input.transfer.as_ref()).map_err(|error| format!("{file}: {error}"))?;
+        }
         scene.clips.iter().try_for_each(|clip| clip.clip().map(|_| ()))?;
         Ok(scene)
     }
 
-    /// Returns the file of the transfer function, if the scene names one.
-    fn transfer_file(&self) -> Option<PathBuf> {
-        let name = self.transfer.as_ref()?.as_str()?;
-        (!TransferFunction::NAMES.contains(&name)).then(|| name.into())
+    /// Changes the paths of transfer functions.
+    fn change_transfer_files(&mut self, change: impl Fn(&Path) -> PathBuf) {
+        let own = self.inputs.iter_mut().map(|input| &mut input.transfer);
+        for transfer in own.chain([&mut self.transfer]) {
+            if let Some(file) = file_of(transfer.as_ref()) {
+                *transfer = Some(change(&file).to_string_lossy().into());
+            }
+        }
     }
 
     /// Returns the transfer function, if the scene has one of its own, rather than a name or a
@@ -187,15 +210,30 @@ impl SceneFile {
     /// # Errors
     /// What is wrong with it.
     pub fn transfer_function(&self) -> Result<Option<TransferFunction>, String> {
-        let read = |value: &Value| TransferFunction::from_json(&value.to_string());
-        let own = self.transfer.as_ref().filter(|transfer| !transfer.is_string());
-        own.map(read).transpose().map_err(|error| format!("transfer: {error}"))
+        function_of(self.transfer.as_ref())
+    }
+
+    /// Returns the transfer function of an input, by its number, like
+    /// [`transfer_function`](Self::transfer_function): that of the input itself, or else that of
+    /// the scene.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn transfer_of(&self, input: usize) -> Result<Option<TransferFunction>, String> {
+        let own = self.inputs.get(input).and_then(|input| input.transfer.as_ref());
+        function_of(own.or(self.transfer.as_ref()))
     }
 
     /// Sets the transfer function.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
-        // What `to_json` writes is JSON.
-        self.transfer = serde_json::from_str(&transfer.to_json()).ok();
+        self.transfer = value_of(transfer);
+    }
+
+    /// Sets the transfer function of an input, by its number.
+    pub fn set_transfer_of(&mut self, input: usize, transfer: &TransferFunction) {
+        if let Some(input) = self.inputs.get_mut(input) {
+            input.transfer = value_of(transfer);
+        }
     }
 
     /// Returns the text of a scene file in a folder. Inputs below the folder get relative paths.
@@ -204,9 +242,7 @@ impl SceneFile {
         for input in &mut own.inputs {
             input.file = relative(&input.file, folder);
         }
-        if let Some(file) = own.transfer_file() {
-            own.transfer = Some(relative(&file, folder).to_string_lossy().into());
-        }
+        own.change_transfer_files(|file| relative(file, folder));
         // Maps with text keys and numbers always become JSON.
         let mut text = serde_json::to_string_pretty(&own).unwrap_or_default();
         text.push('\n');
@@ -222,6 +258,25 @@ impl SceneFile {
         let folder = path.parent().unwrap_or(Path::new(""));
         crate::disk::write(path, self.to_json(folder).as_bytes())
     }
+}
+
+/// Returns the file of a transfer function, if an entry names one.
+fn file_of(transfer: Option<&Value>) -> Option<PathBuf> {
+    let name = transfer?.as_str()?;
+    (!TransferFunction::NAMES.contains(&name)).then(|| name.into())
+}
+
+/// Returns the transfer function of an entry, if the entry is one, rather than a name or a file.
+fn function_of(transfer: Option<&Value>) -> Result<Option<TransferFunction>, String> {
+    let read = |value: &Value| TransferFunction::from_json(&value.to_string());
+    let own = transfer.filter(|transfer| !transfer.is_string());
+    own.map(read).transpose().map_err(|error| format!("transfer: {error}"))
+}
+
+/// Returns a transfer function as an entry.
+fn value_of(transfer: &TransferFunction) -> Option<Value> {
+    // What `to_json` writes is JSON.
+    serde_json::from_str(&transfer.to_json()).ok()
 }
 
 /// Returns a path as seen from a folder, if it lies below the folder or beside it.
@@ -340,6 +395,26 @@ mod tests {
     }
 
     #[test]
+    fn inputs_have_transfer_functions_of_their_own() {
+        let mut scene = scene();
+        let shared = scene.transfer_function().expect("a function");
+        assert!(shared.is_some());
+        assert_eq!(scene.transfer_of(0), Ok(shared.clone()));
+        let own = TransferFunction { opacity: vec![(1.0, 0.5)], ..TransferFunction::default() };
+        scene.set_transfer_of(1, &own);
+        (scene.inputs[1].range, scene.inputs[1].iso) = (Some([0.0, 9.0]), Some("50%:red".into()));
+        let again = SceneFile::parse(&scene.to_json(Path::new(""))).expect("its own text");
+        assert_eq!(again, scene);
+        assert_eq!(again.transfer_of(1), Ok(Some(own)));
+        assert_eq!(again.transfer_of(0), Ok(shared));
+        scene.inputs[0].transfer = Some("mri".into());
+        assert_eq!(scene.transfer_of(0), Ok(None));
+        scene.inputs[0].transfer = Some(serde_json::json!({"opacity": 3}));
+        let error = SceneFile::parse(&scene.to_json(Path::new(""))).expect_err("no function");
+        assert!(error.contains("a.nrrd: transfer"), "{error}");
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         let wrong = |from: &str, to: &str| {
             let text = scene().to_json(Path::new("")).replace(from, to);
@@ -370,7 +445,7 @@ mod tests {
         let text = std::fs::read_to_string(&file).expect("text");
         assert!(text.contains("../data/a.ply") && text.contains("../data/t.json"), "{text}");
         let read = SceneFile::read(&file, &Limits::default()).expect("read");
-        assert!(read.transfer_file().is_some_and(|file| file.exists()));
+        assert!(file_of(read.transfer.as_ref()).is_some_and(|file| file.exists()));
         assert_eq!(
             read.inputs[0].file.canonicalize().unwrap(),
             data.join("a.ply").canonicalize().unwrap()

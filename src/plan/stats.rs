@@ -12,7 +12,7 @@ pub struct FrameStats {
     pub entries: u64,
     /// Depth passes; 0 if nothing is scattered.
     pub passes: u32,
-    /// For a gathered lattice: (tile, sheet) pairs in which it may be visible, so that rays
+    /// For gathered lattices: (tile, sheet) pairs in which each may be visible, so that rays
     /// evaluate it there.
     pub gathered: u64,
     /// Memory that the scene and the frame hold, in bytes: that of the device, or that of the CPU
@@ -23,7 +23,8 @@ pub struct FrameStats {
     /// Pages of hierarchies that the view needed but that did not fit in memory. The nodes above
     /// them were drawn.
     pub missing_pages: u64,
-    /// For volumes in bricks: the level of detail, a real number of levels. Higher is coarser.
+    /// For volumes in bricks: the level of detail, a real number of levels. Higher is coarser; of
+    /// several volumes, that of the coarsest.
     pub lambda: f64,
     /// Bricks that the view needed.
     pub bricks: u64,

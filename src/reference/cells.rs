@@ -1,21 +1,18 @@
 //! The field of tetrahedra along a ray, found by brute force.
 
 use super::{
-    Frame,
-    composite::{Composite, Medium, Step},
-    facets::Cover,
-    field::{Field, Layer},
+    Frame, clip,
+    composite::{Added, Medium, Step},
+    field::{Field, Found, Layer},
     ray::Ray,
-    sheet::Sheet,
 };
 use crate::{
     cells::{Place, Tetrahedra},
     math::View,
-    scene::{Item, Optics, Scene},
 };
 use glam::{DMat3, DVec3, DVec4};
 
-/// The tetrahedra of a scene, in view space.
+/// Tetrahedra in view space.
 pub(super) struct Solids {
     solids: Vec<Solid>,
     place: Place,
@@ -39,18 +36,19 @@ struct Part {
 }
 
 impl Solids {
-    /// Returns the tetrahedra of a scene of which the field shows some value.
-    pub fn of(scene: &Scene, view: &View, field: Option<&Field>, all: bool) -> Option<Self> {
-        let (tetrahedra, _) = scene.items.iter().find_map(|item| match item {
-            Item::Cells(tetrahedra, transfer) => Some((tetrahedra, transfer)),
-            _ => None,
-        })?;
+    /// Returns the tetrahedra of which the field shows some value, or all of them.
+    pub fn new(tetrahedra: &Tetrahedra, view: &View, field: &Field, all: bool) -> Self {
         let shows = |solid: &Solid| {
             let (low, high) = (solid.values.min_element(), solid.values.max_element());
-            field.is_some_and(|field| all || field.shows([low, high]))
+            all || field.shows([low, high])
         };
         let solids = (0..tetrahedra.len()).map(|number| solid(tetrahedra, view, number));
-        Some(Self { solids: solids.filter(shows).collect(), place: tetrahedra.place() })
+        Self { solids: solids.filter(shows).collect(), place: tetrahedra.place() }
+    }
+
+    /// Returns where the values are.
+    pub fn place(&self) -> Place {
+        self.place
     }
 
     /// Returns the parts of a ray in all tetrahedra.
@@ -153,62 +151,53 @@ fn layer(parts: &[Part], thickness: f64) -> Option<Layer> {
     })
 }
 
-impl Frame<'_> {
-    /// Colours and composites the sheets of a pixel in a scene with cells. `sheets` have the
-    /// radiance, `covers` the facets; the clips leave the parts `allowed` of the ray.
-    pub(super) fn pixel_of_cells(
+impl Solids {
+    /// Returns the parts of a ray in each sheet.
+    fn parts_of_sheets(&self, frame: &Frame, ray: &Ray) -> Vec<Vec<Part>> {
+        let parts = self.parts(ray);
+        let of_sheet =
+            |k: usize| parts.iter().filter_map(|part| part.within(frame.span(k))).collect();
+        (0..frame.count()).map(of_sheet).collect()
+    }
+
+    /// Returns the field in each sheet of a ray of which the clips leave parts, with values at the
+    /// points.
+    pub fn layers(&self, frame: &Frame, ray: &Ray, allowed: &[[f64; 2]]) -> Vec<Option<Found>> {
+        let own = |(k, parts): (usize, Vec<Part>)| {
+            let [from, to] = frame.span(k);
+            let layer = layer(&parts, to - from)?;
+            Some((layer, clip::intersection(allowed, Some(layer.span))))
+        };
+        self.parts_of_sheets(frame, ray).into_iter().enumerate().map(own).collect()
+    }
+
+    /// Returns what tetrahedra that have one value each add to the sheets of a ray.
+    pub fn media(
         &self,
-        solids: &Solids,
+        frame: &Frame,
         field: &Field,
         ray: &Ray,
-        (sheets, covers): (&[Sheet], &[Cover]),
         allowed: &[[f64; 2]],
-    ) -> Composite {
-        let parts = solids.parts(ray);
-        let of_sheet = |k: usize| -> Vec<Part> {
-            parts.iter().filter_map(|part| part.within(self.span(k))).collect()
-        };
-        let thickness = |k: usize| self.span(k)[1] - self.span(k)[0];
-        let pieces = |span: [f64; 2]| super::clip::intersection(allowed, Some(span)).into_iter();
-        if self.optics == Optics::Maximum {
-            let largest = |k: usize| match solids.place {
-                Place::Points => {
-                    let layer = layer(&of_sheet(k), thickness(k))?;
-                    layer.largest(field, &pieces(layer.span).collect::<Vec<_>>())
-                }
-                Place::Cells => {
-                    let parts = of_sheet(k).into_iter();
-                    let parts = parts.filter(|part| pieces(part.span).next().is_some());
-                    parts.map(|part| part.values[0]).reduce(f64::max)
-                }
-            };
-            return (0..self.count())
-                .filter_map(largest)
-                .reduce(f64::max)
-                .map_or(Composite::EMPTY, |value| self.largest(field, value));
-        }
-        self.composite(sheets, covers, ray, |k| {
-            let (mut medium, steps) = match solids.place {
-                Place::Points => {
-                    let layer = layer(&of_sheet(k), thickness(k))?;
-                    let pieces: Vec<[f64; 2]> = pieces(layer.span).collect();
-                    layer.shine(field, ray.direction, &pieces)
-                }
-                Place::Cells => {
-                    let mut medium = Medium::default();
-                    for part in of_sheet(k) {
-                        let (extinction, color) = field.classifier.at(part.values[0]);
-                        let factor = field.classifier.transfer.gradient_factor(0.0);
-                        let length: f64 = pieces(part.span).map(|[from, to]| to - from).sum();
-                        medium = medium.with(Medium { depth: extinction * factor * length, color });
-                    }
-                    (medium, vec![Step { depth: medium.depth, span: self.span(k) }])
-                }
-            };
-            if self.optics == Optics::XRay {
-                medium.color = DVec3::ONE;
+    ) -> Vec<Option<Added>> {
+        let own = |(k, parts): (usize, Vec<Part>)| {
+            let mut medium = Medium::default();
+            for part in parts {
+                let (extinction, color) = field.classifier.at(part.values[0]);
+                let factor = field.classifier.transfer.gradient_factor(0.0);
+                let pieces = clip::intersection(allowed, Some(part.span));
+                let length: f64 = pieces.iter().map(|[from, to]| to - from).sum();
+                medium = medium.with(Medium { depth: extinction * factor * length, color });
             }
-            Some((medium, steps))
-        })
+            Some((medium, vec![Step { depth: medium.depth, span: frame.span(k) }]))
+        };
+        self.parts_of_sheets(frame, ray).into_iter().enumerate().map(own).collect()
+    }
+
+    /// Returns the largest value on a ray of tetrahedra that have one value each.
+    pub fn largest(&self, frame: &Frame, ray: &Ray, allowed: &[[f64; 2]]) -> Option<f64> {
+        let parts = self.parts_of_sheets(frame, ray).into_iter().flatten();
+        let is_seen = |part: &Part| !clip::intersection(allowed, Some(part.span)).is_empty();
+        let seen = parts.filter(is_seen);
+        seen.map(|part| part.values[0]).reduce(f64::max)
     }
 }

@@ -33,6 +33,9 @@ pub(super) struct Step {
     pub span: [f64; 2],
 }
 
+/// What a field adds to a sheet, and its steps of optical depth.
+pub(super) type Added = (Medium, Vec<Step>);
+
 /// The light gathered along a ray so far, front to back.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Composite {

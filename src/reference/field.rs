@@ -35,6 +35,9 @@ pub(super) struct Layer {
     pub filling: f64,
 }
 
+/// The field in a sheet, and the parts of the ray where it counts.
+pub(super) type Found = (Layer, Vec<[f64; 2]>);
+
 /// A part of a sheet: the places of its ends, and the values there.
 struct Part {
     places: [f64; 2],

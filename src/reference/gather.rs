@@ -22,37 +22,61 @@ pub(super) struct Before {
     pub lit: bool,
 }
 
-/// Returns all kernels of a scene, in the scene's order. If `before` is set, samples become
-/// radiance.
-pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) -> Vec<Kernel<'a>> {
+/// Returns all kernels of a scene that are radiance, in the scene's order. If `before` is set,
+/// samples become radiance.
+pub(super) fn radiance<'a>(
+    scene: &'a Scene,
+    view: &View,
+    before: Option<Before>,
+) -> Vec<Kernel<'a>> {
     let mut kernels = Vec::new();
     for item in &scene.items {
-        match item {
-            Item::Radiance(set) => kernels
-                .extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view))),
-            // Facets are no kernels. A hierarchy's cut and Gaussians have become sets by now, and
-            // bricks a volume.
-            Item::Facets(_)
-            | Item::Gaussians(_)
-            | Item::Hierarchy(_)
-            | Item::Bricks(..)
-            | Item::Cells(..) => {}
-            Item::Scalar(set, transfer) => {
-                let before = before.map(|before| (before, transfer));
-                kernels.extend(
-                    set.splats.iter().filter_map(|splat| from_splat(set, splat, before, view)),
-                );
-            }
-            // Tensor products are not radial functions: their field is evaluated point by point
-            // (product.rs).
-            Item::Volume(_, kernel, _) if kernel.as_tensor().is_some() => {}
-            Item::Volume(volume, kernel, transfer) => {
-                let before = before.map(|before| (before, transfer));
-                from_volume(&mut kernels, volume, kernel, before, view);
-            }
+        if item.transfer().is_none() || before.is_some() {
+            add_item(&mut kernels, item, before, view);
         }
     }
     kernels
+}
+
+/// Returns the samples of an item, to be classified after interpolation.
+pub(super) fn samples<'a>(item: &'a Item, view: &View) -> Vec<Kernel<'a>> {
+    let mut kernels = Vec::new();
+    add_item(&mut kernels, item, None, view);
+    kernels
+}
+
+/// Appends the kernels of an item.
+fn add_item<'a>(
+    kernels: &mut Vec<Kernel<'a>>,
+    item: &'a Item,
+    before: Option<Before>,
+    view: &View,
+) {
+    match item {
+        Item::Radiance(set) => {
+            let own = |splat| from_splat(set, splat, None, view);
+            kernels.extend(set.splats.iter().filter_map(own));
+        }
+        // Facets are no kernels. A hierarchy's cut and Gaussians have become sets by now, and
+        // bricks a volume.
+        Item::Facets(_)
+        | Item::Gaussians(_)
+        | Item::Hierarchy(_)
+        | Item::Bricks(..)
+        | Item::Cells(..) => {}
+        Item::Scalar(set, transfer) => {
+            let before = before.map(|before| (before, transfer));
+            let own = |splat| from_splat(set, splat, before, view);
+            kernels.extend(set.splats.iter().filter_map(own));
+        }
+        // Tensor products are not radial functions: their field is evaluated point by point
+        // (product.rs).
+        Item::Volume(_, kernel, _) if kernel.as_tensor().is_some() => {}
+        Item::Volume(volume, kernel, transfer) => {
+            let before = before.map(|before| (before, transfer));
+            from_volume(kernels, volume, kernel, before, view);
+        }
+    }
 }
 
 /// Returns the weight of a splat's colour and normal within a sheet: splats that face the eye hide

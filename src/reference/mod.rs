@@ -134,11 +134,15 @@
 //! its sheet, a share a adds min(a, 1 − A)·c to C, and min(a, 1 − A) to A: what fills the rest of a
 //! pixel in another sheet leaves no gap. Other modes and optics draw no facets.
 //!
-//! **Compositing.** The optical depths of surface and field add, and their colours mix in
-//! proportion to them. Front to back, with α = 1 − exp(−τ): C += (1 − A)·α·c, A += (1 − A)·α. The
-//! depth is the view-space z at which the optical depth passes ln 2. Optical depth grows evenly in
-//! a sheet with radiance. In other sheets it grows evenly within each part, and jumps at an
-//! isosurface.
+//! **Several fields** ([`Scene::fields`]). Each field is classified and lit by itself, as above,
+//! with its own samples, kernel and transfer function, and has its own box. It does not see the
+//! others. Its isosurfaces are a part of its medium. All fields have the same sheets.
+//!
+//! **Compositing.** In a sheet the optical depths of the radiance and of all fields add, and their
+//! colours mix in proportion to them. Front to back, with α = 1 − exp(−τ): C += (1 − A)·α·c,
+//! A += (1 − A)·α. The depth is the view-space z at which the optical depth passes ln 2. Optical
+//! depth grows evenly in a sheet with radiance, or with several fields that absorb light there. In
+//! other sheets it grows evenly within each part, and jumps at an isosurface.
 //!
 //! **Light** is that of Blinn and Phong with the light at the eye, on both sides; colours are
 //! clamped to 1. If the gradient is 0, the ambient and diffuse parts count in full. A field's
@@ -149,19 +153,19 @@
 //!
 //! # Other ways
 //! **Optics.** The above is emission and absorption (Max 1995). [`Optics::XRay`] uses the same
-//! optical depths, without isosurfaces; all colours are white and unlit. [`Optics::Maximum`] shows
-//! the colour and the opacity, unscaled by length, of the largest f(u) at the ends of all parts of
-//! the ray. A ray without parts shows nothing. This picture has no depth.
+//! optical depths, without isosurfaces; all colours are white and unlit. [`Optics::Maximum`] is for
+//! one field. It shows the colour and the opacity, unscaled by length, of the largest f(u) at the
+//! ends of all parts of the ray. A ray without parts shows nothing. This picture has no depth.
 //!
 //! **Samples classified before interpolation** ([`Classification::Pre`], and always in the modes
-//! below) are radiance (Westover 1989). They have the colour c(f) and, over a part of the ray, the
-//! optical depth κ(f)·w/o·∫h ds. Here o is the average sum of the kernels. On a lattice, o is ∫h
-//! over kernel space (body-centred: times 2^(−3/2)/½, unit over cell). Scattered sets store their
-//! own. Slopes do not count. If the field is lit, a sample has a normal, against the gradient g
-//! that is defined as on a rectilinear lattice. (On body-centred lattices g uses the next samples
-//! of the same cubic lattice; scattered samples have their own slope.) A sample with g = 0 has no
-//! normal. One shade lights the whole picture: the field's. There is no box. Kernels with negative
-//! lobes can take light back within a sheet; colours are clamped to 0 … 1.
+//! below; of one field only) are radiance (Westover 1989). They have the colour c(f) and, over a
+//! part of the ray, the optical depth κ(f)·w/o·∫h ds. Here o is the average sum of the kernels. On
+//! a lattice, o is ∫h over kernel space (body-centred: times 2^(−3/2)/½, unit over cell). Scattered
+//! sets store their own. Slopes do not count. If the field is lit, a sample has a normal, against
+//! the gradient g that is defined as on a rectilinear lattice. (On body-centred lattices g uses the
+//! next samples of the same cubic lattice; scattered samples have their own slope.) A sample with g
+//! = 0 has no normal. One shade lights the whole picture: the field's. There is no box. Kernels
+//! with negative lobes can take light back within a sheet; colours are clamped to 0 … 1.
 //!
 //! **[`Mode::AxisSheets`]** (Westover 1990). n is a unit vector perpendicular to two of the
 //! lattice's axes (the world's axes without a lattice). Of the three such vectors it is the one
@@ -181,6 +185,7 @@ mod composite;
 mod face;
 mod facets;
 mod field;
+mod fields;
 mod gather;
 mod images;
 mod kernel;
@@ -205,23 +210,17 @@ pub use truth::integrate;
 use crate::{
     Result,
     gaussians::Eye,
-    math::{Camera, Sheets, View},
+    math::{Camera, View},
     parallel::prelude::*,
     picture::Picture,
-    scene::{
-        Classification, Clip, Evaluate, Gradient, Item, MOST_GATHERED, Mode, Optics, Scene,
-        Settings,
-    },
+    scene::{Classification, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
     volume::{Lattice, Shade},
 };
-use cells::Solids;
-use classify::Classifier;
 use composite::{Composite, Medium};
-use field::Field;
+use fields::Drawn;
 use gather::Before;
 use glam::{DVec2, DVec3};
 use kernel::Kernel;
-use product::Product;
 use ray::Ray;
 use sheet::Light;
 
@@ -295,11 +294,6 @@ fn nearest(scene: &Scene, view: &View, settings: &Settings) -> f64 {
     if view.perspective { settings.near.unwrap_or_else(usual) } else { f64::NEG_INFINITY }
 }
 
-/// Whether sheets are so thin that the field in one is known from its faces and its middle.
-fn is_thin(sheets: &Sheets, lattice: &Lattice) -> bool {
-    sheets.step <= MOST_GATHERED * lattice.least_kernel_spacing() * (1.0 + 1e-9)
-}
-
 /// Sheets with an optical depth below this are left out. They cannot be seen, and 32-bit sums of
 /// sections leave remainders of this size.
 const LEAST_DEPTH: f64 = 1e-5;
@@ -310,19 +304,14 @@ struct Frame<'a> {
     mode: Mode,
     optics: Optics,
     gradient: Gradient,
-    /// Whether gradients are known in the middles of sheets: those of gathered fields.
-    has_middles: bool,
     clips: Vec<Clip>,
     planes: Vec<f64>,
     near: f64,
+    /// The kernels of radiance.
     kernels: Vec<Kernel<'a>>,
     facets: Vec<facets::Facet>,
-    /// The field, if it is classified after interpolation.
-    field: Option<Field<'a>>,
-    /// The same field, if its kernels are tensor products.
-    product: Option<Product<'a>>,
-    /// The same field, if it is that of cells.
-    solids: Option<Solids>,
+    /// The fields that are classified after interpolation.
+    fields: Vec<Drawn<'a>>,
     /// The lattice of a volume's samples.
     lattice: Option<&'a Lattice>,
     /// The shading of radiance.
@@ -331,63 +320,36 @@ struct Frame<'a> {
     has_trained: bool,
     /// The largest channel of a colour of radiance.
     brightest: f64,
-    /// The minimum sum of kernels for which a value exists.
-    least_sum: f64,
 }
 
 impl<'a> Frame<'a> {
     /// `flat` is the scene with its hierarchies cut.
     fn new(scene: &Scene, flat: &'a Scene, view: View, settings: &Settings) -> Self {
         let sheets = scene.sheets(&view, settings);
-        let samples = flat.items.iter().find_map(|item| match item {
-            // Bricks have become a volume by now.
-            Item::Radiance(_)
-            | Item::Facets(_)
-            | Item::Gaussians(_)
-            | Item::Hierarchy(_)
-            | Item::Bricks(..) => None,
-            Item::Scalar(_, transfer) | Item::Cells(_, transfer) => Some((transfer, None)),
-            Item::Volume(volume, _, transfer) => Some((transfer, Some(&volume.lattice))),
-        });
-        let dark = settings.optics == Optics::XRay;
+        let is_dark = settings.optics == Optics::XRay;
         let before =
             settings.mode != Mode::Sheets || settings.classification == Classification::Pre;
-        let shade = flat.items.iter().find_map(|item| item.light(settings)).filter(|_| !dark);
-        let field = samples.filter(|_| !before).map(|(transfer, lattice)| Field {
-            classifier: Classifier::new(transfer),
-            lattice,
-            shade,
-            surfaces: if dark { &[] } else { &transfer.isosurfaces },
-            inside: settings.classification == Classification::PreIntegrated,
-        });
-        let kernel = scene.items.iter().find_map(|item| match item {
-            Item::Volume(_, kernel, _) => Some(kernel.clone()),
-            _ => None,
-        });
-        let all = settings.optics == Optics::Maximum;
+        let has_field = flat.items.iter().any(|item| item.transfer().is_some());
+        let shade = flat.items.iter().find_map(|item| item.light(settings)).filter(|_| !is_dark);
+        // Bricks have become volumes by now.
+        let own = |item| Drawn::new(item, &view, settings, &sheets);
+        let fields = flat.items.iter().filter(|_| !before).filter_map(own).collect();
+        let before_shade = before.then_some(Before { lit: shade.is_some() });
         Self {
-            solids: Solids::of(flat, &view, field.as_ref(), all),
             has_trained: scene.items.iter().any(Item::is_trained),
             brightest: scene.brightest().into(),
-            least_sum: kernel.unwrap_or_default().least_sum(),
             mode: settings.mode,
             optics: settings.optics,
             gradient: settings.gradient,
-            has_middles: settings.evaluate != Evaluate::Scatter
-                && settings.gradient == Gradient::Analytic
-                && samples.is_some_and(|(_, lattice)| {
-                    lattice.is_some_and(|lattice| is_thin(&sheets, lattice))
-                }),
             clips: settings.clips.clone(),
             planes: sheets.planes,
             near: nearest(scene, &view, settings),
-            kernels: gather::gather(flat, &view, before.then_some(Before { lit: shade.is_some() })),
+            kernels: gather::radiance(flat, &view, before_shade),
             facets: facets::gather(scene, &view, settings),
-            field,
-            product: Product::of(flat, &view),
-            lattice: samples.and_then(|(_, lattice)| lattice),
+            fields,
+            lattice: flat.items.iter().find_map(Item::lattice),
             // Normals are as certain as their splats.
-            shade: if before && samples.is_some() { shade } else { settings.surface_shade }
+            shade: if before && has_field { shade } else { settings.surface_shade }
                 .map(|shade| Shade { certain: None, ..shade }),
             view,
         }
@@ -404,14 +366,14 @@ impl<'a> Frame<'a> {
         match self.mode {
             Mode::Sheets => self.row_of_sheets(row),
             Mode::AxisSheets => {
-                let kernels = self.kernels_of_row(row);
+                let kernels = self.kernels_of_row(&self.kernels, row);
                 let axis = whole::sheet_axis(&self.view, self.lattice);
                 columns
                     .map(|column| self.pixel_of_axis_sheets(&self.ray(column, row), &kernels, axis))
                     .collect()
             }
             Mode::Splats(order) => {
-                let kernels = self.kernels_of_row(row);
+                let kernels = self.kernels_of_row(&self.kernels, row);
                 columns
                     .map(|column| self.pixel_of_splats(&self.ray(column, row), &kernels, order))
                     .collect()
@@ -419,13 +381,13 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Returns the kernels that the rays of a row can meet. These rays lie in one plane.
-    fn kernels_of_row(&self, row: i64) -> Vec<&Kernel<'a>> {
+    /// Returns those of some kernels that the rays of a row can meet. These rays lie in one plane.
+    fn kernels_of_row<'k>(&self, kernels: &'k [Kernel<'k>], row: i64) -> Vec<&'k Kernel<'k>> {
         let [left, right] = [0, i64::from(self.view.size[0])].map(|column| self.ray(column, row));
         let normal =
             if self.view.perspective { left.direction.cross(right.direction) } else { DVec3::Y };
         let offset = left.origin.dot(normal);
-        self.kernels.iter().filter(|kernel| kernel.meets_plane(normal, offset)).collect()
+        kernels.iter().filter(|kernel| kernel.meets_plane(normal, offset)).collect()
     }
 
     /// The number of sheets.

@@ -3,7 +3,6 @@
 use super::{face::Face, quadrature::quadrature, ray::Ray, sheet::Mean};
 use crate::{
     math::{Kernel, Tensor, View, cosine::mirrored},
-    scene::{Item, Scene},
     volume::{Lattice, Volume},
 };
 use glam::{DMat3, DVec3};
@@ -27,14 +26,6 @@ impl<'a> Product<'a> {
         let Lattice { axes, origin, .. } = volume.lattice;
         let to_steps = (view.rotation * axes).inverse();
         Some(Self { volume, tensor: kernel.as_tensor()?, to_steps, origin: view.to_view(origin) })
-    }
-
-    /// Returns the field of a scene.
-    pub fn of(scene: &'a Scene, view: &View) -> Option<Self> {
-        scene.items.iter().find_map(|item| match item {
-            Item::Volume(volume, kernel, _) => Self::new(volume, kernel, view),
-            _ => None,
-        })
     }
 
     /// Returns the value and the gradient at a point of view space.

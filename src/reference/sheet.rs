@@ -6,13 +6,6 @@ use super::{
 };
 use glam::DVec3;
 
-/// The sums over all kernels in one sheet of one ray.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sheet {
-    pub light: Light,
-    pub mean: Mean,
-}
-
 /// Radiance in a sheet.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Light {

@@ -7,7 +7,7 @@ use super::{
     composite::{Composite, Medium},
     kernel::{Kernel, Load},
     ray::Ray,
-    sheet::{Light, Sheet},
+    sheet::Light,
 };
 use crate::{math::View, scene::Order, volume::Lattice};
 use glam::{DMat3, DVec3};
@@ -54,7 +54,7 @@ impl Frame<'_> {
         axis: DVec3,
     ) -> Composite {
         let allowed = clip::allowed(ray, &self.view, &self.clips);
-        let mut sheets = vec![Sheet::default(); self.count()];
+        let mut sheets = vec![Light::default(); self.count()];
         for kernel in kernels {
             let key = axis.dot(kernel.center);
             let key = if self.view.perspective { key.abs() } else { key };
@@ -67,7 +67,7 @@ impl Frame<'_> {
                 continue;
             };
             if let Some((light, _)) = self.whole(kernel, ray, &allowed) {
-                sheets[k].light.join(&light);
+                sheets[k].join(&light);
             }
         }
         let slope = axis.dot(ray.direction);

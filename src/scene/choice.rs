@@ -44,7 +44,7 @@ impl Scene {
                     return Some(choose(&EVERYTHING));
                 }
                 let choice = choose(&first_visible(transfer, bricks.header().range));
-                let sheets = self.sheets_of(view, settings, Some(&choice), bounds);
+                let sheets = self.sheets_of(view, settings, std::slice::from_ref(&choice), bounds);
                 Some(if self.mixes_afar(settings, &sheets, Some(&choice)) {
                     choose(&EVERYTHING)
                 } else {

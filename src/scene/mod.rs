@@ -16,7 +16,7 @@ pub use settings::{
 pub(crate) use sheets::MOST_GATHERED;
 
 use crate::{
-    Result,
+    Error, Result,
     bricks::Bricks,
     cells::Tetrahedra,
     facet::FacetSet,
@@ -56,6 +56,9 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The largest number of fields: volumes, sample sets and cells.
+    pub const MAX_FIELDS: usize = 4;
+
     /// Creates a scene without items.
     pub fn new() -> Self {
         Self::default()
@@ -136,30 +139,52 @@ impl Scene {
         self
     }
 
-    /// Returns the same scene with another transfer function for its volume or sample set.
+    /// Returns the same scene with another transfer function for the field of an item.
     ///
     /// # Errors
-    /// [`Error::Argument`] if [`validate`](Self::validate) would refuse the function.
-    pub(crate) fn shown_by(&self, transfer: &TransferFunction) -> Result<Self> {
+    /// [`Error::Argument`] if the scene has no such field; [`Error::Transfer`] if
+    /// [`validate`](Self::validate) would refuse the function.
+    pub(crate) fn shown_by(&self, number: usize, transfer: &TransferFunction) -> Result<Self> {
         let mut scene = self.clone();
-        for (number, item) in scene.items.iter_mut().enumerate() {
-            if let Some(shown) = item.transfer_mut() {
-                shown.clone_from(transfer);
-            }
-            numbers::check_field(item).map_err(numbers::of_item(number))?;
-        }
+        let Some(item) = scene.items.get_mut(number) else {
+            return Err(Error::Argument(format!("the scene has no item {number}")));
+        };
+        let Some(shown) = item.transfer_mut() else {
+            return Err(Error::Argument(format!(
+                "item {number} of the scene has colours of its own, and no transfer function"
+            )));
+        };
+        shown.clone_from(transfer);
+        numbers::check_field(item).map_err(numbers::of_item(number))?;
         Ok(scene)
     }
 
-    /// Returns the scene's kernel if it is a tensor product: the function along each axis of the
-    /// lattice.
+    /// Returns the numbers of the items that have a field, in their order: volumes, sample sets and
+    /// cells.
+    pub fn fields(&self) -> Vec<usize> {
+        let has_field = |number: &usize| self.items[*number].transfer().is_some();
+        (0..self.items.len()).filter(has_field).collect()
+    }
+
+    /// Returns the scene without its fields, except that of item `number`.
+    pub(crate) fn with_one_field(&self, number: usize) -> Self {
+        let is_kept = |(own, item): &(usize, &Item)| *own == number || item.transfer().is_none();
+        let items = self.items.iter().enumerate().filter(is_kept);
+        Self { items: items.map(|(_, item)| item.clone()).collect() }
+    }
+
+    /// Returns the kernel of the scene's first volume of tensor products: the function along each
+    /// axis of the lattice.
     pub fn tensor(&self) -> Option<Tensor> {
         self.items.iter().find_map(|item| item.kernel()?.as_tensor())
     }
 
-    /// Returns what of the scene only the CPU engine draws (“the kernel linear”, “cells”); `None`
-    /// if the GPU engine draws all of it.
+    /// Returns what of the scene only the CPU engine draws (“several fields”, “the kernel linear”,
+    /// “cells”); `None` if the GPU engine draws all of it.
     pub fn beyond_gpu(&self) -> Option<String> {
+        if self.fields().len() > 1 {
+            return Some("several fields".into());
+        }
         let tensor = self.tensor().map(|tensor| format!("the kernel {}", tensor.name()));
         let has_cells = self.items.iter().any(|item| matches!(item, Item::Cells(..)));
         tensor.or_else(|| has_cells.then(|| "cells".into()))

@@ -103,9 +103,9 @@ pub enum Evaluate {
     /// Gathers a volume if possible, and scatters everything else.
     #[default]
     Auto,
-    /// Each pixel adds up the kernels that reach its ray, which is the faster way. The scene must
-    /// have exactly one volume, and may have surfaces too. On the GPU engine, the volume needs a
-    /// Cartesian lattice and a Gaussian kernel. Other scenes are an error.
+    /// Each pixel adds up the kernels that reach its ray, which is the faster way. The fields of
+    /// the scene must be volumes, at least one, and there may be surfaces too. On the GPU engine,
+    /// the volume needs a Cartesian lattice and a Gaussian kernel. Other scenes are an error.
     Gather,
     /// Each splat is added to the pixels that it covers.
     Scatter,

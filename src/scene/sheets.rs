@@ -48,21 +48,26 @@ impl Scene {
     ///   the samples, and half a spacing thick if the kernel is linear.
     /// - Cells: half a typical edge, and a fifth if each has one value.
     /// - Surfaces: a few pixels.
-    /// - Both: the finer of the two.
+    /// - Several of these: the finest of them.
     /// - Volumes in bricks: as for volumes, with the spacing of the drawn levels. Between two
     ///   levels it is interpolated.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
         let bounds = self.bounds();
-        let choice = self.choice(view, settings, settings.detail, usize::MAX, &bounds);
-        self.sheets_of(view, settings, choice.as_ref(), &bounds)
+        let choice = |number: usize| {
+            let own = self.with_one_field(number);
+            own.choice(view, settings, settings.detail, usize::MAX, &bounds)
+        };
+        let choices: Vec<Choice> = self.fields().into_iter().filter_map(choice).collect();
+        self.sheets_of(view, settings, &choices, &bounds)
     }
 
-    /// Returns the sheets for a known choice of bricks and the scene's known bounds.
+    /// Returns the sheets for the known choices of bricks, one for each volume in bricks, and the
+    /// scene's known bounds.
     pub(crate) fn sheets_of(
         &self,
         view: &View,
         settings: &Settings,
-        choice: Option<&Choice>,
+        choices: &[Choice],
         bounds: &Bounds,
     ) -> Sheets {
         if settings.mode == Mode::AxisSheets {
@@ -81,7 +86,7 @@ impl Scene {
             (near, far) = (near - reach, far + reach);
         }
         let mut thickness = settings.sheet_thickness;
-        let mut pixels = None;
+        let (mut pixels, mut choices) = (None, choices.iter());
         for item in &self.items {
             match item {
                 Item::Volume(volume, kernel, _) if settings.sheet_thickness.is_none() => {
@@ -103,7 +108,7 @@ impl Scene {
                 }
                 Item::Bricks(bricks, kernel, _) if settings.sheet_thickness.is_none() => {
                     // The thickness follows λ continuously, as the weights of the levels do.
-                    let level = choice.map_or(0.0, |choice| choice.lambda);
+                    let level = choices.next().map_or(0.0, |choice| choice.lambda);
                     let spacing = level.exp2() * bricks.header().lattice.kernel_spacing();
                     let step = (4.0f64 / 3.0).min(2.0 / 3.0 * kernel.extent) * spacing;
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));

@@ -25,29 +25,28 @@ impl Scene {
             numbers::check_transfer(item).map_err(numbers::of_item(number))?;
             check_item(item, settings)?;
         }
-        Ok(())
+        if self.fields().len() > 1 { check_several(settings) } else { Ok(()) }
     }
 
     /// Checks that the engines can draw the scene: payloads that match their items, finite numbers
-    /// (the error names the item and the splat), and at most one scalar field. The densities of two
-    /// fields under two transfer functions cannot be added in one sheet.
+    /// (the error names the item and the splat), and at most [`MAX_FIELDS`](Self::MAX_FIELDS)
+    /// fields.
     ///
     /// # Errors
     /// [`Error::Argument`] with the reason; [`Error::NothingToDraw`] for a scene without splats and
     /// samples.
     pub fn validate(&self) -> Result<()> {
-        let mut fields = 0;
         for item in &self.items {
             let (set, payload) = match item {
                 Item::Radiance(set) => (set, Payload::Radiance),
                 Item::Scalar(set, _) => (set, Payload::Scalar),
-                Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => continue,
-                Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {
-                    fields += 1;
-                    continue;
-                }
+                Item::Facets(_)
+                | Item::Gaussians(_)
+                | Item::Hierarchy(_)
+                | Item::Volume(..)
+                | Item::Bricks(..)
+                | Item::Cells(..) => continue,
             };
-            fields += usize::from(payload == Payload::Scalar);
             if set.payload != payload {
                 return Err(Error::Argument(format!(
                     "a set of {:?} splats was added as {payload:?}",
@@ -65,9 +64,11 @@ impl Scene {
         for (number, item) in self.items.iter().enumerate() {
             numbers::check_item(item).map_err(numbers::of_item(number))?;
         }
-        if fields > 1 {
+        let (fields, most) = (self.fields().len(), Self::MAX_FIELDS);
+        if fields > most {
             return Err(Error::Argument(format!(
-                "a picture can show one volume, sample set or set of cells; the scene has {fields}"
+                "a picture can show {most} volumes, sample sets and sets of cells together; the \
+                 scene has {fields}"
             )));
         }
         if self.bounds().is_empty() {
@@ -173,6 +174,20 @@ fn check_bricks(kernel: &Kernel, settings: &Settings) -> Result<()> {
     if settings.classifies_samples() {
         return wrong(
             "a volume in bricks must be classified after interpolation, in image-aligned sheets",
+        );
+    }
+    Ok(())
+}
+
+/// Returns an error if the method is none for several fields.
+fn check_several(settings: &Settings) -> Result<()> {
+    if settings.optics == Optics::Maximum {
+        return wrong("a maximum intensity picture takes one volume or sample set, not several");
+    }
+    if settings.classifies_samples() {
+        return wrong(
+            "several volumes or sample sets are classified after interpolation, in image-aligned \
+             sheets",
         );
     }
     Ok(())

@@ -2,6 +2,8 @@
 //! run, and the reference draws each in about a second.
 
 pub mod facets;
+#[allow(dead_code, reason = "the GPU engine draws one field")]
+pub mod fields;
 pub mod gaussians;
 pub mod methods;
 

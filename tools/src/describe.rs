@@ -23,7 +23,8 @@ pub fn bricks(stats: &FrameStats) -> Value {
     }
 }
 
-/// Returns the settings of a picture and, if the scene has a field, how the field is shown.
+/// Returns the settings of a picture, and how the fields of the scene are shown. `field` is the
+/// first of them.
 pub fn settings(scene: &Scene, settings: &Settings) -> Value {
     let (mode, order) = match settings.mode {
         Mode::Sheets => ("sheets", None),
@@ -41,7 +42,22 @@ pub fn settings(scene: &Scene, settings: &Settings) -> Value {
         Optics::Maximum => "maximum",
         Optics::XRay => "x-ray",
     };
-    let field = scene.items.iter().find_map(|item| match item {
+    let fields: Vec<Value> = scene.items.iter().filter_map(field).collect();
+    json!({
+        "mode": mode,
+        "order": order,
+        "classify": classify,
+        "optics": optics,
+        "clips": settings.clips.len(),
+        "sheet_thickness": settings.sheet_thickness,
+        "field": fields.first(),
+        "fields": fields,
+    })
+}
+
+/// Returns how an item's field is shown; `None` if it has none.
+fn field(item: &Item) -> Option<Value> {
+    match item {
         Item::Volume(volume, shape, transfer) => {
             let mut field = shown(transfer);
             field["kernel"] = kernel(shape);
@@ -55,16 +71,7 @@ pub fn settings(scene: &Scene, settings: &Settings) -> Value {
         }
         Item::Scalar(_, transfer) | Item::Cells(_, transfer) => Some(shown(transfer)),
         Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => None,
-    });
-    json!({
-        "mode": mode,
-        "order": order,
-        "classify": classify,
-        "optics": optics,
-        "clips": settings.clips.len(),
-        "sheet_thickness": settings.sheet_thickness,
-        "field": field,
-    })
+    }
 }
 
 fn shown(transfer: &TransferFunction) -> Value {

@@ -228,16 +228,14 @@ impl EngineFlags {
             settings.surface_shade = None;
         }
         if self.shade {
-            let own = loaded.scene.items.iter().find_map(|item| match item {
-                Item::Scalar(_, transfer)
-                | Item::Volume(_, _, transfer)
-                | Item::Bricks(_, _, transfer)
-                | Item::Cells(_, transfer) => transfer.shade,
-                Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
-                    None
-                }
-            });
-            settings.volume_shade = Some(Some(own.unwrap_or_default()));
+            let fields = loaded.scene.items.iter().filter_map(Item::transfer);
+            let own = fields.clone().find_map(|transfer| transfer.shade);
+            let mut shade = own.unwrap_or_default();
+            if fields.count() > 1 {
+                // Each field knows itself which of its gradients are certain.
+                shade.certain = None;
+            }
+            settings.volume_shade = Some(Some(shade));
         }
         settings.detail = match (self.budget, self.frame_time) {
             (Some(splats), _) => Detail::Splats(splats),

@@ -23,6 +23,24 @@ impl<T> Own<T> {
         Ok(Self { file, value: parse(value)? })
     }
 
+    /// Returns what is made of the value, for the same inputs.
+    pub fn try_map<'a, U>(
+        &'a self,
+        make: impl FnOnce(&'a T) -> Result<U, Failure>,
+    ) -> Result<Own<U>, Failure> {
+        Ok(Own { file: self.file.clone(), value: make(&self.value)? })
+    }
+
+    /// Returns the inputs that have values of their own.
+    pub fn files(values: &[Self]) -> impl Iterator<Item = &Path> {
+        values.iter().filter_map(|own| own.file.as_deref())
+    }
+
+    /// Returns all values.
+    pub fn values(values: &[Self]) -> impl Iterator<Item = &T> {
+        values.iter().map(|own| &own.value)
+    }
+
     /// A value for all inputs.
     pub fn of_all(value: T) -> Self {
         Self { file: None, value }
@@ -34,22 +52,36 @@ impl<T> Own<T> {
         own.map(|own| &own.value).or_else(|| Self::shared(values))
     }
 
+    /// Returns all of an input's own values, or else all of those of all inputs.
+    pub fn all_of<'a>(values: &'a [Self], path: &Path) -> Vec<&'a T> {
+        let of = |file: Option<&Path>| -> Vec<&'a T> {
+            let own = values.iter().filter(|own| own.file.as_deref() == file);
+            own.map(|own| &own.value).collect()
+        };
+        let own = of(Some(path));
+        if own.is_empty() { of(None) } else { own }
+    }
+
     /// Returns the value of all inputs that have none of their own.
     pub fn shared(values: &[Self]) -> Option<&T> {
         values.iter().find(|own| own.file.is_none()).map(|own| &own.value)
     }
 
+    /// Refuses values of files that are no inputs.
+    pub fn check_files(values: &[Self], flag: &str, inputs: &[PathBuf]) -> Result<(), Failure> {
+        match Self::files(values).find(|file| !inputs.iter().any(|input| input == file)) {
+            None => Ok(()),
+            Some(file) => Err(Failure::Usage(format!(
+                "--{flag} {}=…: no input has this name; write it as the input is written",
+                file.display()
+            ))),
+        }
+    }
+
     /// Refuses values of files that are no inputs, and two values for the same.
     pub fn check(values: &[Self], flag: &str, inputs: &[PathBuf]) -> Result<(), Failure> {
+        Self::check_files(values, flag, inputs)?;
         for (number, own) in values.iter().enumerate() {
-            if let Some(file) = &own.file
-                && !inputs.contains(file)
-            {
-                return Err(Failure::Usage(format!(
-                    "--{flag} {}=…: no input has this name; write it as the input is written",
-                    file.display()
-                )));
-            }
             if values[..number].iter().any(|other| other.file == own.file) {
                 let whose = own
                     .file
@@ -79,5 +111,11 @@ mod tests {
         let twice = [Own::of_all(1.0), Own::of_all(2.0)];
         assert!(Own::check(&twice, "opacity", &[]).is_err());
         assert!(Own::parse("a=x", number).is_err());
+        let many = ["1", "a.ply=2", "3", "a.ply=4"].map(|text| Own::parse(text, number).unwrap());
+        let [own, other] = ["a.ply", "b.ply"].map(PathBuf::from);
+        assert_eq!(Own::all_of(&many, &own), [&2.0, &4.0]);
+        assert_eq!(Own::all_of(&many, &other), [&1.0, &3.0]);
+        assert!(Own::check_files(&many, "iso", std::slice::from_ref(&own)).is_ok());
+        assert!(Own::check_files(&many, "iso", &[other]).is_err());
     }
 }

@@ -104,11 +104,11 @@ impl Drawer {
         }
     }
 
-    /// Sets the transfer function of the field.
+    /// Sets the transfer function of an item's field.
     #[cfg(feature = "window")]
-    fn set_transfer(&mut self, transfer: &TransferFunction) -> splatkit::Result<()> {
+    fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> splatkit::Result<()> {
         match self {
-            Self::Engine(renderer) => renderer.set_transfer(transfer),
+            Self::Engine(renderer) => renderer.set_transfer(item, transfer),
             Self::Reference => Ok(()),
         }
     }
@@ -141,8 +141,8 @@ struct Ready<'a> {
 #[cfg(feature = "window")]
 pub struct Export<'a> {
     pub loaded: &'a Loaded,
-    /// The transfer function of the field, if there is one.
-    pub transfer: Option<&'a TransferFunction>,
+    /// The transfer functions of the fields, with the numbers of their items.
+    pub transfers: &'a [(usize, TransferFunction)],
     pub path: CameraPath,
     /// Frames per second.
     pub rate: f64,
@@ -295,7 +295,7 @@ impl Render {
     /// Draws and writes a film of a scene that is loaded already. Existing files are replaced.
     #[cfg(feature = "window")]
     pub fn export(&self, export: Export<'_>, progress: &Progress) -> Result<(), Failure> {
-        let Export { loaded, transfer, path, rate, output, stop } = export;
+        let Export { loaded, transfers, path, rate, output, stop } = export;
         let begun = Instant::now();
         let motion = Motion::along(path, rate, output)?;
         let film = Film {
@@ -310,8 +310,8 @@ impl Render {
         let settings = Settings { stop, ..self.engine.settings(loaded, self.samples)? };
         let ready = Ready { loaded, settings, finish: self.finish(loaded)? };
         let mut drawer = Drawer::engine(&self.engine, loaded, progress)?;
-        if let Some(transfer) = transfer {
-            drawer.set_transfer(transfer)?;
+        for (item, transfer) in transfers {
+            drawer.set_transfer(*item, transfer)?;
         }
         let run = Run { ready: &ready, motion, film, frames };
         self.draw_frames(&mut drawer, &run, progress)?;
@@ -362,16 +362,14 @@ impl Render {
         Ok(Finish { factor, background: self.background.0, overlay })
     }
 
-    /// The same, if another transfer function shows the scene's field, whose values lie between
-    /// these.
+    /// The same, if other transfer functions show the fields of these items.
     #[cfg(feature = "window")]
     pub fn finish_with(
         &self,
         loaded: &Loaded,
-        transfer: &TransferFunction,
-        values: [f64; 2],
+        transfers: &[(usize, TransferFunction)],
     ) -> Result<Finish, Failure> {
-        let facts = self.scene.facts_with(loaded, transfer, values);
+        let facts = self.scene.facts_with(loaded, transfers);
         let overlay = self.overlay.open(&facts, self.background.0)?;
         Ok(Finish { overlay, ..self.finish(loaded)? })
     }

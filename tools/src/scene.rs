@@ -38,8 +38,8 @@ use std::{
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Scene")]
 pub struct SceneFlags {
-    /// Meshes, point clouds, hierarchies, and at most one volume or set of scattered samples; all
-    /// are drawn in one picture.
+    /// Meshes, point clouds, hierarchies, and up to four volumes, sets of cells or sets of
+    /// scattered samples; all are drawn in one picture.
     #[arg(value_name = "SCENE", required = true)]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -117,6 +117,7 @@ impl SceneFlags {
             adding.add(path, input, deadline)?;
         }
         let mut loaded = adding.loaded;
+        self.name_fields(&mut loaded);
         self.show.color.check_effect(is_scaled, !loaded.facts.bars.is_empty())?;
         if let (Some(_), Some(path), false) = (self.show.radius_scale, unscaled, is_scaled) {
             return Err(Failure::Usage(format!(
@@ -133,7 +134,7 @@ impl SceneFlags {
         let paths = self.inputs.iter().map(PathBuf::as_path);
         let inputs: Vec<_> = paths.zip(loaded.kinds.iter().copied()).collect();
         given.warn(&inputs, progress);
-        if self.show.range.is_some() && loaded.facts.bars.is_empty() {
+        if self.show.has_range() && loaded.facts.bars.is_empty() {
             progress.warn("--range has no effect: nothing here is coloured or shown by values");
         }
         loaded.load_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -145,10 +146,11 @@ impl SceneFlags {
     fn at_fault(&self, scene: &Scene, error: Error) -> Failure {
         let items = self.inputs.iter().zip(&scene.items);
         let found = items.into_iter().find_map(|(path, item)| Some((path, item.validate().err()?)));
-        match (found, self.show.transfer_text()) {
+        let flags = found.as_ref().and_then(|(path, _)| self.show.transfer_text(path));
+        match (found, flags) {
             (None, _) => error.into(),
             (Some((path, Error::Transfer(what))), Some(flags)) => {
-                if let Some(file) = self.show.own_transfer() {
+                if let Some(file) = self.show.own_transfer(path) {
                     let message = format!("{what}; the values are those of {}", path.display());
                     return Error::input(file, "content", message).into();
                 }
@@ -161,22 +163,43 @@ impl SceneFlags {
         }
     }
 
-    /// Returns what a loaded scene says for texts if another transfer function shows its field,
-    /// whose values lie between these.
+    /// Returns what a loaded scene says for texts if other transfer functions show the fields of
+    /// these items.
     #[cfg(feature = "window")]
-    pub fn facts_with(
-        &self,
-        loaded: &Loaded,
-        transfer: &TransferFunction,
-        values: [f64; 2],
-    ) -> Facts {
+    pub fn facts_with(&self, loaded: &Loaded, transfers: &[(usize, TransferFunction)]) -> Facts {
         let mut facts = loaded.facts.clone();
-        if let Some(bar) = facts.field.and_then(|field| facts.bars.get_mut(field)) {
+        let fields = loaded.scene.fields().into_iter().zip(facts.fields.clone());
+        for (item, bar) in fields {
+            let own = transfers.iter().find(|(own, _)| *own == item);
+            let values = loaded.scene.items[item].value_range();
+            let (Some((_, transfer)), Some(values), Some(bar)) =
+                (own, values, facts.bars.get_mut(bar))
+            else {
+                continue;
+            };
             // The colours are the function's own by now, also those of a map.
             let title = std::mem::take(&mut bar.title);
             *bar = self.show.color.bar(transfer, values, title);
         }
         facts
+    }
+
+    /// Gives the bars of several fields without a name the names of their files.
+    fn name_fields(&self, loaded: &mut Loaded) {
+        let items = loaded.scene.fields();
+        if items.len() < 2 {
+            return;
+        }
+        let unnamed = titled("", "");
+        for (item, bar) in items.into_iter().zip(&loaded.facts.fields) {
+            // Each input is an item.
+            let name = self.inputs.get(item).and_then(|path| path.file_stem());
+            let title = &mut loaded.facts.bars[*bar].title;
+            let is_unnamed = *title == unnamed || title.starts_with(&format!("{unnamed} ("));
+            if let Some(name) = name.filter(|_| is_unnamed) {
+                *title = title.replacen(&unnamed, &name.to_string_lossy(), 1);
+            }
+        }
     }
 
     /// Returns the inputs as a line of text.
@@ -223,7 +246,7 @@ impl Adding<'_> {
         self.loaded.facts.bars.extend(color.paint(
             path,
             &mut mesh,
-            self.flags.show.range,
+            self.flags.show.range_of(path),
             up,
             named,
         )?);
@@ -354,7 +377,7 @@ impl Adding<'_> {
     }
 
     fn add_bar(&mut self, transfer: &TransferFunction, values: [f64; 2], title: String) {
-        self.loaded.facts.field = Some(self.loaded.facts.bars.len());
+        self.loaded.facts.fields.push(self.loaded.facts.bars.len());
         self.loaded.facts.bars.push(self.flags.show.color.bar(transfer, values, title));
     }
 

@@ -8,7 +8,7 @@ use splatkit::{
     Error,
     formats::{Kind, ReadOptions},
     input::Limits,
-    interaction::{ClipEntry, SceneFile},
+    interaction::{ClipEntry, InputEntry, SceneFile},
 };
 use std::{
     ffi::{OsStr, OsString},
@@ -138,12 +138,7 @@ pub fn flags(
         flags.push(format!("--camera={}", serde_json::json!(camera)).into());
     }
     if let Some(transfer) = scene.transfer.as_ref().filter(|_| !given.has("transfer")) {
-        let mut flag = OsString::from("--transfer=");
-        match transfer {
-            Value::String(name) => flag.push(name),
-            whole => flag.push(whole.to_string()),
-        }
-        flags.push(flag);
+        flags.push(format!("--transfer={}", text_of(transfer)).into());
     }
     if !(given.has("clip") || given.has("cut-out")) {
         flags.extend(scene.clips.iter().map(|clip| clip_flag(clip).into()));
@@ -151,8 +146,7 @@ pub fn flags(
     for input in scene.inputs.iter().filter(|input| input.visible) {
         let is_like_flag = input.file.as_os_str().as_encoded_bytes().starts_with(b"-");
         let file = if is_like_flag { Path::new(".").join(&input.file) } else { input.file.clone() };
-        let opacity = input.opacity.map(|opacity| opacity.to_string());
-        for (name, value) in [("color", input.color.clone()), ("opacity", opacity)] {
+        for (name, value) in own_values(input) {
             if let Some(value) = value.filter(|_| !given.has(name)) {
                 let mut flag = OsString::from(format!("--{name}="));
                 flag.push(&file);
@@ -166,6 +160,25 @@ pub fn flags(
         return Err(wrong(path, "inputs", "none of them is visible".into()));
     }
     Ok(flags)
+}
+
+/// Returns the flags that an input has of its own, with their values.
+fn own_values(input: &InputEntry) -> [(&'static str, Option<String>); 5] {
+    [
+        ("color", input.color.clone()),
+        ("opacity", input.opacity.map(|opacity| opacity.to_string())),
+        ("transfer", input.transfer.as_ref().map(text_of)),
+        ("range", input.range.map(|[low, high]| format!("{low},{high}"))),
+        ("iso", input.iso.clone()),
+    ]
+}
+
+/// Returns a transfer function as a flag takes it.
+fn text_of(transfer: &Value) -> String {
+    match transfer {
+        Value::String(name) => name.clone(),
+        whole => whole.to_string(),
+    }
 }
 
 fn wrong(path: &Path, name: &str, message: String) -> Failure {
@@ -252,7 +265,8 @@ mod tests {
     fn a_scene_file_stands_for_flags() {
         let words = scene(
             r#"{"splatkit_scene": 1,
-                "inputs": [{"file": "-a.ply"}, {"file": "b.ply", "visible": false}],
+                "inputs": [{"file": "-a.ply"}, {"file": "b.ply", "visible": false},
+                           {"file": "c.nrrd", "transfer": "mri", "range": [-1, 4.5], "iso": "3"}],
                 "size": [64, 48],
                 "camera": {"position": [1, 2, 3], "focal_point": [0, 0, 0], "view_up": [0, 0, 1],
                            "height": 2.5},
@@ -267,6 +281,9 @@ mod tests {
         assert!(has("--clip=plane:-1,0,0,2.5") && has("--cut-out=box:0,0,0:1,1,1"));
         assert_eq!(words.iter().filter(|word| *word == "--no-shade").count(), 1);
         assert!(words.iter().any(|word| word.ends_with("-a.ply")));
+        for end in ["c.nrrd=mri", "c.nrrd=-1,4.5", "c.nrrd=3"] {
+            assert!(words.iter().any(|word| word.ends_with(end)), "{end}: {words:?}");
+        }
         assert!(!words.iter().any(|word| word.contains("b.ply")));
     }
 

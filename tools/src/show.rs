@@ -18,31 +18,38 @@ use std::path::{Path, PathBuf};
 #[command(next_help_heading = "Appearance")]
 pub struct ShowFlags {
     /// Choose how the values of a volume or of samples are shown: ct-bone, ct-soft-tissue, ct-lung,
-    /// ct-angiography, mri, generic, a JSON file, or its text [default: made for the values,
-    /// as `splatkit transfer` writes it]
-    #[arg(long, value_name = "NAME|FILE.json")]
-    transfer: Option<String>,
+    /// ct-angiography, mri, generic, a JSON file, or its text. FILE=NAME is for one input, and the
+    /// flag can be given several times [default: made for the values, as `splatkit transfer` writes
+    /// it]
+    #[arg(long, value_name = "[FILE=]NAME|FILE.json", value_parser = transfer)]
+    transfer: Vec<Own<String>>,
     /// Spread the transfer function over these values instead of its own, and the colour map of
-    /// meshes and point clouds [default of the map: all values of a mesh, the 1st to the 99th
-    /// percentile of a point cloud]
-    #[arg(long, value_name = "LOW,HIGH", value_parser = parse::range, allow_hyphen_values = true)]
-    pub range: Option<[f64; 2]>,
+    /// meshes and point clouds. FILE=LOW,HIGH is for one input, and the flag can be given several
+    /// times [default of the map: all values of a mesh, the 1st to the 99th percentile of a point
+    /// cloud]
+    #[arg(
+        long,
+        value_name = "[FILE=]LOW,HIGH",
+        value_parser = range,
+        allow_hyphen_values = true
+    )]
+    range: Vec<Own<[f64; 2]>>,
     /// Set the length that the transfer function's opacities hold for, in world units [default:
     /// that of the JSON file, else a part of the data's diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     opacity_unit: Option<f64>,
     /// Draw isosurfaces of these values, each as VALUE, VALUE:COLOR, VALUE:OPACITY or
     /// VALUE:COLOR:OPACITY. 50% is the middle of the range of values. A colour is a name, #rgb or
-    /// #rrggbb. Without --transfer, nothing else of the volume is drawn [default: opaque, in the
-    /// transfer function's colour of the value]
+    /// #rrggbb. Without --transfer, nothing else of the volume is drawn. FILE=VALUE,… is for one
+    /// input, and the flag can be given several times [default: opaque, in the transfer function's
+    /// colour of the value]
     #[arg(
         long,
-        value_name = "VALUE,…",
-        value_parser = Surface::parse,
-        value_delimiter = ',',
+        value_name = "[FILE=]VALUE,…",
+        value_parser = surfaces,
         allow_hyphen_values = true
     )]
-    iso: Vec<Surface>,
+    iso: Vec<Own<Vec<Surface>>>,
     /// Multiply the opacity by factors of 0 to 1, given by the gradient's magnitude (value per
     /// world length) and linear in between.
     #[arg(long, value_name = "MAGNITUDE,FACTOR:…", value_parser = Factors::parse)]
@@ -96,35 +103,46 @@ pub struct Show<'a> {
     flags: &'a ShowFlags,
     pub kernel: Kernel,
     pub sharp: bool,
-    transfer: Transfer<'a>,
+    transfers: Vec<Own<Transfer<'a>>>,
 }
 
 enum Transfer<'a> {
-    Automatic,
     Named(&'a str),
     Read(TransferFunction),
 }
 
 impl ShowFlags {
-    /// Returns the flags that change the transfer function as given, for messages; `None` if there
-    /// are none.
-    pub fn transfer_text(&self) -> Option<String> {
-        let transfer = self.transfer.as_ref().map(|transfer| format!("--transfer {transfer}"));
+    /// Returns the flags that change the transfer function of an input as given, for messages;
+    /// `None` if there are none.
+    pub fn transfer_text(&self, path: &Path) -> Option<String> {
+        let transfer = Own::of(&self.transfer, path);
+        let transfer = transfer.map(|transfer| format!("--transfer {transfer}"));
         let unit = self.opacity_unit.map(|unit| format!("--opacity-unit {}", plain(unit)));
-        let texts: Vec<_> = [transfer, self.range_text(), unit].into_iter().flatten().collect();
+        let texts: Vec<_> = [transfer, self.range_text(path), unit].into_iter().flatten().collect();
         (!texts.is_empty()).then(|| texts.join(" "))
     }
 
-    fn range_text(&self) -> Option<String> {
-        self.range.map(|[low, high]| format!("--range {},{}", plain(low), plain(high)))
+    fn range_text(&self, path: &Path) -> Option<String> {
+        let range = self.range_of(path);
+        range.map(|[low, high]| format!("--range {},{}", plain(low), plain(high)))
     }
 
-    /// Returns the transfer function's file if no other flag changes its content.
-    pub fn own_transfer(&self) -> Option<&Path> {
-        let is_changed = self.range.is_some() || self.opacity_unit.is_some();
+    /// Returns the range of values that an input's colours are spread over, if it is given.
+    pub fn range_of(&self, path: &Path) -> Option<[f64; 2]> {
+        Own::of(&self.range, path).copied()
+    }
+
+    /// Whether the range of some input is given.
+    pub fn has_range(&self) -> bool {
+        !self.range.is_empty()
+    }
+
+    /// Returns the file of an input's transfer function if no other flag changes its content.
+    pub fn own_transfer(&self, path: &Path) -> Option<&Path> {
+        let is_changed = self.range_of(path).is_some() || self.opacity_unit.is_some();
         let named =
             |name: &&String| !TransferFunction::NAMES.contains(&name.as_str()) && is_file(name);
-        self.transfer.as_ref().filter(named).filter(|_| !is_changed).map(Path::new)
+        Own::of(&self.transfer, path).filter(named).filter(|_| !is_changed).map(Path::new)
     }
 
     /// Returns a flag that was given and does not change how values are shown.
@@ -142,46 +160,88 @@ impl ShowFlags {
     /// Checks the names of inputs in flags.
     pub fn check_inputs(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
         self.color.check(inputs)?;
+        Own::check(&self.transfer, "transfer", inputs)?;
+        Own::check(&self.range, "range", inputs)?;
+        Own::check_files(&self.iso, "iso", inputs)?;
         Own::check(&self.opacity, "opacity", inputs)
+    }
+
+    /// Returns the isosurfaces of an input.
+    fn surfaces_of(&self, path: &Path) -> Vec<Surface> {
+        Own::all_of(&self.iso, path).into_iter().flatten().copied().collect()
     }
 
     /// Returns the files that flags name.
     pub fn files(&self) -> Vec<PathBuf> {
-        let transfer =
-            self.transfer.as_ref().filter(|transfer| is_file(transfer)).map(PathBuf::from);
-        transfer.into_iter().chain(self.kernel.file()).collect()
+        let transfers = Own::values(&self.transfer).filter(|transfer| is_file(transfer));
+        transfers.map(PathBuf::from).chain(self.kernel.file()).collect()
     }
 
     pub fn open(&self, limits: &Limits) -> Result<Show<'_>, Failure> {
-        let transfer = match &self.transfer {
-            None => Transfer::Automatic,
-            Some(text) if is_json(text) => Transfer::Read(TransferFunction::from_json(text)?),
-            Some(file) if !TransferFunction::NAMES.contains(&file.as_str()) && is_file(file) => {
-                Transfer::Read(TransferFunction::read(Path::new(file), limits)?)
-            }
-            Some(name) => {
-                // An unknown name fails here. The range comes later, with the volume.
-                TransferFunction::named(name, [0.0, 1.0])?;
-                Transfer::Named(name)
-            }
-        };
-        let more = match &transfer {
-            Transfer::Read(transfer) => transfer.isosurfaces.len(),
-            _ => 0,
-        };
-        let (count, most) = (self.iso.len() + more, TransferFunction::MAX_ISOSURFACES);
-        if count > most {
-            return Err(Failure::Usage(format!(
-                "{count} isosurfaces are given; at most {most} are allowed"
-            )));
-        }
+        let own = self.transfer.iter();
+        let own = own.map(|own| own.try_map(|text| Transfer::open(text, limits)));
+        let transfers = own.collect::<Result<Vec<_>, _>>()?;
+        self.check_surfaces(&transfers)?;
         Ok(Show {
             flags: self,
             kernel: self.kernel.kernel(limits)?,
             sharp: self.kernel.is_sharp(),
-            transfer,
+            transfers,
         })
     }
+
+    /// Refuses more isosurfaces of an input than a transfer function can have.
+    fn check_surfaces(&self, transfers: &[Own<Transfer>]) -> Result<(), Failure> {
+        // No input has an empty path: that stands for the inputs without values of their own.
+        let files = Own::files(&self.iso).chain(Own::files(transfers)).chain([Path::new("")]);
+        for file in files {
+            let more = match Own::of(transfers, file) {
+                Some(Transfer::Read(transfer)) => transfer.isosurfaces.len(),
+                _ => 0,
+            };
+            let count = self.surfaces_of(file).len() + more;
+            let most = TransferFunction::MAX_ISOSURFACES;
+            if count > most {
+                return Err(Failure::Usage(format!(
+                    "{count} isosurfaces are given; at most {most} are allowed"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<'a> Transfer<'a> {
+    /// Reads the transfer function that a name, a file or a text of JSON stands for.
+    fn open(text: &'a str, limits: &Limits) -> Result<Self, Failure> {
+        if is_json(text) {
+            return Ok(Self::Read(TransferFunction::from_json(text)?));
+        }
+        if !TransferFunction::NAMES.contains(&text) && is_file(text) {
+            return Ok(Self::Read(TransferFunction::read(Path::new(text), limits)?));
+        }
+        // An unknown name fails here. The range comes later, with the volume.
+        TransferFunction::named(text, [0.0, 1.0])?;
+        Ok(Self::Named(text))
+    }
+}
+
+/// Parses how values are shown. A text of JSON has no `=`.
+fn transfer(text: &str) -> Result<Own<String>, String> {
+    match is_json(text) {
+        true => Ok(Own::of_all(text.to_owned())),
+        false => Own::parse(text, |text| Ok(text.to_owned())),
+    }
+}
+
+/// Parses a range of values.
+fn range(text: &str) -> Result<Own<[f64; 2]>, String> {
+    Own::parse(text, parse::range)
+}
+
+/// Parses isosurfaces.
+fn surfaces(text: &str) -> Result<Own<Vec<Surface>>, String> {
+    Own::parse(text, |text| text.split(',').map(Surface::parse).collect())
 }
 
 /// Parses an opacity.
@@ -257,58 +317,64 @@ impl Show<'_> {
         Values { range: values, diagonal }: Values,
         automatic: impl FnOnce() -> TransferFunction,
     ) -> Result<TransferFunction, Failure> {
-        let transfer = match &self.transfer {
-            Transfer::Automatic if values[0] >= values[1] && self.flags.iso.is_empty() => {
+        let surfaces = self.flags.surfaces_of(path);
+        let transfer = match Own::of(&self.transfers, path) {
+            None if values[0] >= values[1] && surfaces.is_empty() => {
                 return Err(same(path, values[0]).into());
             }
-            Transfer::Automatic => automatic(),
-            Transfer::Named(name) => {
+            None => automatic(),
+            Some(Transfer::Named(name)) => {
                 let mut named = TransferFunction::named(name, values)?.for_size(diagonal);
                 // Light fades where the gradient is noise, whatever the colours are.
                 let certain = automatic().shade.and_then(|shade| shade.certain);
                 named.shade = named.shade.map(|shade| Shade { certain, ..shade });
                 named
             }
-            Transfer::Read(transfer) => transfer.clone(),
+            Some(Transfer::Read(transfer)) => transfer.clone(),
         };
-        let mut transfer = match self.flags.range {
+        let range = self.flags.range_of(path);
+        let mut transfer = match range {
             Some(range) => transfer.spread_over(range),
             None => transfer,
         };
-        self.flags.color.color_transfer(&mut transfer, self.flags.range, values)?;
+        self.flags.color.color_transfer(&mut transfer, range, values)?;
         if let Some(unit) = self.flags.opacity_unit {
             transfer.unit = unit;
         }
         if let Some(Factors(factors)) = &self.flags.gradient_opacity {
             transfer.gradient.clone_from(factors);
         }
-        self.add_surfaces(&mut transfer, values);
-        if !transfer.visible(values) {
-            let [low, high] = values;
-            let shown = match transfer.shown_range() {
-                Some([from, to]) if from == to => format!("shows only the value {from}"),
-                Some([from, to]) => format!("shows values between {from} and {to}"),
-                None => "shows no value".to_owned(),
-            };
-            let spread = self
-                .flags
-                .range_text()
-                .map_or(String::new(), |range| format!("spread over {range}, "));
-            return Err(Error::NothingToDraw(format!(
-                "{spread}the transfer function {shown}, but the values of {} lie between {low} and \
-                 {high}",
-                path.display()
-            ))
-            .into());
+        self.add_surfaces(path, &mut transfer, &surfaces, values);
+        if transfer.visible(values) {
+            return Ok(transfer);
         }
-        Ok(transfer)
+        let [low, high] = values;
+        let shown = match transfer.shown_range() {
+            Some([from, to]) if from == to => format!("shows only the value {from}"),
+            Some([from, to]) => format!("shows values between {from} and {to}"),
+            None => "shows no value".to_owned(),
+        };
+        let spread = self.flags.range_text(path);
+        let spread = spread.map_or(String::new(), |range| format!("spread over {range}, "));
+        Err(Error::NothingToDraw(format!(
+            "{spread}the transfer function {shown}, but the values of {} lie between {low} and \
+             {high}",
+            path.display()
+        ))
+        .into())
     }
 
-    fn add_surfaces(&self, transfer: &mut TransferFunction, [low, high]: [f64; 2]) {
-        if self.flags.iso.is_empty() {
+    fn add_surfaces(
+        &self,
+        path: &Path,
+        transfer: &mut TransferFunction,
+        surfaces: &[Surface],
+        [low, high]: [f64; 2],
+    ) {
+        if surfaces.is_empty() {
             return;
         }
-        for &Surface { value, color, opacity } in &self.flags.iso {
+        for &Surface { value, color, opacity } in surfaces {
             let value = match value {
                 Value::Own(value) => value,
                 Value::Share(share) => low + share * (high - low),
@@ -316,7 +382,7 @@ impl Show<'_> {
             let color = color.unwrap_or_else(|| transfer.color(value));
             transfer.isosurfaces.push(Isosurface { value, color, opacity });
         }
-        if matches!(self.transfer, Transfer::Automatic) {
+        if Own::of(&self.transfers, path).is_none() {
             transfer.opacity = vec![(0.0, 0.0)];
         }
     }
@@ -428,6 +494,22 @@ mod tests {
         ] {
             assert!(surface(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn surfaces_of_one_input_are_read() {
+        let [own, other] = ["a=b.nrrd", "c.nrrd"].map(Path::new);
+        let all = ["-5,50%:red", "a=b.nrrd=7:0.5"].map(|text| surfaces(text).unwrap());
+        let of = |path| -> Vec<Value> {
+            Own::all_of(&all, path).into_iter().flatten().map(|surface| surface.value).collect()
+        };
+        assert_eq!(of(own), [Value::Own(7.0)]);
+        assert_eq!(of(other), [Value::Own(-5.0), Value::Share(0.5)]);
+        assert!(surfaces("a.nrrd=x").is_err() && surfaces("1,").is_err());
+        let whole = r#"{"color": [], "opacity": []}"#;
+        assert_eq!(transfer(whole), Ok(Own::of_all(whole.to_owned())));
+        let text = transfer(&format!("a=b.nrrd={whole}")).unwrap();
+        assert_eq!(Own::of(std::slice::from_ref(&text), own).map(String::as_str), Some(whole));
     }
 
     #[test]

@@ -34,6 +34,7 @@ impl Transfer {
             return Err(Failure::Usage(format!("{flag} has no effect on a transfer function")));
         }
         self.show.color.check_effect(false, true)?;
+        self.show.check_inputs(std::slice::from_ref(&self.input))?;
         let is_stdout = self.output.as_os_str() == "-";
         if !is_stdout {
             self.check_output()?;

@@ -165,7 +165,9 @@ fn cameras_and_pictures_follow_their_flags() {
         .run("render a.ply -o d.png --camera-position 1,2,3 --focal-point 1,2,3")
         .fails(2, &["camera"]);
     folder.run("render a.ply -o d.png --size 100000x100000").fails(2, &["100000"]);
-    folder.run("render a.vti a.nrrd -o d.png").fails(2, &["one volume"]);
+    folder
+        .run("render a.vti a.nrrd a.vti a.nrrd a.vti -o d.png")
+        .fails(2, &["4 volumes", "the scene has 5"]);
 }
 
 #[test]

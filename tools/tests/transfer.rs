@@ -99,3 +99,62 @@ fn presets_follow_the_unit_of_length() {
         }
     }
 }
+
+/// Two volumes in one picture: flags are for both, or for one of them.
+#[test]
+fn each_volume_has_its_own_function() {
+    let folder = folder();
+    let mut other = ball();
+    // Four slices further, and a bit aside.
+    other.rotate_right(4 * 16 * 16 + 3);
+    folder.put("b.nrrd", nrrd("uint8", &other));
+    let mut drawn = 0;
+    let mut render = |flags: &str| {
+        drawn += 1;
+        let name = format!("{drawn}.png");
+        let found = folder.json(&format!("render a.nrrd b.nrrd {SMALL} {flags} -o {name} --json"));
+        (std::fs::read(folder.path(&name)).unwrap(), found)
+    };
+    let both = render("--transfer mri");
+    assert_eq!(both.1["adapter"], "CPU", "{}", both.1);
+    assert!(render("--transfer a.nrrd=mri --transfer b.nrrd=mri").0 == both.0);
+    let one = render("--transfer mri --transfer b.nrrd=generic");
+    assert!(one.0 != both.0);
+    assert!(render("--transfer a.nrrd=mri --transfer b.nrrd=generic").0 == one.0);
+    assert!(render("--transfer b.nrrd=mri --transfer a.nrrd=generic").0 != one.0);
+    let shown = render("--transfer mri --iso b.nrrd=50%:red,90 --iso b.nrrd=20 --scalar-bar").1;
+    let fields = shown["settings"]["fields"].as_array().unwrap();
+    let surfaces = |field: usize| fields[field]["isosurfaces"].as_array().unwrap().len();
+    assert_eq!((fields.len(), surfaces(0), surfaces(1)), (2, 0, 3), "{shown}");
+    let bars = shown["overlay"]["scalar_bars"].as_array().unwrap();
+    let titles: Vec<&str> = bars.iter().map(|bar| bar["title"].as_str().unwrap()).collect();
+    assert_eq!(titles, ["a", "b"], "{shown}");
+    let ranged = render("--transfer generic --range b.nrrd=100,200");
+    assert!(ranged.0 != render("--transfer generic").0);
+    // A scene file says the same.
+    folder.put(
+        "s.json",
+        r#"{"splatkit_scene": 1, "size": [64, 48], "transfer": "mri",
+            "inputs": [{"file": "a.nrrd"}, {"file": "b.nrrd", "transfer": "generic"}]}"#,
+    );
+    folder.run("render s.json -o s.png").ok();
+    assert!(std::fs::read(folder.path("s.png")).unwrap() == one.0);
+}
+
+#[test]
+fn what_several_volumes_cannot_do_is_told() {
+    let folder = folder();
+    folder.put("b.nrrd", nrrd("uint8", &ball()));
+    let render =
+        |flags: &str| folder.run(&format!("render a.nrrd b.nrrd -o o.png {SMALL} {flags}"));
+    render("--transfer c.nrrd=mri").fails(2, &["--transfer c.nrrd=…", "no input has this name"]);
+    render("--iso c.nrrd=3").fails(2, &["--iso c.nrrd=…", "no input has this name"]);
+    render("--transfer mri --transfer generic").fails(2, &["--transfer is given twice"]);
+    render("--range 1,2 --range 3,4").fails(2, &["--range is given twice"]);
+    render("--transfer b.nrrd=bones").fails(2, &["bones"]);
+    render("--mip").fails(2, &["maximum", "not several"]);
+    render("--classify pre").fails(2, &["after interpolation"]);
+    render("--engine gpu --gpu software").fails(2, &["several fields"]);
+    let nine = "--iso 1,2,3 --iso b.nrrd=1,2,3,4,5,6,7,8,9";
+    render(nine).fails(2, &["9 isosurfaces are given; at most 8"]);
+}

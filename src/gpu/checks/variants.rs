@@ -150,7 +150,7 @@ fn add(case: &Case, settings: &Settings, is_usual: bool, found: &mut Found) {
     let Ok(view) = case.camera.view(settings.size) else { return };
     let bounds = case.scene.bounds();
     let choice = case.scene.choice(&view, settings, settings.detail, usize::MAX, &bounds);
-    let sheets = case.scene.sheets_of(&view, settings, choice.as_ref(), &bounds);
+    let sheets = case.scene.sheets_of(&view, settings, choice.as_slice(), &bounds);
     let mut kinds = vec![None];
     if let Ok(volume) = gathered_volume(&case.scene, settings, &sheets) {
         // Settings do not change how samples are read, so one of them is enough for all types.

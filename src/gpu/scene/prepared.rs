@@ -180,14 +180,15 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Sets the transfer function of the scene's volume or sample set. Nothing is rebuilt on the
-    /// CPU.
+    /// Sets the transfer function of the field of an item, by its number in the scene. Nothing is
+    /// rebuilt on the CPU.
     ///
     /// # Errors
-    /// [`Error::Argument`] if [`Renderer::prepare`](crate::gpu::Renderer::prepare) would refuse the
-    /// function; the scene then keeps its old one.
-    pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
-        self.scene = self.scene.shown_by(transfer)?;
+    /// [`Error::Argument`] if the item has no field; [`Error::Transfer`] if
+    /// [`Renderer::prepare`](crate::gpu::Renderer::prepare) would refuse the function. The scene
+    /// then keeps its old one.
+    pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
+        self.scene = self.scene.shown_by(item, transfer)?;
         Ok(())
     }
 

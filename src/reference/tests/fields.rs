@@ -98,11 +98,12 @@ fn assert_linear(
     let settings = Settings { sheet_thickness: Some(0.2), ..Settings::new([32, 24]) };
     let view = camera(projection).view(settings.size).unwrap();
     let frame = Frame::new(scene, scene, view, &settings);
-    let everywhere: Vec<&Kernel> = frame.kernels.iter().collect();
+    let field = &frame.fields[0];
+    let everywhere: Vec<&Kernel> = field.kernels.iter().collect();
     let mut met = 0;
     for (column, row) in [(15, 11), (17, 14), (14, 13)] {
         let ray = frame.ray(column, row);
-        let faces = |column, row| frame.faces(&frame.ray(column, row), &everywhere, &frame.planes);
+        let faces = |column, row| field.faces(&frame.ray(column, row), &everywhere, &frame.planes);
         let around = [(-1, 0), (1, 0), (0, -1), (0, 1)].map(|(x, y)| faces(column + x, row + y));
         for (k, (face, &plane)) in faces(column, row).iter().zip(&frame.planes).enumerate() {
             let world = frame.view.rotation.transpose() * ray.point(plane) + frame.view.position;
@@ -259,8 +260,9 @@ fn heavier_samples_count_more() {
     );
     let settings = unshaded([1, 1]);
     let frame = Frame::new(&scene, &scene, from_above(5.0, 0.1).view([1, 1]).unwrap(), &settings);
-    let everywhere: Vec<&Kernel> = frame.kernels.iter().collect();
-    let faces = frame.faces(&frame.ray(0, 0), &everywhere, &frame.planes);
+    let field = &frame.fields[0];
+    let everywhere: Vec<&Kernel> = field.kernels.iter().collect();
+    let faces = field.faces(&frame.ray(0, 0), &everywhere, &frame.planes);
     close(faces[faces.len() / 2].value(1e-4).unwrap(), 2.0, 1e-9);
 }
 
@@ -276,7 +278,7 @@ fn the_mean_of_a_sample_with_a_slope_is_that_of_many_points() {
         let view = camera(projection).view(settings.size).unwrap();
         let frame = Frame::new(&scene, &scene, view, &settings);
         let ray = frame.ray(2000, 2000);
-        let kernel = &frame.kernels[0];
+        let kernel = &frame.fields[0].kernels[0];
         let kernel::Load::Sample(carried) = &kernel.load else { panic!("a sample is no radiance") };
         let crossing = kernel.cross(&ray).unwrap();
         let part = [crossing.closest - 0.1, crossing.closest + 0.5];

@@ -101,8 +101,7 @@ fn decibels(a: &Picture, b: &Picture) -> f64 {
 
 /// The composite of a pixel's ray.
 fn pixel(frame: &Frame, column: i64, row: i64) -> Composite {
-    let everywhere: Vec<&Kernel> = frame.kernels.iter().collect();
-    frame.pixel_of_sheets(&frame.ray(column, row), &everywhere, None, &[])
+    frame.pixel_of_sheets(column, &frame.met_by_row(row))
 }
 
 /// Pseudo-random numbers in −1 … 1, the same in every run (Marsaglia's xorshift, 2003).

@@ -44,8 +44,8 @@ pub struct OverlayFlags {
 pub struct Facts {
     /// The colours of values, in the order of the inputs.
     pub bars: Vec<Bar>,
-    /// The bar of the field, by its number: it follows the transfer function.
-    pub field: Option<usize>,
+    /// The bars of the fields, by their numbers: they follow the transfer functions.
+    pub fields: Vec<usize>,
     /// The unit of lengths; empty if no file says it.
     pub length: String,
     /// How a patient stands.
@@ -61,7 +61,7 @@ pub struct Overlay {
 }
 
 /// Most scalar bars; more would hide the picture.
-const MOST_BARS: usize = 3;
+const MOST_BARS: usize = 4;
 /// The space between bars, in heights of letters.
 const BETWEEN: f64 = 1.2;
 /// The most of a picture's width that is left free at each side.

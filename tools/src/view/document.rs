@@ -87,16 +87,12 @@ impl Document {
         match name {
             "size" => self.now.size = crate::parse::size(&first).ok(),
             "camera" => self.now.camera = serde_json::from_str(&first).ok(),
-            "transfer" => {
-                let whole = serde_json::from_str(&first);
-                self.now.transfer = Some(whole.unwrap_or(Value::String(first)));
-            }
             "clip" | "cut-out" => {
                 let flags = values.iter().map(|value| format!("--{name}={value}").into());
                 self.pending.extend(flags);
             }
             "quiet" | "verbose" | "threads" => {}
-            "color" | "opacity" => self.take_own(name, values),
+            "color" | "opacity" | "transfer" | "range" | "iso" => self.take_own(name, values),
             _ if scene_file::is_option(name) => {
                 let value = match &values[..] {
                     _ if is_switch => Value::Bool(true),
@@ -114,7 +110,7 @@ impl Document {
         Ok(())
     }
 
-    /// Takes colours or opacities, of which each may be that of one input: `FILE=VALUE`.
+    /// Takes values of which each may be that of one input: `FILE=VALUE`.
     fn take_own(&mut self, name: &str, values: Vec<String>) {
         let mut rest = Vec::new();
         for value in values {
@@ -123,13 +119,18 @@ impl Document {
                 Some((input, own))
             });
             match own {
-                Some((input, own)) if name == "color" => input.color = Some(own.to_owned()),
-                Some((input, own)) => input.opacity = own.parse().ok(),
+                Some((input, own)) => set_own(input, name, own),
+                None if name == "transfer" => self.now.transfer = Some(transfer_entry(&value)),
                 None => rest.push(Value::String(value)),
             }
         }
-        if !rest.is_empty() {
-            self.now.options.insert(name.to_owned(), Value::Array(rest));
+        match (name, rest.len()) {
+            (_, 0) => {}
+            // A single one is edited as a text.
+            ("range" | "iso", 1) => {
+                self.now.options.extend(rest.pop().map(|one| (name.to_owned(), one)));
+            }
+            _ => drop(self.now.options.insert(name.to_owned(), Value::Array(rest))),
         }
     }
 
@@ -196,9 +197,29 @@ impl Document {
         }
     }
 
-    /// Sets the transfer function, which then replaces all flags that change one.
-    pub fn set_transfer(&mut self, transfer: &TransferFunction, has_surfaces: bool) {
-        self.now.set_transfer(transfer);
+    /// Returns the number of an input.
+    fn input_of(&self, file: &Path) -> Option<usize> {
+        self.now.inputs.iter().position(|input| input.visible && input.file == file)
+    }
+
+    /// Returns the transfer function of an input, if the document has it, rather than a name or a
+    /// file, or nothing.
+    pub fn transfer_of(&self, file: &Path) -> Option<TransferFunction> {
+        self.now.transfer_of(self.input_of(file)?).ok().flatten()
+    }
+
+    /// Sets the transfer functions of all inputs that have a field. They then replace all flags
+    /// that change one.
+    pub fn set_transfers(&mut self, transfers: &[(&Path, TransferFunction)], has_surfaces: bool) {
+        for (file, transfer) in transfers {
+            let Some(number) = self.input_of(file) else { continue };
+            let input = &mut self.now.inputs[number];
+            (input.transfer, input.range, input.iso) = (None, None, None);
+            match transfers.len() {
+                1 => self.now.set_transfer(transfer),
+                _ => self.now.set_transfer_of(number, transfer),
+            }
+        }
         for flag in OF_TRANSFER {
             self.now.options.remove(*flag);
         }
@@ -217,16 +238,20 @@ impl Document {
     /// Returns the options and inputs that decide what is loaded. Scenes for which they are equal
     /// need not be loaded again.
     pub fn loaded_by(&self) -> LoadedBy {
-        let inputs = self.now.inputs.iter().filter(|input| input.visible);
+        let inputs = self.now.inputs.iter().filter(|input| input.visible).cloned();
+        let inputs = inputs.map(|mut input| {
+            // An edited transfer function needs no loading; a file or a name does.
+            input.transfer.take_if(|transfer| !transfer.is_string());
+            input
+        });
         let mut options = self.now.options.clone();
         options.retain(|name, _| {
             !(LOOK.contains(&name.as_str()) || scene_file::CAMERA.contains(&name.as_str()))
         });
-        // An edited transfer function needs no loading; a file or a name does.
         if let Some(Value::String(name)) = &self.now.transfer {
             options.insert("transfer".into(), name.clone().into());
         }
-        (inputs.cloned().collect(), options)
+        (inputs.collect(), options)
     }
 
     /// Returns the command that draws this scene.
@@ -271,6 +296,26 @@ impl Document {
     }
 }
 
+/// Sets a value that an input has of its own.
+fn set_own(input: &mut InputEntry, name: &str, value: &str) {
+    match name {
+        "color" => input.color = Some(value.to_owned()),
+        "opacity" => input.opacity = value.parse().ok(),
+        "transfer" => input.transfer = Some(transfer_entry(value)),
+        "range" => input.range = crate::parse::range(value).ok(),
+        _ => {
+            // Several lists are one.
+            let before = input.iso.take().map_or(String::new(), |before| format!("{before},"));
+            input.iso = Some(before + value);
+        }
+    }
+}
+
+/// Returns a transfer function of a flag as scene files have it.
+fn transfer_entry(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned()))
+}
+
 /// Returns the first line of what clap says about arguments.
 fn usage(error: clap::Error) -> Failure {
     let text = error.to_string();
@@ -298,10 +343,35 @@ mod tests {
         .expect("a document");
         let scene = document.scene();
         assert_eq!((scene.size, scene.inputs.len()), (Some([64, 48]), 2));
-        assert_eq!(scene.options["iso"], serde_json::json!(["1", "2:red"]));
+        assert_eq!(scene.options["iso"], serde_json::json!("1,2:red"));
         assert!(document.render().is_ok());
         let line = document.command_line().expect("a command");
         assert!(line.starts_with("splatkit render ") && line.contains("--no-shade"), "{line}");
+    }
+
+    #[test]
+    fn each_field_keeps_its_own_transfer_function() {
+        let mut document = document(
+            "splatkit view a.ply b.nrrd c.nrrd --transfer c.nrrd=mri --iso b.nrrd=1,2 \
+             --iso b.nrrd=3 --range b.nrrd=0,9 --iso 7",
+        )
+        .expect("a document");
+        let [_, b, c] = &document.scene().inputs[..] else { panic!("three inputs") };
+        assert_eq!((b.iso.as_deref(), b.range), (Some("1,2,3"), Some([0.0, 9.0])));
+        assert_eq!(c.transfer, Some(Value::String("mri".into())));
+        assert!(document.render().is_ok());
+        let transfer = |value: f64| TransferFunction {
+            opacity: vec![(value, 0.5)],
+            ..TransferFunction::default()
+        };
+        let [a, b, c] = ["a.ply", "b.nrrd", "c.nrrd"].map(Path::new);
+        assert_eq!(document.transfer_of(c), None);
+        document.set_transfers(&[(b, transfer(1.0)), (c, transfer(2.0))], true);
+        let scene = document.scene();
+        let found = [a, b, c].map(|file| document.transfer_of(file));
+        assert_eq!(found, [None, Some(transfer(1.0)), Some(transfer(2.0))]);
+        assert!(scene.inputs[1].iso.is_none() && !scene.options.contains_key("iso"));
+        assert!(document.render().is_ok());
     }
 
     #[test]
@@ -330,7 +400,7 @@ mod tests {
         document.change(|scene| {
             scene.options.insert("background".into(), "white".into());
         });
-        document.set_transfer(&TransferFunction::default(), false);
+        document.set_transfers(&[(Path::new("a.nrrd"), TransferFunction::default())], false);
         assert_eq!(document.loaded_by(), before);
         document.change(|scene| {
             scene.options.insert("sharp".into(), true.into());

@@ -19,7 +19,8 @@ use std::{
 pub struct Film {
     pub render: Render,
     pub stage: Arc<Stage>,
-    pub transfer: Option<TransferFunction>,
+    /// The transfer functions of the fields, with the numbers of their items.
+    pub transfers: Vec<(usize, TransferFunction)>,
     pub path: CameraPath,
     /// Frames per second.
     pub rate: f64,
@@ -43,7 +44,7 @@ impl Exporting {
         std::thread::Builder::new().name("film".into()).spawn(move || {
             let export = Export {
                 loaded: &film.stage.loaded,
-                transfer: film.transfer.as_ref(),
+                transfers: &film.transfers,
                 path: film.path,
                 rate: film.rate,
                 output: &film.output,

@@ -102,8 +102,8 @@ impl Window {
             .and_then(|render| Ok((render, self.panels.flight.path()?)))
             .map_err(|failure| text_of(&failure))
             .and_then(|(render, path)| {
-                let (transfer, rate) = (self.transfer(), self.panels.flight.rate);
-                let film = Film { render, stage, transfer, path, rate, output };
+                let (transfers, rate) = (self.transfers(), self.panels.flight.rate);
+                let film = Film { render, stage, transfers, path, rate, output };
                 Exporting::start(film, move || repaint.request_repaint())
                     .map_err(|error| error.to_string())
             });

@@ -72,17 +72,20 @@ fn load(given: &Given, render: &Render, progress: &Progress) -> Result<Stage, Fa
     progress.stage("Opening the device");
     let device = render.device(&loaded)?;
     progress.stage("Counting values");
-    let histogram = loaded.scene.items.iter().find_map(Histogram::of_item);
+    let items = &loaded.scene.items;
+    let of_item = |item: usize| Some((item, Histogram::of_item(&items[item])?));
+    let histograms = loaded.scene.fields().into_iter().filter_map(of_item).collect();
     let sheet = sheet_of(&loaded.scene);
-    Ok(Stage { loaded, device, histogram, sheet })
+    Ok(Stage { loaded, device, histograms, sheet })
 }
 
-/// Returns the thickness of a volume's sheets, about as [`Scene::sheets`] chooses it.
+/// Returns the thickness of the sheets of the finest volume, about as [`Scene::sheets`] chooses it.
 fn sheet_of(scene: &Scene) -> Option<f64> {
-    scene.items.iter().find_map(|item| match item {
+    let own = scene.items.iter().filter_map(|item| match item {
         Item::Volume(volume, ..) => Some(4.0 / 3.0 * volume.lattice.kernel_spacing()),
         _ => None,
-    })
+    });
+    own.reduce(f64::min)
 }
 
 /// Returns a failure as a message, with its hint.

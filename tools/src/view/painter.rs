@@ -27,17 +27,30 @@ const CALM: Duration = Duration::from_millis(70);
 pub struct Stage {
     pub loaded: Loaded,
     pub device: Device,
-    /// How often the values of the field are.
-    pub histogram: Option<Histogram>,
+    /// How often the values of the fields are, with the numbers of their items.
+    pub histograms: Vec<(usize, Histogram)>,
     /// The thickness of a sheet that the volume's spacing asks for, in world units.
     pub sheet: Option<f64>,
 }
 
 impl Stage {
-    /// Returns the smallest and the largest value of the field; 0 and 1 if there is none.
-    pub fn values(&self) -> [f64; 2] {
-        let values = self.loaded.scene.items.iter().find_map(Item::value_range);
-        values.unwrap_or([0.0, 1.0])
+    /// Returns the smallest and the largest value of an item's field; 0 and 1 if it has none.
+    pub fn values(&self, item: usize) -> [f64; 2] {
+        let item = self.loaded.scene.items.get(item);
+        item.and_then(Item::value_range).unwrap_or([0.0, 1.0])
+    }
+
+    /// Returns how often the values of an item's field are.
+    pub fn histogram(&self, item: usize) -> Option<&Histogram> {
+        let own = self.histograms.iter().find(|(own, _)| *own == item);
+        own.map(|(_, histogram)| histogram)
+    }
+
+    /// Returns the transfer functions that the scene was loaded with, with the numbers of their
+    /// items.
+    pub fn transfers(&self) -> Vec<(usize, TransferFunction)> {
+        let items = self.loaded.scene.items.iter().enumerate();
+        items.filter_map(|(item, own)| Some((item, own.transfer()?.clone()))).collect()
     }
 }
 
@@ -49,8 +62,8 @@ pub struct Order {
     /// The settings of the exact picture, before it is averaged down.
     pub settings: Settings,
     pub finish: Arc<Finish>,
-    /// The transfer function of the field, if there is one.
-    pub transfer: Option<TransferFunction>,
+    /// The transfer functions of the fields, with the numbers of their items.
+    pub transfers: Vec<(usize, TransferFunction)>,
 }
 
 /// A frame that was drawn.
@@ -170,11 +183,11 @@ impl Drop for Painter {
     }
 }
 
-/// A renderer, the scene that it draws, and the transfer function that it has.
+/// A renderer, the scene that it draws, and the transfer functions that it has.
 struct Prepared {
     stage: Arc<Stage>,
     renderer: Renderer,
-    transfer: Option<TransferFunction>,
+    transfers: Vec<(usize, TransferFunction)>,
 }
 
 /// A frame that is to be drawn.
@@ -277,16 +290,14 @@ fn draw(
         Some(own) => own,
         none => {
             let renderer = Renderer::new(&order.stage.device, &order.stage.loaded.scene)?;
-            let transfer = order.stage.loaded.scene.items.iter().find_map(Item::transfer).cloned();
-            none.insert(Prepared { stage: Arc::clone(&order.stage), renderer, transfer })
+            let (stage, transfers) = (Arc::clone(&order.stage), order.stage.transfers());
+            none.insert(Prepared { stage, renderer, transfers })
         }
     };
-    if let Some(transfer) = &order.transfer
-        && own.transfer.as_ref() != Some(transfer)
-    {
-        own.renderer.set_transfer(transfer)?;
-        own.transfer = Some(transfer.clone());
+    for new in order.transfers.iter().filter(|new| !own.transfers.contains(new)) {
+        own.renderer.set_transfer(new.0, &new.1)?;
     }
+    own.transfers.clone_from(&order.transfers);
     let mut exact = order.settings.clone();
     exact.stop = stop;
     let settings = effort.settings(&exact, exact.sheet_thickness.or(order.stage.sheet));

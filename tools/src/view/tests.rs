@@ -324,3 +324,39 @@ fn a_deleted_file_does_no_harm() {
     assert!(messages.iter().any(|(text, is_error)| *is_error && text.contains("v.nrrd")));
     assert!(window(&mut harness).frame.is_some());
 }
+
+#[test]
+fn one_of_several_fields_is_edited() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    let ball = splatkit::volume::phantoms::Phantom::Ball.sample([12; 3]).expect("a volume");
+    let file = folder.path().join("ball.nrrd");
+    splatkit::formats::nrrd::write(&ball, &file).expect("written");
+    window(&mut harness).open(vec![file]);
+    let before = picture_of(&mut harness);
+    let shown = |harness: &mut Harness<'static, Option<Window>>| {
+        let shown = window(harness).shown.as_ref().expect("a scene");
+        (shown.field, shown.fields())
+    };
+    let (field, fields) = shown(&mut harness);
+    assert_eq!((field, fields.len(), &*fields[1].1), (0, 2, "ball.nrrd"));
+    // The second field is chosen and changed; the first one stays.
+    window(&mut harness).shown.as_mut().expect("a scene").field = 1;
+    harness.step();
+    let first = window(&mut harness).transfer_of(0).expect("a field");
+    let mut transfer = window(&mut harness).transfer().expect("a field");
+    transfer.color = vec![(0.0, [0.0, 0.0, 1.0])];
+    let step = window(&mut harness).document.scene().clone();
+    window(&mut harness).set_transfer(&transfer);
+    window(&mut harness).document.keep(step);
+    harness.step();
+    assert!(picture_of(&mut harness) != before, "the colours are the same");
+    assert_eq!(window(&mut harness).transfer_of(1), Some(transfer));
+    assert_eq!(window(&mut harness).transfer_of(0), Some(first));
+    let scene = window(&mut harness).document.scene().clone();
+    assert!(scene.transfer.is_none() && scene.inputs.iter().all(|input| input.transfer.is_some()));
+    window(&mut harness).document.undo();
+    harness.step();
+    assert!(picture_of(&mut harness) == before);
+}

@@ -20,7 +20,7 @@ use eframe::{
 use glam::{DVec2, DVec3};
 use splatkit::{
     interaction::{CameraEntry, ClipEntry, Orbit, Probe, SceneFile},
-    scene::{Item, Settings},
+    scene::Settings,
     volume::TransferFunction,
 };
 use std::{path::PathBuf, sync::Arc};
@@ -34,8 +34,23 @@ pub struct Shown {
     pub orbit: Orbit,
     settings: Settings,
     pub finish: Arc<Finish>,
-    /// The transfer function that the scene was loaded with.
-    own_transfer: Option<TransferFunction>,
+    /// The inputs that were loaded: those of the items.
+    inputs: Vec<PathBuf>,
+    /// The transfer functions that the scene was loaded with, with the numbers of their items.
+    own_transfers: Vec<(usize, TransferFunction)>,
+    /// The item whose field is edited.
+    pub field: usize,
+}
+
+impl Shown {
+    /// Returns the items that have a field, with their names.
+    pub fn fields(&self) -> Vec<(usize, String)> {
+        let name = |item: usize| {
+            let name = self.inputs.get(item).and_then(|file| file.file_name());
+            name.map_or(String::new(), |name| name.to_string_lossy().into_owned())
+        };
+        self.own_transfers.iter().map(|(item, _)| (*item, name(*item))).collect()
+    }
 }
 
 /// What the window is used for when a point is clicked.
@@ -53,8 +68,8 @@ struct SetFor {
     size: [u32; 2],
     /// Whether the camera is fitted to the scene.
     is_fitted: bool,
-    /// The edited transfer function, if a bar shows its colours.
-    bar: Option<TransferFunction>,
+    /// The edited transfer functions, if bars show their colours.
+    bars: Vec<(usize, TransferFunction)>,
 }
 
 /// The window's state.
@@ -219,24 +234,49 @@ impl Window {
         self.document.set_camera(camera);
     }
 
-    /// Returns the transfer function that is shown, if the scene has a field.
+    /// Returns the transfer functions that show the fields, with the numbers of their items.
+    pub fn transfers(&self) -> Vec<(usize, TransferFunction)> {
+        let Some(shown) = &self.shown else { return Vec::new() };
+        let mut all = shown.own_transfers.clone();
+        for (item, transfer) in self.edited_transfers() {
+            all.iter_mut().filter(|own| own.0 == item).for_each(|own| own.1.clone_from(&transfer));
+        }
+        all
+    }
+
+    /// Returns the transfer function that shows an item's field.
+    pub fn transfer_of(&self, item: usize) -> Option<TransferFunction> {
+        self.transfers().into_iter().find(|(own, _)| *own == item).map(|(_, transfer)| transfer)
+    }
+
+    /// Returns the transfer function that is edited, if the scene has a field.
     pub fn transfer(&self) -> Option<TransferFunction> {
-        let shown = self.shown.as_ref()?;
-        self.edited_transfer().or_else(|| shown.own_transfer.clone())
+        self.transfer_of(self.shown.as_ref()?.field)
     }
 
-    /// Returns the transfer function, if it is another one than the scene was loaded with.
-    fn edited_transfer(&self) -> Option<TransferFunction> {
-        let own = self.document.scene().transfer.as_ref().filter(|own| own.is_object());
-        own.and_then(|_| self.document.scene().transfer_function().ok().flatten())
+    /// Returns the transfer functions that may be others than those that the scene was loaded with.
+    fn edited_transfers(&self) -> Vec<(usize, TransferFunction)> {
+        let Some(shown) = &self.shown else { return Vec::new() };
+        let edited = |(item, _): &(usize, TransferFunction)| {
+            let file = shown.inputs.get(*item)?;
+            Some((*item, self.document.transfer_of(file)?))
+        };
+        shown.own_transfers.iter().filter_map(edited).collect()
     }
 
-    /// Sets the transfer function, without a step that can be undone.
+    /// Sets the transfer function that is edited, without a step that can be undone.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
-        let has_surfaces = self.shown.as_ref().is_some_and(|shown| {
-            shown.stage.loaded.scene.items.iter().any(|item| item.transfer().is_none())
-        });
-        self.document.set_transfer(transfer, has_surfaces);
+        let mut transfers = self.transfers();
+        let Some(shown) = &self.shown else { return };
+        let edited = transfers.iter_mut().filter(|own| own.0 == shown.field);
+        edited.for_each(|own| own.1.clone_from(transfer));
+        let of_file = |(item, transfer): (usize, TransferFunction)| {
+            Some((shown.inputs.get(item)?.as_path(), transfer))
+        };
+        let transfers: Vec<_> = transfers.into_iter().filter_map(of_file).collect();
+        let has_surfaces =
+            shown.stage.loaded.scene.items.iter().any(|item| item.transfer().is_none());
+        self.document.set_transfers(&transfers, has_surfaces);
         // What was loaded stays loaded.
         if self.loading.is_none() && self.shown.is_some() {
             self.loaded_by = Some(self.document.loaded_by());
@@ -591,14 +631,19 @@ impl Window {
         self.document.take_clips(&settings.clips);
         self.loaded_by = Some(self.document.loaded_by());
         let size = stage.loaded.subject.bounds.diagonal();
-        let own_transfer = stage.loaded.scene.items.iter().find_map(Item::transfer).cloned();
+        let own_transfers = stage.transfers();
+        let visible = self.document.scene().inputs.iter().filter(|input| input.visible);
+        let inputs = visible.map(|input| input.file.clone()).collect();
+        let field = own_transfers.first().map_or(0, |(item, _)| *item);
         self.panels.scene_changed(&stage);
         self.shown = Some(Shown {
             stage: Arc::new(stage),
             orbit: Orbit::new(camera, up, size),
             settings,
             finish: Arc::new(finish),
-            own_transfer,
+            inputs,
+            own_transfers,
+            field,
         });
         (self.set_for, self.ordered) = (None, None);
         self.measured.clear();
@@ -612,11 +657,12 @@ impl Window {
         let mut look = self.document.scene().clone();
         let is_fitted = look.camera.is_none();
         (look.camera, look.transfer) = (None, None);
-        let shows_bar = look.options.contains_key("scalar-bar");
-        let bar = if shows_bar { self.edited_transfer() } else { None };
+        look.inputs.iter_mut().for_each(|input| input.transfer = None);
+        let shows_bars = look.options.contains_key("scalar-bar");
+        let bars = if shows_bars { self.edited_transfers() } else { Vec::new() };
         let Some(shown) = &mut self.shown else { return Ok(()) };
         // A fitted camera follows from the settings.
-        let wanted = SetFor { look, size: self.size, is_fitted, bar: bar.clone() };
+        let wanted = SetFor { look, size: self.size, is_fitted, bars: bars.clone() };
         let is_set = self.set_for.as_ref() == Some(&wanted);
         if !is_set {
             self.set_for = Some(wanted);
@@ -624,10 +670,9 @@ impl Window {
             render.set_size(self.size);
             let loaded = &shown.stage.loaded;
             shown.settings = render.settings(loaded).map_err(|error| error.to_string())?;
-            let values = shown.stage.values();
-            let finish = match &bar {
-                Some(transfer) => render.finish_with(loaded, transfer, values),
-                None => render.finish(loaded),
+            let finish = match &bars[..] {
+                [] => render.finish(loaded),
+                bars => render.finish_with(loaded, bars),
             };
             shown.finish = Arc::new(finish.map_err(|failure| text_of(&failure))?);
             let camera = render.camera(loaded, &shown.settings, &shown.finish);
@@ -639,14 +684,14 @@ impl Window {
             return Ok(());
         }
         self.ordered = Some(self.document.scene().clone());
-        let transfer = self.transfer();
+        let transfers = self.transfers();
         let Some(shown) = &self.shown else { return Ok(()) };
         self.last_order = self.painter.order(Order {
             stage: Arc::clone(&shown.stage),
             camera: shown.orbit.camera().clone(),
             settings: shown.settings.clone(),
             finish: Arc::clone(&shown.finish),
-            transfer,
+            transfers,
         });
         Ok(())
     }

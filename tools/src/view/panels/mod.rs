@@ -211,19 +211,23 @@ pub fn side(window: &mut Window, ui: &mut Ui) {
 
 /// Shows three slices of the volume.
 pub fn slices(window: &mut Window, ui: &mut Ui) {
-    let (Some(stage), Some(transfer), Some(mut panes)) = (
-        window.shown.as_ref().map(|shown| Arc::clone(&shown.stage)),
-        window.transfer(),
+    if window.transfer().is_none() {
+        return;
+    }
+    let (Some((stage, field)), Some(mut panes)) = (
+        window.shown.as_ref().map(|shown| (Arc::clone(&shown.stage), shown.field)),
         window.panels.slices.take(),
     ) else {
         return;
     };
-    let volume = stage.loaded.scene.items.iter().find_map(|item| match item {
-        Item::Volume(volume, kernel, _) => Some((volume, kernel)),
+    let items = &stage.loaded.scene.items;
+    let volume = |number: usize| match items.get(number)? {
+        Item::Volume(volume, kernel, _) => Some((volume, kernel, window.transfer_of(number)?)),
         _ => None,
-    });
-    match volume {
-        Some((volume, kernel)) => {
+    };
+    // The field that is edited, or else the first that has slices.
+    match [field].into_iter().chain(0..items.len()).find_map(volume) {
+        Some((volume, kernel, transfer)) => {
             panes.show(ui, volume, kernel, &transfer);
         }
         None => {

@@ -1,0 +1,328 @@
+//! The fields of a scene, each with the data that is kept for it between pictures.
+
+use super::{
+    blend::{Blend, Way},
+    brick_cache::{BrickCache, Grid, most_bricks},
+    cells::CellField,
+    close::Visible,
+    field::Typed,
+    gather::{self, Gather},
+    items::Prepared,
+    march::{DrawnField, Means},
+    plan::{FieldOutline, Plan},
+};
+use crate::{
+    Error, Result,
+    bricks::{Bricks, Choice},
+    hierarchy::Detail,
+    math::{Bounds, Kernel, Sheets, View},
+    plan::{
+        gathering,
+        shown::{self, Shown},
+        weighting::{Weighting, deviation, weighting},
+    },
+    scene::{Evaluate, Item, Optics, Scene, Settings},
+    volume::{
+        Lattice, Volume,
+        reach::{EVERYTHING, first_visible},
+    },
+};
+
+/// A field of a scene.
+#[derive(Debug)]
+pub struct FieldState {
+    /// The number of its item.
+    pub item: usize,
+    /// The scene without the other fields.
+    pub scene: Scene,
+    /// The ranges of the field around the samples of a gathered lattice.
+    ranges: Option<Vec<[u8; 2]>>,
+    /// The kernel sums of a gathered lattice, if four weights an axis do not suffice.
+    blend: Option<Blend>,
+    /// The visible samples of a gathered lattice, and the transfer function's visibility table for
+    /// which they were found.
+    shown: Option<([u16; 256], Shown)>,
+    /// The levels of a gathered volume in bricks, for the bricks of the last picture.
+    levels: Option<(Choice, Vec<(Grid, Shown)>)>,
+}
+
+impl FieldState {
+    /// Returns the fields of a scene.
+    pub fn all(scene: &Scene) -> Vec<Self> {
+        let field = |item: usize| Self {
+            item,
+            scene: scene.with_one_field(item),
+            ranges: None,
+            blend: None,
+            shown: None,
+            levels: None,
+        };
+        scene.fields().into_iter().map(field).collect()
+    }
+
+    /// Returns the bytes of memory held for drawing.
+    pub fn bytes(&self) -> u64 {
+        let shown = self.shown.as_ref().map_or(0, |(_, shown)| shown.bytes());
+        let ranges = self.ranges.as_ref().map_or(0, |ranges| size_of_val(ranges.as_slice()) as u64);
+        shown + ranges
+    }
+
+    /// Returns the bricks that a view needs, if the field is a volume in bricks. `bounds` are those
+    /// of the whole scene.
+    pub fn choice(
+        &self,
+        view: &View,
+        settings: &Settings,
+        detail: Detail,
+        bounds: &Bounds,
+    ) -> Option<Choice> {
+        let most = self.scene.items.iter().find_map(|item| match item {
+            Item::Bricks(bricks, ..) => Some(most_bricks(bricks, settings)),
+            _ => None,
+        });
+        self.scene.choice(view, settings, detail, most.unwrap_or(usize::MAX), bounds)
+    }
+
+    /// Returns what a picture draws of the field.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the field can't be drawn by the method of the settings.
+    pub fn outline(
+        &self,
+        settings: &Settings,
+        sheets: &Sheets,
+        choice: Option<Choice>,
+    ) -> Result<FieldOutline> {
+        let mut shown = EVERYTHING;
+        if let Some(Item::Volume(volume, _, transfer)) =
+            self.scene.items.iter().find(|i| matches!(i, Item::Volume(..)))
+            && !self.scene.mixes_afar(settings, sheets, choice.as_ref())
+        {
+            shown = first_visible(transfer, volume.range);
+        }
+        let gathers = self.gathers(settings, sheets, choice.as_ref())?;
+        Ok(FieldOutline { choice, shown, gathers })
+    }
+
+    /// Whether the field is gathered.
+    fn gathers(
+        &self,
+        settings: &Settings,
+        sheets: &Sheets,
+        choice: Option<&Choice>,
+    ) -> Result<bool> {
+        if settings.evaluate == Evaluate::Scatter {
+            // The sections of tensor products have no known form.
+            return self.scene.tensor().map_or(Ok(false), |tensor| {
+                let name = tensor.name();
+                Err(Error::Argument(format!(
+                    "the kernel {name} can't be scattered; gather instead, \
+                     or leave it to the engine"
+                )))
+            });
+        }
+        let parts = gathering::parts(&self.scene, sheets, choice);
+        match gathering::obstacle(&self.scene, settings, parts, gather::unsuited) {
+            Some(what) if settings.evaluate == Evaluate::Gather => Err(Error::Argument(format!(
+                "{what} can't be gathered; scatter instead, or leave it to the engine"
+            ))),
+            Some(what) if let Some(tensor) = self.scene.tensor() => {
+                Err(Error::Argument(format!("the kernel {} does not draw {what}", tensor.name())))
+            }
+            obstacle => Ok(obstacle.is_none()),
+        }
+    }
+
+    /// Finds what is visible of a gathered field. `prepared` is that of its item.
+    pub fn prepare_gather(&mut self, plan: &Plan, outline: &FieldOutline, prepared: &Prepared) {
+        for item in &self.scene.items {
+            match (item, prepared, &outline.choice) {
+                (Item::Volume(volume, kernel, transfer), ..) => {
+                    let first = match plan.optics {
+                        Optics::Maximum => EVERYTHING,
+                        _ => first_visible(transfer, volume.range),
+                    };
+                    if let (None, Ok(Way::Blend(taps))) = (&self.blend, Way::of(volume, kernel)) {
+                        self.blend = Some(Blend::new(volume, kernel, taps));
+                    }
+                    let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
+                        Some(blend) => blend.ranges(volume, kernel),
+                        None => shown::field_ranges(volume, kernel),
+                    });
+                    let dims =
+                        self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
+                    self.shown.take_if(|(own, _)| *own != first);
+                    self.shown.get_or_insert_with(|| (first, Shown::new(dims, ranges, &first)));
+                }
+                (Item::Bricks(..), Prepared::Bricks(cache), Some(choice))
+                    if self.levels.as_ref().is_none_or(|(own, _)| own != choice) =>
+                {
+                    let level = |(level, _): &(usize, f64)| {
+                        (Grid::new(cache, choice, *level), Shown::of_bricks(cache, choice, *level))
+                    };
+                    self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Returns the field as all tiles of a picture need it.
+    pub fn drawn<'a>(
+        &'a self,
+        plan: &'a Plan<'a>,
+        sheets: &Sheets,
+        outline: &FieldOutline,
+        prepared: &'a Prepared,
+        visible: &'a Visible,
+    ) -> DrawnField<'a> {
+        let (mut means, mut marks) = (Means::Nothing, Vec::new());
+        let cells = self.scene.items.iter().find_map(|item| match item {
+            Item::Cells(own, _) => Some(own),
+            _ => None,
+        });
+        if let Some(cells) = cells {
+            means = Means::Cells(CellField::new(plan, cells, visible));
+        } else if !outline.gathers {
+            means = if plan.has_field { Means::Scattered } else { Means::Nothing };
+        } else if let Some(gather) = self.gather(plan, sheets, outline, prepared, visible) {
+            marks = self.marks(plan, sheets, outline, &gather);
+            means = Means::Gathered(gather);
+        }
+        DrawnField { plan, means, visible, marks }
+    }
+
+    /// Returns the gathered field, or `None` if none of its bricks is visible.
+    fn gather<'a>(
+        &'a self,
+        plan: &'a Plan<'a>,
+        sheets: &Sheets,
+        outline: &FieldOutline,
+        prepared: &'a Prepared,
+        visible: &'a Visible,
+    ) -> Option<Gather<'a>> {
+        let zero = plan.tables.values[0];
+        let mut levels = Vec::new();
+        for item in &self.scene.items {
+            match (item, prepared) {
+                (Item::Volume(volume, kernel, _), _) => {
+                    levels.push(self.whole_level(volume, kernel, zero)?);
+                }
+                (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache))
+                    if !cache.samples().is_empty() =>
+                {
+                    levels = self.levels_of_bricks(bricks, cache, weighting(kernel)?, zero)?;
+                }
+                _ => {}
+            }
+        }
+        let [finest, _] = levels.first()?.cells;
+        let steps = (0..3).map(|axis| {
+            let [x, y, z, _] = plan.frame.field_axes()[axis];
+            f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis])
+        });
+        let steps = steps.fold(0.0, f64::max) * sheets.step;
+        let looks =
+            if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
+        let parts = gathering::parts(&self.scene, sheets, outline.choice.as_ref());
+        let deviation = self.scene.items.iter().find_map(|item| deviation(item.kernel()?));
+        let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
+        let is_blended = self.blend.is_some();
+        Some(Gather { plan, levels, parts, ends, looks, is_blended, visible, zero: zero as f32 })
+    }
+
+    /// Returns a volume in memory as the only level. Values are relative to `zero`.
+    fn whole_level<'a>(
+        &'a self,
+        volume: &'a Volume,
+        kernel: &Kernel,
+        zero: f64,
+    ) -> Option<gather::Level<'a>> {
+        let (_, shown) = self.shown.as_ref()?;
+        let field = match &self.blend {
+            Some(blend) => Typed::blended(volume, blend, zero),
+            None => Typed::new(volume, weighting(kernel)?, zero),
+        };
+        // Coefficients begin before the samples.
+        let drawn = volume.drawn_lattice();
+        let before = volume.lattice.axes.inverse() * (volume.lattice.origin - drawn.origin);
+        let shift = before.as_vec3().to_array();
+        let to_cells = |blend: &Blend| blend.to_cells(shift);
+        Some(gather::Level {
+            field,
+            dims: drawn.dims,
+            grid: None,
+            shown,
+            share: 1.0,
+            scale: [1.0; 3],
+            shift,
+            cells: self.blend.as_ref().map_or([[1.0; 3], shift], to_cells),
+        })
+    }
+
+    /// Returns the levels of a volume in bricks, the finer first.
+    fn levels_of_bricks<'a>(
+        &'a self,
+        bricks: &Bricks,
+        cache: &'a BrickCache,
+        weighting: Weighting,
+        zero: f64,
+    ) -> Option<Vec<gather::Level<'a>>> {
+        let (choice, found) = self.levels.as_ref()?;
+        let fine = &bricks.header().lattice;
+        let level = |((level, share), (grid, shown)): (&(usize, f64), &'a (Grid, Shown))| {
+            let (own, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
+            let to_own = own.axes.inverse();
+            let scale = (to_own * fine.axes).to_cols_array_2d();
+            let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
+            let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
+            gather::Level {
+                field: Typed::of_bricks(cache.samples(), dims, grid, weighting, zero),
+                dims,
+                grid: Some(grid),
+                shown,
+                share: *share as f32,
+                scale,
+                shift,
+                cells: [scale, shift],
+            }
+        };
+        Some(choice.levels.iter().zip(found).map(level).collect())
+    }
+
+    /// Returns the lattices of the gathered levels.
+    fn lattices(&self, outline: &FieldOutline) -> Vec<Lattice> {
+        let own = |item: &Item| match (item, &outline.choice) {
+            (Item::Volume(volume, ..), _) => {
+                Some(vec![self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).clone()])
+            }
+            (Item::Bricks(bricks, ..), Some(choice)) => {
+                Some(choice.levels.iter().map(|(level, _)| bricks.lattice(*level)).collect())
+            }
+            _ => None,
+        };
+        self.scene.items.iter().find_map(own).unwrap_or_default()
+    }
+
+    /// Returns a bit for each sheet of each tile in which the gathered field may be visible.
+    fn marks(
+        &self,
+        plan: &Plan,
+        sheets: &Sheets,
+        outline: &FieldOutline,
+        gather: &Gather,
+    ) -> Vec<Vec<u64>> {
+        let mut marks: Vec<Vec<u64>> = Vec::new();
+        for (level, lattice) in gather.levels.iter().zip(self.lattices(outline)) {
+            let own = level.shown.sheets_of_tiles(&lattice, plan.view, sheets);
+            if marks.is_empty() {
+                marks = own;
+                continue;
+            }
+            for (tile, other) in marks.iter_mut().zip(own) {
+                tile.iter_mut().zip(other).for_each(|(a, b)| *a |= b);
+            }
+        }
+        marks
+    }
+}

@@ -1,0 +1,174 @@
+//! Scenes of several fields: lattices, scattered samples and cells, beside surfels and facets.
+
+use super::{
+    Case, ORIGIN, ORTHOGRAPHIC, PERSPECTIVE, SLANT, blob_scene, camera, facets, methods,
+    mixed_scene, sampled, scattered, settings, transfer,
+};
+use glam::{DMat3, DVec3, Vec3};
+use splatkit::{
+    bricks::Bricks,
+    cells::{CellKind, CellOptions, Cells, Place, Tetrahedra},
+    hierarchy::Detail,
+    math::{Kernel, Projection, Tensor},
+    scene::{Classification, Evaluate, Gradient, Optics, Scene, Settings},
+    volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
+};
+use std::sync::Arc;
+
+fn case(name: &'static str, scene: Scene, projection: Projection) -> Case {
+    Case { name, scene, camera: camera(SLANT, projection), settings: settings() }
+}
+
+/// Green and violet, over values of 0 … 1, without light.
+fn cool() -> TransferFunction {
+    TransferFunction {
+        color: vec![(0.0, [0.1, 0.5, 0.3]), (0.5, [0.2, 0.9, 0.4]), (1.0, [0.6, 0.2, 0.9])],
+        opacity: vec![(0.15, 0.0), (0.7, 0.5), (1.0, 0.6)],
+        unit: 0.4,
+        ..TransferFunction::default()
+    }
+}
+
+/// A smooth field of 0 … 1 that is largest beside the blobs.
+fn wave(at: DVec3) -> f64 {
+    let squared = (at - DVec3::new(-0.3, 0.3, 0.2)).length_squared();
+    (-1.8 * squared).exp() * (0.8 + 0.2 * (3.0 * at.x - 2.0 * at.z).sin())
+}
+
+/// The wave on a sheared lattice that is coarser than that of the blobs, and reaches beyond it.
+pub fn other_volume() -> Volume {
+    let axes = DMat3::from_cols(
+        DVec3::new(0.17, 0.0, 0.02),
+        DVec3::new(-0.03, 0.16, 0.0),
+        DVec3::new(0.0, 0.04, 0.18),
+    );
+    let (lattice, values) = sampled([14, 13, 12], axes, |at| wave(at) as f32);
+    volume(lattice, values)
+}
+
+fn volume(lattice: Lattice, values: Vec<f32>) -> Volume {
+    Volume::new(lattice, Samples::F32(values)).expect("the samples fill the lattice")
+}
+
+fn two() -> Scene {
+    blob_scene().with_volume(other_volume(), Kernel::default(), cool())
+}
+
+/// A lit volume and an unlit one on another lattice.
+pub fn two_volumes() -> Case {
+    case("two_volumes", two(), PERSPECTIVE)
+}
+
+fn with_surfaces() -> TransferFunction {
+    let surface = |value: f64, color: [f64; 3], opacity: f64| Isosurface { value, color, opacity };
+    let isosurfaces = vec![surface(0.3, [0.9, 0.7, 0.3], 0.4), surface(0.6, [0.3, 0.6, 0.9], 0.7)];
+    TransferFunction { isosurfaces, shade: Some(Shade::default()), ..cool() }
+}
+
+/// Tetrahedra of a bent tube around the centre of the scenes, with values of 0 … 100.
+fn tube(place: Place) -> Tetrahedra {
+    let mut cells = Cells::tube(CellKind::Hexahedron, 2).expect("a tube");
+    let sum: Vec3 = cells.points.iter().sum();
+    let middle = sum / cells.points.len() as f32;
+    cells.points.iter_mut().for_each(|point| *point = (*point - middle) * 0.8);
+    cells.origin = ORIGIN;
+    if place == Place::Cells {
+        cells.values = (0..cells.len()).map(|cell| ((cell * 37) % 101) as f32).collect();
+        cells.place = place;
+    }
+    cells.tetrahedra(&CellOptions::default()).expect("tetrahedra")
+}
+
+fn of_tube() -> TransferFunction {
+    TransferFunction {
+        color: vec![(0.0, [0.2, 0.8, 0.9]), (100.0, [0.9, 0.9, 0.2])],
+        opacity: vec![(10.0, 0.0), (90.0, 0.5)],
+        unit: 0.4,
+        shade: Some(Shade::default()),
+        ..TransferFunction::default()
+    }
+}
+
+/// A volume and scattered samples.
+fn volume_and_samples() -> Scene {
+    Scene::new().with_volume(other_volume(), Kernel::default(), cool()).with_samples(
+        scattered(),
+        TransferFunction { unit: 0.6, ..transfer(1.0, Some(Shade::default())) },
+    )
+}
+
+/// Two sets of scattered samples, of which one is moved aside.
+fn two_sample_sets() -> Scene {
+    let mut moved = scattered();
+    for splat in &mut moved.splats {
+        splat.center[0] = 0.3 - splat.center[0];
+        splat.strength = 1.0 - splat.strength;
+    }
+    Scene::new().with_samples(scattered(), transfer(1.0, None)).with_samples(moved, cool())
+}
+
+/// A volume, a volume in bricks, scattered samples and cells, beside surfels.
+fn four() -> Scene {
+    let bricks = Bricks::from_volume(Arc::new(other_volume())).expect("bricks");
+    mixed_scene()
+        .with_bricks(bricks, Kernel::default(), cool())
+        .with_samples(scattered(), TransferFunction { unit: 1.2, ..transfer(1.0, None) })
+        .with_cells(tube(Place::Points), of_tube())
+}
+
+/// Pictures with fields that scatter their samples, because of the settings.
+fn scattered_fields() -> Vec<Case> {
+    let scatter = Settings { evaluate: Evaluate::Scatter, ..settings() };
+    let central = Settings { gradient: Gradient::Central, size: [60, 48], ..settings() };
+    vec![
+        Case { settings: scatter, ..case("two_volumes_scattered", two(), PERSPECTIVE) },
+        Case { settings: central, ..case("two_volumes_central", two(), PERSPECTIVE) },
+        case("volume_and_samples", volume_and_samples(), PERSPECTIVE),
+        case("volume_and_samples_orthographic", volume_and_samples(), ORTHOGRAPHIC),
+        case("two_sample_sets", two_sample_sets(), PERSPECTIVE),
+    ]
+}
+
+pub fn all() -> Vec<Case> {
+    let clips = methods::clipped_volume().settings.clips;
+    let clipped = Settings { clips, ..settings() };
+    let xray = Settings { optics: Optics::XRay, ..settings() };
+    // The reference draws the finest level of bricks.
+    let finest = Settings { detail: Detail::Pixels(0.0), ..settings() };
+    let post = Settings { classification: Classification::Post, ..settings() };
+    let with_isosurfaces =
+        || blob_scene().with_volume(other_volume(), Kernel::default(), with_surfaces());
+    let kernels = blob_scene().with_volume(
+        other_volume(),
+        Kernel::tensor(Tensor::CubicBSpline),
+        TransferFunction { gradient: vec![(0.0, 0.3), (1.5, 1.0)], ..cool() },
+    );
+    let beside_surfels =
+        || mixed_scene().with_volume(other_volume(), Kernel::default(), with_surfaces());
+    let beside_cells = |place| blob_scene().with_cells(tube(place), of_tube());
+    let facets = facets::facets_in_a_volume().scene;
+    let mut all = vec![
+        two_volumes(),
+        case("two_volumes_orthographic", two(), ORTHOGRAPHIC),
+        Case { settings: post, ..case("two_volumes_post", two(), PERSPECTIVE) },
+        Case { settings: xray, ..case("two_volumes_in_x_rays", two(), PERSPECTIVE) },
+        Case { settings: clipped.clone(), ..case("two_clipped_volumes", two(), PERSPECTIVE) },
+        case("two_volumes_with_isosurfaces", with_isosurfaces(), PERSPECTIVE),
+        case("two_volumes_of_two_kernels", kernels, PERSPECTIVE),
+        case("surfels_in_two_volumes", beside_surfels(), PERSPECTIVE),
+        Case {
+            settings: clipped,
+            ..case("clipped_surfels_in_two_volumes", beside_surfels(), PERSPECTIVE)
+        },
+        case(
+            "facets_in_two_volumes",
+            facets.with_volume(other_volume(), Kernel::default(), cool()),
+            PERSPECTIVE,
+        ),
+        case("a_volume_and_cells", beside_cells(Place::Points), PERSPECTIVE),
+        case("a_volume_and_values_of_cells", beside_cells(Place::Cells), ORTHOGRAPHIC),
+        Case { settings: finest, ..case("four_fields", four(), PERSPECTIVE) },
+    ];
+    all.extend(scattered_fields());
+    all
+}
