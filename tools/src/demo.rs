@@ -14,7 +14,7 @@ use crate::{
 };
 use clap::{Args, Parser};
 use splatkit::{
-    Error, disk, formats,
+    Error, disk, formats, gaussians,
     hierarchy::{BuildOptions, build_file, file::WriteOptions},
     picture::PictureFormat,
     surface::{Mesh, SurfelOptions},
@@ -39,6 +39,9 @@ const MESH: &str = "knot.ply";
 const TREE: &str = "knot.splk";
 const VOLUME: &str = "specimen.nrrd";
 const TRANSFER: &str = "specimen.json";
+const TRAINED: &str = "made.spz";
+/// Gaussians of the trained scene.
+const GAUSSIANS: usize = 60_000;
 /// The knot reaches 3.4 from its centre; the specimen's radius is 0.9.
 const KNOT_SCALE: f32 = 0.42;
 /// #10141c.
@@ -64,7 +67,7 @@ struct Shot {
     arguments: &'static str,
 }
 
-const SHOTS: [Shot; 4] = [
+const SHOTS: [Shot; 5] = [
     Shot {
         name: "mesh.png",
         inputs: &[MESH],
@@ -85,6 +88,11 @@ const SHOTS: [Shot; 4] = [
         name: "mixed.png",
         inputs: &[MESH, VOLUME],
         arguments: "--size 800x600 --azimuth 0 --elevation 20",
+    },
+    Shot {
+        name: "gaussians.png",
+        inputs: &[TRAINED, MESH, VOLUME],
+        arguments: "--size 800x600 --azimuth -25 --elevation 14 --zoom 1.5",
     },
 ];
 
@@ -110,9 +118,8 @@ impl Demo {
 
     fn make_inputs(&self, progress: &Progress) -> Result<(), Failure> {
         std::fs::create_dir_all(&self.folder).map_err(|e| Failure::output(&self.folder, e))?;
-        for name in
-            [MESH, TREE, VOLUME, TRANSFER].into_iter().chain(SHOTS.iter().map(|shot| shot.name))
-        {
+        let inputs = [MESH, TREE, VOLUME, TRANSFER, TRAINED];
+        for name in inputs.into_iter().chain(SHOTS.iter().map(|shot| shot.name)) {
             output::check(&self.folder.join(name), self.overwrite)?;
         }
         progress.stage("Making a mesh and a volume");
@@ -137,6 +144,8 @@ impl Demo {
         let splats = mesh.surfels(&SurfelOptions::default())?;
         build_file(&splats, self.folder.join(TREE), &build, &write, None)?;
         formats::nrrd::write(&specimen, self.folder.join(VOLUME))?;
+        progress.stage("Making a trained scene");
+        formats::spz::write(&gaussians::phantom(GAUSSIANS), self.folder.join(TRAINED))?;
         Ok(disk::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())?)
     }
 

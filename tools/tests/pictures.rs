@@ -219,7 +219,7 @@ fn the_demo_draws_its_pictures() {
     let folder = Folder::new();
     let output = folder.run("demo out").ok();
     let text = String::from_utf8_lossy(&output.stdout);
-    for name in ["mesh.png", "volume.png", "mixed.png"] {
+    for name in ["mesh.png", "volume.png", "mixed.png", "gaussians.png"] {
         assert!(text.contains(name) && folder.path("out").join(name).is_file(), "{text}");
     }
     folder.run("demo out").fails(1, &["exists", "--overwrite"]);
