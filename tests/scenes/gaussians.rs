@@ -2,7 +2,8 @@
 //! them, and beside other items.
 
 use super::{
-    Case, ORIGIN, ORTHOGRAPHIC, PERSPECTIVE, Random, SLANT, camera, mixed_scene, settings,
+    Case, ORIGIN, ORTHOGRAPHIC, PERSPECTIVE, Random, SLANT, camera, facets::facets_in_a_volume,
+    mixed_scene, settings,
 };
 use glam::{DVec3, Quat, Vec3};
 use splatkit::{
@@ -40,12 +41,17 @@ fn alone() -> Scene {
     Scene::new().with_gaussians(trained(400))
 }
 
+/// A hierarchy of several blocks.
+fn hierarchy(set: Gaussians) -> Hierarchy {
+    let options = BuildOptions { block_splats: 100, ..BuildOptions::default() };
+    let tree = Tree::of_gaussians(&set, &options, None).expect("a tree");
+    Hierarchy::from_tree(tree).expect("a hierarchy")
+}
+
 /// A hierarchy of them, drawn at a cut of some pixels.
 fn levels(name: &'static str, pixels: f64) -> Case {
-    let options = BuildOptions { block_splats: 100, ..BuildOptions::default() };
-    let tree = Tree::of_gaussians(&trained(400), &options, None).expect("a tree");
-    let hierarchy = Hierarchy::from_tree(tree).expect("a hierarchy");
-    let mut case = case(name, Scene::new().with_hierarchy(hierarchy), PERSPECTIVE);
+    let scene = Scene::new().with_hierarchy(hierarchy(trained(400)));
+    let mut case = case(name, scene, PERSPECTIVE);
     case.settings.detail = Detail::Pixels(pixels);
     case
 }
@@ -62,6 +68,10 @@ pub fn all() -> Vec<Case> {
     clipped.settings.clips = vec![clip(half, false)];
     let mut thin = perspective("gaussians_in_thin_sheets");
     thin.settings.sheet_pixels = 0.5;
+    let everything = facets_in_a_volume()
+        .scene
+        .with_gaussians(trained(200))
+        .with_hierarchy(hierarchy(trained(100)));
     let xray = Settings { optics: Optics::XRay, ..settings() };
     vec![
         perspective("gaussians"),
@@ -75,5 +85,6 @@ pub fn all() -> Vec<Case> {
         levels("levels_of_gaussians", 0.0),
         levels("coarse_levels_of_gaussians", 6.0),
         case("gaussians_in_a_volume", mixed_scene().with_gaussians(trained(200)), PERSPECTIVE),
+        case("gaussians_among_everything", everything, PERSPECTIVE),
     ]
 }
