@@ -296,8 +296,10 @@ fn what_bricks_cannot_do_is_told() {
     assert!(told(&hann, &settings).contains("Gaussian"));
     settings.classification = Classification::Pre;
     assert!(told(&scene(&bricks), &settings).contains("after interpolation"));
-    let two = scene(&bricks).with_bricks(bricks, Kernel::default(), transfer());
-    assert!(two.validate().unwrap_err().to_string().contains("2"));
+    let more = |scene: Scene| scene.with_bricks(bricks.clone(), Kernel::default(), transfer());
+    let most = more(more(more(scene(&bricks))));
+    assert!(most.validate().is_ok());
+    assert!(more(most).validate().unwrap_err().to_string().contains("the scene has 5"));
 }
 
 /// The CPU engine gathers bricks. At the finest level the picture is that of the whole volume.

@@ -46,6 +46,12 @@ pub struct FieldState {
     levels: Option<(Choice, Vec<(Grid, Shown)>)>,
 }
 
+/// Returns the error for what is to be gathered and cannot be.
+pub fn not_gathered(what: &str) -> Error {
+    let message = format!("{what} can't be gathered; scatter instead, or leave it to the engine");
+    Error::Argument(message)
+}
+
 impl FieldState {
     /// Returns the fields of a scene.
     pub fn all(scene: &Scene) -> Vec<Self> {
@@ -123,9 +129,7 @@ impl FieldState {
         }
         let parts = gathering::parts(&self.scene, sheets, choice);
         match gathering::obstacle(&self.scene, settings, parts, gather::unsuited) {
-            Some(what) if settings.evaluate == Evaluate::Gather => Err(Error::Argument(format!(
-                "{what} can't be gathered; scatter instead, or leave it to the engine"
-            ))),
+            Some(what) if settings.evaluate == Evaluate::Gather => Err(not_gathered(what)),
             Some(what) if let Some(tensor) = self.scene.tensor() => {
                 Err(Error::Argument(format!("the kernel {} does not draw {what}", tensor.name())))
             }

@@ -66,7 +66,7 @@ use crate::{
     parallel::prelude::*,
     picture::Picture,
     plan::{FrameStats, TILE, pace::Pace, uniforms::Frame},
-    scene::{Optics, Scene, Settings},
+    scene::{Evaluate, Optics, Scene, Settings},
     volume::TransferFunction,
 };
 use bins::{BLOCK, Bins, TileLists};
@@ -281,6 +281,9 @@ impl CpuRenderer {
         let own = self.fields.iter().zip(choices);
         let own = own.map(|(field, choice)| field.outline(settings, &sheets, choice));
         let fields = own.collect::<Result<Vec<_>>>()?;
+        if fields.is_empty() && settings.evaluate == Evaluate::Gather {
+            return Err(fields::not_gathered("a scene without a volume on a lattice"));
+        }
         let stop = settings.stop.clone();
         Ok(Outline { cut_pixels, sheets, fields, stop })
     }

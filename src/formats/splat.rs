@@ -163,10 +163,10 @@ mod tests {
             origin: DVec3::new(0.0, 100.0, 0.0),
             centers: vec![Vec3::X, Vec3::new(-3.0, 2.0, 0.125)],
             scales: vec![Vec3::ONE, Vec3::new(0.1, 0.0, 3.0)],
-            rotations: vec![Quat::from_rotation_y(-1.0), Quat::from_xyzw(0.1, 0.7, -0.1, 0.7)]
-                .iter()
-                .map(|turn| turn.normalize())
-                .collect(),
+            rotations: vec![
+                Quat::from_rotation_y(-1.0),
+                Quat::from_xyzw(0.1, 0.7, -0.1, 0.7).normalize(),
+            ],
             opacities: vec![1.0, 0.3],
             degree: 1,
             // The second colour is outside of 0 … 1.

@@ -82,7 +82,7 @@ pub static FORMATS: &[Format] = &[
         ..Format::ROW
     },
     Format {
-        name: "splat",
+        name: "SPLAT",
         extensions: &["splat"],
         holds: &[all(Content::Gaussians)],
         written: Some("splat"),

@@ -212,7 +212,7 @@ impl Gaussians {
         if !holds(scale) || scale.min_element() < 0.0 {
             return Some(format!("its deviations {scale} are not from 0 to {LARGEST:e}"));
         }
-        if !((turn.length_squared() - 1.0).abs() < 1e-3) {
+        if !(0.999..=1.001).contains(&turn.length_squared()) {
             return Some(format!("its rotation {turn} has not unit length"));
         }
         if !(0.0..=1.0).contains(&opacity) {
@@ -267,7 +267,8 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named() {
         assert_eq!(one().validate(), Ok(()));
-        let change: [(fn(&mut Gaussians), &str); 8] = [
+        type Change = fn(&mut Gaussians);
+        let change: [(Change, &str); 8] = [
             (|g| g.degree = 4, "degree 4"),
             (|g| g.degree = 1, "need 4 harmonics"),
             (|g| g.scales.clear(), "need 1 scales"),

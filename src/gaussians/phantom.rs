@@ -149,6 +149,6 @@ mod tests {
         assert_eq!((set.len(), set.validate()), (1000, Ok(())));
         assert_eq!(phantom(1000).harmonics, set.harmonics);
         assert_eq!(phantom(0).len(), 4);
-        assert!(set.bounds().diagonal() < 10.0);
+        assert!(set.bounds().diagonal() < 12.0);
     }
 }

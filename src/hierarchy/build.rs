@@ -3,12 +3,12 @@
 use super::{
     Block, Node, Tree,
     cluster::{box_of, cluster},
+    colors::{Harmonics, LeafColors},
     file::{Top, Whole, WriteOptions, Writer},
     measure::Measures,
     merge::Mass,
     partition,
     sphere::{Sphere, enclosing, nest, raise},
-    trained::{Harmonics, LeafColors},
 };
 use crate::{
     Deadline, Error, Result,

@@ -4,6 +4,7 @@
 
 mod build;
 mod cluster;
+mod colors;
 mod cut;
 pub mod external;
 pub mod file;

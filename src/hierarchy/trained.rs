@@ -5,86 +5,18 @@
 use super::{
     Block, Cut, Hierarchy, Node, SHARE_UNIT, Tree,
     build::{BuildOptions, build_colored, tree_colored},
+    colors::LeafColors,
     file::WriteOptions,
-    merge::Mass,
 };
 use crate::{
     Error, Result,
-    gaussians::{
-        Colors, Eye, Gaussians,
-        harmonics::{MOST_TERMS, terms},
-    },
+    gaussians::{Colors, Eye, Gaussians, harmonics::terms},
     parallel::prelude::*,
     progress::Watch,
     splat::{NO_NORMAL, Payload, Splat, SplatSet, TRAINED_OPACITIES, encode_trained_color},
 };
 use glam::Vec3;
 use std::path::Path;
-
-/// The harmonics of a node; those above the degree are 0.
-pub(super) type Harmonics = [[f32; 3]; MOST_TERMS];
-
-/// The colours of the leaves that a hierarchy is built of.
-pub(super) struct LeafColors<'a> {
-    set: &'a Gaussians,
-    /// The number of the Gaussian of each splat.
-    numbers: Vec<u32>,
-    is_exact: bool,
-}
-
-impl LeafColors<'_> {
-    fn of(&self, splat: u32) -> Harmonics {
-        let mut all = [[0.0; 3]; MOST_TERMS];
-        let own = self.set.harmonics_of(self.numbers[splat as usize] as usize);
-        all[..own.len()].copy_from_slice(own);
-        all
-    }
-
-    /// Returns the colours of a block's nodes. `splat` returns the splat of a leaf.
-    pub fn of_block(&self, nodes: &[Node], splat: impl Fn(usize) -> u32) -> Colors {
-        colors_of(nodes, self.set.degree, self.is_exact, |leaf| self.of(splat(leaf)))
-    }
-
-    /// Returns the colours of the block that joins others, from the colours of their roots.
-    pub fn of_top(&self, top: &Block, portals: &[u32], roots: &[Harmonics]) -> Colors {
-        let mut of_leaf = vec![0; top.nodes.len()];
-        for (root, portal) in portals.iter().enumerate() {
-            of_leaf[*portal as usize] = root;
-        }
-        colors_of(&top.nodes, self.set.degree, self.is_exact, |leaf| roots[of_leaf[leaf]])
-    }
-}
-
-/// Returns the colours of nodes, from those of the leaves up.
-fn colors_of(
-    nodes: &[Node],
-    degree: u32,
-    is_exact: bool,
-    leaf: impl Fn(usize) -> Harmonics,
-) -> Colors {
-    let count = terms(degree);
-    let mut all = vec![[0f32; 3]; nodes.len() * count];
-    let mut masses = vec![0f32; nodes.len()];
-    for (index, node) in nodes.iter().enumerate().rev() {
-        let mut own = [[0f32; 3]; MOST_TERMS];
-        if node.is_leaf() {
-            masses[index] = Mass::of(&node.splat).mass;
-            own = leaf(index);
-        } else {
-            let children = node.first_child as usize..(node.first_child + node.children) as usize;
-            let total: f32 = masses[children.clone()].iter().sum();
-            masses[index] = total;
-            for child in children {
-                let share = masses[child] / total;
-                for (own, part) in own.iter_mut().zip(&all[child * count..][..count]) {
-                    own.iter_mut().zip(part).for_each(|(own, part)| *own += share * part);
-                }
-            }
-        }
-        all[index * count..][..count].copy_from_slice(&own[..count]);
-    }
-    if is_exact { Colors::exact(degree, all) } else { Colors::coded(degree, &all) }
-}
 
 /// Returns the splats that a tree is built of, and the number of the Gaussian of each. Gaussians
 /// that cover less than 1/255 of any pixel are left out.
@@ -122,7 +54,7 @@ impl Tree {
     /// Those of [`Tree::build`]; [`Error::Argument`] for a set that is not valid.
     pub fn of_gaussians(set: &Gaussians, options: &BuildOptions, watch: Watch<'_>) -> Result<Self> {
         let (splats, numbers) = splats_of(set)?;
-        let colors = LeafColors { set, numbers, is_exact: true };
+        let colors = LeafColors::new(set, numbers, true);
         tree_colored(&splats, options, watch, Some(&colors))
     }
 
@@ -167,7 +99,7 @@ pub fn build_gaussians(
     watch: Watch<'_>,
 ) -> Result<()> {
     let (splats, numbers) = splats_of(set)?;
-    let colors = LeafColors { set, numbers, is_exact: write.lossless };
+    let colors = LeafColors::new(set, numbers, write.lossless);
     build_colored(&splats, path.as_ref(), build, write, watch, Some(&colors))
 }
 
@@ -250,7 +182,7 @@ mod tests {
         let mut wanted = set.seen_from(Eye::of(&view)).splats;
         wanted.retain(|splat| splat.strength < -0.01);
         let key = |splat: &Splat| splat.center.map(f32::to_bits);
-        let mut found = cut.splats.clone();
+        let mut found = cut.splats;
         wanted.sort_by_key(key);
         found.sort_by_key(key);
         assert_eq!(found.len(), wanted.len());

@@ -115,7 +115,8 @@
 //! optical depth and by how much the splats face the eye: 0.5 − 4·n·ĉ, clamped to 1/255 … 1. The
 //! average is lit once if some splat has a normal. In a scene with trained Gaussians, which are not
 //! lit, the lit colour counts by min(1, 2·|n̄|), with n̄ the average normal. Sheets with an optical
-//! depth below 10⁻⁵ have no radiance. Splats whose closest approach s* is clipped away do not count.
+//! depth below 10⁻⁵ have no radiance. Splats whose closest approach s* is clipped away do not
+//! count.
 //!
 //! **Facets** are triangles. A facet fills a share of a pixel: the area of the pixel's square
 //! inside the triangle's perspective image. At a pixel it has the place, the normal and the colour

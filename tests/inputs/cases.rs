@@ -1286,7 +1286,7 @@
         (
             "future.splk",
             at(splk(true), 8, &99u32.to_le_bytes()),
-            "future.splk: header: has version 99; only version 1 can be read",
+            "future.splk: header: has version 99; versions 1 and 2 can be read",
         ),
         (
             "future.splv",

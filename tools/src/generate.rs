@@ -131,6 +131,10 @@ fn target(text: &str) -> Result<PathBuf, String> {
     }
 }
 
+fn usage(message: &str) -> Failure {
+    Failure::Usage(message.into())
+}
+
 impl Generate {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         output::check(&self.output, self.overwrite)?;
@@ -151,27 +155,21 @@ impl Generate {
                 disk::write(&self.output, &scan::ply(&scan::scan(&mesh, self.points as usize)))?;
             }
             (What::Scan, ..) => {
-                return Err(Failure::Usage(
-                    "a scan is made from a mesh (--from) and written as .ply".into(),
-                ));
+                return Err(usage("a scan is made from a mesh (--from) and written as .ply"));
             }
             (What::Gaussians, _, "ply") => {
                 let set = gaussians::phantom(self.points as usize);
                 formats::ply::write_gaussians(&set, &self.output)?;
             }
-            (What::Gaussians, ..) => {
-                return Err(Failure::Usage("trained Gaussians are made as .ply".into()));
-            }
+            (What::Gaussians, ..) => return Err(usage("trained Gaussians are made as .ply")),
             (What::Tube(kind), _, "vtu") => {
                 formats::write_cells(&Cells::tube(kind, self.parts)?, &self.output)?;
             }
             (What::Tube(_), ..) | (_, _, "vtu") => {
-                return Err(Failure::Usage(
-                    "a tube of cells is written as .vtu, and nothing else is".into(),
-                ));
+                return Err(usage("a tube of cells is written as .vtu, and nothing else is"));
             }
             (_, _, "ply") => {
-                return Err(Failure::Usage("phantoms are written as .nrrd, .vtr or .csv".into()));
+                return Err(usage("phantoms are written as .nrrd, .vtr or .csv"));
             }
             (What::Phantom(phantom), _, "csv") => {
                 disk::write_with(&self.output, |out| scattered(phantom, self.points, out))?;

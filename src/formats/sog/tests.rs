@@ -220,7 +220,8 @@ fn codebooks_may_begin_with_null_and_end_early() {
 #[test]
 fn other_texts_are_errors() {
     let folder = Folder::new();
-    let change: [(fn(&mut Value), &str); 14] = [
+    type Change = fn(&mut Value);
+    let change: [(Change, &str); 14] = [
         (|m| m["version"] = json!(3), "the version 3"),
         (|m| m["version"] = json!("two"), "invalid type"),
         (|m| m["count"] = Value::Null, "no “count”"),

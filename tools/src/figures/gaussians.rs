@@ -115,7 +115,7 @@ pub fn tables(
         likeness.row(&case.name, cells);
         for (name, mode) in MODES {
             progress.stage(format!("Gaussians, popping of {name}"));
-            popping.row(&format!("{}, {name}", case.name), jumps(case, &mut cpu, mode)?);
+            popping.row(format!("{}, {name}", case.name), jumps(case, &mut cpu, mode)?);
         }
     }
     Ok(vec![likeness, popping])

@@ -146,43 +146,7 @@ impl Figures {
         let gpu = Gpu::headless(&choice)?;
         let mut stage = Stage { renderer: Renderer::new(&gpu) };
         let mut report = Report { adapter: gpu.info.name.clone(), tables: Vec::new() };
-        if self.measures(Part::Ripple) {
-            report.tables.push(ripple::table()?);
-        }
-        if self.measures(Part::MarschnerLobb) {
-            report.tables.push(marschner_lobb::table(&mut stage, progress)?);
-        }
-        if self.measures(Part::Bleeding) {
-            report.tables.push(bleeding::table(&mut stage, progress)?);
-        }
-        if self.measures(Part::Popping) {
-            report.tables.push(popping::table(&mut stage, progress)?);
-        }
-        if self.measures(Part::Dense) {
-            report.tables.push(self.dense(&mut stage, progress)?);
-        }
-        if !self.surfaces.is_empty() {
-            let open = |path: &Path| self.load.open(path);
-            report.tables.extend(surfaces::tables(
-                &mut stage,
-                &self.surfaces,
-                open,
-                &pictures,
-                progress,
-            )?);
-        }
-        if !self.detail.is_empty() {
-            let open = |path: &Path| self.load.open(path);
-            report.tables.extend(detail::tables(&mut stage, &self.detail, open, progress)?);
-        }
-        if let Some(files) = &self.gaussians {
-            let mut cases = vec![gaussians::Case::made()];
-            for file in files {
-                cases.push(self.case_of_gaussians(file)?);
-            }
-            let folder = self.pictures.as_deref();
-            report.tables.extend(gaussians::tables(&mut stage, &cases, folder, progress)?);
-        }
+        self.measure(&mut stage, &pictures, &mut report, progress)?;
         progress.clear();
         let text = report.markdown();
         // Printed first: if the file cannot be written after all, nothing has to be measured again.
@@ -194,6 +158,55 @@ impl Figures {
         let is_all = self.only.is_empty() && self.are_generated();
         let page = |old: &str| if is_all { text } else { report.among(old) };
         block.map_or(Ok(()), |block| block.replace(page))
+    }
+
+    /// Adds the tables of what is measured to a report. `pictures` are the paths of those of
+    /// surfaces.
+    fn measure(
+        &self,
+        stage: &mut Stage,
+        pictures: &[[PathBuf; 2]],
+        report: &mut Report,
+        progress: &Progress,
+    ) -> Result<(), Failure> {
+        if self.measures(Part::Ripple) {
+            report.tables.push(ripple::table()?);
+        }
+        if self.measures(Part::MarschnerLobb) {
+            report.tables.push(marschner_lobb::table(stage, progress)?);
+        }
+        if self.measures(Part::Bleeding) {
+            report.tables.push(bleeding::table(stage, progress)?);
+        }
+        if self.measures(Part::Popping) {
+            report.tables.push(popping::table(stage, progress)?);
+        }
+        if self.measures(Part::Dense) {
+            report.tables.push(self.dense(stage, progress)?);
+        }
+        if !self.surfaces.is_empty() {
+            let open = |path: &Path| self.load.open(path);
+            report.tables.extend(surfaces::tables(
+                stage,
+                &self.surfaces,
+                open,
+                pictures,
+                progress,
+            )?);
+        }
+        if !self.detail.is_empty() {
+            let open = |path: &Path| self.load.open(path);
+            report.tables.extend(detail::tables(stage, &self.detail, open, progress)?);
+        }
+        if let Some(files) = &self.gaussians {
+            let mut cases = vec![gaussians::Case::made()];
+            for file in files {
+                cases.push(self.case_of_gaussians(file)?);
+            }
+            let folder = self.pictures.as_deref();
+            report.tables.extend(gaussians::tables(stage, &cases, folder, progress)?);
+        }
+        Ok(())
     }
 
     fn measures(&self, part: Part) -> bool {

@@ -375,7 +375,7 @@ fn files_with_gaussians_are_known() {
     let mut unused = value.clone();
     primitive(&mut unused)["extensions"] = json!({});
     assert!(!holds(unused.to_string().as_bytes()).expect("reads"));
-    let mut unnamed = value.clone();
+    let mut unnamed = value;
     unnamed["extensionsUsed"] = json!([]);
     assert!(!holds(unnamed.to_string().as_bytes()).expect("reads"));
     assert!(!holds(b"{}").expect("reads"));
