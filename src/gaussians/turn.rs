@@ -91,7 +91,7 @@ impl Gaussians {
             *own = (quat * own.as_dquat()).normalize().as_quat();
         });
         let terms = terms(self.degree);
-        self.harmonics.par_chunks_exact_mut(terms).for_each(|own| colors.apply(own));
+        self.harmonics.par_chunks_mut(terms).for_each(|own| colors.apply(own));
     }
 }
 

@@ -72,7 +72,7 @@
 //! mean f̄. With [`Classification::Post`], f(u) = f̄. The gradient g(u) of a lattice's field is the
 //! parabola through the gradients at the faces and in the middle of the sheet (at u = ½, defined as
 //! at a face). There are four exceptions: fields without a lattice, central differences, sheets
-//! thicker than 2.2 of the smallest sample spacings, and [`Evaluate::Scatter`], because splats are
+//! thicker than 2.2 of the smallest sample spacings, and `Evaluate::Scatter`, because splats are
 //! added to sheets and faces only. For these, and where one of the three gradients is missing, g(u)
 //! across the ray is linear between the gradients of the faces. (If one face has none, g(u) is that
 //! of the other; if neither has one, it is 0.) Along the ray, it is then the derivative of the
