@@ -138,7 +138,7 @@ fn flags_are_for_some_formats() {
         ("a.ply -o b.ply --unit mm", "--unit is for .splk and .splv files"),
         ("a.nrrd -o b.splv --up z", "--up is for .splk files"),
         ("a.nrrd -o b.nrrd --radius-scale 1", "--radius-scale is for .splk, .ply, .splat"),
-        ("a.nrrd -o b.splv --degree 1", "--degree is for .splk and .ply and .splat"),
+        ("a.nrrd -o b.splv --degree 1", "--degree is for .splk, .ply, .splat"),
     ] {
         folder.run(&format!("convert {arguments}")).fails(2, &[flag]);
     }

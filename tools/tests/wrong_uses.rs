@@ -106,7 +106,12 @@ const USES: &[(&str, &str, i32, &str)] = &[
         3,
         "plain.raw",
     ),
-    ("two volumes", "render a.nrrd b.nrrd -o out.png", 2, "volume"),
+    (
+        "the maximum of two volumes",
+        "render a.nrrd b.nrrd -o out.png --mip",
+        2,
+        "takes one volume or sample set",
+    ),
     (
         "a volume as a hierarchy",
         "convert a.nrrd -o b.splk",
