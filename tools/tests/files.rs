@@ -308,6 +308,7 @@ fn formats_are_listed() {
             {"content": "mesh", "when": "with faces"},
             {"content": "point cloud", "when": "without faces"},
             {"content": "scattered samples", "when": "without faces, if a scalar is named"},
+            {"content": "trained Gaussians", "when": "as trainers write them, also compressed"},
         ])
     );
     for (name, in_pieces, written) in
