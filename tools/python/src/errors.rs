@@ -1,0 +1,90 @@
+//! Errors of the library as exceptions of Python. The classes are in `splatkit/_errors.py`.
+
+use pyo3::{intern, prelude::*, types::PyTuple};
+use serde::de::DeserializeOwned;
+use splatkit::{Error, error::LimitKind};
+use std::io;
+
+/// Returns the exception for an error.
+pub fn raise(py: Python<'_>, error: &Error) -> PyErr {
+    made(py, error).unwrap_or_else(|failure| failure)
+}
+
+/// Returns the exception for an argument that is wrong.
+pub fn wrong(message: impl Into<String>) -> Error {
+    Error::Argument(message.into())
+}
+
+/// Reads options that Python has written as JSON.
+pub fn options<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
+    let plain = |error: serde_json::Error| {
+        // The place in the JSON says nothing to people who never saw it.
+        let message = error.to_string();
+        wrong(message.split(" at line ").next().unwrap_or_default())
+    };
+    serde_json::from_str(text).map_err(plain)
+}
+
+fn made(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
+    let text = error.to_string();
+    match error {
+        Error::Input { file, place, message, hint } => {
+            new(py, "InputError", (file, place, message, hint.as_deref()))
+        }
+        Error::Limit { file, what, kind, found, limit } => {
+            new(py, "LimitError", (file, what, name(*kind), *found, *limit))
+        }
+        Error::File { file, action, source } => {
+            let class = match source.kind() {
+                io::ErrorKind::NotFound => "MissingFileError",
+                io::ErrorKind::PermissionDenied => "DeniedFileError",
+                _ => "FileError",
+            };
+            new(py, class, (file, format!("cannot {action}"), source.raw_os_error(), plain(source)))
+        }
+        Error::Output { file, source } => {
+            let told = (file, "cannot be written", source.raw_os_error(), plain(source));
+            new(py, "OutputError", told)
+        }
+        Error::Argument(_) => new(py, "ArgumentError", (text,)),
+        Error::Transfer(_) => new(py, "TransferError", (text,)),
+        Error::Timeout { what, limit } => new(py, "TimeLimitError", (what, *limit, text)),
+        Error::Memory { what, bytes } => new(py, "OutOfMemoryError", (what, *bytes, text)),
+        Error::NothingToDraw(_) => new(py, "NothingToDrawError", (text,)),
+        _ => new(py, "Error", (text,)),
+    }
+}
+
+/// Returns the system's message without its number.
+fn plain(error: &io::Error) -> String {
+    let text = error.to_string();
+    text.split(" (os error").next().unwrap_or_default().to_owned()
+}
+
+/// What an exception is made from.
+trait Arguments<'py>:
+    IntoPyObject<'py, Target = PyTuple, Output = Bound<'py, PyTuple>, Error = PyErr>
+{
+}
+
+impl<'py, T> Arguments<'py> for T where
+    T: IntoPyObject<'py, Target = PyTuple, Output = Bound<'py, PyTuple>, Error = PyErr>
+{
+}
+
+fn new<'py>(py: Python<'py>, class: &str, arguments: impl Arguments<'py>) -> PyResult<PyErr> {
+    let module = py.import(intern!(py, "splatkit._errors"))?;
+    let arguments = arguments.into_pyobject(py)?;
+    Ok(PyErr::from_value(module.getattr(class)?.call1(arguments)?))
+}
+
+/// Returns the name of a limit, as `limits` takes it.
+fn name(kind: LimitKind) -> &'static str {
+    match kind {
+        LimitKind::Points => "points",
+        LimitKind::Bytes => "bytes",
+        LimitKind::Depth => "depth",
+        LimitKind::Texels => "texels",
+        LimitKind::Seconds => "seconds",
+    }
+}

@@ -1,0 +1,233 @@
+//! The items of a scene, and the stance and the bounds that they give it.
+
+use crate::{
+    camera::{Origin, Subject},
+    load::{Input, Load},
+    look::Look,
+};
+use splatkit::{
+    Deadline, Error,
+    about::Stance,
+    bricks::Bricks,
+    cells::{CellOptions, Cells},
+    facet::FacetSet,
+    gaussians::Gaussians,
+    math::Bounds,
+    scattered::Points,
+    scene::{Item, Scene},
+    splat::SplatSet,
+    surface::{Mesh, SurfelOptions},
+    volume::Volume,
+};
+use std::sync::{Arc, OnceLock};
+
+/// What a scene is made of, in the order in which it was added.
+#[derive(Default)]
+pub struct Items {
+    entries: Vec<Entry>,
+    pub subject: Subject,
+    /// What was added: kind, name, and the number of splats or samples.
+    pub contents: Vec<(&'static str, String, u64)>,
+}
+
+/// An item, or a mesh, which is drawn as facets in the usual pictures and as surfels in others.
+enum Entry {
+    Ready(Item),
+    Mesh(Box<Faceted>),
+}
+
+struct Faceted {
+    name: String,
+    facets: Arc<FacetSet>,
+    mesh: Mesh,
+    options: SurfelOptions,
+    surfels: OnceLock<Arc<SplatSet>>,
+}
+
+/// An input with its looks.
+pub struct Added {
+    pub name: String,
+    pub input: Input,
+    pub load: Load,
+    pub look: Look,
+    /// By when its splats must be made.
+    pub deadline: Deadline,
+}
+
+impl Items {
+    /// Adds an input.
+    pub fn add(&mut self, added: Added) -> Result<(), Error> {
+        let Added { name, input, load, look, deadline } = added;
+        match input {
+            Input::Mesh(mesh) => {
+                self.add_mesh(name, mesh, &look, load.scalar().is_some(), deadline)
+            }
+            Input::Volume(volume) => self.add_volume(name, volume, &look),
+            Input::Samples(points) => self.add_samples(name, &points, &load, &look, deadline),
+            Input::Cells(cells) => self.add_cells(name, cells, &look),
+            Input::Bricks(bricks) => self.add_bricks(name, bricks, &look),
+            Input::Gaussians(set) => {
+                self.add_gaussians(name, set);
+                Ok(())
+            }
+            Input::Hierarchy(hierarchy) => {
+                let header = hierarchy.header();
+                let count = header.leaves;
+                if let Some(stance) = header.stance {
+                    let origin = if header.is_guessed { Origin::Guess } else { Origin::File };
+                    self.subject.consider(stance, origin);
+                }
+                let bounds = header.bounds;
+                self.push("hierarchy", name, count, bounds, Item::Hierarchy(hierarchy));
+                Ok(())
+            }
+        }
+    }
+
+    fn push(
+        &mut self,
+        kind: &'static str,
+        name: String,
+        count: u64,
+        bounds: Bounds,
+        item: impl Into<Entry>,
+    ) {
+        self.subject.count_in(bounds);
+        self.contents.push((kind, name, count));
+        self.entries.push(item.into());
+    }
+
+    fn add_mesh(
+        &mut self,
+        name: String,
+        mut mesh: Mesh,
+        look: &Look,
+        named: bool,
+        deadline: Deadline,
+    ) -> Result<(), Error> {
+        let mut subject = self.subject.clone();
+        match mesh.about.stance {
+            Some(stance) => subject.consider(stance, Origin::File),
+            // A guess would not count.
+            None if subject.origin >= Origin::Guess => {}
+            None => {
+                if let Some(stance) = mesh.guess_stance() {
+                    subject.consider(stance, Origin::Guess);
+                }
+            }
+        }
+        look.paint(&name, &mut mesh, subject.stance.up, named)?;
+        let options = SurfelOptions { deadline, ..look.surfel_options() };
+        let kind = if mesh.triangles.is_empty() { "points" } else { "mesh" };
+        let bounds = mesh.bounds().map(|[min, max]| Bounds { min, max });
+        let wrong = |error: Error| error.in_file(name.as_ref());
+        if let Some(facets) = mesh.facets(&options).map_err(wrong)? {
+            let (count, own) = (facets.facets.len() as u64, facets.bounds());
+            let options = SurfelOptions { deadline: Deadline::NEVER, ..options };
+            let (facets, surfels) = (Arc::new(facets), OnceLock::new());
+            let entry = Faceted { name: name.clone(), facets, mesh, options, surfels };
+            self.subject = subject;
+            self.push(kind, name, count, bounds.unwrap_or(own), Entry::Mesh(Box::new(entry)));
+        } else {
+            let splats = mesh.surfels(&options).map_err(wrong)?;
+            let (count, own) = (splats.splats.len() as u64, splats.bounds());
+            self.subject = subject;
+            self.push(kind, name, count, bounds.unwrap_or(own), Item::Radiance(splats.into()));
+        }
+        Ok(())
+    }
+
+    fn add_gaussians(&mut self, name: String, set: Gaussians) {
+        self.subject.stand(set.about.stance, Stance::Y_DOWN);
+        let (count, bounds) = (set.len() as u64, set.bounds());
+        self.push("gaussians", name, count, bounds, Item::Gaussians(set.into()));
+    }
+
+    fn add_bricks(&mut self, name: String, bricks: Arc<Bricks>, look: &Look) -> Result<(), Error> {
+        if look.sharp {
+            return Err(Error::Argument("a volume in bricks cannot be sharpened".into()));
+        }
+        let transfer = look.of_bricks(&name, &bricks)?;
+        let count = bricks.level(0).dims.iter().product::<usize>() as u64;
+        let (bounds, kernel) = (bricks.bounds(), look.kernel()?);
+        self.subject.stand(None, Stance::SURVEY);
+        self.push("bricks", name, count, bounds, Item::Bricks(bricks, kernel, transfer));
+        Ok(())
+    }
+
+    fn add_volume(&mut self, name: String, mut volume: Volume, look: &Look) -> Result<(), Error> {
+        let transfer = look.of_volume(&name, &volume)?;
+        let kernel = look.kernel()?;
+        let [min, max] = volume.bounds();
+        if look.sharp {
+            volume = volume.sharpened(&kernel)?;
+        }
+        self.subject.stand(volume.about.stance, Stance::SURVEY);
+        let (count, bounds) = (volume.len() as u64, Bounds { min, max });
+        self.push("volume", name, count, bounds, Item::Volume(volume.into(), kernel, transfer));
+        Ok(())
+    }
+
+    fn add_samples(
+        &mut self,
+        name: String,
+        points: &Points,
+        load: &Load,
+        look: &Look,
+        deadline: Deadline,
+    ) -> Result<(), Error> {
+        let transfer = look.of_samples(&name, points)?;
+        let splats = points.to_splats(&load.sample_options(deadline));
+        let splats = splats.map_err(|error| error.in_file(name.as_ref()))?;
+        let [min, max] = points.bounds();
+        let bounds = Bounds { min, max }.union(splats.bounds());
+        self.subject.stand(points.about.stance, Stance::SURVEY);
+        let item = Item::Scalar(splats.into(), transfer);
+        self.push("samples", name, points.len() as u64, bounds, item);
+        Ok(())
+    }
+
+    fn add_cells(&mut self, name: String, mut cells: Cells, look: &Look) -> Result<(), Error> {
+        let transfer = look.of_cells(&name, &cells)?;
+        if !transfer.isosurfaces.is_empty() {
+            cells = cells.with_values_of_points();
+        }
+        let tetrahedra = cells.tetrahedra(&CellOptions::default());
+        let tetrahedra = tetrahedra.map_err(|error| error.in_file(name.as_ref()))?;
+        self.subject.stand(cells.about.stance, Stance::SURVEY);
+        let (count, bounds) = (cells.len() as u64, tetrahedra.bounds());
+        self.push("cells", name, count, bounds, Item::Cells(tetrahedra.into(), transfer));
+        Ok(())
+    }
+
+    /// Returns the scene. `facets` says whether its pictures can show facets.
+    pub fn scene(&self, facets: bool) -> Result<Scene, Error> {
+        let mut scene = Scene::new();
+        for entry in &self.entries {
+            scene.items.push(match entry {
+                Entry::Ready(item) => item.clone(),
+                Entry::Mesh(own) if facets => Item::Facets(own.facets.clone()),
+                Entry::Mesh(own) => Item::Radiance(own.surfels()?),
+            });
+        }
+        scene.validate()?;
+        Ok(scene)
+    }
+}
+
+impl Faceted {
+    fn surfels(&self) -> Result<Arc<SplatSet>, Error> {
+        if let Some(surfels) = self.surfels.get() {
+            return Ok(surfels.clone());
+        }
+        let made = self.mesh.surfels(&self.options);
+        let made = made.map_err(|error| error.in_file(self.name.as_ref()))?;
+        Ok(self.surfels.get_or_init(|| made.into()).clone())
+    }
+}
+
+impl From<Item> for Entry {
+    fn from(item: Item) -> Self {
+        Self::Ready(item)
+    }
+}

@@ -1,0 +1,95 @@
+//! The compiled half of the Python package `splatkit`. The other half, in `python/splatkit`, has
+//! the signatures and documentation that users see; options come from there as JSON.
+
+mod arrays;
+mod camera;
+mod draw;
+mod errors;
+mod hierarchy;
+mod items;
+mod load;
+mod look;
+mod notes;
+mod picture;
+mod scene;
+mod worker;
+
+use errors::raise;
+use pyo3::prelude::*;
+use splatkit::{color::ColorMap, volume::TransferFunction};
+use std::path::PathBuf;
+
+/// Returns red, green and blue of a colour as in CSS.
+#[pyfunction]
+fn color(py: Python<'_>, text: &str) -> PyResult<[f32; 3]> {
+    look::color(text).map_err(|error| raise(py, &error))
+}
+
+/// Returns a transfer function by name, as JSON.
+#[pyfunction]
+fn named_transfer(
+    py: Python<'_>,
+    name: &str,
+    range: [f64; 2],
+    diagonal: Option<f64>,
+) -> PyResult<String> {
+    let named = TransferFunction::named(name, range).map_err(|error| raise(py, &error))?;
+    Ok(diagonal.map_or(named.clone(), |diagonal| named.for_size(diagonal)).to_json())
+}
+
+/// Checks a transfer function and returns it in the usual form.
+#[pyfunction]
+fn checked_transfer(py: Python<'_>, text: &str) -> PyResult<String> {
+    let read = TransferFunction::from_json(text).map_err(|error| raise(py, &error))?;
+    Ok(read.to_json())
+}
+
+/// Reads the file of a transfer function and returns its JSON.
+#[pyfunction]
+fn read_transfer(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+    let limits = splatkit::input::Limits::default();
+    let read = TransferFunction::read(path, &limits).map_err(|error| raise(py, &error))?;
+    Ok(read.to_json())
+}
+
+/// Turns and enlarges a camera: degrees about the up axis, degrees upwards, and a factor.
+#[pyfunction]
+fn moved_camera(
+    py: Python<'_>,
+    text: &str,
+    azimuth: f64,
+    elevation: f64,
+    zoom: f64,
+) -> PyResult<String> {
+    let mut own = camera::camera(text).map_err(|error| raise(py, &error))?;
+    own.azimuth(azimuth);
+    own.elevation(elevation);
+    own.zoom(zoom);
+    own.view([1, 1]).map_err(|error| raise(py, &error))?;
+    Ok(camera::to_json(&own))
+}
+
+/// Returns the same view without perspective.
+#[pyfunction]
+fn orthographic_camera(py: Python<'_>, text: &str) -> PyResult<String> {
+    let mut own = camera::camera(text).map_err(|error| raise(py, &error))?;
+    own.make_orthographic();
+    Ok(camera::to_json(&own))
+}
+
+#[pymodule]
+fn _splatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    notes::collect();
+    module.add("TRANSFER_FUNCTIONS", TransferFunction::NAMES.to_vec())?;
+    module.add("COLOR_MAPS", ColorMap::NAMES.to_vec())?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<picture::Picture>()?;
+    module.add_class::<hierarchy::Hierarchy>()?;
+    module.add_function(wrap_pyfunction!(color, module)?)?;
+    module.add_function(wrap_pyfunction!(named_transfer, module)?)?;
+    module.add_function(wrap_pyfunction!(checked_transfer, module)?)?;
+    module.add_function(wrap_pyfunction!(read_transfer, module)?)?;
+    module.add_function(wrap_pyfunction!(moved_camera, module)?)?;
+    module.add_function(wrap_pyfunction!(orthographic_camera, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,104 @@
+//! Finished pictures.
+
+use crate::{camera::to_json, draw::Drawn, errors::raise, worker::run};
+use numpy::PyArray1;
+use pyo3::{prelude::*, types::PyBytes};
+use splatkit::{
+    Error, FrameStats, Stop, disk,
+    picture::{Picture as Pixels, PictureFormat},
+};
+use std::{path::PathBuf, sync::Arc};
+
+/// A finished picture: the half of `splatkit.Picture` that holds its pixels.
+#[pyclass(frozen, module = "splatkit._splatkit")]
+pub struct Picture {
+    pixels: Arc<Pixels>,
+    stats: FrameStats,
+    camera: String,
+}
+
+impl From<Drawn> for Picture {
+    fn from(drawn: Drawn) -> Self {
+        let Drawn { picture, stats, camera } = drawn;
+        Self { pixels: Arc::new(picture), stats, camera: to_json(&camera) }
+    }
+}
+
+#[pymethods]
+impl Picture {
+    /// The width and the height in pixels.
+    #[getter]
+    fn size(&self) -> (u32, u32) {
+        (self.pixels.width, self.pixels.height)
+    }
+
+    /// The camera as JSON.
+    #[getter]
+    fn camera(&self) -> &str {
+        &self.camera
+    }
+
+    /// The statistics as JSON.
+    #[getter]
+    fn statistics(&self) -> String {
+        let stats = &self.stats;
+        let facts = serde_json::json!({
+            "splats": stats.splats,
+            "hidden": stats.hidden,
+            "entries": stats.entries,
+            "passes": stats.passes,
+            "gathered": stats.gathered,
+            "bytes": stats.gpu_bytes,
+            "cut_pixels": stats.cut_pixels,
+            "missing_pages": stats.missing_pages,
+            "level": stats.lambda,
+            "bricks": stats.bricks,
+            "read_bricks": stats.read_bricks,
+        });
+        facts.to_string()
+    }
+
+    /// Bytes over a background, row by row.
+    fn rgba<'py>(&self, py: Python<'py>, background: Option<[f32; 3]>) -> Bound<'py, PyArray1<u8>> {
+        let pixels = self.pixels.clone();
+        PyArray1::from_vec(py, py.detach(move || pixels.to_rgba8(background)))
+    }
+
+    /// Colours that are multiplied by their opacity, row by row.
+    fn color<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
+        PyArray1::from_slice(py, self.pixels.color.as_flattened())
+    }
+
+    /// Depths, row by row.
+    fn depth<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
+        PyArray1::from_slice(py, &self.pixels.depth)
+    }
+
+    /// The bytes of a PNG file.
+    fn png<'py>(
+        &self,
+        py: Python<'py>,
+        background: Option<[f32; 3]>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let pixels = self.pixels.clone();
+        let encoded = move || pixels.encode(PictureFormat::Png, background);
+        Ok(PyBytes::new(py, &run(py, &Stop::default(), encoded)?))
+    }
+
+    /// Writes a PNG or JPEG file.
+    fn save(&self, py: Python<'_>, path: PathBuf, background: Option<[f32; 3]>) -> PyResult<()> {
+        let pixels = self.pixels.clone();
+        run(py, &Stop::default(), move || pixels.save(path, background))
+    }
+
+    /// Writes the depths as a grey PNG of 16 bits.
+    fn save_depth(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let format = PictureFormat::of(&path).map_err(|error| raise(py, &error))?;
+        if format != PictureFormat::Png {
+            let error = Error::Argument(format!("{}: depths are written as .png", path.display()));
+            return Err(raise(py, &error));
+        }
+        let pixels = self.pixels.clone();
+        run(py, &Stop::default(), move || disk::write(&path, &pixels.encode_depth()?))
+    }
+}

@@ -1,0 +1,389 @@
+//! Scenes: the half of `splatkit.Scene` that holds its items.
+
+use crate::{
+    arrays::{numbers, positions, rows, samples, volume},
+    camera::{Fit, to_json},
+    draw::{Draw, Stage},
+    errors::{options, raise, wrong},
+    items::Added,
+    load::{Input, Load, warn_of_holes},
+    look::Look,
+    picture::Picture,
+    worker::run,
+};
+use pyo3::prelude::*;
+use serde::Deserialize;
+use splatkit::{
+    Deadline, Error, Stop,
+    about::{About, Modality, Stance},
+    gaussians::{Gaussians, harmonics},
+    glam::{DMat3, DVec3, Quat, Vec3},
+    scattered::Points,
+    surface::Mesh,
+    volume::{Lattice, Volume},
+};
+use std::{path::PathBuf, sync::Arc};
+
+/// What is drawn together.
+#[pyclass(frozen, module = "splatkit._splatkit")]
+#[derive(Default)]
+pub struct Scene(Arc<Stage>);
+
+/// What a caller says of an array.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Told {
+    name: String,
+    /// World position of the first sample.
+    origin: Option<[f64; 3]>,
+    spacing: Option<[f64; 3]>,
+    /// The rows of the matrix whose columns are the directions of the axes.
+    axes: Option<[[f64; 3]; 3]>,
+    missing: Option<f64>,
+    modality: Option<String>,
+    value_name: String,
+    value_unit: String,
+    unit: String,
+    up: Option<[f64; 3]>,
+}
+
+impl Told {
+    fn about(&self) -> Result<About, Error> {
+        let mut about = About::default();
+        about.name.clone_from(&self.value_name);
+        about.unit.clone_from(&self.value_unit);
+        about.length.clone_from(&self.unit);
+        about.modality = match self.modality.as_deref() {
+            None => None,
+            Some("ct") => Some(Modality::Ct),
+            Some("mr") => Some(Modality::Mr),
+            Some("emission") => Some(Modality::Emission),
+            Some("ultrasound") => Some(Modality::Ultrasound),
+            Some("microscopy") => Some(Modality::Microscopy),
+            Some(other) => {
+                return Err(wrong(format!(
+                    "the modality “{other}” is none of ct, mr, emission, ultrasound and microscopy"
+                )));
+            }
+        };
+        if let Some(up) = self.up {
+            let up = DVec3::from_array(up).try_normalize();
+            let up = up.ok_or_else(|| wrong("up is a direction with a length above 0"))?;
+            about.stance = Some(Stance::with_up(up));
+        }
+        Ok(about)
+    }
+
+    fn lattice(&self, dims: [usize; 3]) -> Lattice {
+        let spacing = DMat3::from_diagonal(self.spacing.map_or(DVec3::ONE, DVec3::from_array));
+        let axes =
+            self.axes.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array_2d(&rows).transpose());
+        let origin = self.origin.map_or(DVec3::ZERO, DVec3::from_array);
+        Lattice::cartesian(dims, origin, axes * spacing)
+    }
+}
+
+/// The arrays of a mesh or of points; `None` where there are none.
+#[derive(FromPyObject)]
+struct MeshArrays<'py> {
+    #[pyo3(item)]
+    positions: Bound<'py, PyAny>,
+    #[pyo3(item)]
+    faces: Option<Bound<'py, PyAny>>,
+    #[pyo3(item)]
+    normals: Option<Bound<'py, PyAny>>,
+    #[pyo3(item)]
+    colors: Option<Bound<'py, PyAny>>,
+    #[pyo3(item)]
+    values: Option<Bound<'py, PyAny>>,
+}
+
+impl MeshArrays<'_> {
+    fn mesh(&self, about: About) -> Result<Mesh, Error> {
+        let (origin, positions) = positions(&self.positions)?;
+        let mut mesh = Mesh { origin, positions, about, ..Mesh::default() };
+        if let Some(faces) = &self.faces {
+            mesh.triangles = rows::<u32, 3>(faces)?;
+            let count = mesh.positions.len() as u32;
+            let bad = mesh.triangles.iter().position(|own| own.iter().any(|&at| at >= count));
+            if let Some(face) = bad {
+                return Err(wrong(format!(
+                    "face {face} names the vertices {:?}, but there are {count}",
+                    mesh.triangles[face]
+                )));
+            }
+        }
+        if let Some(normals) = &self.normals {
+            let given = rows::<f32, 3>(normals)?.into_iter();
+            let unit = |row| Vec3::from_array(row).as_dvec3().normalize_or_zero().as_vec3();
+            mesh.normals = given.map(unit).collect();
+        }
+        if let Some(colors) = &self.colors {
+            mesh.colors = rows::<u8, 4>(colors)?;
+        }
+        if let Some(values) = &self.values {
+            mesh.values = numbers::<f32>(values)?;
+            mesh.about.holes = mesh.values.iter().filter(|value| !value.is_finite()).count() as u64;
+            let no_value = |value: &mut f32| *value = f32::NAN;
+            mesh.values.iter_mut().filter(|value| !value.is_finite()).for_each(no_value);
+        }
+        let lists = [
+            ("normals", mesh.normals.len()),
+            ("colors", mesh.colors.len()),
+            ("values", mesh.values.len()),
+        ];
+        let count = mesh.positions.len();
+        match lists.into_iter().find(|(_, found)| *found > 0 && *found != count) {
+            Some((name, found)) => {
+                Err(wrong(format!("there are {found} {name} for {count} positions")))
+            }
+            None => Ok(mesh),
+        }
+    }
+}
+
+/// The arrays of scattered samples.
+#[derive(FromPyObject)]
+struct SampleArrays<'py> {
+    #[pyo3(item)]
+    positions: Bound<'py, PyAny>,
+    #[pyo3(item)]
+    values: Bound<'py, PyAny>,
+    #[pyo3(item)]
+    radii: Option<Bound<'py, PyAny>>,
+    #[pyo3(item)]
+    covariances: Option<Bound<'py, PyAny>>,
+}
+
+impl SampleArrays<'_> {
+    fn points(&self, about: About, missing: Option<f64>) -> Result<Points, Error> {
+        let (origin, positions) = positions(&self.positions)?;
+        let values = numbers::<f32>(&self.values)?;
+        let radii = self.radii.as_ref().map(numbers::<f32>).transpose()?.unwrap_or_default();
+        let covariances = self.covariances.as_ref().map(rows::<f32, 6>).transpose()?;
+        let covariances = covariances.unwrap_or_default();
+        let mut points = Points { origin, positions, values, radii, covariances, about };
+        let is_hole = |value: f32| !value.is_finite() || missing.is_some_and(|m| value == m as f32);
+        if points.values.len() == points.positions.len()
+            && points.values.iter().any(|v| is_hole(*v))
+        {
+            points = without_holes(points, is_hole);
+        }
+        points.validate()?;
+        Ok(points)
+    }
+}
+
+/// Leaves out the samples without a value.
+fn without_holes(points: Points, is_hole: impl Fn(f32) -> bool) -> Points {
+    let Points { origin, positions, values, radii, covariances, mut about } = points;
+    let keeps: Vec<bool> = values.iter().map(|value| !is_hole(*value)).collect();
+    about.holes = keeps.iter().filter(|kept| !**kept).count() as u64;
+    fn kept<T>(list: Vec<T>, keeps: &[bool]) -> Vec<T> {
+        list.into_iter().zip(keeps).filter_map(|(item, keep)| keep.then_some(item)).collect()
+    }
+    Points {
+        origin,
+        positions: kept(positions, &keeps),
+        values: kept(values, &keeps),
+        radii: kept(radii, &keeps),
+        covariances: kept(covariances, &keeps),
+        about,
+    }
+}
+
+/// The arrays of trained Gaussians.
+#[derive(FromPyObject)]
+struct GaussianArrays<'py> {
+    #[pyo3(item)]
+    centers: Bound<'py, PyAny>,
+    #[pyo3(item)]
+    scales: Bound<'py, PyAny>,
+    #[pyo3(item)]
+    rotations: Bound<'py, PyAny>,
+    #[pyo3(item)]
+    opacities: Bound<'py, PyAny>,
+    /// Rows of red, green and blue: the terms of the first Gaussian, then those of the second, …
+    #[pyo3(item)]
+    harmonics: Bound<'py, PyAny>,
+}
+
+impl GaussianArrays<'_> {
+    fn set(&self, about: About) -> Result<Gaussians, Error> {
+        let (origin, centers) = positions(&self.centers)?;
+        let scales = rows::<f32, 3>(&self.scales)?.into_iter().map(Vec3::from_array).collect();
+        let turn = |[w, x, y, z]: [f32; 4]| Quat::from_xyzw(x, y, z, w);
+        let rotations: Vec<Quat> = rows::<f32, 4>(&self.rotations)?.into_iter().map(turn).collect();
+        if let Some(index) = rotations.iter().position(|q| !(q.length_squared() > 0.0)) {
+            return Err(wrong(format!("the rotation of Gaussian {index} has no length")));
+        }
+        let rotations = rotations.into_iter().map(Quat::normalize).collect();
+        let opacities = numbers::<f32>(&self.opacities)?;
+        let harmonics = rows::<f32, 3>(&self.harmonics)?;
+        let terms = harmonics.len() / centers.len().max(1);
+        let degree = harmonics::degree_of(terms).ok_or_else(|| {
+            wrong(format!("{terms} terms of harmonics are no degree; 1, 4, 9 or 16 are"))
+        })?;
+        let set = Gaussians {
+            origin,
+            centers,
+            scales,
+            rotations,
+            opacities,
+            degree,
+            harmonics,
+            about,
+            ..Gaussians::default()
+        };
+        set.validate().map_err(wrong)?;
+        Ok(set)
+    }
+}
+
+impl Scene {
+    /// Adds what an array has become, with its looks.
+    fn add(&self, py: Python<'_>, input: Input, told: Told, more: (Load, Look)) -> PyResult<()> {
+        let (stage, (load, look)) = (self.0.clone(), more);
+        warn_of_holes(&told.name, &input);
+        let added = Added { name: told.name, input, load, look, deadline: Deadline::NEVER };
+        run(py, &Stop::default(), move || stage.add(added))
+    }
+}
+
+/// Reads the options of an array.
+fn told(told: &str, load: &str, look: &str) -> Result<(Told, (Load, Look)), Error> {
+    let look: Look = options(look)?;
+    look.check()?;
+    Ok((options(told)?, (Load::parse(load)?, look)))
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a file.
+    fn add_file(&self, py: Python<'_>, path: PathBuf, load: &str, look: &str) -> PyResult<()> {
+        let own = told("{}", load, look).map_err(|error| raise(py, &error))?;
+        let (_, (load, look)) = own;
+        let stage = self.0.clone();
+        run(py, &Stop::default(), move || {
+            // One deadline covers reading the input and making its splats.
+            let deadline = load.limits().deadline();
+            let attribute = look.attribute();
+            let input = load.open(&path, attribute.as_deref(), &mut Vec::new())?;
+            let name = path.display().to_string();
+            stage.add(Added { name, input, load, look, deadline })
+        })
+    }
+
+    /// Adds the samples of an array.
+    fn add_volume(
+        &self,
+        py: Python<'_>,
+        array: Bound<'_, PyAny>,
+        told: &str,
+        load: &str,
+        look: &str,
+    ) -> PyResult<()> {
+        let (told, more) = self::told(told, load, look).map_err(|error| raise(py, &error))?;
+        let made = samples(&array).and_then(|(dims, samples)| Ok((dims, samples, told.about()?)));
+        let (dims, samples, about) = made.map_err(|error| raise(py, &error))?;
+        let (lattice, missing) = (told.lattice(dims), told.missing);
+        let measured = move || volume(lattice, samples, missing);
+        let mut volume: Volume = run(py, &Stop::default(), measured)?;
+        let holes = std::mem::replace(&mut volume.about, about).holes;
+        volume.about.holes = holes;
+        self.add(py, Input::Volume(volume), told, more)
+    }
+
+    /// Adds a mesh, or points if there are no faces.
+    fn add_mesh(
+        &self,
+        py: Python<'_>,
+        arrays: MeshArrays<'_>,
+        told: &str,
+        load: &str,
+        look: &str,
+    ) -> PyResult<()> {
+        let made = self::told(told, load, look)
+            .and_then(|(told, more)| Ok((arrays.mesh(told.about()?)?, told, more)));
+        let (mesh, told, more) = made.map_err(|error| raise(py, &error))?;
+        self.add(py, Input::Mesh(mesh), told, more)
+    }
+
+    /// Adds samples at any positions.
+    fn add_samples(
+        &self,
+        py: Python<'_>,
+        arrays: SampleArrays<'_>,
+        told: &str,
+        load: &str,
+        look: &str,
+    ) -> PyResult<()> {
+        let made = self::told(told, load, look)
+            .and_then(|(told, more)| Ok((arrays.points(told.about()?, told.missing)?, told, more)));
+        let (points, told, more) = made.map_err(|error| raise(py, &error))?;
+        self.add(py, Input::Samples(points), told, more)
+    }
+
+    /// Adds trained Gaussians.
+    fn add_gaussians(
+        &self,
+        py: Python<'_>,
+        arrays: GaussianArrays<'_>,
+        told: &str,
+    ) -> PyResult<()> {
+        let made = self::told(told, "{}", "{}")
+            .and_then(|(told, more)| Ok((arrays.set(told.about()?)?, told, more)));
+        let (set, told, more) = made.map_err(|error| raise(py, &error))?;
+        self.add(py, Input::Gaussians(set), told, more)
+    }
+
+    /// What the scene holds: kind, name, and the number of splats or samples.
+    #[getter]
+    fn contents(&self) -> Vec<(&'static str, String, u64)> {
+        self.0.contents()
+    }
+
+    /// The smallest and the largest coordinates; `None` for an empty scene.
+    #[getter]
+    fn bounds(&self) -> Option<[[f64; 3]; 2]> {
+        self.0.bounds().map(|bounds| [bounds.min.to_array(), bounds.max.to_array()])
+    }
+
+    /// The camera that is fitted to the scene, as JSON.
+    fn camera(&self, py: Python<'_>, fit: &str, draw: &str) -> PyResult<String> {
+        let own = Fit::parse(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
+        let (fit, draw) = own.map_err(|error| raise(py, &error))?;
+        let stage = self.0.clone();
+        run(py, &Stop::default(), move || stage.camera(&fit, &draw).map(|own| to_json(&own)))
+    }
+
+    /// The cameras of a turntable, as JSON.
+    fn turntable(
+        &self,
+        py: Python<'_>,
+        frames: u32,
+        fit: &str,
+        draw: &str,
+    ) -> PyResult<Vec<String>> {
+        let own = Fit::parse(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
+        let (fit, draw) = own.map_err(|error| raise(py, &error))?;
+        let stage = self.0.clone();
+        run(py, &Stop::default(), move || {
+            Ok(stage.turntable(&fit, &draw, frames)?.iter().map(to_json).collect())
+        })
+    }
+
+    /// Draws a picture.
+    fn render(&self, py: Python<'_>, camera: Option<String>, draw: &str) -> PyResult<Picture> {
+        let draw = Draw::parse(draw).map_err(|error| raise(py, &error))?;
+        let (stage, stop) = (self.0.clone(), Stop::default());
+        let own = stop.clone();
+        let drawn = run(py, &stop, move || stage.draw(camera.as_deref(), &draw, &own))?;
+        Ok(drawn.into())
+    }
+}
