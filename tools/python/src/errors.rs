@@ -15,14 +15,16 @@ pub fn wrong(message: impl Into<String>) -> Error {
     Error::Argument(message.into())
 }
 
-/// Reads options that Python has written as JSON.
+/// Reads options that Python has written as JSON. An error names the option.
 pub fn options<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
-    let plain = |error: serde_json::Error| {
+    let mut reader = serde_json::Deserializer::from_str(text);
+    serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+        let path = error.path().to_string();
+        let place = if path == "." { String::new() } else { format!("{path}: ") };
         // The place in the JSON says nothing to people who never saw it.
-        let message = error.to_string();
-        wrong(message.split(" at line ").next().unwrap_or_default())
-    };
-    serde_json::from_str(text).map_err(plain)
+        let message = error.into_inner().to_string();
+        wrong(place + message.split(" at line ").next().unwrap_or_default())
+    })
 }
 
 fn made(py: Python<'_>, error: &Error) -> PyResult<PyErr> {

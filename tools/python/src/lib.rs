@@ -3,8 +3,10 @@
 
 mod arrays;
 mod camera;
+mod convert;
 mod draw;
 mod errors;
+mod files;
 mod hierarchy;
 mod items;
 mod load;
@@ -77,9 +79,18 @@ fn orthographic_camera(py: Python<'_>, text: &str) -> PyResult<String> {
     Ok(camera::to_json(&own))
 }
 
+/// Removes the unfinished files of conversions that go on although they were interrupted. To be
+/// called once, as the process ends.
+#[pyfunction]
+fn abandon() {
+    // Dropping what it returns would let other threads create files again.
+    std::mem::forget(splatkit::disk::abandon());
+}
+
 #[pymodule]
 fn _splatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     notes::collect();
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("TRANSFER_FUNCTIONS", TransferFunction::NAMES.to_vec())?;
     module.add("COLOR_MAPS", ColorMap::NAMES.to_vec())?;
     module.add_class::<scene::Scene>()?;
@@ -91,5 +102,10 @@ fn _splatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(read_transfer, module)?)?;
     module.add_function(wrap_pyfunction!(moved_camera, module)?)?;
     module.add_function(wrap_pyfunction!(orthographic_camera, module)?)?;
+    module.add_function(wrap_pyfunction!(files::info, module)?)?;
+    module.add_function(wrap_pyfunction!(files::check, module)?)?;
+    module.add_function(wrap_pyfunction!(files::known_formats, module)?)?;
+    module.add_function(wrap_pyfunction!(convert::convert, module)?)?;
+    module.add_function(wrap_pyfunction!(abandon, module)?)?;
     Ok(())
 }

@@ -113,6 +113,11 @@ impl Look {
         }
     }
 
+    /// Whether something else than its own colours colours a surface.
+    pub fn is_painted(&self) -> bool {
+        !matches!(self.surface(), None | Some(SurfaceColor::File | SurfaceColor::Normal))
+    }
+
     fn surface(&self) -> Option<SurfaceColor> {
         let text = self.color.as_deref()?.trim();
         Some(match text.to_ascii_lowercase().as_str() {

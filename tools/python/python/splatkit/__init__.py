@@ -1,0 +1,95 @@
+"""Pictures of NumPy arrays and of files, drawn as elliptic splats, without GPU or display.
+
+>>> import splatkit
+>>> splatkit.render("skull.nrrd").save("skull.png")
+
+A `Scene` holds several items, and is drawn from any side:
+
+>>> scene = splatkit.Scene().add_volume(array, spacing=(0.7, 0.7, 1.25)).add("implant.stl")
+>>> picture = scene.render((800, 600), scene.camera((800, 600), view="left"))
+>>> picture.rgba.shape
+(600, 800, 4)
+"""
+
+from __future__ import annotations
+
+import atexit
+import inspect
+from typing import Any
+
+from . import _splatkit
+from ._camera import Camera, Clip
+from ._errors import (
+    ArgumentError,
+    DataWarning,
+    DeniedFileError,
+    Error,
+    FileError,
+    InputError,
+    LimitError,
+    MissingFileError,
+    NothingToDrawError,
+    OutOfMemoryError,
+    OutputError,
+    TimeLimitError,
+    TransferError,
+)
+from ._files import Finding, Format, Hierarchy, Leaves, Report, check, convert, formats, info
+from ._picture import Picture
+from ._scene import Scene
+from ._transfer import TransferFunction
+
+__version__: str = _splatkit.__version__
+
+#: The names of transfer functions.
+TRANSFER_FUNCTIONS: tuple[str, ...] = tuple(_splatkit.TRANSFER_FUNCTIONS)
+#: The names of colour maps. Each may end with `_r`, which reverses it.
+COLOR_MAPS: tuple[str, ...] = tuple(_splatkit.COLOR_MAPS)
+
+_DRAWING = frozenset(inspect.signature(Scene.render).parameters) - {"self"}
+
+
+def render(source: Any, **options: Any) -> Picture:
+    """Draws a file or an array: a volume [z, y, x], or points (n, 3).
+
+    The options are those of `Scene.add` and of `Scene.render`.
+    """
+    drawing = {name: options.pop(name) for name in list(options) if name in _DRAWING}
+    return Scene().add(source, **options).render(**drawing)
+
+
+# Interrupted conversions may go on until the process ends. They leave no files.
+atexit.register(_splatkit.abandon)
+
+__all__ = [
+    "COLOR_MAPS",
+    "TRANSFER_FUNCTIONS",
+    "ArgumentError",
+    "Camera",
+    "Clip",
+    "DataWarning",
+    "DeniedFileError",
+    "Error",
+    "FileError",
+    "Finding",
+    "Format",
+    "Hierarchy",
+    "InputError",
+    "Leaves",
+    "LimitError",
+    "MissingFileError",
+    "NothingToDrawError",
+    "OutOfMemoryError",
+    "OutputError",
+    "Picture",
+    "Report",
+    "Scene",
+    "TimeLimitError",
+    "TransferError",
+    "TransferFunction",
+    "check",
+    "convert",
+    "formats",
+    "info",
+    "render",
+]

@@ -1,0 +1,138 @@
+"""Arrays of any type and layout, in the types and the layout that the compiled half takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._errors import ArgumentError
+
+#: Types of samples that the library holds as they are.
+_SAMPLES = {np.dtype(name) for name in ("u1", "u2", "i2", "i4", "f4")}
+_KINDS = "booleans, integers, real or complex numbers"
+
+
+def numbers(value: Any, name: str) -> npt.NDArray[Any]:
+    """Returns an array of numbers in the machine's byte order. Masked values become NaN."""
+    if np.ma.isMaskedArray(value):
+        value = np.ma.asanyarray(value)
+        mask = np.ma.getmaskarray(value)
+        if mask.any():
+            value = np.where(mask, np.nan, value.data)
+        else:
+            value = value.data
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{name} cannot be made an array: {error}") from error
+    if array.dtype.kind not in "biufc":
+        raise ArgumentError(f"{name} has the type {array.dtype}; {_KINDS} are needed")
+    if array.dtype.kind == "c":
+        array = np.abs(array)
+    return array.astype(array.dtype.newbyteorder("="), copy=False)
+
+
+def samples(value: Any) -> npt.NDArray[Any]:
+    """Returns the samples of a volume, [z, y, x], in one of the library's types."""
+    array = numbers(value, "the volume")
+    if array.ndim != 3 or array.size == 0:
+        hint = ""
+        if array.ndim == 4:
+            hint = "; choose one time or component, such as array[0] or array[..., 0]"
+        raise ArgumentError(
+            f"a volume has three axes (z, y, x) with samples, not the shape {array.shape}{hint}"
+        )
+    if array.dtype not in _SAMPLES:
+        array = array.astype(_sample_type(array))
+    return np.ascontiguousarray(array)
+
+
+def _sample_type(array: npt.NDArray[Any]) -> str:
+    kind, size = array.dtype.kind, array.dtype.itemsize
+    if kind == "b":
+        return "u1"
+    if kind == "f":
+        return "f4"
+    if kind == "i" and size == 1:
+        return "i2"
+    # Wide integers keep their digits if all of them fit.
+    limits = np.iinfo(np.int32)
+    return "i4" if limits.min <= array.min() and array.max() <= limits.max else "f4"
+
+
+def rows(value: Any, width: int, name: str, dtype: str = "f4") -> npt.NDArray[Any]:
+    """Returns rows of so many numbers."""
+    array = numbers(value, name)
+    if array.ndim != 2 or array.shape[1] != width:
+        raise ArgumentError(f"{name} has the shape {array.shape}; (n, {width}) is needed")
+    return _converted(array, dtype)
+
+
+def positions(value: Any, name: str) -> npt.NDArray[Any]:
+    """Returns positions: 32-bit numbers if they are no wider, otherwise 64-bit numbers."""
+    array = numbers(value, name)
+    is_narrow = array.dtype in (np.dtype("f4"), np.dtype("f2"))
+    return rows(array, 3, name, "f4" if is_narrow else "f8")
+
+
+def column(value: Any, name: str) -> npt.NDArray[Any]:
+    """Returns one number for each element."""
+    array = numbers(value, name)
+    if array.ndim == 2 and array.shape[1] == 1:
+        array = array[:, 0]
+    if array.ndim != 1:
+        raise ArgumentError(f"{name} has the shape {array.shape}; (n,) is needed")
+    return _converted(array, "f4")
+
+
+def colors(value: Any, count: int, name: str = "colors") -> npt.NDArray[Any]:
+    """Returns a colour of four bytes for each position: from bytes, from 16-bit integers, or from
+    real numbers between 0 and 1; red, green and blue, or with opacity."""
+    array = numbers(value, name)
+    if array.shape in ((3,), (4,)):
+        array = np.broadcast_to(array, (count, array.shape[0]))
+    if array.ndim != 2 or array.shape[1] not in (3, 4):
+        raise ArgumentError(f"{name} has the shape {array.shape}; (n, 3) or (n, 4) is needed")
+    if array.dtype == np.uint16:
+        parts = np.round(array / 257.0)
+    elif array.dtype == np.uint8:
+        parts = array
+    elif array.dtype.kind == "f":
+        if not np.all((array >= 0.0) & (array <= 1.0)):
+            raise ArgumentError(f"{name} of real numbers lie between 0 and 1")
+        parts = np.round(array * 255.0)
+    else:
+        raise ArgumentError(
+            f"{name} has the type {array.dtype}; uint8, uint16 or real numbers are needed"
+        )
+    bytes_ = np.full((len(parts), 4), 255, np.uint8)
+    bytes_[:, : array.shape[1]] = parts
+    return bytes_
+
+
+def faces(value: Any, count: int) -> npt.NDArray[Any]:
+    """Returns triangles. Rows of more than three vertices are convex polygons, which are divided
+    around their first vertex."""
+    array = numbers(value, "faces")
+    if array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "iu":
+        raise ArgumentError(
+            f"faces are rows of three or more whole numbers, not {array.dtype} of the shape "
+            f"{array.shape}"
+        )
+    if array.size and (array.min() < 0 or array.max() >= count):
+        bad = int(np.argmax((array < 0).any(axis=1) | (array >= count).any(axis=1)))
+        raise ArgumentError(
+            f"face {bad} names the vertices {array[bad].tolist()}, but they go from 0 to {count - 1}"
+        )
+    width = array.shape[1]
+    if width > 3:
+        fan = [array[:, [0, at, at + 1]] for at in range(1, width - 1)]
+        array = np.stack(fan, axis=1).reshape(-1, 3)
+    return np.ascontiguousarray(array, dtype=np.uint32)
+
+
+def _converted(array: npt.NDArray[Any], dtype: str) -> npt.NDArray[Any]:
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(array, dtype=dtype)

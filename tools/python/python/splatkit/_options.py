@@ -1,0 +1,221 @@
+"""Options that several functions share, and how they are passed to the compiled half."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, TypedDict, Union
+
+import numpy as np
+
+from . import _splatkit
+from ._errors import ArgumentError
+from ._transfer import TransferFunction
+
+#: A path of a file or folder.
+PathLike = Union[str, "os.PathLike[str]"]
+#: A colour: a name or '#rrggbb', or red, green and blue from 0 to 1.
+Color = Union[str, Sequence[float]]
+#: Three numbers: x, y, z.
+Vector = Sequence[float]
+
+
+class FieldLook(TypedDict, total=False):
+    """How values are shown: those of volumes, samples and cells."""
+
+    #: A `TransferFunction`, the name of one, a JSON file or its text. Default: made for the values.
+    transfer: TransferFunction | PathLike
+    #: Spread the transfer function or the colour map over these values.
+    range: tuple[float, float]
+    #: The length that opacities hold for, in world units.
+    opacity_unit: float
+    #: Values of surfaces: numbers, or (value, colour, opacity) with None for the usual colour.
+    isosurfaces: Sequence[float | tuple[float, Color | None, float]]
+    #: Factors on the opacity by the magnitude of the gradient: (magnitude, factor), ….
+    gradient_opacity: Sequence[tuple[float, float]]
+    #: Colour values by this map (`splatkit.COLOR_MAPS`; `_r` at the end reverses it).
+    colormap: str
+    #: Spread the colour map over the logarithms of the values.
+    log_colors: bool
+
+
+class KernelLook(TypedDict, total=False):
+    """How a volume is reconstructed from its samples. Lengths are in samples."""
+
+    #: gaussian, b-spline, hann, linear, catmull-rom, cubic-b-spline, or values from 0 to extent.
+    kernel: str | Sequence[float]
+    #: The standard deviation of the Gaussian. Default: 0.6.
+    sigma: float
+    #: The radius of a footprint.
+    extent: float
+    #: Pass through the samples instead of smoothing them.
+    sharp: bool
+
+
+class SurfaceLook(TypedDict, total=False):
+    """How meshes and point clouds are shown."""
+
+    #: file, values, height, normal, an attribute of the file, or a colour.
+    color: Color
+    #: Colour values by this map. Default: viridis.
+    colormap: str
+    #: Spread the colour map over these values.
+    range: tuple[float, float]
+    #: Spread the colour map over the logarithms of the values.
+    log_colors: bool
+    #: The colour of what has no value.
+    nan_color: Color
+    #: The share of the light that a surface absorbs, above 0, up to 1.
+    opacity: float
+    #: A factor on the radii of surfels.
+    radius_scale: float
+    #: Split normals where two triangles meet at more than this angle, in degrees. Default: 60.
+    crease: float
+
+
+class VolumeLook(FieldLook, KernelLook):
+    """How a volume is shown."""
+
+
+class Reading(TypedDict, total=False):
+    """How files are read."""
+
+    #: The array, property or column that has the values.
+    scalar: str
+    #: Raw volumes: the number of samples along x, y and z.
+    dims: tuple[int, int, int]
+    #: Raw volumes: u8, i8, u16, i16, u32, i32, u64, i64, f32 or f64.
+    sample_type: str
+    #: Raw volumes: little or big.
+    endian: str
+    #: Raw volumes: bytes before the first sample.
+    header: int
+    #: Volumes at several times: which one, from 0.
+    time: int
+    #: DICOM: the series to read: its number, UID or a part of its description.
+    series: str
+    #: HDF5 and NPZ: the data set to read.
+    dataset: str
+    #: Volumes: the distances between samples along x, y and z, instead of the file's.
+    spacing: float | Vector
+    #: A value that stands for “no value”.
+    missing: float
+    #: Scattered samples: one radius for all, in world units.
+    radius: float
+    #: Scattered samples: the number of neighbours that kernels are made from, 4 to 64.
+    neighbours: int
+    #: Scattered samples: whether samples carry slopes.
+    slopes: bool
+    #: Most of points, bytes, depth, texels, seconds that a file may take.
+    limits: Mapping[str, int]
+
+
+class FileOptions(VolumeLook, SurfaceLook, Reading):
+    """How a file is read and shown."""
+
+
+FIELD = frozenset(FieldLook.__annotations__)
+VOLUME = frozenset(VolumeLook.__annotations__)
+SURFACE = frozenset(SurfaceLook.__annotations__)
+READING = frozenset(Reading.__annotations__)
+
+
+def checked(given: Mapping[str, Any], known: frozenset[str], where: str) -> dict[str, Any]:
+    """Returns the options that are given. An unknown one is a `TypeError`, as in any call."""
+    for name in given:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise TypeError(f"{where}() got an unexpected keyword argument {name!r}{hint}")
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def text(options: Mapping[str, Any]) -> str:
+    """Returns options as JSON, without those that are None."""
+    given = {name: value for name, value in options.items() if value is not None}
+    try:
+        return json.dumps(given, default=_plain, allow_nan=False)
+    except ValueError as error:
+        raise ArgumentError(f"the options {given} are no finite numbers and texts") from error
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    raise ArgumentError(f"{value!r} is not a value for an option")
+
+
+def color(value: Color) -> list[float]:
+    """Returns red, green and blue from 0 to 1."""
+    if isinstance(value, str):
+        return list(_splatkit.color(value))
+    parts = [float(part) for part in value]
+    if len(parts) != 3 or not all(0.0 <= part <= 1.0 for part in parts):
+        raise ArgumentError(f"a colour is a name, '#rrggbb' or three numbers from 0 to 1, not {value}")
+    return parts
+
+
+def background(value: Color | None) -> list[float] | None:
+    """Returns the colour behind a picture; None for transparency."""
+    if value is None or (isinstance(value, str) and value.strip().lower() == "none"):
+        return None
+    return color(value)
+
+
+def vector(value: float | Vector) -> list[float]:
+    """Returns three numbers, or one number three times."""
+    parts = np.asarray(value, dtype=float).ravel().tolist()
+    if len(parts) == 1:
+        parts *= 3
+    if len(parts) != 3:
+        raise ArgumentError(f"three numbers are needed: x, y, z; not {value!r}")
+    return parts
+
+
+def direction(value: Vector | None) -> list[float] | None:
+    """Returns three numbers; None for none."""
+    return None if value is None else vector(value)
+
+
+def look(options: Mapping[str, Any]) -> str:
+    """Returns how an item looks, as JSON."""
+    given = {name: options[name] for name in options if name in VOLUME | SURFACE}
+    transfer = given.get("transfer")
+    if transfer is not None:
+        given["transfer"] = TransferFunction.of(transfer)
+    if "isosurfaces" in given:
+        given["isosurfaces"] = [_surface(surface) for surface in given["isosurfaces"]]
+    if given.get("nan_color") is not None:
+        given["nan_color"] = color(given["nan_color"])
+    own = given.get("color")
+    if own is not None and not isinstance(own, str):
+        given["color"] = "#" + "".join(f"{round(part * 255):02x}" for part in color(own))
+    return text(given)
+
+
+def _surface(value: Any) -> dict[str, Any]:
+    if isinstance(value, (int, float, np.number)):
+        return {"value": float(value), "color": None, "opacity": 1.0}
+    try:
+        value, own, *rest = value
+        opacity = float(rest[0]) if rest else 1.0
+        return {"value": float(value), "color": own and color(own), "opacity": opacity}
+    except (TypeError, ValueError) as error:
+        form = "an isosurface is a value, or (value, colour, opacity)"
+        raise ArgumentError(f"{form}, not {value!r}") from error
+
+
+def reading(options: Mapping[str, Any]) -> str:
+    """Returns how a file is read, as JSON."""
+    given = {name: options[name] for name in options if name in READING}
+    if "sample_type" in given:
+        given["type"] = given.pop("sample_type")
+    if given.get("spacing") is not None:
+        given["spacing"] = vector(given["spacing"])
+    return text(given)

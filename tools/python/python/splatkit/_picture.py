@@ -1,0 +1,100 @@
+"""Finished pictures."""
+
+from __future__ import annotations
+
+import json
+import os
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _options, _splatkit
+from ._camera import Camera
+from ._errors import OutputError
+
+_T = TypeVar("_T", bound=np.generic)
+
+
+class Picture:
+    """A finished picture, with rows from the top. `Scene.render` returns it.
+
+    Its arrays are read-only; `picture.rgba.copy()` can be changed.
+    """
+
+    def __init__(self, own: _splatkit.Picture, background: list[float] | None) -> None:
+        self._own = own
+        self._background = background
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """The width and the height in pixels."""
+        return self._own.size
+
+    @cached_property
+    def rgba(self) -> npt.NDArray[np.uint8]:
+        """Red, green, blue and opacity of each pixel, (height, width, 4) bytes: what `save` writes.
+
+        Over a background the opacity is 255. Without one, colours are not multiplied by it.
+        """
+        return self._shaped(self._own.rgba(self._background), 4)
+
+    @cached_property
+    def color(self) -> npt.NDArray[np.float32]:
+        """Red, green and blue, multiplied by opacity, and opacity: (height, width, 4), 0 to 1,
+        without the background, before they are rounded to bytes."""
+        return self._shaped(self._own.color(), 4)
+
+    @cached_property
+    def depth(self) -> npt.NDArray[np.float32]:
+        """How far in front of the eye half of the light is absorbed, in world units along the view
+        direction: (height, width). Infinite where less than half is absorbed."""
+        return self._shaped(self._own.depth())
+
+    @property
+    def camera(self) -> Camera:
+        """The camera that the picture was taken with."""
+        return Camera.from_json(self._own.camera)
+
+    @cached_property
+    def statistics(self) -> dict[str, Any]:
+        """What was drawn: splats, bricks, bytes of memory, …."""
+        return dict(json.loads(self._own.statistics))
+
+    def over(self, background: _options.Color | None) -> Picture:
+        """Returns the same picture over another background; None for transparency."""
+        return Picture(self._own, _options.background(background))
+
+    def save(self, path: _options.PathLike, *, overwrite: bool = True) -> Path:
+        """Writes a .png or .jpg file, which appears whole or not at all. Returns its path."""
+        return self._written(path, overwrite, lambda to: self._own.save(to, self._background))
+
+    def save_depth(self, path: _options.PathLike, *, overwrite: bool = True) -> Path:
+        """Writes the depths as a grey PNG of 16 bits: white for the nearest, black for nothing."""
+        return self._written(path, overwrite, self._own.save_depth)
+
+    def _written(self, path: _options.PathLike, overwrite: bool, write: Any) -> Path:
+        to = Path(os.fspath(path))
+        if not overwrite and (to.exists() or to.is_symlink()):
+            raise OutputError(to, "cannot be written", None, "it exists already")
+        write(to)
+        return to
+
+    def _shaped(self, flat: npt.NDArray[_T], *channels: int) -> npt.NDArray[_T]:
+        width, height = self.size
+        array = flat.reshape((height, width, *channels))
+        array.flags.writeable = False
+        return array
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        array = self.rgba if dtype is None else self.rgba.astype(dtype, copy=False)
+        return array.copy() if copy else array
+
+    def _repr_png_(self) -> bytes:
+        return self._own.png(self._background)
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        return f"<splatkit.Picture of {width}x{height} pixels>"

@@ -1,0 +1,400 @@
+"""Scenes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, Unpack
+
+import numpy as np
+
+from . import _arrays, _options, _splatkit
+from ._camera import Camera, Clip
+from ._errors import ArgumentError
+from ._options import Color, FieldLook, FileOptions, PathLike, SurfaceLook, Vector, VolumeLook
+from ._picture import Picture
+
+
+class Scene:
+    """What is drawn together in one picture. Methods that add return the scene.
+
+    >>> Scene().add("skull.nrrd").add("knee.stl", color="ivory").render().save("both.png")
+
+    World coordinates are x, y, z, in any unit. A scene may be drawn by several threads at once.
+    """
+
+    def __init__(self) -> None:
+        self._own = _splatkit.Scene()
+
+    def add(self, source: Any, **options: Unpack[FileOptions]) -> Scene:
+        """Adds a file, a folder of DICOM slices, or an array: of three axes a volume, of (n, 3)
+        points. `docs/python.md` lists the options."""
+        if isinstance(source, (str, os.PathLike)):
+            known = _options.VOLUME | _options.SURFACE | _options.READING
+            given = _options.checked(options, known, "add")
+            path = os.fspath(source)
+            self._own.add_file(path, _options.reading(given), _options.look(given))
+            return self
+        shape = np.shape(source)
+        if len(shape) == 3:
+            return self.add_volume(source, **options)  # type: ignore[misc]
+        if len(shape) == 2 and shape[1] == 3:
+            return self.add_points(source, **options)  # type: ignore[misc]
+        raise ArgumentError(
+            f"an array of the shape {shape} is neither a volume (z, y, x) nor points (n, 3)"
+        )
+
+    def add_volume(
+        self,
+        array: Any,
+        *,
+        spacing: float | Vector = 1.0,
+        origin: Vector = (0.0, 0.0, 0.0),
+        axes: Any = None,
+        missing: float | None = None,
+        modality: str | None = None,
+        value_name: str = "",
+        value_unit: str = "",
+        unit: str = "",
+        up: Vector | None = None,
+        name: str = "volume",
+        **look: Unpack[VolumeLook],
+    ) -> Scene:
+        """Adds the samples of an array, which is indexed [z, y, x] whatever its order in memory.
+
+        Args:
+            array: Booleans or numbers. NaN and infinite samples have no value.
+            spacing: The distances between samples along x, y and z, in world units.
+            origin: The world position x, y, z of the sample array[0, 0, 0].
+            axes: A 3 × 3 matrix whose columns are the directions of x, y and z of the array in
+                the world. They are multiplied by `spacing`.
+            missing: A value that stands for “no value”.
+            modality: ct, mr, emission, ultrasound or microscopy: for the automatic colours.
+            up: The world direction that is up. Default: z.
+        """
+        given = _options.checked(look, _options.VOLUME, "add_volume")
+        samples = _arrays.samples(array)
+        matrix = None
+        if axes is not None:
+            matrix = _arrays.rows(axes, 3, "axes", "f8")
+            if matrix.shape != (3, 3):
+                raise ArgumentError(f"axes is a matrix of 3 × 3, not {matrix.shape}")
+        told = {
+            "name": name,
+            "spacing": _options.vector(spacing),
+            "origin": _options.vector(origin),
+            "axes": matrix,
+            "missing": missing,
+            "modality": modality,
+            "value_name": value_name,
+            "value_unit": value_unit,
+            "unit": unit,
+            "up": _options.direction(up),
+        }
+        self._own.add_volume(samples, _options.text(told), "{}", _options.look(given))
+        return self
+
+    def add_mesh(
+        self,
+        vertices: Any,
+        faces: Any,
+        *,
+        normals: Any = None,
+        colors: Any = None,
+        values: Any = None,
+        up: Vector | None = None,
+        name: str = "mesh",
+        **look: Unpack[SurfaceLook],
+    ) -> Scene:
+        """Adds triangles.
+
+        Args:
+            vertices: Positions x, y, z, (n, 3).
+            faces: Rows of three indices of vertices, counter-clockwise from outside. Rows of more
+                are convex polygons.
+            normals: One normal for each vertex, (n, 3).
+            colors: (n, 3) or (n, 4): bytes, 16-bit integers, or real numbers from 0 to 1.
+            values: One number for each vertex, to colour it by `colormap`; NaN for none.
+            up: The world direction that is up. Default: guessed from the shape.
+        """
+        given = _options.checked(look, _options.SURFACE, "add_mesh")
+        return self._add_mesh(vertices, faces, normals, colors, values, up, name, given)
+
+    def add_points(
+        self,
+        positions: Any,
+        *,
+        colors: Any = None,
+        values: Any = None,
+        normals: Any = None,
+        up: Vector | None = None,
+        name: str = "points",
+        **look: Unpack[SurfaceLook],
+    ) -> Scene:
+        """Adds a point cloud: points of a surface, each drawn as a disc.
+
+        `values` colour the points. Values in space, such as those of particles, are drawn by
+        `add_samples`. The arguments are those of `add_mesh`.
+        """
+        given = _options.checked(look, _options.SURFACE, "add_points")
+        return self._add_mesh(positions, None, normals, colors, values, up, name, given)
+
+    def _add_mesh(
+        self,
+        vertices: Any,
+        faces: Any,
+        normals: Any,
+        colors: Any,
+        values: Any,
+        up: Vector | None,
+        name: str,
+        given: Mapping[str, Any],
+    ) -> Scene:
+        positions = _arrays.positions(vertices, "vertices" if faces is not None else "positions")
+        count = len(positions)
+        arrays = {
+            "positions": positions,
+            "faces": None if faces is None else _arrays.faces(faces, count),
+            "normals": None if normals is None else _arrays.rows(normals, 3, "normals"),
+            "colors": None if colors is None else _arrays.colors(colors, count),
+            "values": None if values is None else _arrays.column(values, "values"),
+        }
+        told = _options.text({"name": name, "up": _options.direction(up)})
+        # Values colour a surface even if it has colours.
+        named = {"scalar": "values"} if values is not None else {}
+        self._own.add_mesh(arrays, told, _options.text(named), _options.look(given))
+        return self
+
+    def add_samples(
+        self,
+        positions: Any,
+        values: Any,
+        *,
+        radii: Any = None,
+        covariances: Any = None,
+        missing: float | None = None,
+        radius: float | None = None,
+        neighbours: int | None = None,
+        slopes: bool | None = None,
+        up: Vector | None = None,
+        name: str = "samples",
+        **look: Unpack[FieldLook],
+    ) -> Scene:
+        """Adds values at any positions, such as those of particles, and draws the field between.
+
+        Args:
+            positions: x, y, z, (n, 3).
+            values: One number for each position. Samples without a finite value are left out.
+            radii: The reach of each sample: two standard deviations of its kernel, such as the
+                smoothing length of SPH. Default: made from the distances of neighbours.
+            covariances: xx, xy, xz, yy, yz, zz of each kernel, (n, 6), instead of radii.
+            radius: One radius for all samples.
+            neighbours: The number of neighbours that kernels are made from, 4 to 64.
+            slopes: Whether samples carry slopes. Default: True.
+        """
+        given = _options.checked(look, _options.FIELD, "add_samples")
+        arrays = {
+            "positions": _arrays.positions(positions, "positions"),
+            "values": _arrays.column(values, "values"),
+            "radii": None if radii is None else _arrays.column(radii, "radii"),
+            "covariances": None,
+        }
+        if covariances is not None:
+            arrays["covariances"] = _arrays.rows(covariances, 6, "covariances")
+        told = {"name": name, "missing": missing, "up": _options.direction(up)}
+        load = {"radius": radius, "neighbours": neighbours, "slopes": slopes}
+        self._own.add_samples(
+            arrays, _options.text(told), _options.text(load), _options.look(given)
+        )
+        return self
+
+    def add_gaussians(
+        self,
+        centers: Any,
+        scales: Any,
+        rotations: Any,
+        opacities: Any,
+        *,
+        colors: Any = None,
+        harmonics: Any = None,
+        up: Vector | None = None,
+        name: str = "gaussians",
+    ) -> Scene:
+        """Adds trained 3D Gaussians.
+
+        Args:
+            centers: Positions x, y, z, (n, 3).
+            scales: Standard deviations along the axes of each Gaussian, (n, 3); not logarithms.
+            rotations: Quaternions w, x, y, z, (n, 4).
+            opacities: 0 to 1, (n,); not logits.
+            colors: Red, green and blue, the same from all sides, (n, 3).
+            harmonics: Coefficients of spherical harmonics, (n, 1, 4, 9 or 16, 3), instead of
+                colours.
+            up: The world direction that is up. Default: −y, as trainers have it.
+        """
+        places = _arrays.positions(centers, "centers")
+        if (colors is None) == (harmonics is None):
+            raise ArgumentError("Gaussians have either colors or harmonics")
+        if harmonics is not None:
+            terms = _arrays.numbers(harmonics, "harmonics")
+            if terms.ndim != 3 or terms.shape[0] != len(places) or terms.shape[2] != 3:
+                raise ArgumentError(f"harmonics has the shape {terms.shape}; (n, terms, 3) is needed")
+        else:
+            # The constant term of the harmonics.
+            own = _arrays.colors(colors, len(places))[:, :3]
+            terms = (own.astype(np.float64) / 255.0 - 0.5) / 0.28209479177387814
+        arrays = {
+            "centers": places,
+            "scales": _arrays.rows(scales, 3, "scales"),
+            "rotations": _arrays.rows(rotations, 4, "rotations"),
+            "opacities": _arrays.column(opacities, "opacities"),
+            "harmonics": np.ascontiguousarray(terms.reshape(-1, 3), dtype=np.float32),
+        }
+        told = {"name": name, "up": _options.direction(up)}
+        self._own.add_gaussians(arrays, _options.text(told))
+        return self
+
+    def camera(
+        self,
+        size: tuple[int, int] = (1280, 720),
+        *,
+        view: str | None = None,
+        azimuth: float | None = None,
+        elevation: float | None = None,
+        zoom: float | None = None,
+        focal_point: Vector | None = None,
+        view_up: Vector | None = None,
+        view_angle: float | None = None,
+        distance: float | None = None,
+        orthographic: bool = False,
+        up: Vector | None = None,
+        clips: Sequence[Clip] = (),
+    ) -> Camera:
+        """Returns the camera that sees the whole scene in a picture of this size.
+
+        By default it looks from the front, 30° to the right and 20° upwards. `view` is front, back,
+        left, right, top, bottom or iso; `azimuth` and `elevation` turn it further.
+        """
+        fit = _fit(**{name: own for name, own in locals().items() if name in _FIT})
+        return Camera.from_json(self._own.camera(fit, _drawn(size, clips)))
+
+    def turntable(
+        self, frames: int, size: tuple[int, int] = (1280, 720), **view: Any
+    ) -> list[Camera]:
+        """Returns the cameras of a film that turns once around the scene, all at one distance.
+
+        The options are those of `camera`.
+        """
+        clips = view.pop("clips", ())
+        given = _options.checked(view, frozenset(_FIT), "turntable")
+        if frames < 1:
+            raise ArgumentError("a turntable has at least one frame")
+        cameras = self._own.turntable(frames, _fit(**given), _drawn(size, clips))
+        return [Camera.from_json(text) for text in cameras]
+
+    def render(
+        self,
+        size: tuple[int, int] = (1280, 720),
+        camera: Camera | None = None,
+        *,
+        background: Color | None = "black",
+        samples: int | str = "auto",
+        mode: str = "sheets",
+        back_to_front: bool = False,
+        classify: str = "pre-integrated",
+        optics: str = "light",
+        shade: bool | None = None,
+        clips: Sequence[Clip] = (),
+        gradient: str = "analytic",
+        evaluate: str = "auto",
+        sheet_thickness: float | None = None,
+        cut: float | None = None,
+        budget: int | None = None,
+        memory: int | None = None,
+        cull_backfaces: bool | None = None,
+        occlusion: bool = True,
+    ) -> Picture:
+        """Draws a picture. The defaults are those of `splatkit render --engine cpu`.
+
+        Ctrl-C stops it. Other threads of Python go on meanwhile.
+
+        Args:
+            size: Width and height in pixels.
+            camera: Default: that of `Scene.camera`. If nothing is seen then, that is a
+                `NothingToDrawError`; with a camera of one's own, the picture is empty.
+            background: A colour; None for transparent pixels.
+            samples: Pixels that are drawn for each pixel and averaged: 1, 4, 9, 16, 64 or auto.
+            mode: sheets, axis-sheets or splats.
+            classify: pre-integrated, post or pre.
+            optics: light, maximum or x-ray.
+            shade: False draws without light, True lights volumes in any case.
+            clips: Shapes that cut the scene.
+            sheet_thickness: The largest thickness of a sheet, in world units.
+            cut: The width of the splats of hierarchies, in pixels.
+            budget: About this many splats of hierarchies, instead of `cut`.
+            memory: Bytes for pages of hierarchies and for bricks.
+        """
+        draw = {
+            "size": size,
+            "samples": None if samples == "auto" else samples,
+            "mode": mode,
+            "back_to_front": back_to_front,
+            "classify": classify,
+            "optics": optics,
+            "shade": shade,
+            "gradient": gradient,
+            "evaluate": evaluate,
+            "sheet_thickness": sheet_thickness,
+            "cut": cut,
+            "budget": budget,
+            "memory": memory,
+            "cull_backfaces": cull_backfaces,
+            "occlusion": occlusion,
+            "clips": [clip._entry() for clip in clips],
+        }
+        back = _options.background(background)
+        own = None if camera is None else camera.to_json()
+        return Picture(self._own.render(own, _options.text(draw)), back)
+
+    @property
+    def bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+        """The smallest and the largest x, y, z of samples and vertices; None for an empty scene."""
+        own = self._own.bounds
+        return None if own is None else (tuple(own[0]), tuple(own[1]))
+
+    @property
+    def contents(self) -> list[tuple[str, str, int]]:
+        """What was added: its kind, its name, and the number of splats or samples."""
+        return self._own.contents
+
+    def __len__(self) -> int:
+        return len(self._own.contents)
+
+    def __repr__(self) -> str:
+        items = ", ".join(f"{kind} {name!r} of {count}" for kind, name, count in self.contents)
+        return f"<splatkit.Scene: {items or 'empty'}>"
+
+
+_FIT = (
+    "view",
+    "azimuth",
+    "elevation",
+    "zoom",
+    "focal_point",
+    "view_up",
+    "view_angle",
+    "distance",
+    "orthographic",
+    "up",
+)
+
+
+def _fit(**given: Any) -> str:
+    for name in ("focal_point", "view_up", "up"):
+        if given.get(name) is not None:
+            given[name] = _options.vector(given[name])
+    return _options.text(given)
+
+
+def _drawn(size: tuple[int, int], clips: Sequence[Clip]) -> str:
+    return _options.text({"size": size, "clips": [clip._entry() for clip in clips]})
