@@ -151,6 +151,11 @@ impl Fit {
         Ok(cameras)
     }
 
+    /// Whether the camera's distance is given, so that it is not fitted to the scene.
+    pub fn is_placed(&self) -> bool {
+        self.distance.is_some()
+    }
+
     fn stance(&self, subject: &Subject) -> Stance {
         let up = self.up.and_then(|up| DVec3::from_array(up).try_normalize());
         match up {

@@ -231,7 +231,7 @@ impl Stage {
     pub fn camera(&self, fit: &Fit, draw: &Draw) -> Result<Camera, Error> {
         let mut kept = self.take(draw.draws_facets())?;
         let settings = draw.settings(&kept.scene, &Stop::default())?;
-        let seen = kept.seen(&settings.clips)?;
+        let seen = kept.fitted(fit, &settings.clips)?;
         let camera = fit.camera(&kept.subject, &seen, settings.size);
         self.put(kept, draw.draws_facets());
         camera
@@ -241,7 +241,7 @@ impl Stage {
     pub fn turntable(&self, fit: &Fit, draw: &Draw, frames: u32) -> Result<Vec<Camera>, Error> {
         let mut kept = self.take(draw.draws_facets())?;
         let settings = draw.settings(&kept.scene, &Stop::default())?;
-        let seen = kept.seen(&settings.clips)?;
+        let seen = kept.fitted(fit, &settings.clips)?;
         let cameras = fit.turntable(&kept.subject, &seen, settings.size, frames);
         self.put(kept, draw.draws_facets());
         cameras
@@ -312,6 +312,11 @@ impl Stage {
 }
 
 impl Kept {
+    /// Returns the points that a camera is fitted to; none if it has a distance already.
+    fn fitted(&mut self, fit: &Fit, clips: &[Clip]) -> Result<Arc<Vec<DVec3>>, Error> {
+        if fit.is_placed() { Ok(Arc::default()) } else { self.seen(clips) }
+    }
+
     /// Returns the points that span what is seen with these clips.
     fn seen(&mut self, clips: &[Clip]) -> Result<Arc<Vec<DVec3>>, Error> {
         if let Some((own, seen)) = &self.seen

@@ -214,7 +214,8 @@ impl GaussianArrays<'_> {
         let scales = rows::<f32, 3>(&self.scales)?.into_iter().map(Vec3::from_array).collect();
         let turn = |[w, x, y, z]: [f32; 4]| Quat::from_xyzw(x, y, z, w);
         let rotations: Vec<Quat> = rows::<f32, 4>(&self.rotations)?.into_iter().map(turn).collect();
-        if let Some(index) = rotations.iter().position(|q| !(q.length_squared() > 0.0)) {
+        let has_length = |turn: &Quat| turn.length_squared() > 0.0;
+        if let Some(index) = rotations.iter().position(|turn| !has_length(turn)) {
             return Err(wrong(format!("the rotation of Gaussian {index} has no length")));
         }
         let rotations = rotations.into_iter().map(Quat::normalize).collect();

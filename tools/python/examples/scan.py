@@ -1,0 +1,39 @@
+"""Converts a scan to a hierarchy with levels of detail, and draws as much as a picture can show.
+
+    python scan.py scan.laz picture.png
+    python scan.py                          # makes up a scan
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import splatkit
+
+
+def write_made_up_scan(path, side=500):
+    """Writes a hilly landscape as an array of points."""
+    random = np.random.default_rng(3)
+    x, y = random.uniform(0, 100, (2, side * side))
+    z = 4 * np.sin(x / 9) * np.cos(y / 13) + 0.5 * np.sin(x * y / 40)
+    np.save(path, np.stack([x, y, z], axis=1))
+
+
+def main(source=None, output="scan.png"):
+    with tempfile.TemporaryDirectory() as folder:
+        if not source:
+            source = Path(folder) / "scan.npy"
+            write_made_up_scan(source)
+        tree = Path(output).with_suffix(".splk")
+        splatkit.convert(source, tree, color="height", up=(0, 0, 1), overwrite=True)
+    hierarchy = splatkit.Hierarchy(tree)
+    print(f"{hierarchy.splats} splats in {hierarchy.nodes} nodes, {tree.stat().st_size} bytes")
+    scene = splatkit.Scene().add(tree)
+    picture = scene.render((800, 600), cut=2)
+    print(picture.save(output), "shows", picture.statistics["splats"], "splats")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,190 @@
+"""Arrays of every type, order and layout; wrong ones are exceptions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import ball, blob, particles
+
+import splatkit
+from splatkit import ArgumentError, Scene, TransferFunction
+
+SIZE = (48, 36)
+TRANSFER = TransferFunction([(0, "navy"), (100, "gold")], [(10, 0), (100, 0.8)], unit=5)
+
+
+def drawn(array, **options):
+    return Scene().add_volume(array, transfer=TRANSFER, **options).render(SIZE).color
+
+
+@pytest.fixture(scope="module")
+def whole():
+    volume = blob((9, 10, 12))
+    return np.round(100 * volume / volume.max())
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("kind", ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8"])
+def test_every_type_gives_the_same_picture(whole, kind, order):
+    array = whole.astype(np.dtype(kind).newbyteorder(order))
+    # Pictures of other types differ in the last digits.
+    assert np.abs(drawn(array) - drawn(whole.astype("f4"))).max() < 1e-4
+
+
+def test_more_types(whole):
+    wanted = drawn(whole.astype("f4"))
+    assert np.array_equal(drawn(whole.astype(np.longdouble)), wanted)
+    assert np.array_equal(drawn(whole.astype("c8") * (0.6 + 0.8j)).round(3), wanted.round(3))
+    assert np.array_equal(drawn(whole.tolist()), wanted)
+    step = TransferFunction([(0, "red")], [(0.5, 0), (1, 0.5)])
+    assert Scene().add_volume(whole > 50, transfer=step).render(SIZE).color.max() > 0
+    large = whole.astype("u8") * 10**12
+    Scene().add_volume(large).render(SIZE)
+
+
+def test_every_layout_gives_the_same_picture(whole):
+    array = whole.astype("u1")
+    wanted = drawn(array)
+    wide = np.zeros(tuple(2 * n for n in array.shape), "u1")
+    wide[::2, ::2, ::2] = array
+    backwards = np.ascontiguousarray(array[::-1, :, ::-1])[::-1, :, ::-1]
+    frozen = array.copy()
+    frozen.flags.writeable = False
+    for same in (np.asfortranarray(array), wide[::2, ::2, ::2], backwards, frozen):
+        assert np.array_equal(drawn(same), wanted)
+    mapped = np.frombuffer(array.tobytes(), "u1").reshape(array.shape)
+    assert np.array_equal(drawn(mapped), wanted)
+    # A changed array does not change a scene.
+    scene = Scene().add_volume(array, transfer=TRANSFER)
+    array[:] = 0
+    assert np.array_equal(scene.render(SIZE).color, wanted)
+
+
+def test_missing_values(whole):
+    holes = whole.astype("f4")
+    holes[2, 3, 4], holes[5, 5, 5], holes[1, 1, 1] = np.nan, np.inf, -np.inf
+    filled = np.where(np.isfinite(holes), holes, holes[np.isfinite(holes)].min())
+    with pytest.warns(splatkit.DataWarning, match="3 of 1080 values missing"):
+        assert np.array_equal(drawn(holes), drawn(filled))
+    masked = np.ma.masked_array(whole.astype("i2"), whole > 90)
+    with pytest.warns(splatkit.DataWarning, match="missing"):
+        drawn(masked)
+    with pytest.warns(splatkit.DataWarning, match="missing"):
+        drawn(whole.astype("i2"), missing=100)
+    with pytest.raises(ArgumentError, match="none of the 1080 values"):
+        drawn(np.full(whole.shape, np.nan))
+    positions, values = particles(100)
+    values[7] = np.nan
+    with pytest.warns(splatkit.DataWarning, match="1 of 100 values missing: left out"):
+        scene = Scene().add_samples(positions, values)
+    assert scene.contents[0][2] == 99
+
+
+@pytest.mark.parametrize(
+    ("array", "message"),
+    [
+        (np.zeros((0, 3, 4)), "three axes"),
+        (np.zeros((3, 4)), "three axes"),
+        (np.zeros((2, 3, 4, 5)), "choose one time or component"),
+        (np.array(5.0), "three axes"),
+        (np.full((2, 2, 2), "x"), "has the type <U1"),
+        (np.full((2, 2, 2), None), "has the type object"),
+        (np.zeros((2, 2, 2), "M8[s]"), "has the type datetime64"),
+        (np.zeros((2, 2, 2), [("a", "f4")]), "has the type"),
+        ([[[1, 2], [3]]], "cannot be made an array"),
+    ],
+)
+def test_wrong_volumes_are_refused(array, message):
+    with pytest.raises(ArgumentError, match=message):
+        Scene().add_volume(array)
+
+
+def test_wrong_options_are_refused(whole):
+    for options, message in [
+        ({"spacing": 0}, "spacing"),
+        ({"spacing": (1, 2)}, "three numbers"),
+        ({"spacing": float("nan")}, "finite"),
+        ({"axes": np.zeros((3, 3))}, "spacing"),
+        ({"axes": np.eye(2)}, "axes"),
+        ({"modality": "photo"}, "modality"),
+        ({"kernel": "box"}, "kernel"),
+        ({"sigma": 2, "kernel": "hann"}, "sigma"),
+        ({"range": (2, 1)}, "range"),
+        ({"colormap": "virids"}, "colour map"),
+        ({"up": (0, 0, 0)}, "up"),
+        ({"isosurfaces": ["x"]}, "isosurface"),
+        ({"opacity_unit": -1}, "opacity_unit"),
+    ]:
+        with pytest.raises(ArgumentError, match=message):
+            Scene().add_volume(whole, **options)
+    with pytest.raises(TypeError, match="did you mean 'colormap'"):
+        Scene().add_volume(whole, colourmap="viridis")
+    scene = Scene().add_volume(whole)
+    for options, message in [
+        ({"size": (0, 5)}, "above 0"),
+        ({"size": (5, -1)}, "size"),
+        ({"size": (10**6, 10**6)}, "larger than"),
+        ({"samples": 5}, "samples"),
+        ({"mode": "rays"}, "mode"),
+        ({"back_to_front": True}, "back_to_front"),
+        ({"background": "blak"}, "no colour"),
+        ({"background": (0, 0, 2)}, "colour"),
+        ({"sheet_thickness": -1}, "sheet"),
+        ({"clips": [splatkit.Clip.box((1, 1, 1), (0, 0, 0))]}, "box"),
+        ({"camera": splatkit.Camera((0, 0, 0), (0, 0, 0))}, "focal point"),
+    ]:
+        with pytest.raises(ArgumentError, match=message):
+            scene.render(**{"size": SIZE, **options})
+    with pytest.raises(splatkit.NothingToDrawError):
+        Scene().render(SIZE)
+    assert Scene().bounds is None and "empty" in repr(Scene())
+
+
+def test_meshes_from_arrays():
+    vertices, faces = ball()
+    wanted = Scene().add_mesh(vertices, faces).render(SIZE).color
+    for kind in ("i4", "i8", "u2", "u4"):
+        assert np.array_equal(Scene().add_mesh(vertices, faces.astype(kind)).render(SIZE).color, wanted)
+    quads = [[0, 1, 2, 3]]
+    square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    halves = Scene().add_mesh(square, [[0, 1, 2], [0, 2, 3]]).render(SIZE).color
+    assert np.array_equal(Scene().add_mesh(square, quads).render(SIZE).color, halves)
+    real = np.clip(0.5 + 0.5 * vertices, 0, 1)
+    pictures = [
+        Scene().add_mesh(vertices, faces, colors=colors).render(SIZE).color
+        for colors in (np.round(255 * real).astype("u1"), np.round(65535 * real).astype("u2"), real)
+    ]
+    assert np.abs(pictures[0] - pictures[1]).max() < 0.01
+    assert np.array_equal(pictures[0], pictures[2])
+    up = (0, 0, 1)
+    by_value = Scene().add_mesh(vertices, faces, values=vertices[:, 2], colormap="turbo", up=up)
+    by_height = Scene().add_mesh(vertices, faces, color="height", colormap="turbo", up=up)
+    assert np.abs(by_value.render(SIZE).color - by_height.render(SIZE).color).max() < 0.02
+    far = Scene().add_mesh(vertices + [4e6, 5e6, 0], faces)
+    assert np.abs(far.render(SIZE).color - wanted).max() < 0.05
+
+
+def test_wrong_meshes_are_refused():
+    vertices, faces = ball()
+    for call, message in [
+        (lambda: Scene().add_mesh(vertices, faces + 10**6), "names the vertices"),
+        (lambda: Scene().add_mesh(vertices, faces - 10), "names the vertices"),
+        (lambda: Scene().add_mesh(vertices, faces.astype(float)), "whole numbers"),
+        (lambda: Scene().add_mesh(vertices[:, :2], faces), r"\(n, 3\)"),
+        (lambda: Scene().add_mesh(np.full((3, 3), np.nan), [[0, 1, 2]]), "not finite"),
+        (lambda: Scene().add_mesh(vertices, faces, colors=faces), "uint8"),
+        (lambda: Scene().add_mesh(vertices, faces, colors=vertices * 300), "between 0 and 1"),
+        (lambda: Scene().add_mesh(vertices, faces, values=[1, 2]), "2 values for"),
+        (lambda: Scene().add_mesh(vertices, faces, normals=vertices[1:]), "normals for"),
+        (lambda: Scene().add_points(np.zeros((0, 3))), "no positions"),
+        (lambda: Scene().add_points(vertices, color="values"), "no values"),
+        (lambda: Scene().add_points(vertices, opacity=0), "opacity"),
+        (lambda: Scene().add_samples(vertices, vertices), r"\(n,\)"),
+        (lambda: Scene().add_samples(vertices, vertices[:5, 0]), "values for"),
+        (lambda: Scene().add_samples(vertices, vertices[:, 0], radii=-np.ones(len(vertices))), "radius"),
+        (lambda: Scene().add_samples(vertices, vertices[:, 0], neighbours=1), "neighbours"),
+        (lambda: Scene().add_gaussians(vertices, vertices, vertices, vertices[:, 0]), "colors"),
+        (lambda: Scene().add(np.zeros((5, 7))), "neither a volume"),
+    ]:
+        with pytest.raises(ArgumentError, match=message):
+            call()

@@ -1,0 +1,187 @@
+"""Threads, signals, memory and processes."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from conftest import ball, blob
+
+import splatkit
+from splatkit import Scene
+
+SIZE = (64, 48)
+
+
+def resident():
+    """Returns the bytes of memory that the process holds."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * 4096
+
+
+def test_threads_draw_at_once():
+    shared = Scene().add_volume(blob()).add_mesh(*ball())
+    cameras = shared.turntable(6, SIZE)
+    wanted = [shared.render(SIZE, camera).rgba for camera in cameras]
+
+    def draw(turn):
+        at = turn % len(cameras)
+        own = Scene().add_volume(blob()).add_mesh(*ball()) if turn % 2 else shared
+        return at, own.render(SIZE, cameras[at]).rgba
+
+    with ThreadPoolExecutor(4) as pool:
+        for at, picture in pool.map(draw, range(24)):
+            assert np.array_equal(picture, wanted[at])
+
+
+def test_other_threads_go_on_meanwhile():
+    scene = Scene().add_volume(blob((40, 40, 40)))
+    count, running = 0, True
+
+    def tick():
+        nonlocal count
+        while running:
+            count += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    try:
+        begun = time.monotonic()
+        scene.render((1200, 900))
+        took = time.monotonic() - begun
+    finally:
+        running = False
+        thread.join()
+    # Half of the ticks that an idle machine would have, in seconds of which it has few.
+    assert count > 50 * took
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_ctrl_c_stops_drawing():
+    script = textwrap.dedent(
+        """
+        import time, numpy as np, splatkit
+        scene = splatkit.Scene().add_volume(np.random.default_rng(0).random((96, 96, 96)))
+        camera = scene.camera((64, 48))
+        print("ready", flush=True)
+        begun = time.monotonic()
+        try:
+            scene.render((12000, 9000), camera)
+        except KeyboardInterrupt:
+            print("stopped", flush=True)
+        scene.render((64, 48), camera)
+        print("again", flush=True)
+        """
+    )
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(1.0)
+    begun = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    assert process.stdout.readline() == "stopped\n"
+    assert time.monotonic() - begun < 3.0
+    assert process.communicate(timeout=60)[0] == "again\n" and process.returncode == 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_an_interrupted_conversion_leaves_no_file(tmp_path):
+    script = textwrap.dedent(
+        f"""
+        import numpy as np, splatkit
+        np.save("cloud.npy", np.random.default_rng(0).random((1_500_000, 3)))
+        print("ready", flush=True)
+        try:
+            splatkit.convert("cloud.npy", "cloud.splk", preset="best")
+        except KeyboardInterrupt:
+            print("stopped", flush=True)
+        """
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, cwd=tmp_path
+    )
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=20)[0] == "stopped\n" and process.returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["cloud.npy"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
+def test_memory_is_steady_over_a_thousand_frames():
+    scene = Scene().add_volume(blob((12, 12, 12)))
+    camera = scene.camera(SIZE)
+
+    def frames(count):
+        for at in range(count):
+            picture = scene.render(SIZE, camera, samples=1)
+            picture.rgba, picture.depth
+            if at % 10 == 0:
+                Scene().add_volume(blob((12, 12, 12))).render(SIZE, samples=1)
+
+    frames(300)
+    before = resident()
+    frames(1000)
+    assert resident() - before < 16 << 20
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
+def test_a_volume_is_copied_once():
+    script = textwrap.dedent(
+        """
+        import resource, numpy as np, splatkit
+        def resident():
+            with open("/proc/self/statm") as file:
+                return int(file.read().split()[1]) * 4096
+        array = np.ones((512, 512, 512), "u1")
+        array[100:150, 100:150, 100:150] = 200
+        splatkit.Scene().add_volume(array[:8, :8, :8] + np.arange(8, dtype="u1"))
+        before = resident()
+        scene = splatkit.Scene().add_volume(array, transfer="generic")
+        held = resident() - before
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - before
+        print(held / array.nbytes, peak / array.nbytes)
+        """
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    held, peak = map(float, done.stdout.split())
+    assert 0.9 < held < 1.2, done.stdout
+    # Making the transfer function takes memory for a while.
+    assert peak < 1.8, done.stdout
+
+
+@pytest.mark.skipif(not hasattr(__import__("os"), "fork"), reason="needs fork")
+def test_a_fork_is_refused_rather_than_hangs():
+    script = textwrap.dedent(
+        """
+        import os, numpy as np, splatkit
+        array = np.random.default_rng(0).random((8, 8, 8))
+        splatkit.render(array, size=(16, 16))
+        child = os.fork()
+        if child == 0:
+            try:
+                splatkit.render(array, size=(16, 16))
+            except splatkit.ArgumentError as error:
+                os._exit(0 if "spawn" in str(error) else 2)
+            os._exit(1)
+        print(os.waitpid(child, 0)[1])
+        """
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout == "0\n"
+
+
+def test_the_module_has_a_version_and_documentation():
+    assert splatkit.__version__.count(".") == 2
+    for name in splatkit.__all__:
+        own = getattr(splatkit, name)
+        assert isinstance(own, tuple) or own.__doc__
