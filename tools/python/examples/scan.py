@@ -1,7 +1,7 @@
 """Converts a scan to a hierarchy with levels of detail, and draws as much as a picture can show.
 
-    python scan.py scan.laz picture.png
-    python scan.py                          # makes up a scan
+python scan.py scan.laz picture.png
+python scan.py                          # makes up a scan
 """
 
 import sys
@@ -31,8 +31,11 @@ def main(source=None, output="scan.png"):
     hierarchy = splatkit.Hierarchy(tree)
     print(f"{hierarchy.splats} splats in {hierarchy.nodes} nodes, {tree.stat().st_size} bytes")
     scene = splatkit.Scene().add(tree)
-    picture = scene.render((800, 600), cut=2)
-    print(picture.save(output), "shows", picture.statistics["splats"], "splats")
+    # The widest splat, in pixels: as many levels are drawn as the picture can show.
+    for cut in (16, 8, 4, 2):
+        picture = scene.render((800, 600), cut=cut)
+        print(f"cut {cut}: {picture.statistics['splats']} splats")
+    print(picture.save(output))
 
 
 if __name__ == "__main__":

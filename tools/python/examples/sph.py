@@ -1,7 +1,7 @@
-"""Draws particles of smoothed particle hydrodynamics: the density between them, in space.
+"""Draws particles of smoothed particle hydrodynamics: the field between them, in space.
 
-    python sph.py particles.npy picture.png     # rows of x, y, z, density, smoothing length
-    python sph.py                               # draws a made-up disc of gas
+python sph.py particles.npy picture.png     # rows of x, y, z, value, smoothing length
+python sph.py                               # draws made-up gas
 """
 
 import sys
@@ -11,33 +11,35 @@ import numpy as np
 import splatkit
 
 
-def made_up_disc(count=20_000):
-    """Returns positions, densities and smoothing lengths of a spiral galaxy."""
+def made_up_gas(count=30_000):
+    """Returns positions, temperatures and smoothing lengths in a cube with hot filaments."""
     random = np.random.default_rng(7)
-    radius = random.exponential(0.35, count)
-    arm = random.integers(0, 2, count) * np.pi
-    angle = arm + 3.0 * np.log1p(4 * radius) + random.normal(0, 0.35, count)
-    height = random.normal(0, 0.03, count)
-    positions = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
-    density = np.exp(-radius / 0.35 - np.abs(height) / 0.05)
-    return positions, density, 0.02 + 0.08 * radius
+    positions = random.uniform(-1, 1, (count, 3))
+    x, y, z = positions.T
+    filament = np.hypot(y - 0.5 * np.sin(3 * x), z - 0.4 * np.cos(2 * x))
+    other = np.hypot(x + 0.3 * np.sin(4 * z), y - 0.3)
+    temperature = np.exp(-((filament / 0.22) ** 2)) + 0.7 * np.exp(-((other / 0.16) ** 2))
+    # The reach of a particle: so many neighbours lie within it.
+    length = np.full(count, 2 * 0.8 * (8 / count) ** (1 / 3))
+    return positions, 1e4 * (0.1 + temperature), length
 
 
 def main(source=None, output="sph.png"):
     if source:
         rows = np.load(source)
-        positions, density, length = rows[:, :3], rows[:, 3], rows[:, 4]
+        positions, value, length = rows[:, :3], rows[:, 3], rows[:, 4]
     else:
-        positions, density, length = made_up_disc()
-    scene = splatkit.Scene().add_samples(
-        positions,
-        np.log10(density),
-        radii=length,
-        colormap="inferno",
+        positions, value, length = made_up_gas()
+    low, middle, high = np.percentile(value, [60, 85, 99.9])
+    size_of_all = np.linalg.norm(np.ptp(positions, axis=0))
+    transfer = splatkit.TransferFunction(
+        colors=[(low, "midnightblue"), (middle, "tomato"), (high, "lightyellow")],
+        opacities=[(low, 0.0), (middle, 0.1), (high, 0.6)],
+        unit=size_of_all / 100,
     )
+    scene = splatkit.Scene().add_samples(positions, value, radii=length, transfer=transfer)
     size = (800, 600)
-    picture = scene.render(size, scene.camera(size, elevation=40), shade=False)
-    print(picture.save(output))
+    print(scene.render(size, scene.camera(size)).save(output))
 
 
 if __name__ == "__main__":

@@ -33,7 +33,8 @@ def ball(rows=12, columns=24):
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     # The triangles at the poles have no area.
     corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    a, b, c = corners.transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return vertices, faces[area > 1e-9]
 
 
@@ -71,12 +72,23 @@ def write_cells(path):
     axis = np.linspace(-1, 1, n)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
     at = np.arange(n**3).reshape(n, n, n)
-    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    corners = [
+        (0, 0, 0),
+        (1, 0, 0),
+        (1, 1, 0),
+        (0, 1, 0),
+        (0, 0, 1),
+        (1, 0, 1),
+        (1, 1, 1),
+        (0, 1, 1),
+    ]
     cells = [[at[i + a, j + b, k + c] for a, b, c in corners] for i, j, k in np.ndindex(3, 3, 3)]
     values = np.exp(-2 * np.sum(points**2, axis=1)) + 0.2 * points[:, 0]
     lines = ["# vtk DataFile Version 3.0", "cells", "ASCII", "DATASET UNSTRUCTURED_GRID"]
-    lines += [f"POINTS {len(points)} double", *(" ".join(map(repr, row)) for row in points.tolist())]
-    lines += [f"CELLS {len(cells)} {9 * len(cells)}", *("8 " + " ".join(map(str, own)) for own in cells)]
+    lines += [f"POINTS {len(points)} double"]
+    lines += [" ".join(map(repr, row)) for row in points.tolist()]
+    lines += [f"CELLS {len(cells)} {9 * len(cells)}"]
+    lines += ["8 " + " ".join(map(str, own)) for own in cells]
     lines += [f"CELL_TYPES {len(cells)}", *(["12"] * len(cells))]
     lines += [f"POINT_DATA {len(points)}", "SCALARS heat double 1", "LOOKUP_TABLE default"]
     lines += [repr(value) for value in values.tolist()]

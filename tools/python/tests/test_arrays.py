@@ -144,7 +144,8 @@ def test_meshes_from_arrays():
     vertices, faces = ball()
     wanted = Scene().add_mesh(vertices, faces).render(SIZE).color
     for kind in ("i4", "i8", "u2", "u4"):
-        assert np.array_equal(Scene().add_mesh(vertices, faces.astype(kind)).render(SIZE).color, wanted)
+        scene = Scene().add_mesh(vertices, faces.astype(kind))
+        assert np.array_equal(scene.render(SIZE).color, wanted)
     quads = [[0, 1, 2, 3]]
     square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     halves = Scene().add_mesh(square, [[0, 1, 2], [0, 2, 3]]).render(SIZE).color
@@ -166,6 +167,7 @@ def test_meshes_from_arrays():
 
 def test_wrong_meshes_are_refused():
     vertices, faces = ball()
+    heights = vertices[:, 2]
     for call, message in [
         (lambda: Scene().add_mesh(vertices, faces + 10**6), "names the vertices"),
         (lambda: Scene().add_mesh(vertices, faces - 10), "names the vertices"),
@@ -181,8 +183,8 @@ def test_wrong_meshes_are_refused():
         (lambda: Scene().add_points(vertices, opacity=0), "opacity"),
         (lambda: Scene().add_samples(vertices, vertices), r"\(n,\)"),
         (lambda: Scene().add_samples(vertices, vertices[:5, 0]), "values for"),
-        (lambda: Scene().add_samples(vertices, vertices[:, 0], radii=-np.ones(len(vertices))), "radius"),
-        (lambda: Scene().add_samples(vertices, vertices[:, 0], neighbours=1), "neighbours"),
+        (lambda: Scene().add_samples(vertices, heights, radii=0 * heights - 1), "radius"),
+        (lambda: Scene().add_samples(vertices, heights, neighbours=1), "neighbours"),
         (lambda: Scene().add_gaussians(vertices, vertices, vertices, vertices[:, 0]), "colors"),
         (lambda: Scene().add(np.zeros((5, 7))), "neither a volume"),
     ]:

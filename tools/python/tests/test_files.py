@@ -10,8 +10,17 @@ import pytest
 
 import splatkit
 
-NAMES = ["volume.npy", "bytes.npy", "mesh.ply", "cloud.ply", "samples.npy", "cells.vtk", "tree.splk",
-         "bricks.splv", "trained.spz"]
+NAMES = [
+    "volume.npy",
+    "bytes.npy",
+    "mesh.ply",
+    "cloud.ply",
+    "samples.npy",
+    "cells.vtk",
+    "tree.splk",
+    "bricks.splv",
+    "trained.spz",
+]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -26,8 +35,12 @@ def test_facts_and_findings_are_those_of_the_command(command, data, name):
 
 CONVERSIONS = [
     ("colors.ply", "splk", [], {}),
-    ("mesh.ply", "splk", ["--color", "height", "--preset", "fast", "--unit", "m"],
-     {"color": "height", "preset": "fast", "unit": "m"}),
+    (
+        "mesh.ply",
+        "splk",
+        ["--color", "height", "--preset", "fast", "--unit", "m"],
+        {"color": "height", "preset": "fast", "unit": "m"},
+    ),
     ("cloud.ply", "splk", ["--lossless", "--up", "z"], {"lossless": True, "up": (0, 0, 1)}),
     ("tree.splk", "ply", [], {}),
     ("trained.spz", "splk", [], {}),
@@ -63,7 +76,8 @@ def test_scans_larger_than_memory_are_converted_in_regions(data, tmp_path):
 
 def test_hierarchies_are_open_books(data):
     hierarchy = splatkit.Hierarchy(data / "tree.splk")
-    assert len(hierarchy) == hierarchy.splats > 0 and hierarchy.has_color and hierarchy.degree is None
+    assert len(hierarchy) == hierarchy.splats > 0 and hierarchy.has_color
+    assert hierarchy.degree is None and hierarchy.source == "colors.ply"
     leaves = hierarchy.leaves()
     assert leaves.positions.shape == (hierarchy.splats, 3) and leaves.colors.shape[1] == 4
     low, high = np.array(hierarchy.bounds)

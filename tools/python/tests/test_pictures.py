@@ -55,22 +55,39 @@ CASES = [
     ("bytes.npy", ["--optics", "maximum"], {"optics": "maximum"}),
     ("bytes.npy", ["--transfer", "generic"], {"transfer": "generic"}),
     ("bytes.npy", ["--kernel", "catmull-rom"], {"kernel": "catmull-rom"}),
-    ("bytes.npy", ["--sharp", "--kernel", "cubic-b-spline"],
-     {"sharp": True, "kernel": "cubic-b-spline"}),
-    ("bytes.npy", ["--colormap", "plasma", "--range", "50,200"],
-     {"colormap": "plasma", "range": (50, 200)}),
-    ("bytes.npy", ["--iso", "100,180:#ff8800:0.5"],
-     {"isosurfaces": [100, (180, "#ff8800", 0.5)]}),
-    ("bytes.npy", ["--spacing", "1,2,3", "--background", "none"],
-     {"spacing": (1, 2, 3), "background": None}),
+    (
+        "bytes.npy",
+        ["--sharp", "--kernel", "cubic-b-spline"],
+        {"sharp": True, "kernel": "cubic-b-spline"},
+    ),
+    (
+        "bytes.npy",
+        ["--colormap", "plasma", "--range", "50,200"],
+        {"colormap": "plasma", "range": (50, 200)},
+    ),
+    ("bytes.npy", ["--iso", "100,180:#ff8800:0.5"], {"isosurfaces": [100, (180, "#ff8800", 0.5)]}),
+    (
+        "bytes.npy",
+        ["--spacing", "1,2,3", "--background", "none"],
+        {"spacing": (1, 2, 3), "background": None},
+    ),
     ("bytes.npy", ["--clip", "plane:1,0,0,12"], {"clips": [Clip.plane((1, 0, 0), 12)]}),
-    ("bytes.npy", ["--cut-out", "box:0,0,0:10,10,30"],
-     {"clips": [Clip.box((0, 0, 0), (10, 10, 30), inside=False)]}),
-    ("bytes.npy", ["--samples", "4", "--classify", "post", "--no-shade"],
-     {"samples": 4, "classify": "post", "shade": False}),
+    (
+        "bytes.npy",
+        ["--cut-out", "box:0,0,0:10,10,30"],
+        {"clips": [Clip.box((0, 0, 0), (10, 10, 30), inside=False)]},
+    ),
+    (
+        "bytes.npy",
+        ["--samples", "4", "--classify", "post", "--no-shade"],
+        {"samples": 4, "classify": "post", "shade": False},
+    ),
     ("mesh.ply", [], {}),
-    ("mesh.ply", ["--color", "height", "--colormap", "turbo"],
-     {"color": "height", "colormap": "turbo"}),
+    (
+        "mesh.ply",
+        ["--color", "height", "--colormap", "turbo"],
+        {"color": "height", "colormap": "turbo"},
+    ),
     ("mesh.ply", ["--color", "normal", "--crease", "0"], {"color": "normal", "crease": 0}),
     ("mesh.ply", ["--color", "orange", "--opacity", "0.5"], {"color": "orange", "opacity": 0.5}),
     ("mesh.ply", ["--mode", "splats"], {"mode": "splats"}),
@@ -104,13 +121,26 @@ def test_cameras_are_those_of_the_command(command, data, tmp_path):
         (["--view", "iso", "--zoom", "1.5"], {"view": "iso", "zoom": 1.5}),
         (["--azimuth", "70", "--up", "0,1,0"], {"azimuth": 70, "up": (0, 1, 0)}),
         (["--orthographic", "--view", "left"], {"orthographic": True, "view": "left"}),
-        (["--focal-point", "1,2,3", "--view-angle", "50"],
-         {"focal_point": (1, 2, 3), "view_angle": 50}),
+        (
+            ["--focal-point", "1,2,3", "--view-angle", "50"],
+            {"focal_point": (1, 2, 3), "view_angle": 50},
+        ),
         (["--distance", "90"], {"distance": 90}),
     ]:
         out = tmp_path / "camera.png"
-        told = command("render", *files, "--engine", "cpu", "--size", "640x480", *flags, "--json",
-                       "--overwrite", "-o", out)
+        told = command(
+            "render",
+            *files,
+            "--engine",
+            "cpu",
+            "--size",
+            "640x480",
+            *flags,
+            "--json",
+            "--overwrite",
+            "-o",
+            out,
+        )
         camera = scene.camera((640, 480), **options)
         assert json.loads(camera.to_json()) == json.loads(told)["camera"]
         assert np.array_equal(read_png(out), scene.render((640, 480), camera).rgba)
@@ -181,7 +211,10 @@ def test_particles_with_radii_and_gaussians():
     count = len(positions)
     turns = np.tile([2.0, 0, 0, 0], (count, 1))
     scene = Scene().add_gaussians(
-        positions, np.full((count, 3), 0.05), turns, np.full(count, 0.9),
+        positions,
+        np.full((count, 3), 0.05),
+        turns,
+        np.full(count, 0.9),
         colors=np.tile([0.0, 1.0, 0.0], (count, 1)),
     )
     red, green, _, opacity = scene.render(SIZE, background=None).color.reshape(-1, 4).T

@@ -124,7 +124,8 @@ def faces(value: Any, count: int) -> npt.NDArray[Any]:
     if array.size and (array.min() < 0 or array.max() >= count):
         bad = int(np.argmax((array < 0).any(axis=1) | (array >= count).any(axis=1)))
         raise ArgumentError(
-            f"face {bad} names the vertices {array[bad].tolist()}, but they go from 0 to {count - 1}"
+            f"face {bad} names the vertices {array[bad].tolist()}, but they go from 0 to "
+            f"{count - 1}"
         )
     width = array.shape[1]
     if width > 3:

@@ -37,9 +37,7 @@ class Camera:
     def from_json(cls, text: str) -> Camera:
         """Reads the JSON form, which the command prints with `--json` and takes as `--camera`."""
         parts = json.loads(text)
-        vectors = {
-            name: tuple(parts[name]) for name in ("position", "focal_point", "view_up")
-        }
+        vectors = {name: tuple(parts[name]) for name in ("position", "focal_point", "view_up")}
         return cls(**vectors, view_angle=parts.get("view_angle"), height=parts.get("height"))
 
     def to_json(self) -> str:

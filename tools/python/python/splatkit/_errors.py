@@ -24,9 +24,7 @@ class NothingToDrawError(Error):
 class InputError(Error):
     """A file that does not follow its format."""
 
-    def __init__(
-        self, file: str | Path, place: str, message: str, hint: str | None = None
-    ) -> None:
+    def __init__(self, file: str | Path, place: str, message: str, hint: str | None = None) -> None:
         super().__init__(file, place, message, hint)
         #: The file.
         self.file = Path(file)
@@ -59,8 +57,8 @@ class LimitError(Error):
         self.limit = limit
 
     def __str__(self) -> str:
-        raise_it = f"limits={{'{self.kind}': …}} raises it"
-        return f"{self.file}: {self.what} is {self.found}, over the limit of {self.limit} ({raise_it})"
+        found = f"{self.what} is {self.found}, over the limit of {self.limit}"
+        return f"{self.file}: {found} (limits={{'{self.kind}': …}} raises it)"
 
 
 class FileError(Error, OSError):

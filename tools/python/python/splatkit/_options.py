@@ -17,7 +17,7 @@ from ._transfer import TransferFunction
 #: A path of a file or folder.
 PathLike = Union[str, "os.PathLike[str]"]
 #: A colour: a name or '#rrggbb', or red, green and blue from 0 to 1.
-Color = Union[str, Sequence[float]]
+Color = str | Sequence[float]
 #: Three numbers: x, y, z.
 Vector = Sequence[float]
 
@@ -157,7 +157,8 @@ def color(value: Color) -> list[float]:
         return list(_splatkit.color(value))
     parts = [float(part) for part in value]
     if len(parts) != 3 or not all(0.0 <= part <= 1.0 for part in parts):
-        raise ArgumentError(f"a colour is a name, '#rrggbb' or three numbers from 0 to 1, not {value}")
+        form = "a colour is a name, '#rrggbb' or three numbers from 0 to 1"
+        raise ArgumentError(f"{form}, not {value}")
     return parts
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from . import _arrays, _options, _splatkit
 from ._camera import Camera, Clip
 from ._errors import ArgumentError
-from ._options import Color, FieldLook, FileOptions, PathLike, SurfaceLook, Vector, VolumeLook
+from ._options import Color, FieldLook, FileOptions, SurfaceLook, Vector, VolumeLook
 from ._picture import Picture
 
 
@@ -238,7 +238,8 @@ class Scene:
         if harmonics is not None:
             terms = _arrays.numbers(harmonics, "harmonics")
             if terms.ndim != 3 or terms.shape[0] != len(places) or terms.shape[2] != 3:
-                raise ArgumentError(f"harmonics has the shape {terms.shape}; (n, terms, 3) is needed")
+                form = "(n, terms, 3) is needed"
+                raise ArgumentError(f"harmonics has the shape {terms.shape}; {form}")
         else:
             # The constant term of the harmonics.
             own = _arrays.colors(colors, len(places))[:, :3]
@@ -329,10 +330,7 @@ class Scene:
             optics: light, maximum or x-ray.
             shade: False draws without light, True lights volumes in any case.
             clips: Shapes that cut the scene.
-            sheet_thickness: The largest thickness of a sheet, in world units.
-            cut: The width of the splats of hierarchies, in pixels.
-            budget: About this many splats of hierarchies, instead of `cut`.
-            memory: Bytes for pages of hierarchies and for bricks.
+            cut, budget: The width of splats of hierarchies, in pixels, or about how many.
         """
         draw = {
             "size": size,

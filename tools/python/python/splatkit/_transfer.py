@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Union
+from typing import Any
 
 from . import _splatkit
 
@@ -64,7 +64,7 @@ class TransferFunction:
         )
 
     @classmethod
-    def read(cls, path: Union[str, os.PathLike[str]]) -> TransferFunction:
+    def read(cls, path: str | os.PathLike[str]) -> TransferFunction:
         """Reads a JSON file."""
         return cls.from_json(_splatkit.read_transfer(os.fspath(path)))
 
