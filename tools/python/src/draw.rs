@@ -208,10 +208,15 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Stage {
-    /// Adds an input.
-    pub fn add(&self, added: Added) -> Result<(), Error> {
+    /// Adds an input, unless the caller has stopped waiting for it.
+    pub fn add(&self, added: Added, stop: &Stop) -> Result<(), Error> {
         let mut items = locked(&self.items);
+        let (count, subject) = (items.contents.len(), items.subject.clone());
         items.add(added)?;
+        if stop.is_requested() {
+            items.restore(count, subject);
+            return Err(Error::Stopped);
+        }
         *locked(&self.kept) = [None, None];
         Ok(())
     }

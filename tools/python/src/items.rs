@@ -84,6 +84,13 @@ impl Items {
         }
     }
 
+    /// Removes the inputs after the first `count`, with which the scene stood like this.
+    pub fn restore(&mut self, count: usize, subject: Subject) {
+        self.entries.truncate(count);
+        self.contents.truncate(count);
+        self.subject = subject;
+    }
+
     fn push(
         &mut self,
         kind: &'static str,

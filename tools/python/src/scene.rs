@@ -247,7 +247,9 @@ impl Scene {
         let (stage, (load, look)) = (self.0.clone(), more);
         warn_of_holes(&told.name, &input);
         let added = Added { name: told.name, input, load, look, deadline: Deadline::NEVER };
-        run(py, &Stop::default(), move || stage.add(added))
+        let stop = Stop::default();
+        let own = stop.clone();
+        run(py, &stop, move || stage.add(added, &own))
     }
 }
 
@@ -269,14 +271,15 @@ impl Scene {
     fn add_file(&self, py: Python<'_>, path: PathBuf, load: &str, look: &str) -> PyResult<()> {
         let own = told("{}", load, look).map_err(|error| raise(py, &error))?;
         let (_, (load, look)) = own;
-        let stage = self.0.clone();
-        run(py, &Stop::default(), move || {
+        let (stage, stop) = (self.0.clone(), Stop::default());
+        let own = stop.clone();
+        run(py, &stop, move || {
             // One deadline covers reading the input and making its splats.
             let deadline = load.limits().deadline();
             let attribute = look.attribute();
             let input = load.open(&path, attribute.as_deref(), &mut Vec::new())?;
             let name = path.display().to_string();
-            stage.add(Added { name, input, load, look, deadline })
+            stage.add(Added { name, input, load, look, deadline }, &own)
         })
     }
 

@@ -77,6 +77,10 @@ def test_ctrl_c_stops_drawing():
             scene.render((12000, 9000), camera)
         except KeyboardInterrupt:
             print("stopped", flush=True)
+        # Nothing goes on behind.
+        spent = time.process_time()
+        time.sleep(1.0)
+        assert time.process_time() - spent < 0.5
         scene.render((64, 48), camera)
         print("again", flush=True)
         """
@@ -89,6 +93,28 @@ def test_ctrl_c_stops_drawing():
     assert process.stdout.readline() == "stopped\n"
     assert time.monotonic() - begun < 3.0
     assert process.communicate(timeout=60)[0] == "again\n" and process.returncode == 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_an_interrupted_input_is_not_added():
+    script = textwrap.dedent(
+        """
+        import time, numpy as np, splatkit
+        positions = np.random.default_rng(0).random((3_000_000, 3))
+        scene = splatkit.Scene()
+        print("ready", flush=True)
+        try:
+            scene.add_samples(positions, positions[:, 0])
+        except KeyboardInterrupt:
+            print("stopped", flush=True)
+        print(len(scene), scene.bounds, flush=True)
+        """
+    )
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(0.7)
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=120)[0] == "stopped\n0 None\n"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
