@@ -60,13 +60,13 @@ mod tests {
         assert_eq!(
             named("PLY"),
             "PLY  .ply\n   mesh (with faces), point cloud (without faces), scattered samples \
-             (without faces, if a scalar is named)\n   binary files are read in pieces, written \
-             as .ply"
+             (without faces, if a scalar is named), trained Gaussians (as trainers write them, \
+             also compressed)\n   binary files are read in pieces, written as .ply"
         );
         assert_eq!(
             named("glTF"),
-            "glTF  .gltf .glb\n   mesh (with faces), point cloud (without faces)\n   read as a \
-             whole, not written"
+            "glTF  .gltf .glb\n   mesh (with faces), point cloud (without faces), trained \
+             Gaussians (with KHR_gaussian_splatting)\n   read as a whole, written as .glb"
         );
         assert!(named("raw").starts_with("raw  any extension\n   volume (if its layout is given)"));
     }
