@@ -1,6 +1,7 @@
 //! What a file says about its values and about the thing they were measured from.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// What a file says about a volume or samples beyond their values. It changes only defaults: the
 /// first transfer function, the first camera, and the texts around a picture.
@@ -24,7 +25,7 @@ pub struct About {
 }
 
 /// How a subject stands in the world. Both directions have unit length and are perpendicular.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stance {
     /// The direction that is up.
     pub up: DVec3,

@@ -106,6 +106,11 @@ pub const STEP_BACK: f64 = 2.4;
 /// the variances in the picture (Kerbl et al. 2023).
 pub const TRAINED_BLUR: f64 = 0.547_722_557_505_166_1;
 
+/// The widening of a trained Gaussian along the view's axis, as a share of the widening across it.
+/// The trainer widens across the axis only, and widening along it as well is visible away from the
+/// picture's centre. Without any, a flat Gaussian may have no volume.
+pub const TRAINED_BLUR_ALONG: f64 = 0.1;
+
 /// A trained Gaussian covers at most the second of these shares of a pixel. Where it covers less
 /// than the first, it is not drawn (Kerbl et al. 2023).
 pub const TRAINED_OPACITIES: [f64; 2] = [1.0 / 255.0, 0.99];

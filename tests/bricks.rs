@@ -6,7 +6,7 @@ mod testing;
 use glam::DVec3;
 use splatkit::{
     FrameStats,
-    bricks::{self, Bricks, WriteOptions},
+    bricks::{self, Bricks, Wish, WriteOptions},
     cpu::CpuRenderer,
     gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::Detail,
@@ -218,8 +218,10 @@ fn a_zoom_shows_no_pop() {
     for (name, camera) in &cameras(&scene) {
         // λ is 1 if steps may cover twice the pixels that they cover at the finest level.
         let view = camera.view([96, 96]).expect("a view");
-        let lambda =
-            |pixels| bricks::choice(&bricks, &view, 2.0, pixels, &EVERYTHING, usize::MAX).lambda;
+        let lambda = |pixels| {
+            let wish = Wish { pixels, most: usize::MAX, least: 0.0, region: None };
+            bricks::choice(&bricks, &view, 2.0, &EVERYTHING, &wish).lambda
+        };
         let some = (0..)
             .map(|power| 2f64.powi(power))
             .find(|pixels| lambda(*pixels) > 0.0)

@@ -10,14 +10,14 @@ mod scenes;
 mod testing;
 
 use glam::DVec3;
-use scenes::{Case, methods};
+use scenes::{Case, fields, methods};
 use splatkit::{
     gpu::{AdapterChoice, Budget, Gpu, Renderer},
     math::{Kernel, Tensor},
     picture::Picture,
     reference,
     scene::{Classification, Evaluate, Item, Mode, Optics, Order, Scene, Settings},
-    volume::{Lattice, Samples, Volume},
+    volume::{Lattice, Samples, TransferFunction, Volume},
 };
 use testing::psnr::psnr;
 
@@ -29,7 +29,7 @@ fn drawn(case: &Case, budget: Budget) -> Picture {
 fn drawn_by(evaluate: Evaluate, case: &Case, budget: Budget) -> splatkit::Result<Picture> {
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
     let mut renderer = Renderer::with_budget(&gpu, budget);
-    let mut prepared = renderer.prepare(&case.scene).expect(case.name);
+    let mut prepared = renderer.prepare(&case.scene)?;
     let settings = Settings { evaluate, ..case.settings.clone() };
     Ok(renderer.render(&mut prepared, &case.camera, &settings)?.0)
 }
@@ -154,6 +154,7 @@ fn what_is_gathered_and_what_is_not() {
         (methods::pre_classified(), "classified before"),
         (methods::axis_sheets(), "classified before"),
         (methods::sharp(), "sharp volumes"),
+        (fields::two_volumes(), "several fields"),
         (thick(4.0), "sheets thicker"),
     ] {
         let error =
@@ -286,6 +287,28 @@ fn gaussians() {
     for case in scenes::gaussians::all() {
         assert_matches(case, 50.0);
     }
+}
+
+/// Pages that a view does not need keep the colours for an earlier eye until a view needs them.
+#[test]
+fn pages_of_gaussians_follow_the_eye() {
+    let levels = |case: &Case| case.name == "levels_of_gaussians";
+    let Case { scene, camera, settings, .. } =
+        scenes::gaussians::all().into_iter().find(levels).expect("the case");
+    let mut moved = camera.clone();
+    moved.position = camera.focal_point + DVec3::X * camera.position.distance(camera.focal_point);
+    let mut away = moved.clone();
+    away.focal_point = 2.0 * moved.position - camera.focal_point;
+    let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
+    let mut renderer = Renderer::with_budget(&gpu, Budget::default());
+    let mut prepared = renderer.prepare(&scene).expect("prepared");
+    let mut draw = |camera| renderer.render(&mut prepared, camera, &settings).expect("a picture").0;
+    draw(&camera);
+    draw(&away);
+    let found = draw(&moved);
+    let expected = reference::render(&scene, &moved, &settings).expect("a picture");
+    let agreement = psnr(&found, &expected);
+    assert!(agreement > 50.0, "{agreement:.1} dB");
 }
 
 #[test]
@@ -594,6 +617,7 @@ fn small_budgets_draw_the_same_picture() {
         (by(Evaluate::Scatter, scenes::blobs_analytic()), 20_000, 16_000),
         (by(Evaluate::Scatter, scenes::surface_in_a_volume()), 20_000, 16_000),
         (by(Evaluate::Gather, scenes::surface_in_a_volume()), 700, 700),
+        (fields::two_volumes(), 20_000, 16_000),
     ];
     for (case, few_entries, few_words) in cases {
         let whole = drawn(&case, Budget::default());
@@ -639,6 +663,8 @@ fn the_gpus_way_is_the_same() {
         methods::maximum(),
         methods::clipped_surface_in_a_volume(),
         by(Evaluate::Scatter, methods::sharp_body_centred()),
+        by(Evaluate::Scatter, fields::two_volumes()),
+        by(Evaluate::Scatter, fields::four_without_cells()),
     ];
     let own = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
     let info = wgpu::AdapterInfo {
@@ -646,8 +672,12 @@ fn the_gpus_way_is_the_same() {
         ..wgpu::AdapterInfo::clone(&own.info)
     };
     let gpu = Gpu::from_wgpu(own.device.clone(), own.queue, info);
-    let mut renderer = Renderer::new(&gpu);
+    // Entries of several fields take more iterations than the driver allows a tile
+    // (docs/engine.md). So their tiles stop, as on the software driver.
+    let stopping = Budget { tile_entries: Some(10_000), ..Budget::default() };
     for case in cases {
+        let budget = if case.scene.fields().len() > 1 { stopping } else { Budget::default() };
+        let mut renderer = Renderer::with_budget(&gpu, budget);
         let mut prepared = renderer.prepare(&case.scene).expect(case.name);
         let mut draw =
             || renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name).0;
@@ -671,6 +701,7 @@ fn tiles_that_stop_go_on() {
         scenes::surface_in_a_volume(),
         by(Evaluate::Scatter, scenes::surface_in_a_volume()),
         scenes::huge_among_small(),
+        fields::two_volumes(),
         methods::single_splats(Order::FrontToBack),
         methods::single_splats(Order::BackToFront),
     ];
@@ -679,6 +710,65 @@ fn tiles_that_stop_go_on() {
         let agreement = psnr(&drawn(&case, budget), &drawn(&case, Budget::default()));
         println!("{} in stops: {agreement:.1} dB", case.name);
         assert!(agreement > 80.0, "{}: {agreement:.1} dB", case.name);
+    }
+}
+
+/// Scenes of several fields, except those with something that the engine refuses.
+#[test]
+fn several_fields() {
+    let (drawn, refused): (Vec<Case>, Vec<Case>) =
+        fields::all().into_iter().partition(|case| case.scene.beyond_gpu().is_none());
+    assert!(drawn.len() > 12, "{} scenes", drawn.len());
+    for case in refused {
+        let what = case.scene.beyond_gpu().expect(case.name);
+        let error = drawn_by(Evaluate::Auto, &case, Budget::default()).expect_err(case.name);
+        assert!(error.to_string().contains(&what), "{}: {error}", case.name);
+    }
+    for case in drawn {
+        assert_matches(case, 50.0);
+    }
+}
+
+/// Each field is drawn with its own transfer function: with exchanged ones, or without one of the
+/// fields, the reference draws another picture.
+#[test]
+fn fields_are_not_exchanged() {
+    let case = by(Evaluate::Scatter, fields::two_volumes());
+    let found = drawn(&case, Budget::default());
+    let truth = |items: Vec<Item>| {
+        reference::render(&Scene { items }, &case.camera, &case.settings).expect(case.name)
+    };
+    let items = &case.scene.items;
+    let [Item::Volume(a, kernel_a, shown_a), Item::Volume(b, kernel_b, shown_b)] = &items[..]
+    else {
+        panic!("{} has two volumes", case.name)
+    };
+    // Both functions over the values 0 … 1.
+    let per_byte =
+        |points: &[(f64, f64)], by: f64| points.iter().map(|(v, o)| (v * by, *o)).collect();
+    let to_a = TransferFunction {
+        opacity: per_byte(&shown_b.opacity, 255.0),
+        color: shown_b.color.iter().map(|(v, c)| (v * 255.0, *c)).collect(),
+        ..shown_b.clone()
+    };
+    let to_b = TransferFunction {
+        opacity: per_byte(&shown_a.opacity, 1.0 / 255.0),
+        color: shown_a.color.iter().map(|(v, c)| (v / 255.0, *c)).collect(),
+        ..shown_a.clone()
+    };
+    let exchanged = vec![
+        Item::Volume(a.clone(), kernel_a.clone(), to_a),
+        Item::Volume(b.clone(), kernel_b.clone(), to_b),
+    ];
+    assert!(psnr(&found, &truth(items.clone())) > 50.0);
+    for (what, items) in [
+        ("exchanged", exchanged),
+        ("the first alone", vec![items[0].clone()]),
+        ("the second alone", vec![items[1].clone()]),
+    ] {
+        let agreement = psnr(&found, &truth(items));
+        println!("{what}: {agreement:.1} dB");
+        assert!(agreement < 35.0, "{what}: {agreement:.1} dB");
     }
 }
 

@@ -9,7 +9,7 @@ use splatkit::{
     formats,
     hierarchy::{
         self, BuildOptions, Hierarchy,
-        external::{Converted, ExternalOptions, convert},
+        external::{Converted, ExternalOptions, Plan, convert},
         file::{WriteOptions, check},
     },
     input::Limits,
@@ -28,6 +28,7 @@ fn options() -> ExternalOptions {
         surfels: SurfelOptions::default(),
         paint: None,
         scalar: None,
+        parts: None,
     }
 }
 
@@ -379,9 +380,8 @@ fn what_is_damaged_leaves_nothing() {
     }
 }
 
-#[test]
-fn points_of_surveys_keep_their_millimetres_and_colours() {
-    let folder = Folder::new();
+/// A LAS file of 3000 points, one of which is withheld.
+fn las(colored: bool) -> Vec<u8> {
     let count = 3000u32;
     let record = |i: u32| {
         let mut record = vec![0; 26];
@@ -390,27 +390,32 @@ fn points_of_surveys_keep_their_millimetres_and_colours() {
             record[4 * axis..4 * axis + 4].copy_from_slice(&value.to_le_bytes());
         }
         record[12..14].copy_from_slice(&(i as u16).to_le_bytes());
-        // One point is withheld.
         record[15] = if i == 1234 { 0x80 } else { 0 };
         record[20..22].copy_from_slice(&((i * 20) as u16).to_le_bytes());
         record
     };
+    let mut las = vec![0; 227];
+    las[..4].copy_from_slice(b"LASF");
+    las[24..26].copy_from_slice(&[1, 2]);
+    las[94..96].copy_from_slice(&227u16.to_le_bytes());
+    las[96..100].copy_from_slice(&227u32.to_le_bytes());
+    las[104] = if colored { 2 } else { 0 };
+    las[105..107].copy_from_slice(&26u16.to_le_bytes());
+    las[107..111].copy_from_slice(&count.to_le_bytes());
+    for (at, value) in
+        [(131, 0.001), (139, 0.001), (147, 0.001), (155, 4.5e6), (163, 5.3e6), (171, 400.0)]
+    {
+        las[at..at + 8].copy_from_slice(&f64::to_le_bytes(value));
+    }
+    las.extend((0..count).flat_map(record));
+    las
+}
+
+#[test]
+fn points_of_surveys_keep_their_millimetres_and_colours() {
+    let folder = Folder::new();
     for colored in [true, false] {
-        let mut las = vec![0; 227];
-        las[..4].copy_from_slice(b"LASF");
-        las[24..26].copy_from_slice(&[1, 2]);
-        las[94..96].copy_from_slice(&227u16.to_le_bytes());
-        las[96..100].copy_from_slice(&227u32.to_le_bytes());
-        las[104] = if colored { 2 } else { 0 };
-        las[105..107].copy_from_slice(&26u16.to_le_bytes());
-        las[107..111].copy_from_slice(&count.to_le_bytes());
-        for (at, value) in
-            [(131, 0.001), (139, 0.001), (147, 0.001), (155, 4.5e6), (163, 5.3e6), (171, 400.0)]
-        {
-            las[at..at + 8].copy_from_slice(&f64::to_le_bytes(value));
-        }
-        las.extend((0..count).flat_map(record));
-        folder.write("a.las", las);
+        folder.write("a.las", las(colored));
         let (whole, parts, converted) = both_ways(&folder, "a.las");
         assert!(converted.regions > 2 && converted.points == 2999);
         let same = |(a, b): (&Splat, &Splat)| (a.center, a.color) == (b.center, b.color);
@@ -471,4 +476,185 @@ fn paints_are_the_same_in_regions() {
     let error = convert(&files, &Limits::default(), &out, &options, &lossless(), None);
     let message = error.unwrap_err().to_string();
     assert!(message.contains("no array “heat”"), "{message}");
+}
+
+/// Plans a conversion in parts, and makes those in `order`.
+fn in_parts(folder: &Folder, files: &[PathBuf], options: &ExternalOptions, order: &[u32]) -> Plan {
+    let parts = folder.path("parts");
+    let plan = Plan::make(files, &parts, &Limits::default(), options, &lossless(), None).unwrap();
+    for &index in order {
+        plan.part(index, &Limits::default(), None).unwrap();
+    }
+    plan
+}
+
+/// The join of parts, made in any order, is the file of the conversion by one program. So it is for
+/// clouds and meshes, with long triangles too, for several files, and for all sources of colours.
+#[test]
+fn parts_become_the_same_file() {
+    let folder = Folder::new();
+    let mut cloud = torus(350, 30);
+    cloud.triangles.clear();
+    let mut mesh = torus(200, 30);
+    let last = mesh.positions.len() as u32;
+    mesh.positions.extend([Vec3::X * 5.0, Vec3::new(5.0, 3.0, 0.2), Vec3::new(5.0, 0.0, 3.0)]);
+    mesh.colors.resize(mesh.positions.len(), [9, 8, 7, 255]);
+    mesh.triangles.push([last, last + 1, last + 2]);
+    folder.write("cloud.ply", ply(&cloud, false, true));
+    folder.write("mesh.ply", ply(&mesh, true, false));
+    folder.write("colors.las", las(true));
+    folder.write("greys.las", las(false));
+    let [cloud, mesh, colors, greys] =
+        ["cloud.ply", "mesh.ply", "colors.las", "greys.las"].map(|name| folder.path(name));
+    for (files, parts) in [
+        (vec![cloud.clone()], Some(3)),
+        (vec![cloud.clone()], None),
+        (vec![mesh.clone()], Some(4)),
+        (vec![mesh, cloud], Some(5)),
+        (vec![colors, greys], Some(3)),
+    ] {
+        let options = ExternalOptions { parts, ..options() };
+        let one = folder.path("one.splk");
+        let converted =
+            convert(&files, &Limits::default(), &one, &options, &lossless(), None).unwrap();
+        assert!(converted.regions >= parts.unwrap_or(10) as usize, "{converted:?}");
+        leaves(&one);
+        let plan = in_parts(&folder, &files, &options, &[]);
+        assert_eq!(plan.parts(), parts.unwrap_or(converted.regions as u32));
+        let text = std::fs::read(plan.path()).unwrap();
+        let made = |index: u32| {
+            plan.part(index, &Limits::default(), None).unwrap();
+            std::fs::read(plan.part_path(index)).unwrap()
+        };
+        let order: Vec<u32> = (0..plan.parts()).rev().collect();
+        let all: Vec<Vec<u8>> = order.iter().map(|&index| made(index)).collect();
+        let joined = folder.path("joined.splk");
+        assert_eq!(plan.join(&joined, None).unwrap(), converted);
+        assert!(std::fs::read(&one).unwrap() == std::fs::read(&joined).unwrap(), "{parts:?}");
+        // Again, in another order, by another program: the plan and the parts have the same bytes.
+        for &index in &order {
+            assert!(plan.part(index, &Limits::default(), None).unwrap().was_finished);
+            std::fs::remove_file(plan.part_path(index)).unwrap();
+        }
+        let again = in_parts(&folder, &files, &options, &[]);
+        assert!(text == std::fs::read(again.path()).unwrap());
+        for (&index, before) in order.iter().zip(&all).rev() {
+            let done = again.part(index, &Limits::default(), None).unwrap();
+            assert!(!done.was_finished && done.bytes == before.len() as u64);
+            assert!(std::fs::read(again.part_path(index)).unwrap() == *before, "part {index}");
+        }
+        std::fs::remove_dir_all(folder.path("parts")).unwrap();
+    }
+}
+
+/// The range of a colour map is found once, for all parts.
+#[test]
+fn painted_parts_become_the_same_file() {
+    let folder = Folder::new();
+    let cloud = Mesh { triangles: Vec::new(), ..torus(300, 30) };
+    let files = [folder.write("cloud.ply", ply(&cloud, false, true))];
+    let scale = ColorScale::new(ColorMap::named("turbo_r").unwrap());
+    let spread = Some(Spread::Percentiles);
+    for (of, scale) in [
+        (Values::Own, scale),
+        (Values::Height(glam::DVec3::Y), ColorScale { map: ColorMap::CLASSES, ..scale }),
+    ] {
+        let paint = Some(Paint::Values { of, scale, spread });
+        let scalar = Some("red".into());
+        let options = ExternalOptions { paint, scalar, parts: Some(3), ..options() };
+        let [one, joined] = ["one.splk", "joined.splk"].map(|name| folder.path(name));
+        convert(&files, &Limits::default(), &one, &options, &lossless(), None).unwrap();
+        in_parts(&folder, &files, &options, &[1, 0, 2]).join(&joined, None).unwrap();
+        assert!(std::fs::read(&one).unwrap() == std::fs::read(&joined).unwrap(), "{of:?}");
+    }
+}
+
+/// Every bit of a part is checked: in its header, its pages and its description.
+#[test]
+fn parts_that_are_missing_or_damaged_are_named() {
+    let folder = Folder::new();
+    let mut cloud = torus(300, 30);
+    cloud.triangles.clear();
+    folder.write("cloud.ply", ply(&cloud, false, true));
+    let options = ExternalOptions { parts: Some(3), ..options() };
+    let plan = in_parts(&folder, &[folder.path("cloud.ply")], &options, &[0, 1, 2]);
+    let out = folder.path("out.splk");
+    let refused = |index: u32, message: &str| {
+        let error = plan.join(&out, None).unwrap_err();
+        let splatkit::Error::Input { hint: Some(hint), .. } = &error else { panic!("{error}") };
+        let told = error.to_string();
+        assert!(told.contains(&format!("part {index} of 3: {message}")), "{told}");
+        assert!(hint.contains(&plan.part_command(index)), "{hint}");
+        assert!(!out.exists());
+    };
+    let path = plan.part_path(1);
+    let whole = std::fs::read(&path).unwrap();
+    for at in (0..whole.len()).step_by(whole.len() / 50) {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 4;
+        std::fs::write(&path, &damaged).unwrap();
+        refused(1, "");
+        if at % 7 == 0 {
+            assert!(!plan.part(1, &Limits::default(), None).unwrap().was_finished);
+            assert!(std::fs::read(&path).unwrap() == whole, "byte {at}");
+        }
+    }
+    std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    refused(1, "is cut or damaged");
+    // The part of another number is not taken for this one.
+    std::fs::copy(plan.part_path(0), &path).unwrap();
+    refused(1, "belongs to another plan or part");
+    std::fs::remove_file(&path).unwrap();
+    refused(1, "is missing");
+    std::fs::remove_file(plan.part_path(2)).unwrap();
+    refused(1, "is missing, and 1 more parts are missing or damaged");
+    plan.part(2, &Limits::default(), None).unwrap();
+    plan.part(1, &Limits::default(), None).unwrap();
+    plan.join(&out, None).unwrap();
+    leaves(&out);
+}
+
+#[test]
+fn plans_and_inputs_that_changed_are_refused() {
+    let folder = Folder::new();
+    let mut cloud = torus(200, 30);
+    cloud.triangles.clear();
+    let bytes = ply(&cloud, false, true);
+    let input = folder.write("cloud.ply", &bytes);
+    let options = ExternalOptions { parts: Some(2), ..options() };
+    let plan = in_parts(&folder, std::slice::from_ref(&input), &options, &[]);
+    let fails = |plan: &Plan, message: &str| {
+        let error = plan.part(0, &Limits::default(), None).unwrap_err();
+        let splatkit::Error::Input { hint: Some(hint), .. } = &error else { panic!("{error}") };
+        assert!(error.to_string().contains(message), "{error}");
+        assert!(hint.contains("make the plan again"), "{hint}");
+        assert!(!plan.part_path(0).exists());
+    };
+    let mut changed = bytes.clone();
+    *changed.last_mut().unwrap() ^= 1;
+    std::fs::write(&input, &changed).unwrap();
+    fails(&plan, "cloud.ply: file: has changed since the plan was made");
+    std::fs::write(&input, &bytes[..bytes.len() - 1]).unwrap();
+    fails(&plan, "when the plan was made");
+    std::fs::write(&input, &bytes).unwrap();
+    let error = plan.part(2, &Limits::default(), None).unwrap_err().to_string();
+    assert!(error.contains("there is no part 2; the 2 parts are numbered from 0"), "{error}");
+    let tables = folder.path("parts").join("plan.tables");
+    let whole = std::fs::read(&tables).unwrap();
+    std::fs::write(&tables, &whole[1..]).unwrap();
+    fails(&plan, "not those of the plan, or damaged");
+    std::fs::write(&tables, &whole).unwrap();
+    let text = std::fs::read_to_string(plan.path()).unwrap();
+    for (from, to, message) in [
+        ("\"preset\": \"Fastest\"", "\"preset\": \"Best\"", "does not match its hash"),
+        ("\"program\": \"splatkit", "\"program\": \"splatkit 7", "was made by splatkit 7"),
+        ("{", "[", "plan:"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(plan.path(), text.replacen(from, to, 1)).unwrap();
+        let error = Plan::open(plan.path()).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
+    std::fs::write(plan.path(), &text).unwrap();
+    Plan::open(plan.path()).unwrap().part(0, &Limits::default(), None).unwrap();
 }

@@ -7,6 +7,7 @@ mod testing;
 use scenes::{Case, fields};
 use splatkit::{
     Error,
+    bricks::Bricks,
     cpu::CpuRenderer,
     math::Kernel,
     picture::Picture,
@@ -14,6 +15,7 @@ use splatkit::{
     scene::{Classification, Item, Mode, Optics, Scene, Settings},
     volume::TransferFunction,
 };
+use std::sync::Arc;
 use testing::psnr::measured;
 
 fn drawn(case: &Case) -> Picture {
@@ -153,7 +155,14 @@ fn sheets_suit_the_finest_field() {
 fn what_several_fields_cannot_do_is_told() {
     let case = fields::two_volumes();
     assert_eq!(case.scene.fields(), [0, 1]);
-    assert_eq!(case.scene.beyond_gpu().as_deref(), Some("several fields"));
+    assert_eq!(case.scene.beyond_gpu(), None);
+    let bricks = Arc::new(Bricks::from_volume(Arc::new(fields::other_volume())).expect("bricks"));
+    let add = |scene: Scene| {
+        scene.with_bricks(bricks.clone(), Kernel::default(), TransferFunction::default())
+    };
+    let one = add(case.scene.clone());
+    assert_eq!(one.beyond_gpu(), None);
+    assert_eq!(add(one).beyond_gpu().as_deref(), Some("several volumes in bricks"));
     let mut renderer = CpuRenderer::new(&case.scene).expect("a scene");
     let usual = || case.settings.clone();
     let refused = [
@@ -168,7 +177,7 @@ fn what_several_fields_cannot_do_is_told() {
             assert!(matches!(&error, Error::Argument(text) if text.contains(word)), "{error}");
         }
     }
-    let volume = std::sync::Arc::new(fields::other_volume());
+    let volume = Arc::new(fields::other_volume());
     let of = |count: usize| {
         let add = |scene: Scene, _| {
             scene.with_volume(volume.clone(), Kernel::default(), TransferFunction::default())

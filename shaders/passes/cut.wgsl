@@ -25,9 +25,6 @@ struct Bounds {
 
 // Ten bits of share above the number of the node.
 const SHARE_SHIFT: u32 = 22u;
-// Number of invocations that share a batch. Each visits every eighth node: if no parent is refined,
-// all of them end at once.
-const SHARERS: u32 = 8u;
 const OWN_NODES: u32 = SELECT_RUN / SHARERS;
 
 @compute @workgroup_size(64)

@@ -39,7 +39,7 @@ fn gather(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id)
     if all(lane.xy == vec2(0u)) {
         atomicAdd(&progress[gathered_word()], 1u);
     }
-    let tile = shown[frame.shown.z + number];
+    let tile = shown[frame.fields[0].shown.z + number];
     let pixel = vec2(tile % frame.tiles.x, tile / frame.tiles.x) * 8u + lane.xy;
     if any(pixel >= frame.size) {
         return;
@@ -61,12 +61,12 @@ fn gather(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id)
     if sheet < end {
         loop {
             let next = select(sheet, sheet + 1u, plane == sheet);
-            pixels[0].front = pixels[0].behind;
-            pixels[0].behind = face_at(0u, next);
+            pixels[0].fields[0].front = pixels[0].fields[0].behind;
+            pixels[0].fields[0].behind = face_at(0u, next);
             plane = next;
             if plane > sheet {
-                if MAXIMUM || range_shows(sheet, pixels[0].front, pixels[0].behind) {
-                    composite(0u, sheet, resolve(0u, sheet));
+                if MAXIMUM || range_shows(sheet) {
+                    composite_field(0u, sheet);
                 }
                 if !MAXIMUM && pixels[0].transmittance < OPAQUE {
                     end = 0u;

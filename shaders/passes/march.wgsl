@@ -28,11 +28,11 @@
 // See progress.wgsl.
 @group(0) @binding(9) var<storage, read_write> progress: array<atomic<u32>>;
 
-// Values on the plane behind the sheet that is being closed, for differences between neighbouring
-// pixels.
-var<workgroup> neighbours: array<f32, 64>;
+// Values of each field on the plane behind the sheet that is being closed, for differences between
+// neighbouring pixels.
+var<workgroup> neighbours: array<array<f32, 64>, FIELDS>;
 // The slopes of these values, per pixel.
-var<private> slopes: array<vec2<f32>, ROWS>;
+var<private> slopes: array<array<vec2<f32>, FIELDS>, ROWS>;
 // Whether an invocation of the tile stopped, and the tile's slot.
 var<workgroup> any_stopped: atomic<u32>;
 var<workgroup> own_slot: u32;
@@ -49,6 +49,13 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     let row = tile / frame.tiles.x;
     let resumed = atomicLoad(&progress[tile]);
     begin_field(tile);
+    if CAN_STOP {
+        // Workgroup memory may hold anything at first.
+        if all(lane.xy == vec2(0u)) {
+            atomicStore(&any_stopped, 0u);
+        }
+        workgroupBarrier();
+    }
     // All lanes must read the tile's progress before one of them changes it, and see that change
     // before another one.
     storageBarrier();
@@ -125,26 +132,17 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             }
         }
         let stop = min(min(end, group_end), at + max(entries_left, 1u));
-        loop {
-            let entry = entries[at];
-            var taken = 1u;
-            if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
-                for (var i = 1u; i < TOGETHER; i++) {
-                    if taken == i && at + i < stop && is_alike(entries[at + i], entry) {
-                        taken++;
-                    }
-                }
-                add_isotropic(at, taken, front, first_pixel);
-            } else if HAS_FACETS && (entry & ENTRY_COARSE) != 0u {
-                add_facet(entry, front, first_pixel);
-            } else if GENERAL_RECORDS {
-                add_general(entry, front, first_pixel);
-            }
-            at += taken;
-            entries_left -= min(entries_left, 1u);
-            if at >= stop || (entries[at] >> ENTRY_SHEET_SHIFT) != entry_sheet {
-                break;
-            }
+        // One call for each field, so that the field's number is a constant in the code that adds
+        // to it. Fields may alternate within a sheet; the next iterations add the rest.
+        at = add_entries(0u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+        if FIELDS > 1u {
+            at = add_entries(1u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+        }
+        if FIELDS > 2u {
+            at = add_entries(2u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+        }
+        if FIELDS > 3u {
+            at = add_entries(3u, at, stop, entry_sheet, front, first_pixel, &entries_left);
         }
         open = 4u;
     }
@@ -195,9 +193,54 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     }
 }
 
-// Whether two entries of a group have the same sheet and the same kind of record.
+// Adds the entries from `first` on that lie in sheet `entry_sheet` and belong to field `f`.
+// Radiance belongs to field 0. Returns the index of the first entry that was not added.
+fn add_entries(
+    f: u32,
+    first: u32,
+    stop: u32,
+    entry_sheet: u32,
+    front: u32,
+    first_pixel: vec2<i32>,
+    entries_left: ptr<function, u32>,
+) -> u32 {
+    var at = first;
+    if FIELDS > 1u && !(at < stop && is_of(entries[at], f, entry_sheet)) {
+        return at;
+    }
+    loop {
+        let entry = entries[at];
+        var taken = 1u;
+        if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
+            for (var i = 1u; i < TOGETHER; i++) {
+                if taken == i && at + i < stop && is_alike(entries[at + i], entry) {
+                    taken++;
+                }
+            }
+            add_isotropic(f, at, taken, front, first_pixel);
+        } else if HAS_FACETS && (entry & ENTRY_COARSE) != 0u {
+            add_facet(entry, front, first_pixel);
+        } else if GENERAL_RECORDS {
+            add_general(f, entry, front, first_pixel);
+        }
+        at += taken;
+        *entries_left -= min(*entries_left, 1u);
+        if at >= stop || !is_of(entries[at], f, entry_sheet) {
+            break;
+        }
+    }
+    return at;
+}
+
+// Whether an entry lies in a sheet and belongs to a field.
+fn is_of(entry: u32, f: u32, entry_sheet: u32) -> bool {
+    return (entry >> ENTRY_SHEET_SHIFT) == entry_sheet && field_of(entry & ENTRY_RECORD) == f;
+}
+
+// Whether two entries of a group have the same sheet, the same field and the same kind of record.
 fn is_alike(a: u32, b: u32) -> bool {
-    let same = ((a ^ b) >> ENTRY_SHEET_SHIFT) == 0u;
+    let same = ((a ^ b) >> ENTRY_SHEET_SHIFT) == 0u
+        && field_of(a & ENTRY_RECORD) == field_of(b & ENTRY_RECORD);
     return same && (!GENERAL_RECORDS || ((a ^ b) & ENTRY_ISOTROPIC) == 0u);
 }
 
@@ -224,14 +267,13 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
         }
         others += open_field(sheet);
         for (var r = 0u; r < ROWS; r++) {
-            var own = resolve(r, sheet);
-            if CENTRAL {
-                own.back.slope = slope_on_plane(r, slopes[r], planes[sheet + 1u]);
+            var mixture = resolve_radiance(r, sheet);
+            if SCALAR {
+                for (var f = 0u; f < FIELDS; f++) {
+                    close_field(r, f, sheet, &mixture);
+                }
             }
-            if SUMS {
-                pixels[r].front = own.back;
-            }
-            composite(r, sheet, own);
+            composite(r, sheet, mixture);
             if HAS_FACETS {
                 cover(r, sheet);
             }
@@ -244,38 +286,54 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
     return others;
 }
 
+fn close_field(r: u32, f: u32, sheet: u32, mixture: ptr<function, Mixture>) {
+    var own: Sheet;
+    resolve_field(r, f, sheet, &own);
+    if CENTRAL {
+        own.back.slope = slope_on_plane(r, f, slopes[r][f], planes[sheet + 1u]);
+    }
+    if SUMS {
+        pixels[r].fields[f].front = own.back;
+    }
+    mix_field(r, f, sheet, own, mixture);
+}
+
 // Finds the slopes on the plane behind the sheet being closed, from the values of the tile's
 // neighbouring pixels. Both barriers are here, and the sheet is closed behind them: with a barrier
 // behind the code that closes it, Mesa's software Vulkan loses the slopes once that code is long.
 fn find_slopes(lane: vec2<u32>) {
     for (var r = 0u; r < ROWS; r++) {
-        let weight = pixels[r].face_weight.x;
         let at = (lane.y * ROWS + r) * 8u + lane.x;
-        neighbours[at] = select(
-            NO_VALUE,
-            pixels[r].face_value.x / max(weight, 1e-37),
-            weight > frame.isotropic.w,
-        );
+        for (var f = 0u; f < FIELDS; f++) {
+            let weight = pixels[r].fields[f].face_weight.x;
+            neighbours[f][at] = select(
+                NO_VALUE,
+                pixels[r].fields[f].face_value.x / max(weight, 1e-37),
+                weight > frame.fields[f].isotropic.w,
+            );
+        }
     }
     workgroupBarrier();
     for (var r = 0u; r < ROWS; r++) {
-        slopes[r] = difference(lane, r);
+        for (var f = 0u; f < FIELDS; f++) {
+            slopes[r][f] = difference(lane, r, f);
+        }
     }
     workgroupBarrier();
 }
 
-// Returns the slopes of the values around a pixel: central differences, one-sided if a neighbour
-// has no value.
-fn difference(lane: vec2<u32>, r: u32) -> vec2<f32> {
+// Returns the slopes of a field's values around a pixel: central differences, one-sided if a
+// neighbour has no value.
+fn difference(lane: vec2<u32>, r: u32, f: u32) -> vec2<f32> {
     let y = lane.y * ROWS + r;
-    let own = neighbours[y * 8u + lane.x];
+    let own = neighbours[f][y * 8u + lane.x];
     let before = vec2(
-        neighbours[y * 8u + max(lane.x, 1u) - 1u],
-        neighbours[(max(y, 1u) - 1u) * 8u + lane.x],
+        neighbours[f][y * 8u + max(lane.x, 1u) - 1u],
+        neighbours[f][(max(y, 1u) - 1u) * 8u + lane.x],
     );
     let after = vec2(
-        neighbours[y * 8u + min(lane.x + 1u, 7u)],
-        neighbours[min(y + 1u, 7u) * 8u + lane.x],
+        neighbours[f][y * 8u + min(lane.x + 1u, 7u)],
+        neighbours[f][min(y + 1u, 7u) * 8u + lane.x],
     );
     let has_before = before > vec2(NO_VALUE);
     let has_after = after > vec2(NO_VALUE);

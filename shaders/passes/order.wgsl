@@ -1,5 +1,5 @@
 // Order: sorts each bin's entries, by sheet and then by record, or single splats by sheet and then
-// by distance. Bins are filled in the arbitrary order in which invocations run. After sorting, the
+// by their key. Bins are filled in the arbitrary order in which invocations run. After sorting, the
 // same input is added in the same order and gives the same bytes every time.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -19,17 +19,16 @@ const SHORT: u32 = 2048u;
 
 var<workgroup> shared_number: u32;
 
-fn distance_of(entry: u32) -> f32 {
-    let center = records[entry & ENTRY_RECORD].xyz;
-    let distance = select(center.z, length(center), PERSPECTIVE);
-    return select(distance, -distance, BACK_TO_FRONT);
+fn key_of(entry: u32) -> f32 {
+    let key = single_key(records[entry & ENTRY_RECORD].xyz);
+    return select(key, -key, BACK_TO_FRONT);
 }
 
 fn goes_before(a: u32, b: u32) -> bool {
     if SINGLE_SPLATS && (a >> ENTRY_SHEET_SHIFT) == (b >> ENTRY_SHEET_SHIFT) {
-        let of_a = distance_of(a);
-        let of_b = distance_of(b);
-        // Splats at equal distance keep the order of the scene, in either direction.
+        let of_a = key_of(a);
+        let of_b = key_of(b);
+        // Splats with equal keys keep the order of the scene, in either direction.
         return of_a < of_b || (of_a == of_b && (a < b) != BACK_TO_FRONT);
     }
     return a < b;

@@ -38,6 +38,9 @@ fn hold() {
     state[HELD + 5u] = stage.group_shift;
     state[HELD + 6u] = arguments[MARCH_ARGUMENTS];
     state[HELD + 7u] = arguments[MARCH_ARGUMENTS + 1u];
+    for (var f = 0u; f < 4u; f++) {
+        state[HELD + 8u + f] = frame.record_starts[f];
+    }
 }
 
 @compute @workgroup_size(1)

@@ -19,8 +19,8 @@ fn step_of(wide: f32) -> f32 {
 
 @compute @workgroup_size(64)
 fn count(@builtin(global_invocation_id) invocation: vec3<u32>) {
-    let run = run_of(invocation.x);
-    for (var i = run.x; i < run.y; i++) {
+    let run = run_of(invocation.x / SHARERS);
+    for (var i = run.x + invocation.x % SHARERS; i < run.y; i += SHARERS) {
         let node = nodes[i];
         if is_hidden(i, node) {
             continue;

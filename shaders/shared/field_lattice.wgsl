@@ -1,7 +1,7 @@
-// The field of a lattice, gathered: at a place it is the weighted mean of the samples within reach
-// of the kernel. A Gaussian on a lattice is a product of Gaussians along its axes, so four weights
-// an axis replace the 64 kernels in reach. The gradient follows from the first moments: ∂E[f]/∂p =
-// (E[n·f] − E[n]·E[f])/σ², with n the sample's index along the axis.
+// The only field of a picture, gathered from its lattice: at a place it is the weighted mean of the
+// samples within reach of the kernel. A Gaussian on a lattice is a product of Gaussians along its
+// axes, so four weights an axis replace the 64 kernels in reach. The gradient follows from the
+// first moments: ∂E[f]/∂p = (E[n·f] − E[n]·E[f])/σ², with n the sample's index along the axis.
 //
 // The shader that includes this file declares `shown`. It has a bit for each sample: whether
 // something may be visible at the places nearest to that sample. Behind these bits it has, for each
@@ -31,9 +31,9 @@ fn whole_at(x: i32, y: i32, z: i32) -> f32 {
     if SAMPLE_KIND == SAMPLE_I32 {
         // In two parts, because a 32-bit float cannot hold the whole integer.
         let low = word & 0xffffu;
-        return counted_sum(f32(bitcast<i32>(word - low)), f32(low));
+        return counted_sum(0u, f32(bitcast<i32>(word - low)), f32(low));
     }
-    return counted(bitcast<f32>(word));
+    return counted(0u, bitcast<f32>(word));
 }
 
 // Returns the 32 bits that begin `shift` bits after the start of the first of two words.
@@ -63,12 +63,12 @@ fn row_at(taps: Taps, y: i32, z: i32) -> vec4<f32> {
         let high = joined(middle, word_at(x + 2, y, z), taps.shift);
         if SAMPLE_KIND == SAMPLE_U16 {
             return vec4(f32(low & 0xffffu), f32(low >> 16u), f32(high & 0xffffu), f32(high >> 16u))
-                - frame.transfer.x;
+                - frame.fields[0].transfer.x;
         }
         let a = bitcast<i32>(low);
         let b = bitcast<i32>(high);
         return vec4(f32((a << 16u) >> 16u), f32(a >> 16u), f32((b << 16u) >> 16u), f32(b >> 16u))
-            - frame.transfer.x;
+            - frame.fields[0].transfer.x;
     }
     return vec4(
         whole_at(x, y, z),
@@ -81,10 +81,10 @@ fn row_at(taps: Taps, y: i32, z: i32) -> vec4<f32> {
 // Converts a mean of row_at's samples to entries of the transfer function's table.
 fn counted_mean(mean: f32) -> f32 {
     if BYTES {
-        return (mean - frame.transfer.x) * frame.transfer.y;
+        return (mean - frame.fields[0].transfer.x) * frame.fields[0].transfer.y;
     }
     if HALVES {
-        return mean * frame.transfer.y;
+        return mean * frame.fields[0].transfer.y;
     }
     return mean;
 }
@@ -97,8 +97,9 @@ const MOST_EXPONENT: f32 = 30.0;
 // geometric series times the weights at whole steps, so one exponential suffices.
 fn weights_at(place: f32, first: f32, last: f32) -> vec4<f32> {
     // Relative to the second sample.
-    let q = exp(clamp((place - first - 1.0) * frame.taps.x, -MOST_EXPONENT, MOST_EXPONENT));
-    let all = vec4(frame.taps.y / q, 1.0, frame.taps.y * q, frame.taps.z * q * q);
+    let taps = frame.fields[0].taps;
+    let q = exp(clamp((place - first - 1.0) * taps.x, -MOST_EXPONENT, MOST_EXPONENT));
+    let all = vec4(taps.y / q, 1.0, taps.y * q, taps.z * q * q);
     let weights = select(vec4(0.0), all, first + vec4(0.0, 1.0, 2.0, 3.0) <= vec4(last));
     return weights * (1.0 / ((weights.x + weights.y) + (weights.z + weights.w)));
 }
@@ -116,11 +117,11 @@ struct Taps {
 }
 
 fn taps_at(r: u32, distance: f32) -> Taps {
-    let last = vec3<f32>(frame.lattice.xyz - 1u);
+    let last = vec3<f32>(frame.fields[0].lattice.xyz - 1u);
     let place = clamp(place_at(r, distance), vec3(-BEYOND_LATTICE), last + BEYOND_LATTICE);
     let first = clamp(floor(place) - 1.0, vec3(0.0), max(last - 3.0, vec3(0.0)));
     let at = vec3<i32>(first);
-    let end = vec3<i32>(frame.lattice.xyz) - 1;
+    let end = vec3<i32>(frame.fields[0].lattice.xyz) - 1;
     var taps: Taps;
     taps.word = at.x;
     if SAMPLE_KIND == SAMPLE_U8 {
@@ -140,7 +141,8 @@ fn taps_at(r: u32, distance: f32) -> Taps {
 
 // Returns a place on a pixel's ray, in steps of the lattice.
 fn place_at(r: u32, distance: f32) -> vec3<f32> {
-    return frame.field_origin.xyz + in_steps(origin_of(r)) + in_steps(direction_of(r)) * distance;
+    return frame.fields[0].origin.xyz + in_steps(0u, origin_of(r))
+        + in_steps(0u, direction_of(r)) * distance;
 }
 
 // Four rows of a slice, weighted along y, and their first moment.
@@ -180,18 +182,18 @@ fn field_at(r: u32, distance: f32) -> Face {
     let moments = vec3(dot(taps.x * OFFSETS, sum), dot(taps.x, sum_y), dot(taps.x, sum_z));
     let means = vec3(dot(taps.x, OFFSETS), dot(taps.y, OFFSETS), dot(taps.z, OFFSETS));
     // Per step along each axis.
-    var slopes = (moments - means * mean) * frame.taps.x;
+    var slopes = (moments - means * mean) * frame.fields[0].taps.x;
     if BYTES || HALVES {
-        slopes *= frame.transfer.y;
+        slopes *= frame.fields[0].transfer.y;
     }
-    let gradient = slopes.x * frame.field_axis_x.xyz + slopes.y * frame.field_axis_y.xyz
-        + slopes.z * frame.field_axis_z.xyz;
+    let gradient = slopes.x * frame.fields[0].axis_x.xyz + slopes.y * frame.fields[0].axis_y.xyz
+        + slopes.z * frame.fields[0].axis_z.xyz;
     let direction = direction_of(r);
     var face: Face;
     face.has_value = true;
     face.value = counted_mean(mean);
     face.along = dot(gradient, direction);
-    face.slope = (gradient - face.along * direction).xy * frame.gradients.z;
+    face.slope = (gradient - face.along * direction).xy * frame.fields[0].gradients.z;
     return face;
 }
 
@@ -222,8 +224,9 @@ fn mean_of(r: u32, sheet: u32, own: ptr<function, Sheet>) -> f32 {
 }
 
 fn sample_shows(place: vec3<f32>) -> bool {
-    let at = vec3<u32>(clamp(floor(place + 0.5), vec3(0.0), vec3<f32>(frame.lattice.xyz - 1u)));
-    let number = (at.z * frame.lattice.y + at.y) * frame.lattice.x + at.x;
+    let dims = frame.fields[0].lattice.xyz;
+    let at = vec3<u32>(clamp(floor(place + 0.5), vec3(0.0), vec3<f32>(dims - 1u)));
+    let number = (at.z * dims.y + at.y) * dims.x + at.x;
     return ((shown[number >> 5u] >> (number & 31u)) & 1u) != 0u;
 }
 
@@ -232,15 +235,18 @@ fn sample_shows(place: vec3<f32>) -> bool {
 fn may_show(r: u32, sheet: u32) -> bool {
     let start = planes[sheet];
     let end = planes[sheet + 1u];
-    if !(max(pixels[r].inside.x, start) < min(pixels[r].inside.y, end)) {
+    if !(max(pixels[r].fields[0].inside.x, start) < min(pixels[r].fields[0].inside.y, end)) {
         return false;
     }
     return sample_shows(place_at(r, start)) || sample_shows(place_at(r, 0.5 * (start + end)))
         || sample_shows(place_at(r, end));
 }
 
-// Whether any value that a sheet may have between two faces is visible.
-fn range_shows(sheet: u32, front: Face, back: Face) -> bool {
+// Whether any value that a sheet may have between the two planes that the pixel's invocation
+// evaluated last is visible.
+fn range_shows(sheet: u32) -> bool {
+    let front = pixels[0].fields[0].front;
+    let back = pixels[0].fields[0].behind;
     // Hermite interpolation: the mean of the ends, plus an eighth of the difference of the slopes
     // there.
     let bend = (front.along - back.along) * (planes[sheet + 1u] - planes[sheet]);
@@ -251,11 +257,12 @@ fn range_shows(sheet: u32, front: Face, back: Face) -> bool {
     // of that range. Integrals cover at least NARROW entries.
     let slack = 0.125 * (high - low) + 0.5 * NARROW + 1.0;
     let ends = clamp(
-        vec2(low - slack, high + slack) + frame.transfer.w,
+        vec2(low - slack, high + slack) + frame.fields[0].transfer.w,
         vec2(0.0),
-        vec2(frame.transfer.z),
+        vec2(frame.fields[0].transfer.z),
     );
-    return shown[frame.shown.x + u32(ends.y) + 1u] > shown[frame.shown.x + u32(ends.x)];
+    let before = frame.fields[0].shown.x;
+    return shown[before + u32(ends.y) + 1u] > shown[before + u32(ends.x)];
 }
 
 // Returns the next sheet from `sheet` on in which something may be visible in a tile, or `end` if
@@ -264,7 +271,7 @@ fn next_marked(tile: u32, sheet: u32, end: u32) -> u32 {
     if sheet >= end {
         return end;
     }
-    let marks = frame.shown.y + tile * frame.shown.w;
+    let marks = frame.fields[0].shown.y + tile * frame.fields[0].shown.w;
     var word = sheet >> 5u;
     var bits = shown[marks + word] & (0xffffffffu << (sheet & 31u));
     loop {
@@ -279,10 +286,20 @@ fn next_marked(tile: u32, sheet: u32, end: u32) -> u32 {
 
 // Resolves the field of the sheet between the two planes that were evaluated last. The shader that
 // includes this file defines shows_field, which says whether the field is wanted there.
-fn resolve_field(r: u32, sheet: u32, own: ptr<function, Sheet>) {
+fn resolve_field(r: u32, f: u32, sheet: u32, own: ptr<function, Sheet>) {
     (*own).has_value = shows_field(r, sheet);
     (*own).filling = 1.0;
-    (*own).front = pixels[r].front;
-    (*own).back = pixels[r].behind;
+    (*own).front = pixels[r].fields[0].front;
+    (*own).back = pixels[r].fields[0].behind;
     (*own).value = mean_of(r, sheet, own);
+}
+
+// Adds a sheet that contains only the field to the picture.
+fn composite_field(r: u32, sheet: u32) {
+    var own: Sheet;
+    resolve_field(r, 0u, sheet, &own);
+    var mixture: Mixture;
+    mixture.hit = NO_HIT;
+    mix_field(r, 0u, sheet, own, &mixture);
+    composite(r, sheet, mixture);
 }

@@ -6,36 +6,39 @@ fn shift_faces(sums: vec3<f32>) -> vec3<f32> {
 
 // Returns the field on the plane behind a sheet, from the first of the three open planes, and
 // shifts that plane out.
-fn resolve_face(r: u32, sheet: u32) -> Face {
+fn resolve_face(r: u32, f: u32, sheet: u32) -> Face {
     var face: Face;
-    let weight = pixels[r].face_weight.x;
+    let weight = pixels[r].fields[f].face_weight.x;
     let inverse = 1.0 / max(weight, 1e-37);
-    face.has_value = weight > frame.isotropic.w;
-    face.value = pixels[r].face_value.x * inverse;
+    face.has_value = weight > frame.fields[f].isotropic.w;
+    face.value = pixels[r].fields[f].face_value.x * inverse;
     if GRADIENTS && !CENTRAL {
-        let slope = face.value * vec2(pixels[r].weight_x.x, pixels[r].weight_y.x)
-            - vec2(pixels[r].value_x.x, pixels[r].value_y.x);
-        face.slope = slope_on_plane(r, slope * inverse, planes[sheet + 1u]);
-        pixels[r].weight_x = shift_faces(pixels[r].weight_x);
-        pixels[r].weight_y = shift_faces(pixels[r].weight_y);
-        pixels[r].value_x = shift_faces(pixels[r].value_x);
-        pixels[r].value_y = shift_faces(pixels[r].value_y);
+        let own = pixels[r].fields[f];
+        let slope = face.value * vec2(own.weight_x.x, own.weight_y.x)
+            - vec2(own.value_x.x, own.value_y.x);
+        face.slope = slope_on_plane(r, f, slope * inverse, planes[sheet + 1u]);
+        pixels[r].fields[f].weight_x = shift_faces(pixels[r].fields[f].weight_x);
+        pixels[r].fields[f].weight_y = shift_faces(pixels[r].fields[f].weight_y);
+        pixels[r].fields[f].value_x = shift_faces(pixels[r].fields[f].value_x);
+        pixels[r].fields[f].value_y = shift_faces(pixels[r].fields[f].value_y);
     }
-    pixels[r].face_weight = shift_faces(pixels[r].face_weight);
-    pixels[r].face_value = shift_faces(pixels[r].face_value);
+    pixels[r].fields[f].face_weight = shift_faces(pixels[r].fields[f].face_weight);
+    pixels[r].fields[f].face_value = shift_faces(pixels[r].fields[f].face_value);
     return face;
 }
 
-fn resolve_field(r: u32, sheet: u32, own: ptr<function, Sheet>) {
+fn resolve_field(r: u32, f: u32, sheet: u32, own: ptr<function, Sheet>) {
     let thickness = planes[sheet + 1u] - planes[sheet];
-    let weight = pixels[r].weight.x;
-    (*own).has_value = weight > frame.isotropic.w * thickness;
-    (*own).value = pixels[r].value.x / max(weight, 1e-37);
-    (*own).filling = min(weight / thickness, 1.0);
-    (*own).front = pixels[r].front;
-    (*own).back = resolve_face(r, sheet);
-    pixels[r].weight = shift(pixels[r].weight);
-    pixels[r].value = shift(pixels[r].value);
+    let weight = pixels[r].fields[f].weight.x;
+    (*own).has_value = weight > frame.fields[f].isotropic.w * thickness;
+    (*own).value = pixels[r].fields[f].value.x / max(weight, 1e-37);
+    // A lattice fills its box.
+    let is_full = LATTICE && (!SAMPLES || frame.fields[f].low.w > 0.0);
+    (*own).filling = select(min(weight / thickness, 1.0), 1.0, is_full);
+    (*own).front = pixels[r].fields[f].front;
+    (*own).back = resolve_face(r, f, sheet);
+    pixels[r].fields[f].weight = shift(pixels[r].fields[f].weight);
+    pixels[r].fields[f].value = shift(pixels[r].fields[f].value);
 }
 
 // No field is gathered.

@@ -39,6 +39,14 @@ fn quadratic_form(m: Symmetric, v: vec3<f32>) -> f32 {
         + 2.0 * (m.xy * v.x * v.y + m.xz * v.x * v.z + m.yz * v.y * v.z);
 }
 
+// Returns the number of the field whose samples the candidates are.
+fn source_field() -> u32 {
+    if FIELDS == 1u {
+        return 0u;
+    }
+    return source.flags >> FIELD_SHIFT;
+}
+
 // Returns the sheet that contains a distance; 0 in front of the first plane.
 fn sheet_of(distance: f32) -> u32 {
     let near = planes[1];
@@ -164,13 +172,15 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
     span.visible = true;
     if WHOLE {
         // A whole splat belongs to the sheet of its centre.
-        var key = distance;
+        var place = distance;
         if AXIS_SHEETS {
-            key = dot(frame.sheet_normal.xyz, c);
-            key = select(key, abs(key), frame.perspective != 0u);
+            place = dot(frame.sheet_normal.xyz, c);
+            place = select(place, abs(place), frame.perspective != 0u);
         }
-        span.visible = key >= planes[1] && key < last_plane;
-        span.first_sheet = min(sheet_of(key), frame.sheet_count);
+        span.visible = place >= planes[1] && place < last_plane;
+        // A depth may be smaller than the distance of the first plane.
+        let key = select(place, single_key(c), SINGLE_SPLATS);
+        span.first_sheet = clamp(sheet_of(key), 1u, frame.sheet_count);
         if BACK_TO_FRONT {
             span.first_sheet = frame.sheet_count + 1u - span.first_sheet;
         }

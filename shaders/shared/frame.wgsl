@@ -23,17 +23,38 @@ struct Frame {
     // Capacities of a pass, in records (in vec4) and entries.
     record_capacity: u32,
     entry_capacity: u32,
-    // View space to lattice steps: steps = field_origin + field_axes * position; samples fill
-    // field_low … field_high.
-    field_axis_x: vec4<f32>,
-    field_axis_y: vec4<f32>,
-    field_axis_z: vec4<f32>,
-    field_origin: vec4<f32>,
-    field_low: vec4<f32>,
-    field_high: vec4<f32>,
     // Ambient, diffuse, specular, power.
-    volume_shade: vec4<f32>,
     surface_shade: vec4<f32>,
+    // Axis-aligned sheets: their normal in view space.
+    sheet_normal: vec4<f32>,
+    // The first record word of each field in the pass. The fields' records lie behind those of
+    // radiance, in the order of the fields.
+    record_starts: vec4<u32>,
+    // Columns of the rotation from view space to the world's axes.
+    world_x: vec4<f32>,
+    world_y: vec4<f32>,
+    world_z: vec4<f32>,
+    // The regions that are kept, and the boxes that are cut out; relative to the eye, along the
+    // world's axes.
+    clips: array<Clip, 8>,
+    holes: array<Clip, 8>,
+    // The first FIELDS are used.
+    fields: array<Field, 4>,
+}
+
+// A field of the scene.
+struct Field {
+    // View space to lattice steps: steps = origin + axes * position. Samples fill low … high. low.w
+    // is 1 if the samples lie on a lattice, high.w is 1 if the kernel is in tables; otherwise they
+    // are 0.
+    axis_x: vec4<f32>,
+    axis_y: vec4<f32>,
+    axis_z: vec4<f32>,
+    origin: vec4<f32>,
+    low: vec4<f32>,
+    high: vec4<f32>,
+    // Ambient, diffuse, specular, power.
+    shade: vec4<f32>,
     // The magnitude of a field's gradient up to which its direction does not count, and one over
     // the magnitudes from there to where it counts in full; in entries of the table per thickness.
     certain: vec4<f32>,
@@ -46,7 +67,8 @@ struct Frame {
     // The magnitude of the first entry of the gradient factor, entries per magnitude; the world
     // length over which gradients count, and that length in pixels, as `scale`.
     gradients: vec4<f32>,
-    // The starts of the parts of `tables`: integrals, gradient factors, kernel, sections.
+    // The starts of the parts of `tables`: transfer function, its integrals, gradient factors,
+    // kernel and its sections.
     table_starts: vec4<u32>,
     // Extinction times colour, and extinction, of values before the first table entry, and behind
     // the last one.
@@ -57,8 +79,6 @@ struct Frame {
     kernel: vec4<f32>,
     // Volumes in bricks: the shares of the finer and of the coarser level.
     levels: vec4<f32>,
-    // Axis-aligned sheets: their normal in view space.
-    sheet_normal: vec4<f32>,
     // A gathered lattice: samples along x, y and z; one over the kernel's variance in squared
     // steps, its weights one and two steps from its centre. The starts of the parts of `shown`:
     // visibility of the transfer function's entries, the tiles' sheets, the list of tiles; and the
@@ -66,14 +86,7 @@ struct Frame {
     lattice: vec4<u32>,
     taps: vec4<f32>,
     shown: vec4<u32>,
-    // Columns of the rotation from view space to the world's axes.
-    world_x: vec4<f32>,
-    world_y: vec4<f32>,
-    world_z: vec4<f32>,
-    // The regions that are kept, and the boxes that are cut out; relative to the eye, along the
-    // world's axes.
-    clips: array<Clip, 8>,
-    holes: array<Clip, 8>,
+    // By ascending value.
     isosurfaces: array<Isosurface, 8>,
 }
 
@@ -127,7 +140,8 @@ struct Source {
     count: u32,
     // First batch of this chunk in the frame's list of batches.
     first_run: u32,
-    // RADIANCE, ISOTROPIC, ENDS, NODES, COARSE, FACETS, CULLED, MIXED, TRAINED_FLAG.
+    // RADIANCE, ISOTROPIC, ENDS, NODES, COARSE, FACETS, CULLED, MIXED, TRAINED_FLAG,
+    // BODY_CENTRED_FLAG, RECTILINEAR_FLAG; the number of the field from bit FIELD_SHIFT on.
     flags: u32,
 }
 
@@ -144,6 +158,9 @@ const FACETS: u32 = 32u;
 const CULLED: u32 = 64u;
 const MIXED: u32 = 128u;
 const TRAINED_FLAG: u32 = 256u;
+const BODY_CENTRED_FLAG: u32 = 512u;
+const RECTILINEAR_FLAG: u32 = 1024u;
+const FIELD_SHIFT: u32 = 16u;
 
 // Returns the number of words of a splat's record.
 fn record_words(flags: u32) -> u32 {

@@ -45,6 +45,39 @@ fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
     return vec4(f.x - base, f.y - f.x, f.z - f.y, 1.0 - f.z);
 }
 
+// Returns the number of the field to which a record belongs.
+fn field_of(record: u32) -> u32 {
+    if FIELDS == 1u {
+        return 0u;
+    }
+    return dot(vec3<u32>(vec3(record) >= frame.record_starts.yzw), vec3(1u));
+}
+
+// What samples add to the open sheets of a field.
+struct Added {
+    weight: vec4<f32>,
+    value: vec4<f32>,
+    face_weight: vec3<f32>,
+    face_value: vec3<f32>,
+    weight_x: vec3<f32>,
+    weight_y: vec3<f32>,
+    value_x: vec3<f32>,
+    value_y: vec3<f32>,
+}
+
+fn add_to_field(r: u32, f: u32, own: Added) {
+    pixels[r].fields[f].weight += own.weight;
+    pixels[r].fields[f].value += own.value;
+    pixels[r].fields[f].face_weight += own.face_weight;
+    pixels[r].fields[f].face_value += own.face_value;
+    if GRADIENTS && !CENTRAL {
+        pixels[r].fields[f].weight_x += own.weight_x;
+        pixels[r].fields[f].weight_y += own.weight_y;
+        pixels[r].fields[f].value_x += own.value_x;
+        pixels[r].fields[f].value_y += own.value_y;
+    }
+}
+
 // An isotropic lattice sample in the picture. Far from the eye, the shells of the sheets are flat
 // across its footprint, so its values along the ray are the same for all pixels.
 struct Round {
@@ -59,17 +92,19 @@ struct Round {
     extent2: f32,
 }
 
-fn load_isotropic(entry: u32, is_one: bool, near: vec3<f32>) -> Round {
+fn load_isotropic(f: u32, entry: u32, is_one: bool, near: vec3<f32>) -> Round {
     let record = records[entry & ENTRY_RECORD];
     let c = record.xyz;
-    var sigma = frame.isotropic.x;
-    var inverse_sigma = frame.isotropic.y;
+    let isotropic = frame.fields[f].isotropic;
+    var sigma = isotropic.x;
+    var inverse_sigma = isotropic.y;
     var share = 1.0;
     if TWO_LEVELS {
         let coarse = (entry & ENTRY_COARSE) != 0u;
         sigma *= select(1.0, 2.0, coarse);
         inverse_sigma *= select(1.0, 0.5, coarse);
-        share = select(frame.levels.x, frame.levels.y, coarse);
+        let levels = frame.fields[f].levels;
+        share = select(levels.x, levels.y, coarse);
     }
     let per_pixel = inverse_sigma / frame.scale;
     var sample: Round;
@@ -88,7 +123,7 @@ fn load_isotropic(entry: u32, is_one: bool, near: vec3<f32>) -> Round {
     sample.along = sections(t, base) * (SQRT_TAU * sigma * share);
     sample.on_plane = exp(-0.5 * t * t) * share;
     sample.value = record.w;
-    sample.extent2 = select(-1.0, frame.isotropic.z, is_one);
+    sample.extent2 = select(-1.0, isotropic.z, is_one);
     return sample;
 }
 
@@ -97,23 +132,16 @@ fn load_isotropic(entry: u32, is_one: bool, near: vec3<f32>) -> Round {
 // (docs/performance.md).
 const TOGETHER: u32 = 2u;
 
-// Adds `count` entries from `at` on to all pixels.
-fn add_isotropic(at: u32, count: u32, front: u32, first_pixel: vec2<i32>) {
+// Adds `count` entries of a field from `at` on to all pixels.
+fn add_isotropic(f: u32, at: u32, count: u32, front: u32, first_pixel: vec2<i32>) {
     let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
     var samples: array<Round, TOGETHER>;
     for (var i = 0u; i < TOGETHER; i++) {
-        samples[i] = load_isotropic(entries[at + min(i, count - 1u)], i < count, near);
+        samples[i] = load_isotropic(f, entries[at + min(i, count - 1u)], i < count, near);
     }
     for (var r = 0u; r < ROWS; r++) {
         let cosine2 = pixels[r].cosine * pixels[r].cosine;
-        var weight = vec4(0.0);
-        var value = vec4(0.0);
-        var face_weight = vec3(0.0);
-        var face_value = vec3(0.0);
-        var weight_x = vec3(0.0);
-        var weight_y = vec3(0.0);
-        var value_x = vec3(0.0);
-        var value_y = vec3(0.0);
+        var sum: Added;
         for (var i = 0u; i < TOGETHER; i++) {
             let own = samples[i];
             let d = vec2<f32>(first_pixel + vec2(0, i32(r))) + 0.5 - own.at;
@@ -124,28 +152,19 @@ fn add_isotropic(at: u32, count: u32, front: u32, first_pixel: vec2<i32>) {
             let rho2 = dot(d, turned) * cosine2;
             let e = select(0.0, exp(-0.5 * rho2), rho2 <= own.extent2);
             let v = e * own.value;
-            weight += own.along * e;
-            value += own.along * v;
-            face_weight += own.on_plane * e;
-            face_value += own.on_plane * v;
+            sum.weight += own.along * e;
+            sum.value += own.along * v;
+            sum.face_weight += own.on_plane * e;
+            sum.face_value += own.on_plane * v;
             if GRADIENTS && !CENTRAL {
                 let slope = turned * cosine2;
-                weight_x += own.on_plane * (e * slope.x);
-                weight_y += own.on_plane * (e * slope.y);
-                value_x += own.on_plane * (v * slope.x);
-                value_y += own.on_plane * (v * slope.y);
+                sum.weight_x += own.on_plane * (e * slope.x);
+                sum.weight_y += own.on_plane * (e * slope.y);
+                sum.value_x += own.on_plane * (v * slope.x);
+                sum.value_y += own.on_plane * (v * slope.y);
             }
         }
-        pixels[r].weight += weight;
-        pixels[r].value += value;
-        pixels[r].face_weight += face_weight;
-        pixels[r].face_value += face_value;
-        if GRADIENTS && !CENTRAL {
-            pixels[r].weight_x += weight_x;
-            pixels[r].weight_y += weight_y;
-            pixels[r].value_x += value_x;
-            pixels[r].value_y += value_y;
-        }
+        add_to_field(r, f, sum);
     }
 }
 
@@ -213,9 +232,9 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
         }
     }
     if CLASSIFIED && !splat.is_radiance {
-        let shown = classify(a.w);
+        let shown = classify(0u, a.w);
         splat.color = shown.xyz;
-        splat.strength = shown.w * d.w * frame.kernel.z;
+        splat.strength = shown.w * d.w * frame.fields[0].kernel.z;
     }
     if RADIANCE_PAYLOAD && any(splat.normal != vec3(0.0)) {
         splat.facing = facing_weight(splat.normal, a.xyz);
@@ -234,12 +253,15 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
 // closest approach is where |β|²·z = L, at v × β / |β|² in whitened space. All of these are exact
 // in perspective. They are computed from vectors, not from expanded polynomials, which cancel
 // beside the eye. See docs/engine.md.
-fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
+fn add_general(f: u32, entry: u32, front: u32, first_pixel: vec2<i32>) {
     let index = entry & ENTRY_RECORD;
     let a = records[index];
     let b = records[index + 1u];
     let c = records[index + 2u];
     let splat = load(a, c, records[index + 3u]);
+    // With several fields, high.w marks those whose kernel is in tables.
+    let is_table = TABLE_KERNEL && !splat.is_radiance
+        && (FIELDS == 1u || frame.fields[f].high.w > 0.0);
     let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
     let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
     // The change of the whitened ray per pixel to the right and down, and its constant part.
@@ -284,18 +306,23 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
         var on_plane: vec3<f32>;
         var steep: vec3<f32>;
         var along: vec4<f32>;
-        if TABLE_KERNEL && !splat.is_radiance {
+        if is_table {
             let rho = sqrt(rho2);
-            let half = kernel_integral(rho, 3e38);
-            let f = vec3(
-                kernel_integral(rho, t.x),
-                kernel_integral(rho, t.y),
-                kernel_integral(rho, t.z),
+            let half = kernel_integral(f, rho, 3e38);
+            let inner = vec3(
+                kernel_integral(f, rho, t.x),
+                kernel_integral(f, rho, t.y),
+                kernel_integral(f, rho, t.z),
             );
-            along = vec4(f.x + half - 2.0 * half * base, f.y - f.x, f.z - f.y, half - f.z);
-            let k0 = kernel_at(sqrt(rho2 + t.x * t.x));
-            let k1 = kernel_at(sqrt(rho2 + t.y * t.y));
-            let k2 = kernel_at(sqrt(rho2 + t.z * t.z));
+            along = vec4(
+                inner.x + half - 2.0 * half * base,
+                inner.y - inner.x,
+                inner.z - inner.y,
+                half - inner.z,
+            );
+            let k0 = kernel_at(f, sqrt(rho2 + t.x * t.x));
+            let k1 = kernel_at(f, sqrt(rho2 + t.y * t.y));
+            let k2 = kernel_at(f, sqrt(rho2 + t.z * t.z));
             on_plane = vec3(k0.x, k1.x, k2.x);
             steep = vec3(k0.y, k1.y, k2.y);
             e = select(0.0, 1.0, rho2 <= splat.extent2);
@@ -307,8 +334,8 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
         }
         if WHOLE {
             along = vec4(e, 0.0, 0.0, 0.0);
-            if TABLE_KERNEL && !splat.is_radiance {
-                along.x = 2.0 * kernel_integral(sqrt(rho2), 3e38) * e;
+            if is_table {
+                along.x = 2.0 * kernel_integral(f, sqrt(rho2), 3e38) * e;
             } else if CLASSIFIED && !splat.is_radiance {
                 along.x = e * SQRT_TAU;
             }
@@ -333,22 +360,23 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
             add_radiance(r, along * strength, splat);
         } else if SUMS {
             var value = vec3(splat.strength);
-            var section = along * (length_of * splat.weight);
-            pixels[r].weight += section;
-            pixels[r].value += section * splat.strength;
+            let section = along * (length_of * splat.weight);
             on_plane *= splat.weight;
             steep *= splat.weight;
             let nearest = cross(v, beta) * (inverse * inverse);
             let unit = beta * inverse;
+            var own: Added;
+            own.weight = section;
+            own.value = section * splat.strength;
             if SLOPES {
                 let slope_along = dot(splat.slope, unit);
                 value += dot(splat.slope, nearest) + t * slope_along;
                 let g = on_plane;
                 let carried = vec4(-g.x, g.x - g.y, g.y - g.z, g.z) * slope_along;
-                pixels[r].value += section * dot(splat.slope, nearest) + carried * length_of;
+                own.value += section * dot(splat.slope, nearest) + carried * length_of;
             }
-            pixels[r].face_weight += on_plane;
-            pixels[r].face_value += on_plane * value;
+            own.face_weight = on_plane;
+            own.face_value = on_plane * value;
             if GRADIENTS && !CENTRAL {
                 // The change of x′ on a plane per pixel to the right and down.
                 var across = array<vec3<f32>, 2>(m0, m1);
@@ -361,15 +389,16 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
                 }
                 let x = size * (dot(nearest, across[0]) + t * dot(unit, across[0]));
                 let y = size * (dot(nearest, across[1]) + t * dot(unit, across[1]));
-                pixels[r].weight_x += steep * x;
-                pixels[r].weight_y += steep * y;
-                pixels[r].value_x += steep * x * value;
-                pixels[r].value_y += steep * y * value;
+                own.weight_x = steep * x;
+                own.weight_y = steep * y;
+                own.value_x = steep * x * value;
+                own.value_y = steep * y * value;
                 if SLOPES {
-                    pixels[r].value_x -= on_plane * size * dot(splat.slope, across[0]);
-                    pixels[r].value_y -= on_plane * size * dot(splat.slope, across[1]);
+                    own.value_x -= on_plane * size * dot(splat.slope, across[0]);
+                    own.value_y -= on_plane * size * dot(splat.slope, across[1]);
                 }
             }
+            add_to_field(r, f, own);
         }
     }
 }

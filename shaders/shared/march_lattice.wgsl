@@ -5,7 +5,7 @@
 
 // The field of the sheets before this one is drawn already.
 var<private> next_field: u32;
-// The plane of pixels[r].behind, and the current tile.
+// The plane of pixels[r].fields[0].behind, and the current tile.
 var<private> held_plane: u32;
 var<private> own_tile: u32;
 
@@ -25,8 +25,8 @@ fn look_at(sheet: u32) {
     var plane = select(sheet, sheet + 1u, held_plane == sheet);
     loop {
         for (var r = 0u; r < ROWS; r++) {
-            pixels[r].front = pixels[r].behind;
-            pixels[r].behind = face_at(r, plane);
+            pixels[r].fields[0].front = pixels[r].fields[0].behind;
+            pixels[r].fields[0].behind = face_at(r, plane);
         }
         plane++;
         if plane > sheet + 1u {
@@ -46,9 +46,7 @@ fn pass_field_before(end: u32) -> u32 {
         }
         look_at(sheet);
         for (var r = 0u; r < ROWS; r++) {
-            var own: Sheet;
-            resolve_field(r, sheet, &own);
-            composite(r, sheet, own);
+            composite_field(r, sheet);
         }
         count++;
         sheet = next_marked(own_tile, sheet + 1u, end);

@@ -42,9 +42,12 @@ const NO_PAGE: u32 = 0xffffffffu;
 const BLEND_BAND: f32 = 1.5;
 const SHARE_UNIT: u32 = 1023u;
 const MOST_PIXELS: f32 = 1e9;
-const SLOT_NODES: u32 = 4096u;
+const SLOT_NODES: u32 = 512u;
 const SELECT_RUN: u32 = 64u;
 const SLOT_RUNS: u32 = SLOT_NODES / SELECT_RUN;
+// Number of invocations that share a batch. Each visits every eighth node: if no parent is refined,
+// all of them end at once.
+const SHARERS: u32 = 8u;
 
 fn to_view(place: vec3<f32>) -> vec3<f32> {
     return source.axis_x.xyz * place.x + source.axis_y.xyz * place.y + source.axis_z.xyz * place.z

@@ -10,21 +10,20 @@ struct Face {
     along: f32,
 }
 
-// One sheet at one pixel.
+// A field in one sheet at one pixel.
 struct Sheet {
     has_value: bool,
-    // The mean, and the filled fraction of the sheet (scattered samples).
+    // The mean, and the filled fraction of the sheet (1 on a lattice).
     value: f32,
     filling: f32,
     front: Face,
     back: Face,
     // A gathered lattice: the field in the middle.
     inside: Face,
-    // Radiance payload: colour times optical depth, and optical depth.
-    radiance: vec4<f32>,
 }
 
-struct Pixel {
+// A field in the open sheets.
+struct OpenField {
     // Sums of the four open sheets: weights, weighted values.
     weight: vec4<f32>,
     value: vec4<f32>,
@@ -40,6 +39,12 @@ struct Pixel {
     front: Face,
     // A gathered lattice: the plane behind the sheet that was evaluated last.
     behind: Face,
+    // The part of the ray that clips keep inside the samples' box.
+    inside: vec2<f32>,
+}
+
+struct Pixel {
+    fields: array<OpenField, FIELDS>,
     // Optical depth; then the sums of facing weights, colours and normals, each weighted by optical
     // depth.
     depth: vec4<f32>,
@@ -58,9 +63,8 @@ struct Pixel {
     // The ray: image-plane position, cosine to the optical axis.
     ray: vec2<f32>,
     cosine: f32,
-    // The part of the ray that clips keep, and its part inside the samples' box.
+    // The part of the ray that clips keep.
     kept: vec2<f32>,
-    inside: vec2<f32>,
     // The parts that boxes cut out.
     holes: array<vec2<f32>, HOLES + 1u>,
 }
@@ -104,25 +108,28 @@ fn aim(r: u32, pixel: vec2<i32>) {
         let hole = frame.holes[i];
         pixels[r].holes[i] = box_part(hole.low.xyz, hole.high.xyz, origin, direction);
     }
-    pixels[r].inside = pixels[r].kept;
-    if SCALAR && LATTICE {
-        let start = frame.field_origin.xyz + in_steps(origin_of(r));
-        let part = box_part(
-            frame.field_low.xyz,
-            frame.field_high.xyz,
-            start,
-            in_steps(direction_of(r)),
-        );
-        pixels[r].inside = vec2(max(pixels[r].kept.x, part.x), min(pixels[r].kept.y, part.y));
+    for (var f = 0u; f < FIELDS; f++) {
+        pixels[r].fields[f].inside = pixels[r].kept;
+        if SCALAR && LATTICE {
+            let start = frame.fields[f].origin.xyz + in_steps(f, origin_of(r));
+            let part = box_part(
+                frame.fields[f].low.xyz,
+                frame.fields[f].high.xyz,
+                start,
+                in_steps(f, direction_of(r)),
+            );
+            pixels[r].fields[f].inside =
+                vec2(max(pixels[r].kept.x, part.x), min(pixels[r].kept.y, part.y));
+        }
     }
 }
 
-// Converts a view-space direction to steps of the lattice.
-fn in_steps(v: vec3<f32>) -> vec3<f32> {
+// Converts a view-space direction to steps of a field's lattice.
+fn in_steps(f: u32, v: vec3<f32>) -> vec3<f32> {
     return vec3(
-        dot(frame.field_axis_x.xyz, v),
-        dot(frame.field_axis_y.xyz, v),
-        dot(frame.field_axis_z.xyz, v),
+        dot(frame.fields[f].axis_x.xyz, v),
+        dot(frame.fields[f].axis_y.xyz, v),
+        dot(frame.fields[f].axis_z.xyz, v),
     );
 }
 

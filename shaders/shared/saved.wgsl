@@ -3,8 +3,10 @@
 // slot when it first stops, and frees the slot when it is finished. The sums are saved exactly, so
 // a tile that stops draws the same as without a stop.
 
-// Vectors of a pixel: the position of its invocation, then 16 of sums, then those of facets.
-const FIRST_FACET_VECTOR: u32 = 17u;
+// Vectors of a pixel: the position of its invocation, then 8 of radiance, then 8 of each field,
+// then those of facets.
+const FIRST_FIELD_VECTOR: u32 = 9u;
+const FIRST_FACET_VECTOR: u32 = FIRST_FIELD_VECTOR + 8u * FIELDS;
 const SAVED_VECTORS: u32 = FIRST_FACET_VECTOR + FACET_VECTORS;
 const NO_SLOT: u32 = 0xffffffffu;
 
@@ -40,30 +42,20 @@ fn save(slot: u32, lane: vec2<u32>, walk: vec4<u32>) {
     for (var r = 0u; r < ROWS; r++) {
         let at = saved_at(slot, lane, r);
         colors[at] = bitcast<vec4<f32>>(walk);
-        let front = pixels[r].front;
-        if SUMS {
-            colors[at + 1u] = pixels[r].weight;
-            colors[at + 2u] = pixels[r].value;
-            colors[at + 3u] = vec4(pixels[r].face_weight, front.value);
-            colors[at + 4u] = vec4(pixels[r].face_value, select(0.0, 1.0, front.has_value));
-        }
-        if SUMS && GRADIENTS {
-            colors[at + 5u] = vec4(pixels[r].weight_x, front.slope.x);
-            colors[at + 6u] = vec4(pixels[r].weight_y, front.slope.y);
-            colors[at + 7u] = vec4(pixels[r].value_x, 0.0);
-            colors[at + 8u] = vec4(pixels[r].value_y, 0.0);
+        for (var f = 0u; f < FIELDS; f++) {
+            save_field(r, f, at + FIRST_FIELD_VECTOR + 8u * f);
         }
         if RADIANCE_PAYLOAD {
-            colors[at + 9u] = pixels[r].depth;
-            colors[at + 10u] = pixels[r].facing;
-            colors[at + 11u] = pixels[r].red;
-            colors[at + 12u] = pixels[r].green;
-            colors[at + 13u] = pixels[r].blue;
+            colors[at + 1u] = pixels[r].depth;
+            colors[at + 2u] = pixels[r].facing;
+            colors[at + 3u] = pixels[r].red;
+            colors[at + 4u] = pixels[r].green;
+            colors[at + 5u] = pixels[r].blue;
         }
         if SURFACE_SHADED {
-            colors[at + 14u] = pixels[r].normal_x;
-            colors[at + 15u] = pixels[r].normal_y;
-            colors[at + 16u] = pixels[r].normal_z;
+            colors[at + 6u] = pixels[r].normal_x;
+            colors[at + 7u] = pixels[r].normal_y;
+            colors[at + 8u] = pixels[r].normal_z;
         }
         save_facets(r, at + FIRST_FACET_VECTOR);
     }
@@ -72,38 +64,61 @@ fn save(slot: u32, lane: vec2<u32>, walk: vec4<u32>) {
 fn restore(slot: u32, lane: vec2<u32>) -> vec4<u32> {
     for (var r = 0u; r < ROWS; r++) {
         let at = saved_at(slot, lane, r);
-        if SUMS {
-            let face_weight = colors[at + 3u];
-            let face_value = colors[at + 4u];
-            pixels[r].weight = colors[at + 1u];
-            pixels[r].value = colors[at + 2u];
-            pixels[r].face_weight = face_weight.xyz;
-            pixels[r].face_value = face_value.xyz;
-            pixels[r].front.value = face_weight.w;
-            pixels[r].front.has_value = face_value.w > 0.0;
-        }
-        if SUMS && GRADIENTS {
-            let weight_x = colors[at + 5u];
-            let weight_y = colors[at + 6u];
-            pixels[r].weight_x = weight_x.xyz;
-            pixels[r].weight_y = weight_y.xyz;
-            pixels[r].front.slope = vec2(weight_x.w, weight_y.w);
-            pixels[r].value_x = colors[at + 7u].xyz;
-            pixels[r].value_y = colors[at + 8u].xyz;
+        for (var f = 0u; f < FIELDS; f++) {
+            restore_field(r, f, at + FIRST_FIELD_VECTOR + 8u * f);
         }
         if RADIANCE_PAYLOAD {
-            pixels[r].depth = colors[at + 9u];
-            pixels[r].facing = colors[at + 10u];
-            pixels[r].red = colors[at + 11u];
-            pixels[r].green = colors[at + 12u];
-            pixels[r].blue = colors[at + 13u];
+            pixels[r].depth = colors[at + 1u];
+            pixels[r].facing = colors[at + 2u];
+            pixels[r].red = colors[at + 3u];
+            pixels[r].green = colors[at + 4u];
+            pixels[r].blue = colors[at + 5u];
         }
         if SURFACE_SHADED {
-            pixels[r].normal_x = colors[at + 14u];
-            pixels[r].normal_y = colors[at + 15u];
-            pixels[r].normal_z = colors[at + 16u];
+            pixels[r].normal_x = colors[at + 6u];
+            pixels[r].normal_y = colors[at + 7u];
+            pixels[r].normal_z = colors[at + 8u];
         }
         restore_facets(r, at + FIRST_FACET_VECTOR);
     }
     return bitcast<vec4<u32>>(colors[saved_at(slot, lane, 0u)]);
+}
+
+fn save_field(r: u32, f: u32, at: u32) {
+    let own = pixels[r].fields[f];
+    let front = own.front;
+    if SUMS {
+        colors[at] = own.weight;
+        colors[at + 1u] = own.value;
+        colors[at + 2u] = vec4(own.face_weight, front.value);
+        colors[at + 3u] = vec4(own.face_value, select(0.0, 1.0, front.has_value));
+    }
+    if SUMS && GRADIENTS {
+        colors[at + 4u] = vec4(own.weight_x, front.slope.x);
+        colors[at + 5u] = vec4(own.weight_y, front.slope.y);
+        colors[at + 6u] = vec4(own.value_x, 0.0);
+        colors[at + 7u] = vec4(own.value_y, 0.0);
+    }
+}
+
+fn restore_field(r: u32, f: u32, at: u32) {
+    if SUMS {
+        let face_weight = colors[at + 2u];
+        let face_value = colors[at + 3u];
+        pixels[r].fields[f].weight = colors[at];
+        pixels[r].fields[f].value = colors[at + 1u];
+        pixels[r].fields[f].face_weight = face_weight.xyz;
+        pixels[r].fields[f].face_value = face_value.xyz;
+        pixels[r].fields[f].front.value = face_weight.w;
+        pixels[r].fields[f].front.has_value = face_value.w > 0.0;
+    }
+    if SUMS && GRADIENTS {
+        let weight_x = colors[at + 4u];
+        let weight_y = colors[at + 5u];
+        pixels[r].fields[f].weight_x = weight_x.xyz;
+        pixels[r].fields[f].weight_y = weight_y.xyz;
+        pixels[r].fields[f].front.slope = vec2(weight_x.w, weight_y.w);
+        pixels[r].fields[f].value_x = colors[at + 6u].xyz;
+        pixels[r].fields[f].value_y = colors[at + 7u].xyz;
+    }
 }

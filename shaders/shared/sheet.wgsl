@@ -1,8 +1,8 @@
 // Closes a sheet at one pixel: resolves its sums, classifies and shades it, and composites it.
 
 // A sheet with less optical depth than this has no colour: such a small sum may be a rounding
-// remainder of the sections that a splat's windows add and take back. For fields, frame.isotropic.w
-// is the limit, with a margin for kernels of both signs.
+// remainder of the sections that a splat's windows add and take back. The limit for fields is
+// `isotropic.w`, with a margin for kernels of both signs.
 const LEAST_DEPTH: f32 = 1e-5;
 // Optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
@@ -50,32 +50,41 @@ fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f3
 }
 
 // The same for the gradient of the field.
-fn lit_field(r: u32, color: vec3<f32>, gradient: vec3<f32>) -> vec3<f32> {
-    return lit_from(color, gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
+fn lit_field(r: u32, f: u32, color: vec3<f32>, gradient: vec3<f32>) -> vec3<f32> {
+    let own = frame.fields[f].shade;
+    return lit_from(color, gradient, direction_of(r), own, frame.fields[f].certain.xy);
 }
 
 // The same for a part of a sheet, in its mean light: gradients change more within a part than
 // values do. The light is taken at four places, without a loop, which march would pay for.
-fn lit_piece(r: u32, medium: Medium, color: vec3<f32>, place: f32, next_place: f32) -> vec3<f32> {
+fn lit_piece(
+    r: u32,
+    f: u32,
+    medium: Medium,
+    color: vec3<f32>,
+    place: f32,
+    next_place: f32,
+) -> vec3<f32> {
     let step = 0.125 * (next_place - place);
-    let light = 0.25 * (light_at(r, medium, place + step)
-        + light_at(r, medium, place + 3.0 * step)
-        + light_at(r, medium, place + 5.0 * step)
-        + light_at(r, medium, place + 7.0 * step));
+    let light = 0.25 * (light_at(r, f, medium, place + step)
+        + light_at(r, f, medium, place + 3.0 * step)
+        + light_at(r, f, medium, place + 5.0 * step)
+        + light_at(r, f, medium, place + 7.0 * step));
     return min(color * light.x + light.y, vec3(1.0));
 }
 
 // Returns the light of the field at a place in a sheet.
-fn light_at(r: u32, medium: Medium, place: f32) -> vec2<f32> {
-    let gradient = gradient_at(r, medium, place);
-    return light_of(gradient, direction_of(r), frame.volume_shade, frame.certain.xy);
+fn light_at(r: u32, f: u32, medium: Medium, place: f32) -> vec2<f32> {
+    let gradient = gradient_at(r, f, medium, place);
+    return light_of(gradient, direction_of(r), frame.fields[f].shade, frame.fields[f].certain.xy);
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
-// are in table entries per thickness of a sheet, approximately (`frame.gradients`), so that their
+// are in table entries per thickness of a sheet, approximately (`gradients`), so that their
 // squares fit 32 bits in any units.
-fn slope_on_plane(r: u32, slope: vec2<f32>, distance: f32) -> vec2<f32> {
-    return slope * frame.gradients.w / select(1.0, pixels[r].cosine * distance, PERSPECTIVE);
+fn slope_on_plane(r: u32, f: u32, slope: vec2<f32>, distance: f32) -> vec2<f32> {
+    let size = select(1.0, pixels[r].cosine * distance, PERSPECTIVE);
+    return slope * frame.fields[f].gradients.w / size;
 }
 
 // Returns the gradient in view space, from the slope across the picture and the derivative along
@@ -90,12 +99,26 @@ fn shift(sums: vec4<f32>) -> vec4<f32> {
     return vec4(sums.yzw, 0.0);
 }
 
-// Resolves the front lane to a sheet and shifts it out.
-fn resolve(r: u32, sheet: u32) -> Sheet {
-    var own: Sheet;
-    if SCALAR {
-        resolve_field(r, sheet, &own);
-    }
+// Everything in a sheet, mixed.
+struct Mixture {
+    // Colour times optical depth, and optical depth.
+    color: vec3<f32>,
+    depth: f32,
+    // The nearest distance at which an isosurface absorbed half of the light.
+    hit: f32,
+}
+
+// The distance of an isosurface that is not met.
+const NO_HIT: f32 = 3e38;
+
+fn is_in_pass(sheet: u32) -> bool {
+    return sheet >= stage.first_sheet && sheet < stage.end_sheet;
+}
+
+// Resolves the radiance of the front lane and shifts it out.
+fn resolve_radiance(r: u32, sheet: u32) -> Mixture {
+    var mixture: Mixture;
+    mixture.hit = NO_HIT;
     if RADIANCE_PAYLOAD && !SINGLE_SPLATS {
         let depth = pixels[r].depth.x;
         let sum = vec3(pixels[r].red.x, pixels[r].green.x, pixels[r].blue.x);
@@ -116,14 +139,17 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
             pixels[r].normal_y = shift(pixels[r].normal_y);
             pixels[r].normal_z = shift(pixels[r].normal_z);
         }
-        own.radiance = select(vec4(0.0), vec4(depth * color, depth), depth >= LEAST_DEPTH);
+        if depth >= LEAST_DEPTH && is_in_pass(sheet) {
+            mixture.color = depth * color;
+            mixture.depth = depth;
+        }
         pixels[r].facing = shift(pixels[r].facing);
         pixels[r].depth = shift(pixels[r].depth);
         pixels[r].red = shift(pixels[r].red);
         pixels[r].green = shift(pixels[r].green);
         pixels[r].blue = shift(pixels[r].blue);
     }
-    return own;
+    return mixture;
 }
 
 // The field of a sheet, composited front to back.
@@ -146,8 +172,8 @@ struct Medium {
     along: vec3<f32>,
     // The largest value.
     peak: f32,
-    // Whether an isosurface absorbed half of the light.
-    has_hit: bool,
+    // The distance at which an isosurface absorbed half of the light.
+    hit: f32,
 }
 
 const NO_VALUE: f32 = -3e38;
@@ -156,13 +182,13 @@ const NO_VALUE: f32 = -3e38;
 // middle, and a parabola in between. Otherwise it is interpolated between the faces across the
 // picture; along the ray it is the derivative of the values' parabola, which knows more of the
 // inside.
-fn gradient_at(r: u32, medium: Medium, u: f32) -> vec3<f32> {
+fn gradient_at(r: u32, f: u32, medium: Medium, u: f32) -> vec3<f32> {
     if GATHER {
         let shares = vec3((1.0 - u) * (1.0 - 2.0 * u), 4.0 * u * (1.0 - u), u * (2.0 * u - 1.0));
         return gradient(
             r,
             shares.x * medium.front + shares.y * medium.inside + shares.z * medium.back,
-            dot(shares, medium.along) * frame.gradients.z,
+            dot(shares, medium.along) * frame.fields[f].gradients.z,
         );
     }
     let curve = medium.curve;
@@ -170,13 +196,21 @@ fn gradient_at(r: u32, medium: Medium, u: f32) -> vec3<f32> {
     return gradient(
         r,
         mix(medium.front, medium.back, u),
-        along * (frame.gradients.z / medium.thickness),
+        along * (frame.fields[f].gradients.z / medium.thickness),
     );
 }
 
 // Adds the part of a sheet between two distances. The field there is a parabola with the values of
 // the faces at the ends and the sheet's mean.
-fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<function, Medium>) {
+fn pass_piece(
+    r: u32,
+    f: u32,
+    sheet: u32,
+    own: Sheet,
+    begin: f32,
+    end: f32,
+    medium: ptr<function, Medium>,
+) {
     let start = planes[sheet];
     let thickness = (*medium).thickness;
     let curve = (*medium).curve;
@@ -192,26 +226,27 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
         } else {
             var shown: vec4<f32>;
             if POST {
-                shown = classify(own.value);
+                shown = classify(f, own.value);
                 shown = vec4(shown.xyz * shown.w, shown.w);
             } else {
-                shown = classify_between(value, next);
+                shown = classify_between(f, value, next);
             }
             var normal: vec3<f32>;
             if GRADIENT_OPACITY {
-                normal = gradient_at(r, *medium, 0.5 * (place + next_place));
-                shown *= gradient_factor(length(normal));
+                normal = gradient_at(r, f, *medium, 0.5 * (place + next_place));
+                shown *= gradient_factor(f, length(normal));
             }
             // Differences of integrals: rounding remainders, where nothing is visible, must stay a
             // colour.
-            let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
+            let depth = max(shown.w, 0.0) * step * own.filling;
             var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
             if VOLUME_SHADED {
-                color = lit_piece(r, *medium, color, place, next_place);
+                color = lit_piece(r, f, *medium, color, place, next_place);
             }
             var done = 0.0;
             for (var i = 0u; i < ISOSURFACES; i++) {
-                let surface = frame.isosurfaces[select(ISOSURFACES - 1u - i, i, next > value)];
+                let number = select(ISOSURFACES - 1u - i, i, next > value);
+                let surface = frame.fields[f].isosurfaces[number];
                 let level = surface.value.x;
                 if (value < level) != (next < level) {
                     let share = (level - value) / (next - value);
@@ -219,6 +254,7 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
                     done = share;
                     pass_surface(
                         r,
+                        f,
                         surface,
                         mix(place, next_place, share),
                         near + step * share,
@@ -260,6 +296,7 @@ fn pass_part(depth: f32, color: vec3<f32>, medium: ptr<function, Medium>) {
 
 fn pass_surface(
     r: u32,
+    f: u32,
     surface: Isosurface,
     place: f32,
     distance: f32,
@@ -270,21 +307,21 @@ fn pass_surface(
     (*medium).through -= share;
     (*medium).depth += surface.value.z;
     if before > 0.5 && pixels[r].transmittance * (*medium).through <= 0.5 {
-        pixels[r].hit = distance;
-        (*medium).has_hit = true;
+        (*medium).hit = distance;
     }
     var color = surface.color.xyz;
     if VOLUME_SHADED {
-        color = lit_field(r, color, gradient_at(r, *medium, place));
+        color = lit_field(r, f, color, gradient_at(r, f, *medium, place));
     }
     (*medium).color += share * color;
 }
 
-// Returns the medium of a sheet, inside the box of the samples and what the clips leave.
-fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
+// Returns a field's medium of a sheet, inside the box of the samples and what the clips leave.
+fn pass_field(r: u32, f: u32, sheet: u32, own: Sheet) -> Medium {
     var medium: Medium;
     medium.through = 1.0;
     medium.peak = NO_VALUE;
+    medium.hit = NO_HIT;
     let front = select(own.value, own.front.value, own.front.has_value);
     let back = select(own.value, own.back.value, own.back.has_value);
     medium.curve = vec3(front, 1.5 * own.value - 0.25 * (front + back), back);
@@ -297,11 +334,11 @@ fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
             medium.along = vec3(own.front.along, own.inside.along, own.back.along);
         }
     }
-    var begin = max(planes[sheet], pixels[r].inside.x);
-    let last = min(planes[sheet + 1u], pixels[r].inside.y);
+    var begin = max(planes[sheet], pixels[r].fields[f].inside.x);
+    let last = min(planes[sheet + 1u], pixels[r].fields[f].inside.y);
     if HOLES == 0u {
         if begin < last {
-            pass_piece(r, sheet, own, begin, last, &medium);
+            pass_piece(r, f, sheet, own, begin, last, &medium);
         }
         return medium;
     }
@@ -317,55 +354,50 @@ fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
             end = select(end, min(end, hole.x), hole.x > begin && hole.x < hole.y);
         }
         if begin < end {
-            pass_piece(r, sheet, own, begin, end, &medium);
+            pass_piece(r, f, sheet, own, begin, end, &medium);
         }
         begin = max(begin, end);
     }
     return medium;
 }
 
-// Adds a sheet to the picture.
-fn composite(r: u32, sheet: u32, own: Sheet) {
-    let in_pass = sheet >= stage.first_sheet && sheet < stage.end_sheet;
+// Adds a field's medium of a sheet to the mixture.
+fn mix_field(r: u32, f: u32, sheet: u32, own: Sheet, mixture: ptr<function, Mixture>) {
     // A gathered field may remain from sheets before the pass.
-    if !GATHER && !in_pass {
+    if !own.has_value || !(GATHER || is_in_pass(sheet)) {
         return;
     }
-    let radiance = select(vec4(0.0), own.radiance, in_pass);
-    var premultiplied = radiance.xyz;
-    var depth = radiance.w;
+    var medium = pass_field(r, f, sheet, own);
+    if MAXIMUM {
+        pixels[r].hit = max(pixels[r].hit, medium.peak);
+        return;
+    }
+    // Converts opacity to optical depth: τ / (1 − e^−τ). For small τ that ratio would lose its
+    // digits.
+    let depth = min(medium.depth, MOST_DEPTH);
+    let ratio = select(depth / (1.0 - exp(-depth)), 1.0 + 0.5 * depth, depth < 1e-2);
+    (*mixture).color += ratio * medium.color;
+    (*mixture).depth += depth;
+    (*mixture).hit = min((*mixture).hit, medium.hit);
+}
+
+// Adds a sheet to the picture.
+fn composite(r: u32, sheet: u32, mixture: Mixture) {
+    let depth = mixture.depth;
+    if MAXIMUM || !(depth > LEAST_DIVISOR) {
+        return;
+    }
+    let premultiplied = select(mixture.color, vec3(depth), XRAY);
     let before = pixels[r].transmittance;
-    var has_hit = false;
-    if SCALAR && own.has_value {
-        var medium = pass_field(r, sheet, own);
-        if MAXIMUM {
-            pixels[r].hit = max(pixels[r].hit, medium.peak);
-            return;
-        }
-        // Converts opacity to optical depth: τ / (1 − e^−τ). For small τ that ratio would lose its
-        // digits.
-        let field_depth = min(medium.depth, MOST_DEPTH);
-        let ratio = select(
-            field_depth / (1.0 - exp(-field_depth)),
-            1.0 + 0.5 * field_depth,
-            field_depth < 1e-2,
-        );
-        premultiplied += ratio * medium.color;
-        depth += field_depth;
-        has_hit = medium.has_hit;
+    let share = before * taken(depth);
+    let left = before - share;
+    pixels[r].color += share / depth * premultiplied;
+    // Inside the sheet, optical depth counts as evenly spread; an isosurface counts at its exact
+    // place.
+    if mixture.hit < NO_HIT {
+        pixels[r].hit = mixture.hit;
+    } else if before > 0.5 && left <= 0.5 {
+        pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);
     }
-    if XRAY {
-        premultiplied = vec3(depth);
-    }
-    if depth > LEAST_DIVISOR {
-        let share = before * taken(depth);
-        let left = before - share;
-        pixels[r].color += share / depth * premultiplied;
-        // Inside the sheet, optical depth counts as evenly spread; an isosurface counts at its
-        // exact place.
-        if !has_hit && before > 0.5 && left <= 0.5 {
-            pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);
-        }
-        pixels[r].transmittance = left;
-    }
+    pixels[r].transmittance = left;
 }

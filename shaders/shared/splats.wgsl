@@ -3,8 +3,10 @@
 // The picture is sampled at pixel centres. A blur of this many pixels keeps small splats from
 // falling between them.
 const FOOTPRINT_BLUR: f32 = 0.35;
-// Trained Gaussians are widened by their trainer's √0.3 pixels.
+// Trained Gaussians are widened by their trainer's √0.3 pixels across the view's axis, and by this
+// share of it along the axis.
 const TRAINED_BLUR: f32 = 0.54772256;
+const TRAINED_BLUR_ALONG: f32 = 0.1;
 // Opaque surfaces must not grow through the blur: see splat.rs.
 const STEP_BACK: f32 = 2.4;
 
@@ -34,19 +36,20 @@ fn splat_at(index: u32) -> Candidate {
     let c0 = to_view * vec3(b.x, b.y, b.w);
     let c1 = to_view * vec3(0.0, b.z, d.x);
     let c2 = to_view * vec3(0.0, 0.0, d.y);
+    let is_trained = TRAINED && (source.flags & TRAINED_FLAG) != 0u;
     var pixel = 1.0 / frame.scale;
     if frame.perspective != 0u {
-        pixel = pixel * length(splat.center);
+        pixel = pixel * select(length(splat.center), abs(splat.center.z), is_trained);
     }
-    let is_trained = TRAINED && (source.flags & TRAINED_FLAG) != 0u;
     let blur = select(FOOTPRINT_BLUR, TRAINED_BLUR, is_trained) * pixel;
     let blur2 = blur * blur;
+    let along = select(1.0, TRAINED_BLUR_ALONG, is_trained) * blur;
     splat.covariance.xx = c0.x * c0.x + c1.x * c1.x + c2.x * c2.x + blur2;
     splat.covariance.xy = c0.x * c0.y + c1.x * c1.y + c2.x * c2.y;
     splat.covariance.xz = c0.x * c0.z + c1.x * c1.z + c2.x * c2.z;
     splat.covariance.yy = c0.y * c0.y + c1.y * c1.y + c2.y * c2.y + blur2;
     splat.covariance.yz = c0.y * c0.z + c1.y * c1.z + c2.y * c2.z;
-    splat.covariance.zz = c0.z * c0.z + c1.z * c1.z + c2.z * c2.z + blur2;
+    splat.covariance.zz = c0.z * c0.z + c1.z * c1.z + c2.z * c2.z + along * along;
     splat.extent = source.extent;
     splat.strength = own.strength;
     splat.color = own.color;
@@ -68,8 +71,10 @@ fn splat_at(index: u32) -> Candidate {
         let slope_z = slope.z / d.y;
         let slope_y = (slope.y - d.x * slope_z) / b.z;
         let slope_x = (slope.x - b.y * slope_y - b.w * slope_z) / b.x;
-        splat.gradient = to_view * vec3(slope_x, slope_y, slope_z) * frame.transfer.y;
-        splat.strength = counted(splat.strength);
+        let field = source_field();
+        splat.gradient = to_view * vec3(slope_x, slope_y, slope_z)
+            * frame.fields[field].transfer.y;
+        splat.strength = counted(field, splat.strength);
     }
     if !is_trained && (source.flags & RADIANCE) != 0u {
         splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;

@@ -28,9 +28,9 @@ const TOUCHED: u32 = 13u;
 // Number of passes that began, plus tiles that stopped after some entries. If this stays the same,
 // the frame makes no progress.
 const ADVANCED: u32 = 14u;
-// The stalled pass.
+// The stalled pass: 8 words, and the first record words of the fields.
 const HELD: u32 = 15u;
-const STATE_WORDS: u32 = 24u;
+const STATE_WORDS: u32 = 28u;
 
 // Indirect dispatches of a pass, as offsets in `arguments`: over the bins for clear and scan, over
 // the bins for order, over the tiles with entries for march, over them once more if some are

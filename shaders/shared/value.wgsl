@@ -2,14 +2,15 @@
 // relative to a value within the data. So 32 bits resolve the function, wherever the data's zero is
 // and whatever their unit.
 
-// Converts a value of the data to entries; the result is clamped so that it stays finite.
-fn counted(value: f32) -> f32 {
-    return counted_sum(value, 0.0);
+// Converts a value of a field's data to entries; the result is clamped so that it stays finite.
+fn counted(field: u32, value: f32) -> f32 {
+    return counted_sum(field, value, 0.0);
 }
 
 // The same for the sum of two numbers.
-fn counted_sum(large: f32, small: f32) -> f32 {
-    return clamp(((large - frame.transfer.x) + small) * frame.transfer.y, -1e30, 1e30);
+fn counted_sum(field: u32, large: f32, small: f32) -> f32 {
+    let transfer = frame.fields[field].transfer;
+    return clamp(((large - transfer.x) + small) * transfer.y, -1e30, 1e30);
 }
 
 // The types of samples.

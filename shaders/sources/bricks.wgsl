@@ -25,6 +25,7 @@ fn candidate(order: u32) -> Candidate {
     splat.strength = sample_value(number, source.lattice.w);
     splat.color = 0u;
     splat.normal = NO_NORMAL;
-    splat.weight = select(frame.levels.x, frame.levels.y, (source.flags & COARSE) != 0u);
+    let levels = frame.fields[source_field()].levels;
+    splat.weight = select(levels.x, levels.y, (source.flags & COARSE) != 0u);
     return splat;
 }

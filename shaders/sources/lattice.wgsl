@@ -9,6 +9,16 @@
 // element.
 @group(1) @binding(3) var<uniform> places: array<vec4<f32>, 4096>;
 
+// The arrangement of a single field is known when the shader is compiled. Several fields carry it
+// in their flags.
+fn is_body_centred() -> bool {
+    return BODY_CENTRED && (FIELDS == 1u || (source.flags & BODY_CENTRED_FLAG) != 0u);
+}
+
+fn is_rectilinear() -> bool {
+    return RECTILINEAR && (FIELDS == 1u || (source.flags & RECTILINEAR_FLAG) != 0u);
+}
+
 fn candidate_count() -> u32 {
     return source.slices.w;
 }
@@ -27,7 +37,7 @@ fn place_along(axis: u32, index: u32) -> vec2<f32> {
 }
 
 fn coordinate(axis: u32, index: u32) -> f32 {
-    if RECTILINEAR {
+    if is_rectilinear() {
         return place_along(axis, index).x;
     }
     return f32(index);
@@ -46,7 +56,7 @@ fn value_at(index: vec3<u32>) -> f32 {
 // neighbours on both sides.
 fn slope_along(axis: u32, index: vec3<u32>, value: f32) -> f32 {
     // Layers of the same cubic lattice of a body-centred lattice lie two apart.
-    let stride = select(1u, 2u, BODY_CENTRED && axis == 2u);
+    let stride = select(1u, 2u, is_body_centred() && axis == 2u);
     let first = select(0u, source.slices.y, axis == 2u);
     let last = select(source.lattice[axis] - 1u, source.slices.z, axis == 2u);
     let has_before = index[axis] >= first + stride;
@@ -78,7 +88,7 @@ fn candidate(order: u32) -> Candidate {
     );
     let value = value_at(index);
     var steps = vec3<f32>(index);
-    if BODY_CENTRED {
+    if is_body_centred() {
         let displaced = 0.5 * f32(index.z & 1u);
         steps = vec3(steps.xy + displaced, 0.5 * steps.z);
     }
@@ -86,7 +96,7 @@ fn candidate(order: u32) -> Candidate {
     let b = source.covariance_b;
     var splat: Candidate;
     splat.covariance = Symmetric(a.x, a.y, a.z, a.w, b.x, b.y);
-    if RECTILINEAR {
+    if is_rectilinear() {
         let x = place_along(0u, index.x);
         let y = place_along(1u, index.y);
         let z = place_along(2u, index.z);
@@ -100,15 +110,17 @@ fn candidate(order: u32) -> Candidate {
     splat.color = 0u;
     splat.normal = NO_NORMAL;
     splat.weight = 1.0;
-    if SLOPES || SAMPLE_NORMALS {
+    if (SLOPES && is_rectilinear()) || SAMPLE_NORMALS {
         // Convert the derivatives along the axes to a gradient in view space.
         let slopes = vec3(
             slope_along(0u, index, value),
             slope_along(1u, index, value),
             slope_along(2u, index, value),
         );
-        splat.gradient = frame.field_axis_x.xyz * slopes.x + frame.field_axis_y.xyz * slopes.y
-            + frame.field_axis_z.xyz * slopes.z;
+        let field = source_field();
+        splat.gradient = frame.fields[field].axis_x.xyz * slopes.x
+            + frame.fields[field].axis_y.xyz * slopes.y
+            + frame.fields[field].axis_z.xyz * slopes.z;
     }
     return splat;
 }

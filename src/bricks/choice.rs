@@ -1,7 +1,11 @@
 //! Which bricks a picture needs.
 
 use super::{Bricks, SIDE};
-use crate::{math::View, parallel::prelude::*};
+use crate::{
+    math::{Bounds, View},
+    parallel::prelude::*,
+    volume::Lattice,
+};
 use glam::DVec3;
 
 /// The levels and bricks of a picture.
@@ -21,37 +25,54 @@ pub struct Choice {
     pub shown: [u16; 256],
 }
 
+/// How fine a picture should be, and how much of it is drawn.
+#[derive(Debug, Clone, Copy)]
+pub struct Wish {
+    /// How many pixels a step between samples covers where the volume is nearest to the eye.
+    pub pixels: f64,
+    /// The maximum number of bricks.
+    pub most: usize,
+    /// The finest level.
+    pub least: f64,
+    /// The part of the world that is drawn; `None` for the whole.
+    pub region: Option<Bounds>,
+}
+
+/// How far the sheets that a region cuts reach beyond it, in samples of a level: sheets are at most
+/// 4/3 samples of the next level thick, and differences of pixels need one sample more.
+const BEYOND: f64 = 4.0;
+
 /// If the bricks exceed the budget, the level rises in steps of one over this number.
 const STEPS: f64 = 16.0;
 
-/// Chooses the levels whose step between samples covers `pixels` pixels where the volume is nearest
-/// to the eye. Of these levels it chooses the bricks that are in the picture and hold values that
-/// show according to `shown` ([`Choice::shown`]). `extent` is the kernel's, in samples of the drawn
-/// level.
+/// Chooses the levels whose step between samples covers [`Wish::pixels`] pixels where the volume is
+/// nearest to the eye. Of these levels it chooses the bricks that are in the picture and hold
+/// values that show according to `shown` ([`Choice::shown`]). `extent` is the kernel's, in samples
+/// of the drawn level. Of a region, it chooses the bricks that the region needs.
 ///
-/// The level is a real number λ = log₂(`pixels` / p), at least 0 and at most the coarsest level.
-/// Here p is the size in pixels of the longest step of level 0 at the point of the volume's box
-/// nearest to the eye. Between two levels both are drawn, with weights that follow λ, so that
-/// zooming causes no popping. If they have more than `most` bricks, λ rises to the next sixteenth
-/// at which they do not. The coarsest level, of one brick, is always allowed.
+/// The level is a real number λ = log₂(`pixels` / p), at least [`Wish::least`] and at most the
+/// coarsest level. Here p is the size in pixels of the longest step of level 0 at the point of the
+/// volume's box nearest to the eye. Between two levels both are drawn, with weights that follow λ,
+/// so that zooming causes no popping. If they have more than [`Wish::most`] bricks, λ rises to the
+/// next sixteenth at which they do not. The coarsest level, of one brick, is always allowed.
 pub fn choice(
     bricks: &Bricks,
     view: &View,
     extent: f64,
-    pixels: f64,
     shown: &[u16; 256],
-    most: usize,
+    wish: &Wish,
 ) -> Choice {
+    let &Wish { pixels, most, least, region } = wish;
     let coarsest = (bricks.levels().len() - 1) as f64;
     // A level's bricks do not depend on λ, so each level is searched once, when it is first needed.
     let mut known: Vec<Option<Vec<(f64, u32)>>> = vec![None; bricks.levels().len()];
-    let mut lambda = wanted(bricks, view, pixels).min(coarsest);
+    let mut lambda = wanted(bricks, view, pixels).max(least).min(coarsest);
     let levels = loop {
         let levels = shares(lambda);
         let mut count = 0;
         for &(level, _) in &levels {
             count += known[level]
-                .get_or_insert_with(|| visible(bricks, level, view, extent, shown))
+                .get_or_insert_with(|| visible(bricks, level, view, extent, shown, region))
                 .len();
         }
         if count <= most || lambda >= coarsest {
@@ -91,25 +112,23 @@ fn visible(
     view: &View,
     extent: f64,
     shown: &[u16; 256],
+    region: Option<Bounds>,
 ) -> Vec<(f64, u32)> {
     let level = bricks.level(number);
     let lattice = bricks.lattice(number);
     let sides = view.sides(1.0);
     let shows = |[low, high]: [u8; 2]| u16::from(high) >= shown[usize::from(low)];
-    let look = |(brick, &range): (usize, &[u8; 2])| {
-        let brick = brick as u32;
-        if !shows(range) {
+    // The samples that bricks from the first to the last one along each axis reach, if they may be
+    // in the picture.
+    let in_picture = |[first, last]: [[usize; 3]; 2]| {
+        let low = DVec3::from_array(first.map(|at| (at * SIDE) as f64)) - extent;
+        let last: [usize; 3] =
+            std::array::from_fn(|axis| ((last[axis] + 1) * SIDE).min(level.dims[axis]) - 1);
+        let high = DVec3::from_array(last.map(|at| at as f64)) + extent;
+        if region.is_some_and(|region| !meets(&region, &lattice, [low - BEYOND, high + BEYOND])) {
             return None;
         }
-        let place = level.place(brick).map(|at| at * SIDE);
-        let low = DVec3::from_array(place.map(|at| at as f64)) - extent;
-        let last: [usize; 3] =
-            std::array::from_fn(|axis| (place[axis] + SIDE).min(level.dims[axis]) - 1);
-        let high = DVec3::from_array(last.map(|at| at as f64)) + extent;
-        let corners: [DVec3; 8] = std::array::from_fn(|corner| {
-            let at = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
-            view.to_view(lattice.position(DVec3::new(at(0), at(1), at(2))))
-        });
+        let corners = corners(&lattice, [low, high]).map(|corner| view.to_view(corner));
         let outside = |(normal, reach): &(DVec3, f64)| {
             corners.iter().all(|corner| normal.dot(*corner) + reach < 0.0)
         };
@@ -118,15 +137,33 @@ fn visible(
         {
             return None;
         }
+        Some([low, high])
+    };
+    let look = |(brick, range): (u32, [u8; 2])| {
+        let place = level.place(brick);
+        let [low, high] = shows(range).then(|| in_picture([place; 2])).flatten()?;
         let center = view.to_view(lattice.position(0.5 * (low + high)));
         Some((if view.perspective { center.length() } else { center.z }, brick))
     };
-    bricks.ranges(number).par_iter().enumerate().filter_map(look).collect()
+    let found = bricks.ranges_within(number, |group| in_picture(group).is_some());
+    found.into_par_iter().filter_map(look).collect()
+}
+
+/// Returns the corners of a box of samples in the world.
+fn corners(lattice: &Lattice, [min, max]: [DVec3; 2]) -> [DVec3; 8] {
+    Bounds { min, max }.corners().map(|corner| lattice.position(corner))
+}
+
+/// Whether a box of samples may meet a box of the world: the world's boxes around both overlap.
+fn meets(bounds: &Bounds, lattice: &Lattice, samples: [DVec3; 2]) -> bool {
+    let point = |at: DVec3| Bounds { min: at, max: at };
+    let own = corners(lattice, samples).map(point).into_iter().fold(Bounds::EMPTY, Bounds::union);
+    (own.min.cmple(bounds.max) & own.max.cmpge(bounds.min)).all()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{choice as choice_for, *};
     use crate::{
         math::{Camera, Projection},
         volume::{
@@ -176,6 +213,18 @@ mod tests {
     }
 
     const MANY: usize = usize::MAX;
+
+    /// The choice for the whole picture.
+    fn choice(
+        bricks: &Bricks,
+        view: &View,
+        extent: f64,
+        pixels: f64,
+        shown: &[u16; 256],
+        most: usize,
+    ) -> Choice {
+        choice_for(bricks, view, extent, shown, &Wish { pixels, most, least: 0.0, region: None })
+    }
 
     #[test]
     fn levels_follow_the_size_of_steps() {
@@ -295,5 +344,30 @@ mod tests {
             [72, 64, 63, 9, 8, 7, 1, 0].map(lambda),
             [0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
         );
+    }
+
+    #[test]
+    fn regions_need_their_bricks_and_those_beside_them() {
+        let bricks = ramp();
+        let at = |[from, to]: [f64; 2], level: f64| {
+            let (min, max) = (DVec3::new(from, -1e3, -1e3), DVec3::new(to, 1e3, 1e3));
+            let region = Some(Bounds { min, max });
+            let wish = Wish { pixels: 1.0, most: MANY, least: level, region };
+            choice_for(&bricks, &flat(400.0), 2.0, &EVERYTHING, &wish)
+        };
+        let columns = |from: f64, to: f64| {
+            let found = at([from, to], 0.0);
+            let own = found.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick)[0]);
+            let mut own: Vec<usize> = own.collect();
+            own.sort_unstable();
+            own.dedup();
+            own
+        };
+        // Brick 1 has the samples 32 to 63, at x of 64 to 126; it is needed 6 samples beyond.
+        assert_eq!(columns(-1e3, 40.0), [0]);
+        assert_eq!(columns(-1e3, 60.0), [0, 1]);
+        assert_eq!(columns(80.0, 110.0), [1]);
+        assert_eq!(columns(-1e3, 1e3), [0, 1, 2, 3]);
+        assert_eq!((at([0.0, 9.0], 0.0).lambda, at([0.0, 9.0], 1.5).lambda), (0.0, 1.5));
     }
 }

@@ -4,6 +4,9 @@ use super::SIDE;
 use crate::volume::{Arrangement, Lattice};
 use glam::{DMat3, DVec3};
 
+/// Bricks of a group along each axis. Groups are listed together.
+const GROUP: usize = 8;
+
 /// The size of a level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Level {
@@ -29,6 +32,43 @@ impl Level {
         [brick % nx, brick / nx % ny, brick / nx / ny]
     }
 
+    /// Returns the number of a brick among those of its level, in groups of 8³ that are cut at the
+    /// border. The first axis is fastest, among groups and in each.
+    pub(super) fn rank(&self, brick: u32) -> u32 {
+        let [nx, ny, nz] = self.brick_dims;
+        let [x, y, z] = self.place(brick);
+        let [x0, y0, z0] = [x, y, z].map(|at| at / GROUP * GROUP);
+        let [w, h, d] = [nx - x0, ny - y0, nz - z0].map(|rest| rest.min(GROUP));
+        let before = z0 * nx * ny + y0 * nx * d + x0 * h * d;
+        (before + ((z - z0) * h + y - y0) * w + x - x0) as u32
+    }
+
+    /// Returns the brick with a number from [`rank`](Self::rank).
+    pub(super) fn brick(&self, rank: u32) -> u32 {
+        let [nx, ny, nz] = self.brick_dims;
+        let rank = rank as usize;
+        let z0 = rank / (nx * ny * GROUP) * GROUP;
+        let (rank, d) = (rank - z0 * nx * ny, (nz - z0).min(GROUP));
+        let y0 = rank / (nx * d * GROUP) * GROUP;
+        let (rank, h) = (rank - y0 * nx * d, (ny - y0).min(GROUP));
+        let x0 = rank / (h * d * GROUP) * GROUP;
+        let (rank, w) = (rank - x0 * h * d, (nx - x0).min(GROUP));
+        let [x, y, z] = [x0 + rank % w, y0 + rank / w % h, z0 + rank / w / h];
+        ((z * ny + y) * nx + x) as u32
+    }
+
+    /// Returns the first and the last brick of each group along each axis.
+    pub(super) fn groups(&self) -> Vec<[[usize; 3]; 2]> {
+        let [nx, ny, nz] = self.brick_dims;
+        let along = |n: usize| (0..n).step_by(GROUP);
+        let first = along(nz).flat_map(|z| along(ny).map(move |y| (y, z)));
+        let first = first.flat_map(|(y, z)| along(nx).map(move |x| [x, y, z]));
+        let last = |first: [usize; 3]| {
+            [0, 1, 2].map(|axis| (first[axis] + GROUP).min(self.brick_dims[axis]) - 1)
+        };
+        first.map(|first| [first, last(first)]).collect()
+    }
+
     /// Samples of a slice across the last axis.
     pub(super) fn slice(&self) -> usize {
         self.dims[0] * self.dims[1]
@@ -46,7 +86,7 @@ pub fn levels(dims: [usize; 3]) -> Vec<Level> {
 /// with at most as many bricks as 32 bits can count.
 pub fn refusal(lattice: &Lattice) -> Result<(), String> {
     let name = match lattice.arrangement {
-        Arrangement::Cartesian if u32::try_from(Level::new(lattice.dims).bricks()).is_ok() => {
+        Arrangement::Cartesian if are_countable(lattice.dims) => {
             return Ok(());
         }
         Arrangement::Cartesian => {
@@ -59,6 +99,15 @@ pub fn refusal(lattice: &Lattice) -> Result<(), String> {
         Arrangement::Rectilinear(_) => "rectilinear",
     };
     Err(format!("its lattice is {name}, but only volumes on Cartesian lattices are cut in bricks"))
+}
+
+/// Returns whether 32 bits can count the bricks of all levels.
+fn are_countable(dims: [usize; 3]) -> bool {
+    let bricks = levels(dims)
+        .into_iter()
+        .map(|level| level.brick_dims.iter().try_fold(1usize, |all, n| all.checked_mul(*n)));
+    let count = bricks.into_iter().try_fold(0usize, |all, own| all.checked_add(own?));
+    count.is_some_and(|count| u32::try_from(count).is_ok())
 }
 
 /// Returns the lattice of a level. Every halving of an axis doubles its step and moves its first
@@ -88,6 +137,29 @@ mod tests {
         let level = Level::new([33, 32, 100]);
         assert_eq!((level.brick_dims, level.bricks(), level.place(7)), ([2, 1, 4], 8, [1, 0, 3]));
         assert_eq!(levels([1024; 3]).len(), 6);
+    }
+
+    #[test]
+    fn groups_number_all_bricks() {
+        for dims in [[1, 1, 1], [8, 8, 8], [9, 3, 17], [20, 11, 8], [16, 16, 16]] {
+            let level = Level::new(dims.map(|n| n * SIDE));
+            let mut ranks: Vec<u32> =
+                (0..level.bricks() as u32).map(|brick| level.rank(brick)).collect();
+            assert!((0..).zip(&ranks).all(|(brick, rank)| level.brick(*rank) == brick), "{dims:?}");
+            let mut next = 0;
+            for [first, last] in level.groups() {
+                let own = (0..level.bricks() as u32).filter(|brick| {
+                    let at = level.place(*brick);
+                    (0..3).all(|axis| (first[axis]..=last[axis]).contains(&at[axis]))
+                });
+                let mut own: Vec<u32> = own.map(|brick| level.rank(brick)).collect();
+                own.sort_unstable();
+                assert!(own.iter().copied().eq(next..next + own.len() as u32), "{dims:?}");
+                next += own.len() as u32;
+            }
+            ranks.sort_unstable();
+            assert!(ranks.into_iter().eq(0..level.bricks() as u32));
+        }
     }
 
     #[test]

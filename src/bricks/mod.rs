@@ -23,7 +23,7 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-pub use choice::{Choice, choice};
+pub use choice::{Choice, Wish, choice};
 pub use cut::Brick;
 pub use file::{WriteOptions, check, convert, memory_of, write};
 pub use level::Level;

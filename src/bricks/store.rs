@@ -1,17 +1,21 @@
-//! Reading bricks: from a volume in memory, or from a file of which only the header and the
-//! directory are in memory.
+//! Reading bricks: from a volume in memory, or from a file of which only the header and parts of
+//! the directory are in memory.
 
 use super::{
     Brick, EMPTY, Level,
     cut::Slices,
-    file::{Directory, Refusal, Stored, VERSION, decode},
+    file::{
+        Entry, HASH, Listing, Numbers, Refusal, Stored, VERSION, decode, flat_length, read_flat,
+        too_short,
+    },
     halve::halve,
     level,
 };
 use crate::{
     Error, Result,
+    container::directory::{Directory, Fault, Kind, Shape},
     error::LimitKind,
-    input::{Limits, Mapping, Source, intact},
+    input::{self, Bytes, Limits},
     math::Bounds,
     parallel::prelude::*,
     volume::{Lattice, Samples, Scalar, Volume, steps::Steps},
@@ -71,9 +75,7 @@ impl Header {
 pub struct Bricks {
     path: PathBuf,
     header: Header,
-    levels: Vec<Level>,
-    /// For each level, the range of each brick.
-    ranges: Vec<Vec<[u8; 2]>>,
+    directory: Directory<Listing>,
     origin: Origin,
     limits: Limits,
 }
@@ -85,15 +87,7 @@ enum Origin {
         coarse: Vec<Vec<u8>>,
         steps: Steps,
     },
-    File {
-        bytes: Bytes,
-        directory: Directory,
-    },
-}
-
-enum Bytes {
-    Mapped(Mapping),
-    Held(Vec<u8>),
+    File(Bytes),
 }
 
 impl std::fmt::Debug for Bricks {
@@ -131,26 +125,31 @@ impl Bricks {
             coarse.push(halve(scalar, fine, level.dims));
         }
         let steps = Steps::new(scalar, volume.range);
-        let ranges = levels.iter().enumerate().map(|(number, &level)| {
-            let slices = in_memory(&volume, &coarse, number, level);
-            let range = |brick| slices.range(level.place(brick), &steps);
-            (0..level.bricks() as u32).into_par_iter().map(range).collect()
-        });
-        let ranges = ranges.collect();
+        let numbers = Numbers::new(levels);
+        let entry = |number| {
+            let (own, brick) = numbers.brick(number);
+            let level = numbers.levels[own];
+            let slices = in_memory(&volume, &coarse, own, level);
+            Entry::in_memory(slices.range(level.place(brick), &steps))
+        };
+        let entries: Vec<Entry> = (0..numbers.count).into_par_iter().map(entry).collect();
+        let directory = Directory::held(Listing { numbers, scalar, start: 0, end: 0 }, &entries);
         let path = PathBuf::from("memory");
         let origin = Origin::Memory { volume, coarse, steps };
-        Ok(Self { path, header, levels, ranges, origin, limits: Limits::none() })
+        Ok(Self { path, header, directory, origin, limits: Limits::none() })
     }
 
-    /// Opens a file: reads and checks the header and the directory, and maps the rest.
+    /// Opens a file: reads and checks the header and the root of the directory, and maps the rest.
+    /// Bricks of a remote object ([`address`](crate::input::address())) are fetched when they are
+    /// read.
     ///
     /// # Errors
     /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files
     /// that are truncated or have data after their end. [`Error::Limit`] and [`Error::File`] as for
     /// every input.
     pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
-        let path = path.as_ref();
-        Self::new(path, Bytes::Mapped(Source::map(path, limits)?), limits)
+        let path = &input::address(path.as_ref());
+        Self::new(path, Bytes::open(path, limits)?, limits)
     }
 
     /// Takes the bytes of a file. Errors call it `name`.
@@ -162,23 +161,10 @@ impl Bricks {
     }
 
     fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
-        let begun = begin(path, bytes.all(), limits).map_err(|error| bytes.why(path, error));
-        let (stored, directory) = begun?;
-        let header = stored.header;
-        let levels = level::levels(header.lattice.dims);
-        let ranges = directory
-            .levels
-            .iter()
-            .map(|level| level.iter().map(|entry| entry.range).collect())
-            .collect();
-        Ok(Self {
-            path: path.to_owned(),
-            header,
-            levels,
-            ranges,
-            origin: Origin::File { bytes, directory },
-            limits: limits.clone(),
-        })
+        let begun = bytes.begun(|bytes| begin(path, bytes, limits));
+        let (header, directory) = begun.map_err(|error| bytes.why(path, error))?;
+        let (path, limits) = (path.to_owned(), limits.clone());
+        Ok(Self { path, header, directory, origin: Origin::File(bytes), limits })
     }
 
     /// The properties of the volume as a whole.
@@ -193,7 +179,7 @@ impl Bricks {
 
     /// The levels, finest first; the last one is one brick.
     pub fn levels(&self) -> &[Level] {
-        &self.levels
+        &self.directory.kind().numbers.levels
     }
 
     /// Returns one of the levels.
@@ -201,7 +187,7 @@ impl Bricks {
     /// # Panics
     /// If there is no such level.
     pub fn level(&self, level: usize) -> &Level {
-        &self.levels[level]
+        &self.levels()[level]
     }
 
     /// Returns where the samples of a level lie. Level l has 2^l steps of level 0 between samples.
@@ -221,10 +207,56 @@ impl Bricks {
     /// may be skipped if `high < first_visible[low]`
     /// ([`first_visible`](crate::volume::reach::first_visible)).
     ///
+    /// If a part of the directory cannot be read, the ranges there are 0 to 255, so that these
+    /// bricks are read, and that returns the error.
+    ///
     /// # Panics
     /// If there is no such level.
-    pub fn ranges(&self, level: usize) -> &[[u8; 2]] {
-        &self.ranges[level]
+    pub fn ranges(&self, level: usize) -> Vec<[u8; 2]> {
+        let mut ranges = vec![[0, 255]; self.level(level).bricks()];
+        for (brick, range) in self.ranges_within(level, |_| true) {
+            ranges[brick as usize] = range;
+        }
+        ranges
+    }
+
+    /// Returns the bricks of some groups of a level, in any order, with their ranges as
+    /// [`ranges`](Self::ranges) does. `wanted` decides by the first and the last brick of a group
+    /// along each axis.
+    pub(super) fn ranges_within(
+        &self,
+        level: usize,
+        wanted: impl Fn([[usize; 3]; 2]) -> bool + Sync,
+    ) -> Vec<(u32, [u8; 2])> {
+        let size = *self.level(level);
+        let numbers = &self.directory.kind().numbers;
+        let groups = size.groups().into_par_iter().filter(|group| wanted(*group));
+        let groups: Vec<[[usize; 3]; 2]> = groups.collect();
+        let at = |[x, y, z]: [usize; 3]| {
+            let [nx, ny, _] = size.brick_dims;
+            ((z * ny + y) * nx + x) as u32
+        };
+        let ends = |group: &[[usize; 3]; 2]| group.map(|end| numbers.number(level, at(end)));
+        // What cannot be fetched together is read one by one, which returns the error.
+        self.directory.prepare(self.bytes(), groups.iter().flat_map(ends)).ok();
+        let of_group = |group: &[[usize; 3]; 2]| {
+            let [first, last] = ends(group);
+            let mut own = Vec::with_capacity((last - first) as usize + 1);
+            let mut number = first;
+            while number <= last {
+                let run = self.directory.run(self.bytes(), number).ok();
+                let end = self.directory.run_end(number).min(last + 1);
+                for number in number..end {
+                    let range = run.as_ref().map_or([0, 255], |(first, entries)| {
+                        entries[(number - first) as usize].range
+                    });
+                    own.push((numbers.brick(number).1, range));
+                }
+                number = end;
+            }
+            own
+        };
+        groups.par_iter().flat_map_iter(of_group).collect()
     }
 
     /// Bytes of the samples of a brick.
@@ -237,7 +269,7 @@ impl Bricks {
     /// # Errors
     /// [`Error::Argument`] if there is no such brick, [`Error::Input`] if it is damaged.
     pub fn read(&self, level: usize, brick: u32) -> Result<Brick> {
-        let size = self.levels.get(level).filter(|size| (brick as usize) < size.bricks());
+        let size = self.levels().get(level).filter(|size| (brick as usize) < size.bricks());
         let size = *size.ok_or_else(|| {
             Error::Argument(format!(
                 "{}: there is no brick {brick} of level {level}",
@@ -248,18 +280,60 @@ impl Bricks {
             Origin::Memory { volume, coarse, steps } => {
                 Ok(in_memory(volume, coarse, level, size).brick(size.place(brick), steps))
             }
-            Origin::File { bytes, directory } => {
-                let entry = &directory.levels[level][brick as usize];
-                let offset = directory.offsets[level][brick as usize] as usize;
-                // Copied first: if another program writes to the file, the decoded bytes are still
-                // those of the checksum.
-                let stored = bytes.all()[offset..offset + entry.bytes as usize].to_vec();
-                decode(entry, &stored, self.header.scalar).map_err(|message| {
-                    let place = format!("level {level}, brick {brick} (byte {offset})");
+            Origin::File(bytes) => {
+                let entry = self.entry(level, brick)?;
+                let range = entry.place.range();
+                let decode = |stored: &[u8]| decode(&entry, stored, self.header.scalar);
+                bytes.decoded(range.clone(), decode)?.map_err(|message| {
+                    let place = format!("level {level}, brick {brick} (byte {})", range.start);
                     bytes.why(&self.path, damaged(&self.path, place, message))
                 })
             }
         }
+    }
+
+    fn entry(&self, level: usize, brick: u32) -> Result<Entry> {
+        let number = self.directory.kind().numbers.number(level, brick);
+        self.directory.entry(self.bytes(), number).map_err(|fault| self.fault(fault))
+    }
+
+    /// Returns the error for a fault of the directory.
+    pub(super) fn fault(&self, fault: Fault) -> Error {
+        let error = told(&self.path, fault);
+        match self.bytes() {
+            Some(file) => file.why(&self.path, error),
+            None => error,
+        }
+    }
+
+    pub(super) fn directory(&self) -> &Directory<Listing> {
+        &self.directory
+    }
+
+    /// Reads bricks in parallel, as [`read`](Self::read) does: their levels and numbers are given.
+    /// Those of a remote object are fetched together.
+    ///
+    /// # Errors
+    /// Those of [`read`](Self::read).
+    pub fn read_all(&self, bricks: &[(usize, u32)]) -> Result<Vec<Brick>> {
+        self.fetch(bricks.iter().copied())?;
+        bricks.par_iter().map(|&(level, brick)| self.read(level, brick)).collect()
+    }
+
+    /// Fetches bricks of a remote object together, which are read soon. Leaves out those that do
+    /// not exist.
+    pub(super) fn fetch(&self, bricks: impl Iterator<Item = (usize, u32)>) -> Result<()> {
+        let Origin::File(bytes) = &self.origin else { return Ok(()) };
+        let exists = |&(level, brick): &(usize, u32)| {
+            self.levels().get(level).is_some_and(|size| (brick as usize) < size.bricks())
+        };
+        let numbers = &self.directory.kind().numbers;
+        let wanted: Vec<(usize, u32)> = bricks.filter(exists).collect();
+        let all = wanted.iter().map(|&(level, brick)| numbers.number(level, brick));
+        self.directory.prepare(Some(bytes), all).map_err(|fault| self.fault(fault))?;
+        let entries = wanted.iter().map(|&(level, brick)| self.entry(level, brick));
+        let places = entries.map(|entry| Ok(Listing::place(&entry?).range()));
+        bytes.fetch(places.collect::<Result<Vec<_>>>()?.into_iter())
     }
 
     /// Returns the samples of a whole level, in memory. Its range is that of level 0.
@@ -270,7 +344,7 @@ impl Bricks {
     pub fn volume(&self, level: usize) -> Result<Volume> {
         let missing =
             || Error::Argument(format!("{}: there is no level {level}", self.path.display()));
-        let size = *self.levels.get(level).ok_or_else(missing)?;
+        let size = *self.levels().get(level).ok_or_else(missing)?;
         let scalar = self.header.scalar;
         let [nx, ny, _] = size.dims;
         let [bx, by, _] = size.brick_dims;
@@ -280,6 +354,7 @@ impl Bricks {
         self.check_memory(&format!("the size of level {level} in bytes"), size.dims[2], size, 2)?;
         let mut bytes = vec![0; size.slice() * size.dims[2] * scalar.bytes()];
         // Each layer of bricks is its own chunk.
+        self.fetch((0..size.bricks() as u32).map(|brick| (level, brick)))?;
         bytes.par_chunks_mut(super::SIDE * ny * row).enumerate().try_for_each(
             |(layer, slices)| {
                 for number in layer * bx * by..(layer + 1) * bx * by {
@@ -321,11 +396,11 @@ impl Bricks {
         self.limits.check(LimitKind::Bytes, &self.path, what, bytes.saturating_mul(times))
     }
 
-    /// Returns all bytes of a file, or none for a volume in memory.
-    pub(super) fn bytes(&self) -> &[u8] {
+    /// Returns the bytes of a file; `None` for a volume in memory.
+    pub(super) fn bytes(&self) -> Option<&Bytes> {
         match &self.origin {
-            Origin::Memory { .. } => &[],
-            Origin::File { bytes, .. } => bytes.all(),
+            Origin::Memory { .. } => None,
+            Origin::File(bytes) => Some(bytes),
         }
     }
 }
@@ -336,10 +411,11 @@ impl Slices<'_> {
     }
 }
 
-/// Reads and checks the beginning of a file: header and directory.
-fn begin(path: &Path, all: &[u8], limits: &Limits) -> Result<(Stored, Directory)> {
-    let stored = Stored::decode(all).map_err(|refusal| refused(path, refusal))?;
-    let present = all.len() as u64;
+/// Reads and checks the beginning of a file: the header and the root of the directory, or all of a
+/// flat one.
+fn begin(path: &Path, file: &Bytes, limits: &Limits) -> Result<(Header, Directory<Listing>)> {
+    let stored = Stored::decode(&file.beginning(0)?).map_err(|refusal| refused(path, refusal))?;
+    let present = file.len();
     let end = stored.file_bytes;
     if present < end {
         return Err(incomplete(path, format!("byte {present} of {end}")));
@@ -351,33 +427,45 @@ fn begin(path: &Path, all: &[u8], limits: &Limits) -> Result<(Stored, Directory)
             format!("{} bytes follow the end", present - end),
         ));
     }
-    let directory =
-        Directory::decode(all, &stored).map_err(|message| damaged(path, "directory", message))?;
-    let memory = present + directory.memory();
+    let fail = |message| damaged(path, "directory", message);
+    let numbers = Numbers::new(level::levels(stored.header.lattice.dims));
+    let count = numbers.count;
+    let kind = |start: u64| Listing {
+        numbers: numbers.clone(),
+        scalar: stored.header.scalar,
+        start,
+        end: end.saturating_sub(HASH as u64),
+    };
+    let (directory, memory) = if stored.is_flat {
+        let start = flat_length(count).saturating_add(stored.length() as u64);
+        let entries = read_flat(&file.beginning(start)?, &stored, &numbers).map_err(fail)?;
+        let memory = 2 * u64::from(count) * size_of::<Entry>() as u64;
+        (Directory::held(kind(start), &entries), memory)
+    } else {
+        // Each brick has a record, so that the time to read them is bounded by the file.
+        if end / (Listing::ENTRY as u64) < u64::from(count) {
+            return Err(fail(too_short(count)));
+        }
+        let start = (stored.length() + Shape::of(count).root_length::<Listing>()) as u64;
+        let (head, place) = (file.beginning(start)?, (stored.length(), kind(start).end));
+        let directory = Directory::open(kind(start), count, place, &head);
+        (directory.map_err(|fault| told(path, fault))?, 0)
+    };
     limits.check(
         LimitKind::Bytes,
         path,
         "the size of the file and its directory in bytes",
-        memory,
+        present + memory,
     )?;
-    Ok((stored, directory))
+    Ok((stored.header, directory))
 }
 
-impl Bytes {
-    /// Returns the cause of an error. Checksums find damage; this reports if the file changed while
-    /// it was mapped.
-    fn why(&self, path: &Path, error: Error) -> Error {
-        match self {
-            Self::Mapped(map) => intact(map, path).err().unwrap_or(error),
-            Self::Held(_) => error,
-        }
-    }
-
-    fn all(&self) -> &[u8] {
-        match self {
-            Self::Mapped(map) => map,
-            Self::Held(bytes) => bytes,
-        }
+/// The error for a fault of the directory.
+fn told(path: &Path, fault: Fault) -> Error {
+    match fault {
+        Fault::Incomplete(place) => incomplete(path, place),
+        Fault::Damaged(place, message) => damaged(path, place, message),
+        Fault::Unread(error) => error,
     }
 }
 
@@ -399,7 +487,7 @@ fn refused(path: &Path, refusal: Refusal) -> Error {
         Refusal::Version(version) => Error::input(
             path,
             "header",
-            format!("has version {version}; only version {VERSION} can be read"),
+            format!("has version {version}; versions 1 and {VERSION} can be read"),
         )
         .hint("convert the source again, or use the release that wrote the file"),
         Refusal::Damaged(message) => damaged(path, "header", message),

@@ -1,5 +1,9 @@
 //! Bricks in memory, in files and built by hand.
 
+#[allow(clippy::duplicate_mod, reason = "both rooms rewrite files")]
+#[path = "../../tests/regressions/flat.rs"]
+mod flat_files;
+
 use super::{
     file::{to_bytes, with_changes},
     *,
@@ -108,6 +112,54 @@ fn files_hold_what_memory_does() {
 }
 
 #[test]
+fn both_layouts_hold_the_same() {
+    let folder = Folder::new();
+    for dims in [[70, 40, 33], [300, 40, 33], [5, 300, 31]] {
+        let bytes = to_bytes(&volume(Scalar::I16, dims), &options()).unwrap();
+        let flat = flat_files::flat_bricks(&bytes);
+        assert_eq!((bytes[8], flat[8]), (2, 1));
+        let [paged, old] = [&bytes, &flat].map(|bytes| open(bytes).unwrap());
+        assert_eq!(paged.header(), old.header());
+        for level in 0..paged.levels().len() {
+            assert_eq!(paged.ranges(level), old.ranges(level));
+            assert_eq!(every(&paged, level), every(&old, level));
+        }
+        for bytes in [bytes, flat] {
+            let path = folder.write("a.splv", bytes);
+            assert_eq!(check(path, &Limits::default(), None).findings, []);
+        }
+    }
+}
+
+#[test]
+fn a_directory_of_several_pages_is_read_in_parts() {
+    let folder = Folder::new();
+    let bytes = to_bytes(&volume(Scalar::U8, [600 * SIDE, 2, 3]), &options()).unwrap();
+    let file = open(&bytes).unwrap();
+    assert!(file.levels().iter().map(|level| level.bricks()).sum::<usize>() > 2 * 512);
+    assert_eq!(file.directory().read_pages(), 0);
+    let coarsest = file.levels().len() - 1;
+    assert!(file.read(coarsest, 0).is_ok());
+    assert_eq!(file.directory().read_pages(), 1);
+    let path = folder.write("a.splv", &bytes);
+    assert_eq!(check(&path, &Limits::default(), None).findings, []);
+    // A damaged directory page: its bricks count as shown, and reading them says why.
+    let root = 196 + "mm".len() + "a.raw".len();
+    let place = u64::from_le_bytes(bytes[root + 20..root + 28].try_into().unwrap()) as usize;
+    let mut broken = bytes;
+    broken[place + 3] ^= 1;
+    let file = open(&broken).unwrap();
+    assert!(file.read(coarsest, 0).is_ok());
+    assert_eq!(file.ranges(0)[0], [0, 255]);
+    let error = file.read(0, 0).unwrap_err().to_string();
+    let name = format!("directory page 1 of level 0 (byte {place})");
+    assert!(error.contains(&name), "{error}");
+    let path = folder.write("a.splv", &broken);
+    let found = check(path, &Limits::default(), None).findings;
+    assert!(found.iter().any(|f| f.code == "directory" && f.place == name), "{found:?}");
+}
+
+#[test]
 fn levels_are_means() {
     for scalar in Scalar::ALL {
         for dims in ODD {
@@ -196,7 +248,7 @@ fn what_one_value_says_takes_no_room() {
     .unwrap();
     let bytes = to_bytes(&constant, &WriteOptions::default()).unwrap();
     // Header, the entries of eight bricks and one, their checksum, and the hash.
-    assert_eq!(bytes.len(), 196 + 9 * 16 + 4 + 32);
+    assert_eq!(bytes.len(), 196 + 9 * 24 + 4 + 32);
     let file = open(&bytes).unwrap();
     assert_eq!(file.ranges(0)[0], [0, 0]);
     assert_eq!(
@@ -214,7 +266,7 @@ fn what_one_value_says_takes_no_room() {
         Volume::new(Lattice::with_spacing([32; 3], DVec3::ONE), Samples::U8(noise.collect()))
             .unwrap();
     let bytes = to_bytes(&noise, &WriteOptions::default()).unwrap();
-    assert!(bytes.len() <= 196 + 20 + 32 + 32 * 32 * 32 + 1024);
+    assert!(bytes.len() <= 196 + 28 + 32 + 32 * 32 * 32 + 1024);
     assert_eq!(open(&bytes).unwrap().read(0, 0).unwrap().samples, noise.samples.bytes());
 }
 

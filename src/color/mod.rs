@@ -4,6 +4,7 @@ mod diverging;
 mod tables;
 
 use crate::{Error, Result, parallel::prelude::*};
+use serde::{Deserialize, Deserializer, Serialize, de};
 use std::{fmt, sync::LazyLock};
 
 /// A colour map: the colour of each number from 0 to 1.
@@ -16,7 +17,8 @@ use std::{fmt, sync::LazyLock};
 /// assert_eq!(ColorMap::named("viridis_r")?.color(1.0), map.color(0.0));
 /// # Ok::<(), splatkit::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(into = "String")]
 pub struct ColorMap {
     name: &'static str,
     is_reversed: bool,
@@ -33,7 +35,7 @@ pub struct ColorMap {
 /// assert_eq!(scale.color(f64::NAN), scale.missing);
 /// # Ok::<(), splatkit::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ColorScale {
     /// The colours.
     pub map: ColorMap,
@@ -47,7 +49,7 @@ pub struct ColorScale {
 }
 
 /// Which of a set of values a scale spans.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Spread {
     /// From the lowest to the highest value.
@@ -165,6 +167,25 @@ impl fmt::Display for ColorMap {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         out.write_str(self.name)?;
         if self.is_reversed { out.write_str("_r") } else { Ok(()) }
+    }
+}
+
+impl From<ColorMap> for String {
+    fn from(map: ColorMap) -> Self {
+        map.to_string()
+    }
+}
+
+impl<'de> Deserialize<'de> for ColorMap {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(from)?;
+        let (plain, is_reversed) =
+            name.strip_suffix("_r").map_or((name.as_str(), false), |plain| (plain, true));
+        // `named` does not know the map of classes, which nobody chooses by its name.
+        if plain == Self::CLASSES.name {
+            return Ok(Self { is_reversed, ..Self::CLASSES });
+        }
+        Self::named(&name).map_err(de::Error::custom)
     }
 }
 

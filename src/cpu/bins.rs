@@ -326,10 +326,8 @@ fn turn_of(plan: &Plan) -> u32 {
 /// composited one by one.
 fn order(plan: &Plan, record: &Record) -> u32 {
     let Some(order) = plan.single() else { return record.sheets[0].into() };
-    let [x, y, z] = record.center;
-    let distance = if plan.view.perspective { (x * x + y * y + z * z).sqrt() } else { z };
     // Map the float's bits to an integer of the same order.
-    let bits = distance.to_bits();
+    let bits = plan.key(record.center.into()).to_bits();
     let rising = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
     match order {
         Order::FrontToBack => rising,

@@ -15,7 +15,8 @@ use crate::{
     math::{Kernel, Profile},
     plan::weighting::{LEAST_DEVIATION, Weighting, weighting},
     volume::{
-        Arrangement, Lattice, Samples, Volume, overshoot::Overshoot, reach::neighbourhood_ranges,
+        Arrangement, Lattice, SampleSlice, Volume, overshoot::Overshoot,
+        reach::neighbourhood_ranges,
     },
 };
 use fearless_simd::{Simd, i32x8, prelude::*};
@@ -101,7 +102,7 @@ fn is_whole(kernel: &Kernel) -> bool {
 /// The values of a volume's samples.
 #[derive(Clone, Copy)]
 enum Source<'a> {
-    Samples(&'a Samples),
+    Samples(SampleSlice<'a>),
     /// The coefficients of a sharp volume.
     Coefficients(&'a [f32]),
 }
@@ -118,7 +119,7 @@ impl<'a> Blended<'a> {
     pub fn new(volume: &'a Volume, blend: &'a Blend, zero: f64) -> Self {
         let samples = match &volume.coefficients {
             Some(coefficients) => Source::Coefficients(&coefficients.values),
-            None => Source::Samples(&volume.samples),
+            None => Source::Samples(volume.samples.as_slice()),
         };
         Self { blend, samples, zero: zero as f32 }
     }
@@ -251,19 +252,19 @@ impl<'a> Blended<'a> {
                 Source::Coefficients(own) => {
                     part.load::<S, f32, N, WIDE, ALL>(simd, own, zero, around, values);
                 }
-                Source::Samples(Samples::F32(own)) => {
+                Source::Samples(SampleSlice::F32(own)) => {
                     part.load::<S, f32, N, WIDE, ALL>(simd, own, zero, around, values);
                 }
-                Source::Samples(Samples::U8(own)) => {
+                Source::Samples(SampleSlice::U8(own)) => {
                     part.load::<S, u8, N, WIDE, ALL>(simd, own, zero, around, values);
                 }
-                Source::Samples(Samples::U16(own)) => {
+                Source::Samples(SampleSlice::U16(own)) => {
                     part.load::<S, u16, N, WIDE, ALL>(simd, own, zero, around, values);
                 }
-                Source::Samples(Samples::I16(own)) => {
+                Source::Samples(SampleSlice::I16(own)) => {
                     part.load::<S, i16, N, WIDE, ALL>(simd, own, zero, around, values);
                 }
-                Source::Samples(Samples::I32(own)) => {
+                Source::Samples(SampleSlice::I32(own)) => {
                     part.load::<S, i32, N, WIDE, ALL>(simd, own, zero, around, values);
                 }
             },
@@ -543,7 +544,7 @@ impl Part {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::field::Typed;
+    use crate::{cpu::field::Typed, volume::Samples};
     use fearless_simd::{Level, dispatch};
     use std::sync::Arc;
 

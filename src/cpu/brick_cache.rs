@@ -5,7 +5,6 @@ use crate::{
     Result,
     bricks::{BRICK_BLOCKS, Bricks, Choice, SIDE},
     math::Kernel,
-    parallel::prelude::*,
     scene::Settings,
     volume::{Samples, each_type},
 };
@@ -100,21 +99,18 @@ impl BrickCache {
         }
         self.make_room((self.held.len() + absent.len()).saturating_sub(most));
         for keys in absent.chunks(BATCH) {
-            let read: Vec<_> = keys
-                .par_iter()
-                .map(|&(level, brick)| self.bricks.read(level, brick))
-                .collect::<Result<_>>()?;
+            let read = self.bricks.read_all(keys)?;
             self.reads += read.len() as u64;
             for (key, brick) in keys.iter().zip(read) {
                 let slot = self.free.pop().unwrap_or(self.blocks.len());
                 if slot == self.blocks.len() {
                     self.blocks.push(*brick.blocks);
-                    each_type!(&mut self.samples, samples => samples
+                    each_type!(mut self.samples, samples => samples
                         .resize((slot + 1) * SLOT, Default::default()));
                 } else {
                     self.blocks[slot] = *brick.blocks;
                 }
-                each_type!(&mut self.samples, samples => fill(
+                each_type!(mut self.samples, samples => fill(
                     &mut samples[slot * SLOT..], &brick.samples,
                 ));
                 self.held.insert(*key, Held { slot, last: self.update });
@@ -156,7 +152,7 @@ impl BrickCache {
             let Some(own) = self.slot(level, brick) else { continue };
             for step in around().filter(|step| *step != [0; 3]) {
                 let from = self.neighbour(level, brick, step).map(|(_, slot)| slot);
-                each_type!(&mut self.samples, samples => copy_beside(samples, own, from, step));
+                each_type!(mut self.samples, samples => copy_beside(samples, own, from, step));
             }
         }
     }
@@ -246,8 +242,8 @@ impl Grid {
             }
         }
         let [low, high] = cache.bricks.header().range;
-        let value = |[step, _]: &[u8; 2]| (low + (high - low) * f64::from(*step) / 255.0) as f32;
-        let values = cache.bricks.ranges(level).iter().map(value).collect();
+        let value = |[step, _]: [u8; 2]| (low + (high - low) * f64::from(step) / 255.0) as f32;
+        let values = cache.bricks.ranges(level).into_iter().map(value).collect();
         Self { counts: cache.bricks.level(level).brick_dims, slots, values }
     }
 }

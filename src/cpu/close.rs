@@ -48,6 +48,16 @@ impl<S: Simd> Pixels<S> {
         Self { color: [none; 3], through: Lanes::splat(simd, 1.0), hit }
     }
 
+    /// Returns these pixels where a mask is set, and the others elsewhere.
+    #[inline(always)]
+    pub fn select(self, mask: mask32x8<S>, others: Self) -> Self {
+        Self {
+            color: three!(I => mask.select(self.color[I], others.color[I])),
+            through: mask.select(self.through, others.through),
+            hit: mask.select(self.hit, others.hit),
+        }
+    }
+
     /// Records where half of the light is absorbed, if that is in a sheet with optical depth and
     /// not on an isosurface in it. The sheet lies between two planes, and `before` is the light
     /// that reaches it.
@@ -191,7 +201,7 @@ impl Visible {
     /// Whether any value between two values, in entries of the table, is visible.
     pub fn may_show_between(&self, plan: &Plan, low: f32, high: f32) -> bool {
         let slack = 0.5 * NARROW + 1.0;
-        let [_, _, last, place] = plan.frame.transfer;
+        let [_, _, last, place] = plan.frame.field().transfer;
         let at = |value: f32| (value + place).clamp(0.0, last) as usize;
         self.0[at(high + slack) + 1] > self.0[at(low - slack)]
     }
@@ -200,10 +210,10 @@ impl Visible {
         if !plan.has_field {
             return Self(Vec::new());
         }
-        let [_, _, last, place] = plan.frame.transfer;
+        let [_, _, last, place] = plan.frame.field().transfer;
         let mut shows: Vec<bool> =
             plan.tables.entries[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
-        for surface in &plan.frame.isosurfaces[..plan.isosurfaces] {
+        for surface in &plan.frame.field().isosurfaces[..plan.isosurfaces] {
             let at = (surface.value[0] + place).clamp(0.0, last) as usize;
             let end = (at + 2).min(shows.len());
             shows[at..end].fill(true);
@@ -225,7 +235,7 @@ impl Visible {
         // A parabola exceeds the range of its values at both ends and the middle by at most an
         // eighth of that range. Integrals cover at least NARROW entries.
         let slack = (high - low) * 0.125 + (0.5 * NARROW + 1.0);
-        let [_, _, last, place] = plan.frame.transfer;
+        let [_, _, last, place] = plan.frame.field().transfer;
         let (none, last) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, last));
         let low: [i32; 8] = i32x8::truncate_from((low - slack + place).max(none).min(last)).into();
         let high: [i32; 8] =
@@ -241,7 +251,7 @@ impl Plan<'_> {
     /// values.
     #[inline(always)]
     fn between<S: Simd>(&self, simd: S, a: Lanes<S>, b: Lanes<S>) -> [Lanes<S>; 4] {
-        let [_, _, end, place] = self.frame.transfer;
+        let [_, _, end, place] = self.frame.field().transfer;
         let none = Lanes::splat(simd, 0.0);
         let all = Lanes::splat(simd, end);
         let middle = (a + b) * 0.5 + place;
@@ -263,14 +273,14 @@ impl Plan<'_> {
         // Values before and behind the table count as those of its ends.
         let before = (high.min(none) - low.min(none)) * inverse;
         let behind = (high.max(all) - low.max(all)) * inverse;
-        let [first, last] = self.frame.beyond();
+        let [first, last] = self.frame.field().beyond();
         four!(I => within[I] * inverse + before * first[I] + behind * last[I])
     }
 
     /// Returns extinction times colour, and extinction, for one value.
     #[inline(always)]
     fn one<S: Simd>(&self, simd: S, value: Lanes<S>) -> [Lanes<S>; 4] {
-        let [_, _, end, place] = self.frame.transfer;
+        let [_, _, end, place] = self.frame.field().transfer;
         let at = (value + place).max(Lanes::splat(simd, 0.0)).min(Lanes::splat(simd, end));
         let places: [f32; 8] = at.into();
         let [red, green, blue, extinction] = columns(
@@ -299,7 +309,7 @@ impl Plan<'_> {
     /// Returns the factor on the extinction for a gradient's magnitude.
     #[inline(always)]
     fn gradient_factor<S: Simd>(&self, simd: S, magnitude: Lanes<S>) -> Lanes<S> {
-        let [first, per_magnitude, ..] = self.frame.gradients;
+        let [first, per_magnitude, ..] = self.frame.field().gradients;
         let factors =
             &self.tables.entries[self.tables.starts[1] as usize..self.tables.starts[2] as usize];
         let last = Lanes::splat(simd, (factors.len() - 2) as f32);
@@ -358,8 +368,8 @@ impl Plan<'_> {
         direction: [Lanes<S>; 3],
     ) -> [Lanes<S>; 2] {
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-        let [ambient, diffuse, specular, power] = self.frame.volume_shade;
-        let [low, per_magnitude, ..] = self.frame.certain;
+        let [ambient, diffuse, specular, power] = self.frame.field().shade;
+        let [low, per_magnitude, ..] = self.frame.field().certain;
         let size = dot(gradient, gradient).sqrt();
         let certainty = ((size - low) * per_magnitude).max(none).min(one);
         let has_direction = size.simd_gt(LEAST_GRADIENT);
@@ -585,7 +595,7 @@ impl Plan<'_> {
             // In the order from the front value to the back value.
             let rises = next.simd_gt(value);
             let [up, down] = [number, self.isosurfaces - 1 - number].map(|i| {
-                let FrameIsosurface { value, color } = self.frame.isosurfaces[i];
+                let FrameIsosurface { value, color } = self.frame.field().isosurfaces[i];
                 [value, color]
             });
             let own = |row: usize, column: usize| {
@@ -679,7 +689,7 @@ impl Plan<'_> {
     pub fn gradient_of_faces<S: Simd>(&self, layer: &Layer<S>, u: Lanes<S>) -> [Lanes<S>; 3] {
         let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
         let slope = a * (u * 4.0 - 3.0) + b * (4.0 - u * 8.0) + c * (u * 4.0 - 1.0);
-        let along = slope * self.frame.gradients[2] / layer.thickness;
+        let along = slope * self.frame.field().gradients[2] / layer.thickness;
         let (front, back) = (layer.front.across, layer.back.across);
         three!(I => (back[I] - front[I]).mul_add(u, front[I]) + along * layer.direction[I])
     }

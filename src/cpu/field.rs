@@ -20,7 +20,7 @@ use crate::{
     bricks::SIDE,
     math::Tensor,
     plan::weighting::Weighting,
-    volume::{Samples, Volume},
+    volume::{SampleSlice, Samples, Volume},
 };
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
 
@@ -79,12 +79,12 @@ impl<'a> Typed<'a> {
         shape: Shape,
         zero: f64,
     ) -> Self {
-        match samples {
-            Samples::U8(samples) => Self::U8(Field::new(samples, dims, memory, shape, zero)),
-            Samples::U16(samples) => Self::U16(Field::new(samples, dims, memory, shape, zero)),
-            Samples::I16(samples) => Self::I16(Field::new(samples, dims, memory, shape, zero)),
-            Samples::I32(samples) => Self::I32(Field::new(samples, dims, memory, shape, zero)),
-            Samples::F32(samples) => Self::F32(Field::new(samples, dims, memory, shape, zero)),
+        match samples.as_slice() {
+            SampleSlice::U8(samples) => Self::U8(Field::new(samples, dims, memory, shape, zero)),
+            SampleSlice::U16(samples) => Self::U16(Field::new(samples, dims, memory, shape, zero)),
+            SampleSlice::I16(samples) => Self::I16(Field::new(samples, dims, memory, shape, zero)),
+            SampleSlice::I32(samples) => Self::I32(Field::new(samples, dims, memory, shape, zero)),
+            SampleSlice::F32(samples) => Self::F32(Field::new(samples, dims, memory, shape, zero)),
         }
     }
 }

@@ -222,7 +222,7 @@ impl FieldState {
         }
         let [finest, _] = levels.first()?.cells;
         let steps = (0..3).map(|axis| {
-            let [x, y, z, _] = plan.frame.field_axes()[axis];
+            let [x, y, z, _] = plan.frame.field().axes()[axis];
             f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis])
         });
         let steps = steps.fold(0.0, f64::max) * sheets.step;

@@ -86,11 +86,14 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
         Vec3::new(0.0, 0.0, b22),
     );
     let turned = to_view * factor;
-    let pixel = if plan.view.perspective { center.length() } else { 1.0 } / plan.frame.scale;
-    let blur2 = (source.blur() * pixel).powi(2);
-    let covariance = turned * turned.transpose() + Mat3::from_diagonal(Vec3::splat(blur2));
+    let is_trained = source.flags & TRAINED != 0;
+    let distance = if is_trained { center.z.abs() } else { center.length() };
+    let pixel = if plan.view.perspective { distance } else { 1.0 } / plan.frame.scale;
+    let [blur2, along2] = source.blur().map(|blur| (blur * pixel).powi(2));
+    let covariance =
+        turned * turned.transpose() + Mat3::from_diagonal(Vec3::new(blur2, blur2, along2));
     let mut strength = splat.strength;
-    let carried = if source.flags & TRAINED != 0 {
+    let carried = if is_trained {
         Carried::Radiance { color: decode_trained_color(splat), normal: Vec3::ZERO }
     } else if source.flags & RADIANCE != 0 {
         let [red, green, blue, opacity] =
@@ -115,7 +118,8 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
         let slope_z = slope.z / b22;
         let slope_y = (slope.y - b21 * slope_z) / b11;
         let slope_x = (slope.x - b10 * slope_y - b20 * slope_z) / b00;
-        let gradient = to_view * Vec3::new(slope_x, slope_y, slope_z) * plan.frame.transfer[1];
+        let gradient =
+            to_view * Vec3::new(slope_x, slope_y, slope_z) * plan.frame.field().transfer[1];
         strength = counted(plan, strength);
         Carried::Scalar { weight: weight * before / after, gradient }
     };
@@ -124,7 +128,7 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
 
 /// Returns a value in entries of the transfer function's table, clamped so that it stays finite.
 pub fn counted(plan: &Plan, value: f32) -> f32 {
-    ((value - plan.frame.transfer[0]) * plan.frame.transfer[1]).clamp(-1e30, 1e30)
+    ((value - plan.frame.field().transfer[0]) * plan.frame.field().transfer[1]).clamp(-1e30, 1e30)
 }
 
 pub fn to_view(source: &Source) -> Mat3 {
@@ -162,7 +166,7 @@ pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record>
         Carried::Radiance { color, normal } => (Kind::Radiance, radiance(color, normal)),
         Carried::Scalar { weight, gradient } if plan.is_classified => {
             let [red, green, blue, extinction] = classify(plan, splat.strength);
-            strength = extinction * weight * plan.frame.kernel[2];
+            strength = extinction * weight * plan.frame.field().kernel[2];
             let size = gradient.length();
             // The normal points to smaller values: outward.
             let has_direction = plan.lit_surfaces && size > LEAST_GRADIENT;
@@ -193,7 +197,7 @@ pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record>
 
 /// Looks up the colour and extinction of a value.
 fn classify(plan: &Plan, value: f32) -> [f32; 4] {
-    let [_, _, end, place] = plan.frame.transfer;
+    let [_, _, end, place] = plan.frame.field().transfer;
     let at = (value + place).clamp(0.0, end);
     let (low, part) = (at as usize, at.fract());
     let (a, b) = (plan.tables.entries[low], plan.tables.entries[low + 1]);
@@ -310,14 +314,16 @@ fn pixels(plan: &Plan, bounds: [[f32; 2]; 2]) -> Option<[[i32; 2]; 2]> {
 /// Returns the sheet of a splat that is drawn whole: that of its centre, or `None` if no sheet
 /// contains the centre.
 fn whole_sheet(plan: &Plan, center: Vec3, distance: f32) -> Option<usize> {
-    let mut key = distance;
+    let mut place = distance;
     if plan.mode == Mode::AxisSheets {
         let [x, y, z, _] = plan.frame.sheet_normal;
-        key = Vec3::new(x, y, z).dot(center);
-        key = if plan.view.perspective { key.abs() } else { key };
+        place = Vec3::new(x, y, z).dot(center);
+        place = if plan.view.perspective { place.abs() } else { place };
     }
-    let is_within = key >= plan.planes[1] && key < plan.planes[plan.sheets + 1];
-    let mut sheet = plan.sheet_of(key).min(plan.sheets);
+    let is_within = place >= plan.planes[1] && place < plan.planes[plan.sheets + 1];
+    let key = if plan.single().is_some() { plan.key(center) } else { place };
+    // A depth may be smaller than the distance of the first plane.
+    let mut sheet = plan.sheet_of(key).clamp(1, plan.sheets);
     if plan.single() == Some(Order::BackToFront) {
         sheet = plan.sheets + 1 - sheet;
     }

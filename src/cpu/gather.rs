@@ -149,7 +149,7 @@ impl<S: Simd> Last<S> {
 fn outside2<S: Simd>(simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
     let none = Lanes::splat(simd, 0.0);
     let outside = three!(I => {
-        (plan.frame.field_low[I] - place[I]).max(place[I] - plan.frame.field_high[I]).max(none)
+        (plan.frame.field().low[I] - place[I]).max(place[I] - plan.frame.field().high[I]).max(none)
     });
     dot(outside, outside)
 }
@@ -243,7 +243,7 @@ impl Gather<'_> {
         }
         // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with
         // slopes).
-        let inside = inside.value * plan.frame.transfer[1];
+        let inside = inside.value * plan.frame.field().transfer[1];
         let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
         layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
@@ -299,7 +299,7 @@ impl Gather<'_> {
                     let [enter, leave] = rays.in_lattice(simd, plan, reach);
                     (from, to) = (enter.max(start).min(stop), leave.min(stop).max(start));
                 }
-                let least = plan.frame.isotropic[3];
+                let least = plan.frame.field().isotropic[3];
                 let step = (to - from) * (1.0 / self.parts as f32);
                 let (mut sum, mut all) = (none, none);
                 for part in 0..self.parts {
@@ -315,8 +315,8 @@ impl Gather<'_> {
                         all += weight;
                     }
                 }
-                let mean =
-                    sum / all.max(Lanes::splat(simd, f32::MIN_POSITIVE)) * plan.frame.transfer[1];
+                let mean = sum / all.max(Lanes::splat(simd, f32::MIN_POSITIVE))
+                    * plan.frame.field().transfer[1];
                 let (front, back) = (layer.front, layer.back);
                 let has_value = if self.is_blended {
                     each!([0, 1], I => weights[I].simd_gt(0.0))
@@ -347,7 +347,7 @@ impl Gather<'_> {
         let mut all = Lanes::splat(simd, 1.0);
         let Some(per_deviation) = self.ends else { return all };
         let frame = &self.plan.frame;
-        let ends = frame.field_low.iter().zip(frame.field_high);
+        let ends = frame.field().low.iter().zip(frame.field().high);
         for (place, (low, high)) in place.into_iter().zip(ends) {
             let after = place - *low;
             let before = high - place;
@@ -469,13 +469,13 @@ impl Gather<'_> {
     #[inline(always)]
     fn face<S: Simd>(&self, simd: S, rays: &Rays<S>, plane: usize, last: &mut Last<S>) {
         let frame = &self.plan.frame;
-        let per_value = frame.transfer[1];
+        let per_value = frame.field().transfer[1];
         let Point { value, slopes, weight } = self.at(simd, rays, self.plan.planes[plane]);
         let gradient = self.gradient(slopes);
         let along = dot(gradient, rays.direction);
         let across = three!(I => gradient[I] - along * rays.direction[I]);
         (last.plane, last.gradient, last.weight) = (plane, gradient, weight);
-        last.along = along * (1.0 / frame.gradients[2]);
+        last.along = along * (1.0 / frame.field().gradients[2]);
         last.face = Face { value: value * per_value, across };
     }
 
@@ -484,7 +484,8 @@ impl Gather<'_> {
     #[inline(always)]
     fn gradient<S: Simd>(&self, slopes: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
         let frame = &self.plan.frame;
-        let (axes, scale) = (frame.field_axes(), frame.transfer[1] * frame.gradients[2]);
+        let (axes, scale) =
+            (frame.field().axes(), frame.field().transfer[1] * frame.field().gradients[2]);
         three!(I => {
             (slopes[0] * axes[0][I] + slopes[1] * axes[1][I] + slopes[2] * axes[2][I]) * scale
         })
@@ -530,12 +531,13 @@ impl<S: Simd> Layer<S> {
         inside: &Point<S>,
     ) -> mask32x8<S> {
         let none = Lanes::splat(simd, 0.0);
-        let least = plan.frame.isotropic[3];
+        let least = plan.frame.field().isotropic[3];
         let [has_front, has_inside, has_back] = [front, inside.weight, back].map(
             #[inline(always)]
             |weight| weight.simd_gt(0.0),
         );
-        let values = [self.front.value, inside.value * plan.frame.transfer[1], self.back.value];
+        let values =
+            [self.front.value, inside.value * plan.frame.field().transfer[1], self.back.value];
         // Simpson's rule for the sums of weights and of values. A place without a value does not
         // count.
         let shares = [

@@ -22,7 +22,9 @@ use crate::{
     plan::uniforms::Source,
     scene::{Item, Scene, Settings},
     splat::{Payload, Splat, SplatSet},
-    volume::{Arrangement, Lattice, Samples, TransferFunction, Volume, reach::EVERYTHING},
+    volume::{
+        Arrangement, Lattice, SampleSlice, Samples, TransferFunction, Volume, reach::EVERYTHING,
+    },
 };
 use fearless_simd::Level;
 use glam::{Mat3, Vec3};
@@ -245,7 +247,7 @@ impl<'a> LatticeSource<'a> {
     fn new(plan: &Plan, volume: &'a Volume, kernel: &Kernel) -> Self {
         let lattice = volume.drawn_lattice();
         let source = Source::of_lattice(plan.view, lattice, kernel, false);
-        let [x, y, z] = plan.frame.field_axes().map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
+        let [x, y, z] = plan.frame.field().axes().map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
         Self {
             volume,
             lattice,
@@ -407,14 +409,14 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
 
 /// Returns a sample in entries of the transfer function's table.
 fn sample(plan: &Plan, samples: &Samples, index: usize) -> f32 {
-    match samples {
+    match samples.as_slice() {
         // A 32-bit float cannot hold the whole integer.
-        Samples::I32(values) => {
+        SampleSlice::I32(values) => {
             let low = values[index] & 0xffff;
-            let [zero, per_value, ..] = plan.frame.transfer;
+            let [zero, per_value, ..] = plan.frame.field().transfer;
             ((((values[index] - low) as f32 - zero) + low as f32) * per_value).clamp(-1e30, 1e30)
         }
-        samples => counted(plan, samples.value(index) as f32),
+        _ => counted(plan, samples.value(index) as f32),
     }
 }
 

@@ -328,6 +328,11 @@ impl March<'_> {
             if packet.is_done {
                 continue;
             }
+            let planes = [plan.planes[sheet], plan.planes[sheet + 1]];
+            let region = plan.region.map(|_| (packet.rays.in_region(planes), packet.pixels));
+            if region.is_some_and(|(inside, _)| !inside.any_true()) {
+                continue;
+            }
             let mut radiance = sums.take_radiance(simd, plan, packet, sheet);
             for (field, own) in self.fields.iter().zip(fields.iter()) {
                 let Some(cells) = &own.cells else { continue };
@@ -353,6 +358,9 @@ impl March<'_> {
             }
             if let Some(facets) = &facets {
                 facets.absorb(simd, &mut packet.pixels);
+            }
+            if let Some((inside, before)) = region {
+                packet.pixels = packet.pixels.select(inside, before);
             }
             packet.is_done =
                 plan.optics != Optics::Maximum && !packet.pixels.through.simd_ge(OPAQUE).any_true();

@@ -428,7 +428,8 @@ fn of_largest(value: f32, transfer: &TransferFunction, frame: &Frame) -> [f32; 4
     if value <= NO_VALUE {
         return [0.0; 4];
     }
-    let value = f64::from(frame.transfer[0]) + f64::from(value) / f64::from(frame.transfer[1]);
+    let value = f64::from(frame.field().transfer[0])
+        + f64::from(value) / f64::from(frame.field().transfer[1]);
     let opacity = 1.0 - (-transfer.extinction(value) * transfer.unit).exp();
     let [red, green, blue] = transfer.color(value);
     [red, green, blue, 1.0].map(|part| (part * opacity) as f32)

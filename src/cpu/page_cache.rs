@@ -11,7 +11,10 @@ use super::{
 use crate::{
     Result,
     gaussians::Eye,
-    hierarchy::{Cut, Hierarchy, SHARE_UNIT, needed::Needed},
+    hierarchy::{
+        Cut, Hierarchy, SHARE_UNIT,
+        needed::{self, needed},
+    },
     math::View,
     parallel::prelude::*,
     plan::uniforms::Source,
@@ -25,6 +28,9 @@ use std::{collections::HashMap, sync::Arc};
 /// of splats.
 const STEPS: f64 = 8.0;
 
+/// Number of pages read together.
+const BATCH: usize = 64;
+
 /// The nodes of a page, and the last picture that needed them.
 #[derive(Debug)]
 struct Held {
@@ -35,7 +41,6 @@ struct Held {
 #[derive(Debug)]
 pub struct PageCache {
     pub hierarchy: Arc<Hierarchy>,
-    needed: Needed,
     held: HashMap<u32, Held>,
     /// The pages that take part in the last view, in order.
     active: Vec<u32>,
@@ -47,7 +52,6 @@ pub struct PageCache {
 impl PageCache {
     pub fn new(hierarchy: &Arc<Hierarchy>) -> Self {
         Self {
-            needed: Needed::new(hierarchy),
             hierarchy: hierarchy.clone(),
             held: HashMap::new(),
             active: Vec::new(),
@@ -58,7 +62,9 @@ impl PageCache {
 
     fn cut(&self, view: &View, settings: &Settings, pixels: f64) -> Cut {
         let header = self.hierarchy.header();
-        Cut::new(view, header.origin, pixels, settings.culls(header.closed, &header.bounds, view))
+        let culls = settings.culls(header.closed, &header.bounds, view);
+        let region = settings.region.map(|region| region.bounds);
+        Cut::new(view, header.origin, pixels, culls).within(header.origin, region)
     }
 
     pub fn bytes(&self) -> u64 {
@@ -70,51 +76,43 @@ impl PageCache {
     pub fn update(&mut self, view: &View, settings: &Settings, pixels: f64) -> Result<()> {
         self.frame += 1;
         let cut = self.cut(view, settings, pixels);
-        let mut needed = self.needed.of(&self.hierarchy, &cut);
-        let entries = self.hierarchy.pages();
+        let mut found = needed(&self.hierarchy, &cut)?;
         let degree = self.hierarchy.header().degree;
-        let bytes_of = |page: u32| Nodes::bytes_of(entries[page as usize].nodes as usize, degree);
         let mut room = settings.page_memory;
-        let mut most = 0;
-        for &page in &needed {
-            let bytes = bytes_of(page);
+        let (mut most, mut absent, mut more) = (0, Vec::new(), 0);
+        for own in &found {
+            let bytes = Nodes::bytes_of(own.nodes as usize, degree);
             if bytes > room && most > 0 {
                 break;
             }
             room = room.saturating_sub(bytes);
             most += 1;
+            if !self.held.contains_key(&own.page) {
+                absent.push(own.page);
+                more += bytes;
+            }
         }
-        self.missing = needed.len() - most;
-        needed.truncate(most);
-        let absent: Vec<u32> =
-            needed.iter().copied().filter(|page| !self.held.contains_key(page)).collect();
-        self.make_room(
-            &needed,
-            absent.iter().map(|&page| bytes_of(page)).sum(),
-            settings.page_memory,
-        );
-        let read = |&page: &u32| {
-            Ok((
-                page,
-                Held {
-                    nodes: Nodes::new(&self.hierarchy.read_page(page)?),
-                    last_needed: self.frame,
-                },
-            ))
-        };
-        let read: Vec<(u32, Held)> = absent.par_iter().map(read).collect::<Result<_>>()?;
-        self.held.extend(read);
+        self.missing = found.len() - most;
+        found.truncate(most);
+        let mut needed: Vec<u32> = found.into_iter().map(|own| own.page).collect();
+        needed.sort_unstable();
+        self.make_room(&needed, more, settings.page_memory);
+        for batch in absent.chunks(BATCH) {
+            let pages = self.hierarchy.read_pages(batch)?;
+            let held = |page| Held { nodes: Nodes::new(page), last_needed: self.frame };
+            let held: Vec<Held> = pages.par_iter().map(held).collect();
+            self.held.extend(batch.iter().copied().zip(held));
+        }
         for page in &needed {
             if let Some(held) = self.held.get_mut(page) {
                 held.last_needed = self.frame;
             }
         }
-        needed.sort_unstable();
         self.active = needed;
         Ok(())
     }
 
-    /// Evicts the least recently needed pages, so that `more` bytes fit.
+    /// Evicts the least recently needed pages, so that `more` bytes fit. `needed` are sorted.
     fn make_room(&mut self, needed: &[u32], more: u64, most: u64) {
         let mut held = self.bytes();
         if held + more <= most {
@@ -123,7 +121,7 @@ impl PageCache {
         let mut others: Vec<(u64, u32)> = self
             .held
             .iter()
-            .filter(|(page, _)| !needed.contains(page))
+            .filter(|(page, _)| needed.binary_search(page).is_err())
             .map(|(page, held)| (held.last_needed, *page))
             .collect();
         others.sort_unstable();
@@ -185,8 +183,9 @@ impl PageCache {
     }
 
     /// Returns the finest cut, in pixels, whose pages contain no more than `most` nodes.
-    pub fn finest_pages(&self, view: &View, settings: &Settings, most: u64) -> f64 {
-        self.needed.finest_within(&self.hierarchy, most, |pixels| self.cut(view, settings, pixels))
+    pub fn finest_pages(&self, view: &View, settings: &Settings, most: u64) -> Result<f64> {
+        let cut = |pixels| self.cut(view, settings, pixels);
+        needed::finest_within(&self.hierarchy, most, cut)
     }
 }
 
@@ -200,8 +199,10 @@ pub fn finest_within(
 ) -> Result<f64> {
     // The pages of a cut contain several times the nodes that it draws.
     let nodes = most.saturating_mul(8).max(1 << 16);
-    let pages =
-        caches.iter().map(|cache| cache.finest_pages(view, settings, nodes)).fold(0.0, f64::max);
+    let mut pages = 0.0f64;
+    for cache in caches.iter() {
+        pages = pages.max(cache.finest_pages(view, settings, nodes)?);
+    }
     for cache in caches.iter_mut() {
         cache.update(view, settings, pages)?;
     }

@@ -10,9 +10,10 @@ use crate::{
         tables::Tables,
         uniforms::{Frame, clip_counts},
     },
-    scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
+    scene::{Classification, Gradient, Item, Mode, Optics, Order, Region, Scene, Settings},
     volume::Arrangement,
 };
+use glam::{DVec3, Vec3};
 
 /// The place of a plane in front of or behind all others.
 const NOWHERE: f32 = 3e38;
@@ -83,6 +84,8 @@ pub struct Plan<'a> {
     /// The number of convex regions that are kept, and of boxes that are cut out.
     pub clips: usize,
     pub holes: usize,
+    /// The lower and the upper corner of the region that is drawn, relative to the eye.
+    pub region: Option<[[f32; 4]; 2]>,
 }
 
 impl<'a> Plan<'a> {
@@ -95,18 +98,11 @@ impl<'a> Plan<'a> {
         choice: Option<&Choice>,
     ) -> Self {
         let [clips, holes] = clip_counts(settings).map(|count| count as usize);
-        let empty = Tables {
-            entries: Vec::new(),
-            starts: [0; 4],
-            values: [0.0; 4],
-            gradients: [0.0; 2],
-            beyond: [[0.0; 4]; 2],
-        };
         let mut plan = Self {
             number: 0,
             view,
             frame: Frame::new(scene, view, sheets, settings, choice),
-            tables: empty,
+            tables: Tables::default(),
             planes: planes_of(sheets),
             sheets: sheets.count(),
             mode: settings.mode,
@@ -129,6 +125,7 @@ impl<'a> Plan<'a> {
             brightest: scene.brightest(),
             clips,
             holes,
+            region: settings.region.map(|region| from_eye(view, region)),
         };
         // Only emission and absorption is lit.
         let emits = settings.optics == Optics::EmissionAbsorption;
@@ -168,7 +165,8 @@ impl<'a> Plan<'a> {
         let (Some(transfer), Some(range)) = (item.transfer(), item.value_range()) else { return };
         let kernel = item.kernel();
         self.tables = Tables::new(transfer, range, kernel);
-        self.frame.set_tables(&self.tables, transfer, item.light(settings), self.view, sheets);
+        let light = item.light(settings);
+        self.frame.fields[0].set_tables((&self.tables, 0), transfer, light, self.view, sheets);
         self.table_kernel =
             kernel.is_some_and(|kernel| !matches!(kernel.profile, Profile::Gaussian(_)));
         let emits = settings.optics == Optics::EmissionAbsorption;
@@ -200,6 +198,12 @@ impl<'a> Plan<'a> {
     /// Returns the order of splats if they are composited one by one.
     pub fn single(&self) -> Option<Order> {
         if let Mode::Splats(order) = self.mode { Some(order) } else { None }
+    }
+
+    /// Returns what splats are sorted by if they are composited one by one: the distance of their
+    /// centre, or its depth along the view's axis in scenes with trained Gaussians.
+    pub fn key(&self, center: Vec3) -> f32 {
+        if self.view.perspective && !self.has_trained { center.length() } else { center.z }
     }
 
     /// Returns the number of pixels that tiles share with each neighbour.
@@ -245,6 +249,12 @@ impl<'a> Plan<'a> {
         }
         sheet
     }
+}
+
+/// Returns the corners of a region, relative to the eye.
+fn from_eye(view: &View, Region { bounds, .. }: Region) -> [[f32; 4]; 2] {
+    let corner = |corner: DVec3| (corner - view.position).as_vec3().extend(0.0).to_array();
+    [corner(bounds.min), corner(bounds.max)]
 }
 
 /// Returns the planes between all sheets: one before the first sheet, and four behind the last.

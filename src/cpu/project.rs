@@ -164,10 +164,12 @@ impl<'a> Projector<'a> {
             three!(I => b11 * b[I] + b21 * c[I]),
             three!(I => b22 * c[I]),
         ];
-        let pixel = if plan.view.perspective { dot(center, center).sqrt() } else { one }
-            * (1.0 / plan.frame.scale);
-        let blur = pixel * self.source.blur();
-        let blur2 = blur * blur;
+        let distance = match self.is_trained() {
+            true => center[2].abs(),
+            false => dot(center, center).sqrt(),
+        };
+        let pixel = if plan.view.perspective { distance } else { one } * (1.0 / plan.frame.scale);
+        let [blur2, along2] = self.source.blur().map(|blur| (pixel * blur) * (pixel * blur));
         let [x, y, z]: [[Lanes<S>; 3]; 3] = three!(I => three!(J => columns[J][I]));
         let covariance = [
             dot(x, x) + blur2,
@@ -175,7 +177,7 @@ impl<'a> Projector<'a> {
             dot(x, z),
             dot(y, y) + blur2,
             dot(y, z),
-            dot(z, z) + blur2,
+            dot(z, z) + along2,
         ];
         let (normal, mut has_normal) = normals(simd, eight.normal.simd_into(simd));
         if self.is_trained() {

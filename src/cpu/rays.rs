@@ -8,7 +8,7 @@ use crate::{
     plan::{TILE, uniforms::FrameClip},
     scene::Settings,
 };
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// Packets of a tile.
 pub const PACKETS: usize = TILE * TILE / 8;
@@ -38,6 +38,8 @@ pub struct Rays<S: Simd> {
     /// The part that the clips keep, and its part inside the lattice's box.
     pub kept: Part<S>,
     pub inside: Part<S>,
+    /// The part in the region that is drawn.
+    region: Part<S>,
     /// The parts that boxes cut out.
     pub holes: [Part<S>; Settings::MAX_CLIPS],
 }
@@ -76,12 +78,16 @@ impl<S: Simd> Rays<S> {
         for (own, FrameClip { low, high }) in holes.iter_mut().zip(&frame.holes[..plan.holes]) {
             *own = part_in_box(simd, *low, *high, from, toward);
         }
-        let axes = frame.field_axes();
-        let start = three!(I => dot_with(axes[I], origin) + frame.field_origin[I]);
+        let region = match plan.region {
+            Some([low, high]) => part_in_box(simd, low, high, from, toward),
+            None => [Lanes::splat(simd, BEFORE), Lanes::splat(simd, BEHIND)],
+        };
+        let axes = frame.field().axes();
+        let start = three!(I => dot_with(axes[I], origin) + frame.field().origin[I]);
         let way = three!(I => dot_with(axes[I], direction));
         let mut inside = kept;
         if plan.has_field && plan.on_lattice {
-            let part = part_in_box(simd, frame.field_low, frame.field_high, start, way);
+            let part = part_in_box(simd, frame.field().low, frame.field().high, start, way);
             inside = [kept[0].max(part[0]), kept[1].min(part[1])];
         }
         Self {
@@ -93,6 +99,7 @@ impl<S: Simd> Rays<S> {
             way,
             kept,
             inside,
+            region,
             holes,
         }
     }
@@ -101,10 +108,18 @@ impl<S: Simd> Rays<S> {
     #[inline(always)]
     pub fn in_lattice(&self, simd: S, plan: &Plan, wider: f32) -> Part<S> {
         let (low, high) = (
-            plan.frame.field_low.map(|low| low - wider),
-            plan.frame.field_high.map(|high| high + wider),
+            plan.frame.field().low.map(|low| low - wider),
+            plan.frame.field().high.map(|high| high + wider),
         );
         part_in_box(simd, low, high, self.start, self.way)
+    }
+
+    /// Returns the rays on which a sheet between two planes belongs to the region that is drawn:
+    /// its middle does. So each sheet belongs to one region of several that fill space.
+    #[inline(always)]
+    pub fn in_region(&self, [start, stop]: [f32; 2]) -> mask32x8<S> {
+        let middle = 0.5 * (start + stop);
+        self.region[0].simd_le(middle) & self.region[1].simd_gt(middle)
     }
 
     /// Returns the places at distances, in steps of the lattice.

@@ -538,7 +538,7 @@ pub fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask
 /// Returns the kernel and −h′(r)/r at radii in kernel space; 0 beyond its extent.
 #[inline(always)]
 fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
-    let [length, per_length, ..] = plan.frame.kernel;
+    let [length, per_length, ..] = plan.frame.field().kernel;
     let last = (RADII - 1) as f32;
     let start = plan.tables.starts[2] as usize;
     let radii: [f32; 8] = radius.into();
@@ -558,7 +558,7 @@ fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
 /// approach to t.
 #[inline(always)]
 fn kernel_integral<S: Simd>(simd: S, plan: &Plan, rho: Lanes<S>, t: Lanes<S>) -> Lanes<S> {
-    let per_length = plan.frame.kernel[1];
+    let per_length = plan.frame.field().kernel[1];
     let cells = SECTIONS as f32;
     let start = plan.tables.starts[3] as usize;
     let ([rhos, ts], mut found): ([[f32; 8]; 2], _) = ([rho.into(), t.into()], [0.0f32; 8]);

@@ -253,7 +253,7 @@ impl<S: Simd> ScalarSums<S> {
         let [start, stop] = [plan.planes[sheet], plan.planes[sheet + 1]];
         let thickness = stop - start;
         let own = &self.field[slot][packet.number];
-        let has_value = own.weight.simd_gt(plan.frame.isotropic[3] * thickness);
+        let has_value = own.weight.simd_gt(plan.frame.field().isotropic[3] * thickness);
         let value = own.value / own.weight.max(Lanes::splat(simd, 1e-37));
         let one = Lanes::splat(simd, 1.0);
         let filling = if plan.on_lattice { one } else { (own.weight * (1.0 / thickness)).min(one) };
@@ -294,7 +294,7 @@ impl<S: Simd> ScalarSums<S> {
         differences: Option<[Lanes<S>; 2]>,
     ) -> Resolved<S> {
         let own = &self.faces[plane % WINDOW][packet.number];
-        let has_value = own.weight.simd_gt(plan.frame.isotropic[3]);
+        let has_value = own.weight.simd_gt(plan.frame.field().isotropic[3]);
         let inverse = Lanes::splat(simd, 1.0) / own.weight.max(Lanes::splat(simd, 1e-37));
         let value = own.value * inverse;
         let mut across = [self.none; 3];
@@ -313,7 +313,7 @@ impl<S: Simd> ScalarSums<S> {
     pub fn values_on(&self, simd: S, plan: &Plan, plane: usize) -> [[f32; TILE]; TILE] {
         let mut values = [[f32::NAN; TILE]; TILE];
         for (packet, own) in self.faces[plane % WINDOW].iter().enumerate() {
-            let has_value = own.weight.simd_gt(plan.frame.isotropic[3]);
+            let has_value = own.weight.simd_gt(plan.frame.field().isotropic[3]);
             let value = own.value / own.weight.max(Lanes::splat(simd, 1e-37));
             let value: [f32; 8] = has_value.select(value, Lanes::splat(simd, f32::NAN)).into();
             for (lane, value) in value.into_iter().enumerate() {
@@ -352,7 +352,7 @@ fn across_of<S: Simd>(
     slopes: [Lanes<S>; 2],
     distance: f32,
 ) -> [Lanes<S>; 3] {
-    let [.., to_world] = plan.frame.gradients;
+    let [.., to_world] = plan.frame.field().gradients;
     let scale = if plan.view.perspective {
         Lanes::splat(simd, to_world) / (rays.cosine * distance)
     } else {

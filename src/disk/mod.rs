@@ -26,6 +26,6 @@ use std::path::Path;
 pub(crate) const BUFFER: usize = if cfg!(test) { 1 << 8 } else { 1 << 20 };
 
 /// Returns the folder that contains a file.
-fn folder(path: &Path) -> &Path {
+pub(crate) fn folder(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -128,6 +128,7 @@ fn hierarchies_made_in_regions_are_whole_or_not_there() {
         surfels: SurfelOptions::default(),
         paint: None,
         scalar: None,
+        parts: None,
     };
     let stops = stop_everywhere("b.splk", |path| {
         let write = file::WriteOptions::default();

@@ -9,6 +9,7 @@ use crate::{
 };
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
+use std::ops::Range;
 
 /// The counts in a file's header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,12 +50,21 @@ impl StreamPoint {
     }
 }
 
+/// Numbers by which a form scales colours; each form has its own.
+pub(super) type Coloring = [Option<f64>; 4];
+
 /// Where the points of a file are, and its triangles if it is a mesh.
 pub(super) trait Form: Send + Sync {
     fn counts(&self) -> Counts;
 
     /// Returns the number of pieces of points, and of triangles.
     fn pieces(&self) -> [usize; 2];
+
+    /// Returns where the bytes of a piece of points are. Only forms that read objects in parts say
+    /// so.
+    fn bytes(&self, _: usize) -> Range<usize> {
+        0..0
+    }
 
     /// Returns how the points stand, if the file or the format's convention says so.
     fn stance(&self) -> Option<Stance>;
@@ -77,6 +87,12 @@ pub(super) trait Form: Send + Sync {
     /// number of points visited so far.
     fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])>;
 
+    /// Returns the numbers by which colours are scaled, as [`survey`](Self::survey) found them.
+    fn coloring(&self) -> Coloring;
+
+    /// Takes the numbers that a survey of the same file found.
+    fn recolor(&mut self, coloring: Coloring);
+
     /// Returns the points of a piece, relative to an origin.
     fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>>;
 
@@ -90,26 +106,57 @@ pub(super) trait Form: Send + Sync {
     fn position(&self, source: &Source, index: usize) -> Option<DVec3>;
 }
 
-/// Makes something of each piece, several in parallel. `take` receives the results one after the
-/// other, in order. The pages of the file that were read are returned to the system.
+/// Makes something of each of these pieces, several in parallel. `take` receives the results one
+/// after the other, in order. The pages of the file that were read are returned to the system.
 pub(super) fn in_order<T: Send>(
     source: &Source,
-    pieces: usize,
+    pieces: impl IntoIterator<Item = usize>,
+    bytes: impl Fn(usize) -> Range<usize>,
     make: impl Fn(usize) -> Result<T> + Sync,
     mut take: impl FnMut(T) -> Result<()>,
 ) -> Result<()> {
-    let batch = 2 * parallel::current_num_threads();
-    for first in (0..pieces).step_by(batch) {
+    in_batches(source, pieces, bytes, |pieces| {
         source.restart_time();
-        let made: Vec<Result<T>> =
-            (first..(first + batch).min(pieces)).into_par_iter().map(&make).collect();
+        let made: Vec<Result<T>> = pieces.par_iter().map(|&piece| make(piece)).collect();
         // If the file has changed, the results may mix old and new content, so none is taken.
         source.intact()?;
         for made in made {
             take(made?)?;
         }
         source.release();
-    }
+        Ok(())
+    })?;
     // `take` may have read single points from the file.
     source.intact()
+}
+
+/// Bytes of pieces of a remote object that are fetched together.
+const AHEAD: usize = 32 << 20;
+
+/// Calls `read` with a few pieces at a time, as many as are worth reading in parallel. `bytes` says
+/// where their bytes are: those of a remote object are fetched ahead.
+pub(super) fn in_batches(
+    source: &Source,
+    pieces: impl IntoIterator<Item = usize>,
+    bytes: impl Fn(usize) -> Range<usize>,
+    mut read: impl FnMut(&[usize]) -> Result<()>,
+) -> Result<()> {
+    let batch = 2 * parallel::current_num_threads();
+    let pieces: Vec<usize> = pieces.into_iter().collect();
+    let (mut next, mut fetched) = (0, 0);
+    while next < pieces.len() {
+        let end = pieces.len().min(next + batch);
+        if fetched < end {
+            let mut sum = 0;
+            let more = pieces[end..].iter().take_while(|piece| {
+                sum += bytes(**piece).len();
+                sum < AHEAD
+            });
+            fetched = end + more.count();
+            source.fetch(pieces[next..fetched].iter().map(|piece| bytes(*piece)))?;
+        }
+        read(&pieces[next..end])?;
+        next = end;
+    }
+    Ok(())
 }

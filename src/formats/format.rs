@@ -114,6 +114,8 @@ pub(super) enum InPieces {
     Points {
         of: &'static str,
         find: FindPieces,
+        /// Whether remote objects are fetched piece by piece, and not as a whole.
+        in_parts: bool,
     },
     /// By [`VolumeStream`](super::VolumeStream).
     Volume {
@@ -273,7 +275,7 @@ pub(super) fn by_extension<'a>(
 
 /// Returns the format that a file's first bytes show, among those that `may` be read. Prefixes come
 /// before rules, because a rule may look for a word that files of other formats contain too.
-fn by_magic<'a>(
+pub(super) fn by_magic<'a>(
     table: &'a [Format],
     bytes: &[u8],
     may: impl Fn(&Format) -> bool,

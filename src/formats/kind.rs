@@ -3,11 +3,11 @@
 
 use super::{
     FORMATS, ReadOptions,
-    format::{Format, find},
+    format::{Format, Which, by_extension, by_magic, find},
 };
 use crate::{
     Result,
-    input::{Limits, Source},
+    input::{Bytes, Limits, Source, is_remote},
 };
 use std::path::Path;
 
@@ -55,7 +55,27 @@ impl Kind {
         limits: &Limits,
         options: &ReadOptions,
     ) -> Result<Option<Self>> {
-        Self::of_source(&Source::open_any(path.as_ref(), limits)?, options)
+        let path = path.as_ref();
+        match Self::of_remote(path, limits)? {
+            Some(kind) => Ok(Some(kind)),
+            None => Self::of_source(&Source::open_any(path, limits)?, options),
+        }
+    }
+
+    /// Returns the kind of a remote object if its name or its first bytes determine it, so that the
+    /// rest need not be fetched.
+    fn of_remote(path: &Path, limits: &Limits) -> Result<Option<Self>> {
+        if !is_remote(path) {
+            return Ok(None);
+        }
+        let format = match by_extension(FORMATS, path, |_| true) {
+            Some(format) => Some(format),
+            None => by_magic(FORMATS, &Bytes::open(path, limits)?.beginning(0)?, |_| true),
+        };
+        Ok(format.filter(|format| !format.is_left_out()).and_then(|format| match format.kind {
+            Which::Always(kind) => Some(kind),
+            Which::Rule(_) => None,
+        }))
     }
 
     /// As [`of`](Self::of), but reads from an open source, which may be in memory

@@ -18,6 +18,7 @@ use super::shared::cloud::{Cloud, colors_of_16_bits, greys};
 use crate::{Result, about::Stance, input::Source, parallel::prelude::*, surface::Mesh};
 use attribute::Attribute;
 use glam::DVec3;
+use std::ops::Range;
 
 /// Reads a point cloud: positions and colours, or intensities as greys if there are no colours.
 /// Points that are marked as withheld are left out.
@@ -64,25 +65,23 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
 }
 
 fn plain(source: &Source, header: &Header) -> Result<Vec<Point>> {
-    let data = plain_bytes(source, header)?;
+    let data = source.part(plain_bytes(source, header)?)?;
     source.room::<Point>("the points", header.points)?;
     Ok(data.par_chunks_exact(header.size).filter_map(|record| header.point(record)).collect())
 }
 
-/// Returns the bytes of points that are not packed.
-fn plain_bytes<'a>(source: &'a Source, header: &Header) -> Result<&'a [u8]> {
-    let data = &source.bytes()[header.start..];
+/// Returns where the bytes of points that are not packed are.
+fn plain_bytes(source: &Source, header: &Header) -> Result<Range<usize>> {
+    let present = source.len() - header.start;
     let size = (header.points as u64).saturating_mul(header.size as u64);
-    if (data.len() as u64) < size {
+    if (present as u64) < size {
         let message = format!(
-            "counts {} points of {} bytes, {size} in all, but {} bytes follow",
-            header.points,
-            header.size,
-            data.len()
+            "counts {} points of {} bytes, {size} in all, but {present} bytes follow",
+            header.points, header.size,
         );
         return Err(source.error("header", message).hint("the file is cut"));
     }
-    Ok(&data[..size as usize])
+    Ok(header.start..header.start + size as usize)
 }
 
 /// Bytes per point besides `Point`: its position, its colour in 16 and in 8 bits, its intensity,
@@ -120,13 +119,16 @@ struct Header {
 /// Minimum bytes per point of each format.
 const SIZES: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
+/// Bytes of the longest header, that of version 1.4.
+const MOST_HEADER: usize = 375;
+
 impl Header {
     fn read(source: &Source) -> Result<Self> {
-        let bytes = source.bytes();
+        let bytes = source.part(0..source.len().min(MOST_HEADER))?;
         let wrong = |message: String| source.error("header", message);
         let (header, points) =
-            Self::parse(&Fields { bytes, place: "the header" }).map_err(wrong)?;
-        header.check(bytes.len()).map_err(wrong)?;
+            Self::parse(&Fields { bytes: &bytes, place: "the header" }).map_err(wrong)?;
+        header.check(source.len()).map_err(wrong)?;
         Ok(Self { points: source.check_points("the number of points", points)?, ..header })
     }
 

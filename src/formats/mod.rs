@@ -74,6 +74,7 @@ pub use raw::RawLayout;
 pub use series::{Series, series};
 pub use shared::sample_type::{Endian, SampleType};
 pub(crate) use shared::texture::decode as decode_picture;
+pub(crate) use stream::Settled;
 pub use stream::Stream;
 pub use table::FORMATS;
 pub use volume_stream::VolumeStream;

@@ -3,7 +3,7 @@
 
 use super::{
     FORMATS,
-    form::{Counts, Form, StreamPoint, in_order},
+    form::{Coloring, Counts, Form, StreamPoint, in_order},
     format::{InPieces, by_extension},
 };
 use crate::{
@@ -15,10 +15,27 @@ use crate::{
 };
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Values of which percentiles are taken: of more, every second, third, … one.
 const LOOKS: u64 = 1 << 20;
+
+/// What the first pass over a file finds. Another stream of the same file, with the same paint, can
+/// take it instead of making that pass.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Settled {
+    /// Points that are not withheld.
+    pub points: u64,
+    /// World position that the points are relative to.
+    pub origin: DVec3,
+    /// The corners of the box around all points.
+    pub bounds: [Vec3; 2],
+    /// What the file's colours are scaled by.
+    coloring: Coloring,
+    /// The values with the first and the last colour, if values colour the points.
+    range: Option<[f64; 2]>,
+}
 
 /// A point cloud or mesh file that is read in pieces: binary PLY of points or triangles, LAS and
 /// LAZ.
@@ -38,15 +55,32 @@ pub struct Stream<'a> {
 }
 
 impl<'a> Stream<'a> {
+    /// Checks that the file has not changed since it was opened.
+    ///
+    /// # Errors
+    /// [`Error::Input`](crate::Error::Input) that says how it has changed.
+    pub(crate) fn intact(&self) -> Result<()> {
+        self.source.intact()
+    }
+
     /// Opens a file and reads its header only. Returns `None` for a file that can only be read as a
-    /// whole.
+    /// whole. A remote LAS, LAZ or COPC object is fetched piece by piece, any other as a whole.
     ///
     /// # Errors
     /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a malformed header and
     /// for a file that ends before its last point; [`Error::Limit`](crate::Error::Limit) for more
     /// points than the limits allow.
     pub fn open(path: &'a (impl AsRef<Path> + ?Sized), limits: &'a Limits) -> Result<Option<Self>> {
-        Self::of(Source::open(path.as_ref(), limits)?)
+        let path = path.as_ref();
+        let format = by_extension(FORMATS, path, |_| true);
+        let in_parts = matches!(
+            format.map(|format| format.pieces),
+            Some(InPieces::Points { in_parts: true, .. })
+        );
+        Self::of(match in_parts {
+            true => Source::open_in_parts(path, limits)?,
+            false => Source::open(path, limits)?,
+        })
     }
 
     /// As [`open`](Self::open), but takes an open source, which may be in memory
@@ -117,6 +151,7 @@ impl<'a> Stream<'a> {
         let first = read(0, DVec3::ZERO)?.first().map(|point| Vec3::from(point.position));
         let origin = first.unwrap_or_default().as_dvec3();
         let chosen: Vec<usize> = (0..pieces).step_by(pieces.div_ceil(PIECES)).collect();
+        self.source.fetch(chosen.iter().map(|piece| self.form.bytes(*piece)))?;
         let mut positions = Vec::new();
         for &piece in &chosen {
             let points = read(piece, origin)?;
@@ -176,6 +211,28 @@ impl<'a> Stream<'a> {
             (*own, *spread) = (scale, None);
         }
         Ok(())
+    }
+
+    /// Returns what the first pass has found.
+    pub(crate) fn settled(&self) -> Settled {
+        Settled {
+            points: self.points,
+            origin: self.origin,
+            bounds: self.bounds,
+            coloring: self.form.coloring(),
+            range: self.scale().map(|scale| scale.range),
+        }
+    }
+
+    /// Takes what the first pass over the same file has found.
+    pub(crate) fn resume(&mut self, found: &Settled) {
+        (self.points, self.origin, self.bounds) = (found.points, found.origin, found.bounds);
+        self.form.recolor(found.coloring);
+        if let (Some(Paint::Values { scale, spread, .. }), Some(range)) =
+            (&mut self.paint, found.range)
+        {
+            (scale.range, *spread) = (range, None);
+        }
     }
 
     /// Returns how the values of the points become colours; `None` if they have colours.
@@ -246,12 +303,22 @@ impl<'a> Stream<'a> {
         map: impl Fn(&[StreamPoint]) -> T + Sync,
         take: impl FnMut(T) -> Result<()>,
     ) -> Result<()> {
+        self.points_of(0..self.form.pieces()[0], map, take)
+    }
+
+    /// As [`points`](Self::points), of some of the pieces, in ascending order.
+    pub(crate) fn points_of<T: Send>(
+        &self,
+        pieces: impl IntoIterator<Item = usize>,
+        map: impl Fn(&[StreamPoint]) -> T + Sync,
+        take: impl FnMut(T) -> Result<()>,
+    ) -> Result<()> {
         let of_piece = |piece: usize| {
             let mut points = self.form.points(&self.source, piece, self.origin)?;
             points.iter_mut().for_each(|point| self.paint(point));
             Ok(map(&points))
         };
-        in_order(&self.source, self.form.pieces()[0], of_piece, take)
+        in_order(&self.source, pieces, |piece| self.form.bytes(piece), of_piece, take)
     }
 
     /// As [`points`](Self::points), for the triangles. `map` also gets the index of the piece's
@@ -265,7 +332,7 @@ impl<'a> Stream<'a> {
             let (first, triangles) = self.form.triangles(&self.source, piece)?;
             Ok(map(first, &triangles))
         };
-        in_order(&self.source, self.form.pieces()[1], of_piece, take)
+        in_order(&self.source, 0..self.form.pieces()[1], |_| 0..0, of_piece, take)
     }
 
     /// Returns the position of a vertex of a mesh.

@@ -78,6 +78,7 @@ pub static FORMATS: &[Format] = &[
         pieces: InPieces::Points {
             of: "binary files",
             find: |source| Ok(ply::Pieces::find(source)?.map(|pieces| Box::new(pieces) as _)),
+            in_parts: false,
         },
         ..Format::ROW
     },
@@ -172,6 +173,7 @@ pub static FORMATS: &[Format] = &[
         pieces: InPieces::Points {
             of: "",
             find: |source| Ok(las::Pieces::find(source)?.map(|pieces| Box::new(pieces) as _)),
+            in_parts: true,
         },
         ..Format::ROW
     },

@@ -158,7 +158,7 @@ fn hierarchies_and_bricks() {
     let path = folder.path("a.splk");
     file::write(&tree(&surface(5000, 1)), &path, &file::WriteOptions::default()).unwrap();
     let hierarchy = Hierarchy::open(&path, &Limits::default()).unwrap();
-    let pages = hierarchy.pages().len() as u32;
+    let pages = hierarchy.page_count();
     assert!(hierarchy.read_page(pages - 1).is_ok() && pages > 1);
     cut(&path, 100);
     is_told("page", hierarchy.read_page(pages - 1));

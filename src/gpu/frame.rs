@@ -153,6 +153,7 @@ impl<'a> Work<'a> {
                     scatter.plan.encode_advance(gpu, encoder, targets);
                     scatter.cull.encode(gpu, encoder, targets, chunks);
                     scan.encode(gpu, encoder, &targets.runs, targets.run_total + 1);
+                    targets.copy_record_starts(encoder);
                 }),
             ),
             (

@@ -147,11 +147,11 @@ pub struct Rows {
     pub first: u32,
 }
 
-/// Returns the view in strips of whole rows. The colours of a strip (16 bytes a pixel) fit a
-/// binding, and its tiles have enough bins for all sheets.
-pub fn strips(gpu: &Gpu, view: &View, sheets: &Sheets) -> Vec<Rows> {
+/// Splits a view into strips of whole rows, for a scene with this number of fields. The colours of
+/// a strip (16 bytes a pixel) fit a binding, and its tiles have enough bins for all sheets.
+pub fn strips(gpu: &Gpu, view: &View, sheets: &Sheets, fields: usize) -> Vec<Rows> {
     let [width, height] = view.size;
-    let colors = gpu.binding_size() - targets::most_slot_bytes(gpu);
+    let colors = gpu.binding_size() - targets::most_slot_bytes(gpu, fields);
     let most = (colors / (16 * u64::from(width))).min(targets::most_rows(width, sheets.count()));
     let rows = u32::try_from(most).unwrap_or(u32::MAX).clamp(1, height);
     let strip = |first: u32| {

@@ -14,7 +14,7 @@ use crate::{
             present::{Presenter, Strip},
         },
         pipeline::{state::State, variant::Variant},
-        scene::{PreparedScene, chunk::Origin, nodes::PageCache},
+        scene::{PreparedScene, chunk::Origin},
         targets::{self, Pool, Targets},
         variant,
     },
@@ -153,8 +153,10 @@ impl PendingFrame {
             Detail::Splats(most) => {
                 // The pages of a cut contain several times as many nodes as it draws.
                 let nodes = most.saturating_mul(8).max(1 << 16);
-                let finest = |cache: &PageCache| cache.finest_within(&view, settings, nodes);
-                let pixels = prepared.page_caches.iter().map(finest).fold(0.0, f64::max);
+                let mut pixels = 0.0f64;
+                for cache in &prepared.page_caches {
+                    pixels = pixels.max(cache.finest_within(&view, settings, nodes)?);
+                }
                 prepared.update_forests(&engine.gpu, &view, settings, pixels)?;
                 Stage::Tally { pixels, most }
             }
@@ -247,7 +249,8 @@ impl PendingFrame {
         let request = Request { view, settings, detail: *detail, cut_pixels };
         let outline = request.outline(&engine.gpu, &engine.passes, prepared)?;
         self.stats.read_bricks = outline.read_bricks;
-        self.strips = strips(&engine.gpu, &self.view, &outline.sheets);
+        self.strips =
+            strips(&engine.gpu, &self.view, &outline.sheets, prepared.scene.fields().len());
         self.strips.reverse();
         self.outline = Some(outline);
         Ok(())
@@ -267,7 +270,7 @@ impl PendingFrame {
         view.validate_for(&prepared.bounds)?;
         let choice = outline.choice.as_ref();
         let kind = prepared.field.as_ref().map_or(0, |field| field.kind);
-        let variant = variant::variant(&variant::Request {
+        let request = variant::Request {
             scene: &prepared.scene,
             view,
             settings,
@@ -275,7 +278,15 @@ impl PendingFrame {
             choice,
             gathered: outline.gather.then_some(kind),
             is_software: gpu.is_software(),
-        });
+        };
+        let variant = variant::variant(&request);
+        let fields = prepared.scene.fields();
+        for chunk in &prepared.chunks {
+            let isotropic = request.is_isotropic(&prepared.scene.items[chunk.item]);
+            let field = fields.iter().position(|item| *item == chunk.item).unwrap_or(0);
+            let source = chunk.source(view, isotropic, &prepared.page_caches).of_field(field);
+            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
+        }
         let request = targets::Request {
             variant: &variant,
             view,
@@ -286,11 +297,6 @@ impl PendingFrame {
         };
         let targets = request.targets(gpu, &mut engine.pool, prepared)?;
         engine.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
-        for chunk in &prepared.chunks {
-            let lattice = matches!(chunk.origin, Origin::Lattice { .. } | Origin::Bricks { .. });
-            let source = chunk.source(view, variant.isotropic && lattice, &prepared.page_caches);
-            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
-        }
         self.strip = Some(Drawn { rows, variant, targets, state: State::default() });
         Ok(())
     }

@@ -66,8 +66,9 @@ impl Renderer {
     /// Uploads a scene.
     ///
     /// # Errors
-    /// [`Error::Argument`] if [`Scene::validate`] refuses the scene, or if its kernel is a tensor
-    /// product. [`Error::Driver`] or [`Error::Argument`] if the scene does not fit the device.
+    /// [`Error::Argument`] if [`Scene::validate`] refuses the scene, or if [`Scene::beyond_gpu`]
+    /// names something in it. [`Error::Driver`] or [`Error::Argument`] if the scene does not fit
+    /// the device.
     pub fn prepare(&self, scene: &Scene) -> Result<PreparedScene> {
         let gpu = &self.engine.gpu;
         gpu.watch(|| PreparedScene::new(gpu, scene))?
@@ -198,6 +199,10 @@ impl Renderer {
     ) -> Result<PendingFrame> {
         self.guarded(prepared, |renderer, prepared| {
             prepared.scene.validate_settings(settings)?;
+            if settings.region.is_some() {
+                let what = "the GPU engine does not draw regions yet; the CPU engine does";
+                return Err(Error::Argument(what.into()));
+            }
             let view = camera.view(settings.size)?;
             let detail = match settings.detail {
                 Detail::Milliseconds(_) => Detail::Pixels(renderer.pace.next(&view)),

@@ -11,14 +11,14 @@ use crate::{
         },
         pipeline::{
             scan::SCAN_CAPACITY,
-            state::{ARGUMENT_BYTES, PASS_BYTES, State},
+            state::{ARGUMENT_BYTES, HELD_RECORD_STARTS, PASS_BYTES, State},
             variant::{MOST_BINS, MOST_GROUP_SHIFT, Variant},
         },
         scene::{PreparedScene, chunk::RUN, field::Gathered},
     },
     math::{Sheets, View},
     plan::{tables::Tables, uniforms::Frame},
-    scene::Settings,
+    scene::{Scene, Settings},
 };
 use wgpu::BufferUsages as Usage;
 
@@ -56,13 +56,16 @@ pub fn most_rows(width: u32, sheets: usize) -> u64 {
 /// have a bit for each).
 const SLOTS: u64 = 1024;
 
-/// Bytes of a tile's saved sums (`SAVED_VECTORS` in saved.wgsl, with facets).
-const SLOT_BYTES: u64 = 64 * 27 * 16;
+/// Returns the bytes of a tile's saved sums (`SAVED_VECTORS` in saved.wgsl, with facets).
+fn slot_bytes(fields: usize) -> u64 {
+    64 * (19 + 8 * fields.max(1) as u64) * 16
+}
 
-/// Returns the maximum bytes of the slots. They lie behind the colours of a picture, in the same
-/// binding.
-pub fn most_slot_bytes(gpu: &Gpu) -> u64 {
-    SLOTS.min(gpu.binding_size() / 2 / SLOT_BYTES) * SLOT_BYTES
+/// Returns the maximum bytes of the slots for a scene with this number of fields. They lie behind
+/// the colours of a picture, in the same binding.
+pub fn most_slot_bytes(gpu: &Gpu, fields: usize) -> u64 {
+    let own = slot_bytes(fields);
+    SLOTS.min(gpu.binding_size() / 2 / own) * own
 }
 
 /// The buffers of a frame: the data that passes write for later passes, and the picture.
@@ -98,10 +101,36 @@ pub struct Targets {
     /// The lattice that is gathered, if any.
     pub gathered: Option<Gathered>,
     pub run_total: u32,
+    /// The first batch of each field.
+    pub first_runs: Vec<u32>,
     pub tiles: [u32; 2],
 }
 
 impl Targets {
+    /// Encodes the copy of each field's first record word, from the sums over the batches, to the
+    /// frame.
+    pub fn copy_record_starts(&self, encoder: &mut wgpu::CommandEncoder) {
+        // With a single field, march does not read these words.
+        if self.first_runs.len() < 2 {
+            return;
+        }
+        let all = self.first_runs.iter().copied().chain(std::iter::repeat(self.run_total));
+        let offset = std::mem::offset_of!(Frame, record_starts) as u64;
+        for (field, run) in (0..Scene::MAX_FIELDS as u64).zip(all) {
+            let (from, to) = (4 * u64::from(run), offset + 4 * field);
+            encoder.copy_buffer_to_buffer(&self.runs, from, &self.frame, to, 4);
+        }
+    }
+
+    /// Encodes the copy of these words as they were when the pass was held. Later passes that draw
+    /// nothing overwrite them.
+    pub fn restore_record_starts(&self, encoder: &mut wgpu::CommandEncoder) {
+        let offset = std::mem::offset_of!(Frame, record_starts) as u64;
+        let bytes = size_of_val(&Frame::default().record_starts) as u64;
+        let (state, frame) = (&self.state, &self.frame);
+        encoder.copy_buffer_to_buffer(state, HELD_RECORD_STARTS, frame, offset, bytes);
+    }
+
     /// Returns the bytes of GPU memory.
     pub fn bytes(&self) -> u64 {
         let Self {
@@ -180,7 +209,12 @@ impl Request<'_> {
         let sizes = Sizes::of(self, gpu, budget, prepared.runs);
         let Sizes { tile_count, pixels, slots, bin_count, words, runs, .. } = sizes;
         Ok(Targets {
-            frame: uniform("frame", bytemuck::bytes_of(&frame)),
+            frame: filled_buffer(
+                gpu,
+                "frame",
+                bytemuck::bytes_of(&frame),
+                Usage::UNIFORM | Usage::COPY_DST,
+            ),
             planes: upload(gpu, "planes", bytemuck::cast_slice(&planes(self.sheets))),
             tables: upload(gpu, "tables", bytemuck::cast_slice(&table)),
             run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
@@ -213,6 +247,7 @@ impl Request<'_> {
             depths: pool.take(gpu, "depths", 4 * pixels),
             gathered,
             run_total: prepared.runs,
+            first_runs: prepared.first_runs(),
             tiles,
         })
     }
@@ -304,7 +339,8 @@ impl Sizes {
         let room = |count: u64| if variant.scatters() { count } else { 0 };
         let tiles = request.tiles();
         let tile_count = tiles[0] * tiles[1];
-        let slots = (u64::from(tile_count) * SLOT_BYTES).min(most_slot_bytes(gpu));
+        let fields = variant.fields as usize;
+        let slots = (u64::from(tile_count) * slot_bytes(fields)).min(most_slot_bytes(gpu, fields));
         // The number of entries is stored behind the last bin.
         let bins = (groups(sheets.count(), 0) * u64::from(tile_count)).min(u64::from(MOST_BINS));
         Self {
@@ -335,7 +371,8 @@ pub fn gathered_word(tiles: u32) -> u64 {
     2 * u64::from(tiles) + SLOTS / 32 + 3
 }
 
-/// Returns the tables of the scene's field, or unused placeholders if it has no field.
+/// Returns the tables of the scene's fields one behind the other, or unused placeholders if there
+/// are no fields.
 fn tables_of(
     prepared: &PreparedScene,
     settings: &Settings,
@@ -343,15 +380,17 @@ fn tables_of(
     sheets: &Sheets,
     frame: &mut Frame,
 ) -> Vec<[f32; 4]> {
-    let field = prepared
-        .scene
-        .items
-        .iter()
-        .find_map(|item| Some((item, item.transfer()?, item.value_range()?)));
-    let Some((item, transfer, range)) = field else { return vec![[0.0; 4]; 2] };
-    let tables = Tables::new(transfer, range, item.kernel());
-    frame.set_tables(&tables, transfer, item.light(settings), view, sheets);
-    tables.entries
+    let mut all = Vec::new();
+    let scene = &prepared.scene;
+    for (field, number) in frame.fields.iter_mut().zip(scene.fields()) {
+        let item = &scene.items[number];
+        let (Some(transfer), Some(range)) = (item.transfer(), item.value_range()) else { continue };
+        let tables = Tables::new(transfer, range, item.kernel());
+        let start = all.len() as u32;
+        field.set_tables((&tables, start), transfer, item.light(settings), view, sheets);
+        all.extend(tables.entries);
+    }
+    if all.is_empty() { vec![[0.0; 4]; 2] } else { all }
 }
 
 /// Returns the bytes of the counts by sheet and band (census.wgsl) for a number of sheets: 6 counts

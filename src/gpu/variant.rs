@@ -49,7 +49,7 @@ pub fn variant(request: &Request<'_>) -> Variant {
             | Item::Volume(_, _, transfer)
             | Item::Bricks(_, _, transfer) => {
                 add_field(&mut variant, settings, item, transfer);
-                add_lattice(&mut variant, request, item);
+                add_samples(&mut variant, request, item);
             }
         }
     }
@@ -64,6 +64,8 @@ pub fn variant(request: &Request<'_>) -> Variant {
         variant.rows = GATHERED_ROWS;
         variant.most_entries = variant.most_entries.min(GATHERED_ENTRIES);
     }
+    // The code of a sheet is repeated for each pixel and field.
+    variant.rows = (variant.rows / variant.fields.next_power_of_two()).max(1);
     variant
 }
 
@@ -79,6 +81,8 @@ fn without_items(request: &Request<'_>) -> Variant {
         optics: settings.optics,
         scalar: false,
         classified: false,
+        fields: request.scene.fields().len().max(1) as u32,
+        samples: false,
         lattice: false,
         body_centred: false,
         rectilinear: false,
@@ -89,6 +93,7 @@ fn without_items(request: &Request<'_>) -> Variant {
         trained: false,
         facets: false,
         isotropic: false,
+        general: false,
         table_kernel: false,
         beyond: false,
         volume_shaded: false,
@@ -121,35 +126,59 @@ fn add_field(variant: &mut Variant, settings: &Settings, item: &Item, transfer: 
         variant.surface_shaded |= shaded;
     } else {
         variant.scalar = true;
-        variant.volume_shaded = shaded;
-        variant.gradient_opacity =
+        variant.volume_shaded |= shaded;
+        variant.gradient_opacity |=
             !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
-        variant.isosurfaces = if is_lit { transfer.isosurfaces.len() as u32 } else { 0 };
+        let isosurfaces = if is_lit { transfer.isosurfaces.len() as u32 } else { 0 };
+        variant.isosurfaces = variant.isosurfaces.max(isosurfaces);
     }
     // Finding the range of scattered samples would take longer.
     let range = item.lattice().and_then(|_| item.value_range());
-    variant.beyond = range.is_none_or(|range| tables::leaves_out(transfer, range));
+    variant.beyond |= range.is_none_or(|range| tables::leaves_out(transfer, range));
 }
 
-/// Adds what the lattice and the kernel of an item need, if it has a lattice.
-fn add_lattice(variant: &mut Variant, request: &Request<'_>, item: &Item) {
-    let &Request { view, settings, choice, gathered, .. } = request;
-    if let Item::Volume(volume, kernel, _) = item {
-        variant.lattice = true;
-        variant.body_centred = volume.lattice.arrangement == Arrangement::BodyCentred;
-        variant.rectilinear = matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
-        variant.table_kernel = !matches!(kernel.profile, Profile::Gaussian(_));
-        let alike = !variant.rectilinear && !variant.table_kernel && !settings.classifies_samples();
-        variant.isotropic =
-            alike && gathered.is_none() && are_flat(&volume.lattice, kernel, view, item);
-        variant.sample_kind = gathered.unwrap_or(0);
+/// Adds what the samples and the kernel of an item need.
+fn add_samples(variant: &mut Variant, request: &Request<'_>, item: &Item) {
+    let &Request { choice, gathered, .. } = request;
+    match item {
+        Item::Volume(volume, kernel, _) => {
+            let arrangement = &volume.lattice.arrangement;
+            variant.lattice = true;
+            variant.body_centred |= *arrangement == Arrangement::BodyCentred;
+            variant.rectilinear |= matches!(arrangement, Arrangement::Rectilinear(_));
+            variant.table_kernel |= !matches!(kernel.profile, Profile::Gaussian(_));
+            variant.sample_kind = gathered.unwrap_or(0);
+        }
+        Item::Bricks(..) => {
+            variant.lattice = true;
+            variant.two_levels |= choice.is_some_and(|choice| choice.levels.len() > 1);
+        }
+        _ => variant.samples = true,
     }
-    if let (Item::Bricks(bricks, kernel, _), Some(choice)) = (item, choice) {
-        variant.lattice = true;
-        variant.two_levels = choice.levels.len() > 1;
-        let flat =
-            |&(level, _): &(usize, f64)| are_flat(&bricks.lattice(level), kernel, view, item);
-        variant.isotropic = choice.levels.iter().all(flat);
+    let is_isotropic = request.is_isotropic(item);
+    variant.isotropic |= is_isotropic;
+    variant.general |= !is_isotropic;
+}
+
+impl Request<'_> {
+    /// Whether the samples of an item are drawn with sections that do not depend on the pixel.
+    pub fn is_isotropic(&self, item: &Item) -> bool {
+        let Self { view, settings, choice, gathered, .. } = *self;
+        let flat = |lattice: &Lattice, kernel| are_flat(lattice, kernel, view, item);
+        match item {
+            Item::Volume(volume, kernel, _) => {
+                let lattice = &volume.lattice;
+                gathered.is_none()
+                    && !settings.classifies_samples()
+                    && matches!(kernel.profile, Profile::Gaussian(_))
+                    && !matches!(lattice.arrangement, Arrangement::Rectilinear(_))
+                    && flat(lattice, kernel)
+            }
+            Item::Bricks(bricks, kernel, _) => choice.is_some_and(|choice| {
+                choice.levels.iter().all(|&(level, _)| flat(&bricks.lattice(level), kernel))
+            }),
+            _ => false,
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::{
     Block, Node, Tree,
     cluster::{box_of, cluster},
     colors::{Harmonics, LeafColors},
-    file::{Top, Whole, WriteOptions, Writer},
+    file::{Placed, Top, Whole, WriteOptions, Writer},
     measure::Measures,
     merge::Mass,
     partition,
@@ -18,13 +18,14 @@ use crate::{
     progress::{Watch, tell},
     splat::{Payload, Splat, SplatSet},
 };
+use serde::{Deserialize, Serialize};
 use std::{
     path::Path,
     sync::atomic::{AtomicU64, Ordering},
 };
 
 /// Trades the time of building against the quality of the tree.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Preset {
     /// Compares each splat with the fewest neighbours before it is paired.
@@ -218,8 +219,19 @@ impl Builder {
         preset: Preset,
         options: &WriteOptions,
     ) -> Result<Self> {
-        let writer = Writer::new(path, extent, options)?;
-        Ok(Self { writer, outer, preset, roots: Vec::new(), root_colors: Vec::new() })
+        Ok(Self::over(Writer::new(path, extent, options)?, outer, preset))
+    }
+
+    /// As [`new`](Self::new), with a writer whose pages are there already.
+    pub fn over(writer: Writer, outer: Sphere, preset: Preset) -> Self {
+        Self { writer, outer, preset, roots: Vec::new(), root_colors: Vec::new() }
+    }
+
+    /// Adds a block whose pages have been written.
+    pub fn adopt(&mut self, block: &Placed) -> Result<()> {
+        self.writer.adopt(block)?;
+        self.roots.push(block.root);
+        Ok(())
     }
 
     pub fn add(&mut self, blocks: Vec<Block>) -> Result<()> {

@@ -155,34 +155,59 @@ fn pairs(boxes: &[Aabb], preset: Preset) -> Bvh2 {
     PlocBuilder::new().build(distance, boxes, indices, SortPrecision::U64, threshold)
 }
 
-/// Decides which inner nodes of the binary hierarchy remain nodes. Bottom-up, two pairs join while
-/// they contain at most eight items together. Otherwise both are closed, and count as one item each
-/// from then on.
+/// Decides which inner nodes of the binary hierarchy remain nodes. Each pair has a grade, by the
+/// number of leaves below it ([`grade`]). Bottom-up, two pairs join while they have one grade and
+/// contain at most eight items together. Otherwise they are closed, and count as one item each from
+/// then on.
 ///
-/// Closing small pairs would waste nodes, so a pair of one or two items stays open where it can.
+/// So the nodes of a level have similar sizes, and a view that needs one node of a page needs most
+/// of the others. Closing small pairs would waste nodes, so a pair of one or two items stays open
+/// where it can.
 fn groups(pairs: &Bvh2) -> Vec<bool> {
     let mut items = vec![1u8; pairs.nodes.len()];
+    let mut leaves = vec![1u32; pairs.nodes.len()];
     let mut closed = vec![false; pairs.nodes.len()];
+    let sum = |counts: [u8; 2]| usize::from(counts[0] + counts[1]);
     for index in post_order(pairs) {
-        let node = &pairs.nodes[index as usize];
-        let first = node.first_index as usize;
+        let first = pairs.nodes[index as usize].first_index as usize;
         let halves = [first, first + 1];
         let mut counts = halves.map(|half| items[half]);
-        if usize::from(counts[0] + counts[1]) > MOST_CHILDREN {
+        leaves[index as usize] = leaves[first] + leaves[first + 1];
+        let own = grade(leaves[index as usize]);
+        let mut close = |side: usize, counts: &mut [u8; 2]| {
+            closed[halves[side]] = true;
+            counts[side] = 1;
+        };
+        for side in [0, 1] {
+            if counts[side] > 2 && grade(leaves[halves[side]]) < own {
+                close(side, &mut counts);
+            }
+        }
+        if sum(counts) > MOST_CHILDREN {
             let larger = usize::from(counts[1] > counts[0]);
             for side in [larger, 1 - larger] {
-                let is_small =
-                    counts[side] <= 2 && usize::from(counts[0] + counts[1]) <= MOST_CHILDREN;
+                let is_small = counts[side] <= 2 && sum(counts) <= MOST_CHILDREN;
                 if counts[side] > 1 && !is_small {
-                    closed[halves[side]] = true;
-                    counts[side] = 1;
+                    close(side, &mut counts);
                 }
             }
         }
-        items[index as usize] = counts[0] + counts[1];
+        items[index as usize] = sum(counts) as u8;
     }
     closed[0] = true;
     closed
+}
+
+/// Returns the grade of a pair of so many leaves: 0 up to 8 leaves, 1 up to 48, and so on by
+/// factors of six.
+fn grade(leaves: u32) -> u32 {
+    let mut most = MOST_CHILDREN as u64;
+    let mut grade = 0;
+    while u64::from(leaves) > most {
+        most *= 6;
+        grade += 1;
+    }
+    grade
 }
 
 /// The inner nodes, children before their parents.

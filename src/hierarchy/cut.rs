@@ -16,7 +16,7 @@ use super::{
 use crate::{
     Error, Result,
     gaussians::Eye,
-    math::View,
+    math::{Bounds, View},
     parallel::prelude::*,
     splat::{Payload, Splat, SplatSet, decode_normal},
 };
@@ -54,6 +54,12 @@ pub const BLEND_BAND: f32 = 1.5;
 /// Shares are integers in units of one over this.
 pub const SHARE_UNIT: u32 = 1023;
 
+/// How far sheets of splats, and footprints that are widened, may reach beyond a node, in pixels.
+const WIDENED: f32 = 32.0;
+
+/// Margin for rounding in tests of bounds, as a fraction of the largest length in them.
+const ROUNDING: f32 = 1e-5;
+
 /// Bounds on sizes in pixels, so that their quotients are finite.
 const LEAST_PIXELS: f64 = 1e-9;
 pub(crate) const MOST_PIXELS: f32 = 1e9;
@@ -81,6 +87,8 @@ pub struct Cut {
     /// The picture's four sides. A view-space sphere with centre c and radius r is outside if n·c +
     /// d < −r.
     pub(crate) sides: [Vec4; 4],
+    /// The box around what is drawn, in the hierarchy's frame; `None` for everything.
+    region: Option<[Vec3; 2]>,
 }
 
 impl Cut {
@@ -97,7 +105,27 @@ impl Cut {
             fineness: (1.0 / pixels.max(LEAST_PIXELS)) as f32,
             culls,
             sides,
+            region: None,
         }
+    }
+
+    /// Limits the pages that are needed to those of a region. Nodes beyond it may be selected.
+    pub fn within(self, origin: DVec3, region: Option<Bounds>) -> Self {
+        let local = |place: DVec3| (place - origin).as_vec3();
+        let region = region.map(|bounds| [local(bounds.min), local(bounds.max)]);
+        Self { region, ..self }
+    }
+
+    /// Whether a sphere in the hierarchy's frame lies outside the region.
+    fn is_beyond(&self, center: [f32; 3], radius: f32) -> bool {
+        self.region.is_some_and(|[min, max]| {
+            let center = Vec3::from_array(center);
+            // Sheets and footprints are widened by pixels, which are larger farther away.
+            let away =
+                if self.perspective { self.to_view(center.to_array()).length() } else { 1.0 };
+            let reach = radius + WIDENED * away / self.scale;
+            center.distance_squared(center.clamp(min, max)) > reach * reach
+        })
     }
 
     fn to_view(self, place: [f32; 3]) -> Vec3 {
@@ -172,7 +200,22 @@ impl Cut {
     /// too often.
     pub fn may_refine(&self, parents: &CutSphere) -> bool {
         let reach = parents.radius + 1.3 * parents.size;
-        self.refinement(parents) > 0 && !self.is_outside(self.to_view(parents.center), reach)
+        self.refinement(parents) > 0
+            && !self.is_outside(self.to_view(parents.center), reach)
+            && !self.is_beyond(parents.center, reach)
+    }
+
+    /// As [`may_refine`](Self::may_refine), for bounds around the bounds of several pages: returns
+    /// true wherever that would for one of these, also after rounding.
+    pub fn may_refine_below(&self, around: &CutSphere) -> bool {
+        let away = Vec3::from(around.center).length() + self.origin.length();
+        let radius = around.radius + ROUNDING * (away + around.radius);
+        let around = CutSphere { radius, size: around.size * (1.0 + ROUNDING), ..*around };
+        let reach = radius + 1.3 * around.size;
+        self.refinement(&around) > 0
+            && !self.is_outside(self.to_view(around.center), reach)
+            // The bounds of a page may be farther away than the middle of those around them.
+            && !self.is_beyond(around.center, reach + WIDENED * radius / self.scale)
     }
 }
 

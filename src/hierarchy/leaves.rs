@@ -1,13 +1,18 @@
 //! The finest level on its own.
 
-use super::Hierarchy;
+use super::{Hierarchy, file::Page};
 use crate::{
     Result, memory,
-    parallel::prelude::*,
     splat::{Payload, Splat, SplatSet},
 };
 
 impl Hierarchy {
+    /// Returns what is made of each page, in their order. A few pages are in memory at a time.
+    pub(super) fn each_page<T: Send>(&self, make: impl Fn(&Page) -> T + Sync) -> Result<Vec<T>> {
+        let all: Vec<u32> = (0..self.page_count()).collect();
+        self.batched(&all, |page| Ok(make(&self.read_page(page)?)))
+    }
+
     /// Returns the splats of the finest level, page by page: those that the hierarchy was built
     /// from, as stored in its file.
     ///
@@ -20,13 +25,11 @@ impl Hierarchy {
             "reading the splats of the finest level",
             2 * size_of::<Splat>() as u64 * self.header().leaves,
         )?;
-        let of_page = |page: u32| {
-            let page = self.read_page(page)?;
+        let of_page = |page: &Page| {
             let nodes = page.nodes.iter().filter(|node| node.is_leaf() && !page.has_portals);
-            Ok(nodes.map(|node| node.splat).collect::<Vec<Splat>>())
+            nodes.map(|node| node.splat).collect::<Vec<Splat>>()
         };
-        let pages: Vec<Vec<Splat>> =
-            (0..self.pages().len() as u32).into_par_iter().map(of_page).collect::<Result<_>>()?;
+        let pages = self.each_page(of_page)?;
         let header = self.header();
         let splats = pages.concat();
         Ok(SplatSet {

@@ -4,59 +4,151 @@ use super::{
     Cut, CutSphere, Hierarchy,
     file::{Page, PageEntry},
 };
-use crate::parallel::prelude::*;
+use crate::{Result, parallel::prelude::*};
 use glam::Vec3;
+use std::{collections::BTreeMap, ops::Range};
 
 /// Margin for rounding in the bounds of several nodes.
 const ROOM: f32 = 1.00001;
 
-/// The order in which the pages of a hierarchy are loaded.
-#[derive(Debug)]
+/// A page that a cut may need.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Needed {
-    /// All pages, coarse ones first.
-    order: Vec<u32>,
+    pub page: u32,
+    /// The number of its nodes.
+    pub nodes: u32,
 }
 
-impl Needed {
-    pub fn new(hierarchy: &Hierarchy) -> Self {
-        Self { order: hierarchy.coarse_first() }
+/// Returns the pages that a cut may need and all pages above them, coarse ones first.
+///
+/// # Errors
+/// Those of [`Hierarchy::entry`].
+pub fn needed(hierarchy: &Hierarchy, cut: &Cut) -> Result<Vec<Needed>> {
+    let around = |sphere: &CutSphere| cut.may_refine_below(sphere);
+    Ok(found(hierarchy, around, |sphere| cut.may_refine(sphere), u64::MAX)?.in_order(hierarchy))
+}
+
+/// Returns the coarsest pages, `most` of them, coarse ones first.
+///
+/// # Errors
+/// Those of [`Hierarchy::entry`].
+pub fn coarsest(hierarchy: &Hierarchy, most: usize) -> Result<Vec<Needed>> {
+    let mut size = (hierarchy.bounds().diagonal() as f32).min(f32::MAX);
+    loop {
+        let large = |sphere: &CutSphere| sphere.size >= size;
+        let mut found = found(hierarchy, large, large, u64::MAX)?.in_order(hierarchy);
+        if found.len() >= most || size == 0.0 {
+            found.truncate(most);
+            return Ok(found);
+        }
+        size = if size > f32::MIN_POSITIVE { size * 0.5 } else { 0.0 };
+    }
+}
+
+/// Returns the finest cut, as a width in pixels, whose pages contain at most `most` nodes.
+///
+/// # Errors
+/// Those of [`Hierarchy::entry`].
+pub fn finest_within(hierarchy: &Hierarchy, most: u64, cut: impl Fn(f64) -> Cut) -> Result<f64> {
+    let fits = |pixels: f64| {
+        let cut = cut(pixels);
+        let around = |sphere: &CutSphere| cut.may_refine_below(sphere);
+        let found = found(hierarchy, around, |sphere| cut.may_refine(sphere), most)?;
+        Ok(found.nodes <= most)
+    };
+    if fits(0.0)? {
+        return Ok(0.0);
+    }
+    let (mut fine, mut coarse) = (-10.0f64, 16.0f64);
+    for _ in 0..12 {
+        let middle = (fine + coarse) * 0.5;
+        *(if fits(middle.exp2())? { &mut coarse } else { &mut fine }) = middle;
+    }
+    Ok(coarse.exp2())
+}
+
+/// A page that was found, in brief.
+#[derive(Debug, Clone)]
+struct Found {
+    nodes: u32,
+    size: f32,
+    parents: Range<u32>,
+}
+
+impl Found {
+    fn of(entry: &PageEntry) -> Self {
+        let parents = entry.parent_pages.clone();
+        Self { nodes: entry.nodes, size: entry.largest_parent_size, parents }
+    }
+}
+
+/// Pages with all pages above them.
+#[derive(Debug, Default)]
+struct All {
+    pages: BTreeMap<u32, Found>,
+    nodes: u64,
+}
+
+impl All {
+    /// Adds a page and the pages above it, which may be on other pages of the directory.
+    fn add(&mut self, hierarchy: &Hierarchy, page: u32, own: Found) -> Result<()> {
+        let mut rest = vec![(page, own)];
+        while let Some((page, own)) = rest.pop() {
+            if self.pages.contains_key(&page) {
+                continue;
+            }
+            for above in own.parents.clone().filter(|above| !self.pages.contains_key(above)) {
+                rest.push((above, Found::of(&hierarchy.entry(above)?)));
+            }
+            self.nodes += u64::from(own.nodes);
+            self.pages.insert(page, own);
+        }
+        Ok(())
     }
 
-    /// Returns the pages that a cut may need and all pages above them, coarse ones first.
-    pub fn of(&self, hierarchy: &Hierarchy, cut: &Cut) -> Vec<u32> {
-        let pages = hierarchy.pages();
-        let test = |(page, entry): (usize, &PageEntry)| {
-            hierarchy.is_present(page as u32) && (page == 0 || cut.may_refine(&parents_of(entry)))
+    /// Returns the pages by descending size of the nodes that they refine, each after the pages of
+    /// its parents.
+    fn in_order(self, hierarchy: &Hierarchy) -> Vec<Needed> {
+        debug_assert!(self.pages.keys().all(|page| *page < hierarchy.page_count()));
+        let mut sizes: BTreeMap<u32, f32> = BTreeMap::new();
+        for (page, own) in &self.pages {
+            let above = own.parents.clone().filter_map(|above| sizes.get(&above).copied());
+            sizes.insert(*page, above.fold(own.size, f32::min));
+        }
+        let mut order: Vec<(u32, f32)> = sizes.into_iter().collect();
+        order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let needed = |(page, _): (u32, f32)| Needed { page, nodes: self.pages[&page].nodes };
+        order.into_iter().map(needed).collect()
+    }
+}
+
+/// Returns the pages whose bounds pass, if those around them do, with all pages above them. Stops
+/// when they have more than `most` nodes.
+fn found(
+    hierarchy: &Hierarchy,
+    around: impl Fn(&CutSphere) -> bool + Sync,
+    wanted: impl Fn(&CutSphere) -> bool + Sync,
+    most: u64,
+) -> Result<All> {
+    let mut all = All::default();
+    hierarchy.visit(around, |runs| {
+        let of_run = |(first, entries): &(u32, std::sync::Arc<[PageEntry]>)| {
+            let test = |(page, entry): &(u32, &PageEntry)| {
+                hierarchy.has(entry) && (*page == 0 || wanted(&parents_of(entry)))
+            };
+            let own = (*first..).zip(entries.iter()).filter(test);
+            own.map(|(page, entry)| (page, Found::of(entry))).collect::<Vec<_>>()
         };
-        let mut needed: Vec<bool> =
-            pages.par_iter().enumerate().with_min_len(1 << 10).map(test).collect();
-        for index in (0..pages.len()).rev() {
-            if needed[index] {
-                for parent in pages[index].parent_pages.clone() {
-                    needed[parent as usize] = true;
-                }
+        let found: Vec<Vec<(u32, Found)>> = runs.par_iter().map(of_run).collect();
+        for (page, own) in found.into_iter().flatten() {
+            all.add(hierarchy, page, own)?;
+            if all.nodes > most {
+                return Ok(false);
             }
         }
-        self.order.iter().copied().filter(|&page| needed[page as usize]).collect()
-    }
-
-    /// Returns the finest cut, as a width in pixels, whose pages contain at most `most` nodes.
-    pub fn finest_within(&self, hierarchy: &Hierarchy, most: u64, cut: impl Fn(f64) -> Cut) -> f64 {
-        let pages = hierarchy.pages();
-        let nodes = |pixels: f64| {
-            let needed = self.of(hierarchy, &cut(pixels));
-            needed.iter().map(|&page| u64::from(pages[page as usize].nodes)).sum::<u64>()
-        };
-        if nodes(0.0) <= most {
-            return 0.0;
-        }
-        let (mut fine, mut coarse) = (-10.0f64, 16.0f64);
-        for _ in 0..12 {
-            let middle = (fine + coarse) * 0.5;
-            *(if nodes(middle.exp2()) <= most { &mut coarse } else { &mut fine }) = middle;
-        }
-        coarse.exp2()
-    }
+        Ok(true)
+    })?;
+    Ok(all)
 }
 
 /// Returns a sphere around the spheres of all parents of a page's nodes, with their largest size.
@@ -85,4 +177,79 @@ pub fn parents_around(page: &Page, first: usize, count: usize) -> Option<CutSphe
         radius: parents.iter().map(reach).fold(0.0, f32::max) * ROOM,
         size: (parents.iter().map(|parent| parent.size).fold(0.0, f32::max) * ROOM).min(f32::MAX),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        hierarchy::testing::{Random, joined, surface},
+        math::{Camera, Projection},
+    };
+    use glam::DVec3;
+
+    /// The pages of a cut, found by a test of each.
+    fn of_all(hierarchy: &Hierarchy, cut: &Cut) -> Vec<u32> {
+        let entries: Vec<PageEntry> =
+            (0..hierarchy.page_count()).map(|page| hierarchy.entry(page).unwrap()).collect();
+        let mut sizes: Vec<f32> = Vec::new();
+        for entry in &entries {
+            let above = entry.parent_pages.clone().map(|above| sizes[above as usize]);
+            sizes.push(above.fold(entry.largest_parent_size, f32::min));
+        }
+        let own = |entry: &PageEntry| cut.may_refine(&parents_of(entry));
+        let mut needed: Vec<bool> = entries.iter().map(own).collect();
+        needed[0] = true;
+        for page in (0..entries.len()).rev() {
+            if needed[page] {
+                entries[page].parent_pages.clone().for_each(|above| needed[above as usize] = true);
+            }
+        }
+        let mut order: Vec<u32> =
+            (0..entries.len() as u32).filter(|p| needed[*p as usize]).collect();
+        order.sort_by(|a, b| sizes[*b as usize].total_cmp(&sizes[*a as usize]).then(a.cmp(b)));
+        order
+    }
+
+    #[test]
+    fn the_pages_of_a_cut_are_those_of_a_test_of_each() {
+        // Blocks are slices across x. Of a long surface they are small, and seen one by one.
+        let mut splats = surface(6_000, 3);
+        splats.iter_mut().for_each(|splat| splat.center[0] *= 40.0);
+        let tree = joined(&splats, 1_200);
+        let origin = tree.origin;
+        let hierarchy = Hierarchy::from_tree(tree).unwrap();
+        assert!(hierarchy.page_count() > 1_024);
+        let (bounds, mut random) = (hierarchy.bounds(), Random(5));
+        let (mut least, mut most) = (usize::MAX, 0);
+        for number in 0..200 {
+            let mut next = || random.next() * 2.0 - 1.0;
+            let away = DVec3::new(next(), next(), next()) * bounds.diagonal();
+            let mut camera = Camera::framing(&bounds, away, DVec3::new(0.1, 0.2, 1.0), 1.0);
+            camera.position = bounds.center() + away * (0.1 + random.next());
+            if number % 3 == 0 {
+                let height = bounds.diagonal() * random.next();
+                camera.projection = Projection::Orthographic { height };
+            }
+            let view = camera.view([100, 60]).unwrap();
+            let cut = Cut::new(&view, origin, [0.0, 0.5, 2.0, 16.0][number % 4], false);
+            let found: Vec<u32> =
+                needed(&hierarchy, &cut).unwrap().iter().map(|own| own.page).collect();
+            assert_eq!(found, of_all(&hierarchy, &cut), "{number}");
+            (least, most) = (least.min(found.len()), most.max(found.len()));
+        }
+        assert!(least < 20 && most > 600, "{least} to {most}");
+        let coarse = coarsest(&hierarchy, 50).unwrap();
+        let all = of_all(
+            &hierarchy,
+            &Cut::new(
+                &Camera::framing(&bounds, DVec3::X, DVec3::Z, 1.0).view([1000; 2]).unwrap(),
+                origin,
+                0.0,
+                false,
+            ),
+        );
+        assert_eq!(all.len(), hierarchy.page_count() as usize);
+        assert!(coarse.iter().map(|own| own.page).eq(all[..50].iter().copied()));
+    }
 }

@@ -1,7 +1,7 @@
 //! Splits many splats into blocks of neighbours along the space-filling curve of Morton (1966).
 
 use crate::{parallel::prelude::*, splat::Splat};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rdst::RadixSort;
 
 /// Bits of a Morton key on each axis.
@@ -33,20 +33,43 @@ impl Cube {
     pub fn fine_key(&self, place: Vec3) -> u64 {
         let scale = f64::from(self.scale) * f64::from(1 << (FINE_BITS - BITS));
         let cell = (place - self.low).as_dvec3() * scale;
-        let [x, y, z] =
-            cell.to_array().map(|cell| cell.clamp(0.0, f64::from((1 << FINE_BITS) - 1)) as u32);
-        let low = (1 << BITS) - 1;
-        let part = |shift: u32| {
-            let [x, y, z] = [x, y, z].map(|cell| cell >> shift & low);
-            u64::from(spread(x) | spread(y) << 1 | spread(z) << 2)
-        };
-        part(0) | part(BITS) << (3 * BITS) | part(2 * BITS) << (6 * BITS)
+        let most = f64::from((1 << FINE_BITS) - 1);
+        fine_key_of(cell.to_array().map(|cell| cell.clamp(0.0, most) as u32))
+    }
+
+    /// Returns the corners of the cell of a fine key and all keys that differ from it in the lowest
+    /// `below` bits only, a multiple of three. They are rounded outward.
+    pub fn cell(&self, key: u64, below: u32) -> [Vec3; 2] {
+        let step = f64::from(self.edge()) / f64::from(1 << FINE_BITS);
+        let low = self.low.as_dvec3() + DVec3::from(fine_cell(key).map(f64::from)) * step;
+        let high = low + step * f64::from(1 << (below / 3));
+        let margin = DVec3::splat(f64::from(self.edge()) * 1e-6);
+        [(low - margin).as_vec3(), (high + margin).as_vec3()]
     }
 
     /// Returns the edge length of the cube.
     pub fn edge(&self) -> f32 {
         (1 << BITS) as f32 / self.scale
     }
+}
+
+/// Returns the fine key of a cell by its number on each axis.
+pub(crate) fn fine_key_of([x, y, z]: [u32; 3]) -> u64 {
+    let low = (1 << BITS) - 1;
+    let part = |shift: u32| {
+        let [x, y, z] = [x, y, z].map(|cell| cell >> shift & low);
+        u64::from(spread(x) | spread(y) << 1 | spread(z) << 2)
+    };
+    part(0) | part(BITS) << (3 * BITS) | part(2 * BITS) << (6 * BITS)
+}
+
+/// Returns the number of a fine key's cell on each axis.
+pub(crate) fn fine_cell(key: u64) -> [u32; 3] {
+    let axis = |shift: u32| {
+        let bit = |at: u32| ((key >> (3 * at + shift) & 1) as u32) << at;
+        (0..FINE_BITS).map(bit).sum()
+    };
+    [axis(0), axis(1), axis(2)]
 }
 
 /// Inserts two zero bits between each of the lowest ten bits.

@@ -14,8 +14,9 @@ use super::{Block, Node, merge::leaf};
 use crate::{parallel::prelude::*, splat::Splat};
 use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Sphere {
     pub center: DVec3,
     pub radius: f64,

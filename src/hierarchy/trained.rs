@@ -6,7 +6,7 @@ use super::{
     Block, Cut, Hierarchy, Node, SHARE_UNIT, Tree,
     build::{BuildOptions, build_colored, tree_colored},
     colors::LeafColors,
-    file::WriteOptions,
+    file::{Page, WriteOptions},
 };
 use crate::{
     Error, Result,
@@ -112,16 +112,14 @@ impl Hierarchy {
     pub fn gaussians(&self) -> Result<Option<Gaussians>> {
         let Some(degree) = self.header().degree else { return Ok(None) };
         let count = terms(degree);
-        let of_page = |page: u32| {
-            let page = self.read_page(page)?;
+        let of_page = |page: &Page| {
             let (Some(colors), false) = (&page.colors, page.has_portals) else {
-                return Ok(Vec::new());
+                return Vec::new();
             };
             let leaves = (0..page.nodes.len()).filter(|node| page.nodes[*node].is_leaf());
-            Ok(leaves.flat_map(|leaf| colors.harmonics(leaf).into_iter().take(count)).collect())
+            leaves.flat_map(|leaf| colors.harmonics(leaf).into_iter().take(count)).collect()
         };
-        let pages: Vec<Vec<[f32; 3]>> =
-            (0..self.pages().len() as u32).into_par_iter().map(of_page).collect::<Result<_>>()?;
+        let pages: Vec<Vec<[f32; 3]>> = self.each_page(of_page)?;
         let set = Gaussians::from_splats(&self.leaves()?)?;
         let header = self.header();
         let mut about = set.about.clone();

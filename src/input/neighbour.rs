@@ -1,6 +1,6 @@
 //! References from one file to another: relative, and inside the folder of the referring file.
 
-use super::Source;
+use super::{Source, address::is_remote};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -20,9 +20,10 @@ impl Source<'_> {
         if let Some(reason) = refusal(reference) {
             return Err(refuse(reason));
         }
-        if self.is_in_memory() {
+        if self.is_alone() {
+            let from = if is_remote(self.path) { "an address" } else { "memory" };
             let message = format!(
-                "refers to “{reference}”, but was read from memory, where there are no other files"
+                "refers to “{reference}”, but was read from {from}, where there are no other files"
             );
             return Err(self
                 .error(place, message)

@@ -1,11 +1,13 @@
 //! Guarded access to input files. Every format reads its bytes through a [`Source`]. It maps the
 //! file, holds the limits and creates errors that name the file.
 
-use super::{Limits, budget::Budget, copy, mapping::Mapping};
+use super::{Limits, address::is_remote, budget::Budget, copy, mapping::Mapping, remote::Remote};
 use crate::{Error, Result, error::LimitKind, memory};
 use std::{
+    borrow::Cow,
     fs::File,
     io::Read,
+    ops::Range,
     path::{Path, PathBuf},
     sync::{Arc, OnceLock},
 };
@@ -21,6 +23,8 @@ enum Content<'a> {
     Mapped(Mapping),
     /// Bytes from the caller, instead of a file.
     Held(&'a [u8]),
+    /// An object that is fetched in ranges.
+    Remote(Remote),
     /// The files of a folder.
     Listed(Vec<PathBuf>),
 }
@@ -39,13 +43,27 @@ pub struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// Opens and maps a regular file.
+    /// Opens and maps a regular file. A remote object ([`address`](super::address())) is fetched as
+    /// a whole first, within the limits; files that it refers to are not read.
     ///
     /// # Errors
     /// [`Error::File`] for a missing file or one that cannot be opened, [`Error::Input`] for
     /// directories and devices, and [`Error::Limit`] for a file over the byte limit.
     pub fn open(path: &'a Path, limits: &'a Limits) -> Result<Self> {
         Self::open_within(path, limits, Arc::new(Budget::new()))
+    }
+
+    /// As [`open`](Self::open), but does not fetch a remote object: for readers that take all bytes
+    /// from [`part`](Self::part).
+    pub(crate) fn open_in_parts(path: &'a Path, limits: &'a Limits) -> Result<Self> {
+        if !is_remote(path) {
+            return Self::open(path, limits);
+        }
+        let (remote, budget) = (Remote::open(path)?, Arc::new(Budget::new()));
+        budget.spend(limits, path, "the object's size in bytes", remote.len())?;
+        budget.opened(path);
+        let content = Content::Remote(remote);
+        Ok(Self { path, limits, content, text: OnceLock::new(), budget })
     }
 
     /// Opens a file that belongs to this one: it refers to it, by a path from
@@ -81,7 +99,7 @@ impl<'a> Source<'a> {
     pub fn folder(&self) -> Option<&[PathBuf]> {
         match &self.content {
             Content::Listed(files) => Some(files),
-            Content::Mapped(_) | Content::Held(_) => None,
+            Content::Mapped(_) | Content::Held(_) | Content::Remote(_) => None,
         }
     }
 
@@ -114,18 +132,53 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// Returns whether this source holds bytes from the caller, which have no neighbouring files.
-    pub(crate) fn is_in_memory(&self) -> bool {
-        matches!(self.content, Content::Held(_))
+    /// Returns whether this source holds bytes from the caller or from a server, which have no
+    /// neighbouring files.
+    pub(crate) fn is_alone(&self) -> bool {
+        matches!(self.content, Content::Held(_)) || is_remote(self.path)
     }
 
-    /// Returns all bytes of the file; none for a folder.
+    /// Returns all bytes of the file; none for a folder and for an object that is read in parts.
     pub fn bytes(&self) -> &[u8] {
         match &self.content {
             Content::Mapped(mapping) => mapping,
             Content::Held(bytes) => bytes,
-            Content::Listed(_) => &[],
+            Content::Remote(_) | Content::Listed(_) => &[],
         }
+    }
+
+    /// Returns the number of all bytes.
+    pub(crate) fn len(&self) -> usize {
+        match &self.content {
+            Content::Remote(remote) => usize::try_from(remote.len()).unwrap_or(usize::MAX),
+            _ => self.bytes().len(),
+        }
+    }
+
+    /// Returns a range of bytes, which must lie within the file.
+    ///
+    /// # Errors
+    /// Those of fetching it, and [`Error::Memory`] if it is too large to hold.
+    pub(crate) fn part(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>> {
+        match &self.content {
+            Content::Remote(remote) => {
+                let bytes = range.len() as u64;
+                if bytes >= SMALL {
+                    let room = memory::room("reading a part of an object", 2 * bytes);
+                    room.map_err(|error| error.in_file(self.path))?;
+                }
+                let range = range.start as u64..range.end as u64;
+                Ok(Cow::Owned(remote.read(range)?.into()))
+            }
+            _ => Ok(Cow::Borrowed(&self.bytes()[range])),
+        }
+    }
+
+    /// Says that these ranges are read soon, so that those of a remote object are fetched together.
+    pub(crate) fn fetch(&self, ranges: impl Iterator<Item = Range<usize>>) -> Result<()> {
+        let Content::Remote(remote) = &self.content else { return Ok(()) };
+        let ranges = ranges.map(|range| range.start as u64..range.end as u64);
+        remote.fetch(&ranges.collect::<Vec<_>>())
     }
 
     /// Checks that the file has not changed since it was opened. If it has, what was read may match
@@ -137,7 +190,8 @@ impl<'a> Source<'a> {
     pub fn intact(&self) -> Result<()> {
         match &self.content {
             Content::Mapped(mapping) => intact(mapping, self.path),
-            Content::Held(_) | Content::Listed(_) => Ok(()),
+            // The server says if an object has changed, whenever a part is fetched.
+            Content::Held(_) | Content::Remote(_) | Content::Listed(_) => Ok(()),
         }
     }
 
@@ -186,7 +240,7 @@ impl<'a> Source<'a> {
     pub(crate) fn into_mapping(self) -> Option<Mapping> {
         match self.content {
             Content::Mapped(mapping) => Some(mapping),
-            Content::Held(_) | Content::Listed(_) => None,
+            Content::Held(_) | Content::Remote(_) | Content::Listed(_) => None,
         }
     }
 
@@ -287,6 +341,13 @@ impl<'a> Source<'a> {
 }
 
 fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> {
+    if is_remote(path) {
+        let remote = Remote::open(path)?;
+        budget.spend(limits, path, "the object's size in bytes", remote.len())?;
+        budget.opened(path);
+        let file = remote.whole()?;
+        return Mapping::new(file).map_err(|e| Error::file(path, "map", e));
+    }
     // Opening a pipe would wait for its other end, and opening a device may start it. So check the
     // type before opening.
     let look = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;

@@ -106,7 +106,7 @@ impl Histogram {
     }
 
     fn of_volume(volume: &Volume, range: [f64; 2]) -> Self {
-        each_type!(&volume.samples, values => {
+        each_type!(volume.samples, values => {
             Self::of_lattice(&volume.lattice, range, |at: usize| f64::from(values[at]))
         })
     }

@@ -3,7 +3,7 @@
 
 use crate::{
     Error, Result,
-    input::{Limits, Source},
+    input::{Limits, Source, address, is_remote},
     math::{Bounds, Camera, Projection},
     scene::{Clip, ClipShape},
     volume::TransferFunction,
@@ -160,8 +160,11 @@ impl SceneFile {
             )
         })?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        scene.inputs.iter_mut().for_each(|input| input.file = folder.join(&input.file));
-        scene.change_transfer_files(|file| folder.join(file));
+        let joined = |file: &Path| {
+            if is_remote(file) { address(file) } else { folder.join(file) }
+        };
+        scene.inputs.iter_mut().for_each(|input| input.file = joined(&input.file));
+        scene.change_transfer_files(joined);
         Ok(scene)
     }
 

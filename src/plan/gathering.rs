@@ -23,6 +23,7 @@ pub fn obstacle(
     let unsuited = match fields.collect::<Vec<_>>()[..] {
         [Item::Volume(volume, kernel, _)] => unsuited(volume, kernel),
         [Item::Bricks(_, kernel, _)] => unsuited_kernel(kernel),
+        [_, _, ..] => return Some("several fields"),
         _ => return Some("a scene without a volume on a lattice"),
     };
     if unsuited.is_some() {

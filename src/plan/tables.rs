@@ -45,7 +45,7 @@ pub fn constants() -> String {
 }
 
 /// The tables of a picture, and the numbers by which values are looked up in them.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Tables {
     pub entries: Vec<[f32; 4]>,
     /// Where the parts behind the transfer function start: its integrals, the gradient's factors,

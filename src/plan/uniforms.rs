@@ -8,7 +8,7 @@ use crate::{
     math::{Bounds, Kernel, Profile, Sheets, View},
     plan::tables::Tables,
     scene::{Clip, ClipShape, Item, Mode, Scene, Settings},
-    splat::{FOOTPRINT_BLUR, Payload, SplatSet, TRAINED_BLUR},
+    splat::{FOOTPRINT_BLUR, Payload, SplatSet, TRAINED_BLUR, TRAINED_BLUR_ALONG},
     volume::{Arrangement, Isosurface, Lattice, Shade, TransferFunction},
 };
 use bytemuck::{Pod, Zeroable};
@@ -31,14 +31,30 @@ pub struct Frame {
     pub tile_shift: u32,
     pub record_capacity: u32,
     pub entry_capacity: u32,
-    pub field_axis_x: [f32; 4],
-    pub field_axis_y: [f32; 4],
-    pub field_axis_z: [f32; 4],
-    pub field_origin: [f32; 4],
-    pub field_low: [f32; 4],
-    pub field_high: [f32; 4],
-    pub volume_shade: [f32; 4],
     pub surface_shade: [f32; 4],
+    pub sheet_normal: [f32; 4],
+    /// Set on the GPU, before march.
+    pub record_starts: [u32; Scene::MAX_FIELDS],
+    pub world_x: [f32; 4],
+    pub world_y: [f32; 4],
+    pub world_z: [f32; 4],
+    pub clips: [FrameClip; Settings::MAX_CLIPS],
+    pub holes: [FrameClip; Settings::MAX_CLIPS],
+    /// The fields of the scene, in its order.
+    pub fields: [FrameField; Scene::MAX_FIELDS],
+}
+
+/// `Field` in frame.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub struct FrameField {
+    pub axis_x: [f32; 4],
+    pub axis_y: [f32; 4],
+    pub axis_z: [f32; 4],
+    pub origin: [f32; 4],
+    pub low: [f32; 4],
+    pub high: [f32; 4],
+    pub shade: [f32; 4],
     pub certain: [f32; 4],
     pub isotropic: [f32; 4],
     pub transfer: [f32; 4],
@@ -48,15 +64,9 @@ pub struct Frame {
     pub behind: [f32; 4],
     pub kernel: [f32; 4],
     pub levels: [f32; 4],
-    pub sheet_normal: [f32; 4],
     pub lattice: [u32; 4],
     pub taps: [f32; 4],
     pub shown: [u32; 4],
-    pub world_x: [f32; 4],
-    pub world_y: [f32; 4],
-    pub world_z: [f32; 4],
-    pub clips: [FrameClip; Settings::MAX_CLIPS],
-    pub holes: [FrameClip; Settings::MAX_CLIPS],
     pub isosurfaces: [FrameIsosurface; TransferFunction::MAX_ISOSURFACES],
 }
 
@@ -113,6 +123,13 @@ pub const MIXED: u32 = 128;
 
 pub const TRAINED: u32 = 256;
 
+pub const BODY_CENTRED: u32 = 512;
+
+pub const RECTILINEAR: u32 = 1024;
+
+/// The number of the field lies in the upper half of `Source::flags`.
+pub const FIELD_SHIFT: u32 = 16;
+
 fn wide(v: DVec3, w: f32) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, w]
 }
@@ -132,13 +149,23 @@ impl Source {
         [self.axis_x, self.axis_y, self.axis_z]
     }
 
-    /// Returns the standard deviation, in pixels, by which splats are widened.
-    pub fn blur(&self) -> f32 {
-        (if self.flags & TRAINED != 0 { TRAINED_BLUR } else { FOOTPRINT_BLUR }) as f32
+    /// Returns the standard deviations, in pixels, by which splats are widened: across the view's
+    /// axis and along it.
+    pub fn blur(&self) -> [f32; 2] {
+        let blur = match self.flags & TRAINED {
+            0 => [FOOTPRINT_BLUR; 2],
+            _ => [TRAINED_BLUR, TRAINED_BLUR * TRAINED_BLUR_ALONG],
+        };
+        blur.map(|blur| blur as f32)
     }
 
     pub fn covariance(&self) -> [[f32; 4]; 2] {
         [self.covariance_a, self.covariance_b]
+    }
+
+    /// Returns the same source for samples of the scene's field with this number.
+    pub fn of_field(self, number: usize) -> Self {
+        Self { flags: self.flags | (number as u32) << FIELD_SHIFT, ..self }
     }
 
     /// Returns the source of a chunk of explicit splats.
@@ -186,6 +213,12 @@ impl Source {
         let c = own * own.transpose();
         let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
         let [axis_x, axis_y, axis_z] = columns(axes);
+        let arrangement = match lattice.arrangement {
+            Arrangement::Cartesian => 0,
+            Arrangement::BodyCentred => BODY_CENTRED,
+            Arrangement::Rectilinear(_) => RECTILINEAR,
+        };
+        let round = if isotropic { ISOTROPIC } else { 0 };
         Self {
             axis_x,
             axis_y,
@@ -194,7 +227,7 @@ impl Source {
             covariance_a: [c.x_axis.x, c.x_axis.y, c.x_axis.z, c.y_axis.y].map(|v| v as f32),
             covariance_b: [c.y_axis.z, c.z_axis.z, 0.0, kernel.unit()].map(|v| v as f32),
             extent: kernel.radius() as f32,
-            flags: if isotropic { ISOTROPIC } else { 0 } | if is_gaussian { 0 } else { ENDS },
+            flags: round | arrangement | if is_gaussian { 0 } else { ENDS },
             ..Self::default()
         }
     }
@@ -210,12 +243,9 @@ fn smallest_cosine(view: &View) -> f64 {
 }
 
 impl Frame {
-    pub fn field_axes(&self) -> [[f32; 4]; 3] {
-        [self.field_axis_x, self.field_axis_y, self.field_axis_z]
-    }
-
-    pub fn beyond(&self) -> [[f32; 4]; 2] {
-        [self.before, self.behind]
+    /// Returns the only field of a scene, or the first one.
+    pub fn field(&self) -> &FrameField {
+        &self.fields[0]
     }
 
     /// Fills everything except the tiles, the capacities and the tables.
@@ -242,114 +272,19 @@ impl Frame {
             // Axis-aligned sheets may begin behind an eye that lies among them.
             z_near: (sheets.planes[0] * smallest_cosine(view)).max(1e-6 * sheets.step) as f32,
             surface_shade: shade(settings.surface_shade),
-            levels: [1.0, 1.0, 0.0, 0.0],
             ..Self::default()
         };
         if settings.mode == Mode::AxisSheets {
             frame.sheet_normal = wide(scene.sheet_normal(view), 0.0);
         }
-        for item in &scene.items {
-            let transfer = match item {
-                Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
-                    continue;
-                }
-                Item::Scalar(set, transfer) => {
-                    frame.kernel[2] = 1.0 / set.overlap;
-                    frame.isotropic[3] = Kernel::default().least_sum() as f32;
-                    transfer
-                }
-                Item::Cells(_, transfer) => transfer,
-                Item::Volume(volume, kernel, transfer) => {
-                    frame.set_field(view, &volume.lattice);
-                    frame.set_kernel(&volume.lattice, kernel);
-                    transfer
-                }
-                Item::Bricks(bricks, kernel, transfer) => {
-                    let levels = choice.map_or(&[][..], |choice| &choice.levels);
-                    // The field fills the same box, whichever levels are drawn.
-                    frame.set_field(view, &bricks.header().lattice);
-                    frame.set_kernel(
-                        &bricks.lattice(levels.first().map_or(0, |(level, _)| *level)),
-                        kernel,
-                    );
-                    for (own, &(_, weight)) in frame.levels.iter_mut().zip(levels) {
-                        *own = weight as f32;
-                    }
-                    transfer
-                }
-            };
-            frame.kernel[3] = transfer.unit as f32;
-            frame.volume_shade = shade(settings.shade_of(transfer));
+        for (field, number) in frame.fields.iter_mut().zip(scene.fields()) {
+            *field = FrameField::new(&scene.items[number], view, settings, choice);
             if settings.classifies_samples() {
-                frame.surface_shade = frame.volume_shade;
+                frame.surface_shade = field.shade;
             }
         }
         frame.set_clips(view, settings);
         frame
-    }
-
-    /// Sets how values are looked up in the tables, and which gradients of a field with this light
-    /// are certain. Gradients are per thickness of a sheet.
-    pub fn set_tables(
-        &mut self,
-        tables: &Tables,
-        transfer: &TransferFunction,
-        light: Option<Shade>,
-        view: &View,
-        sheets: &Sheets,
-    ) {
-        let [zero, per_value, ..] = tables.values;
-        self.transfer = tables.values.map(|v| v as f32);
-        let [first, per_magnitude] = tables.gradients;
-        let (to_own, length) = (per_value * sheets.step, sheets.step);
-        // If the factors are constant or change in one step, their number per magnitude may exceed
-        // 32 bits.
-        let per_own = (per_magnitude / to_own).min(1e30);
-        self.gradients = [first * to_own, per_own, length, view.scale * length].map(|v| v as f32);
-        let [low, high] =
-            light.and_then(|light| light.certain).unwrap_or_default().map(|end| end * to_own);
-        self.certain = [low, (1.0 / (high - low)).min(1e30), 0.0, 0.0].map(|v| v as f32);
-        self.table_starts = tables.starts;
-        [self.before, self.behind] = tables.beyond;
-        let mut surfaces = transfer.isosurfaces.clone();
-        surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
-        for (own, surface) in self.isosurfaces.iter_mut().zip(surfaces) {
-            let Isosurface { value, color: [red, green, blue], opacity } = surface;
-            let (entry, depth) = ((value - zero) * per_value, -(1.0 - opacity).max(1e-9).ln());
-            *own = FrameIsosurface {
-                value: [entry, opacity, depth, 0.0].map(|v| v as f32),
-                color: [red, green, blue, 0.0].map(|v| v as f32),
-            };
-        }
-    }
-
-    fn set_field(&mut self, view: &View, lattice: &Lattice) {
-        let inverse = (view.rotation * lattice.axes).inverse();
-        let rows = inverse.transpose();
-        [self.field_axis_x, self.field_axis_y, self.field_axis_z] = columns(rows);
-        // Relative to the first sample, for the precision of 32-bit numbers.
-        let [low, high] = lattice.step_range();
-        self.field_origin = wide(-(inverse * view.to_view(lattice.position(low))), 0.0);
-        // An axis with a single sample still fills that sample's cell.
-        let unit = lattice.unit([0; 3]);
-        let margin = DVec3::select((high - low).cmpgt(DVec3::ZERO), DVec3::ZERO, 0.5 * unit);
-        self.field_low = wide(-margin, 0.0);
-        self.field_high = wide(high - low + margin, 0.0);
-    }
-
-    fn set_kernel(&mut self, lattice: &Lattice, kernel: &Kernel) {
-        let unit = lattice.unit([0; 3]);
-        let sigma = kernel.unit() * unit.x * lattice.axes.x_axis.length();
-        let radius = kernel.radius();
-        self.isotropic =
-            [sigma, 1.0 / sigma, radius * radius, kernel.least_sum()].map(|v| v as f32);
-        // A cell of the body-centred lattice holds two samples.
-        let overlap = match lattice.arrangement {
-            Arrangement::BodyCentred => kernel.integral() * (unit.x * unit.y * unit.z) / 0.5,
-            _ => kernel.integral(),
-        };
-        let length = kernel.extent / kernel.unit();
-        self.kernel = [length, 1.0 / length, 1.0 / overlap, 0.0].map(|v| v as f32);
     }
 
     /// Sets the clips, relative to the eye and along the world's axes: half-spaces and boxes that
@@ -374,6 +309,128 @@ impl Frame {
                 *slot = FrameClip { low, high };
             }
         }
+    }
+}
+
+/// Where the box of scattered samples ends, in all directions.
+const NOWHERE: f32 = 1e15;
+
+impl FrameField {
+    /// Returns the field of an item, without its tables. `choice` is that of a volume in bricks.
+    fn new(item: &Item, view: &View, settings: &Settings, choice: Option<&Choice>) -> Self {
+        let mut field = Self {
+            low: [-NOWHERE, -NOWHERE, -NOWHERE, 0.0],
+            high: [NOWHERE, NOWHERE, NOWHERE, 0.0],
+            levels: [1.0, 1.0, 0.0, 0.0],
+            ..Self::default()
+        };
+        match item {
+            Item::Scalar(set, _) => {
+                field.kernel[2] = 1.0 / set.overlap;
+                field.isotropic[3] = Kernel::default().least_sum() as f32;
+            }
+            Item::Volume(volume, kernel, _) => {
+                field.set_lattice(view, &volume.lattice);
+                field.set_kernel(&volume.lattice, kernel);
+            }
+            Item::Bricks(bricks, kernel, _) => {
+                let levels = choice.map_or(&[][..], |choice| &choice.levels);
+                // The field fills the same box, whichever levels are drawn.
+                field.set_lattice(view, &bricks.header().lattice);
+                let level = levels.first().map_or(0, |(level, _)| *level);
+                field.set_kernel(&bricks.lattice(level), kernel);
+                for (own, &(_, weight)) in field.levels.iter_mut().zip(levels) {
+                    *own = weight as f32;
+                }
+            }
+            Item::Cells(..)
+            | Item::Radiance(_)
+            | Item::Facets(_)
+            | Item::Gaussians(_)
+            | Item::Hierarchy(_) => {}
+        }
+        if let Some(transfer) = item.transfer() {
+            field.kernel[3] = transfer.unit as f32;
+            field.shade = shade(settings.shade_of(transfer));
+        }
+        field
+    }
+
+    pub fn axes(&self) -> [[f32; 4]; 3] {
+        [self.axis_x, self.axis_y, self.axis_z]
+    }
+
+    pub fn beyond(&self) -> [[f32; 4]; 2] {
+        [self.before, self.behind]
+    }
+
+    /// Sets how values are looked up in the tables, which begin at entry `start`, and which
+    /// gradients of a field with this light are certain. Gradients are per thickness of a sheet.
+    pub fn set_tables(
+        &mut self,
+        (tables, start): (&Tables, u32),
+        transfer: &TransferFunction,
+        light: Option<Shade>,
+        view: &View,
+        sheets: &Sheets,
+    ) {
+        let [zero, per_value, ..] = tables.values;
+        self.transfer = tables.values.map(|v| v as f32);
+        let [first, per_magnitude] = tables.gradients;
+        let (to_own, length) = (per_value * sheets.step, sheets.step);
+        // If the factors are constant or change in one step, their number per magnitude may exceed
+        // 32 bits.
+        let per_own = (per_magnitude / to_own).min(1e30);
+        self.gradients = [first * to_own, per_own, length, view.scale * length].map(|v| v as f32);
+        let [low, high] =
+            light.and_then(|light| light.certain).unwrap_or_default().map(|end| end * to_own);
+        self.certain = [low, (1.0 / (high - low)).min(1e30), 0.0, 0.0].map(|v| v as f32);
+        let [integrals, factors, kernel, _] = tables.starts;
+        self.table_starts = [0, integrals, factors, kernel].map(|own| start + own);
+        [self.before, self.behind] = tables.beyond;
+        let mut surfaces = transfer.isosurfaces.clone();
+        surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
+        // Unused isosurfaces have a value that no ray reaches.
+        self.isosurfaces
+            .fill(FrameIsosurface { value: [f32::MAX, 0.0, 0.0, 0.0], color: [0.0; 4] });
+        for (own, surface) in self.isosurfaces.iter_mut().zip(surfaces) {
+            let Isosurface { value, color: [red, green, blue], opacity } = surface;
+            let (entry, depth) = ((value - zero) * per_value, -(1.0 - opacity).max(1e-9).ln());
+            *own = FrameIsosurface {
+                value: [entry, opacity, depth, 0.0].map(|v| v as f32),
+                color: [red, green, blue, 0.0].map(|v| v as f32),
+            };
+        }
+    }
+
+    fn set_lattice(&mut self, view: &View, lattice: &Lattice) {
+        let inverse = (view.rotation * lattice.axes).inverse();
+        let rows = inverse.transpose();
+        [self.axis_x, self.axis_y, self.axis_z] = columns(rows);
+        // Relative to the first sample, for the precision of 32-bit numbers.
+        let [low, high] = lattice.step_range();
+        self.origin = wide(-(inverse * view.to_view(lattice.position(low))), 0.0);
+        // An axis with a single sample still fills that sample's cell.
+        let unit = lattice.unit([0; 3]);
+        let margin = DVec3::select((high - low).cmpgt(DVec3::ZERO), DVec3::ZERO, 0.5 * unit);
+        self.low = wide(-margin, 1.0);
+        self.high = wide(high - low + margin, 0.0);
+    }
+
+    fn set_kernel(&mut self, lattice: &Lattice, kernel: &Kernel) {
+        let unit = lattice.unit([0; 3]);
+        let sigma = kernel.unit() * unit.x * lattice.axes.x_axis.length();
+        let radius = kernel.radius();
+        self.isotropic =
+            [sigma, 1.0 / sigma, radius * radius, kernel.least_sum()].map(|v| v as f32);
+        // A cell of the body-centred lattice holds two samples.
+        let overlap = match lattice.arrangement {
+            Arrangement::BodyCentred => kernel.integral() * (unit.x * unit.y * unit.z) / 0.5,
+            _ => kernel.integral(),
+        };
+        let length = kernel.extent / kernel.unit();
+        self.kernel = [length, 1.0 / length, 1.0 / overlap, 0.0].map(|v| v as f32);
+        self.high[3] = f32::from(!matches!(kernel.profile, Profile::Gaussian(_)));
     }
 }
 

@@ -8,8 +8,8 @@ use crate::{
     math::{self, View},
     scene::{Item, Scene},
     splat::{
-        FOOTPRINT_BLUR, Payload, STEP_BACK, Splat, SplatSet, TRAINED_BLUR, decode_normal,
-        decode_trained_color,
+        FOOTPRINT_BLUR, Payload, STEP_BACK, Splat, SplatSet, TRAINED_BLUR, TRAINED_BLUR_ALONG,
+        decode_normal, decode_trained_color,
     },
     volume::{Arrangement, Lattice, TransferFunction, Volume},
 };
@@ -118,9 +118,16 @@ fn from_splat<'a>(
     let [b00, b10, b11, b20, b21, b22] = splat.factor.map(f64::from);
     let columns = [DVec3::new(b00, b10, b20), DVec3::new(0.0, b11, b21), DVec3::new(0.0, 0.0, b22)];
     let sharp = view.rotation * DMat3::from_cols(columns[0], columns[1], columns[2]);
-    let pixel = if view.perspective { center.length() } else { 1.0 } / view.scale;
-    let blur = if set.payload == Payload::Trained { TRAINED_BLUR } else { FOOTPRINT_BLUR };
-    let blur = DMat3::from_diagonal(DVec3::splat((blur * pixel).powi(2)));
+    // Trained Gaussians are widened by pixels of the plane of their centres, as their trainer does.
+    let is_trained = set.payload == Payload::Trained;
+    let distance = if is_trained { center.z.abs() } else { center.length() };
+    let pixel = if view.perspective { distance } else { 1.0 } / view.scale;
+    let blur = if is_trained {
+        TRAINED_BLUR * DVec3::new(1.0, 1.0, TRAINED_BLUR_ALONG)
+    } else {
+        DVec3::splat(FOOTPRINT_BLUR)
+    };
+    let blur = DMat3::from_diagonal((blur * pixel).powf(2.0));
     let factor = cholesky(sharp * sharp.transpose() + blur)?;
     let mut center = center;
     let load = match set.payload {

@@ -24,10 +24,11 @@
 //!   the splat's standard deviations along n before and after widening.
 //! - A trained Gaussian ([`Gaussians`](crate::gaussians::Gaussians)) is a splat without a normal,
 //!   with the colour of its harmonics in the direction from the eye to its centre. It is widened by
-//!   (√0.3 pixel)², and covers the share α = min(0.99, o·exp(−ρ²/2)) of a ray that passes it at ρ,
-//!   with o its opacity. If α < 1/255 it covers nothing. Its optical depth on the ray is
-//!   −ln(1 − α), spread like its line integral. Its colour may exceed 1. (Kerbl et al. 2023 draw
-//!   whole Gaussians; [`trained`] draws by their formulas.)
+//!   (√0.3 pixel)² across the view's axis and by a hundredth of that along it. Its pixel has the
+//!   size z/f, with z the centre's distance along that axis. It covers the share α = min(0.99,
+//!   o·exp(−ρ²/2)) of a ray that passes it at ρ, with o its opacity. If α < 1/255 it covers
+//!   nothing. Its optical depth on the ray is −ln(1 − α), spread like its line integral. Its colour
+//!   may exceed 1. (Kerbl et al. 2023 draw whole Gaussians; [`trained`] draws by their formulas.)
 //! - A sample of a lattice has the profile of its volume's kernel, and B = A·U·u. A holds the steps
 //!   of the lattice, U is the sample's unit in steps, u the kernel's unit. Lattice samples are not
 //!   widened. Their lattice is `drawn_lattice` and their values are `drawn_value`: the volume's
@@ -175,9 +176,10 @@
 //! crosses a face at the distance key/|n·b̂| (orthographic: (key − n·a)/(n·b̂)).
 //!
 //! **[`Mode::Splats`]** (Westover 1989). Whole kernels are composited one by one, each lit alone,
-//! in the order of |c| (orthographic: of c_z), then of the scene. Kernels nearer than `near`, and
-//! kernels whose optical depth is zero or negative, are left out. A kernel's depth is at its s*. In
-//! both modes, perspective views leave out kernels with s* behind the eye.
+//! in the order of |c|, then of the scene. Orthographic views, and scenes with trained Gaussians as
+//! their trainer draws them, take c_z instead of |c|. Kernels nearer than `near`, and kernels whose
+//! optical depth is zero or negative, are left out. A kernel's depth is at its s*. In both modes,
+//! perspective views leave out kernels with s* behind the eye.
 
 mod cells;
 mod classify;

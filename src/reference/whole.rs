@@ -96,15 +96,18 @@ impl Frame<'_> {
         let distance = |kernel: &Kernel| {
             if self.view.perspective { kernel.center.length() } else { kernel.center.z }
         };
+        let key = |kernel: &Kernel| {
+            if self.has_trained { kernel.center.z } else { distance(kernel) }
+        };
         let mut splats: Vec<(f64, f64, Medium)> = kernels
             .iter()
             .filter(|kernel| distance(kernel) >= self.near)
             .filter_map(|kernel| {
                 let (light, place) = self.whole(kernel, ray, &allowed)?;
-                Some((distance(kernel), place, self.lit(&light, ray)))
+                Some((key(kernel), place, self.lit(&light, ray)))
             })
             .collect();
-        // The sort is stable: equal distances stay in the order of the scene.
+        // The sort is stable: equal keys stay in the order of the scene.
         splats.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
         let mut composite = Composite::EMPTY;
         for (_, place, medium) in &splats {

@@ -1,8 +1,8 @@
 //! Which bricks of the scene's volume a picture needs.
 
-use super::{Item, Scene, Settings};
+use super::{Item, Region, Scene, Settings};
 use crate::{
-    bricks::{self, Choice},
+    bricks::{self, Choice, Wish},
     hierarchy::Detail,
     math::{Bounds, View},
     volume::reach::{EVERYTHING, first_visible},
@@ -35,9 +35,17 @@ impl Scene {
                     Detail::Milliseconds(_) => (Detail::PIXELS, room),
                 };
                 let most = usize::try_from(room).unwrap_or(usize::MAX).min(most).max(1);
-                let choose = |shown: &[u16; 256]| {
-                    bricks::choice(bricks, view, kernel.extent, pixels / SAMPLE_WIDTH, shown, most)
-                };
+                // Thick sheets average the field beyond the faces of a region.
+                let beyond = settings.sheet_thickness.unwrap_or(0.0);
+                let region =
+                    settings.region.map(|Region { bounds: Bounds { min, max }, .. }| Bounds {
+                        min: min - beyond,
+                        max: max + beyond,
+                    });
+                let least = settings.region.map_or(0.0, |region| region.level);
+                let wish = Wish { pixels: pixels / SAMPLE_WIDTH, most, least, region };
+                let choose =
+                    |shown: &[u16; 256]| bricks::choice(bricks, view, kernel.extent, shown, &wish);
                 // If kernels reach further than the ranges of blocks cover, the ranges cannot
                 // exclude bricks.
                 if kernel.extent > bricks::REACH as f64 {

@@ -11,7 +11,7 @@ mod validate;
 
 pub use item::Item;
 pub use settings::{
-    Classification, Clip, ClipShape, Evaluate, Gradient, Mode, Optics, Order, Settings,
+    Classification, Clip, ClipShape, Evaluate, Gradient, Mode, Optics, Order, Region, Settings,
 };
 pub(crate) use sheets::MOST_GATHERED;
 
@@ -179,15 +179,17 @@ impl Scene {
         self.items.iter().find_map(|item| item.kernel()?.as_tensor())
     }
 
-    /// Returns what of the scene only the CPU engine draws (“several fields”, “the kernel linear”,
-    /// “cells”); `None` if the GPU engine draws all of it.
+    /// Returns what of the scene only the CPU engine draws (“the kernel linear”, “cells”, “several
+    /// volumes in bricks”); `None` if the GPU engine draws all of it.
     pub fn beyond_gpu(&self) -> Option<String> {
-        if self.fields().len() > 1 {
-            return Some("several fields".into());
+        if let Some(tensor) = self.tensor() {
+            return Some(format!("the kernel {}", tensor.name()));
         }
-        let tensor = self.tensor().map(|tensor| format!("the kernel {}", tensor.name()));
-        let has_cells = self.items.iter().any(|item| matches!(item, Item::Cells(..)));
-        tensor.or_else(|| has_cells.then(|| "cells".into()))
+        if self.items.iter().any(|item| matches!(item, Item::Cells(..))) {
+            return Some("cells".into());
+        }
+        let bricks = self.items.iter().filter(|item| matches!(item, Item::Bricks(..)));
+        (bricks.count() > 1).then(|| "several volumes in bricks".into())
     }
 
     /// Returns the box around everything that can be seen, footprints included.

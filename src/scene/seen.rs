@@ -7,7 +7,7 @@ use crate::{
     cells::Tetrahedra,
     facet::FacetSet,
     gaussians::{Eye, Gaussians},
-    hierarchy::Hierarchy,
+    hierarchy::{Hierarchy, file::Page, needed::coarsest},
     math::{
         Bounds,
         hull::{outermost, without_strays},
@@ -149,18 +149,17 @@ fn of_cells(cells: &Tetrahedra, transfer: &TransferFunction, clips: &[Clip]) -> 
 
 /// Returns the leaves of a hierarchy, or, if it has many pages, the nodes of its coarse pages.
 fn coarse(hierarchy: &Hierarchy) -> Result<SplatSet> {
-    if hierarchy.pages().len() <= MOST_PAGES {
+    if hierarchy.page_count() as usize <= MOST_PAGES {
         return hierarchy.leaves();
     }
-    let read: Vec<u32> = hierarchy.coarse_first().into_iter().take(MOST_PAGES).collect();
+    let read: Vec<u32> = coarsest(hierarchy, MOST_PAGES)?.into_iter().map(|own| own.page).collect();
     let known: HashSet<u32> = read.iter().copied().collect();
-    let of_page = |&page: &u32| {
-        let page = hierarchy.read_page(page)?;
+    let of_page = |page: &Page| {
         let last = |at: &usize| !known.contains(&page.child_pages[*at]);
         let nodes = (0..page.nodes.len()).filter(last);
-        Ok(nodes.map(|at| page.nodes[at].splat).collect::<Vec<Splat>>())
+        nodes.map(|at| page.nodes[at].splat).collect::<Vec<Splat>>()
     };
-    let pages: Vec<Vec<Splat>> = read.par_iter().map(of_page).collect::<Result<_>>()?;
+    let pages: Vec<Vec<Splat>> = hierarchy.read_pages(&read)?.par_iter().map(of_page).collect();
     let header = hierarchy.header();
     Ok(SplatSet {
         origin: header.origin,

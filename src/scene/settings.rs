@@ -84,6 +84,21 @@ pub enum ClipShape {
     Box(Bounds),
 }
 
+/// The part of a picture that one of several machines draws. At each pixel it consists of the
+/// sheets whose middle lies in a box. The parts of boxes that fill space, composited in the order
+/// of their distances from the eye, are the picture of the whole scene: sheets, levels and culling
+/// are those of the whole, and only what a region needs is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Region {
+    /// The box, in world coordinates. Samples and nodes beyond its faces are read as far as kernels
+    /// and sheets reach.
+    pub bounds: Bounds,
+    /// The finest level of volumes in bricks, in the unit of
+    /// [`FrameStats::lambda`](crate::FrameStats). Set it to the finest level that fits the memory
+    /// of every machine, so that all draw the same one.
+    pub level: f64,
+}
+
 /// How the gradient across the picture is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -124,6 +139,9 @@ pub struct Settings {
     pub optics: Optics,
     /// Clips that cut the scene, at most [`Settings::MAX_CLIPS`].
     pub clips: Vec<Clip>,
+    /// The part of the picture to draw, by the CPU engine in the mode [`Mode::Sheets`]. `None`
+    /// draws the whole.
+    pub region: Option<Region>,
     /// How the gradients of fields are found, for light and for `gradient` of transfer functions.
     pub gradient: Gradient,
     /// How the field of a lattice is evaluated in a sheet.
@@ -170,6 +188,7 @@ impl Settings {
             classification: Classification::default(),
             optics: Optics::default(),
             clips: Vec::new(),
+            region: None,
             gradient: Gradient::default(),
             evaluate: Evaluate::default(),
             volume_shade: None,

@@ -1,6 +1,6 @@
 //! Whether the engines can draw a scene, and with which settings.
 
-use super::{ClipShape, Gradient, Item, Mode, Optics, Scene, Settings, numbers};
+use super::{ClipShape, Gradient, Item, Mode, Optics, Region, Scene, Settings, numbers};
 use crate::{
     Error, Result,
     cells::{Place, Tetrahedra},
@@ -20,6 +20,7 @@ impl Scene {
         numbers::check_settings(settings)?;
         check_size(settings.size)?;
         check_clips(settings)?;
+        check_region(settings)?;
         for (number, item) in self.items.iter().enumerate() {
             // The transfer function may have changed since the scene was validated.
             numbers::check_transfer(item).map_err(numbers::of_item(number))?;
@@ -111,6 +112,23 @@ fn check_clips(settings: &Settings) -> Result<()> {
                 }
             }
         }
+    }
+    Ok(())
+}
+
+/// Returns an error if the region has no shape, or cannot be drawn.
+fn check_region(settings: &Settings) -> Result<()> {
+    let Some(Region { bounds: Bounds { min, max }, level }) = settings.region else {
+        return Ok(());
+    };
+    if !(min.is_finite() && max.is_finite() && min.cmplt(max).all()) {
+        return wrong(format!("a region from {min} to {max} holds nothing"));
+    }
+    if !(level >= 0.0 && level.is_finite()) {
+        return wrong(format!("a region's level is {level}; a number of at least 0 is needed"));
+    }
+    if settings.mode != Mode::Sheets {
+        return wrong("regions are drawn in image-aligned sheets only");
     }
     Ok(())
 }

@@ -19,6 +19,12 @@ const LEAST_VOTE: f64 = 0.03;
 /// A part counts as closed if its mean normal is shorter than this.
 const CLOSED: f64 = 0.2;
 
+/// The least cosine of the angle between the planes of a normal and of the same one as it was
+/// decided elsewhere, if that is to count.
+const SAME_PLANE: f64 = 0.5;
+/// The least part of those normals, more of one side than of the other, that decides.
+const AGREEING: f64 = 0.25;
+
 /// What the caller knows about points that are a part of a point cloud.
 #[derive(Default)]
 pub(crate) struct Known {
@@ -27,8 +33,8 @@ pub(crate) struct Known {
     pub spacing: Option<f32>,
     /// The centre of the whole cloud; that of these points if `None`.
     pub center: Option<DVec3>,
-    /// Normals whose side is already decided, by point. The connected parts that contain them
-    /// follow.
+    /// Normals of some points whose sides were decided by more of the cloud than these points. The
+    /// connected parts that contain them follow, if most of them agree.
     pub normals: Vec<(u32, Vec3)>,
 }
 
@@ -74,8 +80,8 @@ pub(super) fn orient<const N: usize>(
     }
     for &(index, settled) in known.normals.iter().filter(|(index, _)| free[*index as usize]) {
         let (root, _) = sets.find(index);
-        votes[parts[root as usize] as usize - 1].settled +=
-            f64::from(normals[index as usize].dot(settled));
+        let agreement = f64::from(normals[index as usize].dot(settled));
+        votes[parts[root as usize] as usize - 1].follow(agreement);
     }
     let inward: Vec<bool> = votes.iter().map(Votes::face_inward).collect();
     for index in taking_part {
@@ -176,8 +182,8 @@ struct Votes {
     squares: f64,
     normals: DVec3,
     fluxes: f64,
-    /// How far the normals agree with those already decided.
-    settled: f64,
+    /// How far the normals agree with those already decided, and how far they might.
+    settled: [f64; 2],
 }
 
 impl Votes {
@@ -190,9 +196,19 @@ impl Votes {
         self.fluxes += position.dot(normal) * area;
     }
 
+    /// Counts the cosine between a normal and the same one as already decided. If their planes
+    /// differ, its sign means little.
+    fn follow(&mut self, cosine: f64) {
+        if cosine.abs() >= SAME_PLANE {
+            self.settled[0] += cosine;
+            self.settled[1] += cosine.abs();
+        }
+    }
+
     fn face_inward(&self) -> bool {
-        if self.settled != 0.0 {
-            return self.settled < 0.0;
+        let [sum, most] = self.settled;
+        if most > 0.0 && sum.abs() >= AGREEING * most {
+            return sum < 0.0;
         }
         let own_center = self.positions / self.area.max(f64::MIN_POSITIVE);
         // Over a closed part the sum is the same around any centre, but most precise around its

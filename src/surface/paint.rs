@@ -8,12 +8,13 @@ use crate::{
     splat::decode_normal,
 };
 use glam::{DVec3, Vec2};
+use serde::{Deserialize, Serialize};
 
 /// The colour of a mesh that defines none.
 pub(super) const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
 
 /// What colours a surface instead of its file's colours.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Paint {
     /// One colour: red, green and blue in 0 … 1.
     Plain([f32; 3]),
@@ -29,7 +30,7 @@ pub enum Paint {
 }
 
 /// Values that may colour a surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Values {
     /// [`Mesh::values`], which the reader has filled.
     Own,

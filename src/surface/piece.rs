@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{Deadline, Result, parallel::prelude::*, splat::Splat};
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// What one pass over the triangles of a mesh collects. The results of two parts can be joined.
 #[derive(Debug, Clone, Default)]
@@ -102,7 +103,7 @@ impl Triangles {
 }
 
 /// How the surfels of all parts of a mesh are made, so that they equal those of the whole.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct MeshPieces {
     whole: Whole,
     /// The longest edge that is not cut, unless its triangle is narrow.
@@ -111,7 +112,7 @@ pub(crate) struct MeshPieces {
 }
 
 /// How a mesh is closed, as in [`Mesh::is_closed`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum PiecesClosing {
     Vertices,
     Places,

@@ -25,10 +25,11 @@ use crate::{
     splat::{Payload, Splat, SplatSet},
 };
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use std::{borrow::Cow, ops::RangeInclusive};
 
 /// How surfels are made from a mesh or point cloud.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurfelOptions {
     /// Factor on all radii. Below 1 the surface may show holes.
     pub radius_scale: f32,
@@ -51,6 +52,7 @@ pub struct SurfelOptions {
     /// pixels. 0 draws surfels always.
     pub most_facets: usize,
     /// When the surfels must be ready.
+    #[serde(skip)]
     pub deadline: Deadline,
 }
 
@@ -388,7 +390,7 @@ fn origin_of<'a>(mesh: &'a Mesh, sources: Vec<u32>, options: &SurfelOptions) -> 
 }
 
 /// Properties of a whole mesh on which the surfels of its parts depend.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Whole {
     pub is_split: bool,
     /// Whether edges are cut. Then normals are interpolated everywhere.

@@ -3,7 +3,7 @@
 //! regular volume sampling", 2001). The reason is that their spectra repeat on a face-centred cubic
 //! lattice, the densest packing of balls.
 
-use super::{Arrangement, Lattice, Samples, Volume};
+use super::{Arrangement, Lattice, Samples, Scalar, Volume};
 use crate::{
     Error, Result,
     math::cosine::{self, frequency, mirrored},
@@ -86,12 +86,12 @@ pub fn body_centred(volume: &Volume) -> Result<Volume> {
         };
     let layers = Layers { count: lattice.dims[2], size: width * height, fill };
     let [low, high] = volume.range;
-    let samples = match &volume.samples {
-        Samples::U8(_) => Samples::U8(layers.of(|value| value.clamp(low, high).round() as u8)),
-        Samples::U16(_) => Samples::U16(layers.of(|value| value.clamp(low, high).round() as u16)),
-        Samples::I16(_) => Samples::I16(layers.of(|value| value.clamp(low, high).round() as i16)),
-        Samples::I32(_) => Samples::I32(layers.of(|value| value.clamp(low, high).round() as i32)),
-        Samples::F32(_) => Samples::F32(layers.of(|value| value.clamp(low, high) as f32)),
+    let samples = match volume.samples.scalar() {
+        Scalar::U8 => Samples::U8(layers.of(|value| value.clamp(low, high).round() as u8)),
+        Scalar::U16 => Samples::U16(layers.of(|value| value.clamp(low, high).round() as u16)),
+        Scalar::I16 => Samples::I16(layers.of(|value| value.clamp(low, high).round() as i16)),
+        Scalar::I32 => Samples::I32(layers.of(|value| value.clamp(low, high).round() as i32)),
+        Scalar::F32 => Samples::F32(layers.of(|value| value.clamp(low, high) as f32)),
     };
     Ok(Volume { about: volume.about.clone(), ..Volume::new(lattice, samples)? })
 }

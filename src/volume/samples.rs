@@ -1,6 +1,8 @@
 //! The values of a volume, in the sample type of their file.
 
-use super::{Lattice, Scalar, overshoot::Overshoot, reach::neighbourhood_ranges};
+use super::{
+    Lattice, SampleSlice, Scalar, SharedSamples, overshoot::Overshoot, reach::neighbourhood_ranges,
+};
 use crate::{
     Error, Result,
     about::About,
@@ -10,7 +12,7 @@ use crate::{
 use std::{borrow::Cow, sync::Arc};
 
 /// Samples in the type of their file, first axis fastest.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Samples {
     /// 8 bits, unsigned.
@@ -23,17 +25,37 @@ pub enum Samples {
     I32(Vec<i32>),
     /// 32 bits, floating point.
     F32(Vec<f32>),
+    /// Samples of any of these types in memory that something else owns.
+    Shared(SharedSamples),
 }
 
-/// Evaluates one expression on the vector inside, whatever its type.
+/// Samples as a list of their type, which can be changed.
+pub(crate) enum SampleVecs<'a> {
+    U8(&'a mut Vec<u8>),
+    U16(&'a mut Vec<u16>),
+    I16(&'a mut Vec<i16>),
+    I32(&'a mut Vec<i32>),
+    F32(&'a mut Vec<f32>),
+}
+
+/// Evaluates one expression on the slice of samples, whatever its type. With `mut`, on the list.
 macro_rules! each_type {
+    (mut $samples:expr, $values:ident => $body:expr) => {
+        match $samples.vecs_mut() {
+            $crate::volume::SampleVecs::U8($values) => $body,
+            $crate::volume::SampleVecs::U16($values) => $body,
+            $crate::volume::SampleVecs::I16($values) => $body,
+            $crate::volume::SampleVecs::I32($values) => $body,
+            $crate::volume::SampleVecs::F32($values) => $body,
+        }
+    };
     ($samples:expr, $values:ident => $body:expr) => {
-        match $samples {
-            $crate::volume::Samples::U8($values) => $body,
-            $crate::volume::Samples::U16($values) => $body,
-            $crate::volume::Samples::I16($values) => $body,
-            $crate::volume::Samples::I32($values) => $body,
-            $crate::volume::Samples::F32($values) => $body,
+        match $samples.as_slice() {
+            $crate::volume::SampleSlice::U8($values) => $body,
+            $crate::volume::SampleSlice::U16($values) => $body,
+            $crate::volume::SampleSlice::I16($values) => $body,
+            $crate::volume::SampleSlice::I32($values) => $body,
+            $crate::volume::SampleSlice::F32($values) => $body,
         }
     };
 }
@@ -43,6 +65,33 @@ pub(crate) use each_type;
 const CHUNK: usize = 1 << 16;
 
 impl Samples {
+    /// Returns the samples as a slice of their type.
+    pub fn as_slice(&self) -> SampleSlice<'_> {
+        match self {
+            Self::U8(values) => SampleSlice::U8(values),
+            Self::U16(values) => SampleSlice::U16(values),
+            Self::I16(values) => SampleSlice::I16(values),
+            Self::I32(values) => SampleSlice::I32(values),
+            Self::F32(values) => SampleSlice::F32(values),
+            Self::Shared(shared) => shared.as_slice(),
+        }
+    }
+
+    /// Returns the samples as a list that can be changed. Shared samples are copied first.
+    pub(crate) fn vecs_mut(&mut self) -> SampleVecs<'_> {
+        if let Self::Shared(shared) = self {
+            *self = Self::from_bytes(shared.scalar(), shared.bytes());
+        }
+        match self {
+            Self::U8(values) => SampleVecs::U8(values),
+            Self::U16(values) => SampleVecs::U16(values),
+            Self::I16(values) => SampleVecs::I16(values),
+            Self::I32(values) => SampleVecs::I32(values),
+            Self::F32(values) => SampleVecs::F32(values),
+            Self::Shared(_) => unreachable!("shared samples were copied"),
+        }
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         each_type!(self, values => values.len())
@@ -69,6 +118,7 @@ impl Samples {
             Self::I16(_) => Scalar::I16,
             Self::I32(_) => Scalar::I32,
             Self::F32(_) => Scalar::F32,
+            Self::Shared(shared) => shared.scalar(),
         }
     }
 
@@ -115,7 +165,7 @@ impl Samples {
                 .reduce(|| [first, first], |a, b| wider(wider(a, b[0]), b[1]));
             ends.map(Into::into)
         }
-        if let Self::F32(values) = self {
+        if let SampleSlice::F32(values) = self.as_slice() {
             let bad = |v: &f32| !v.is_finite();
             let count: usize =
                 values.par_chunks(CHUNK).map(|chunk| chunk.iter().filter(|v| bad(v)).count()).sum();
@@ -131,6 +181,13 @@ impl Samples {
             Some(&first) => Ok(extremes(values, first)),
             None => Err("there are no samples".into()),
         })
+    }
+}
+
+/// Samples are equal if their types and values are, whoever owns them.
+impl PartialEq for Samples {
+    fn eq(&self, other: &Self) -> bool {
+        self.as_slice() == other.as_slice()
     }
 }
 
@@ -337,7 +394,7 @@ impl Volume {
         }
         let count = |range: std::ops::Range<usize>| {
             let mut counts = vec![0u64; bins];
-            each_type!(&self.samples, values => for &v in &values[range] {
+            each_type!(self.samples, values => for &v in &values[range] {
                 counts[self.bin(f64::from(v), bins)] += 1;
             });
             counts

@@ -10,6 +10,10 @@ use checksums::{sum_bricks, sum_hierarchy};
 
 /// Nodes in a full page.
 const PAGE_NODES: u32 = 4096;
+/// Bytes of the record of a page.
+const OF_PAGE: usize = 68;
+/// Bytes of the record of a brick.
+const OF_BRICK: usize = 24;
 /// The first byte of a lossless page.
 const LOSSLESS: u8 = 0;
 
@@ -19,8 +23,8 @@ fn word(bytes: &[u8], at: usize) -> usize {
 
 /// Byte offsets of a hierarchy's page entries and of its pages.
 fn pages(bytes: &[u8]) -> [usize; 2] {
-    let entries = 160 + word(bytes, 136) + word(bytes, 140) + 4 + 16 * word(bytes, 124);
-    [entries, entries + 44 * word(bytes, 128) + 4]
+    let entries = 160 + word(bytes, 136) + word(bytes, 140) + 4;
+    [entries, entries + OF_PAGE * word(bytes, 128) + 4]
 }
 
 fn summed(mut bytes: Vec<u8>) -> Vec<u8> {
@@ -51,7 +55,7 @@ pub fn page_of_code(code: u8) -> Vec<u8> {
 pub fn with_node_bytes(place: usize, value: &[u8]) -> Vec<u8> {
     let bytes = splk(true);
     let [entries, start] = pages(&bytes);
-    let count = word(&bytes, entries + 16);
+    let count = word(&bytes, entries + 24);
     let content = &bytes[start + 1..start + word(&bytes, entries + 8)];
     let mut planes = zstd::bulk::decompress(content, count * 80).expect("a page");
     for (plane, byte) in value.iter().enumerate() {
@@ -78,7 +82,7 @@ pub fn swapped(is_told: bool) -> Vec<u8> {
     let bytes = long_splk();
     let [entries, _] = pages(&bytes);
     let count = word(&bytes, 128);
-    let [first, second] = [count - 2, count - 1].map(|page| entries + 44 * page);
+    let [first, second] = [count - 2, count - 1].map(|page| entries + OF_PAGE * page);
     let mut places = [first, second].map(|entry| {
         let start = word(&bytes, entry);
         (start, bytes[start..start + word(&bytes, entry + 8)].to_vec())
@@ -109,7 +113,8 @@ pub fn far_page() -> Vec<u8> {
 }
 
 /// A tree of equal nodes with eight children each: `full` pages of inner nodes, and eight times as
-/// many pages of leaves below them. Each page takes 100 bytes in the file and 320 KiB in memory.
+/// many pages of leaves below them, in version 1. Each page takes 100 bytes in the file and 320 KiB
+/// in memory.
 pub fn pages_of_one_node(full: u32) -> Vec<u8> {
     // 45 columns of one number each, and no symbols: the four states as they begin.
     let page = |children: u8| {
@@ -131,6 +136,7 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
     let nodes = 1 + 8 * inner;
     let count = 1 + (nodes - first_page).div_ceil(PAGE_NODES);
     let mut head = splk(false)[..160].to_vec();
+    head[8..12].copy_from_slice(&1u32.to_le_bytes());
     head[104..112].copy_from_slice(&u64::from(nodes - inner).to_le_bytes());
     head[112..120].copy_from_slice(&u64::from(nodes).to_le_bytes());
     head[128..132].copy_from_slice(&count.to_le_bytes());
@@ -169,11 +175,12 @@ fn bricks_and_levels(dims: [u64; 3]) -> [u64; 2] {
     }
 }
 
-/// A bricked volume of bytes that all have one value: 16 bytes in the file for each brick of 32
-/// KiB.
+/// A bricked volume of version 1, of bytes that all have one value: 16 bytes in the file for each
+/// brick of 32 KiB.
 pub fn bricks_of_one_value(dims: [u64; 3]) -> Vec<u8> {
     let [bricks, levels] = bricks_and_levels(dims);
     let mut head = splv(&Folder::new())[..192].to_vec();
+    head[8..12].copy_from_slice(&1u32.to_le_bytes());
     head[24..48].copy_from_slice(&dims.map(u64::to_le_bytes).concat());
     head[144..160].fill(0);
     head[160..164].copy_from_slice(&(levels as u32).to_le_bytes());
@@ -206,11 +213,11 @@ pub fn brick_of_zeros(bytes: usize) -> Vec<u8> {
     let header = 192 + word(&file, 172) + word(&file, 176) + 4;
     let packed = zstd::bulk::compress(&vec![0; bytes], 19).expect("bytes");
     let [bricks, _] = bricks_and_levels([24, 32, 40].map(|at| word(&file, at) as u64));
-    let entry = header + 16 * (bricks as usize - 1);
-    let start = file.len() - 32 - word(&file, entry);
+    let entry = header + OF_BRICK * (bricks as usize - 1);
+    let start = file.len() - 32 - word(&file, entry + 8);
     file.splice(start..file.len() - 32, packed);
     // The code of a compressed brick of differing values.
-    file[entry + 14] = 4;
+    file[entry + 22] = 4;
     sum_bricks(&mut file).expect("bricks");
     file
 }

@@ -24,22 +24,40 @@ fn hash(bytes: &mut [u8]) -> Option<()> {
     put(bytes, end, &hash)
 }
 
-/// Corrects a `.splk`; docs/splk.md describes its layout. Returns `None` if there are fewer bytes
-/// than the file claims.
+/// Corrects a `.splk` of any version; docs/splk.md describes its layout. Returns `None` if there
+/// are fewer bytes than the file claims.
 pub fn sum_hierarchy(bytes: &mut [u8]) -> Option<()> {
-    put(bytes, 0, b"SPLK\r\n\x1a\n\x01\0\0\0")?;
+    put(bytes, 0, b"SPLK\r\n\x1a\n")?;
+    let version = word(bytes, 8).filter(|version| [1, 2].contains(version)).unwrap_or(3);
+    put(bytes, 8, &(version as u32).to_le_bytes())?;
     let length = bytes.len() as u64;
     put(bytes, 16, &length.to_le_bytes())?;
     let header_end = word(bytes, 136)?.checked_add(word(bytes, 140)?)?.checked_add(160)?;
     let (blocks, pages) = (word(bytes, 124)?, word(bytes, 128)?);
-    let entries = header_end + 4 + 16 * blocks;
-    let directory_end = entries + 44 * pages;
     sum(bytes, 0, header_end)?;
+    let start = header_end + 4;
+    match version {
+        3 if pages > RECORDS => sum_directory(bytes, start, pages, [68, 36])?,
+        3 => sum_pages(bytes, start, [start, 68], pages)?,
+        _ => sum_pages(bytes, start, [start + 16 * blocks, 44], pages)?,
+    }
+    hash(bytes)
+}
+
+/// Corrects a directory at byte `start`, whose `pages` records begin at byte `entries` and have
+/// `stride` bytes each, and the places of the pages behind it.
+fn sum_pages(
+    bytes: &mut [u8],
+    start: usize,
+    [entries, stride]: [usize; 2],
+    pages: usize,
+) -> Option<()> {
+    let directory_end = entries + stride * pages;
     let mut at = directory_end + 4;
     let end = bytes.len().checked_sub(32).filter(|&end| end >= at)?;
     let mut order: Vec<(u64, usize)> = Vec::new();
     for page in 0..pages {
-        let entry = entries + 44 * page;
+        let entry = entries + stride * page;
         order.push((u64::from_le_bytes(*bytes.get(entry..)?.first_chunk()?), entry));
     }
     order.sort_unstable();
@@ -52,14 +70,55 @@ pub fn sum_hierarchy(bytes: &mut [u8]) -> Option<()> {
         put(bytes, entry + 12, &crc.to_le_bytes())?;
         at += length;
     }
-    sum(bytes, header_end + 4, directory_end)?;
-    hash(bytes)
+    sum(bytes, start, directory_end)
 }
 
-/// Corrects a `.splv`; docs/splv.md describes its layout. Returns `None` if there are fewer bytes
-/// than the file claims.
+/// Records in a directory page.
+const RECORDS: usize = 512;
+
+/// Corrects the checksums of a directory with several levels, and of the pages that it lists. The
+/// root begins at byte `start`. `strides` are the bytes of the records of pages and of directory
+/// pages.
+fn sum_directory(bytes: &mut [u8], start: usize, pages: usize, strides: [usize; 2]) -> Option<()> {
+    let mut levels = vec![pages];
+    while let Some(&below) = levels.last().filter(|below| **below > 1) {
+        levels.push(below.div_ceil(RECORDS));
+    }
+    let root = levels.len() - 2;
+    sum_below(bytes, start, &levels, [root, 0], strides)?;
+    sum(bytes, start, start + strides[1] * levels[root])
+}
+
+/// Corrects the records of a directory page at byte `at`, and all below.
+fn sum_below(
+    bytes: &mut [u8],
+    at: usize,
+    levels: &[usize],
+    [level, number]: [usize; 2],
+    strides: [usize; 2],
+) -> Option<()> {
+    let records = (levels[level] - number * RECORDS).min(RECORDS);
+    let stride = strides[level.min(1)];
+    for record in 0..records {
+        let entry = at + stride * record;
+        let offset = u64::from_le_bytes(*bytes.get(entry..)?.first_chunk()?);
+        let offset = usize::try_from(offset).ok()?;
+        if level > 0 {
+            sum_below(bytes, offset, levels, [level - 1, number * RECORDS + record], strides)?;
+        }
+        let end = offset.checked_add(word(bytes, entry + 8)?)?;
+        let crc = crc32fast::hash(bytes.get(offset..end)?);
+        put(bytes, entry + 12, &crc.to_le_bytes())?;
+    }
+    Some(())
+}
+
+/// Corrects a `.splv` of any version; docs/splv.md describes its layout. Returns `None` if there
+/// are fewer bytes than the file claims.
 pub fn sum_bricks(bytes: &mut [u8]) -> Option<()> {
-    put(bytes, 0, b"SPLV\r\n\x1a\n\x01\0\0\0")?;
+    put(bytes, 0, b"SPLV\r\n\x1a\n")?;
+    let version = word(bytes, 8).filter(|version| *version == 1).unwrap_or(2);
+    put(bytes, 8, &(version as u32).to_le_bytes())?;
     let length = bytes.len() as u64;
     put(bytes, 16, &length.to_le_bytes())?;
     let header_end = word(bytes, 172)?.checked_add(word(bytes, 176)?)?.checked_add(192)?;
@@ -73,6 +132,14 @@ pub fn sum_bricks(bytes: &mut [u8]) -> Option<()> {
             break;
         }
         dims = dims.map(|n| n.div_ceil(2));
+    }
+    if version == 2 {
+        let start = header_end + 4;
+        match count > RECORDS {
+            true => sum_directory(bytes, start, count, [24, 20])?,
+            false => sum_pages(bytes, start, [start, 24], count)?,
+        }
+        return hash(bytes);
     }
     let directory_end = count.checked_mul(16)?.checked_add(header_end + 4)?;
     let mut at = directory_end.checked_add(4)?;

@@ -604,6 +604,7 @@ pub fn regions(bytes: &[u8]) {
         surfels: surfel_options(),
         paint: None,
         scalar: None,
+        parts: None,
     };
     let whole = accepted(formats::load_mesh(&path, &limits, &ReadOptions::default()));
     let converted = accepted(external::convert(
@@ -641,7 +642,7 @@ pub fn splk(bytes: &[u8]) {
     let is_sound = hierarchy.check().is_sound();
     let tree = accepted(hierarchy.read_tree());
     assert!(tree.is_some() >= is_sound, "a sound file cannot be read as a whole");
-    for page in 0..hierarchy.pages().len() as u32 {
+    for page in 0..hierarchy.page_count() {
         let nodes = accepted(hierarchy.read_page(page));
         assert!(nodes.is_some() >= is_sound, "page {page} of a sound file cannot be read");
         for node in nodes.iter().flat_map(|page| &page.nodes) {

@@ -10,7 +10,8 @@ use splatkit::{
     cells::{CellKind, CellOptions, Cells, Place, Tetrahedra},
     hierarchy::Detail,
     math::{Kernel, Projection, Tensor},
-    scene::{Classification, Evaluate, Gradient, Optics, Scene, Settings},
+    scene::{Classification, Evaluate, Gradient, Item, Optics, Scene, Settings},
+    splat::SplatSet,
     volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
 };
 use std::sync::Arc;
@@ -116,6 +117,61 @@ fn four() -> Scene {
         .with_cells(tube(Place::Points), of_tube())
 }
 
+/// A volume, samples on a rectilinear lattice, scattered samples, and a volume in bricks, beside
+/// surfels.
+fn four_lattices_and_samples() -> Scene {
+    let bricks = Bricks::from_volume(Arc::new(other_volume())).expect("bricks");
+    let rectilinear = methods::rectilinear().scene.items.remove(0);
+    let mut scene = mixed_scene();
+    scene.items.push(rectilinear);
+    scene
+        .with_samples(scattered(), TransferFunction { unit: 1.2, ..transfer(1.0, None) })
+        .with_bricks(bricks, Kernel::default(), cool())
+}
+
+/// A body-centred and a Cartesian lattice, with kernels of different kinds.
+fn two_arrangements() -> Scene {
+    let mut scene = methods::body_centred().scene;
+    let Item::Volume(volume, ..) = &methods::b_spline().scene.items[0] else { panic!("a volume") };
+    let kernel = Kernel::b_spline(2.0).expect("a kernel");
+    scene.items.push(Item::Volume(volume.clone(), kernel, with_surfaces()));
+    scene
+}
+
+/// Two cubic lattices, of which the second is moved and has a factor on its gradients.
+fn two_cubic() -> Scene {
+    let mut scene = blob_scene();
+    let Item::Volume(volume, kernel, transfer) = &scene.items[0] else { panic!("a volume") };
+    let mut moved = (**volume).clone();
+    moved.lattice.origin += DVec3::new(0.25, -0.15, 0.1);
+    let high = moved.range[1];
+    let shown = TransferFunction {
+        color: vec![(0.0, [0.2, 0.9, 0.4]), (high, [0.6, 0.2, 0.9])],
+        gradient: vec![(0.0, 0.3), (1.5 * high, 1.0)],
+        ..transfer.clone()
+    };
+    let other = Item::Volume(Arc::new(moved), kernel.clone(), shown);
+    scene.items.push(other);
+    scene
+}
+
+/// Two volumes, with a set of samples between them that has none.
+fn around_nothing() -> Scene {
+    let nothing = SplatSet { splats: Vec::new(), ..scattered() };
+    blob_scene().with_samples(nothing, transfer(1.0, None)).with_volume(
+        other_volume(),
+        Kernel::default(),
+        with_surfaces(),
+    )
+}
+
+/// From far away, where sections of round kernels are the same for all pixels.
+fn from_afar(mut case: Case) -> Case {
+    case.camera.position = ORIGIN + 30.0 * SLANT;
+    case.camera.projection = Projection::Perspective { view_angle: 1.0 };
+    case
+}
+
 /// Pictures with fields that scatter their samples, because of the settings.
 fn scattered_fields() -> Vec<Case> {
     let scatter = Settings { evaluate: Evaluate::Scatter, ..settings() };
@@ -129,12 +185,21 @@ fn scattered_fields() -> Vec<Case> {
     ]
 }
 
+/// The reference draws the finest level of bricks.
+fn finest() -> Settings {
+    Settings { detail: Detail::Pixels(0.0), ..settings() }
+}
+
+pub fn four_without_cells() -> Case {
+    let scene = four_lattices_and_samples();
+    Case { settings: finest(), ..case("four_without_cells", scene, PERSPECTIVE) }
+}
+
 pub fn all() -> Vec<Case> {
     let clips = methods::clipped_volume().settings.clips;
     let clipped = Settings { clips, ..settings() };
     let xray = Settings { optics: Optics::XRay, ..settings() };
-    // The reference draws the finest level of bricks.
-    let finest = Settings { detail: Detail::Pixels(0.0), ..settings() };
+    let finest = finest();
     let post = Settings { classification: Classification::Post, ..settings() };
     let with_isosurfaces =
         || blob_scene().with_volume(other_volume(), Kernel::default(), with_surfaces());
@@ -168,6 +233,13 @@ pub fn all() -> Vec<Case> {
         case("a_volume_and_cells", beside_cells(Place::Points), PERSPECTIVE),
         case("a_volume_and_values_of_cells", beside_cells(Place::Cells), ORTHOGRAPHIC),
         Case { settings: finest, ..case("four_fields", four(), PERSPECTIVE) },
+        four_without_cells(),
+        case("two_arrangements", two_arrangements(), PERSPECTIVE),
+        case("two_cubic_volumes_orthographic", two_cubic(), ORTHOGRAPHIC),
+        from_afar(case("two_cubic_volumes_from_afar", two_cubic(), PERSPECTIVE)),
+        case("volumes_around_an_empty_set", around_nothing(), PERSPECTIVE),
+        from_afar(case("two_volumes_from_afar", two(), PERSPECTIVE)),
+        from_afar(case("two_arrangements_from_afar", two_arrangements(), PERSPECTIVE)),
     ];
     all.extend(scattered_fields());
     all

@@ -3,7 +3,7 @@
 use crate::{
     failure::{Failure, in_file},
     load::{Input, LoadFlags},
-    output,
+    output, parse,
     progress::Progress,
     terminal::safe,
 };
@@ -22,7 +22,8 @@ use std::path::PathBuf;
 #[derive(Args, Debug)]
 pub struct Check {
     /// A hierarchy or a volume in bricks, of which every checksum and guarantee is checked, or
-    /// another input, which is read and searched for oddities.
+    /// another input, which is read and searched for oddities. Or an address (docs/remote.md).
+    #[arg(value_parser = parse::input())]
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,

@@ -79,7 +79,7 @@ pub struct EngineFlags {
         value_parser = parse::positive
     )]
     frame_time: Option<f64>,
-    /// Limit the GPU memory for the pages of each hierarchy, or for the bricks of a volume, in
+    /// Limit the memory for the pages of each hierarchy, or for the bricks of a volume, in
     /// bytes or with KiB, MiB or GiB. If it is too small for the bricks, coarser levels are drawn
     /// [default: 1GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
@@ -258,7 +258,8 @@ impl EngineFlags {
             return Some("--optics maximum (--mip) has no effect: it is for values");
         }
         let fields = || scene.items.iter().filter_map(Item::transfer);
-        let has_surfaces = scene.items.iter().any(|item| item.transfer().is_none());
+        let is_lit = |item: &Item| item.transfer().is_none() && !item.is_trained();
+        let has_surfaces = scene.items.iter().any(is_lit);
         if self.shade && fields().count() > 0 && fields().all(|field| field.shade.is_some()) {
             return Some("--shade has no effect: the transfer function has its own light");
         }

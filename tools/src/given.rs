@@ -126,6 +126,13 @@ impl Given {
         self.0.contains(flag)
     }
 
+    /// Returns a given flag that is none of these, if there is one.
+    pub fn other_than(&self, flags: &[&str]) -> Option<&str> {
+        // Groups of flags are listed by the names of their types.
+        let is_flag = |name: &str| name.starts_with(|first: char| first.is_ascii_lowercase());
+        self.0.iter().map(String::as_str).find(|name| is_flag(name) && !flags.contains(name))
+    }
+
     /// Returns a warning for each given flag that has no effect on inputs of these kinds.
     pub fn idle(&self, inputs: &[(&Path, Kinds)]) -> Vec<String> {
         let all = inputs.iter().fold(0, |all, (_, kinds)| all | kinds);

@@ -6,7 +6,7 @@ use crate::{
     failure::Failure,
     given::{Given, kinds_of},
     load::{Input, LoadFlags},
-    output,
+    output, parse,
     progress::Progress,
     terminal::safe,
 };
@@ -20,7 +20,7 @@ use splatkit::{
     formats::{self, Series},
     gaussians::Gaussians,
     hierarchy::Hierarchy,
-    input::Source,
+    input::{self, Source},
     math::Bounds,
     memory,
     scattered::Points,
@@ -73,7 +73,8 @@ const ORDER: &[&str] = &[
 #[derive(Args, Debug)]
 pub struct Info {
     /// A mesh, point cloud, hierarchy, volume, volume in bricks, cells, trained Gaussians, or a set
-    /// of scattered samples; or a folder of DICOM files.
+    /// of scattered samples; or a folder of DICOM files. Or an address (docs/remote.md).
+    #[arg(value_parser = parse::input())]
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,
@@ -140,6 +141,9 @@ impl Info {
 impl Info {
     /// Returns the series of a folder of pictures; none for other inputs.
     fn series(&self) -> Result<Vec<Series>, Failure> {
+        if input::is_remote(&self.file) {
+            return Ok(Vec::new());
+        }
         let limits = self.load.limits();
         let source = Source::open_any(&self.file, &limits)?;
         Ok(formats::series(&source, &self.load.options())?)
@@ -148,11 +152,10 @@ impl Info {
 
 /// Returns the bytes of a file, or of the files of a folder that were read.
 fn size(path: &Path, read: &[PathBuf]) -> Result<u64, Failure> {
-    let of = |path: &Path| path.metadata().map_err(|e| Error::file(path, "read", e));
     if !path.is_dir() {
-        return Ok(of(path)?.len());
+        return Ok(input::size(path)?);
     }
-    let sizes: Result<Vec<u64>, Error> = read.iter().map(|path| Ok(of(path)?.len())).collect();
+    let sizes: Result<Vec<u64>, Error> = read.iter().map(input::size).collect();
     Ok(sizes?.into_iter().sum())
 }
 
@@ -291,7 +294,7 @@ fn of_hierarchy(hierarchy: &Hierarchy) -> Map<String, Value> {
     facts.insert("kind".into(), json!("hierarchy"));
     facts.insert("splats".into(), json!(header.leaves));
     facts.insert("nodes".into(), json!(header.nodes));
-    facts.insert("pages".into(), json!(hierarchy.pages().len()));
+    facts.insert("pages".into(), json!(hierarchy.page_count()));
     facts.insert("closed".into(), json!(header.closed));
     facts.insert("lossless".into(), json!(header.lossless));
     if let Some(degree) = header.degree {

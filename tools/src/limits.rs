@@ -1,7 +1,11 @@
 //! The flags that limit what reading an input may take.
 
 use clap::Args;
-use splatkit::{error::LimitKind, formats::Format, input::Limits};
+use splatkit::{
+    error::LimitKind,
+    formats::Format,
+    input::{self, Limits},
+};
 use std::path::Path;
 
 /// Limits for what a file claims, and for the memory and time that reading it takes.
@@ -86,7 +90,7 @@ fn too_few_bytes(file: &Path, kind: LimitKind, found: u64) -> Option<u64> {
     // A packed point takes a fraction of a byte or more. A byte unpacks to at most a thousand
     // bytes, each of which may take several hundred bytes of memory.
     let most = if kind == LimitKind::Points { 64 } else { 1 << 20 };
-    let bytes = file.metadata().ok()?.len();
+    let bytes = input::size(file).ok()?;
     (!refers && bytes.saturating_mul(most) < found).then_some(bytes)
 }
 

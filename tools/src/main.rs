@@ -5,6 +5,8 @@
 
 mod arrays;
 mod bench;
+#[cfg(feature = "remote")]
+mod cache;
 mod camera;
 mod check;
 mod clip;
@@ -56,6 +58,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use failure::Failure;
 use given::Given;
 use progress::Progress;
+use splatkit::input::is_remote;
 use std::{
     ffi::OsString,
     io::{ErrorKind, IsTerminal, Write},
@@ -89,6 +92,10 @@ struct Command {
         value_parser = clap::value_parser!(u32).range(1..=1024)
     )]
     threads: Option<u32>,
+
+    #[cfg(feature = "remote")]
+    #[command(flatten)]
+    cache: cache::CacheFlags,
 }
 
 #[derive(Subcommand)]
@@ -153,6 +160,8 @@ fn main() -> ExitCode {
     if let Err(failure) = threads::start(command.threads) {
         return failure.report();
     }
+    #[cfg(feature = "remote")]
+    command.cache.apply();
     let progress = Progress::new(!command.quiet);
     let result = match command.task {
         Task::Render(task) => task.run(&given, &progress),
@@ -189,7 +198,7 @@ fn with_task(mut arguments: Vec<OsString>) -> Vec<OsString> {
                 || Command::command().find_subcommand(name).is_some()
         });
         let path = Path::new(argument);
-        !is_task && (path.exists() || path.extension().is_some())
+        !is_task && (path.exists() || path.extension().is_some() || is_remote(path))
     };
     if arguments.get(1).is_some_and(is_file) {
         arguments.insert(1, "render".into());

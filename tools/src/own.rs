@@ -1,6 +1,7 @@
 //! Values of flags for all inputs, or for one: `VALUE` or `FILE=VALUE`.
 
 use crate::failure::Failure;
+use splatkit::input;
 use std::path::{Path, PathBuf};
 
 /// A value for all inputs, or for one.
@@ -17,7 +18,7 @@ impl<T> Own<T> {
         parse: impl FnOnce(&str) -> Result<T, String>,
     ) -> Result<Self, String> {
         let (file, value) = match text.rsplit_once('=') {
-            Some((file, value)) => (Some(PathBuf::from(file)), value),
+            Some((file, value)) => (Some(input::address(file)), value),
             None => (None, text),
         };
         Ok(Self { file, value: parse(value)? })

@@ -1,11 +1,13 @@
 //! Values of flags that are more than a word or a number.
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use glam::DVec3;
 use splatkit::{
     formats::{Endian, SampleType},
+    input::address,
     surface::SurfelOptions,
 };
-use std::str::FromStr;
+use std::{path::PathBuf, str::FromStr};
 
 /// Parses exactly `N` numbers with a separator between them.
 pub fn numbers<T: FromStr, const N: usize>(
@@ -16,6 +18,11 @@ pub fn numbers<T: FromStr, const N: usize>(
     let parts: Option<Vec<T>> =
         text.split(separator).map(|part| part.trim().parse().ok()).collect();
     parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| format!("the form is {form}"))
+}
+
+/// A path, or an address without its secrets.
+pub fn input() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().map(address)
 }
 
 /// `1280x720`.

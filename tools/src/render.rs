@@ -19,6 +19,7 @@ use crate::{
 use clap::Args;
 use splatkit::{
     Error, FrameStats, Renderer, disk,
+    input::is_remote,
     math::Camera,
     picture::{Picture, PictureFormat},
     reference,
@@ -434,7 +435,8 @@ impl Render {
                 name.push(format!("_{number}"));
             }
             name.push(".png");
-            first.with_file_name(name)
+            // Nothing is written beside an address.
+            if is_remote(first) { name.into() } else { first.with_file_name(name) }
         };
         let is_free = |path: &PathBuf| {
             let path = match self.motion.is_moving() {
@@ -480,7 +482,7 @@ impl Render {
         let free = self.free(settings, finish);
         let cameras = motion.cameras(&self.camera, &loaded.subject, free)?;
         let mut last = (FrameStats::default(), cameras[0].clone());
-        let mut is_shown = false;
+        let (mut is_shown, mut missing) = (false, 0);
         let mut writer = frames.open(*film)?;
         let count = cameras.len();
         for (frame, camera) in cameras.into_iter().enumerate() {
@@ -504,12 +506,19 @@ impl Render {
             if let Some(depth) = &self.depth {
                 disk::write(depth, &picture.encode_depth()?)?;
             }
+            missing = missing.max(stats.missing_pages);
             last = (stats, camera);
             if !is_wanted {
                 break;
             }
         }
         writer.finish()?;
+        if missing > 0 {
+            progress.warn(format_args!(
+                "{missing} of the pages that the picture needs do not fit in memory, so it is \
+                 coarser there; --memory raises the limit"
+            ));
+        }
         times.sort_by(f64::total_cmp);
         let (stats, camera) = last;
         Ok(Drawn { stats, camera, frame_ms: times[times.len() / 2], overlay: texts })

@@ -7,6 +7,7 @@ use crate::{
     given::{Given, Kinds, kinds_of},
     load::{Input, LoadFlags},
     overlay::Facts,
+    parse,
     progress::Progress,
     show::{Show, ShowFlags},
 };
@@ -39,8 +40,9 @@ use std::{
 #[command(next_help_heading = "Scene")]
 pub struct SceneFlags {
     /// Meshes, point clouds, hierarchies, and up to four volumes, sets of cells or sets of
-    /// scattered samples; all are drawn in one picture.
-    #[arg(value_name = "SCENE", required = true)]
+    /// scattered samples; all are drawn in one picture. Addresses are inputs too: https://…,
+    /// s3://…, gs://…, az://… (docs/remote.md).
+    #[arg(value_name = "SCENE", required = true, value_parser = parse::input())]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
     load: LoadFlags,

@@ -41,6 +41,8 @@ const NOT_OF_PICTURES: &[&str] = &[
     "verbose",
     "quiet",
     "threads",
+    "cache",
+    "cache-size",
     "reference",
 ];
 

@@ -3,7 +3,7 @@
 use crate::{
     failure::Failure,
     load::{Input, LoadFlags},
-    output,
+    output, parse,
     progress::Progress,
     show::{Show, ShowFlags},
 };
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 #[derive(Args, Debug)]
 pub struct Transfer {
     /// Make it for this volume, volume in bricks, set of cells, or set of scattered samples.
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", value_parser = parse::input())]
     input: PathBuf,
     /// Write to this .json file, or to stdout if it is `-`. `render --transfer` reads it.
     #[arg(short, long, value_name = "FILE.json", allow_hyphen_values = true)]

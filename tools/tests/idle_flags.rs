@@ -50,7 +50,7 @@ const FLAGS: &[&str] = &[
 /// Flags that apply to an input, but leave this one as it is: its bricks have one level.
 const ALIKE: [(&str, &str); 2] = [("a.splv", "--cut"), ("a.splv", "--budget")];
 
-const INPUTS: [&str; 6] = ["a.ply", "a.xyz", "a.splk", "a.nrrd", "a.splv", "a.csv"];
+const INPUTS: [&str; 7] = ["a.ply", "b.ply", "a.xyz", "a.splk", "a.nrrd", "a.splv", "a.csv"];
 
 fn folder() -> Folder {
     let folder = Folder::new();
@@ -65,6 +65,7 @@ fn folder() -> Folder {
         format!("{},{},{z},{}\n", p[0], p[1], 120.0 + 25.0 * height(p))
     };
     folder.put("a.csv", format!("x,y,z,value\n{}", places().map(rows).collect::<String>()));
+    folder.run("generate gaussians -o b.ply --points 900").ok();
     folder.run("convert a.ply -o a.splk").ok();
     folder.run("convert a.nrrd -o a.splv").ok();
     folder

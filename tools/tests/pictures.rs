@@ -17,6 +17,21 @@ fn folder() -> Folder {
     folder
 }
 
+/// A hierarchy whose pages do not fit in memory is drawn coarser, and that is told.
+#[test]
+fn too_little_memory_for_pages_is_told() {
+    let folder = Folder::new();
+    folder.put("sheet.ply", sheet(120));
+    folder.run("convert sheet.ply -o a.splk").ok();
+    let told = |memory: &str| {
+        let run =
+            format!("render a.splk -o a.png --overwrite --engine cpu --cut 0 {SMALL} {memory}");
+        let run = folder.run(&run).ok();
+        String::from_utf8_lossy(&run.stderr).contains("pages that the picture needs do not fit")
+    };
+    assert!(told("--memory 200KiB") && !told(""));
+}
+
 #[test]
 fn every_format_gives_a_picture() {
     let folder = folder();

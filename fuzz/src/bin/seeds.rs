@@ -2,6 +2,10 @@
 //! format, made by the library's own writers, by the writers of the formats' crates, or as text.
 //! With them a fuzzer need not guess headers.
 
+#[path = "../../../tests/regressions/flat.rs"]
+mod flat;
+#[path = "../../../tests/testing/grid.rs"]
+mod grid;
 #[path = "../../../tests/inputs/medical.rs"]
 mod inputs;
 
@@ -914,10 +918,16 @@ fn hierarchies(seeds: &mut Seeds) -> Result<()> {
                 ..WriteOptions::default()
             };
             let bytes = to_bytes(&tree, &options)?;
-            seeds.put("splk", &bytes)?;
-            seeds.known("splk_summed", bytes)?;
+            for bytes in [flat::flat(&bytes), bytes] {
+                seeds.put("splk", &bytes)?;
+                seeds.known("splk_summed", bytes)?;
+            }
         }
     }
+    // More pages than one directory page lists.
+    let bytes = to_bytes(&grid::grid(3), &WriteOptions::default())?;
+    seeds.put("splk", &bytes)?;
+    seeds.known("splk_summed", bytes)?;
     Ok(())
 }
 
@@ -935,8 +945,10 @@ fn in_bricks(seeds: &mut Seeds) -> Result<()> {
             let volume = Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples)?;
             let options = bricks::WriteOptions { unit: "mm".into(), source: "a".into() };
             let bytes = seeds.written(|path| bricks::write(&volume, path, &options, None))?;
-            seeds.put("splv", &bytes)?;
-            seeds.known("splv_summed", bytes)?;
+            for bytes in [flat::flat_bricks(&bytes), bytes] {
+                seeds.put("splv", &bytes)?;
+                seeds.known("splv_summed", bytes)?;
+            }
         }
     }
     Ok(())

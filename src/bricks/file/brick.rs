@@ -4,7 +4,10 @@
 use super::directory::{CONSTANT, Entry, PACKED, UNIFORM};
 use crate::{
     bricks::{BRICK_BLOCKS, Brick, SIDE},
-    container::pack::{self, Compressor},
+    container::{
+        directory::Place,
+        pack::{self, Compressor},
+    },
     volume::Scalar,
 };
 
@@ -14,7 +17,7 @@ pub fn encode(
     scalar: Scalar,
     packer: &mut Compressor,
 ) -> std::io::Result<(Entry, Vec<u8>)> {
-    let mut entry = Entry { bytes: 0, crc: 0, value: [0; 4], range: brick.range(), flags: 0 };
+    let mut entry = Entry::in_memory(brick.range());
     let mut samples = brick.samples.clone();
     turn(&mut samples, scalar);
     let first = &samples[..scalar.bytes()];
@@ -36,14 +39,13 @@ pub fn encode(
             bytes = packed;
         }
     }
-    entry.bytes = bytes.len() as u32;
-    entry.crc = crc32fast::hash(&bytes);
+    entry.place = Place::of(0, &bytes);
     Ok((entry, bytes))
 }
 
 /// Decodes a brick from its bytes in the file. The error is a message.
 pub fn decode(entry: &Entry, bytes: &[u8], scalar: Scalar) -> Result<Brick, String> {
-    if crc32fast::hash(bytes) != entry.crc {
+    if crc32fast::hash(bytes) != entry.place.crc {
         return Err("its checksum does not match".into());
     }
     let [samples, blocks] = entry.contents(scalar);

@@ -1,11 +1,11 @@
 //! Looking for damage.
 
-use super::HASH;
+use super::{HASH, Listing};
 use crate::{
     Error, Result,
     bricks::{Brick, Bricks, Level, SIDE, pyramid::Pyramid},
     container::{Finding, Findings, Report},
-    input::Limits,
+    input::{Bytes, Limits},
     parallel::prelude::*,
     progress::{Watch, tell},
     volume::steps::Steps,
@@ -32,8 +32,8 @@ impl Bricks {
     /// memory has nothing to check.
     pub fn check(&self, watch: Watch<'_>) -> Report {
         let mut findings = Findings::default();
-        if !self.bytes().is_empty()
-            && sums(self, watch, &mut findings)
+        if let Some(bytes) = self.bytes()
+            && sums(self, bytes, watch, &mut findings)
             && let Err(error) = contents(self, watch, &mut findings)
         {
             findings.push(finding("brick", &error));
@@ -47,19 +47,38 @@ fn count(bricks: &Bricks) -> u64 {
 }
 
 /// Returns whether every brick can be read and the hash matches.
-fn sums(bricks: &Bricks, watch: Watch<'_>, findings: &mut Findings) -> bool {
-    let bytes = bricks.bytes();
-    let (text, hash) = bytes.split_at(bytes.len() - HASH);
-    let mut is_sound = *blake3::hash(text).as_bytes() == *hash;
-    if !is_sound {
-        let message = "the hash of the whole file does not match";
-        findings.push(Finding::error("hash", format!("byte {}", text.len()), message));
+fn sums(bricks: &Bricks, bytes: &Bytes, watch: Watch<'_>, findings: &mut Findings) -> bool {
+    let start = bytes.len() - HASH as u64;
+    let mut is_sound = false;
+    match bytes.is_hashed(start) {
+        Ok(true) => is_sound = true,
+        Ok(false) => {
+            let message = "the hash of the whole file does not match";
+            findings.push(Finding::error("hash", format!("byte {start}"), message));
+        }
+        Err(error) => findings.push(finding("hash", &error)),
+    }
+    let mut wrong = |fault| findings.push(finding("directory", &bricks.fault(fault)));
+    let mut faults = Vec::new();
+    bricks.directory().check(Some(bytes), &mut |fault| faults.push(fault));
+    is_sound &= faults.is_empty();
+    faults.into_iter().for_each(&mut wrong);
+    let Listing { start, end, .. } = *bricks.directory().kind();
+    if is_sound && !bricks.directory().fills(bytes, start..end) {
+        is_sound = false;
+        let message = "bricks overlap, or leave gaps between them";
+        findings.push(Finding::error("directory", "file", message));
     }
     let mut done = 0;
     for (number, level) in bricks.levels().iter().enumerate() {
         let layer = level.brick_dims[0] * level.brick_dims[1];
         for first in (0..level.bricks()).step_by(layer) {
-            let layer = (first as u32..(first + layer) as u32).into_par_iter();
+            let layer = first as u32..(first + layer) as u32;
+            if let Err(error) = bricks.fetch(layer.clone().map(|brick| (number, brick))) {
+                findings.push(finding("brick", &error));
+                return false;
+            }
+            let layer = layer.into_par_iter();
             let errors: Vec<Error> =
                 layer.clone().filter_map(|brick| bricks.read(number, brick).err()).collect();
             is_sound &= errors.is_empty();
@@ -134,10 +153,8 @@ fn slices(bricks: &Bricks, level: &Level, layer: usize) -> Result<Vec<u8>> {
     let ([nx, ny, nz], [across, down, _]) = (level.dims, level.brick_dims);
     let mut out = vec![0; nx * ny * SIDE.min(nz - layer * SIDE) * size];
     for j in 0..down {
-        let row = (0..across)
-            .into_par_iter()
-            .map(|i| bricks.read(0, ((layer * down + j) * across + i) as u32));
-        let row: Vec<Brick> = row.collect::<Result<_>>()?;
+        let row = (0..across).map(|i| (0, ((layer * down + j) * across + i) as u32));
+        let row: Vec<Brick> = bricks.read_all(&row.collect::<Vec<_>>())?;
         out.par_chunks_mut(nx * ny * size).enumerate().for_each(|(z, slice)| {
             let lines = slice.chunks_mut(nx * size).skip(j * SIDE).take(SIDE);
             for (y, line) in lines.enumerate() {

@@ -1,14 +1,15 @@
-//! The directory: how each brick is stored, its size, and the range of its values.
+//! The directory: how each brick is stored, its size, and the range of its values. Bricks are
+//! numbered from the coarsest level to the finest, in each level group by group.
 
-use super::{HASH, Stored};
+use super::Stored;
 use crate::{
-    bricks::{BRICK_BLOCKS, Level, SIDE, level},
-    container::{Cursor, Put},
+    bricks::{BRICK_BLOCKS, Level, SIDE, joined},
+    container::{
+        Cursor, Put,
+        directory::{Kind, Place},
+    },
     volume::Scalar,
 };
-
-/// Bytes of an entry.
-const ENTRY: usize = 16;
 
 /// Bits of [`Entry::flags`]: all samples have one value, all blocks have the brick's range, the
 /// rest is packed by zstd.
@@ -19,10 +20,7 @@ pub const PACKED: u8 = 4;
 /// The directory's entry of a brick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Entry {
-    /// Bytes in the file.
-    pub bytes: u32,
-    /// Checksum of these bytes.
-    pub crc: u32,
+    pub place: Place,
     /// The value of all samples if they have only one, little-endian; else 0.
     pub value: [u8; 4],
     /// The range of all its blocks together.
@@ -31,6 +29,11 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// The entry of a brick in memory.
+    pub fn in_memory(range: [u8; 2]) -> Self {
+        Self { place: Place::default(), value: [0; 4], range, flags: 0 }
+    }
+
     pub fn has(&self, flag: u8) -> bool {
         self.flags & flag != 0
     }
@@ -43,113 +46,174 @@ impl Entry {
 
     fn is_sound(&self, scalar: Scalar) -> bool {
         let whole: usize = self.contents(scalar).iter().sum();
-        let bytes = self.bytes as usize;
+        let bytes = self.place.bytes as usize;
         let fits = if self.has(PACKED) { (1..whole).contains(&bytes) } else { bytes == whole };
         let used = if self.has(CONSTANT) { scalar.bytes() } else { 0 };
         fits && self.flags < 8
             && self.range[0] <= self.range[1]
             && self.value[used..].iter().all(|&byte| byte == 0)
     }
-}
 
-/// The entries of all levels, finest first, and where their bricks are.
-#[derive(Debug, Clone, Default)]
-pub struct Directory {
-    pub levels: Vec<Vec<Entry>>,
-    /// The byte of the file at which each brick begins.
-    pub offsets: Vec<Vec<u64>>,
-}
-
-impl Directory {
-    /// Bytes of the directory of `bricks` bricks, with its checksum.
-    pub fn length(bricks: u64) -> u64 {
-        ENTRY as u64 * bricks + 4
+    /// Appends the record of the entry.
+    pub fn put(&self, out: &mut Vec<u8>) {
+        self.place.put(out);
+        self.put_rest(out);
     }
 
-    /// Places bricks after a header of `header` bytes and the directory, coarse levels first.
-    pub fn new(levels: Vec<Vec<Entry>>, header: usize) -> Self {
-        let bricks = levels.iter().map(|level| level.len() as u64).sum();
-        let mut at = header as u64 + Self::length(bricks);
-        let mut offsets: Vec<Vec<u64>> =
-            levels.iter().map(|level| Vec::with_capacity(level.len())).collect();
-        for (entries, offsets) in levels.iter().zip(&mut offsets).rev() {
-            for entry in entries {
-                offsets.push(at);
-                at += u64::from(entry.bytes);
-            }
-        }
-        Self { levels, offsets }
+    fn put_rest(&self, out: &mut Vec<u8>) {
+        out.put(&self.value);
+        out.put(&self.range);
+        out.put(&[self.flags, 0]);
     }
 
-    /// Bytes of the directory in memory: entries, offsets and ranges.
-    pub fn memory(&self) -> u64 {
-        let bricks = self.levels.iter().map(|level| level.len() as u64).sum::<u64>();
-        bricks * (size_of::<Entry>() + size_of::<u64>() + size_of::<[u8; 2]>()) as u64
+    /// Reads a record.
+    pub fn read(record: &mut Cursor) -> Option<Self> {
+        let place = Place::read(record)?;
+        Self::read_rest(place, record)
     }
 
-    /// Where the hash begins: after the last brick of level 0.
-    pub fn end(&self) -> u64 {
-        let last = |(entries, offsets): (&Vec<Entry>, &Vec<u64>)| {
-            Some(offsets.last()? + u64::from(entries.last()?.bytes))
-        };
-        self.levels.iter().zip(&self.offsets).next().and_then(last).unwrap_or_default()
-    }
-
-    pub fn encode(&self) -> Vec<u8> {
-        let mut out = Vec::new();
-        for entry in self.levels.iter().rev().flatten() {
-            out.u32(entry.bytes);
-            out.u32(entry.crc);
-            out.put(&entry.value);
-            out.put(&entry.range);
-            out.put(&[entry.flags, 0]);
-        }
-        out.u32(crc32fast::hash(&out));
-        out
-    }
-
-    /// Reads the directory after a header. The error is a message. No memory is allocated that the
-    /// file does not have bytes for.
-    pub fn decode(bytes: &[u8], stored: &Stored) -> Result<Self, String> {
-        let scalar = stored.header.scalar;
-        let levels = level::levels(stored.header.lattice.dims);
-        let bricks = levels.iter().map(|level| level.bricks() as u64).sum::<u64>();
-        let start = stored.length();
-        let short = || format!("the file is too short for the {bricks} bricks of its header");
-        let end = usize::try_from(start as u64 + Self::length(bricks)).map_err(|_| short())?;
-        let (text, crc) = bytes.get(start..end).ok_or_else(short)?.split_at(end - start - 4);
-        if Cursor::new(crc).u32() != Some(crc32fast::hash(text)) {
-            return Err("its checksum does not match".into());
-        }
-        let mut cursor = Cursor::new(text);
-        let mut entries = vec![Vec::new(); levels.len()];
-        for (number, level) in levels.iter().enumerate().rev() {
-            entries[number] = read(&mut cursor, level, number, scalar)?;
-        }
-        let directory = Self::new(entries, start);
-        if directory.end() + HASH as u64 != stored.file_bytes {
-            let message =
-                format!("its bricks end at byte {}, not {HASH} before the end", directory.end());
-            return Err(message);
-        }
-        Ok(directory)
-    }
-}
-
-fn read(
-    cursor: &mut Cursor,
-    level: &Level,
-    number: usize,
-    scalar: Scalar,
-) -> Result<Vec<Entry>, String> {
-    let mut entry = || {
-        let [bytes, crc] = [cursor.u32()?, cursor.u32()?];
-        let (value, range, [flags, 0]) = (cursor.array()?, cursor.array()?, cursor.array()?) else {
+    fn read_rest(place: Place, record: &mut Cursor) -> Option<Self> {
+        let (value, range, [flags, 0]) = (record.array()?, record.array()?, record.array()?) else {
             return None;
         };
-        Some(Entry { bytes, crc, value, range, flags }).filter(|entry| entry.is_sound(scalar))
-    };
-    let contradicts =
-        |brick: usize| format!("the values of level {number}, brick {brick} contradict each other");
-    (0..level.bricks()).map(|brick| entry().ok_or_else(|| contradicts(brick))).collect()
+        Some(Self { place, value, range, flags })
+    }
+}
+
+/// The numbers of all bricks of a volume.
+#[derive(Debug, Clone)]
+pub struct Numbers {
+    pub levels: Vec<Level>,
+    /// The number of the first brick of each level.
+    firsts: Vec<u32>,
+    pub count: u32,
+}
+
+impl Numbers {
+    pub fn new(levels: Vec<Level>) -> Self {
+        let mut firsts = vec![0; levels.len()];
+        let mut count = 0;
+        for (first, level) in firsts.iter_mut().zip(&levels).rev() {
+            *first = count;
+            count += level.bricks() as u32;
+        }
+        Self { levels, firsts, count }
+    }
+
+    /// Returns the number of a brick of a level.
+    pub fn number(&self, level: usize, brick: u32) -> u32 {
+        self.firsts[level] + self.levels[level].rank(brick)
+    }
+
+    /// Returns the level of a number, and the brick in it.
+    pub fn brick(&self, number: u32) -> (usize, u32) {
+        // The first numbers descend.
+        let level = self.firsts.partition_point(|first| *first > number);
+        (level, self.levels[level].brick(number - self.firsts[level]))
+    }
+}
+
+/// The directory of a volume's bricks.
+pub struct Listing {
+    pub numbers: Numbers,
+    pub scalar: Scalar,
+    /// Where the bricks of the file begin, after the root, and where they end.
+    pub start: u64,
+    pub end: u64,
+}
+
+impl Kind for Listing {
+    type Entry = Entry;
+    type Bounds = [u8; 2];
+    const ENTRY: usize = Place::BYTES + 8;
+    const BOUNDS: usize = 4;
+
+    fn entry(&self, page: u32, record: &[u8]) -> Result<Entry, String> {
+        let entry = Entry::read(&mut Cursor::new(record));
+        let entry = entry.filter(|entry| entry.is_sound(self.scalar));
+        let (level, brick) = self.numbers.brick(page);
+        let entry = entry.ok_or_else(|| contradicts(level, brick))?;
+        if entry.place.offset < self.start || entry.place.range().end > self.end {
+            let Self { start, end, .. } = self;
+            return Err(format!(
+                "level {level}, brick {brick} begins at byte {}, but the bricks are from byte \
+                 {start} to {end}",
+                entry.place.offset
+            ));
+        }
+        Ok(entry)
+    }
+
+    fn follows(_: &Entry, _: &Entry) -> Result<(), String> {
+        Ok(())
+    }
+
+    fn place(entry: &Entry) -> Place {
+        entry.place
+    }
+
+    fn bounds(entry: &Entry) -> [u8; 2] {
+        entry.range
+    }
+
+    fn read_bounds(bytes: &mut Cursor) -> Option<[u8; 2]> {
+        let [low, high, 0, 0] = bytes.array()? else { return None };
+        (low <= high).then_some([low, high])
+    }
+
+    fn put_bounds(&[low, high]: &[u8; 2], out: &mut Vec<u8>) {
+        out.put(&[low, high, 0, 0]);
+    }
+
+    fn around(bounds: &[[u8; 2]]) -> [u8; 2] {
+        bounds.iter().fold(crate::bricks::EMPTY, |all, own| joined(all, *own))
+    }
+}
+
+fn contradicts(level: usize, brick: u32) -> String {
+    format!("the values of level {level}, brick {brick} contradict each other")
+}
+
+/// Returns the bytes of the directory of version 1, with its checksum.
+pub fn flat_length(bricks: u32) -> u64 {
+    FLAT_ENTRY as u64 * u64::from(bricks) + 4
+}
+
+/// Bytes of an entry of version 1.
+const FLAT_ENTRY: usize = 16;
+
+/// Reads the directory of version 1 after a header, as entries by their numbers. The error is a
+/// message. No memory is allocated that the file does not have bytes for.
+pub fn read_flat(bytes: &[u8], stored: &Stored, numbers: &Numbers) -> Result<Vec<Entry>, String> {
+    let scalar = stored.header.scalar;
+    let start = stored.length();
+    let short = || too_short(numbers.count);
+    let end = usize::try_from(start as u64 + flat_length(numbers.count)).map_err(|_| short())?;
+    let (text, crc) = bytes.get(start..end).ok_or_else(short)?.split_at(end - start - 4);
+    if Cursor::new(crc).u32() != Some(crc32fast::hash(text)) {
+        return Err("its checksum does not match".into());
+    }
+    let mut entries = vec![Entry::in_memory([0; 2]); numbers.count as usize];
+    let (mut cursor, mut offset) = (Cursor::new(text), end as u64);
+    for (number, level) in numbers.levels.iter().enumerate().rev() {
+        for brick in 0..level.bricks() as u32 {
+            let mut read = || {
+                let place = Place { offset, bytes: cursor.u32()?, crc: cursor.u32()? };
+                Entry::read_rest(place, &mut cursor).filter(|entry| entry.is_sound(scalar))
+            };
+            let entry = read().ok_or_else(|| contradicts(number, brick))?;
+            offset += u64::from(entry.place.bytes);
+            entries[numbers.number(number, brick) as usize] = entry;
+        }
+    }
+    if offset + super::HASH as u64 != stored.file_bytes {
+        let hash = super::HASH;
+        return Err(format!("its bricks end at byte {offset}, not {hash} before the end"));
+    }
+    Ok(entries)
+}
+
+/// The message for a file that has no room for its bricks' entries.
+pub fn too_short(bricks: u32) -> String {
+    format!("the file is too short for the {bricks} bricks of its header")
 }

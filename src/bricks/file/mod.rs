@@ -1,5 +1,5 @@
-//! The file of a bricked volume, `.splv`. A directory, with the size and the range of values of
-//! each brick, precedes the bricks, coarse levels first. docs/splv.md describes the file byte by
+//! The file of a bricked volume, `.splv`: bricks, coarse levels first, and a directory in pages
+//! with the size and the range of values of each brick. docs/splv.md describes the file byte by
 //! byte.
 
 #![deny(clippy::disallowed_methods)]
@@ -14,7 +14,7 @@ pub use check::check;
 pub use write::{WriteOptions, convert, memory_of, write};
 
 pub(super) use brick::decode;
-pub(super) use directory::{Directory, Entry};
+pub(super) use directory::{Entry, Listing, Numbers, flat_length, read_flat, too_short};
 pub(super) use header::{Refusal, Stored};
 #[cfg(test)]
 pub(super) use write::{to_bytes, with_changes};
@@ -22,8 +22,8 @@ pub(super) use write::{to_bytes, with_changes};
 /// How a file begins: a name, and line ends that a transfer as text would change.
 const MAGIC: [u8; 8] = *b"SPLV\r\n\x1a\n";
 
-/// The version that is written, and the newest that is read.
-pub(super) const VERSION: u32 = 1;
+/// The version that is written, and the newest that is read. Version 1 has a flat directory.
+pub(super) const VERSION: u32 = 2;
 
 /// Bytes of the BLAKE3 hash at the end of a file.
 pub(super) const HASH: usize = 32;

@@ -1,19 +1,28 @@
 //! Writing: slices arrive once, in order, and little more than a layer of bricks of each level is
 //! in memory.
 
-use super::{Directory, Entry, HASH, Stored, brick::encode};
+use super::{Entry, HASH, Listing, Numbers, Stored, brick::encode};
 #[cfg(test)]
 use crate::bricks::{Brick, Bricks};
 use crate::{
     Error, Result,
     bricks::{Header, REACH, SIDE, cut::Slices, level, pyramid::Pyramid},
-    container::{Spill, Target, pack::Compressor},
+    container::{
+        Cursor, Spill, Spilled, Target,
+        directory::{Contents, Kind, Layout, Place},
+        pack::Compressor,
+    },
     formats::VolumeStream,
     parallel::prelude::*,
     progress::{Watch, tell},
     volume::{Scalar, Volume, steps::Steps},
 };
-use std::{borrow::Cow, io::Write, ops::Range, path::Path};
+use std::{
+    borrow::Cow,
+    io::{self, Write},
+    ops::Range,
+    path::Path,
+};
 
 /// Descriptions that are stored in the file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -39,7 +48,7 @@ const BATCH: usize = 256;
 pub fn memory_of(dims: [usize; 3], scalar: Scalar) -> u64 {
     let slice =
         (dims[0] as u64).saturating_mul(dims[1] as u64).saturating_mul(scalar.bytes() as u64);
-    let slices = (SIDE + 2 * REACH + 4 * PIECE).min(2 * dims[2]) as u64;
+    let slices = (SIDE + 2 * REACH + 4 * PIECE).min(dims[2].saturating_mul(2)) as u64;
     slice.saturating_mul(slices).saturating_mul(4) / 3 + (64 << 20)
 }
 
@@ -110,7 +119,7 @@ pub fn to_bytes(volume: &Volume, options: &WriteOptions) -> Result<Vec<u8>> {
 #[cfg(test)]
 pub fn with_changes(bricks: &Bricks, change: impl Fn(usize, u32, &mut Brick)) -> Vec<u8> {
     let header = bricks.header();
-    let mut kept = Kept::new(header, Spill::Memory(Vec::new()));
+    let mut kept = Kept::new(header, || Ok(Spill::Memory(Vec::new()))).unwrap();
     let mut packer = Compressor::new(LEVEL).unwrap();
     for (number, level) in bricks.levels().iter().enumerate() {
         for brick in 0..level.bricks() as u32 {
@@ -143,14 +152,14 @@ fn slices(volume: &Volume, z: Range<usize>) -> Cow<'_, [u8]> {
 fn all<'a>(
     header: &Header,
     path: &Path,
-    spill: impl FnOnce() -> Result<Spill>,
+    spill: impl Fn() -> Result<Spill>,
     target: impl FnOnce() -> Result<Target>,
     slices: impl Fn(Range<usize>) -> Result<Cow<'a, [u8]>>,
     watch: Watch<'_>,
 ) -> Result<Vec<u8>> {
     header.validate().map_err(Error::Argument)?;
     let dims = header.lattice.dims;
-    let mut coder = Coder::new(header, spill()?);
+    let mut coder = Coder::new(header, spill)?;
     let mut pyramid = Pyramid::new(header.scalar, dims);
     let fail = |e| Error::output(path, e);
     for first in (0..dims[2]).step_by(PIECE) {
@@ -171,9 +180,9 @@ struct Coder {
 }
 
 impl Coder {
-    fn new(header: &Header, spill: Spill) -> Self {
+    fn new(header: &Header, spill: impl Fn() -> Result<Spill>) -> Result<Self> {
         let steps = Steps::new(header.scalar, header.range);
-        Self { scalar: header.scalar, steps, kept: Kept::new(header, spill) }
+        Ok(Self { scalar: header.scalar, steps, kept: Kept::new(header, spill)? })
     }
 
     fn layer(&mut self, level: usize, layer: usize, slices: &Slices) -> std::io::Result<()> {
@@ -196,44 +205,84 @@ impl Coder {
     }
 }
 
-/// Bricks on their way to the file: for each level the entries of the directory, and where the
-/// bricks wait in the spill file.
+/// Bricks on their way to the file. Their entries wait too, in the order of bricks of each level,
+/// with the place where the brick waits.
 struct Kept {
     spill: Spill,
-    entries: Vec<Vec<Entry>>,
-    waiting: Vec<Vec<u64>>,
+    entries: Vec<Spill>,
 }
 
 impl Kept {
-    fn new(header: &Header, spill: Spill) -> Self {
-        let levels = level::levels(header.lattice.dims).len();
-        Self { spill, entries: vec![Vec::new(); levels], waiting: vec![Vec::new(); levels] }
+    /// Begins to keep bricks; `spill` creates storage.
+    fn new(header: &Header, spill: impl Fn() -> Result<Spill>) -> Result<Self> {
+        let levels = level::levels(header.lattice.dims);
+        let entries = levels.iter().map(|_| spill()).collect::<Result<_>>()?;
+        Ok(Self { entries, spill: spill()? })
     }
 
-    fn push(&mut self, level: usize, entry: Entry, bytes: &[u8]) -> std::io::Result<()> {
-        self.waiting[level].push(self.spill.push(bytes)?);
-        self.entries[level].push(entry);
+    fn push(&mut self, level: usize, mut entry: Entry, bytes: &[u8]) -> io::Result<()> {
+        entry.place.offset = self.spill.push(bytes)?;
+        let mut record = Vec::with_capacity(Listing::ENTRY);
+        entry.put(&mut record);
+        self.entries[level].push(&record)?;
         Ok(())
     }
 
     /// Assembles the file.
-    fn finish(self, header: &Header, mut out: Target) -> std::io::Result<Target> {
-        let mut stored = Stored { header: header.clone(), file_bytes: 0 };
-        let directory = Directory::new(self.entries, stored.length());
-        stored.file_bytes = directory.end() + HASH as u64;
+    fn finish(self, header: &Header, mut out: Target) -> io::Result<Target> {
+        let mut stored = Stored { header: header.clone(), file_bytes: 0, is_flat: false };
+        let numbers = Numbers::new(level::levels(header.lattice.dims));
+        let count = numbers.count;
+        let spilled = self.entries.into_iter().map(Spill::end).collect::<io::Result<Vec<_>>>()?;
+        let (mut entries, mut spill) = (Entries { numbers, spilled }, self.spill);
+        let mut layout = Layout::new(count, stored.length() as u64, &mut entries)?;
+        stored.file_bytes = layout.end + HASH as u64;
+        let (root, waiting) = layout.encode(&mut entries, &mut spill)?;
         let mut hash = blake3::Hasher::new();
         let mut put = |bytes: &[u8]| {
             hash.update(bytes);
             out.write_all(bytes)
         };
         put(&stored.encode())?;
-        put(&directory.encode())?;
-        let places = self.waiting.iter().zip(&directory.levels).rev();
-        let pieces = places.flat_map(|(waiting, entries)| {
-            waiting.iter().copied().zip(entries.iter().map(|e| e.bytes))
-        });
-        self.spill.replay(pieces, &mut put)?;
+        put(&root)?;
+        layout.write(&mut entries, &waiting, &mut spill.end()?, &mut put)?;
         out.write_all(hash.finalize().as_bytes())?;
         Ok(out)
+    }
+}
+
+/// The entries of all levels, as they wait.
+struct Entries {
+    numbers: Numbers,
+    spilled: Vec<Spilled>,
+}
+
+impl Entries {
+    /// Returns the level of a number, and its entry.
+    fn entry(&mut self, number: u32) -> io::Result<(usize, Entry)> {
+        let (level, brick) = self.numbers.brick(number);
+        let mut record = [0; Listing::ENTRY];
+        self.spilled[level].read(u64::from(brick) * Listing::ENTRY as u64, &mut record)?;
+        let entry = Entry::read(&mut Cursor::new(&record)).ok_or(io::ErrorKind::InvalidData)?;
+        Ok((level, entry))
+    }
+}
+
+impl Contents<Listing> for Entries {
+    fn look(&mut self, number: u32) -> io::Result<(u32, u8)> {
+        let (level, entry) = self.entry(number)?;
+        // There are at most 64 levels.
+        Ok((entry.place.bytes, level as u8))
+    }
+
+    fn record(&mut self, number: u32, offset: u64, out: &mut Vec<u8>) -> io::Result<[u8; 2]> {
+        let (_, mut entry) = self.entry(number)?;
+        entry.place.offset = offset;
+        entry.put(out);
+        Ok(entry.range)
+    }
+
+    fn waiting(&mut self, number: u32) -> io::Result<Place> {
+        Ok(self.entry(number)?.1.place)
     }
 }

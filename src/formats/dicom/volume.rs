@@ -67,7 +67,7 @@ fn fill(samples: &mut Samples, [low, high]: [f64; 2]) -> u64 {
         padding.map(|value| *value = lowest).count() as u64
     }
     let is = |value: f64| low <= value && value <= high;
-    each_type!(samples, values => of(values, |value| is(f64::from(value))))
+    each_type!(mut samples, values => of(values, |value| is(f64::from(value))))
 }
 
 /// Returns the stack of the series that the options choose.
@@ -130,7 +130,7 @@ fn joined(source: &Source, heads: &[Head], slices: &[Slice], is_even: bool) -> R
                 }
                 let out = out.get_or_insert_with(|| zeros(scalar, size * slices.len()));
                 let (start, end) = (at * size, (at + 1) * size);
-                each_type!(out, values => {
+                each_type!(mut out, values => {
                     bytemuck::cast_slice_mut(&mut values[start..end])
                         .copy_from_slice(samples.bytes());
                 });

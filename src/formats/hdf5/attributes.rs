@@ -73,7 +73,7 @@ impl Attributes {
             return Ok(());
         }
         source.room::<f32>("the scaled samples", volume.len())?;
-        let scaled = each_type!(&volume.samples, values => values
+        let scaled = each_type!(volume.samples, values => values
             .par_iter()
             .map(|&value| (f64::from(value) * scale + offset) as f32)
             .collect());

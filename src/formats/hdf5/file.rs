@@ -50,7 +50,7 @@ impl<'a> File<'a> {
     /// Opens the bytes of a source.
     pub fn open(source: &'a Source<'a>) -> Result<Self> {
         let file = isolated(source, "file", || {
-            let opened = if source.is_in_memory() {
+            let opened = if source.is_alone() {
                 source.room::<u8>("the file", source.bytes().len())?;
                 hdf5_pure::File::from_bytes(source.bytes().to_vec())
             } else {

@@ -66,8 +66,11 @@ impl Attribute {
             let message = "the times of packed points are not read";
             return Err(source.error("points", message).hint("unpack the file to .las"));
         }
-        let first = source.bytes()[header.start..].get(..header.size);
-        let less = first.map_or(0.0, |record| Self { of, less: 0.0 }.value(header.format, record));
+        let first = header.start..header.start + header.size;
+        if first.end > source.len() {
+            return Ok(Self { of, less: 0.0 });
+        }
+        let less = Self { of, less: 0.0 }.value(header.format, &source.part(first)?);
         Ok(Self { of, less })
     }
 

@@ -19,6 +19,10 @@ use std::{io::Cursor, ops::Range};
 /// Points that are unpacked between two checks of the time limit.
 const POINTS: usize = 1 << 16;
 
+/// Bytes of an entry of the chunk table, at most: two numbers of 32 bits, which badly predicted
+/// take somewhat more.
+const MOST_ENTRY: usize = 64;
+
 /// A chunk: its byte range in the file, and its number of points.
 pub(super) struct Chunk {
     pub number: usize,
@@ -47,17 +51,17 @@ pub(super) fn layout(source: &Source, header: &Header) -> Result<LazVlr> {
 /// Returns how the points are packed, from one of the file's variable length records.
 fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
     let place = "LASzip record";
-    let bytes = source.bytes();
+    let bytes = source.part(0..header.start)?;
     let (mut at, count) = header.records;
     for _ in 0..count {
-        let field = Fields { bytes: &bytes[..header.start], place: "a record before the points" };
+        let field = Fields { bytes: &bytes, place: "a record before the points" };
         let cut = |message: String| source.error("header", message);
         let id = u16::from_le_bytes(field.at(at + 18).map_err(cut)?);
         let length = usize::from(u16::from_le_bytes(field.at(at + 20).map_err(cut)?));
         let is_wanted =
             id == LazVlr::RECORD_ID && bytes[at + 2..].starts_with(LazVlr::USER_ID.as_bytes());
         at += 54;
-        let Some(data) = bytes[..header.start].get(at..at + length) else {
+        let Some(data) = bytes.get(at..at + length) else {
             return Err(source.error("header", "a record before the points overlaps them"));
         };
         at += length;
@@ -102,30 +106,34 @@ pub(super) fn chunks(source: &Source, header: &Header, layout: &LazVlr) -> Resul
 }
 
 fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
-    let bytes = source.bytes();
-    let wrong = |message: String| source.error("chunk table", message);
-    let field = Fields { bytes, place: "the chunk table" };
+    let (wrong, length) = (|message: String| source.error("chunk table", message), source.len());
+    let long = |at: usize| -> Result<i64> {
+        let bytes = source.part(at.min(length)..length.min(at + ChunkTable::OFFSET_SIZE))?;
+        let bytes = bytes.first_chunk().ok_or_else(|| wrong(format!("ends at byte {length}")))?;
+        Ok(i64::from_le_bytes(*bytes))
+    };
     // Writers that cannot seek back put the table's offset at the end of the file instead of the
     // start.
-    let mut table = i64::from_le_bytes(field.at(header.start).map_err(wrong)?);
+    let mut table = long(header.start)?;
     if table <= header.start as i64 {
-        table = i64::from_le_bytes(field.at(bytes.len() - 8).map_err(wrong)?);
+        table = long(length - ChunkTable::OFFSET_SIZE)?;
     }
-    let table =
-        usize::try_from(table).ok().filter(|&table| table > header.start && table < bytes.len());
+    let table = usize::try_from(table).ok().filter(|&table| table > header.start && table < length);
     let Some(table) = table else {
         return Err(wrong("lies outside of the file: it is cut".into()));
     };
     // The crate allocates all entries that the table claims.
-    let claimed = u32::from_le_bytes(field.at(table + 4).map_err(wrong)?) as usize;
+    let claimed = (long(table)? >> 32) as u32 as usize;
     if claimed > table - header.start {
         return Err(wrong(format!("claims {claimed} chunks in {} bytes", table - header.start)));
     }
     source.room::<[Chunk; 2]>("the chunk table", claimed)?;
-    let mut cursor = Cursor::new(bytes);
-    cursor.set_position(header.start as u64);
-    let entries =
-        ChunkTable::read_from(&mut cursor, layout).map_err(|error| wrong(error.to_string()))?;
+    // The crate expects the offset of the table before it.
+    let most = claimed.saturating_mul(MOST_ENTRY).saturating_add(MOST_ENTRY);
+    let mut bytes = (ChunkTable::OFFSET_SIZE as i64).to_le_bytes().to_vec();
+    bytes.extend_from_slice(&source.part(table..table.saturating_add(most).min(length))?);
+    let entries = ChunkTable::read_from(&mut Cursor::new(bytes), layout)
+        .map_err(|error| wrong(error.to_string()))?;
     let mut at = header.start + ChunkTable::OFFSET_SIZE;
     let mut left = header.points;
     let mut chunks = Vec::new();
@@ -170,9 +178,10 @@ fn unpack_here(
     chunk: &Chunk,
 ) -> Result<Vec<Point>> {
     let wrong = |message: String| source.error(format!("chunk {}", chunk.number), message);
-    let input = Cursor::new(&source.bytes()[chunk.bytes.clone()]);
+    let bytes = source.part(chunk.bytes.clone())?;
+    let input = Cursor::new(&*bytes);
     let mut decoder: Box<dyn RecordDecompressor<Cursor<&[u8]>>> = if header.format >= 6 {
-        check_layers(source, header, layout, chunk).map_err(wrong)?;
+        check_layers(&bytes, header, layout).map_err(wrong)?;
         let mut decoder = LayeredPointRecordDecompressor::new(input);
         decoder.set_fields_from(layout.items()).map_err(|error| wrong(error.to_string()))?;
         // Times have a layer of their own, which is skipped: see time.rs.
@@ -207,13 +216,7 @@ fn unpack_here(
 
 /// Checks the sizes of the layers. A layered chunk begins with its first point, its count and the
 /// size of each layer. The decoder allocates these sizes.
-fn check_layers(
-    source: &Source,
-    header: &Header,
-    layout: &LazVlr,
-    chunk: &Chunk,
-) -> Result<(), String> {
-    let bytes = &source.bytes()[chunk.bytes.clone()];
+fn check_layers(bytes: &[u8], header: &Header, layout: &LazVlr) -> Result<(), String> {
     let layers = layout.items().iter().map(|item| match item.item_type() {
         LazItemType::Point14 => 9,
         LazItemType::RGBNIR14 => 2,

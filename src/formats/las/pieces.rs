@@ -2,7 +2,7 @@
 
 use super::{
     super::{
-        form::{Counts, Form, StreamPoint},
+        form::{Coloring, Counts, Form, StreamPoint, in_batches},
         shared::{
             cloud::{color_of_16_bits, grey},
             found::Found,
@@ -14,7 +14,7 @@ use crate::{
     Error, Result,
     about::{About, Stance},
     input::{Source, positions},
-    parallel::{self, prelude::*},
+    parallel::prelude::*,
 };
 use glam::{DVec3, Vec3};
 use laz::LazVlr;
@@ -89,10 +89,8 @@ impl Pieces {
         let points: Vec<Point> = match &self.packed {
             Some((layout, chunks)) => packed::unpack(source, &self.header, layout, &chunks[piece])?,
             None => {
-                let size = self.header.size;
-                let range: Range<usize> =
-                    first * size..(first + POINTS).min(self.header.points) * size;
-                let records = source.bytes()[self.header.start..][range].chunks_exact(size);
+                let bytes = source.part(self.bytes(piece))?;
+                let records = bytes.chunks_exact(self.header.size);
                 records.filter_map(|record| self.header.point(record)).collect()
             }
         };
@@ -129,6 +127,15 @@ impl Form for Pieces {
         Some(Stance::SURVEY)
     }
 
+    fn bytes(&self, piece: usize) -> Range<usize> {
+        let Header { start, points, size, .. } = self.header;
+        let first = self.firsts[piece];
+        match &self.packed {
+            Some((_, chunks)) => chunks[piece].bytes.clone(),
+            None => start + first * size..start + (first + POINTS).min(points) * size,
+        }
+    }
+
     fn has_normals(&self) -> bool {
         false
     }
@@ -150,17 +157,21 @@ impl Form for Pieces {
 
     fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
         let mut seen = Seen::nothing();
-        let batch = 2 * parallel::current_num_threads();
-        source.restart_time();
-        for first in (0..self.firsts.len()).step_by(batch) {
-            let pieces = (first..(first + batch).min(self.firsts.len())).into_par_iter();
-            let more: Vec<Seen> =
-                pieces.map(|piece| self.look(source, piece)).collect::<Result<_>>()?;
-            more.into_iter().for_each(|more| seen.join(more));
-            source.release();
-            source.restart_time();
-            watch(seen.points);
-        }
+        let pieces = 0..self.firsts.len();
+        in_batches(
+            source,
+            pieces,
+            |piece| self.bytes(piece),
+            |pieces| {
+                source.restart_time();
+                let look = |&piece: &usize| self.look(source, piece);
+                let more: Vec<Seen> = pieces.par_iter().map(look).collect::<Result<_>>()?;
+                more.into_iter().for_each(|more| seen.join(more));
+                source.release();
+                watch(seen.points);
+                Ok(())
+            },
+        )?;
         if let Some((point, position)) = seen.bad {
             return Err(positions::not_finite(source, format!("point {point}"), position));
         }
@@ -169,6 +180,23 @@ impl Form for Pieces {
         }
         self.paint = seen.paint(&self.header);
         Ok((seen.points, [seen.low, seen.high]))
+    }
+
+    /// The largest channel of a colour, or the ends of the greys.
+    fn coloring(&self) -> Coloring {
+        match self.paint {
+            Paint::None => [None; 4],
+            Paint::Color { largest } => [Some(f64::from(largest)), None, None, None],
+            Paint::Grey { low, high } => [None, Some(f64::from(low)), Some(f64::from(high)), None],
+        }
+    }
+
+    fn recolor(&mut self, coloring: Coloring) {
+        self.paint = match coloring {
+            [Some(largest), ..] => Paint::Color { largest: largest as u16 },
+            [_, Some(low), Some(high), _] => Paint::Grey { low: low as f32, high: high as f32 },
+            _ => Paint::None,
+        };
     }
 
     fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>> {

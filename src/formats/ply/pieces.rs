@@ -3,7 +3,7 @@
 
 use super::{
     super::{
-        form::{Counts, Form, StreamPoint, in_order},
+        form::{Coloring, Counts, Form, StreamPoint, in_order},
         shared::found::Found,
     },
     COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale, column_named,
@@ -257,14 +257,28 @@ impl Form for Pieces {
             }
             Ok((around, brightest, self.rows(piece).end as u64))
         };
-        in_order(source, self.pieces()[0], of_piece, |(around, of_piece, seen)| {
-            (low, high) = (low.min(around.0), high.max(around.1));
-            brightest = larger(brightest, of_piece);
-            watch(seen);
-            Ok(())
-        })?;
+        in_order(
+            source,
+            0..self.pieces()[0],
+            |_| 0..0,
+            of_piece,
+            |(around, of_piece, seen)| {
+                (low, high) = (low.min(around.0), high.max(around.1));
+                brightest = larger(brightest, of_piece);
+                watch(seen);
+                Ok(())
+            },
+        )?;
         self.settle_colors(brightest);
         Ok((self.points() as u64, [low, high]))
+    }
+
+    fn coloring(&self) -> Coloring {
+        self.vertices.color_scale
+    }
+
+    fn recolor(&mut self, coloring: Coloring) {
+        self.vertices.color_scale = coloring;
     }
 
     fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>> {

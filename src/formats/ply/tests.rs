@@ -24,8 +24,8 @@ fn check(mesh: &Mesh) {
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
 }
 
-/// A number as bytes of a PLY type.
-fn put(out: &mut Vec<u8>, kind: &str, value: f64, big: bool) {
+/// Appends a number as bytes of a PLY type.
+pub fn put(out: &mut Vec<u8>, kind: &str, value: f64, big: bool) {
     macro_rules! put {
         ($t:ty) => {{
             let value = value as $t;

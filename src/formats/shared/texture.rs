@@ -75,7 +75,7 @@ pub(crate) fn find(source: &Source, place: &str, reference: &str) -> Result<Opti
         Ok(path) => Ok(Some(path)),
         Err(_)
             if is_inside(&reference)
-                && (source.is_in_memory()
+                && (source.is_alone()
                     || source
                         .path
                         .parent()

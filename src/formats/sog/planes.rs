@@ -33,6 +33,10 @@ pub struct Plane {
 /// Returns the text of `meta.json`, and where the planes are.
 pub fn open<'a>(source: &'a Source) -> Result<(String, Files<'a>)> {
     if !source.bytes().starts_with(b"PK") {
+        if !source.bytes().trim_ascii_start().starts_with(b"{") {
+            let message = format!("is neither a ZIP archive with a {META} nor a {META}");
+            return Err(source.error("file", message));
+        }
         return Ok((source.small_text("a meta.json", MOST_META)?, Files::Folder));
     }
     let mut archive = isolated(source, "archive", || {

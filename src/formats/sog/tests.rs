@@ -148,44 +148,42 @@ fn check_harmonics(set: &Gaussians, degree: u32) {
     }
 }
 
-#[test]
-fn the_second_version_has_codebooks() {
+/// Checks scenes of each degree, from a folder and from an archive.
+fn check_scenes(meta: fn(u32) -> Value, check: fn(&Gaussians)) {
     let folder = Folder::new();
     for degree in 0..=3 {
-        let meta = second(degree);
+        let meta = meta(degree);
         let zipped = folder.write("a.sog", archive_of(&meta, degree));
         for path in [folder_of(&folder, &meta, degree), zipped] {
             let set = read_with(&path, read).unwrap();
             assert_eq!((set.len(), set.broken.all(), set.validate()), (2, 0, Ok(())));
             check_places(&set);
             check_harmonics(&set, degree);
-            near(&set.scales[0].to_array(), &[0.367_879_45, 1.0, 1.648_721_3]);
-            near(&set.scales[1].to_array(), &[1.648_721_3, 1.648_721_3, 0.367_879_45]);
-            near(&set.opacities, &[0.2, 1.0]);
-            near(&set.harmonics_of(0)[0], &[-1.0, 0.25, 2.0]);
-            near(&set.harmonics_of(1)[0], &[2.0, -1.0, -1.0]);
+            check(&set);
         }
     }
 }
 
 #[test]
+fn the_second_version_has_codebooks() {
+    check_scenes(second, |set| {
+        near(&set.scales[0].to_array(), &[0.367_879_45, 1.0, 1.648_721_3]);
+        near(&set.scales[1].to_array(), &[1.648_721_3, 1.648_721_3, 0.367_879_45]);
+        near(&set.opacities, &[0.2, 1.0]);
+        near(&set.harmonics_of(0)[0], &[-1.0, 0.25, 2.0]);
+        near(&set.harmonics_of(1)[0], &[2.0, -1.0, -1.0]);
+    });
+}
+
+#[test]
 fn the_first_version_has_ranges() {
-    let folder = Folder::new();
-    for degree in 0..=3 {
-        let meta = first(degree);
-        let zipped = folder.write("a.sog", archive_of(&meta, degree));
-        for path in [folder_of(&folder, &meta, degree), zipped] {
-            let set = read_with(&path, read).unwrap();
-            assert_eq!((set.len(), set.broken.all(), set.validate()), (2, 0, Ok(())));
-            check_places(&set);
-            check_harmonics(&set, degree);
-            let logs = [-1.0, -2.0 + 2.0 / 255.0, 0.02f64];
-            near(&set.scales[0].to_array(), &logs.map(|log| log.exp() as f32));
-            // The sigmoid of −1.2 and of 2.
-            near(&set.opacities, &[0.231_475_22, 0.880_797_1]);
-            near(&set.harmonics_of(0)[0], &[-1.0, -1.0 + 1.0 / 255.0, 0.02]);
-        }
-    }
+    check_scenes(first, |set| {
+        let logs = [-1.0, -2.0 + 2.0 / 255.0, 0.02f64];
+        near(&set.scales[0].to_array(), &logs.map(|log| log.exp() as f32));
+        // The sigmoid of −1.2 and of 2.
+        near(&set.opacities, &[0.231_475_22, 0.880_797_1]);
+        near(&set.harmonics_of(0)[0], &[-1.0, -1.0 + 1.0 / 255.0, 0.02]);
+    });
 }
 
 #[test]

@@ -11,7 +11,7 @@ use crate::{
         },
         scene::nodes::{GpuBounds, GpuCut, GpuNode},
     },
-    plan::uniforms::{Frame, FrameClip, FrameIsosurface, Source},
+    plan::uniforms::{Frame, FrameClip, FrameField, FrameIsosurface, Source},
     splat::Splat,
 };
 use bytemuck::Zeroable;
@@ -62,6 +62,12 @@ impl Shader for u32 {
 impl Shader for FrameClip {
     fn name() -> String {
         "Clip".into()
+    }
+}
+
+impl Shader for FrameField {
+    fn name() -> String {
+        "Field".into()
     }
 }
 
@@ -119,11 +125,12 @@ impl Layout {
 fn mirrors() -> BTreeMap<&'static str, Layout> {
     let frame = layout!(Frame:
         size, tiles, center, scale, perspective, sheet_count, geometric_sheets, ratio_log2_inverse,
-        step_inverse, z_near, tile_shift, record_capacity, entry_capacity, field_axis_x,
-        field_axis_y, field_axis_z, field_origin, field_low, field_high, volume_shade,
-        surface_shade, certain, isotropic, transfer, gradients, table_starts, before, behind,
-        kernel, levels, sheet_normal, lattice, taps, shown, world_x, world_y, world_z, clips,
-        holes, isosurfaces,
+        step_inverse, z_near, tile_shift, record_capacity, entry_capacity, surface_shade,
+        sheet_normal, record_starts, world_x, world_y, world_z, clips, holes, fields,
+    );
+    let field = layout!(FrameField:
+        axis_x, axis_y, axis_z, origin, low, high, shade, certain, isotropic, transfer, gradients,
+        table_starts, before, behind, kernel, levels, lattice, taps, shown, isosurfaces,
     );
     let source = layout!(Source:
         axis_x, axis_y, axis_z, origin, covariance_a, covariance_b, lattice, slices, extent, count,
@@ -146,6 +153,7 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
     );
     [
         ("Frame", frame),
+        ("Field", field),
         ("Clip", layout!(FrameClip: low, high)),
         ("Isosurface", layout!(FrameIsosurface: value, color)),
         ("Source", source),

@@ -79,6 +79,7 @@ fn cases() -> Vec<Case> {
     all.extend([0.25, 9.0, 20.0].map(bricks));
     all.extend(scenes::facets::all());
     all.extend(scenes::gaussians::all());
+    all.extend(scenes::fields::all().into_iter().filter(|case| case.scene.beyond_gpu().is_none()));
     all
 }
 

@@ -9,12 +9,14 @@ use crate::gpu::{
         shaders,
         stage::Stage,
     },
-    scene::nodes::{NodeChunk, OWN_NODES, RUN_NODES, SLOT_NODES, counts_of},
+    scene::{
+        nodes::{NodeChunk, OWN_NODES, counts_of},
+        slots::SLOT_NODES,
+    },
 };
 
-// A workgroup of tally visits the nodes of one slot, and a whole number of workgroups of cut do so
-// together.
-const _: () = assert!(SLOT_NODES == 64 * RUN_NODES && SLOT_NODES.is_multiple_of(64 * OWN_NODES));
+// A workgroup visits the nodes of one slot.
+const _: () = assert!(SLOT_NODES == 64 * OWN_NODES);
 
 /// Counters of a tally: eight per octave, the first for a cut of 2⁻⁸ pixels (tally.wgsl).
 const TALLY_COUNT: usize = 256;
@@ -65,8 +67,8 @@ impl Cut {
         chunk: &NodeChunk<'_>,
     ) {
         let (nodes, list) = (chunk.nodes(), chunk.list());
-        let at_hand = chunk.slots.active() * SLOT_NODES;
-        let groups = at_hand / (64 * OWN_NODES);
+        let groups = chunk.slots.active();
+        let at_hand = groups * SLOT_NODES;
         let bound = [self.count.bind(gpu, 0, &nodes), self.count.bind(gpu, 1, &list[..3])];
         self.count.dispatch(encoder, &[&bound[0], &bound[1]], groups);
         scan.encode(gpu, encoder, &chunk.slots.counts, counts_of(at_hand));

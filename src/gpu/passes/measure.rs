@@ -31,6 +31,7 @@ impl Measure {
                 &constants,
                 shaders::FRAME,
                 shaders::NORMAL,
+                shaders::KEY,
                 shaders::FOOTPRINT,
                 source,
                 shaders::SPANS,

@@ -33,7 +33,8 @@ impl Order {
         let bindings = [Uniform, Uniform, Read, Write, Write, Write, Read, Read];
         let recipe = |label, entry, arguments: &[&[Binding]]| {
             let groups = [&[bindings.as_slice()], arguments].concat();
-            let sources = [&constants, shaders::FRAME, shaders::PROGRESS, shaders::ORDER];
+            let sources =
+                [&constants, shaders::FRAME, shaders::KEY, shaders::PROGRESS, shaders::ORDER];
             Recipe::new(label, &sources, entry, &groups)
         };
         [

@@ -30,6 +30,7 @@ impl Project {
                 &constants,
                 shaders::FRAME,
                 shaders::NORMAL,
+                shaders::KEY,
                 shaders::FOOTPRINT,
                 source,
                 shaders::BINS,

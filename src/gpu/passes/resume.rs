@@ -57,5 +57,6 @@ impl Resume {
     /// Continues the pass at which the frame stopped.
     pub fn encode_resume(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         Self::encode(&self.resume, gpu, encoder, targets);
+        targets.restore_record_starts(encoder);
     }
 }

@@ -34,6 +34,7 @@ pub const NORMAL: &str = include_str!("../../../shaders/shared/normal.wgsl");
 pub const VALUE: &str = include_str!("../../../shaders/shared/value.wgsl");
 pub const SAMPLE: &str = include_str!("../../../shaders/shared/sample.wgsl");
 pub const FOOTPRINT: &str = include_str!("../../../shaders/shared/footprint.wgsl");
+pub const KEY: &str = include_str!("../../../shaders/shared/key.wgsl");
 pub const SPLAT: &str = include_str!("../../../shaders/shared/splat.wgsl");
 pub const SPLATS: &str = include_str!("../../../shaders/shared/splats.wgsl");
 pub const SPANS: &str = include_str!("../../../shaders/shared/spans.wgsl");

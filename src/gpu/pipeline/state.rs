@@ -1,6 +1,7 @@
 //! The state of a frame on the GPU, field by field as in shaders/shared/state.wgsl, and the
 //! indirect dispatches of a depth pass.
 
+use crate::scene::Scene;
 use bytemuck::{Pod, Zeroable};
 
 /// Bytes of `Pass` in frame.wgsl.
@@ -25,9 +26,16 @@ pub struct State {
     pub tiles: u32,
     pub touched: u32,
     pub advanced: u32,
-    pub held: [u32; 8],
+    pub held: [u32; HELD_PASS_WORDS + Scene::MAX_FIELDS],
     pub unused: u32,
 }
+
+/// The words of a held pass before the first record words of the fields.
+const HELD_PASS_WORDS: usize = 8;
+
+/// Byte offset of the first record words of the fields in a held pass.
+pub const HELD_RECORD_STARTS: u64 =
+    (std::mem::offset_of!(State, held) + 4 * HELD_PASS_WORDS) as u64;
 
 /// The words `done` and `stalled`.
 pub const DONE_WORD: u32 = (std::mem::offset_of!(State, done) / 4) as u32;

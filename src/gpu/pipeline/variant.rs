@@ -22,8 +22,11 @@ pub struct Variant {
     /// The scene has scalars that are classified after interpolation (`classified`: before).
     pub scalar: bool,
     pub classified: bool,
-    /// The scalars lie on a lattice, possibly of one of the two kinds below; otherwise they are
-    /// scattered samples.
+    /// The number of fields, at least 1. A flag below is set if any field needs it.
+    pub fields: u32,
+    /// The scalars are scattered samples.
+    pub samples: bool,
+    /// The scalars lie on a lattice, possibly of one of the two kinds below.
     pub lattice: bool,
     pub body_centred: bool,
     pub rectilinear: bool,
@@ -40,6 +43,8 @@ pub struct Variant {
     pub facets: bool,
     /// Lattice samples are drawn with sections that do not depend on the pixel.
     pub isotropic: bool,
+    /// Samples are drawn with sections that depend on the pixel.
+    pub general: bool,
     /// The field's kernel has no closed form.
     pub table_kernel: bool,
     /// Samples may have values outside the range of the transfer function's table.
@@ -47,6 +52,7 @@ pub struct Variant {
     pub volume_shaded: bool,
     pub surface_shaded: bool,
     pub gradient_opacity: bool,
+    /// The largest number of isosurfaces of a field.
     pub isosurfaces: u32,
     /// Convex parts that the clips keep.
     pub clips: u32,
@@ -124,7 +130,6 @@ impl Variant {
     /// The constants that are true or false.
     fn flags(&self) -> [(&'static str, bool); 35] {
         let radiance = self.radiance || self.classified;
-        let samples = (self.scalar || self.classified) && !self.lattice;
         [
             ("PERSPECTIVE", self.perspective),
             ("SCALAR", self.scalar),
@@ -134,15 +139,15 @@ impl Variant {
             ("LATTICE", self.lattice),
             ("BODY_CENTRED", self.body_centred),
             ("RECTILINEAR", self.rectilinear),
-            ("SAMPLES", samples),
-            ("SLOPES", self.scalar && (samples || self.rectilinear)),
+            ("SAMPLES", self.samples),
+            ("SLOPES", self.scalar && (self.samples || self.rectilinear)),
             ("TWO_LEVELS", self.two_levels),
-            ("WEIGHTS", self.scalar && (samples || self.rectilinear || self.two_levels)),
+            ("WEIGHTS", self.scalar && (self.samples || self.rectilinear || self.two_levels)),
             ("SAMPLE_NORMALS", self.classified && self.surface_shaded),
             ("RADIANCE_PAYLOAD", radiance),
             ("TRAINED", self.trained),
             ("ISOTROPIC_RECORDS", self.isotropic),
-            ("GENERAL_RECORDS", radiance || self.facets || !self.isotropic),
+            ("GENERAL_RECORDS", radiance || self.facets || self.general),
             ("HAS_FACETS", self.facets),
             ("TABLE_KERNEL", self.table_kernel),
             ("BEYOND", self.beyond),
@@ -165,14 +170,15 @@ impl Variant {
     }
 
     /// The constants that are whole numbers.
-    fn counts(&self) -> [(&'static str, u32); 13] {
+    fn counts(&self) -> [(&'static str, u32); 14] {
         let parts = if self.parabola() { PARTS } else { 1 };
         // The cost of closing a sheet, in entries, against the driver's limit on iterations (see
         // docs/engine.md).
-        let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes))
-            .div_ceil(ENTRY_ITERATIONS);
+        let field = parts * (1 + self.isosurfaces) * (1 + self.holes);
+        let closing = (2 + self.rows * self.fields * field).div_ceil(ENTRY_ITERATIONS);
         let closing = closing + u32::from(self.gather);
         [
+            ("FIELDS", self.fields),
             ("ISOSURFACES", self.isosurfaces),
             ("PARTS", parts),
             ("CLIPS", self.clips),

@@ -9,10 +9,9 @@
 
 use crate::{
     Result,
-    bricks::{BLOCK, BLOCKS, BRICK_BLOCKS, Brick, Bricks, Choice, EMPTY, SIDE, slot_bytes},
+    bricks::{BLOCK, BLOCKS, BRICK_BLOCKS, Bricks, Choice, EMPTY, SIDE, slot_bytes},
     gpu::device::{Gpu, buffers::buffer},
     math::Kernel,
-    parallel::prelude::*,
 };
 use std::{collections::HashMap, sync::Arc};
 use wgpu::BufferUsages as Usage;
@@ -117,6 +116,8 @@ pub enum Listed {
 pub struct BrickCache {
     pub bricks: Arc<Bricks>,
     pub kernel: Kernel,
+    /// The index of the item in the scene.
+    pub item: usize,
     /// Bricks read so far.
     pub reads: u64,
     /// What the lists on the GPU show; `None` if that is not certain.
@@ -137,10 +138,11 @@ pub struct BrickCache {
 }
 
 impl BrickCache {
-    pub fn new(bricks: &Arc<Bricks>, kernel: &Kernel) -> Self {
+    pub fn new(bricks: &Arc<Bricks>, kernel: &Kernel, item: usize) -> Self {
         Self {
             bricks: bricks.clone(),
             kernel: kernel.clone(),
+            item,
             reads: 0,
             drawn: None,
             fitting: None,
@@ -235,10 +237,7 @@ impl BrickCache {
         let mut places = places.into_iter();
         let bytes = self.bricks.brick_bytes();
         for batch in absent.chunks(BATCH) {
-            let read: Vec<Brick> = batch
-                .par_iter()
-                .map(|&(level, brick)| self.bricks.read(level, brick))
-                .collect::<Result<_>>()?;
+            let read = self.bricks.read_all(batch)?;
             for ((&key, brick), slot) in batch.iter().zip(read).zip(&mut places) {
                 if let Some((old, _)) = self.slots[slot].replace((key, self.update)) {
                     self.slot_of.remove(&old);

@@ -28,20 +28,17 @@ pub const WORKGROUP_CANDIDATES: u32 = 64 * RUN;
 /// The source of a chunk's candidates.
 #[derive(Debug)]
 pub enum Origin {
-    Splats {
-        set: Arc<SplatSet>,
-        /// The index of the item in the scene.
-        item: usize,
-    },
+    Splats(Arc<SplatSet>),
     Facets {
         set: Arc<FacetSet>,
         /// Whether the view leaves out backs.
         is_culled: bool,
-        /// The index of the item in the scene.
-        item: usize,
     },
     /// Slots for pages of the hierarchy with this number.
-    Nodes { page_cache: usize, slots: Box<Slots> },
+    Nodes {
+        page_cache: usize,
+        slots: Box<Slots>,
+    },
     Lattice {
         volume: Arc<Volume>,
         kernel: Kernel,
@@ -52,13 +49,20 @@ pub enum Origin {
         places: wgpu::Buffer,
     },
     /// The bricks of one level that lie in a chunk of slots.
-    Bricks { bricks: Arc<Bricks>, kernel: Kernel, slab: Box<Slab>, level: usize },
+    Bricks {
+        bricks: Arc<Bricks>,
+        kernel: Kernel,
+        slab: Box<Slab>,
+        level: usize,
+    },
 }
 
 /// A part of an item that fits a binding.
 #[derive(Debug)]
 pub struct Chunk {
     pub origin: Origin,
+    /// The index of the item in the scene.
+    pub item: usize,
     /// Splats (48 bytes each), facets (60 bytes), or samples in their own type.
     pub data: wgpu::Buffer,
     pub uniform: wgpu::Buffer,
@@ -86,7 +90,7 @@ impl Chunk {
             Origin::Lattice { selection, .. } => selection.selected.size(),
             Origin::Bricks { slab, .. } => slab.selected.size(),
             Origin::Nodes { slots, .. } => slots.bytes(),
-            Origin::Splats { .. } | Origin::Facets { .. } => 0,
+            Origin::Splats(_) | Origin::Facets { .. } => 0,
         };
         selected + self.spans.size()
     }
@@ -98,8 +102,8 @@ impl Chunk {
                 let header = page_caches[*page_cache].hierarchy.header();
                 Source::of_nodes(view, header)
             }
-            Origin::Splats { set, .. } => Source::of_splats(view, set),
-            Origin::Facets { set, is_culled, .. } => Source::of_facets(view, set, *is_culled),
+            Origin::Splats(set) => Source::of_splats(view, set),
+            Origin::Facets { set, is_culled } => Source::of_facets(view, set, *is_culled),
             Origin::Bricks { bricks, kernel, slab, level } => {
                 let lattice = bricks.lattice(*level);
                 let [width, height, depth] = lattice.dims.map(|n| n as u32);

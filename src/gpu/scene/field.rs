@@ -297,11 +297,12 @@ impl Field {
         }
         gpu.queue.write_buffer(&self.buffer, 4 * bits as u64, bytemuck::cast_slice(&tail));
         let [width, height, depth] = self.volume.lattice.dims.map(|n| n as u32);
-        frame.lattice = [width, height, depth, 0];
+        let field = &mut frame.fields[0];
+        field.lattice = [width, height, depth, 0];
         let per_variance = 1.0 / (self.sigma * self.sigma);
         let weight = |steps: f64| (-0.5 * steps * steps * per_variance).exp() as f32;
-        frame.taps = [per_variance as f32, weight(1.0), weight(2.0), 0.0];
-        frame.shown = [starts[0] as u32, starts[1] as u32, starts[2] as u32, words as u32];
+        field.taps = [per_variance as f32, weight(1.0), weight(2.0), 0.0];
+        field.shown = [starts[0] as u32, starts[1] as u32, starts[2] as u32, words as u32];
         let (last, window) = (sheets.count() as u32 + 1, variant.gathered_sheets());
         let windows = (1..last).step_by(window as usize).map(|first| {
             let end = first.saturating_add(window).min(last);
@@ -321,9 +322,9 @@ impl Field {
 /// Returns, for each entry of the transfer function's table and for one behind the last, how many
 /// entries before it show something.
 fn visible_before(variant: &Variant, table: &[[f32; 4]], frame: &Frame) -> Vec<u32> {
-    let [_, _, last, place] = frame.transfer;
+    let [_, _, last, place] = frame.field().transfer;
     let mut shows: Vec<bool> = table[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
-    for surface in &frame.isosurfaces[..variant.isosurfaces as usize] {
+    for surface in &frame.field().isosurfaces[..variant.isosurfaces as usize] {
         let at = (surface.value[0] + place).clamp(0.0, last) as usize;
         let end = (at + 2).min(shows.len());
         shows[at..end].fill(true);

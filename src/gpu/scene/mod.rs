@@ -1,7 +1,7 @@
 //! The data of a scene on the GPU. `prepared` holds a scene, divided into the chunks of `chunk`,
-//! each of which fits a binding. `nodes` and `bricks` cache the pages of hierarchies and the bricks
-//! of volumes, `field` holds a gathered lattice, and `select` and `select_bricks` list visible
-//! samples.
+//! each of which fits a binding. `nodes` caches the pages of hierarchies in the slots of `slots`,
+//! and `bricks` the bricks of volumes. `field` holds a gathered lattice, and `select` and
+//! `select_bricks` list visible samples.
 
 pub(crate) mod bricks;
 pub(crate) mod chunk;
@@ -10,5 +10,6 @@ pub(crate) mod nodes;
 mod prepared;
 pub(crate) mod select;
 pub(crate) mod select_bricks;
+pub(crate) mod slots;
 
 pub use prepared::PreparedScene;

@@ -5,14 +5,15 @@
 //! They take free slots, or the slots of pages that no recent view needed. If there is no capacity
 //! for more pages, the nodes above them are drawn instead.
 
+use super::slots::{Part, SLOT_NODES, SlotTable, slots_for};
 use crate::{
     Result,
     gaussians::{Colors, Eye},
     gpu::device::{Gpu, buffers::buffer},
     hierarchy::{
         self, CutSphere, Hierarchy, Node,
-        file::{PAGE_NODES, Page},
-        needed::{Needed, parents_around},
+        file::Page,
+        needed::{self, Needed, needed, parents_around},
         trained,
     },
     math::View,
@@ -24,6 +25,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use std::{
     collections::HashMap,
+    ops::Range,
     sync::{
         Arc,
         atomic::{AtomicU32, Ordering::Relaxed},
@@ -34,14 +36,11 @@ use wgpu::BufferUsages as Usage;
 /// Nodes of a batch (`SELECT_RUN` in nodes.wgsl).
 pub const RUN_NODES: u32 = 64;
 
-/// Invocations that share a batch (`SHARERS` in cut.wgsl).
+/// Invocations that share a batch (`SHARERS` in nodes.wgsl).
 const SHARERS: u32 = 8;
 
 /// Nodes of a batch for each of these invocations.
 pub const OWN_NODES: u32 = RUN_NODES / SHARERS;
-
-/// Nodes of a slot (`SLOT_NODES` in nodes.wgsl), as many as the largest page has.
-pub const SLOT_NODES: u32 = PAGE_NODES as u32;
 
 /// Maximum number of slots in a chunk: the number of a node has 22 bits in cut.wgsl's list.
 const MOST_SLOTS: u64 = (1 << 22) / SLOT_NODES as u64;
@@ -171,35 +170,28 @@ pub struct Growth {
 #[derive(Debug)]
 pub struct PageCache {
     pub hierarchy: Arc<Hierarchy>,
+    /// The index of the item in the scene.
+    pub item: usize,
     resident: wgpu::Buffer,
     cut: wgpu::Buffer,
-    /// The page in each slot, and the last frame that needed it.
-    slots: Vec<Option<(u32, u64)>>,
-    /// The slot of each page.
-    slot_of: Vec<Option<u32>>,
-    needed: Needed,
+    table: SlotTable,
     /// The pages in slots, of trained Gaussians: their colours change with the eye.
     trained: HashMap<u32, Trained>,
-    /// The eye that the splats in the slots are coloured for.
-    eye: Option<Eye>,
-    frame: u64,
-    /// Pages that the last view needed but that found no slot.
+    /// Pages that the last view needed but that found too few slots.
     pub missing: usize,
 }
 
 impl PageCache {
-    pub fn new(gpu: &Gpu, hierarchy: &Arc<Hierarchy>) -> Self {
-        let pages = hierarchy.pages().len();
+    pub fn new(gpu: &Gpu, hierarchy: &Arc<Hierarchy>, item: usize) -> Self {
+        // One bit a page.
+        let resident = u64::from(hierarchy.page_count().div_ceil(32)) * 4;
         Self {
             hierarchy: hierarchy.clone(),
-            resident: buffer(gpu, "resident pages", pages.div_ceil(32) as u64 * 4, Usage::STORAGE),
+            item,
+            resident: buffer(gpu, "resident pages", resident, Usage::STORAGE),
             cut: buffer(gpu, "cut", size_of::<GpuCut>() as u64, Usage::UNIFORM),
-            slots: Vec::new(),
-            slot_of: vec![None; pages],
-            needed: Needed::new(hierarchy),
+            table: SlotTable::default(),
             trained: HashMap::new(),
-            eye: None,
-            frame: 0,
             missing: 0,
         }
     }
@@ -212,13 +204,14 @@ impl PageCache {
     }
 
     /// Returns the pages that a cut may need, coarse pages first, with all pages above them.
-    pub fn needed(&self, cut: &hierarchy::Cut) -> Vec<u32> {
-        self.needed.of(&self.hierarchy, cut)
+    pub fn needed(&self, cut: &hierarchy::Cut) -> Result<Vec<Needed>> {
+        needed(&self.hierarchy, cut)
     }
 
     /// Returns the finest cut, in pixels, whose pages contain at most `most` nodes.
-    pub fn finest_within(&self, view: &View, settings: &Settings, most: u64) -> f64 {
-        self.needed.finest_within(&self.hierarchy, most, |pixels| self.cut(view, settings, pixels))
+    pub fn finest_within(&self, view: &View, settings: &Settings, most: u64) -> Result<f64> {
+        let cut = |pixels| self.cut(view, settings, pixels);
+        needed::finest_within(&self.hierarchy, most, cut)
     }
 
     /// Sets the cut without loading pages.
@@ -247,29 +240,21 @@ impl PageCache {
         room: u64,
         chunks: &[(&Slots, &wgpu::Buffer)],
     ) -> Result<Vec<Growth>> {
-        self.frame += 1;
+        self.table.begin();
         self.set_cut(gpu, cut);
-        let is_new_eye = self.eye.replace(eye) != Some(eye);
-        let mut needed = self.needed(cut);
-        let most = usize::try_from(room / SLOT_BYTES).unwrap_or(usize::MAX).max(1);
-        self.missing = needed.len().saturating_sub(most);
-        needed.truncate(most);
-        let mut absent = Vec::new();
-        for &page in &needed {
-            match self.slot_of[page as usize] {
-                Some(slot) => self.slots[slot as usize] = Some((page, self.frame)),
-                None => absent.push(page),
-            }
-        }
-        if is_new_eye {
-            self.recolor(gpu, eye, chunks);
-        }
-        let free = self.slots.iter().filter(|slot| slot.is_none()).count();
-        let held = self.slots.len();
+        let mut needed = self.needed(cut)?;
+        let most = self.fit(&mut needed, usize::try_from(room / SLOT_BYTES).unwrap_or(usize::MAX));
+        let absent: Vec<Needed> =
+            needed.into_iter().filter(|own| !self.table.need(own.page)).collect();
+        self.recolor(gpu, eye, chunks);
+        let wanted: usize = absent.iter().map(|own| slots_for(own.nodes)).sum();
+        let held = self.table.len();
         let mut grown = Vec::new();
-        while self.slots.len() < most && free + grown_slots(&grown) < absent.len() {
-            let wanted = absent.len() - free - grown_slots(&grown);
-            grown.push(self.grow(gpu, wanted, most - self.slots.len()));
+        while self.table.len() < most && self.table.free() < wanted {
+            grown.push(self.grow(gpu, wanted - self.table.free(), most - self.table.len()));
+        }
+        for page in self.table.make_room(wanted) {
+            self.trained.remove(&page);
         }
         let all: Vec<(&Slots, &wgpu::Buffer)> = chunks
             .iter()
@@ -277,22 +262,36 @@ impl PageCache {
             .chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats)))
             .collect();
         if let Err(error) = self.load(gpu, &absent, eye, &all) {
-            // Drop the added chunks and the pages in them.
-            for (page, _) in self.slots.drain(held..).flatten() {
-                self.slot_of[page as usize] = None;
-            }
+            self.table.shrink(held);
             return Err(error);
         }
         self.describe(gpu, &all);
         Ok(grown)
     }
 
-    /// Returns a chunk with slots for about `wanted` more pages, and at most `most`.
+    /// Shortens a list of pages to those that fit into `room` slots, but never below one. Returns
+    /// the number of slots that the hierarchy may take.
+    fn fit(&mut self, needed: &mut Vec<Needed>, room: usize) -> usize {
+        let most = room.max(needed.first().map_or(1, |own| slots_for(own.nodes)));
+        let mut taken = 0;
+        let mut fits = |own: &Needed| {
+            taken += slots_for(own.nodes);
+            taken <= most
+        };
+        let count = needed.iter().take_while(|own| fits(own)).count();
+        self.missing = needed.len() - count;
+        needed.truncate(count);
+        most
+    }
+
+    /// Returns a chunk of about `wanted` more slots, and at most `most`.
     fn grow(&mut self, gpu: &Gpu, wanted: usize, most: usize) -> Growth {
         let most = most.min((gpu.binding_size() / SLOT_HALF).min(MOST_SLOTS) as usize);
         // Nearby views need a few more pages. The last chunk of a small file need not be larger
         // than the file.
-        let left = self.slot_of.len() - self.slots.len().min(self.slot_of.len());
+        let pages = self.hierarchy.page_count() as usize;
+        let all = (self.hierarchy.header().nodes / u64::from(SLOT_NODES)) as usize + pages;
+        let left = all.saturating_sub(self.table.len());
         let count = (wanted + wanted / 4 + 1).min(left.max(1)).max(wanted).min(most);
         let capacity = count as u32 * SLOT_NODES;
         let half = count as u64 * SLOT_HALF;
@@ -306,71 +305,41 @@ impl PageCache {
             arguments: buffer(gpu, "drawn arguments", 12, Usage::STORAGE | Usage::INDIRECT),
             resident: self.resident.clone(),
             cut: self.cut.clone(),
-            first_slot: self.slots.len(),
+            first_slot: self.table.len(),
             count,
             active: AtomicU32::new(0),
         };
-        self.slots.extend(std::iter::repeat_n(None, count));
+        self.table.grow(count);
         Growth { slots, splats: buffer(gpu, "node splats", half, Usage::STORAGE), capacity }
     }
 
-    /// Reads pages into free slots, or into the slots whose pages have been unused for longest.
+    /// Reads pages into free slots.
     fn load(
         &mut self,
         gpu: &Gpu,
-        absent: &[u32],
+        absent: &[Needed],
         eye: Eye,
         chunks: &[(&Slots, &wgpu::Buffer)],
     ) -> Result<()> {
-        let mut places: Vec<u32> = (0..self.slots.len() as u32).collect();
-        let last_needed = |slot: &u32| self.slots[*slot as usize].map_or(0, |(_, frame)| frame);
-        places.retain(|slot| last_needed(slot) < self.frame);
-        places.sort_by_key(last_needed);
-        let mut places = places.into_iter();
         for batch in absent.chunks(BATCH) {
-            let pages: Vec<Page> = batch
-                .par_iter()
-                .map(|&page| self.hierarchy.read_page(page))
-                .collect::<Result<_>>()?;
-            for (&page, content) in batch.iter().zip(&pages) {
-                let Some(slot) = places.next() else {
+            let numbers: Vec<u32> = batch.iter().map(|own| own.page).collect();
+            let pages: Vec<Page> = self.hierarchy.read_pages(&numbers)?;
+            for (&own, content) in batch.iter().zip(&pages) {
+                let Some(slots) = self.table.place(own) else {
                     self.missing += 1;
                     continue;
                 };
-                if let Some((old, _)) = self.slots[slot as usize] {
-                    self.slot_of[old as usize] = None;
-                    self.trained.remove(&old);
-                }
-                self.slots[slot as usize] = Some((page, self.frame));
-                self.slot_of[page as usize] = Some(slot);
-                let holder = chunks.iter().find(|(s, _)| {
-                    (s.first_slot..s.first_slot + s.count).contains(&(slot as usize))
-                });
-                let Some((slots, splats)) = holder else { continue };
-                let place = (slot as usize - slots.first_slot) as u64;
-                let nodes: Vec<GpuNode> =
-                    (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
-                let own: Vec<Splat> = match Trained::of(content) {
+                let splats = match Trained::of(content) {
                     None => content.nodes.iter().map(|node| node.splat).collect(),
-                    Some(trained) => {
-                        let seen = trained.seen(eye, self.hierarchy.header().origin);
-                        self.trained.insert(page, trained);
+                    Some(mut trained) => {
+                        trained.eye = Some(eye);
+                        let all = 0..content.nodes.len();
+                        let seen = trained.seen(all, eye, self.hierarchy.header().origin);
+                        self.trained.insert(own.page, trained);
                         seen
                     }
                 };
-                let runs = (0..content.nodes.len()).step_by(RUN_NODES as usize);
-                let bounds: Vec<GpuBounds> = runs.map(|first| run_bounds(content, first)).collect();
-                gpu.queue.write_buffer(
-                    &slots.nodes,
-                    place * SLOT_HALF,
-                    bytemuck::cast_slice(&nodes),
-                );
-                gpu.queue.write_buffer(
-                    &slots.bounds,
-                    place * SLOT_BOUNDS,
-                    bytemuck::cast_slice(&bounds),
-                );
-                gpu.queue.write_buffer(splats, place * SLOT_HALF, bytemuck::cast_slice(&own));
+                upload(gpu, content, &splats, &slots, chunks);
             }
             // Writes wait in staging memory until the next submission.
             gpu.queue.submit([]);
@@ -378,42 +347,46 @@ impl PageCache {
         Ok(())
     }
 
-    /// Uploads the pages of trained Gaussians that take part in this frame, as an eye sees them.
-    fn recolor(&self, gpu: &Gpu, eye: Eye, chunks: &[(&Slots, &wgpu::Buffer)]) {
+    /// Uploads the pages of trained Gaussians that take part in this frame and that were uploaded
+    /// as another eye sees them.
+    fn recolor(&mut self, gpu: &Gpu, eye: Eye, chunks: &[(&Slots, &wgpu::Buffer)]) {
         let origin = self.hierarchy.header().origin;
         for (slots, splats) in chunks {
-            let own = &self.slots[slots.first_slot..slots.first_slot + slots.count];
-            let taking_part = (0u64..).zip(own).filter_map(|(place, slot)| match slot {
-                Some((page, frame)) if *frame == self.frame => {
-                    Some((place, self.trained.get(page)?))
-                }
-                _ => None,
+            let parts = self.table.parts(slots.first_slot, slots.count);
+            let stale = parts.filter_map(|(place, part)| {
+                let page = self.trained.get(&part.page).filter(|page| page.eye != Some(eye))?;
+                Some((place, part, page))
             });
-            let taking_part: Vec<(u64, &Trained)> = taking_part.collect();
-            let seen = |(place, page): &(u64, &Trained)| (*place, page.seen(eye, origin));
-            let seen: Vec<(u64, Vec<Splat>)> = taking_part.par_iter().map(seen).collect();
+            let stale: Vec<(u32, Part, &Trained)> = stale.collect();
+            let seen = |(place, part, page): &(u32, Part, &Trained)| {
+                let own = part.first as usize..(part.first + part.nodes) as usize;
+                (*place, page.seen(own, eye, origin))
+            };
+            let seen: Vec<(u32, Vec<Splat>)> = stale.par_iter().map(seen).collect();
             for (place, own) in seen {
-                gpu.queue.write_buffer(splats, place * SLOT_HALF, bytemuck::cast_slice(&own));
+                let at = u64::from(place) * SLOT_HALF;
+                gpu.queue.write_buffer(splats, at, bytemuck::cast_slice(&own));
+            }
+        }
+        for page in self.table.needed() {
+            if let Some(trained) = self.trained.get_mut(&page) {
+                trained.eye = Some(eye);
             }
         }
     }
 
     /// Uploads which pages take part in this frame, and which are loaded.
     fn describe(&self, gpu: &Gpu, chunks: &[(&Slots, &wgpu::Buffer)]) {
-        let mut bits = vec![0u32; self.slot_of.len().div_ceil(32)];
+        let mut bits = vec![0u32; self.hierarchy.page_count().div_ceil(32) as usize];
         // Loaded pages that the view does not need, or that exceed its capacity, count as absent.
-        for (page, _) in self.slots.iter().flatten().filter(|(_, frame)| *frame == self.frame) {
-            bits[*page as usize / 32] |= 1 << (page % 32);
+        for page in self.table.needed() {
+            bits[page as usize / 32] |= 1 << (page % 32);
         }
         gpu.queue.write_buffer(&self.resident, 0, bytemuck::cast_slice(&bits));
         for (slots, _) in chunks {
-            let own = &self.slots[slots.first_slot..slots.first_slot + slots.count];
-            let nodes = |page: u32| self.hierarchy.pages()[page as usize].nodes;
-            let taking_part = (0..).zip(own).filter_map(|(number, slot)| match slot {
-                Some((page, frame)) if *frame == self.frame => Some([number, nodes(*page)]),
-                _ => None,
-            });
-            let mut active: Vec<[u32; 2]> = taking_part.collect();
+            let parts = self.table.parts(slots.first_slot, slots.count);
+            let mut active: Vec<[u32; 2]> =
+                parts.map(|(number, part)| [number, part.nodes]).collect();
             if active.is_empty() {
                 // An empty list must be made as well.
                 active.push([0, 0]);
@@ -424,12 +397,43 @@ impl PageCache {
     }
 }
 
+/// Uploads a page, with its splats as they are drawn, into slots of these chunks.
+fn upload(
+    gpu: &Gpu,
+    page: &Page,
+    splats: &[Splat],
+    slots: &[u32],
+    chunks: &[(&Slots, &wgpu::Buffer)],
+) {
+    for (number, &slot) in slots.iter().enumerate() {
+        let slot = slot as usize;
+        let holds = |(own, _): &&(&Slots, &wgpu::Buffer)| {
+            (own.first_slot..own.first_slot + own.count).contains(&slot)
+        };
+        let Some((own, splats_of)) = chunks.iter().find(holds) else { continue };
+        let place = (slot - own.first_slot) as u64;
+        let first = number * SLOT_NODES as usize;
+        let nodes = first..page.nodes.len().min(first + SLOT_NODES as usize);
+        let write = |to: &wgpu::Buffer, size: u64, bytes: &[u8]| {
+            gpu.queue.write_buffer(to, place * size, bytes);
+        };
+        let runs = nodes.clone().step_by(RUN_NODES as usize);
+        let bounds: Vec<GpuBounds> = runs.map(|first| run_bounds(page, first)).collect();
+        write(&own.bounds, SLOT_BOUNDS, bytemuck::cast_slice(&bounds));
+        write(splats_of, SLOT_HALF, bytemuck::cast_slice(&splats[nodes.clone()]));
+        let nodes: Vec<GpuNode> = nodes.map(|index| gpu_node(page, index)).collect();
+        write(&own.nodes, SLOT_HALF, bytemuck::cast_slice(&nodes));
+    }
+}
+
 /// The splats of a page of trained Gaussians, and their colours.
 #[derive(Debug)]
 struct Trained {
     splats: Vec<Splat>,
     are_leaves: Vec<bool>,
     colors: Colors,
+    /// The eye that the splats in the slots are coloured for.
+    eye: Option<Eye>,
 }
 
 impl Trained {
@@ -439,22 +443,19 @@ impl Trained {
             splats: page.nodes.iter().map(|node| node.splat).collect(),
             are_leaves: page.nodes.iter().map(Node::is_leaf).collect(),
             colors: page.colors.clone()?,
+            eye: None,
         })
     }
 
-    /// Returns the splats as an eye sees them; `origin` is that of their positions.
-    fn seen(&self, eye: Eye, origin: DVec3) -> Vec<Splat> {
-        let both = self.splats.iter().zip(&self.are_leaves).enumerate();
-        both.map(|(index, (splat, is_leaf))| {
+    /// Returns a range of the splats as an eye sees them; `origin` is that of their positions.
+    fn seen(&self, own: Range<usize>, eye: Eye, origin: DVec3) -> Vec<Splat> {
+        own.map(|index| {
+            let (splat, is_leaf) = (&self.splats[index], self.are_leaves[index]);
             let place = origin + Vec3::from(splat.center).as_dvec3();
-            trained::drawn(splat, *is_leaf, 1.0, self.colors.seen(index, eye.toward(place)))
+            trained::drawn(splat, is_leaf, 1.0, self.colors.seen(index, eye.toward(place)))
         })
         .collect()
     }
-}
-
-fn grown_slots(grown: &[Growth]) -> usize {
-    grown.iter().map(|growth| growth.slots.count).sum()
 }
 
 /// Returns the bounds of the parents of a batch of nodes, as the shader reads them.

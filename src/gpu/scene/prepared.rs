@@ -27,7 +27,7 @@ use crate::{
     scene::{Item, Optics, Scene, Settings},
     splat::{Splat, SplatSet},
     volume::{
-        Arrangement, Lattice, Samples, TransferFunction, Volume,
+        Arrangement, Lattice, TransferFunction, Volume,
         reach::{EVERYTHING, first_visible},
     },
 };
@@ -145,15 +145,15 @@ impl PreparedScene {
                 Item::Gaussians(set) => prepared.seen.push(SeenSet::new(number, set)),
                 Item::Facets(set) => prepared.add_facets(gpu, set, number),
                 Item::Hierarchy(hierarchy) => {
-                    prepared.page_caches.push(PageCache::new(gpu, hierarchy));
+                    prepared.page_caches.push(PageCache::new(gpu, hierarchy, number));
                 }
                 // Other volumes are uploaded when a picture first gathers or scatters them.
                 Item::Volume(volume, kernel, _) if unsuited(volume, kernel).is_some() => {
-                    prepared.add_volume(gpu, volume, kernel.clone())?;
+                    prepared.add_volume(gpu, volume, kernel.clone(), number)?;
                 }
                 Item::Volume(..) | Item::Cells(..) => {}
                 Item::Bricks(bricks, kernel, _) => {
-                    prepared.brick_cache = Some(BrickCache::new(bricks, kernel));
+                    prepared.brick_cache = Some(BrickCache::new(bricks, kernel, number));
                 }
             }
         }
@@ -226,29 +226,21 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Uploads the samples of a volume that is scattered for the first time.
-    fn bring_lattice(&mut self, gpu: &Gpu) -> Result<()> {
-        if self.chunks.iter().any(|chunk| matches!(chunk.origin, Origin::Lattice { .. })) {
-            return Ok(());
-        }
-        for item in self.scene.items.clone() {
+    /// Uploads the samples of volumes that are scattered for the first time.
+    fn bring_lattices(&mut self, gpu: &Gpu) -> Result<()> {
+        let items = self.scene.items.iter().enumerate();
+        let is_missing = |(number, item): &(usize, &Item)| {
+            matches!(item, Item::Volume(..))
+                && self.chunks.iter().all(|chunk| chunk.item != *number)
+        };
+        let missing = items.filter(is_missing).map(|(number, item)| (number, item.clone()));
+        for (number, item) in missing.collect::<Vec<_>>() {
             if let Item::Volume(volume, kernel, _) = &item {
                 gpu.check_memory(self.bytes + bytes_of(&item))?;
-                self.add_volume(gpu, volume, kernel.clone())?;
+                self.add_volume(gpu, volume, kernel.clone(), number)?;
             }
         }
-        self.order_chunks();
         Ok(())
-    }
-
-    /// Sorts the chunks. Sums depend on the order of the splats, which must not depend on earlier
-    /// views.
-    fn order_chunks(&mut self) {
-        self.chunks.sort_by_key(|chunk| match &chunk.origin {
-            Origin::Splats { item, .. } | Origin::Facets { item, .. } => *item,
-            Origin::Lattice { .. } => usize::MAX - 1,
-            _ => usize::MAX,
-        });
     }
 
     /// Lists the visible samples of lattices again if others have become visible. `all` lists all
@@ -260,17 +252,18 @@ impl PreparedScene {
         view: &View,
         all: bool,
     ) -> Result<()> {
-        let shown = self.scene.items.iter().find_map(|item| match item {
-            Item::Volume(..) if all => Some(EVERYTHING),
-            Item::Volume(volume, _, transfer) => Some(first_visible(transfer, volume.range)),
-            _ => None,
-        });
-        let Some(shown) = shown else { return Ok(()) };
-        self.bring_lattice(gpu)?;
+        if !self.scene.items.iter().any(|item| matches!(item, Item::Volume(..))) {
+            return Ok(());
+        }
+        self.bring_lattices(gpu)?;
         for chunk in &mut self.chunks {
             let (source, before) =
                 (chunk.source(view, false, &self.page_caches), chunk.list_bytes());
-            let Origin::Lattice { selection, .. } = &mut chunk.origin else { continue };
+            let Origin::Lattice { volume, selection, .. } = &mut chunk.origin else { continue };
+            let shown = match self.scene.items[chunk.item].transfer() {
+                Some(transfer) if !all => first_visible(transfer, volume.range),
+                _ => EVERYTHING,
+            };
             if selection.is_for(&shown) {
                 continue;
             }
@@ -304,6 +297,7 @@ impl PreparedScene {
         }
         let grown = brick_cache.update(gpu, choice, room.bytes)?;
         let (bricks, kernel) = (brick_cache.bricks.clone(), brick_cache.kernel.clone());
+        let item = brick_cache.item;
         for samples in grown {
             // One chunk for each of two levels: they share the slots.
             for part in 0..2 {
@@ -311,7 +305,7 @@ impl PreparedScene {
                 self.bytes += slab.bytes();
                 let (bricks, kernel, data) = (bricks.clone(), kernel.clone(), samples.data.clone());
                 let origin = Origin::Bricks { bricks, kernel, slab, level: 0 };
-                self.push_chunk(gpu, origin, data, samples.capacity());
+                self.push_chunk(gpu, item, origin, data, samples.capacity());
             }
             // Both chunks have counted the samples, but neither the ranges.
             self.bytes += samples.ranges.size();
@@ -334,7 +328,7 @@ impl PreparedScene {
         let held = self.chunks.iter().map(|chunk| match &chunk.origin {
             Origin::Nodes { .. } => chunk.data.size() + chunk.list_bytes(),
             Origin::Bricks { slab, .. } => slab.slots.size() + chunk.list_bytes(),
-            Origin::Splats { .. } | Origin::Facets { .. } | Origin::Lattice { .. } => 0,
+            Origin::Splats(_) | Origin::Facets { .. } | Origin::Lattice { .. } => 0,
         });
         let slots = self.brick_cache.as_ref().map_or(0, BrickCache::bytes);
         let readers = self.page_caches.len() + usize::from(self.brick_cache.is_some());
@@ -389,14 +383,30 @@ impl PreparedScene {
         Ok(Listed::All)
     }
 
-    /// Numbers the batches of candidates through all chunks. One number stays free before the
-    /// batches of each chunk (active.wgsl).
+    /// Sorts the chunks, and numbers the batches of candidates through all of them. Sums depend on
+    /// the order of the splats, which must not depend on earlier views. The chunks of fields lie
+    /// behind the others, field by field, and so do their records (`record_starts` in frame.wgsl).
+    /// One number stays free before the batches of each chunk (active.wgsl).
     fn number_runs(&mut self) {
+        let items = &self.scene.items;
+        self.chunks.sort_by_key(|chunk| (items[chunk.item].transfer().is_some(), chunk.item));
         self.runs = 0;
         for chunk in &mut self.chunks {
             chunk.first_run = self.runs + 1;
             self.runs += runs_of(chunk.candidates);
         }
+    }
+
+    /// Returns the first batch of candidates of each field. A field without chunks has the first
+    /// batch of the next field that has some, or the number of all batches.
+    pub(crate) fn first_runs(&self) -> Vec<u32> {
+        let items = &self.scene.items;
+        let first = |field: usize| {
+            let is_from =
+                |chunk: &&Chunk| chunk.item >= field && items[chunk.item].transfer().is_some();
+            self.chunks.iter().find(is_from).map_or(self.runs, |chunk| chunk.first_run)
+        };
+        self.scene.fields().into_iter().map(first).collect()
     }
 
     /// Uploads the splats that a view shows of the sets with levels of detail. `pixels` is as in
@@ -405,7 +415,6 @@ impl PreparedScene {
         let mut levels = std::mem::take(&mut self.levels);
         let done = levels.iter_mut().try_for_each(|own| self.update_level(gpu, own, view, pixels));
         self.levels = levels;
-        self.order_chunks();
         self.number_runs();
         done
     }
@@ -426,12 +435,7 @@ impl PreparedScene {
         if own.set.as_ref().is_some_and(|shown| Arc::ptr_eq(shown, &set)) {
             return Ok(());
         }
-        let is_old = |chunk: &Chunk| {
-            matches!(
-                &chunk.origin,
-                Origin::Splats { item, .. } if *item == own.item
-            )
-        };
+        let is_old = |chunk: &Chunk| chunk.item == own.item;
         self.bytes -=
             self.chunks.iter().filter(|chunk| is_old(chunk)).map(Chunk::bytes).sum::<u64>();
         self.chunks.retain(|chunk| !is_old(chunk));
@@ -448,7 +452,6 @@ impl PreparedScene {
         let mut seen = std::mem::take(&mut self.seen);
         let done = seen.iter_mut().try_for_each(|own| self.update_seen_set(gpu, own, eye));
         self.seen = seen;
-        self.order_chunks();
         self.number_runs();
         done
     }
@@ -474,11 +477,8 @@ impl PreparedScene {
         let splats: Vec<Splat> = drawn.splats.par_iter().zip(&own.order).map(colored).collect();
         let mut rest = &splats[..];
         for chunk in &self.chunks {
-            let (Origin::Splats { item, .. }, count) = (&chunk.origin, chunk.count as usize) else {
-                continue;
-            };
-            if *item == own.item {
-                let (part, behind) = rest.split_at(count);
+            if chunk.item == own.item {
+                let (part, behind) = rest.split_at(chunk.count as usize);
                 gpu.queue.write_buffer(&chunk.data, 0, bytemuck::cast_slice(part));
                 rest = behind;
             }
@@ -489,29 +489,35 @@ impl PreparedScene {
     fn add_splats(&mut self, gpu: &Gpu, set: &Arc<SplatSet>, item: usize) {
         let most = (gpu.binding_size() / size_of::<Splat>() as u64) as usize;
         for splats in set.splats.chunks(most) {
-            let origin = Origin::Splats { set: set.clone(), item };
-            self.add_chunk(gpu, origin, bytemuck::cast_slice(splats), splats.len() as u32);
+            let origin = Origin::Splats(set.clone());
+            self.add_chunk(gpu, item, origin, bytemuck::cast_slice(splats), splats.len() as u32);
         }
     }
 
     fn add_facets(&mut self, gpu: &Gpu, set: &Arc<FacetSet>, item: usize) {
         let most = (gpu.binding_size() / size_of::<Facet>() as u64) as usize;
         for facets in set.facets.chunks(most) {
-            let origin = Origin::Facets { set: set.clone(), is_culled: false, item };
-            self.add_chunk(gpu, origin, bytemuck::cast_slice(facets), facets.len() as u32);
+            let origin = Origin::Facets { set: set.clone(), is_culled: false };
+            self.add_chunk(gpu, item, origin, bytemuck::cast_slice(facets), facets.len() as u32);
         }
     }
 
     /// Decides for each set of facets whether a view leaves out backs.
     pub(crate) fn update_facets(&mut self, view: &View, settings: &Settings) {
         for chunk in &mut self.chunks {
-            if let Origin::Facets { set, is_culled, .. } = &mut chunk.origin {
+            if let Origin::Facets { set, is_culled } = &mut chunk.origin {
                 *is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
             }
         }
     }
 
-    fn add_volume(&mut self, gpu: &Gpu, volume: &Arc<Volume>, kernel: Kernel) -> Result<()> {
+    fn add_volume(
+        &mut self,
+        gpu: &Gpu,
+        volume: &Arc<Volume>,
+        kernel: Kernel,
+        item: usize,
+    ) -> Result<()> {
         let lattice = volume.drawn_lattice();
         let [width, height, depth] = lattice.dims;
         let slice = (width * height) as u64;
@@ -549,22 +555,21 @@ impl PreparedScene {
                 places: places.clone(),
             };
             let part = in_slices(held);
-            let bytes = match (&volume.coefficients, &volume.samples) {
-                (Some(coefficients), _) => bytemuck::cast_slice(&coefficients.values[part]),
-                (None, Samples::U8(v)) => bytemuck::cast_slice(&v[part]),
-                (None, Samples::U16(v)) => bytemuck::cast_slice(&v[part]),
-                (None, Samples::I16(v)) => bytemuck::cast_slice(&v[part]),
-                (None, Samples::I32(v)) => bytemuck::cast_slice(&v[part]),
-                (None, Samples::F32(v)) => bytemuck::cast_slice(&v[part]),
+            let bytes = match &volume.coefficients {
+                Some(coefficients) => bytemuck::cast_slice(&coefficients.values[part]),
+                None => {
+                    let size = volume.samples.sample_bytes();
+                    &volume.samples.bytes()[part.start * size..part.end * size]
+                }
             };
-            self.add_chunk(gpu, origin, bytes, own.len() as u32);
+            self.add_chunk(gpu, item, origin, bytes, own.len() as u32);
         }
         Ok(())
     }
 
-    fn add_chunk(&mut self, gpu: &Gpu, origin: Origin, bytes: &[u8], count: u32) {
+    fn add_chunk(&mut self, gpu: &Gpu, item: usize, origin: Origin, bytes: &[u8], count: u32) {
         let data = upload(gpu, "chunk", bytes);
-        self.push_chunk(gpu, origin, data, count);
+        self.push_chunk(gpu, item, origin, data, count);
     }
 
     /// Brings the pages that the cuts of all hierarchies need to the GPU, as far as memory allows.
@@ -591,8 +596,10 @@ impl PreparedScene {
             let grown = self.page_caches[index].update(gpu, (&cut, Eye::of(view)), room, &own)?;
             for Growth { slots, splats, capacity } in grown {
                 self.bytes += slots.bytes();
+                let item = self.page_caches[index].item;
                 self.push_chunk(
                     gpu,
+                    item,
                     Origin::Nodes { page_cache: index, slots: Box::new(slots) },
                     splats,
                     capacity,
@@ -602,7 +609,14 @@ impl PreparedScene {
         Ok(())
     }
 
-    fn push_chunk(&mut self, gpu: &Gpu, origin: Origin, data: wgpu::Buffer, count: u32) {
+    fn push_chunk(
+        &mut self,
+        gpu: &Gpu,
+        item: usize,
+        origin: Origin,
+        data: wgpu::Buffer,
+        count: u32,
+    ) {
         let uniform =
             buffer(gpu, "source", size_of::<Source>() as u64, wgpu::BufferUsages::UNIFORM);
         // Which samples are visible is not known yet.
@@ -617,6 +631,7 @@ impl PreparedScene {
         let active_arguments = buffer(gpu, "active arguments", 12, usage);
         self.chunks.push(Chunk {
             origin,
+            item,
             data,
             uniform,
             spans,

@@ -3,89 +3,78 @@
 use super::{
     super::{
         Block,
-        build::{Builder, WORK, block_of, check_splats},
+        build::{WORK, block_of, check_splats},
         partition,
         sphere::Sphere,
     },
-    ExternalOptions, OF_POINT, Stage, StageWatch,
-    bins::Bins,
-    distribute::Distributed,
-    survey::Triangulated,
+    ExternalOptions, OF_POINT, Shape, Stage, StageWatch,
+    distribute::{Distributed, distribute},
+    made::PartWriter,
+    survey::{Surveyed, Triangulated},
     tell,
 };
 use crate::{
     Deadline, Error, Result,
     formats::StreamPoint,
-    math::Bounds,
     memory,
     parallel::{self, prelude::*},
-    splat::{Payload, Splat, SplatSet, decode_normal},
+    splat::{Payload, Splat, SplatSet},
     surface::{EXTENT, Known, Mesh, SurfelOptions, cloud_piece},
 };
 use glam::{DVec3, Vec3};
-use std::path::Path;
+use std::{io::Write, ops::Range, path::Path};
 
 /// How far the surfels of a point cloud are assumed to reach, as a fraction of the core's radius.
 /// If one reaches farther, its block's sphere sticks out, and the spheres above grow with it.
 const CLOUD_REACH: f64 = 0.01;
 
-/// The result of all inputs so far.
-pub struct Work<'a> {
-    pub builder: Builder,
-    pub origin: DVec3,
-    pub bounds: Bounds,
+/// The regions of a part while they are built.
+pub struct Work<'a, W: Write> {
+    pub part: PartWriter<W>,
+    pub shape: &'a Shape,
     pub options: &'a ExternalOptions,
-    /// Points of all inputs.
+    /// The points of the part's regions, and those built so far.
     pub points: u64,
-    /// Points in finished regions.
     pub built: u64,
-    pub splats: u64,
     pub watch: StageWatch<'a>,
     /// Seconds that a region may take, and the deadline of the current one.
     pub seconds: u64,
     pub deadline: Deadline,
 }
 
-/// The index of a point, and the packed normal of its surfel.
-type Side = [u32; 2];
-
-impl Distributed<'_> {
+impl Surveyed<'_> {
     /// Returns a sphere around all footprints, relative to `origin`.
     pub fn around(&self, origin: DVec3, options: &ExternalOptions) -> Sphere {
         let scale = f64::from(options.surfels.radius_scale);
-        let reach = match &self.input.mesh {
+        let Sphere { center, radius } = self.facts.around;
+        let reach = match &self.facts.mesh {
             Some(mesh) => f64::from(EXTENT * mesh.longest) * scale,
-            None => self.input.core.radius * CLOUD_REACH * scale,
+            None => radius * CLOUD_REACH * scale,
         };
-        let center = self.input.core.center + (self.input.stream.origin() - origin);
-        Sphere { center, radius: (self.radius + reach) * (1.0 + 1e-6) }
+        let center = center + (self.stream.origin() - origin);
+        Sphere { center, radius: (radius + reach) * (1.0 + 1e-6) }
     }
 }
 
-impl Work<'_> {
-    /// Builds all regions of an input.
-    pub fn input(&mut self, mut input: Distributed, wanted: &Path) -> Result<()> {
-        let regions = input.input.regions() as u32;
-        let orients = input.input.mesh.is_none() && !input.input.stream.has_normals();
-        let mut sides = match orients {
-            true => Some(Bins::<Side>::beside(wanted, regions as usize, self.options.memory)?),
-            false => None,
-        };
+impl<W: Write> Work<'_, W> {
+    /// Builds the `wanted` regions of an input, with temporary files beside `path`.
+    pub fn input(&mut self, input: &Surveyed, wanted: Range<u32>, path: &Path) -> Result<()> {
+        let limits = [self.shape.most, self.options.memory];
+        let mut shares = distribute(input, &wanted, limits, path, self.watch)?;
         tell(self.watch, Stage::Building, self.built, self.points);
-        for region in 0..regions {
+        for region in wanted.clone() {
             self.deadline = Deadline::after(self.seconds);
             let surfels = SurfelOptions { deadline: self.deadline, ..self.options.surfels.clone() };
-            memory::room(WORK, OF_POINT.saturating_mul(input.points.count(region) as u64))?;
-            let part = Part::read(&mut input, region)?;
-            let splats = match &input.input.mesh {
-                Some(mesh) => {
-                    part.of_mesh(mesh, Some(region) == input.input.long_region(), &surfels)?
-                }
-                None => part.of_cloud(&input, sides.as_mut(), region, &surfels)?,
+            let bin = region - wanted.start;
+            memory::room(WORK, OF_POINT.saturating_mul(shares.points.count(bin) as u64))?;
+            let piece = Piece::read(input, &mut shares, region, bin)?;
+            let splats = match &input.facts.mesh {
+                Some(mesh) => piece.of_mesh(mesh, Some(region) == input.long_region(), &surfels)?,
+                None => piece.of_cloud(input, &surfels)?,
             };
-            let owned = part.owned.iter().filter(|owned| **owned).count() as u64;
-            drop(part);
-            let stream = &input.input.stream;
+            let owned = piece.owned.iter().filter(|owned| **owned).count() as u64;
+            drop(piece);
+            let stream = &input.stream;
             self.add(splats, stream.origin()).map_err(|error| match error {
                 Error::Argument(message) => stream.error("content", message),
                 other => other,
@@ -101,27 +90,27 @@ impl Work<'_> {
         if splats.is_empty() {
             return Ok(());
         }
-        self.splats += splats.len() as u64;
         let mut set =
             SplatSet { origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 };
-        set.move_origin(self.origin)?;
+        set.move_origin(self.shape.origin)?;
         check_splats(&set)?;
-        self.bounds = self.bounds.union(set.bounds());
         let parts = partition::blocks(&set.splats, self.options.block_splats.max(64));
         for parts in parts.chunks(2 * parallel::current_num_threads()) {
             let block = |part: &Vec<u32>| {
                 self.deadline.check(WORK)?;
-                Ok(block_of(&set, part, self.options.preset, self.builder.outer))
+                Ok(block_of(&set, part, self.options.preset, self.shape.outer))
             };
             let blocks: Result<Vec<Block>> = parts.par_iter().map(block).collect();
-            self.builder.add(blocks?)?;
+            self.part.add(&blocks?)?;
         }
+        self.part.made.bounds = self.part.made.bounds.union(set.bounds());
+        self.part.made.splats += set.splats.len() as u64;
         Ok(())
     }
 }
 
 /// A region as a separate mesh.
-struct Part {
+struct Piece {
     mesh: Mesh,
     /// The index of each point in the input, ascending.
     indices: Vec<u32>,
@@ -129,15 +118,15 @@ struct Part {
     owned: Vec<bool>,
 }
 
-impl Part {
-    fn read(input: &mut Distributed, region: u32) -> Result<Self> {
-        let mut points: Vec<StreamPoint> = input.points.read(region)?;
+impl Piece {
+    fn read(input: &Surveyed, shares: &mut Distributed, region: u32, bin: u32) -> Result<Self> {
+        let mut points: Vec<StreamPoint> = shares.points.read(bin)?;
         points.par_sort_by_key(|point| point.index);
         points.dedup_by_key(|point| point.index);
-        let owner = |point: &StreamPoint| input.input.owner(Vec3::from(point.position)) == region;
+        let owner = |point: &StreamPoint| input.owner(Vec3::from(point.position)) == region;
         let owned = points.par_iter().map(owner).collect();
         let indices: Vec<u32> = points.par_iter().map(|point| point.index).collect();
-        let stream = &input.input.stream;
+        let stream = &input.stream;
         let mut mesh = Mesh { origin: stream.origin(), ..Mesh::default() };
         mesh.positions = points.par_iter().map(|point| Vec3::from(point.position)).collect();
         if stream.has_normals() {
@@ -151,8 +140,8 @@ impl Part {
             mesh.scale = Some(scale);
         }
         drop(points);
-        if let Some(triangles) = &mut input.triangles {
-            mesh.triangles = triangles.read(region)?;
+        if let Some(triangles) = &mut shares.triangles {
+            mesh.triangles = triangles.read(bin)?;
             let place = |index: u32| indices.binary_search(&index).unwrap_or(0) as u32;
             mesh.triangles.par_iter_mut().for_each(|triangle| *triangle = triangle.map(place));
         }
@@ -171,36 +160,13 @@ impl Part {
         mesh.pieces.surfels(&self.mesh, &self.owned, is_long, options)
     }
 
-    /// Orients normals like those that other regions passed on, and passes on normals near other
-    /// regions to those that come later.
-    fn of_cloud(
-        &self,
-        input: &Distributed,
-        sides: Option<&mut Bins<Side>>,
-        region: u32,
-        options: &SurfelOptions,
-    ) -> Result<Vec<Splat>> {
-        let spacing = Some(input.input.regions.spacing);
-        let mut known = Known { spacing, center: Some(input.input.center), normals: Vec::new() };
-        let Some(sides) = sides else {
-            let splats = cloud_piece(&self.mesh, &self.owned, known, options)?;
-            return Ok(splats.into_iter().map(|(_, splat)| splat).collect());
+    fn of_cloud(&self, input: &Surveyed, options: &SurfelOptions) -> Result<Vec<Splat>> {
+        let known = Known {
+            spacing: Some(input.regions.ranges().spacing),
+            center: Some(input.facts.center),
+            normals: input.guide.of_points(&self.indices),
         };
-        known.normals =
-            sides.read(region)?.into_iter().filter_map(|side| self.known(side)).collect();
         let splats = cloud_piece(&self.mesh, &self.owned, known, options)?;
-        let mut around = Vec::new();
-        for (point, splat) in &splats {
-            input.input.regions.around(Vec3::from(splat.center), &mut around);
-            for &other in around.iter().filter(|&&other| other > region) {
-                sides.push(other, [self.indices[*point as usize], splat.normal])?;
-            }
-        }
         Ok(splats.into_iter().map(|(_, splat)| splat).collect())
-    }
-
-    fn known(&self, [index, normal]: Side) -> Option<(u32, Vec3)> {
-        let point = self.indices.binary_search(&index).ok()?;
-        Some((point as u32, decode_normal(normal)?))
     }
 }

@@ -1,38 +1,56 @@
-//! Converts files larger than memory to a hierarchy, one region after another.
+//! Converts files larger than memory to a hierarchy, one region after another, or in parts that
+//! several programs make.
 //!
 //! A first pass finds where the points are (`survey`) and splits space into regions with about
 //! equally many points (`regions`). A second pass gives each region its points and those around
 //! them (`distribute`), in files without names beside the output (`bins`). Then the surfels of each
-//! region are made, built into blocks and written (`build`).
+//! region are made and built into blocks (`build`), whose pages are written (`made`). At the end,
+//! the top of the tree is built over all blocks, and the pages are copied (`join`).
+//!
+//! No region needs the result of another. So a [`Plan`] may keep what the first pass found, and
+//! others make the regions, as parts with files of their own (`part_file`). [`convert`] is the same
+//! with one part.
 //!
 //! The leaves are those of the same input converted in memory. For meshes they are identical,
 //! unless subdividing a long edge puts a vertex at the position of another vertex that is on no
 //! long edge. For point clouds, points are judged by neighbours within the region and some distance
-//! beyond, and the orientation of normals is passed on from region to region.
+//! beyond, and which side of them is outside is decided by a sample of the whole cloud (`guide`).
 
 mod bins;
 mod build;
 mod distribute;
+mod guide;
+mod inputs;
+mod join;
+mod made;
 mod memory;
+mod part_file;
+mod plan;
 mod regions;
 mod solid;
 mod survey;
 mod triangles;
 
-use super::{Preset, build::Builder, file::WriteOptions, sphere::Sphere};
+use super::{Preset, file::WriteOptions, sphere::Sphere};
 use crate::{
-    Error, Result,
+    Deadline, Error, Result,
+    container::Spill,
+    disk::Scratch,
     formats::Stream,
-    hierarchy::file::Whole,
     input::Limits,
-    math::Bounds,
-    surface::{EXTENT, Paint, SurfelOptions},
+    surface::{Paint, SurfelOptions},
 };
+use build::Work;
+use glam::DVec3;
+use made::PartWriter;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use survey::Surveyed;
 
 pub use memory::{
     BLOCKS, check, memory_between, memory_of_mesh, memory_of_splats, memory_of_stream,
 };
+pub use plan::{PartMade, Plan};
 
 /// The stage of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +78,7 @@ fn tell(watch: StageWatch<'_>, stage: Stage, done: u64, total: u64) {
 }
 
 /// Options for converting a file in regions.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExternalOptions {
     /// The approximate memory to use, in bytes. Regions are made as small as this requires, down to
     /// a thousand points. A few hundred million bytes are used in any case.
@@ -75,6 +93,24 @@ pub struct ExternalOptions {
     pub paint: Option<Paint>,
     /// The attribute of the files that [`Values::Own`](crate::surface::Values::Own) means.
     pub scalar: Option<String>,
+    /// The number of parts of a [`Plan`]; `None` makes a part of every region. Regions are small
+    /// enough for this many parts of about equal size, down to a thousand points. The file depends
+    /// on the regions, but not on their grouping to parts.
+    pub parts: Option<u32>,
+}
+
+impl Default for ExternalOptions {
+    fn default() -> Self {
+        Self {
+            memory: 4 << 30,
+            preset: Preset::default(),
+            block_splats: super::BuildOptions::default().block_splats,
+            surfels: SurfelOptions::default(),
+            paint: None,
+            scalar: None,
+            parts: None,
+        }
+    }
 }
 
 impl ExternalOptions {
@@ -137,60 +173,96 @@ pub fn convert(
 ) -> Result<Converted> {
     let _span = tracing::info_span!("convert").entered();
     let path = path.as_ref();
-    let most = (options.memory / OF_POINT).clamp(FEWEST_POINTS, MOST_POINTS);
-    let mut inputs = Vec::new();
-    for file in files {
-        let stream = options.open(file, limits)?.ok_or_else(|| {
+    let (inputs, shape) = survey_all(files, limits, options, watch)?;
+    let mut work = Work {
+        part: PartWriter::new(Scratch::beside(path)?, write.lossless, path),
+        shape: &shape,
+        options,
+        points: shape.points,
+        built: 0,
+        watch,
+        seconds: limits.seconds,
+        deadline: Deadline::NEVER,
+    };
+    for (input, file) in inputs.into_iter().zip(files) {
+        let all = 0..input.count();
+        work.input(&input, all, path).map_err(|error| error.in_file(file))?;
+    }
+    tell(watch, Stage::Writing, 0, 0);
+    let (pages, length, made) = work.part.end()?;
+    let parts = std::iter::once((&made, 0));
+    join::write(&shape, parts, Spill::over(pages, length), path, options, write)
+}
+
+/// Properties of the whole hierarchy on which its regions depend.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Shape {
+    /// The most points in a region.
+    most: u64,
+    /// The number of regions of all inputs.
+    regions: usize,
+    /// Points in the source.
+    points: u64,
+    /// See [`Tree::closed`](super::Tree::closed).
+    closed: bool,
+    /// World position of the origin of all positions.
+    origin: DVec3,
+    /// A sphere around all footprints, relative to the origin.
+    outer: Sphere,
+}
+
+/// Makes the first passes over all inputs.
+fn survey_all<'a>(
+    files: &'a [PathBuf],
+    limits: &'a Limits,
+    options: &ExternalOptions,
+    watch: StageWatch<'_>,
+) -> Result<(Vec<Surveyed<'a>>, Shape)> {
+    let open = |file: &'a PathBuf| {
+        options.open(file, limits)?.ok_or_else(|| {
             Error::Argument(format!(
                 "{}: a file of this kind can only be read as a whole",
                 file.display()
             ))
-        })?;
+        })
+    };
+    let streams: Vec<Stream> = files.iter().map(open).collect::<Result<_>>()?;
+    let points = streams.iter().map(|stream| stream.counts().points).sum();
+    let most = most_points(points, options);
+    let mut inputs = Vec::new();
+    for (stream, file) in streams.into_iter().zip(files) {
         stream.warn();
         // Long triangles are subdivided once to count them, and once to make surfels. Each has its
         // own deadline.
         let surfels = SurfelOptions { deadline: limits.deadline(), ..options.surfels.clone() };
         let options = &ExternalOptions { surfels, ..options.clone() };
-        let input =
-            survey::survey(stream, most, options, watch).map_err(|error| error.in_file(file))?;
-        tracing::info!(file = %file.display(), regions = input.regions(), "split into regions");
-        inputs.push(distribute::distribute(input, [most, options.memory], path, watch)?);
+        let input = Surveyed::new(stream, most, options, watch);
+        let input = input.map_err(|error| error.in_file(file))?;
+        tracing::info!(file = %file.display(), regions = input.count(), "split into regions");
+        inputs.push(input);
     }
     let Some(first) = inputs.first() else {
         return Err(Error::NothingToDraw("there are no files".into()));
     };
-    let origin = first.input.stream.origin();
+    let origin = first.stream.origin();
     let spheres: Vec<Sphere> = inputs.iter().map(|input| input.around(origin, options)).collect();
-    let outer = Sphere::around(&spheres, 1 << 10);
-    let mut done = Converted {
-        points: inputs.iter().map(|input| input.input.stream.point_count()).sum(),
-        splats: 0,
-        closed: inputs
-            .iter()
-            .all(|input| input.input.mesh.as_ref().is_some_and(|mesh| mesh.is_solid)),
-        regions: inputs.iter().map(|input| input.input.regions()).sum(),
-    };
-    let mut work = build::Work {
-        builder: Builder::new(path, EXTENT, outer, options.preset, write)?,
+    let is_solid = |input: &Surveyed| input.facts.mesh.as_ref().is_some_and(|mesh| mesh.is_solid);
+    let shape = Shape {
+        most,
+        regions: inputs.iter().map(|input| input.count() as usize).sum(),
+        points: inputs.iter().map(|input| input.stream.point_count()).sum(),
+        closed: inputs.iter().all(is_solid),
         origin,
-        bounds: Bounds::EMPTY,
-        options,
-        points: done.points,
-        built: 0,
-        splats: 0,
-        watch,
-        seconds: limits.seconds,
-        deadline: limits.deadline(),
+        outer: Sphere::around(&spheres, 1 << 10),
     };
-    for (input, file) in inputs.into_iter().zip(files) {
-        work.input(input, path).map_err(|error| error.in_file(file))?;
-    }
-    if work.splats == 0 {
-        return Err(Error::NothingToDraw("no points are left, or no triangle has an area".into()));
-    }
-    done.splats = work.splats;
-    tell(watch, Stage::Writing, 0, 0);
-    let Converted { points, closed, .. } = done;
-    work.builder.finish(&Whole { origin, bounds: work.bounds, closed, source_points: points })?;
-    Ok(done)
+    Ok((inputs, shape))
+}
+
+/// Returns the most points in a region, for inputs of this many points: as many as memory allows,
+/// but so that all parts can have equally many.
+fn most_points(points: u64, options: &ExternalOptions) -> u64 {
+    let most = (options.memory / OF_POINT).clamp(FEWEST_POINTS, MOST_POINTS);
+    let Some(parts) = options.parts else { return most };
+    let of_part = points.div_ceil(u64::from(parts.max(1))).max(1);
+    of_part.div_ceil(of_part.div_ceil(most)).max(FEWEST_POINTS)
 }

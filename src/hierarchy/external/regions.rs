@@ -5,9 +5,11 @@
 //! are split as evenly as others. Only points at the same position, or nearly, stay together
 //! however many there are.
 
-use super::super::partition::{Cube, FINE_BITS};
+use super::super::partition::{Cube, FINE_BITS, fine_cell, fine_key_of};
 use crate::Result;
-use glam::Vec3;
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
 /// Bits of a fine key below those of a coarse cell.
@@ -30,21 +32,41 @@ const SEVERAL: u32 = u32::MAX;
 /// The regions of the points in a cube.
 pub struct Regions {
     cube: Cube,
-    /// The first key of each region.
-    starts: Vec<u64>,
+    ranges: Ranges,
     /// The region of each coarse cell.
     coarse: Vec<u32>,
     /// How far the neighbours of the points in each coarse cell may be. Negative for subdivided
     /// cells, whose reach is in `cut`.
     reach: Vec<f32>,
     cut: BTreeMap<u64, f32>,
+    /// The largest reach.
+    farthest: f32,
+}
+
+/// Where regions begin, and what they hold.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ranges {
+    /// The first key of each region.
+    starts: Vec<u64>,
+    /// The number of points in each.
+    pub points: Vec<u64>,
     /// Approximate median distance to the neighbour by which points are judged, estimated as on a
     /// surface.
     pub spacing: f32,
 }
 
+/// How far the neighbours of the points in a cell may be.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Reach {
+    start: u64,
+    /// `BELOW_COARSE` for a whole coarse cell; less for a cell inside one.
+    below: u32,
+    reach: f32,
+}
+
 /// A cell that is not subdivided further.
-struct Cell {
+pub struct Cell {
     start: u64,
     /// The number of key bits below the cell's own.
     below: u32,
@@ -52,13 +74,12 @@ struct Cell {
 }
 
 impl Regions {
-    /// Splits the cube into regions of at most `most` points. `pass` calls its argument with the
-    /// fine keys of all points, in parts.
-    pub fn cut(
-        cube: Cube,
+    /// Splits the cube into cells of at most `most` points, as far as they lie apart. `pass` calls
+    /// its argument with the fine keys of all points, in parts.
+    pub fn count_cells(
         most: u64,
         mut pass: impl FnMut(&mut dyn FnMut(&[u64])) -> Result<()>,
-    ) -> Result<Self> {
+    ) -> Result<Vec<Cell>> {
         let mut coarse = vec![0u64; 1 << (3 * FINE_BITS - BELOW_COARSE)];
         pass(&mut |keys| keys.iter().for_each(|key| coarse[(key >> BELOW_COARSE) as usize] += 1))?;
         let mut cells = Vec::new();
@@ -95,52 +116,147 @@ impl Regions {
             }
         }
         cells.sort_unstable_by_key(|cell| cell.start);
-        Ok(Self::of_cells(cube, most, &cells))
+        Ok(cells)
     }
 
-    fn of_cells(cube: Cube, most: u64, cells: &[Cell]) -> Self {
-        let mut starts = vec![0];
-        let mut held = 0;
-        let mut reach = vec![0.0; 1 << (3 * FINE_BITS - BELOW_COARSE)];
-        let mut cut = BTreeMap::new();
+    /// Joins cells to regions of at most `most` points, all of about the same number.
+    pub fn of_cells(cube: Cube, most: u64, cells: &[Cell]) -> Self {
+        let total: u64 = cells.iter().map(|cell| cell.count).sum();
+        let regions = total.div_ceil(most.max(1)).max(1);
+        let (mut starts, mut points) = (vec![0], vec![0]);
+        let mut before = 0;
+        let mut reaches = Vec::with_capacity(cells.len());
         let mut typical = Vec::with_capacity(cells.len());
         let larger = Larger::of(cells);
         for cell in cells {
-            if held > 0 && held + cell.count > most {
+            let held = points[points.len() - 1];
+            // The share of all points that the middle of the cell has reached.
+            let reached = u128::from(before + cell.count / 2) * u128::from(regions);
+            let is_next = reached / u128::from(total) >= points.len() as u128;
+            if held > 0 && (is_next || held + cell.count > most) {
                 starts.push(cell.start);
-                held = 0;
+                points.push(0);
             }
-            held += cell.count;
+            *points.last_mut().expect("a region") += cell.count;
+            before += cell.count;
             let (below, count) = larger.enough(cell);
             let edge = cube.edge() / (1u64 << (FINE_BITS - below / 3)) as f32;
             let spacings = (REACH_ON_SURFACE / (count as f32).sqrt())
                 .max(REACH_IN_SOLID / (count as f32).cbrt());
-            let own = edge * spacings.min(1.0);
+            let reach = edge * spacings.min(1.0);
             // Coincident points count as one.
             typical
                 .push((edge / (count as f32).sqrt(), if cell.below > 0 { cell.count } else { 1 }));
-            if cell.below == BELOW_COARSE {
-                reach[(cell.start >> BELOW_COARSE) as usize] = own;
-            } else {
-                reach[(cell.start >> BELOW_COARSE) as usize] = -1.0;
-                cut.insert(cell.start, own);
-            }
+            reaches.push(Reach { start: cell.start, below: cell.below, reach });
         }
         if starts.len() == 1 {
             // One region needs no tables. With many files, they would take much memory.
-            (reach, cut) = (Vec::new(), BTreeMap::new());
+            reaches.clear();
         }
-        let coarse = table(&starts, reach.len());
-        Self { cube, starts, coarse, reach, cut, spacing: SIXTH * middle(typical) }
+        Self::new(cube, Ranges { starts, points, spacing: SIXTH * middle(typical) }, &reaches)
+    }
+
+    /// Puts regions together of what [`ranges`](Self::ranges) and [`reaches`](Self::reaches) gave.
+    pub fn new(cube: Cube, ranges: Ranges, reaches: &[Reach]) -> Self {
+        let is_whole = reaches.is_empty();
+        let cells = if is_whole { 0 } else { 1 << (3 * FINE_BITS - BELOW_COARSE) };
+        let mut reach = vec![0.0; cells];
+        let mut cut = BTreeMap::new();
+        for cell in reaches {
+            let coarse = &mut reach[(cell.start >> BELOW_COARSE) as usize];
+            if cell.below == BELOW_COARSE {
+                *coarse = cell.reach;
+            } else {
+                *coarse = -1.0;
+                cut.insert(cell.start, cell.reach);
+            }
+        }
+        let coarse = table(&ranges.starts, cells);
+        let farthest = reaches.iter().map(|cell| cell.reach).fold(0.0, f32::max);
+        Self { cube, ranges, coarse, reach, cut, farthest }
+    }
+
+    /// Returns where the regions begin, and what they hold.
+    pub fn ranges(&self) -> &Ranges {
+        &self.ranges
+    }
+
+    /// Returns how far the neighbours of points in each cell may be; nothing for a single region.
+    pub fn reaches(&self) -> Vec<Reach> {
+        let whole = (0u64..).zip(&self.reach).filter(|(_, reach)| **reach > 0.0);
+        let whole = whole.map(|(index, &reach)| Reach {
+            start: index << BELOW_COARSE,
+            below: BELOW_COARSE,
+            reach,
+        });
+        let cut = self.cut.iter().map(|(&start, &reach)| Reach { start, below: 0, reach });
+        whole.chain(cut).collect()
+    }
+
+    /// Returns a distance beyond which the points in a box have no neighbours.
+    pub fn reach_in(&self, [low, high]: [Vec3; 2]) -> f32 {
+        /// Cells that are looked at; in a larger box, the largest reach of all counts.
+        const MOST: usize = 1 << 12;
+        if self.reach.is_empty() {
+            return 0.0;
+        }
+        let shift = BELOW_COARSE / 3;
+        let [low, high] =
+            [low, high].map(|corner| fine_cell(self.cube.fine_key(corner)).map(|at| at >> shift));
+        let axis = |axis: usize| low[axis]..=high[axis];
+        let count: usize = (0..3).map(|at| axis(at).count()).product();
+        if count > MOST {
+            return self.farthest;
+        }
+        let cells =
+            axis(0).flat_map(|x| axis(1).flat_map(move |y| axis(2).map(move |z| [x, y, z])));
+        let reach = cells.map(|cell| {
+            let key = fine_key_of(cell.map(|at| at << shift));
+            match self.reach[(key >> BELOW_COARSE) as usize] {
+                reach if reach < 0.0 => {
+                    let inside = self.cut.range(key..key + (1 << BELOW_COARSE));
+                    inside.map(|(_, &reach)| reach).fold(0.0, f32::max)
+                }
+                reach => reach,
+            }
+        });
+        reach.fold(0.0, f32::max)
+    }
+
+    /// Returns boxes that cover a region. What lies outside the cube belongs to the nearest cells.
+    pub fn boxes(&self, region: u32) -> Vec<[Vec3; 2]> {
+        let starts = &self.ranges.starts;
+        let end = starts.get(region as usize + 1).copied().unwrap_or(1 << (3 * FINE_BITS));
+        let mut at = starts[region as usize];
+        let mut boxes = Vec::new();
+        while at < end {
+            // The largest cell that begins here and ends within the region.
+            let fits = |below: &u32| at.is_multiple_of(1 << below) && at + (1 << below) <= end;
+            let below = (0..=FINE_BITS).rev().map(|level| 3 * level).find(fits).unwrap_or(0);
+            boxes.push(self.cube.cell(at, below));
+            at += 1 << below;
+        }
+        boxes
+    }
+
+    /// Returns the distance from a centre within which all points of the cells lie. The points lie
+    /// in a box.
+    pub fn radius(cube: Cube, cells: &[Cell], [low, high]: [Vec3; 2], center: DVec3) -> f64 {
+        let farthest = |cell: &Cell| {
+            let [a, b] = cube.cell(cell.start, cell.below);
+            let [a, b] = [a.max(low), b.min(high)].map(|corner| corner.as_dvec3() - center);
+            a.abs().max(b.abs()).length()
+        };
+        cells.iter().map(farthest).fold(0.0, f64::max)
     }
 
     /// Returns the number of regions, at least 1.
     pub fn count(&self) -> usize {
-        self.starts.len()
+        self.ranges.starts.len()
     }
 
     fn search(&self, key: u64) -> u32 {
-        self.starts.partition_point(|&start| start <= key) as u32 - 1
+        self.ranges.starts.partition_point(|&start| start <= key) as u32 - 1
     }
 
     /// Returns the region of a position.
@@ -149,7 +265,7 @@ impl Regions {
     }
 
     fn of_key(&self, key: u64) -> u32 {
-        if self.starts.len() == 1 {
+        if self.ranges.starts.len() == 1 {
             return 0;
         }
         match self.coarse[(key >> BELOW_COARSE) as usize] {
@@ -161,7 +277,7 @@ impl Regions {
     /// Finds the other regions in which a point at this position may be a neighbour.
     pub fn around(&self, place: Vec3, found: &mut Vec<u32>) {
         found.clear();
-        if self.starts.len() == 1 {
+        if self.ranges.starts.len() == 1 {
             return;
         }
         let key = self.cube.fine_key(place);
@@ -255,11 +371,11 @@ mod tests {
         let (low, high) = places.iter().fold(none, |(low, high), &p| (low.min(p), high.max(p)));
         let cube = Cube::around(low, high);
         let keys: Vec<u64> = places.iter().map(|&place| cube.fine_key(place)).collect();
-        Regions::cut(cube, most, |count| {
+        let cells = Regions::count_cells(most, |count| {
             count(&keys);
             Ok(())
-        })
-        .unwrap()
+        });
+        Regions::of_cells(cube, most, &cells.unwrap())
     }
 
     fn counts(places: &[Vec3], regions: &Regions) -> Vec<u64> {

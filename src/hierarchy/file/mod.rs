@@ -1,5 +1,5 @@
-//! The file of a hierarchy, `.splk`: pages of nodes, coarse ones first, after a directory with
-//! their positions. docs/splk.md describes it byte by byte.
+//! The file of a hierarchy, `.splk`: pages of nodes, coarse ones first, and a directory with their
+//! positions, which is divided into pages too. docs/splk.md describes it byte by byte.
 //!
 //! [`write`](write()) and [`Writer`] write it, [`Hierarchy`] reads it page by page or as a whole,
 //! and [`check`](check()) looks for damage.
@@ -11,8 +11,10 @@ mod check;
 mod column;
 mod cones;
 mod direction;
-mod directory;
+mod drafts;
 mod entropy;
+mod entry;
+mod flat;
 mod header;
 mod lossless;
 mod lossy;
@@ -26,7 +28,7 @@ mod tests;
 mod write;
 
 pub use check::check;
-pub use directory::PageEntry;
+pub use entry::PageEntry;
 pub use header::Header;
 pub use read::{CutSphere, Hierarchy, NO_PAGE, Page};
 pub use write::{Top, Whole, WriteOptions, Writer, to_bytes, write};
@@ -34,14 +36,19 @@ pub use write::{Top, Whole, WriteOptions, Writer, to_bytes, write};
 /// The maximum number of nodes in a page.
 pub const PAGE_NODES: usize = 4096;
 
+/// The maximum number of nodes in the first page of a block that is written. Each page after it may
+/// have [`GROWTH`] times as many as the page before, up to [`MOST_NODES`]: a view that needs some
+/// nodes of a block then needs few others with them. Shorter pages need less memory still, but the
+/// tables and the record of each take about 250 bytes of the file.
+const FIRST_NODES: usize = 64;
+const MOST_NODES: usize = 1024;
+const GROWTH: usize = 4;
+
 /// The first bytes of a file: a name, and line ends that a transfer as text would change.
 const MAGIC: [u8; 8] = *b"SPLK\r\n\x1a\n";
 
-/// The version that is written.
-const VERSION: u32 = 1;
-
-/// The version of files of trained Gaussians, whose pages have colours of their own.
-const TRAINED_VERSION: u32 = 2;
+/// The version that is written. Versions 1 and 2 have a flat directory.
+const VERSION: u32 = 3;
 
 /// Bytes of the BLAKE3 hash at the end of a file.
 const HASH: usize = 32;
@@ -49,4 +56,5 @@ const HASH: usize = 32;
 pub(in crate::hierarchy) use cones::joint_angle;
 #[cfg(test)]
 pub(in crate::hierarchy) use page::enclose;
-pub(in crate::hierarchy) use pages::{in_order, reach};
+pub(in crate::hierarchy) use pages::{Around, Run, in_order, reach};
+pub(in crate::hierarchy) use write::{Contents, Placed, encode};

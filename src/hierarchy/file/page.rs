@@ -223,16 +223,25 @@ fn bound(
     out
 }
 
-/// Decodes a page as [`decode`], with its colours of this degree, if it has one.
-pub fn decode_colored(
-    bytes: &[u8],
-    count: usize,
-    first_child: u32,
-    extent: f32,
-    degree: Option<u32>,
-) -> Result<(Vec<Node>, Option<Colors>), String> {
-    let Some(degree) = degree else {
-        return Ok((decode(bytes, count, first_child, extent)?, None));
+/// What a page must be decoded with.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// The number of nodes.
+    pub nodes: usize,
+    /// Where their children begin, in the block.
+    pub first_child: u32,
+    pub extent: f32,
+    /// The degree of their colours, if they have some.
+    pub degree: Option<u32>,
+    /// Whether its leaves state a page, the one that replaces them.
+    pub has_links: bool,
+}
+
+/// Decodes a page as [`decode`], with its colours.
+pub fn decode_colored(bytes: &[u8], frame: Frame) -> Result<(Vec<Node>, Option<Colors>), String> {
+    let count = frame.nodes;
+    let Some(degree) = frame.degree else {
+        return Ok((decode(bytes, frame)?, None));
     };
     let (&code, rest) = bytes.split_first().ok_or("it is empty")?;
     if code != COLORED {
@@ -242,20 +251,15 @@ pub fn decode_colored(
         .split_first_chunk()
         .and_then(|(length, rest)| rest.split_at_checked(u32::from_le_bytes(*length) as usize));
     let (nodes, packed) = parts.ok_or("it ends before its colours")?;
-    let nodes = decode(nodes, count, first_child, extent)?;
+    let nodes = decode(nodes, frame)?;
     let colors = pack::decompress(packed, Colors::most_bytes(degree, count))
         .map_err(|e| format!("its colours cannot be unpacked: {e}"))?;
     Ok((nodes, Some(Colors::from_bytes(&colors, degree, count)?)))
 }
 
-/// Decodes a page of `count` nodes, whose children begin at `first_child`. An error says what is
-/// wrong with the page.
-pub fn decode(
-    bytes: &[u8],
-    count: usize,
-    first_child: u32,
-    extent: f32,
-) -> Result<Vec<Node>, String> {
+/// Decodes the nodes of a page. An error says what is wrong with the page.
+pub fn decode(bytes: &[u8], frame: Frame) -> Result<Vec<Node>, String> {
+    let Frame { nodes: count, first_child, extent, has_links, .. } = frame;
     let (&code, rest) = bytes.split_first().ok_or("it is empty")?;
     let nodes = match code {
         LOSSLESS => lossless::decode(rest, count)?,
@@ -274,7 +278,7 @@ pub fn decode(
             ));
         }
         let wanted = if node.is_leaf() { 0 } else { next };
-        if node.first_child != wanted {
+        if node.first_child != wanted && !(node.is_leaf() && has_links) {
             return Err(format!(
                 "the children of its node {index} begin at {}, not at {wanted}",
                 node.first_child

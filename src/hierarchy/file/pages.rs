@@ -1,8 +1,8 @@
 //! Splits a block into pages, and computes what a page must know of the nodes above it.
 
-use super::PAGE_NODES;
+use super::{FIRST_NODES, GROWTH, MOST_NODES};
 use crate::hierarchy::{MOST_CHILDREN, Node};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::ops::Range;
 
 /// Checks that the nodes are in breadth-first order and that the children of successive nodes are
@@ -53,9 +53,10 @@ pub struct Run {
     pub children: Range<usize>,
 }
 
-/// Splits a block into pages without separating siblings.
+/// Splits a block into pages without separating siblings, short ones first.
 pub fn pages(nodes: &[Node]) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::with_capacity(nodes.len() / (PAGE_NODES - MOST_CHILDREN) + 1);
+    let mut most = FIRST_NODES;
+    let mut runs: Vec<Run> = Vec::with_capacity(nodes.len() / (MOST_NODES - MOST_CHILDREN) + 3);
     let (mut start, mut end, mut first_parent, mut first_child) = (0, 1, 0, 1);
     let mut push = |nodes_of: Range<usize>, parents: Range<usize>| {
         let count: usize = nodes[nodes_of.clone()].iter().map(|node| node.children as usize).sum();
@@ -64,9 +65,9 @@ pub fn pages(nodes: &[Node]) -> Vec<Run> {
     };
     for (index, node) in nodes.iter().enumerate() {
         let group = node.children as usize;
-        if end + group - start > PAGE_NODES {
+        if end + group - start > most {
             push(start..end, first_parent..index);
-            (start, first_parent) = (end, index);
+            (start, first_parent, most) = (end, index, MOST_NODES.min(GROWTH * most));
         }
         end += group;
     }
@@ -103,15 +104,39 @@ impl Around {
     /// Returns the bounds around the nodes that have children.
     pub fn parents(nodes: &[Node]) -> Self {
         let nodes = nodes.iter().filter(|node| !node.is_leaf());
+        Self::enclosing(nodes.map(|node| Self {
+            center: node.center,
+            radius: node.radius,
+            largest_size: node.size,
+        }))
+    }
+
+    /// Returns the bounds around others. They are endless if one of these is.
+    pub fn of(all: &[Self]) -> Self {
+        if all.iter().any(Self::is_endless) {
+            Self::EVERYTHING
+        } else {
+            Self::enclosing(all.iter().copied())
+        }
+    }
+
+    fn enclosing(all: impl Iterator<Item = Self> + Clone) -> Self {
+        let place = |own: &Self| Vec3::from(own.center).as_dvec3();
         let (low, high) =
-            nodes.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), node| {
-                let (center, radius) = (node.center().as_dvec3(), f64::from(node.radius));
+            all.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), own| {
+                let (center, radius) = (place(&own), f64::from(own.radius));
                 (low.min(center - radius), high.max(center + radius))
             });
         let center = ((low + high) * 0.5).as_vec3();
-        let reach = nodes.clone().map(|node| reach(center.as_dvec3(), node)).fold(0.0, f64::max);
-        let largest_size = nodes.map(|node| node.size).fold(0.0, f32::max);
-        Self { center: center.to_array(), radius: round_up(reach), largest_size }
+        let reach = |own: &Self| center.as_dvec3().distance(place(own)) + f64::from(own.radius);
+        let radius = all.clone().map(|own| reach(&own)).fold(0.0, f64::max);
+        let largest_size = all.map(|own| own.largest_size).fold(0.0, f32::max);
+        Self { center: center.to_array(), radius: round_up(radius), largest_size }
+    }
+
+    /// Whether these are bounds around everything.
+    pub fn is_endless(&self) -> bool {
+        self.radius == f32::INFINITY && self.largest_size == f32::INFINITY
     }
 }
 

@@ -1,23 +1,25 @@
-//! Reads a hierarchy: the directory at once, pages one by one as a picture needs them, or
-//! everything.
+//! Reads a hierarchy: pages one by one as a picture needs them, with those of the directory that
+//! list them, or everything.
 
 use super::{
     HASH,
-    directory::{Directory, NO_PORTAL, PageEntry, Place, Trouble},
+    entry::{self, Listing, NO_PORTAL, PageEntry},
+    flat::{Flat, Trouble},
     header::{Header, Refusal, Stored},
-    page,
-    pages::{in_order, pages},
+    page::{self, Frame},
+    pages::{Around, in_order, pages},
     write::{arounds, check_nodes},
 };
 use crate::{
     Error, Result,
+    container::directory::{Directory, Fault, Place, Run, Shape},
     error::LimitKind,
     gaussians::Colors,
     hierarchy::{
         Block, Node, Tree,
         validate::{fault_of_box, fault_of_extent},
     },
-    input::{Limits, Mapping, Source, intact},
+    input::{self, Bytes, Limits},
     math::Bounds,
     parallel::prelude::*,
 };
@@ -26,6 +28,9 @@ use std::{
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
 };
+
+/// No root of a directory is longer, with its checksum.
+const MOST_ROOT: usize = 64 << 10;
 
 /// In [`Page::child_pages`]: a leaf, which has no children.
 pub const NO_PAGE: u32 = u32::MAX;
@@ -47,10 +52,19 @@ impl CutSphere {
     pub fn of(node: &Node) -> Self {
         Self { center: node.center, radius: node.radius, size: node.size }
     }
+
+    fn around(around: &Around) -> Self {
+        Self { center: around.center, radius: around.radius, size: around.largest_size }
+    }
 }
 
-/// The nodes of a page, and their colours.
-type Content = (Vec<Node>, Option<Colors>);
+/// The nodes of a page, their colours, and for each node the page that a portal states, if pages
+/// state these.
+struct Content {
+    nodes: Vec<Node>,
+    colors: Option<Colors>,
+    links: Option<Vec<u32>>,
+}
 
 /// A decoded page.
 #[derive(Debug, Clone)]
@@ -101,9 +115,11 @@ pub struct Hierarchy {
     path: PathBuf,
     store: Store,
     header: Header,
-    directory: Directory,
-    /// The block for each portal, a leaf of block 0.
-    portals: HashMap<u32, u32>,
+    /// The number of blocks.
+    blocks: u32,
+    directory: Directory<Listing>,
+    /// The page for each portal, a leaf of block 0. `None` if the portals themselves state it.
+    portals: Option<HashMap<u32, u32>>,
     families: Mutex<Families>,
     limits: Limits,
 }
@@ -118,21 +134,23 @@ impl std::fmt::Debug for Hierarchy {
 }
 
 enum Store {
-    Mapped(Mapping),
-    Bytes(Vec<u8>),
+    File(Bytes),
     Blocks(Vec<Block>),
 }
 
+/// Pages that are fetched and decoded together.
+const BATCH: usize = 64;
+
 impl Hierarchy {
-    /// Opens a file: reads and checks the header and the directory, and maps the rest.
+    /// Opens a file: reads and checks the header and the directory, and maps the rest. Pages of a
+    /// remote object ([`address`](crate::input::address())) are fetched when they are read.
     ///
     /// # Errors
     /// [`Error::Input`] for other kinds of files, other versions, damaged headers and directories,
     /// and incomplete files; [`Error::Limit`] and [`Error::File`] as for every input.
     pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
-        let path = path.as_ref();
-        let map = Source::map(path, limits)?;
-        Self::new(path, Store::Mapped(map), limits, false)
+        let path = &input::address(path.as_ref());
+        Self::new(path, Bytes::open(path, limits)?, limits, false)
     }
 
     /// Opens the beginning of a file that is still being transferred, or was cut off, as a coarser
@@ -141,9 +159,8 @@ impl Hierarchy {
     /// # Errors
     /// Those of [`open`](Self::open), if the header or the directory is not complete.
     pub fn open_prefix(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
-        let path = path.as_ref();
-        let map = Source::map(path, limits)?;
-        Self::new(path, Store::Mapped(map), limits, true)
+        let path = &input::address(path.as_ref());
+        Self::new(path, Bytes::open(path, limits)?, limits, true)
     }
 
     /// Opens the bytes of a file, which errors call `name`.
@@ -151,14 +168,13 @@ impl Hierarchy {
     /// # Errors
     /// Those of [`open`](Self::open).
     pub fn from_bytes(bytes: Vec<u8>, name: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
-        Self::new(name.as_ref(), Store::Bytes(bytes), limits, false)
+        Self::new(name.as_ref(), Bytes::Held(bytes), limits, false)
     }
 
-    fn new(path: &Path, store: Store, limits: &Limits, may_be_cut: bool) -> Result<Self> {
-        let begun =
-            begin(path, store.bytes(), limits, may_be_cut).map_err(|error| store.why(path, error));
-        let (header, directory) = begun?;
-        Ok(Self::assemble(path, store, header, directory, limits.clone()))
+    fn new(path: &Path, bytes: Bytes, limits: &Limits, may_be_cut: bool) -> Result<Self> {
+        let begun = bytes.begun(|bytes| begin(path, bytes, limits, may_be_cut));
+        let begun = begun.map_err(|error| bytes.why(path, error))?;
+        Ok(Self::assemble(path, Store::File(bytes), begun, limits.clone()))
     }
 
     /// Uses a tree directly, without encoding it.
@@ -175,7 +191,7 @@ impl Hierarchy {
         if let Some(fault) = fault.or_else(|| fault_of_extent(tree.extent)) {
             return Err(Error::Argument(format!("the hierarchy: {fault}")));
         }
-        let directory = directory_of(&tree)?;
+        let (entries, portals) = entries_of(&tree)?;
         let header = Header {
             origin: tree.origin,
             bounds: tree.bounds,
@@ -193,32 +209,17 @@ impl Hierarchy {
             unit: String::new(),
             source: String::new(),
         };
-        Ok(Self::assemble(
-            Path::new("memory"),
-            Store::Blocks(tree.blocks),
-            header,
-            directory,
-            Limits::none(),
-        ))
+        let blocks = tree.blocks.len() as u32;
+        let kind = Listing { blocks, pages: entries.len() as u32, start: 0, end: 0 };
+        let directory = Directory::held(kind, &entries);
+        let begun = Begun { header, blocks, directory, portals: Some(portals) };
+        Ok(Self::assemble(Path::new("memory"), Store::Blocks(tree.blocks), begun, Limits::none()))
     }
 
-    fn assemble(
-        path: &Path,
-        store: Store,
-        header: Header,
-        directory: Directory,
-        limits: Limits,
-    ) -> Self {
-        let below = directory.blocks.iter().enumerate().skip(1);
-        Self {
-            path: path.to_owned(),
-            store,
-            header,
-            portals: below.map(|(number, block)| (block.portal, number as u32)).collect(),
-            directory,
-            families: Mutex::default(),
-            limits,
-        }
+    fn assemble(path: &Path, store: Store, begun: Begun, limits: Limits) -> Self {
+        let Begun { header, blocks, directory, portals } = begun;
+        let (path, families) = (path.to_owned(), Mutex::default());
+        Self { path, store, header, blocks, directory, portals, families, limits }
     }
 
     /// Returns the properties of the whole hierarchy.
@@ -231,30 +232,54 @@ impl Hierarchy {
         self.header.bounds
     }
 
-    /// Returns all pages, block by block; the root's page is first.
-    pub fn pages(&self) -> &[PageEntry] {
-        &self.directory.pages
+    /// Returns the number of pages. They are numbered from 0, block by block; the root's page is
+    /// first.
+    pub fn page_count(&self) -> u32 {
+        self.directory.len()
     }
 
-    /// Returns the indices of all pages, coarse ones first, each after the pages of its parents.
-    pub(crate) fn coarse_first(&self) -> Vec<u32> {
-        self.directory.coarse_first()
+    /// Returns the entry of a page in the directory. May read the part of the directory that lists
+    /// it.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is no such page; [`Error::Input`] if the directory is damaged
+    /// or not available there.
+    pub fn entry(&self, page: u32) -> Result<PageEntry> {
+        let count = self.page_count();
+        if page >= count {
+            return Err(Error::Argument(format!("there is no page {page} among {count}")));
+        }
+        self.directory.entry(self.bytes(), page).map_err(|fault| self.fault(fault))
+    }
+
+    /// Calls `each` with batches of entries, in the order of pages: those of the pages that are
+    /// present and whose bounds, or bounds around them, pass. It returns whether to go on.
+    pub(in crate::hierarchy) fn visit(
+        &self,
+        around: impl Fn(&CutSphere) -> bool + Sync,
+        mut each: impl FnMut(&[Run<Listing>]) -> Result<bool>,
+    ) -> Result<()> {
+        let wanted = |own: &Around| own.is_endless() || around(&CutSphere::around(own));
+        let fail = |fault| self.fault(fault);
+        self.directory.visit(self.bytes(), &wanted, &mut each, &fail)
     }
 
     /// Returns whether the leaves of block 0 are portals.
     pub fn is_joined(&self) -> bool {
-        self.directory.blocks.len() > 1
+        self.blocks > 1
     }
 
     /// Returns whether a page is available. In a complete file all pages are; if only its beginning
     /// is open, some are not. `false` for a page that the directory does not contain.
     pub fn is_present(&self, page: u32) -> bool {
-        let Some(entry) = self.directory.pages.get(page as usize) else { return false };
-        let Place { offset, bytes, .. } = entry.place;
-        match &self.store {
-            Store::Blocks(_) => true,
-            store => offset + u64::from(bytes) <= store.bytes().len() as u64,
-        }
+        page < self.page_count()
+            && self.directory.is_present(self.bytes(), page)
+            && self.entry(page).is_ok_and(|entry| self.has(&entry))
+    }
+
+    /// Returns whether the page of an entry is available.
+    pub(in crate::hierarchy) fn has(&self, entry: &PageEntry) -> bool {
+        self.bytes().is_none_or(|file| entry.place.range().end <= file.len())
     }
 
     /// Reads and decodes a page, and verifies its checksum. Can be called from any thread. Pages
@@ -265,13 +290,13 @@ impl Hierarchy {
     /// [`Error::Argument`] if there is no such page.
     pub fn read_page(&self, page: u32) -> Result<Page> {
         let entry = self.entry(page)?;
-        let (nodes, colors) = self.read_nodes(page)?;
+        let Content { nodes, colors, links } = self.read_nodes(page, &entry)?;
         let own: Arc<[Family]> = families(&nodes).into();
         let is_first = entry.first_node == 0;
         let mut parents = Vec::new();
         let mut parent = Vec::with_capacity(nodes.len());
         if is_first {
-            parent.push(match self.directory.blocks[entry.block as usize].portal {
+            parent.push(match entry.portal {
                 NO_PORTAL | 0 => u32::MAX,
                 portal => {
                     let above = self.families(entry.parent_pages.start)?;
@@ -285,13 +310,13 @@ impl Hierarchy {
                 }
             });
         }
+        let range = entry.range();
         let mut add = |families: &[Family]| {
-            let nodes = self.directory.nodes(page);
-            let begin = families.partition_point(|family| family.first_child < nodes.start);
+            let begin = families.partition_point(|family| family.first_child < range.start);
             for family in
-                families[begin..].iter().take_while(|family| family.first_child < nodes.end)
+                families[begin..].iter().take_while(|family| family.first_child < range.end)
             {
-                if family.first_child != nodes.start + parent.len() as u32 {
+                if family.first_child != range.start + parent.len() as u32 {
                     return Err(self.torn(page));
                 }
                 parent.extend(std::iter::repeat_n(parents.len() as u32, family.children as usize));
@@ -309,9 +334,50 @@ impl Hierarchy {
             return Err(self.torn(page));
         }
         self.families.lock().unwrap_or_else(|e| e.into_inner()).keep(page, own);
-        let has_portals = self.is_joined() && entry.block == 0;
-        let child_pages = self.child_pages(page, &nodes)?;
+        let has_portals = self.has_portals(&entry);
+        let child_pages = self.child_pages(page, &entry, &nodes, links.as_deref())?;
         Ok(Page { nodes, colors, parents, parent, child_pages, has_portals })
+    }
+
+    /// Returns whether the leaves of a page are portals.
+    fn has_portals(&self, entry: &PageEntry) -> bool {
+        self.is_joined() && entry.block == 0
+    }
+
+    /// Reads pages in parallel, as [`read_page`](Self::read_page) does. Those of a remote object
+    /// are fetched together.
+    ///
+    /// # Errors
+    /// Those of [`read_page`](Self::read_page).
+    pub fn read_pages(&self, pages: &[u32]) -> Result<Vec<Page>> {
+        self.batched(pages, |page| self.read_page(page))
+    }
+
+    /// Returns what `read` makes of each page, in parallel and in order. Pages of a remote object
+    /// are fetched together first, a batch at a time.
+    pub(in crate::hierarchy) fn batched<T: Send>(
+        &self,
+        pages: &[u32],
+        read: impl Fn(u32) -> Result<T> + Sync,
+    ) -> Result<Vec<T>> {
+        let is_remote = matches!(self.store, Store::File(Bytes::Remote(_)));
+        let most = if is_remote { BATCH } else { pages.len().max(1) };
+        let mut all = Vec::with_capacity(pages.len());
+        for batch in pages.chunks(most) {
+            self.fetch(batch.iter().copied())?;
+            // Reports the first of several damaged pages, whichever thread finds one first.
+            let own: Vec<Result<T>> = batch.par_iter().map(|&page| read(page)).collect();
+            all.extend(own.into_iter().collect::<Result<Vec<T>>>()?);
+        }
+        Ok(all)
+    }
+
+    /// Fetches pages of a remote object together, which are read soon.
+    fn fetch(&self, pages: impl Iterator<Item = u32>) -> Result<()> {
+        let Store::File(file) = &self.store else { return Ok(()) };
+        let entries = pages.map(|page| self.entry(page)).collect::<Result<Vec<_>>>()?;
+        let places = entries.iter().filter(|entry| self.has(entry));
+        file.fetch(places.map(|entry| entry.place.range()))
     }
 
     /// Reads the whole tree.
@@ -321,15 +387,39 @@ impl Hierarchy {
     /// limits allow.
     pub fn read_tree(&self) -> Result<Tree> {
         self.check_size()?;
-        let blocks = (0..self.directory.blocks.len() as u32).map(|block| self.read_block(block));
+        let mut blocks = Vec::new();
+        let mut page = 0;
+        while page < self.page_count() {
+            let entries = self.block_from(page)?;
+            blocks.push(self.read_block(page, &entries)?);
+            page += entries.len() as u32;
+        }
         Ok(Tree {
             origin: self.header.origin,
             extent: self.header.extent,
             closed: self.header.closed,
             bounds: self.header.bounds,
             source_points: self.header.source_points,
-            blocks: blocks.collect::<Result<_>>()?,
+            blocks,
         })
+    }
+
+    /// Returns the entries of the block whose first page has a number.
+    pub(super) fn block_from(&self, first: u32) -> Result<Vec<PageEntry>> {
+        let mut entries: Vec<PageEntry> = Vec::new();
+        loop {
+            let page = first + entries.len() as u32;
+            if page == self.page_count() {
+                return Ok(entries);
+            }
+            let run = self.directory.run(self.bytes(), page).map_err(|fault| self.fault(fault))?;
+            for entry in &run.1[(page - run.0) as usize..] {
+                if entries.first().is_some_and(|first| first.block != entry.block) {
+                    return Ok(entries);
+                }
+                entries.push(entry.clone());
+            }
+        }
     }
 
     /// Returns an error if the tree is larger than the limits allow. A few bytes of the file may
@@ -340,89 +430,99 @@ impl Hierarchy {
         self.limits.check(LimitKind::Bytes, &self.path, "the size of the tree in bytes", found)
     }
 
-    pub(super) fn read_block(&self, block: u32) -> Result<Block> {
-        let entry = self.directory.blocks[block as usize];
+    /// Reads the block whose first page has the number `first`; `entries` are those of its pages.
+    pub(super) fn read_block(&self, first: u32, entries: &[PageEntry]) -> Result<Block> {
+        let (block, portal) = (entries[0].block, entries[0].portal);
         // A few bytes of the file may decode to a whole page of equal nodes.
-        let found = u64::from(entry.nodes) * 2 * size_of::<Node>() as u64;
+        let found = entries.iter().map(|entry| u64::from(entry.nodes)).sum::<u64>()
+            * 2
+            * size_of::<Node>() as u64;
         self.limits.check(
             LimitKind::Bytes,
             &self.path,
             format!("the size of block {block} in bytes"),
             found,
         )?;
-        let pages = entry.first_page..entry.first_page + entry.pages;
-        // Reports the first of several damaged pages, whichever thread finds one first.
-        let pages: Vec<Result<Content>> =
-            pages.into_par_iter().map(|page| self.read_nodes(page)).collect();
-        let pages: Vec<Content> = pages.into_iter().collect::<Result<_>>()?;
-        let (nodes, colors): (Vec<Vec<Node>>, Vec<Option<Colors>>) = pages.into_iter().unzip();
-        let colors: Option<Vec<Colors>> = colors.into_iter().collect();
+        let numbers: Vec<u32> = (first..).take(entries.len()).collect();
+        let mut pages = self
+            .batched(&numbers, |page| self.read_nodes(page, &entries[(page - first) as usize]))?;
+        let colors: Option<Vec<Colors>> =
+            pages.iter_mut().map(|content| content.colors.take()).collect();
+        let nodes: Vec<Node> = pages.into_iter().flat_map(|content| content.nodes).collect();
+        in_order(&nodes)
+            .map_err(|message| damaged(&self.path, format!("block {block}"), message))?;
         Ok(Block {
-            nodes: nodes.concat(),
-            portal: Some(entry.portal).filter(|&portal| portal != NO_PORTAL),
+            nodes,
+            portal: Some(portal).filter(|&portal| portal != NO_PORTAL),
             colors: self.header.degree.zip(colors).map(|(_, colors)| Colors::joined(&colors)),
         })
     }
 
-    pub(super) fn directory(&self) -> &Directory {
+    pub(super) fn block_count(&self) -> u32 {
+        self.blocks
+    }
+
+    pub(super) fn directory(&self) -> &Directory<Listing> {
         &self.directory
     }
 
-    /// Returns all bytes of a file; empty for a tree in memory.
-    pub(super) fn bytes(&self) -> &[u8] {
-        self.store.bytes()
+    /// Returns the page that each portal states, if portals state it: those of a page of block 0.
+    pub(super) fn links(&self, page: u32, entry: &PageEntry) -> Result<Option<Vec<u32>>> {
+        Ok(self.read_nodes(page, entry)?.links)
     }
 
-    fn entry(&self, page: u32) -> Result<&PageEntry> {
-        let count = self.directory.pages.len();
-        self.directory
-            .pages
-            .get(page as usize)
-            .ok_or_else(|| Error::Argument(format!("there is no page {page} among {count}")))
+    /// Returns the error for a fault of the directory.
+    pub(super) fn fault(&self, fault: Fault) -> Error {
+        let error = told(&self.path, fault);
+        match self.bytes() {
+            Some(file) => file.why(&self.path, error),
+            None => error,
+        }
+    }
+
+    /// Returns the bytes of a file; `None` for a tree in memory.
+    pub(super) fn bytes(&self) -> Option<&Bytes> {
+        match &self.store {
+            Store::File(bytes) => Some(bytes),
+            Store::Blocks(_) => None,
+        }
     }
 
     /// Reads the nodes of a page without their parents, and their colours.
-    fn read_nodes(&self, page: u32) -> Result<Content> {
-        let entry = self.entry(page)?;
-        if let Store::Blocks(blocks) = &self.store {
-            let (block, nodes) = (&blocks[entry.block as usize], self.directory.nodes(page));
-            let range = nodes.start as usize..nodes.end as usize;
-            let colors = block.colors.as_ref().map(|colors| colors.chosen(range.clone()));
-            return Ok((block.nodes[range].to_vec(), colors));
-        }
-        let Place { offset, bytes: length, crc } = entry.place;
+    fn read_nodes(&self, page: u32, entry: &PageEntry) -> Result<Content> {
+        let file = match &self.store {
+            Store::File(file) => file,
+            Store::Blocks(blocks) => {
+                let (block, nodes) = (&blocks[entry.block as usize], entry.range());
+                let range = nodes.start as usize..nodes.end as usize;
+                let colors = block.colors.as_ref().map(|colors| colors.chosen(range.clone()));
+                return Ok(Content { nodes: block.nodes[range].to_vec(), colors, links: None });
+            }
+        };
+        let Place { offset, crc, .. } = entry.place;
         let place = || format!("page {page} (byte {offset})");
-        let all = self.store.bytes();
-        let end = offset.saturating_add(u64::from(length)).min(all.len() as u64);
-        if end < offset.saturating_add(u64::from(length)) {
+        if !self.has(entry) {
             return Err(incomplete(&self.path, place()));
         }
-        let broken =
-            |message: String| self.store.why(&self.path, damaged(&self.path, place(), message));
-        // Decodes a copy, so that the bytes decoded are those that were verified, whoever writes to
-        // the file.
-        let bytes = all[offset as usize..end as usize].to_vec();
-        if crc32fast::hash(&bytes) != crc {
-            return Err(broken("its checksum does not match".into()));
-        }
-        let children = self.directory.children(page);
-        let (nodes, colors) = page::decode_colored(
-            &bytes,
-            entry.nodes as usize,
-            entry.first_child,
-            self.header.extent,
-            self.header.degree,
-        )
-        .map_err(broken)?;
-        let counted: u64 = nodes.iter().map(|node| u64::from(node.children)).sum();
-        if counted != u64::from(children.end - children.start) {
-            let message = format!(
-                "its nodes have {counted} children, but the directory states {}",
-                children.len()
-            );
-            return Err(damaged(&self.path, place(), message));
-        }
-        Ok((nodes, colors))
+        let has_links = self.portals.is_none() && self.has_portals(entry);
+        let frame = Frame {
+            nodes: entry.nodes as usize,
+            first_child: entry.first_child,
+            extent: self.header.extent,
+            degree: self.header.degree,
+            has_links,
+        };
+        let decode = |bytes: &[u8]| {
+            if crc32fast::hash(bytes) != crc {
+                return Err("its checksum does not match".into());
+            }
+            page::decode_colored(bytes, frame)
+        };
+        let (mut nodes, colors) = file
+            .decoded(entry.place.range(), decode)?
+            .map_err(|message| file.why(&self.path, damaged(&self.path, place(), message)))?;
+        let links = has_links.then(|| links(&mut nodes));
+        Ok(Content { nodes, colors, links })
     }
 
     /// Returns the nodes of a page that have children.
@@ -430,35 +530,53 @@ impl Hierarchy {
         if let Some(held) = self.families.lock().unwrap_or_else(|e| e.into_inner()).get(page) {
             return Ok(held);
         }
-        let read: Arc<[Family]> = families(&self.read_nodes(page)?.0).into();
+        let read = self.read_nodes(page, &self.entry(page)?)?;
+        let read: Arc<[Family]> = families(&read.nodes).into();
         self.families.lock().unwrap_or_else(|e| e.into_inner()).keep(page, read.clone());
         Ok(read)
     }
 
-    fn child_pages(&self, page: u32, nodes: &[Node]) -> Result<Vec<u32>> {
-        let entry = &self.directory.pages[page as usize];
-        let has_portals = self.is_joined() && entry.block == 0;
+    fn child_pages(
+        &self,
+        page: u32,
+        entry: &PageEntry,
+        nodes: &[Node],
+        links: Option<&[u32]>,
+    ) -> Result<Vec<u32>> {
+        let wrong = |message: String| damaged(&self.path, format!("page {page}"), message);
         // Children are adjacent, so their pages are too.
-        let mut below = NO_PAGE;
+        let mut below = entry.child_page;
+        let mut range = 0..0;
         let child_page = |(index, node): (usize, &Node)| {
             if !node.is_leaf() {
-                if below == NO_PAGE || !self.directory.nodes(below).contains(&node.first_child) {
-                    below = self.directory.page_of(entry.block, node.first_child);
+                while !range.contains(&node.first_child) {
+                    let next = if range.is_empty() { below } else { below + 1 };
+                    let found = (next < self.page_count()).then(|| self.entry(next)).transpose()?;
+                    let found = found.filter(|found| {
+                        found.block == entry.block
+                            && (range.is_empty() || found.first_node == range.end)
+                            && found.first_node <= node.first_child
+                    });
+                    let found = found.ok_or_else(|| {
+                        wrong(format!("no page has node {} of its block", node.first_child))
+                    })?;
+                    (below, range) = (next, found.range());
                 }
                 return Ok(below);
             }
-            if !has_portals {
+            if !self.has_portals(entry) {
                 return Ok(NO_PAGE);
             }
             let number = entry.first_node + index as u32;
-            let block = self.portals.get(&number).ok_or_else(|| {
-                damaged(
-                    &self.path,
-                    format!("page {page}"),
-                    format!("no block has the portal at node {number}"),
-                )
-            })?;
-            Ok(self.directory.blocks[*block as usize].first_page)
+            let linked = match (links, &self.portals) {
+                (Some(links), _) => {
+                    Some(links[index]).filter(|link| (page + 1..self.page_count()).contains(link))
+                }
+                (None, portals) => {
+                    portals.as_ref().and_then(|portals| portals.get(&number).copied())
+                }
+            };
+            linked.ok_or_else(|| wrong(format!("no block has the portal at node {number}")))
         };
         nodes.iter().enumerate().map(child_page).collect()
     }
@@ -469,11 +587,21 @@ impl Hierarchy {
     }
 }
 
-/// Returns the directory of a tree in memory, whose pages have no places in a file.
-fn directory_of(tree: &Tree) -> Result<Directory> {
+/// Takes the pages that portals state out of the nodes of a page.
+fn links(nodes: &mut [Node]) -> Vec<u32> {
+    let link = |node: &mut Node| match node.is_leaf() {
+        true => std::mem::take(&mut node.first_child),
+        false => NO_PAGE,
+    };
+    nodes.iter_mut().map(link).collect()
+}
+
+/// Returns the entries of a tree in memory, whose pages have no places in a file, and the page for
+/// each portal.
+fn entries_of(tree: &Tree) -> Result<(Vec<PageEntry>, HashMap<u32, u32>)> {
     let top = &tree.blocks[0].nodes;
-    let mut directory = Directory::default();
-    let mut portals = Vec::new();
+    let mut entries: Vec<PageEntry> = Vec::new();
+    let mut portals = HashMap::new();
     for (number, block) in tree.blocks.iter().enumerate() {
         let refuse =
             |message| Error::Argument(format!("block {number} of the hierarchy: {message}"));
@@ -482,44 +610,59 @@ fn directory_of(tree: &Tree) -> Result<Directory> {
         if own != tree.degree().map(|degree| (degree, block.nodes.len())) {
             return Err(refuse(format!("its colours are {own:?} for {} nodes", block.nodes.len())));
         }
-        let runs = pages(&block.nodes);
-        let places = vec![Place::default(); runs.len()];
-        directory.push_block(&runs, &arounds(&block.nodes, &runs), &places);
+        let first = entries.len() as u32;
         match (number, block.portal) {
             (0, None) => {}
             (1.., Some(portal)) if top.get(portal as usize).is_some_and(Node::is_leaf) => {
-                portals.push(portal);
+                portals.insert(portal, first);
             }
             (_, portal) => return Err(refuse(format!("its portal is {portal:?}"))),
         }
+        let runs = pages(&block.nodes);
+        let places = vec![Place::default(); runs.len()];
+        let around = arounds(&block.nodes, &runs);
+        let mut own = entry::of_block(number as u32, first, &runs, &around, &places);
+        let portal = block.portal.unwrap_or(NO_PORTAL);
+        own.iter_mut().for_each(|entry| entry.portal = portal);
+        entries.extend(own);
     }
     let leaves = top.iter().filter(|node| node.is_leaf()).count();
-    directory.hang(top, &portals);
-    let mut sorted = portals.clone();
-    sorted.sort_unstable();
-    sorted.dedup();
-    if tree.is_joined() && (sorted.len() != leaves || portals.len() != leaves) {
-        let message = format!("the hierarchy has {} blocks below {leaves} portals", portals.len());
+    if tree.is_joined() && (portals.len() != leaves || tree.blocks.len() != leaves + 1) {
+        let blocks = tree.blocks.len() - 1;
+        let message = format!("the hierarchy has {blocks} blocks below {leaves} portals");
         return Err(Error::Argument(message));
     }
-    directory.link();
-    Ok(directory)
+    let top_pages = entries.iter().take_while(|entry| entry.block == 0).count();
+    let (own, below) = entries.split_at_mut(top_pages);
+    entry::hang_all(own, below, top);
+    Ok((entries, portals))
+}
+
+/// The beginning of a file.
+struct Begun {
+    header: Header,
+    blocks: u32,
+    directory: Directory<Listing>,
+    portals: Option<HashMap<u32, u32>>,
 }
 
 /// Reads and checks the beginning of a file.
-fn begin(
-    path: &Path,
-    bytes: &[u8],
-    limits: &Limits,
-    may_be_cut: bool,
-) -> Result<(Header, Directory)> {
-    let stored = Stored::decode(bytes).map_err(|refusal| refused(path, refusal))?;
-    let directory = Directory::decode(bytes, &stored).map_err(|trouble| match trouble {
-        Trouble::Incomplete => incomplete(path, "directory"),
-        Trouble::Damaged(message) => damaged(path, "directory", message),
-    })?;
-    let Stored { header, file_bytes, .. } = stored;
-    let present = bytes.len() as u64;
+fn begin(path: &Path, file: &Bytes, limits: &Limits, may_be_cut: bool) -> Result<Begun> {
+    let stored = Stored::decode(&file.beginning(0)?).map_err(|refusal| refused(path, refusal))?;
+    let (directory, portals, memory) = match stored.is_flat {
+        true => flat_directory(path, file, &stored)?,
+        false => {
+            let root = Shape::of(stored.pages).root_length::<Listing>();
+            let kind = listing(&stored, (stored.length() + root) as u64);
+            let most = (stored.length() + MOST_ROOT) as u64;
+            let head = file.beginning(most)?;
+            let place = (stored.length(), kind.end);
+            let directory = Directory::open(kind, stored.pages, place, &head);
+            (directory.map_err(|fault| told(path, fault))?, None, 0)
+        }
+    };
+    let Stored { header, file_bytes, blocks, .. } = stored;
+    let present = file.len();
     if present > file_bytes {
         let message = format!("the file has {} bytes after its end", present - file_bytes);
         return Err(damaged(path, format!("byte {file_bytes}"), message));
@@ -532,32 +675,41 @@ fn begin(
     {
         limits.check(LimitKind::Points, path, what, found)?;
     }
-    let bytes = present + directory.memory();
     limits.check(
         LimitKind::Bytes,
         path,
         "the size of the file and its directory in bytes",
-        bytes,
+        present + memory,
     )?;
-    Ok((header, directory))
+    Ok(Begun { header, blocks, directory, portals })
 }
 
-impl Store {
-    /// Finds the cause of an error. A failed checksum shows damage, but not whether the file was
-    /// changed while it was read.
-    fn why(&self, path: &Path, error: Error) -> Error {
-        match self {
-            Self::Mapped(map) => intact(map, path).err().unwrap_or(error),
-            Self::Bytes(_) | Self::Blocks(_) => error,
-        }
-    }
+/// What the directory of a file lists, whose pages begin at byte `start`.
+fn listing(stored: &Stored, start: u64) -> Listing {
+    let end = stored.file_bytes.saturating_sub(HASH as u64);
+    Listing { blocks: stored.blocks, pages: stored.pages, start, end }
+}
 
-    fn bytes(&self) -> &[u8] {
-        match self {
-            Self::Mapped(map) => map,
-            Self::Bytes(bytes) => bytes,
-            Self::Blocks(_) => &[],
-        }
+/// A directory of versions 1 and 2: with the page for each portal, and its size in memory.
+type FlatDirectory = (Directory<Listing>, Option<HashMap<u32, u32>>, u64);
+
+fn flat_directory(path: &Path, file: &Bytes, stored: &Stored) -> Result<FlatDirectory> {
+    let length = Flat::length(stored.blocks as usize, stored.pages as usize);
+    let head = file.beginning(length.saturating_add(stored.length() as u64))?;
+    let flat = Flat::decode(&head, stored).map_err(|trouble| match trouble {
+        Trouble::Incomplete => incomplete(path, "directory"),
+        Trouble::Damaged(message) => damaged(path, "directory", message),
+    })?;
+    let directory = Directory::held(listing(stored, stored.length() as u64 + length), &flat.pages);
+    Ok((directory, Some(flat.portals()), flat.memory()))
+}
+
+/// The error for a fault of the directory.
+fn told(path: &Path, fault: Fault) -> Error {
+    match fault {
+        Fault::Incomplete(place) => incomplete(path, place),
+        Fault::Damaged(place, message) => damaged(path, place, message),
+        Fault::Unread(error) => error,
     }
 }
 
@@ -625,7 +777,7 @@ pub(super) fn refused(path: &Path, refusal: Refusal) -> Error {
         Refusal::Version(version) => Error::input(
             path,
             "header",
-            format!("has version {version}; versions 1 and {} can be read", super::TRAINED_VERSION),
+            format!("has version {version}; versions 1 to {} can be read", super::VERSION),
         )
         .hint("convert the source again, or use the release that wrote the file"),
         Refusal::Damaged(message) => damaged(path, "header", message),
@@ -643,7 +795,7 @@ pub(super) fn damaged(path: &Path, place: impl Into<String>, message: impl Into<
     Error::input(path, place, message).hint("the file is damaged: copy or convert it again")
 }
 
-/// Returns where the hash of a file begins.
-pub(super) fn hash_start(bytes: &[u8]) -> Option<usize> {
-    bytes.len().checked_sub(HASH)
+/// Returns where the hash of a file of this many bytes begins.
+pub(super) fn hash_start(bytes: u64) -> Option<u64> {
+    bytes.checked_sub(HASH as u64)
 }

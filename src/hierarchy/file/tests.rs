@@ -1,8 +1,13 @@
 //! Whole files: what is read is what was written, and damage is reported.
 
-use super::*;
+#[allow(clippy::duplicate_mod, reason = "both rooms rewrite files")]
+#[path = "../../../tests/regressions/flat.rs"]
+mod flat_files;
+
+use super::{entry::Listing, page::Frame, *};
 use crate::{
     about::Stance,
+    container::directory::Shape,
     hierarchy::{
         Block, Detail, Node, Tree,
         testing::{cloud, joined, surface, tree},
@@ -53,6 +58,16 @@ fn trees() -> Vec<Tree> {
     small.into_iter().chain(large).collect()
 }
 
+/// Returns the first page of a block.
+fn encoded(nodes: &[Node], extent: f32, lossless: bool) -> Vec<u8> {
+    page::encode(&block_of(nodes), extent, lossless).unwrap().pages.swap_remove(0)
+}
+
+/// The frame of the first page of a block.
+fn frame(nodes: usize, extent: f32) -> Frame {
+    Frame { nodes, first_child: 1, extent, degree: None, has_links: false }
+}
+
 fn block_of(nodes: &[Node]) -> Block {
     Block { nodes: nodes.to_vec(), ..Block::default() }
 }
@@ -78,12 +93,16 @@ fn lossless_keeps_every_bit() {
     }
 }
 
+fn entries(hierarchy: &Hierarchy) -> Vec<PageEntry> {
+    (0..hierarchy.page_count()).map(|page| hierarchy.entry(page).unwrap()).collect()
+}
+
 /// Compares every page with the tree that it came from.
 fn pages_tell_their_parents(hierarchy: &Hierarchy) {
     let tree = hierarchy.read_tree().unwrap();
     let parents: Vec<Vec<Option<u32>>> =
         tree.blocks.iter().map(|block| pages::parents(&block.nodes)).collect();
-    for (number, entry) in hierarchy.pages().iter().enumerate() {
+    for (number, entry) in entries(hierarchy).iter().enumerate() {
         let page = hierarchy.read_page(number as u32).unwrap();
         assert_eq!(page.nodes.len(), entry.nodes as usize);
         for (index, node) in page.nodes.iter().enumerate() {
@@ -112,7 +131,7 @@ fn pages_tell_their_parents(hierarchy: &Hierarchy) {
             }
             let below = page.child_pages[index];
             if page.is_portal(index) {
-                let block = &hierarchy.pages()[below as usize];
+                let block = hierarchy.entry(below).unwrap();
                 assert_eq!(
                     (tree.blocks[block.block as usize].portal, block.first_node),
                     (Some(own as u32), 0)
@@ -120,7 +139,7 @@ fn pages_tell_their_parents(hierarchy: &Hierarchy) {
             } else if node.is_leaf() {
                 assert_eq!(below, NO_PAGE);
             } else {
-                let entry = &hierarchy.pages()[below as usize];
+                let entry = hierarchy.entry(below).unwrap();
                 assert!(
                     (entry.first_node..entry.first_node + entry.nodes).contains(&node.first_child)
                 );
@@ -133,6 +152,8 @@ fn pages_tell_their_parents(hierarchy: &Hierarchy) {
 #[test]
 fn pages_know_what_is_above_and_below() {
     for tree in trees() {
+        let flat = flat_files::flat(&to_bytes(&tree, &options(true)).unwrap());
+        pages_tell_their_parents(&open(flat));
         pages_tell_their_parents(&open(to_bytes(&tree, &options(true)).unwrap()));
         pages_tell_their_parents(&open(to_bytes(&tree, &options(false)).unwrap()));
         pages_tell_their_parents(&Hierarchy::from_tree(tree).unwrap());
@@ -158,7 +179,7 @@ fn a_file_is_written_whole_and_is_sound() {
 /// Opens a file and reads every page: returns the tree, or the first error.
 fn try_all(bytes: Vec<u8>) -> crate::Result<Tree> {
     let hierarchy = Hierarchy::from_bytes(bytes, Path::new("memory"), &Limits::default())?;
-    for page in 0..hierarchy.pages().len() as u32 {
+    for page in 0..hierarchy.page_count() {
         hierarchy.read_page(page)?;
     }
     hierarchy.read_tree()
@@ -230,13 +251,13 @@ fn the_beginning_of_a_file_is_a_coarse_model() {
         let path = folder.write(&format!("{part}.splk"), &bytes[..bytes.len() * part / 10]);
         let prefix = Hierarchy::open_prefix(&path, &Limits::default()).unwrap();
         let mut present = 0;
-        for page in 0..prefix.pages().len() as u32 {
+        for page in 0..prefix.page_count() {
             if prefix.is_present(page) {
                 assert_eq!(
                     prefix.read_page(page).unwrap().nodes,
                     whole.read_page(page).unwrap().nodes
                 );
-                let above = prefix.pages()[page as usize].parent_pages.clone();
+                let above = prefix.entry(page).unwrap().parent_pages;
                 assert!(
                     above.into_iter().all(|above| prefix.is_present(above)),
                     "parents come first"
@@ -252,13 +273,16 @@ fn the_beginning_of_a_file_is_a_coarse_model() {
     assert!(most > 5);
 }
 
-/// Changes the header of a file, and corrects checksums and hash.
+/// Changes a file, and corrects the checksums of its header and its root, and the hash.
 fn forged(bytes: &[u8], change: impl Fn(&mut [u8])) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let stored = header::Stored::decode(&bytes).unwrap();
     let start = stored.length();
     let end = start
-        + directory::Directory::length(stored.blocks as usize, stored.pages as usize) as usize;
+        + match stored.is_flat {
+            true => flat::Flat::length(stored.blocks as usize, stored.pages as usize) as usize,
+            false => Shape::of(stored.pages).root_length::<Listing>(),
+        };
     change(&mut bytes);
     for range in [0..start, start..end] {
         let crc = crc32fast::hash(&bytes[range.start..range.end - 4]);
@@ -272,30 +296,36 @@ fn forged(bytes: &[u8], change: impl Fn(&mut [u8])) -> Vec<u8> {
 
 #[test]
 fn lies_are_told_though_checksums_fit() {
-    let bytes = to_bytes(&joined(&surface(9_000, 8), 2), &options(false)).unwrap();
-    assert!(try_all(forged(&bytes, |_| ())).is_ok());
-    let start = header::Stored::decode(&bytes).unwrap().length();
-    // The version, the counts of leaves, nodes, blocks and pages; then every word of the directory.
-    let directory_end =
-        start + directory::Directory::length(3, open(bytes.clone()).pages().len()) as usize - 4;
-    for at in [8, 16, 104, 112, 124, 128].into_iter().chain((start..directory_end).step_by(4)) {
-        for change in [1u32, 0x0100_0000, u32::MAX] {
-            let broken = forged(&bytes, |bytes| {
-                let word = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) ^ change;
-                bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
-            });
-            let folder = Folder::new();
-            let path = folder.write("forged.splk", &broken);
-            assert!(!check(&path, &Limits::default()).is_sound(), "word {at} ^ {change:x}");
-            try_all(broken).ok();
+    let paged = to_bytes(&joined(&surface(9_000, 8), 2), &options(false)).unwrap();
+    let flat = flat_files::flat(&paged);
+    let pages = open(paged.clone()).page_count();
+    let start = header::Stored::decode(&paged).unwrap().length();
+    for (bytes, end) in [
+        (paged, start + 68 * pages as usize),
+        (flat, start + flat::Flat::length(3, pages as usize) as usize - 4),
+    ] {
+        assert!(try_all(forged(&bytes, |_| ())).is_ok());
+        // The version, the counts of leaves, nodes, blocks and pages; then every word of the
+        // directory.
+        for at in [8, 16, 104, 112, 124, 128].into_iter().chain((start..end).step_by(4)) {
+            for change in [1u32, 0x0100_0000, u32::MAX] {
+                let broken = forged(&bytes, |bytes| {
+                    let word = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) ^ change;
+                    bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
+                });
+                let folder = Folder::new();
+                let path = folder.write("forged.splk", &broken);
+                assert!(!check(&path, &Limits::default()).is_sound(), "word {at} ^ {change:x}");
+                try_all(broken).ok();
+            }
         }
-    }
-    let future = forged(&bytes, |bytes| bytes[8] = 9);
-    match try_all(future) {
-        Err(crate::Error::Input { message, .. }) => {
-            assert!(message.contains("version 9"), "{message}");
+        let future = forged(&bytes, |bytes| bytes[8] = 9);
+        match try_all(future) {
+            Err(crate::Error::Input { message, .. }) => {
+                assert!(message.contains("version 9"), "{message}");
+            }
+            other => panic!("{other:?}"),
         }
-        other => panic!("{other:?}"),
     }
 }
 
@@ -308,8 +338,7 @@ fn pages_of_noise_are_survived() {
         let nodes = &tree.blocks[0].nodes;
         let runs = pages::pages(nodes);
         for lossless in [true, false] {
-            let page =
-                page::encode(&block_of(nodes), tree.extent, lossless).unwrap().pages.swap_remove(0);
+            let page = encoded(nodes, tree.extent, lossless);
             for _ in 0..3000 {
                 let mut broken = page.clone();
                 for _ in 0..1 + random.below(3) {
@@ -325,7 +354,7 @@ fn pages_of_noise_are_survived() {
                 } else {
                     broken.len()
                 });
-                if let Ok(nodes) = page::decode(&broken, runs[0].nodes.len(), 1, tree.extent) {
+                if let Ok(nodes) = page::decode(&broken, frame(runs[0].nodes.len(), tree.extent)) {
                     assert_eq!(nodes.len(), runs[0].nodes.len());
                 }
             }
@@ -393,7 +422,8 @@ fn losses_keep_to_the_promises() {
         let along = ellipsoid(&a.splat).1;
         for axis in &along[..2] {
             let ratio = (axis.dot(its * *axis) / axis.dot(own * *axis)).sqrt();
-            assert!((0.82..1.2).contains(&ratio), "{ratio}");
+            // The extremes of 60,000 axes; which these are depends on the order of the nodes.
+            assert!((0.82..1.22).contains(&ratio), "{ratio}");
         }
     }
     let [root, wanted] = [&read, &tree].map(|tree| tree.blocks[0].nodes[0].radius);
@@ -433,7 +463,8 @@ fn a_smooth_surface_takes_few_bytes() {
     let mut splats = surface(30_000, 6);
     splats.iter_mut().for_each(|splat| splat.color = 0xffff_ffff);
     let bytes = to_bytes(&tree(&splats), &options(false)).unwrap();
-    assert!(bytes.len() < 30_000 * 53 / 10, "{}", bytes.len());
+    // Of these, 0.3 are for pages of at most 1,024 nodes, in place of 4,096.
+    assert!(bytes.len() < 30_000 * 55 / 10, "{}", bytes.len());
 }
 
 #[test]
@@ -512,7 +543,8 @@ fn validation_finds_what_is_loose() {
 /// Values that cannot be drawn are rejected in trees, on writing and on reading.
 #[test]
 fn numbers_that_cannot_be_drawn_are_refused() {
-    let sound = tree(&surface(50, 1));
+    // All of it is on one page.
+    let sound = tree(&surface(40, 1));
     let refused = |change: &dyn Fn(&mut Tree), message: &str| {
         let mut tree = sound.clone();
         change(&mut tree);
@@ -545,9 +577,8 @@ fn numbers_that_cannot_be_drawn_are_refused() {
         refused(&|tree| change(&mut tree.blocks[0].nodes[7]), &format!("has {message}"));
         let mut nodes = sound.blocks[0].nodes.clone();
         change(&mut nodes[7]);
-        let page =
-            page::encode(&block_of(&nodes), sound.extent, true).unwrap().pages.swap_remove(0);
-        let error = page::decode(&page, nodes.len(), 1, sound.extent).unwrap_err();
+        let page = encoded(&nodes, sound.extent, true);
+        let error = page::decode(&page, frame(nodes.len(), sound.extent)).unwrap_err();
         assert!(error.contains(&format!("its node 7 has {message}")), "{error}");
     }
     refused(&|tree| tree.extent = 8.1, "its extent is 8.1; it must lie in 0 … 8");

@@ -2,10 +2,10 @@
 
 use super::{
     HASH,
-    directory::{Directory, Place},
+    drafts::{Drafts, Joint},
     header::{Header, Stored},
     page::{self, Coded},
-    pages::{Around, Run, in_order},
+    pages::{Around, Run, in_order, pages},
 };
 use crate::{
     Error, Result,
@@ -19,17 +19,21 @@ use crate::{
     splat::NO_NORMAL,
 };
 use crate::{
-    container::{Spill, Target},
+    container::{
+        Spill, Target,
+        directory::{Layout, Place},
+    },
     parallel::{self, prelude::*},
 };
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::{
     io::{self, Write},
     path::{Path, PathBuf},
 };
 
 /// Options for writing a hierarchy, and what the file says about its source.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct WriteOptions {
     /// Store every bit, at about eight times the size.
     pub lossless: bool,
@@ -73,8 +77,7 @@ pub struct Writer {
     options: WriteOptions,
     extent: f32,
     spill: Spill,
-    /// Of the ordinary blocks, without the one that joins them.
-    directory: Directory,
+    drafts: Drafts,
     roots: Vec<Node>,
     contents: Contents,
     /// The degree of the first block's colours, if there is one already.
@@ -93,6 +96,16 @@ impl Writer {
         Self::begin(Some(path.to_owned()), extent, options, || Spill::beside(path))
     }
 
+    /// As [`new`](Self::new), with pages that are there already ([`adopt`](Self::adopt)).
+    pub(in crate::hierarchy) fn over(
+        path: &Path,
+        extent: f32,
+        options: &WriteOptions,
+        pages: Spill,
+    ) -> Result<Self> {
+        Self::begin(Some(path.to_owned()), extent, options, || Ok(pages))
+    }
+
     fn begin(
         path: Option<PathBuf>,
         extent: f32,
@@ -102,12 +115,16 @@ impl Writer {
         if let Some(fault) = fault_of_extent(extent) {
             return Err(Error::Argument(format!("the hierarchy: {fault}")));
         }
+        let drafts = match &path {
+            Some(path) => Spill::beside(path)?,
+            None => Spill::Memory(Vec::new()),
+        };
         Ok(Self {
             path,
             options: options.clone(),
             extent,
             spill: spill()?,
-            directory: Directory::default(),
+            drafts: Drafts::new(drafts),
             roots: Vec::new(),
             contents: Contents::default(),
             degree: None,
@@ -132,28 +149,28 @@ impl Writer {
     pub fn blocks(&mut self, blocks: &[&Block]) -> Result<Vec<Node>> {
         let written = self.roots.len();
         for (number, block) in (written..).zip(blocks) {
-            let refuse = |message: String| {
-                Error::Argument(format!("block {number} of the hierarchy: {message}"))
-            };
-            in_order(&block.nodes).map_err(refuse)?;
-            check_nodes(&block.nodes).map_err(refuse)?;
-            self.check_colors(block).map_err(refuse)?;
+            self.check_colors(block).map_err(|message| refusal(number, message))?;
         }
+        let wanted = self.path.as_deref().unwrap_or(Path::new("memory"));
         let (extent, is_lossless) = (self.extent, self.options.lossless);
-        let encode = |block: &&Block| {
-            let coded = page::encode(block, extent, is_lossless)?;
-            let around = arounds(&coded.nodes, &coded.runs);
-            Ok((coded, around))
-        };
-        let coded: io::Result<Vec<(Coded, Vec<Around>)>> = blocks.par_iter().map(encode).collect();
-        let coded = coded.map_err(|e| self.fault(e))?;
-        for (coded, around) in coded {
-            self.contents.add(&coded.nodes);
+        for (coded, around) in encode(blocks, written, extent, is_lossless, wanted)? {
             let places = self.push(&coded.pages)?;
-            self.directory.push_block(&coded.runs, &around, &places);
-            self.roots.push(coded.nodes[0]);
+            self.adopt(&Placed::new(&coded, around, places))?;
         }
         Ok(self.roots[written..].to_vec())
+    }
+
+    /// Adds a block whose pages are already in the storage that this began with.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if its entries cannot be written.
+    pub(in crate::hierarchy) fn adopt(&mut self, block: &Placed) -> Result<()> {
+        self.degree.get_or_insert(None);
+        self.contents.join(&block.contents);
+        let Placed { runs, around, places, .. } = block;
+        self.drafts.push(runs, around, places).map_err(|e| self.fault(e))?;
+        self.roots.push(block.root);
+        Ok(())
     }
 
     /// Returns an error unless all blocks have colours of one degree for all nodes, or none has.
@@ -194,9 +211,9 @@ impl Writer {
         if let Some(fault) = fault_of_box(whole.origin, &whole.bounds) {
             return Err(Error::Argument(format!("the hierarchy: {fault}")));
         }
-        let mut directory = match (top, self.roots.len()) {
+        let joint = match (top, self.roots.len()) {
             (_, 0) => return Err(Error::Argument("the hierarchy has no blocks".into())),
-            (None, 1) => std::mem::take(&mut self.directory),
+            (None, 1) => Joint::default(),
             (None, count) => {
                 return Err(Error::Argument(format!(
                     "the {count} blocks of the hierarchy need a block that joins them"
@@ -204,42 +221,41 @@ impl Writer {
             }
             (Some(top), _) => self.join(top)?,
         };
-        directory.link();
-        let order = directory.coarse_first();
-        let spilled: Vec<Place> = directory.pages.iter().map(|page| page.place).collect();
+        let (wanted, path) = (self.path.clone(), PathBuf::from("memory"));
+        let wanted = wanted.unwrap_or(path);
         let mut stored = Stored {
-            header: self.header(&directory, whole),
+            header: self.header(whole, joint.nodes.len() as u64),
             file_bytes: 0,
-            blocks: directory.blocks.len() as u32,
-            pages: directory.pages.len() as u32,
+            blocks: self.drafts.blocks() + u32::from(!joint.pages.is_empty()),
+            pages: self.drafts.pages + joint.pages.len() as u32,
+            is_flat: false,
         };
-        let mut at = stored.length() as u64
-            + Directory::length(directory.blocks.len(), directory.pages.len());
-        for &page in &order {
-            let place = &mut directory.pages[page as usize].place;
-            place.offset = at;
-            at += u64::from(place.bytes);
-        }
-        stored.file_bytes = at + HASH as u64;
         let mut out = target()?;
+        let written = self.assemble(&mut stored, joint, &mut out);
+        written.map_err(|e| Error::output(&wanted, e))?;
+        out.end(&wanted)
+    }
+
+    /// Writes the whole file.
+    fn assemble(self, stored: &mut Stored, joint: Joint, out: &mut Target) -> io::Result<()> {
+        let mut entries = self.drafts.end(joint)?;
+        let mut spill = self.spill;
+        let mut layout = Layout::new(stored.pages, stored.length() as u64, &mut entries)?;
+        stored.file_bytes = layout.end + HASH as u64;
+        let (root, waiting) = layout.encode(&mut entries, &mut spill)?;
         let mut hash = blake3::Hasher::new();
         let mut put = |bytes: &[u8]| {
             hash.update(bytes);
             out.write_all(bytes)
         };
-        let pieces =
-            order.iter().map(|&page| (spilled[page as usize].offset, spilled[page as usize].bytes));
-        let written = put(&stored.encode())
-            .and_then(|()| put(&directory.encode()))
-            .and_then(|()| self.spill.replay(pieces, &mut put))
-            .and_then(|()| out.write_all(hash.finalize().as_bytes()));
-        let wanted = self.path.as_deref().unwrap_or(Path::new("memory"));
-        written.map_err(|e| Error::output(wanted, e))?;
-        out.end(wanted)
+        put(&stored.encode())?;
+        put(&root)?;
+        layout.write(&mut entries, &waiting, &mut spill.end()?, &mut put)?;
+        out.write_all(hash.finalize().as_bytes())
     }
 
-    /// Writes the block on top, and returns the directory of all blocks.
-    fn join(&mut self, top: Top) -> Result<Directory> {
+    /// Writes the pages of the block on top.
+    fn join(&mut self, top: Top) -> Result<Joint> {
         let refuse = |message: String| {
             Error::Argument(format!("the block that joins the others: {message}"))
         };
@@ -267,15 +283,15 @@ impl Writer {
         }
         page::enclose(&mut nodes);
         check_nodes(&nodes).map_err(refuse)?;
+        // Each portal states the first page of its block. The pages on top come before these.
+        let own = pages(&nodes).len() as u32;
+        for (&portal, first) in top.portals.iter().zip(self.drafts.firsts()) {
+            nodes[portal as usize].first_child = own + first;
+        }
         let block = Block { nodes, colors: top.block.colors.clone(), portal: None };
-        let coded = page::encode(&block, self.extent, true).map_err(|e| self.fault(e))?;
-        let nodes = block.nodes;
+        let (coded, around) = encode_block(&block, self.extent, true).map_err(|e| self.fault(e))?;
         let places = self.push(&coded.pages)?;
-        let mut directory = Directory::default();
-        directory.push_block(&coded.runs, &arounds(&nodes, &coded.runs), &places);
-        directory.append(std::mem::take(&mut self.directory));
-        directory.hang(&nodes, top.portals);
-        Ok(directory)
+        Ok(Joint::new(block.nodes, &coded.runs, &around, &places, top.portals))
     }
 
     fn fault(&self, e: io::Error) -> Error {
@@ -287,12 +303,12 @@ impl Writer {
         for bytes in pages {
             let offset = self.spill.push(bytes);
             let offset = offset.map_err(|e| self.fault(e))?;
-            places.push(Place { offset, bytes: bytes.len() as u32, crc: crc32fast::hash(bytes) });
+            places.push(Place::of(offset, bytes));
         }
         Ok(places)
     }
 
-    fn header(&self, directory: &Directory, whole: &Whole) -> Header {
+    fn header(&self, whole: &Whole, joint_nodes: u64) -> Header {
         Header {
             origin: whole.origin,
             bounds: whole.bounds,
@@ -304,13 +320,62 @@ impl Writer {
             lossless: self.options.lossless,
             source_points: whole.source_points,
             leaves: self.contents.leaves,
-            nodes: directory.blocks.iter().map(|block| u64::from(block.nodes)).sum(),
+            nodes: self.drafts.nodes + joint_nodes,
             stance: self.options.stance,
             is_guessed: self.options.is_guessed,
             unit: self.options.unit.clone(),
             source: self.options.source.clone(),
         }
     }
+}
+
+/// A block whose pages have been written: everything that a [`Writer`] must know of it.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::hierarchy) struct Placed {
+    pub root: Node,
+    pub runs: Vec<Run>,
+    pub around: Vec<Around>,
+    pub places: Vec<Place>,
+    pub contents: Contents,
+}
+
+impl Placed {
+    pub fn new(coded: &Coded, around: Vec<Around>, places: Vec<Place>) -> Self {
+        let mut contents = Contents::default();
+        contents.add(&coded.nodes);
+        Self { root: coded.nodes[0], runs: coded.runs.clone(), around, places, contents }
+    }
+}
+
+fn refusal(number: usize, message: String) -> Error {
+    Error::Argument(format!("block {number} of the hierarchy: {message}"))
+}
+
+/// Encodes blocks in parallel, with the bounds above each of their pages. `number` is that of the
+/// first, and `wanted` the file, for errors.
+///
+/// # Errors
+/// Those of [`Writer::block`].
+pub(in crate::hierarchy) fn encode(
+    blocks: &[&Block],
+    number: usize,
+    extent: f32,
+    is_lossless: bool,
+    wanted: &Path,
+) -> Result<Vec<(Coded, Vec<Around>)>> {
+    for (number, block) in (number..).zip(blocks) {
+        in_order(&block.nodes).map_err(|message| refusal(number, message))?;
+        check_nodes(&block.nodes).map_err(|message| refusal(number, message))?;
+    }
+    let encode = |block: &&Block| encode_block(block, extent, is_lossless);
+    let coded: io::Result<Vec<_>> = blocks.par_iter().map(encode).collect();
+    coded.map_err(|e| Error::output(wanted, e))
+}
+
+fn encode_block(block: &Block, extent: f32, is_lossless: bool) -> io::Result<(Coded, Vec<Around>)> {
+    let coded = page::encode(block, extent, is_lossless)?;
+    let around = arounds(&coded.nodes, &coded.runs);
+    Ok((coded, around))
 }
 
 /// Returns an error if a node has values that cannot be drawn.
@@ -321,13 +386,13 @@ pub(super) fn check_nodes(nodes: &[Node]) -> Result<(), String> {
 }
 
 /// Properties of the leaves of ordinary blocks.
-#[derive(Default)]
-struct Contents {
-    leaves: u64,
-    has_color: bool,
-    has_normals: bool,
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::hierarchy) struct Contents {
+    pub leaves: u64,
+    pub has_color: bool,
+    pub has_normals: bool,
     /// Red, green and blue of the first leaf.
-    color: Option<u32>,
+    pub color: Option<u32>,
 }
 
 impl Contents {
@@ -337,6 +402,16 @@ impl Contents {
             self.leaves += 1;
             self.has_color |= *self.color.get_or_insert(color) != color;
             self.has_normals |= node.splat.normal != NO_NORMAL;
+        }
+    }
+
+    /// Adds those of the blocks that follow.
+    fn join(&mut self, other: &Self) {
+        self.leaves += other.leaves;
+        self.has_normals |= other.has_normals;
+        self.has_color |= other.has_color;
+        if let Some(color) = other.color {
+            self.has_color |= *self.color.get_or_insert(color) != color;
         }
     }
 }

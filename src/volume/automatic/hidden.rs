@@ -12,7 +12,7 @@ const BORDER: usize = 3;
 /// border of what lies beyond the first one. Values lie beyond if they are larger, or smaller if
 /// the second value is. Rays run along the axes, from all six sides. Without any such ray, 0.
 pub fn share(volume: &Volume, outer: f64, inner: f64) -> f64 {
-    each_type!(&volume.samples, values => {
+    each_type!(volume.samples, values => {
         let beyond = |at: usize, limit: f64| {
             let value = f64::from(values[at]);
             if outer <= inner { value >= limit } else { value <= limit }

@@ -3,7 +3,7 @@
 
 use crate::{
     parallel::prelude::*,
-    volume::{Lattice, Samples, Volume, each_type},
+    volume::{Lattice, Scalar, Volume, each_type},
 };
 use glam::DVec3;
 
@@ -64,7 +64,7 @@ impl Survey {
     /// Surveys a volume, which must be valid. A window replaces the values without outliers.
     pub fn of_volume(volume: &Volume, window: Option<[f64; 2]>) -> Self {
         let lattice = &volume.lattice;
-        let looks = each_type!(&volume.samples, values => {
+        let looks = each_type!(volume.samples, values => {
             looks(lattice, |at: usize| f64::from(values[at]))
         });
         let spacing = lattice.spacing();
@@ -74,7 +74,7 @@ impl Survey {
             _ => spacing.max_element(),
         };
         let [first, last] = volume.bounds();
-        let is_float = matches!(volume.samples, Samples::F32(_));
+        let is_float = volume.samples.scalar() == Scalar::F32;
         let mut survey = Self::of_looks(&looks, volume.range, window, is_float);
         (survey.spacing, survey.diagonal) = (spacing, (last - first).length());
         survey.add_slopes(&looks);

@@ -51,23 +51,24 @@ impl Convert {
         let stages = progress.stages();
         let watch = |done, all| stages.set("Writing bricks, slice by slice", done, all);
         match &source {
-            Source::Whole(volume) => bricks::write(volume, &self.output, &options, Some(&watch)),
+            Source::Whole(volume) => bricks::write(volume, self.output(), &options, Some(&watch)),
             Source::Stream(stream) => {
                 let range =
                     stream.range(Some(&|done, all| stages.set("Scanning the input", done, all)))?;
                 warn_of_holes(file, stream.holes(), lattice.len());
-                bricks::convert(stream, range, &self.output, &options, Some(&watch))
+                bricks::convert(stream, range, self.output(), &options, Some(&watch))
             }
         }
         .map_err(|error| in_file(file, error))?;
         drop(stages);
         progress.clear();
-        let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
+        let bytes =
+            self.output().metadata().map_err(|e| Error::file(self.output(), "read", e))?.len();
         let per_sample = bytes as f64 / lattice.len() as f64;
         let [nx, ny, nz] = lattice.dims;
         if self.json {
             return output::line(json!({
-                "file": self.output.to_string_lossy(),
+                "file": self.output().to_string_lossy(),
                 "dims": lattice.dims,
                 "type": scalar.name(),
                 "slice_by_slice": matches!(source, Source::Stream(_)),

@@ -8,11 +8,21 @@ use splatkit::{
     formats::Stream,
     hierarchy::{
         BuildOptions,
-        external::{BLOCKS, Converted, ExternalOptions, Stage, check, convert},
+        external::{BLOCKS, Converted, ExternalOptions, Plan, Stage, check, convert},
     },
     surface::{Paint, SurfelOptions},
 };
 use std::time::Instant;
+
+/// Returns what a progress bar calls a stage.
+pub fn name_of(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Reading => "Scanning the input",
+        Stage::Distributing => "Distributing to regions",
+        Stage::Building => "Building the hierarchy",
+        Stage::Writing => "Writing the file",
+    }
+}
 
 impl Convert {
     /// Converts inputs that need more than the `most` bytes of memory that may be used.
@@ -23,12 +33,20 @@ impl Convert {
         progress: &Progress,
     ) -> Result<(), Failure> {
         let [wanted, most_mib] = [need.bytes, most].map(|bytes| bytes >> 20);
-        if !need.in_pieces? {
-            return Err(Failure::Usage(format!(
-                "converting this takes about {wanted} MiB, but only {most_mib} MiB may be used; \
-                 only binary PLY of points or triangles, LAS and LAZ become hierarchies in less; \
-                 --memory allows more"
-            )));
+        if let Some(file) = need.whole? {
+            let file = file.display();
+            return Err(Failure::Usage(if self.parts.divide() {
+                format!(
+                    "{file}: only binary PLY of points or triangles, LAS and LAZ are converted in \
+                     parts"
+                )
+            } else {
+                format!(
+                    "converting this takes about {wanted} MiB, but only {most_mib} MiB may be \
+                     used; only binary PLY of points or triangles, LAS and LAZ become hierarchies \
+                     in less, not {file}; --memory allows more"
+                )
+            }));
         }
         let start = Instant::now();
         let limits = self.load.limits();
@@ -49,17 +67,10 @@ impl Convert {
             },
             paint: self.paint_in_regions(&frame)?,
             scalar: self.attribute().map(str::to_owned),
+            parts: self.parts.parts,
         };
         let stages = progress.stages();
-        let watch = |stage: Stage, done: u64, total: u64| {
-            let name = match stage {
-                Stage::Reading => "Scanning the input",
-                Stage::Distributing => "Distributing to regions",
-                Stage::Building => "Building the hierarchy",
-                Stage::Writing => "Writing the file",
-            };
-            stages.set(name, done, total);
-        };
+        let watch = |stage, done, total| stages.set(name_of(stage), done, total);
         if self.dry_run {
             check(&self.files, &limits, &options, Some(&watch))?;
             drop(stages);
@@ -67,7 +78,14 @@ impl Convert {
             return self.print_need(need.bytes, most);
         }
         let write = self.surface.write_options(&self.files, &frame);
-        let done = convert(&self.files, &limits, &self.output, &options, &write, Some(&watch))?;
+        if let Some(folder) = &self.parts.plan {
+            self.check_plan(folder)?;
+            let plan = Plan::make(&self.files, folder, &limits, &options, &write, Some(&watch))?;
+            drop(stages);
+            progress.clear();
+            return self.print_plan(&plan);
+        }
+        let done = convert(&self.files, &limits, self.output(), &options, &write, Some(&watch))?;
         drop(stages);
         progress.clear();
         self.print_converted(&done, milliseconds(start))
@@ -106,12 +124,13 @@ impl Convert {
     }
 
     /// Prints the counts and the size of the file.
-    fn print_converted(&self, done: &Converted, total_ms: f64) -> Result<(), Failure> {
-        let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
+    pub(super) fn print_converted(&self, done: &Converted, total_ms: f64) -> Result<(), Failure> {
+        let bytes =
+            self.output().metadata().map_err(|e| Error::file(self.output(), "read", e))?.len();
         let per_point = bytes as f64 / done.points as f64;
         if self.json {
             return output::line(json!({
-                "file": self.output.to_string_lossy(),
+                "file": self.output().to_string_lossy(),
                 "points": done.points,
                 "splats": done.splats,
                 "closed": done.closed,

@@ -94,7 +94,7 @@ impl Target {
 impl Convert {
     /// Writes the Gaussians of all inputs, in the format that the output's name asks for.
     pub(super) fn gaussians(self, progress: &Progress) -> Result<(), Failure> {
-        let target = Target::of(&self.output);
+        let target = Target::of(self.output());
         let is_trained = self.are_gaussians()?;
         let Gathered { mut set, points, read_ms } = self.gather_gaussians(progress)?;
         if let Some(degree) = self.surface.degree {
@@ -109,12 +109,13 @@ impl Convert {
             progress.clear();
             return self.say_expected(&set, points, bytes, "at most", read_ms);
         }
-        progress.stage(format!("Writing {}", self.output.display()));
+        progress.stage(format!("Writing {}", self.output().display()));
         let start = Instant::now();
-        target.write(&set, &self.output)?;
+        target.write(&set, self.output())?;
         progress.clear();
         let write_ms = milliseconds(start);
-        let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
+        let bytes =
+            self.output().metadata().map_err(|e| Error::file(self.output(), "read", e))?.len();
         self.say(&Written { set: &set, points, bytes, read_ms, write_ms })
     }
 
@@ -146,7 +147,7 @@ impl Convert {
         let per_splat = bytes as f64 / set.len().max(1) as f64;
         if self.json {
             return output::line(json!({
-                "file": self.output.to_string_lossy(),
+                "file": self.output().to_string_lossy(),
                 "points": points,
                 "splats": set.len(),
                 "degree": set.degree,
@@ -197,10 +198,11 @@ impl Convert {
         if self.dry_run {
             return self.expect_gaussians(&set, points, &build, &write, read_ms);
         }
-        let built = hierarchy::build_gaussians(&set, &self.output, &build, &write, Some(&watch));
+        let built = hierarchy::build_gaussians(&set, self.output(), &build, &write, Some(&watch));
         built.map_err(|error| error.in_file(&self.files[0]))?;
         progress.clear();
-        let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
+        let bytes =
+            self.output().metadata().map_err(|e| Error::file(self.output(), "read", e))?.len();
         self.say(&Written { set: &set, points, bytes, read_ms, write_ms: milliseconds(start) })
     }
 

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use splatkit::{
     formats::Stream,
     hierarchy::external::{BLOCKS, memory_between, memory_of_stream},
-    input::Limits,
+    input::{self, Limits},
     surface::SurfelOptions,
 };
 use std::path::{Path, PathBuf};
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 pub struct Need {
     /// Approximate number of bytes. If a file's header has no counts, the file's size decides.
     pub bytes: u64,
-    /// Whether all files can be read in pieces, or the error of a file that cannot be opened.
-    pub in_pieces: splatkit::Result<bool>,
+    /// The first file that cannot be read in pieces, or the error of a file that cannot be opened.
+    pub whole: splatkit::Result<Option<PathBuf>>,
 }
 
 /// Memory for each byte of a file whose header has no counts: the byte and what is made from it.
@@ -28,7 +28,7 @@ const OF_PACKED_BYTE: u64 = 24;
 /// that decides the comparison. In that case, files are scanned one after another until it is known
 /// whether all of them together need more than `enough` bytes.
 pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough: u64) -> Need {
-    let mut in_pieces = Ok(true);
+    let mut whole = Ok(None);
     let mut is_stream = false;
     let mut between = Vec::new();
     for file in files {
@@ -41,9 +41,9 @@ pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough:
                 );
                 continue;
             }
-            Ok(None) => in_pieces = in_pieces.map(|_| false),
+            Ok(None) => whole = whole.map(|first: Option<PathBuf>| first.or(Some(file.clone()))),
             // If the file fits into memory, its reader reports what is wrong with it.
-            Err(error) => in_pieces = in_pieces.and(Err(error)),
+            Err(error) => whole = whole.and(Err(error)),
         }
         let is_packed =
             file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splk"));
@@ -62,12 +62,12 @@ pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough:
                 // As above, the reader reports this error.
                 Err(error) => {
                     between[index] = [least_of_this; 2];
-                    in_pieces = in_pieces.and(Err(error));
+                    whole = whole.and(Err(error));
                 }
             }
         }
     }
-    Need { bytes: sums(&between, blocks)[0], in_pieces }
+    Need { bytes: sums(&between, blocks)[0], whole }
 }
 
 /// Returns the lower and upper bound for all files together.
@@ -108,5 +108,5 @@ pub fn check(file: &Path, need: u64, taken: u64, most: u64) -> Result<(), Failur
 }
 
 fn file_bytes(file: &Path) -> u64 {
-    file.metadata().map_or(0, |meta| meta.len())
+    input::size(file).unwrap_or(0)
 }

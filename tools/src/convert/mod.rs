@@ -4,6 +4,7 @@ mod bricks;
 mod external;
 mod gaussians;
 mod memory;
+mod parts;
 mod source;
 mod surface;
 mod volume;
@@ -17,19 +18,25 @@ use crate::{
     progress::Progress,
 };
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Args, Debug)]
 pub struct Convert {
     /// Meshes, point clouds, hierarchies and trained Gaussians, which are merged into one; or a
-    /// single volume.
-    #[arg(value_name = "FILE", required = true)]
+    /// single volume. Addresses are inputs too (docs/remote.md).
+    #[arg(
+        value_name = "FILE",
+        required_unless_present_any = ["part", "join"],
+        value_parser = parse::input()
+    )]
     files: Vec<PathBuf>,
     /// Write to this file. Meshes, point clouds, hierarchies and trained Gaussians become .splk, a
     /// hierarchy of splats; or 3D Gaussians for other viewers: .ply, .compressed.ply, .splat, .spz
     /// or .glb. A volume becomes .nrrd, or .splv, levels of bricks that are read one by one.
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["plan", "part"])]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    parts: parts::PartFlags,
     #[command(flatten)]
     surface: surface::SurfaceFlags,
     #[command(flatten)]
@@ -70,16 +77,19 @@ const SURFACES: [&str; 5] = ["splk", "ply", "splat", "spz", "glb"];
 
 impl Convert {
     pub fn run(mut self, given: &Given, progress: &Progress) -> Result<(), Failure> {
-        let extension = self
-            .output
-            .extension()
-            .map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-        let extension = extension.unwrap_or_default();
+        if let Some(plan) = &self.parts.part {
+            return self.make_part(plan, given, progress);
+        }
+        let extension = self.extension();
         if !WRITTEN.contains(&extension.as_str()) {
-            let file = self.output.display();
+            let file = self.output().display();
             return Err(Failure::Usage(format!(
                 "{file}: only .splk, .ply, .splat, .spz, .glb, .nrrd and .splv files can be written"
             )));
+        }
+        self.parts.check(&extension)?;
+        if let Some(plan) = &self.parts.join {
+            return self.join_parts(plan, given, progress);
         }
         self.surface.check(&extension)?;
         let flag = self.color.given().or(self.range.map(|_| "--range"));
@@ -91,15 +101,25 @@ impl Convert {
         self.color.check(&self.files)?;
         self.color = self.color.of(&self.files[0]);
         self.warn(given, progress);
-        if !self.dry_run {
-            output::check(&self.output, self.overwrite)?;
-            output::try_writing(&self.output, &self.files)?;
+        if !self.dry_run && self.parts.plan.is_none() {
+            output::check(self.output(), self.overwrite)?;
+            output::try_writing(self.output(), &self.files)?;
         }
         match extension.as_str() {
             "nrrd" => self.volume(progress),
             "splv" => self.bricks(progress),
             _ => self.surface(&extension, progress),
         }
+    }
+
+    /// Returns the file to write; a name that plans stand for if none is given.
+    fn output(&self) -> &Path {
+        self.output.as_deref().unwrap_or(Path::new("out.splk"))
+    }
+
+    fn extension(&self) -> String {
+        let extension = self.output().extension();
+        extension.map_or(String::new(), |own| own.to_string_lossy().to_ascii_lowercase())
     }
 
     /// Warns of flags that change nothing in any conversion of these files.
@@ -112,7 +132,7 @@ impl Convert {
 
     /// Refuses to replace a file that was read.
     fn check_unneeded(&self, read: &[PathBuf]) -> Result<(), Failure> {
-        if self.dry_run { Ok(()) } else { output::check_unneeded(&self.output, read) }
+        if self.dry_run { Ok(()) } else { output::check_unneeded(self.output(), read) }
     }
 
     /// Returns the bytes of memory that a conversion may use.

@@ -3,8 +3,8 @@
 use super::Convert;
 use crate::{failure::Failure, load::Input};
 use splatkit::{
-    Error,
     formats::{Kind, VolumeStream},
+    input,
     volume::{Lattice, Scalar, Volume},
 };
 use std::path::Path;
@@ -55,7 +55,7 @@ impl Convert {
         }
         // Uncompressed data takes no less memory than its file. What compressed data takes is known
         // once it is unpacked.
-        let bytes = file.metadata().map_err(|e| Error::file(file, "read", e))?.len();
+        let bytes = input::size(file)?;
         if bytes > most {
             return Err(Failure::Usage(format!(
                 "{}: {} MiB cannot be read as a whole in {} MiB of memory; raw volumes and NRRD \

@@ -131,7 +131,7 @@ impl Convert {
             &self.surface.surfel_options(limits.deadline()),
             most,
         );
-        if need.bytes > most {
+        if need.bytes > most || self.parts.divide() {
             return self.in_regions(need, most, progress);
         }
         let gathered = self.gather(progress)?;
@@ -146,15 +146,16 @@ impl Convert {
             self.surface.write_options(&self.files, &gathered.frame),
         );
         let built =
-            hierarchy::build_file(&gathered.set, &self.output, &build, &write, Some(&watch));
+            hierarchy::build_file(&gathered.set, self.output(), &build, &write, Some(&watch));
         built.map_err(|error| error.in_file(&self.files[0]))?;
         progress.clear();
         let build_ms = milliseconds(start);
-        let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
+        let bytes =
+            self.output().metadata().map_err(|e| Error::file(self.output(), "read", e))?.len();
         let per_point = bytes as f64 / gathered.points as f64;
         if self.json {
             return output::line(json!({
-                "file": self.output.to_string_lossy(),
+                "file": self.output().to_string_lossy(),
                 "points": gathered.points,
                 "splats": gathered.set.splats.len(),
                 "closed": gathered.closed,

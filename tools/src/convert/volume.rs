@@ -41,13 +41,13 @@ impl Convert {
         let count = volume.len();
         progress.stage("Resampling");
         let volume = on_lattice(volume, self.lattice)?;
-        progress.stage(format!("Writing {}", self.output.display()));
-        formats::nrrd::write(&volume, &self.output)?;
+        progress.stage(format!("Writing {}", self.output().display()));
+        formats::nrrd::write(&volume, self.output())?;
         progress.clear();
         let (lattice, dims) = (name_of(&volume), volume.lattice.dims);
         if self.json {
             return output::line(json!({
-                "file": self.output.to_string_lossy(),
+                "file": self.output().to_string_lossy(),
                 "lattice": lattice,
                 "dims": dims,
                 "type": volume.samples.type_name(),

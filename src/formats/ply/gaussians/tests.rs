@@ -1,7 +1,10 @@
 use super::*;
 use crate::{
     Error,
-    formats::{ReadOptions, ply},
+    formats::{
+        ReadOptions,
+        ply::{self, tests::put},
+    },
     gaussians::harmonics::{constant_of, terms},
     input::testing::*,
     surface::Mesh,
@@ -12,23 +15,6 @@ use glam::{DVec3, Quat, Vec3};
 type Part = (&'static str, Vec<String>, Vec<Vec<f64>>);
 
 const FORMATS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
-
-fn put(out: &mut Vec<u8>, kind: &str, value: f64, big: bool) {
-    macro_rules! put {
-        ($t:ty) => {{
-            let value = value as $t;
-            out.extend(if big { value.to_be_bytes() } else { value.to_le_bytes() });
-        }};
-    }
-    match kind {
-        "uchar" => put!(u8),
-        "short" => put!(i16),
-        "uint" => put!(u32),
-        "float" => put!(f32),
-        "double" => put!(f64),
-        other => panic!("{other}"),
-    }
-}
 
 fn file(format: &str, parts: &[Part]) -> Vec<u8> {
     let mut head = format!("ply\nformat {format} 1.0\ncomment a test\n");

@@ -1,75 +1,34 @@
-//! The directory: the pages, their positions in the file, and what must be refined for each to be
-//! needed.
+//! The directory of versions 1 and 2, which is read as a whole.
 
 use super::{
-    HASH, PAGE_NODES,
+    HASH, NO_PAGE, PAGE_NODES,
+    entry::{NO_PORTAL, PageEntry, link, parent_page},
     header::Stored,
-    pages::{Around, Run, parents},
 };
-use crate::container::{Cursor, Put};
-use crate::hierarchy::Node;
-use std::ops::Range;
-
-/// A page, as listed in the directory.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PageEntry {
-    /// The block that contains its nodes.
-    pub block: u32,
-    /// Index of its first node in the block.
-    pub first_node: u32,
-    /// The number of its nodes, at most [`PAGE_NODES`].
-    pub nodes: u32,
-    /// Index, in the block, of the first child of its nodes.
-    pub first_child: u32,
-    /// The earlier pages that contain parents of its nodes; empty for the root's page. For the
-    /// first page of a joined block, the page with the parent of its portal.
-    ///
-    /// Nodes whose parents are in the same page do not matter: if one is needed, so is a node whose
-    /// parent is elsewhere.
-    pub parent_pages: Range<u32>,
-    /// A sphere around the spheres of all the parents, relative to the tree's origin. Its radius is
-    /// infinite for the root's page.
-    pub parents_center: [f32; 3],
-    /// The radius of that sphere, in world units.
-    pub parents_radius: f32,
-    /// The largest size of a parent; infinite for the root's page. If a node of this sphere and
-    /// size would not be refined, the page is not needed.
-    pub largest_parent_size: f32,
-    pub(super) place: Place,
-}
-
-/// Position, length and checksum of a page's bytes.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Place {
-    pub offset: u64,
-    pub bytes: u32,
-    pub crc: u32,
-}
+use crate::container::{Cursor, directory::Place};
+use std::collections::HashMap;
 
 /// The pages of one block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BlockEntry {
-    pub first_page: u32,
-    pub pages: u32,
-    pub nodes: u32,
+struct BlockEntry {
+    first_page: u32,
+    pages: u32,
+    nodes: u32,
     /// The leaf of block 0 that its root replaces; [`NO_PORTAL`] for block 0.
-    pub portal: u32,
+    portal: u32,
 }
-
-/// The portal of block 0.
-pub const NO_PORTAL: u32 = u32::MAX;
 
 const BLOCK_BYTES: usize = 16;
 const PAGE_BYTES: usize = 44;
 
 /// All blocks, and all pages, block by block.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Directory {
-    pub blocks: Vec<BlockEntry>,
+pub struct Flat {
+    blocks: Vec<BlockEntry>,
     pub pages: Vec<PageEntry>,
 }
 
-impl Directory {
+impl Flat {
     /// Returns the size in bytes of a directory with its checksum.
     pub fn length(blocks: usize, pages: usize) -> u64 {
         blocks as u64 * BLOCK_BYTES as u64 + pages as u64 * PAGE_BYTES as u64 + 4
@@ -81,139 +40,25 @@ impl Directory {
             + self.pages.len() * 2 * size_of::<PageEntry>()) as u64
     }
 
-    /// Adds a block whose portal is not known yet.
-    pub fn push_block(&mut self, runs: &[Run], around: &[Around], places: &[Place]) {
-        let (block, first_page) = (self.blocks.len() as u32, self.pages.len() as u32);
-        let nodes = runs.last().map_or(0, |run| run.nodes.end as u32);
-        self.blocks.push(BlockEntry {
-            first_page,
-            pages: runs.len() as u32,
-            nodes,
-            portal: NO_PORTAL,
-        });
-        for ((run, around), &place) in runs.iter().zip(around).zip(places) {
-            self.pages.push(PageEntry {
-                block,
-                first_node: run.nodes.start as u32,
-                nodes: run.nodes.len() as u32,
-                first_child: run.children.start as u32,
-                parent_pages: 0..0,
-                parents_center: around.center,
-                parents_radius: around.radius,
-                largest_parent_size: around.largest_size,
-                place,
-            });
-        }
+    /// Returns the first page of the block that replaces each portal.
+    pub fn portals(&self) -> HashMap<u32, u32> {
+        self.blocks.iter().skip(1).map(|block| (block.portal, block.first_page)).collect()
     }
 
-    /// Attaches all blocks except the first to their portals in the first. This also determines
-    /// what must be refined for their first pages.
-    pub fn hang(&mut self, top: &[Node], portals: &[u32]) {
-        let parents = parents(top);
-        for (block, &portal) in self.blocks[1..].iter_mut().zip(portals) {
-            block.portal = portal;
-            let parent = parents[portal as usize].map(|parent| parent as usize);
-            let around =
-                parent.map_or(Around::EVERYTHING, |parent| Around::parents(&top[parent..=parent]));
-            let page = &mut self.pages[block.first_page as usize];
-            page.parents_center = around.center;
-            (page.parents_radius, page.largest_parent_size) = (around.radius, around.largest_size);
-        }
-    }
-
-    /// Adds the blocks of another directory.
-    pub fn append(&mut self, other: Self) {
-        let (blocks, pages) = (self.blocks.len() as u32, self.pages.len() as u32);
-        let shifted =
-            |block: BlockEntry| BlockEntry { first_page: block.first_page + pages, ..block };
-        self.blocks.extend(other.blocks.into_iter().map(shifted));
-        self.pages.extend(
-            other.pages.into_iter().map(|page| PageEntry { block: page.block + blocks, ..page }),
-        );
-    }
-
-    /// Returns the range of a page's nodes in their block.
-    pub fn nodes(&self, page: u32) -> Range<u32> {
-        let entry = &self.pages[page as usize];
-        entry.first_node..entry.first_node + entry.nodes
-    }
-
-    /// Returns the range, in the block, of the children of a page's nodes.
-    pub fn children(&self, page: u32) -> Range<u32> {
-        let entry = &self.pages[page as usize];
-        let block = &self.blocks[entry.block as usize];
-        let end = if page + 1 < block.first_page + block.pages {
-            self.pages[page as usize + 1].first_child
-        } else {
-            block.nodes
-        };
-        entry.first_child..end
-    }
-
-    /// Returns the page that contains a node of a block.
-    pub fn page_of(&self, block: u32, node: u32) -> u32 {
-        let BlockEntry { first_page, pages, .. } = self.blocks[block as usize];
-        let entries = &self.pages[first_page as usize..(first_page + pages) as usize];
-        first_page + entries.partition_point(|entry| entry.first_node <= node) as u32 - 1
-    }
-
-    /// Returns the page that contains the parent of a node of a block, which must not be a root.
-    pub fn parent_page_of(&self, block: u32, node: u32) -> u32 {
-        let BlockEntry { first_page, pages, .. } = self.blocks[block as usize];
-        let entries = &self.pages[first_page as usize..(first_page + pages) as usize];
-        first_page + entries.partition_point(|entry| entry.first_child <= node).max(1) as u32 - 1
-    }
-
-    /// Sets, for each page, the pages that contain the parents of its nodes. Portals must be known.
-    pub fn link(&mut self) {
-        for page in 0..self.pages.len() as u32 {
-            let block = self.pages[page as usize].block;
-            let nodes = self.nodes(page);
-            let BlockEntry { portal, .. } = self.blocks[block as usize];
-            self.pages[page as usize].parent_pages = match (nodes.start, portal) {
-                (0, NO_PORTAL | 0) => 0..0,
-                (0, portal) => {
-                    let parent = self.parent_page_of(0, portal);
-                    parent..parent + 1
-                }
-                _ => {
-                    self.parent_page_of(block, nodes.start)
-                        ..page.min(self.parent_page_of(block, nodes.end - 1) + 1)
-                }
-            };
-        }
-    }
-
-    /// Returns the pages by descending size of the nodes that they refine, each after the pages of
-    /// its parents.
-    pub fn coarse_first(&self) -> Vec<u32> {
-        let mut sizes = vec![f32::INFINITY; self.pages.len()];
-        for (page, entry) in self.pages.iter().enumerate() {
-            let above = entry.parent_pages.clone().map(|parent| sizes[parent as usize]);
-            sizes[page] = above.fold(entry.largest_parent_size, f32::min);
-        }
-        let mut order: Vec<u32> = (0..self.pages.len() as u32).collect();
-        order.sort_by(|&a, &b| sizes[b as usize].total_cmp(&sizes[a as usize]).then(a.cmp(&b)));
-        order
-    }
-
-    pub fn encode(&self) -> Vec<u8> {
-        let mut out = Vec::new();
+    /// Sets, for each page, the pages that contain parents and children. Portals must be known.
+    fn link(&mut self) {
         for block in &self.blocks {
-            [block.first_page, block.pages, block.nodes, block.portal]
-                .iter()
-                .for_each(|&value| out.u32(value));
+            let (first, end) = (block.first_page as usize, block.first_page + block.pages);
+            let (above, rest) = self.pages.split_at_mut(first);
+            let own = &mut rest[..end as usize - first];
+            link(own, block.first_page, block.nodes);
+            if block.portal != NO_PORTAL {
+                own.iter_mut().for_each(|entry| entry.portal = block.portal);
+                let top = &above[..self.blocks[0].pages as usize];
+                let page = parent_page(top, block.portal);
+                own[0].parent_pages = page..page + 1;
+            }
         }
-        for page in &self.pages {
-            out.u64(page.place.offset);
-            [page.place.bytes, page.place.crc, page.nodes, page.first_child]
-                .iter()
-                .for_each(|&value| out.u32(value));
-            out.f32s(&page.parents_center);
-            out.f32s(&[page.parents_radius, page.largest_parent_size]);
-        }
-        out.u32(crc32fast::hash(&out));
-        out
     }
 
     /// Reads the directory after the header; `bytes` is the available part of the file.
@@ -261,6 +106,8 @@ impl Directory {
                 parents_center: cursor.f32s()?,
                 parents_radius: cursor.f32()?,
                 largest_parent_size: cursor.f32()?,
+                child_page: NO_PAGE,
+                portal: NO_PORTAL,
                 place: Place { offset, bytes, crc },
             });
         }

@@ -1,0 +1,159 @@
+//! Inputs as a plan keeps them: their paths, fingerprints and tables.
+
+use super::{
+    ExternalOptions,
+    regions::Ranges,
+    survey::{Facts, Surveyed, Tables},
+};
+use crate::{
+    Error, Result,
+    container::{Cursor, Put, pack},
+    input::{Limits, fingerprint, is_remote},
+};
+use bytemuck::Pod;
+use serde::{Deserialize, Serialize};
+use std::{
+    fs::File,
+    io::{self, Read, Seek, SeekFrom},
+    path::{Path, PathBuf},
+};
+
+/// How hard tables are packed.
+const LEVEL: i32 = 3;
+
+/// An input of a plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlannedInput {
+    pub path: PathBuf,
+    /// Its size.
+    pub bytes: u64,
+    /// See [`fingerprint`].
+    fingerprint: String,
+    facts: Facts,
+    regions: Ranges,
+    tables: Place,
+}
+
+/// Where the tables of an input are among those of all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Place {
+    at: u64,
+    bytes: u64,
+    /// Their size once unpacked.
+    unpacked: u64,
+    hash: String,
+}
+
+impl PlannedInput {
+    /// Describes an input, and appends its tables to those of others.
+    pub fn new(path: &Path, input: &Surveyed, all_tables: &mut Vec<u8>) -> Result<Self> {
+        let absolute = match is_remote(path) {
+            true => path.to_owned(),
+            false => std::path::absolute(path).map_err(|e| Error::file(path, "find", e))?,
+        };
+        let (bytes, fingerprint) = fingerprint(path)?;
+        // What has changed since it was surveyed must not get a fingerprint.
+        input.stream.intact()?;
+        let unpacked = input.tables().to_bytes();
+        let tables = pack::compress(&unpacked, LEVEL)
+            .map_err(|e| Error::file(path, "pack the tables of", e))?;
+        let place = Place {
+            at: all_tables.len() as u64,
+            bytes: tables.len() as u64,
+            unpacked: unpacked.len() as u64,
+            hash: blake3::hash(&tables).to_hex().to_string(),
+        };
+        all_tables.extend(tables);
+        Ok(Self {
+            path: absolute,
+            bytes,
+            fingerprint,
+            facts: input.facts.clone(),
+            regions: input.regions.ranges().clone(),
+            tables: place,
+        })
+    }
+
+    /// Opens the input, with its tables out of the file that holds all.
+    ///
+    /// # Errors
+    /// Those of opening it; [`Error::Input`] if the input or the tables are not those of the plan.
+    pub fn open<'a>(
+        &'a self,
+        tables: &Path,
+        options: &ExternalOptions,
+        limits: &'a Limits,
+    ) -> Result<Surveyed<'a>> {
+        let changed = |message: String| {
+            Error::input(&self.path, "file", message)
+                .hint("make the plan again, with --overwrite, and its parts")
+        };
+        let (bytes, fingerprint) = fingerprint(&self.path)?;
+        if bytes != self.bytes {
+            let planned = self.bytes;
+            return Err(changed(format!(
+                "has {bytes} bytes, but had {planned} when the plan was made"
+            )));
+        }
+        if fingerprint != self.fingerprint {
+            return Err(changed("has changed since the plan was made".into()));
+        }
+        let own = self.read_tables(tables)?;
+        let stream = options.open(&self.path, limits)?;
+        let stream = stream.ok_or_else(|| changed("can no longer be read in pieces".into()))?;
+        Ok(Surveyed::resume(stream, self.facts.clone(), self.regions.clone(), own))
+    }
+
+    fn read_tables(&self, path: &Path) -> Result<Tables> {
+        let read = || -> io::Result<Vec<u8>> {
+            let mut file = File::open(path)?;
+            file.seek(SeekFrom::Start(self.tables.at))?;
+            let mut bytes = Vec::new();
+            file.take(self.tables.bytes).read_to_end(&mut bytes)?;
+            Ok(bytes)
+        };
+        let packed = read().map_err(|e| Error::file(path, "read", e))?;
+        let damaged = || {
+            Error::input(path, "tables", "are not those of the plan, or damaged")
+                .hint("make the plan again, with --overwrite; finished parts are kept")
+        };
+        if blake3::hash(&packed).to_hex().as_str() != self.tables.hash {
+            return Err(damaged());
+        }
+        let bytes = pack::decompress(&packed, self.tables.unpacked as usize);
+        bytes.ok().and_then(|bytes| Tables::from_bytes(&bytes)).ok_or_else(damaged)
+    }
+}
+
+impl Tables {
+    fn to_bytes(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        put(&mut out, &self.reaches);
+        put(&mut out, &self.pieces);
+        put(&mut out, &self.guide);
+        put(&mut out, &self.long);
+        out
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut bytes = Cursor::new(bytes);
+        let tables = Self {
+            reaches: take(&mut bytes)?,
+            pieces: take(&mut bytes)?,
+            guide: take(&mut bytes)?,
+            long: take(&mut bytes)?,
+        };
+        (bytes.remaining() == 0).then_some(tables)
+    }
+}
+
+fn put<T: Pod>(out: &mut Vec<u8>, items: &[T]) {
+    out.u64(items.len() as u64);
+    out.put(bytemuck::cast_slice(items));
+}
+
+fn take<T: Pod>(bytes: &mut Cursor) -> Option<Vec<T>> {
+    let count = usize::try_from(bytes.u64()?).ok()?;
+    let bytes = bytes.take(count.checked_mul(size_of::<T>())?)?;
+    Some(bytemuck::pod_collect_to_vec(bytes))
+}
