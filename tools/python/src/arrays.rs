@@ -2,12 +2,15 @@
 //! and has chosen one of the types here.
 
 use crate::errors::wrong;
-use numpy::{Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
-use pyo3::prelude::*;
+use bytes::Bytes;
+use numpy::{
+    Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
+};
+use pyo3::{buffer::PyUntypedBuffer, prelude::*};
 use splatkit::{
     Error,
     glam::{DVec3, Vec3},
-    volume::{Lattice, Samples, Volume},
+    volume::{Samples, Scalar, SharedSamples},
 };
 
 /// The squares of coordinates up to this size fit in 32 bits.
@@ -80,68 +83,42 @@ fn settled<T>(rows: &[T], place: impl Fn(&T) -> DVec3) -> Result<(DVec3, Vec<Vec
     Ok((origin, rows.iter().map(|row| (place(row) - origin).as_vec3()).collect()))
 }
 
-/// Returns the samples of an array, with the number of samples along x, y and z, which are the
-/// array's last, middle and first axis.
+/// The memory of an array, which stays in place as long as this lives.
+struct Memory(PyUntypedBuffer);
+
+impl AsRef<[u8]> for Memory {
+    #[expect(unsafe_code, reason = "reading an array where it is, without the interpreter's lock")]
+    fn as_ref(&self) -> &[u8] {
+        if self.0.len_bytes() == 0 {
+            return &[];
+        }
+        // SAFETY: the buffer is contiguous, as `samples` has checked, and its owner keeps it until
+        // it is released. That nobody writes to it is asked of the caller of `add_volume`; the
+        // library takes no value of a sample as an address.
+        unsafe { std::slice::from_raw_parts(self.0.buf_ptr().cast(), self.0.len_bytes()) }
+    }
+}
+
+/// Returns the samples of an array, which are not copied, with the number of samples along x, y and
+/// z, which are the array's last, middle and first axis.
 pub fn samples(array: &Bound<'_, PyAny>) -> Result<([usize; 3], Samples), Error> {
-    let untyped = array.cast::<numpy::PyUntypedArray>();
-    let untyped = untyped.map_err(|error| wrong(error.to_string()))?;
+    let untyped = array.cast::<PyUntypedArray>().map_err(|error| wrong(error.to_string()))?;
     let &[nz, ny, nx] = untyped.shape() else {
         return Err(wrong(format!("a volume has three axes, not {:?}", untyped.shape())));
     };
-    let is = |name: &str| untyped.dtype().str().is_ok_and(|own| own.to_string().ends_with(name));
-    let samples = match () {
-        () if is("uint8") => Samples::U8(numbers(array)?),
-        () if is("uint16") => Samples::U16(numbers(array)?),
-        () if is("int16") => Samples::I16(numbers(array)?),
-        () if is("int32") => Samples::I32(numbers(array)?),
-        () => Samples::F32(numbers(array)?),
+    let found = untyped.dtype().str().map(|own| own.to_string()).unwrap_or_default();
+    let scalar = match found.as_str() {
+        "uint8" => Scalar::U8,
+        "uint16" => Scalar::U16,
+        "int16" => Scalar::I16,
+        "int32" => Scalar::I32,
+        "float32" => Scalar::F32,
+        _ => return Err(wrong(format!("samples of the type {found} are not drawn"))),
     };
-    Ok(([nx, ny, nz], samples))
-}
-
-/// Puts samples on a lattice. Samples that are not finite, or equal to `missing`, are read as the
-/// lowest value of the others, as by readers of files.
-pub fn volume(
-    lattice: Lattice,
-    mut samples: Samples,
-    missing: Option<f64>,
-) -> Result<Volume, Error> {
-    let holes = match &mut samples {
-        Samples::U8(values) => fill(values, missing),
-        Samples::U16(values) => fill(values, missing),
-        Samples::I16(values) => fill(values, missing),
-        Samples::I32(values) => fill(values, missing),
-        Samples::F32(values) => fill(values, missing),
-        _ => Ok(0),
-    }?;
-    let mut volume = Volume::new(lattice, samples)?;
-    volume.about.holes = holes;
-    Ok(volume)
-}
-
-/// Replaces values that are missing by the lowest of the others, and returns their number.
-fn fill<T>(values: &mut [T], missing: Option<f64>) -> Result<u64, Error>
-where
-    T: Copy + PartialOrd + Into<f64>,
-{
-    let is_hole = |value: T| {
-        let value: f64 = value.into();
-        !value.is_finite() || missing.is_some_and(|m| value == m || value as f32 == m as f32)
-    };
-    let holes = values.iter().filter(|value| is_hole(**value)).count();
-    if holes == 0 {
-        return Ok(0);
+    let buffer = PyUntypedBuffer::get(array).map_err(|error| wrong(error.to_string()))?;
+    if !buffer.is_c_contiguous() {
+        return Err(wrong("the samples are not contiguous"));
     }
-    let lower = |a: Option<T>, &b: &T| match a {
-        Some(a) if a <= b => Some(a),
-        _ => Some(b),
-    };
-    let Some(lowest) = values.iter().filter(|value| !is_hole(**value)).fold(None, lower) else {
-        return Err(wrong(format!(
-            "none of the {} values is a finite number that is not missing",
-            values.len()
-        )));
-    };
-    values.iter_mut().filter(|value| is_hole(**value)).for_each(|value| *value = lowest);
-    Ok(holes as u64)
+    let shared = SharedSamples::new(scalar, Bytes::from_owner(Memory(buffer)))?;
+    Ok(([nx, ny, nz], Samples::Shared(shared)))
 }

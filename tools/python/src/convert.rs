@@ -308,6 +308,7 @@ impl Work {
             surfels: self.surfel_options(Deadline::NEVER),
             paint: None,
             scalar: None,
+            parts: None,
         };
         let write = self.write_options(&frame)?;
         external::convert(&self.files, &limits, part, &options, &write, None).map(drop)

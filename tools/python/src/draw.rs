@@ -4,16 +4,21 @@ use crate::{
     camera::{Fit, Subject, camera},
     errors::{options, wrong},
     items::{Added, Items},
+    weights,
 };
 use serde::Deserialize;
 use splatkit::{
     Device, Error, FrameStats, Renderer, Stop,
     glam::DVec3,
     hierarchy::Detail,
-    interaction::ClipEntry,
+    interaction::{ClipEntry, Effort, Histogram},
     math::{Bounds, Camera},
     picture::Picture,
-    scene::{Classification, Clip, Evaluate, Gradient, Item, Mode, Optics, Order, Scene, Settings},
+    scene::{
+        Classification, Clip, Evaluate, Gradient, Item, Mode, Optics, Order, Region, Scene,
+        Settings,
+    },
+    volume::TransferFunction,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -40,6 +45,25 @@ pub struct Draw {
     cull_backfaces: Option<bool>,
     occlusion: Option<bool>,
     clips: Vec<ClipEntry>,
+    region: Option<Part>,
+    /// Whether the picture keeps all pixels that are drawn, instead of their means.
+    keep_samples: bool,
+}
+
+/// The part of a picture that one of several machines draws.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Part {
+    #[serde(rename = "box")]
+    cuboid: [[f64; 3]; 2],
+    level: f64,
+}
+
+impl From<Part> for Region {
+    fn from(Part { cuboid, level }: Part) -> Self {
+        let [min, max] = cuboid.map(DVec3::from_array);
+        Self { bounds: Bounds { min, max }, level }
+    }
 }
 
 /// A scene that several threads may change and draw.
@@ -53,10 +77,24 @@ pub struct Stage {
 /// A renderer and what the camera is fitted to, of one version of the scene.
 struct Kept {
     version: usize,
+    /// The version of the transfer functions.
+    look: usize,
     scene: Arc<Scene>,
     subject: Subject,
     seen: Option<(Vec<Clip>, Arc<Vec<DVec3>>)>,
     renderer: Option<Renderer>,
+}
+
+/// An item whose values are shown by a transfer function.
+pub struct Field {
+    /// The number of the item in its scene.
+    pub item: usize,
+    pub name: String,
+    /// The smallest and the largest value.
+    pub range: [f64; 2],
+    /// The diagonal of the box around the item, in world units.
+    pub diagonal: f64,
+    pub transfer: TransferFunction,
 }
 
 /// A finished picture.
@@ -184,6 +222,7 @@ impl Draw {
         settings.page_memory = self.memory.unwrap_or(settings.page_memory);
         let clips = self.clips.iter().map(|entry| entry.clip().map_err(wrong));
         settings.clips = clips.collect::<Result<_, _>>()?;
+        settings.region = self.region.map(Region::from);
         scene.validate_settings(&settings)?;
         Ok(settings)
     }
@@ -217,6 +256,7 @@ impl Stage {
             items.restore(count, subject);
             return Err(Error::Stopped);
         }
+        items.version += 1;
         *locked(&self.kept) = [None, None];
         Ok(())
     }
@@ -230,6 +270,54 @@ impl Stage {
     pub fn bounds(&self) -> Option<Bounds> {
         let bounds = locked(&self.items).subject.bounds;
         (!bounds.is_empty()).then_some(bounds)
+    }
+
+    /// Returns the way up, and the diagonal of the box around the scene in world units.
+    pub fn stance(&self) -> (DVec3, f64) {
+        let items = locked(&self.items);
+        (items.subject.stance.up, items.subject.bounds.diagonal())
+    }
+
+    /// Returns the fields of the scene.
+    pub fn fields(&self) -> Vec<Field> {
+        let items = locked(&self.items);
+        let field = |(number, item): (usize, &Item)| Field {
+            item: number,
+            name: items.contents[number].1.clone(),
+            range: item.value_range().unwrap_or([0.0, 1.0]),
+            diagonal: item.bounds().diagonal(),
+            transfer: item.transfer().cloned().unwrap_or_default(),
+        };
+        items.fields().map(field).collect()
+    }
+
+    /// Returns how often the values of an item's field are; nothing if it has no field.
+    pub fn histogram(&self, number: usize) -> Vec<u64> {
+        let item =
+            locked(&self.items).fields().find(|own| own.0 == number).map(|own| own.1.clone());
+        let histogram = item.and_then(|item| Histogram::of_item(&item));
+        histogram.map(|own| own.counts).unwrap_or_default()
+    }
+
+    /// Sets the transfer function of an item's field.
+    pub fn set_transfer(&self, number: usize, transfer: TransferFunction) -> Result<(), Error> {
+        locked(&self.items).set_transfer(number, transfer)
+    }
+
+    /// Returns where the work of a picture lies: rows of x, y, z and a weight.
+    pub fn weights(&self) -> Result<Vec<[f64; 4]>, Error> {
+        let kept = self.take(true)?;
+        let weights = weights::of_scene(&kept.scene);
+        self.put(kept, true);
+        weights
+    }
+
+    /// Refuses options that the scene cannot be drawn with.
+    pub fn check(&self, draw: &Draw) -> Result<(), Error> {
+        let kept = self.take(draw.draws_facets())?;
+        let checked = draw.settings(&kept.scene, &Stop::default());
+        self.put(kept, draw.draws_facets());
+        checked.map(|_| ())
     }
 
     /// Returns the fitted camera of a picture.
@@ -252,8 +340,15 @@ impl Stage {
         cameras
     }
 
-    /// Draws a picture. Without a camera, the usual one is fitted to the scene.
-    pub fn draw(&self, own: Option<&str>, draw: &Draw, stop: &Stop) -> Result<Drawn, Error> {
+    /// Draws a picture with this effort. Without a camera, the usual one is fitted to the scene.
+    /// Only an exact picture is reduced to the asked size.
+    pub fn draw(
+        &self,
+        own: Option<&str>,
+        draw: &Draw,
+        effort: Effort,
+        stop: &Stop,
+    ) -> Result<Drawn, Error> {
         let own = own.map(camera).transpose()?;
         let is_fitted = own.is_none();
         let mut kept = self.take(draw.draws_facets())?;
@@ -269,31 +364,39 @@ impl Stage {
             Some(renderer) => renderer,
             None => Renderer::new(&Device::Cpu, &kept.scene)?,
         };
-        let (mut picture, stats) = renderer.render(&camera, &settings)?;
+        let sheet = settings.sheet_thickness.or_else(|| sheet_of(&kept.scene));
+        let done = renderer.render(&camera, &effort.settings(&settings, sheet));
+        kept.renderer = Some(renderer);
+        let factor = draw.factor(&kept.scene);
+        self.put(kept, draw.draws_facets());
+        let (mut picture, stats) = done?;
         // An opacity that rounds to 0 in a file of 8 bits counts as none.
         if is_fitted && picture.color.iter().all(|pixel| pixel[3] < 0.5 / 255.0) {
             return Err(Error::NothingToDraw("the picture is empty: nothing has opacity".into()));
         }
-        let factor = draw.factor(&kept.scene);
-        if factor > 1 {
+        if factor > 1 && effort == Effort::EXACT && !draw.keep_samples {
             picture = picture.reduced(factor)?;
         }
-        kept.renderer = Some(renderer);
-        self.put(kept, draw.draws_facets());
         Ok(Drawn { picture, stats, camera })
     }
 
     /// Takes what is kept of the scene, or makes it.
     fn take(&self, facets: bool) -> Result<Kept, Error> {
         let items = locked(&self.items);
-        let version = items.contents.len();
+        let version = items.version;
         let mut kept = locked(&self.kept);
         let slot = &mut kept[usize::from(facets)];
         match slot {
             Some(own) if own.version == version => {
-                let renderer = own.renderer.take();
+                let subject = own.subject.clone();
                 let (scene, seen) = (own.scene.clone(), own.seen.clone());
-                return Ok(Kept { version, scene, seen, renderer, subject: own.subject.clone() });
+                let renderer = own.renderer.take();
+                let kept = Kept { version, look: own.look, scene, subject, seen, renderer };
+                return if kept.look == items.look {
+                    Ok(kept)
+                } else {
+                    kept.shown_by(&items, facets)
+                };
             }
             _ => {}
         }
@@ -304,19 +407,34 @@ impl Stage {
         if is_one_place(&subject.bounds) {
             subject.bounds = scene.bounds();
         }
-        Ok(Kept { version, scene, subject, seen: None, renderer: None })
+        let look = items.look;
+        Ok(Kept { version, look, scene, subject, seen: None, renderer: None })
     }
 
     /// Keeps what a picture was drawn with, unless the scene has changed.
     fn put(&self, own: Kept, facets: bool) {
         let items = locked(&self.items);
-        if items.contents.len() == own.version {
+        if items.version == own.version {
             locked(&self.kept)[usize::from(facets)] = Some(own);
         }
     }
 }
 
 impl Kept {
+    /// Takes over the transfer functions of a scene that has not changed otherwise.
+    fn shown_by(mut self, items: &Items, facets: bool) -> Result<Self, Error> {
+        let scene = Arc::new(items.scene(facets)?);
+        if let Some(renderer) = &mut self.renderer {
+            for number in scene.fields() {
+                let [old, new] = [&self.scene, &scene].map(|own| own.items[number].transfer());
+                if let Some(new) = new.filter(|_| old != new) {
+                    renderer.set_transfer(number, new)?;
+                }
+            }
+        }
+        Ok(Self { look: items.look, scene, seen: None, ..self })
+    }
+
     /// Returns the points that a camera is fitted to; none if it has a distance already.
     fn fitted(&mut self, fit: &Fit, clips: &[Clip]) -> Result<Arc<Vec<DVec3>>, Error> {
         if fit.is_placed() { Ok(Arc::default()) } else { self.seen(clips) }
@@ -333,6 +451,15 @@ impl Kept {
         self.seen = Some((clips.to_vec(), seen.clone()));
         Ok(seen)
     }
+}
+
+/// Returns the thickness of the sheets of the finest volume, about as the scene chooses it.
+fn sheet_of(scene: &Scene) -> Option<f64> {
+    let own = scene.items.iter().filter_map(|item| match item {
+        Item::Volume(volume, ..) => Some(4.0 / 3.0 * volume.lattice.kernel_spacing()),
+        _ => None,
+    });
+    own.reduce(f64::min)
 }
 
 /// Whether a box is no larger than the rounding error of its coordinates.

@@ -217,7 +217,7 @@ fn of_hierarchy(hierarchy: &Hierarchy) -> Facts {
     facts.insert("kind".into(), json!("hierarchy"));
     facts.insert("splats".into(), json!(header.leaves));
     facts.insert("nodes".into(), json!(header.nodes));
-    facts.insert("pages".into(), json!(hierarchy.pages().len()));
+    facts.insert("pages".into(), json!(hierarchy.page_count()));
     facts.insert("closed".into(), json!(header.closed));
     facts.insert("lossless".into(), json!(header.lossless));
     if let Some(degree) = header.degree {

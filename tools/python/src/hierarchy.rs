@@ -40,7 +40,7 @@ impl Hierarchy {
             "splats": header.leaves,
             "nodes": header.nodes,
             "points": header.source_points,
-            "pages": self.0.pages().len(),
+            "pages": self.0.page_count(),
             "closed": header.closed,
             "lossless": header.lossless,
             "degree": header.degree,

@@ -2,6 +2,7 @@
 
 use crate::{
     camera::{Origin, Subject},
+    errors::wrong,
     load::{Input, Load},
     look::Look,
 };
@@ -17,7 +18,7 @@ use splatkit::{
     scene::{Item, Scene},
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
-    volume::Volume,
+    volume::{TransferFunction, Volume},
 };
 use std::sync::{Arc, OnceLock};
 
@@ -26,6 +27,10 @@ use std::sync::{Arc, OnceLock};
 pub struct Items {
     entries: Vec<Entry>,
     pub subject: Subject,
+    /// Grows with each input.
+    pub version: usize,
+    /// Grows with each change of a transfer function.
+    pub look: usize,
     /// What was added: kind, name, and the number of splats or samples.
     pub contents: Vec<(&'static str, String, u64)>,
 }
@@ -204,6 +209,35 @@ impl Items {
         self.subject.stand(cells.about.stance, Stance::SURVEY);
         let (count, bounds) = (cells.len() as u64, tetrahedra.bounds());
         self.push("cells", name, count, bounds, Item::Cells(tetrahedra.into(), transfer));
+        Ok(())
+    }
+
+    /// Returns the items with a field, and their numbers.
+    pub fn fields(&self) -> impl Iterator<Item = (usize, &Item)> {
+        self.entries.iter().enumerate().filter_map(|(number, entry)| match entry {
+            Entry::Ready(item) => item.transfer().map(|_| (number, item)),
+            Entry::Mesh(_) => None,
+        })
+    }
+
+    /// Sets the transfer function of an item's field. A function that cannot show the field
+    /// changes nothing.
+    pub fn set_transfer(&mut self, number: usize, new: TransferFunction) -> Result<(), Error> {
+        let item = match self.entries.get_mut(number) {
+            Some(Entry::Ready(item)) => item,
+            _ => return Err(wrong(format!("the scene has no field {number}"))),
+        };
+        let mut changed = item.clone();
+        match &mut changed {
+            Item::Scalar(_, own)
+            | Item::Volume(_, _, own)
+            | Item::Bricks(_, _, own)
+            | Item::Cells(_, own) => *own = new,
+            _ => return Err(wrong(format!("item {number} of the scene has no field"))),
+        }
+        changed.validate()?;
+        *item = changed;
+        self.look += 1;
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 
 mod arrays;
 mod camera;
+mod cells;
 mod convert;
 mod draw;
 mod errors;
@@ -14,6 +15,8 @@ mod look;
 mod notes;
 mod picture;
 mod scene;
+mod show;
+mod weights;
 mod worker;
 
 use errors::raise;
@@ -87,7 +90,8 @@ fn abandon() {
     std::mem::forget(splatkit::disk::abandon());
 }
 
-#[pymodule]
+// Nothing here needs the interpreter's lock: classes are frozen, or pyo3 guards them.
+#[pymodule(gil_used = false)]
 fn _splatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     notes::collect();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -107,5 +111,5 @@ fn _splatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(files::known_formats, module)?)?;
     module.add_function(wrap_pyfunction!(convert::convert, module)?)?;
     module.add_function(wrap_pyfunction!(abandon, module)?)?;
-    Ok(())
+    show::register(module)
 }

@@ -345,6 +345,19 @@ impl Look {
     }
 }
 
+/// Returns a transfer function with the colours of a map, spread over the values that it shows.
+pub fn recolored(
+    mut transfer: TransferFunction,
+    map: &ColorMap,
+    values: [f64; 2],
+) -> Result<TransferFunction, Error> {
+    let [low, high] = shown_of(&transfer, values);
+    let point = |(share, color)| (low + (high - low) * share, color);
+    transfer.color = map.points().into_iter().map(point).collect();
+    transfer.validate()?;
+    Ok(transfer)
+}
+
 fn shown<'a>(name: &'a str, range: [f64; 2], [first, last]: [DVec3; 2]) -> Shown<'a> {
     Shown { name, range, diagonal: (last - first).length() }
 }

@@ -1,10 +1,16 @@
 //! Finished pictures.
 
-use crate::{camera::to_json, draw::Drawn, errors::raise, worker::run};
+use crate::{
+    arrays::{numbers, rows},
+    camera::to_json,
+    draw::Drawn,
+    errors::raise,
+    worker::run,
+};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyBytes};
 use splatkit::{
-    Error, FrameStats, Stop, disk,
+    Error, Stop, disk,
     picture::{Picture as Pixels, PictureFormat},
 };
 use std::{path::PathBuf, sync::Arc};
@@ -13,36 +19,15 @@ use std::{path::PathBuf, sync::Arc};
 #[pyclass(frozen, module = "splatkit._splatkit")]
 pub struct Picture {
     pixels: Arc<Pixels>,
-    stats: FrameStats,
+    /// The statistics as JSON.
+    statistics: String,
     camera: String,
 }
 
 impl From<Drawn> for Picture {
     fn from(drawn: Drawn) -> Self {
         let Drawn { picture, stats, camera } = drawn;
-        Self { pixels: Arc::new(picture), stats, camera: to_json(&camera) }
-    }
-}
-
-#[pymethods]
-impl Picture {
-    /// The width and the height in pixels.
-    #[getter]
-    fn size(&self) -> (u32, u32) {
-        (self.pixels.width, self.pixels.height)
-    }
-
-    /// The camera as JSON.
-    #[getter]
-    fn camera(&self) -> &str {
-        &self.camera
-    }
-
-    /// The statistics as JSON.
-    #[getter]
-    fn statistics(&self) -> String {
-        let stats = &self.stats;
-        let facts = serde_json::json!({
+        let statistics = serde_json::json!({
             "splats": stats.splats,
             "hidden": stats.hidden,
             "entries": stats.entries,
@@ -55,7 +40,55 @@ impl Picture {
             "bricks": stats.bricks,
             "read_bricks": stats.read_bricks,
         });
-        facts.to_string()
+        let (pixels, statistics) = (Arc::new(picture), statistics.to_string());
+        Self { pixels, statistics, camera: to_json(&camera) }
+    }
+}
+
+impl Picture {
+    /// Returns the picture.
+    pub fn pixels(&self) -> &Pixels {
+        &self.pixels
+    }
+}
+
+#[pymethods]
+impl Picture {
+    /// A picture of rows of pixels that were composited elsewhere, each `factor` × `factor` of
+    /// which become one.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        color: &Bound<'_, PyAny>,
+        depth: &Bound<'_, PyAny>,
+        size: [u32; 2],
+        factor: u32,
+        about: [String; 2],
+    ) -> PyResult<Self> {
+        let arrays = rows::<f32, 4>(color).and_then(|color| Ok((color, numbers::<f32>(depth)?)));
+        let (color, depth) = arrays.map_err(|error| raise(py, &error))?;
+        let ([width, height], [statistics, camera]) = (size, about);
+        let reduce = move || Pixels { width, height, color, depth }.reduced(factor);
+        let pixels = Arc::new(run(py, &Stop::default(), reduce)?);
+        Ok(Self { pixels, statistics, camera })
+    }
+
+    /// The width and the height in pixels.
+    #[getter]
+    fn size(&self) -> (u32, u32) {
+        (self.pixels.width, self.pixels.height)
+    }
+
+    /// The camera as JSON.
+    #[getter]
+    pub fn camera(&self) -> &str {
+        &self.camera
+    }
+
+    /// The statistics as JSON.
+    #[getter]
+    fn statistics(&self) -> &str {
+        &self.statistics
     }
 
     /// Bytes over a background, row by row.

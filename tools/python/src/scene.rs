@@ -1,8 +1,9 @@
 //! Scenes: the half of `splatkit.Scene` that holds its items.
 
 use crate::{
-    arrays::{numbers, positions, rows, samples, volume},
+    arrays::{numbers, positions, rows, samples},
     camera::{Fit, to_json},
+    cells::CellArrays,
     draw::{Draw, Stage},
     errors::{options, raise, wrong},
     items::Added,
@@ -11,6 +12,7 @@ use crate::{
     picture::Picture,
     worker::run,
 };
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde::Deserialize;
 use splatkit::{
@@ -18,9 +20,10 @@ use splatkit::{
     about::{About, Modality, Stance},
     gaussians::{Gaussians, harmonics},
     glam::{DMat3, DVec3, Quat, Vec3},
+    interaction::Effort,
     scattered::Points,
     surface::Mesh,
-    volume::{Lattice, Volume},
+    volume::{Arrangement, Lattice, Volume},
 };
 use std::{path::PathBuf, sync::Arc};
 
@@ -39,12 +42,16 @@ struct Told {
     spacing: Option<[f64; 3]>,
     /// The rows of the matrix whose columns are the directions of the axes.
     axes: Option<[[f64; 3]; 3]>,
+    /// Where samples are along the axes, in units of the spacing, if they are not evenly spaced.
+    coordinates: Option<[Vec<f64>; 3]>,
     missing: Option<f64>,
     modality: Option<String>,
     value_name: String,
     value_unit: String,
     unit: String,
     up: Option<[f64; 3]>,
+    /// The frame of a patient, `lps` or `ras`.
+    frame: Option<String>,
 }
 
 impl Told {
@@ -66,6 +73,11 @@ impl Told {
                 )));
             }
         };
+        about.stance = match self.frame.as_deref() {
+            Some("lps") => Some(Stance::LPS),
+            Some("ras") => Some(Stance::RAS),
+            _ => None,
+        };
         if let Some(up) = self.up {
             let up = DVec3::from_array(up).try_normalize();
             let up = up.ok_or_else(|| wrong("up is a direction with a length above 0"))?;
@@ -79,7 +91,11 @@ impl Told {
         let axes =
             self.axes.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array_2d(&rows).transpose());
         let origin = self.origin.map_or(DVec3::ZERO, DVec3::from_array);
-        Lattice::cartesian(dims, origin, axes * spacing)
+        let mut lattice = Lattice::cartesian(dims, origin, axes * spacing);
+        if let Some(coordinates) = &self.coordinates {
+            lattice.arrangement = Arrangement::Rectilinear(Arc::new(coordinates.clone()));
+        }
+        lattice
     }
 }
 
@@ -242,6 +258,11 @@ impl GaussianArrays<'_> {
 }
 
 impl Scene {
+    /// Returns what is drawn.
+    pub fn stage(&self) -> &Arc<Stage> {
+        &self.0
+    }
+
     /// Adds what an array has become, with its looks.
     fn add(&self, py: Python<'_>, input: Input, told: Told, more: (Load, Look)) -> PyResult<()> {
         let (stage, (load, look)) = (self.0.clone(), more);
@@ -296,7 +317,7 @@ impl Scene {
         let made = samples(&array).and_then(|(dims, samples)| Ok((dims, samples, told.about()?)));
         let (dims, samples, about) = made.map_err(|error| raise(py, &error))?;
         let (lattice, missing) = (told.lattice(dims), told.missing);
-        let measured = move || volume(lattice, samples, missing);
+        let measured = move || Volume::with_missing(lattice, samples, missing);
         let mut volume: Volume = run(py, &Stop::default(), measured)?;
         let holes = std::mem::replace(&mut volume.about, about).holes;
         volume.about.holes = holes;
@@ -316,6 +337,20 @@ impl Scene {
             .and_then(|(told, more)| Ok((arrays.mesh(told.about()?)?, told, more)));
         let (mesh, told, more) = made.map_err(|error| raise(py, &error))?;
         self.add(py, Input::Mesh(mesh), told, more)
+    }
+
+    /// Adds cells.
+    fn add_cells(
+        &self,
+        py: Python<'_>,
+        arrays: CellArrays<'_>,
+        told: &str,
+        look: &str,
+    ) -> PyResult<()> {
+        let made = self::told(told, "{}", look)
+            .and_then(|(told, more)| Ok((arrays.cells(told.about()?, told.missing)?, told, more)));
+        let (cells, told, more) = made.map_err(|error| raise(py, &error))?;
+        self.add(py, Input::Cells(cells), told, more)
     }
 
     /// Adds samples at any positions.
@@ -358,6 +393,20 @@ impl Scene {
         self.0.bounds().map(|bounds| [bounds.min.to_array(), bounds.max.to_array()])
     }
 
+    /// Where the work of a picture lies: x, y, z and a weight, row by row.
+    fn weights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let stage = self.0.clone();
+        let rows = run(py, &Stop::default(), move || stage.weights())?;
+        Ok(PyArray1::from_slice(py, rows.as_flattened()))
+    }
+
+    /// Refuses options of drawing that the scene cannot be drawn with.
+    fn check(&self, py: Python<'_>, draw: &str) -> PyResult<()> {
+        let draw = Draw::parse(draw).map_err(|error| raise(py, &error))?;
+        let stage = self.0.clone();
+        run(py, &Stop::default(), move || stage.check(&draw))
+    }
+
     /// The camera that is fitted to the scene, as JSON.
     fn camera(&self, py: Python<'_>, fit: &str, draw: &str) -> PyResult<String> {
         let own = Fit::parse(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
@@ -387,7 +436,8 @@ impl Scene {
         let draw = Draw::parse(draw).map_err(|error| raise(py, &error))?;
         let (stage, stop) = (self.0.clone(), Stop::default());
         let own = stop.clone();
-        let drawn = run(py, &stop, move || stage.draw(camera.as_deref(), &draw, &own))?;
+        let drawn =
+            run(py, &stop, move || stage.draw(camera.as_deref(), &draw, Effort::EXACT, &own))?;
         Ok(drawn.into())
     }
 }

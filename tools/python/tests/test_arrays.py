@@ -54,10 +54,57 @@ def test_every_layout_gives_the_same_picture(whole):
         assert np.array_equal(drawn(same), wanted)
     mapped = np.frombuffer(array.tobytes(), "u1").reshape(array.shape)
     assert np.array_equal(drawn(mapped), wanted)
-    # A changed array does not change a scene.
-    scene = Scene().add_volume(array, transfer=TRANSFER)
-    array[:] = 0
-    assert np.array_equal(scene.render(SIZE).color, wanted)
+    crooked = np.frombuffer(b"0" + array.astype("i2").tobytes(), "i2", offset=1)
+    assert np.abs(drawn(crooked.reshape(array.shape)) - wanted).max() < 1e-4
+
+
+@pytest.mark.parametrize("kind", ["u1", "u2", "i2", "i4", "f4", "?"])
+def test_arrays_are_shared(whole, kind):
+    array = whole.astype(kind) if kind != "?" else whole > 50
+    turned = np.ascontiguousarray(array[:, :, ::-1])
+    step = TransferFunction([(0, "red")], [(0.5, 0), (1, 0.5)])
+    transfer = step if kind == "?" else TRANSFER
+
+    def drawn(own):
+        return Scene().add_volume(own, transfer=transfer).render(SIZE).color
+
+    before, after = drawn(array), drawn(turned)
+    assert not np.array_equal(before, after)
+    shared = Scene().add_volume(array, transfer=transfer, copy=False)
+    usual = Scene().add_volume(array, transfer=transfer)
+    copied = Scene().add_volume(array, transfer=transfer, copy=True)
+    # A scene keeps the memory of its arrays, which cannot be resized meanwhile.
+    with pytest.raises(ValueError, match="resize"):
+        array.resize((2, 2, 2))
+    array[:] = turned
+    assert np.array_equal(shared.render(SIZE).color, after)
+    assert np.array_equal(usual.render(SIZE).color, after)
+    assert np.array_equal(copied.render(SIZE).color, before)
+    del array, turned
+    assert np.array_equal(shared.render(SIZE).color, after)
+
+
+def test_arrays_that_need_a_copy(whole):
+    array = whole.astype("i2")
+    for other in (
+        whole,
+        array.astype(">i2"),
+        np.asfortranarray(array),
+        array[:, :, ::2],
+        array.astype("i8"),
+        array.tolist(),
+    ):
+        with pytest.raises(ArgumentError, match="without a copy"):
+            Scene().add_volume(other, copy=False)
+        Scene().add_volume(other, copy=True)
+    with pytest.raises(ArgumentError, match="without a copy"):
+        Scene().add_volume(np.ma.masked_array(array, array > 90), copy=False)
+    # Missing values are replaced in a copy.
+    holes = whole.astype("f4")
+    holes[2, 3, 4] = np.nan
+    with pytest.warns(splatkit.DataWarning, match="missing"):
+        Scene().add_volume(holes)
+    assert np.isnan(holes[2, 3, 4])
 
 
 def test_missing_values(whole):
@@ -71,7 +118,7 @@ def test_missing_values(whole):
         drawn(masked)
     with pytest.warns(splatkit.DataWarning, match="missing"):
         drawn(whole.astype("i2"), missing=100)
-    with pytest.raises(ArgumentError, match="none of the 1080 values"):
+    with pytest.raises(ArgumentError, match="none of the 1080 samples"):
         drawn(np.full(whole.shape, np.nan))
     positions, values = particles(100)
     values[7] = np.nan

@@ -14,7 +14,6 @@ A `Scene` holds several items, and is drawn from any side:
 from __future__ import annotations
 
 import atexit
-import inspect
 from typing import Any
 
 from . import _splatkit
@@ -36,7 +35,7 @@ from ._errors import (
 )
 from ._files import Finding, Format, Hierarchy, Leaves, Report, check, convert, formats, info
 from ._picture import Picture
-from ._scene import Scene
+from ._scene import DRAWING, Scene
 from ._transfer import TransferFunction
 
 __version__: str = _splatkit.__version__
@@ -46,15 +45,13 @@ TRANSFER_FUNCTIONS: tuple[str, ...] = tuple(_splatkit.TRANSFER_FUNCTIONS)
 #: The names of colour maps. Each may end with `_r`, which reverses it.
 COLOR_MAPS: tuple[str, ...] = tuple(_splatkit.COLOR_MAPS)
 
-_DRAWING = frozenset(inspect.signature(Scene.render).parameters) - {"self"}
-
 
 def render(source: Any, **options: Any) -> Picture:
     """Draws a file or an array: a volume [z, y, x], or points (n, 3).
 
     The options are those of `Scene.add` and of `Scene.render`.
     """
-    drawing = {name: options.pop(name) for name in list(options) if name in _DRAWING}
+    drawing = {name: options.pop(name) for name in list(options) if name in DRAWING}
     return Scene().add(source, **options).render(**drawing)
 
 

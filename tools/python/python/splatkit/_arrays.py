@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from . import _neighbours
 from ._errors import ArgumentError
 
 #: Types of samples that the library holds as they are.
 _SAMPLES = {np.dtype(name) for name in ("u1", "u2", "i2", "i4", "f4")}
+#: VTK's types of cells by the number of their corners.
+_CELLS = {4: 10, 5: 14, 6: 13, 8: 12}
 _KINDS = "booleans, integers, real or complex numbers"
 
 
@@ -27,6 +30,8 @@ def numbers(value: Any, name: str) -> npt.NDArray[Any]:
         array = np.asarray(value)
     except (TypeError, ValueError) as error:
         raise ArgumentError(f"{name} cannot be made an array: {error}") from error
+    if array.ndim == 0 and array.dtype.kind == "O":
+        raise _neighbours.unknown(value, name)
     if array.dtype.kind not in "biufc":
         raise ArgumentError(f"{name} has the type {array.dtype}; {_KINDS} are needed")
     if array.dtype.kind == "c":
@@ -34,8 +39,12 @@ def numbers(value: Any, name: str) -> npt.NDArray[Any]:
     return array.astype(array.dtype.newbyteorder("="), copy=False)
 
 
-def samples(value: Any) -> npt.NDArray[Any]:
-    """Returns the samples of a volume, [z, y, x], in one of the library's types."""
+def samples(value: Any, copy: bool | None = None) -> npt.NDArray[Any]:
+    """Returns the samples of a volume, [z, y, x], in one of the library's types.
+
+    They are copied if `copy` is True, and if it is None where the library needs another type or
+    layout.
+    """
     array = numbers(value, "the volume")
     if array.ndim != 3 or array.size == 0:
         hint = ""
@@ -44,15 +53,25 @@ def samples(value: Any) -> npt.NDArray[Any]:
         raise ArgumentError(
             f"a volume has three axes (z, y, x) with samples, not the shape {array.shape}{hint}"
         )
+    if array.dtype.kind == "b":
+        array = array.view("u1")
     if array.dtype not in _SAMPLES:
         array = array.astype(_sample_type(array))
-    return np.ascontiguousarray(array)
+    array = np.require(array, requirements=["C", "A"])
+    if copy is None:
+        return array
+    is_shared = np.may_share_memory(array, np.asarray(value))
+    if not copy and not is_shared:
+        types = ", ".join(map(str, _SAMPLES))
+        raise ArgumentError(
+            f"the volume cannot be drawn without a copy: that needs an aligned array in C order of "
+            f"one of the types {types}"
+        )
+    return array.copy() if copy and is_shared else array
 
 
 def _sample_type(array: npt.NDArray[Any]) -> str:
     kind, size = array.dtype.kind, array.dtype.itemsize
-    if kind == "b":
-        return "u1"
     if kind == "f":
         return "f4"
     if kind == "i" and size == 1:
@@ -132,6 +151,64 @@ def faces(value: Any, count: int) -> npt.NDArray[Any]:
         fan = [array[:, [0, at, at + 1]] for at in range(1, width - 1)]
         array = np.stack(fan, axis=1).reshape(-1, 3)
     return np.ascontiguousarray(array, dtype=np.uint32)
+
+
+def cells(value: Any, kinds: Any) -> dict[str, npt.NDArray[Any]]:
+    """Returns the kinds, the offsets and the nodes of cells: rows of nodes of one kind, or a list
+    of each cell's number of nodes and its nodes."""
+    array = numbers(value, "cells")
+    if array.dtype.kind not in "iu" or array.ndim not in (1, 2) or array.size == 0:
+        raise ArgumentError(
+            f"cells are rows of whole numbers, or a list of them, not {array.dtype} of the shape "
+            f"{array.shape}"
+        )
+    if array.min() < 0 or array.max() >= 2**32:
+        raise ArgumentError("cells name a point with a number below 0 or above 32 bits")
+    if array.ndim == 2:
+        count, width = array.shape
+        offsets = np.arange(count + 1) * width
+        nodes = array.ravel()
+    else:
+        starts = []
+        at = 0
+        while at < len(array):
+            starts.append(at)
+            at += int(array[at]) + 1
+        if at != len(array):
+            raise ArgumentError(f"the last cell of the list has {at - len(array)} nodes too few")
+        nodes = np.delete(array, starts)
+        offsets = np.append(starts, at) - np.arange(len(starts) + 1)
+        count = len(starts)
+    if kinds is None:
+        widths = set(np.diff(offsets).tolist())
+        if len(widths) != 1 or not widths <= set(_CELLS):
+            raise ArgumentError("cells of several lengths, or of a rare one, need kinds")
+        kinds = _CELLS[widths.pop()]
+    numbers_ = numbers(kinds, "kinds")
+    if numbers_.dtype.kind not in "iu" or numbers_.shape not in ((), (1,), (count,)):
+        raise ArgumentError(f"kinds is VTK's number of a type, or one for each of {count} cells")
+    return raw_cells(np.broadcast_to(numbers_, (count,)), offsets, nodes)
+
+
+def raw_cells(kinds: Any, offsets: Any, nodes: Any) -> dict[str, npt.NDArray[Any]]:
+    """Returns the arrays of cells in the types of the library."""
+    return {
+        "kinds": np.ascontiguousarray(np.clip(kinds, 0, 255), np.uint8),
+        "offsets": np.ascontiguousarray(offsets, np.int64),
+        "nodes": np.ascontiguousarray(nodes, np.uint32),
+    }
+
+
+def used(nodes: npt.NDArray[Any], count: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Returns the points that cells use, in the order of their first use, as readers of files have
+    them, and the nodes by their numbers among these."""
+    if nodes.size and nodes.max() >= count:
+        raise ArgumentError(f"a cell refers to point {nodes.max()} of {count}")
+    points, first, inverse = np.unique(nodes, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    numbers_ = np.empty(len(points), np.uint32)
+    numbers_[order] = np.arange(len(points), dtype=np.uint32)
+    return points[order], numbers_[inverse]
 
 
 def _converted(array: npt.NDArray[Any], dtype: str) -> npt.NDArray[Any]:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from . import _arrays, _options, _splatkit
+from . import _arrays, _neighbours, _options, _splatkit
 from ._camera import Camera, Clip
 from ._errors import ArgumentError
 from ._options import Color, FieldLook, FileOptions, SurfaceLook, Vector, VolumeLook
 from ._picture import Picture
+
+if TYPE_CHECKING:
+    from ._widget import Widget
 
 
 class Scene:
@@ -27,35 +31,66 @@ class Scene:
         self._own = _splatkit.Scene()
 
     def add(self, source: Any, **options: Unpack[FileOptions]) -> Scene:
-        """Adds a file, a folder of DICOM slices, or an array: of three axes a volume, of (n, 3)
-        points. `docs/python.md` lists the options."""
+        """Adds a file, a folder of DICOM slices, an array, or an object of another package.
+
+        Arrays of three axes are volumes, those of (n, 3) points. A dictionary has the arguments of
+        a method: an `array`, `vertices`, `positions`, `points` or `centers`, and more.
+        `docs/python.md` lists the options, and the objects that are known.
+        """
         if isinstance(source, (str, os.PathLike)):
             known = _options.VOLUME | _options.SURFACE | _options.READING
             given = _options.checked(options, known, "add")
             path = os.fspath(source)
             self._own.add_file(path, _options.reading(given), _options.look(given))
             return self
+        own = _neighbours.found(source, options.get("scalar"))
+        if own is not None:
+            options.pop("scalar", None)
+            return getattr(self, own.method)(own, **options)  # type: ignore[no-any-return]
+        if isinstance(source, Mapping):
+            return self._add_arguments(source, options)
         shape = np.shape(source)
         if len(shape) == 3:
             return self.add_volume(source, **options)  # type: ignore[misc]
         if len(shape) == 2 and shape[1] == 3:
             return self.add_points(source, **options)  # type: ignore[misc]
+        if len(shape) == 0:
+            raise _neighbours.unknown(source, "Scene.add", _ALSO)
         raise ArgumentError(
             f"an array of the shape {shape} is neither a volume (z, y, x) nor points (n, 3)"
         )
+
+    def _add_arguments(self, source: Mapping[str, Any], options: Mapping[str, Any]) -> Scene:
+        methods = {
+            "array": self.add_volume,
+            "vertices": self.add_mesh,
+            "centers": self.add_gaussians,
+            "points": self.add_cells,
+            "positions": self.add_points,
+        }
+        if {"positions", "values"} < set(source) and set(source) & {"radii", "covariances"}:
+            methods["positions"] = self.add_samples
+        for first, method in methods.items():
+            if first in source:
+                given = {**source, **options}
+                return method(given.pop(first), **given)  # type: ignore[no-any-return, operator]
+        raise _neighbours.unknown(source, "Scene.add", _ALSO)
 
     def add_volume(
         self,
         array: Any,
         *,
-        spacing: float | Vector = 1.0,
-        origin: Vector = (0.0, 0.0, 0.0),
+        scalar: str | None = None,
+        copy: bool | None = None,
+        spacing: float | Vector | None = None,
+        origin: Vector | None = None,
         axes: Any = None,
+        coordinates: Sequence[Any] | None = None,
         missing: float | None = None,
         modality: str | None = None,
-        value_name: str = "",
-        value_unit: str = "",
-        unit: str = "",
+        value_name: str | None = None,
+        value_unit: str | None = None,
+        unit: str | None = None,
         up: Vector | None = None,
         name: str = "volume",
         **look: Unpack[VolumeLook],
@@ -63,17 +98,29 @@ class Scene:
         """Adds the samples of an array, which is indexed [z, y, x] whatever its order in memory.
 
         Args:
-            array: Booleans or numbers. NaN and infinite samples have no value.
-            spacing: The distances between samples along x, y and z, in world units.
+            array: Booleans or numbers, or an image of another package, which says where it is.
+                NaN and infinite samples have no value.
+            scalar: The name of the array of an object that has several.
+            copy: None draws an array in C order and of a type of the library where it is; nothing
+                may write to it as long as the scene lives. Others are copied. True copies in any
+                case, False never: that is an error where a copy is needed.
+            spacing: The distances between samples along x, y and z, in world units. Default: those
+                of the object, else 1.
             origin: The world position x, y, z of the sample array[0, 0, 0].
             axes: A 3 × 3 matrix whose columns are the directions of x, y and z of the array in
                 the world. They are multiplied by `spacing`.
+            coordinates: Where samples are along x, y and z if they are not evenly spaced: three
+                lists of ascending numbers, in units of the spacing.
             missing: A value that stands for “no value”.
             modality: ct, mr, emission, ultrasound or microscopy: for the automatic colours.
             up: The world direction that is up. Default: z.
         """
         given = _options.checked(look, _options.VOLUME, "add_volume")
-        samples = _arrays.samples(array)
+        own = _neighbours.of_kind(_neighbours.Volume, array, scalar, "add_volume")
+        own = own or _neighbours.Volume(array)
+        samples = _arrays.samples(own.samples, copy)
+        axes = own.axes if axes is None else axes
+        coordinates = own.coordinates if coordinates is None else coordinates
         matrix = None
         if axes is not None:
             matrix = _arrays.rows(axes, 3, "axes", "f8")
@@ -81,15 +128,17 @@ class Scene:
                 raise ArgumentError(f"axes is a matrix of 3 × 3, not {matrix.shape}")
         told = {
             "name": name,
-            "spacing": _options.vector(spacing),
-            "origin": _options.vector(origin),
+            "spacing": _options.vector(own.spacing if spacing is None else spacing),
+            "origin": _options.vector(own.origin if origin is None else origin),
             "axes": matrix,
+            "coordinates": _coordinates(coordinates, samples.shape),
             "missing": missing,
             "modality": modality,
-            "value_name": value_name,
-            "value_unit": value_unit,
-            "unit": unit,
+            "value_name": own.value_name if value_name is None else value_name,
+            "value_unit": own.value_unit if value_unit is None else value_unit,
+            "unit": own.unit if unit is None else unit,
             "up": _options.direction(up),
+            "frame": own.frame,
         }
         self._own.add_volume(samples, _options.text(told), "{}", _options.look(given))
         return self
@@ -97,8 +146,9 @@ class Scene:
     def add_mesh(
         self,
         vertices: Any,
-        faces: Any,
+        faces: Any = None,
         *,
+        scalar: str | None = None,
         normals: Any = None,
         colors: Any = None,
         values: Any = None,
@@ -109,7 +159,9 @@ class Scene:
         """Adds triangles.
 
         Args:
-            vertices: Positions x, y, z, (n, 3).
+            vertices: Positions x, y, z, (n, 3), or a mesh of another package, which has its own
+                faces, and the other arrays that are not given.
+            scalar: The name of the array of such a mesh that colours it.
             faces: Rows of three indices of vertices, counter-clockwise from outside. Rows of more
                 are convex polygons.
             normals: One normal for each vertex, (n, 3).
@@ -118,12 +170,19 @@ class Scene:
             up: The world direction that is up. Default: guessed from the shape.
         """
         given = _options.checked(look, _options.SURFACE, "add_mesh")
-        return self._add_mesh(vertices, faces, normals, colors, values, up, name, given)
+        own = _neighbours.of_kind(_neighbours.Surface, vertices, scalar, "add_mesh")
+        own = own or _neighbours.Surface(vertices)
+        if faces is not None:
+            own.faces = faces
+        if own.faces is None:
+            raise TypeError("add_mesh() needs faces: add_points() adds points without")
+        return self._add_mesh(own.with_given(normals, colors, values), up, name, given)
 
     def add_points(
         self,
         positions: Any,
         *,
+        scalar: str | None = None,
         colors: Any = None,
         values: Any = None,
         normals: Any = None,
@@ -134,22 +193,23 @@ class Scene:
         """Adds a point cloud: points of a surface, each drawn as a disc.
 
         `values` colour the points. Values in space, such as those of particles, are drawn by
-        `add_samples`. The arguments are those of `add_mesh`.
+        `add_samples`. The arguments are those of `add_mesh`. Of a mesh of another package the
+        vertices are drawn.
         """
         given = _options.checked(look, _options.SURFACE, "add_points")
-        return self._add_mesh(positions, None, normals, colors, values, up, name, given)
+        own = _neighbours.points(positions, scalar, "add_points")
+        own = own or _neighbours.Surface(positions)
+        return self._add_mesh(own.with_given(normals, colors, values), up, name, given)
 
     def _add_mesh(
         self,
-        vertices: Any,
-        faces: Any,
-        normals: Any,
-        colors: Any,
-        values: Any,
+        own: _neighbours.Surface,
         up: Vector | None,
         name: str,
         given: Mapping[str, Any],
     ) -> Scene:
+        vertices, faces, normals = own.positions, own.faces, own.normals
+        colors, values = own.colors, own.values
         positions = _arrays.positions(vertices, "vertices" if faces is not None else "positions")
         count = len(positions)
         arrays = {
@@ -163,6 +223,60 @@ class Scene:
         # Values colour a surface even if it has colours.
         named = {"scalar": "values"} if values is not None else {}
         self._own.add_mesh(arrays, told, _options.text(named), _options.look(given))
+        return self
+
+    def add_cells(
+        self,
+        points: Any,
+        cells: Any = None,
+        values: Any = None,
+        *,
+        kinds: Any = None,
+        scalar: str | None = None,
+        missing: float | None = None,
+        up: Vector | None = None,
+        name: str = "cells",
+        **look: Unpack[FieldLook],
+    ) -> Scene:
+        """Adds cells that fill space, such as those of a solver, with the field inside.
+
+        Args:
+            points: Positions x, y, z, (n, 3), or a grid of PyVista or VTK, which has the rest.
+            cells: Rows of the points of cells of one kind, in VTK's order, or the list of the
+                number of points and the points of each cell.
+            values: One number for each point, or for each cell. Cells with a value that is not
+                finite, or at a point with one, are left out.
+            kinds: VTK's number of the type of all cells, or of each. Default: by the length of
+                rows: 4 tetrahedra, 5 pyramids, 6 wedges, 8 hexahedra.
+            scalar: The name of the array of a grid.
+        """
+        given = _options.checked(look, _options.FIELD, "add_cells")
+        own = _neighbours.of_kind(_neighbours.Cells, points, scalar, "add_cells")
+        if own is None:
+            if cells is None or values is None:
+                raise TypeError("add_cells() needs points, cells and values, or a grid")
+            arrays = _arrays.cells(cells, kinds)
+        else:
+            points = own.positions
+            arrays = _arrays.raw_cells(own.kinds, own.offsets, own.nodes)
+        is_told = own is not None and values is None
+        positions = _arrays.positions(points, "points")
+        column = _arrays.column(own.values if is_told else values, "values")
+        count = len(arrays["kinds"])
+        of_cells = own.of_cells if is_told else len(column) == count != len(positions)
+        if len(column) != (count if of_cells else len(positions)):
+            raise ArgumentError(
+                f"there are {len(column)} values for {len(positions)} points and {count} cells"
+            )
+        points, arrays["nodes"] = _arrays.used(arrays["nodes"], len(positions))
+        given_arrays = {
+            **arrays,
+            "positions": positions[points],
+            "values": column if of_cells else column[points],
+            "of_cells": of_cells,
+        }
+        told = {"name": name, "missing": missing, "up": _options.direction(up)}
+        self._own.add_cells(given_arrays, _options.text(told), _options.look(given))
         return self
 
     def add_samples(
@@ -276,7 +390,8 @@ class Scene:
         By default it looks from the front, 30° to the right and 20° upwards. `view` is front, back,
         left, right, top, bottom or iso; `azimuth` and `elevation` turn it further.
         """
-        fit = _fit(**{name: own for name, own in locals().items() if name in _FIT})
+        given = dict(locals())
+        fit = _fit(**{name: given[name] for name in _FIT})
         return Camera.from_json(self._own.camera(fit, _drawn(size, clips)))
 
     def turntable(
@@ -332,27 +447,35 @@ class Scene:
             clips: Shapes that cut the scene.
             cut, budget: The width of splats of hierarchies, in pixels, or about how many.
         """
-        draw = {
-            "size": size,
-            "samples": None if samples == "auto" else samples,
-            "mode": mode,
-            "back_to_front": back_to_front,
-            "classify": classify,
-            "optics": optics,
-            "shade": shade,
-            "gradient": gradient,
-            "evaluate": evaluate,
-            "sheet_thickness": sheet_thickness,
-            "cut": cut,
-            "budget": budget,
-            "memory": memory,
-            "cull_backfaces": cull_backfaces,
-            "occlusion": occlusion,
-            "clips": [clip._entry() for clip in clips],
-        }
-        back = _options.background(background)
+        given = dict(locals())
+        behind = _options.background(background)
+        return Picture(self._pixels(camera, {name: given[name] for name in _DRAW}), behind)
+
+    def _pixels(self, camera: Camera | None, draw: Mapping[str, Any]) -> _splatkit.Picture:
+        """Draws with options by their names."""
         own = None if camera is None else camera.to_json()
-        return Picture(self._own.render(own, _options.text(draw)), back)
+        return self._own.render(own, _drawn(**draw))
+
+    def show(
+        self, camera: Camera | None = None, size: tuple[int, int] = (800, 600), **drawing: Any
+    ) -> Widget:
+        """Returns a widget for notebooks, in which the scene is turned by hand.
+
+        It needs the package anywidget: `pip install "splatkit[notebook]"`.
+
+        Args:
+            camera: The first view. Default: that of `Scene.camera`.
+            size: Width and height on the screen, in pixels of CSS.
+            drawing: The other options of `render`.
+        """
+        try:
+            from ._widget import Widget
+        except ModuleNotFoundError as error:
+            if error.name not in ("anywidget", "traitlets"):
+                raise
+            message = 'Scene.show needs anywidget: pip install "splatkit[notebook]"'
+            raise ImportError(message, name=error.name) from error
+        return Widget(self, camera, size, **drawing)
 
     @property
     def bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
@@ -373,6 +496,9 @@ class Scene:
         return f"<splatkit.Scene: {items or 'empty'}>"
 
 
+#: What else `Scene.add` takes.
+_ALSO = "a path, a dictionary of the arguments of a method, "
+
 _FIT = (
     "view",
     "azimuth",
@@ -387,6 +513,24 @@ _FIT = (
 )
 
 
+#: The names of the options of `Scene.render`.
+DRAWING = frozenset(inspect.signature(Scene.render).parameters) - {"self"}
+#: Those that the compiled half takes.
+_DRAW = DRAWING - {"camera", "background"}
+
+
+def _coordinates(given: Sequence[Any] | None, shape: tuple[int, ...]) -> list[Any] | None:
+    if given is None:
+        return None
+    lines = [_arrays.numbers(line, "coordinates").ravel().astype(float) for line in given]
+    if tuple(map(len, reversed(lines))) != shape:
+        raise ArgumentError(
+            f"coordinates of {' × '.join(str(len(line)) for line in lines)} samples along x, y and z "
+            f"do not fit an array of the shape {shape}"
+        )
+    return [line.tolist() for line in lines]
+
+
 def _fit(**given: Any) -> str:
     for name in ("focal_point", "view_up", "up"):
         if given.get(name) is not None:
@@ -394,5 +538,9 @@ def _fit(**given: Any) -> str:
     return _options.text(given)
 
 
-def _drawn(size: tuple[int, int], clips: Sequence[Clip]) -> str:
-    return _options.text({"size": size, "clips": [clip._entry() for clip in clips]})
+def _drawn(
+    size: tuple[int, int], clips: Sequence[Clip] = (), samples: int | str = "auto", **draw: Any
+) -> str:
+    """Returns how a picture is drawn, as JSON."""
+    own = {"size": size, "clips": [clip._entry() for clip in clips]}
+    return _options.text({**own, **draw, "samples": None if samples == "auto" else samples})

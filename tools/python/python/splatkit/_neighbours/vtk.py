@@ -1,0 +1,265 @@
+"""Data sets of VTK, and of PyVista, whose classes are VTK's with more methods."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .._errors import ArgumentError
+from .parts import Array, Cells, Parts, Surface, Volume, fans, of_coordinates
+
+#: The numbers of VTK's cells that fill space and have a list of nodes.
+_SOLID = (10, 11, 12, 13, 14, 15, 16, 24, 25, 26, 27, 29, 31, 32, 33, 37, 71, 72, 73, 78, 79, 80)
+_POLYHEDRON = 42
+#: The corners of VTK's flat cells.
+_FLAT = {5: 3, 22: 3, 34: 3, 8: 4, 9: 4, 23: 4, 28: 4, 30: 4}
+_POLYGON, _PIXEL = 7, 8
+
+
+def parts(source: Any, scalar: str | None) -> Parts | None:
+    """Returns the parts of a data set."""
+    if not hasattr(source, "IsA"):
+        return None
+    if source.IsA("vtkImageData"):
+        return _image(source, scalar)
+    if source.IsA("vtkRectilinearGrid"):
+        return _rectilinear(source, scalar)
+    if source.IsA("vtkStructuredGrid"):
+        return _structured(source, scalar)
+    if source.IsA("vtkUnstructuredGrid"):
+        return _unstructured(source, scalar)
+    if source.IsA("vtkPolyData"):
+        return _polygons(source, scalar)
+    if source.IsA("vtkCompositeDataSet"):
+        raise ArgumentError("add the blocks of a composite data set one by one")
+    return None
+
+
+def points(source: Any, scalar: str | None) -> Surface | None:
+    """Returns the points of any data set that has a list of them, as a cloud."""
+    if not (hasattr(source, "IsA") and source.IsA("vtkPointSet")):
+        return None
+    values, of_cells = _values(source, scalar, is_needed=False)
+    if of_cells:
+        if scalar is not None:
+            raise ArgumentError(f"the array {scalar!r} is one of cells, not of points")
+        values = None
+    colors, values = _colors(values)
+    return Surface(_positions(source), None, _normals(source), colors, _scalars(values))
+
+
+def _image(source: Any, scalar: str | None) -> Volume:
+    values, of_cells = _values(source, scalar)
+    dims = np.array(source.GetDimensions())
+    own = source.GetDirectionMatrix()
+    direction = np.array([[own.GetElement(row, column) for column in range(3)] for row in range(3)])
+    spacing = np.array(source.GetSpacing())
+    origin = np.array(source.GetPoint(0))
+    if of_cells:
+        origin = origin + direction @ (np.where(dims > 1, 0.5, 0.0) * spacing)
+        dims = np.maximum(dims - 1, 1)
+    samples = _scalars(values).reshape(dims[::-1])
+    return Volume(samples, spacing.tolist(), origin.tolist(), direction)
+
+
+def _rectilinear(source: Any, scalar: str | None) -> Volume:
+    values, of_cells = _values(source, scalar)
+    lines = [
+        _array(own).ravel()
+        for own in (source.GetXCoordinates(), source.GetYCoordinates(), source.GetZCoordinates())
+    ]
+    if of_cells:
+        lines = [line if len(line) == 1 else 0.5 * (line[1:] + line[:-1]) for line in lines]
+    samples = _scalars(values).reshape([len(line) for line in reversed(lines)])
+    return of_coordinates(samples, lines)
+
+
+def _structured(source: Any, scalar: str | None) -> Parts:
+    ends = np.reshape(source.GetExtent(), (3, 2))
+    dims = ends[:, 1] - ends[:, 0] + 1
+    if dims.min() <= 0:
+        raise ArgumentError("the grid is empty")
+    at = np.arange(np.prod(dims)).reshape(dims[::-1])
+    wide = [axis for axis, count in enumerate(dims[::-1]) if count > 1]
+    if len(wide) < 2:
+        cloud = points(source, scalar)
+        assert cloud is not None
+        return cloud
+    if len(wide) == 2:
+        at = at.squeeze()
+        corners = [at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]]
+        quads = np.stack([own.ravel() for own in corners], axis=1)
+        return _surface(source, scalar, quads, np.arange(len(quads)))
+    flat = [at[:, :-1, :-1], at[:, :-1, 1:], at[:, 1:, 1:], at[:, 1:, :-1]]
+    corners = [*(own[:-1] for own in flat), *(own[1:] for own in flat)]
+    nodes = np.stack([own.ravel() for own in corners], axis=1)
+    values, of_cells = _values(source, scalar)
+    kinds = np.full(len(nodes), 12, np.uint8)
+    offsets = np.arange(len(nodes) + 1) * 8
+    return Cells(_positions(source), kinds, offsets, nodes.ravel(), _scalars(values), of_cells)
+
+
+def _unstructured(source: Any, scalar: str | None) -> Parts:
+    offsets, nodes = _lists(source.GetCells())
+    kinds = _kinds(source)
+    if (kinds == _POLYHEDRON).any():
+        raise ArgumentError(
+            "polyhedra are read from files only: save the grid as .vtu and add that"
+        )
+    is_solid = np.isin(kinds, _SOLID)
+    if not is_solid.any():
+        return _flat(source, scalar, kinds, offsets, nodes)
+    values, of_cells = _values(source, scalar)
+    numbers = _scalars(values)
+    if not is_solid.all():
+        counts = np.diff(offsets)
+        nodes = nodes[np.repeat(is_solid, counts)]
+        offsets = np.concatenate([[0], np.cumsum(counts[is_solid])])
+        kinds = kinds[is_solid]
+        numbers = numbers[is_solid] if of_cells else numbers
+    return Cells(_positions(source), kinds, offsets, nodes, numbers, of_cells)
+
+
+def _kinds(source: Any) -> Array:
+    try:
+        own = source.GetCellTypes()
+    except TypeError:
+        # Before VTK 9.6 that was another method.
+        own = source.GetCellTypesArray()
+    return _array(own).ravel().astype(np.uint8)
+
+
+def _flat(source: Any, scalar: str | None, kinds: Array, offsets: Array, nodes: Array) -> Surface:
+    """Returns the flat cells of a grid as a mesh, or its points."""
+    counts = np.array([_FLAT.get(int(kind), 0) for kind in range(256)])[kinds]
+    lengths = np.diff(offsets)
+    counts = np.where(kinds == _POLYGON, lengths, counts)
+    if not counts.any():
+        cloud = points(source, scalar)
+        assert cloud is not None
+        return cloud
+    nodes = nodes.copy()
+    pixels = offsets[:-1][kinds == _PIXEL]
+    nodes[pixels + 2], nodes[pixels + 3] = nodes[pixels + 3], nodes[pixels + 2]
+    ordinal = np.arange(len(nodes)) - np.repeat(offsets[:-1], lengths)
+    corners = nodes[ordinal < np.repeat(counts, lengths)]
+    triangles, owners = fans(np.concatenate([[0], np.cumsum(counts)]), corners)
+    return _surface(source, scalar, triangles, owners)
+
+
+def _polygons(source: Any, scalar: str | None) -> Surface:
+    offsets, nodes = _lists(source.GetPolys())
+    triangles, owners = fans(offsets, nodes)
+    # Values of cells are in the order points, lines, polygons, strips.
+    before = source.GetNumberOfVerts() + source.GetNumberOfLines()
+    own = source.GetStrips()
+    if own.GetNumberOfCells():
+        starts, more = _lists(own)
+        strips = [_strip(more[a:b]) for a, b in pairwise(starts)]
+        numbers = np.repeat(np.arange(len(strips)), [len(strip) for strip in strips])
+        triangles = np.concatenate([triangles, *strips])
+        owners = np.concatenate([owners, source.GetNumberOfPolys() + numbers])
+    if not len(triangles):
+        cloud = points(source, scalar)
+        assert cloud is not None
+        return cloud
+    return _surface(source, scalar, triangles, before + owners)
+
+
+def _lists(own: Any) -> tuple[Array, Array]:
+    """Returns where the nodes of each cell of an array of cells begin and end, and all nodes."""
+    count, width = own.GetNumberOfCells(), own.IsHomogeneous()
+    nodes = _array(own.GetConnectivityArray()).ravel().astype(np.int64)
+    if count and width > 0:
+        # VTK may keep no list of offsets then.
+        return np.arange(count + 1) * width, nodes
+    return _array(own.GetOffsetsArray()).ravel().astype(np.int64), nodes
+
+
+def _strip(nodes: Array) -> Array:
+    """Returns the triangles of a strip, of which every other one is turned around."""
+    rows = np.stack([nodes[:-2], nodes[1:-1], nodes[2:]], axis=1)
+    rows[1::2] = rows[1::2, [1, 0, 2]]
+    return rows
+
+
+def _surface(source: Any, scalar: str | None, faces: Array, owners: Array) -> Surface:
+    """Returns a mesh. `owners` are the cells of the faces."""
+    values, of_cells = _values(source, scalar, is_needed=False)
+    own = Surface(_positions(source), faces, _normals(source))
+    colors, values = _colors(values)
+    numbers = None if values is None else _scalars(values)
+    if of_cells:
+        return own.by_face(
+            None if colors is None else colors[owners], None if numbers is None else numbers[owners]
+        )
+    own.colors, own.values = colors, numbers
+    return own
+
+
+def _positions(source: Any) -> Array:
+    own = source.GetPoints()
+    if own is None or own.GetNumberOfPoints() == 0:
+        raise ArgumentError("the data set has no points")
+    return _array(own.GetData())
+
+
+def _normals(source: Any) -> Array | None:
+    own = source.GetPointData().GetNormals()
+    return None if own is None else _array(own)
+
+
+def _values(source: Any, scalar: str | None, is_needed: bool = True) -> tuple[Any, bool]:
+    """Returns an array of a data set, and whether it is one of cells: the named one, or the active
+    one, or where values are needed the first."""
+    data = [source.GetPointData(), source.GetCellData()]
+    if scalar is None:
+        for of_cells, own in enumerate(data):
+            if own.GetScalars() is not None:
+                return _array(own.GetScalars()), bool(of_cells)
+        if not is_needed:
+            return None, False
+        for of_cells, own in enumerate(data):
+            if own.GetNumberOfArrays() and own.GetArray(0) is not None:
+                return _array(own.GetArray(0)), bool(of_cells)
+        raise ArgumentError("the data set has no arrays of points or cells")
+    # As for files, “velocity:0” is the first component.
+    name, _, part = scalar.rpartition(":")
+    for of_cells, own in enumerate(data):
+        if own.GetArray(scalar) is not None:
+            return _array(own.GetArray(scalar)), bool(of_cells)
+        if part.isdigit() and own.GetArray(name) is not None:
+            values = _array(own.GetArray(name))
+            if values.ndim == 2 and int(part) < values.shape[1]:
+                return values[:, int(part)], bool(of_cells)
+    names = [own.GetArrayName(at) for own in data for at in range(own.GetNumberOfArrays())]
+    listed = ", ".join(map(repr, names)) or "none"
+    raise ArgumentError(f"the data set has no array {scalar!r}; its arrays: {listed}")
+
+
+def _colors(values: Any) -> tuple[Array | None, Any]:
+    """Returns an array as colours if it is one of bytes for red, green and blue; else as values."""
+    if values is None or values.dtype != np.uint8 or values.shape[1:] not in ((3,), (4,)):
+        return None, values
+    return values, None
+
+
+def _scalars(values: Any) -> Any:
+    """Returns one number for each element: of vectors their length."""
+    if values is None or values.ndim == 1:
+        return values
+    if values.shape[1] == 1:
+        return values[:, 0]
+    return np.linalg.norm(values.astype(np.float64), axis=1)
+
+
+def _array(own: Any) -> Array:
+    """Returns the numbers of an array of VTK, where they are if they have memory."""
+    try:
+        return np.asarray(memoryview(own))
+    except (TypeError, ValueError, BufferError):
+        count, width = own.GetNumberOfTuples(), own.GetNumberOfComponents()
+        rows = np.array([own.GetTuple(row) for row in range(count)]).reshape(count, width)
+        return rows[:, 0] if width == 1 else rows

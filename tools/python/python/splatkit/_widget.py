@@ -1,0 +1,344 @@
+"""The widget for notebooks. It needs the package anywidget."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import anywidget
+import numpy as np
+import numpy.typing as npt
+import traitlets
+
+from . import _options, _scene, _splatkit
+from ._camera import Camera
+from ._errors import ArgumentError, Error
+from ._painter import Frame, Order, Painter
+from ._picture import Picture
+from ._transfer import TransferFunction
+
+_STATIC = Path(__file__).parent / "static"
+_OPTIONS = _scene.DRAWING - {"size", "camera"}
+#: What a message of the browser can lead to. It is shown in the widget.
+_FAILURES = (Error, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+#: Most pixels of the screen in a pixel of CSS that are drawn.
+_MOST_PIXELS = 3.0
+
+
+class _CameraTrait(traitlets.Instance[Camera]):
+    """A camera that is copied as it is read and set, so that each change is noticed."""
+
+    def __init__(self) -> None:
+        super().__init__(Camera, args=((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
+
+    def get(self, obj: Any, cls: Any = None) -> Camera:
+        return cast(Camera, super().get(obj, cls)).copy()
+
+    def validate(self, obj: Any, value: Any) -> Camera:
+        return cast(Camera, super().validate(obj, value)).copy()
+
+
+class Widget(anywidget.AnyWidget):
+    """A picture of a scene that is turned by hand. `Scene.show` returns it.
+
+    Coarse frames follow the hand. When it rests, the exact picture is drawn: the one that
+    `Scene.render` returns for `widget.camera`, `widget.pixels` and the same options.
+    """
+
+    _esm = _STATIC / "widget.js"
+    _css = _STATIC / "widget.css"
+
+    #: The camera. A new one may be set, and cameras of several widgets be linked by traitlets.
+    camera = _CameraTrait()
+    #: Width and height on the screen, in pixels of CSS.
+    size = traitlets.Tuple(traitlets.Int(), traitlets.Int()).tag(sync=True)
+    #: Which field the editor shows, from 0, if several items have transfer functions.
+    field = traitlets.Int(0).tag(sync=True)
+
+    _names: traitlets.List[Any] = traitlets.List().tag(sync=True)
+    _ranges: traitlets.List[Any] = traitlets.List().tag(sync=True)
+    #: How often the values of each field are; an empty list until they are counted.
+    _histograms: traitlets.List[Any] = traitlets.List().tag(sync=True)
+    _transfers: traitlets.List[Any] = traitlets.List().tag(sync=True)
+    _presets: traitlets.List[Any] = traitlets.List().tag(sync=True)
+    _maps: traitlets.List[Any] = traitlets.List().tag(sync=True)
+    #: The exact picture as PNG; empty while coarser ones are shown.
+    _still = traitlets.Bytes(b"").tag(sync=True)
+    #: What is shown: its size and the milliseconds that it took.
+    _status = traitlets.Dict().tag(sync=True)
+    _error = traitlets.Unicode("").tag(sync=True)
+
+    _painter: Painter | None = None
+
+    def __init__(
+        self,
+        scene: _scene.Scene,
+        camera: Camera | None = None,
+        size: tuple[int, int] = (800, 600),
+        **drawing: Any,
+    ) -> None:
+        self._scene = scene
+        self._drawing = _options.checked(drawing, _OPTIONS, "show")
+        self._background = _options.background(drawing.get("background", "black"))
+        self._drawing.pop("background", None)
+        self._ratio = 1.0
+        self._orders = 0
+        self._lock = threading.Lock()
+        self._arrived: tuple[Frame, bytes] | None = None
+        self._exact: Frame | None = None
+        self._shown: _splatkit.Picture | None = None
+        self._grabbed: list[float] | None = None
+        self._loop = _running_loop()
+        # Refuses sizes and options that cannot be drawn.
+        scene._own.check(self._draws(size))
+        own = self._fitted(size) if camera is None else camera
+        _splatkit.moved_by_hand(scene._own, own.to_json(), size, '{"turn": {"drag": [0, 0]}}')
+        super().__init__(
+            camera=own,
+            size=size,
+            _presets=list(_splatkit.TRANSFER_FUNCTIONS),
+            _maps=list(_splatkit.COLOR_MAPS),
+        )
+        self._fields: list[dict[str, Any]] = []
+        self._painter = Painter(self._take_frame)
+        self.on_msg(self._take_message)
+        self.refresh()
+
+    # What programs use.
+
+    @property
+    def pixels(self) -> tuple[int, int]:
+        """Width and height of the exact picture: `size` times the pixels of the screen in one of
+        CSS, which the browser tells."""
+        width, height = (max(1, round(side * self._ratio)) for side in self.size)
+        return width, height
+
+    @property
+    def transfer(self) -> TransferFunction | None:
+        """The transfer function of `field`; None if the scene has none.
+
+        It can be set: to a `TransferFunction`, a name, a JSON file or its text. Functions belong to
+        the scene, so that `Scene.render` and other widgets of the scene draw with it, too.
+        """
+        if not self._transfers:
+            return None
+        return TransferFunction.from_json(json.dumps(self._transfers[self.field]))
+
+    @transfer.setter
+    def transfer(self, value: Any) -> None:
+        if not self._transfers:
+            raise ArgumentError("the scene has no field, and so no transfer function")
+        own = TransferFunction.of(value)
+        if isinstance(own, str):
+            own = self._named(self.field, own)
+        self._set_transfer(self.field, json.loads(_splatkit.checked_transfer(json.dumps(own))))
+
+    def snapshot(self) -> npt.NDArray[np.uint8]:
+        """Returns the exact picture: red, green, blue and opacity, (height, width, 4) bytes."""
+        order = self._order()
+        with self._lock:
+            exact = self._exact
+        if exact is not None and exact.order == order and exact.picture is not None:
+            return Picture(exact.picture, self._background).rgba
+        picture = self._scene._own.render(order.camera, order.draw)
+        return Picture(picture, self._background).rgba
+
+    def refresh(self) -> None:
+        """Draws the scene again: after items were added, or a transfer function was changed
+        elsewhere."""
+        fields = json.loads(_splatkit.fields(self._scene._own))
+        counted = len(self._fields)
+        # Items are only ever added. Those that are known keep the function they came with.
+        self._fields += fields[counted:]
+        with self.hold_sync():
+            self._names = [field["name"] for field in fields]
+            self._ranges = [field["range"] for field in fields]
+            self._histograms = [*self._histograms, *([] for _ in fields[counted:])]
+            self._transfers = [field["transfer"] for field in fields]
+        for number in range(counted, len(fields)):
+            threading.Thread(target=self._count, args=(number,), daemon=True).start()
+        self._draw()
+
+    def close(self) -> None:
+        """Ends drawing and removes the widget from the page."""
+        if self._painter is not None:
+            self._painter.order(None)
+        super().close()
+
+    # What the browser asks for.
+
+    def _take_message(self, _: Any, content: Any, __: Any = None) -> None:
+        self._loop = _running_loop() or self._loop
+        before = self._orders
+        try:
+            for kind, details in content["do"]:
+                getattr(self, f"_on_{kind}")(**details)
+        except _FAILURES as error:
+            self._error = str(error) or repr(error)
+        if self._orders == before:
+            # No frame follows, which the browser would wait for.
+            self.send({"type": "idle"})
+
+    def _on_ready(self, ratio: float) -> None:
+        """A view is there. Its screen has `ratio` pixels in one of CSS."""
+        ratio = min(max(float(ratio), 1.0), _MOST_PIXELS)
+        if ratio != self._ratio:
+            self._ratio = ratio
+            self._draw()
+
+    def _on_turn(self, drag: list[float]) -> None:
+        self._move(turn={"drag": drag})
+
+    def _on_look_around(self, drag: list[float]) -> None:
+        self._move(look_around={"drag": drag})
+
+    def _on_grab(self, cursor: list[float]) -> None:
+        """Takes hold of the point under the cursor, for the drag that follows."""
+        self._grabbed = self._picked(cursor)
+
+    def _on_pan(self, drag: list[float]) -> None:
+        self._move(pan={"drag": drag, "point": self._grabbed})
+
+    def _on_zoom(self, factor: float, cursor: list[float]) -> None:
+        self._move(zoom={"factor": factor, "cursor": cursor, "point": self._picked(cursor)})
+
+    def _on_center(self, cursor: list[float]) -> None:
+        point = self._picked(cursor)
+        if point is not None:
+            self._move(center={"point": point})
+
+    def _on_projection(self) -> None:
+        self._move(orthographic=self.camera.height is None)
+
+    def _on_view(self, name: str | None = None) -> None:
+        self.camera = self._fitted(self.size, view=name)
+
+    def _on_preset(self, field: int, name: str) -> None:
+        """Sets a transfer function by name; the one that the field came with if it is empty."""
+        own = self._named(field, name) if name else self._fields[field]["transfer"]
+        self._set_transfer(field, own)
+
+    def _on_colors(self, field: int, name: str) -> None:
+        """Sets the colours of a map."""
+        own = json.dumps(self._transfers[field])
+        text = _splatkit.recolored(own, name, tuple(self._ranges[field]))
+        self._set_transfer(field, json.loads(text))
+
+    def _on_transfer(self, field: int, transfer: dict[str, Any]) -> None:
+        text = _splatkit.checked_transfer(json.dumps(transfer))
+        self._set_transfer(field, json.loads(text))
+
+    # How that is done.
+
+    def _draws(self, size: tuple[int, int]) -> str:
+        return _scene._drawn(size, **self._drawing)
+
+    def _fitted(self, size: tuple[int, int], view: str | None = None) -> Camera:
+        own = self._scene._own.camera(_scene._fit(view=view), self._draws(size))
+        return Camera.from_json(own)
+
+    def _order(self) -> Order:
+        looks = json.dumps(self._transfers)
+        return Order(self._scene._own, self.camera.to_json(), self._draws(self.pixels), looks)
+
+    def _draw(self) -> None:
+        if self._painter is not None:
+            self._orders += 1
+            self._still = b""
+            self._painter.order(self._order())
+
+    @traitlets.observe("camera", "size")
+    def _changed(self, _: Any) -> None:
+        self._draw()
+
+    def _move(self, **gesture: Any) -> None:
+        text = _options.text(gesture)
+        own = self.camera.to_json()
+        moved = _splatkit.moved_by_hand(self._scene._own, own, self.pixels, text)
+        self.camera = Camera.from_json(moved)
+
+    def _picked(self, cursor: list[float]) -> list[float] | None:
+        """Returns the world point under the cursor in the picture that is shown."""
+        if self._shown is None:
+            return None
+        x, y = map(float, cursor)
+        return _splatkit.picked(self._shown, self.pixels, (x, y))
+
+    def _named(self, field: int, name: str) -> dict[str, Any]:
+        """Returns a preset for a field. Light fades where the gradient is noise, as before."""
+        own = self._fields[field]
+        text = _splatkit.named_transfer(name, own["range"], own["diagonal"])
+        named: dict[str, Any] = json.loads(text)
+        certain = (own["transfer"].get("shade") or {}).get("certain")
+        if named.get("shade") and certain is not None:
+            named["shade"]["certain"] = certain
+        return named
+
+    def _set_transfer(self, field: int, transfer: dict[str, Any]) -> None:
+        item = self._fields[field]["item"]
+        _splatkit.set_transfer(self._scene._own, item, json.dumps(transfer))
+        transfers = list(self._transfers)
+        transfers[field] = transfer
+        self._transfers = transfers
+        self._draw()
+
+    def _count(self, field: int) -> None:
+        """Counts the values of a field, on a thread of its own."""
+        counts = _splatkit.histogram(self._scene._own, self._fields[field]["item"])
+
+        def take() -> None:
+            histograms = list(self._histograms)
+            histograms[field] = counts
+            self._histograms = histograms
+
+        self._later(take)
+
+    def _take_frame(self, frame: Frame) -> None:
+        """Takes a frame from the thread that draws. The kernel shows the newest when it is free."""
+        png = b"" if frame.picture is None else frame.picture.png(self._background)
+        with self._lock:
+            is_first, self._arrived = self._arrived is None, (frame, png)
+            if frame.is_exact:
+                self._exact = frame
+        if is_first:
+            self._later(self._show_frame)
+
+    def _show_frame(self) -> None:
+        with self._lock:
+            arrived, self._arrived = self._arrived, None
+        if arrived is None or self.comm is None:
+            return
+        frame, png = arrived
+        if frame.picture is None:
+            self._error = str(frame.error)
+            self.send({"type": "idle"})
+            return
+        self._shown = frame.picture
+        is_exact = frame.is_exact and frame.order == self._order()
+        size, took = frame.picture.size, frame.milliseconds
+        status = {"size": size, "exact": is_exact, "milliseconds": took}
+        with self.hold_sync():
+            self._error = ""
+            self._status = status
+            if is_exact:
+                self._still = png
+        if not is_exact:
+            self.send({"type": "frame", **status}, [png])
+
+    def _later(self, call: Callable[[], None]) -> None:
+        """Calls a function on the kernel's thread, which alone may send messages."""
+        if self._loop is None or self._loop.is_closed():
+            call()
+        else:
+            self._loop.call_soon_threadsafe(call)
+
+
+def _running_loop() -> asyncio.AbstractEventLoop | None:
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        return None

@@ -1,0 +1,341 @@
+"""Several ranks draw what one process draws; failures cost what failed alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ball, blob, write_ply
+
+import splatkit
+
+ray = pytest.importorskip("ray", reason='Ray is missing: pip install "splatkit[ray]"')
+pytestmark = pytest.mark.filterwarnings("default")
+
+SIZE = (160, 120)
+VIEWS = [{}, {"azimuth": 200, "elevation": -35}, {"view": "top", "orthographic": True}]
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    ray.init(
+        num_cpus=8,
+        include_dashboard=False,
+        object_store_memory=128 << 20,
+        configure_logging=True,
+        log_to_driver=False,
+    )
+    yield
+    ray.shutdown()
+
+
+@pytest.fixture(scope="module")
+def bricks(tmp_path_factory):
+    """A volume of several bricks along each axis."""
+    folder = tmp_path_factory.mktemp("ray")
+    volume = blob((70, 100, 90))
+    np.save(folder / "bytes.npy", (255 * volume / volume.max()).astype("u1"))
+    splatkit.convert(folder / "bytes.npy", folder / "bricks.splv")
+    return folder / "bricks.splv"
+
+
+def renderer(scene, ranks=4, **options):
+    from splatkit.ray import Renderer
+
+    return Renderer(scene, ranks=ranks, **options)
+
+
+def decibels(a, b):
+    error = np.mean((a.astype(float) - b.astype(float)) ** 2)
+    return 120.0 if error == 0 else -10 * np.log10(error)
+
+
+def same(drawn, alone, least=60):
+    """Whether two pictures agree, and show something."""
+    assert drawn.rgba.shape == alone.rgba.shape
+    assert (alone.color[..., 3] > 0.1).mean() > 0.02
+    found = decibels(drawn.color, alone.color)
+    assert found >= least, f"{found:.1f} dB"
+    assert np.abs(drawn.rgba.astype(int) - alone.rgba).max() <= 6
+    return found
+
+
+@pytest.mark.parametrize("view", VIEWS, ids=["usual", "behind", "flat"])
+def test_a_volume_in_bricks(cluster, bricks, view):
+    alone = splatkit.Scene().add(bricks, transfer="generic")
+    camera = alone.camera(SIZE, **view)
+    with renderer(bricks, transfer="generic", memory=64 << 20) as ranks:
+        own = ranks.render(SIZE, camera, background="navy")
+        same(own, alone.render(SIZE, camera, background="navy"))
+        told = own.statistics["ranks"]
+        # No rank reads all bricks.
+        whole = alone.render(SIZE, camera).statistics["bricks"]
+        assert len(told) == 4 and max(rank["bricks"] for rank in told) < whole
+        assert own.camera == camera and own.statistics["moved_bytes"] > 0
+
+
+def test_an_array(cluster):
+    volume = (200 * blob((40, 50, 60))).astype("u1")
+    alone = splatkit.Scene().add(volume, transfer="generic")
+    with renderer(volume, transfer="generic") as ranks:
+        own, one = ranks.render(SIZE), alone.render(SIZE)
+        same(own, one)
+        both = np.isfinite(own.depth) & np.isfinite(one.depth)
+        assert (np.isfinite(own.depth) == np.isfinite(one.depth)).mean() > 0.995
+        bounds = np.array(alone.bounds)
+        off = np.abs(own.depth[both] - one.depth[both]) / np.linalg.norm(bounds[1] - bounds[0])
+        assert np.median(off) < 1e-3 and np.quantile(off, 0.99) < 0.1
+
+
+def test_a_hierarchy(cluster, tmp_path):
+    vertices, faces = ball(120, 240)
+    colors = np.clip(255 * (0.5 + 0.5 * vertices), 0, 255).astype("u1")
+    write_ply(tmp_path / "ball.ply", vertices, faces, colors)
+    splatkit.convert(tmp_path / "ball.ply", tmp_path / "ball.splk")
+    alone = splatkit.Scene().add(tmp_path / "ball.splk")
+    with renderer(tmp_path / "ball.splk") as ranks:
+        for view in VIEWS:
+            camera = alone.camera(SIZE, **view)
+            same(ranks.render(SIZE, camera), alone.render(SIZE, camera))
+
+
+def test_a_mesh_in_a_volume(cluster):
+    vertices, faces = ball()
+    volume = blob((40, 50, 60)).astype("f4")
+
+    def scene():
+        own = splatkit.Scene().add_mesh(15 * vertices + [30, 25, 20], faces, color="gold")
+        return own.add_volume(volume, transfer="generic")
+
+    alone = scene()
+    with renderer(scene) as ranks:
+        for view in VIEWS:
+            camera = alone.camera(SIZE, **view)
+            same(ranks.render(SIZE, camera), alone.render(SIZE, camera))
+        # Clips and other options reach all ranks.
+        options = {"clips": [splatkit.Clip.plane((1, 0, 0), 28.0)], "samples": 4, "shade": True}
+        camera = alone.camera(SIZE)
+        same(ranks.render(SIZE, camera, **options), alone.render(SIZE, camera, **options))
+
+
+def test_colours_of_16_bits(cluster, bricks):
+    alone = splatkit.Scene().add(bricks, transfer="generic").render(SIZE)
+    with renderer(bricks, transfer="generic", precision="float16") as ranks:
+        same(ranks.render(SIZE), alone)
+
+
+def test_ranks_that_swap_halves(cluster, bricks, monkeypatch):
+    from splatkit.ray import _renderer
+
+    monkeypatch.setattr(_renderer, "_DIRECT", 2)
+    alone = splatkit.Scene().add(bricks, transfer="generic")
+    with renderer(bricks, ranks=8, transfer="generic") as ranks:
+        for view in VIEWS:
+            camera = alone.camera(SIZE, **view)
+            same(ranks.render(SIZE, camera), alone.render(SIZE, camera))
+
+
+def test_one_rank_draws_the_same_bytes(cluster, bricks):
+    alone = splatkit.Scene().add(bricks, transfer="generic").render(SIZE)
+    with renderer(bricks, ranks=1, transfer="generic") as ranks:
+        assert decibels(ranks.render(SIZE).color, alone.color) > 100
+
+
+def test_ranks_with_little_memory_agree_on_a_level(cluster, bricks):
+    with renderer(bricks, ranks=3, transfer="generic", memory=300_000) as ranks:
+        own = ranks.render((400, 300))
+        levels = {rank["level"] for rank in own.statistics["ranks"]}
+        assert len(levels) == 1 and levels.pop() > 0
+        alone = splatkit.Scene().add(bricks, transfer="generic").render((400, 300))
+        assert decibels(own.color, alone.color) > 25
+
+
+def test_a_killed_rank_is_started_again(cluster, bricks):
+    alone = splatkit.Scene().add(bricks, transfer="generic").render((600, 450), samples=4)
+    with renderer(bricks, transfer="generic") as ranks:
+        ranks.render(SIZE)
+        victim = ray.get(ranks.ranks[2].pid.remote())
+        timer = threading.Timer(0.3, os.kill, (victim, signal.SIGKILL))
+        timer.start()
+        own = ranks.render((600, 450), samples=4)
+        assert timer.finished.is_set(), "the picture was done before the rank was killed"
+        same(own, alone)
+        assert ray.get(ranks.ranks[2].pid.remote()) != victim
+
+
+def test_a_film_and_a_straggler(cluster, tmp_path):
+    volume = (200 * blob()).astype("u1")
+    slow = tmp_path / "slow"
+
+    def scene():
+        # The first rank that comes here stops for a while.
+        try:
+            slow.mkdir()
+        except FileExistsError:
+            pass
+        else:
+            time.sleep(150)
+        return splatkit.Scene().add(volume, transfer="generic")
+
+    alone = splatkit.Scene().add(volume, transfer="generic")
+    cameras = alone.turntable(7, SIZE)
+    with renderer(scene, ranks=3) as ranks:
+        start = time.monotonic()
+        frames = list(ranks.render_path(cameras, SIZE, background=None))
+        assert time.monotonic() - start < 120
+    assert len(frames) == 7
+    for frame, camera in zip(frames, cameras, strict=True):
+        assert np.array_equal(frame.rgba, alone.render(SIZE, camera, background=None).rgba)
+
+
+def test_errors_are_those_of_the_package(cluster, tmp_path):
+    with renderer(tmp_path / "none.splv", ranks=2) as ranks:
+        with pytest.raises(splatkit.MissingFileError) as caught:
+            ranks.render(SIZE)
+        assert caught.value.file == tmp_path / "none.splv"
+    (tmp_path / "broken.ply").write_text("ply\nformat nonsense\n")
+    with renderer(tmp_path / "broken.ply", ranks=2) as ranks:
+        with pytest.raises(splatkit.InputError) as caught:
+            ranks.render(SIZE)
+        assert caught.value.file.name == "broken.ply" and caught.value.place
+        with pytest.raises(splatkit.ArgumentError, match="render_path"):
+            ranks.render(SIZE, optics="maximum")
+        with pytest.raises(TypeError, match="backgroud"):
+            ranks.render(SIZE, backgroud="red")
+    with pytest.raises(splatkit.ArgumentError, match="more than the cluster has"):
+        renderer("any.splv", ranks=1000)
+
+
+def test_without_ray_the_error_names_the_command(tmp_path):
+    (tmp_path / "ray.py").write_text("raise ImportError('no ray here')\n")
+    path = os.pathsep.join([str(tmp_path), str(Path(splatkit.__file__).parents[1])])
+    words = [sys.executable, "-c", "import splatkit.ray"]
+    done = subprocess.run(
+        words, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, check=False
+    )
+    assert done.returncode and 'pip install "splatkit[ray]"' in done.stderr
+
+
+#: A command that makes parts as splatkit's does, slowly.
+STAND_IN = """#!{python}
+import json, os, pathlib, sys, time
+words = sys.argv[1:]
+value = lambda flag: words[words.index(flag) + 1]
+if "--plan" in words:
+    folder = pathlib.Path(value("--plan"))
+    folder.mkdir(exist_ok=True)
+    parts = [words[1]] * int(value("--parts"))
+    (folder / "plan.json").write_text(json.dumps({{"parts": parts}}))
+elif "--part" in words:
+    plan, index = pathlib.Path(value("--part")), value("--index")
+    with open(plan.with_name("log"), "a") as log:
+        log.write(f"{{index}} {{os.getppid()}}\\n")
+    if os.path.exists(plan.with_name("refuse")):
+        sys.exit("a.las: point 3: is broken")
+    time.sleep(1.5)
+    source = pathlib.Path(json.loads(plan.read_text())["parts"][0]).read_bytes()
+    plan.with_name(index + ".part").write_bytes(source[int(index) :: 4])
+else:
+    plan = pathlib.Path(value("--join"))
+    count = len(json.loads(plan.read_text())["parts"])
+    joined = [plan.with_name(str(at) + ".part").read_bytes() for at in range(count)]
+    pathlib.Path(value("-o")).write_bytes(b"".join(joined))
+"""
+
+
+@pytest.fixture
+def stand_in(tmp_path, monkeypatch):
+    command = tmp_path / "splatkit"
+    command.write_text(STAND_IN.format(python=sys.executable))
+    command.chmod(0o755)
+    return command
+
+
+def in_cluster(command, function, *arguments, **options):
+    """Converts with a command that the workers know too."""
+    environment = {"env_vars": {"SPLATKIT_COMMAND": str(command)}}
+    before = os.environ.get("SPLATKIT_COMMAND")
+    os.environ["SPLATKIT_COMMAND"] = str(command)
+    try:
+        return function(*arguments, task_options={"runtime_env": environment}, **options)
+    finally:
+        del os.environ["SPLATKIT_COMMAND"]
+        if before is not None:
+            os.environ["SPLATKIT_COMMAND"] = before
+
+
+def test_a_killed_worker_costs_its_part(cluster, stand_in, tmp_path):
+    from splatkit.ray import convert
+
+    source = bytes(range(200))
+    (tmp_path / "in.bin").write_bytes(source)
+    folder, killed = tmp_path / "parts", []
+
+    def begun():
+        log = folder / "log"
+        return [line.split() for line in log.read_text().splitlines()] if log.exists() else []
+
+    def kill():
+        while not begun():
+            time.sleep(0.02)
+        killed.append(int(begun()[0][1]))
+        os.kill(killed[0], signal.SIGKILL)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    out = in_cluster(
+        stand_in, convert, tmp_path / "in.bin", tmp_path / "out.splk", parts=4, folder=folder
+    )
+    killer.join()
+    assert killed and out.read_bytes() == b"".join(source[at::4] for at in range(4))
+    parts = sorted(index for index, _ in begun())
+    assert len(parts) == 5 and set(parts) == {"0", "1", "2", "3"}
+
+
+def test_a_part_that_fails_says_why(cluster, stand_in, tmp_path):
+    from splatkit.ray import convert
+
+    (tmp_path / "in.bin").write_bytes(b"any")
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "refuse").touch()
+    with pytest.raises(splatkit.Error, match=r"a\.las: point 3: is broken"):
+        in_cluster(
+            stand_in,
+            convert,
+            tmp_path / "in.bin",
+            tmp_path / "out.splk",
+            parts=2,
+            folder=tmp_path / "parts",
+        )
+    assert not (tmp_path / "out.splk").exists()
+    (tmp_path / "there.splk").touch()
+    with pytest.raises(splatkit.OutputError, match="exists already"):
+        convert(tmp_path / "in.bin", tmp_path / "there.splk")
+
+
+def test_the_parts_of_the_command(cluster, tmp_path):
+    from splatkit.ray import convert
+
+    command = os.environ.get("SPLATKIT_COMMAND")
+    if not command or not Path(command).is_file():
+        pytest.skip("SPLATKIT_COMMAND names no command")
+    help_ = subprocess.run(
+        [command, "convert", "--help"], capture_output=True, text=True, check=False
+    ).stdout
+    if "--plan" not in help_:
+        pytest.skip("the command does not know --plan")
+    vertices, _ = ball(200, 400)
+    write_ply(tmp_path / "cloud.ply", vertices)
+    at_once, in_parts = tmp_path / "at-once.splk", tmp_path / "in-parts.splk"
+    words = [command, "convert", tmp_path / "cloud.ply", "-o", at_once, "--parts", "4"]
+    subprocess.run(words, check=True)
+    in_cluster(command, convert, tmp_path / "cloud.ply", in_parts, parts=4)
+    assert at_once.read_bytes() == in_parts.read_bytes()
+    assert not splatkit.check(in_parts).findings
