@@ -2,7 +2,7 @@
 //! ranges that are needed are fetched.
 //!
 //! An object is kept in blocks of 64 KiB, in memory and in a [`Cache`] on disk. Missing blocks are
-//! fetched with few requests: near ones together, and several requests at once ([`fetch`]). The
+//! fetched with few requests: near ones together, and several requests at once (`fetch.rs`). The
 //! first 256 KiB come with the request that opens an object, and stay in memory.
 
 mod blocks;
