@@ -672,12 +672,8 @@ fn the_gpus_way_is_the_same() {
         ..wgpu::AdapterInfo::clone(&own.info)
     };
     let gpu = Gpu::from_wgpu(own.device.clone(), own.queue, info);
-    // Entries of several fields take more iterations than the driver allows a tile
-    // (docs/engine.md). So their tiles stop, as on the software driver.
-    let stopping = Budget { tile_entries: Some(10_000), ..Budget::default() };
     for case in cases {
-        let budget = if case.scene.fields().len() > 1 { stopping } else { Budget::default() };
-        let mut renderer = Renderer::with_budget(&gpu, budget);
+        let mut renderer = Renderer::new(&gpu);
         let mut prepared = renderer.prepare(&case.scene).expect(case.name);
         let mut draw =
             || renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name).0;

@@ -131,7 +131,8 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
                 break;
             }
         }
-        let stop = min(min(end, group_end), at + max(entries_left, 1u));
+        // MOST_ENTRIES may be the largest number there is.
+        let stop = min(group_end, at + clamp(entries_left, 1u, end - at));
         // One call for each field, so that the field's number is a constant in the code that adds
         // to it. Fields may alternate within a sheet; the next iterations add the rest.
         at = add_entries(0u, at, stop, entry_sheet, front, first_pixel, &entries_left);
