@@ -26,6 +26,14 @@ def resident():
         return int(file.read().split()[1]) * 4096
 
 
+def interruptible(script, folder=None):
+    """Starts a script that Ctrl-C stops, also if these tests run in the background of a shell,
+    which lets its children ignore it."""
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    command = [sys.executable, "-c", heard + textwrap.dedent(script)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
+
+
 def test_threads_draw_at_once():
     shared = Scene().add_volume(blob()).add_mesh(*ball())
     cameras = shared.turntable(6, SIZE)
@@ -66,8 +74,7 @@ def test_other_threads_go_on_meanwhile():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_ctrl_c_stops_drawing():
-    script = textwrap.dedent(
-        """
+    script = """
         import time, numpy as np, splatkit
         scene = splatkit.Scene().add_volume(np.random.default_rng(0).random((96, 96, 96)))
         camera = scene.camera((64, 48))
@@ -88,8 +95,7 @@ def test_ctrl_c_stops_drawing():
         scene.render((64, 48), camera)
         print("again", flush=True)
         """
-    )
-    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    process = interruptible(script)
     assert process.stdout.readline() == "ready\n"
     time.sleep(1.0)
     begun = time.monotonic()
@@ -101,8 +107,7 @@ def test_ctrl_c_stops_drawing():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_an_interrupted_input_is_not_added():
-    script = textwrap.dedent(
-        """
+    script = """
         import time, numpy as np, splatkit
         positions = np.random.default_rng(0).random((3_000_000, 3))
         scene = splatkit.Scene()
@@ -113,8 +118,7 @@ def test_an_interrupted_input_is_not_added():
             print("stopped", flush=True)
         print(len(scene), scene.bounds, flush=True)
         """
-    )
-    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    process = interruptible(script)
     assert process.stdout.readline() == "ready\n"
     time.sleep(0.7)
     process.send_signal(signal.SIGINT)
@@ -123,8 +127,7 @@ def test_an_interrupted_input_is_not_added():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_an_interrupted_conversion_leaves_no_file(tmp_path):
-    script = textwrap.dedent(
-        """
+    script = """
         import numpy as np, splatkit
         np.save("cloud.npy", np.random.default_rng(0).random((1_500_000, 3)))
         print("ready", flush=True)
@@ -133,10 +136,7 @@ def test_an_interrupted_conversion_leaves_no_file(tmp_path):
         except KeyboardInterrupt:
             print("stopped", flush=True)
         """
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, cwd=tmp_path
-    )
+    process = interruptible(script, tmp_path)
     assert process.stdout.readline() == "ready\n"
     time.sleep(1.0)
     process.send_signal(signal.SIGINT)
