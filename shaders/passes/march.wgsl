@@ -131,7 +131,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
                 break;
             }
         }
-        // MOST_ENTRIES may be the largest number there is.
+        // On a GPU, MOST_ENTRIES is the largest u32: clamped before it is added, or the sum wraps.
         let stop = min(group_end, at + clamp(entries_left, 1u, end - at));
         // One call for each field, so that the field's number is a constant in the code that adds
         // to it. Fields may alternate within a sheet; the next iterations add the rest.

@@ -64,8 +64,9 @@ pub fn variant(request: &Request<'_>) -> Variant {
         variant.rows = GATHERED_ROWS;
         variant.most_entries = variant.most_entries.min(GATHERED_ENTRIES);
     }
-    // The code of a sheet is repeated for each pixel and field. With more than a row, the software
-    // driver compiles march for two fields four times as long.
+    // The code of a sheet is repeated for each pixel and field. With four rows, the software driver
+    // shows the first picture of two volumes after 13 s, with one row after 5 s. Later frames then
+    // take a third longer.
     if variant.fields > 1 {
         variant.rows = 1;
     }
