@@ -103,7 +103,8 @@ impl<'a> Connected<'a> {
         )?;
         let places: Cow<[[u32; 3]]> = if is_split {
             let first = first_of_equals(&mesh.positions);
-            mesh.triangles.par_iter().map(|t| t.map(|i| first[i as usize])).collect()
+            let places = mesh.triangles.par_iter().map(|t| t.map(|i| first[i as usize]));
+            Cow::Owned(places.collect())
         } else {
             Cow::Borrowed(&mesh.triangles)
         };

@@ -675,8 +675,9 @@ fn cut(
     memory::reserve(&mut mesh.triangles, more, WORK)?;
     memory::reserve(&mut mesh.triangle_materials, more, WORK)?;
     let positions = &mesh.positions;
-    let open = mesh.triangles[settled..].par_iter().zip(&mesh.triangle_materials[settled..]);
+    let open = &mesh.triangles[settled..];
     memory::room(WORK, open.len() as u64 * size_of::<Pieces>() as u64)?;
+    let open = open.par_iter().zip(&mesh.triangle_materials[settled..]);
     let parts: Vec<Pieces> =
         open.map(|(&t, &source)| (split(t, halves(t), positions), source)).collect();
     mesh.triangles.truncate(settled);

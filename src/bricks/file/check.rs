@@ -78,9 +78,8 @@ fn sums(bricks: &Bricks, bytes: &Bytes, watch: Watch<'_>, findings: &mut Finding
                 findings.push(finding("brick", &error));
                 return false;
             }
-            let layer = layer.into_par_iter();
-            let errors: Vec<Error> =
-                layer.clone().filter_map(|brick| bricks.read(number, brick).err()).collect();
+            let read = layer.clone().into_par_iter().filter_map(|b| bricks.read(number, b).err());
+            let errors: Vec<Error> = read.collect();
             is_sound &= errors.is_empty();
             errors.iter().for_each(|error| findings.push(finding("brick", error)));
             done += layer.len() as u64;
