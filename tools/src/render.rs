@@ -14,6 +14,7 @@ use crate::{
     progress::Progress,
     samples::Samples,
     scene::{Loaded, SceneFlags},
+    timing::milliseconds,
     video::{Film, Format},
 };
 use clap::Args;
@@ -617,9 +618,4 @@ fn size_of_file(bytes: u64) -> String {
         bytes if bytes < 1e6 => format!("{:.0} kB", bytes / 1e3),
         bytes => format!("{:.1} MB", bytes / 1e6),
     }
-}
-
-/// Returns the milliseconds since an instant.
-pub fn milliseconds(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }
