@@ -29,6 +29,7 @@ mod frames;
 pub mod generate;
 mod given;
 mod gpus;
+mod help;
 mod info;
 mod interrupt;
 mod kernel;
@@ -125,7 +126,7 @@ enum Task {
 
 /// Returns the whole command line.
 fn command() -> clap::Command {
-    Command::command()
+    help::with_short_help(Command::command())
 }
 
 /// Runs the command with the arguments of this process.

@@ -35,8 +35,6 @@ use std::{
 
 #[derive(Args, Debug)]
 pub struct Render {
-    #[command(flatten)]
-    scene: SceneFlags,
     /// Write the picture to this .png or .jpg file, or to stdout as PNG if it is `-`. With
     /// --turntable or --path, write an animation to this .gif, .webp or .apng file, or with ffmpeg,
     /// if it is installed, to this .mp4, .webm or .mov file. Or write numbered pictures: out.png
@@ -64,6 +62,11 @@ pub struct Render {
     /// auto draws as many as fit into 512x512 pixels in all, at most 16 for volumes.
     #[arg(long, value_name = "N|auto", default_value = "auto")]
     samples: Samples,
+    /// Print statistics to stdout, as JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    scene: SceneFlags,
     #[command(flatten)]
     motion: MotionFlags,
     #[command(flatten)]
@@ -75,9 +78,6 @@ pub struct Render {
     /// Draw with the reference on the CPU, which is exact, but slow for all but small scenes.
     #[arg(long, help_heading = "Engine", conflicts_with_all = ["gpu", "budget", "engine"])]
     reference: bool,
-    /// Print statistics to stdout, as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 /// The renderer of the pictures.
@@ -157,6 +157,7 @@ pub struct Export<'a> {
 pub struct Finish {
     /// Pixels drawn along each side of a pixel of the picture.
     pub factor: u32,
+    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "for the window"))]
     pub background: Option<[f32; 3]>,
     overlay: Option<Overlay>,
 }
