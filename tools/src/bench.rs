@@ -8,61 +8,39 @@ use crate::{
     given::Given,
     output,
     progress::Progress,
-    render::milliseconds,
     samples::Samples,
     scene::{Loaded, SceneFlags},
-    suite::{SuiteFlags, effort::EffortFlags},
-    sweep::SweepFlags,
-    timing::{self, STEP, Times},
+    timing::{self, STEP, Times, milliseconds},
 };
 use clap::Args;
 use splatkit::{Error, FrameStats, Renderer, math::Camera, scene::Settings};
 use std::time::Instant;
 
-/// Number of frames measured for one scene.
-const FRAMES: u32 = 10;
-
 #[derive(Args, Debug)]
-// The suite and the sweep have their own scenes.
-#[command(mut_arg("inputs", |inputs| {
-    inputs.required(false).required_unless_present_any(["suite", "sweep"])
-}))]
 pub struct Bench {
-    #[command(flatten)]
-    scene: SceneFlags,
-    /// Measure this many frames, after a first one that does not count [default: 10; 5 for each
-    /// case of the suite; for each step of the sweep, a number that follows from --effort]
+    /// Measure this many frames, after a first one that does not count.
     #[arg(
         long,
         value_name = "N",
+        default_value_t = 10,
         value_parser = clap::value_parser!(u32).range(1..=1_000_000)
     )]
-    frames: Option<u32>,
+    frames: u32,
+    /// Print the results as JSON.
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
-    suite: SuiteFlags,
-    #[command(flatten)]
-    sweep: SweepFlags,
-    #[command(flatten)]
-    effort: EffortFlags,
+    scene: SceneFlags,
     #[command(flatten)]
     camera: CameraFlags,
     #[command(flatten)]
     engine: EngineFlags,
-    /// Print the results as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 impl Bench {
     pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
-        if self.suite.suite {
-            return self.suite.run(&self.engine, &self.effort, self.frames, self.json, progress);
-        }
-        if self.sweep.sweep {
-            return self.sweep.run(&self.engine, &self.effort, self.frames, self.json, progress);
-        }
         self.engine.check()?;
-        let frames = self.frames.unwrap_or(FRAMES);
+        let frames = self.frames;
         let loaded = self.scene.load(given, progress)?;
         let settings = self.engine.settings(&loaded, Samples::Factor(1))?;
         progress.stage("Opening the device");

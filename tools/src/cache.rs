@@ -11,10 +11,16 @@ use std::path::PathBuf;
 pub struct CacheFlags {
     /// Keep what is fetched from addresses in this folder, for the next time [default: splatkit in
     /// the user's folder for caches]
-    #[arg(long, global = true, value_name = "DIR")]
+    #[arg(long, global = true, value_name = "DIR", hide_short_help = true)]
     cache: Option<PathBuf>,
     /// Keep at most so many bytes there, such as 8GiB; 0 keeps nothing [default: 1GiB]
-    #[arg(long, global = true, value_name = "BYTES", value_parser = size)]
+    #[arg(
+        long,
+        global = true,
+        value_name = "BYTES",
+        value_parser = size,
+        hide_short_help = true
+    )]
     cache_size: Option<u64>,
 }
 

@@ -25,11 +25,11 @@ pub struct Check {
     /// another input, which is read and searched for oddities. Or an address (docs/remote.md).
     #[arg(value_parser = parse::input())]
     file: PathBuf,
-    #[command(flatten)]
-    load: LoadFlags,
     /// Print the findings as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    load: LoadFlags,
 }
 
 impl Check {

@@ -14,11 +14,11 @@ pub struct Compare {
     /// Fail with exit code 5 if the PSNR is lower than this, in dB.
     #[arg(long, value_name = "DECIBELS", value_parser = parse::finite, allow_hyphen_values = true)]
     threshold: Option<f64>,
-    #[command(flatten)]
-    limits: LimitFlags,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: LimitFlags,
 }
 
 impl Compare {

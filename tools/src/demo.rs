@@ -2,15 +2,8 @@
 //! any other file.
 
 use crate::{
-    camera::CameraFlags,
-    engine::EngineFlags,
-    failure::Failure,
-    given::Given,
-    output,
-    progress::Progress,
-    render::{Drawer, milliseconds},
-    samples::Samples,
-    scene::SceneFlags,
+    camera::CameraFlags, engine::EngineFlags, failure::Failure, given::Given, output,
+    progress::Progress, render::Drawer, samples::Samples, scene::SceneFlags, timing::milliseconds,
 };
 use clap::{Args, Parser};
 use splatkit::{

@@ -16,13 +16,10 @@ use std::time::Duration;
 /// Longest timeout in seconds: nobody waits that long, and every clock can count it.
 const LONGEST: f64 = 1e9;
 
-/// How pictures are drawn.
+/// The device that draws.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Engine")]
-pub struct EngineFlags {
-    /// Set the width and height of the picture, in pixels.
-    #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1280x720")]
-    pub size: [u32; 2],
+pub struct DeviceFlags {
     /// Choose the engine: gpu for GPUs, or cpu for processors, which needs no driver. auto uses the
     /// GPU if there is one, or if --pass-entries or one of the --gpu options is set.
     #[arg(long, value_enum, default_value_t = Engine::Auto)]
@@ -39,6 +36,21 @@ pub struct EngineFlags {
     /// the machine's memory]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     gpu_memory: Option<u64>,
+    /// Set the capacity of a depth pass, in pairs of a splat and a tile. Pictures that need more
+    /// take more passes.
+    #[arg(long, value_name = "ENTRIES", value_parser = clap::value_parser!(u32).range(1..))]
+    pass_entries: Option<u32>,
+}
+
+/// How pictures are drawn.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Engine")]
+pub struct EngineFlags {
+    /// Set the width and height of the picture, in pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1280x720")]
+    pub size: [u32; 2],
+    #[command(flatten)]
+    device: DeviceFlags,
     /// Choose how the gradient of a volume across the picture is computed.
     #[arg(long, value_enum, default_value_t = Gradient::Analytic)]
     gradient: Gradient,
@@ -91,10 +103,6 @@ pub struct EngineFlags {
     /// Also draw what opaque parts hide: the same picture, for comparing times.
     #[arg(long)]
     no_occlusion: bool,
-    /// Set the capacity of a depth pass, in pairs of a splat and a tile. Pictures that need more
-    /// take more passes.
-    #[arg(long, value_name = "ENTRIES", value_parser = clap::value_parser!(u32).range(1..))]
-    pass_entries: Option<u32>,
     #[command(flatten)]
     method: MethodFlags,
     #[command(flatten)]
@@ -118,7 +126,7 @@ enum Gradient {
 
 /// [`scene::Evaluate`] as a flag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Evaluate {
+pub enum Evaluate {
     /// Gather where possible, scatter the rest.
     Auto,
     /// For each pixel, sum the samples around its ray. For volumes, also among surfaces; the engine
@@ -128,9 +136,29 @@ enum Evaluate {
     Scatter,
 }
 
-impl EngineFlags {
+impl From<Evaluate> for scene::Evaluate {
+    fn from(evaluate: Evaluate) -> Self {
+        match evaluate {
+            Evaluate::Auto => Self::Auto,
+            Evaluate::Gather => Self::Gather,
+            Evaluate::Scatter => Self::Scatter,
+        }
+    }
+}
+
+impl DeviceFlags {
+    /// Checks that the flags go together.
+    pub fn check(&self) -> Result<(), Failure> {
+        if self.engine == Engine::Cpu && self.asks_gpu() {
+            let message = "--engine cpu cannot be used with --gpu, --gpu-timeout, --gpu-memory or \
+                 --pass-entries";
+            return Err(Failure::Usage(message.into()));
+        }
+        Ok(())
+    }
+
     /// Opens the device that draws the scene.
-    pub fn device(&self, scene: &Scene) -> splatkit::Result<Device> {
+    pub fn open(&self, scene: &Scene) -> splatkit::Result<Device> {
         match self.engine {
             Engine::Cpu => Ok(Device::Cpu),
             // If an adapter is named, the GPU engine reports what it does not draw.
@@ -141,16 +169,6 @@ impl EngineFlags {
             }),
             Engine::Auto | Engine::Gpu => Ok(Device::Gpu(self.gpu()?, self.passes())),
         }
-    }
-
-    /// Whether meshes can be drawn as facets: by the CPU engine, in sheets that emit and absorb
-    /// light.
-    pub fn draws_facets(&self) -> splatkit::Result<bool> {
-        let mut settings = Settings::new([1, 1]);
-        self.method.apply(&mut settings);
-        let is_usual = settings.mode == scene::Mode::Sheets
-            && settings.optics == scene::Optics::EmissionAbsorption;
-        Ok(is_usual && matches!(self.device(&Scene::new())?, Device::Cpu))
     }
 
     /// Opens the adapter that the flags choose.
@@ -186,25 +204,29 @@ impl EngineFlags {
             || self.gpu_memory.is_some()
             || self.pass_entries.is_some()
     }
+}
+
+impl EngineFlags {
+    /// Opens the device that draws the scene.
+    pub fn device(&self, scene: &Scene) -> splatkit::Result<Device> {
+        self.device.open(scene)
+    }
+
+    /// Whether meshes can be drawn as facets: by the CPU engine, in sheets that emit and absorb
+    /// light.
+    pub fn draws_facets(&self) -> splatkit::Result<bool> {
+        let mut settings = Settings::new([1, 1]);
+        self.method.apply(&mut settings);
+        let is_usual = settings.mode == scene::Mode::Sheets
+            && settings.optics == scene::Optics::EmissionAbsorption;
+        Ok(is_usual && matches!(self.device(&Scene::new())?, Device::Cpu))
+    }
 
     /// Checks what does not depend on the scene.
     pub fn check(&self) -> Result<(), Failure> {
-        if self.engine == Engine::Cpu && self.asks_gpu() {
-            let message = "--engine cpu cannot be used with --gpu, --gpu-timeout, --gpu-memory or \
-                 --pass-entries";
-            return Err(Failure::Usage(message.into()));
-        }
+        self.device.check()?;
         self.method.check()?;
         self.clip.check()
-    }
-
-    /// Returns how a volume's samples are summed.
-    pub fn evaluate(&self) -> scene::Evaluate {
-        match self.evaluate {
-            Evaluate::Auto => scene::Evaluate::Auto,
-            Evaluate::Gather => scene::Evaluate::Gather,
-            Evaluate::Scatter => scene::Evaluate::Scatter,
-        }
     }
 
     /// Returns the settings of a picture before it is averaged down. Settings that the scene cannot
@@ -222,7 +244,7 @@ impl EngineFlags {
             Gradient::Analytic => scene::Gradient::Analytic,
             Gradient::Central => scene::Gradient::Central,
         };
-        settings.evaluate = self.evaluate();
+        settings.evaluate = self.evaluate.into();
         if self.no_shade {
             settings.volume_shade = Some(None);
             settings.surface_shade = None;

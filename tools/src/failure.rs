@@ -4,14 +4,19 @@ use crate::{
     limits,
     terminal::{safe, safe_lines},
 };
+use console::{Term, style};
 use splatkit::Error;
 use std::{
     borrow::Cow,
     fmt,
-    io::{self, ErrorKind, IsTerminal, Write},
+    io::{self, ErrorKind, Write},
     path::{Path, PathBuf},
     process::ExitCode,
 };
+
+/// Columns before the texts of an error: `error: …` and `  help: …`.
+const ERROR: usize = 7;
+const HELP: usize = 8;
 
 /// Why the command ends without success.
 #[derive(Debug)]
@@ -123,14 +128,17 @@ impl Failure {
     /// Prints the failure to stderr. A terminal gets lines that are wrapped at its width; other
     /// readers, such as logs, get whole lines.
     pub fn report(self) -> ExitCode {
-        let is_terminal = io::stderr().is_terminal();
-        // This fails only if a hook is set already.
-        miette::set_hook(Box::new(move |_| {
-            Box::new(miette::MietteHandlerOpts::new().wrap_lines(is_terminal).build())
-        }))
-        .ok();
+        let width = Term::stderr().size_checked().map(|(_, columns)| usize::from(columns));
+        let Printed { message, hint } = Printed::of(&self);
+        let wrapped = |text: &str, indent| wrapped(text, indent, width.unwrap_or(usize::MAX));
+        let label = style("error:").for_stderr().red().bold();
+        let mut text = format!("{label} {}\n", wrapped(&message, ERROR));
+        if let Some(hint) = hint {
+            let label = style("help:").for_stderr().cyan();
+            text += &format!("  {label} {}\n", wrapped(&hint, HELP));
+        }
         // The reader of stderr may be gone already.
-        writeln!(io::stderr(), "{:?}", miette::Report::new(Printed::of(&self))).ok();
+        io::stderr().write_all(text.as_bytes()).ok();
         ExitCode::from(self.code())
     }
 
@@ -142,7 +150,6 @@ impl Failure {
 }
 
 /// A failure that is safe to print: a terminal obeys no text in it.
-#[derive(Debug)]
 struct Printed {
     message: String,
     hint: Option<String>,
@@ -159,18 +166,28 @@ impl Printed {
     }
 }
 
-impl fmt::Display for Printed {
-    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        out.write_str(&self.message)
+/// Returns a text in lines. Each line that is longer than a width is broken between words, and
+/// goes on below the first word: `indent` columns from the left.
+fn wrapped(text: &str, indent: usize, width: usize) -> String {
+    let mut out = String::new();
+    for line in text.lines() {
+        let mut column = indent;
+        for (at, word) in line.split(' ').enumerate() {
+            let letters = word.chars().count();
+            if at > 0 && column + 1 + letters > width {
+                out += &format!("\n{}", " ".repeat(indent));
+                column = indent;
+            } else if at > 0 {
+                out.push(' ');
+                column += 1;
+            }
+            out += word;
+            column += letters;
+        }
+        out += &format!("\n{}", " ".repeat(indent));
     }
-}
-
-impl std::error::Error for Printed {}
-
-impl miette::Diagnostic for Printed {
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.hint.as_ref().map(|hint| Box::new(hint) as Box<dyn fmt::Display>)
-    }
+    out.truncate(out.trim_end().len());
+    out
 }
 
 /// Returns what the user can do if the operating system could not write a result.
@@ -220,3 +237,17 @@ impl fmt::Display for Failure {
 }
 
 impl std::error::Error for Failure {}
+
+#[cfg(test)]
+mod tests {
+    use super::wrapped;
+
+    #[test]
+    fn lines_are_broken_between_words() {
+        assert_eq!(wrapped("a bc def", 2, 6), "a bc\n  def");
+        assert_eq!(wrapped("a bc def", 2, usize::MAX), "a bc def");
+        // A word that is too long has a line of its own, and the text's own lines stay.
+        assert_eq!(wrapped("a https://b c\nd e", 1, 5), "a\n https://b\n c\n d e");
+        assert_eq!(wrapped("", 3, 5), "");
+    }
+}

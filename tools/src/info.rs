@@ -76,11 +76,11 @@ pub struct Info {
     /// of scattered samples; or a folder of DICOM files. Or an address (docs/remote.md).
     #[arg(value_parser = parse::input())]
     file: PathBuf,
-    #[command(flatten)]
-    load: LoadFlags,
     /// Print the facts as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    load: LoadFlags,
 }
 
 impl Info {

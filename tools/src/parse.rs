@@ -1,6 +1,7 @@
 //! Values of flags that are more than a word or a number.
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
+use color::{Rgba8, Srgb, parse_color};
 use glam::DVec3;
 use splatkit::{
     formats::{Endian, SampleType},
@@ -80,14 +81,19 @@ pub fn background(text: &str) -> Result<Background, String> {
 
 /// A colour as in CSS: a name, `#rgb`, `#rrggbb` (also without `#`) or `rgb(…)`, without opacity.
 pub fn color(text: &str) -> Result<[f32; 3], String> {
-    // An empty text would be black.
-    let parsed = Some(text.trim()).filter(|text| !text.is_empty());
-    let parsed = parsed.and_then(|text| csscolorparser::parse(text).ok());
-    let color = parsed.ok_or("a colour is a name, #rgb or #rrggbb, such as orange or '#ff8800'")?;
-    if color.a < 1.0 {
+    // The crate knows the names in American spelling only.
+    let text = text.trim().to_ascii_lowercase().replace("grey", "gray");
+    let is_plain =
+        matches!(text.len(), 3 | 4 | 6 | 8) && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+    let parsed = parse_color(&if is_plain { format!("#{text}") } else { text });
+    let parsed =
+        parsed.map_err(|_| "a colour is a name, #rgb or #rrggbb, such as orange or '#ff8800'")?;
+    let color = parsed.to_alpha_color::<Srgb>();
+    if color.components[3] < 1.0 {
         return Err("a colour has no opacity here: write '#rrggbb', such as '#ff8800'".into());
     }
-    Ok([color.r, color.g, color.b].map(|channel| channel.clamp(0.0, 1.0)))
+    let Rgba8 { r, g, b, .. } = color.to_rgba8();
+    Ok([r, g, b].map(|channel| f32::from(channel) / 255.0))
 }
 
 /// The colour behind the picture; `None` for transparency.
@@ -241,6 +247,9 @@ mod tests {
         }
         assert!(color("#ff880080").unwrap_err().contains("no opacity"));
         assert!(color("transparent").is_err());
+        assert_eq!(color("hsl(120 100% 50%)"), Ok([0.0, 1.0, 0.0]));
+        assert_eq!(color("RebeccaPurple"), color("#663399"));
+        assert_eq!(color("LightSlateGrey"), color("#778899"));
         assert_eq!(
             (axis("+Z"), axis("-x"), axis("Y")),
             (Ok(DVec3::Z), Ok(DVec3::NEG_X), Ok(DVec3::Y))

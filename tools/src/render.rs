@@ -14,6 +14,7 @@ use crate::{
     progress::Progress,
     samples::Samples,
     scene::{Loaded, SceneFlags},
+    timing::milliseconds,
     video::{Film, Format},
 };
 use clap::Args;
@@ -34,8 +35,6 @@ use std::{
 
 #[derive(Args, Debug)]
 pub struct Render {
-    #[command(flatten)]
-    scene: SceneFlags,
     /// Write the picture to this .png or .jpg file, or to stdout as PNG if it is `-`. With
     /// --turntable or --path, write an animation to this .gif, .webp or .apng file, or with ffmpeg,
     /// if it is installed, to this .mp4, .webm or .mov file. Or write numbered pictures: out.png
@@ -63,6 +62,11 @@ pub struct Render {
     /// auto draws as many as fit into 512x512 pixels in all, at most 16 for volumes.
     #[arg(long, value_name = "N|auto", default_value = "auto")]
     samples: Samples,
+    /// Print statistics to stdout, as JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    scene: SceneFlags,
     #[command(flatten)]
     motion: MotionFlags,
     #[command(flatten)]
@@ -74,9 +78,6 @@ pub struct Render {
     /// Draw with the reference on the CPU, which is exact, but slow for all but small scenes.
     #[arg(long, help_heading = "Engine", conflicts_with_all = ["gpu", "budget", "engine"])]
     reference: bool,
-    /// Print statistics to stdout, as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 /// The renderer of the pictures.
@@ -156,6 +157,7 @@ pub struct Export<'a> {
 pub struct Finish {
     /// Pixels drawn along each side of a pixel of the picture.
     pub factor: u32,
+    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "for the window"))]
     pub background: Option<[f32; 3]>,
     overlay: Option<Overlay>,
 }
@@ -617,9 +619,4 @@ fn size_of_file(bytes: u64) -> String {
         bytes if bytes < 1e6 => format!("{:.0} kB", bytes / 1e3),
         bytes => format!("{:.1} MB", bytes / 1e6),
     }
-}
-
-/// Returns the milliseconds since an instant.
-pub fn milliseconds(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }

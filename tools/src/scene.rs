@@ -37,7 +37,6 @@ use std::{
 
 /// The inputs, and how their values and surfaces are shown.
 #[derive(Args, Debug, Clone)]
-#[command(next_help_heading = "Scene")]
 pub struct SceneFlags {
     /// Meshes, point clouds, hierarchies, and up to four volumes, sets of cells or sets of
     /// scattered samples; all are drawn in one picture. Addresses are inputs too: https://…,

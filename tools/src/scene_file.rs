@@ -304,6 +304,7 @@ mod tests {
         assert!(wrong(r#"{"background": "nocolour"}"#).contains("nocolour"));
     }
 
+    #[cfg(feature = "window")]
     #[test]
     fn words_are_quoted_for_a_shell() {
         assert_eq!(quoted("--size=3x4"), "--size=3x4");

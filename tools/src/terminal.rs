@@ -2,7 +2,7 @@
 //!
 //! Names of files, comments, columns and materials come from outside. A terminal obeys control
 //! characters in them: they can set its title, hide a part of a message, or reverse its direction.
-//! All output of the command is escaped here: messages of errors (`failure`), log lines (`main`),
+//! All output of the command is escaped here: messages of errors (`failure`), log lines (`start`),
 //! progress (`progress`) and results on stdout (`output`). The command adds its own colours
 //! afterwards.
 

@@ -1,7 +1,14 @@
 //! Frame times.
 
+use std::time::Instant;
+
 /// Degrees between frames, as in VTK's benchmark of the same view.
 pub const STEP: f64 = 5.0;
+
+/// Returns the milliseconds since an instant.
+pub fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
 
 /// Statistics of frame times, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -340,3 +340,21 @@ fn formats_are_listed() {
         ],
     );
 }
+
+#[test]
+fn phantoms_become_files() {
+    let folder = Folder::new();
+    folder.run("generate ball -o ball.nrrd --dims 9x7x5").ok();
+    let found = folder.json("info ball.nrrd --json");
+    assert_eq!(
+        (&found["dims"], found["type"].as_str()),
+        (&serde_json::json!([9, 7, 5]), Some("f32"))
+    );
+    assert_eq!(found["bounds"]["max"], serde_json::json!([1.0, 1.0, 1.0]));
+    folder.run("generate ball -o ball.csv --points 12").ok();
+    assert_eq!(std::fs::read_to_string(folder.path("ball.csv")).unwrap().lines().count(), 13);
+    folder.run("generate ball -o ball.csv").fails(1, &["ball.csv", "exists", "--overwrite"]);
+    folder.run("generate ball -o ball.vti").fails(2, &[".nrrd, .vtr, .csv, .ply or .vtu"]);
+    folder.run("generate egg -o egg.nrrd").fails(2, &["marschner-lobb", "head"]);
+    folder.run("generate ball -o none.nrrd --dims 0x2x2").fails(2, &["holds none"]);
+}

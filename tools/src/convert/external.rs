@@ -1,7 +1,7 @@
 //! Conversion of files larger than memory, region by region.
 
 use super::{Convert, memory::Need, surface::Frame};
-use crate::{failure::Failure, output, progress::Progress, render::milliseconds};
+use crate::{failure::Failure, output, progress::Progress, timing::milliseconds};
 use serde_json::json;
 use splatkit::{
     Deadline, Error,

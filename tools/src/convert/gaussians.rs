@@ -6,7 +6,7 @@ use crate::{
     load::Input,
     output,
     progress::Progress,
-    render::milliseconds,
+    timing::milliseconds,
 };
 use serde_json::json;
 use splatkit::{

@@ -35,6 +35,20 @@ pub struct Convert {
     /// or .glb. A volume becomes .nrrd, or .splv, levels of bricks that are read one by one.
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["plan", "part"])]
     output: Option<PathBuf>,
+    /// Resample a Cartesian volume. bcc is the body-centred cubic lattice, which has 29.3 % fewer
+    /// samples for the same detail in all directions [default: the file's lattice]
+    #[arg(long, value_name = "NAME")]
+    lattice: Option<volume::Wanted>,
+    /// Replace an existing file.
+    #[arg(long)]
+    overwrite: bool,
+    /// Print how large the result would be and what making it would take, by trying a part; write
+    /// nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     parts: parts::PartFlags,
     #[command(flatten)]
@@ -51,20 +65,6 @@ pub struct Convert {
         allow_hyphen_values = true
     )]
     range: Option<[f64; 2]>,
-    /// Resample a Cartesian volume. bcc is the body-centred cubic lattice, which has 29.3 % fewer
-    /// samples for the same detail in all directions [default: the file's lattice]
-    #[arg(long, value_name = "NAME")]
-    lattice: Option<volume::Wanted>,
-    /// Replace an existing file.
-    #[arg(long)]
-    overwrite: bool,
-    /// Print how large the result would be and what making it would take, by trying a part; write
-    /// nothing.
-    #[arg(long)]
-    dry_run: bool,
-    /// Print the result as JSON.
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     load: LoadFlags,
 }

@@ -1,7 +1,7 @@
 //! Conversion in parts, which any number of machines make.
 
 use super::{Convert, external::name_of};
-use crate::{failure::Failure, given::Given, output, progress::Progress, render::milliseconds};
+use crate::{failure::Failure, given::Given, output, progress::Progress, timing::milliseconds};
 use clap::Args;
 use serde_json::json;
 use splatkit::hierarchy::external::{PartMade, Plan};

@@ -6,7 +6,7 @@ use crate::{
     load::Input,
     output, parse,
     progress::Progress,
-    render::milliseconds,
+    timing::milliseconds,
 };
 use clap::{Args, ValueEnum};
 use glam::DVec3;

@@ -1,12 +1,12 @@
 //! Animated GIF: 256 colours a frame: all of them, if a frame has no more, or else chosen for the
 //! frame and dithered. A pixel is opaque or transparent.
 
-use super::{Encoder, Film, Out, commit, create};
+use super::{
+    Encoder, Film, Out, commit, create,
+    palette::{Color, chosen, dithered},
+};
 use crate::failure::Failure;
 use gif::{DisposalMethod, EncodingError, Frame, Repeat};
-use quantette::{
-    ImageRef, PaletteSize, Pipeline, QuantizeMethod, deps::palette::Srgb, dither::FloydSteinberg,
-};
 use splatkit::Error;
 use std::{
     collections::HashMap,
@@ -44,7 +44,7 @@ impl Gif {
 impl Encoder for Gif {
     fn add(&mut self, rgba: &[u8]) -> Result<bool, Failure> {
         let is_transparent = self.film.background.is_none();
-        let (palette, indices, transparent) = indexed(rgba, self.film.size, is_transparent);
+        let (palette, indices, transparent) = indexed(rgba, self.film.size[0], is_transparent);
         let [width, height] = self.film.size.map(|side| side as u16);
         let shown = self.film.shown(self.count, 100.0).max(2);
         self.count += 1;
@@ -71,28 +71,26 @@ impl Encoder for Gif {
 }
 
 /// Returns the palette, the index of each pixel, and the index of transparent pixels.
-fn indexed(
-    rgba: &[u8],
-    [width, height]: [u32; 2],
-    is_transparent: bool,
-) -> (Vec<u8>, Vec<u8>, Option<u8>) {
+fn indexed(rgba: &[u8], width: u32, is_transparent: bool) -> (Vec<u8>, Vec<u8>, Option<u8>) {
     let is_seen = |pixel: &[u8]| pixel[3] >= OPAQUE;
     // A pixel that is not drawn takes the colour of the last one that is: a colour of its own would
     // claim a part of the palette.
-    let mut last = Srgb::new(0, 0, 0);
+    let mut last = [0; 3];
     let color = |pixel: &[u8]| {
         if is_seen(pixel) {
-            last = Srgb::new(pixel[0], pixel[1], pixel[2]);
+            last = [pixel[0], pixel[1], pixel[2]];
         }
         last
     };
-    let colors: Vec<Srgb<u8>> = rgba.chunks_exact(4).map(color).collect();
+    let colors: Vec<Color> = rgba.chunks_exact(4).map(color).collect();
     // The last index is left for transparent pixels.
     let most = if is_transparent { 255 } else { 256 };
-    let (palette, mut indices) =
-        exact(&colors, most).unwrap_or_else(|| chosen(&colors, most, [width, height]));
-    let mut palette: Vec<u8> =
-        palette.into_iter().flat_map(|color| [color.red, color.green, color.blue]).collect();
+    let (palette, mut indices) = exact(&colors, most).unwrap_or_else(|| {
+        let palette = chosen(&colors, most);
+        let indices = dithered(&colors, &palette, width as usize);
+        (palette, indices)
+    });
+    let mut palette = palette.into_flattened();
     let mut transparent = None;
     if is_transparent {
         let index = (palette.len() / 3) as u8;
@@ -108,36 +106,21 @@ fn indexed(
 }
 
 /// Returns all colours and the index of each pixel, if there are at most so many colours.
-fn exact(colors: &[Srgb<u8>], most: u16) -> Option<(Vec<Srgb<u8>>, Vec<u8>)> {
+fn exact(colors: &[Color], most: usize) -> Option<(Vec<Color>, Vec<u8>)> {
     let mut palette = Vec::new();
     let mut known = HashMap::new();
     let mut indices = Vec::with_capacity(colors.len());
     for color in colors {
-        let index = *known.entry((color.red, color.green, color.blue)).or_insert(palette.len());
+        let index = *known.entry(color).or_insert(palette.len());
         if index == palette.len() {
             palette.push(*color);
         }
-        if palette.len() > usize::from(most) {
+        if palette.len() > most {
             return None;
         }
         indices.push(index as u8);
     }
     Some((palette, indices))
-}
-
-/// Returns colours for all pixels and the index of each pixel, dithered.
-fn chosen(colors: &[Srgb<u8>], most: u16, size: [u32; 2]) -> (Vec<Srgb<u8>>, Vec<u8>) {
-    let most = PaletteSize::from_u16_clamped(most);
-    let [width, height] = size;
-    let image = ImageRef::new(width, height, colors).expect("a colour for each pixel");
-    let found = Pipeline::new()
-        .palette_size(most)
-        .quantize_method(QuantizeMethod::kmeans())
-        .ditherer(FloydSteinberg::new())
-        .parallel(true)
-        .input_image(image)
-        .output_srgb8_indexed_image();
-    found.into_parts()
 }
 
 fn failure(path: &Path, error: EncodingError) -> Failure {

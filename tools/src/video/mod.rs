@@ -4,6 +4,7 @@
 mod apng;
 mod ffmpeg;
 mod gif;
+mod palette;
 mod raw;
 mod webp;
 

@@ -1,4 +1,5 @@
-//! Runs the command in a folder of its own, on files that the tests write.
+//! Runs the command, `splatkit` or `splatkit-measure`, in a folder of its own, on files that the
+//! tests write.
 
 #![allow(dead_code, reason = "each test file uses only a part")]
 
@@ -14,6 +15,12 @@ use std::{
     process::{Command, Output},
 };
 
+/// The command of the package whose tests these are.
+const COMMAND: &str = match option_env!("CARGO_BIN_EXE_splatkit") {
+    Some(splatkit) => splatkit,
+    None => option_env!("CARGO_BIN_EXE_splatkit-measure").expect("a command"),
+};
+
 impl Folder {
     /// Writes an input and returns its name.
     pub fn put<'a>(&self, name: &'a str, bytes: impl AsRef<[u8]>) -> &'a str {
@@ -21,7 +28,7 @@ impl Folder {
         name
     }
 
-    /// Runs `splatkit` in the folder; arguments are separated by spaces.
+    /// Runs the command in the folder; arguments are separated by spaces.
     pub fn run(&self, arguments: &str) -> Run {
         self.run_with(&arguments.split_whitespace().collect::<Vec<_>>())
     }
@@ -30,9 +37,9 @@ impl Folder {
         Run::of(&mut self.command(), arguments)
     }
 
-    /// Returns `splatkit` in the folder, without arguments.
+    /// Returns the command in the folder, without arguments.
     pub fn command(&self) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
+        let mut command = Command::new(COMMAND);
         command.current_dir(self).env("NO_COLOR", "1").env_remove("RUST_LOG");
         command
     }

@@ -1,0 +1,7 @@
+//! Runs `splatkit-measure`: its tasks, their tables, and the blocks of documents that they replace.
+
+#[path = "../../../tests/common/mod.rs"]
+mod common;
+mod figures;
+mod suite;
+mod sweep;

@@ -1,0 +1,5 @@
+//! The `splatkit` command.
+
+fn main() -> std::process::ExitCode {
+    splatkit_tools::main()
+}
