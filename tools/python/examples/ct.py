@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 
-import splatkit
+import pysplatkit
 
 
 def made_up_head(side=96):
@@ -34,7 +34,7 @@ def made_up_head(side=96):
 
 
 def main(source=None, output="ct.png"):
-    scene = splatkit.Scene()
+    scene = pysplatkit.Scene()
     look = {"transfer": "ct-bone"}
     if source:
         scene.add(source, **look)
@@ -44,7 +44,7 @@ def main(source=None, output="ct.png"):
     size = (800, 600)
     # The upper third is cut away.
     (_, _, low), (_, _, high) = scene.bounds
-    below = splatkit.Clip.plane((0, 0, 1), low + 0.7 * (high - low))
+    below = pysplatkit.Clip.plane((0, 0, 1), low + 0.7 * (high - low))
     camera = scene.camera(size, clips=[below], elevation=35)
     picture = scene.render(size, camera, clips=[below], background="#20242c")
     print(picture.save(output))
