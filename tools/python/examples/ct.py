@@ -33,7 +33,7 @@ def made_up_head(side=96):
     return head.astype(np.int16), (2.0, 2.0, 2.0)
 
 
-def main(source=None, output="ct.png"):
+def main(source=None, output="ct.png", size=(800, 600)):
     scene = pysplatkit.Scene()
     look = {"transfer": "ct-bone"}
     if source:
@@ -41,7 +41,6 @@ def main(source=None, output="ct.png"):
     else:
         volume, spacing = made_up_head()
         scene.add_volume(volume, spacing=spacing, modality="ct", unit="mm", **look)
-    size = (800, 600)
     # The upper third is cut away.
     (_, _, low), (_, _, high) = scene.bounds
     below = pysplatkit.Clip.plane((0, 0, 1), low + 0.7 * (high - low))

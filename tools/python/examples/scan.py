@@ -21,7 +21,7 @@ def write_made_up_scan(path, side=500):
     np.save(path, np.stack([x, y, z], axis=1))
 
 
-def main(source=None, output="scan.png"):
+def main(source=None, output="scan.png", size=(800, 600)):
     with tempfile.TemporaryDirectory() as folder:
         if not source:
             source = Path(folder) / "scan.npy"
@@ -33,7 +33,7 @@ def main(source=None, output="scan.png"):
     scene = pysplatkit.Scene().add(tree)
     # The widest splat, in pixels: as many levels are drawn as the picture can show.
     for cut in (16, 8, 4, 2):
-        picture = scene.render((800, 600), cut=cut)
+        picture = scene.render(size, cut=cut)
         print(f"cut {cut}: {picture.statistics['splats']} splats")
     print(picture.save(output))
 

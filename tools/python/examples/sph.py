@@ -24,7 +24,7 @@ def made_up_gas(count=30_000):
     return positions, 1e4 * (0.1 + temperature), length
 
 
-def main(source=None, output="sph.png"):
+def main(source=None, output="sph.png", size=(800, 600)):
     if source:
         rows = np.load(source)
         positions, value, length = rows[:, :3], rows[:, 3], rows[:, 4]
@@ -38,7 +38,6 @@ def main(source=None, output="sph.png"):
         unit=size_of_all / 100,
     )
     scene = pysplatkit.Scene().add_samples(positions, value, radii=length, transfer=transfer)
-    size = (800, 600)
     print(scene.render(size, scene.camera(size)).save(output))
 
 

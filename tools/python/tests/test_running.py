@@ -81,7 +81,7 @@ def test_ctrl_c_stops_drawing():
         print("ready", flush=True)
         begun = time.monotonic()
         try:
-            scene.render((12000, 9000), camera)
+            scene.render((6000, 4500), camera)
         except KeyboardInterrupt:
             print("stopped", flush=True)
         # What is left behind ends soon. The whole picture would take a minute.
@@ -109,7 +109,7 @@ def test_ctrl_c_stops_drawing():
 def test_an_interrupted_input_is_not_added():
     script = """
         import time, numpy as np, pysplatkit
-        positions = np.random.default_rng(0).random((3_000_000, 3))
+        positions = np.random.default_rng(0).random((1_000_000, 3))
         scene = pysplatkit.Scene()
         print("ready", flush=True)
         try:
@@ -120,7 +120,7 @@ def test_an_interrupted_input_is_not_added():
         """
     process = interruptible(script)
     assert process.stdout.readline() == "ready\n"
-    time.sleep(0.7)
+    time.sleep(0.3)
     process.send_signal(signal.SIGINT)
     assert process.communicate(timeout=120)[0] == "stopped\n0 None\n"
 
