@@ -284,3 +284,52 @@ fn no_modules_import_each_other() {
         assert_eq!(names, None, "a circle of imports");
     }
 }
+
+/// On the Python index, the project's plain name belongs to a stranger's package. Nothing tells
+/// anyone to install or import it.
+#[test]
+fn python_knows_the_package_by_its_own_name() {
+    // In two parts, since this file is read too.
+    let taken = concat!("splat", "kit");
+    let installers = ["install", "pip", "pipx", "uv", "uvx", "conda", "mamba", "poetry", "pixi"];
+    let statements = ["import", "from", "requires", "import_module", "importorskip"];
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let names_it = |before: &str, after: &str| {
+        let is_part = |c: char| is_word(c) || "-/".contains(c);
+        if before.ends_with(|c| is_part(c) || ".:$".contains(c))
+            || after.starts_with(|c| is_part(c) || c == ':')
+        {
+            return false;
+        }
+        let words = |text: &str| text.split(|c| !is_word(c)).map(String::from).collect::<Vec<_>>();
+        let last = words(before.trim_end_matches(|c| !is_word(c))).pop().unwrap_or_default();
+        let is_installed = || {
+            let command = words(before.rsplit('`').next().unwrap_or_default());
+            let has = |word: &&str| command.iter().any(|other| other == word);
+            installers.iter().any(|word| has(&word) || last == **word) && !has(&"cargo")
+        };
+        // As in `import numpy as np, x`.
+        let is_listed = before.rsplit_once("import ").is_some_and(|(_, list)| {
+            list.ends_with(", ") && list.chars().all(|c| is_word(c) || ",. ".contains(c))
+        });
+        // Extras, as in `x[ray]`.
+        after.starts_with('[') || statements.contains(&&*last) || is_listed || is_installed()
+    };
+    let mut all = Vec::new();
+    files(root(), &mut all);
+    files(&root().join(".github"), &mut all);
+    let mut offers = Vec::new();
+    for path in all {
+        // Pictures and the like are no texts.
+        let Ok(text) = fs::read_to_string(&path) else { continue };
+        for (number, line) in (1..).zip(text.lines()) {
+            let mut places = line.match_indices(taken);
+            if places.any(|(at, _)| names_it(&line[..at], &line[at + taken.len()..])) {
+                offers.push(format!("{}:{number}: {}", path.display(), line.trim()));
+            }
+        }
+    }
+    assert!(offers.is_empty(), "the package is called py{taken}:\n{}", offers.join("\n"));
+    let project = fs::read_to_string(root().join("tools/python/pyproject.toml")).expect("a text");
+    assert!(project.contains(&format!("\nname = \"py{taken}\"\n")), "another name in the project");
+}

@@ -38,10 +38,10 @@ def opacities():
 
 
 def transfer():
-    import splatkit
+    import pysplatkit
 
     colors = [(0, "navy"), (120, "orange"), (255, "white")]
-    return splatkit.TransferFunction(colors, opacities(), unit=4)
+    return pysplatkit.TransferFunction(colors, opacities(), unit=4)
 
 
 def spent():
@@ -73,14 +73,14 @@ def peak():
 
 def of_memory(side, copy):
     """Draws an array, and returns the memory beyond it in parts of its size."""
-    import splatkit
+    import pysplatkit
 
     array = volume(side)
     small = np.ascontiguousarray(array[:: side // 8, :: side // 8, :: side // 8])
-    splatkit.Scene().add_volume(small, transfer=transfer()).render(SIZE)
+    pysplatkit.Scene().add_volume(small, transfer=transfer()).render(SIZE)
     Path("/proc/self/clear_refs").write_text("5")
     _, before = peak()
-    scene = splatkit.Scene().add_volume(array, transfer=transfer(), copy=copy)
+    scene = pysplatkit.Scene().add_volume(array, transfer=transfer(), copy=copy)
     added, _ = peak()
     scene.render(SIZE)
     drawn, _ = peak()
@@ -89,10 +89,10 @@ def of_memory(side, copy):
 
 
 def of_splatkit(side, runs):
-    import splatkit
+    import pysplatkit
 
     array = volume(side)
-    scene = splatkit.Scene()
+    scene = pysplatkit.Scene()
     add = timed(lambda: scene.add_volume(array, transfer=transfer()))
     camera = scene.camera(SIZE)
     first = timed(lambda: scene.render(SIZE, camera))
@@ -103,7 +103,7 @@ def of_splatkit(side, runs):
 
 def of_command(command, side, runs):
     """Times `splatkit render` of the array as a file, beside this package with the same file."""
-    import splatkit
+    import pysplatkit
 
     with tempfile.TemporaryDirectory() as folder:
         file, picture = Path(folder) / "volume.npy", Path(folder) / "picture.png"
@@ -117,7 +117,7 @@ def of_command(command, side, runs):
             subprocess.run(list(map(str, words)), check=True, capture_output=True)
 
         def call():
-            splatkit.render(file, transfer=own, size=SIZE).save(Path(folder) / "own.png")
+            pysplatkit.render(file, transfer=own, size=SIZE).save(Path(folder) / "own.png")
 
         command_time, python_time = median(run, runs), median(call, runs)
         same = picture.read_bytes() == (Path(folder) / "own.png").read_bytes()

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 import ray
 
-import splatkit
-import splatkit.ray
+import pysplatkit
+import pysplatkit.ray
 
 MIB = 1 << 20
 
@@ -42,7 +42,7 @@ def drawn(path: Path, ranks: int, memory: int, given: argparse.Namespace, precis
     size = (given.width, given.height)
     options = {"transfer": given.transfer, "memory": memory * MIB, "precision": precision}
     cpus = max((os.cpu_count() or 1) // ranks, 1)
-    with splatkit.ray.Renderer(path, ranks=ranks, cpus=cpus, **options) as renderer:
+    with pysplatkit.ray.Renderer(path, ranks=ranks, cpus=cpus, **options) as renderer:
         camera = renderer.camera(size)
         base = ray.get([rank.memory.remote() for rank in renderer.ranks])
         times = []

@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 
-import splatkit
+import pysplatkit
 
 
 def made_up_head(side=96):
@@ -33,18 +33,17 @@ def made_up_head(side=96):
     return head.astype(np.int16), (2.0, 2.0, 2.0)
 
 
-def main(source=None, output="ct.png"):
-    scene = splatkit.Scene()
+def main(source=None, output="ct.png", size=(800, 600)):
+    scene = pysplatkit.Scene()
     look = {"transfer": "ct-bone"}
     if source:
         scene.add(source, **look)
     else:
         volume, spacing = made_up_head()
         scene.add_volume(volume, spacing=spacing, modality="ct", unit="mm", **look)
-    size = (800, 600)
     # The upper third is cut away.
     (_, _, low), (_, _, high) = scene.bounds
-    below = splatkit.Clip.plane((0, 0, 1), low + 0.7 * (high - low))
+    below = pysplatkit.Clip.plane((0, 0, 1), low + 0.7 * (high - low))
     camera = scene.camera(size, clips=[below], elevation=35)
     picture = scene.render(size, camera, clips=[below], background="#20242c")
     print(picture.save(output))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-import splatkit
+import pysplatkit
 
 
 def write_made_up_scan(path, side=500):
@@ -21,19 +21,19 @@ def write_made_up_scan(path, side=500):
     np.save(path, np.stack([x, y, z], axis=1))
 
 
-def main(source=None, output="scan.png"):
+def main(source=None, output="scan.png", size=(800, 600)):
     with tempfile.TemporaryDirectory() as folder:
         if not source:
             source = Path(folder) / "scan.npy"
             write_made_up_scan(source)
         tree = Path(output).with_suffix(".splk")
-        splatkit.convert(source, tree, color="height", up=(0, 0, 1), overwrite=True)
-    hierarchy = splatkit.Hierarchy(tree)
+        pysplatkit.convert(source, tree, color="height", up=(0, 0, 1), overwrite=True)
+    hierarchy = pysplatkit.Hierarchy(tree)
     print(f"{hierarchy.splats} splats in {hierarchy.nodes} nodes, {tree.stat().st_size} bytes")
-    scene = splatkit.Scene().add(tree)
+    scene = pysplatkit.Scene().add(tree)
     # The widest splat, in pixels: as many levels are drawn as the picture can show.
     for cut in (16, 8, 4, 2):
-        picture = scene.render((800, 600), cut=cut)
+        picture = scene.render(size, cut=cut)
         print(f"cut {cut}: {picture.statistics['splats']} splats")
     print(picture.save(output))
 

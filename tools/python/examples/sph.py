@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 
-import splatkit
+import pysplatkit
 
 
 def made_up_gas(count=30_000):
@@ -24,7 +24,7 @@ def made_up_gas(count=30_000):
     return positions, 1e4 * (0.1 + temperature), length
 
 
-def main(source=None, output="sph.png"):
+def main(source=None, output="sph.png", size=(800, 600)):
     if source:
         rows = np.load(source)
         positions, value, length = rows[:, :3], rows[:, 3], rows[:, 4]
@@ -32,13 +32,12 @@ def main(source=None, output="sph.png"):
         positions, value, length = made_up_gas()
     low, middle, high = np.percentile(value, [60, 85, 99.9])
     size_of_all = np.linalg.norm(np.ptp(positions, axis=0))
-    transfer = splatkit.TransferFunction(
+    transfer = pysplatkit.TransferFunction(
         colors=[(low, "midnightblue"), (middle, "tomato"), (high, "lightyellow")],
         opacities=[(low, 0.0), (middle, 0.1), (high, 0.6)],
         unit=size_of_all / 100,
     )
-    scene = splatkit.Scene().add_samples(positions, value, radii=length, transfer=transfer)
-    size = (800, 600)
+    scene = pysplatkit.Scene().add_samples(positions, value, radii=length, transfer=transfer)
     print(scene.render(size, scene.camera(size)).save(output))
 
 

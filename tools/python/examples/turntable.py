@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-import splatkit
+import pysplatkit
 
 
 def made_up_knot(around=240, across=24):
@@ -35,7 +35,7 @@ def made_up_knot(around=240, across=24):
 
 
 def main(source=None, folder="turntable", frames=24):
-    scene = splatkit.Scene()
+    scene = pysplatkit.Scene()
     if source:
         scene.add(source)
     else:

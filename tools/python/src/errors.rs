@@ -1,4 +1,4 @@
-//! Errors of the library as exceptions of Python. The classes are in `splatkit/_errors.py`.
+//! Errors of the library as exceptions of Python. The classes are in `pysplatkit/_errors.py`.
 
 use pyo3::{intern, prelude::*, types::PyTuple};
 use serde::de::DeserializeOwned;
@@ -75,7 +75,7 @@ impl<'py, T> Arguments<'py> for T where
 }
 
 fn new<'py>(py: Python<'py>, class: &str, arguments: impl Arguments<'py>) -> PyResult<PyErr> {
-    let module = py.import(intern!(py, "splatkit._errors"))?;
+    let module = py.import(intern!(py, "pysplatkit._errors"))?;
     let arguments = arguments.into_pyobject(py)?;
     Ok(PyErr::from_value(module.getattr(class)?.call1(arguments)?))
 }

@@ -1,4 +1,4 @@
-//! Hierarchies of splats: the half of `splatkit.Hierarchy` that holds the file.
+//! Hierarchies of splats: the half of `pysplatkit.Hierarchy` that holds the file.
 
 use crate::{errors::raise, load::Load, worker::run};
 use numpy::PyArray1;
@@ -11,7 +11,7 @@ use splatkit::{
 use std::{path::PathBuf, sync::Arc};
 
 /// An open hierarchy.
-#[pyclass(frozen, module = "splatkit._splatkit")]
+#[pyclass(frozen, module = "pysplatkit._pysplatkit")]
 pub struct Hierarchy(Arc<File>);
 
 /// The arrays of the leaves: positions (64-bit), factors, optical depths, colours and normals.

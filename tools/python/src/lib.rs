@@ -1,5 +1,5 @@
-//! The compiled half of the Python package `splatkit`. The other half, in `python/splatkit`, has
-//! the signatures and documentation that users see; options come from there as JSON.
+//! The compiled half of the Python package `pysplatkit`. The other half, in `python/pysplatkit`,
+//! has the signatures and documentation that users see; options come from there as JSON.
 
 mod arrays;
 mod camera;
@@ -92,7 +92,7 @@ fn abandon() {
 
 // Nothing here needs the interpreter's lock: classes are frozen, or pyo3 guards them.
 #[pymodule(gil_used = false)]
-fn _splatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
+fn _pysplatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     notes::collect();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("TRANSFER_FUNCTIONS", TransferFunction::NAMES.to_vec())?;

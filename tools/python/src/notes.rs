@@ -41,7 +41,7 @@ pub fn warn(py: Python<'_>) -> PyResult<()> {
     if messages.is_empty() {
         return Ok(());
     }
-    let class = py.import("splatkit._errors")?.getattr("DataWarning")?;
+    let class = py.import("pysplatkit._errors")?.getattr("DataWarning")?;
     for message in messages {
         let message = CString::new(message.replace('\0', " "));
         let text = message.as_deref().unwrap_or(c_str!("a warning"));

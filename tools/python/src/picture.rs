@@ -15,8 +15,8 @@ use splatkit::{
 };
 use std::{path::PathBuf, sync::Arc};
 
-/// A finished picture: the half of `splatkit.Picture` that holds its pixels.
-#[pyclass(frozen, module = "splatkit._splatkit")]
+/// A finished picture: the half of `pysplatkit.Picture` that holds its pixels.
+#[pyclass(frozen, module = "pysplatkit._pysplatkit")]
 pub struct Picture {
     pixels: Arc<Pixels>,
     /// The statistics as JSON.

@@ -1,4 +1,4 @@
-//! Scenes: the half of `splatkit.Scene` that holds its items.
+//! Scenes: the half of `pysplatkit.Scene` that holds its items.
 
 use crate::{
     arrays::{numbers, positions, rows, samples},
@@ -28,7 +28,7 @@ use splatkit::{
 use std::{path::PathBuf, sync::Arc};
 
 /// What is drawn together.
-#[pyclass(frozen, module = "splatkit._splatkit")]
+#[pyclass(frozen, module = "pysplatkit._pysplatkit")]
 #[derive(Default)]
 pub struct Scene(Arc<Stage>);
 

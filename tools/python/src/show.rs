@@ -20,7 +20,7 @@ use splatkit::{
 };
 
 /// A request to stop drawing, which another thread may make.
-#[pyclass(frozen, module = "splatkit._splatkit")]
+#[pyclass(frozen, module = "pysplatkit._pysplatkit")]
 #[derive(Default)]
 pub struct Stop(splatkit::Stop);
 
@@ -39,7 +39,7 @@ impl Stop {
 
 /// Chooses the effort of each frame: the width of its pixels, and a factor on the width of splats
 /// and the thickness of sheets. `(1, 1)` is the exact picture.
-#[pyclass(module = "splatkit._splatkit")]
+#[pyclass(module = "pysplatkit._pysplatkit")]
 pub struct Pace(splatkit::interaction::Pace);
 
 #[pymethods]

@@ -90,7 +90,7 @@ fn check_process(py: Python<'_>) -> PyResult<()> {
 }
 
 fn bug(py: Python<'_>) -> PyErr {
-    let class = py.import("splatkit._errors").and_then(|module| module.getattr("Error"));
+    let class = py.import("pysplatkit._errors").and_then(|module| module.getattr("Error"));
     let message = "an internal error of splatkit; please report the message on stderr";
     match class.and_then(|class| class.call1((message,))) {
         Ok(error) => PyErr::from_value(error),

@@ -144,7 +144,7 @@ def command():
 @pytest.fixture(scope="session")
 def data(tmp_path_factory):
     """Returns a folder with a file of each kind."""
-    import splatkit
+    import pysplatkit
 
     folder = tmp_path_factory.mktemp("data")
     volume = blob()
@@ -158,7 +158,7 @@ def data(tmp_path_factory):
     positions, values = particles()
     np.save(folder / "samples.npy", np.column_stack([positions, values]))
     write_cells(folder / "cells.vtk")
-    splatkit.convert(folder / "colors.ply", folder / "tree.splk")
-    splatkit.convert(folder / "bytes.npy", folder / "bricks.splv")
-    splatkit.convert(folder / "colors.ply", folder / "trained.spz")
+    pysplatkit.convert(folder / "colors.ply", folder / "tree.splk")
+    pysplatkit.convert(folder / "bytes.npy", folder / "bricks.splv")
+    pysplatkit.convert(folder / "colors.ply", folder / "trained.spz")
     return folder

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from conftest import ball, blob, particles
 
-import splatkit
-from splatkit import ArgumentError, Scene, TransferFunction
+import pysplatkit
+from pysplatkit import ArgumentError, Scene, TransferFunction
 
 SIZE = (48, 36)
 TRANSFER = TransferFunction([(0, "navy"), (100, "gold")], [(10, 0), (100, 0.8)], unit=5)
@@ -102,7 +102,7 @@ def test_arrays_that_need_a_copy(whole):
     # Missing values are replaced in a copy.
     holes = whole.astype("f4")
     holes[2, 3, 4] = np.nan
-    with pytest.warns(splatkit.DataWarning, match="missing"):
+    with pytest.warns(pysplatkit.DataWarning, match="missing"):
         Scene().add_volume(holes)
     assert np.isnan(holes[2, 3, 4])
 
@@ -111,18 +111,18 @@ def test_missing_values(whole):
     holes = whole.astype("f4")
     holes[2, 3, 4], holes[5, 5, 5], holes[1, 1, 1] = np.nan, np.inf, -np.inf
     filled = np.where(np.isfinite(holes), holes, holes[np.isfinite(holes)].min())
-    with pytest.warns(splatkit.DataWarning, match="3 of 1080 values missing"):
+    with pytest.warns(pysplatkit.DataWarning, match="3 of 1080 values missing"):
         assert np.array_equal(drawn(holes), drawn(filled))
     masked = np.ma.masked_array(whole.astype("i2"), whole > 90)
-    with pytest.warns(splatkit.DataWarning, match="missing"):
+    with pytest.warns(pysplatkit.DataWarning, match="missing"):
         drawn(masked)
-    with pytest.warns(splatkit.DataWarning, match="missing"):
+    with pytest.warns(pysplatkit.DataWarning, match="missing"):
         drawn(whole.astype("i2"), missing=100)
     with pytest.raises(ArgumentError, match="none of the 1080 samples"):
         drawn(np.full(whole.shape, np.nan))
     positions, values = particles(100)
     values[7] = np.nan
-    with pytest.warns(splatkit.DataWarning, match="1 of 100 values missing: left out"):
+    with pytest.warns(pysplatkit.DataWarning, match="1 of 100 values missing: left out"):
         scene = Scene().add_samples(positions, values)
     assert scene.contents[0][2] == 99
 
@@ -177,12 +177,12 @@ def test_wrong_options_are_refused(whole):
         ({"background": "blak"}, "no colour"),
         ({"background": (0, 0, 2)}, "colour"),
         ({"sheet_thickness": -1}, "sheet"),
-        ({"clips": [splatkit.Clip.box((1, 1, 1), (0, 0, 0))]}, "box"),
-        ({"camera": splatkit.Camera((0, 0, 0), (0, 0, 0))}, "focal point"),
+        ({"clips": [pysplatkit.Clip.box((1, 1, 1), (0, 0, 0))]}, "box"),
+        ({"camera": pysplatkit.Camera((0, 0, 0), (0, 0, 0))}, "focal point"),
     ]:
         with pytest.raises(ArgumentError, match=message):
             scene.render(**{"size": SIZE, **options})
-    with pytest.raises(splatkit.NothingToDrawError):
+    with pytest.raises(pysplatkit.NothingToDrawError):
         Scene().render(SIZE)
     assert Scene().bounds is None and "empty" in repr(Scene())
 

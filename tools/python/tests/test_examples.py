@@ -10,10 +10,11 @@ import pytest
 from conftest import particles, read_png
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
+SIZE = (320, 240)
 
 
-def run(name, *arguments):
-    runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](*arguments)
+def run(name, *arguments, **options):
+    runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](*arguments, **options)
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +30,7 @@ def shown(path):
 
 @pytest.mark.parametrize("name", ["ct", "sph", "scan"])
 def test_made_up_data(name):
-    run(name)
+    run(name, size=SIZE)
     assert shown(f"{name}.png") > 0.1
 
 
@@ -37,9 +38,9 @@ def test_files(data):
     positions, values = particles()
     density = 2 + values
     np.save("own.npy", np.column_stack([positions, density, np.full(len(values), 0.4)]))
-    run("sph", "own.npy", "own.png")
+    run("sph", "own.npy", "own.png", SIZE)
     assert shown("own.png") > 0.1
-    run("scan", data / "cloud.ply", "scanned.png")
+    run("scan", data / "cloud.ply", "scanned.png", SIZE)
     assert shown("scanned.png") > 0.05
 
 

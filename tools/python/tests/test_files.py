@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 
-import splatkit
+import pysplatkit
 
 NAMES = [
     "volume.npy",
@@ -26,9 +26,9 @@ NAMES = [
 @pytest.mark.parametrize("name", NAMES)
 def test_facts_and_findings_are_those_of_the_command(command, data, name):
     path = data / name
-    assert splatkit.info(path) == json.loads(command("info", "--json", path))
+    assert pysplatkit.info(path) == json.loads(command("info", "--json", path))
     told = json.loads(command("check", "--json", path))
-    report = splatkit.check(path)
+    report = pysplatkit.check(path)
     assert bool(report) and report.ok == told["ok"]
     assert [finding._asdict() for finding in report.findings] == told["findings"]
 
@@ -57,7 +57,7 @@ CONVERSIONS = [
 def test_conversions_are_those_of_the_command(command, data, tmp_path, name, kind, flags, options):
     theirs, own = tmp_path / f"theirs.{kind}", tmp_path / f"own.{kind}"
     command("convert", data / name, "-o", theirs, *flags)
-    assert splatkit.convert(data / name, own, **options) == own
+    assert pysplatkit.convert(data / name, own, **options) == own
     assert own.read_bytes() == theirs.read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == [own.name, theirs.name]
 
@@ -67,15 +67,15 @@ def test_scans_larger_than_memory_are_converted_in_regions(data, tmp_path):
 
     random = np.random.default_rng(1)
     write_ply(tmp_path / "scan.ply", random.uniform(size=(300_000, 3)) * [10, 10, 0.01])
-    splatkit.convert(tmp_path / "scan.ply", tmp_path / "scan.splk", memory=220 << 20)
-    hierarchy = splatkit.Hierarchy(tmp_path / "scan.splk")
-    assert hierarchy.splats > 290_000 and splatkit.check(tmp_path / "scan.splk")
-    picture = splatkit.render(tmp_path / "scan.splk", size=(64, 48), budget=5000)
+    pysplatkit.convert(tmp_path / "scan.ply", tmp_path / "scan.splk", memory=220 << 20)
+    hierarchy = pysplatkit.Hierarchy(tmp_path / "scan.splk")
+    assert hierarchy.splats > 290_000 and pysplatkit.check(tmp_path / "scan.splk")
+    picture = pysplatkit.render(tmp_path / "scan.splk", size=(64, 48), budget=5000)
     assert picture.statistics["splats"] < 40_000
 
 
 def test_hierarchies_are_open_books(data):
-    hierarchy = splatkit.Hierarchy(data / "tree.splk")
+    hierarchy = pysplatkit.Hierarchy(data / "tree.splk")
     assert len(hierarchy) == hierarchy.splats > 0 and hierarchy.has_color
     assert hierarchy.degree is None and hierarchy.source == "colors.ply"
     leaves = hierarchy.leaves()
@@ -89,30 +89,30 @@ def test_hierarchies_are_open_books(data):
 
 def test_errors_say_what_to_do(data, tmp_path):
     with pytest.raises(FileNotFoundError) as found:
-        splatkit.render(tmp_path / "none.ply")
-    assert isinstance(found.value, splatkit.FileError) and found.value.errno == 2
+        pysplatkit.render(tmp_path / "none.ply")
+    assert isinstance(found.value, pysplatkit.FileError) and found.value.errno == 2
     assert found.value.file == tmp_path / "none.ply" and found.value.filename.endswith("none.ply")
     (tmp_path / "bad.ply").write_text("ply\nformat ascii 1.0\nelement vertex x\nend_header\n")
-    with pytest.raises(splatkit.InputError) as found:
-        splatkit.render(tmp_path / "bad.ply")
+    with pytest.raises(pysplatkit.InputError) as found:
+        pysplatkit.render(tmp_path / "bad.ply")
     assert found.value.file.name == "bad.ply" and found.value.place and found.value.message
     (tmp_path / "what.xyzzy").write_bytes(b"\0\1\2")
-    with pytest.raises(splatkit.InputError, match="no format") as found:
-        splatkit.info(tmp_path / "what.xyzzy")
+    with pytest.raises(pysplatkit.InputError, match="no format") as found:
+        pysplatkit.info(tmp_path / "what.xyzzy")
     assert "dims" in found.value.hint
-    with pytest.raises(splatkit.LimitError) as limit:
-        splatkit.render(data / "mesh.ply", limits={"points": 10})
+    with pytest.raises(pysplatkit.LimitError) as limit:
+        pysplatkit.render(data / "mesh.ply", limits={"points": 10})
     assert (limit.value.kind, limit.value.limit) == ("points", 10) and limit.value.found > 10
-    with pytest.raises(splatkit.OutputError) as found:
-        splatkit.convert(data / "mesh.ply", data / "tree.splk")
-    with pytest.raises(splatkit.OutputError, match="No such file"):
-        splatkit.convert(data / "mesh.ply", tmp_path / "none" / "a.splk")
-    with pytest.raises(splatkit.ArgumentError, match="can be written"):
-        splatkit.convert(data / "mesh.ply", tmp_path / "a.obj")
-    with pytest.raises(splatkit.ArgumentError, match="holds no volume"):
-        splatkit.convert(data / "mesh.ply", tmp_path / "a.splv")
-    with pytest.raises(splatkit.InputError):
-        splatkit.Hierarchy(data / "mesh.ply")
+    with pytest.raises(pysplatkit.OutputError) as found:
+        pysplatkit.convert(data / "mesh.ply", data / "tree.splk")
+    with pytest.raises(pysplatkit.OutputError, match="No such file"):
+        pysplatkit.convert(data / "mesh.ply", tmp_path / "none" / "a.splk")
+    with pytest.raises(pysplatkit.ArgumentError, match="can be written"):
+        pysplatkit.convert(data / "mesh.ply", tmp_path / "a.obj")
+    with pytest.raises(pysplatkit.ArgumentError, match="holds no volume"):
+        pysplatkit.convert(data / "mesh.ply", tmp_path / "a.splv")
+    with pytest.raises(pysplatkit.InputError):
+        pysplatkit.Hierarchy(data / "mesh.ply")
     for error in (limit.value, found.value):
         again = pickle.loads(pickle.dumps(error))
         assert type(again) is type(error) and str(again) == str(error)
@@ -122,10 +122,10 @@ def test_raw_volumes_and_names(tmp_path):
     values = np.arange(24, dtype=">u2").reshape(2, 3, 4)
     path = tmp_path / "übung.raw"
     path.write_bytes(b"head" + values.tobytes())
-    facts = splatkit.info(path, dims=(4, 3, 2), sample_type="u16", endian="big", header=4)
+    facts = pysplatkit.info(path, dims=(4, 3, 2), sample_type="u16", endian="big", header=4)
     assert facts["range"] == [0, 23] and facts["dims"] == [4, 3, 2]
-    with pytest.raises(splatkit.ArgumentError, match="both dims"):
-        splatkit.info(path, dims=(4, 3, 2))
+    with pytest.raises(pysplatkit.ArgumentError, match="both dims"):
+        pysplatkit.info(path, dims=(4, 3, 2))
     with pytest.raises(TypeError, match="did you mean 'sample_type'"):
-        splatkit.info(path, sampletype="u16")
-    assert any("ply" in own.extensions for own in splatkit.formats())
+        pysplatkit.info(path, sampletype="u16")
+    assert any("ply" in own.extensions for own in pysplatkit.formats())

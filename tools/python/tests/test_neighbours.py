@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from conftest import ball, blob
 
-import splatkit
-from splatkit import ArgumentError, Scene, TransferFunction
+import pysplatkit
+from pysplatkit import ArgumentError, Scene, TransferFunction
 
 # Other packages use what is deprecated. ITK does not survive an exception there.
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -485,7 +485,7 @@ def test_unknown_objects_are_refused():
         lambda: Scene().add(None),
         lambda: Scene().add_volume(object()),
         lambda: Scene().add_points(object()),
-        lambda: splatkit.render(object()),
+        lambda: pysplatkit.render(object()),
     ):
         with pytest.raises(TypeError, match=r"PyVista, VTK, nibabel.*not (object|NoneType)"):
             call()

@@ -22,11 +22,11 @@ SIZE = (320, 240)
 CELL = f"""
 import json, os
 import numpy as np
-import splatkit
+import pysplatkit
 
 z, y, x = np.meshgrid(*3 * [np.linspace(-1, 1, 40)], indexing="ij")
 values = np.exp(-6 * ((x - 0.2) ** 2 + y**2 + (z + 0.1) ** 2)) + 0.1 * x
-scene = splatkit.Scene().add_volume(values)
+scene = pysplatkit.Scene().add_volume(values)
 widget = scene.show(size={SIZE})
 
 def write(change):

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from conftest import ball, blob, particles, read_png
 
-import splatkit
-from splatkit import Clip, Scene, TransferFunction
+import pysplatkit
+from pysplatkit import Clip, Scene, TransferFunction
 
 SIZE = (96, 72)
 
 
 def test_two_lines_draw_a_picture(tmp_path):
-    picture = splatkit.render(blob(), size=SIZE)
+    picture = pysplatkit.render(blob(), size=SIZE)
     assert picture.save(tmp_path / "a.png").is_file()
     assert picture.rgba.shape == (72, 96, 4) and picture.rgba.dtype == np.uint8
     assert picture.rgba[:, :, 3].min() == 255 and picture.rgba[:, :, :3].max() > 100
@@ -36,13 +36,13 @@ def test_pictures_are_drawn_alike_twice():
 
 
 def test_backgrounds_and_files(tmp_path):
-    clear = splatkit.render(blob(), size=SIZE, background=None)
+    clear = pysplatkit.render(blob(), size=SIZE, background=None)
     assert clear.rgba[:, :, 3].min() == 0
     assert tuple(clear.over("orange").rgba[0, 0]) == (255, 165, 0, 255)
     assert tuple(clear.over((0, 0.5, 1)).rgba[0, 0]) == (0, 128, 255, 255)
     assert clear.save(tmp_path / "a.jpg").read_bytes()[:2] == b"\xff\xd8"
     clear.save_depth(tmp_path / "depth.png")
-    with pytest.raises(splatkit.OutputError, match="exists already"):
+    with pytest.raises(pysplatkit.OutputError, match="exists already"):
         clear.save(tmp_path / "a.jpg", overwrite=False)
     with pytest.raises(ValueError, match="read-only"):
         clear.rgba[0, 0] = 0
@@ -109,7 +109,7 @@ def test_files_are_drawn_as_by_the_command(command, data, tmp_path, name, flags,
     out = tmp_path / "command.png"
     size = f"{SIZE[0]}x{SIZE[1]}"
     command("render", data / name, "--engine", "cpu", "--size", size, *flags, "-o", out)
-    picture = splatkit.render(data / name, size=SIZE, **options)
+    picture = pysplatkit.render(data / name, size=SIZE, **options)
     assert np.array_equal(read_png(out), picture.rgba)
 
 
@@ -157,20 +157,20 @@ def test_a_turntable_keeps_its_distance():
 
 def test_arrays_are_drawn_as_their_files(data):
     def same(array, file, **options):
-        own = splatkit.render(array, size=SIZE, **options)
-        assert np.array_equal(own.rgba, splatkit.render(data / file, size=SIZE).rgba)
+        own = pysplatkit.render(array, size=SIZE, **options)
+        assert np.array_equal(own.rgba, pysplatkit.render(data / file, size=SIZE).rgba)
 
     same(np.load(data / "volume.npy"), "volume.npy")
     same(np.load(data / "bytes.npy"), "bytes.npy")
     rows = np.load(data / "samples.npy")
     own = Scene().add_samples(rows[:, :3], rows[:, 3]).render(SIZE)
-    assert np.array_equal(own.rgba, splatkit.render(data / "samples.npy", size=SIZE).rgba)
+    assert np.array_equal(own.rgba, pysplatkit.render(data / "samples.npy", size=SIZE).rgba)
     vertices, faces = ball()
     own = Scene().add_mesh(vertices, faces).render(SIZE)
-    assert np.array_equal(own.rgba, splatkit.render(data / "mesh.ply", size=SIZE).rgba)
+    assert np.array_equal(own.rgba, pysplatkit.render(data / "mesh.ply", size=SIZE).rgba)
     colors = np.clip(255 * (0.5 + 0.5 * vertices), 0, 255).astype("u1")
     own = Scene().add_points(vertices.astype("f4"), colors=colors).render(SIZE)
-    assert np.array_equal(own.rgba, splatkit.render(data / "cloud.ply", size=SIZE).rgba)
+    assert np.array_equal(own.rgba, pysplatkit.render(data / "cloud.ply", size=SIZE).rgba)
 
 
 def test_lattices_lie_where_they_are_told():
@@ -189,16 +189,16 @@ def test_transfer_functions(tmp_path):
     path = tmp_path / "own.json"
     path.write_text(own.to_json())
     pictures = [
-        splatkit.render(blob(), size=SIZE, transfer=transfer).rgba
+        pysplatkit.render(blob(), size=SIZE, transfer=transfer).rgba
         for transfer in (own, path, str(path), own.to_json())
     ]
     assert all(np.array_equal(pictures[0], picture) for picture in pictures)
-    assert set(splatkit.TRANSFER_FUNCTIONS) >= {"ct-bone", "mri"}
+    assert set(pysplatkit.TRANSFER_FUNCTIONS) >= {"ct-bone", "mri"}
     assert TransferFunction.named("mri", (0, 10)).opacities[-1][0] == 10
-    with pytest.raises(splatkit.TransferError, match="without opacity"):
+    with pytest.raises(pysplatkit.TransferError, match="without opacity"):
         TransferFunction([(0, "red")], [(0, 0)]).to_json()
-    with pytest.raises(splatkit.NothingToDrawError, match="shows values between"):
-        splatkit.render(blob(), transfer=TransferFunction([(0, "red")], [(50, 0), (60, 1)]))
+    with pytest.raises(pysplatkit.NothingToDrawError, match="shows values between"):
+        pysplatkit.render(blob(), transfer=TransferFunction([(0, "red")], [(50, 0), (60, 1)]))
 
 
 def test_particles_with_radii_and_gaussians():
@@ -224,7 +224,7 @@ def test_particles_with_radii_and_gaussians():
 def test_an_own_camera_may_see_nothing():
     scene = Scene().add_volume(blob())
     camera = scene.camera(SIZE)
-    away = splatkit.Camera(camera.position, np.multiply(camera.position, 2) - camera.focal_point)
+    away = pysplatkit.Camera(camera.position, np.multiply(camera.position, 2) - camera.focal_point)
     assert scene.render(SIZE, away, background=None).rgba.max() == 0
     assert scene.render(SIZE, camera).camera == camera
     turned = camera.copy().azimuth(20).elevation(5).zoom(2)

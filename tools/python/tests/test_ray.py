@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from conftest import ball, blob, write_ply
 
-import splatkit
+import pysplatkit
 
-ray = pytest.importorskip("ray", reason='Ray is missing: pip install "splatkit[ray]"')
+ray = pytest.importorskip("ray", reason='Ray is missing: pip install "pysplatkit[ray]"')
 pytestmark = pytest.mark.filterwarnings("default")
 
 SIZE = (160, 120)
@@ -42,12 +42,12 @@ def bricks(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ray")
     volume = blob((70, 100, 90))
     np.save(folder / "bytes.npy", (255 * volume / volume.max()).astype("u1"))
-    splatkit.convert(folder / "bytes.npy", folder / "bricks.splv")
+    pysplatkit.convert(folder / "bytes.npy", folder / "bricks.splv")
     return folder / "bricks.splv"
 
 
 def renderer(scene, ranks=4, **options):
-    from splatkit.ray import Renderer
+    from pysplatkit.ray import Renderer
 
     return Renderer(scene, ranks=ranks, **options)
 
@@ -69,7 +69,7 @@ def same(drawn, alone, least=60):
 
 @pytest.mark.parametrize("view", VIEWS, ids=["usual", "behind", "flat"])
 def test_a_volume_in_bricks(cluster, bricks, view):
-    alone = splatkit.Scene().add(bricks, transfer="generic")
+    alone = pysplatkit.Scene().add(bricks, transfer="generic")
     camera = alone.camera(SIZE, **view)
     with renderer(bricks, transfer="generic", memory=64 << 20) as ranks:
         own = ranks.render(SIZE, camera, background="navy")
@@ -83,7 +83,7 @@ def test_a_volume_in_bricks(cluster, bricks, view):
 
 def test_an_array(cluster):
     volume = (200 * blob((40, 50, 60))).astype("u1")
-    alone = splatkit.Scene().add(volume, transfer="generic")
+    alone = pysplatkit.Scene().add(volume, transfer="generic")
     with renderer(volume, transfer="generic") as ranks:
         own, one = ranks.render(SIZE), alone.render(SIZE)
         same(own, one)
@@ -98,8 +98,8 @@ def test_a_hierarchy(cluster, tmp_path):
     vertices, faces = ball(120, 240)
     colors = np.clip(255 * (0.5 + 0.5 * vertices), 0, 255).astype("u1")
     write_ply(tmp_path / "ball.ply", vertices, faces, colors)
-    splatkit.convert(tmp_path / "ball.ply", tmp_path / "ball.splk")
-    alone = splatkit.Scene().add(tmp_path / "ball.splk")
+    pysplatkit.convert(tmp_path / "ball.ply", tmp_path / "ball.splk")
+    alone = pysplatkit.Scene().add(tmp_path / "ball.splk")
     with renderer(tmp_path / "ball.splk") as ranks:
         for view in VIEWS:
             camera = alone.camera(SIZE, **view)
@@ -111,7 +111,7 @@ def test_a_mesh_in_a_volume(cluster):
     volume = blob((40, 50, 60)).astype("f4")
 
     def scene():
-        own = splatkit.Scene().add_mesh(15 * vertices + [30, 25, 20], faces, color="gold")
+        own = pysplatkit.Scene().add_mesh(15 * vertices + [30, 25, 20], faces, color="gold")
         return own.add_volume(volume, transfer="generic")
 
     alone = scene()
@@ -120,22 +120,22 @@ def test_a_mesh_in_a_volume(cluster):
             camera = alone.camera(SIZE, **view)
             same(ranks.render(SIZE, camera), alone.render(SIZE, camera))
         # Clips and other options reach all ranks.
-        options = {"clips": [splatkit.Clip.plane((1, 0, 0), 28.0)], "samples": 4, "shade": True}
+        options = {"clips": [pysplatkit.Clip.plane((1, 0, 0), 28.0)], "samples": 4, "shade": True}
         camera = alone.camera(SIZE)
         same(ranks.render(SIZE, camera, **options), alone.render(SIZE, camera, **options))
 
 
 def test_colours_of_16_bits(cluster, bricks):
-    alone = splatkit.Scene().add(bricks, transfer="generic").render(SIZE)
+    alone = pysplatkit.Scene().add(bricks, transfer="generic").render(SIZE)
     with renderer(bricks, transfer="generic", precision="float16") as ranks:
         same(ranks.render(SIZE), alone)
 
 
 def test_ranks_that_swap_halves(cluster, bricks, monkeypatch):
-    from splatkit.ray import _renderer
+    from pysplatkit.ray import _renderer
 
     monkeypatch.setattr(_renderer, "_DIRECT", 2)
-    alone = splatkit.Scene().add(bricks, transfer="generic")
+    alone = pysplatkit.Scene().add(bricks, transfer="generic")
     with renderer(bricks, ranks=8, transfer="generic") as ranks:
         for view in VIEWS:
             camera = alone.camera(SIZE, **view)
@@ -143,7 +143,7 @@ def test_ranks_that_swap_halves(cluster, bricks, monkeypatch):
 
 
 def test_one_rank_draws_the_same_bytes(cluster, bricks):
-    alone = splatkit.Scene().add(bricks, transfer="generic").render(SIZE)
+    alone = pysplatkit.Scene().add(bricks, transfer="generic").render(SIZE)
     with renderer(bricks, ranks=1, transfer="generic") as ranks:
         assert decibels(ranks.render(SIZE).color, alone.color) > 100
 
@@ -153,12 +153,12 @@ def test_ranks_with_little_memory_agree_on_a_level(cluster, bricks):
         own = ranks.render((400, 300))
         levels = {rank["level"] for rank in own.statistics["ranks"]}
         assert len(levels) == 1 and levels.pop() > 0
-        alone = splatkit.Scene().add(bricks, transfer="generic").render((400, 300))
+        alone = pysplatkit.Scene().add(bricks, transfer="generic").render((400, 300))
         assert decibels(own.color, alone.color) > 25
 
 
 def test_a_killed_rank_is_started_again(cluster, bricks):
-    alone = splatkit.Scene().add(bricks, transfer="generic").render((600, 450), samples=4)
+    alone = pysplatkit.Scene().add(bricks, transfer="generic").render((600, 450), samples=4)
     with renderer(bricks, transfer="generic") as ranks:
         ranks.render(SIZE)
         victim = ray.get(ranks.ranks[2].pid.remote())
@@ -182,9 +182,9 @@ def test_a_film_and_a_straggler(cluster, tmp_path):
             pass
         else:
             time.sleep(150)
-        return splatkit.Scene().add(volume, transfer="generic")
+        return pysplatkit.Scene().add(volume, transfer="generic")
 
-    alone = splatkit.Scene().add(volume, transfer="generic")
+    alone = pysplatkit.Scene().add(volume, transfer="generic")
     cameras = alone.turntable(7, SIZE)
     with renderer(scene, ranks=3) as ranks:
         start = time.monotonic()
@@ -197,30 +197,30 @@ def test_a_film_and_a_straggler(cluster, tmp_path):
 
 def test_errors_are_those_of_the_package(cluster, tmp_path):
     with renderer(tmp_path / "none.splv", ranks=2) as ranks:
-        with pytest.raises(splatkit.MissingFileError) as caught:
+        with pytest.raises(pysplatkit.MissingFileError) as caught:
             ranks.render(SIZE)
         assert caught.value.file == tmp_path / "none.splv"
     (tmp_path / "broken.ply").write_text("ply\nformat nonsense\n")
     with renderer(tmp_path / "broken.ply", ranks=2) as ranks:
-        with pytest.raises(splatkit.InputError) as caught:
+        with pytest.raises(pysplatkit.InputError) as caught:
             ranks.render(SIZE)
         assert caught.value.file.name == "broken.ply" and caught.value.place
-        with pytest.raises(splatkit.ArgumentError, match="render_path"):
+        with pytest.raises(pysplatkit.ArgumentError, match="render_path"):
             ranks.render(SIZE, optics="maximum")
         with pytest.raises(TypeError, match="backgroud"):
             ranks.render(SIZE, backgroud="red")
-    with pytest.raises(splatkit.ArgumentError, match="more than the cluster has"):
+    with pytest.raises(pysplatkit.ArgumentError, match="more than the cluster has"):
         renderer("any.splv", ranks=1000)
 
 
 def test_without_ray_the_error_names_the_command(tmp_path):
     (tmp_path / "ray.py").write_text("raise ImportError('no ray here')\n")
-    path = os.pathsep.join([str(tmp_path), str(Path(splatkit.__file__).parents[1])])
-    words = [sys.executable, "-c", "import splatkit.ray"]
+    path = os.pathsep.join([str(tmp_path), str(Path(pysplatkit.__file__).parents[1])])
+    words = [sys.executable, "-c", "import pysplatkit.ray"]
     done = subprocess.run(
         words, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, check=False
     )
-    assert done.returncode and 'pip install "splatkit[ray]"' in done.stderr
+    assert done.returncode and 'pip install "pysplatkit[ray]"' in done.stderr
 
 
 #: A command that makes parts as splatkit's does, slowly.
@@ -272,7 +272,7 @@ def in_cluster(command, function, *arguments, **options):
 
 
 def test_a_killed_worker_costs_its_part(cluster, stand_in, tmp_path):
-    from splatkit.ray import convert
+    from pysplatkit.ray import convert
 
     source = bytes(range(200))
     (tmp_path / "in.bin").write_bytes(source)
@@ -300,12 +300,12 @@ def test_a_killed_worker_costs_its_part(cluster, stand_in, tmp_path):
 
 
 def test_a_part_that_fails_says_why(cluster, stand_in, tmp_path):
-    from splatkit.ray import convert
+    from pysplatkit.ray import convert
 
     (tmp_path / "in.bin").write_bytes(b"any")
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "refuse").touch()
-    with pytest.raises(splatkit.Error, match=r"a\.las: point 3: is broken"):
+    with pytest.raises(pysplatkit.Error, match=r"a\.las: point 3: is broken"):
         in_cluster(
             stand_in,
             convert,
@@ -316,12 +316,12 @@ def test_a_part_that_fails_says_why(cluster, stand_in, tmp_path):
         )
     assert not (tmp_path / "out.splk").exists()
     (tmp_path / "there.splk").touch()
-    with pytest.raises(splatkit.OutputError, match="exists already"):
+    with pytest.raises(pysplatkit.OutputError, match="exists already"):
         convert(tmp_path / "in.bin", tmp_path / "there.splk")
 
 
 def test_the_parts_of_the_command(cluster, tmp_path):
-    from splatkit.ray import convert
+    from pysplatkit.ray import convert
 
     command = os.environ.get("SPLATKIT_COMMAND")
     if not command or not Path(command).is_file():
@@ -338,4 +338,4 @@ def test_the_parts_of_the_command(cluster, tmp_path):
     subprocess.run(words, check=True)
     in_cluster(command, convert, tmp_path / "cloud.ply", in_parts, parts=4)
     assert at_once.read_bytes() == in_parts.read_bytes()
-    assert not splatkit.check(in_parts).findings
+    assert not pysplatkit.check(in_parts).findings

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from conftest import ball, blob
 
-import splatkit
-from splatkit import Camera, Scene, TransferFunction, _painter
+import pysplatkit
+from pysplatkit import Camera, Scene, TransferFunction, _painter
 
 pytest.importorskip("anywidget", reason="anywidget is not installed")
 
@@ -72,7 +72,7 @@ def test_the_still_picture_is_that_of_render(scene, widget, tmp_path):
 
 
 def test_options_and_screens_with_small_pixels(scene):
-    clip = splatkit.Clip.plane((1, 0, 0), 12)
+    clip = pysplatkit.Clip.plane((1, 0, 0), 12)
     options = {"background": "white", "clips": [clip], "shade": False}
     widget = rest(scene.show(scene.camera(SIZE, view="left"), SIZE, **options))
     assert widget.camera == scene.camera(SIZE, view="left")
@@ -84,7 +84,7 @@ def test_options_and_screens_with_small_pixels(scene):
 
 def test_wrong_options_are_refused_at_once(scene):
     for camera in (None, scene.camera(SIZE)):
-        with pytest.raises(splatkit.ArgumentError, match="optics"):
+        with pytest.raises(pysplatkit.ArgumentError, match="optics"):
             scene.show(camera, SIZE, optics="bright")
         with pytest.raises(TypeError, match="optic"):
             scene.show(camera, SIZE, optic="light")
@@ -203,7 +203,7 @@ def test_items_that_are_added_later_are_drawn_by_refresh():
     scene = Scene().add_mesh(*ball())
     widget = rest(scene.show(size=SIZE))
     assert widget.transfer is None and not widget._transfers
-    with pytest.raises(splatkit.ArgumentError, match="no field"):
+    with pytest.raises(pysplatkit.ArgumentError, match="no field"):
         widget.transfer = "generic"
     before = widget._still
     scene.add_volume(2 + blob(), origin=(2, 0, 0), spacing=0.1, name="late")
@@ -238,11 +238,11 @@ def test_errors_are_told_and_pass(widget):
 def test_wrong_arguments_are_refused_at_once(scene):
     with pytest.raises(TypeError, match="background"):
         scene.show(bakground="white")
-    with pytest.raises(splatkit.ArgumentError):
+    with pytest.raises(pysplatkit.ArgumentError):
         scene.show(size=(0, 100))
-    with pytest.raises(splatkit.ArgumentError, match="mode"):
+    with pytest.raises(pysplatkit.ArgumentError, match="mode"):
         scene.show(mode="fast")
-    with pytest.raises(splatkit.NothingToDrawError):
+    with pytest.raises(pysplatkit.NothingToDrawError):
         Scene().show()
 
 
@@ -276,12 +276,12 @@ def test_a_frame_that_refines_is_stopped_by_the_next_order(monkeypatch):
         if effort == _painter.EXACT and camera == "first":
             begun.set()
             assert stop.wait(20)
-            raise splatkit.Error("stopped")
+            raise pysplatkit.Error("stopped")
         return camera
 
     frames = []
-    monkeypatch.setattr(_painter._splatkit, "Stop", Stop)
-    monkeypatch.setattr(_painter._splatkit, "render_frame", render_frame)
+    monkeypatch.setattr(_painter._pysplatkit, "Stop", Stop)
+    monkeypatch.setattr(_painter._pysplatkit, "render_frame", render_frame)
     painter = _painter.Painter(frames.append)
     painter.order(_painter.Order(None, "first", ""))
     assert begun.wait(20)
@@ -332,11 +332,11 @@ def test_without_anywidget_the_error_says_what_to_install():
     code = """
 import sys
 sys.modules["anywidget"] = None
-import numpy, splatkit
+import numpy, pysplatkit
 try:
-    splatkit.Scene().add_volume(numpy.random.rand(4, 4, 4)).show()
+    pysplatkit.Scene().add_volume(numpy.random.rand(4, 4, 4)).show()
 except ImportError as error:
     print(error)
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert 'pip install "splatkit[notebook]"' in ran.stdout
+    assert 'pip install "pysplatkit[notebook]"' in ran.stdout

@@ -1,11 +1,11 @@
 """Pictures of NumPy arrays and of files, drawn as elliptic splats, without GPU or display.
 
->>> import splatkit
->>> splatkit.render("skull.nrrd").save("skull.png")
+>>> import pysplatkit
+>>> pysplatkit.render("skull.nrrd").save("skull.png")
 
 A `Scene` holds several items, and is drawn from any side:
 
->>> scene = splatkit.Scene().add_volume(array, spacing=(0.7, 0.7, 1.25)).add("implant.stl")
+>>> scene = pysplatkit.Scene().add_volume(array, spacing=(0.7, 0.7, 1.25)).add("implant.stl")
 >>> picture = scene.render((800, 600), scene.camera((800, 600), view="left"))
 >>> picture.rgba.shape
 (600, 800, 4)
@@ -16,7 +16,7 @@ from __future__ import annotations
 import atexit
 from typing import Any
 
-from . import _splatkit
+from . import _pysplatkit
 from ._camera import Camera, Clip
 from ._errors import (
     ArgumentError,
@@ -38,12 +38,12 @@ from ._picture import Picture
 from ._scene import DRAWING, Scene
 from ._transfer import TransferFunction
 
-__version__: str = _splatkit.__version__
+__version__: str = _pysplatkit.__version__
 
 #: The names of transfer functions.
-TRANSFER_FUNCTIONS: tuple[str, ...] = tuple(_splatkit.TRANSFER_FUNCTIONS)
+TRANSFER_FUNCTIONS: tuple[str, ...] = tuple(_pysplatkit.TRANSFER_FUNCTIONS)
 #: The names of colour maps. Each may end with `_r`, which reverses it.
-COLOR_MAPS: tuple[str, ...] = tuple(_splatkit.COLOR_MAPS)
+COLOR_MAPS: tuple[str, ...] = tuple(_pysplatkit.COLOR_MAPS)
 
 
 def render(source: Any, **options: Any) -> Picture:
@@ -56,7 +56,7 @@ def render(source: Any, **options: Any) -> Picture:
 
 
 # Interrupted conversions may go on until the process ends. They leave no files.
-atexit.register(_splatkit.abandon)
+atexit.register(_pysplatkit.abandon)
 
 __all__ = [
     "COLOR_MAPS",

@@ -10,7 +10,7 @@ from typing import Any, TypedDict, Union
 
 import numpy as np
 
-from . import _splatkit
+from . import _pysplatkit
 from ._errors import ArgumentError
 from ._transfer import TransferFunction
 
@@ -35,7 +35,7 @@ class FieldLook(TypedDict, total=False):
     isosurfaces: Sequence[float | tuple[float, Color | None, float]]
     #: Factors on the opacity by the magnitude of the gradient: (magnitude, factor), ….
     gradient_opacity: Sequence[tuple[float, float]]
-    #: Colour values by this map (`splatkit.COLOR_MAPS`; `_r` at the end reverses it).
+    #: Colour values by this map (`pysplatkit.COLOR_MAPS`; `_r` at the end reverses it).
     colormap: str
     #: Spread the colour map over the logarithms of the values.
     log_colors: bool
@@ -154,7 +154,7 @@ def _plain(value: Any) -> Any:
 def color(value: Color) -> list[float]:
     """Returns red, green and blue from 0 to 1."""
     if isinstance(value, str):
-        return list(_splatkit.color(value))
+        return list(_pysplatkit.color(value))
     parts = [float(part) for part in value]
     if len(parts) != 3 or not all(0.0 <= part <= 1.0 for part in parts):
         form = "a colour is a name, '#rrggbb' or three numbers from 0 to 1"

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from . import _options, _splatkit
+from . import _options, _pysplatkit
 from ._camera import Camera
 from ._errors import OutputError
 
@@ -24,7 +24,7 @@ class Picture:
     Its arrays are read-only; `picture.rgba.copy()` can be changed.
     """
 
-    def __init__(self, own: _splatkit.Picture, background: list[float] | None) -> None:
+    def __init__(self, own: _pysplatkit.Picture, background: list[float] | None) -> None:
         self._own = own
         self._background = background
 
@@ -97,4 +97,4 @@ class Picture:
 
     def __repr__(self) -> str:
         width, height = self.size
-        return f"<splatkit.Picture of {width}x{height} pixels>"
+        return f"<pysplatkit.Picture of {width}x{height} pixels>"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import _splatkit
+from . import _pysplatkit
 
 #: The light of surfaces inside a volume, unless another one is given.
 _LIGHT = {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10.0}
@@ -42,18 +42,18 @@ class TransferFunction:
     def named(
         cls, name: str, range: tuple[float, float] = (0.0, 1.0), *, diagonal: float | None = None
     ) -> TransferFunction:
-        """Returns a preset (`splatkit.TRANSFER_FUNCTIONS`).
+        """Returns a preset (`pysplatkit.TRANSFER_FUNCTIONS`).
 
         Those of CT expect Hounsfield units; “mri” and “generic” are spread over `range`. Opacities
         hold for a length of 1, or for 1/350 of `diagonal`, the diagonal of the box around the data.
         """
         low, high = range
-        return cls.from_json(_splatkit.named_transfer(name, [float(low), float(high)], diagonal))
+        return cls.from_json(_pysplatkit.named_transfer(name, [float(low), float(high)], diagonal))
 
     @classmethod
     def from_json(cls, text: str) -> TransferFunction:
         """Reads the JSON form, which the command and the window write."""
-        parts = json.loads(_splatkit.checked_transfer(text))
+        parts = json.loads(_pysplatkit.checked_transfer(text))
         return cls(
             colors=[(value, tuple(rgb)) for value, *rgb in parts["color"]],
             opacities=[(value, opacity) for value, opacity in parts["opacity"]],
@@ -66,7 +66,7 @@ class TransferFunction:
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> TransferFunction:
         """Reads a JSON file."""
-        return cls.from_json(_splatkit.read_transfer(os.fspath(path)))
+        return cls.from_json(_pysplatkit.read_transfer(os.fspath(path)))
 
     @classmethod
     def of(cls, value: Any) -> Any:
@@ -75,7 +75,7 @@ class TransferFunction:
             return value._parts()
         if isinstance(value, os.PathLike):
             return cls.read(value)._parts()
-        if not isinstance(value, str) or value in _splatkit.TRANSFER_FUNCTIONS:
+        if not isinstance(value, str) or value in _pysplatkit.TRANSFER_FUNCTIONS:
             return value
         if value.lstrip().startswith("{"):
             return cls.from_json(value)._parts()
@@ -84,7 +84,7 @@ class TransferFunction:
 
     def to_json(self) -> str:
         """Returns the JSON form, which `from_json` and the command read."""
-        return _splatkit.checked_transfer(json.dumps(self._parts()))
+        return _pysplatkit.checked_transfer(json.dumps(self._parts()))
 
     def _parts(self) -> dict[str, Any]:
         from ._options import color

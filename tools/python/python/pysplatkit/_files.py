@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 import numpy.typing as npt
 
-from . import _options, _splatkit
+from . import _options, _pysplatkit
 from ._options import Color, PathLike, Reading, Vector
 
 
@@ -20,7 +20,7 @@ def info(path: PathLike, **reading: Unpack[Reading]) -> dict[str, Any]:
     """Returns what a file holds: kind, count, bounds, range of values, arrays, …: the facts of
     `splatkit info --json`."""
     given = _options.checked(reading, _options.READING, "info")
-    return dict(json.loads(_splatkit.info(os.fspath(path), _options.reading(given))))
+    return dict(json.loads(_pysplatkit.info(os.fspath(path), _options.reading(given))))
 
 
 class Finding(NamedTuple):
@@ -52,7 +52,7 @@ class Report:
 def check(path: PathLike, **reading: Unpack[Reading]) -> Report:
     """Checks a file: every checksum and guarantee of hierarchies and bricks, oddities of others."""
     given = _options.checked(reading, _options.READING, "check")
-    found = json.loads(_splatkit.check(os.fspath(path), _options.reading(given)))
+    found = json.loads(_pysplatkit.check(os.fspath(path), _options.reading(given)))
     return Report(found["ok"], [Finding(**own) for own in found["findings"]])
 
 
@@ -68,7 +68,7 @@ class Format(NamedTuple):
 
 def formats() -> list[Format]:
     """Returns the formats that are read."""
-    return [Format(*own) for own in _splatkit.known_formats()]
+    return [Format(*own) for own in _pysplatkit.known_formats()]
 
 
 def convert(
@@ -123,7 +123,7 @@ def convert(
         "memory": memory,
     }
     look = {"color": color, "colormap": colormap, "range": range}
-    _splatkit.convert(
+    _pysplatkit.convert(
         paths,
         os.fspath(output),
         _options.text(conversion),
@@ -173,7 +173,7 @@ class Hierarchy:
 
     def __init__(self, path: PathLike) -> None:
         self.path = Path(os.fspath(path))
-        self._own = _splatkit.Hierarchy(os.fspath(path), "{}")
+        self._own = _pysplatkit.Hierarchy(os.fspath(path), "{}")
         self.__dict__.update(json.loads(self._own.header))
 
     def leaves(self) -> Leaves:
@@ -194,4 +194,4 @@ class Hierarchy:
         return self.splats
 
     def __repr__(self) -> str:
-        return f"<splatkit.Hierarchy {str(self.path)!r}: {self.splats} splats>"
+        return f"<pysplatkit.Hierarchy {str(self.path)!r}: {self.splats} splats>"

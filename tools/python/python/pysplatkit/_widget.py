@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import traitlets
 
-from . import _options, _scene, _splatkit
+from . import _options, _pysplatkit, _scene
 from ._camera import Camera
 from ._errors import ArgumentError, Error
 from ._painter import Frame, Order, Painter
@@ -90,18 +90,18 @@ class Widget(anywidget.AnyWidget):
         self._lock = threading.Lock()
         self._arrived: tuple[Frame, bytes] | None = None
         self._exact: Frame | None = None
-        self._shown: _splatkit.Picture | None = None
+        self._shown: _pysplatkit.Picture | None = None
         self._grabbed: list[float] | None = None
         self._loop = _running_loop()
         # Refuses sizes and options that cannot be drawn.
         scene._own.check(self._draws(size))
         own = self._fitted(size) if camera is None else camera
-        _splatkit.moved_by_hand(scene._own, own.to_json(), size, '{"turn": {"drag": [0, 0]}}')
+        _pysplatkit.moved_by_hand(scene._own, own.to_json(), size, '{"turn": {"drag": [0, 0]}}')
         super().__init__(
             camera=own,
             size=size,
-            _presets=list(_splatkit.TRANSFER_FUNCTIONS),
-            _maps=list(_splatkit.COLOR_MAPS),
+            _presets=list(_pysplatkit.TRANSFER_FUNCTIONS),
+            _maps=list(_pysplatkit.COLOR_MAPS),
         )
         self._fields: list[dict[str, Any]] = []
         self._painter = Painter(self._take_frame)
@@ -135,7 +135,7 @@ class Widget(anywidget.AnyWidget):
         own = TransferFunction.of(value)
         if isinstance(own, str):
             own = self._named(self.field, own)
-        self._set_transfer(self.field, json.loads(_splatkit.checked_transfer(json.dumps(own))))
+        self._set_transfer(self.field, json.loads(_pysplatkit.checked_transfer(json.dumps(own))))
 
     def snapshot(self) -> npt.NDArray[np.uint8]:
         """Returns the exact picture: red, green, blue and opacity, (height, width, 4) bytes."""
@@ -150,7 +150,7 @@ class Widget(anywidget.AnyWidget):
     def refresh(self) -> None:
         """Draws the scene again: after items were added, or a transfer function was changed
         elsewhere."""
-        fields = json.loads(_splatkit.fields(self._scene._own))
+        fields = json.loads(_pysplatkit.fields(self._scene._own))
         counted = len(self._fields)
         # Items are only ever added. Those that are known keep the function they came with.
         self._fields += fields[counted:]
@@ -225,11 +225,11 @@ class Widget(anywidget.AnyWidget):
     def _on_colors(self, field: int, name: str) -> None:
         """Sets the colours of a map."""
         own = json.dumps(self._transfers[field])
-        text = _splatkit.recolored(own, name, tuple(self._ranges[field]))
+        text = _pysplatkit.recolored(own, name, tuple(self._ranges[field]))
         self._set_transfer(field, json.loads(text))
 
     def _on_transfer(self, field: int, transfer: dict[str, Any]) -> None:
-        text = _splatkit.checked_transfer(json.dumps(transfer))
+        text = _pysplatkit.checked_transfer(json.dumps(transfer))
         self._set_transfer(field, json.loads(text))
 
     # How that is done.
@@ -258,7 +258,7 @@ class Widget(anywidget.AnyWidget):
     def _move(self, **gesture: Any) -> None:
         text = _options.text(gesture)
         own = self.camera.to_json()
-        moved = _splatkit.moved_by_hand(self._scene._own, own, self.pixels, text)
+        moved = _pysplatkit.moved_by_hand(self._scene._own, own, self.pixels, text)
         self.camera = Camera.from_json(moved)
 
     def _picked(self, cursor: list[float]) -> list[float] | None:
@@ -266,12 +266,12 @@ class Widget(anywidget.AnyWidget):
         if self._shown is None:
             return None
         x, y = map(float, cursor)
-        return _splatkit.picked(self._shown, self.pixels, (x, y))
+        return _pysplatkit.picked(self._shown, self.pixels, (x, y))
 
     def _named(self, field: int, name: str) -> dict[str, Any]:
         """Returns a preset for a field. Light fades where the gradient is noise, as before."""
         own = self._fields[field]
-        text = _splatkit.named_transfer(name, own["range"], own["diagonal"])
+        text = _pysplatkit.named_transfer(name, own["range"], own["diagonal"])
         named: dict[str, Any] = json.loads(text)
         certain = (own["transfer"].get("shade") or {}).get("certain")
         if named.get("shade") and certain is not None:
@@ -280,7 +280,7 @@ class Widget(anywidget.AnyWidget):
 
     def _set_transfer(self, field: int, transfer: dict[str, Any]) -> None:
         item = self._fields[field]["item"]
-        _splatkit.set_transfer(self._scene._own, item, json.dumps(transfer))
+        _pysplatkit.set_transfer(self._scene._own, item, json.dumps(transfer))
         transfers = list(self._transfers)
         transfers[field] = transfer
         self._transfers = transfers
@@ -288,7 +288,7 @@ class Widget(anywidget.AnyWidget):
 
     def _count(self, field: int) -> None:
         """Counts the values of a field, on a thread of its own."""
-        counts = _splatkit.histogram(self._scene._own, self._fields[field]["item"])
+        counts = _pysplatkit.histogram(self._scene._own, self._fields[field]["item"])
 
         def take() -> None:
             histograms = list(self._histograms)

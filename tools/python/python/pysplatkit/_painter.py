@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from . import _splatkit
+from . import _pysplatkit
 from ._errors import Error
 
 #: The wanted time of a moving frame, in milliseconds. With what the browser and the kernel take,
@@ -25,7 +25,7 @@ class Order:
     """What is to be drawn: a scene, and as JSON a camera, the options of the exact picture, and the
     transfer functions that the scene has then."""
 
-    scene: _splatkit.Scene
+    scene: _pysplatkit.Scene
     camera: str
     draw: str
     transfers: str = ""
@@ -36,7 +36,7 @@ class Frame:
     """What was drawn of an order, or why nothing was."""
 
     order: Order
-    picture: _splatkit.Picture | None
+    picture: _pysplatkit.Picture | None
     is_exact: bool = False
     milliseconds: float = 0.0
     error: Error | None = None
@@ -49,13 +49,13 @@ class Painter:
     def __init__(self, tell: Callable[[Frame], None]) -> None:
         """`tell` is called with each frame, on the thread that draws."""
         self._tell = tell
-        self._pace = _splatkit.Pace(MOVING)
+        self._pace = _pysplatkit.Pace(MOVING)
         self._changed = threading.Condition()
         # All of these are used with the condition's lock only.
         self._order: Order | None = None
         self._is_new = False
         self._since = 0.0
-        self._refining: _splatkit.Stop | None = None
+        self._refining: _pysplatkit.Stop | None = None
         self._thread: threading.Thread | None = None
 
     def order(self, order: Order | None) -> None:
@@ -82,7 +82,7 @@ class Painter:
             order, effort, stop = step
             start = time.monotonic()
             try:
-                picture = _splatkit.render_frame(
+                picture = _pysplatkit.render_frame(
                     order.scene, order.camera, order.draw, effort, stop
                 )
             except Error as error:
@@ -102,7 +102,7 @@ class Painter:
                 return False
             return self._refining is not None
 
-    def _next(self) -> tuple[Order, tuple[float, float], _splatkit.Stop] | None:
+    def _next(self) -> tuple[Order, tuple[float, float], _pysplatkit.Stop] | None:
         """Waits for the next frame that is to be drawn; None at the end."""
         with self._changed:
             while True:
@@ -120,7 +120,7 @@ class Painter:
                 if not is_new and calm > 0:
                     self._changed.wait(calm)
                     continue
-                stop = _splatkit.Stop()
+                stop = _pysplatkit.Stop()
                 if not is_new:
                     self._refining = stop
                 return self._order, effort, stop

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from . import _arrays, _neighbours, _options, _splatkit
+from . import _arrays, _neighbours, _options, _pysplatkit
 from ._camera import Camera, Clip
 from ._errors import ArgumentError
 from ._options import Color, FieldLook, FileOptions, SurfaceLook, Vector, VolumeLook
@@ -28,7 +28,7 @@ class Scene:
     """
 
     def __init__(self) -> None:
-        self._own = _splatkit.Scene()
+        self._own = _pysplatkit.Scene()
 
     def add(self, source: Any, **options: Unpack[FileOptions]) -> Scene:
         """Adds a file, a folder of DICOM slices, an array, or an object of another package.
@@ -451,7 +451,7 @@ class Scene:
         behind = _options.background(background)
         return Picture(self._pixels(camera, {name: given[name] for name in _DRAW}), behind)
 
-    def _pixels(self, camera: Camera | None, draw: Mapping[str, Any]) -> _splatkit.Picture:
+    def _pixels(self, camera: Camera | None, draw: Mapping[str, Any]) -> _pysplatkit.Picture:
         """Draws with options by their names."""
         own = None if camera is None else camera.to_json()
         return self._own.render(own, _drawn(**draw))
@@ -461,7 +461,7 @@ class Scene:
     ) -> Widget:
         """Returns a widget for notebooks, in which the scene is turned by hand.
 
-        It needs the package anywidget: `pip install "splatkit[notebook]"`.
+        It needs the package anywidget: `pip install "pysplatkit[notebook]"`.
 
         Args:
             camera: The first view. Default: that of `Scene.camera`.
@@ -473,7 +473,7 @@ class Scene:
         except ModuleNotFoundError as error:
             if error.name not in ("anywidget", "traitlets"):
                 raise
-            message = 'Scene.show needs anywidget: pip install "splatkit[notebook]"'
+            message = 'Scene.show needs anywidget: pip install "pysplatkit[notebook]"'
             raise ImportError(message, name=error.name) from error
         return Widget(self, camera, size, **drawing)
 
@@ -493,7 +493,7 @@ class Scene:
 
     def __repr__(self) -> str:
         items = ", ".join(f"{kind} {name!r} of {count}" for kind, name, count in self.contents)
-        return f"<splatkit.Scene: {items or 'empty'}>"
+        return f"<pysplatkit.Scene: {items or 'empty'}>"
 
 
 #: What else `Scene.add` takes.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from . import _splatkit
+from . import _pysplatkit
 
 
 @dataclass
@@ -51,19 +51,19 @@ class Camera:
 
     def azimuth(self, degrees: float) -> Camera:
         """Orbits to the right around the up axis (VTK's Azimuth)."""
-        return self._take(_splatkit.moved_camera(self.to_json(), degrees, 0.0, 1.0))
+        return self._take(_pysplatkit.moved_camera(self.to_json(), degrees, 0.0, 1.0))
 
     def elevation(self, degrees: float) -> Camera:
         """Orbits upwards (VTK's Elevation)."""
-        return self._take(_splatkit.moved_camera(self.to_json(), 0.0, degrees, 1.0))
+        return self._take(_pysplatkit.moved_camera(self.to_json(), 0.0, degrees, 1.0))
 
     def zoom(self, factor: float) -> Camera:
         """Narrows the view by a factor (VTK's Zoom)."""
-        return self._take(_splatkit.moved_camera(self.to_json(), 0.0, 0.0, factor))
+        return self._take(_pysplatkit.moved_camera(self.to_json(), 0.0, 0.0, factor))
 
     def orthographic(self) -> Camera:
         """Removes the perspective; what lies at the focal point keeps its size."""
-        return self._take(_splatkit.orthographic_camera(self.to_json()))
+        return self._take(_pysplatkit.orthographic_camera(self.to_json()))
 
     def copy(self) -> Camera:
         """Returns a camera that can be changed without changing this one."""

@@ -138,7 +138,7 @@ def run(words: Sequence[str]) -> str:
     found = shutil.which(command)
     if found is None:
         raise ArgumentError(
-            f"there is no command {command}; install splatkit's, or let SPLATKIT_COMMAND name it"
+            f"there is no command {command}: build splatkit's, or let SPLATKIT_COMMAND name it"
         )
     done = subprocess.run([found, *words], capture_output=True, text=True, check=False)
     if done.returncode:

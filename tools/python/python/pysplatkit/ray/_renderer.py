@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 import ray
 
-from .. import _options, _splatkit
+from .. import _options, _pysplatkit
 from .._camera import Camera
 from .._errors import ArgumentError, NothingToDrawError
 from .._options import Color
@@ -34,7 +34,7 @@ class Renderer:
     """Draws a scene with several ranks, which are actors of Ray and keep the scene between
     pictures.
 
-    >>> with splatkit.ray.Renderer("large.splv", ranks=4, memory=512 << 20) as renderer:
+    >>> with pysplatkit.ray.Renderer("large.splv", ranks=4, memory=512 << 20) as renderer:
     ...     renderer.render((1920, 1080)).save("large.png")
     """
 
@@ -144,7 +144,7 @@ class Renderer:
         about = (_told(reports, sent), camera.to_json())
         factor = whole[0] // size[0]
         pixels = (color.reshape(-1, 4), depth.ravel(), whole, factor, about)
-        return Picture(_splatkit.Picture(*pixels), back)
+        return Picture(_pysplatkit.Picture(*pixels), back)
 
     def render_path(
         self,
@@ -164,7 +164,7 @@ class Renderer:
         path = list(cameras)
         for number, (color, depth, statistics) in self._frames(path, given):
             about = (statistics, path[number].to_json())
-            own = _splatkit.Picture(color.reshape(-1, 4), depth.ravel(), size, 1, about)
+            own = _pysplatkit.Picture(color.reshape(-1, 4), depth.ravel(), size, 1, about)
             yield Picture(own, back)
 
     @property
