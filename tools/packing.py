@@ -1,10 +1,10 @@
 """The parts of tools/release that a shell does badly. Needs nothing but Python's own library.
 
-    packing.py notices TARGET           print the licences of the crates built into the command
-    packing.py pack FOLDER ARCHIVE      pack a folder as .tar.xz or .zip, the same bytes each time
-    packing.py unpack ARCHIVE FOLDER    unpack such an archive
-    packing.py sums [--check]           write SHA256SUMS of this folder's files, or compare them
-    packing.py picture FILE             fail if a PNG has fewer than 100 colours
+packing.py notices TARGET           print the licences of the crates built into the command
+packing.py pack FOLDER ARCHIVE      pack a folder as .tar.xz or .zip, the same bytes each time
+packing.py unpack ARCHIVE FOLDER    unpack such an archive
+packing.py sums [--check]           write SHA256SUMS of this folder's files, or compare them
+packing.py picture FILE             fail if a PNG has fewer than 100 colours
 """
 
 import hashlib
@@ -72,22 +72,24 @@ def pack(folder: Path, archive: Path) -> None:
     when = int(os.environ["SOURCE_DATE_EPOCH"])
     files = sorted(file for file in folder.rglob("*") if file.is_file())
     names = [(file, file.relative_to(folder.parent).as_posix()) for file in files]
-    program = {"splatkit", "splatkit.exe"}
     if archive.suffix == ".zip":
         with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
             for file, name in names:
-                info = zipfile.ZipInfo(name, time.gmtime(when)[:6])
-                info.compress_type = zipfile.ZIP_DEFLATED
-                info.external_attr = (0o755 if file.name in program else 0o644) << 16
-                packed.writestr(info, file.read_bytes())
+                entry = zipfile.ZipInfo(name, time.gmtime(when)[:6])
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = mode(file) << 16
+                packed.writestr(entry, file.read_bytes())
         return
-    with tarfile.open(archive, "w:xz", preset=9) as packed:
+    with tarfile.open(archive, "w:xz", preset=9) as tar:
         for file, name in names:
             info = tarfile.TarInfo(name)
-            info.size, info.mtime = file.stat().st_size, when
-            info.mode = 0o755 if file.name in program else 0o644
+            info.size, info.mtime, info.mode = file.stat().st_size, when, mode(file)
             with file.open("rb") as content:
-                packed.addfile(info, content)
+                tar.addfile(info, content)
+
+
+def mode(file: Path) -> int:
+    return 0o755 if file.name in ("splatkit", "splatkit.exe") else 0o644
 
 
 def unpack(archive: Path, folder: Path) -> None:
@@ -95,9 +97,8 @@ def unpack(archive: Path, folder: Path) -> None:
         with zipfile.ZipFile(archive) as packed:
             packed.extractall(folder)
         return
-    with tarfile.open(archive) as packed:
-        # Python 3.11 has the filter from 3.11.4 on.
-        packed.extractall(folder, filter="data")
+    with tarfile.open(archive) as tar:
+        tar.extractall(folder, filter="data")
 
 
 def sums(check: bool) -> None:
@@ -128,15 +129,17 @@ def picture(file: Path) -> None:
     if depth != 8:
         sys.exit(f"error: {file} has {depth} bits")
     rows, stride = zlib.decompress(packed), width * channels
-    above, colors = bytearray(stride), set()
+    above = bytearray(stride)
+    colors: set[bytes] = set()
     for y in range(height):
         start = y * (stride + 1)
-        kind, row = rows[start], bytearray(rows[start + 1 : start + 1 + stride])
+        predictor, row = rows[start], bytearray(rows[start + 1 : start + 1 + stride])
         for i in range(stride):
             left = row[i - channels] if i >= channels else 0
             corner = above[i - channels] if i >= channels else 0
             near = (0, left, above[i], (left + above[i]) // 2)
-            row[i] = row[i] + (near[kind] if kind < 4 else paeth(left, above[i], corner)) & 255
+            guess = near[predictor] if predictor < 4 else paeth(left, above[i], corner)
+            row[i] = (row[i] + guess) & 255
         colors.update(bytes(row[x : x + channels]) for x in range(0, stride, channels))
         above = row
     print(f"{file.name}: {width}x{height}, {len(colors)} colours")
