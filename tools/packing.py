@@ -80,7 +80,7 @@ def pack(folder: Path, archive: Path) -> None:
                 entry.external_attr = mode(file) << 16
                 packed.writestr(entry, file.read_bytes())
         return
-    with tarfile.open(archive, "w:xz", preset=9) as tar:
+    with tarfile.open(archive, "w:xz") as tar:
         for file, name in names:
             info = tarfile.TarInfo(name)
             info.size, info.mtime, info.mode = file.stat().st_size, when, mode(file)
