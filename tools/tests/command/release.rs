@@ -1,8 +1,6 @@
 //! The names of what a release packs: those that tools/release makes for the targets of the
 //! workflow are those that `cargo binstall` asks for, by the metadata of tools/Cargo.toml.
 
-#![cfg(unix)]
-
 use serde_json::Value;
 use std::{fs, path::Path, process::Command};
 
