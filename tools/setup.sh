@@ -36,7 +36,8 @@ has_vulkan() {
 
 command -v cargo >/dev/null || PATH="$PATH:$HOME/.cargo/bin"
 command -v cargo >/dev/null || fail "cargo is missing: install Rust from https://rustup.rs"
-command -v cc >/dev/null || install_packages gcc libc6-dev
+# Elsewhere, the compiler of the system links, under another name on Windows.
+[ "$(uname -s)" != Linux ] || command -v cc >/dev/null || install_packages gcc libc6-dev
 
 # Installs a Vulkan driver if there is none.
 need_vulkan() {
