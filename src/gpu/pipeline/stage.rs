@@ -23,18 +23,16 @@ impl Stage {
     pub fn new(gpu: &Gpu, recipe: &Recipe) -> Self {
         let label = recipe.label.clone();
         let most_workgroups = gpu.device.limits().max_compute_workgroups_per_dimension;
-        let source = recipe.source(most_workgroups);
-        let made_of = format!("{label}\n{}\n{:?}\n{source}", recipe.entry, recipe.groups);
-        let hash = blake3::hash(made_of.as_bytes());
-        let compiled = gpu.pipeline_cache.get(hash, || Self::compile(&gpu.device, recipe, source));
+        let compile = || Self::compile(&gpu.device, recipe, most_workgroups);
+        let compiled = gpu.pipeline_cache.get(recipe.hash(most_workgroups), compile);
         Self { label, compiled, most_workgroups }
     }
 
-    fn compile(device: &wgpu::Device, recipe: &Recipe, source: String) -> Compiled {
+    fn compile(device: &wgpu::Device, recipe: &Recipe, most_workgroups: u32) -> Compiled {
         let label = recipe.label.as_str();
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
+            source: wgpu::ShaderSource::Wgsl(recipe.source(most_workgroups).into()),
         };
         // Loop counters and clamped indices keep the driver from unrolling the loops over an
         // invocation's pixels. The sums of the pixels then live in memory instead of registers:
