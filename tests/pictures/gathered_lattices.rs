@@ -16,8 +16,11 @@ use splatkit::{
 };
 use std::sync::Arc;
 
+/// Small pictures, because there are many.
+const SIZE: [u32; 2] = [40, 32];
+
 fn drawn(case: &Case) -> Picture {
-    let settings = Settings { evaluate: Evaluate::Gather, ..case.settings.clone() };
+    let settings = Settings { evaluate: Evaluate::Gather, size: SIZE, ..case.settings.clone() };
     CpuRenderer::new(&case.scene)
         .expect(case.name)
         .render(&case.camera, &settings)
@@ -26,7 +29,8 @@ fn drawn(case: &Case) -> Picture {
 }
 
 fn truth(case: &Case) -> Picture {
-    reference::render(&case.scene, &case.camera, &case.settings).expect(case.name)
+    let settings = Settings { size: SIZE, ..case.settings.clone() };
+    reference::render(&case.scene, &case.camera, &settings).expect(case.name)
 }
 
 /// The case with another kernel. Its volume is sharpened if `is_sharp`.

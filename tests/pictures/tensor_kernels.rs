@@ -15,6 +15,9 @@ use splatkit::{
     volume::{Lattice, Reconstruction, Samples, Volume},
 };
 
+/// Small pictures, because there are many.
+const SIZE: [u32; 2] = [40, 32];
+
 /// The kernels, and whether the volume is sharpened.
 const KERNELS: [(Tensor, bool); 4] = [
     (Tensor::Linear, false),
@@ -38,7 +41,8 @@ fn with_kernel(case: &Case, tensor: Tensor, is_sharp: bool) -> Case {
         other => other.clone(),
     });
     let scene = Scene { items: items.collect() };
-    Case { name: case.name, scene, camera: case.camera.clone(), settings: case.settings.clone() }
+    let settings = Settings { size: SIZE, ..case.settings.clone() };
+    Case { name: case.name, scene, camera: case.camera.clone(), settings }
 }
 
 /// A case with random bytes on a lattice of `dims` samples, whose border is visible.
