@@ -109,6 +109,7 @@ impl Drop for StopAtEnd<'_> {
 
 #[test]
 fn files_that_are_written_to_while_they_are_read() {
+    crate::count_panics();
     let (folder, limits) = (Folder::new(), Limits::default());
     for (name, bytes) in files() {
         assert!(bytes.len().is_multiple_of(PAGE), "{name}: {}", bytes.len());
