@@ -94,9 +94,9 @@ fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> vec2<f32> {
 }
 
 // Factor by which a splat's windows reach beyond the ellipsoid. Mass further away is added to the
-// splat's first or last sheet. With 1.25 the pictures of tests/engine_equals_reference.rs agree to
-// 69 dB or better, with 1 to 49 dB; bunny's entries grow by 5 %. An isotropic lattice kernel, wide
-// compared with its sheets, does not need this.
+// splat's first or last sheet. With 1.25 the pictures of tests/pictures/cases.rs agree to 69 dB or
+// better, with 1 to 49 dB; bunny's entries grow by 5 %. An isotropic lattice kernel, wide compared
+// with its sheets, does not need this.
 const SECTION_OVERREACH: f32 = 1.25;
 
 fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {

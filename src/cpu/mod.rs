@@ -3,8 +3,8 @@
 //! A tile of 8 × 8 pixels is drawn sheet by sheet, front to back. *Splats* scatter: each adds its
 //! sections to the sheets it meets (`scatter`). The field of a lattice is *gathered*: each pixel
 //! evaluates it on the planes between its sheets (`gather`). Then the sheet is classified, lit and
-//! composited (`close`). The GPU engine does the same in shaders; tests/cpu_equals_reference.rs
-//! compares both with the reference.
+//! composited (`close`). The GPU engine does the same in shaders; tests/pictures/cases.rs compares
+//! both with the reference.
 //!
 //! A scene may have several *fields*. Each has a plan of its own: its tables, its lattice and its
 //! light, with the view and the sheets that all share. In a sheet, each field is classified by

@@ -199,7 +199,7 @@ const GATHERED_ROWS: u32 = 1;
 
 /// Distance, in footprint radii, beyond which the sections of an isotropic kernel count as the same
 /// for all pixels. The error is at most a hundredth of the radius, at the footprint's rim;
-/// tests/engine_equals_reference.rs bounds the error of the picture.
+/// tests/pictures/cases.rs bounds the error of the picture.
 const ISOTROPIC_DISTANCE: f64 = 50.0;
 
 /// Whether the kernels of a lattice are round, and so far away that their sections are the same for

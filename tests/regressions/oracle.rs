@@ -1,7 +1,7 @@
 //! What must hold for every input, whatever its bytes: the reader returns an error or a valid
 //! result, in little time and memory. The fuzz targets (`fuzz/`) and the regression tests
-//! (`tests/regressions.rs`) share these entry points. There is one per format, with the name of its
-//! fuzz target and of its folder of regressions.
+//! (`tests/files/regressions.rs`) share these entry points. There is one per format, with the name
+//! of its fuzz target and of its folder of regressions.
 //!
 //! A function here panics if the library breaks a promise, and returns otherwise.
 

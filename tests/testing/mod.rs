@@ -1,8 +1,9 @@
-//! Helpers that several integration tests share.
+//! Helpers that several tests share.
 
-#![allow(dead_code, reason = "each test file uses only a part")]
+#![allow(dead_code, reason = "each program uses only a part")]
 
 pub mod folder;
+pub mod gpu;
 pub mod grid;
 pub mod outline;
 pub mod psnr;

@@ -1,4 +1,4 @@
-//! Files are written by `Made`, a writer of its own; tests/medical.rs reads those of pydicom.
+//! Files are written by `Made`, a writer of its own; tests/files/medical.rs reads those of pydicom.
 
 mod made;
 mod series_of_files;

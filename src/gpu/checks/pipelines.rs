@@ -7,7 +7,7 @@ use super::{
     variants,
 };
 use crate::gpu::pipeline::{
-    recipe::{Binding, Recipe},
+    recipe::{Binding, Recipe, split, words},
     variant::Variant,
 };
 use naga::{
@@ -31,11 +31,6 @@ fn told(error: impl Error) -> String {
     causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
-/// Returns the words of a shader: its names, among others.
-fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|c: char| !(c.is_alphanumeric() || c == '_'))
-}
-
 /// Finds pipelines that compile alike: they differ in constants that their shaders do not mention.
 #[derive(Default)]
 struct Essences {
@@ -47,8 +42,7 @@ impl Essences {
     /// Returns the number of the pipeline's shader, and the constants that it mentions.
     fn of(&mut self, recipe: &Recipe) -> (usize, Vec<String>) {
         let source = source_of(recipe);
-        let generated = source.lines().take_while(|line| line.starts_with("const "));
-        let (constants, body) = source.split_at(generated.map(|line| line.len() + 1).sum());
+        let (constants, body) = split(&source);
         if !self.known.contains_key(body) {
             let words = words(body).map(str::to_owned).collect();
             self.known.insert(body.to_owned(), (self.known.len(), words));

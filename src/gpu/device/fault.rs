@@ -120,6 +120,7 @@ impl Gpu {
     }
 
     fn told(&self, complaint: wgpu::Error) -> Error {
+        self.pipeline_cache.forget();
         let (name, reason) = (&self.info.name, complaint.to_string());
         Error::Driver(match complaint {
             wgpu::Error::OutOfMemory { .. } => format!("the memory of {name} ran out: {reason}"),

@@ -1,14 +1,17 @@
 //! The GPU device: which adapters can run the engine, how a device is opened, and its limits. The
-//! submodules create buffers, turn a device's faults into errors, and read its clock.
+//! submodules create buffers, keep compiled pipelines, turn a device's faults into errors, and read
+//! its clock.
 
 pub(crate) mod buffers;
 pub(crate) mod fault;
+pub(crate) mod pipeline_cache;
 pub(crate) mod readback;
 #[cfg(not(target_arch = "wasm32"))]
 pub(crate) mod timestamps;
 
 use crate::{Error, Result, memory};
 use fault::{Answers, Condition};
+use pipeline_cache::PipelineCache;
 use std::{sync::Arc, time::Duration};
 
 /// Storage buffers that march binds if a lattice is gathered among surfaces. WebGPU promises eight.
@@ -32,6 +35,7 @@ pub struct Gpu {
     pub info: Arc<wgpu::AdapterInfo>,
     pub(crate) condition: Arc<Condition>,
     pub(crate) answers: Answers,
+    pub(crate) pipeline_cache: Arc<PipelineCache>,
     pub(crate) patience: Duration,
     /// Maximum bytes of memory that a scene may take.
     memory: u64,
@@ -260,6 +264,7 @@ impl Gpu {
             info: Arc::new(info),
             condition: Arc::default(),
             answers: Answers::default(),
+            pipeline_cache: Arc::default(),
             patience: PATIENCE,
             memory,
             choice: None,

@@ -1,28 +1,35 @@
 //! One compute pipeline with its bindings, compiled from its recipe.
 
 use super::recipe::{Binding, Recipe};
-use crate::gpu::device::Gpu;
+use crate::gpu::device::{Gpu, pipeline_cache::Compiled};
 
-/// A compute pipeline and the layouts of its bind groups.
+/// A compute pipeline, ready to be bound and dispatched.
 #[derive(Debug, Clone)]
 pub struct Stage {
     label: String,
-    pipeline: wgpu::ComputePipeline,
-    layouts: Vec<wgpu::BindGroupLayout>,
+    compiled: Compiled,
     /// Maximum number of workgroups along one dimension of a dispatch. Shaders know it as
     /// `MOST_WORKGROUPS`.
     most_workgroups: u32,
 }
 
 impl Stage {
-    /// Compiles several recipes.
+    /// Returns the stages of several recipes.
     pub fn all<const N: usize>(gpu: &Gpu, recipes: [Recipe; N]) -> [Self; N] {
         recipes.map(|recipe| Self::new(gpu, &recipe))
     }
 
+    /// Returns the stage of a recipe, which is compiled if the device does not have it yet.
     pub fn new(gpu: &Gpu, recipe: &Recipe) -> Self {
-        let (device, label) = (&gpu.device, recipe.label.as_str());
-        let most_workgroups = device.limits().max_compute_workgroups_per_dimension;
+        let label = recipe.label.clone();
+        let most_workgroups = gpu.device.limits().max_compute_workgroups_per_dimension;
+        let compile = || Self::compile(&gpu.device, recipe, most_workgroups);
+        let compiled = gpu.pipeline_cache.get(recipe.hash(most_workgroups), compile);
+        Self { label, compiled, most_workgroups }
+    }
+
+    fn compile(device: &wgpu::Device, recipe: &Recipe, most_workgroups: u32) -> Compiled {
+        let label = recipe.label.as_str();
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(recipe.source(most_workgroups).into()),
@@ -62,7 +69,7 @@ impl Stage {
             },
             cache: None,
         });
-        Self { label: label.to_owned(), pipeline, layouts, most_workgroups }
+        Compiled { pipeline, layouts }
     }
 
     /// Binds buffers, or parts of them, to group `group`, in the order of their binding numbers.
@@ -81,7 +88,7 @@ impl Stage {
             .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(&self.label),
-            layout: &self.layouts[group],
+            layout: &self.compiled.layouts[group],
             entries: &entries,
         })
     }
@@ -95,7 +102,7 @@ impl Stage {
     ) -> wgpu::BindGroup {
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(&self.label),
-            layout: &self.layouts[group],
+            layout: &self.compiled.layouts[group],
             entries: &[wgpu::BindGroupEntry {
                 binding: 0,
                 resource: wgpu::BindingResource::TextureView(texture),
@@ -141,7 +148,7 @@ impl Stage {
             label: Some(&self.label),
             timestamp_writes: None,
         });
-        pass.set_pipeline(&self.pipeline);
+        pass.set_pipeline(&self.compiled.pipeline);
         for (index, group) in (0..).zip(groups) {
             pass.set_bind_group(index, *group, &[]);
         }
@@ -180,4 +187,22 @@ pub fn layout_of(
         label: Some(label),
         entries: &entries,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{device::AdapterChoice, pipeline::scan::Scan};
+
+    #[test]
+    fn a_device_compiles_each_recipe_once() {
+        let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("an adapter");
+        let pipelines =
+            |gpu: &Gpu| Stage::all(gpu, Scan::recipes()).map(|own| own.compiled.pipeline);
+        let first = pipelines(&gpu);
+        assert_eq!(first, pipelines(&gpu.clone().with_memory(1)), "shared by the device's clones");
+        assert!(first[0] != first[1] && first[1] != first[2], "entry points differ");
+        gpu.pipeline_cache.forget();
+        assert_ne!(first, pipelines(&gpu), "compiled again after an error");
+    }
 }

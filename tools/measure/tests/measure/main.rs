@@ -1,6 +1,6 @@
 //! Runs `splatkit-measure`: its tasks, their tables, and the blocks of documents that they replace.
 
-#[path = "../../../tests/common/mod.rs"]
+#[path = "../../../tests/command/common/mod.rs"]
 mod common;
 mod figures;
 mod suite;

@@ -1,0 +1,18 @@
+//! Files: what is read from them and written to them. Also the files of the project itself: its
+//! modules, and the tables of its README.
+
+mod external;
+#[path = "../regressions/flat.rs"]
+mod flat;
+mod house;
+mod laboratories;
+mod list_of_formats;
+mod medical;
+mod paged;
+mod regressions;
+#[cfg(feature = "remote")]
+mod remote;
+#[path = "../testing/mod.rs"]
+mod testing;
+mod upright;
+mod vtk_files;

@@ -1,0 +1,424 @@
+//! A host application that owns the frame: it encodes splatkit's passes among its own, polls, and
+//! composites by depth. The pictures are those that `render` reads back.
+
+#[path = "../../examples/host/compositor.rs"]
+mod compositor;
+
+use crate::testing::gpu::gpu;
+use compositor::{Compositor, Corner};
+use splatkit::{
+    Error,
+    glam::{DVec2, DVec3, DVec4},
+    gpu::{Budget, Gpu, Output, PreparedScene, Progress, Renderer},
+    hierarchy::{BuildOptions, Detail, Hierarchy, Tree, file},
+    input::Limits,
+    math::{Camera, Kernel},
+    picture::Picture,
+    scene::{Evaluate, Scene, Settings},
+    surface::{Mesh, SurfelOptions},
+    volume::{TransferFunction, phantoms::Phantom},
+    wgpu::{self, TextureFormat, TextureUsages},
+};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+const SIZE: [u32; 2] = [90, 70];
+
+fn knot() -> splatkit::splat::SplatSet {
+    Mesh::knot(200, 24).surfels(&SurfelOptions::default()).expect("surfels")
+}
+
+fn with_volume(scene: Scene) -> Scene {
+    let volume = Phantom::Specimen.sample_bytes([40; 3]).expect("a volume");
+    let transfer = TransferFunction::automatic(&volume);
+    scene.with_volume(volume, Kernel::default(), transfer)
+}
+
+fn hierarchy() -> Scene {
+    let tree = Tree::build(&knot(), &BuildOptions::default(), None).expect("a tree");
+    let bytes = file::to_bytes(&tree, &file::WriteOptions::default()).expect("the file");
+    let own = Hierarchy::from_bytes(bytes, "knot", &Limits::default()).expect("a hierarchy");
+    Scene::new().with_hierarchy(own)
+}
+
+fn camera(scene: &Scene) -> Camera {
+    let mut camera = Camera::framing(&scene.bounds(), DVec3::NEG_Z, DVec3::Y, 9.0 / 7.0);
+    camera.azimuth(35.0);
+    camera
+}
+
+/// A texture to draw into and to read.
+fn texture(gpu: &Gpu, format: TextureFormat, [width, height]: [u32; 2]) -> wgpu::TextureView {
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("test"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+fn buffer(gpu: &Gpu, bytes: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("test"),
+        size: bytes,
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+/// Returns the bytes that `copy` brings to a buffer.
+fn bytes(
+    gpu: &Gpu,
+    count: u64,
+    copy: impl FnOnce(&mut wgpu::CommandEncoder, &wgpu::Buffer),
+) -> Vec<u8> {
+    let staging = buffer(gpu, count, wgpu::BufferUsages::MAP_READ);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    copy(&mut encoder, &staging);
+    gpu.queue.submit([encoder.finish()]);
+    staging.map_async(wgpu::MapMode::Read, .., |mapped| mapped.expect("mapped"));
+    gpu.wait().expect("a sound device");
+    staging.get_mapped_range(..).expect("mapped").to_vec()
+}
+
+/// Returns the texels of a texture, row by row.
+fn texels(gpu: &Gpu, view: &wgpu::TextureView, bytes_each: u32) -> Vec<u8> {
+    let size = view.texture().size();
+    let (own, row) = (size.width * bytes_each, (size.width * bytes_each).next_multiple_of(256));
+    let rows = bytes(gpu, u64::from(row * size.height), |encoder, staging| {
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(row),
+            rows_per_image: None,
+        };
+        encoder.copy_texture_to_buffer(
+            view.texture().as_image_copy(),
+            wgpu::TexelCopyBufferInfo { buffer: staging, layout },
+            size,
+        );
+    });
+    rows.chunks(row as usize).flat_map(|row| row[..own as usize].to_vec()).collect()
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.chunks_exact(4).map(|word| f32::from_le_bytes(word.try_into().unwrap())).collect()
+}
+
+/// Draws a picture as a host does. Returns the number of its batches.
+fn drawn(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    prepared: &mut PreparedScene,
+    (camera, settings): (&Camera, &Settings),
+    output: Output,
+) -> splatkit::Result<u32> {
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let mut frame = renderer.encode(&mut encoder, prepared, camera, settings, output)?;
+    assert!(matches!(renderer.poll(prepared, &mut frame)?, Progress::Working), "not submitted");
+    gpu.queue.submit([encoder.finish()]);
+    let mut batches = 1;
+    loop {
+        match renderer.poll(prepared, &mut frame)? {
+            Progress::Done(stats) => {
+                assert!(stats.splats + stats.gathered > 0);
+                return Ok(batches);
+            }
+            Progress::NextBatch => {
+                batches += 1;
+                let mut encoder = gpu.device.create_command_encoder(&Default::default());
+                renderer.encode_next(&mut encoder, prepared, &mut frame)?;
+                gpu.queue.submit([encoder.finish()]);
+            }
+            _ => std::thread::yield_now(),
+        }
+    }
+}
+
+fn same_depths(found: &[f32], expected: &[f32]) {
+    for (at, (found, expected)) in found.iter().zip(expected).enumerate() {
+        let is_near = found == expected || (found - expected).abs() <= 1e-6 * expected.abs();
+        assert!(is_near, "depth of pixel {at}: {found}, not {expected}");
+    }
+}
+
+/// Draws a scene into textures and into buffers, and compares them with the picture of `render`.
+/// Returns the number of batches.
+fn check(name: &str, scene: &Scene, settings: &Settings, budget: Budget) -> u32 {
+    let gpu = gpu();
+    let mut renderer = Renderer::with_budget(gpu, budget);
+    let mut prepared = renderer.prepare(scene).expect(name);
+    let camera = camera(scene);
+    let view = (&camera, settings);
+    let color = texture(gpu, TextureFormat::Rgba32Float, SIZE);
+    let depth = texture(gpu, TextureFormat::R32Float, SIZE);
+    let output = Output::Textures {
+        color: color.clone(),
+        format: TextureFormat::Rgba32Float,
+        depth: Some(depth.clone()),
+    };
+    // First of all, so that nothing is left of another picture.
+    let batches = drawn(gpu, &mut renderer, &mut prepared, view, output).expect(name);
+    let (expected, _) = renderer.render(&mut prepared, &camera, settings).expect(name);
+    assert!(expected.color.iter().any(|pixel| pixel[3] > 0.3), "{name}: an empty picture");
+    assert_eq!(floats(&texels(gpu, &color, 16)), expected.color.as_flattened(), "{name}");
+    same_depths(&floats(&texels(gpu, &depth, 4)), &expected.depth);
+
+    let pixels = u64::from(SIZE[0] * SIZE[1]);
+    let own = |bytes| buffer(gpu, bytes, wgpu::BufferUsages::COPY_SRC);
+    let (colors, distances) = (own(16 * pixels), own(4 * pixels));
+    let output = Output::Buffers { color: colors.clone(), distance: Some(distances.clone()) };
+    drawn(gpu, &mut renderer, &mut prepared, view, output).expect(name);
+    let read = |from: &wgpu::Buffer| {
+        let all = bytes(gpu, from.size(), |encoder, to| {
+            encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+        });
+        floats(&all)
+    };
+    assert_eq!(read(&colors), expected.color.as_flattened(), "{name}");
+    let rays = camera.view(SIZE).unwrap();
+    let depths = read(&distances).into_iter().enumerate().map(|(at, distance)| {
+        let [x, y] = [at as u32 % SIZE[0], at as u32 / SIZE[0]].map(|n| f64::from(n) + 0.5);
+        match expected.color[at][3] < 0.5 {
+            true => f32::INFINITY,
+            false => distance * rays.ray(DVec2::new(x, y)).1.z as f32,
+        }
+    });
+    same_depths(&depths.collect::<Vec<_>>(), &expected.depth);
+    batches
+}
+
+#[test]
+fn a_host_gets_the_picture_that_is_read_back() {
+    let settings = Settings::new(SIZE);
+    let usual = Budget::default();
+    check("surfels", &Scene::new().with_splats(knot()), &settings, usual);
+    check("a volume", &with_volume(Scene::new()), &settings, usual);
+    let scatter = Settings { evaluate: Evaluate::Scatter, ..settings.clone() };
+    check("a scattered volume", &with_volume(Scene::new()), &scatter, usual);
+    check("both", &with_volume(Scene::new().with_splats(knot())), &settings, usual);
+    check("a hierarchy", &hierarchy(), &settings, usual);
+    let few = Settings { detail: Detail::Splats(500), ..settings };
+    let batches = check("a hierarchy in few splats", &hierarchy(), &few, usual);
+    assert!(batches > 1, "the cut is counted first");
+}
+
+/// A picture that does not fit a pass takes several batches. The textures stay as they are until
+/// the last.
+#[test]
+fn small_passes_take_several_batches() {
+    let scene = with_volume(Scene::new());
+    let settings = Settings { evaluate: Evaluate::Scatter, ..Settings::new(SIZE) };
+    let budget = Budget { entries: 1 << 14, record_words: 1 << 13, ..Budget::default() };
+    assert!(check("small passes", &scene, &settings, budget) > 1);
+}
+
+#[test]
+fn srgb_textures_display_the_same_colours() {
+    let gpu = gpu();
+    let scene = Scene::new().with_splats(knot());
+    let (camera, settings) = (camera(&scene), Settings::new(SIZE));
+    let mut renderer = Renderer::new(gpu);
+    let mut prepared = renderer.prepare(&scene).unwrap();
+    let mut shown = |format| {
+        let view = texture(gpu, format, SIZE);
+        let own = (&camera, &settings);
+        drawn(gpu, &mut renderer, &mut prepared, own, (&view).into()).unwrap();
+        texels(gpu, &view, 4)
+    };
+    // Both hold the bytes that are displayed. Where pixels are translucent, they differ: colours
+    // are multiplied by opacity before they are encoded.
+    let [plain, srgb] = [TextureFormat::Rgba8Unorm, TextureFormat::Rgba8UnormSrgb].map(&mut shown);
+    let mut opaque = 0;
+    for (plain, srgb) in plain.chunks_exact(4).zip(srgb.chunks_exact(4)) {
+        assert_eq!(plain[3], srgb[3]);
+        if plain[3] == 255 {
+            opaque += 1;
+            let far = plain.iter().zip(srgb).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(far <= Some(1), "{plain:?} is displayed as {srgb:?}");
+        }
+    }
+    assert!(opaque > 500);
+}
+
+#[test]
+fn a_picture_can_be_awaited() {
+    let gpu = gpu();
+    let scene = with_volume(Scene::new().with_splats(knot()));
+    let (camera, settings) = (camera(&scene), Settings::new(SIZE));
+    let mut renderer = Renderer::new(gpu);
+    let mut prepared = renderer.prepare(&scene).unwrap();
+    let is_done = AtomicBool::new(false);
+    let (picture, stats) = std::thread::scope(|threads| {
+        // The event loop of the host.
+        threads.spawn(|| {
+            while !is_done.load(Ordering::Relaxed) {
+                gpu.device.poll(wgpu::PollType::Poll).expect("a sound device");
+                std::thread::yield_now();
+            }
+        });
+        let drawn = pollster::block_on(renderer.render_async(&mut prepared, &camera, &settings));
+        is_done.store(true, Ordering::Relaxed);
+        drawn
+    })
+    .unwrap();
+    assert!(stats.splats > 0);
+    let (expected, _) = renderer.render(&mut prepared, &camera, &settings).unwrap();
+    assert_eq!(picture.color, expected.color);
+    assert_eq!(picture.depth, expected.depth);
+}
+
+#[test]
+fn misuse_is_refused_with_what_to_do() {
+    let gpu = gpu();
+    let scene = Scene::new().with_splats(knot());
+    let (camera, settings) = (camera(&scene), Settings::new(SIZE));
+    let mut renderer = Renderer::new(gpu);
+    let mut prepared = renderer.prepare(&scene).unwrap();
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let usual = texture(gpu, TextureFormat::Rgba8Unorm, SIZE);
+    let textures = |color: &wgpu::TextureView, depth: Option<&wgpu::TextureView>| {
+        let format = color.texture().format();
+        Output::Textures { color: color.clone(), format, depth: depth.cloned() }
+    };
+    let small = buffer(gpu, 100, wgpu::BufferUsages::COPY_SRC);
+    let narrow = texture(gpu, TextureFormat::Rgba8Unorm, [80, 70]);
+    let outputs = [
+        (textures(&narrow, None), "the texture of the colours is 80x70, the picture 90x70"),
+        (textures(&usual, Some(&usual)), "depths need the format R32Float, not Rgba8Unorm"),
+        ((&small).into(), "the buffer of the colours has 100 bytes; 100800 are needed"),
+    ];
+    let said = |error: Error| match error {
+        Error::Argument(message) => message,
+        other => panic!("{other}"),
+    };
+    for (output, message) in outputs {
+        let refused = renderer.encode(&mut encoder, &mut prepared, &camera, &settings, output);
+        assert_eq!(said(refused.expect_err(message)), message);
+    }
+
+    let mut begin = |encoder: &mut _, prepared: &mut _| {
+        renderer.encode(encoder, prepared, &camera, &settings, &usual).unwrap()
+    };
+    let mut older = begin(&mut encoder, &mut prepared);
+    let mut newer = begin(&mut encoder, &mut prepared);
+    gpu.queue.submit([encoder.finish()]);
+    let refused = said(renderer.poll(&mut prepared, &mut older).unwrap_err());
+    assert!(refused.contains("another picture was begun"), "{refused}");
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let refused = renderer.encode_next(&mut encoder, &mut prepared, &mut newer).unwrap_err();
+    assert!(said(refused).contains("the last batch of the picture is not done"));
+}
+
+/// An opaque picture of the triangles alone, and their view-space z.
+fn triangles_alone(corners: &[Corner], camera: &Camera) -> Vec<Option<(f64, [f32; 3])>> {
+    let view = camera.view(SIZE).unwrap();
+    let clip = view.clip_from_world(0.1, 1000.0);
+    let mut pixels = vec![None; (SIZE[0] * SIZE[1]) as usize];
+    for triangle in corners.chunks_exact(3) {
+        let points = [0, 1, 2].map(|at| {
+            let p = clip * DVec3::from(triangle[at].position.map(f64::from)).extend(1.0);
+            let (DVec4 { x, y, .. }, [width, height]) = (p / p.w, SIZE.map(f64::from));
+            (DVec2::new(0.5 * (x + 1.0) * width, 0.5 * (1.0 - y) * height), p.w)
+        });
+        let area = |a: DVec2, b: DVec2, c: DVec2| (b - a).perp_dot(c - a);
+        let whole = area(points[0].0, points[1].0, points[2].0);
+        for (at, pixel) in pixels.iter_mut().enumerate() {
+            let [x, y] = [at as u32 % SIZE[0], at as u32 / SIZE[0]].map(|n| f64::from(n) + 0.5);
+            let place = DVec2::new(x, y);
+            let weights = [0, 1, 2]
+                .map(|at| area(points[(at + 1) % 3].0, points[(at + 2) % 3].0, place) / whole);
+            if weights.iter().any(|&weight| weight < 0.0) {
+                continue;
+            }
+            let z = 1.0 / (0..3).map(|at| weights[at] / points[at].1).sum::<f64>();
+            if pixel.is_none_or(|(nearest, _)| z < nearest) {
+                *pixel = Some((z, triangle[0].color));
+            }
+        }
+    }
+    pixels
+}
+
+/// The composite of the example's host is the two pictures put together by depth.
+#[test]
+fn a_host_composites_its_triangles_by_depth() {
+    let gpu = gpu();
+    let scene = with_volume(Scene::new().with_splats(knot()));
+    let camera = camera(&scene);
+    let (center, size) = (scene.bounds().center(), 0.5 * scene.bounds().diagonal());
+    let corner = |x: f64, y: f64, z: f64, color| Corner {
+        position: (center + size * DVec3::new(x, y, z)).as_vec3().to_array(),
+        color,
+    };
+    let (red, blue) = ([0.9, 0.2, 0.1], [0.1, 0.4, 0.9]);
+    let corners = [
+        corner(-0.9, -0.1, -0.5, red),
+        corner(0.9, -0.2, -0.3, red),
+        corner(0.0, 0.3, 0.7, red),
+        corner(0.1, -0.7, 0.6, blue),
+        corner(-0.1, 0.7, 0.5, blue),
+        corner(0.0, 0.0, -0.8, blue),
+    ];
+    let target = texture(gpu, TextureFormat::Rgba8Unorm, SIZE);
+    let mut host = Compositor::new(gpu, &scene, &corners, TextureFormat::Rgba8Unorm, SIZE).unwrap();
+    let draw = |host: &mut Compositor, target: &wgpu::TextureView| {
+        let mut turns = 0;
+        while !host.draw(&camera, target).unwrap() {
+            turns += 1;
+            assert!(turns < 1_000_000, "the picture is never finished");
+            std::thread::yield_now();
+        }
+        texels(gpu, target, 4)
+    };
+    // The size of a window may change at any time.
+    host.resize([33, 44]);
+    let other = texture(gpu, TextureFormat::Rgba8Unorm, [33, 44]);
+    assert!(draw(&mut host, &other).iter().any(|&byte| byte > 100));
+    host.resize(SIZE);
+    let composite = draw(&mut host, &target);
+
+    let mut renderer = Renderer::new(gpu);
+    let mut prepared = renderer.prepare(&scene).unwrap();
+    let settings = Settings::new(SIZE);
+    let (picture, _): (Picture, _) = renderer.render(&mut prepared, &camera, &settings).unwrap();
+    let triangles = triangles_alone(&corners, &camera);
+    let (mut before, mut behind, mut edges) = (0, 0, 0);
+    for (at, own) in composite.chunks_exact(4).enumerate() {
+        let depth = f64::from(picture.depth[at]);
+        let own_z = triangles[at].map(|(z, _)| z);
+        let expected = put_together(picture.color[at], depth, triangles[at]);
+        let differs = own
+            .iter()
+            .zip(&expected)
+            .any(|(&own, expected)| (f32::from(own) / 255.0 - expected).abs() > 1.01 / 255.0);
+        match own_z {
+            // Rounding decides where the two cross.
+            _ if differs => {
+                edges += usize::from(own_z.is_none_or(|z| (z / depth - 1.0).abs() > 1e-4));
+            }
+            Some(z) if z < depth => before += usize::from(depth.is_finite()),
+            Some(_) => behind += 1,
+            None => {}
+        }
+    }
+    // Pixels on the edges of triangles.
+    assert!(edges <= 12, "{edges} pixels differ");
+    assert!(before > 100 && behind > 100, "{before} pixels before splats, {behind} behind");
+}
+
+/// Returns the colour of a pixel: the triangle's if it is nearer, or splatkit's over the host's
+/// background.
+fn put_together([r, g, b, a]: [f32; 4], depth: f64, triangle: Option<(f64, [f32; 3])>) -> Vec<f32> {
+    match triangle {
+        Some((z, color)) if z < depth => color.to_vec(),
+        _ => {
+            let background = [0.02, 0.03, 0.06];
+            let both = [r, g, b].into_iter().zip(background);
+            both.map(|(color, under)| color + (1.0 - a) * under).collect()
+        }
+    }
+}

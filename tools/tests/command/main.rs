@@ -1,0 +1,31 @@
+//! Runs the command: what it draws, converts, prints and refuses.
+
+mod bad_input;
+mod bricks;
+mod colors;
+mod common;
+mod convert;
+mod convert_memory;
+mod files;
+#[cfg(unix)]
+mod gaussian_oracle;
+mod gaussians;
+mod help;
+#[cfg(unix)]
+mod hostile;
+mod idle_flags;
+#[cfg(unix)]
+mod interrupted;
+mod licences;
+mod medical;
+mod parts;
+mod pictures;
+#[cfg(unix)]
+mod release;
+#[cfg(feature = "remote")]
+mod remote;
+mod scene_files;
+mod transfer;
+mod video;
+mod views;
+mod wrong_uses;

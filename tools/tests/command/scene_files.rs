@@ -1,0 +1,109 @@
+//! Scene files: the same picture as from flags, and errors that name what is wrong.
+
+use crate::common::*;
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.put("a.ply", PLY);
+    folder.put("a.nrrd", nrrd("uint8", &ball()));
+    folder
+}
+
+#[test]
+fn a_scene_file_draws_what_its_flags_draw() {
+    let folder = folder();
+    let camera = r#"{"position": [40, -20.1, 25], "focal_point": [7, 7.3, 7], "view_up": [0, 0, 1],
+        "view_angle": 31.7}"#;
+    let transfer = r#"{"color": [[0, 0.9, 0.5, 0.1]], "opacity": [[60, 0], [200, 0.7]],
+        "unit": 1.5, "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}"#;
+    std::fs::create_dir(folder.path("scenes")).unwrap();
+    folder.put(
+        "scenes/s.json",
+        format!(
+            r#"{{"splatkit_scene": 1, "inputs": [{{"file": "../a.nrrd"}}, {{"file": "../a.ply"}}],
+                "size": [64, 48], "camera": {camera}, "transfer": {transfer},
+                "clips": [{{"plane": [1, 0, 0, 9.5]}}],
+                "options": {{"background": "white", "engine": "cpu"}}}}"#
+        ),
+    );
+    folder
+        .run_with(&[
+            "render",
+            "a.nrrd",
+            "a.ply",
+            "--size=64x48",
+            "--camera",
+            camera,
+            "--transfer",
+            transfer,
+            "--clip=plane:1,0,0,9.5",
+            "--background=white",
+            "--engine=cpu",
+            "-o",
+            "flags.png",
+        ])
+        .ok();
+    folder.run("render scenes/s.json -o scene.png").ok();
+    let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert!(is_png(&read("scene.png"), 64, 48));
+    assert_eq!(read("flags.png"), read("scene.png"));
+    // Flags beside the scene count more.
+    folder.run("render scenes/s.json -o other.png --size 32x32 --azimuth 70").ok();
+    assert!(is_png(&read("other.png"), 32, 32));
+    // A transfer function in a file of its own, seen from the scene's folder.
+    folder.put("scenes/t.json", transfer);
+    let named = std::fs::read_to_string(folder.path("scenes/s.json")).unwrap();
+    folder.put("scenes/n.json", named.replace(transfer, "\"t.json\""));
+    folder.run("render scenes/n.json -o named.png").ok();
+    assert_eq!(read("named.png"), read("scene.png"));
+    // The file itself draws beside itself.
+    folder.run("scenes/s.json -o same.png").ok();
+    assert_eq!(read("same.png"), read("scene.png"));
+    let found = folder.json("bench scenes/s.json --frames 1 --json");
+    assert!(found.is_object());
+}
+
+#[test]
+fn a_camera_that_was_printed_is_taken_again() {
+    let folder = folder();
+    let flags = "--size 64x48 --engine cpu --orthographic --azimuth 33";
+    let found = folder.json(&format!("render a.ply {flags} -o a.png --json"));
+    let camera = found["camera"].to_string();
+    folder
+        .run_with(&[
+            "render",
+            "a.ply",
+            "--size=64x48",
+            "--engine=cpu",
+            "--camera",
+            &camera,
+            "-o",
+            "b.png",
+        ])
+        .ok();
+    let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert_eq!(read("a.png"), read("b.png"));
+    folder.run("render a.ply -o c.png --camera {}").fails(2, &["position"]);
+}
+
+#[test]
+fn wrong_scenes_name_what_is_wrong() {
+    let folder = folder();
+    let wrong = |text: &str, words: &[&str]| {
+        folder.put("s.json", text);
+        folder.run("render s.json -o x.png").fails(3, &[&["s.json"], words].concat());
+    };
+    let input = r#""splatkit_scene": 1, "inputs": [{"file": "a.ply"}]"#;
+    wrong("{", &["EOF", "line 1"]);
+    wrong(r#"{"splatkit_scene": 2, "inputs": [{"file": "a.ply"}]}"#, &["version 1"]);
+    wrong(r#"{"splatkit_scene": 1, "inputs": []}"#, &["no input"]);
+    wrong(&format!("{{{input}, \"sise\": [1, 1]}}"), &["sise"]);
+    wrong(&format!("{{{input}, \"options\": {{\"output\": \"y.png\"}}}}"), &["options.output"]);
+    wrong(&format!("{{{input}, \"options\": {{\"colour\": \"red\"}}}}"), &["options.colour"]);
+    wrong(&format!("{{{input}, \"clips\": [{{}}]}}"), &["plane or a box"]);
+    let hidden = r#"{"splatkit_scene": 1, "inputs": [{"file": "a.ply", "visible": false}]}"#;
+    wrong(hidden, &["visible"]);
+    folder.put("s.json", format!("{{{input}}}"));
+    folder.run("render s.json a.ply -o x.png").fails(2, &["drawn alone"]);
+    folder.run("render none.json -o x.png").fails(3, &["none.json"]);
+}

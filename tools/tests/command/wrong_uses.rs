@@ -1,0 +1,225 @@
+//! Wrong uses of flags and files, and what the command says. The table is also the page
+//! docs/wrong-uses.md, which is written by
+//! `SPLATKIT_WRITE=1 cargo test --release -p splatkit-tools --test command wrong_uses`.
+
+use crate::common::*;
+use std::{fmt::Write, fs, path::Path};
+
+/// What was meant, the arguments, the exit code, and a part of what is said. Commands that draw in
+/// spite of the mistake have the exit code 0 and a warning.
+const USES: &[(&str, &str, i32, &str)] = &[
+    ("no file", "render -o out.png", 2, "<SCENE>"),
+    ("a misspelt task", "rendr a.ply -o out.png", 2, "a similar subcommand exists: 'render'"),
+    (
+        "a misspelt flag",
+        "render a.ply -o out.png --zom 2",
+        2,
+        "a similar argument exists: '--zoom'",
+    ),
+    ("a file that is not there", "render gone.ply -o out.png", 3, "gone.ply"),
+    ("a file alone that is not there", "gone.ply", 3, "gone.ply"),
+    (
+        "a file in another format",
+        "render notes.docx -o out.png",
+        3,
+        "is in no format that can be read",
+    ),
+    ("an empty file", "render empty.ply -o out.png", 3, "empty.ply"),
+    ("a file that was cut off", "render cut.ply -o out.png", 3, "cut.ply"),
+    ("a picture in another format", "render a.ply -o out.tga", 2, "out.tga"),
+    (
+        "an animation of a camera that stands still",
+        "render a.ply -o out.gif",
+        2,
+        "an animation needs --turntable or --path",
+    ),
+    (
+        "an animation in another format",
+        "render a.ply -o out.avi --turntable 9",
+        2,
+        "use .gif, .webp, .apng, .mp4, .webm or .mov, or .png or .jpg for numbered pictures",
+    ),
+    (
+        "an animation as a picture on stdout",
+        "render a.ply -o - --turntable 9",
+        2,
+        "the frames of an animation can go to stdout only with --raw",
+    ),
+    ("a folder that is not there", "render a.ply -o gone/out.png", 1, "its folder does not exist"),
+    ("a picture that is there", "render a.ply -o old.png", 1, "old.png: exists already"),
+    (
+        "one number as the size",
+        "render a.ply -o out.png --size 1280",
+        2,
+        "WIDTHxHEIGHT, such as 1280x720",
+    ),
+    ("a colour that has no name", "render a.ply -o out.png --background redish", 2, "redish"),
+    (
+        "a side that is none",
+        "render a.ply -o out.png --view above",
+        2,
+        "[possible values: front, back, left, right, top, bottom, iso]",
+    ),
+    (
+        "an axis that is none",
+        "render a.ply -o out.png --up W",
+        2,
+        "an axis is one of +X, -X, +Y, -Y, +Z, -Z, and a direction is X,Y,Z",
+    ),
+    (
+        "a place and a side",
+        "render a.ply -o out.png --view top --camera-position 0,0,9",
+        2,
+        "cannot be used with",
+    ),
+    ("a preset that is none", "render a.nrrd -o out.png --transfer bones", 2, "bones"),
+    (
+        "a window beside the values",
+        "render a.nrrd -o out.png --transfer ct-bone --range 900,1200",
+        3,
+        "but the values of a.nrrd lie between 0 and 223",
+    ),
+    (
+        "a surface beside the values",
+        "render a.nrrd -o out.png --iso 900",
+        3,
+        "shows only the value 900, but the values of a.nrrd lie between 0 and 223",
+    ),
+    (
+        "a share beyond the values",
+        "render a.nrrd -o out.png --iso 150%",
+        2,
+        "a share of the range of values lies between 0% and 100%",
+    ),
+    (
+        "a clip that leaves nothing",
+        "render a.ply -o out.png --clip x>200%",
+        3,
+        "leaves nothing of the scene",
+    ),
+    ("samples without their layout", "render plain.raw -o out.png", 3, "--dims"),
+    (
+        "a layout that does not fit",
+        "render plain.raw -o out.png --dims 16x16x16 --type u16",
+        3,
+        "plain.raw",
+    ),
+    (
+        "the maximum of two volumes",
+        "render a.nrrd b.nrrd -o out.png --mip",
+        2,
+        "takes one volume or sample set",
+    ),
+    (
+        "a volume as a hierarchy",
+        "convert a.nrrd -o b.splk",
+        2,
+        "hierarchies are built from meshes and point clouds",
+    ),
+    ("a picture and JSON on stdout", "render a.ply -o - --json", 2, "cannot both go to stdout"),
+    (
+        "a flag of volumes for a mesh",
+        "render a.ply -o out.png --sigma 0.8",
+        0,
+        "--sigma has no effect: it is for volumes and volumes in bricks, but a.ply is a mesh",
+    ),
+    (
+        "an isosurface of a mesh",
+        "render a.ply -o out.png --iso 50%",
+        0,
+        "warning: --iso has no effect",
+    ),
+    (
+        "a flag of meshes for a volume",
+        "render a.nrrd -o out.png --crease 30",
+        0,
+        "warning: --crease has no effect: it is for meshes, but a.nrrd is a volume",
+    ),
+    (
+        "edges of a hierarchy",
+        "render a.splk -o out.png --edges",
+        0,
+        "warning: --edges has no effect: it is for meshes, but a.splk is a hierarchy",
+    ),
+    (
+        "a layout of a file that has its own",
+        "render a.nrrd -o out.png --dims 16x16x16 --type u8",
+        0,
+        "warning: --dims has no effect: it is for raw volumes, but a.nrrd is a volume",
+    ),
+    (
+        "a cut of a mesh",
+        "render a.ply -o out.png --cut 4",
+        0,
+        "--cut has no effect: it is for hierarchies and volumes in bricks, but a.ply is a mesh",
+    ),
+    (
+        "a view angle without perspective",
+        "render a.ply -o out.png --orthographic --view-angle 60",
+        0,
+        "warning: --view-angle has no effect: there is no perspective",
+    ),
+    (
+        "radii of a hierarchy",
+        "render a.splk -o out.png --radius-scale 2",
+        2,
+        "a hierarchy keeps the radii that it was converted with",
+    ),
+];
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.put("a.ply", PLY);
+    folder.put("a.nrrd", nrrd("uint8", &ball()));
+    folder.put("b.nrrd", nrrd("uint8", &ball()));
+    folder.put("plain.raw", ball());
+    folder.put("notes.docx", "PK notes");
+    folder.put("empty.ply", "");
+    folder.put("cut.ply", &PLY[..PLY.len() - 30]);
+    folder.put("old.png", "a picture");
+    folder.run("convert a.ply -o a.splk").ok();
+    folder
+}
+
+#[test]
+fn wrong_uses_are_answered() {
+    let folder = folder();
+    let mut wrong = Vec::new();
+    for (meant, arguments, code, says) in USES {
+        let small = match arguments.starts_with("render") && !arguments.contains("--size") {
+            true => format!("{arguments} --size 32x24 --engine cpu"),
+            false => (*arguments).to_owned(),
+        };
+        let run = folder.run(&small);
+        let told = run.stderr();
+        if run.code() != Some(*code) || !told.contains(says) {
+            wrong.push(format!("{meant}: {arguments}: {:?}: {told}", run.code()));
+        }
+        fs::remove_file(folder.path("out.png")).ok();
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
+
+#[test]
+fn the_page_of_wrong_uses_is_current() {
+    let mut page = String::from(
+        "# Wrong uses, and what the command says\n\n\
+         A mistake gives a message that names the file or the flag, and an exit code: 1 the\n\
+         picture could not be written, 2 wrong usage, 3 bad input or nothing to draw. A flag that\n\
+         has no effect on the inputs gives a warning, and the picture is drawn (0).\n\n\
+         <!-- SPLATKIT_WRITE=1 cargo test --release -p splatkit-tools --test command \
+         wrong_uses -->\n\n\
+         | mistake | command | code | says |\n|---|---|---|---|\n",
+    );
+    for (meant, arguments, code, says) in USES {
+        let escaped = |text: &str| text.replace('|', "\\|");
+        let (command, says) = (escaped(arguments), escaped(says).replace('<', "\\<"));
+        writeln!(page, "| {meant} | `splatkit {command}` | {code} | {says} |").expect("text");
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/wrong-uses.md");
+    if std::env::var_os("SPLATKIT_WRITE").is_some() {
+        fs::write(&path, &page).expect("a page");
+    }
+    let found = fs::read_to_string(&path).unwrap_or_default().replace('\r', "");
+    assert_eq!(found, page, "docs/wrong-uses.md is not current: SPLATKIT_WRITE=1 writes it");
+}
