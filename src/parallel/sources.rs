@@ -241,7 +241,7 @@ impl<'a, T> Once<&'a mut [T]> {
 }
 
 /// Returns the items of a part whose places have `size` items each.
-fn of_part<'a, T>(all: &'a [T], part: Part, size: usize) -> &'a [T] {
+fn of_part<T>(all: &[T], part: Part, size: usize) -> &[T] {
     &all[(part.start * size).min(all.len())..(part.end * size).min(all.len())]
 }
 

@@ -63,12 +63,13 @@ fn steps_are_those_of_iterators() {
 fn ends_are_those_of_iterators() {
     for length in LENGTHS {
         let all: Vec<u64> = (0..length as u64).collect();
-        assert_eq!(all.par_iter().copied().sum::<u64>(), all.iter().sum());
+        let sum: u64 = all.iter().sum();
+        assert_eq!(all.par_iter().copied().sum::<u64>(), sum);
         assert_eq!(all.par_iter().copied().max(), all.iter().copied().max());
         assert_eq!(all.par_iter().filter(|n| **n % 2 == 0).count(), length.div_ceil(2));
-        assert_eq!(all.par_iter().copied().reduce(|| 0, |a, b| a + b), all.iter().sum());
+        assert_eq!(all.par_iter().copied().reduce(|| 0, |a, b| a + b), sum);
         let folded = all.par_iter().fold(|| 0, |sum, n| sum + n).reduce(|| 0, |a, b| a + b);
-        assert_eq!(folded, all.iter().sum());
+        assert_eq!(folded, sum);
         assert_eq!(all.par_iter().position_first(|&n| n >= 40), (length > 40).then_some(40));
         assert_eq!(all.par_iter().find_first(|n| **n >= 40).copied(), (length > 40).then_some(40));
         assert_eq!(all.par_iter().any(|&n| n == 64), length > 64);
@@ -84,8 +85,8 @@ fn errors_end_a_loop() {
         seen.fetch_add(1, Relaxed);
         if n == 5 { Err(n) } else { Ok(n) }
     };
-    let length = 1_000_000;
-    let whole: Result<Vec<usize>, usize> = (0..length).into_par_iter().map(each).collect();
+    let length: usize = 1_000_000;
+    let whole = (0..length).into_par_iter().map(each).collect::<Result<Vec<usize>, usize>>();
     assert_eq!(whole, Err(5));
     assert_eq!((0..length).into_par_iter().try_for_each(|n| each(n).map(drop)), Err(5));
     assert!(seen.load(Relaxed) < length, "{} items were visited", seen.load(Relaxed));

@@ -195,8 +195,9 @@ mod tests {
     /// Joins batches of `few` triangles, each batch on its own.
     fn parts(triangles: &[[u32; 3]], few: usize) -> Parts {
         let joining = Joining::new(triangles.len());
-        let chunks = triangles.par_chunks(few).enumerate().rev();
-        let open = chunks.flat_map_iter(|(chunk, triangles)| {
+        let mut chunks: Vec<_> = triangles.chunks(few).enumerate().collect();
+        chunks.reverse();
+        let open = chunks.into_par_iter().flat_map_iter(|(chunk, triangles)| {
             joining.add((chunk * few) as u32, triangles, |vertex| vertex)
         });
         let open = open.collect();

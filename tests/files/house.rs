@@ -308,7 +308,7 @@ fn python_knows_the_package_by_its_own_name() {
         let is_installed = || {
             let command = words(before.rsplit('`').next().unwrap_or_default());
             let has = |word: &&str| command.iter().any(|other| other == word);
-            installers.iter().any(|word| has(&word) || last == **word) && !has(&"cargo")
+            installers.iter().any(|word| has(word) || last == **word) && !has(&"cargo")
         };
         // As in `import numpy as np, x`.
         let is_listed = before.rsplit_once("import ").is_some_and(|(_, list)| {

@@ -335,7 +335,7 @@ fn many_sheets_of_many_tiles_are_drawn_in_strips() {
     knot.positions.iter_mut().for_each(|place| *place *= 0.5);
     let scene = Scene::new().with_splats(knot.surfels(&SurfelOptions::default()).unwrap());
     let camera = Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.3, -1.0), DVec3::Y, 1.2);
-    let mut renderer = Renderer::new(&gpu);
+    let mut renderer = Renderer::new(gpu);
     let mut prepared = renderer.prepare(&scene).expect("fits");
     // 90,000 tiles of 8 × 8 pixels, with about 30 groups of 128 sheets, need more than the
     // 2,097,152 bins.

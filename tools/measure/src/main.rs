@@ -29,12 +29,12 @@ struct Command {
 #[derive(Subcommand)]
 enum Task {
     /// Measure the frame times of a suite of cases. docs/performance.md describes each case.
-    Suite(suite::Suite),
+    Suite(Box<suite::Suite>),
     /// Measure how the frame time follows the view, the data and the settings, step by step.
     /// docs/performance.md explains how to read the tables.
-    Sweep(sweep::Sweep),
+    Sweep(Box<sweep::Sweep>),
     /// Measure the quality of pictures: the tables of docs/volumes.md.
-    Figures(figures::Figures),
+    Figures(Box<figures::Figures>),
 }
 
 fn main() -> ExitCode {

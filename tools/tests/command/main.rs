@@ -29,3 +29,6 @@ mod transfer;
 mod video;
 mod views;
 mod wrong_uses;
+
+/// The command that is tested.
+const COMMAND: &str = env!("CARGO_BIN_EXE_splatkit");

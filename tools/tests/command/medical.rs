@@ -1,10 +1,10 @@
 //! Scans of hospitals: folders of slices, series and times.
 
 #[path = "../../../tests/inputs/medical.rs"]
-mod medical;
+mod inputs;
 
 use crate::common::*;
-use medical::{dicom, element};
+use inputs::{dicom, element};
 
 /// A slice of a series at a place along z: a box of 2 × 2 pixels.
 fn slice(series: &str, number: &str, words: &str, z: u8) -> Vec<u8> {
@@ -70,7 +70,7 @@ fn wrong_choices_are_told() {
     folder.run("info study --series chest").fails(3, &["2 series fit “chest”", "1.2.3, 1.2.5"]);
     folder.run("info study --time 2").fails(3, &["has 1 time, but number 2", "leave out --time"]);
     folder.run("info empty").fails(3, &["no series of pictures was found", "DICOM"]);
-    folder.put("a.nii", medical::nifti(|_| {}));
+    folder.put("a.nii", inputs::nifti(|_| {}));
     folder.run("info a.nii --time 1").fails(3, &["has 1 time,", "leave out --time"]);
     folder.run("render a.nii -o a.png --engine cpu --size 64x64").ok();
 }

@@ -5,3 +5,6 @@ mod common;
 mod figures;
 mod suite;
 mod sweep;
+
+/// The command that is tested.
+const COMMAND: &str = env!("CARGO_BIN_EXE_splatkit-measure");

@@ -15,12 +15,6 @@ use std::{
     process::{Command, Output},
 };
 
-/// The command of the package whose tests these are.
-const COMMAND: &str = match option_env!("CARGO_BIN_EXE_splatkit") {
-    Some(splatkit) => splatkit,
-    None => option_env!("CARGO_BIN_EXE_splatkit-measure").expect("a command"),
-};
-
 impl Folder {
     /// Writes an input and returns its name.
     pub fn put<'a>(&self, name: &'a str, bytes: impl AsRef<[u8]>) -> &'a str {
@@ -39,7 +33,7 @@ impl Folder {
 
     /// Returns the command in the folder, without arguments.
     pub fn command(&self) -> Command {
-        let mut command = Command::new(COMMAND);
+        let mut command = Command::new(crate::COMMAND);
         command.current_dir(self).env("NO_COLOR", "1").env_remove("RUST_LOG");
         command
     }
