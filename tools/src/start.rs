@@ -50,7 +50,14 @@ pub fn end(result: Result<(), Failure>, progress: &Progress) -> ExitCode {
     progress.clear();
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+        Err(failure) => {
+            let code = failure.code();
+            failure.report();
+            std::io::stdout().flush().ok();
+            // At once: the ordinary exit unloads the driver, whose threads may still be drawing on
+            // a device that was lost, and then crash.
+            signal_hook::low_level::exit(code.into())
+        }
     }
 }
 
