@@ -48,7 +48,7 @@ impl Failure {
         }
     }
 
-    fn code(&self) -> u8 {
+    pub fn code(&self) -> u8 {
         match self {
             Self::Output { .. }
             | Self::Library(Error::Output { .. })
