@@ -1,7 +1,10 @@
 //! Dense scenes in small pictures, with thousands of splats in every pixel. They are drawn at any
 //! size. A picture that takes too long ends with an error at the time limit.
 
-use crate::testing::{gpu::gpu, psnr::measured};
+use crate::testing::{
+    gpu::{gpu, own_gpu},
+    psnr::measured,
+};
 use glam::{DVec3, Vec3};
 use splatkit::{
     bricks::Bricks,
@@ -122,7 +125,7 @@ fn fewer_splats_stand_for_what_is_too_fine() {
 /// A picture that makes progress, but too slowly, ends at the time limit.
 #[test]
 fn a_picture_ends_at_the_time_limit() {
-    let gpu = gpu().clone().with_patience(Duration::from_millis(300));
+    let gpu = own_gpu().with_patience(Duration::from_millis(300));
     let scene = Scene::new().with_splats(hills(300));
     // Some hundred thousand dispatches.
     let budget = Budget { tile_entries: Some(1), ..Budget::default() };
@@ -187,7 +190,7 @@ fn any_scene_draws_at_any_size() {
         .ok()
         .and_then(|text| text.parse().ok())
         .unwrap_or(5.0);
-    let gpu = gpu().clone().with_patience(Duration::from_secs(60));
+    let gpu = own_gpu().with_patience(Duration::from_secs(60));
     let scenes = any_scenes();
     let mut renderers: Vec<Renderer> = [None, Some(50)]
         .map(|tile_entries| {
