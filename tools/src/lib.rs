@@ -63,6 +63,9 @@ mod transfer;
 mod video;
 #[cfg(feature = "window")]
 mod view;
+#[cfg(not(feature = "window"))]
+#[path = "view_absent.rs"]
+mod view;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use given::Given;
@@ -93,7 +96,6 @@ enum Task {
     /// Draw meshes, point clouds and volumes in one picture.
     Render(Box<render::Render>),
     /// Show a scene in a window: turn it, edit its transfer function, cut it open, save pictures.
-    #[cfg(feature = "window")]
     View(Box<view::View>),
     /// Print what a file contains.
     Info(info::Info),
@@ -157,7 +159,6 @@ pub fn main() -> ExitCode {
     own.cache.apply();
     let result = match own.task {
         Task::Render(task) => task.run(&given, &progress),
-        #[cfg(feature = "window")]
         Task::View(task) => task.run(&matches, &progress),
         Task::Info(task) => task.run(&given, &progress),
         Task::Convert(task) => task.run(&given, &progress),
