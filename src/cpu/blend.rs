@@ -45,6 +45,9 @@ impl Way {
     /// # Errors
     /// The reason why the volume can't be gathered, in words.
     pub fn of(volume: &Volume, kernel: &Kernel) -> Result<Self, &'static str> {
+        if volume.is_label_map() {
+            return Ok(Self::Plain(Weighting::Labels));
+        }
         let arrangement = &volume.lattice.arrangement;
         let plain = weighting(kernel).filter(|_| *arrangement == Arrangement::Cartesian);
         match (&kernel.profile, plain) {

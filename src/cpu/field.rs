@@ -9,6 +9,10 @@
 //! The weights of tensor products are polynomials of the place between two samples. Their
 //! derivatives give the gradient. The samples are mirrored at the outermost ones, so the weights
 //! always add up to 1.
+//!
+//! A label map has the label of the nearest sample, and the gradient of that label's mask.
+
+mod labels;
 
 use super::{
     blend::{Blend, Blended},
@@ -19,7 +23,7 @@ use super::{
 use crate::{
     bricks::SIDE,
     math::Tensor,
-    plan::weighting::Weighting,
+    plan::weighting::{MASK_DEVIATION, Weighting},
     volume::{SampleSlice, Samples, Volume},
 };
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
@@ -45,12 +49,17 @@ impl<'a> Typed<'a> {
         Self::of_volume(volume, Shape::new(weighting), zero)
     }
 
+    /// Returns the field of a label map. `shares` are those of each sample's own label around it.
+    pub fn labels(volume: &'a Volume, shares: &'a [u8], zero: f64) -> Self {
+        Self::of_volume(volume, Shape::Labels(Bell::new(MASK_DEVIATION), shares), zero)
+    }
+
     /// Returns the same by sums over samples.
     pub fn blended(volume: &'a Volume, blend: &'a Blend, zero: f64) -> Self {
         Self::Blend(Blended::new(volume, blend, zero))
     }
 
-    fn of_volume(volume: &'a Volume, shape: Shape, zero: f64) -> Self {
+    fn of_volume(volume: &'a Volume, shape: Shape<'a>, zero: f64) -> Self {
         let dims = volume.drawn_lattice().dims;
         match &volume.coefficients {
             Some(coefficients) => {
@@ -76,7 +85,7 @@ impl<'a> Typed<'a> {
         samples: &'a Samples,
         dims: [usize; 3],
         memory: Memory<'a>,
-        shape: Shape,
+        shape: Shape<'a>,
         zero: f64,
     ) -> Self {
         match samples.as_slice() {
@@ -94,7 +103,7 @@ pub struct Field<'a, T> {
     samples: &'a [T],
     dims: [usize; 3],
     memory: Memory<'a>,
-    shape: Shape,
+    shape: Shape<'a>,
     zero: f32,
 }
 
@@ -109,19 +118,23 @@ enum Memory<'a> {
 
 /// The kernel that interpolates samples.
 #[derive(Clone, Copy)]
-enum Shape {
+enum Shape<'a> {
     Gaussian(Bell),
     Linear,
     /// Four weights an axis, each given by its coefficients of 1, t, t² and t³.
     Cubic([[f32; 4]; 4]),
+    /// The nearest sample, with the Gaussian that smooths the mask of its label, and the shares of
+    /// each sample's own label around it ([`own_shares`](crate::volume::own_shares)).
+    Labels(Bell, &'a [u8]),
 }
 
-impl Shape {
+impl Shape<'_> {
     fn new(weighting: Weighting) -> Self {
         match weighting {
             Weighting::Gaussian(sigma) => Self::Gaussian(Bell::new(sigma)),
             Weighting::Tensor(Tensor::Linear) => Self::Linear,
             Weighting::Tensor(tensor) => Self::Cubic(polynomials(tensor)),
+            Weighting::Labels => unreachable!("the field of a label map is made by `labels`"),
         }
     }
 }
@@ -147,7 +160,7 @@ impl<'a, T: Sample> Field<'a, T> {
         samples: &'a [T],
         dims: [usize; 3],
         memory: Memory<'a>,
-        shape: Shape,
+        shape: Shape<'a>,
         zero: f64,
     ) -> Self {
         Self { samples, dims, memory, shape, zero: zero as f32 }
@@ -164,6 +177,10 @@ impl<'a, T: Sample> Field<'a, T> {
             Shape::Cubic(factors) => simd.vectorize(
                 #[inline(always)]
                 || self.cubic(simd, factors, place),
+            ),
+            Shape::Labels(bell, shares) => simd.vectorize(
+                #[inline(always)]
+                || self.label(simd, bell, shares, place),
             ),
         }
     }
@@ -264,6 +281,16 @@ impl<T: Sample> Field<'_, T> {
     /// Returns the windows of samples in the lattice that begin at the first sample of each lane.
     #[inline(always)]
     fn window<S: Simd, const N: usize>(&self, starts: [Lanes<S>; 3]) -> Window<'_, T, N> {
+        self.window_of(self.samples, starts)
+    }
+
+    /// Returns the same windows of something else that lies as the samples do.
+    #[inline(always)]
+    fn window_of<'b, U: Copy, S: Simd, const N: usize>(
+        &self,
+        samples: &'b [U],
+        starts: [Lanes<S>; 3],
+    ) -> Window<'b, U, N> {
         let first: [i32x8<S>; 3] = three!(I => i32x8::truncate_from(starts[I]));
         let [nx, ny, nz] = self.dims;
         let (places, row, slice) = match self.memory {
@@ -280,7 +307,7 @@ impl<T: Sample> Field<'_, T> {
                 (own, nx, nx * ny)
             }
         };
-        Window::new(self.samples, places, row, slice)
+        Window::new(samples, places, row, slice)
     }
 
     /// Evaluates lattices with fewer than four samples along an axis, sample by sample.
@@ -292,6 +319,26 @@ impl<T: Sample> Field<'_, T> {
         place: [Lanes<S>; 3],
         first: [Lanes<S>; 3],
     ) -> (Lanes<S>, [Lanes<S>; 3]) {
+        let (weights, samples) = self.held(self.samples, simd, (bell, place, first));
+        let row = weights[0].weights;
+        self.sums(
+            bell,
+            &weights,
+            1.0,
+            #[inline(always)]
+            |j, k| row_of(&row, samples.four(simd, j, k), self.zero),
+        )
+    }
+
+    /// Returns the weights of the samples around places, of which those outside the lattice have
+    /// none, and the samples. `first` is the sample before a place.
+    #[inline(always)]
+    fn held<'b, U, S: Simd>(
+        &self,
+        samples: &'b [U],
+        simd: S,
+        (bell, place, first): (&Bell, [Lanes<S>; 3], [Lanes<S>; 3]),
+    ) -> ([Weights<S>; 3], Border<'b, U>) {
         let none = Lanes::splat(simd, 0.0);
         let mut weights: [Weights<S>; 3] = three!(I => bell.weights(simd, place[I] - first[I]));
         let mut taps = [[[0; 4]; 8]; 3];
@@ -309,15 +356,7 @@ impl<T: Sample> Field<'_, T> {
             }
             weights[axis] = normalised(simd, own);
         }
-        let samples = self.border(taps);
-        let row = weights[0].weights;
-        self.sums(
-            bell,
-            &weights,
-            1.0,
-            #[inline(always)]
-            |j, k| row_of(&row, samples.four(simd, j, k), self.zero),
-        )
+        (weights, self.border(samples, taps))
     }
 
     /// Returns the mean of the samples in reach, and its gradient. `row` returns the sum of a row
@@ -495,7 +534,7 @@ impl<T: Sample> Field<'_, T> {
             }
             Taps::new(simd, factors, place - first)
         });
-        let samples = self.border(indices);
+        let samples = self.border(self.samples, indices);
         let (value, slopes) = self.tap_sums(simd, &taps, &samples);
         (value, three!(I => slopes[I] * sides[I]))
     }
@@ -637,11 +676,11 @@ struct Border<'a, T> {
 impl<T> Field<'_, T> {
     /// Returns the samples at four indices along each axis for each lane. The second index is at
     /// most two from the others.
-    fn border(&self, mut taps: [[[usize; 4]; 8]; 3]) -> Border<'_, T> {
+    fn border<'b, U>(&self, samples: &'b [U], mut taps: [[[usize; 4]; 8]; 3]) -> Border<'b, U> {
         let [nx, ny, _] = self.dims;
         let mut starts = [0; 8];
         let Memory::Slots(grid) = self.memory else {
-            return Border { samples: self.samples, starts, taps, row: nx, slice: nx * ny };
+            return Border { samples, starts, taps, row: nx, slice: nx * ny };
         };
         for (lane, start) in starts.iter_mut().enumerate() {
             let mut number = 0;
@@ -653,7 +692,7 @@ impl<T> Field<'_, T> {
             let slot = grid.slots[number];
             *start = if slot == Grid::ABSENT { 0 } else { slot as usize * SLOT };
         }
-        Border { samples: self.samples, starts, taps, row: SLOT_SIDE, slice: SLOT_SIDE * SLOT_SIDE }
+        Border { samples, starts, taps, row: SLOT_SIDE, slice: SLOT_SIDE * SLOT_SIDE }
     }
 }
 

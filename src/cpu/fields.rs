@@ -23,7 +23,7 @@ use crate::{
     },
     scene::{Evaluate, Item, Optics, Scene, Settings},
     volume::{
-        Lattice, Volume,
+        Lattice, Volume, own_shares,
         reach::{EVERYTHING, first_visible},
     },
 };
@@ -39,6 +39,8 @@ pub struct FieldState {
     ranges: Option<Vec<[u8; 2]>>,
     /// The kernel sums of a gathered lattice, if four weights an axis do not suffice.
     blend: Option<Blend>,
+    /// The shares of each sample's own label around it, of a gathered label map.
+    shares: Option<Vec<u8>>,
     /// The visible samples of a gathered lattice, and the transfer function's visibility table for
     /// which they were found.
     shown: Option<([u16; 256], Shown)>,
@@ -60,6 +62,7 @@ impl FieldState {
             scene: scene.with_one_field(item),
             ranges: None,
             blend: None,
+            shares: None,
             shown: None,
             levels: None,
         };
@@ -70,7 +73,7 @@ impl FieldState {
     pub fn bytes(&self) -> u64 {
         let shown = self.shown.as_ref().map_or(0, |(_, shown)| shown.bytes());
         let ranges = self.ranges.as_ref().map_or(0, |ranges| size_of_val(ranges.as_slice()) as u64);
-        shown + ranges
+        shown + ranges + self.shares.as_ref().map_or(0, |shares| shares.len() as u64)
     }
 
     /// Returns the bricks that a view needs, if the field is a volume in bricks. `bounds` are those
@@ -118,20 +121,18 @@ impl FieldState {
         choice: Option<&Choice>,
     ) -> Result<bool> {
         if settings.evaluate == Evaluate::Scatter {
-            // The sections of tensor products have no known form.
-            return self.scene.tensor().map_or(Ok(false), |tensor| {
-                let name = tensor.name();
+            // The sections of tensor products have no known form, and labels no sums.
+            return self.scene.only_gathered().map_or(Ok(false), |what| {
                 Err(Error::Argument(format!(
-                    "the kernel {name} can't be scattered; gather instead, \
-                     or leave it to the engine"
+                    "{what} can't be scattered; gather instead, or leave it to the engine"
                 )))
             });
         }
         let parts = gathering::parts(&self.scene, sheets, choice);
         match gathering::obstacle(&self.scene, settings, parts, gather::unsuited) {
             Some(what) if settings.evaluate == Evaluate::Gather => Err(not_gathered(what)),
-            Some(what) if let Some(tensor) = self.scene.tensor() => {
-                Err(Error::Argument(format!("the kernel {} does not draw {what}", tensor.name())))
+            Some(what) if let Some(own) = self.scene.only_gathered() => {
+                Err(Error::Argument(format!("{own} does not draw {what}")))
             }
             obstacle => Ok(obstacle.is_none()),
         }
@@ -148,6 +149,9 @@ impl FieldState {
                     };
                     if let (None, Ok(Way::Blend(taps))) = (&self.blend, Way::of(volume, kernel)) {
                         self.blend = Some(Blend::new(volume, kernel, taps));
+                    }
+                    if volume.is_label_map() {
+                        self.shares.get_or_insert_with(|| own_shares(volume));
                     }
                     let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
                         Some(blend) => blend.ranges(volume, kernel),
@@ -231,8 +235,9 @@ impl FieldState {
         let parts = gathering::parts(&self.scene, sheets, outline.choice.as_ref());
         let deviation = self.scene.items.iter().find_map(|item| deviation(item.kernel()?));
         let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
-        let is_blended = self.blend.is_some();
-        Some(Gather { plan, levels, parts, ends, looks, is_blended, visible, zero: zero as f32 })
+        let (is_blended, zero) = (self.blend.is_some(), zero as f32);
+        let is_label_map = self.scene.items.iter().any(Item::is_label_map);
+        Some(Gather { plan, levels, parts, ends, looks, is_blended, is_label_map, visible, zero })
     }
 
     /// Returns a volume in memory as the only level. Values are relative to `zero`.
@@ -243,9 +248,13 @@ impl FieldState {
         zero: f64,
     ) -> Option<gather::Level<'a>> {
         let (_, shown) = self.shown.as_ref()?;
-        let field = match &self.blend {
-            Some(blend) => Typed::blended(volume, blend, zero),
-            None => Typed::new(volume, weighting(kernel)?, zero),
+        let field = match (&self.blend, Way::of(volume, kernel)) {
+            (Some(blend), _) => Typed::blended(volume, blend, zero),
+            (None, Ok(Way::Plain(Weighting::Labels))) => {
+                Typed::labels(volume, self.shares.as_ref()?, zero)
+            }
+            (None, Ok(Way::Plain(weighting))) => Typed::new(volume, weighting, zero),
+            (None, _) => return None,
         };
         // Coefficients begin before the samples.
         let drawn = volume.drawn_lattice();

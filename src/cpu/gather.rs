@@ -41,6 +41,8 @@ pub struct Gather<'a> {
     /// There may be places without a field, and places where the kernels' sum is larger than
     /// elsewhere.
     pub is_blended: bool,
+    /// The values are labels.
+    pub is_label_map: bool,
     pub visible: &'a Visible,
     /// The value that values are relative to.
     pub zero: f32,
@@ -193,13 +195,13 @@ impl Gather<'_> {
         if !mask.any_true() {
             return None;
         }
-        if !(last.first..last.first + LOOKED_UP).contains(&sheet) {
-            self.look_up(simd, rays, sheet, marks, last);
-        }
-        let shows = last.shows[sheet - last.first].into();
-        let mask = mask & mask32x8::from_bitmask(simd, shows);
+        let mask = mask & self.showing(simd, rays, sheet, marks, last);
         if !mask.any_true() {
             return None;
+        }
+        if self.is_label_map {
+            let layer = self.label_layer(simd, rays, [start, stop], [begin, end]);
+            return self.may_show(simd, &layer).then_some((layer, mask));
         }
         if last.plane != sheet {
             self.face(simd, rays, sheet, last);
@@ -247,6 +249,48 @@ impl Gather<'_> {
         let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
         layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
+    }
+
+    /// Returns the rays on which something may be visible in a sheet.
+    #[inline(always)]
+    fn showing<S: Simd>(
+        &self,
+        simd: S,
+        rays: &Rays<S>,
+        sheet: usize,
+        marks: &[u64],
+        last: &mut Last<S>,
+    ) -> mask32x8<S> {
+        if !(last.first..last.first + LOOKED_UP).contains(&sheet) {
+            self.look_up(simd, rays, sheet, marks, last);
+        }
+        mask32x8::from_bitmask(simd, last.shows[sheet - last.first].into())
+    }
+
+    /// Returns the sheet of a label map: the label in the middle of the part of the rays that
+    /// counts, with the gradient of its mask.
+    #[inline(always)]
+    fn label_layer<S: Simd>(
+        &self,
+        simd: S,
+        rays: &Rays<S>,
+        [start, stop]: [f32; 2],
+        [begin, end]: [Lanes<S>; 2],
+    ) -> Layer<S> {
+        let none = Lanes::splat(simd, 0.0);
+        let place = rays.places((begin + end) * 0.5);
+        let Point { value, slopes, .. } = self.at_place(simd, rays, place);
+        let value = value * self.plan.frame.field().transfer[1];
+        let face = Face { value, across: [none; 3] };
+        let of_sheet = [start, stop - start].map(
+            #[inline(always)]
+            |own| Lanes::splat(simd, own),
+        );
+        let mut layer = Layer::new(simd, rays.direction, [face; 2], value, of_sheet, [begin, end]);
+        if self.plan.has_gradients() {
+            layer.sections = Some([self.gradient(slopes); 3]);
+        }
+        layer
     }
 
     /// Whether the field in a sheet differs from what its faces show. `bend` is the difference of

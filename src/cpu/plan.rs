@@ -164,7 +164,7 @@ impl<'a> Plan<'a> {
     fn set_field(&mut self, sheets: &Sheets, settings: &Settings, item: &Item) {
         let (Some(transfer), Some(range)) = (item.transfer(), item.value_range()) else { return };
         let kernel = item.kernel();
-        self.tables = Tables::new(transfer, range, kernel);
+        self.tables = Tables::of(item, transfer, range);
         let light = item.light(settings);
         self.frame.fields[0].set_tables((&self.tables, 0), transfer, light, self.view, sheets);
         self.table_kernel =
@@ -178,6 +178,8 @@ impl<'a> Plan<'a> {
             return;
         }
         self.has_field = true;
+        // Nothing lies between two labels.
+        self.is_integrated &= !item.is_label_map();
         self.is_lit = is_shaded;
         self.has_gradient_opacity =
             !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;

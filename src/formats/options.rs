@@ -1,6 +1,7 @@
 //! What a caller chooses when a file is read.
 
 use super::RawLayout;
+use crate::about::Label;
 use glam::DVec3;
 
 /// Which of a file's data to read, and what its bytes mean if it does not say so itself. A format
@@ -33,6 +34,9 @@ pub struct ReadOptions {
     /// A value that stands for “no value”. Samples of this value are holes, as samples that are
     /// not numbers are.
     pub missing: Option<f64>,
+    /// What is known about labels ([`read_labels`](super::read_labels)). It is for label maps, and
+    /// for volumes whose values are all in the table, apart from 0.
+    pub labels: Vec<Label>,
 }
 
 impl ReadOptions {

@@ -385,7 +385,7 @@ fn tables_of(
     for (field, number) in frame.fields.iter_mut().zip(scene.fields()) {
         let item = &scene.items[number];
         let (Some(transfer), Some(range)) = (item.transfer(), item.value_range()) else { continue };
-        let tables = Tables::new(transfer, range, item.kernel());
+        let tables = Tables::of(item, transfer, range);
         let start = all.len() as u32;
         field.set_tables((&tables, start), transfer, item.light(settings), view, sheets);
         all.extend(tables.entries);

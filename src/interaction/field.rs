@@ -21,6 +21,8 @@ enum Kind<'a> {
     /// Linear between the samples of a rectilinear lattice, whose kernels have no common shape.
     /// With the map from world positions to steps.
     Linear(DMat3, &'a [Vec<f64>; 3]),
+    /// The label of the nearest sample. With the map from world positions to steps.
+    Nearest(DMat3),
 }
 
 impl<'a> Field<'a> {
@@ -31,6 +33,7 @@ impl<'a> Field<'a> {
     pub fn new(volume: &'a Volume, kernel: &'a Kernel) -> Result<Self> {
         check(volume)?;
         let kind = match &volume.lattice.arrangement {
+            _ if volume.is_label_map() => Kind::Nearest(volume.lattice.axes.inverse()),
             Arrangement::Rectilinear(places) => Kind::Linear(volume.lattice.axes.inverse(), places),
             _ => Kind::Kernel(Reconstruction::of_checked(volume, kernel)?),
         };
@@ -44,7 +47,21 @@ impl<'a> Field<'a> {
             Kind::Linear(inverse, places) => {
                 self.linear_at(*inverse * (position - self.volume.lattice.origin), places)
             }
+            Kind::Nearest(inverse) => {
+                self.nearest_to(*inverse * (position - self.volume.lattice.origin))
+            }
         }
+    }
+
+    /// Returns the sample nearest to a position in steps.
+    fn nearest_to(&self, steps: DVec3) -> Option<f64> {
+        let dims = self.volume.lattice.dims;
+        let mut index = [0; 3];
+        for (axis, own) in index.iter_mut().enumerate() {
+            let nearest = (steps[axis] + 0.5).floor();
+            *own = (0.0..dims[axis] as f64).contains(&nearest).then_some(nearest as usize)?;
+        }
+        Some(self.volume.value(index[0] + dims[0] * (index[1] + dims[1] * index[2])))
     }
 
     /// Interpolates between the eight samples around a position in steps.

@@ -20,6 +20,9 @@ pub fn obstacle(
     unsuited: impl Fn(&Volume, &Kernel) -> Option<&'static str>,
 ) -> Option<&'static str> {
     let fields = scene.items.iter().filter(|item| item.transfer().is_some());
+    if parts > 1 && scene.items.iter().any(Item::is_label_map) {
+        return Some("sheets thicker than two samples");
+    }
     let unsuited = match fields.collect::<Vec<_>>()[..] {
         [Item::Volume(volume, kernel, _)] => unsuited(volume, kernel),
         [Item::Bricks(_, kernel, _)] => unsuited_kernel(kernel),

@@ -45,6 +45,10 @@ const FAR_WEIGHT: f64 = 0.15;
 /// sample. The samples next to it have nearly all the weight; those two steps away move the field
 /// by at most their share.
 pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
+    if volume.is_label_map() {
+        // A lookup may miss the nearest sample by one.
+        return neighbourhood_ranges(volume, [1; 3]);
+    }
     let mut ranges = volume.drawn_ranges(kernel).into_owned();
     if deviation(kernel).is_some_and(|sigma| sigma <= WIDEST) && volume.coefficients.is_none() {
         let near = neighbourhood_ranges(volume, [1; 3]);

@@ -3,6 +3,7 @@
 
 use crate::{
     math::{Kernel, Profile},
+    scene::Item,
     volume::TransferFunction,
 };
 
@@ -63,10 +64,30 @@ pub struct Tables {
 }
 
 impl Tables {
+    /// Makes the tables of the field of an item with values in `range`.
+    pub fn of(item: &Item, transfer: &TransferFunction, range: [f64; 2]) -> Self {
+        let [low, high] = range;
+        if item.is_label_map() {
+            // Labels are whole numbers, and each has an entry.
+            let window = Window { ends: range, entries: (high - low) as usize + 1 };
+            let one = Window { ends: [low, low + 1.0], entries: 2 };
+            return Self::within(if high > low { window } else { one }, transfer, range, None);
+        }
+        Self::new(transfer, range, item.kernel())
+    }
+
     /// Makes the tables of a transfer function for samples in `range`, and those of the kernel if
     /// it has no closed form.
     pub fn new(transfer: &TransferFunction, range: [f64; 2], kernel: Option<&Kernel>) -> Self {
-        let Window { ends: [low, high], entries: count } = window(transfer, range);
+        Self::within(window(transfer, range), transfer, range, kernel)
+    }
+
+    fn within(
+        Window { ends: [low, high], entries: count }: Window,
+        transfer: &TransferFunction,
+        range: [f64; 2],
+        kernel: Option<&Kernel>,
+    ) -> Self {
         let last = (count - 1) as f64;
         let mut entries = transfer.table([low, high], count);
         // The last entry again, for interpolation at the upper end.

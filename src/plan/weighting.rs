@@ -13,7 +13,13 @@ pub enum Weighting {
     /// By Gaussians with this standard deviation, in steps.
     Gaussian(f64),
     Tensor(Tensor),
+    /// The label of the nearest sample, with the gradient of the label's mask, whose samples are
+    /// weighted by Gaussians with a standard deviation of [`MASK_DEVIATION`].
+    Labels,
 }
+
+/// Standard deviation, in steps, of the Gaussians that smooth a label's mask.
+pub const MASK_DEVIATION: f64 = 0.7;
 
 /// Returns the weighting of a kernel, or `None` if four weights an axis do not suffice.
 pub fn weighting(kernel: &Kernel) -> Option<Weighting> {

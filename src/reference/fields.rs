@@ -10,6 +10,7 @@ use super::{
     field::{Field, Found, Layer},
     gather,
     kernel::{Kernel, Load},
+    labels::LabelMap,
     product::Product,
     ray::Ray,
     sheet::Mean,
@@ -32,6 +33,8 @@ pub(super) struct Drawn<'a> {
     pub kernels: Vec<Kernel<'a>>,
     /// The same field, if its kernels are tensor products.
     product: Option<Product<'a>>,
+    /// The same field, if its values are labels.
+    labels: Option<LabelMap<'a>>,
     /// The same field, if it is that of cells.
     solids: Option<Solids>,
     /// Whether gradients are known in the middles of sheets: those of gathered fields.
@@ -67,11 +70,16 @@ impl<'a> Drawn<'a> {
             lattice,
             shade: item.light(settings).filter(|_| !is_dark),
             surfaces: if is_dark { &[] } else { &transfer.isosurfaces },
-            inside: settings.classification == Classification::PreIntegrated,
+            inside: settings.classification == Classification::PreIntegrated
+                && !item.is_label_map(),
         };
         let shows_all = settings.optics == Optics::Maximum;
         let product = match item {
             Item::Volume(volume, kernel, _) => Product::new(volume, kernel, view),
+            _ => None,
+        };
+        let labels = match item {
+            Item::Volume(volume, ..) => LabelMap::new(volume, view),
             _ => None,
         };
         let solids = match item {
@@ -85,7 +93,7 @@ impl<'a> Drawn<'a> {
             .kernel()
             .map_or_else(|| math::Kernel::default().least_sum(), math::Kernel::least_sum);
         let kernels = gather::samples(item, view);
-        Some(Self { field, kernels, product, solids, has_middles, least_sum })
+        Some(Self { field, kernels, product, labels, solids, has_middles, least_sum })
     }
 
     /// Sums the samples at distances along a ray, in ascending order: the faces of its sheets, or
@@ -154,6 +162,14 @@ impl<'a> Drawn<'a> {
             return solids.layers(frame, on.ray, on.allowed);
         }
         let Through { ray, kernels, allowed, .. } = *on;
+        if let (Some(labels), Some(lattice)) = (&self.labels, self.field.lattice) {
+            let held = clip::intersection(allowed, clip::sample_box(ray, &frame.view, lattice));
+            let layer = |span: [f64; 2]| {
+                let pieces = clip::intersection(&held, Some(span));
+                Some((labels.layer(ray, span, &pieces)?, pieces))
+            };
+            return (0..frame.count()).map(|k| layer(frame.span(k))).collect();
+        }
         let means = self.means(frame, ray, kernels);
         let faces = self.faces(ray, kernels, &frame.planes);
         let middles = self.middles(frame, ray, kernels);

@@ -109,6 +109,12 @@ impl Item {
         }
     }
 
+    /// Returns whether the item is a volume whose values are drawn as labels
+    /// ([`Volume::is_label_map`]).
+    pub fn is_label_map(&self) -> bool {
+        matches!(self, Self::Volume(volume, ..) if volume.is_label_map())
+    }
+
     /// Returns the smallest and largest value of the item's field; `None` for splats that carry
     /// their own colour. Scattered samples are searched for it.
     pub fn value_range(&self) -> Option<[f64; 2]> {

@@ -115,7 +115,8 @@ impl Scene {
         self
     }
 
-    /// Adds a volume.
+    /// Adds a volume. Of a label map ([`Volume::with_labels`]), each label has what the transfer
+    /// function shows of its value, and an isosurface shows the label of its value.
     #[must_use]
     pub fn with_volume(
         mut self,
@@ -123,7 +124,9 @@ impl Scene {
         kernel: Kernel,
         transfer: TransferFunction,
     ) -> Self {
-        self.items.push(Item::Volume(volume.into(), kernel, transfer));
+        let volume = volume.into();
+        let transfer = if volume.is_label_map() { transfer.over_labels(&volume) } else { transfer };
+        self.items.push(Item::Volume(volume, kernel, transfer));
         self
     }
 
@@ -155,6 +158,11 @@ impl Scene {
             )));
         };
         shown.clone_from(transfer);
+        if let Item::Volume(volume, _, shown) = item
+            && volume.is_label_map()
+        {
+            *shown = transfer.over_labels(volume);
+        }
         numbers::check_field(item).map_err(numbers::of_item(number))?;
         Ok(scene)
     }
@@ -179,11 +187,18 @@ impl Scene {
         self.items.iter().find_map(|item| item.kernel()?.as_tensor())
     }
 
+    /// Returns what of the scene is gathered, but never scattered (“the kernel linear”, “a label
+    /// map”).
+    pub(crate) fn only_gathered(&self) -> Option<String> {
+        let labels = || self.items.iter().any(Item::is_label_map).then(|| "a label map".to_owned());
+        self.tensor().map(|tensor| format!("the kernel {}", tensor.name())).or_else(labels)
+    }
+
     /// Returns what of the scene only the CPU engine draws (“the kernel linear”, “cells”, “several
     /// volumes in bricks”); `None` if the GPU engine draws all of it.
     pub fn beyond_gpu(&self) -> Option<String> {
-        if let Some(tensor) = self.tensor() {
-            return Some(format!("the kernel {}", tensor.name()));
+        if let Some(what) = self.only_gathered() {
+            return Some(what);
         }
         if self.items.iter().any(|item| matches!(item, Item::Cells(..))) {
             return Some("cells".into());

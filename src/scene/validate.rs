@@ -164,6 +164,12 @@ fn check_item(item: &Item, settings: &Settings) -> Result<()> {
 fn check_volume(volume: &Volume, kernel: &Kernel, settings: &Settings) -> Result<()> {
     let before = settings.classifies_samples();
     let arrangement = &volume.lattice.arrangement;
+    if volume.is_label_map() && (before || settings.mode != Mode::Sheets) {
+        return wrong("a label map is classified after interpolation, in image-aligned sheets");
+    }
+    if volume.is_label_map() && settings.gradient == Gradient::Central {
+        return wrong("the gradient of a label map is that of each label's mask");
+    }
     if let Some(tensor) = kernel.as_tensor() {
         check_tensor(tensor, &volume.lattice, before).map_err(Error::Argument)?;
     }

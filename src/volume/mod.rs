@@ -1,11 +1,13 @@
 //! Volumes: samples on a lattice, and the transfer functions that give them colour and opacity.
 
 mod automatic;
+mod colored;
 #[cfg(test)]
 mod contradictions;
 mod grid;
 mod head;
 pub(crate) mod holes;
+mod labels;
 mod lattice;
 pub(crate) mod overshoot;
 pub mod phantoms;
@@ -22,6 +24,7 @@ mod sharp;
 pub(crate) mod steps;
 mod transfer;
 
+pub(crate) use labels::{OWN_DEVIATION, OWN_REACH, own_shares};
 pub use lattice::{Arrangement, Lattice};
 pub use reconstruct::Reconstruction;
 pub use resample::body_centred;

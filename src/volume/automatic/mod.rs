@@ -50,7 +50,8 @@ impl TransferFunction {
     /// - Without materials, a field with borders is shown as a solid whose colours follow the
     ///   values, and a field without borders as a cloud. Values on both sides of the background get
     ///   blue and red colours.
-    /// - Labels (few whole values, constant over regions) get one colour each.
+    /// - Labels get one colour each, that of the file if it has one. Volumes of two whole values
+    ///   are masks.
     /// - Hounsfield units, of a file that says so or as the values look, show skin and bone. Other
     ///   modalities have colours and light of their own. The file's window limits the values.
     /// - Light fades where the gradient may be noise ([`Shade::certain`]).
@@ -67,6 +68,9 @@ impl TransferFunction {
         }
         if let Some(slice) = slice(volume) {
             return slice;
+        }
+        if let Some(labels) = volume.about.labels.as_ref().filter(|_| volume.is_label_map()) {
+            return Self::of_labels(volume, labels);
         }
         let survey = Survey::of_volume(volume, window(&volume.about, volume.range));
         let (dims, spacing) = (volume.lattice.dims, volume.lattice.spacing());
@@ -105,6 +109,11 @@ fn window(about: &About, [low, high]: [f64; 2]) -> Option<[f64; 2]> {
     let [from, to] = about.window?;
     let window = [from.max(low), to.min(high)];
     (window[1] - window[0] > 0.01 * (high - low).min(to - from)).then_some(window)
+}
+
+/// Returns the colour of a label, by its number.
+pub(super) fn label_color(number: usize) -> [f64; 3] {
+    colours::of_label(number)
 }
 
 /// Returns the function of a volume of one slice; `None` for other volumes.

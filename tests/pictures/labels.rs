@@ -1,0 +1,175 @@
+//! Label maps, drawn by the CPU engine, the reference and beside other volumes: each sample's label
+//! is visible, and nothing has a colour between two labels.
+
+use crate::testing::psnr::measured;
+use glam::{DMat3, DVec3};
+use splatkit::{
+    cpu::CpuRenderer,
+    math::{Camera, Kernel, Projection},
+    picture::Picture,
+    reference,
+    scene::{Clip, ClipShape, Evaluate, Gradient, Mode, Optics, Scene, Settings},
+    volume::{Isosurface, Lattice, Samples, TransferFunction, Volume},
+};
+
+const SIDE: usize = 20;
+const SIZE: [u32; 2] = [72, 64];
+const LABELS: [u16; 4] = [3, 17, 1003, 40_000];
+
+/// Labels of any distance: a ball, two balls that touch it, and one sample alone.
+fn labels() -> Volume {
+    let lattice = Lattice::cartesian(
+        [SIDE; 3],
+        DVec3::new(3.0, -2.0, 7.0),
+        DMat3::from_diagonal(DVec3::new(0.5, 0.5, 0.6)),
+    );
+    let value = |i: usize| {
+        let [x, y, z] = lattice.index(i);
+        let at = |center: [f64; 3]| {
+            DVec3::new(x as f64, y as f64, z as f64).distance(DVec3::from(center))
+        };
+        match () {
+            () if [x, y, z] == [17, 3, 16] => 40_000,
+            () if at([5.0, 5.0, 13.0]) < 4.0 => 17,
+            () if at([14.0, 6.0, 6.0]) < 4.5 => 1003,
+            () if at([9.5, 11.0, 9.0]) < 6.0 => 3,
+            () => 0,
+        }
+    };
+    let values = (0..lattice.len()).map(value).collect();
+    let volume = Volume::new(lattice, Samples::U16(values)).expect("a volume");
+    volume.with_labels(Vec::new())
+}
+
+fn camera(projection: Projection) -> Camera {
+    let middle = DVec3::new(7.75, 2.75, 12.7);
+    Camera {
+        position: middle + DVec3::new(-3.0, -22.0, 5.0),
+        focal_point: middle,
+        view_up: DVec3::Z,
+        projection,
+    }
+}
+
+fn settings() -> Settings {
+    Settings::new(SIZE)
+}
+
+fn scene(transfer: Option<TransferFunction>) -> Scene {
+    let volume = labels();
+    let transfer = transfer.unwrap_or_else(|| TransferFunction::automatic(&volume));
+    Scene::new().with_volume(volume, Kernel::default(), transfer)
+}
+
+fn draw(scene: &Scene, camera: &Camera, settings: &Settings) -> Picture {
+    let mut renderer = CpuRenderer::new(scene).expect("a scene");
+    renderer.render(camera, settings).expect("a picture").0
+}
+
+/// The agreement of the CPU engine with the reference, in dB.
+fn agreement(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
+    let truth = reference::render(scene, camera, settings).expect("a reference");
+    assert!(truth.color.iter().any(|pixel| pixel[3] > 0.3), "an empty picture");
+    measured(&draw(scene, camera, settings), &truth)
+}
+
+/// The labels whose colours a picture without light shows. Nothing else may be opaque in it.
+fn shown(picture: &Picture, transfer: &TransferFunction) -> Vec<u16> {
+    let mut found = Vec::new();
+    for &[red, green, blue, opacity] in picture.color.iter().filter(|pixel| pixel[3] > 0.95) {
+        let color = [red, green, blue].map(|channel| f64::from(channel / opacity));
+        let is_of = |label: &u16| {
+            let own = transfer.color(f64::from(*label));
+            own.iter().zip(color).all(|(own, found)| (own - found).abs() < 0.02)
+        };
+        let label = LABELS.into_iter().find(is_of);
+        let label = label.unwrap_or_else(|| panic!("{color:?} is no label's colour"));
+        if !found.contains(&label) {
+            found.push(label);
+        }
+    }
+    found.sort_unstable();
+    found
+}
+
+#[test]
+fn label_maps_are_those_of_the_reference() {
+    let shape = ClipShape::HalfSpace { normal: DVec3::NEG_Y, offset: -2.7 };
+    let half = Clip { shape, inside: true };
+    let wide = Projection::Perspective { view_angle: 30.0 };
+    for (name, camera, settings) in [
+        ("perspective", camera(wide), settings()),
+        ("parallel", camera(Projection::Orthographic { height: 12.0 }), settings()),
+        ("cut", camera(wide), Settings { clips: vec![half], ..settings() }),
+        ("maximum", camera(wide), Settings { optics: Optics::Maximum, ..settings() }),
+        ("x-ray", camera(wide), Settings { optics: Optics::XRay, ..settings() }),
+    ] {
+        // Single pixels at the border of two labels may differ by rounding.
+        let near = agreement(&scene(None), &camera, &settings);
+        println!("{name}: {near:.1} dB");
+        assert!(near > 35.0, "{name}: {near} dB");
+    }
+}
+
+#[test]
+fn each_label_is_seen_and_nothing_between() {
+    let camera = camera(Projection::Perspective { view_angle: 30.0 });
+    let settings = Settings { size: [360, 320], volume_shade: Some(None), ..settings() };
+    let transfer = TransferFunction::automatic(&labels());
+    let picture = draw(&scene(None), &camera, &settings);
+    assert_eq!(shown(&picture, &transfer), LABELS);
+    // An isosurface shows the label of its value alone.
+    let surface = Isosurface { value: 1003.0, color: transfer.color(1003.0), opacity: 1.0 };
+    let iso = TransferFunction { isosurfaces: vec![surface], ..TransferFunction::default() };
+    let picture = draw(&scene(Some(iso)), &camera, &settings);
+    assert_eq!(shown(&picture, &transfer), [1003]);
+}
+
+/// All samples of all labels are framed, also the one far away.
+#[test]
+fn each_sample_is_framed() {
+    let volume = labels();
+    let [first, last] = volume.bounds();
+    let seen = scene(None).seen(&[]).expect("points");
+    let around = |point: DVec3| seen.iter().any(|seen| seen.distance(point) < 0.31);
+    let lone = volume.lattice.sample_position((16 * SIDE + 3) * SIDE + 17);
+    assert!(around(lone + DVec3::X * 0.25), "{lone} is not framed");
+    assert!(seen.iter().all(|seen| seen.z < last.z - 0.5 && seen.z > first.z), "air is framed");
+}
+
+#[test]
+fn label_maps_are_drawn_beside_volumes() {
+    let lattice = Lattice::cartesian(
+        [10; 3],
+        DVec3::new(3.0, -2.0, 7.0),
+        DMat3::from_diagonal(DVec3::splat(1.0)),
+    );
+    let values = (0..lattice.len()).map(|i| (i * 37 % 101) as u8).collect();
+    let volume = Volume::new(lattice, Samples::U8(values)).expect("a volume");
+    let haze = TransferFunction {
+        color: vec![(0.0, [0.2, 0.3, 0.9]), (100.0, [0.9, 0.9, 0.2])],
+        opacity: vec![(0.0, 0.0), (100.0, 0.15)],
+        ..TransferFunction::default()
+    };
+    let both = scene(None).with_volume(volume, Kernel::default(), haze);
+    let camera = camera(Projection::Perspective { view_angle: 30.0 });
+    let near = agreement(&both, &camera, &settings());
+    assert!(near > 35.0, "{near} dB");
+}
+
+/// Methods that mix samples before they are classified are refused.
+#[test]
+fn methods_that_mix_labels_are_refused() {
+    let camera = camera(Projection::Perspective { view_angle: 30.0 });
+    for settings in [
+        Settings { mode: Mode::AxisSheets, ..settings() },
+        Settings { evaluate: Evaluate::Scatter, ..settings() },
+        Settings { gradient: Gradient::Central, ..settings() },
+        Settings { sheet_thickness: Some(3.0), ..settings() },
+    ] {
+        let mut renderer = CpuRenderer::new(&scene(None)).expect("a scene");
+        let error = renderer.render(&camera, &settings).unwrap_err().to_string();
+        assert!(error.contains("label map"), "{error}");
+    }
+    assert_eq!(scene(None).beyond_gpu().as_deref(), Some("a label map"));
+}
