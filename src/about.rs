@@ -1,6 +1,6 @@
 //! What a file says about its values and about the thing they were measured from.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// What a file says about a volume or samples beyond their values. It changes only defaults: the
@@ -10,6 +10,8 @@ use serde::{Deserialize, Serialize};
 pub struct About {
     /// How the subject stands in the world; `None` if the file does not say.
     pub stance: Option<Stance>,
+    /// What the axes of the world mean.
+    pub frame: Frame,
     /// What measured the values.
     pub modality: Option<Modality>,
     /// The lowest and the highest value that the file suggests to show, from its window.
@@ -22,6 +24,107 @@ pub struct About {
     pub length: String,
     /// The number of samples without a value, which were read as the lowest value.
     pub holes: u64,
+    /// The labels, if the values are labels: names of things, not quantities.
+    pub labels: Option<Labels>,
+    /// The names of the values that may colour a mesh or a point cloud, as its reader takes them
+    /// ([`ReadOptions::scalar`](crate::formats::ReadOptions::scalar)).
+    pub attributes: Vec<String>,
+    /// The coordinate reference system of the positions, as in “EPSG:25832”; empty if the file does
+    /// not say.
+    pub crs: String,
+    /// How the file stores its points, as in “LAS 1.4, point format 6”; empty if its format has
+    /// only one way.
+    pub layout: String,
+}
+
+/// The labels of a label map: whole numbers that name things, such as organs or grains. They are
+/// not quantities, so nothing lies between two of them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Labels {
+    /// The labels that occur among the samples, ascending.
+    pub present: Vec<i32>,
+    /// What the file, or a table beside it, says about labels; also about some that do not occur.
+    pub table: Vec<Label>,
+    /// The label of what surrounds the things, which is not drawn.
+    pub background: Option<i32>,
+}
+
+/// What is known about a label.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Label {
+    /// The value of its samples.
+    pub value: i32,
+    /// Its name; empty if there is none.
+    pub name: String,
+    /// Red, green, blue in 0 … 1; `None` if no colour is given.
+    pub color: Option<[f64; 3]>,
+    /// Its opacity, 0 … 1; `None` if none is given. 0 hides the label.
+    pub opacity: Option<f64>,
+}
+
+impl Labels {
+    /// Returns what is known about a label.
+    pub fn get(&self, value: i32) -> Option<&Label> {
+        self.table.iter().find(|label| label.value == value)
+    }
+
+    /// Returns the labels that are drawn, each with its name if it has one (“3 left ear”).
+    pub fn listed(&self) -> Vec<String> {
+        let text = |&value: &i32| match self.name(value) {
+            name if name == value.to_string() => name,
+            name => format!("{value} {name}"),
+        };
+        self.present.iter().filter(|value| self.background != Some(**value)).map(text).collect()
+    }
+
+    /// Returns the name of a label, or its number.
+    pub fn name(&self, value: i32) -> String {
+        match self.get(value) {
+            Some(label) if !label.name.is_empty() => label.name.clone(),
+            _ => value.to_string(),
+        }
+    }
+}
+
+/// What the axes of an input's coordinates mean.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Frame {
+    /// The file's own axes, of which it says no more.
+    #[default]
+    Own,
+    /// A patient's: x to the right, y to the front (anterior), z to the head (superior), called
+    /// RAS. Readers turn the other frames of medical files into this one.
+    Patient,
+}
+
+/// The frames of the inputs of a scene, to find out whether they belong together.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Frames {
+    /// The first input in the frame of a patient, and the first other one.
+    first: [Option<String>; 2],
+}
+
+impl Frames {
+    /// Adds an input. Returns a warning if inputs in the frame of a patient and others have met:
+    /// the coordinates of the others may mean other places.
+    pub fn add(&mut self, name: &str, frame: Frame) -> Option<String> {
+        let (had_patient, had_other) = (self.first[0].is_some(), self.first[1].is_some());
+        let own = usize::from(frame != Frame::Patient);
+        self.first[own].get_or_insert_with(|| name.to_owned());
+        let [Some(patient), Some(other)] = &self.first else { return None };
+        (!(had_patient && had_other)).then(|| {
+            format!(
+                "{other} does not say how its axes lie in the patient, as {patient} does: it is \
+                 drawn by its own coordinates, and may lie elsewhere"
+            )
+        })
+    }
+
+    /// Returns whether an input is in the frame of a patient.
+    pub fn have_patient(&self) -> bool {
+        self.first[0].is_some()
+    }
 }
 
 /// How a subject stands in the world. Both directions have unit length and are perpendicular.
@@ -50,10 +153,7 @@ pub enum Modality {
 }
 
 impl Stance {
-    /// The frame of DICOM (LPS): x to the patient's left, y to the back, z to the head.
-    pub const LPS: Self = Self { up: DVec3::Z, front: DVec3::NEG_Y };
-
-    /// The frame of NIfTI (RAS): x to the patient's right, y to the front, z to the head.
+    /// The frame of a patient (RAS): x to the right, y to the front, z to the head.
     pub const RAS: Self = Self { up: DVec3::Z, front: DVec3::Y };
 
     /// The frame of surveyors, and of most tools for construction: z up, seen along +y.
@@ -64,6 +164,13 @@ impl Stance {
 
     /// The frame of a camera, which trainers of Gaussian scenes keep: y down, seen along +z.
     pub const Y_DOWN: Self = Self { up: DVec3::NEG_Y, front: DVec3::NEG_Z };
+
+    /// Returns the rotation that turns a subject of this stance to another one.
+    pub(crate) fn turn_to(self, wanted: Self) -> DMat3 {
+        let axes =
+            |stance: Self| DMat3::from_cols(stance.up.cross(stance.front), stance.up, stance.front);
+        axes(wanted) * axes(self).transpose()
+    }
 
     /// Returns the stance with this direction up, and the front that is usual for it: −Y if Z or −Z
     /// is nearest to the direction, otherwise +Z; made perpendicular to it.
@@ -81,6 +188,25 @@ impl Stance {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_patient_and_something_else_are_told_of_once() {
+        let mut frames = Frames::default();
+        assert_eq!(frames.add("ct.nii", Frame::Patient), None);
+        assert_eq!(frames.add("mask.dcm", Frame::Patient), None);
+        let warning = frames.add("mesh.stl", Frame::Own).unwrap();
+        assert!(warning.contains("mesh.stl") && warning.contains("ct.nii"), "{warning}");
+        assert_eq!(frames.add("more.stl", Frame::Own), None);
+        assert!(frames.have_patient());
+    }
+
+    #[test]
+    fn turns_lead_from_one_stance_to_another() {
+        let turn = Stance::Y_UP.turn_to(Stance::SURVEY);
+        assert_eq!(turn * DVec3::Y, DVec3::Z);
+        assert_eq!(turn * DVec3::Z, DVec3::NEG_Y);
+        assert_eq!(turn * DVec3::X, DVec3::X);
+    }
 
     #[test]
     fn every_direction_has_a_front() {

@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    about::{Frame, Stance},
     container::directory::{Directory, Fault, Kind, Shape},
     error::LimitKind,
     input::{self, Bytes, Limits},
@@ -34,6 +35,8 @@ pub struct Header {
     pub scalar: Scalar,
     /// The smallest and the largest value of level 0. Coarser levels lie within.
     pub range: [f64; 2],
+    /// What the axes of the world mean.
+    pub frame: Frame,
     /// The name of the world's unit (`"mm"`); empty if unknown.
     pub unit: String,
     /// The name of the file that this volume was made from; empty if there is none.
@@ -41,6 +44,11 @@ pub struct Header {
 }
 
 impl Header {
+    /// Returns how the subject stands, if that is known.
+    pub fn stance(&self) -> Option<Stance> {
+        (self.frame == Frame::Patient).then_some(Stance::RAS)
+    }
+
     /// Checks that a volume with this header can be cut into bricks, in memory or in a file. The
     /// error is a message.
     pub(super) fn validate(&self) -> Result<(), String> {
@@ -114,6 +122,7 @@ impl Bricks {
             lattice: volume.lattice.clone(),
             scalar,
             range: volume.range,
+            frame: volume.about.frame,
             unit: String::new(),
             source: String::new(),
         };

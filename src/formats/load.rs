@@ -5,6 +5,7 @@ use super::{
     FORMATS, ReadOptions,
     foreign::advice,
     format::{Format, VolumeReader, extensions, find, find_volume, listed},
+    shared::{anatomy, visible::keep_visible},
 };
 use crate::{
     Error, Result,
@@ -34,7 +35,11 @@ pub fn load_mesh(path: impl AsRef<Path>, limits: &Limits, options: &ReadOptions)
 /// Those of [`load_mesh`], except those of opening the file.
 pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     let _span = tracing::info_span!("load_mesh", file = %source.path.display()).entered();
-    source.unless_changed(mesh_of(FORMATS, source, options))
+    let mut mesh = source.unless_changed(mesh_of(FORMATS, source, options))?;
+    if let Some(anatomy) = anatomy::stated(source.bytes()).filter(|_| mesh.about.stance.is_none()) {
+        anatomy.place_mesh(&mut mesh);
+    }
+    Ok(mesh)
 }
 
 /// As [`read_mesh`], in the formats of a table, but does not check whether the file changed
@@ -42,7 +47,11 @@ pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
 pub(super) fn mesh_of(table: &[Format], source: &Source, options: &ReadOptions) -> Result<Mesh> {
     let may = |format: &Format| format.mesh.is_some();
     match find(table, source, may)?.and_then(|format| format.mesh) {
-        Some(read) => read(source, options),
+        Some(read) => {
+            let mut mesh = read(source, options)?;
+            keep_visible(source, &mut mesh);
+            Ok(mesh)
+        }
         None => Err(foreign(table, source).unwrap_or_else(|| {
             let message = format!("“.{}” is not a mesh format that can be read", named(source));
             source
@@ -74,7 +83,8 @@ pub fn load_volume(
 /// # Errors
 /// Those of [`load_volume`], except those of opening the file.
 pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
-    source.unless_changed(volume_of(FORMATS, source, options))
+    let volume = source.unless_changed(volume_of(FORMATS, source, options))?;
+    Ok(volume.with_guessed_labels().with_label_table(&options.labels))
 }
 
 /// As [`read_volume`], in the formats of a table, but does not check whether the file changed

@@ -6,14 +6,15 @@ use super::{
     Endian, ReadOptions, SampleType,
     nrrd::files,
     shared::{
+        anatomy::{self, Anatomy},
         grid::{Component, Element, Grid, too_few},
-        holes,
         plain::Plain,
+        several,
     },
 };
 use crate::{
     Result,
-    about::{About, Modality, Stance},
+    about::{About, Modality},
     input::{Source, copy},
     volume::{Lattice, Volume},
 };
@@ -24,14 +25,17 @@ use std::{borrow::Cow, collections::HashMap, io::Read};
 /// Maximum size of a header in bytes; headers of real files are far smaller.
 const LONGEST: usize = 1 << 20;
 
+/// The names of the field with the directions of the axes.
+const DIRECTIONS: [&str; 3] = ["TransformMatrix", "Rotation", "Orientation"];
+
 /// The field that ends the header, or names the files with the samples.
 const DATA: &str = "ElementDataFile";
 
 /// Reads an image of two to four axes; the fourth is time ([`ReadOptions::time`]). World positions
 /// are those of ITK: the rows of `TransformMatrix` are the directions of the axes, `Offset` is the
 /// position of the first sample, and `CenterOfRotation` has no effect. If the file gives an
-/// anatomical orientation, the world is that of DICOM (x to the left, y to the back, z to the
-/// head).
+/// anatomical orientation, the volume is turned from DICOM's frame, which ITK uses, into the
+/// patient's ([`Frame::Patient`](crate::about::Frame)).
 ///
 /// Samples may have several channels ([`ReadOptions::scalar`]): without a choice, three or four of
 /// unsigned bytes are a colour, of which the brightness is read, and others a vector, of which the
@@ -48,19 +52,26 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let size = grid.check(source)?;
     let component = header.component(options, &grid)?;
     let skipped = size.saturating_mul(skip);
-    let samples = header
-        .with_data(size, skipped, grid.dims, |file, data| grid.samples(file, data, component))?;
-    let mut volume = holes::volume(source, lattice, samples, options)?;
+    let mut volume = header.with_data(size, skipped, grid.dims, |file, data| {
+        grid.volume(file, lattice.clone(), data, component, options)
+    })?;
     volume.about = About { holes: volume.about.holes, ..header.about() };
+    if let Some(anatomy) = header.anatomy() {
+        anatomy.place(&mut volume);
+    }
     Ok(volume)
 }
 
-/// Returns where the samples are, if they are in one file, neither compressed nor text.
+/// Returns where the samples are, if they are of one time and in one file, neither compressed nor
+/// text.
 ///
 /// # Errors
 /// As [`read`], for the header.
 pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
     let header = Header::of(source)?;
+    if header.sizes()?[3] > 1 {
+        return Ok(None);
+    }
     let (grid, _) = header.grid(&ReadOptions::default())?;
     let field = header.need(DATA)?;
     let Element::Real(sample_type) = grid.element else { return Ok(None) };
@@ -74,7 +85,8 @@ pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
         Some(body) => (source.path.to_owned(), body),
         None => (source.neighbour(DATA, field)?, 0),
     };
-    Ok(Some(Plain { path, start, sample_type, endian: grid.endian, lattice }))
+    let (lattice, frame) = anatomy::placed(header.anatomy(), lattice);
+    Ok(Some(Plain { path, start, sample_type, endian: grid.endian, lattice, frame }))
 }
 
 /// Returns whether the first bytes are of a header.
@@ -186,18 +198,19 @@ impl<'a> Header<'a> {
         }
     }
 
-    /// Returns the layout of the samples, and the number of volumes before the one to read.
-    fn grid(&self, options: &ReadOptions) -> Result<(Grid, usize)> {
+    /// Returns the samples along x, y and z, and the number of times.
+    fn sizes(&self) -> Result<Vec<usize>> {
         let axes = self.axes()?;
         self.need("DimSize")?;
         let mut sizes = self.numbers::<usize>(&["DimSize"], axes)?.unwrap_or_default();
         sizes.resize(4, 1);
-        let times = sizes[3];
-        let time = options.time.filter(|_| axes == 4).unwrap_or(0);
-        if time >= times {
-            let message = format!("has {times} volumes, numbered from 0, but {time} is asked for");
-            return Err(self.source.error("DimSize", message).hint("choose another --time"));
-        }
+        Ok(sizes)
+    }
+
+    /// Returns the layout of the samples, and the number of volumes before the one to read.
+    fn grid(&self, options: &ReadOptions) -> Result<(Grid, usize)> {
+        let sizes = self.sizes()?;
+        let time = several::time(self.source, "DimSize", sizes[3] as u64, options)?;
         let channels = self.numbers::<usize>(&["ElementNumberOfChannels"], 1)?;
         let channels = channels.map_or(1, |channels| channels[0]);
         if channels == 0 {
@@ -212,8 +225,7 @@ impl<'a> Header<'a> {
     }
 
     fn component(&self, options: &ReadOptions, grid: &Grid) -> Result<Component> {
-        let byte = Element::Real(SampleType::U8);
-        let are_colors = grid.element == byte && matches!(grid.components, 3 | 4);
+        let are_colors = grid.element.is_byte() && matches!(grid.components, 3 | 4);
         Component::chosen(self.source, options, grid.components, are_colors)
     }
 
@@ -245,8 +257,7 @@ impl<'a> Header<'a> {
         let spacing =
             spacing.map_or_else(|| self.numbers(&["ElementSize"], axes), |own| Ok(Some(own)));
         let spacing = spacing?.unwrap_or_else(|| vec![1.0; axes]);
-        let directions =
-            self.numbers::<f64>(&["TransformMatrix", "Rotation", "Orientation"], axes * axes)?;
+        let directions = self.numbers::<f64>(&DIRECTIONS, axes * axes)?;
         let offset = self.numbers::<f64>(&["Offset", "Position", "Origin"], axes)?;
         let spatial = axes.min(3);
         let mut steps = DMat3::IDENTITY;
@@ -264,21 +275,24 @@ impl<'a> Header<'a> {
         Ok(lattice)
     }
 
+    /// Returns how the world lies in the patient, if the header gives an anatomical orientation:
+    /// the letters of the sides that the image's axes come from. Directions and positions are
+    /// those of DICOM. Without directions, the letters give them.
+    fn anatomy(&self) -> Option<Anatomy> {
+        let of_axes = Anatomy::from_sides(self.get(&["AnatomicalOrientation"])?)?;
+        Some(if self.get(&DIRECTIONS).is_some() { Anatomy::LPS } else { of_axes })
+    }
+
     fn about(&self) -> About {
-        let mut about = About::default();
-        let orientation = self.get(&["AnatomicalOrientation"]).unwrap_or_default();
-        let is_known = orientation.len() == 3
-            && orientation.bytes().all(|letter| b"RLAPIS".contains(&letter.to_ascii_uppercase()));
-        about.stance = is_known.then_some(Stance::LPS);
-        about.modality = match self.get(&["Modality"]).unwrap_or_default() {
+        let modality = match self.get(&["Modality"]).unwrap_or_default() {
             "MET_MOD_CT" => Some(Modality::Ct),
             "MET_MOD_MR" => Some(Modality::Mr),
             "MET_MOD_NM" => Some(Modality::Emission),
             "MET_MOD_US" => Some(Modality::Ultrasound),
             _ => None,
         };
-        about.length = self.get(&["DistanceUnits"]).unwrap_or_default().into();
-        about
+        let length = self.get(&["DistanceUnits"]).unwrap_or_default().into();
+        About { modality, length, ..About::default() }
     }
 
     /// Returns the bytes before the samples in each file; `None` if the samples are the last bytes.
@@ -405,6 +419,7 @@ fn is_word(value: &str, word: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::about::Stance;
     use crate::input::testing::*;
     use flate2::{Compression, write::ZlibEncoder};
     use std::io::Write;
@@ -488,7 +503,7 @@ mod tests {
             assert_eq!(values(&at(None).unwrap()), [1.0, 2.0], "{fields}");
             assert_eq!(values(&at(Some(1)).unwrap()), [3.0, 4.0], "{fields}");
             let error = at(Some(2)).unwrap_err().to_string();
-            assert!(error.contains("has 2 volumes"), "{error}");
+            assert!(error.contains("has 2 times"), "{error}");
         }
     }
 
@@ -500,12 +515,19 @@ mod tests {
         let volume =
             load(&mha(fields, "1 1 1", "MET_UCHAR", &[1]), &ReadOptions::default()).unwrap();
         let axes = volume.lattice.axes;
-        assert_eq!(axes.x_axis, DVec3::new(0.0, 2.0, 0.0));
-        assert_eq!(axes.y_axis, DVec3::new(-3.0, 0.0, 0.0));
+        // ITK's x leads to the left and y to the back.
+        assert_eq!(axes.x_axis, DVec3::new(0.0, -2.0, 0.0));
+        assert_eq!(axes.y_axis, DVec3::new(3.0, 0.0, 0.0));
         assert_eq!(axes.z_axis, DVec3::new(0.0, 0.0, 4.0));
-        assert_eq!(volume.lattice.origin, DVec3::new(1.0, 2.0, 3.0));
-        assert_eq!(volume.about.stance, Some(Stance::LPS));
+        assert_eq!(volume.lattice.origin, DVec3::new(-1.0, -2.0, 3.0));
+        assert_eq!(volume.about.stance, Some(Stance::RAS));
         assert_eq!(volume.about.modality, Some(Modality::Ct));
+        // Without directions, the letters are those of the sides that the axes come from.
+        let turned = mha("AnatomicalOrientation = PIR\n", "1 1 1", "MET_UCHAR", &[1]);
+        let turned = load(&turned, &ReadOptions::default()).unwrap();
+        assert_eq!(turned.lattice.axes.x_axis, DVec3::Y);
+        assert_eq!(turned.lattice.axes.y_axis, DVec3::Z);
+        assert_eq!(turned.lattice.axes.z_axis, DVec3::NEG_X);
         let plain = mha("AnatomicalOrientation = ???\n", "1 1 1", "MET_UCHAR", &[1]);
         let plain = load(&plain, &ReadOptions::default()).unwrap();
         assert_eq!((plain.lattice.spacing(), plain.about.stance), (DVec3::ONE, None));

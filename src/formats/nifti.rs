@@ -8,11 +8,10 @@ mod tests;
 
 use super::{
     Endian, ReadOptions, SampleType, raw,
-    shared::{holes, luminance::luminance, rescale::rescaled},
+    shared::{anatomy::Anatomy, colors, holes, luminance::luminance, rescale::rescaled, several},
 };
 use crate::{
     Result,
-    about::Stance,
     input::Source,
     volume::{Samples, Volume},
 };
@@ -22,7 +21,11 @@ use std::{
     borrow::Cow,
     io::{self, Read},
     path::{Path, PathBuf},
+    sync::Arc,
 };
+
+/// The intents of vectors of three or four components that are colours: RGB and RGBA.
+const COLOR_VECTORS: [i64; 2] = [2003, 2004];
 
 /// Bytes that are skipped between two checks of the time limit.
 const PORTION: u64 = 16 << 20;
@@ -47,8 +50,8 @@ pub(super) fn is_nifti(bytes: &[u8]) -> bool {
 ///
 /// The header's matrix (“sform”) places the samples, else its rotation (“qform”), else the steps
 /// alone. Values are scaled by the header's slope and intercept. Complex numbers become their
-/// magnitude, and colours their luminance. Files with vectors become their length, or the component
-/// that [`ReadOptions::scalar`] names (`:x` or `:0`).
+/// magnitude. Colours are kept, with their luminance as samples. Files with vectors become their
+/// length, or the component that [`ReadOptions::scalar`] names (`:x` or `:0`).
 ///
 /// A name that ends with `.hdr` or `.img` is one of a pair, which lies beside it. Headers of
 /// Analyze 7.5 are read too; they do not say how the subject lies.
@@ -153,6 +156,9 @@ fn form(source: &Source, header: &Header) -> Result<(SampleType, Form)> {
     })
 }
 
+/// The intent of volumes whose values are labels (`NIFTI_INTENT_LABEL`).
+const LABELS: i64 = 1002;
+
 /// Reads the volume that the options choose. The header is from one source, the samples from
 /// another, or from the same.
 fn volume(own: &Source, image: &Source, header: &Header, options: &ReadOptions) -> Result<Volume> {
@@ -173,52 +179,52 @@ fn volume(own: &Source, image: &Source, header: &Header, options: &ReadOptions) 
     };
     let wide = kind.bytes_of(claimed).and_then(|bytes| bytes.checked_mul(numbers as u64));
     let size = image.check_bytes("the size of the samples in bytes", wide.unwrap_or(u64::MAX))?;
-    let time = chosen_time(own, times, options.time)?;
+    let time = several::time(own, "header, dim[4]", times, options)? as u64;
+    let components_read = wanted(own, header, options)?;
     let mut parts = Vec::new();
-    for component in wanted(own, header, options)? {
+    let mut colors: Option<Arc<[[u8; 4]]>> = None;
+    for component in components_read {
         let number = u64::from(component) * times + time;
         let is_last = number + 1 == times.saturating_mul(components);
         let at = start(own, header)?.saturating_add(number.saturating_mul(size as u64));
         let bytes = bytes(image, at, size, is_last)?;
+        if let (Form::Color(channels), None) = (form, &options.scalar) {
+            image.spend("the size of the colours in bytes", 4 * bytes.len() as u64)?;
+            colors = Some(colors::of_pixels(&bytes, channels).into());
+        }
         parts.push(decoded(image, bytes, header, kind, form)?);
     }
+    let is_color = COLOR_VECTORS.contains(&header.intent) && options.scalar.is_none();
     let samples = match <[Samples; 1]>::try_from(parts) {
         Ok([one]) => one,
+        Err(several) if is_color && several.len() >= 3 => {
+            let own = colors::of_channels(image, &several)?;
+            let brightness = colors::brightness(&own);
+            colors = Some(own);
+            brightness
+        }
         Err(several) => length(image, &several)?,
     };
     let mut volume = holes::volume(image, lattice, samples, options)?;
+    if let Some(colors) = colors {
+        colors::attach(&mut volume, colors);
+    }
     describe(&mut volume, header, is_stated);
-    Ok(volume)
+    Ok(if header.intent == LABELS { volume.with_labels(Vec::new()) } else { volume })
 }
 
 /// Fills in what the header says beyond the values.
 fn describe(volume: &mut Volume, header: &Header, is_stated: bool) {
+    if is_stated {
+        Anatomy::RAS.place(volume);
+    }
     let about = &mut volume.about;
-    about.stance = is_stated.then_some(Stance::RAS);
     about.name.clone_from(&header.name);
     let [low, high] = header.shown;
     about.window = (low < high && low.is_finite() && high.is_finite()).then_some(header.shown);
     if place::millimetres(header).is_some() {
         about.length = "mm".into();
     }
-}
-
-fn chosen_time(source: &Source, times: u64, wanted: Option<usize>) -> Result<u64> {
-    let time = wanted.unwrap_or(0) as u64;
-    if time < times {
-        if times > 1 && wanted.is_none() {
-            let path = source.path.display();
-            tracing::warn!("{path}: has {times} times, of which the first is read; see --time");
-        }
-        return Ok(time);
-    }
-    let are = if times == 1 { "time" } else { "times" };
-    let message = format!("has {times} {are}, but number {time} was asked for");
-    let hint = match times {
-        1 => "leave out --time".into(),
-        _ => format!("choose a time from 0 to {}", times - 1),
-    };
-    Err(source.error("header, dim[4]", message).hint(hint))
 }
 
 /// Returns the components to read: one, or all of a vector.
@@ -232,8 +238,16 @@ fn wanted(source: &Source, header: &Header, options: &ReadOptions) -> Result<std
         "x" | "y" | "z" => Some(u64::from(part.as_bytes()[0] - b'x')),
         // The file has no other names.
         _ if part == header.name && !part.is_empty() => None,
-        "" if header.intent == VECTOR => None,
-        "" => Some(0),
+        "" if header.intent == VECTOR || COLOR_VECTORS.contains(&header.intent) => None,
+        "" => {
+            if count > 1 {
+                let path = source.path.display();
+                tracing::warn!(
+                    "{path}: shows the first of {count} components; --scalar :1 shows the second"
+                );
+            }
+            Some(0)
+        }
         _ => Some(part.parse().unwrap_or(u64::MAX)),
     };
     // Vectors have few components.
@@ -313,8 +327,6 @@ fn decoded(
     let what = "the size of the samples in bytes";
     source.spend(what, kind.decoded_bytes(bytes.len()))?;
     if let Form::Color(channels) = form {
-        let path = source.path.display();
-        tracing::warn!("{path}: samples: colours are drawn as their luminance");
         return Ok(Samples::U8(luminance(&bytes, channels)));
     }
     // A slope of 0 means that there is none.

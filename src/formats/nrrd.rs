@@ -1,26 +1,35 @@
 //! NRRD volumes (Teem's format, versions 1 to 5), attached and detached. Follows the definition at
 //! <https://teem.sourceforge.net/nrrd/format.html>.
 
+mod axes;
 pub(super) mod files;
+mod segments;
 mod write;
 
 use super::{
     Endian, ReadOptions, SampleType,
-    shared::{holes, plain::Plain},
+    shared::{
+        anatomy::{self, Anatomy},
+        plain::Plain,
+    },
 };
 use crate::{
     Error, Result,
     input::{Source, copy},
     volume::{Arrangement, Lattice, Volume},
 };
+use axes::Axes;
 use flate2::read::MultiGzDecoder;
 use glam::{DMat3, DVec3};
 use std::{borrow::Cow, collections::HashMap, path::Path, sync::Arc};
 pub use write::{write, write_bytes};
 
-/// Reads a volume of three axes with one scalar per sample. Positions are in the file's own space
-/// (RAS, LPS, …); nothing is rotated. Without `space directions`, the axes are x, y and z with the
-/// steps in `spacings`, or 1 where those are missing or NaN.
+/// Reads a volume of three axes of space. A fourth axis may have colours, the components of vectors
+/// ([`ReadOptions::scalar`]), or times and other lists ([`ReadOptions::time`]); `kinds` says so, or
+/// the options do. Positions are in the file's own space. If that is a patient's (`space:
+/// left-posterior-superior`, LPS, RAS or LAS), the volume is turned into the frame of
+/// [`Frame::Patient`](crate::about::Frame). Without `space directions`, the axes are x, y and z
+/// with the steps in `spacings`, or 1 where those are missing or NaN.
 ///
 /// The key `lattice:=bcc`, splatkit's own, marks a body-centred cubic lattice. `sizes` then counts
 /// its layers along the third axis; the layers of its two Cartesian lattices alternate. The first
@@ -44,11 +53,29 @@ pub use write::{write, write_bytes};
 /// sample has a value; [`Error::Limit`] for sizes over the limits.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let (header, body) = Header::read(source)?;
-    let dims = header.dims()?;
+    let mut volume = volume(source, (&header, body), options)?;
+    if let Some(anatomy) = header.anatomy() {
+        anatomy.place(&mut volume);
+    }
+    Ok(match segments::table(&header.keys) {
+        Some(table) => volume.with_labels(table),
+        None => volume,
+    })
+}
+
+/// Reads the volume in the file's own space.
+fn volume(
+    source: &Source,
+    (header, body): (&Header, usize),
+    options: &ReadOptions,
+) -> Result<Volume> {
+    let axes = header.axes()?;
+    let dims = axes.dims();
     let lattice = header.lattice(dims)?;
     let kind = header.sample_type()?;
     let rest = &source.bytes()[body..];
-    let claimed = kind.bytes_of(dims).unwrap_or(u64::MAX);
+    let claimed = axes.count().and_then(|count| count.checked_mul(kind.bytes() as u64));
+    let claimed = claimed.unwrap_or(u64::MAX);
     // Raising a limit would not help if raw samples are missing, so check that first.
     if header.data_file().is_none()
         && !header.has_skips()
@@ -61,20 +88,21 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
         ));
     }
     let size = source.check_bytes("the size of the samples in bytes", claimed)?;
-    source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
+    let volume = |file: &Source, bytes: Cow<'_, [u8]>, endian: Endian| {
+        let (grid, component) = axes.grid(header, kind, endian, options)?;
+        grid.volume(file, lattice.clone(), bytes, component, options)
+    };
     let Some(field) = header.data_file() else {
         let (bytes, endian) = header.bytes(source, rest, kind, size)?;
-        return holes::volume(source, lattice, kind.decode(bytes, endian), options);
+        return volume(source, bytes, endian);
     };
     let names = files::names(source, field, rest, dims)?;
     let part = size / names.len();
     if let [name] = &names[..] {
         let path = source.neighbour("data file", name)?;
         let data = source.open_beside(&path)?;
-        let volume = header.bytes(&data, data.bytes(), kind, size).and_then(|(bytes, endian)| {
-            holes::volume(&data, lattice, kind.decode(bytes, endian), options)
-        });
-        return data.unless_changed(volume);
+        let read = header.bytes(&data, data.bytes(), kind, size);
+        return data.unless_changed(read.and_then(|(bytes, endian)| volume(&data, bytes, endian)));
     }
     source.spend("the size of the joined samples in bytes", size as u64)?;
     let (mut all, mut order) = (Vec::new(), Endian::Little);
@@ -87,16 +115,18 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
         order = endian;
         data.intact()?;
     }
-    holes::volume(source, lattice, kind.decode(all.into(), order), options)
+    volume(source, all.into(), order)
 }
 
 /// Returns where the samples are in a file with raw encoding; `None` for other encodings, and if
 /// bytes or lines are to be skipped or the header names several files.
 pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
     let (header, body) = Header::read(source)?;
-    let lattice = header.lattice(header.dims()?)?;
+    let axes = header.axes()?;
+    let lattice = header.lattice(axes.dims())?;
     let sample_type = header.sample_type()?;
-    if header.has_skips() || !header.is_raw()? {
+    let is_segmentation = segments::table(&header.keys).is_some();
+    if axes.has_other() || header.has_skips() || !header.is_raw()? || is_segmentation {
         return Ok(None);
     }
     let endian = header.endian(sample_type)?;
@@ -113,7 +143,8 @@ pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
             (path, 0)
         }
     };
-    Ok(Some(Plain { path, start, sample_type, endian, lattice }))
+    let (lattice, frame) = anatomy::placed(header.anatomy(), lattice);
+    Ok(Some(Plain { path, start, sample_type, endian, lattice, frame }))
 }
 
 /// Returns an error if a separate file of raw samples has more bytes than the samples need.
@@ -272,32 +303,23 @@ impl<'a> Header<'a> {
         numbers.unwrap_or_default().try_into().map_err(wrong)
     }
 
-    fn dims(&self) -> Result<[usize; 3]> {
-        let [dimension]: [u32; 1] = self.numbers("dimension", self.need("dimension")?)?;
-        if dimension != 3 {
-            return Err(self.source.error(
-                "dimension",
-                format!("is {dimension}, but a volume has 3 axes with one scalar for each sample"),
-            ));
-        }
-        // An axis of colours or vectors is not an axis of space.
-        let several =
-            ["color", "vector", "normal", "gradient", "matrix", "quaternion", "complex", "point"];
-        let kinds = self.get(&["kinds"]).unwrap_or_default().to_ascii_lowercase();
-        if let Some(kind) = kinds
-            .split_ascii_whitespace()
-            .find(|kind| several.iter().any(|name| kind.contains(name)))
-        {
-            let message = format!(
-                "one axis holds values of the kind “{kind}”, but a volume has one scalar for each \
-                 sample"
-            );
-            return Err(self
-                .source
-                .error("kinds", message)
-                .hint("write one component, or a length, to a file of its own"));
-        }
-        self.numbers("sizes", self.need("sizes")?)
+    fn axes(&self) -> Result<Axes> {
+        Axes::of(self)
+    }
+
+    /// Returns the words of a field with one for each axis, without that of an axis that is not one
+    /// of space.
+    fn of_space(&self, text: &str) -> Result<String> {
+        let axes = self.axes()?;
+        let words = text.split_ascii_whitespace().enumerate();
+        let kept: Vec<&str> =
+            words.filter(|(axis, _)| axes.is_space(*axis)).map(|(_, word)| word).collect();
+        Ok(kept.join(" "))
+    }
+
+    /// Returns how the file's space lies in the patient, if it says so.
+    fn anatomy(&self) -> Option<Anatomy> {
+        self.get(&["space"]).and_then(Anatomy::towards)
     }
 
     fn lattice(&self, dims: [usize; 3]) -> Result<Lattice> {
@@ -307,6 +329,8 @@ impl<'a> Header<'a> {
         };
         let axes = match self.get(&["space directions"]) {
             Some(text) => {
+                let text =
+                    if self.axes()?.has_other() { &text.replacen("none", "", 1) } else { text };
                 let [x, y, z] = self.vectors("space directions", text)?;
                 DMat3::from_cols(x, y, z)
             }
@@ -342,7 +366,7 @@ impl<'a> Header<'a> {
     fn along_axes(&self, dims: [usize; 3]) -> Result<[[f64; 2]; 3]> {
         // NaN marks an unknown value of an axis.
         let numbers = |names: &[&str]| match self.get(names) {
-            Some(text) => self.numbers::<3, f64>(names[0], text),
+            Some(text) => self.numbers::<3, f64>(names[0], &self.of_space(text)?),
             None => Ok([f64::NAN; 3]),
         };
         let spacings = numbers(&["spacings"])?;
@@ -350,6 +374,7 @@ impl<'a> Header<'a> {
             (numbers(&["axis mins", "axismins"])?, numbers(&["axis maxs", "axismaxs"])?);
         // Samples are at the centres of cells unless the header says that they are nodes.
         let centers = self.get(&["centers", "centerings"]).unwrap_or_default();
+        let centers = self.of_space(centers)?;
         let is_node: Vec<bool> = centers
             .split_ascii_whitespace()
             .map(|word| word.eq_ignore_ascii_case("node"))
@@ -699,6 +724,55 @@ mod tests {
             lattice("units:=mm:=lattice:=bcc\ncontent: lattice:=bcc").unwrap(),
             Lattice::with_spacing([2, 1, 1], DVec3::ONE)
         );
+    }
+
+    /// Reads a file of 2 × 1 × 1 samples with a fourth axis of three numbers.
+    fn with_fourth_axis(fields: &str, options: &ReadOptions) -> (Result<Volume>, Vec<String>) {
+        let folder = Folder::new();
+        let text = format!("NRRD0004\ntype: uint8\ndimension: 4\nencoding: raw\n{fields}\n\n");
+        let mut content = text.into_bytes();
+        content.extend([200, 40, 40, 0, 0, 255]);
+        let path = folder.write("volume.nrrd", &content);
+        warnings_of(|| read_with(&path, |source| super::read(source, options)))
+    }
+
+    #[test]
+    fn a_fourth_axis_has_colours_components_or_times() {
+        let default = ReadOptions::default();
+        let first = "sizes: 3 2 1 1\nspace directions: none (0,0,2) (0,1,0) (1,0,0)\nkinds";
+        let (volume, words) =
+            with_fourth_axis(&format!("{first}: RGB-color domain domain domain"), &default);
+        let volume = volume.unwrap();
+        assert_eq!(volume.colors.as_deref().unwrap(), [[200, 40, 40, 255], [0, 0, 255, 255]]);
+        assert_eq!((volume.lattice.axes.x_axis, words.len()), (2.0 * DVec3::Z, 0));
+        let values = |fields: &str, options: &ReadOptions| {
+            let volume = with_fourth_axis(fields, options).0.unwrap();
+            assert!(volume.colors.is_none());
+            [0, 1].map(|index| volume.value(index))
+        };
+        let vector = format!("{first}: vector space space space");
+        assert_eq!(values(&vector, &ReadOptions::scalar(Some(":2"))), [40.0, 255.0]);
+        assert_eq!(values(&vector, &default)[1], 255.0);
+        // The same numbers as three times, each with its samples one after the other.
+        let last = "sizes: 2 1 1 3\nspacings: 3 1 1 nan\nkinds: domain domain domain time";
+        let (volume, words) = with_fourth_axis(last, &default);
+        let volume = volume.unwrap();
+        assert_eq!((volume.range, volume.lattice.spacing().x), ([40.0, 200.0], 3.0));
+        assert!(words[0].ends_with("shows the first of 3 times; --time 1 shows the second"));
+        let third = ReadOptions { time: Some(2), ..ReadOptions::default() };
+        assert_eq!(values(last, &third), [0.0, 255.0]);
+    }
+
+    #[test]
+    fn a_fourth_axis_without_a_kind_is_asked_for() {
+        let (error, _) = with_fourth_axis("sizes: 3 2 1 1", &ReadOptions::default());
+        let Error::Input { message, hint, .. } = error.unwrap_err() else { panic!("no input") };
+        assert!(message.contains("does not say what the 3 numbers along axis 0 are"), "{message}");
+        assert!(hint.unwrap().contains("--scalar rgb draws colours"));
+        let rgb = ReadOptions::scalar(Some("rgb"));
+        assert!(with_fourth_axis("sizes: 3 2 1 1", &rgb).0.unwrap().colors.is_some());
+        let (error, _) = with_fourth_axis("sizes: 0 2 1 1\nkinds: list domain domain domain", &rgb);
+        assert!(error.unwrap_err().to_string().contains("axis 0 has no numbers"));
     }
 
     #[test]

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    about::Frame,
     input::{Limits, Mapping, Source, intact},
     progress::{Watch, tell},
     volume::{Lattice, Samples, Scalar},
@@ -103,6 +104,11 @@ impl VolumeStream {
     /// file.
     pub fn path(&self) -> &Path {
         &self.plain.path
+    }
+
+    /// Returns what the axes of the world mean.
+    pub fn frame(&self) -> Frame {
+        self.plain.frame
     }
 
     /// Returns the lattice that the samples lie on.

@@ -75,13 +75,10 @@ impl Turn {
 impl Gaussians {
     /// Turns a scene of a known stance in the world, so that it has another one.
     pub fn stand(&mut self, wanted: Stance) {
-        let axes = |stance: Stance| {
-            DMat3::from_cols(stance.up.cross(stance.front), stance.up, stance.front)
-        };
         let Some(own) = self.about.stance.replace(wanted).filter(|own| *own != wanted) else {
             return;
         };
-        let rotation = axes(wanted) * axes(own).transpose();
+        let rotation = own.turn_to(wanted);
         let (quat, colors) = (DQuat::from_mat3(&rotation), turn(self.degree, rotation));
         self.origin = rotation * self.origin;
         self.centers.par_iter_mut().for_each(|center| {

@@ -1,7 +1,11 @@
 //! The content of a mesh or point cloud file, whatever its format.
 
-use crate::{about::About, color::ColorScale};
-use glam::{DVec3, Vec2, Vec3};
+use crate::{
+    about::{About, Stance},
+    color::ColorScale,
+    parallel::prelude::*,
+};
+use glam::{DMat3, DVec3, Vec2, Vec3};
 use std::{ops::Range, sync::Arc};
 
 /// A triangle mesh, or a point cloud if it has no triangles.
@@ -74,6 +78,32 @@ impl Mesh {
         arrays.iter().map(|&bytes| bytes as u64).sum()
     }
 
+    /// Turns a mesh of a known stance in the world, so that it has another one.
+    pub fn stand(&mut self, wanted: Stance) {
+        if let Some(own) = self.about.stance.replace(wanted) {
+            self.turn(own.turn_to(wanted));
+        }
+    }
+
+    /// Turns the world about its origin. If the matrix mirrors, triangles turn over, so that their
+    /// outsides stay outside.
+    pub(crate) fn turn(&mut self, turn: DMat3) {
+        let own = turn.as_mat3();
+        self.origin = turn * self.origin + DVec3::ZERO;
+        self.positions.par_iter_mut().for_each(|position| *position = own * *position);
+        self.normals.par_iter_mut().for_each(|normal| *normal = own * *normal);
+        self.sensors.iter_mut().for_each(|sensor| sensor.position = own * sensor.position);
+        if turn.determinant() < 0.0 {
+            self.triangles.par_iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+        }
+    }
+
+    /// Returns whether a triangle is drawn in its own colour, without light.
+    pub(crate) fn is_unlit(&self, triangle: usize) -> bool {
+        let material = self.triangle_materials.get(triangle);
+        material.is_some_and(|&material| self.materials[material as usize].unlit)
+    }
+
     /// Returns the unit normal from the file at a vertex, if there is one.
     pub(super) fn given_normal(&self, vertex: usize) -> Option<Vec3> {
         self.normals.get(vertex).copied().and_then(given)
@@ -95,7 +125,7 @@ pub struct Sensor {
 }
 
 /// A base colour, and a texture that is multiplied with it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Material {
     /// The name in the file; may be empty.
     pub name: String,
@@ -103,6 +133,8 @@ pub struct Material {
     pub color: [f32; 4],
     /// The texture; `None` if the base colour is all.
     pub texture: Option<Arc<Texture>>,
+    /// Whether the colour is drawn as it is, whatever the light.
+    pub unlit: bool,
 }
 
 /// A decoded picture, rows from the top; `uv` (0, 0) is its top left corner.

@@ -69,6 +69,14 @@ impl Lattice {
         Ok(lattice)
     }
 
+    /// Returns this lattice with the world turned about its origin. The matrix may mirror.
+    #[must_use]
+    pub(crate) fn turned(&self, turn: DMat3) -> Self {
+        // Adding 0 makes -0 positive.
+        let axes = turn * self.axes + DMat3::ZERO;
+        Self { origin: turn * self.origin + DVec3::ZERO, axes, ..self.clone() }
+    }
+
     /// Number of samples. If that exceeds `usize::MAX`, returns `usize::MAX`.
     pub fn len(&self) -> usize {
         self.dims.iter().fold(1, |all, &n| all.saturating_mul(n))

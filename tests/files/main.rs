@@ -4,9 +4,13 @@
 mod external;
 #[path = "../regressions/flat.rs"]
 mod flat;
+mod frames;
 mod house;
 mod laboratories;
 mod list_of_formats;
+#[expect(dead_code, reason = "other programs use the rest")]
+#[path = "../inputs/medical.rs"]
+mod made;
 mod medical;
 mod paged;
 mod regressions;

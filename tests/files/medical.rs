@@ -167,7 +167,9 @@ for name, syntax, tilt in [('plain', ExplicitVRLittleEndian, 0),
     for at, k in enumerate(rng.permutation(n)):
         d = slice_of(place(0, 0, int(k)), a[:, :, k], series, int(k), syntax)
         d.save_as(f'{name}/{at}', enforce_file_format=True)
-    tell(name, a.astype(np.float64) - 1024, place)
+    # DICOM's x leads to the left and y to the back, and a patient's to the right and the front.
+    tell(name, a.astype(np.float64) - 1024,
+         lambda i, j, k: (-place(i, j, k)[0], -place(i, j, k)[1], place(i, j, k)[2]))
 "#;
 
 #[test]

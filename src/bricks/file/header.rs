@@ -2,6 +2,7 @@
 
 use super::{MAGIC, VERSION};
 use crate::{
+    about::Frame,
     bricks::{Header, REACH, SIDE, level},
     container::{Cursor, Put},
     input::copy,
@@ -44,7 +45,7 @@ impl Stored {
     }
 
     pub fn encode(&self) -> Vec<u8> {
-        let Header { lattice, scalar, range, unit, source } = &self.header;
+        let Header { lattice, scalar, range, frame, unit, source } = &self.header;
         let mut out = Vec::with_capacity(self.length());
         out.put(&MAGIC);
         out.u32(if self.is_flat { FLAT } else { VERSION });
@@ -61,7 +62,8 @@ impl Stored {
         out.u32(REACH as u32);
         out.u32(unit.len() as u32);
         out.u32(source.len() as u32);
-        out.put(&[0; FIXED - 180]);
+        out.u32(u32::from(*frame == Frame::Patient));
+        out.put(&[0; FIXED - 184]);
         debug_assert_eq!(out.len(), FIXED);
         out.put(unit.as_bytes());
         out.put(source.as_bytes());
@@ -115,6 +117,7 @@ impl Stored {
         let range =
             [cursor.array().map(f64::from_le_bytes)?, cursor.array().map(f64::from_le_bytes)?];
         let [levels, side, reach] = [cursor.u32()?, cursor.u32()?, cursor.u32()?];
+        let [_, _, frame] = [cursor.u32()?, cursor.u32()?, cursor.u32()?];
         let sound = || {
             let wrong = |what: &str| format!("its {what} is not valid");
             let scalar =
@@ -125,7 +128,12 @@ impl Stored {
             let lattice = Lattice::cartesian([nx, ny, nz], origin, axes);
             let text = |bytes| copy::text(bytes).map_err(|_| "its texts are not UTF-8");
             let (unit, source) = (text(&texts[..unit])?, text(&texts[unit..])?);
-            let header = Header { lattice, scalar, range, unit, source };
+            let frame = match frame {
+                0 => Frame::Own,
+                1 => Frame::Patient,
+                _ => return Err(wrong("frame")),
+            };
+            let header = Header { lattice, scalar, range, frame, unit, source };
             header.validate()?;
             if [levels, side, reach].map(|n| n as usize)
                 != [level::levels(header.lattice.dims).len(), SIDE, REACH]

@@ -66,6 +66,11 @@ pub fn write(
 ) -> Result<()> {
     let path = path.as_ref();
     volume.validate().map_err(Error::Argument)?;
+    if volume.is_label_map() {
+        return Err(Error::Argument(
+            "a label map has no coarser levels: labels have no mean; draw the original file".into(),
+        ));
+    }
     let spill = || Spill::beside(path);
     all(
         &header(volume, options),
@@ -93,8 +98,14 @@ pub fn convert(
 ) -> Result<()> {
     let path = path.as_ref();
     let WriteOptions { unit, source } = options.clone();
-    let header =
-        Header { lattice: stream.lattice().clone(), scalar: stream.scalar(), range, unit, source };
+    let header = Header {
+        lattice: stream.lattice().clone(),
+        scalar: stream.scalar(),
+        range,
+        frame: stream.frame(),
+        unit,
+        source,
+    };
     let slices = |z| Ok(Cow::Owned(stream.slices(z)?.bytes().to_vec()));
     all(&header, path, || Spill::beside(path), || Target::at(path), slices, watch).map(|_| ())
 }
@@ -138,6 +149,7 @@ fn header(volume: &Volume, options: &WriteOptions) -> Header {
         lattice: volume.lattice.clone(),
         scalar: volume.samples.scalar(),
         range: volume.range,
+        frame: volume.about.frame,
         unit,
         source,
     }

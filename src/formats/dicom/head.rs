@@ -87,6 +87,11 @@ pub struct Nature {
 }
 
 impl Layout {
+    /// Whether its pixels are colours.
+    pub fn is_colored(&self) -> bool {
+        self.channels > 1 || self.colors == Colors::Palette
+    }
+
     /// Numbers of one frame.
     pub fn frame_numbers(&self) -> usize {
         self.columns.saturating_mul(self.rows).saturating_mul(self.channels)
@@ -104,6 +109,9 @@ impl Head {
             description: set.text(tags::SERIES_DESCRIPTION).unwrap_or_default(),
             modality: set.text(tags::MODALITY).unwrap_or_default(),
         };
+        if let Some(what) = no_slices(&set) {
+            return Err(what.error(source));
+        }
         let layout = layout(&file, &set)?;
         let nature = nature(&set, &series);
         Ok(Self {
@@ -203,30 +211,74 @@ fn colors(source: &Source, set: &Set, channels: u16) -> Result<Colors> {
     })
 }
 
+/// Files of a class that are no slices of a volume.
+struct Other {
+    /// What they hold, after “holds”.
+    what: &'static str,
+    hint: &'static str,
+}
+
+const OTHERS_HINT: &str = "name files of CT, MR, PET or other pictures";
+
+impl Other {
+    fn error(&self, source: &Source) -> crate::Error {
+        let message = format!("holds {}, not slices of a volume", self.what);
+        source.error("SOP class", message).hint(self.hint)
+    }
+}
+
+/// What the classes of files are called that never hold slices (PS3.4, annex B.5), below
+/// 1.2.840.10008.5.1.4.1.1. A name that ends with a point is that of a family.
+const OTHERS: &[(&str, &str)] = &[
+    ("77.1.6", "tiles of a whole slide"),
+    ("481.3", "outlines of radiotherapy (RT Structure Set)"),
+    ("481.5", "a plan of radiotherapy"),
+    ("481.8", "a plan of radiotherapy"),
+    ("481.4", "a record of radiotherapy"),
+    ("481.6", "a record of radiotherapy"),
+    ("481.7", "a record of radiotherapy"),
+    ("481.9", "a record of radiotherapy"),
+    ("104.1", "a PDF document"),
+    ("104.2", "a clinical document (CDA)"),
+    ("104.", "a surface (STL, OBJ or MTL) inside DICOM"),
+    ("66.5", "a surface (Surface Segmentation)"),
+    ("66.6", "lines (Tractography)"),
+    ("66.1", "a registration"),
+    ("66.2", "places of reference (Spatial Fiducials)"),
+    ("66.3", "a registration"),
+    ("66", "raw data"),
+    ("88.59", "a selection of other files (Key Objects)"),
+    ("88.", "a report"),
+    ("4.2", "a spectrum"),
+    ("11.", "a presentation of other pictures"),
+    ("9.", "a waveform"),
+    ("67", "a mapping to real values"),
+];
+
+/// Returns what a file holds if its class says that it has no slices of a volume.
+fn no_slices(set: &Set) -> Option<Other> {
+    let class = set.text(tags::CLASS).unwrap_or_default();
+    let own = class.strip_prefix("1.2.840.10008.5.1.4.1.1.")?;
+    let fits = |name: &str| if name.ends_with('.') { own.starts_with(name) } else { own == name };
+    let &(_, what) = OTHERS.iter().find(|(name, _)| fits(name))?;
+    let is_slide = own == "77.1.6";
+    let hint = match is_slide {
+        true => {
+            "one level of the slide can be written as a picture by OpenSlide or wsidicom; pictures \
+             are not drawn"
+        }
+        false => OTHERS_HINT,
+    };
+    Some(Other { what, hint })
+}
+
 /// Returns the error for a file without pixels.
 fn without_pixels(source: &Source, set: &Set) -> crate::Error {
-    let class = set.text(tags::CLASS).unwrap_or_default();
-    let what = match class.strip_prefix("1.2.840.10008.5.1.4.1.1.").unwrap_or_default() {
-        "481.3" => "outlines of radiotherapy (RT Structure Set)",
-        "481.5" | "481.8" => "a plan of radiotherapy",
-        "481.4" | "481.6" | "481.7" | "481.9" => "a record of radiotherapy",
-        "104.1" => "a PDF document",
-        "104.3" | "104.4" | "104.5" => "a surface (STL, OBJ or MTL) inside DICOM",
-        "66.5" => "a surface (Surface Segmentation)",
-        "66" => "raw data",
-        "66.1" | "66.3" => "a registration",
-        "88.11" | "88.22" | "88.33" | "88.34" | "88.67" => "a report",
-        "88.59" => "a selection of other files (Key Objects)",
-        "4.2" => "a spectrum",
-        other if other.starts_with("11.") => "a presentation of other pictures",
-        other if other.starts_with("9.") => "a waveform",
-        _ => "other data",
-    };
     let modality = set.text(tags::MODALITY).unwrap_or_default();
     let modality =
         if modality.is_empty() { String::new() } else { format!(" (modality {modality})") };
-    let message = format!("holds {what}{}, not a picture", super::shown(&modality));
-    source.error("data set", message).hint("name files of CT, MR, PET or other pictures")
+    let message = format!("holds other data{}, not a picture", super::shown(&modality));
+    source.error("data set", message).hint(OTHERS_HINT)
 }
 
 /// Reads what the values are.

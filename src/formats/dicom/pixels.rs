@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     Result,
-    formats::{Endian, SampleType, shared::luminance::luminance},
+    formats::{Endian, SampleType, shared::colors::brightness},
     volume::{Samples, Scalar},
 };
 use std::borrow::Cow;
@@ -26,11 +26,18 @@ struct Plain<'a> {
     colors: Colors,
 }
 
-/// The luminances of a palette.
+/// The colours of a palette.
 struct Palette {
-    /// The stored number of the first luminance.
+    /// The stored number of the first colour.
     first: i32,
-    luminances: Vec<u8>,
+    colors: Vec<[u8; 4]>,
+}
+
+/// A decoded frame.
+pub struct Decoded {
+    /// The numbers of grey pixels, or the luminance of colours.
+    pub samples: Samples,
+    pub colors: Option<Vec<[u8; 4]>>,
 }
 
 /// An opened file whose frames are decoded one by one.
@@ -84,29 +91,41 @@ impl<'a> Decoder<'a> {
         Ok(Self { file, set, layout, palette })
     }
 
-    /// Returns the stored numbers of a frame: rows from the top, columns from the left. Colours are
-    /// their luminance.
+    /// Returns the stored numbers of a frame, or its colours: rows from the top, columns from the
+    /// left.
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) for pixels that are cut off or cannot be unpacked.
-    pub fn frame(&self, number: u32) -> Result<Samples> {
+    pub fn frame(&self, number: u32) -> Result<Decoded> {
         let plain = self.shallow(self.plain(number)?);
         let count = self.layout.columns * self.layout.rows;
         let (bytes, channels) = (&plain.bytes[..], self.layout.channels);
-        let lights = match plain.colors {
-            Colors::Rgb if plain.is_planar => {
-                let at = |i: usize| [bytes[i], bytes[i + count], bytes[i + 2 * count]];
-                luminance((0..count).flat_map(at).collect::<Vec<u8>>().as_slice(), 3)
-            }
-            Colors::Rgb => luminance(bytes, channels),
-            Colors::Luminance if plain.is_planar => bytes[..count].to_vec(),
-            Colors::Luminance => bytes.iter().step_by(channels).copied().collect(),
+        let planar = |i: usize| [bytes[i], bytes[i + count], bytes[i + 2 * count]];
+        let pixels = || bytes.chunks_exact(channels).map(|pixel| [pixel[0], pixel[1], pixel[2]]);
+        let colors: Vec<[u8; 4]> = match plain.colors {
+            Colors::Rgb if plain.is_planar => (0..count).map(planar).map(opaque).collect(),
+            Colors::Rgb => pixels().map(opaque).collect(),
+            Colors::Luminance if plain.is_planar => (0..count).map(planar).map(of_ybr).collect(),
+            Colors::Luminance => pixels().map(of_ybr).collect(),
             // Two luminances, then the colours that both pixels have.
-            Colors::Halved => bytes.chunks_exact(4).flat_map(|four| [four[0], four[1]]).collect(),
-            Colors::Palette => return Ok(self.shaded(self.whole(&plain))),
-            Colors::Grey | Colors::Inverted => return Ok(self.whole(&plain)),
+            Colors::Halved => {
+                let pair = |four: &[u8]| [0, 1].map(|at| of_ybr([four[at], four[2], four[3]]));
+                bytes.chunks_exact(4).flat_map(pair).collect()
+            }
+            Colors::Palette => self.shaded(&self.whole(&plain)),
+            Colors::Grey | Colors::Inverted => {
+                return Ok(Decoded { samples: self.whole(&plain), colors: None });
+            }
         };
-        Ok(Samples::U8(lights))
+        let samples = match plain.colors {
+            Colors::Luminance if plain.is_planar => Samples::U8(bytes[..count].to_vec()),
+            Colors::Luminance => Samples::U8(bytes.iter().step_by(channels).copied().collect()),
+            Colors::Halved => {
+                Samples::U8(bytes.chunks_exact(4).flat_map(|four| [four[0], four[1]]).collect())
+            }
+            _ => brightness(&colors),
+        };
+        Ok(Decoded { samples, colors: Some(colors) })
     }
 
     /// Returns colours with 8 bits a channel, the highest of those stored.
@@ -128,15 +147,17 @@ impl<'a> Decoder<'a> {
         Plain { bytes: Cow::Owned(bytes), ..plain }
     }
 
-    /// Returns the luminances of a palette that stored numbers stand for.
-    fn shaded(&self, numbers: Samples) -> Samples {
-        let Some(Palette { first, luminances }) = &self.palette else { return numbers };
-        let last = luminances.len() - 1;
+    /// Returns the colours of a palette that stored numbers stand for.
+    fn shaded(&self, numbers: &Samples) -> Vec<[u8; 4]> {
+        let Some(Palette { first, colors }) = &self.palette else {
+            return vec![[0; 4]; numbers.len()];
+        };
+        let last = colors.len() - 1;
         let of = |i: usize| {
             let index = (numbers.value(i) as i32).saturating_sub(*first).max(0) as usize;
-            luminances[index.min(last)]
+            colors[index.min(last)]
         };
-        Samples::U8((0..numbers.len()).map(of).collect())
+        (0..numbers.len()).map(of).collect()
     }
 
     /// Returns the numbers of grey pixels.
@@ -252,6 +273,20 @@ impl<'a> Decoder<'a> {
     }
 }
 
+fn opaque([red, green, blue]: [u8; 3]) -> [u8; 4] {
+    [red, green, blue, 255]
+}
+
+/// Returns the colour of a luminance and two differences of colour (ITU-R BT.601, all of the 256
+/// values).
+fn of_ybr(pixel: [u8; 3]) -> [u8; 4] {
+    let [light, blue, red] = pixel.map(f32::from);
+    let (blue, red) = (blue - 128.0, red - 128.0);
+    let channels =
+        [light + 1.402 * red, light - 0.344_136 * blue - 0.714_136 * red, light + 1.772 * blue];
+    opaque(channels.map(|channel| channel.round() as u8))
+}
+
 /// Reads a palette.
 fn palette(file: &File, set: &Set) -> Result<Palette> {
     let shape = set.shorts(tags::PALETTE_RED_SHAPE);
@@ -276,8 +311,8 @@ fn palette(file: &File, set: &Set) -> Result<Palette> {
     let (Some(red), Some(green), Some(blue)) = (channel(0), channel(1), channel(2)) else {
         return Err(error("has fewer colours than its shape says, or is segmented"));
     };
-    let colors: Vec<u8> = (0..count).flat_map(|i| [red[i], green[i], blue[i]]).collect();
+    let colors = (0..count).map(|i| [red[i], green[i], blue[i], 255]).collect();
     let is_signed = set.short(tags::REPRESENTATION) == Some(1);
     let first = if is_signed { i32::from(first as i16) } else { first.into() };
-    Ok(Palette { first, luminances: luminance(&colors, 3) })
+    Ok(Palette { first, colors })
 }

@@ -47,14 +47,15 @@ fn a_slice_in_every_coding() {
         let expected = vec![-1024, -1023, -1022, -24, 976, 3071];
         assert_eq!(volume.samples, Samples::I16(expected), "“{syntax}”");
         assert_eq!(volume.lattice.dims, [3, 2, 1]);
-        assert_eq!(volume.lattice.origin, DVec3::new(-10.0, 20.0, 30.5));
-        let axes = [[0.25, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 2.0]];
+        // DICOM's x leads to the left and y to the back.
+        assert_eq!(volume.lattice.origin, DVec3::new(10.0, -20.0, 30.5));
+        let axes = [[-0.25, 0.0, 0.0], [0.0, -0.5, 0.0], [0.0, 0.0, 2.0]];
         assert_eq!(volume.lattice.axes.to_cols_array_2d(), axes);
         let about = &volume.about;
         assert_eq!((about.modality, about.window), (Some(Modality::Ct), Some([-160.0, 240.0])));
         assert_eq!((&*about.unit, &*about.length), ("HU", "mm"));
         // One slice is seen as on film.
-        let stance = Stance { up: DVec3::NEG_Y, front: DVec3::NEG_Z };
+        let stance = Stance { up: DVec3::Y, front: DVec3::NEG_Z };
         assert_eq!(about.stance, Some(stance));
         assert!(is_dicom(&made.file()), "“{syntax}”");
         // Without the preamble, and without the header.
@@ -136,6 +137,22 @@ fn colours_are_luminances_and_inverted_values_turned() {
         made.shorts(tags::PALETTE_RED + at, "OW", &[0x1000, 0x2000, 0xff00]);
     }
     assert_eq!(values(&read_made(&made)), [16.0, 16.0, 32.0, 255.0]);
+    let colors = |made: &mut Made| read_made(made).colors.map(|colors| colors.to_vec());
+    assert_eq!(colors(&mut made), None, "greys are values");
+    made.shorts(tags::PALETTE_RED, "OW", &[0xc800, 0, 0xff00]);
+    let [red, cyan] = [[200, 16, 16, 255], [0, 32, 32, 255]];
+    assert_eq!(colors(&mut made).unwrap(), [red, red, cyan, [255; 4]]);
+    let mut pixels = Made::slice(".1", 2, 1);
+    pixels.bits(8, 8, 0).short(tags::SAMPLES_PER_PIXEL, 3).text(tags::PHOTOMETRIC, "RGB");
+    pixels.short(tags::PLANAR, 1).bytes(tags::PIXEL_DATA, "OB", &[200, 9, 40, 9, 40, 200]);
+    assert_eq!(colors(&mut pixels).unwrap(), [[200, 40, 40, 255], [9, 9, 200, 255]]);
+    // Red in the terms of YBR, rounded (ITU-R BT.601).
+    pixels.short(tags::PLANAR, 0).text(tags::PHOTOMETRIC, "YBR_FULL");
+    pixels.bytes(tags::PIXEL_DATA, "OB", &[76, 85, 255, 76, 85, 255]);
+    assert_eq!(colors(&mut pixels).unwrap()[0], [254, 0, 0, 255]);
+    pixels.text(tags::PHOTOMETRIC, "YBR_FULL_422");
+    pixels.bytes(tags::PIXEL_DATA, "OB", &[76, 76, 85, 255]);
+    assert_eq!(colors(&mut pixels).unwrap()[1], [254, 0, 0, 255]);
     made.without(tags::PALETTE_RED + 1);
     assert!(told(&made.file()).contains("palette: has fewer colours than its shape says"));
     for (bits, pixels) in [(8, vec![10u8, 30]), (16, vec![10, 0, 30, 0])] {
@@ -323,6 +340,18 @@ fn files_without_usable_pixels_are_told() {
             }),
             "holds outlines of radiotherapy",
         ),
+        (
+            told_of(|made| {
+                made.text(tags::CLASS, "1.2.840.10008.5.1.4.1.1.77.1.6");
+            }),
+            "SOP class: holds tiles of a whole slide, not slices of a volume",
+        ),
+        (
+            told_of(|made| {
+                made.without(tags::PIXEL_DATA).text(tags::CLASS, "1.2.840.10008.5.1.4.1.1.88.33");
+            }),
+            "holds a report",
+        ),
     ] {
         assert!(found.contains(message), "{found} / {message}");
     }
@@ -389,7 +418,7 @@ fn one_file_of_many_frames() {
     });
     let volume = read_made(&made);
     assert_eq!((volume.lattice.dims, values(&volume)), ([2, 1, 3], pixels.map(f64::from).into()));
-    assert_eq!(volume.lattice.axes.z_axis, DVec3::new(-1.5, 0.0, 0.0));
+    assert_eq!(volume.lattice.axes.z_axis, DVec3::new(1.5, 0.0, 0.0));
     // Those of ultrasound without one are times.
     let made = film(&|made: &mut Made| {
         made.text(tags::MODALITY, "US").text(tags::FRAME_TIME, "33");
@@ -465,7 +494,7 @@ fn groups_of_functions_place_frames() {
             let volume = read_with(&path, |source| read(source, &options)).unwrap();
             assert_eq!(values(&volume), expected, "“{syntax}”");
             assert_eq!(volume.lattice.spacing(), DVec3::new(3.0, 2.0, 5.0));
-            assert_eq!(volume.about.stance, Some(Stance::LPS));
+            assert_eq!(volume.about.stance, Some(Stance::RAS));
         }
     }
 }

@@ -4,7 +4,7 @@ use super::{
     file::File,
     head::{Colors, Head, Layout},
     name,
-    pixels::Decoder,
+    pixels::{Decoded, Decoder},
     stack::{Slice, Stack, stacks},
 };
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
     about::Stance,
     formats::{
         ReadOptions,
-        shared::{holes, rescale::rescaled},
+        shared::{anatomy::Anatomy, colors, holes, rescale::rescaled, several},
     },
     input::Source,
     parallel::{self, prelude::*},
@@ -36,7 +36,7 @@ pub fn read(source: &Source, heads: Vec<Head>, options: &ReadOptions) -> Result<
             && own.scalar() == layout.scalar()
             && own.padding == layout.padding
     });
-    let mut samples = joined(source, &heads, &stack.slices, is_even)?;
+    let (mut samples, colors) = joined(source, &heads, &stack.slices, is_even)?;
     if is_even && (one.slope, one.intercept) != (1.0, 0.0) {
         source.room::<f32>("the scaled samples", samples.len())?;
         samples = rescaled(samples, one.slope, one.intercept);
@@ -48,11 +48,14 @@ pub fn read(source: &Source, heads: Vec<Head>, options: &ReadOptions) -> Result<
     }
     let mut volume = holes::volume(source, lattice, samples, options)?;
     volume.about.holes += padded;
+    if let Some(own) = colors.filter(|_| options.scalar.is_none()) {
+        colors::attach(&mut volume, own.into());
+    }
     describe(&mut volume, first, &stack);
     if layout.colors == Colors::Inverted {
         volume = inverted(source, volume)?;
     }
-    tell(source, &stack, &layout);
+    tell(source, &stack);
     Ok(volume)
 }
 
@@ -77,22 +80,15 @@ fn chosen(source: &Source, heads: &[Head], options: &ReadOptions) -> Result<Stac
     let sizes = || stacks.iter().map(|stack| stack.slices.len());
     let most = sizes().max().unwrap_or(0);
     let first = sizes().position(|size| size == most).unwrap_or(0);
-    let at = options.time.unwrap_or(first);
-    if at >= count {
-        let are = if count == 1 { "time" } else { "times" };
-        let message = format!("has {count} {are}, but number {at} was asked for");
-        let hint = match count {
-            1 => "leave out --time".into(),
-            _ => format!("choose a time from 0 to {}", count - 1),
-        };
-        return Err(source.error("series", message).hint(hint));
-    }
+    let wanted = ReadOptions { time: options.time.or(Some(first)), ..ReadOptions::default() };
+    let at = several::time(source, "series", count as u64, &wanted)?;
     let mut stack = stacks.swap_remove(at);
     if count > 1 && options.time.is_none() {
-        let word = format!(
-            "the series shows {count} times, echoes or other repetitions, of which number {at} is \
-             read; see --time"
-        );
+        let names = "times, echoes or other repetitions";
+        let word = match at {
+            0 => format!("shows the first of {count} {names}; --time 1 shows the second"),
+            _ => format!("shows number {at} of {count} {names}; --time 0 shows the first"),
+        };
         stack.words.push(word);
     }
     Ok(stack)
@@ -104,8 +100,14 @@ struct Job<'a> {
     frames: Vec<(usize, &'a Slice)>,
 }
 
-/// Returns the samples of all slices, as they are stored, or scaled one by one.
-fn joined(source: &Source, heads: &[Head], slices: &[Slice], is_even: bool) -> Result<Samples> {
+/// Returns the samples of all slices, as they are stored, or scaled one by one; and their colours,
+/// if all slices are in colours.
+fn joined(
+    source: &Source,
+    heads: &[Head],
+    slices: &[Slice],
+    is_even: bool,
+) -> Result<(Samples, Option<Vec<[u8; 4]>>)> {
     let layout = &heads[slices[0].file].layout;
     let scalar = if is_even { layout.scalar() } else { Scalar::F32 };
     let size = layout.columns.saturating_mul(layout.rows);
@@ -117,16 +119,26 @@ fn joined(source: &Source, heads: &[Head], slices: &[Slice], is_even: bool) -> R
     for part in order.chunk_by(|a, b| a.1.file == b.1.file) {
         jobs.push(Job { head: &heads[part[0].1.file], frames: part.to_vec() });
     }
+    let is_colored = slices.iter().all(|slice| heads[slice.file].layout.is_colored());
     let mut out: Option<Samples> = None;
+    let mut colors: Option<Vec<[u8; 4]>> = None;
     for batch in jobs.chunks(2 * parallel::current_num_threads()) {
         source.check_time()?;
-        let decoded: Vec<Result<Vec<(usize, Samples)>>> =
+        let decoded: Vec<Result<Vec<(usize, Decoded)>>> =
             batch.par_iter().map(|job| frames(source, job, is_even)).collect();
         for decoded in decoded {
-            for (at, samples) in decoded? {
+            for (at, Decoded { samples, colors: own }) in decoded? {
                 // Memory is taken once there is a frame, which has the bytes that it claims.
                 if out.is_none() {
                     source.spend("the size of the samples in bytes", bytes as u64)?;
+                    if is_colored {
+                        let bytes = 4 * (size * slices.len()) as u64;
+                        source.spend("the size of the colours in bytes", bytes)?;
+                        colors = Some(vec![[0; 4]; size * slices.len()]);
+                    }
+                }
+                if let (Some(colors), Some(own)) = (&mut colors, own) {
+                    colors[at * size..(at + 1) * size].copy_from_slice(&own);
                 }
                 let out = out.get_or_insert_with(|| zeros(scalar, size * slices.len()));
                 let (start, end) = (at * size, (at + 1) * size);
@@ -137,7 +149,7 @@ fn joined(source: &Source, heads: &[Head], slices: &[Slice], is_even: bool) -> R
             }
         }
     }
-    out.ok_or_else(|| source.error("series", "has no slices"))
+    Ok((out.ok_or_else(|| source.error("series", "has no slices"))?, colors))
 }
 
 fn zeros(scalar: Scalar, count: usize) -> Samples {
@@ -151,7 +163,7 @@ fn zeros(scalar: Scalar, count: usize) -> Samples {
 }
 
 /// Decodes the frames of one file.
-fn frames(source: &Source, job: &Job, is_even: bool) -> Result<Vec<(usize, Samples)>> {
+fn frames(source: &Source, job: &Job, is_even: bool) -> Result<Vec<(usize, Decoded)>> {
     let path = job.head.path.as_path();
     let own;
     let opened = if path == source.path {
@@ -164,15 +176,16 @@ fn frames(source: &Source, job: &Job, is_even: bool) -> Result<Vec<(usize, Sampl
     let decoder = Decoder::new(&file, job.head.layout)?;
     let expected = job.head.layout.columns * job.head.layout.rows;
     let decode = |&(at, slice): &(usize, &Slice)| {
-        let mut samples = decoder.frame(slice.frame.number)?;
-        if samples.len() != expected {
-            let message = format!("{} pixels where {expected} were expected", samples.len());
+        let mut decoded = decoder.frame(slice.frame.number)?;
+        let count = decoded.samples.len();
+        if count != expected || decoded.colors.as_ref().is_some_and(|own| own.len() != expected) {
+            let message = format!("{count} pixels where {expected} were expected");
             return Err(opened.error("pixel data", message));
         }
         if !is_even {
-            samples = scaled(&samples, slice, &job.head.layout);
+            decoded.samples = scaled(&decoded.samples, slice, &job.head.layout);
         }
-        Ok((at, samples))
+        Ok((at, decoded))
     };
     let decoded: Result<Vec<_>> = job.frames.par_iter().map(decode).collect();
     opened.unless_changed(decoded)
@@ -199,11 +212,12 @@ fn describe(volume: &mut Volume, head: &Head, stack: &Stack) {
         about.length = "mm".into();
     }
     if let Some([x, y]) = middle.directions {
-        about.stance = Some(match stack.slices.len() {
-            // One slice is seen from its front, as on film.
-            1 => Stance { up: -y, front: -x.cross(y).normalize_or(y.any_orthonormal_vector()) },
-            _ => Stance::LPS,
-        });
+        // One slice is seen from its front, as on film.
+        if stack.slices.len() == 1 {
+            let front = -x.cross(y).normalize_or(y.any_orthonormal_vector());
+            about.stance = Some(Stance { up: -y, front });
+        }
+        Anatomy::LPS.place(volume);
     } else if stack.slices.len() == 1 {
         let [x, y] = [glam::DVec3::X, glam::DVec3::Y];
         about.stance = Some(Stance { up: -y, front: -x.cross(y) });
@@ -227,13 +241,10 @@ fn inverted(source: &Source, mut volume: Volume) -> Result<Volume> {
     Ok(volume)
 }
 
-/// Says what was left out, and how colours are drawn.
-fn tell(source: &Source, stack: &Stack, layout: &Layout) {
+/// Says what was left out.
+fn tell(source: &Source, stack: &Stack) {
     let path = source.path.display();
     stack.words.iter().for_each(|word| tracing::warn!("{path}: {word}"));
-    if layout.channels > 1 || layout.colors == Colors::Palette {
-        tracing::warn!("{path}: colours are drawn as their luminance");
-    }
     if stack.slices.len() == 1 && source.folder().is_none() {
         tracing::warn!("{path}: holds one slice; name its folder to draw the whole series");
     }

@@ -163,7 +163,9 @@ fn every_type_in_both_versions_and_orders() {
         let mut made = Made::new(second, big, 1792, &[1, 1, 1]);
         assert_eq!(values(&of(&made.values(SampleType::F64, "6 8"))), [10.0]);
         let mut made = Made::new(second, big, 128, &[2, 1, 1]);
-        assert_eq!(values(&of(&made.values(SampleType::U8, "9 9 9 255 0 0"))), [9.0, 76.0]);
+        let volume = of(&made.values(SampleType::U8, "9 9 9 255 0 0"));
+        assert_eq!(values(&volume), [9.0, 76.0]);
+        assert_eq!(volume.colors.as_deref().unwrap()[1], [255, 0, 0, 255]);
         let mut made = Made::new(second, big, 2304, &[1, 2, 1]);
         let colors = made.values(SampleType::U8, "0 255 0 1 7 7 7 255");
         assert_eq!(values(&of(&colors)), [150.0, 7.0]);

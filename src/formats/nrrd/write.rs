@@ -1,7 +1,9 @@
 //! Writes NRRD: samples in their own type, compressed by gzip, in the same file as the header.
 
 use crate::{
-    Error, Result, disk,
+    Error, Result,
+    about::Frame,
+    disk,
     volume::{Arrangement, Lattice, Scalar, Volume},
 };
 use flate2::{Compression, write::GzEncoder};
@@ -39,7 +41,7 @@ pub fn write_bytes(
     let [nx, ny, nz] = lattice.dims;
     let mut wrong = None;
     let written = disk::write_with(path.as_ref(), |out| {
-        write_header(lattice, Scalar::U8, "raw", out)?;
+        write_header((lattice, Frame::Own), Scalar::U8, "raw", out)?;
         for k in 0..nz {
             let samples = slice(k);
             if samples.len() != nx * ny {
@@ -56,7 +58,7 @@ pub fn write_bytes(
 /// Writes the header: the fields that every file has, and the keys of lattices that are not
 /// Cartesian.
 fn write_header(
-    lattice: &Lattice,
+    (lattice, frame): (&Lattice, Frame),
     scalar: Scalar,
     encoding: &str,
     out: &mut impl Write,
@@ -72,11 +74,12 @@ fn write_header(
         Scalar::I32 => "int32",
         Scalar::F32 => "float",
     };
+    let space = match frame {
+        Frame::Patient => "space: right-anterior-superior",
+        Frame::Own => "space dimension: 3",
+    };
     let endian = if cfg!(target_endian = "little") { "little" } else { "big" };
-    writeln!(
-        out,
-        "NRRD0004\ntype: {kind}\ndimension: 3\nspace dimension: 3\nsizes: {nx} {ny} {nz}"
-    )?;
+    writeln!(out, "NRRD0004\ntype: {kind}\ndimension: 3\n{space}\nsizes: {nx} {ny} {nz}")?;
     writeln!(out, "space directions: {i} {j} {k}\nspace origin: {}", vector(lattice.origin))?;
     writeln!(out, "endian: {endian}\nencoding: {encoding}")?;
     if body_centred {
@@ -92,7 +95,8 @@ fn write_header(
 }
 
 fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
-    write_header(&volume.lattice, volume.samples.scalar(), "gzip", out)?;
+    let place = (&volume.lattice, volume.about.frame);
+    write_header(place, volume.samples.scalar(), "gzip", out)?;
     let mut packed = GzEncoder::new(out, Compression::default());
     packed.write_all(volume.samples.bytes())?;
     packed.finish().map(drop)

@@ -1,7 +1,7 @@
 //! Where a file holds its samples, in order and uncompressed.
 
 use super::sample_type::{Endian, SampleType};
-use crate::volume::Lattice;
+use crate::{about::Frame, volume::Lattice};
 use std::path::PathBuf;
 
 /// Location and layout of the samples in a file: contiguous and not compressed.
@@ -13,4 +13,5 @@ pub(crate) struct Plain {
     pub sample_type: SampleType,
     pub endian: Endian,
     pub lattice: Lattice,
+    pub frame: Frame,
 }

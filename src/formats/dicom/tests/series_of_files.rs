@@ -35,9 +35,11 @@ fn stack(positions: &[[f64; 3]]) -> Volume {
     open(&folder, &ReadOptions::default()).unwrap()
 }
 
-/// Returns where each sample lies, with its value.
+/// Returns where each sample lies in DICOM's frame, with its value.
 fn places(volume: &Volume) -> Vec<(DVec3, f64)> {
-    (0..volume.len()).map(|i| (volume.lattice.sample_position(i), volume.value(i))).collect()
+    let turn = DVec3::new(-1.0, -1.0, 1.0);
+    let place = |i| (turn * volume.lattice.sample_position(i), volume.value(i));
+    (0..volume.len()).map(place).collect()
 }
 
 #[test]
@@ -47,8 +49,9 @@ fn slices_are_ordered_by_their_positions() {
     assert_eq!(values(&volume), [2.0, 1.0, 4.0, 3.0]);
     assert_eq!(volume.lattice.arrangement, Arrangement::Cartesian);
     assert_eq!(volume.lattice.axes.z_axis, DVec3::new(0.0, 0.0, 2.5));
-    assert_eq!(volume.lattice.origin, DVec3::new(1.0, 2.0, 2.5));
-    assert_eq!(volume.about.stance, Some(Stance::LPS));
+    // The patient's x leads to the right and y to the front.
+    assert_eq!(volume.lattice.origin, DVec3::new(-1.0, -2.0, 2.5));
+    assert_eq!(volume.about.stance, Some(Stance::RAS));
     // Rounded positions are even all the same.
     let volume = stack(&[at(0.0), at(0.63), at(1.25), at(1.88), at(2.5)]);
     assert_eq!(volume.lattice.arrangement, Arrangement::Cartesian);
