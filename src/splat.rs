@@ -18,8 +18,10 @@ pub struct Splat {
     pub strength: f32,
     /// B row by row: b00, b10, b11, b20, b21, b22, in world units.
     pub factor: [f32; 6],
-    /// Radiance: red, green, blue and opacity, 8 bits each, red in the lowest bits. Scalar: the
-    /// weight as a 16-bit float, and a part of the slope ([`Splat::sample`]).
+    /// Radiance: red, green, blue and opacity, 8 bits each, red in the lowest bits. The opacity is
+    /// a factor on the strength. A splat with an opacity below 1 is translucent: where it is
+    /// widened in the picture, its optical depth shrinks as its area grows. Scalar: the weight as a
+    /// 16-bit float, and a part of the slope ([`Splat::sample`]).
     pub color: u32,
     /// Radiance: the unit normal, octahedral, two signed 16-bit components ([`encode_normal`]);
     /// [`NO_NORMAL`] if there is none, which draws the splat unshaded. Scalar: the rest of the

@@ -67,9 +67,9 @@ fn add_facet(entry: u32, front: u32, first_pixel: vec2<i32>) {
     let b = second.xyz;
     let c = third.xyz;
     let normals = mat3x3<f32>(
-        decode_normal(bitcast<u32>(first.w)),
-        decode_normal(bitcast<u32>(second.w)),
-        decode_normal(bitcast<u32>(third.w)),
+        normal_or_none(bitcast<u32>(first.w)),
+        normal_or_none(bitcast<u32>(second.w)),
+        normal_or_none(bitcast<u32>(third.w)),
     );
     let tints = mat3x3<f32>(
         unpack4x8unorm(bitcast<u32>(last.x)).xyz,
@@ -131,7 +131,8 @@ fn add_facet(entry: u32, front: u32, first_pixel: vec2<i32>) {
         }
         if counts {
             var color = tints * weights;
-            if SURFACE_SHADED {
+            // Facets without normals keep their colours.
+            if SURFACE_SHADED && any(normals[0] != vec3(0.0)) {
                 color = lit(color, normals * weights, direction_of(r), frame.surface_shade);
             }
             let is_inside = vec4(distance) < behind;

@@ -10,6 +10,11 @@ fn decode_normal(packed: u32) -> vec3<f32> {
     return normalize(vec3(p - select(vec2(-fold), vec2(fold), p >= vec2(0.0)), z));
 }
 
+// The same, but a vector without length for NO_NORMAL.
+fn normal_or_none(packed: u32) -> vec3<f32> {
+    return select(decode_normal(packed), vec3(0.0), packed == NO_NORMAL);
+}
+
 fn encode_normal(n: vec3<f32>) -> u32 {
     var p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
     if n.z < 0.0 {

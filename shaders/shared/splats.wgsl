@@ -24,6 +24,28 @@ fn slope_of(color: u32, normal: u32) -> vec3<f32> {
     return vec3<f32>(parts) * exp2(f32(half)) * exp2(f32(exponent - half));
 }
 
+// Returns the area of a splat with these axes, seen from the eye, over its area once it is widened:
+// the factor on the optical depth of translucent splats. All lengths are in units of the splat's
+// own size, so that their fourth powers fit 32 bits.
+fn thinned(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, center: vec3<f32>, blur2: f32) -> f32 {
+    var toward = vec3(0.0, 0.0, 1.0);
+    if frame.perspective != 0u {
+        toward = center * inverseSqrt(max(dot(center, center), 1e-37));
+    }
+    let trace = dot(a, a) + dot(b, b) + dot(c, c);
+    let unit = 1.0 / max(trace + blur2, 1e-37);
+    let shadow = unit * vec3(
+        dot(cross(b, c), toward),
+        dot(cross(c, a), toward),
+        dot(cross(a, b), toward),
+    );
+    let along = vec3(dot(a, toward), dot(b, toward), dot(c, toward));
+    let before = dot(shadow, shadow);
+    let widened = blur2 * unit;
+    let after = before + widened * ((trace - dot(along, along)) * unit) + widened * widened;
+    return sqrt(before / max(after, 1e-37));
+}
+
 // Returns a splat in view space, widened.
 fn splat_at(index: u32) -> Candidate {
     let own = splats[index];
@@ -78,6 +100,9 @@ fn splat_at(index: u32) -> Candidate {
     }
     if !is_trained && (source.flags & RADIANCE) != 0u {
         splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;
+        if splat.color < 0xff000000u {
+            splat.strength *= thinned(c0, c1, c2, splat.center, blur2);
+        }
         if splat.normal != NO_NORMAL {
             let normal = to_view * decode_normal(splat.normal);
             splat.normal = encode_normal(normal);

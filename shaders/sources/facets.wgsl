@@ -71,8 +71,9 @@ fn facet_record(index: u32) -> array<vec4<f32>, 4> {
     let to_view = mat3x3<f32>(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz);
     var normals: array<f32, 3>;
     for (var i = 0u; i < 3u; i++) {
-        let normal = to_view * decode_normal(facets[index].normals[i]);
-        normals[i] = bitcast<f32>(encode_normal(normal));
+        let own = facets[index].normals[i];
+        let turned = encode_normal(to_view * decode_normal(own));
+        normals[i] = bitcast<f32>(select(turned, NO_NORMAL, own == NO_NORMAL));
     }
     // On a set that winds in any way, all facets count as fronts.
     let is_front = away_of(a, b, c) < 0.0 || (source.flags & MIXED) != 0u;

@@ -13,7 +13,7 @@ use crate::{
     facet::{Facet, FacetSet, NEARER, Sides},
     plan::uniforms::Source,
     scene::Settings,
-    splat::{decode_normal, encode_normal},
+    splat::{NO_NORMAL, decode_normal, encode_normal},
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
 use glam::{Vec2, Vec3};
@@ -57,8 +57,8 @@ impl<'a> FacetProjector<'a> {
         // On a set that winds in any way, all facets count as fronts.
         let is_front = away < 0.0 || self.sides == Sides::Mixed;
         let normals = facet.normals.map(|normal| {
-            let normal = decode_normal(normal).unwrap_or(Vec3::Z);
-            f32::from_bits(encode_normal(turn * normal))
+            let turned = decode_normal(normal).map(|normal| encode_normal(turn * normal));
+            f32::from_bits(turned.unwrap_or(NO_NORMAL))
         });
         let colors = facet.colors.map(f32::from_bits);
         Some(Record {
@@ -177,7 +177,7 @@ impl Shown {
             corners,
             places,
             nearness,
-            normals: [a, b, c].map(|bits| decode_normal(bits.to_bits()).unwrap_or(Vec3::Z)),
+            normals: [a, b, c].map(|bits| decode_normal(bits.to_bits()).unwrap_or(Vec3::ZERO)),
             colors: [d, e, f].map(unpack),
             is_front: record.strength > 0.0,
             turn: if away < 0.0 { -1.0 } else { 1.0 },
@@ -280,7 +280,10 @@ impl<S: Simd> OpenTile<'_, S> {
         let mut color = three!(I => of(facet.colors.map(|color| color[I])));
         if plan.lit_surfaces {
             let normal = three!(I => of(facet.normals.map(|normal| normal[I])));
-            color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_shade);
+            // Facets without normals keep their colours.
+            if facet.normals != [Vec3::ZERO; 3] {
+                color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_shade);
+            }
         }
         let none = Lanes::splat(simd, 0.0);
         for own in usize::from(window.is_continued)..WINDOW {

@@ -99,6 +99,10 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
         let [red, green, blue, opacity] =
             splat.color.to_le_bytes().map(|part| f32::from(part) / 255.0);
         strength *= opacity;
+        if opacity < 1.0 {
+            let toward = if plan.view.perspective { center.normalize_or(Vec3::Z) } else { Vec3::Z };
+            strength *= thinned(turned, toward, blur2);
+        }
         let normal = decode_normal(splat.normal).map_or(Vec3::ZERO, |normal| to_view * normal);
         if normal != Vec3::ZERO {
             // Opaque splats must not grow through widening, so they step back.
@@ -124,6 +128,20 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
         Carried::Scalar { weight: weight * before / after, gradient }
     };
     Candidate { center, covariance, extent: source.extent, strength, carried }
+}
+
+/// Returns the area of a splat with these axes, seen along a direction, over its area once it is
+/// widened: the factor on the optical depth of translucent splats. All lengths are in units of the
+/// splat's own size, so that their fourth powers fit 32 bits.
+fn thinned(axes: Mat3, toward: Vec3, blur2: f32) -> f32 {
+    let Mat3 { x_axis: a, y_axis: b, z_axis: c } = axes;
+    let trace = a.length_squared() + b.length_squared() + c.length_squared();
+    let unit = 1.0 / (trace + blur2).max(1e-37);
+    let shadow = [b.cross(c), c.cross(a), a.cross(b)].map(|v| v.dot(toward) * unit);
+    let along = [a, b, c].map(|v| v.dot(toward).powi(2)).iter().sum::<f32>();
+    let (before, blur2) = (shadow.iter().map(|v| v * v).sum::<f32>(), blur2 * unit);
+    let after = before + blur2 * ((trace - along) * unit) + blur2 * blur2;
+    (before / after.max(1e-37)).sqrt()
 }
 
 /// Returns a value in entries of the transfer function's table, clamped so that it stays finite.

@@ -37,6 +37,8 @@ struct Widened<S: Simd> {
     /// A zero vector for none.
     normal: [Lanes<S>; 3],
     has_normal: mask32x8<S>,
+    /// The factor on the optical depth.
+    thinned: Lanes<S>,
 }
 
 /// The places of footprints: the first and the last pixel, the range of distances, and which
@@ -185,18 +187,60 @@ impl<'a> Projector<'a> {
         }
         let normal = self.turned(normal);
         let normal = three!(I => has_normal.select(normal[I], none));
+        let mut thinned = one;
+        let is_translucent =
+            !self.is_trained() && eight.color.iter().any(|&own| own as u32 >> 24 < 255);
+        if is_translucent {
+            thinned = self.thinned(simd, eight, center, columns, blur2);
+        }
         // Opaque splats must not grow through widening, so they step back.
         let along = three!(I => dot(columns[I], normal));
         let own2 = dot(along, along);
         let back = ((own2 + blur2).sqrt() - own2.sqrt()) * STEP_BACK as f32;
         let center = three!(I => center[I] - normal[I] * back);
-        Widened { center, covariance, normal, has_normal }
+        Widened { center, covariance, normal, has_normal, thinned }
+    }
+
+    /// Returns the areas of translucent splats, seen from the eye, over those of the widened ones
+    /// (`thinned` in `footprint`); 1 for opaque ones.
+    #[inline(always)]
+    fn thinned<S: Simd>(
+        &self,
+        simd: S,
+        eight: &Eight,
+        center: [Lanes<S>; 3],
+        [a, b, c]: [[Lanes<S>; 3]; 3],
+        blur2: Lanes<S>,
+    ) -> Lanes<S> {
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let least = Lanes::splat(simd, 1e-37);
+        let mut toward = [none, none, one];
+        if self.plan.view.perspective {
+            let inverse = one / dot(center, center).max(least).sqrt();
+            toward = three!(I => center[I] * inverse);
+        }
+        let trace = dot(a, a) + dot(b, b) + dot(c, c);
+        let unit = one / (trace + blur2).max(least);
+        let axes = [a, b, c];
+        let shadow = three!(I => {
+            let (u, v) = (axes[(I + 1) % 3], axes[(I + 2) % 3]);
+            let across = three!(J => {
+                u[(J + 1) % 3] * v[(J + 2) % 3] - u[(J + 2) % 3] * v[(J + 1) % 3]
+            });
+            dot(across, toward) * unit
+        });
+        let along = three!(I => dot(axes[I], toward));
+        let (before, blur2) = (dot(shadow, shadow), blur2 * unit);
+        let after = before + blur2 * ((trace - dot(along, along)) * unit) + blur2 * blur2;
+        let packed: i32x8<S> = eight.color.simd_into(simd);
+        let is_opaque = ((packed >> 24) & 0xff).simd_eq(255);
+        is_opaque.select(one, (before / after.max(least)).sqrt())
     }
 
     /// Returns the strengths of splats, and the payloads of their records after the first part.
     #[inline(always)]
     fn payload<S: Simd>(&self, simd: S, eight: &Eight, splats: &Widened<S>) -> [Lanes<S>; 8] {
-        let Widened { center, normal, has_normal, .. } = *splats;
+        let Widened { center, normal, has_normal, thinned, .. } = *splats;
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         if self.is_trained() {
             let first: i32x8<S> = eight.color.simd_into(simd);
@@ -219,7 +263,7 @@ impl<'a> Projector<'a> {
             Lanes::<S>::float_from((packed >> SHIFT as u32) & 0xff) * (1.0 / 255.0));
         let strength: Lanes<S> = eight.strength.simd_into(simd);
         [
-            strength * opacity,
+            strength * opacity * thinned,
             facing,
             red * facing,
             green * facing,

@@ -192,7 +192,9 @@ pub(crate) fn merge(children: &[Node], masses: &[Mass]) -> (Node, Mass) {
     let shown: Moments = std::array::from_fn(|i| within[i] + SPREAD * between[i]);
     let shown_area = area(&shown).max(f32::MIN_POSITIVE);
     let alpha = (color[3] / 255.0).max(1.0 / 255.0);
-    let made_up = 1.0 + (SPREAD - 1.0) * (depth / OPAQUE).min(1.0);
+    // What is not opaque keeps its mass: it is meant to let light pass.
+    let opaque = if color[3] < 254.5 { 0.0 } else { (depth / OPAQUE).min(1.0) };
+    let made_up = 1.0 + (SPREAD - 1.0) * opaque;
     let packed_normal = encode_normal(normal.normalize_or_zero());
     let splat = Splat {
         center: mean.to_array(),

@@ -55,6 +55,27 @@ pub(crate) fn number<T: FromStr>(word: &[u8]) -> Option<T> {
     }
 }
 
+/// Parses a word as a number, which may be written as C libraries write those that are not finite:
+/// `nan(ind)`, `-1.#QNAN`, `1.#INF`.
+pub(crate) fn float(word: &[u8]) -> Option<f64> {
+    number(word).or_else(|| {
+        /// How such words go on after their sign, in lower case, and what they mean.
+        const WORDS: [(&[u8], f64); 6] = [
+            (b"nan(", f64::NAN),
+            (b"nanq", f64::NAN),
+            (b"nans", f64::NAN),
+            (b"1.#qnan", f64::NAN),
+            (b"1.#ind", f64::NAN),
+            (b"1.#inf", f64::INFINITY),
+        ];
+        let rest = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word);
+        let found = WORDS.iter().find(|(start, _)| {
+            rest.get(..start.len()).is_some_and(|own| own.eq_ignore_ascii_case(start))
+        });
+        found.map(|(_, value)| *value)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,6 +87,20 @@ mod tests {
         assert_eq!(lossy(b"ab\xffc"), "ab\u{fffd}c");
         assert_eq!(excerpt(&[b'x'; 1000]), "x".repeat(40));
         assert_eq!(excerpt("µ".repeat(100).as_bytes()), "µ".repeat(40));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_read_as_c_libraries_write_them() {
+        for word in ["nan", "NaN", "-nan(ind)", "nan(0x7fffff)", "1.#QNAN", "-1.#IND", "1.#QNAN00"]
+        {
+            assert!(float(word.as_bytes()).is_some_and(f64::is_nan), "{word}");
+        }
+        for word in ["inf", "-Infinity", "1.#INF", "-1.#INF000"] {
+            assert!(float(word.as_bytes()).is_some_and(f64::is_infinite), "{word}");
+        }
+        assert_eq!((float(b"-1.5"), float(b"1.5#"), float(b"nano"), float(b"")), {
+            (Some(-1.5), None, None, None)
+        });
     }
 
     #[test]

@@ -7,6 +7,45 @@ use glam::{DVec3, Vec3};
 /// The squares of coordinates up to this size still fit in 32-bit floats.
 const LARGEST: f64 = 1e18;
 
+/// As [`settle`], but rows whose position is not finite may occur: theirs become NaN. The origin is
+/// that of the others.
+///
+/// # Errors
+/// Those of [`settle`]; [`Error::Input`] if there are rows, but none has a finite position.
+pub(crate) fn settle_some(
+    source: &Source,
+    count: usize,
+    position: impl Fn(usize) -> DVec3 + Sync,
+) -> Result<(DVec3, Vec<Vec3>)> {
+    source.check_time()?;
+    source.room::<Vec3>("the positions", count)?;
+    let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = (0..count)
+        .into_par_iter()
+        .map(&position)
+        .filter(|position| position.is_finite())
+        .map(|position| (position, position))
+        .reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    if count == 0 {
+        return Ok((DVec3::ZERO, Vec::new()));
+    }
+    if low.x > high.x {
+        return Err(source.error(
+            "positions",
+            format!("none of the {count} points has coordinates that are finite numbers"),
+        ));
+    }
+    let step = count.div_ceil(LOOKS);
+    let looks = (0..count).step_by(step).map(&position);
+    let looks: Vec<DVec3> = looks.filter(|position| position.is_finite()).collect();
+    let origin = origin(source, [low, high], &looks)?;
+    let relative = |row| match position(row) {
+        position if position.is_finite() => (position - origin).as_vec3(),
+        _ => Vec3::NAN,
+    };
+    Ok((origin, (0..count).into_par_iter().map(relative).collect()))
+}
+
 /// Chooses an origin and returns it with the positions relative to it. The origin is zero unless
 /// the coordinates are large compared with the extent of the whole. Then it is the centre, rounded
 /// to whole numbers. `place` names a row in an error.
@@ -30,15 +69,25 @@ pub(crate) fn settle(
         .into_par_iter()
         .map(|row| (position(row), position(row)))
         .reduce(|| (start, start), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-    let origin = origin(source, low, high)?;
+    let step = count.div_ceil(LOOKS);
+    let looks: Vec<DVec3> = (0..count).step_by(step).map(&position).collect();
+    let origin = origin(source, [low, high], &looks)?;
     Ok((origin, (0..count).into_par_iter().map(|row| (position(row) - origin).as_vec3()).collect()))
 }
 
-/// Returns the origin for positions between two corners.
-pub(crate) fn origin(source: &Source, low: DVec3, high: DVec3) -> Result<DVec3> {
-    let (center, extent) = (low * 0.5 + high * 0.5, (high * 0.5 - low * 0.5).max_element());
-    let origin =
-        if center.abs().max_element() > 16.0 * extent { center.round() } else { DVec3::ZERO };
+/// Returns the origin for positions between two corners, given some of the positions, spread evenly
+/// over all.
+///
+/// If nine tenths of these lie together in a box a hundredth as large as the whole along each axis,
+/// or smaller, that box decides: one point far away must not take the precision of the others.
+pub(crate) fn origin(source: &Source, [low, high]: [DVec3; 2], looks: &[DVec3]) -> Result<DVec3> {
+    let around = |[low, high]: [DVec3; 2]| {
+        let center = low * 0.5 + high * 0.5;
+        let is_far = center.abs().max_element() > 16.0 * half([low, high]);
+        if is_far { center.round() } else { DVec3::ZERO }
+    };
+    let usual = usual(looks).filter(|_| are_crowded(looks, [low, high]));
+    let origin = around(usual.unwrap_or([low, high]));
     if (low - origin).abs().max((high - origin).abs()).max_element() > LARGEST {
         return Err(source.error(
             "positions",
@@ -52,6 +101,35 @@ pub(crate) fn origin(source: &Source, low: DVec3, high: DVec3) -> Result<DVec3> 
     Ok(origin)
 }
 
+/// Returns whether nine tenths of some positions lie in a box a hundredth as large as the whole.
+pub(crate) fn are_crowded(looks: &[DVec3], whole: [DVec3; 2]) -> bool {
+    usual(looks).is_some_and(|usual| 100.0 * half(usual) < half(whole))
+}
+
+/// Returns half of the longest side of a box.
+fn half([low, high]: [DVec3; 2]) -> f64 {
+    (high * 0.5 - low * 0.5).max_element()
+}
+
+/// Positions that are looked at for an origin, and how few say nothing about the others.
+pub(crate) const LOOKS: usize = 1 << 14;
+const FEWEST: usize = 20;
+
+/// Returns the box between the 5th and the 95th percentile along each axis.
+fn usual(looks: &[DVec3]) -> Option<[DVec3; 2]> {
+    if looks.len() < FEWEST {
+        return None;
+    }
+    let cut = looks.len() / 20;
+    let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
+    for axis in 0..3 {
+        let mut along: Vec<f64> = looks.iter().map(|place| place[axis]).collect();
+        let mut at = |index: usize| *along.select_nth_unstable_by(index, f64::total_cmp).1;
+        (low[axis], high[axis]) = (at(cut), at(looks.len() - 1 - cut));
+    }
+    Some([low, high])
+}
+
 /// Returns the error for a position that is not finite.
 pub(crate) fn not_finite(source: &Source, place: String, position: DVec3) -> Error {
     source
@@ -62,4 +140,34 @@ pub(crate) fn not_finite(source: &Source, place: String, position: DVec3) -> Err
 /// Returns a normal of unit length, or zero if the file's normal is unusable.
 pub(crate) fn unit(normal: Vec3) -> Vec3 {
     normal.as_dvec3().normalize_or_zero().as_vec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::Limits;
+
+    #[test]
+    fn one_point_far_away_does_not_choose_the_origin() {
+        let limits = Limits::default();
+        let source = Source::from_bytes("a.xyz".as_ref(), b"", &limits).unwrap();
+        let at = |row: usize| DVec3::new(5e5, 5e6, 100.0) + DVec3::splat(row as f64 % 7.3);
+        let settled = |stray: Option<usize>| {
+            let place = |row| if Some(row) == stray { DVec3::ZERO } else { at(row) };
+            settle(&source, 1000, place, |row| row.to_string()).unwrap()
+        };
+        let (origin, all) = settled(None);
+        assert!(origin.distance(at(0)) < 10.0, "{origin}");
+        for stray in [0, 500, 999] {
+            let (origin, places) = settled(Some(stray));
+            assert!(origin.distance(at(0)) < 10.0, "{origin}");
+            assert_eq!(places.len(), all.len());
+            let found = origin + places[7].as_dvec3();
+            assert!(found.distance(at(7)) < 1e-5, "{found}");
+            assert!((origin + places[stray].as_dvec3()).length() < 1.0);
+        }
+        // Two parts that are both substantial lie around the usual origin.
+        let parts = |row: usize| if row.is_multiple_of(9) { DVec3::ZERO } else { at(row) };
+        assert_eq!(settle(&source, 1000, parts, |row| row.to_string()).unwrap().0, DVec3::ZERO);
+    }
 }

@@ -2,7 +2,12 @@
 
 use super::{Limits, Source};
 use crate::{Error, Result};
-use std::path::Path;
+use std::{
+    fmt,
+    path::Path,
+    sync::{Arc, Mutex},
+};
+use tracing::{Event, Level, Metadata, Subscriber, field, span};
 
 #[path = "../../tests/testing/folder.rs"]
 mod folder;
@@ -45,4 +50,49 @@ pub fn png(width: u32, height: u32, texels: &[[u8; 4]]) -> Vec<u8> {
         .expect("one texel per pixel of the size");
     picture.write_to(&mut out, image::ImageFormat::Png).expect("encodes");
     out.into_inner()
+}
+
+/// Keeps the texts of warnings.
+#[derive(Clone, Default)]
+struct Warnings(Arc<Mutex<Vec<String>>>);
+
+impl Subscriber for Warnings {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        *metadata.level() == Level::WARN
+    }
+
+    fn new_span(&self, _: &span::Attributes<'_>) -> span::Id {
+        span::Id::from_u64(1)
+    }
+
+    fn record(&self, _: &span::Id, _: &span::Record<'_>) {}
+
+    fn record_follows_from(&self, _: &span::Id, _: &span::Id) {}
+
+    fn event(&self, event: &Event<'_>) {
+        event.record(&mut Message(&self.0));
+    }
+
+    fn enter(&self, _: &span::Id) {}
+
+    fn exit(&self, _: &span::Id) {}
+}
+
+/// Takes the text of an event.
+struct Message<'a>(&'a Mutex<Vec<String>>);
+
+impl field::Visit for Message<'_> {
+    fn record_debug(&mut self, field: &field::Field, value: &dyn fmt::Debug) {
+        if field.name() == "message" {
+            self.0.lock().expect("no test panics here").push(format!("{value:?}"));
+        }
+    }
+}
+
+/// Returns the result of `act` and the warnings that this thread gives meanwhile.
+pub fn warnings_of<T>(act: impl FnOnce() -> T) -> (T, Vec<String>) {
+    let warnings = Warnings::default();
+    let result = tracing::subscriber::with_default(warnings.clone(), act);
+    let words = warnings.0.lock().expect("no test panics here").clone();
+    (result, words)
 }

@@ -20,7 +20,8 @@ pub(crate) enum Want {
     Nothing,
     /// Finite numbers.
     Numbers,
-    /// Numbers, or a word that stands for a missing value.
+    /// Numbers, finite or not, or a word that stands for a missing value: coordinates too, because
+    /// points without them are left out.
     Values,
 }
 
@@ -41,16 +42,23 @@ pub(crate) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// Finds the rows of a file. Lines for which `skip` returns true are skipped.
-    pub fn of(
-        source: &'a Source,
-        mut skip: impl FnMut(usize, &[u8]) -> Result<bool>,
-    ) -> Result<Self> {
+    /// Finds the rows of a file. A line with a single whole number counts rows, as in `.pts` files,
+    /// which begin each scan with its number of points.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a file without rows, and for one that counts more or fewer rows.
+    pub fn of(source: &'a Source) -> Result<Self> {
+        refuse_utf16(source)?;
+        let mut counts = Growing::new(source, "the counts");
         let mut lines: Growing<(usize, &[u8])> = Growing::new(source, "the list of lines");
         for (number, line) in (1..).zip(lines_of(without_mark(source.bytes()))) {
             let line = line.trim_ascii();
-            if is_row(line, lines.is_empty()) && !skip(number, line)? {
-                lines.push((number, line))?;
+            if !is_row(line, lines.is_empty()) {
+                continue;
+            }
+            match copy::number::<u64>(line) {
+                Some(count) => counts.push((number, count))?,
+                None => lines.push((number, line))?,
             }
         }
         source.check_points("the number of lines", lines.len() as u64)?;
@@ -75,6 +83,7 @@ impl<'a> Text<'a> {
         if names.is_some() {
             lines.remove(0);
         }
+        check_counts(source, &counts, lines.len())?;
         Ok(Self { names, width: words.len(), first, rows: lines, separator })
     }
 
@@ -133,7 +142,7 @@ impl<'a> Text<'a> {
         for &(_, line) in self.rows.iter().take(FIRST) {
             let Some(word) = words(line, self.separator).nth(column) else { continue };
             let word = without_quotes(word);
-            if copy::number::<f64>(word).is_some() {
+            if copy::float(word).is_some() {
                 has_number = true;
             } else if !MISSING.iter().any(|other| word.eq_ignore_ascii_case(other)) {
                 return false;
@@ -153,6 +162,29 @@ impl<'a> Text<'a> {
         let message = format!("has {count} columns, but the first line has {}", self.width);
         source.error(format!("line {line}"), message)
     }
+}
+
+/// Returns an error if the file counts its rows, with the line of each count, and has another
+/// number.
+fn check_counts(source: &Source, counts: &[(usize, u64)], there: usize) -> Result<()> {
+    let Some(&(line, _)) = counts.first() else { return Ok(()) };
+    let counted = counts.iter().fold(0u64, |sum, &(_, count)| sum.saturating_add(count));
+    if counted == there as u64 {
+        return Ok(());
+    }
+    Err(source
+        .error(format!("line {line}"), format!("counts {counted} points, but there are {there}"))
+        .hint("the file is cut, or a line has a single number"))
+}
+
+/// Returns an error for a text in UTF-16, by its byte order mark.
+pub(crate) fn refuse_utf16(source: &Source) -> Result<()> {
+    if source.bytes().starts_with(b"\xff\xfe") || source.bytes().starts_with(b"\xfe\xff") {
+        return Err(source
+            .error("file", "is text in UTF-16, which is not read")
+            .hint("save it as UTF-8, or convert it: iconv -f UTF-16 -t UTF-8"));
+    }
+    Ok(())
 }
 
 /// Returns the words of the first row, and whether they are names; `None` for a file without rows.
@@ -180,7 +212,7 @@ fn without_quotes(mut word: &[u8]) -> &[u8] {
 }
 
 /// Removes the byte order mark that some writers of UTF-8 put first.
-fn without_mark(bytes: &[u8]) -> &[u8] {
+pub(crate) fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
@@ -199,7 +231,7 @@ fn names_columns(line: &[u8]) -> bool {
 }
 
 fn has_names(words: &[String]) -> bool {
-    !words.iter().all(|word| word.parse::<f64>().is_ok())
+    !words.iter().all(|word| copy::float(word.as_bytes()).is_some())
 }
 
 /// Returns the separator that a first line uses, and its words without quotes.
@@ -235,7 +267,7 @@ fn parsed(
     (column, want): (usize, Want),
 ) -> Result<f64> {
     let may_lack = want == Want::Values;
-    let number: f64 = match copy::number(word) {
+    let number = match copy::float(word) {
         Some(number) => number,
         None if may_lack && MISSING.iter().any(|other| word.eq_ignore_ascii_case(other)) => {
             f64::NAN

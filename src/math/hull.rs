@@ -1,7 +1,7 @@
 //! Points that lie farthest out, and the convex hull of points of a plane.
 
 use crate::parallel::prelude::*;
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// The number of directions in which the farthest points are found. Of a ball, the points found
 /// span all but 0.3 % of the radius.
@@ -109,21 +109,102 @@ fn direction(number: usize) -> Vec3 {
     Vec3::new((radius * turn.cos()) as f32, (radius * turn.sin()) as f32, z as f32)
 }
 
-/// Returns the corners of a box that contains points, with half of its side to spare on each side,
-/// without a few that lie far away from all others: up to a thousandth on each side.
-pub(crate) fn without_strays(points: &[Vec3]) -> Option<[Vec3; 2]> {
+/// What a set of points is, which decides how much of it may lie far away without counting.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Points that were measured. Some may be wrong.
+    Measured,
+    /// Corners of a modelled surface, where few of them may be a whole part.
+    Modelled,
+    /// A trained scene: an object, and a background all around.
+    Trained,
+}
+
+impl Kind {
+    /// Returns shares of points on each side, and how far away they have to lie to be left out, in
+    /// diagonals of the box around the others.
+    fn strays(self) -> &'static [[f64; 2]] {
+        match self {
+            Self::Modelled => &[[0.01, 20.0]],
+            Self::Measured | Self::Trained => &[[0.01, 4.0], [0.05, 20.0]],
+        }
+    }
+}
+
+/// The share of a trained scene on each side that may be background, and how far away it lies at
+/// least, in diagonals of the box around the rest.
+const BACKGROUND: [f64; 2] = [0.2, 1.5];
+
+/// A background makes the whole this many times as large as the rest, or more.
+const WIDENED: f32 = 10.0;
+
+/// Points that percentiles are taken of. Of fewer than the least, none is a stray by its share.
+const LOOKS: usize = 1 << 16;
+const FEWEST: usize = 100;
+
+/// Returns the corners of a box that contains nearly all points. Left out are up to a thousandth on
+/// each side that lies farther out than half of the side of the box around the others, and more of
+/// them only if they lie much farther away ([`Kind::strays`], [`BACKGROUND`]).
+pub(crate) fn without_strays(points: &[Vec3], kind: Kind) -> Option<[Vec3; 2]> {
     if points.is_empty() {
         return None;
     }
+    let [low, high] = percentiles(points, STRAY);
+    let slack = 0.5 * (high - low);
+    let mut kept = [low - slack, high + slack];
+    if points.len() < FEWEST {
+        return Some(kept);
+    }
+    let step = points.len().div_ceil(LOOKS);
+    let looks: Vec<Vec3> = points.iter().step_by(step).copied().collect();
+    let mut keep = |[low, high]: [Vec3; 2], diagonals: f32| {
+        let slack = diagonals * low.distance(high);
+        if slack > 0.0 {
+            kept = [kept[0].max(low - slack), kept[1].min(high + slack)];
+        }
+    };
+    for &[share, diagonals] in kind.strays() {
+        keep(percentiles(&looks, share), diagonals as f32);
+    }
+    let [share, diagonals] = BACKGROUND;
+    if kind == Kind::Trained {
+        let core = percentiles(&looks, share);
+        if is_surrounded(&looks, core, diagonals as f32) {
+            keep(core, diagonals as f32);
+        }
+    }
+    Some(kept)
+}
+
+/// Returns whether the points outside of a box, and of some diagonals around it, lie far away on
+/// several sides, as a background does. Another object lies on one side.
+fn is_surrounded(points: &[Vec3], [low, high]: [Vec3; 2], diagonals: f32) -> bool {
+    let diagonal = low.distance(high);
+    let slack = Vec3::splat(diagonals * diagonal);
+    let is_near = |p: &Vec3| p.cmpge(low - slack).all() && p.cmple(high + slack).all();
+    let outside: Vec<DVec3> = points.iter().filter(|p| !is_near(p)).map(|p| p.as_dvec3()).collect();
+    if outside.is_empty() {
+        return false;
+    }
+    let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let (first, last) = points.iter().fold(none, |(a, b), p| (a.min(*p), b.max(*p)));
+    let mean = outside.iter().sum::<DVec3>() / outside.len() as f64;
+    let spread = outside.iter().map(|p| p.distance_squared(mean)).sum::<f64>();
+    let spread = (spread / outside.len() as f64).sqrt();
+    let aside = mean.distance((0.5 * (low + high)).as_dvec3());
+    diagonal > 0.0 && first.distance(last) >= WIDENED * diagonal && aside < spread
+}
+
+/// Returns the corners of the box without this share of the points on each side, rounded up.
+pub(crate) fn percentiles(points: &[Vec3], share: f64) -> [Vec3; 2] {
     let (mut low, mut high) = (Vec3::ZERO, Vec3::ZERO);
-    let beyond = ((points.len() as f64 * STRAY).ceil() as usize).min((points.len() - 1) / 2);
+    let beyond = ((points.len() as f64 * share).ceil() as usize).min((points.len() - 1) / 2);
     for axis in 0..3 {
         let mut along: Vec<f32> = points.iter().map(|point| point[axis]).collect();
         let mut at = |index: usize| *along.select_nth_unstable_by(index, f32::total_cmp).1;
         (low[axis], high[axis]) = (at(beyond), at(points.len() - 1 - beyond));
     }
-    let slack = 0.5 * (high - low);
-    Some([low - slack, high + slack])
+    [low, high]
 }
 
 /// Returns the corners of the convex hull of points of a plane, counter-clockwise (Andrew 1979).
@@ -182,6 +263,57 @@ mod tests {
         assert_eq!(depth_inside(&corners, DVec2::new(1.0, 2.0)), 1.0);
         assert_eq!(depth_inside(&corners, DVec2::new(2.0, 6.0)), -2.0);
         assert!(area(&hull(vec![DVec2::ZERO, DVec2::X, 2.0 * DVec2::X])) == 0.0);
+    }
+
+    fn ball(count: usize) -> Vec<Vec3> {
+        // Steps that fill space evenly (Roberts 2018).
+        let unit = |i: usize, step: f64| ((i as f64 * step).fract() * 2.0 - 1.0) as f32;
+        let place = |i| Vec3::new(unit(i, 0.819_172_5), unit(i, 0.671_043_6), unit(i, 0.549_700_5));
+        (0..).map(place).filter(|p| p.length() < 1.0).take(count).collect()
+    }
+
+    fn kept(points: &[Vec3], kind: Kind) -> usize {
+        let [low, high] = without_strays(points, kind).unwrap();
+        points.iter().filter(|p| p.cmpge(low).all() && p.cmple(high).all()).count()
+    }
+
+    #[test]
+    fn few_points_far_away_are_left_out() {
+        let around = ball(2000);
+        let with = |count: usize, factor: f32, aside: Vec3| {
+            let more = ball(count).into_iter().map(|p| factor * p + aside);
+            around.iter().copied().chain(more).collect::<Vec<Vec3>>()
+        };
+        let far = with(14, 1.0, Vec3::new(3000.0, 5000.0, 8000.0));
+        assert_eq!(kept(&far, Kind::Measured), 2000);
+        assert_eq!(kept(&far, Kind::Modelled), 2000);
+        // A small part beside the rest, and substantial parts, stay.
+        for other in [
+            with(14, 0.1, Vec3::X * 8.0),
+            with(120, 1.0, Vec3::X * 50.0),
+            with(300, 1.0, Vec3::X * 5000.0),
+            with(2000, 1.0, Vec3::X * 5000.0),
+        ] {
+            assert_eq!(kept(&other, Kind::Measured), other.len());
+            assert_eq!(kept(&other, Kind::Trained), other.len());
+        }
+        // So do long thin objects, sparse at one end.
+        let rod: Vec<Vec3> =
+            ball(2000).into_iter().map(|p| Vec3::new((3.0 * p.x).exp() * 50.0, p.y, p.z)).collect();
+        assert_eq!(kept(&rod, Kind::Measured), 2000);
+    }
+
+    #[test]
+    fn a_background_all_around_is_left_out_of_trained_scenes() {
+        let around = ball(2000);
+        let shell = ball(280).into_iter().map(|p| p.normalize() * 120.0);
+        let scene: Vec<Vec3> = around.iter().copied().chain(shell).collect();
+        assert_eq!(kept(&scene, Kind::Trained), 2000);
+        assert_eq!(kept(&scene, Kind::Measured), 2280);
+        // The ground around an object belongs to it.
+        let ground = ball(600).into_iter().map(|p| Vec3::new(4.0 * p.x, -1.0, 4.0 * p.z));
+        let scene: Vec<Vec3> = around.into_iter().chain(ground).collect();
+        assert_eq!(kept(&scene, Kind::Trained), 2600);
     }
 
     /// The points that a plain search finds, in any order of the points.

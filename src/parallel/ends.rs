@@ -165,13 +165,6 @@ pub trait ParallelIterator: Parallel {
         by_part(self, |divided, part| Self::items(divided, part).count()).into_iter().sum()
     }
 
-    fn max(self) -> Option<Self::Item>
-    where
-        Self::Item: Ord + Send,
-    {
-        self.max_by(Ord::cmp)
-    }
-
     fn max_by(
         self,
         order: impl Fn(&Self::Item, &Self::Item) -> Ordering + Sync,

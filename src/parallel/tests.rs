@@ -65,7 +65,7 @@ fn ends_are_those_of_iterators() {
         let all: Vec<u64> = (0..length as u64).collect();
         let sum: u64 = all.iter().sum();
         assert_eq!(all.par_iter().copied().sum::<u64>(), sum);
-        assert_eq!(all.par_iter().copied().max(), all.iter().copied().max());
+        assert_eq!(all.par_iter().copied().max_by(Ord::cmp), all.iter().copied().max());
         assert_eq!(all.par_iter().filter(|n| **n % 2 == 0).count(), length.div_ceil(2));
         assert_eq!(all.par_iter().copied().reduce(|| 0, |a, b| a + b), sum);
         let folded = all.par_iter().fold(|| 0, |sum, n| sum + n).reduce(|| 0, |a, b| a + b);

@@ -189,8 +189,11 @@ impl Frame<'_> {
             let weight = share * (-behind).exp();
             let color = of(facet.colors);
             let color = match &self.shade {
-                Some(shade) => shade::lit(color, of(facet.normals), ray.direction, shade),
-                None => color,
+                // Facets without normals keep their colours.
+                Some(shade) if facet.normals != [DVec3::ZERO; 3] => {
+                    shade::lit(color, of(facet.normals), ray.direction, shade)
+                }
+                _ => color,
             };
             let cover = &mut covers[sheet - 1];
             cover.shares[usize::from(!facet.is_front)] += share;

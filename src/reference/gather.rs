@@ -72,6 +72,8 @@ fn add_item<'a>(
         // Tensor products are not radial functions: their field is evaluated point by point
         // (product.rs).
         Item::Volume(_, kernel, _) if kernel.as_tensor().is_some() => {}
+        // Labels are not summed (labels.rs).
+        Item::Volume(volume, ..) if volume.is_label_map() => {}
         Item::Volume(volume, kernel, transfer) => {
             let before = before.map(|before| (before, transfer));
             from_volume(kernels, volume, kernel, before, view);
@@ -162,12 +164,17 @@ fn from_splat<'a>(
                 splat.color.to_le_bytes().map(|byte| f64::from(byte) / 255.0);
             let normal =
                 decode_normal(splat.normal).map(|normal| view.rotation * normal.as_dvec3());
+            let toward = if view.perspective { center.normalize() } else { DVec3::Z };
             if let Some(normal) = normal {
                 let thickness = |factor: DMat3| (factor.transpose() * normal).length();
                 center -= STEP_BACK * (thickness(factor) - thickness(sharp)) * normal;
             }
+            // A translucent splat keeps its optical depth times its area in the picture. Opaque
+            // ones stay opaque however small they are.
+            let thinner =
+                if opacity < 1.0 { area(sharp, toward) / area(factor, toward) } else { 1.0 };
             Load::Radiance(Radiance {
-                amount: Amount::Depth(f64::from(splat.strength) * opacity),
+                amount: Amount::Depth(f64::from(splat.strength) * opacity * thinner),
                 color: DVec3::new(red, green, blue),
                 normal,
                 facing: normal.map_or(1.0, |normal| facing(normal, center, view)),
@@ -175,6 +182,13 @@ fn from_splat<'a>(
         }
     };
     Some(Kernel::new(center, factor, set.extent.into(), Profile::Gaussian, load))
+}
+
+/// Returns the product of the two standard deviations of a kernel seen along a direction. B maps
+/// the unit sphere to the kernel; the area of its shadow is that of the cofactor matrix.
+fn area(factor: DMat3, toward: DVec3) -> f64 {
+    let DMat3 { x_axis: a, y_axis: b, z_axis: c } = factor;
+    DVec3::new(b.cross(c).dot(toward), c.cross(a).dot(toward), a.cross(b).dot(toward)).length()
 }
 
 /// Appends the kernels of a volume's samples.

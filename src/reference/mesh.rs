@@ -144,8 +144,10 @@ impl<'a> Traced<'a> {
                 self.normals[triangle].iter().zip(met.weights).map(|(n, w)| n.as_dvec3() * w).sum();
             let color = DVec3::new(red.into(), green.into(), blue.into());
             let color = match &self.settings.surface_shade {
-                Some(shade) => shade::lit(color, normal, direction, shade),
-                None => color,
+                Some(shade) if !self.mesh.is_unlit(triangle) => {
+                    shade::lit(color, normal, direction, shade)
+                }
+                _ => color,
             };
             composite.pass(
                 Medium { depth: -(1.0 - f64::from(opacity.min(1.0))).ln(), color },

@@ -10,7 +10,7 @@ use crate::{
     hierarchy::{Hierarchy, file::Page, needed::coarsest},
     math::{
         Bounds,
-        hull::{outermost, without_strays},
+        hull::{Kind, outermost, without_strays},
     },
     parallel::prelude::*,
     splat::{Splat, SplatSet, TRAINED_OPACITIES},
@@ -54,8 +54,11 @@ impl Scene {
     /// the transfer function shows. [`Camera::fit_points`](crate::math::Camera::fit_points) makes
     /// them fill a picture.
     ///
-    /// Up to a thousandth of the splats that lies far away on one side of all others, and of what
-    /// is seen of a volume in specks apart from the rest, is left out. The time is linear
+    /// A few splats far away from all others are left out, with a warning that counts them: on each
+    /// side up to a thousandth beyond half the size of the rest, a hundredth beyond 4 diagonals, a
+    /// twentieth beyond 20 diagonals; of trained scenes the background too, a fifth beyond 1.5
+    /// diagonals if it lies all around. So are specks of a volume apart from the rest, up to a
+    /// thousandth of what is seen. The time is linear
     /// in the number of splats and samples; of large hierarchies and bricks only coarse levels are
     /// read. If an item shows nothing, or the clips remove it, the corners of its box stand for it.
     ///
@@ -64,13 +67,17 @@ impl Scene {
     pub fn seen(&self, clips: &[Clip]) -> Result<Vec<DVec3>> {
         let _span = tracing::info_span!("seen").entered();
         let mut points = Vec::new();
-        for item in &self.items {
+        for (number, item) in self.items.iter().enumerate() {
+            let kind = if item.is_trained() { Kind::Trained } else { Kind::Measured };
+            let spread = |points: &[Vec3], origin| near(points, kind, number, origin);
             let own = match item {
-                Item::Radiance(set) => of_splats(set, |_| true, clips),
-                Item::Scalar(set, transfer) => of_samples(set, transfer, clips),
-                Item::Facets(set) => of_facets(set, clips),
-                Item::Gaussians(set) => of_gaussians(set, clips),
-                Item::Hierarchy(hierarchy) => of_splats(&coarse(hierarchy)?, |_| true, clips),
+                Item::Radiance(set) => of_splats(set, |_| true, clips, spread),
+                Item::Scalar(set, transfer) => of_samples(set, transfer, clips, spread),
+                Item::Facets(set) => of_facets(set, clips, number),
+                Item::Gaussians(set) => of_gaussians(set, clips, spread),
+                Item::Hierarchy(hierarchy) => {
+                    of_splats(&coarse(hierarchy)?, |_| true, clips, spread)
+                }
                 Item::Cells(cells, transfer) => of_cells(cells, transfer, clips),
                 Item::Volume(volume, _, transfer) => of_volume(volume, transfer, clips),
                 Item::Bricks(bricks, _, transfer) => {
@@ -86,14 +93,45 @@ impl Scene {
     }
 }
 
-/// Returns the outermost of the splats that `shows` chooses, with their reach.
-fn of_splats(set: &SplatSet, shows: impl Fn(&Splat) -> bool, clips: &[Clip]) -> Vec<DVec3> {
+/// Returns the corners of the box around points that belong together ([`without_strays`]). Warns if
+/// others lie farther away, which the picture may not show.
+fn near(points: &[Vec3], kind: Kind, item: usize, origin: DVec3) -> Option<[Vec3; 2]> {
+    let [low, high] = without_strays(points, kind)?;
+    let middle = 0.5 * (low + high);
+    let is_left = |point: &&Vec3| !(point.cmpge(low).all() && point.cmple(high).all());
+    let left = points.iter().filter(is_left);
+    let away = |point: &Vec3| point.distance(middle);
+    let (count, farthest) = left.fold((0usize, None), |(count, farthest), &point| {
+        let is_farther = farthest.is_none_or(|known| away(&point) > away(&known));
+        (count + 1, if is_farther { Some(point) } else { farthest })
+    });
+    // What lies just outside is in the picture, or nearly.
+    let farthest = farthest.filter(|point| away(point) > 2.0 * low.distance(high));
+    if let Some(point) = farthest {
+        let [x, y, z] = (origin + point.as_dvec3()).as_vec3().to_array();
+        let (all, item, lie) = (points.len(), item + 1, if count == 1 { "lies" } else { "lie" });
+        tracing::warn!(
+            "input {item}: {count} of {all} splats {lie} far from the others, outside of what the \
+             camera is fitted to; the farthest is at {x}, {y}, {z}"
+        );
+    }
+    Some([low, high])
+}
+
+/// Returns the outermost of the splats that `shows` chooses, with their reach. `near` returns the
+/// corners of the box around those that belong together.
+fn of_splats(
+    set: &SplatSet,
+    shows: impl Fn(&Splat) -> bool,
+    clips: &[Clip],
+    near: impl Fn(&[Vec3], DVec3) -> Option<[Vec3; 2]>,
+) -> Vec<DVec3> {
     let world = |point: Vec3| set.origin + point.as_dvec3();
     let kept = |point: Vec3| clips.iter().all(|clip| clip.keeps(world(point)));
     let shown = set.splats.iter().filter(|splat| shows(splat) && kept(Vec3::from(splat.center)));
     let mut splats: Vec<&Splat> = shown.collect();
     let mut centers: Vec<Vec3> = splats.iter().map(|splat| Vec3::from(splat.center)).collect();
-    let Some([low, high]) = without_strays(&centers) else { return Vec::new() };
+    let Some([low, high]) = near(&centers, set.origin) else { return Vec::new() };
     let is_near = |center: &Vec3| center.cmpge(low).all() && center.cmple(high).all();
     splats.retain(|splat| is_near(&Vec3::from(splat.center)));
     centers.retain(is_near);
@@ -108,27 +146,37 @@ fn of_splats(set: &SplatSet, shows: impl Fn(&Splat) -> bool, clips: &[Clip]) -> 
 }
 
 /// Returns the outermost of the Gaussians that can be seen, with their reach.
-fn of_gaussians(set: &Gaussians, clips: &[Clip]) -> Vec<DVec3> {
+fn of_gaussians(
+    set: &Gaussians,
+    clips: &[Clip],
+    near: impl Fn(&[Vec3], DVec3) -> Option<[Vec3; 2]>,
+) -> Vec<DVec3> {
     let splats = set.seen_from(Eye::Along(DVec3::Z));
-    of_splats(&splats, |splat| f64::from(-splat.strength) >= TRAINED_OPACITIES[0], clips)
+    of_splats(&splats, |splat| f64::from(-splat.strength) >= TRAINED_OPACITIES[0], clips, near)
 }
 
 /// Returns the outermost corners of facets.
-fn of_facets(set: &FacetSet, clips: &[Clip]) -> Vec<DVec3> {
+fn of_facets(set: &FacetSet, clips: &[Clip], item: usize) -> Vec<DVec3> {
     let world = |point: Vec3| set.origin + point.as_dvec3();
     let kept = |point: &Vec3| clips.iter().all(|clip| clip.keeps(world(*point)));
     let corners = set.facets.iter().flat_map(|facet| facet.corners.map(Vec3::from));
     let mut corners: Vec<Vec3> = corners.filter(kept).collect();
-    let Some([low, high]) = without_strays(&corners) else { return Vec::new() };
+    let near = near(&corners, Kind::Modelled, item, set.origin);
+    let Some([low, high]) = near else { return Vec::new() };
     corners.retain(|corner| corner.cmpge(low).all() && corner.cmple(high).all());
     outermost(&corners).into_iter().map(|index| world(corners[index as usize])).collect()
 }
 
 /// Returns the outermost samples that a transfer function shows.
-fn of_samples(set: &SplatSet, transfer: &TransferFunction, clips: &[Clip]) -> Vec<DVec3> {
+fn of_samples(
+    set: &SplatSet,
+    transfer: &TransferFunction,
+    clips: &[Clip],
+    near: impl Fn(&[Vec3], DVec3) -> Option<[Vec3; 2]>,
+) -> Vec<DVec3> {
     let values = set.splats.iter().map(|splat| f64::from(splat.strength));
     let sides = Sides::of(transfer, values);
-    of_splats(set, |splat| sides.show(transfer, f64::from(splat.strength)), clips)
+    of_splats(set, |splat| sides.show(transfer, f64::from(splat.strength)), clips, near)
 }
 
 /// Returns the outermost corners of the tetrahedra that a transfer function shows.
@@ -198,6 +246,17 @@ impl Sides {
     }
 }
 
+/// Returns the extinction of values from one to another: that of the first, unless the function is
+/// clear at both and shows something between.
+fn extinction_in(transfer: &TransferFunction, [from, to]: [f64; 2]) -> f64 {
+    let own = transfer.extinction(from);
+    if own > 0.0 || transfer.extinction(to) > 0.0 {
+        return own;
+    }
+    let inside = transfer.opacity.iter().filter(|(value, _)| (from..to).contains(value));
+    inside.map(|&(value, _)| transfer.extinction(value)).fold(0.0, f64::max)
+}
+
 /// The rows of a volume that are looked at, and what is seen in them.
 struct Rows<'a> {
     volume: &'a Volume,
@@ -205,8 +264,12 @@ struct Rows<'a> {
     steps: Steps,
     /// The extinction of samples in each step of 1/255 of the range; infinite inside isosurfaces.
     extinction: [f32; 256],
+    /// The extinction of each label of a label map, from the smallest on.
+    of_labels: Vec<f32>,
     /// Only every so many rows and slices are looked at.
     stride: usize,
+    /// The share of what is seen that may be noise, on each side.
+    noise: f64,
     /// Whether anything is seen in each block of 4 × 4 × 4 of the samples that are looked at.
     blocks: Vec<bool>,
 }
@@ -245,7 +308,10 @@ impl<'a> Rows<'a> {
             clips,
             steps: Steps::new(volume.samples.scalar(), volume.range),
             extinction: [0.0; 256],
+            of_labels: Vec::new(),
             stride: 1,
+            // Each sample of a label map is meant.
+            noise: if volume.is_label_map() { 0.0 } else { NOISE },
             blocks: Vec::new(),
         };
         let [nx, ny, nz] = volume.lattice.dims;
@@ -255,21 +321,26 @@ impl<'a> Rows<'a> {
         let sides = rows.sides(transfer);
         for step in 0..256 {
             let inside = |&(surface, above): &(f64, bool)| (value(step) >= surface) == above;
-            let own = transfer.extinction(value(step)) as f32;
+            let own = extinction_in(transfer, [value(step), value(step + 1)]) as f32;
             rows.extinction[step] = if sides.0.iter().any(inside) { f32::INFINITY } else { own };
+        }
+        if volume.is_label_map() {
+            let count = (high - low) as usize + 1;
+            rows.of_labels =
+                (0..count).map(|at| transfer.extinction(low + at as f64) as f32).collect();
         }
         let [first, last] = volume.bounds();
         let least = (FAINT / (0.1 * (last - first).length())) as f32;
         let means = rows.block_means();
         // What is fainter is seen only if nothing is more opaque.
         let most = means.iter().copied().fold(0.0, f32::max);
-        let least = least.min(0.05 * most);
+        let least = if rows.noise > 0.0 { least.min(0.05 * most) } else { 0.0 };
         rows.blocks = means.iter().map(|mean| *mean > 0.0 && *mean >= least).collect();
         // More than what makes a block opaque does not count.
         let side = (last - first).length() * BLOCK as f64 / nx.max(ny).max(nz) as f64;
         let weights: Vec<f32> = means.iter().map(|mean| mean.min((OPAQUE / side) as f32)).collect();
         let dims = rows.block_dims();
-        take_specks(&mut rows.blocks, dims, &weights, NOISE);
+        take_specks(&mut rows.blocks, dims, &weights, rows.noise);
         rows
     }
 
@@ -280,23 +351,37 @@ impl<'a> Rows<'a> {
         [nx.div_ceil(BLOCK), looked_at(ny), looked_at(nz)]
     }
 
+    /// Writes the extinctions of a row of samples, from sample number `first` on. `scratch` is as
+    /// long as the row.
+    fn write(&self, first: usize, scratch: &mut [[u8; 2]], row: &mut [f32]) {
+        if self.of_labels.is_empty() {
+            let samples = self.volume.samples.bytes();
+            self.steps.write(self.steps.from(samples, first), scratch);
+            for (own, [step, _]) in row.iter_mut().zip(scratch) {
+                *own = self.extinction[usize::from(*step)];
+            }
+            return;
+        }
+        for (at, own) in row.iter_mut().enumerate() {
+            let label = self.volume.value(first + at) - self.volume.range[0];
+            *own = self.of_labels[label as usize];
+        }
+    }
+
     /// Returns the mean extinction of each block: single samples of noise are lost in it.
     fn block_means(&self) -> Vec<f32> {
         let [nx, ny, nz] = self.volume.lattice.dims;
         let [columns, lines, layers] = self.block_dims();
         let of_layer = |layer: usize| {
             let mut sums = vec![0.0f32; columns * lines];
-            let mut row = vec![[0u8; 2]; nx];
-            let samples = self.volume.samples.bytes();
+            let (mut scratch, mut row) = (vec![[0u8; 2]; nx], vec![0.0; nx]);
             let slices = (layer * BLOCK..(layer + 1) * BLOCK).map(|k| k * self.stride);
             for k in slices.filter(|k| *k < nz) {
                 for j in (0..ny).step_by(self.stride) {
-                    self.steps.write(self.steps.from(samples, (k * ny + j) * nx), &mut row);
+                    self.write((k * ny + j) * nx, &mut scratch, &mut row);
                     let line = &mut sums[j / self.stride / BLOCK * columns..][..columns];
                     for (sum, samples) in line.iter_mut().zip(row.chunks(BLOCK)) {
-                        let own =
-                            samples.iter().map(|[step, _]| self.extinction[usize::from(*step)]);
-                        *sum += own.sum::<f32>();
+                        *sum += samples.iter().sum::<f32>();
                     }
                 }
             }
@@ -321,17 +406,16 @@ impl<'a> Rows<'a> {
     fn visit(&self, k: usize, mut visit: impl FnMut([usize; 3])) {
         let [nx, ny, _] = self.volume.lattice.dims;
         let [columns, lines, _] = self.block_dims();
-        let mut row = vec![[0u8; 2]; nx];
-        let samples = self.volume.samples.bytes();
+        let (mut scratch, mut row) = (vec![[0u8; 2]; nx], vec![0.0; nx]);
         for j in (0..ny).step_by(self.stride) {
             let [line, layer] = [j, k].map(|at| at / self.stride / BLOCK);
             let blocks = &self.blocks[(layer * lines + line) * columns..][..columns];
             if !blocks.contains(&true) {
                 continue;
             }
-            self.steps.write(self.steps.from(samples, (k * ny + j) * nx), &mut row);
-            for (i, &[step, _]) in row.iter().enumerate() {
-                let is_seen = blocks[i / BLOCK] && self.extinction[usize::from(step)] > 0.0;
+            self.write((k * ny + j) * nx, &mut scratch, &mut row);
+            for (i, &own) in row.iter().enumerate() {
+                let is_seen = blocks[i / BLOCK] && own > 0.0;
                 if is_seen && self.is_kept([i, j, k]) {
                     visit([i, j, k]);
                 }
@@ -374,7 +458,7 @@ impl<'a> Rows<'a> {
         if total == 0 {
             return None;
         }
-        let most = (total as f64 * NOISE) as u64;
+        let most = (total as f64 * self.noise) as u64;
         Some([0, 1, 2].map(|axis| {
             let passed = |counts: &mut dyn Iterator<Item = (usize, &u64)>| {
                 let mut sum = 0;
@@ -493,8 +577,16 @@ mod tests {
         assert!((points.diagonal() - 12f64.sqrt()).abs() < 0.4, "{points:?}");
         mesh.positions.extend((0..count / 1000).map(|n| Vec3::splat(50.0 + n as f32)));
         assert!((seen(&mesh).diagonal() - points.diagonal()).abs() < 0.1);
-        // More than a thousandth is a part of the scene.
-        mesh.positions.extend((0..count / 100).map(|n| Vec3::splat(80.0 + n as f32)));
+        // So are more of them, if they lie much farther away.
+        let few = mesh.positions.len();
+        mesh.positions.extend((0..count / 150).map(|n| Vec3::splat(80.0 + n as f32)));
+        assert!((seen(&mesh).diagonal() - points.diagonal()).abs() < 0.1);
+        // What is nearer, or substantial, is a part of the scene.
+        mesh.positions.truncate(few);
+        mesh.positions.extend((0..count / 150).map(|n| Vec3::splat(5.0 + 0.01 * n as f32)));
+        assert!(seen(&mesh).diagonal() > 8.0);
+        mesh.positions.truncate(few);
+        mesh.positions.extend((0..count / 8).map(|n| Vec3::splat(80.0 + n as f32)));
         assert!(seen(&mesh).diagonal() > 100.0);
     }
 }

@@ -5,15 +5,22 @@ use crate::{
     bricks::Choice,
     cells::Place,
     gaussians::EXTENT,
-    math::{Bounds, Sheets, Tensor, View},
+    math::{Bounds, Sheets, Tensor, View, hull::percentiles},
     splat::{FOOTPRINT_BLUR, STEP_BACK, TRAINED_BLUR},
     volume::{Arrangement, Lattice},
 };
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
 
 /// Maximum thickness of sheets in which a lattice is gathered, in smallest sample spacings. In
 /// thicker sheets a parabola misses details of the field.
 pub(crate) const MOST_GATHERED: f64 = 2.2;
+
+/// How far away, in sizes of a scene, a few of its parts may be so that the sheets begin where the
+/// others need it.
+const MOST_AFAR: f64 = 1e5;
+
+/// Thickness of sheets of label maps, in sample spacings: a sheet has the label of its middle.
+const LABEL_SHEETS: f64 = 0.5;
 
 /// Thickness of sheets of tetrahedra, in typical edges: with values of points, and with values of
 /// tetrahedra, which do not mix in a sheet.
@@ -38,6 +45,41 @@ impl Scene {
             Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => 0.0,
         });
         reaches.fold(0.0, f64::max)
+    }
+
+    /// Returns a hundred times the diagonal of the box around nine tenths of the splats, and of
+    /// everything else: the size of the scene, if few splats far away make it larger than that. The
+    /// parts that lie together must not be nearer than the first sheet.
+    fn usual_size(&self) -> f64 {
+        const LOOKS: usize = 1 << 12;
+        const FEWEST: usize = 20;
+        const SHARE: f64 = 0.05;
+        let usual = |places: Vec<Vec3>, origin: DVec3| {
+            let [low, high] = percentiles(&places, SHARE);
+            (places.len() >= FEWEST)
+                .then(|| Bounds { min: origin + low.as_dvec3(), max: origin + high.as_dvec3() })
+        };
+        let step = |count: usize| count.div_ceil(LOOKS).max(1);
+        let of_item = |item: &Item| {
+            let found = match item {
+                Item::Radiance(set) if !set.splats.is_empty() => {
+                    let some = set.splats.iter().step_by(step(set.splats.len()));
+                    usual(some.map(|splat| splat.center.into()).collect(), set.origin)
+                }
+                Item::Facets(set) if !set.facets.is_empty() => {
+                    let some = set.facets.iter().step_by(step(set.facets.len()));
+                    usual(some.map(|facet| facet.corners[0].into()).collect(), set.origin)
+                }
+                Item::Gaussians(set) if !set.is_empty() => {
+                    let some = set.centers.iter().step_by(step(set.len()));
+                    usual(some.copied().collect(), set.origin)
+                }
+                _ => None,
+            };
+            found.unwrap_or_else(|| item.bounds())
+        };
+        let all = self.items.iter().map(of_item).fold(Bounds::EMPTY, Bounds::union);
+        100.0 * all.diagonal()
     }
 
     /// Returns the sheets of a picture of this scene. Unless [`Settings::sheet_thickness`] is set,
@@ -80,7 +122,12 @@ impl Scene {
         if view.perspective {
             (near, far) = (near * (1.0 - reach), far * (1.0 + reach));
             // Geometric sheets cannot start at 0, and 32 bits do not distinguish smaller distances.
-            let size = bounds.diagonal();
+            let mut size = bounds.diagonal();
+            // Parts still farther away leave no precision for the others.
+            if near < 1e-3 * size {
+                let usual = self.usual_size();
+                size = if size < MOST_AFAR * usual { size.min(usual) } else { size };
+            }
             near = near.max(settings.near.unwrap_or(1e-3 * size).max(1e-6 * size));
         } else {
             (near, far) = (near - reach, far + reach);
@@ -93,6 +140,8 @@ impl Scene {
                     // A field can bend within a few samples, whatever the kernel's extent; a sharp
                     // field within fewer.
                     let most: f64 = match kernel.as_tensor() {
+                        // A label ends halfway between two samples.
+                        _ if volume.is_label_map() => LABEL_SHEETS,
                         // The field has a kink at every plane of samples.
                         Some(Tensor::Linear) => 0.5,
                         Some(Tensor::CatmullRom) => 2.0 / 3.0,

@@ -4,6 +4,7 @@
 use super::{
     Mesh, SurfelOptions,
     ellipse::{Tensor, factor, lower},
+    opacity::{Absorbed, share_of},
     orient::{Known, orient},
     paint::{of_normal, pack, point_color},
 };
@@ -16,6 +17,7 @@ use crate::{
     splat::{NO_NORMAL, Splat, encode_normal},
 };
 use glam::{DMat3, DVec3, Vec3};
+use std::f32::consts::PI;
 
 /// Neighbours that a point's plane and spacing are computed from.
 const COUNT: usize = 10;
@@ -47,12 +49,16 @@ type Nearest = [u32; COUNT];
 struct Surroundings {
     /// Median distance to the neighbours; 0 without any.
     distance: f32,
+    /// The area that the point stands for, in squares of that distance.
+    area: f32,
     /// Unit normal of the plane of the neighbours, of either sign; zero if they define none.
     normal: Vec3,
     /// The direction in which the neighbours are furthest apart, and the ratio to the extent across
     /// it, at most 2.
     long: Vec3,
     stretch: f32,
+    /// Points at the place of this one, which counts too.
+    crowd: u8,
 }
 
 /// Makes surfels in the order of the points. Of points that coincide, only the first produces one.
@@ -113,16 +119,24 @@ impl<'a> Judged<'a> {
         let mut places = vec![0u32; points.len()];
         order.iter().zip(0..).for_each(|(&point, place)| places[point as usize] = place);
         let clock = Clock::new(deadline);
-        let surroundings = |place: usize| {
+        let surroundings = |place: usize, crowd: usize| {
             let is_over = clock.is_over(place);
             if is_over {
                 Default::default()
             } else {
-                surroundings(&points, &tree, order[place], &places)
+                surroundings(&points, &tree, [order[place], crowd as u32], &places)
             }
         };
-        let (nearest, around): (Vec<Nearest>, Vec<Surroundings>) =
-            (0..order.len()).into_par_iter().map(surroundings).unzip();
+        let judge = |crowd: usize| -> (Vec<Nearest>, Vec<Surroundings>) {
+            let of = |place| surroundings(place, crowd);
+            (0..order.len()).into_par_iter().map(of).unzip()
+        };
+        let (mut nearest, mut around) = judge(1);
+        let crowd = crowd(&around);
+        if crowd > 1 {
+            tracing::info!(crowd, "points lie close together; these are taken as one place");
+            (nearest, around) = judge(crowd);
+        }
         clock.finish(WORK)?;
         drop(tree);
         let points: Vec<Vec3> = order.par_iter().map(|&point| points[point as usize]).collect();
@@ -154,14 +168,20 @@ impl<'a> Judged<'a> {
         let normal =
             Some(self.normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
         let packed = normal.map_or(NO_NORMAL, |normal| encode_normal(normal.as_vec3()));
+        let mut color = match options.color_by_normal {
+            true => of_normal(packed),
+            false => point_color(self.mesh, self.kept[at] as usize),
+        };
+        // Surfels made narrower show as dots of the surface's opacity.
+        let wider = options.radius_scale.max(1.0).powi(2);
+        let share = || share_of(self.around[at].area, SPREAD * SPREAD * wider);
+        let Absorbed { strength, alpha } = options.absorbed(color[3], share);
+        color[3] = alpha;
         Splat {
             center: self.points[at].to_array(),
-            strength: options.optical_depth,
+            strength,
             factor: shape(&self.around[at], width, normal),
-            color: match options.color_by_normal {
-                true => of_normal(packed),
-                false => pack(point_color(self.mesh, self.kept[at] as usize)),
-            },
+            color: pack(color),
             normal: packed,
         }
     }
@@ -251,14 +271,29 @@ fn shape(around: &Surroundings, width: f64, normal: Option<DVec3>) -> [f32; 6] {
     factor(tensor, x, normal.cross(x), normal)
 }
 
-/// Computes the neighbourhood of a point; `places` gives the ranks of its neighbours.
+/// Two points lie at one place if their distance is at most this part of that to the farthest
+/// neighbour. Of points on a surface by chance, one in ten has such a neighbour.
+const SAME_PLACE: f32 = 0.1;
+
+/// Returns how many points lie at the place of a point: usually 1. Scans that were registered and
+/// joined have several, within their noise. The median counts, so that a few do not matter.
+fn crowd(around: &[Surroundings]) -> usize {
+    let mut crowds: Vec<u8> = around.par_iter().map(|around| around.crowd).collect();
+    let middle = crowds.len() / 2;
+    if crowds.is_empty() { 1 } else { usize::from(*crowds.select_nth_unstable(middle).1).max(1) }
+}
+
+/// Computes the neighbourhood of a point; `places` gives the ranks of its neighbours. If several
+/// points make a `crowd` at one place, so many times as many neighbours are looked at, and only the
+/// last of each crowd counts for distances.
 fn surroundings(
     points: &[Vec3],
     tree: &Neighbours,
-    index: u32,
+    [index, crowd]: [u32; 2],
     places: &[u32],
 ) -> (Nearest, Surroundings) {
-    let found = tree.of(index, COUNT);
+    let crowd = crowd as usize;
+    let found = tree.of(index, COUNT * crowd);
     let center = points[index as usize];
     let offsets = || found.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
     let mean = offsets().sum::<DVec3>() / (found.len() + 1) as f64;
@@ -270,14 +305,36 @@ fn surroundings(
     let ([large, middle, _], axes) = eigen(scatter);
     let is_plane = middle > large * 1e-4;
     let mut nearest = [places[index as usize]; COUNT];
-    nearest.iter_mut().zip(&found).for_each(|(slot, &(_, index))| *slot = places[index as usize]);
+    let last = found.last().map_or(0.0, |&(distance, _)| distance);
+    let same = found.iter().take_while(|&&(distance, _)| distance <= SAME_PLACE * last).count();
+    nearest
+        .iter_mut()
+        .zip(found.iter().skip(crowd - 1).step_by(crowd))
+        .for_each(|(slot, &(_, index))| *slot = places[index as usize]);
+    let distance = found.get(found.len() / 2).map_or(0.0, |&(distance, _)| distance);
     let around = Surroundings {
-        distance: found.get(found.len() / 2).map_or(0.0, |&(distance, _)| distance),
+        distance,
+        area: area(&found, distance, crowd),
+        crowd: same as u8 + 1,
         normal: if is_plane { axes[2].as_vec3() } else { Vec3::ZERO },
         long: axes[0].as_vec3(),
         stretch: if is_plane { (large / middle).sqrt().min(2.0) as f32 } else { 1.0 },
     };
     (nearest, around)
+}
+
+/// The neighbours by which the area of a point is measured: those around the median one.
+const MEASURED: std::ops::Range<usize> = 4..8;
+
+/// Returns the area that a point stands for, in squares of a distance. If points lie on a surface
+/// by chance, the disc that reaches to the nth neighbour has n times the area of a point in the
+/// mean. On a grid the mean over a few neighbours is right within a few hundredths.
+fn area(found: &[(f32, u32)], unit: f32, crowd: usize) -> f32 {
+    let discs = (1..).zip(found).skip(MEASURED.start * crowd).take(MEASURED.len() * crowd);
+    let discs = discs.map(|(n, &(distance, _))| PI * (distance / unit).powi(2) / n as f32);
+    let (count, sum) = discs.fold((0u32, 0.0), |(count, sum), disc| (count + 1, sum + disc));
+    // Too few points to measure: as on a square grid.
+    if count > 0 && unit > 0.0 { sum / count as f32 } else { 0.5 }
 }
 
 #[cfg(test)]

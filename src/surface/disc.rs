@@ -79,6 +79,11 @@ impl Ellipse {
         }
     }
 
+    /// The product of the two standard deviations.
+    pub fn sigmas(&self) -> f32 {
+        self.determinant().sqrt()
+    }
+
     /// The smaller standard deviation.
     pub fn narrowest(&self) -> f32 {
         let determinant = self.determinant();

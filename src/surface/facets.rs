@@ -3,7 +3,7 @@
 use super::{
     Mesh, SurfelOptions,
     adjacency::{Connected, is_split},
-    paint::{corner_color, of_normal},
+    paint::{corner_color, of_normal, pack},
     refine::{Origin, Refined, refine},
     smooth::corner_normals,
     surfels::largest_edge,
@@ -133,12 +133,14 @@ fn facet(
     let colors = [0, 1, 2].map(|corner| {
         if by_normal {
             let outward = if is_turned { -own[corner] } else { own[corner] };
-            let [red, green, blue, _] = of_normal(encode_normal(outward)).to_le_bytes();
+            let [red, green, blue, _] = pack(of_normal(encode_normal(outward))).to_le_bytes();
             return [red, green, blue];
         }
         let [red, green, blue, _] = corner_color(mesh, number, corner);
         [red, green, blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8)
     });
     let order = if is_turned { [0, 2, 1] } else { [0, 1, 2] };
-    Some(Facet::new(order.map(|i| corners[i]), order.map(|i| own[i]), order.map(|i| colors[i])))
+    let facet =
+        Facet::new(order.map(|i| corners[i]), order.map(|i| own[i]), order.map(|i| colors[i]));
+    Some(if mesh.is_unlit(number) { facet.unlit() } else { facet })
 }

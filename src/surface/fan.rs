@@ -9,13 +9,14 @@ use super::{
         ALIKE, CENTROID, CORNER, LEAST_RATIO_SQUARED, LEAST_SQUARE, MIDDLE, SAG, SPREAD, STEEP,
         THICKNESS, mixed,
     },
-    paint::{NEUTRAL, corner_color, of_normal, pack},
+    opacity::{Absorbed, OPAQUE, share_of},
+    paint::{Mean, NEUTRAL, corner_color, of_normal, pack},
     refine::Origin,
     smooth::Groups,
 };
 use crate::{
     deadline::Clock,
-    splat::{STEP_BACK, Splat, encode_normal},
+    splat::{NO_NORMAL, STEP_BACK, Splat, encode_normal},
 };
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DVec3, Vec2, Vec3};
@@ -97,7 +98,10 @@ impl Made {
 impl Maker<'_> {
     /// Adds the surfels of some vertices, unless time is up.
     pub fn vertices(&self, vertices: &[usize], made: &mut Made, clock: &Clock) {
-        let by_eight = self.origin.is_none() && self.mesh.normals.is_empty() && self.plain;
+        let by_eight = self.origin.is_none()
+            && self.mesh.normals.is_empty()
+            && self.plain
+            && self.options.optical_depth >= OPAQUE;
         for few in vertices.chunks(TOGETHER) {
             if clock.is_over(0) {
                 return;
@@ -149,7 +153,7 @@ impl Maker<'_> {
             for (lane, &vertex) in eight.iter().enumerate() {
                 let (own, after) = rest.split_at(self.connected.adjacency.corners(vertex).len());
                 rest = after;
-                if found.is_made[lane] {
+                if found.is_made[lane] && self.is_opaque(vertex) {
                     self.take(found, lane, vertex, made);
                 } else {
                     self.vertex(vertex, own, made);
@@ -157,6 +161,11 @@ impl Maker<'_> {
             }
         }
         made.fans = fans;
+    }
+
+    /// Returns whether the colour of a vertex is opaque.
+    fn is_opaque(&self, vertex: usize) -> bool {
+        self.mesh.colors.get(vertex).is_none_or(|color| color[3] == 255)
     }
 
     /// Puts a vertex in a lane, with the triangles of its corners. A vertex with too many gets
@@ -185,17 +194,24 @@ impl Maker<'_> {
     /// Adds the result for the vertex in a lane.
     #[inline(always)]
     fn take(&self, found: &Found, lane: usize, vertex: usize, made: &mut Made) {
-        let pack = |part: f32| u32::from(part as i16 as u16);
+        let half = |part: f32| u32::from(part as i16 as u16);
         made.longest = made.longest.max(found.longest[lane]);
         let cross = Vec3::new(found.cross[0][lane], found.cross[1][lane], found.cross[2][lane]);
         made.sums.add(self.mesh.positions[vertex], found.area[lane], cross);
         let [f0, f1, f2, f3, f4, f5] = &found.factor;
-        let normal = pack(found.normal[0][lane]) | pack(found.normal[1][lane]) << 16;
+        let normal = half(found.normal[0][lane]) | half(found.normal[1][lane]) << 16;
         made.splats.push(Splat {
             center: [found.center[0][lane], found.center[1][lane], found.center[2][lane]],
             strength: self.options.optical_depth,
             factor: [f0[lane], f1[lane], f2[lane], f3[lane], f4[lane], f5[lane]],
-            color: self.color(vertex, &[], 1.0, normal),
+            color: match self.options.color_by_normal {
+                true => pack(of_normal(normal)),
+                // Packed as in memory, red lowest.
+                false => {
+                    let own = self.mesh.vertex_color(vertex);
+                    own.map_or_else(|| pack(NEUTRAL), u32::from_le_bytes)
+                }
+            },
             normal,
         });
     }
@@ -327,31 +343,41 @@ impl Maker<'_> {
         let sag = if is_open { 1.0 } else { SAG } * height / (3.0 * area);
         let aside = x * ellipse.center.x + y * ellipse.center.y;
         let offset = aside + normal * sag - outward * (STEP_BACK as f32 * thickness);
+        let mut color = self.color(vertex, group, area, encode_normal(outward));
+        // Each triangle is shared by its three vertices. Surfels made narrower show as dots of the
+        // surface's opacity.
+        let share = || share_of(area / 3.0, ellipse.sigmas() * scale.max(1.0).powi(2));
+        let Absorbed { strength, alpha } = self.options.absorbed(color[3], share);
+        color[3] = alpha;
         Some(Splat {
             center: (self.mesh.positions[vertex] + offset * self.unit).to_array(),
-            strength: self.options.optical_depth,
+            strength,
             factor: ellipse.factor([x, y, normal], scale * self.unit, thickness * self.unit),
-            color: self.color(vertex, group, area, encode_normal(outward)),
-            normal: encode_normal(outward),
+            color: pack(color),
+            // Splats without a normal are not lit.
+            normal: if group.iter().all(|t| self.mesh.is_unlit(t.at as usize / 3)) {
+                NO_NORMAL
+            } else {
+                encode_normal(outward)
+            },
         })
     }
 
     /// Returns the mean colour of the triangles at their corners, or that of the packed normal.
-    fn color(&self, vertex: usize, group: &[Around], area: f32, normal: u32) -> u32 {
+    fn color(&self, vertex: usize, group: &[Around], area: f32, normal: u32) -> [f32; 4] {
         if self.options.color_by_normal {
             return of_normal(normal);
         }
         if self.plain {
-            // Packed as in memory, red lowest.
             let own = self.mesh.vertex_color(vertex);
-            return own.map_or_else(|| pack(NEUTRAL), u32::from_le_bytes);
+            return own.map_or(NEUTRAL, |own| own.map(|part| f32::from(part) / 255.0));
         }
-        let mut color = [0.0; 4];
+        let mut mean = Mean::default();
         for t in group {
             let own = corner_color(self.mesh, t.at as usize / 3, t.at as usize % 3);
-            color.iter_mut().zip(own).for_each(|(sum, own)| *sum += own * t.area / area);
+            mean.add(own, t.area / area);
         }
-        pack(color)
+        mean.color()
     }
 }
 

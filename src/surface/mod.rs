@@ -10,6 +10,7 @@ mod fan;
 mod fan_rules;
 mod machined;
 mod mesh;
+mod opacity;
 mod orient;
 mod paint;
 mod parts;

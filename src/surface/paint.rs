@@ -111,6 +111,33 @@ impl Mesh {
     }
 }
 
+/// A mean of colours. Each counts by how much of it is seen, so that what a mask hides tints
+/// nothing.
+#[derive(Debug, Default)]
+pub(super) struct Mean {
+    sum: [f32; 4],
+    seen: [f32; 3],
+    weight: f32,
+}
+
+impl Mean {
+    pub fn add(&mut self, color: [f32; 4], weight: f32) {
+        self.sum.iter_mut().zip(color).for_each(|(sum, part)| *sum += part * weight);
+        self.seen.iter_mut().zip(color).for_each(|(sum, part)| *sum += part * color[3] * weight);
+        self.weight += weight;
+    }
+
+    /// Returns the mean times the sum of all weights.
+    pub fn color(&self) -> [f32; 4] {
+        let opacity = self.sum[3];
+        if opacity == self.weight || opacity <= 0.0 {
+            return self.sum;
+        }
+        let [red, green, blue] = self.seen.map(|part| part / opacity * self.weight);
+        [red, green, blue, opacity]
+    }
+}
+
 impl Texture {
     /// Returns the mean colour over the parallelogram from `uv` along `a` and `b`. Samples are
     /// about two texels apart, but at most 8 in each direction.
@@ -121,16 +148,16 @@ impl Texture {
         if rows == 1 && columns == 1 {
             return self.sample(uv);
         }
-        let mut sum = [0.0; 4];
+        let mut mean = Mean::default();
         for i in 0..rows {
             for j in 0..columns {
                 let at = uv
                     + a * ((i as f32 + 0.5) / rows as f32)
                     + b * ((j as f32 + 0.5) / columns as f32);
-                sum.iter_mut().zip(self.sample(at)).for_each(|(sum, part)| *sum += part);
+                mean.add(self.sample(at), 1.0);
             }
         }
-        sum.map(|sum| sum / (rows * columns) as f32)
+        mean.color().map(|part| part / (rows * columns) as f32)
     }
 
     /// Returns the colour at `uv`, interpolated between the four nearest texels, with the texture
@@ -221,11 +248,11 @@ pub(super) fn point_color(mesh: &Mesh, vertex: usize) -> [f32; 4] {
 }
 
 /// Returns the colour of a packed normal: its coordinates from −1 to 1 as red, green and blue.
-pub(super) fn of_normal(packed: u32) -> u32 {
-    pack(decode_normal(packed).map_or(NEUTRAL, |normal| {
+pub(super) fn of_normal(packed: u32) -> [f32; 4] {
+    decode_normal(packed).map_or(NEUTRAL, |normal| {
         let [r, g, b] = (normal * 0.5 + 0.5).to_array();
         [r, g, b, 1.0]
-    }))
+    })
 }
 
 /// Packs a colour into 32 bits, red lowest.

@@ -370,9 +370,9 @@ mod tests {
         let texture =
             |alpha| Some(Arc::new(Texture { width: 1, height: 1, texels: vec![[9, 9, 9, alpha]] }));
         let material = |opacity, alpha| Material {
-            name: String::new(),
             color: [1.0, 1.0, 1.0, opacity],
             texture: texture(alpha),
+            ..Material::default()
         };
         // The second material is not used.
         for (opacity, alpha, is_solid) in [(1.0, 255, true), (0.9, 255, false), (1.0, 99, false)] {

@@ -33,8 +33,9 @@ use std::{borrow::Cow, ops::RangeInclusive};
 pub struct SurfelOptions {
     /// Factor on all radii. Below 1 the surface may show holes.
     pub radius_scale: f32,
-    /// Optical depth at the centre of a surfel. Nearly everywhere on a triangle, the total depth is
-    /// most of this. Inside a triangle it is never below 0.28 times this.
+    /// Optical depth of the surface, times its own opacity where it has one. Below 7 the surfels'
+    /// depths add up to it. From 7 on, which is opaque, it is the optical depth at the centre of
+    /// each surfel; inside a triangle the total is then never below 0.28 times this.
     pub optical_depth: f32,
     /// Neighbouring triangles whose normals differ by more than this angle meet in a crease; at
     /// most 60.

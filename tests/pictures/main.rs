@@ -11,8 +11,11 @@ mod gaussians;
 mod gpu_engine;
 mod hierarchies;
 mod hosts;
+mod labels;
 mod near;
 mod occlusion;
+mod opacity;
+mod outliers;
 mod poison;
 #[path = "../scenes/mod.rs"]
 mod scenes;

@@ -150,3 +150,27 @@ fn the_same_each_time() {
 fn all_surfels(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     surfels(mesh, options).expect("surfels")
 }
+
+/// Scans that were registered and joined: several points at each place, within their noise.
+#[test]
+fn several_points_at_a_place_close_the_surface() {
+    let place = |i: usize, k: usize| {
+        let noise = |factor: f64| ((((4 * i + k) as f64) * factor).fract() - 0.5) as f32 * 0.02;
+        let (x, y) = ((i % 40) as f32, (i / 40) as f32);
+        Vec3::new(x + noise(0.754_877), y + noise(0.569_840), noise(0.430_159))
+    };
+    let sizes = |copies: usize| {
+        let positions = (0..1600).flat_map(|i| (0..copies).map(move |k| place(i, k))).collect();
+        let mesh = Mesh { positions, ..Mesh::default() };
+        let splats = mesh.surfels(&SurfelOptions::default()).unwrap().splats;
+        let mut sizes: Vec<f32> = splats.iter().map(|own| own.deviations().x).collect();
+        sizes.sort_by(f32::total_cmp);
+        (splats.len(), sizes[sizes.len() / 2])
+    };
+    let (_, alone) = sizes(1);
+    for copies in [2, 4] {
+        let (count, together) = sizes(copies);
+        assert_eq!(count, 1600 * copies);
+        assert!((0.8..1.3).contains(&(together / alone)), "{copies}: {together} {alone}");
+    }
+}

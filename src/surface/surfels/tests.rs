@@ -213,7 +213,7 @@ fn textures_are_shown() {
         uvs: corners.to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         triangle_materials: vec![0, 0],
-        materials: vec![Material { name: String::new(), color: [1.0, 1.0, 0.5, 1.0], texture }],
+        materials: vec![Material { color: [1.0, 1.0, 0.5, 1.0], texture, ..Material::default() }],
         ..Mesh::default()
     };
     let set = surfels(&mesh);
@@ -298,7 +298,7 @@ fn a_fine_texture_on_coarse_triangles_is_averaged() {
     let mut mesh = Mesh::sphere(2);
     mesh.uvs = mesh.positions.iter().map(|p| p.truncate() * 0.437).collect();
     mesh.triangle_materials = vec![0; mesh.triangles.len()];
-    mesh.materials = vec![Material { name: String::new(), color: [1.0; 4], texture }];
+    mesh.materials = vec![Material { color: [1.0; 4], texture, ..Material::default() }];
     let coarse =
         SurfelOptions { largest_spacing: 10.0, most_triangles: 300, ..SurfelOptions::default() };
     for splat in mesh.surfels(&coarse).expect("surfels").splats {
@@ -322,9 +322,9 @@ fn textures_keep_to_the_budget() {
                     .to_vec(),
                 triangle_materials: vec![0; 2],
                 materials: vec![Material {
-                    name: String::new(),
                     color: [1.0; 4],
                     texture: texture.clone(),
+                    ..Material::default()
                 }],
                 ..Mesh::default()
             };
@@ -469,7 +469,7 @@ fn textured(uv: glam::Vec2) -> Mesh {
         triangles: corners
             .flat_map(|a| [[a, a + 1, a + SIDE + 2], [a, a + SIDE + 2, a + SIDE + 1]])
             .collect(),
-        materials: vec![Material { name: String::new(), color: [1.0; 4], texture }],
+        materials: vec![Material { color: [1.0; 4], texture, ..Material::default() }],
         ..Mesh::default()
     };
     mesh.triangle_materials = vec![0; mesh.triangles.len()];
