@@ -2,17 +2,20 @@
 //! HDF5 as well.
 
 mod attributes;
+mod coordinates;
 mod file;
 mod vtkhdf;
 
 use super::{
     Endian, Kind, ReadOptions, SampleType,
     array::{Array, Place},
+    foreign,
     npy::{self, Shaped},
     shared::{grid::Element, listing},
 };
 use crate::{Result, cells::Cells, input::Source, surface::Mesh, volume::Volume};
 use attributes::Attributes;
+use coordinates::Coordinates;
 use file::{File, Found};
 use hdf5_pure::{Datatype, DatatypeByteOrder};
 use vtkhdf::DataSet;
@@ -26,6 +29,10 @@ const MOST_UNPACKED: u64 = 1 << 13;
 /// # Errors
 /// As [`read`], for the file.
 pub fn kind(source: &Source) -> Result<Kind> {
+    // Meshes of solvers are HDF5 too, and their arrays are no volumes.
+    if let Some(error) = foreign::mesh_by_name(source) {
+        return Err(error);
+    }
     let file = File::open(source)?;
     DataSet::of(source, &file)?.map_or(Ok(Kind::Volume), |data| data.kind())
 }
@@ -67,6 +74,10 @@ pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
 /// `add_offset`, `_FillValue` and `missing_value` have the meaning of NetCDF: values are scaled,
 /// and samples of these values are holes. `units` and `long_name` name the values.
 ///
+/// Dimension scales (the coordinate variables of NetCDF) place the samples, at even or uneven
+/// distances and in either direction. Of a data set of four dimensions with scales, the first
+/// volume is read, or the one that [`ReadOptions::time`] names.
+///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed file, for a name that it does not contain,
 /// with those that it does, for data sets that are no numbers, and for a filter that is not known,
@@ -83,13 +94,21 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     }
     let found = file.data_sets()?;
     let chosen = chosen(source, &found, options)?;
-    let shaped = shaped(source, chosen)?;
+    let coordinates = Coordinates::of(source, &found, chosen);
+    let mut shaped = shaped(source, chosen)?;
+    let counted = shaped.counted_axes();
+    if let (Some(names), [first, ..]) = (&mut shaped.outer, &counted[..]) {
+        *names = coordinates.names(*first);
+    }
     let data = file.bytes(chosen, shaped.bytes())?;
     let attributes = Attributes::of(&chosen.attributes);
     let missing = options.missing.or(attributes.missing);
     let options = ReadOptions { missing, ..options.clone() };
     let mut volume = npy::volume_of(source, &shaped, data.into(), &options)?;
     attributes.apply(source, &mut volume)?;
+    if let Some(dimensions) = shaped.space() {
+        coordinates.apply(source, &file, &mut volume, dimensions, &options)?;
+    }
     Ok(volume)
 }
 
@@ -155,7 +174,9 @@ fn shaped(source: &Source, found: &Found) -> Result<Shaped> {
         source.error(&place, format!("holds values of the type {shown}, which are not numbers"))
     })?;
     let sizes = found.shape.iter().copied().chain(inner).collect();
-    Ok(Shaped { element, endian, sizes, shown: described(found), place })
+    // The dimensions of NetCDF have names, and those before space are mostly times.
+    let outer = found.has_scales.then(|| "times".to_owned());
+    Ok(Shaped { element, endian, sizes, shown: described(found), place, outer })
 }
 
 /// Returns the type of numbers, their byte order, and the dimensions that each value has itself.

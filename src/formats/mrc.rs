@@ -6,12 +6,13 @@ use super::{
     Endian, ReadOptions, SampleType,
     shared::{
         grid::{Component, Element, Grid, too_few},
-        holes,
         plain::Plain,
+        several,
     },
 };
 use crate::{
     Result,
+    about::Frame,
     input::Source,
     volume::{Lattice, Volume},
 };
@@ -61,29 +62,35 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
         Cow::Borrowed(&there[..stored])
     };
     let component = Component::chosen(source, options, grid.components, grid.components == 3)?;
-    let samples = grid.samples(source, data, component)?;
-    let mut volume = holes::volume(source, lattice, samples, options)?;
+    let mut volume = grid.volume(source, lattice, data, component, options)?;
     if header.cell().is_some() {
         volume.about.length = "Å".into();
     }
     Ok(volume)
 }
 
-/// Returns where the samples are in a file of real numbers.
+/// Returns where the samples are in a file of real numbers, which holds one volume.
 ///
 /// # Errors
 /// As [`read`], for the header.
 pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
     let header = Header::of(source)?;
     let Element::Real(sample_type) = header.element else { return Ok(None) };
-    let (dims, _) = header.chosen(source, &ReadOptions::default())?;
-    if header.mode == PACKED || header.components != 1 {
+    if header.mode == PACKED || header.components != 1 || header.volumes() > 1 {
         return Ok(None);
     }
+    let dims = header.dims;
     let lattice = header.lattice(source, dims)?;
     header.grid(dims).check(source)?;
     let Header { endian, start, .. } = header;
-    Ok(Some(Plain { path: source.path.to_owned(), start, sample_type, endian, lattice }))
+    Ok(Some(Plain {
+        path: source.path.to_owned(),
+        start,
+        sample_type,
+        endian,
+        lattice,
+        frame: Frame::Own,
+    }))
 }
 
 /// Returns whether the first bytes are of a map: the word “MAP” stands behind the cell.
@@ -226,20 +233,20 @@ impl Header {
         Grid::interleaved(self.element, self.endian, dims, self.components)
     }
 
+    /// Returns the number of volumes of a stack; 1 for other files.
+    fn volumes(&self) -> usize {
+        let nz = self.dims[2];
+        let sections = usize::try_from(self.intervals[2]).unwrap_or(0);
+        let is_stack = (401..=630).contains(&self.space_group);
+        if is_stack && sections > 0 && nz.is_multiple_of(sections) { nz / sections } else { 1 }
+    }
+
     /// Returns the size of a volume, and the number of volumes before the one to read.
     fn chosen(&self, source: &Source, options: &ReadOptions) -> Result<([usize; 3], usize)> {
         let [nx, ny, nz] = self.dims;
-        let sections = usize::try_from(self.intervals[2]).unwrap_or(0);
-        let is_stack = (401..=630).contains(&self.space_group);
-        if !is_stack || sections == 0 || !nz.is_multiple_of(sections) {
-            return Ok((self.dims, 0));
-        }
-        let (count, time) = (nz / sections, options.time.unwrap_or(0));
-        if time >= count {
-            let message = format!("has {count} volumes, numbered from 0, but {time} is asked for");
-            return Err(source.error("header", message).hint("choose another --time"));
-        }
-        Ok(([nx, ny, sections], time))
+        let count = self.volumes();
+        let time = several::time(source, "header", count as u64, options)?;
+        Ok(([nx, ny, nz / count], time))
     }
 
     /// Returns the steps along the edges of the cell, in ångström; `None` if there is no cell.
@@ -433,7 +440,7 @@ mod tests {
         let at = |time| load(&map(), &ReadOptions { time, ..ReadOptions::default() });
         assert_eq!(values(&at(None).unwrap()), [1.0, 2.0]);
         assert_eq!(values(&at(Some(1)).unwrap()), [3.0, 4.0]);
-        assert!(at(Some(2)).unwrap_err().to_string().contains("has 2 volumes"));
+        assert!(at(Some(2)).unwrap_err().to_string().contains("has 2"));
     }
 
     #[test]

@@ -11,16 +11,12 @@ pub(super) use volume::{Shaped, plain, shaped, volume_of};
 use super::{
     Kind, ReadOptions,
     shared::{
+        cloud::Cloud,
         gather::{Columns, gather},
         grid::too_few,
     },
 };
-use crate::{
-    Result,
-    input::{Source, positions},
-    scattered::Points,
-    surface::Mesh,
-};
+use crate::{Result, input::Source, scattered::Points, surface::Mesh};
 use glam::DVec3;
 
 /// Returns the kind of data in an array: a point cloud (n × 3), samples (n × 4, n × 5 or n × 10),
@@ -86,22 +82,34 @@ pub fn read_cloud(source: &Source) -> Result<Mesh> {
         return Err(source.error("header", "contains no points"));
     }
     let places = numbers.as_chunks().0;
-    let (origin, positions) = positions::settle(
-        source,
-        rows,
-        |row| DVec3::from_array(places[row]),
-        |row| format!("row {row}"),
-    )?;
-    Ok(Mesh { origin, positions, ..Mesh::default() })
+    let positions = places.iter().copied().map(DVec3::from_array).collect();
+    Cloud { positions, ..Cloud::default() }.into_mesh(source)
 }
 
-/// Returns the numbers of an array of two axes, rows one after the other.
+/// The numbers of an array of one or two axes, rows one after the other.
+pub(super) struct Numbers {
+    pub values: Vec<f64>,
+    /// Numbers of a row.
+    pub width: usize,
+}
+
+/// Returns the numbers of a file of two axes, with their rows and columns.
 fn rows(source: &Source, header: &Header) -> Result<(Vec<f64>, usize, usize)> {
     let rows = source.check_points("the number of rows", header.shape[0])?;
-    let width = header.shape[1] as usize;
+    let Numbers { values, width } = numbers(source, header, &source.bytes()[header.start..])?;
+    Ok((values, rows, width))
+}
+
+/// Returns the numbers of an array of one or two axes, of which `data` are the bytes.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for another size than the header claims.
+pub(super) fn numbers(source: &Source, header: &Header, data: &[u8]) -> Result<Numbers> {
+    let size = |n: &u64| usize::try_from(*n).unwrap_or(usize::MAX);
+    let rows = header.shape.first().map_or(1, size);
+    let width = header.shape.get(1).map_or(1, size);
     let numbers = rows.saturating_mul(width);
     let size = (numbers as u64).saturating_mul(header.element.bytes() as u64);
-    let data = &source.bytes()[header.start..];
     if data.len() as u64 != size {
         return Err(too_few(source, data.len(), size as usize));
     }
@@ -112,7 +120,7 @@ fn rows(source: &Source, header: &Header) -> Result<(Vec<f64>, usize, usize)> {
         let index = |at: usize| at / width + at % width * rows;
         values = (0..numbers).map(|at| values[index(at)]).collect();
     }
-    Ok((values, rows, width))
+    Ok(Numbers { values, width })
 }
 
 #[cfg(test)]
@@ -226,7 +234,7 @@ mod tests {
         let at = |time| ReadOptions { time: Some(time), ..ReadOptions::default() };
         let times = file(1, "'|u1'", "False", "(2, 1, 1, 2)", &data);
         assert_eq!(values(&volume(&times, &at(1)).unwrap()), [0.0, 1.0]);
-        assert!(volume(&times, &at(2)).unwrap_err().to_string().contains("has 2 volumes"));
+        assert!(volume(&times, &at(2)).unwrap_err().to_string().contains("has 2 times"));
         let squeezed = file(1, "'|u1'", "False", "(1, 2, 2, 1, 1)", &data);
         assert_eq!(volume(&squeezed, &default).unwrap().lattice.dims, [1, 2, 2]);
         let unclear = file(1, "'|u1'", "False", "(1, 2, 2, 9)", &[0; 36]);
@@ -269,7 +277,7 @@ mod tests {
             (file(4, "'<f4'", "False", "(1, 4)", &data), "not a NumPy header"),
             (
                 file(1, "'<f4'", "False", "(1, 4)", &[0, 0, 192, 127].repeat(4)),
-                "none of the 1 samples has a value",
+                "none is at finite coordinates",
             ),
         ] {
             let message = load(&content).unwrap_err().to_string();

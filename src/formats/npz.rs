@@ -1,8 +1,10 @@
 //! NPZ archives: several NumPy arrays in a ZIP file, as `numpy.savez` and `numpy.savez_compressed`
 //! write them.
 
+mod cloud;
+
 use super::{
-    ReadOptions,
+    Kind, ReadOptions,
     array::{Array, Place},
     npy::{self, Header, Shaped},
     shared::listing,
@@ -10,8 +12,10 @@ use super::{
 use crate::{
     Result,
     input::{Source, isolate::isolated},
+    surface::Mesh,
     volume::Volume,
 };
+use cloud::Columns;
 use std::io::{Cursor, Read};
 use zip::ZipArchive;
 
@@ -33,23 +37,84 @@ struct Entry {
     shaped: Shaped,
 }
 
+/// What is drawn of an archive: indices among its arrays.
+enum Drawn {
+    Volume(usize),
+    Cloud(Columns),
+}
+
+/// Returns the kind of data: a point cloud if the array that [`ReadOptions::dataset`] names has
+/// three columns, or if the names and the shapes of the arrays say so; else a volume.
+///
+/// # Errors
+/// As [`read`].
+pub fn kind(source: &Source, options: &ReadOptions) -> Result<Kind> {
+    let mut archive = open(source)?;
+    let entries = entries(source, &mut archive)?;
+    Ok(match drawn(source, &entries, options)? {
+        Drawn::Volume(_) => Kind::Volume,
+        Drawn::Cloud(_) => Kind::Mesh,
+    })
+}
+
 /// Reads the array that [`ReadOptions::dataset`] names, as a volume; otherwise the largest that is
 /// one. Which of its axes is x is the same as for NPY files ([`npy::read_volume`]).
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a file that is not an archive of arrays, for a name
-/// that it does not contain, with those that it does, and for an array that is no volume;
-/// [`Error::Limit`](crate::Error::Limit) for an array over the limits.
+/// that it does not contain, with those that it does, for an array that is no volume, and for
+/// arrays of which none is surely what is meant; [`Error::Limit`](crate::Error::Limit) for an array
+/// over the limits.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let mut archive = open(source)?;
     let entries = entries(source, &mut archive)?;
-    let chosen = chosen(source, &entries, options)?;
-    let size = source.check_bytes("the size of an array in bytes", chosen.size)?;
-    let bytes = isolated(source, &chosen.shaped.place, || {
-        let file = archive.by_index(chosen.index).map_err(|error| told(source, &error))?;
-        source.unpack(&chosen.shaped.place, file, size)
-    })?;
+    let Drawn::Volume(chosen) = drawn(source, &entries, options)? else {
+        return Err(source.error("archive", "holds a point cloud, not a volume"));
+    };
+    let volumes = entries.iter().filter(|entry| entry.is_volume()).count();
+    let chosen = &entries[chosen];
+    if volumes > 1 && options.dataset.is_none() {
+        let (path, name) = (source.path.display(), &chosen.name);
+        tracing::warn!(
+            "{path}: shows “{name}”, the largest of {volumes} volumes; --dataset names another"
+        );
+    }
+    let bytes = unpacked(source, &mut archive, chosen)?;
     npy::volume_of(source, &chosen.shaped, bytes[chosen.header.start..].into(), options)
+}
+
+/// Reads a point cloud: an array of three columns with the positions, and with as many rows the
+/// arrays of colours, normals, and of the values that [`ReadOptions::scalar`] names, if there are
+/// any. They are known by their names (`points`, `xyz`, `colors`, `rgb`, `normals`, …); of a single
+/// array of three columns, and of one that [`ReadOptions::dataset`] names, the name may be any.
+///
+/// # Errors
+/// As [`read`], and for positions that are not finite, with the row.
+pub fn read_cloud(source: &Source, options: &ReadOptions) -> Result<Mesh> {
+    let mut archive = open(source)?;
+    let entries = entries(source, &mut archive)?;
+    let Drawn::Cloud(columns) = drawn(source, &entries, options)? else {
+        return Err(source.error("archive", "holds a volume, not a point cloud"));
+    };
+    let read = |entry: &Entry| {
+        let bytes = unpacked(source, &mut archive, entry)?;
+        let data = &bytes[entry.header.start..];
+        npy::numbers(source, &entry.header, data)
+    };
+    cloud::read(source, &entries, &columns, options, read)
+}
+
+/// Unpacks an array, with its header.
+fn unpacked(
+    source: &Source,
+    archive: &mut ZipArchive<Cursor<&[u8]>>,
+    entry: &Entry,
+) -> Result<Vec<u8>> {
+    let size = source.check_bytes("the size of an array in bytes", entry.size)?;
+    isolated(source, &entry.shaped.place, || {
+        let file = archive.by_index(entry.index).map_err(|error| told(source, &error))?;
+        source.unpack(&entry.shaped.place, file, size)
+    })
 }
 
 /// Lists the arrays.
@@ -59,16 +124,20 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
 pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
     let mut archive = open(source)?;
     let entries = entries(source, &mut archive)?;
-    let drawn = chosen(source, &entries, options).ok().map(|entry| entry.index);
-    let array = |entry: Entry| Array {
+    let drawn = match drawn(source, &entries, options) {
+        Ok(Drawn::Volume(at)) => vec![at],
+        Ok(Drawn::Cloud(columns)) => columns.all(&entries, options),
+        Err(_) => Vec::new(),
+    };
+    let array = |(at, entry): (usize, Entry)| Array {
         kind: format!("{} {}", entry.header.element.name(), entry.shaped.shown),
         name: entry.name,
         place: Place::Points,
         components: 1,
         range: None,
-        is_drawn: drawn == Some(entry.index),
+        is_drawn: drawn.contains(&at),
     };
-    Ok(entries.into_iter().map(array).collect())
+    Ok(entries.into_iter().enumerate().map(array).collect())
 }
 
 fn told(source: &Source, error: &zip::result::ZipError) -> crate::Error {
@@ -116,28 +185,58 @@ fn entries(source: &Source, archive: &mut ZipArchive<Cursor<&[u8]>>) -> Result<V
     Ok(entries)
 }
 
-/// Returns the array to draw.
-fn chosen<'a>(source: &Source, entries: &'a [Entry], options: &ReadOptions) -> Result<&'a Entry> {
+impl Entry {
+    /// Whether it is surely a volume. A last axis of three or four numbers behind two longer ones
+    /// is rather a picture in colours, or lists of points.
+    fn is_volume(&self) -> bool {
+        let [first, second, third @ 3..=4] = self.header.shape[..] else {
+            return self.shaped.is_volume();
+        };
+        first.min(second) <= 2 * third
+    }
+}
+
+/// Returns what to draw.
+fn drawn(source: &Source, entries: &[Entry], options: &ReadOptions) -> Result<Drawn> {
     let list = || {
         let entry = |entry: &Entry| {
             format!("“{}”, {} {}", entry.name, entry.header.element.name(), entry.shaped.shown)
         };
         listing(entries.iter().map(entry))
     };
+    let ask =
+        |message: String| source.error("archive", message).hint("name one of these with --dataset");
     if let Some(name) = &options.dataset {
         let name = name.strip_suffix(".npy").unwrap_or(name);
-        return entries.iter().find(|entry| entry.name == name).ok_or_else(|| {
-            source
-                .error("archive", format!("has no array “{name}”; it has {}", list()))
-                .hint("name one of these with --dataset")
+        let Some(at) = entries.iter().position(|entry| entry.name == name) else {
+            return Err(ask(format!("has no array “{name}”; it has {}", list())));
+        };
+        let is_cloud = matches!(entries[at].header.shape[..], [_, 3]);
+        return Ok(match is_cloud {
+            true => Drawn::Cloud(Columns::around(entries, at)),
+            false => Drawn::Volume(at),
         });
     }
-    let volumes = entries.iter().filter(|entry| entry.shaped.is_volume());
-    volumes.max_by_key(|entry| (entry.size, std::cmp::Reverse(entry.index))).ok_or_else(|| {
-        source
-            .error("archive", format!("has no array of three axes; it has {}", list()))
-            .hint("choose an array with --dataset, and its time with --time")
-    })
+    let volumes = (0..entries.len()).filter(|&at| entries[at].is_volume());
+    let largest = volumes.max_by_key(|&at| (entries[at].size, std::cmp::Reverse(at)));
+    match (largest, Columns::of(entries)) {
+        (Some(at), None) => Ok(Drawn::Volume(at)),
+        (None, Some(columns)) => Ok(Drawn::Cloud(columns)),
+        (Some(volume), Some(cloud)) => {
+            let [volume, points] = [volume, cloud.positions].map(|at| &entries[at].name);
+            Err(ask(format!(
+                "holds the volume “{volume}” and the points “{points}”; it has {}",
+                list()
+            )))
+        }
+        (None, None) => {
+            let message =
+                format!("has no array that is surely a volume or a point cloud; it has {}", list());
+            let hint = "choose an array with --dataset, and its time with --time; positions are an \
+                        array of three columns, named points or xyz";
+            Err(source.error("archive", message).hint(hint))
+        }
+    }
 }
 
 #[cfg(test)]
@@ -173,6 +272,69 @@ mod tests {
             ("ct.npy", npy("<i2", "(1, 2, 2)", &[1, 0, 2, 0, 3, 0, 255, 255])),
             ("affine.npy", npy("<f8", "(4, 4)", &[0; 128])),
         ]
+    }
+
+    fn floats(values: &[f32]) -> Vec<u8> {
+        values.iter().flat_map(|v| v.to_le_bytes()).collect()
+    }
+
+    /// Two points, with what belongs to them and what does not.
+    fn points() -> Vec<(&'static str, Vec<u8>)> {
+        vec![
+            ("intrinsics.npy", npy("<f4", "(3, 3)", &floats(&[0.0; 9]))),
+            ("xyz.npy", npy("<f4", "(2, 3)", &floats(&[1.0, 2.0, 3.0, 1.0, 2.0, 5.0]))),
+            ("rgb.npy", npy("|u1", "(2, 3)", &[200, 40, 40, 0, 0, 255])),
+            ("Normals.npy", npy("<f4", "(2, 3)", &floats(&[0.0, 0.0, 2.0, 1.0, 0.0, 0.0]))),
+            ("label.npy", npy("|u1", "(2,)", &[7, 9])),
+        ]
+    }
+
+    #[test]
+    fn points_with_colors_are_a_cloud() {
+        let folder = Folder::new();
+        let path = folder.write("a.npz", archive(&points(), CompressionMethod::Deflated));
+        let read = |options: &ReadOptions| read_with(&path, |source| read_cloud(source, options));
+        let default = ReadOptions::default();
+        assert_eq!(read_with(&path, |source| kind(source, &default)).unwrap(), Kind::Mesh);
+        let mesh = read(&default).unwrap();
+        assert_eq!(mesh.origin + mesh.positions[1].as_dvec3(), glam::DVec3::new(1.0, 2.0, 5.0));
+        assert_eq!(mesh.colors, [[200, 40, 40, 255], [0, 0, 255, 255]]);
+        assert_eq!(mesh.normals[0], glam::Vec3::Z);
+        assert_eq!(read(&ReadOptions::scalar(Some("label"))).unwrap().values, [7.0, 9.0]);
+        let error = read(&ReadOptions::scalar(Some("age"))).unwrap_err().to_string();
+        assert!(error.contains("no values “age” for 2 points"), "{error}");
+        let list = read_with(&path, |source| arrays(source, &default)).unwrap();
+        let drawn: Vec<_> = list.iter().filter(|a| a.is_drawn).map(|a| &a.name[..]).collect();
+        assert_eq!(drawn, ["xyz", "rgb", "Normals"]);
+    }
+
+    #[test]
+    fn colors_of_floats_are_fractions() {
+        let mut files = points();
+        files[2] = ("colors.npy", npy("<f4", "(2, 3)", &floats(&[1.0, 0.2, 0.2, 0.0, 0.0, 0.5])));
+        let folder = Folder::new();
+        let path = folder.write("a.npz", archive(&files, CompressionMethod::Stored));
+        let mesh = read_with(&path, |source| read_cloud(source, &ReadOptions::default())).unwrap();
+        assert_eq!(mesh.colors, [[255, 51, 51, 255], [0, 0, 128, 255]]);
+    }
+
+    #[test]
+    fn arrays_of_unclear_meaning_are_asked_for() {
+        let folder = Folder::new();
+        let error = |files: &[(&str, Vec<u8>)]| {
+            let path = folder.write("a.npz", archive(files, CompressionMethod::Stored));
+            let error = read_with(&path, |source| kind(source, &ReadOptions::default()));
+            error.unwrap_err().to_string()
+        };
+        // A picture in colours is no volume of three samples along x.
+        let picture = vec![("image.npy", npy("|u1", "(9, 9, 3)", &[0; 243]))];
+        assert!(error(&picture).contains("“image”, u8 (9, 9, 3)"), "{}", error(&picture));
+        let path = folder.write("b.npz", archive(&picture, CompressionMethod::Stored));
+        let named = read_with(&path, |source| read(source, &named(Some("image")))).unwrap();
+        assert_eq!(named.lattice.dims, [3, 9, 9]);
+        let both = [points(), two()].concat();
+        let message = error(&both);
+        assert!(message.contains("the volume “ct” and the points “xyz”"), "{message}");
     }
 
     fn named(name: Option<&str>) -> ReadOptions {

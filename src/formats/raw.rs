@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     Result,
+    about::Frame,
     input::Source,
     volume::{Lattice, Volume},
 };
@@ -83,6 +84,7 @@ pub(super) fn plain(source: &Source, layout: &RawLayout) -> Result<Option<Plain>
         sample_type,
         endian,
         lattice,
+        frame: Frame::Own,
     };
     Ok((source.bytes().len() == wanted && !is_packed(source, wanted)).then_some(plain))
 }

@@ -9,7 +9,7 @@ use super::{
     ReadOptions,
     shared::{
         grid::{Component, Grid},
-        holes,
+        several,
     },
 };
 use crate::{
@@ -31,7 +31,8 @@ use std::{borrow::Cow, path::PathBuf};
 ///
 /// ImageJ's and OME's descriptions give the order of slices, channels and times, the distance
 /// between samples and its unit. [`ReadOptions::scalar`] chooses a channel (`channel:1`), and
-/// [`ReadOptions::time`] a time; the first is the default. Colours are read as their brightness.
+/// [`ReadOptions::time`] a time; the first is the default. Pages in colours make a volume in
+/// colours.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed file, for a single page, which is a
@@ -62,8 +63,8 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
             pages.read(&stack, &planes)?.into()
         }
     };
-    let samples = grid.samples(source, data, component)?;
-    let mut volume = holes::volume(source, lattice(source, &grid, &meaning)?, samples, options)?;
+    let lattice = lattice(source, &grid, &meaning)?;
+    let mut volume = grid.volume(source, lattice, data, component, options)?;
     volume.about.length = meaning.unit;
     volume.about.modality = meaning.is_microscopy.then_some(Modality::Microscopy);
     Ok(volume)
@@ -98,18 +99,10 @@ fn component(
 ) -> Result<Component> {
     let options = if is_chosen { &ReadOptions::default() } else { options };
     let chosen = Component::chosen(source, options, layout.components, layout.are_colors)?;
-    if options.scalar.is_some() || layout.components == 1 {
+    if options.scalar.is_some() || layout.components == 1 || layout.are_colors {
         return Ok(chosen);
     }
-    let name = source.path.display();
-    if layout.are_colors {
-        tracing::warn!("{name}: colours are read as their brightness; --scalar red reads one");
-        return Ok(chosen);
-    }
-    tracing::warn!(
-        "{name}: the first of {} channels is read; --scalar channel:1 reads the second",
-        layout.components
-    );
+    several::warn_of_channels(source, layout.components);
     Ok(Component::One(0))
 }
 
@@ -193,8 +186,8 @@ fn read_folder(source: &Source, files: &[PathBuf], options: &ReadOptions) -> Res
     };
     let grid = layout.grid(files.len());
     let component = component(source, options, &layout, false)?;
-    let samples = grid.samples(source, all.into(), component)?;
-    let mut volume = holes::volume(source, lattice(source, &grid, &meaning)?, samples, options)?;
+    let lattice = lattice(source, &grid, &meaning)?;
+    let mut volume = grid.volume(source, lattice, all.into(), component, options)?;
     volume.about.length = meaning.unit;
     Ok(volume)
 }

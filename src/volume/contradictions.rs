@@ -91,6 +91,7 @@ fn volumes_are_refused_where_they_come_in() {
             samples,
             range: [0.0, 7.0],
             coefficients: None,
+            colors: None,
             about: About::default(),
         };
         refused_by_all(&format!("{:?}", volume.lattice), word, &volume);

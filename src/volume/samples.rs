@@ -219,6 +219,9 @@ pub struct Volume {
     /// If set, kernels carry these values instead of the samples, so that their sum passes through
     /// the samples ([`Volume::sharpened`]).
     pub coefficients: Option<Arc<Coefficients>>,
+    /// The colour of each sample, if the file has colours: display colours and opacity, 8 bits a
+    /// channel. The samples are then their brightness ([`Volume::colored_splats`]).
+    pub colors: Option<Arc<[[u8; 4]]>>,
     /// What the file says beyond the values.
     pub about: About,
 }
@@ -267,7 +270,14 @@ impl Volume {
             ));
         }
         let range = samples.range()?;
-        Ok(Self { lattice, samples, range, coefficients: None, about: About::default() })
+        Ok(Self {
+            lattice,
+            samples,
+            range,
+            coefficients: None,
+            colors: None,
+            about: About::default(),
+        })
     }
 
     /// Checks what [`new`](Self::new) checks, and what may have changed since then. Call it first

@@ -142,6 +142,7 @@ impl Volume {
         // The spline lies within the coefficients in reach. Their range is quantised in steps of
         // the samples' range.
         let drawn = Self {
+            colors: None,
             samples: Samples::F32(prefilter::cubic(&self.samples, self.lattice.dims)),
             range: self.range,
             lattice: self.lattice.clone(),

@@ -46,6 +46,7 @@ fn main() -> Result<()> {
     sog(&mut seeds)?;
     obj(&mut seeds)?;
     stl(&mut seeds)?;
+    off(&mut seeds)?;
     gltf(&mut seeds)?;
     las(&mut seeds)?;
     e57(&mut seeds)?;
@@ -337,6 +338,18 @@ fn stl(seeds: &mut Seeds) -> Result<()> {
         binary.extend([0x1f, 0x80]);
     }
     seeds.put("stl", binary)
+}
+
+fn off(seeds: &mut Seeds) -> Result<()> {
+    seeds.known("off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 255 0 0\n")?;
+    seeds.known("off", "CNOFF\n1 0 0\n0 0 0 0 0 1 0.5 0.5 0.5 1\n")?;
+    let mut binary = b"OFF BINARY\n".to_vec();
+    [3i32, 1, 0].iter().for_each(|v| binary.extend(v.to_be_bytes()));
+    for v in [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0] {
+        binary.extend(v.to_be_bytes());
+    }
+    [3i32, 0, 1, 2, 0].iter().for_each(|v| binary.extend(v.to_be_bytes()));
+    seeds.put("off", binary)
 }
 
 fn gltf(seeds: &mut Seeds) -> Result<()> {

@@ -23,6 +23,8 @@ pub struct Found {
     pub shape: Vec<u64>,
     pub datatype: Datatype,
     pub attributes: HashMap<String, AttrValue>,
+    /// Whether it names scales of its dimensions.
+    pub has_scales: bool,
     data_set: Dataset,
 }
 
@@ -115,14 +117,16 @@ impl<'a> File<'a> {
 
     fn looked_at(&self, path: &str, data_set: Dataset) -> Result<Found> {
         let place = format!("data set “{path}”");
-        let (shape, datatype, attributes) = isolated(self.source, &place, || {
+        let (shape, datatype, attributes, has_scales) = isolated(self.source, &place, || {
             let told = |error| told(self.source, &place, &error);
             let datatype = data_set.datatype().map_err(told)?;
             // Attributes are a convenience: what cannot be read of them is left out.
             let attributes = data_set.attrs().unwrap_or_default();
-            Ok((data_set.shape().map_err(told)?, datatype, attributes))
+            let kinds = data_set.attr_datatypes().unwrap_or_default();
+            let has_scales = kinds.contains_key("DIMENSION_LIST");
+            Ok((data_set.shape().map_err(told)?, datatype, attributes, has_scales))
         })?;
-        Ok(Found { path: path.into(), shape, datatype, attributes, data_set })
+        Ok(Found { path: path.into(), shape, datatype, attributes, has_scales, data_set })
     }
 
     /// Returns a group; `None` if there is none of this path.

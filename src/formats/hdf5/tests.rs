@@ -1,7 +1,7 @@
 //! Files that the crate's own writer makes.
 
 use super::*;
-use crate::input::testing::*;
+use crate::{Error, input::testing::*};
 use glam::DVec3;
 use hdf5_pure::{AttrValue, FileBuilder};
 
@@ -103,6 +103,66 @@ fn a_fourth_dimension_may_be_time() {
     let second = ReadOptions { time: Some(1), ..named("v") };
     let volume = load(&bytes, &second).unwrap();
     assert_eq!((volume.lattice.dims, volume.range), ([5, 2, 2], [20.0, 39.0]));
+}
+
+#[test]
+fn meshes_of_solvers_are_no_volumes() {
+    let folder = Folder::new();
+    let of = |name: &str| read_with(&folder.write(name, several()), kind);
+    for name in ["a.nc", "a.mat", "a.mnc", "a.other"] {
+        assert_eq!(of(name).unwrap(), Kind::Volume, "{name}");
+    }
+    for name in ["a.e", "a.cgns", "a.med"] {
+        let Error::Input { hint, .. } = of(name).unwrap_err() else { panic!("{name}") };
+        assert!(hint.unwrap().contains("python -m pysplatkit render"), "{name}");
+    }
+}
+
+/// A data set of two times with scales along its four dimensions, of which three have one length.
+fn with_scales(names: [&str; 3]) -> Vec<u8> {
+    let mut file = FileBuilder::new();
+    let data: Vec<f32> = (0..2 * 27).map(|v| v as f32).collect();
+    file.create_dataset("v")
+        .with_f32_data(&data)
+        .with_shape(&[2, 3, 3, 3])
+        .set_attr("DIMENSION_LIST", AttrValue::I64(0));
+    let mut scale = |name: &str, values: &[f64], unit: &str, positive: &str| {
+        file.create_dataset(name)
+            .with_f64_data(values)
+            .with_shape(&[values.len() as u64])
+            .set_attr("CLASS", AttrValue::String("DIMENSION_SCALE".into()))
+            .set_attr("NAME", AttrValue::String(name.into()))
+            .set_attr("units", AttrValue::String(unit.into()))
+            .set_attr("positive", AttrValue::String(positive.into()));
+    };
+    let [x, y, z] = names;
+    scale("when", &[0.0, 6.0], "hours since 1970-01-01", "");
+    scale(x, &[100.0, 102.0, 104.0], "m", "");
+    scale(y, &[9.0, 6.0, 3.0], "m", "");
+    scale(z, &[0.0, 1.0, 5.0], "m", if z == "depth" { "down" } else { "" });
+    file.finish().unwrap()
+}
+
+#[test]
+fn scales_place_the_samples_and_name_the_times() {
+    let bytes = with_scales(["x", "lat", "depth"]);
+    let (volume, words) = warnings_of(|| load(&bytes, &ReadOptions::default()));
+    let volume = volume.unwrap();
+    assert_eq!(words.len(), 1);
+    assert!(words[0].ends_with("a.h5: shows the first of 2 times; --time 1 shows the second"));
+    assert_eq!((volume.range, &volume.about.length[..]), ([0.0, 26.0], "m"));
+    let places = [0, 26].map(|sample| volume.lattice.sample_position(sample));
+    assert_eq!(places, [DVec3::new(100.0, 9.0, 0.0), DVec3::new(104.0, 3.0, -5.0)]);
+    let second = ReadOptions { time: Some(1), ..ReadOptions::default() };
+    assert_eq!(load(&bytes, &second).unwrap().range, [27.0, 53.0]);
+}
+
+#[test]
+fn scales_that_cannot_be_told_apart_are_named() {
+    let bytes = with_scales(["a", "b", "c"]);
+    let (volume, words) = warnings_of(|| load(&bytes, &ReadOptions::default()));
+    assert_eq!(volume.unwrap().lattice.spacing(), DVec3::ONE);
+    assert!(words[0].contains("“v” has which coordinates (a, b, c) is not"), "{words:?}");
 }
 
 #[test]

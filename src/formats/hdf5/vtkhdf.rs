@@ -15,7 +15,7 @@ use crate::{
         shared::{
             choice::{self, Candidate, Chosen, Part, Role},
             grid::{Component, Grid},
-            holes, polygon,
+            holes, polygon, several, unplaced,
         },
     },
     input::{Source, growing::Growing, positions},
@@ -207,11 +207,7 @@ impl<'a> DataSet<'a> {
             .ok_or_else(|| self.source.error(&place, "holds no numbers"))?;
         let lattice = self.lattice(candidate.place)?;
         let times = if self.has_steps { set.shape.first().copied().unwrap_or(0) } else { 1 };
-        let time = if self.has_steps { options.time.unwrap_or(0) as u64 } else { 0 };
-        if time >= times {
-            let message = format!("has {times} times, numbered from 0, but {time} is asked for");
-            return Err(self.source.error(place, message).hint("choose another --time"));
-        }
+        let time = several::time(self.source, &place, times, options)?;
         let space: Vec<u64> = lattice.dims.iter().rev().map(|&n| n as u64).collect();
         let own = set.shape.iter().skip(usize::from(self.has_steps)).take(3);
         if !own.eq(space.iter()) {
@@ -221,14 +217,15 @@ impl<'a> DataSet<'a> {
         let grid = Grid::interleaved(element, endian, lattice.dims, candidate.components);
         let size = grid.check(self.source)?;
         let data = self.file.bytes(set, (size as u64).checked_mul(times))?;
-        let data = &data[size * time as usize..][..size];
+        let data = &data[size * time..][..size];
+        let is_length = options.scalar.as_deref().is_some_and(|name| name.ends_with(":magnitude"));
         let component = match chosen.part {
             Part::Whole => Component::One(0),
+            Part::Magnitude if candidate.is_color() && !is_length => Component::Color,
             Part::Magnitude => Component::Magnitude,
             Part::Component(at) => Component::One(at),
         };
-        let samples = grid.samples(self.source, data.into(), component)?;
-        let mut volume = holes::volume(self.source, lattice, samples, options)?;
+        let mut volume = grid.volume(self.source, lattice, data.into(), component, options)?;
         volume.about.name = chosen.part.caption(&candidate.name, candidate.components);
         Ok(volume)
     }
@@ -266,17 +263,13 @@ impl<'a> DataSet<'a> {
         Ok(lattice)
     }
 
-    /// Returns the position of every point.
+    /// Returns the position of every point: NaN if it is not at finite coordinates.
     fn points(&self) -> Result<(DVec3, Vec<glam::Vec3>)> {
         let numbers = self.numbers(self.set("Points")?)?;
         let places = numbers.as_chunks::<3>().0;
         self.source.check_points("the number of points", places.len() as u64)?;
-        positions::settle(
-            self.source,
-            places.len(),
-            |point| DVec3::from_array(places[point]),
-            |point| format!("point {point}"),
-        )
+        let position = |point: usize| DVec3::from_array(places[point]);
+        positions::settle_some(self.source, places.len(), position)
     }
 
     /// Returns the values of the chosen array for each of `count` points or cells.
@@ -356,6 +349,10 @@ impl<'a> DataSet<'a> {
     pub fn cells(&self, options: &ReadOptions) -> Result<Cells> {
         self.refuse_steps()?;
         let (origin, points) = self.points()?;
+        if let Some(point) = points.iter().position(|point| !point.is_finite()) {
+            let message = "is not at finite coordinates";
+            return Err(self.source.error(format!("point {point}"), message));
+        }
         let kinds = self.indices("Types")?;
         let Some(chosen) = self.chosen(options, true)? else {
             return Err(self.source.error(ROOT, "contains no values that can be drawn"));
@@ -415,6 +412,7 @@ impl<'a> DataSet<'a> {
             let message = "of the cells does not colour a surface here";
             return Err(self.source.error("CellData", message).hint("name an array of the points"));
         }
+        unplaced::leave_out(self.source, &mut mesh)?;
         Ok(mesh)
     }
 }

@@ -3,12 +3,14 @@
 use super::Header;
 use crate::{
     Result,
+    about::Frame,
     formats::{
         Endian, ReadOptions,
         shared::{
+            choice,
             grid::{Component, Element, Grid, too_few},
-            holes,
             plain::Plain,
+            several,
         },
     },
     input::Source,
@@ -31,6 +33,9 @@ pub struct Shaped {
     pub shown: String,
     /// The place in the file, for messages.
     pub place: String,
+    /// What the volumes along an axis before the three of space are, as in “times”, if the file
+    /// says that there is such an axis.
+    pub outer: Option<String>,
 }
 
 /// What the axes of an array are.
@@ -70,7 +75,8 @@ pub(in crate::formats) fn plain(source: &Source) -> Result<Option<Plain>> {
     let lattice = Lattice::with_spacing(axes.grid.dims, DVec3::ONE);
     lattice.check().map_err(|message| source.error("header", message))?;
     let (endian, start) = (header.endian, header.start);
-    Ok(Some(Plain { path: source.path.to_owned(), start, sample_type, endian, lattice }))
+    let path = source.path.to_owned();
+    Ok(Some(Plain { path, start, sample_type, endian, lattice, frame: Frame::Own }))
 }
 
 pub fn shaped(header: &Header, place: &str) -> Shaped {
@@ -84,6 +90,7 @@ pub fn shaped(header: &Header, place: &str) -> Shaped {
         sizes,
         shown: header.shape_text(),
         place: place.into(),
+        outer: None,
     }
 }
 
@@ -103,8 +110,7 @@ pub fn volume_of(
     if data.len() < whole {
         return Err(too_few(source, data.len(), whole));
     }
-    let byte = Element::Real(crate::formats::SampleType::U8);
-    let are_colors = grid.element == byte && grid.components >= 3;
+    let are_colors = grid.components >= 3 && (grid.element.is_byte() || array.is_color());
     let component = Component::chosen(source, options, grid.components, are_colors)?;
     let part = match data {
         Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[skip..whole]),
@@ -116,21 +122,43 @@ pub fn volume_of(
     };
     let lattice = Lattice::with_spacing(grid.dims, DVec3::ONE);
     lattice.check().map_err(|message| source.error(&array.place, message))?;
-    let samples = grid.samples(source, part, component)?;
-    holes::volume(source, lattice, samples, options)
+    grid.volume(source, lattice, part, component, options)
 }
 
 impl Shaped {
-    /// Returns the sizes that count: without axes of one number, while there are more than three. A
+    /// Whether its name is that of colours.
+    fn is_color(&self) -> bool {
+        let name = self.place.rsplit(['“', '/']).next().unwrap_or_default();
+        choice::names_colors(name.trim_end_matches('”'))
+    }
+
+    /// Returns the axes that count: without axes of one number, while there are more than three. A
     /// last axis of a few numbers, which are components, needs three others before it.
-    fn counted(&self) -> Vec<u64> {
-        let mut sizes = self.sizes.clone();
+    pub fn counted_axes(&self) -> Vec<usize> {
+        let mut axes: Vec<usize> = (0..self.sizes.len()).collect();
         let components = |last: u64| (2..=MOST_COMPONENTS).contains(&last);
-        while sizes.len() > 3 + usize::from(sizes.last().copied().is_some_and(components)) {
-            let Some(one) = sizes.iter().position(|&size| size == 1) else { break };
-            sizes.remove(one);
+        let last = self.sizes.last().copied().unwrap_or_default();
+        let space = 3 + usize::from(components(last) && self.outer.is_none());
+        while axes.len() > space {
+            let Some(one) = axes.iter().position(|&axis| self.sizes[axis] == 1) else { break };
+            axes.remove(one);
         }
-        sizes
+        axes
+    }
+
+    /// Returns the axes of x, y and z; `None` if there are none.
+    #[cfg(feature = "hdf5")]
+    pub fn space(&self) -> Option<[usize; 3]> {
+        match self.counted_axes()[..] {
+            [z, y, x] => Some([x, y, z]),
+            [_, z, y, x] if self.outer.is_some() => Some([x, y, z]),
+            [z, y, x, _] | [_, z, y, x, _] => Some([x, y, z]),
+            _ => None,
+        }
+    }
+
+    fn counted(&self) -> Vec<u64> {
+        self.counted_axes().into_iter().map(|axis| self.sizes[axis]).collect()
     }
 
     /// Returns the bytes of all numbers; `None` if they exceed 64 bits.
@@ -144,6 +172,7 @@ impl Shaped {
     pub fn is_volume(&self) -> bool {
         match self.counted()[..] {
             [_, _, _] => true,
+            [_, _, _, _] if self.outer.is_some() => true,
             [_, _, _, last] => last <= MOST_COMPONENTS,
             _ => false,
         }
@@ -158,12 +187,14 @@ impl Shaped {
         };
         match (&counted[..], options.time) {
             (&[z, y, x], _) => Ok(Axes { grid: grid(x, y, z, 1), skip: 0 }),
-            (&[times, z, y, x], Some(time)) => self.at(source, grid(x, y, z, 1), times, time),
+            (&[times, z, y, x], time) if time.is_some() || self.outer.is_some() => {
+                self.at(source, grid(x, y, z, 1), times, options)
+            }
             (&[z, y, x, count @ 2..=MOST_COMPONENTS], _) => {
                 Ok(Axes { grid: grid(x, y, z, count), skip: 0 })
             }
-            (&[times, z, y, x, count @ 2..=MOST_COMPONENTS], time) => {
-                self.at(source, grid(x, y, z, count), times, time.unwrap_or(0))
+            (&[times, z, y, x, count @ 2..=MOST_COMPONENTS], _) => {
+                self.at(source, grid(x, y, z, count), times, options)
             }
             (&[times, _, _, _], None) => Err(self.wrong(source).hint(format!(
                 "--time 0 takes the first of {times} volumes, if the first axis is time; a last \
@@ -174,11 +205,14 @@ impl Shaped {
     }
 
     /// Returns the axes of one of several volumes.
-    fn at(&self, source: &Source, grid: Grid, times: u64, time: usize) -> Result<Axes> {
-        if time as u64 >= times {
-            let message = format!("has {times} volumes, numbered from 0, but {time} is asked for");
-            return Err(source.error(&self.place, message).hint("choose another --time"));
-        }
+    fn at(&self, source: &Source, grid: Grid, times: u64, options: &ReadOptions) -> Result<Axes> {
+        let time = several::of_times(
+            source,
+            &self.place,
+            times,
+            options,
+            self.outer.as_deref().unwrap_or("times"),
+        )?;
         let skip = grid.check(source)?.saturating_mul(time);
         Ok(Axes { grid, skip })
     }

@@ -1,9 +1,16 @@
 //! Blocks of numbers as laboratories store them: types that [`SampleType`] does not have, any order
 //! of the axes, and several components at each sample.
 
-use super::sample_type::{Endian, SampleType};
+use super::{
+    colors, holes,
+    sample_type::{Endian, SampleType},
+};
 use crate::{
-    Error, Result, formats::ReadOptions, input::Source, parallel::prelude::*, volume::Samples,
+    Error, Result,
+    formats::ReadOptions,
+    input::Source,
+    parallel::prelude::*,
+    volume::{Lattice, Samples, Volume},
 };
 use half::f16;
 use std::borrow::Cow;
@@ -29,6 +36,8 @@ pub enum Component {
     Magnitude,
     /// The brightness of a colour: 0.299 red + 0.587 green + 0.114 blue (ITU-R BT.601).
     Luminance,
+    /// The colour: samples are its brightness, and the volume has the colours as well.
+    Color,
 }
 
 /// The layout of a block. Numbers that follow one another in memory are one stride apart.
@@ -55,6 +64,11 @@ impl Element {
             Self::Half => "f16".into(),
             Self::Complex(part) => format!("complex {}", part.name()),
         }
+    }
+
+    /// Returns whether it is an unsigned number of 8 bits, as colours mostly are.
+    pub fn is_byte(self) -> bool {
+        self == Self::Real(SampleType::U8)
     }
 
     /// Returns the bytes of a number.
@@ -183,7 +197,7 @@ impl Grid {
                 let all: Vec<_> = (0..self.components).map(|which| (which, 1.0)).collect();
                 Ok(Samples::F32(self.combined(&data, &all, |v| v * v, f64::sqrt)))
             }
-            Component::Luminance => {
+            Component::Luminance | Component::Color => {
                 source.room::<f32>("the samples", samples)?;
                 let light = self.combined(&data, &LUMINANCE, |v| v, |sum| sum);
                 Ok(match self.element {
@@ -193,6 +207,32 @@ impl Grid {
                 })
             }
         }
+    }
+
+    /// Reads a volume from the bytes of the block: a component of the samples, with the colours if
+    /// that is [`Component::Color`].
+    ///
+    /// # Errors
+    /// As [`samples`](Self::samples), and [`Error::Input`] if no sample has a value.
+    pub fn volume(
+        &self,
+        source: &Source,
+        lattice: Lattice,
+        data: Cow<'_, [u8]>,
+        component: Component,
+        options: &ReadOptions,
+    ) -> Result<Volume> {
+        if component != Component::Color {
+            let samples = self.samples(source, data, component)?;
+            return holes::volume(source, lattice, samples, options);
+        }
+        let samples = self.samples(source, Cow::Borrowed(&data), component)?;
+        let channel = |which| self.samples(source, Cow::Borrowed(&data), Component::One(which));
+        let channels: Vec<Samples> =
+            (0..self.components.min(4)).map(channel).collect::<Result<_>>()?;
+        let mut volume = holes::volume(source, lattice, samples, options)?;
+        colors::attach(&mut volume, colors::of_channels(source, &channels)?);
+        Ok(volume)
     }
 
     /// Returns the offset in bytes of the first sample of a row, for a component.
@@ -265,7 +305,7 @@ impl Component {
     /// Returns the component that the options choose (`name:x`, `name:1`, `name:magnitude`, or one
     /// of these words alone) of files whose values are all of one array.
     ///
-    /// Without a choice it is the only component, the brightness of colours, or the magnitude.
+    /// Without a choice it is the only component, the colour (`rgb`), or the magnitude.
     ///
     /// # Errors
     /// [`Error::Input`] for a name that is not of a component of the file, with those that are.
@@ -277,7 +317,7 @@ impl Component {
     ) -> Result<Self> {
         let default = match components {
             0 | 1 => Self::One(0),
-            _ if are_colors => Self::Luminance,
+            _ if are_colors => Self::Color,
             _ => Self::Magnitude,
         };
         let Some(name) = options.scalar.as_deref() else { return Ok(default) };
@@ -285,7 +325,8 @@ impl Component {
         let index = match word.as_str() {
             "value" | "values" | "scalar" | "" => return Ok(default),
             "magnitude" if components > 1 => return Ok(Self::Magnitude),
-            "luminance" if are_colors => return Ok(Self::Luminance),
+            "luminance" if matches!(components, 3 | 4) => return Ok(Self::Luminance),
+            "rgb" | "rgba" if matches!(components, 3 | 4) => return Ok(Self::Color),
             "x" | "r" | "red" => 0,
             "y" | "g" | "green" => 1,
             "z" | "b" | "blue" => 2,
@@ -372,6 +413,29 @@ mod tests {
     }
 
     #[test]
+    fn colors_of_any_type_become_bytes() {
+        let lattice = || Lattice::with_spacing([2, 1, 1], glam::DVec3::ONE);
+        let colors = |kind: SampleType, data: &[u8]| {
+            let grid = Grid::interleaved(Element::Real(kind), Endian::Little, [2, 1, 1], 3);
+            let options = ReadOptions::default();
+            let read = |source: &Source| {
+                grid.volume(source, lattice(), data.into(), Component::Color, &options)
+            };
+            with(read).unwrap().colors.unwrap().to_vec()
+        };
+        let expected = [[255, 51, 0, 255], [0, 0, 128, 255]];
+        assert_eq!(colors(SampleType::U8, &[255, 51, 0, 0, 0, 128]), expected);
+        let wide = |all: [u16; 6]| all.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        assert_eq!(colors(SampleType::U16, &wide([65535, 13107, 0, 0, 0, 32896])), expected);
+        assert_eq!(colors(SampleType::U16, &wide([255, 51, 0, 0, 0, 128])), expected);
+        let floats: Vec<u8> =
+            [1.0f32, 0.2, 0.0, 0.0, 0.0, 0.5].iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert_eq!(colors(SampleType::F32, &floats), expected);
+        // Small bytes are dark, not fractions.
+        assert_eq!(colors(SampleType::U8, &[30, 0, 0, 0, 0, 30])[0], [30, 0, 0, 255]);
+    }
+
+    #[test]
     fn names_choose_components() {
         let choose = |name: Option<&str>, count, colors| {
             with(|source| Component::chosen(source, &ReadOptions::scalar(name), count, colors))
@@ -379,7 +443,9 @@ mod tests {
         for (name, count, colors, found) in [
             (None, 1, false, Component::One(0)),
             (None, 3, false, Component::Magnitude),
-            (None, 3, true, Component::Luminance),
+            (None, 3, true, Component::Color),
+            (Some("rgb"), 3, false, Component::Color),
+            (Some("luminance"), 3, true, Component::Luminance),
             (Some("value"), 3, false, Component::Magnitude),
             (Some("velocity:y"), 3, false, Component::One(1)),
             (Some("velocity:magnitude"), 2, true, Component::Magnitude),

@@ -1,7 +1,14 @@
 //! What the pages of a file mean: slices, channels and times, and the distances between samples, by
 //! the descriptions that ImageJ, OME's programs and tifffile leave in the first page.
 
-use crate::{Result, formats::ReadOptions, formats::shared::grid::Component, input::Source};
+use crate::{
+    Result,
+    formats::{
+        ReadOptions,
+        shared::{grid::Component, length::meters, several},
+    },
+    input::Source,
+};
 
 /// The order of pages and the distances between samples.
 #[derive(Debug, Clone)]
@@ -158,12 +165,7 @@ impl Meaning {
         options: &ReadOptions,
     ) -> Result<Vec<usize>> {
         let [slices, channels, times] = self.sizes(pages);
-        let time = options.time.unwrap_or(0);
-        if time >= times {
-            let message =
-                format!("there are {times} times, numbered from 0, but {time} is asked for");
-            return Err(source.error("pages", message).hint("choose another --time"));
-        }
+        let time = several::time(source, "pages", times as u64, options)?;
         let is_named = channels > 1 && options.scalar.is_some();
         let channel = match Component::chosen(source, options, channels, false) {
             Ok(Component::One(channel)) if is_named => channel,
@@ -171,10 +173,7 @@ impl Meaning {
             _ => 0,
         };
         if channels > 1 && !is_named {
-            tracing::warn!(
-                "{}: the first of {channels} channels is read; --scalar channel:1 reads the second",
-                source.path.display()
-            );
+            several::warn_of_channels(source, channels);
         }
         let page = |slice: usize| {
             let mut stride = 1;
@@ -211,20 +210,6 @@ fn unit(name: &str) -> String {
     .chars()
     .take(16)
     .collect()
-}
-
-/// Returns the length of a unit in metres.
-fn meters(unit: &str) -> Option<f64> {
-    Some(match unit {
-        "Å" => 1e-10,
-        "pm" => 1e-12,
-        "nm" => 1e-9,
-        "µm" => 1e-6,
-        "mm" => 1e-3,
-        "cm" => 1e-2,
-        "m" => 1.0,
-        _ => return None,
-    })
 }
 
 /// Returns a key that orders names by the numbers in them: “s9” before “s10”.

@@ -89,6 +89,9 @@ fn every_type_of_samples_is_read() {
     let red = ReadOptions::scalar(Some("red"));
     let colors = pages!(colortype::RGB8, [255, 0, 0], [9, 9, 9]);
     assert_eq!(values(&load(&colors, &red).unwrap()), [255.0, 9.0]);
+    assert!(load(&colors, &red).unwrap().colors.is_none());
+    let whole = load(&colors, &ReadOptions::default()).unwrap().colors.unwrap();
+    assert_eq!(whole.to_vec(), [[255, 0, 0, 255], [9, 9, 9, 255]]);
 }
 
 /// A directory of one page of 9 × 1 pixels, in either byte order, and its pixels.

@@ -2,7 +2,7 @@
 //! (`.pvtu`, …) join pieces to one data set, collections (`.vtm`, `.pvd`, …) list several.
 
 use super::{
-    super::ReadOptions,
+    super::{ReadOptions, shared::several},
     data::Block,
     legacy, pieces,
     xml::{Attributes, Document, number},
@@ -23,6 +23,8 @@ pub struct DataSet<'a> {
     pub whole: usize,
     /// Whether a parallel file joins it to others.
     pub is_piece: bool,
+    /// The number of times of the collection that it belongs to; 0 if there is none with times.
+    pub times: u64,
 }
 
 /// What looks at data sets; returns whether to go on.
@@ -35,7 +37,7 @@ type Look<'l> = dyn FnMut(&DataSet<'_>) -> Result<bool> + 'l;
 /// [`Error::Input`](crate::Error::Input) for a file in another format, one that is cut off, and
 /// references that lead out of the folder; those of `look`.
 pub fn visit(source: &Source, options: &ReadOptions, look: &mut Look<'_>) -> Result<()> {
-    let mut walk = Walk { options, look, wholes: 0, files: 0 };
+    let mut walk = Walk { options, look, wholes: 0, files: 0, times: 0 };
     walk.file(source, 0, None).map(drop)
 }
 
@@ -46,6 +48,8 @@ struct Walk<'l, 'f> {
     wholes: usize,
     /// Number of files so far.
     files: usize,
+    /// The most times of a collection so far.
+    times: u64,
 }
 
 impl Walk<'_, '_> {
@@ -113,7 +117,7 @@ impl Walk<'_, '_> {
     fn show(&mut self, source: &Source, blocks: Vec<Block>, whole: Option<usize>) -> Result<bool> {
         let is_piece = whole.is_some();
         let whole = self.next(whole);
-        (self.look)(&DataSet { source, blocks, whole, is_piece })
+        (self.look)(&DataSet { source, blocks, whole, is_piece, times: self.times })
     }
 
     /// Returns the number of a data set: that of the whole it is a piece of, or the next one.
@@ -125,7 +129,7 @@ impl Walk<'_, '_> {
     }
 
     /// Returns the references of a collection; if they have times, those of one of the times.
-    fn of_time(&self, source: &Source, document: &Document) -> Result<Vec<Attributes>> {
+    fn of_time(&mut self, source: &Source, document: &Document) -> Result<Vec<Attributes>> {
         let time = |reference: &Attributes| -> Result<Option<f64>> {
             let text = reference.get("timestep").filter(|text| !text.trim().is_empty());
             text.map(|text| number(source, "timestep", text)).transpose()
@@ -138,11 +142,11 @@ impl Walk<'_, '_> {
         if all.is_empty() {
             return Ok(document.references.clone());
         }
-        let wanted = self.options.time.unwrap_or(0);
-        let Some(&at) = all.get(wanted) else {
-            let message = format!("has no time {wanted}: it has {} times", all.len());
-            return Err(source.error("Collection", message).hint("times are counted from 0"));
-        };
+        let count = all.len() as u64;
+        self.times = self.times.max(count);
+        // A file is visited more than once. Its survey says that there are several times.
+        let first = ReadOptions { time: self.options.time.or(Some(0)), ..ReadOptions::default() };
+        let at = all[several::time(source, "Collection", count, &first)?];
         let is_wanted = |time: &Option<f64>| time.is_none_or(|time| time == at);
         let pairs = document.references.iter().zip(&times);
         Ok(pairs.filter(|(_, time)| is_wanted(time)).map(|(own, _)| own.clone()).collect())

@@ -4,7 +4,7 @@
 use super::{
     super::{
         Endian, Place, ReadOptions, SampleType,
-        shared::{choice, holes},
+        shared::{choice, colors, holes},
     },
     data::{Block, Kind, cells_of, floats},
     files::{DataSet, visit},
@@ -20,8 +20,31 @@ use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
 /// Reads a volume: the array that is wanted, of the only lattice of the file. Pieces are joined.
-/// Values of cells become samples at the cells' centres.
+/// Values of cells become samples at the cells' centres. Colours are kept as such.
 pub fn read(source: &Source, options: &ReadOptions, wanted: &Wanted) -> Result<Volume> {
+    if !wanted.is_color {
+        let (lattice, samples) = grid(source, options, wanted)?;
+        let mut volume = holes::volume(source, lattice, samples, options)?;
+        volume.about.name = wanted.part.caption(&wanted.array.name, wanted.array.components);
+        return Ok(volume);
+    }
+    let channel = |at: usize| {
+        let part = choice::Part::Component(at);
+        grid(source, options, &Wanted { part, ..wanted.clone() })
+    };
+    let (lattice, first) = channel(0)?;
+    let rest = (1..wanted.array.components).map(|at| Ok(channel(at)?.1));
+    let channels = std::iter::once(Ok(first)).chain(rest).collect::<Result<Vec<_>>>()?;
+    let colors = colors::of_channels(source, &channels)?;
+    let brightness = colors::brightness(&colors);
+    let mut volume = holes::volume(source, lattice, brightness, options)?;
+    colors::attach(&mut volume, colors);
+    volume.about.name.clone_from(&wanted.array.name);
+    Ok(volume)
+}
+
+/// Reads the lattice of a file, with the samples of the array that is wanted.
+fn grid(source: &Source, options: &ReadOptions, wanted: &Wanted) -> Result<(Lattice, Samples)> {
     let mut grid = Grid::default();
     visit(source, options, &mut |set| {
         if set.blocks.iter().any(Block::is_lattice) {
@@ -29,10 +52,7 @@ pub fn read(source: &Source, options: &ReadOptions, wanted: &Wanted) -> Result<V
         }
         Ok(true)
     })?;
-    let (lattice, samples) = grid.finish(source, wanted.array.place)?;
-    let mut volume = holes::volume(source, lattice, samples, options)?;
-    volume.about.name = wanted.part.caption(&wanted.array.name, wanted.array.components);
-    Ok(volume)
+    grid.finish(source, wanted.array.place)
 }
 
 /// The pieces of a lattice.

@@ -4,7 +4,7 @@ use crate::errors::{options, wrong};
 use serde::Deserialize;
 use splatkit::{
     Error,
-    about::Stance,
+    about::{Frame, Frames, Stance},
     glam::DVec3,
     interaction::CameraEntry,
     math::{Bounds, Camera},
@@ -52,20 +52,32 @@ pub struct Subject {
     pub bounds: Bounds,
     pub stance: Stance,
     pub origin: Origin,
+    /// The frames of the inputs.
+    frames: Frames,
 }
 
 impl Default for Subject {
     fn default() -> Self {
         let stance = Stance::with_up(DVec3::Y);
-        Self { bounds: Bounds::EMPTY, stance, origin: Origin::Default }
+        Self { bounds: Bounds::EMPTY, stance, origin: Origin::Default, frames: Frames::default() }
     }
 }
 
 impl Subject {
-    /// Takes a stance if it comes from a more certain origin than the one before.
-    pub fn consider(&mut self, stance: Stance, origin: Origin) {
+    /// Takes a stance if it comes from a more certain origin than the one before. Returns the
+    /// scene's stance if it is another one, although both come from files.
+    pub fn consider(&mut self, stance: Stance, origin: Origin) -> Option<Stance> {
         if origin > self.origin {
             (self.stance, self.origin) = (stance, origin);
+        }
+        let differs = origin == Origin::File && self.stance.up.dot(stance.up) < 0.999;
+        differs.then_some(self.stance)
+    }
+
+    /// Takes the frame of an input, and says if it cannot be compared with those before.
+    pub fn frame(&mut self, name: &str, frame: Frame) {
+        if let Some(warning) = self.frames.add(name, frame) {
+            tracing::warn!("{warning}");
         }
     }
 
@@ -74,7 +86,7 @@ impl Subject {
         match told {
             Some(stance) => self.consider(stance, Origin::File),
             None => self.consider(usual, Origin::Convention),
-        }
+        };
     }
 
     pub fn count_in(&mut self, bounds: Bounds) {

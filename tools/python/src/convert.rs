@@ -221,7 +221,15 @@ impl Work {
 
     fn volume(&self, file: &Path) -> Result<volume::Volume, Error> {
         match self.load.open(file, None, &mut Vec::new())? {
-            Input::Volume(volume) => Ok(volume),
+            Input::Volume(volume) => {
+                if volume.colors.is_some() {
+                    let name = file.display();
+                    notes::add(format!(
+                        "{name}: the brightness is written, and the colours are not"
+                    ));
+                }
+                Ok(volume)
+            }
             _ => Err(wrong(format!("{} holds no volume to convert", file.display()))),
         }
     }

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use serde_json::{Map, Value, json};
 use splatkit::{
     Deadline, Error, Stop,
-    about::{About, Modality, Stance},
+    about::{About, Frame, Modality, Stance},
     bricks::{self, Bricks},
     cells::{CellKind, Cells, Place},
     container::{Finding, Severity},
@@ -147,6 +147,15 @@ fn of_mesh(mesh: &Mesh) -> Facts {
     facts.insert("materials".into(), json!(mesh.materials.len()));
     let textures = mesh.materials.iter().filter(|material| material.texture.is_some());
     facts.insert("textures".into(), json!(textures.count()));
+    let about = &mesh.about;
+    if !about.attributes.is_empty() {
+        facts.insert("color_by".into(), json!(about.attributes));
+    }
+    for (name, text) in [("layout", &about.layout), ("crs", &about.crs)] {
+        if !text.is_empty() {
+            facts.insert(name.into(), json!(text));
+        }
+    }
     stand(&mut facts, mesh.about.stance);
     facts.insert("bounds".into(), bounds(mesh.bounds()));
     facts
@@ -159,9 +168,14 @@ fn of_volume(volume: &Volume) -> Facts {
     facts.insert("spacing".into(), json!(volume.lattice.spacing().to_array()));
     facts.insert("type".into(), json!(volume.samples.type_name()));
     facts.insert("range".into(), json!(volume.range));
-    facts.insert("attributes".into(), json!(["value"]));
+    let attributes =
+        if volume.colors.is_some() { json!(["value", "color"]) } else { json!(["value"]) };
+    facts.insert("attributes".into(), attributes);
     stand(&mut facts, volume.about.stance);
     say(&mut facts, &volume.about);
+    if let Some(labels) = &volume.about.labels {
+        facts.insert("labels".into(), json!(labels.listed()));
+    }
     facts.insert("bounds".into(), bounds(Some(volume.bounds())));
     facts
 }
@@ -178,6 +192,9 @@ fn say(facts: &mut Facts, about: &About) {
     });
     if let Some(modality) = modality {
         facts.insert("modality".into(), json!(modality));
+    }
+    if about.frame == Frame::Patient {
+        facts.insert("frame".into(), json!("RAS"));
     }
     if let Some(window) = about.window {
         facts.insert("window".into(), json!(window));

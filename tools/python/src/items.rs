@@ -5,10 +5,11 @@ use crate::{
     errors::wrong,
     load::{Input, Load},
     look::Look,
+    notes,
 };
 use splatkit::{
     Deadline, Error,
-    about::Stance,
+    about::{Frame, Stance},
     bricks::Bricks,
     cells::{CellOptions, Cells},
     facet::FacetSet,
@@ -82,6 +83,9 @@ impl Items {
                     let origin = if header.is_guessed { Origin::Guess } else { Origin::File };
                     self.subject.consider(stance, origin);
                 }
+                // No other frame has this stance.
+                let is_patient = header.stance == Some(Stance::RAS);
+                self.subject.frame(&name, if is_patient { Frame::Patient } else { Frame::Own });
                 let bounds = header.bounds;
                 self.push("hierarchy", name, count, bounds, Item::Hierarchy(hierarchy));
                 Ok(())
@@ -118,8 +122,14 @@ impl Items {
         deadline: Deadline,
     ) -> Result<(), Error> {
         let mut subject = self.subject.clone();
+        subject.frame(&name, mesh.about.frame);
         match mesh.about.stance {
-            Some(stance) => subject.consider(stance, Origin::File),
+            Some(stance) => {
+                if let Some(wanted) = subject.consider(stance, Origin::File) {
+                    say_turned(&name, stance, wanted);
+                    mesh.stand(wanted);
+                }
+            }
             // A guess would not count.
             None if subject.origin >= Origin::Guess => {}
             None => {
@@ -149,8 +159,17 @@ impl Items {
         Ok(())
     }
 
-    fn add_gaussians(&mut self, name: String, set: Gaussians) {
-        self.subject.stand(set.about.stance, Stance::Y_DOWN);
+    fn add_gaussians(&mut self, name: String, mut set: Gaussians) {
+        self.subject.frame(&name, set.about.frame);
+        match set.about.stance {
+            Some(stance) => {
+                if let Some(wanted) = self.subject.consider(stance, Origin::File) {
+                    say_turned(&name, stance, wanted);
+                    set.stand(wanted);
+                }
+            }
+            None => self.subject.stand(None, Stance::Y_DOWN),
+        }
         let (count, bounds) = (set.len() as u64, set.bounds());
         self.push("gaussians", name, count, bounds, Item::Gaussians(set.into()));
     }
@@ -162,21 +181,42 @@ impl Items {
         let transfer = look.of_bricks(&name, &bricks)?;
         let count = bricks.level(0).dims.iter().product::<usize>() as u64;
         let (bounds, kernel) = (bricks.bounds(), look.kernel()?);
-        self.subject.stand(None, Stance::SURVEY);
+        self.subject.frame(&name, bricks.header().frame);
+        self.subject.stand(bricks.header().stance(), Stance::SURVEY);
         self.push("bricks", name, count, bounds, Item::Bricks(bricks, kernel, transfer));
         Ok(())
     }
 
     fn add_volume(&mut self, name: String, mut volume: Volume, look: &Look) -> Result<(), Error> {
+        if volume.colors.is_some() {
+            match look.shows_values() {
+                None => return self.add_colors(name, &volume),
+                Some(option) => notes::add(format!(
+                    "{name} has colours; {option} shows their brightness instead"
+                )),
+            }
+        }
         let transfer = look.of_volume(&name, &volume)?;
         let kernel = look.kernel()?;
         let [min, max] = volume.bounds();
         if look.sharp {
             volume = volume.sharpened(&kernel)?;
         }
+        self.subject.frame(&name, volume.about.frame);
         self.subject.stand(volume.about.stance, Stance::SURVEY);
         let (count, bounds) = (volume.len() as u64, Bounds { min, max });
         self.push("volume", name, count, bounds, Item::Volume(volume.into(), kernel, transfer));
+        Ok(())
+    }
+
+    /// Adds a volume in its own colours.
+    fn add_colors(&mut self, name: String, volume: &Volume) -> Result<(), Error> {
+        let splats = volume.colored_splats().map_err(|error| error.in_file(name.as_ref()))?;
+        let splats = splats.expect("the volume has colours");
+        self.subject.stand(volume.about.stance, Stance::SURVEY);
+        let [min, max] = volume.bounds();
+        let (count, bounds) = (volume.len() as u64, Bounds { min, max });
+        self.push("volume", name, count, bounds, Item::Radiance(splats.into()));
         Ok(())
     }
 
@@ -193,6 +233,7 @@ impl Items {
         let splats = splats.map_err(|error| error.in_file(name.as_ref()))?;
         let [min, max] = points.bounds();
         let bounds = Bounds { min, max }.union(splats.bounds());
+        self.subject.frame(&name, points.about.frame);
         self.subject.stand(points.about.stance, Stance::SURVEY);
         let item = Item::Scalar(splats.into(), transfer);
         self.push("samples", name, points.len() as u64, bounds, item);
@@ -206,6 +247,7 @@ impl Items {
         }
         let tetrahedra = cells.tetrahedra(&CellOptions::default());
         let tetrahedra = tetrahedra.map_err(|error| error.in_file(name.as_ref()))?;
+        self.subject.frame(&name, cells.about.frame);
         self.subject.stand(cells.about.stance, Stance::SURVEY);
         let (count, bounds) = (cells.len() as u64, tetrahedra.bounds());
         self.push("cells", name, count, bounds, Item::Cells(tetrahedra.into(), transfer));
@@ -271,4 +313,13 @@ impl From<Item> for Entry {
     fn from(item: Item) -> Self {
         Self::Ready(item)
     }
+}
+
+/// Says that an input is turned, because it stands otherwise than one before.
+fn say_turned(name: &str, own: Stance, scene: Stance) {
+    tracing::warn!(
+        "{name} is turned: its {} is up, and the input before has {} up",
+        own.up,
+        scene.up
+    );
 }

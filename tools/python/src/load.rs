@@ -51,6 +51,7 @@ pub struct Load {
     dataset: Option<String>,
     spacing: Option<[f64; 3]>,
     missing: Option<f64>,
+    labels: Option<PathBuf>,
     radius: Option<f64>,
     neighbours: Option<usize>,
     slopes: Option<bool>,
@@ -115,6 +116,7 @@ impl Load {
             dataset: self.dataset.clone(),
             spacing: self.spacing.map(DVec3::from_array),
             missing: self.missing,
+            labels: Vec::new(),
         }
     }
 
@@ -184,7 +186,13 @@ impl Load {
             Kind::Samples => Input::Samples(formats::read_samples(&source, &options)?),
             Kind::Cells => Input::Cells(formats::read_cells(&source, &options)?),
             Kind::Gaussians => Input::Gaussians(formats::read_gaussians(&source)?),
-            _ => Input::Volume(formats::read_volume(&source, &options)?),
+            _ => {
+                if let Some(table) = &self.labels {
+                    options.labels = formats::read_labels(table, &limits)?;
+                    read.push(table.clone());
+                }
+                Input::Volume(formats::read_volume(&source, &options)?)
+            }
         };
         read.extend(source.files());
         warn_of_holes(&path.display().to_string(), &input);

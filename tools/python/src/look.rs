@@ -178,6 +178,18 @@ impl Look {
         }
     }
 
+    /// Returns an option that shows values, if one is given. It counts more than the colours that a
+    /// volume may have.
+    pub fn shows_values(&self) -> Option<&'static str> {
+        let given = [
+            ("transfer", self.transfer.is_some()),
+            ("isosurfaces", !self.isosurfaces.is_empty()),
+            ("range", self.range.is_some()),
+            ("sharp", self.sharp),
+        ];
+        given.into_iter().find(|(_, is_given)| *is_given).map(|(option, _)| option)
+    }
+
     /// Returns the transfer function of a volume.
     pub fn of_volume(&self, name: &str, volume: &Volume) -> Result<TransferFunction, Error> {
         let shown = shown(name, volume.range, volume.bounds());

@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 use splatkit::{
     Deadline, Error, Stop,
-    about::{About, Modality, Stance},
+    about::{About, Frame, Modality, Stance},
     gaussians::{Gaussians, harmonics},
     glam::{DMat3, DVec3, Quat, Vec3},
     interaction::Effort,
@@ -74,10 +74,12 @@ impl Told {
             }
         };
         about.stance = match self.frame.as_deref() {
-            Some("lps") => Some(Stance::LPS),
-            Some("ras") => Some(Stance::RAS),
+            Some("lps" | "ras") => Some(Stance::RAS),
             _ => None,
         };
+        if about.stance.is_some() {
+            about.frame = Frame::Patient;
+        }
         if let Some(up) = self.up {
             let up = DVec3::from_array(up).try_normalize();
             let up = up.ok_or_else(|| wrong("up is a direction with a length above 0"))?;
@@ -91,7 +93,12 @@ impl Told {
         let axes =
             self.axes.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array_2d(&rows).transpose());
         let origin = self.origin.map_or(DVec3::ZERO, DVec3::from_array);
-        let mut lattice = Lattice::cartesian(dims, origin, axes * spacing);
+        // A patient's world is RAS, whatever the frame of the arrays is.
+        let turn = match self.frame.as_deref() {
+            Some("lps") => DMat3::from_diagonal(DVec3::new(-1.0, -1.0, 1.0)),
+            _ => DMat3::IDENTITY,
+        };
+        let mut lattice = Lattice::cartesian(dims, turn * origin, turn * axes * spacing);
         if let Some(coordinates) = &self.coordinates {
             lattice.arrangement = Arrangement::Rectilinear(Arc::new(coordinates.clone()));
         }

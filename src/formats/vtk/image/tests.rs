@@ -132,6 +132,32 @@ impl Style {
     }
 }
 
+/// A file of two points with one array of three components.
+fn of_three(kind: &str, name: &str, numbers: &str) -> Volume {
+    let file = format!(
+        "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0 0 0 0\"><Piece Extent=\"0 1 0 \
+         0 0 0\"><PointData><DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"3\" \
+         format=\"ascii\">{numbers}</DataArray></PointData></Piece></ImageData></VTKFile>"
+    );
+    let folder = Folder::new();
+    read_with(&folder.write("a.vti", file), read).unwrap()
+}
+
+#[test]
+fn bytes_and_numbers_called_so_are_colours() {
+    let expected = [[200, 40, 40, 255], [0, 0, 255, 255]];
+    let bytes = of_three("UInt8", "scan", "200 40 40 0 0 255");
+    assert_eq!(bytes.colors.as_deref().unwrap(), expected);
+    assert_eq!((bytes.value(0), bytes.value(1)), (88.0, 29.0));
+    let floats = of_three("Float32", "RGB", "0.7843 0.1569 0.1569 0 0 1");
+    assert_eq!(floats.colors.as_deref().unwrap(), expected);
+    let wide = of_three("UInt16", "rgb_16", "51400 10280 10280 0 0 65535");
+    assert_eq!(wide.colors.as_deref().unwrap(), expected);
+    let vectors = of_three("Float32", "velocity", "3 4 0 0 0 1");
+    assert!(vectors.colors.is_none());
+    assert_eq!(vectors.value(0), 5.0);
+}
+
 fn styles() -> Vec<Style> {
     let mut styles = Vec::new();
     for (format, appended) in

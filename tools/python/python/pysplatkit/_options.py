@@ -102,6 +102,8 @@ class Reading(TypedDict, total=False):
     spacing: float | Vector
     #: A value that stands for “no value”.
     missing: float
+    #: Label maps: a table with names and colours, of ITK-SNAP, FreeSurfer, 3D Slicer or with columns.
+    labels: str
     #: Scattered samples: one radius for all, in world units.
     radius: float
     #: Scattered samples: the number of neighbours that kernels are made from, 4 to 64.

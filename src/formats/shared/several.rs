@@ -1,0 +1,96 @@
+//! Which of several volumes of a file is read: the one rule of all formats.
+//!
+//! The caller chooses by number, and the first is the default. Nothing is chosen in silence: a
+//! warning says how many there are and which flag reads another.
+
+use crate::{Result, formats::ReadOptions, input::Source};
+
+/// Returns the number of the time to read of a file with `count` of them, from 0: the one that
+/// [`ReadOptions::time`] names, else the first, with a warning if there are several. `place` is
+/// where the file says how many there are.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a time that the file does not have.
+pub(crate) fn time(
+    source: &Source,
+    place: &str,
+    count: u64,
+    options: &ReadOptions,
+) -> Result<usize> {
+    of_times(source, place, count, options, "times")
+}
+
+/// As [`time`], of what the file calls `names`: “times”, “members”, “times or echoes”.
+///
+/// # Errors
+/// As [`time`].
+pub(crate) fn of_times(
+    source: &Source,
+    place: &str,
+    count: u64,
+    options: &ReadOptions,
+    names: &str,
+) -> Result<usize> {
+    let time = options.time.unwrap_or(0);
+    if (time as u64) < count {
+        warn_of_times(source, count, options, names);
+        return Ok(time);
+    }
+    let are = if count == 1 { names.strip_suffix('s').unwrap_or(names) } else { names };
+    let message = format!("has {count} {are}, but number {time} was asked for");
+    let hint = match count {
+        0 | 1 => "leave out --time".into(),
+        _ => format!("choose a time from 0 to {}", count - 1),
+    };
+    Err(source.error(place, message).hint(hint))
+}
+
+/// Says that the first of several times is shown, unless the caller has named one. For readers that
+/// choose a time more than once.
+pub(crate) fn warn_of_times(source: &Source, count: u64, options: &ReadOptions, names: &str) {
+    if count > 1 && options.time.is_none() {
+        let path = source.path.display();
+        tracing::warn!("{path}: shows the first of {count} {names}; --time 1 shows the second");
+    }
+}
+
+/// Says that the first of several channels is shown.
+pub(crate) fn warn_of_channels(source: &Source, count: usize) {
+    let path = source.path.display();
+    tracing::warn!(
+        "{path}: shows the first of {count} channels; --scalar channel:1 shows the second"
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::{Limits, testing::warnings_of};
+    use std::path::Path;
+
+    fn chosen(count: u64, wanted: Option<usize>) -> (Result<usize>, Vec<String>) {
+        let limits = Limits::default();
+        let source = Source::from_bytes(Path::new("a"), &[], &limits).unwrap();
+        let options = ReadOptions { time: wanted, ..ReadOptions::default() };
+        warnings_of(|| time(&source, "header", count, &options))
+    }
+
+    #[test]
+    fn the_first_of_several_is_said_to_be_the_first() {
+        let (time, words) = chosen(5, None);
+        assert_eq!(time.unwrap(), 0);
+        assert_eq!(words, ["a: shows the first of 5 times; --time 1 shows the second"]);
+        let (time, words) = chosen(5, Some(4));
+        assert_eq!((time.unwrap(), words.len()), (4, 0));
+        let (time, words) = chosen(1, None);
+        assert_eq!((time.unwrap(), words.len()), (0, 0));
+    }
+
+    #[test]
+    fn a_time_that_is_missing_is_an_error_with_those_that_are_there() {
+        let error = chosen(5, Some(5)).0.unwrap_err().to_string();
+        assert!(error.contains("has 5 times, but number 5 was asked for"), "{error}");
+        let error = chosen(1, Some(1)).0.unwrap_err().to_string();
+        assert!(error.contains("has 1 time, but number 1 was asked for"), "{error}");
+    }
+}
