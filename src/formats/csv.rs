@@ -31,14 +31,15 @@ const COVARIANCE: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 /// covariance in that order.
 ///
 /// Samples without a value are left out: those whose value is empty, `nan`, `NA`, `null`, `none`,
-/// `-`, not finite in 32 bits, or [`ReadOptions::missing`].
+/// `-`, not finite in 32 bits, or [`ReadOptions::missing`]. So are those that are not at finite
+/// coordinates.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) with the line, for other columns, lines with another
-/// number of columns, words that are not numbers, and positions that are not finite;
+/// number of columns, and words that are not numbers;
 /// [`Error::Limit`](crate::Error::Limit) for more lines than the limits allow points.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Points> {
-    let text = Text::of(source, |_, _| Ok(false))?;
+    let text = Text::of(source)?;
     let layout = match &text.names {
         Some(names) => Layout::named(source, &text, names, options.scalar.as_deref())?,
         None => Layout::plain(source, text.width)?,
@@ -69,7 +70,7 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Points> {
 /// # Errors
 /// Those of [`read`].
 pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
-    let text = Text::of(source, |_, _| Ok(false))?;
+    let text = Text::of(source)?;
     let Some(names) = &text.names else { return Ok(Vec::new()) };
     let candidates = candidates(&text, names);
     let drawn = Layout::named(source, &text, names, options.scalar.as_deref()).ok();
@@ -172,12 +173,11 @@ impl Layout {
     }
 
     fn want(&self, column: usize) -> Want {
-        let is_geometry = self.position.contains(&column)
-            || self.radius == Some(column)
+        let is_kernel = self.radius == Some(column)
             || self.covariance.is_some_and(|terms| terms.contains(&column));
-        if is_geometry {
+        if is_kernel {
             Want::Numbers
-        } else if self.value == column {
+        } else if self.value == column || self.position.contains(&column) {
             Want::Values
         } else {
             Want::Nothing
@@ -251,7 +251,7 @@ mod tests {
             ("x,y,z,name\n1,2,3,four", Some("name"), "not numbers"),
             ("x,y,z,v\n", None, "no samples"),
             ("1 2 3 nan\n\n5 6 7 inf", None, "none of the 2 samples has a value"),
-            ("1 2 3 4\n5 inf 7 8", None, "line 2: number 2 is inf"),
+            ("1 inf 3 4\n5 inf 7 8", None, "none is at finite coordinates"),
             ("1 2 3 4\n5 6 7", None, "line 2: has 3 columns, but the first line has 4"),
             ("1 2 3 4\n5 6 7 8 9", None, "line 2: has 5 columns"),
             ("1 2 3 4\n5 6 seven 8", None, "line 2: “seven” is not a number"),

@@ -51,7 +51,7 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     let has_values = named.transpose()?.is_some();
     // The crate asserts on numbers of the file and clamps by them, which may panic.
     let cloud = isolated(source, "scans", || read_scans(source, has_values))?;
-    cloud.into_mesh(source, |point| format!("point {point}"))
+    cloud.into_mesh(source)
 }
 
 /// Reads the points of all scans.
@@ -142,11 +142,7 @@ impl<'a> Points<'a> {
     /// Adds a point if it has a valid position.
     fn add(&mut self, point: &Point) -> Result<()> {
         let CartesianCoordinate::Valid { x, y, z } = point.cartesian else { return Ok(()) };
-        let position = DVec3::new(x, y, z);
-        if !position.is_finite() {
-            return Ok(());
-        }
-        self.positions.push(position)?;
+        self.positions.push(DVec3::new(x, y, z))?;
         let color = point.color.as_ref().map(|color| [color.red, color.green, color.blue]);
         self.has_colors |= color.is_some();
         // Points without a colour are white if others have colours.
@@ -161,6 +157,9 @@ impl<'a> Points<'a> {
         let colors =
             if self.has_colors { self.colors.into_inner() } else { greys(&self.intensities) };
         let mut about = About::default();
+        if self.intensities.iter().any(|value| value.is_finite()) {
+            about.attributes = vec!["intensity".into()];
+        }
         if has_values {
             about.name = "intensity".into();
         }

@@ -90,8 +90,9 @@ pub(super) trait Form: Send + Sync {
     /// Returns the numbers by which colours are scaled, as [`survey`](Self::survey) found them.
     fn coloring(&self) -> Coloring;
 
-    /// Takes the numbers that a survey of the same file found.
-    fn recolor(&mut self, coloring: Coloring);
+    /// Takes what a survey of the same file found: the numbers by which colours are scaled, and the
+    /// number of points.
+    fn resume(&mut self, coloring: Coloring, points: u64);
 
     /// Returns the points of a piece, relative to an origin.
     fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>>;

@@ -15,6 +15,7 @@ mod tests;
 
 pub use gaussians::{holds_gaussians, read_gaussians, write_gaussians};
 
+use super::shared::unplaced;
 use crate::{
     Result,
     about::Stance,
@@ -26,13 +27,19 @@ use buffers::Buffers;
 use gaussians::Marks;
 use glam::{DMat3, DMat4, DVec3, Mat2, Vec2, Vec3};
 use materials::{Alpha, Base};
-use std::{collections::HashMap, ops::Range, sync::Arc};
+use std::{
+    collections::{BTreeSet, HashMap},
+    ops::Range,
+    sync::Arc,
+};
 
 /// Extensions that a file may require, by prefix: those that are read (among them
 /// `KHR_materials_pbrSpecularGlossiness`), those that only change the look of a material in ways
 /// that splats do not show, and those of Gaussians, which are checked at each primitive.
-const KNOWN: [&str; 5] = [
+const KNOWN: [&str; 7] = [
     "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",
+    "EXT_texture_webp",
     "KHR_texture_transform",
     "KHR_lights_punctual",
     "KHR_materials_",
@@ -49,7 +56,8 @@ struct Opened<'a> {
 
 /// Reads a glTF or GLB file: the triangles of the default scene in its world frame, or its points
 /// if it has no triangles. Reads vertex colours, base colours and textures, with opacities as the
-/// alpha modes require. Skins, morph targets and animations are not applied.
+/// alpha modes require, and instances (`EXT_mesh_gpu_instancing`). Materials may be unlit. What is
+/// not drawn, such as skins and animations, is named in a warning.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for malformed JSON, indices and ranges outside their
@@ -75,8 +83,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
         mesh: Mesh::default(),
         material_of: HashMap::new(),
         pictures: HashMap::new(),
+        idle: BTreeSet::new(),
     };
-    let meshes = nodes::meshes(source, &root)?;
+    let meshes = nodes::meshes(source, &root, &buffers)?;
+    builder.find_idle();
     builder.make_room(&meshes)?;
     for (transform, mesh) in meshes {
         builder.add_mesh(transform, mesh)?;
@@ -100,10 +110,7 @@ fn open<'a>(source: &'a Source) -> Result<Opened<'a>> {
         if !KNOWN.iter().any(|known| extension.starts_with(known)) {
             return Err(source
                 .error("extensionsRequired", format!("the extension {extension} is not supported"))
-                .hint(
-                    "convert the file without compression, for example with gltf-transform or \
-                       gltfpack",
-                ));
+                .hint(materials::remedy(extension)));
         }
     }
     Ok(Opened { root, text, binary })
@@ -121,6 +128,8 @@ fn tree_bytes(text: &[u8]) -> u64 {
         size_of::<json::buffer::View>(),
         size_of::<json::Image>(),
         size_of::<json::animation::Channel>(),
+        // A map of an extension that the crate does not know: a node of a tree.
+        11 * (size_of::<String>() + size_of::<serde_json::Value>()) + 64,
     ];
     let object = largest.into_iter().max().unwrap_or_default() as u64;
     let count = |letter: u8| text.iter().filter(|&&b| b == letter).count() as u64;
@@ -176,6 +185,8 @@ struct Builder<'a> {
     material_of: HashMap<Option<usize>, u32>,
     /// Decoded images, by image and alpha mode.
     pictures: HashMap<(usize, Alpha), Arc<Texture>>,
+    /// What the file says and the mesh does not, to be named in one warning.
+    idle: BTreeSet<String>,
 }
 
 impl Builder<'_> {
@@ -217,6 +228,32 @@ impl Builder<'_> {
         self.source.spend("the size of the scene in bytes", bytes)
     }
 
+    /// Finds what the whole file says and the mesh does not.
+    fn find_idle(&mut self) {
+        let root = self.root;
+        let morphs =
+            |mesh: &json::Mesh| mesh.primitives.iter().any(|primitive| primitive.targets.is_some());
+        let parts = [
+            (!root.animations.is_empty(), "animations"),
+            (!root.skins.is_empty(), "skins"),
+            (root.meshes.iter().any(morphs), "morph targets"),
+        ];
+        let parts = parts.into_iter().filter(|(is_there, _)| *is_there);
+        self.idle.extend(parts.map(|(_, name)| name.to_owned()));
+        let look = |name: &&String| {
+            name.starts_with("KHR_materials_")
+                && !matches!(
+                    name.as_str(),
+                    "KHR_materials_unlit"
+                        | "KHR_materials_pbrSpecularGlossiness"
+                        | "KHR_materials_emissive_strength"
+                        | "KHR_materials_ior"
+                        | "KHR_materials_specular"
+                )
+        };
+        self.idle.extend(root.extensions_used.iter().filter(look).cloned());
+    }
+
     fn add_mesh(&mut self, transform: DMat4, index: usize) -> Result<()> {
         let root = self.root;
         let Some(mesh) = root.meshes.get(index) else {
@@ -250,6 +287,17 @@ impl Builder<'_> {
             return Ok(());
         }
         let Some(position) = attribute(primitive, Semantic::Positions) else { return Ok(()) };
+        let draco = "KHR_draco_mesh_compression";
+        let extensions = primitive.extensions.as_ref();
+        let is_packed = extensions.is_some_and(|own| own.others.contains_key(draco));
+        let has_data =
+            |accessor: &json::Accessor| accessor.buffer_view.is_some() || accessor.sparse.is_some();
+        if is_packed && !self.root.accessors.get(position).is_some_and(has_data) {
+            return Err(self
+                .source
+                .error(place, format!("is compressed by {draco}, which is not supported"))
+                .hint(materials::remedy(draco)));
+        }
         let vertices = self.add_positions(transform, position, place)?;
         let base = self.base(primitive.material.map(|index| index.value()), place)?;
         let part = Part { primitive, place, transform, vertices };
@@ -378,13 +426,14 @@ impl Builder<'_> {
                 self.source.path.display()
             );
         }
+        if !self.idle.is_empty() {
+            let idle: Vec<&str> = self.idle.iter().map(String::as_str).collect();
+            let file = self.source.path.display();
+            tracing::warn!("{file}: drawn without its {}", idle.join(", "));
+        }
         let positions = &self.positions;
-        (self.mesh.origin, self.mesh.positions) = positions::settle(
-            self.source,
-            count,
-            |i| positions[i],
-            |i| format!("vertex {i} of the scene"),
-        )?;
+        (self.mesh.origin, self.mesh.positions) =
+            positions::settle_some(self.source, count, |i| positions[i])?;
         if !self.mesh.normals.is_empty() {
             self.mesh.normals.resize(count, Vec3::ZERO);
         }
@@ -395,6 +444,7 @@ impl Builder<'_> {
             self.mesh.uvs.resize(count, Vec2::ZERO);
         }
         self.mesh.about.stance = Some(Stance::Y_UP);
+        unplaced::leave_out(self.source, &mut self.mesh)?;
         Ok(self.mesh)
     }
 }

@@ -42,8 +42,8 @@ impl Kind {
     /// clouds in these cases, and samples in all others:
     /// - The first line names a colour or a normal but no `value` or `scalar`.
     /// - The first line names nothing but `x`, `y`, `z`.
-    /// - The first line has no names and 3, 6, 7 or 9 numbers, or one number: the count of points
-    ///   that `.pts` files begin with.
+    /// - The first line has no names and 3, 6 to 9, or 11 and more numbers, or one number: the
+    ///   count of points that `.pts` files begin with.
     ///
     /// `.xyzv` files are samples.
     ///

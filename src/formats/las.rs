@@ -6,6 +6,8 @@
 //! present. The `laz` crate unpacks the chunks of points (`packed`).
 
 mod attribute;
+mod describe;
+mod extra;
 mod packed;
 mod pieces;
 #[cfg(test)]
@@ -32,12 +34,13 @@ pub fn read(source: &Source) -> Result<Mesh> {
 }
 
 /// As [`read`], with the values of the attribute that `scalar` names: `intensity`,
-/// `classification`, `return_number`, …
+/// `classification`, `return_number`, …, and extra bytes by their names.
 ///
 /// # Errors
 /// Those of [`read`]; [`Error::Input`](crate::Error::Input) if the points have no such attribute.
 pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     let mut header = Header::read(source)?;
+    let extras = describe::extras(source, &header);
     header.choose(source, scalar)?;
     let points =
         if header.packed { packed::read(source, &header)? } else { plain(source, &header)? };
@@ -56,12 +59,15 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
         cloud.colors =
             greys(&points.par_iter().map(|p| f32::from(p.intensity)).collect::<Vec<f32>>());
     }
-    if let Some(attribute) = header.attribute {
+    if let Some(attribute) = &header.attribute {
         cloud.values = points.par_iter().map(|point| point.value).collect();
         cloud.about = attribute.about();
     }
+    cloud.about.attributes = attribute::names(&header, &extras);
+    cloud.about.crs = describe::crs(source, &header);
+    cloud.about.layout = describe::layout(&header);
     cloud.about.stance = Some(Stance::SURVEY);
-    cloud.into_mesh(source, |point| format!("point {point}"))
+    cloud.into_mesh(source)
 }
 
 fn plain(source: &Source, header: &Header) -> Result<Vec<Point>> {
@@ -106,6 +112,8 @@ struct Header {
     /// The point format, 0 to 10.
     format: u8,
     packed: bool,
+    /// The minor version: 0 to 4.
+    minor: u8,
     scale: DVec3,
     offset: DVec3,
     /// Offset of the colour in a point.
@@ -165,6 +173,7 @@ impl Header {
             size,
             format,
             packed,
+            minor,
             scale,
             offset,
             color_at: attribute::color_at(format),
@@ -219,6 +228,7 @@ impl Header {
             intensity: short(12),
             value: self
                 .attribute
+                .as_ref()
                 .map_or(f32::NAN, |attribute| attribute.value(self.format, record) as f32),
         })
     }

@@ -23,6 +23,7 @@ pub mod gltf;
 #[cfg(feature = "hdf5")]
 pub mod hdf5;
 mod kind;
+mod label_table;
 #[cfg(feature = "las")]
 pub mod las;
 mod load;
@@ -35,6 +36,7 @@ pub mod npz;
 pub mod nrrd;
 #[cfg(feature = "obj")]
 pub mod obj;
+pub mod off;
 mod options;
 pub mod pcd;
 #[cfg(feature = "ply")]
@@ -65,6 +67,7 @@ pub use form::Counts;
 pub(crate) use form::StreamPoint;
 pub use format::{Content, Format, Holding};
 pub use kind::Kind;
+pub use label_table::read_labels;
 pub use load::{
     load_cells, load_gaussians, load_mesh, load_samples, load_volume, read_cells, read_gaussians,
     read_mesh, read_samples, read_volume,

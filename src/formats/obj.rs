@@ -10,10 +10,10 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-use super::shared::polygon;
+use super::shared::{polygon, unplaced};
 use crate::{
     Error, Result,
-    input::{Source, copy, isolate::isolated, positions},
+    input::{Source, copy, isolate::isolated, positions, text},
     surface::{Material, Mesh},
 };
 use glam::{DVec3, Vec2, Vec3};
@@ -26,17 +26,20 @@ use survey::Survey;
 /// only is a point cloud. Lines and points are skipped.
 ///
 /// # Errors
-/// [`Error::Input`] for malformed numbers; for positions, and texture coordinates in pictures, that
-/// are not finite; for indices without a vertex; and for references to files outside the file's
-/// folder. Missing material files and pictures are warnings.
+/// [`Error::Input`] for malformed numbers; for texture coordinates in pictures that are not finite;
+/// for indices without a vertex; and for references to files outside the file's folder. Missing
+/// material files, pictures, texture coordinates and normals, and damaged lines of materials are
+/// warnings. Vertices that are not at finite coordinates are left out, with the faces that use
+/// them.
 pub fn read(source: &Source) -> Result<Mesh> {
     source.room::<u8>("the text", source.bytes().len())?;
-    let text = join_lines(source, copy::lossy(source.bytes()))?;
+    text::refuse_utf16(source)?;
+    let text = join_lines(source, copy::lossy(text::without_mark(source.bytes())))?;
     let survey = Survey::of(source, &text)?;
     if survey.faces == 0 {
         return read_cloud(source, &text, &survey);
     }
-    let (models, materials) = statements(source, &text, &survey)?;
+    let (models, materials, shifts) = statements(source, &text, &survey)?;
     let has_materials = !materials.is_empty();
     let textured: Vec<bool> = materials.iter().map(|material| material.texture.is_some()).collect();
     let mut mesh = Mesh { materials, ..Mesh::default() };
@@ -44,7 +47,11 @@ pub fn read(source: &Source) -> Result<Mesh> {
     for model in models {
         let id = model.mesh.material_id;
         let with_uv = id.is_some_and(|id| textured.get(id) == Some(&true));
+        let first = corners.uvs.len();
         corners.add(source, &text, model.mesh, with_uv, textured.contains(&true))?;
+        if let Some(shift) = id.and_then(|id| shifts.get(id)).filter(|_| with_uv) {
+            corners.uvs[first..].iter_mut().for_each(|uv| *uv = shift.of(*uv));
+        }
         if has_materials {
             let id = id.unwrap_or(mesh.materials.len());
             if id == mesh.materials.len() {
@@ -56,28 +63,33 @@ pub fn read(source: &Source) -> Result<Mesh> {
     source.check_points("the number of vertices", corners.positions.len() as u64)?;
     source.check_points("the number of triangles", corners.triangles.len() as u64)?;
     if corners.triangles.is_empty() {
-        return Err(source.error("file", "has faces, but none with three or more corners"));
+        let message = if survey.has_unplaced() {
+            "each face uses a vertex that is not at finite coordinates"
+        } else {
+            "has faces, but none with three or more corners"
+        };
+        return Err(source.error("file", message));
     }
     let positions = &corners.positions;
-    (mesh.origin, mesh.positions) = positions::settle(
-        source,
-        positions.len(),
-        |i| positions[i],
-        |i| format!("vertex {i} of the faces"),
-    )?;
+    (mesh.origin, mesh.positions) =
+        positions::settle_some(source, positions.len(), |i| positions[i])?;
     mesh.normals = corners.normals;
     mesh.uvs = corners.uvs;
     mesh.colors = to_bytes(&corners.colors);
     mesh.triangles = corners.triangles;
+    // Vertices that no face uses are not among those of the mesh.
+    unplaced::remove(source, &mut mesh)?;
+    survey.warn_of_unplaced(source);
     Ok(mesh)
 }
 
-/// Parses the statements. Returns the models, and the materials with their pictures.
+/// Parses the statements. Returns the models, the materials with their pictures, and how each
+/// material shifts texture coordinates.
 fn statements(
     source: &Source,
     text: &str,
     survey: &Survey,
-) -> Result<(Vec<tobj::Model>, Vec<Material>)> {
+) -> Result<(Vec<tobj::Model>, Vec<Material>, Vec<material::Shift>)> {
     let library = RefCell::new(material::Library::new(source));
     let failure: RefCell<Option<Error>> = RefCell::new(None);
     let mut feed = survey.feed(text);
@@ -105,12 +117,14 @@ fn statements(
     let mut library = library.into_inner();
     let materials = materials.unwrap_or_default();
     let materials = materials.iter().map(|material| library.finish(material));
-    Ok((models, materials.collect::<Result<_>>()?))
+    let (materials, shifts) = materials.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+    library.warn();
+    Ok((models, materials, shifts))
 }
 
 /// The material of faces that name no existing material.
 fn neutral() -> Material {
-    Material { name: "none".into(), color: [0.8, 0.8, 0.8, 1.0], texture: None }
+    Material { name: "none".into(), color: [0.8, 0.8, 0.8, 1.0], ..Material::default() }
 }
 
 /// Joins lines that end with a backslash.
@@ -238,20 +252,21 @@ fn to_bytes(colors: &[[f64; 3]]) -> Vec<[u8; 4]> {
 /// Reads vertices without faces, which tobj does not return.
 fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
     let mut mesh = Mesh::default();
-    let mut points: Vec<(DVec3, usize)> = Vec::new();
+    let mut points: Vec<DVec3> = Vec::new();
     let mut colors: Vec<[f64; 3]> = Vec::new();
     for (number, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();
         if words.next() != Some("v") {
             continue;
         }
-        let values: Vec<f64> = words.take(6).map_while(|word| word.parse().ok()).collect();
+        let parsed = |word: &str| copy::float(word.as_bytes());
+        let values: Vec<f64> = words.take(6).map_while(parsed).collect();
         if values.len() < 3 {
             return Err(
                 source.error(format!("line {}", number + 1), "a vertex needs three numbers")
             );
         }
-        points.push((DVec3::from_slice(&values), number + 1));
+        points.push(DVec3::from_slice(&values));
         if survey.colors && values.len() >= 6 {
             colors.push([values[3], values[4], values[5]]);
         }
@@ -262,21 +277,15 @@ fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
     // Vertices come before faces, so a mesh that is cut within its vertices looks like a point
     // cloud, except for its last line.
     if !source.bytes().ends_with(b"\n") {
-        return Err(source
-            .error(
-                format!("byte {}", source.bytes().len()),
-                "the file ends within a line, before any face: it is cut",
-            )
-            .hint("if this is a whole point cloud, end its last line with a line break"));
+        let place = format!("byte {}", source.bytes().len());
+        let message = "the file ends within a line and has no faces: it may be a mesh that is cut";
+        let hint = "end the last line with a line break if these are points that are whole";
+        return Err(source.error(place, message).hint(hint));
     }
-    (mesh.origin, mesh.positions) = positions::settle(
-        source,
-        points.len(),
-        |i| points[i].0,
-        |i| format!("line {}", points[i].1),
-    )?;
+    (mesh.origin, mesh.positions) = positions::settle_some(source, points.len(), |i| points[i])?;
     if colors.len() == points.len() {
         mesh.colors = to_bytes(&colors);
     }
+    unplaced::leave_out(source, &mut mesh)?;
     Ok(mesh)
 }

@@ -41,8 +41,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
 pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     let header = header::read(source)?;
     let count = source.check_points("the number of points", header.points)?;
-    let find =
-        |names: &[&str]| header.fields.iter().find(|field| names.contains(&field.name.as_str()));
+    let find = |names: &[&str]| {
+        let is = |field: &&Field| names.iter().any(|name| field.name.eq_ignore_ascii_case(name));
+        header.fields.iter().find(is)
+    };
     let triple = |names: [&[&str]; 3]| {
         let [a, b, c] = names.map(find);
         Some([a?, b?, c?])
@@ -60,12 +62,7 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     let three = |row: usize, fields: [&Field; 3]| {
         DVec3::from_array(fields.map(|field| rows.number(row, field)))
     };
-    let kept: Vec<usize> =
-        (0..count).into_par_iter().filter(|&row| three(row, position).is_finite()).collect();
-    if kept.len() < count {
-        tracing::info!(points = count - kept.len(), "points without a position are left out");
-    }
-    let each = || kept.par_iter().copied();
+    let each = || (0..count).into_par_iter();
     let normals =
         normal.map(|fields| each().map(|row| three(row, fields).as_vec3()).collect::<Vec<Vec3>>());
     let colors = color.map(|field| {
@@ -78,14 +75,21 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
         positions: each().map(|row| three(row, position)).collect(),
         normals: normals.unwrap_or_default(),
         colors: colors.unwrap_or_default(),
-        sensors: sensor.map(|place| (place, 0..kept.len())).into_iter().collect(),
+        sensors: sensor.map(|place| (place, 0..count)).into_iter().collect(),
         values: values.unwrap_or_default(),
         about: About {
+            attributes: {
+                let known = [position, normal.unwrap_or(position)].concat();
+                let known =
+                    |field: &Field| known.iter().chain(&color).any(|own| std::ptr::eq(*own, field));
+                let free = header.fields.iter().filter(|field| !known(field) && field.name != "_");
+                free.map(|field| field.name.clone()).collect()
+            },
             name: value.map_or(String::new(), |field| field.name.clone()),
             ..About::default()
         },
     };
-    cloud.into_mesh(source, |point| format!("point {}", kept[point]))
+    cloud.into_mesh(source)
 }
 
 /// Where the numbers are.
@@ -152,7 +156,7 @@ impl<'a> Rows<'a> {
         for (number, line) in (header.lines + 1..).zip(lines_of(data)) {
             let before = numbers.len();
             for word in line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()) {
-                let value: f64 = copy::number(word).ok_or_else(|| {
+                let value: f64 = copy::float(word).ok_or_else(|| {
                     let shown = copy::excerpt(word);
                     source.error(format!("line {number}"), format!("“{shown}” is not a number"))
                 })?;

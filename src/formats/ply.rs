@@ -19,7 +19,7 @@ mod write;
 
 use super::{
     ReadOptions,
-    shared::{holes::is_hole, texture},
+    shared::{brightness::Brightness, holes::is_hole, texture, unplaced},
 };
 use crate::{
     Result,
@@ -48,11 +48,12 @@ const CHUNK: usize = 1 << 14;
 /// (`texcoord`, with a `texnumber`). Colours are bytes, 16-bit numbers or fractions of 1. In wider
 /// types, they are bytes if the largest value of the file shows it. The property of the vertices
 /// that [`ReadOptions::scalar`] names becomes the mesh's values. Of trained Gaussians, the centres
-/// are read as points.
+/// are read as points. Vertices that are not at finite coordinates are left out, with the faces
+/// that use them.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed header, a file that ends before its last
-/// row, positions that are not finite, face indices without a vertex, and compressed Gaussians;
+/// row, face indices without a vertex, and compressed Gaussians;
 /// [`Error::Limit`](crate::Error::Limit) for more vertices or faces than the limits allow.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     let header = header::read(source)?;
@@ -77,6 +78,7 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
             read_vertices(source, element, &rows, &mut mesh)?;
             read_values(source, element, &rows, options, &mut mesh)?;
         } else if is_face {
+            warn_of_face_colors(source, element);
             // Faces are read last, because their vertices may come after them.
             faces.push((element, rows));
         }
@@ -92,8 +94,24 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     }
     let of_corners = all.have_uvs();
     all.give(source, &mut mesh)?;
-    if header.textures.is_empty() || mesh.triangles.is_empty() {
-        return Ok(mesh);
+    if let Some(element) = vertices {
+        mesh.about.attributes = samples::attributes(element);
+    }
+    give_textures(source, header.textures, of_corners, &mut mesh)?;
+    unplaced::leave_out(source, &mut mesh)?;
+    Ok(mesh)
+}
+
+/// Gives the mesh the pictures that the header names. `of_corners`: faces have texture coordinates
+/// for their corners, and the number of their picture.
+fn give_textures(
+    source: &Source,
+    textures: Vec<String>,
+    of_corners: bool,
+    mesh: &mut Mesh,
+) -> Result<()> {
+    if textures.is_empty() || mesh.triangles.is_empty() {
+        return Ok(());
     }
     if mesh.uvs.is_empty() {
         let file = source.path.display();
@@ -101,23 +119,42 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
             "{file}: names a picture, but neither vertices nor faces have texture coordinates; \
              drawn without it"
         );
-        return Ok(mesh);
+        return Ok(());
     }
     // Vertices added by splitting come after those of the file's rows.
     if let Some(vertex) = mesh.uvs.par_iter().position_first(|uv| !uv.is_finite()) {
         return Err(super::uv_error(source, format!("vertex {vertex}"), mesh.uvs[vertex]));
     }
     // Texture coordinates of vertices refer to the first picture.
-    let shown = if of_corners { header.textures.len() } else { 1 };
-    for name in header.textures.into_iter().take(shown) {
+    let shown = if of_corners { textures.len() } else { 1 };
+    if textures.len() > shown {
+        tracing::warn!(
+            "{}: names {} pictures, of which vertices can have coordinates in the first only",
+            source.path.display(),
+            textures.len()
+        );
+    }
+    for name in textures.into_iter().take(shown) {
         let texture = texture::read_reference(source, "comment TextureFile", &name)?;
-        mesh.materials.push(Material { name, color: [1.0; 4], texture });
+        mesh.materials.push(Material { name, color: [1.0; 4], texture, unlit: false });
     }
     if !of_corners {
         source.room::<u32>("the materials of the triangles", mesh.triangles.len())?;
         mesh.triangle_materials = vec![0; mesh.triangles.len()];
     }
-    Ok(mesh)
+    Ok(())
+}
+
+/// Says that colours of faces are not used.
+fn warn_of_face_colors(source: &Source, element: &Element) {
+    if element.count > 0 && ROLES[COLOR..ALPHA].iter().all(|names| element.column(names).is_some())
+    {
+        tracing::warn!(
+            "{}: colours of faces are not drawn; give them to the vertices, in MeshLab by \
+             “Transfer Color: Face to Vertex”",
+            source.path.display()
+        );
+    }
 }
 
 /// Names of the vertex columns that are read. The constants below give their indices.
@@ -151,7 +188,7 @@ fn read_vertices(source: &Source, element: &Element, rows: &Rows, mesh: &mut Mes
         );
     }
     let table = Table::read(source, element, rows, &columns)?;
-    fill(source, element, rows, &columns, |row, role| table.value(row, role), mesh)
+    fill(source, element, &columns, |row, role| table.value(row, role), mesh)
 }
 
 /// Returns the column of the property of a vertex that a user names.
@@ -179,7 +216,6 @@ fn read_values(
 fn fill(
     source: &Source,
     element: &Element,
-    rows: &Rows,
     columns: &[Option<usize>; ROLES.len()],
     value: impl Fn(usize, usize) -> f64 + Sync,
     mesh: &mut Mesh,
@@ -187,8 +223,7 @@ fn fill(
     let count = element.count;
     let position =
         |row| DVec3::new(value(row, POSITION), value(row, POSITION + 1), value(row, POSITION + 2));
-    (mesh.origin, mesh.positions) =
-        positions::settle(source, count, position, |row| rows.place(source, element, row))?;
+    (mesh.origin, mesh.positions) = positions::settle_some(source, count, position)?;
     let has = |from: usize, number: usize| columns[from..from + number].iter().all(Option::is_some);
     if has(NORMAL, 3) {
         source.room::<Vec3>("the normals", count)?;
@@ -201,12 +236,11 @@ fn fill(
         let channel = |row, channel: usize| {
             if kinds[channel].is_some() { value(row, COLOR + channel) } else { 0.0 }
         };
-        let mut largest = [0.0; 4];
+        let mut brightest = Brightest::default();
         if kinds.iter().flatten().any(ColorKind::is_wide) {
-            let of_row = |row| [0, 1, 2, 3].map(|c| channel(row, c));
-            largest = (0..count).into_par_iter().map(of_row).reduce(|| [0.0; 4], larger);
+            brightest = Brightest::of(count, |row| [0, 1, 2, 3].map(|c| channel(row, c)));
         }
-        let scale = color_scale(&kinds, largest);
+        let scale = color_scale(&kinds, &brightest);
         mesh.colors =
             (0..count).into_par_iter().map(|row| color(scale, |c| channel(row, c))).collect();
     }
@@ -247,14 +281,40 @@ fn color_kind(element: &Element, columns: &[Option<usize>; ROLES.len()]) -> [Opt
     })
 }
 
-/// Returns the factor that converts each channel to bytes, given the largest values of all colours.
+/// The brightness of the colours of vertices, and their opacity.
+#[derive(Clone, Copy, Default)]
+struct Brightest {
+    hue: Brightness,
+    opacity: Brightness,
+}
+
+impl Brightest {
+    /// Looks at the colours of all rows.
+    fn of(count: usize, color: impl Fn(usize) -> [f64; 4] + Sync) -> Self {
+        let rows = (0..count).into_par_iter().with_min_len(1 << 12);
+        rows.fold(Self::default, |seen, row| seen.with_color(color(row)))
+            .reduce(Self::default, Self::with)
+    }
+
+    fn with_color(mut self, [red, green, blue, opacity]: [f64; 4]) -> Self {
+        self.hue.add(red.max(green).max(blue));
+        self.opacity.add(opacity);
+        self
+    }
+
+    fn with(self, other: Self) -> Self {
+        Self { hue: self.hue.with(other.hue), opacity: self.opacity.with(other.opacity) }
+    }
+}
+
+/// Returns the factor that converts each channel to bytes, given the brightness of all colours.
 /// Some programs write bytes as 16-bit numbers, others as floats.
-fn color_scale(kinds: &[Option<ColorKind>; 4], largest: [f64; 4]) -> [Option<f64>; 4] {
+fn color_scale(kinds: &[Option<ColorKind>; 4], brightest: &Brightest) -> [Option<f64>; 4] {
     // Fractions may be somewhat brighter than 1.
     const BRIGHTEST: f64 = 16.0;
-    let hue = largest[..3].iter().copied().fold(0.0, f64::max);
+    let (hue, opacity) = (brightest.hue.largest(), brightest.opacity.largest());
     std::array::from_fn(|channel| {
-        let largest = if channel < 3 { hue } else { largest[3] };
+        let largest = if channel < 3 { hue } else { opacity };
         kinds[channel].map(|kind| match kind {
             ColorKind::Short if largest > 255.0 => 255.0 / 65535.0,
             ColorKind::Fraction if largest <= BRIGHTEST => 255.0,
@@ -269,9 +329,4 @@ fn color(scale: [Option<f64>; 4], value: impl Fn(usize) -> f64) -> [u8; 4] {
     std::array::from_fn(|channel| {
         scale[channel].map_or(255, |scale| (value(channel) * scale).round() as u8)
     })
-}
-
-/// Returns the larger value of each channel.
-fn larger(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
-    std::array::from_fn(|channel| a[channel].max(b[channel]))
 }

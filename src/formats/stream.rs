@@ -18,6 +18,9 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+/// Pieces that are read to learn something of all points.
+const PIECES: usize = 64;
+
 /// Values of which percentiles are taken: of more, every second, third, … one.
 const LOOKS: u64 = 1 << 20;
 
@@ -134,7 +137,20 @@ impl<'a> Stream<'a> {
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) for damaged pieces.
     pub fn guess_stance(&self) -> Result<Option<Stance>> {
-        const PIECES: usize = 64;
+        let Some((_, positions)) = self.some_positions(PIECES)? else { return Ok(None) };
+        Ok(Mesh { positions, ..Mesh::default() }.guess_stance())
+    }
+
+    /// Returns the world positions of some points of pieces spread over the file.
+    fn looks(&self, pieces: usize) -> Result<Vec<DVec3>> {
+        let Some((origin, positions)) = self.some_positions(pieces)? else { return Ok(Vec::new()) };
+        let step = positions.len().div_ceil(positions::LOOKS).max(1);
+        Ok(positions.iter().step_by(step).map(|place| origin + place.as_dvec3()).collect())
+    }
+
+    /// Returns some points of up to `most` pieces spread over the file, and what they are relative
+    /// to; `None` for a file without points.
+    fn some_positions(&self, most: usize) -> Result<Option<(DVec3, Vec<Vec3>)>> {
         const MOST_POINTS: usize = 1 << 20;
         let pieces = self.form.pieces()[0];
         let read = |piece: usize, origin: DVec3| {
@@ -150,7 +166,7 @@ impl<'a> Stream<'a> {
         // Around the first point, large coordinates keep their precision.
         let first = read(0, DVec3::ZERO)?.first().map(|point| Vec3::from(point.position));
         let origin = first.unwrap_or_default().as_dvec3();
-        let chosen: Vec<usize> = (0..pieces).step_by(pieces.div_ceil(PIECES)).collect();
+        let chosen: Vec<usize> = (0..pieces).step_by(pieces.div_ceil(most)).collect();
         self.source.fetch(chosen.iter().map(|piece| self.form.bytes(*piece)))?;
         let mut positions = Vec::new();
         for &piece in &chosen {
@@ -158,7 +174,7 @@ impl<'a> Stream<'a> {
             let step = points.len().div_ceil(MOST_POINTS / chosen.len()).max(1);
             positions.extend(points.iter().step_by(step).map(|point| Vec3::from(point.position)));
         }
-        Ok(Mesh { positions, ..Mesh::default() }.guess_stance())
+        Ok(Some((origin, positions)))
     }
 
     /// The first pass over all points: finds their bounds and what their colours are scaled by.
@@ -178,7 +194,12 @@ impl<'a> Stream<'a> {
         let surveyed = self.form.survey(&self.source, watch);
         let (points, [low, high]) = self.source.unless_changed(surveyed)?;
         self.points = points;
-        self.origin = positions::origin(&self.source, low, high)?;
+        // A few points that lie close together, at the beginning, make it worth looking at more.
+        let mut looks = self.looks(1)?;
+        if positions::are_crowded(&looks, [low, high]) {
+            looks = self.looks(PIECES)?;
+        }
+        self.origin = positions::origin(&self.source, [low, high], &looks)?;
         self.bounds = [(low - self.origin).as_vec3(), (high - self.origin).as_vec3()];
         self.settle_scale()
     }
@@ -227,7 +248,7 @@ impl<'a> Stream<'a> {
     /// Takes what the first pass over the same file has found.
     pub(crate) fn resume(&mut self, found: &Settled) {
         (self.points, self.origin, self.bounds) = (found.points, found.origin, found.bounds);
-        self.form.recolor(found.coloring);
+        self.form.resume(found.coloring, found.points);
         if let (Some(Paint::Values { scale, spread, .. }), Some(range)) =
             (&mut self.paint, found.range)
         {

@@ -30,7 +30,7 @@ use super::vtk;
 use super::{
     Kind, csv,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
-    mhd, mrc, nifti, npy, nrrd, pcd, raw, splat, spz, stl, xyz,
+    mhd, mrc, nifti, npy, nrrd, off, pcd, raw, splat, spz, stl, xyz,
 };
 
 /// Every format, in the order of messages: surfaces, volumes, scattered samples.
@@ -158,6 +158,15 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Prefix(b"solid "),
         kind: Which::Always(Kind::Mesh),
         mesh: Some(|source, _| stl::read(source)),
+        ..Format::ROW
+    },
+    Format {
+        name: "OFF",
+        extensions: &["off", "coff", "noff"],
+        holds: &WITH_OR_WITHOUT_FACES,
+        magic: Magic::Rule(off::is_off),
+        kind: Which::Always(Kind::Mesh),
+        mesh: Some(|source, _| off::read(source)),
         ..Format::ROW
     },
     Format {
@@ -420,9 +429,15 @@ pub static FORMATS: &[Format] = &[
     Format {
         name: "NPZ",
         extensions: &["npz"],
-        holds: &[all(Content::Volume)],
+        holds: &[
+            some(Content::Volume, "with an array of three axes"),
+            some(Content::PointCloud, "with an array of positions"),
+        ],
         feature: Some("npz"),
-        kind: Which::Always(Kind::Volume),
+        #[cfg(feature = "npz")]
+        kind: Which::Rule(npz::kind),
+        #[cfg(feature = "npz")]
+        mesh: Some(npz::read_cloud),
         #[cfg(feature = "npz")]
         volume: Some(VolumeReader::Plain(npz::read)),
         #[cfg(feature = "npz")]

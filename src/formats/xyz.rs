@@ -4,14 +4,14 @@
 
 use super::shared::{
     attribute,
+    brightness::Brightness,
     cloud::{Cloud, greys},
 };
 use crate::{
     Result,
     about::Stance,
     input::{
-        Source, copy,
-        growing::Growing,
+        Source,
         text::{Text, Want, first_words},
     },
     surface::Mesh,
@@ -23,7 +23,7 @@ const POINT: u64 = 24 + 12 + 8;
 
 /// Column names of each attribute; case is ignored.
 const POSITION: [&[&str]; 3] = [&["x"], &["y"], &["z"]];
-const COLOR: [&[&str]; 3] = [&["r", "red"], &["g", "green"], &["b", "blue"]];
+const COLOR: [&[&str]; 3] = [&["r", "red", "rf"], &["g", "green", "gf"], &["b", "blue", "bf"]];
 const NORMAL: [&[&str]; 3] = [
     &["nx", "normal_x", "normalx"],
     &["ny", "normal_y", "normaly"],
@@ -34,59 +34,54 @@ const INTENSITY: &[&str] = &["intensity", "i", "grey", "gray", "reflectance"];
 /// Reads a point cloud. With column names, the table has `x`, `y`, `z` and optionally `r`, `g`, `b`
 /// (or `red`, …), `nx`, `ny`, `nz` (or `normal_x`, …) and `intensity`. Other columns are ignored.
 ///
-/// Without names, the first three columns are a position. One of these may follow:
-/// - nothing;
-/// - an intensity;
-/// - a colour or a normal, or both in either order;
-/// - an intensity and a colour, or these and a normal.
+/// Without names, the first three columns are a position. What follows is found by its values, in
+/// any order: three columns of unit length are a normal, three of whole numbers up to 255 the
+/// colour. If there are none, the colour may be fractions or numbers of 16 bits, where it usually
+/// is: after the position, the normal or an intensity. Other columns are attributes. The one after
+/// the position is called `intensity`, the others by their number: `column 7`.
 ///
-/// Three columns are a normal if all numbers lie between −1 and 1 and either one is negative or all
-/// lengths are 1. Without colours, intensities are drawn as greys. Colours are fractions if none is
-/// above 1, 16-bit numbers if one is above 255, and bytes otherwise.
+/// Without colours, intensities are drawn as greys. Colours are fractions if none is above 1,
+/// 16-bit numbers if one is above 255, and bytes otherwise. Points that are not at finite
+/// coordinates are left out.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) with the line, for other columns, lines with another
-/// number of columns, words that are not numbers, numbers that are not finite, and fewer points
-/// than the file counts; [`Error::Limit`](crate::Error::Limit) for more lines than the limits allow
-/// points.
+/// [`Error::Input`](crate::Error::Input) with the line, for fewer than three columns, lines with
+/// another number of columns, words that are not numbers, and fewer points than the file counts;
+/// [`Error::Limit`](crate::Error::Limit) for more lines than the limits allow points.
 pub fn read(source: &Source) -> Result<Mesh> {
     read_named(source, None)
 }
 
-/// As [`read`], with the values of the column that `scalar` names. Without names of columns, an
-/// intensity is called `intensity`.
+/// As [`read`], with the values of the column that `scalar` names.
 ///
 /// # Errors
 /// Those of [`read`]; [`Error::Input`](crate::Error::Input) if no column has the name.
 pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
-    let mut counts = Growing::new(source, "the counts");
-    let text = Text::of(source, |number, line| match copy::number::<u64>(line) {
-        Some(count) => counts.push((number, count)).map(|()| true),
-        None => Ok(false),
-    })?;
-    check_counts(source, &counts, text.len())?;
-    let mut layout = match &text.names {
-        Some(names) => Layout::named(source, text.first, names)?,
-        None => Layout::plain(source, text.first, text.width)?,
-    };
-    let value = scalar.map(|name| layout.column(source, &text, name)).transpose()?;
-    let numbers = text.numbers(source, |column| match value {
-        _ if layout.uses(column) => Want::Numbers,
-        Some(own) if own == column => Want::Values,
-        _ => Want::Nothing,
-    })?;
-    let table = Table { numbers, width: text.width, rows: text.len() };
-    for columns in std::mem::take(&mut layout.untold) {
-        let slot = if table.is_normal(columns) { &mut layout.normal } else { &mut layout.color };
-        if slot.replace(columns).is_some() {
-            return Err(source
-                .error(
-                    format!("line {}", text.first),
-                    "has two colours or two normals after the position",
-                )
-                .hint("name the columns in the first line"));
-        }
+    let text = Text::of(source)?;
+    let named = text.names.as_ref().map(|names| Layout::named(source, text.first, names));
+    let named = named.transpose()?;
+    if text.width < 3 {
+        let message = format!("has {} columns without names", text.width);
+        return Err(source
+            .error(format!("line {}", text.first), message)
+            .hint("a point is x, y, z and its attributes; or name the columns in the first line"));
     }
+    let chosen = match (&named, scalar) {
+        (Some(layout), Some(name)) => Some(layout.column(source, &text, name)?),
+        _ => None,
+    };
+    let is_wanted = |column: usize| match &named {
+        Some(layout) => layout.uses(column) || chosen == Some(column),
+        None => true,
+    };
+    let numbers = text
+        .numbers(source, |column| if is_wanted(column) { Want::Values } else { Want::Nothing })?;
+    let table = Table { numbers, width: text.width, rows: text.len() };
+    let layout = named.unwrap_or_else(|| Layout::found(source, &table));
+    let value = match (chosen, scalar) {
+        (None, Some(name)) => Some(layout.column(source, &text, name)?),
+        (chosen, _) => chosen,
+    };
     source.spend("the size of the points in bytes", POINT * text.len() as u64)?;
     let positions = table.triples(layout.position).collect();
     let mut cloud = Cloud { positions, ..Cloud::default() };
@@ -104,20 +99,8 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
         cloud.values = (0..table.rows).map(|row| table.value(row, column) as f32).collect();
         cloud.about.name = name.into();
     }
-    cloud.into_mesh(source, |row| text.place(row))
-}
-
-/// Returns an error if the file counts its points, with the line of each count, and has another
-/// number.
-fn check_counts(source: &Source, counts: &[(usize, u64)], there: usize) -> Result<()> {
-    let Some(&(line, _)) = counts.first() else { return Ok(()) };
-    let counted = counts.iter().fold(0u64, |sum, &(_, count)| sum.saturating_add(count));
-    if counted == there as u64 {
-        return Ok(());
-    }
-    Err(source
-        .error(format!("line {line}"), format!("counts {counted} points, but there are {there}"))
-        .hint("the file is cut, or a line has a single number"))
+    cloud.about.attributes = layout.attributes(&text);
+    cloud.into_mesh(source)
 }
 
 /// The numbers of the file, row by row.
@@ -138,16 +121,59 @@ impl Table {
             .map(move |row| DVec3::from_array(columns.map(|column| self.value(row, column))))
     }
 
-    /// Returns whether columns without a name are a normal, which their values decide.
+    /// Returns whether three columns may be a normal: no number is beyond ±1, and one is negative
+    /// or all lengths are 1.
     fn is_normal(&self, columns: [usize; 3]) -> bool {
-        let unit = self.triples(columns).all(|v| (v.length() - 1.0).abs() < 0.02);
         let signed = self.triples(columns).any(|v| v.min_element() < 0.0);
-        self.triples(columns).all(|v| v.abs().max_element() <= 1.0) && (unit || signed)
+        self.triples(columns).all(|v| v.abs().max_element() <= 1.0)
+            && (signed || self.is_unit(columns))
     }
 
-    /// Returns the colours in three columns. The largest number decides their scale.
+    /// Returns whether all lengths are 1.
+    fn is_unit(&self, columns: [usize; 3]) -> bool {
+        self.triples(columns).all(|v| (v.length() - 1.0).abs() < 0.02)
+    }
+
+    /// Returns whether three columns are certainly a normal: colours are neither negative, nor have
+    /// fractions of unit length only.
+    fn is_surely_normal(&self, columns: [usize; 3]) -> bool {
+        self.is_unit(columns)
+            && self.triples(columns).any(|v| v.min_element() < 0.0 || v.fract() != DVec3::ZERO)
+    }
+
+    /// Returns whether three columns are colours in bytes: whole numbers up to 255.
+    fn are_bytes(&self, columns: [usize; 3]) -> bool {
+        columns.iter().all(|&column| self.largest(column).is_some_and(|most| most <= 255.0))
+            && columns.iter().any(|&column| self.largest(column) > Some(1.0))
+    }
+
+    /// Returns the largest number of a column of natural numbers; `None` for other columns.
+    fn largest(&self, column: usize) -> Option<f64> {
+        let mut numbers = (0..self.rows).map(|row| self.value(row, column));
+        numbers.try_fold(0.0, |most: f64, number| match number {
+            _ if number.is_nan() => Some(most),
+            _ => (number >= 0.0 && number.fract() == 0.0).then_some(most.max(number)),
+        })
+    }
+
+    /// Returns whether three columns may be colours: natural numbers of up to 16 bits, or
+    /// fractions.
+    fn may_be_colors(&self, columns: [usize; 3]) -> bool {
+        columns.iter().all(|&column| self.largest(column).is_some_and(|most| most <= 65535.0))
+            || self.triples(columns).all(|c| c.min_element() >= 0.0 && c.max_element() <= 1.0)
+    }
+
+    /// Returns the mean difference between two columns.
+    fn difference(&self, a: usize, b: usize) -> f64 {
+        let one = |row: usize| (self.value(row, a) - self.value(row, b)).abs();
+        (0..self.rows).map(one).filter(|found| found.is_finite()).sum::<f64>()
+    }
+
+    /// Returns the colours in three columns. The largest number of nearly all decides their scale.
     fn colors(&self, columns: [usize; 3]) -> Vec<[u8; 4]> {
-        let largest = self.triples(columns).map(|color| color.max_element()).fold(0.0, f64::max);
+        let mut seen = Brightness::default();
+        self.triples(columns).for_each(|color| seen.add(color.max_element()));
+        let largest = seen.largest();
         let scale = if largest > 255.0 {
             255.0 / 65535.0
         } else if largest > 1.0 {
@@ -166,7 +192,7 @@ impl Table {
 pub(super) fn is_cloud(source: &Source) -> bool {
     let Some((words, named)) = first_words(source.bytes()) else { return false };
     if !named {
-        return matches!(words.len(), 1 | 3 | 6 | 7 | 9);
+        return matches!(words.len(), 1 | 3 | 6..=9 | 11..);
     }
     let has = |names: &[&str]| find(&words, names).is_some();
     let is_sample = has(&["value", "scalar"]);
@@ -181,9 +207,10 @@ struct Layout {
     color: Option<[usize; 3]>,
     normal: Option<[usize; 3]>,
     intensity: Option<usize>,
-    /// Columns that are a colour or a normal; their values decide which.
-    untold: Vec<[usize; 3]>,
 }
+
+/// Labels and classes rarely exceed this; a channel of colours rarely stays below.
+const DIM: f64 = 63.0;
 
 impl Layout {
     fn named(source: &Source, line: usize, names: &[String]) -> Result<Self> {
@@ -197,56 +224,107 @@ impl Layout {
             color: triple(names, COLOR),
             normal: triple(names, NORMAL),
             intensity: find(names, INTENSITY),
-            untold: Vec::new(),
         })
     }
 
-    fn plain(source: &Source, line: usize, width: usize) -> Result<Self> {
-        let plain = Self { position: [0, 1, 2], ..Self::default() };
-        match width {
-            3 => Ok(plain),
-            4 => Ok(Self { intensity: Some(3), ..plain }),
-            6 => Ok(Self { untold: vec![[3, 4, 5]], ..plain }),
-            7 => Ok(Self { intensity: Some(3), color: Some([4, 5, 6]), ..plain }),
-            9 => Ok(Self { untold: vec![[3, 4, 5], [6, 7, 8]], ..plain }),
-            10 => Ok(Self {
-                intensity: Some(3),
-                color: Some([4, 5, 6]),
-                normal: Some([7, 8, 9]),
-                ..plain
-            }),
-            _ => Err(source
-                .error(
-                    format!("line {line}"),
-                    format!(
-                        "has {width} columns without \
-                                                                   names"
-                    ),
-                )
-                .hint(
-                    "a point is x, y, z and then a colour, a normal, both, or an intensity and a \
-                 colour; or name the columns in the first line",
-                )),
+    /// Finds the meaning of columns without names by their values. After the position, three
+    /// columns of unit length are a normal, and three of bytes the colour. If there are none, other
+    /// columns at the usual places may be: fractions, and numbers of 16 bits.
+    fn found(source: &Source, table: &Table) -> Self {
+        let width = table.width;
+        let triple = |first: usize| [first, first + 1, first + 2];
+        let all = || (3..).map(triple).take_while(|columns| columns[2] < width);
+        let mut found = Self { position: [0, 1, 2], ..Self::default() };
+        found.normal = all().find(|columns| table.is_surely_normal(*columns));
+        let is_free = |taken: Option<[usize; 3]>, columns: &[usize; 3]| {
+            taken.is_none_or(|taken| !columns.iter().any(|column| taken.contains(column)))
+        };
+        let bytes: Vec<[usize; 3]> = all()
+            .filter(|columns| is_free(found.normal, columns) && table.are_bytes(*columns))
+            .collect();
+        found.color = brightest(source, table, &bytes);
+        let usual: &[usize] = match width {
+            6 | 8 => &[3],
+            7 => &[4],
+            9 => &[3, 6],
+            10 => &[4, 7],
+            _ => &[],
+        };
+        for columns in usual.iter().map(|&first| triple(first)) {
+            if !is_free(found.normal, &columns) || !is_free(found.color, &columns) {
+                continue;
+            }
+            if found.normal.is_none() && table.is_normal(columns) {
+                found.normal = Some(columns);
+            } else if found.color.is_none() && table.may_be_colors(columns) {
+                found.color = Some(columns);
+            }
         }
+        found.intensity = (width > 3 && !found.uses(3)).then_some(3);
+        found
+    }
+
+    /// Returns the name of a column: its own, or a number from 1.
+    fn name(&self, text: &Text, column: usize) -> String {
+        match &text.names {
+            Some(names) => names[column].clone(),
+            None if self.intensity == Some(column) => "intensity".into(),
+            None => format!("column {}", column + 1),
+        }
+    }
+
+    /// Returns the names of the columns that are neither the position, nor the colour or the
+    /// normal.
+    fn attributes(&self, text: &Text) -> Vec<String> {
+        (0..text.width)
+            .filter(|&column| self.intensity == Some(column) || !self.uses(column))
+            .filter(|&column| text.is_numeric(column))
+            .map(|column| self.name(text, column))
+            .collect()
     }
 
     /// Returns the column of an attribute.
     fn column(&self, source: &Source, text: &Text, name: &str) -> Result<usize> {
         let place = format!("line {}", text.first);
-        match (&text.names, self.intensity) {
-            (Some(names), _) => attribute::named(source, &place, name, names),
-            (None, Some(column)) => {
-                attribute::named(source, &place, name, &["intensity"]).map(|_| column)
-            }
-            (None, None) => attribute::named(source, &place, name, &[""; 0]).map(|_| 0),
-        }
+        let names: Vec<String> = match &text.names {
+            Some(names) => names.clone(),
+            None => self.attributes(text),
+        };
+        let at = attribute::named(source, &place, name, &names)?;
+        Ok((0..text.width).find(|&column| self.name(text, column) == names[at]).unwrap_or(at))
     }
 
     fn uses(&self, column: usize) -> bool {
         let triples = [Some(self.position), self.color, self.normal];
         self.intensity == Some(column)
-            || triples.iter().flatten().chain(&self.untold).any(|columns| columns.contains(&column))
+            || triples.iter().flatten().any(|columns| columns.contains(&column))
     }
+}
+
+/// Chooses the colour among triples of bytes. Beside it may be an intensity or a label in bytes,
+/// which make triples with two of its channels. Labels are dim. An intensity comes first, unless
+/// the channels differ less from each other without the last column.
+fn brightest(source: &Source, table: &Table, triples: &[[usize; 3]]) -> Option<[usize; 3]> {
+    let dim = |columns: &[usize; 3]| {
+        columns.iter().filter(|&&column| table.largest(column) <= Some(DIM)).count()
+    };
+    let least = triples.iter().map(dim).min()?;
+    let mut best = triples.iter().filter(|columns| dim(columns) == least);
+    let first = *best.next()?;
+    let Some(&second) = best.next().filter(|columns| columns[0] == first[0] + 1) else {
+        return Some(first);
+    };
+    let [before, after] =
+        [[first[0], first[1]], [second[1], second[2]]].map(|[a, b]| table.difference(a, b));
+    let chosen = if 2.0 * before < after { first } else { second };
+    tracing::warn!(
+        "{}: columns {} to {} are read as the colour; name the columns in the first line if they \
+         are not",
+        source.path.display(),
+        chosen[0] + 1,
+        chosen[2] + 1
+    );
+    Some(chosen)
 }
 
 fn find(names: &[String], wanted: &[&str]) -> Option<usize> {
@@ -306,6 +384,87 @@ mod tests {
         }
     }
 
+    /// Rows of `columns`: x y z position, r g b colour in bytes, u v w normal, i intensity in
+    /// bytes, f intensity in fractions, l label.
+    fn rows(columns: &str) -> String {
+        let normals = ["0 0.6 0.8", "-1 0 0", "0.8 0 -0.6"];
+        let numbers = |row: usize| {
+            let of = |letter: char| match letter {
+                'x' | 'y' | 'z' => format!("{row}.25"),
+                'r' => ["200", "40", "90"][row].into(),
+                'g' => ["190", "50", "80"][row].into(),
+                'b' => ["180", "60", "85"][row].into(),
+                'i' => ["3", "250", "20"][row].into(),
+                'f' => ["0.5", "0.125", "1"][row].into(),
+                'l' => ["2", "0", "11"][row].into(),
+                _ => {
+                    let at = "uvw".find(letter).expect("a letter of the list");
+                    normals[row].split(' ').nth(at).expect("three numbers").to_owned()
+                }
+            };
+            columns.chars().map(of).collect::<Vec<String>>().join(" ")
+        };
+        (0..3).map(|row| numbers(row) + "\n").collect()
+    }
+
+    #[test]
+    fn columns_without_names_are_found_in_any_order() {
+        for (columns, attributes) in [
+            ("rgb", ""),
+            ("rgbl", "column 7"),
+            ("rgbi", "column 7"),
+            ("irgb", "intensity"),
+            ("frgb", "intensity"),
+            ("rgbf", "column 7"),
+            ("rgbuvw", ""),
+            ("uvwrgb", ""),
+            ("rgbluvw", "column 7"),
+            ("frgbuvwl", "intensity column 11"),
+            ("frgbl", "intensity column 8"),
+            ("uvwfrgb", "column 7"),
+            ("rgbll", "column 7 column 8"),
+            ("uvwl", "column 7"),
+            ("fl", "intensity column 5"),
+        ] {
+            let mesh = load(&rows(&format!("xyz{columns}"))).unwrap();
+            let colored = columns.contains('r').then_some([200, 190, 180, 255]);
+            let grey = matches!(columns, "fl");
+            assert!(
+                grey || mesh.colors.first().copied() == colored,
+                "{columns}: {:?}",
+                mesh.colors
+            );
+            assert_eq!(!mesh.normals.is_empty(), columns.contains('u'), "{columns}");
+            assert_eq!(mesh.about.attributes.join(" "), attributes, "{columns}");
+        }
+        let folder = Folder::new();
+        let path = folder.write("a.xyz", rows("xyzrgbl"));
+        let labels = read_with(&path, |source| read_named(source, Some("Column 7"))).unwrap();
+        assert_eq!(labels.values, [2.0, 0.0, 11.0]);
+    }
+
+    #[test]
+    fn headers_of_cloudcompare_name_colours() {
+        let text = "//X;Y;Z;Rf;Gf;Bf;Intensity;Nx;Ny;Nz\n2\n1;2;3;1;0.502;0;7;0;0.6;0.8\n\
+                    4;5;6;0;0;0.2;8;1;0;0\n";
+        let mesh = load(text).unwrap();
+        assert_eq!(mesh.colors, [[255, 128, 0, 255], [0, 0, 51, 255]]);
+        assert_eq!((mesh.normals.len(), mesh.about.attributes), (2, vec!["Intensity".to_owned()]));
+        let folder = Folder::new();
+        let path = folder.write("a.pts", text);
+        let limits = Limits::default();
+        let source = Source::open(&path, &limits).unwrap();
+        assert_eq!(crate::formats::arrays(&source, &ReadOptions::default()).unwrap().len(), 10);
+    }
+
+    #[test]
+    fn points_that_are_not_at_finite_coordinates_are_left_out() {
+        for bad in ["nan nan nan", "1 -nan(ind) 2", "1.#QNAN 0 0", "inf 0 0", "0 NA 0"] {
+            let mesh = load(&format!("1 2 3 255 0 9\n{bad} 1 2 3\n4 5 6 0 0 51\n")).unwrap();
+            assert_eq!((mesh.positions.len(), mesh.colors[1]), (2, [0, 0, 51, 255]), "{bad}");
+        }
+    }
+
     #[test]
     fn columns_are_values_by_name() {
         let folder = Folder::new();
@@ -344,12 +503,12 @@ mod tests {
             ("hello", "no column “x”"),
             ("x y\n1 2", "no column “z”"),
             ("1 2\n", "line 1: has 2 columns without names"),
-            ("1 2 3 4 5", "5 columns without names"),
             ("x y z\n", "no points"),
             ("1 2 3\n4 5", "line 2: has 2 columns, but the first line has 3"),
-            ("1 2 3\n4 nan 6", "line 2: number 2 is NaN"),
-            ("1 2 3\r\n4 nan 6\r\n", "line 2: number 2 is NaN"),
-            ("1 2 3\r4 nan 6\r", "line 2: number 2 is NaN"),
+            ("nan 2 3\n4 - 6", "none of the 2 points"),
+            ("1 2 3\r\n4 five 6\r\n", "line 2: “five” is not a number"),
+            ("1 2 3\r4 five 6\r", "line 2: “five” is not a number"),
+            ("\u{feff}1,5 2,5 3,5\n", "neither numbers nor column names"),
             ("1 2 3\n4 five 6", "line 2: “five” is not a number"),
             ("3\n1 2 3\n4 5 6\n", "line 1: counts 3 points, but there are 2"),
             (
@@ -357,7 +516,6 @@ mod tests {
                 "line 1: counts 18446744073709551615",
             ),
             ("0\n1 2 3\n", "counts 0 points"),
-            ("1 2 3 1 0 0 0 1 0", "two colours or two normals"),
         ] {
             let message = load(text).unwrap_err().to_string();
             assert!(message.contains(word), "{text}: {message}");

@@ -189,18 +189,17 @@
         (
             "nan.ply",
             vertices("2", "1 2 3\n1 nan 3\n"),
-            "nan.ply: element “vertex”, row 1, byte 106: the position [1, NaN, 3] is not finite",
+            "mesh 1 0 0",
         ),
         (
             "inf.ply",
             vertices("1", "1 2 inf\n"),
-            "inf.ply: element “vertex”, row 0, byte 100: the position [1, 2, inf] is not finite",
+            "inf.ply: positions: none of the 1 points has coordinates that are finite numbers",
         ),
         (
             "minusinf.ply",
             vertices("1", "-Infinity 2 3\n"),
-            "minusinf.ply: element “vertex”, row 0, byte 100: the position [-inf, 2, 3] is not \
-             finite",
+            "minusinf.ply: positions: none of the 1 points has coordinates that are finite numbers",
         ),
         (
             "far.ply",
@@ -332,12 +331,12 @@
         (
             "nan.obj",
             "v 0 nan 0\nf 1 1 1\n".into(),
-            "nan.obj: line 1: the position “nan” is not finite",
+            "nan.obj: positions: none of the 1 points has coordinates that are finite numbers",
         ),
         (
             "inf.obj",
             "v 1 2 3\nv 0 1e999 0\nf 1 2 1\n".into(),
-            "inf.obj: vertex 1 of the faces: the position [0, inf, 0] is not finite",
+            "inf.obj: faces: each uses a point that is not at finite coordinates",
         ),
         (
             "comma.obj",
@@ -416,10 +415,16 @@
         ),
         ("missing.obj", obj("mtllib missing.mtl"), "mesh 3 1 0"),
         // STL.
+        ("a.off", OFF.into(), "mesh 3 1 0"),
+        (
+            "far.off",
+            OFF.replace("3 0 1 2", "3 0 1 9").into(),
+            "far.off: line 6: refers to vertex 9, but there are 3, which count from 0",
+        ),
         (
             "count.stl",
             at(stl(), 80, &u32::MAX.to_le_bytes()),
-            "count.stl: the count of facets is 4294967295, over the limit of 2147483648",
+            "mesh 3 1 0",
         ),
         (
             "none.stl",
@@ -429,7 +434,7 @@
         (
             "nan.stl",
             at(stl(), 96, &f32::NAN.to_le_bytes()),
-            "nan.stl: facet 0: the position [NaN, 0, 0] is not finite",
+            "nan.stl: positions: none of the 3 points has coordinates that are finite numbers",
         ),
         ("flat.stl", at(stl(), 96, &[0; 36]), "mesh 3 1 0"),
         (
@@ -783,12 +788,12 @@
         (
             "nan.xyz",
             "1 2 3\n1 nan 3\n".into(),
-            "nan.xyz: line 2: number 2 is NaN, but numbers must be finite",
+            "mesh 1 0 0",
         ),
         (
             "inf.xyz",
             "1 2 -inf\n".into(),
-            "inf.xyz: line 1: number 3 is -inf, but numbers must be finite",
+            "inf.xyz: positions: none of the 1 points has coordinates that are finite numbers",
         ),
         ("one.xyz", "1 2 3\n".into(), "mesh 1 0 0"),
         ("same.xyz", "1 2 3\n1 2 3\n".into(), "mesh 2 0 0"),
@@ -889,7 +894,7 @@
         (
             "nan.npy",
             npy("(1, 4)", &[f32::NAN, 2.0, 3.0, 4.0]),
-            "nan.npy: row 0: the position [NaN, 2, 3] is not finite",
+            "nan.npy: samples: none is at finite coordinates",
         ),
         ("shape.npy", npy("((((((", &[]), "shape.npy: header: has no “shape”"),
         (

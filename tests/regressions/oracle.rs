@@ -44,6 +44,7 @@ pub const FORMATS: &[(&str, Look)] = &[
     ("sog", sog),
     ("obj", obj),
     ("stl", stl),
+    ("off", off),
     ("gltf", gltf),
     ("las", las),
     ("e57", e57),
@@ -304,6 +305,10 @@ fn cut<'a>(bytes: &'a [u8], mark: &[u8]) -> Option<(&'a [u8], &'a [u8])> {
     Some((&bytes[..at + 1], &bytes[at + mark.len()..]))
 }
 
+pub fn off(bytes: &[u8]) {
+    mesh("input.off", bytes, formats::off::read);
+}
+
 pub fn stl(bytes: &[u8]) {
     mesh("input.stl", bytes, formats::stl::read);
 }
@@ -388,6 +393,8 @@ fn arrays(name: &str, bytes: &[u8]) {
 
 pub fn npz(bytes: &[u8]) {
     volumes("input.npz", bytes, formats::npz::read);
+    let cloud = |source: &Source| formats::npz::read_cloud(source, &ReadOptions::default());
+    read("input.npz", bytes, cloud).iter().for_each(sound_mesh);
     arrays("input.npz", bytes);
 }
 

@@ -165,7 +165,7 @@ fn cuts_and_lies_are_errors() {
         (replaced("fileOffset=\"48\"", "fileOffset=\"99999999\""), "scan 0"),
         (replaced("<e57Root", "<root"), "cannot be read as E57"),
         (file(&[], |xml| xml), "no points"),
-        (file(&[(cartesian(), vec![doubles([f64::NAN; 3])], None)], |xml| xml), "no points"),
+        (file(&[(cartesian(), vec![doubles([f64::NAN; 3])], None)], |xml| xml), "none of the 1"),
     ] {
         let message = load(&content).unwrap_err().to_string();
         assert!(message.contains(word), "{word}: {message}");

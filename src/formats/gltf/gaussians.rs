@@ -92,7 +92,7 @@ impl Scene {
         // Index of the cloud, by mesh and primitive. Several nodes may have the same mesh.
         let mut known: HashMap<(usize, usize), usize> = HashMap::new();
         let mut is_empty = true;
-        for (transform, mesh) in nodes::meshes(source, root)? {
+        for (transform, mesh) in nodes::meshes(source, root, buffers)? {
             if root.meshes.get(mesh).is_none() {
                 let message = format!("does not exist; there are {} meshes", root.meshes.len());
                 return Err(source.error(format!("mesh {mesh}"), message));

@@ -15,6 +15,22 @@ pub(super) struct Base<'a> {
     factor: [f32; 4],
     pub texture: Option<&'a json::texture::Info>,
     pub alpha: Alpha,
+    unlit: bool,
+}
+
+/// Returns what to do about an extension that is not read.
+pub(super) fn remedy(extension: &str) -> String {
+    let tool = "npx @gltf-transform/cli";
+    match extension {
+        "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+            format!("write the file without compression: {tool} copy in.glb out.glb")
+        }
+        "KHR_texture_basisu" => {
+            format!("write its pictures as PNG: {tool} ktxdecompress in.glb out.glb")
+        }
+        "EXT_texture_avif" => format!("write its pictures as WebP: {tool} webp in.glb out.glb"),
+        _ => "write the file without this extension".into(),
+    }
 }
 
 /// How the alphas of texels and vertices are converted (glTF 2.0, section 3.9.4).
@@ -59,7 +75,7 @@ impl Alpha {
 impl<'a> Builder<'a> {
     /// Returns the base colour of a file's material (`None`: the default one). `place` names what
     /// refers to it.
-    pub(super) fn base(&self, material: Option<usize>, place: &str) -> Result<Base<'a>> {
+    pub(super) fn base(&mut self, material: Option<usize>, place: &str) -> Result<Base<'a>> {
         let root = self.root;
         let Some(index) = material else {
             return Ok(Base {
@@ -67,6 +83,7 @@ impl<'a> Builder<'a> {
                 factor: [1.0; 4],
                 texture: None,
                 alpha: Alpha::OPAQUE,
+                unlit: false,
             });
         };
         let Some(material) = root.materials.get(index) else {
@@ -86,7 +103,27 @@ impl<'a> Builder<'a> {
                 }
             };
         let name = material.name.as_deref().unwrap_or_default();
-        Ok(Base { name, factor, texture: texture.as_ref(), alpha: Alpha::of(material, factor[3]) })
+        let alpha = Alpha::of(material, factor[3]);
+        let unlit = extensions.is_some_and(|extensions| extensions.unlit.is_some());
+        let mut base = Base { name, factor, texture: texture.as_ref(), alpha, unlit };
+        let emission = material.emissive_factor.0;
+        if !unlit && emission.iter().any(|&part| part > 0.0) {
+            // A black surface shows its emission alone.
+            if factor[..3] == [0.0; 3] {
+                base.factor[..3].copy_from_slice(&emission);
+                base.texture = material.emissive_texture.as_ref();
+                base.unlit = true;
+            } else {
+                self.idle.insert("emission".into());
+            }
+        }
+        if !base.unlit && material.normal_texture.is_some() {
+            self.idle.insert("normal maps".into());
+        }
+        if !base.unlit && material.occlusion_texture.is_some() {
+            self.idle.insert("occlusion maps".into());
+        }
+        Ok(base)
     }
 
     /// Returns the index of a material in the mesh; adds the material at its first use.
@@ -103,7 +140,12 @@ impl<'a> Builder<'a> {
         let texture =
             base.texture.map(|info| self.texture(info.index.value(), base.alpha)).transpose()?;
         let id = self.mesh.materials.len() as u32;
-        self.mesh.materials.push(Material { name: base.name.into(), color, texture });
+        self.mesh.materials.push(Material {
+            name: base.name.into(),
+            color,
+            texture,
+            unlit: base.unlit,
+        });
         self.material_of.insert(index, id);
         Ok(id)
     }
@@ -119,7 +161,24 @@ impl<'a> Builder<'a> {
                 ),
             ));
         };
-        self.picture(texture.source.value(), alpha)
+        let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
+        let source_of = |name: &str| others?.get(name)?.get("source")?.as_u64();
+        if let Some(image) = source_of("EXT_texture_webp") {
+            return self.picture(usize::try_from(image).unwrap_or(usize::MAX), alpha);
+        }
+        let image = texture.source.value();
+        if image == u32::MAX as usize {
+            let place = format!("texture {index}");
+            let other = others.and_then(|others| others.keys().next());
+            return Err(match other {
+                Some(name) => self
+                    .source
+                    .error(place, format!("has its picture by {name}, which is not supported"))
+                    .hint(remedy(name)),
+                None => self.source.error(place, "has no picture"),
+            });
+        }
+        self.picture(image, alpha)
     }
 
     /// Returns a picture with the alphas of an alpha mode, made once for each mode. Modes that

@@ -1,5 +1,6 @@
 use super::*;
 use crate::{
+    Error,
     formats::{ReadOptions, load_mesh},
     input::{
         Limits,
@@ -436,7 +437,7 @@ fn hostile_files_are_refused_with_a_reason() {
         ("/buffers/0/uri", json!("a%00b"), "UTF-8"),
         ("/buffers/0/uri", json!("data:;base64,@@"), "base64"),
         ("/buffers/0/uri", json!("data:"), "comma"),
-        ("/buffers/0/uri", json!(data_uri(&nan)), "not finite"),
+        ("/buffers/0/uri", json!(data_uri(&nan)), "finite coordinates"),
         ("/buffers/0", json!({"byteLength": 108}), "reach beyond"),
         ("/extensionsRequired", json!(["KHR_draco_mesh_compression"]), "not supported"),
         ("/extensionsRequired", json!(["EXT_meshopt_compression"]), "not supported"),
@@ -454,6 +455,78 @@ fn hostile_files_are_refused_with_a_reason() {
         b"{\"asset\":{}}",
     ] {
         load("a.glb", file).expect_err("broken");
+    }
+}
+
+#[test]
+fn instances_are_drawn_each() {
+    let mut binary = square_bytes();
+    binary.extend(bytes(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 7.0, 0.0]));
+    binary.extend(bytes(&[1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0]));
+    let instances = json!({"mesh": 0, "translation": [0, 0, 1], "extensions":
+        {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 4, "SCALE": 5}}}});
+    let mut value = changed(&[
+        ("/buffers/0", json!({"byteLength": 180, "uri": data_uri(&binary)})),
+        ("/bufferViews/0/byteLength", json!(180)),
+        ("/nodes/0", instances),
+        ("/extensionsRequired", json!(["EXT_mesh_gpu_instancing"])),
+    ]);
+    for at in [108, 144] {
+        value["accessors"].as_array_mut().unwrap().push(json!({"bufferView": 0, "byteOffset": at,
+            "componentType": 5126, "count": 3, "type": "VEC3"}));
+    }
+    let mesh = load_json(&value).expect("loads");
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 6));
+    assert_eq!(mesh.positions[6], Vec3::new(7.0, 2.0, 1.0));
+    assert_eq!(mesh.positions[9], Vec3::new(1.0, 7.0, 1.0));
+    value["accessors"][5]["count"] = json!(2);
+    let error = load_json(&value).unwrap_err().to_string();
+    assert!(error.contains("different counts"), "{error}");
+}
+
+#[test]
+fn pictures_of_extensions() {
+    let mut webp = std::io::Cursor::new(Vec::new());
+    let picture = image::RgbaImage::from_raw(1, 1, vec![9, 8, 7, 255]).unwrap();
+    picture.write_to(&mut webp, image::ImageFormat::WebP).expect("encodes");
+    let of = |name: &str| {
+        changed(&[
+            ("/images", json!([{"uri": data_uri(webp.get_ref())}])),
+            ("/textures", json!([{"extensions": {name: {"source": 0}}}])),
+            ("/materials/0", json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})),
+        ])
+    };
+    let mesh = load_json(&of("EXT_texture_webp")).expect("loads");
+    assert_eq!(mesh.materials[0].texture.as_ref().unwrap().texels, [[9, 8, 7, 255]]);
+    let Error::Input { message, hint, .. } = load_json(&of("KHR_texture_basisu")).unwrap_err()
+    else {
+        panic!("an input error");
+    };
+    assert!(message.contains("KHR_texture_basisu") && hint.unwrap().contains("ktxdecompress"));
+}
+
+#[test]
+fn unlit_materials_are_drawn_without_light() {
+    for (material, unlit) in [
+        (json!({"extensions": {"KHR_materials_unlit": {}}}), true),
+        (
+            json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]},
+            "emissiveFactor": [1, 1, 1]}),
+            true,
+        ),
+        (json!({"emissiveFactor": [1, 1, 1]}), false),
+    ] {
+        let mesh = load_json(&changed(&[("/materials/0", material.clone())])).expect("loads");
+        assert_eq!(mesh.materials[0].unlit, unlit, "{material}");
+        let color = mesh.materials[0].color;
+        assert!(color.iter().all(|part| (part - 1.0).abs() < 1e-6), "{material}: {color:?}");
+        let options = crate::surface::SurfelOptions::default();
+        let is_flat = |normal: u32| normal == crate::splat::NO_NORMAL;
+        let surfels = mesh.surfels(&options).unwrap();
+        assert!(surfels.splats.iter().all(|splat| is_flat(splat.normal) == unlit));
+        let colors = vec![[255; 4]; mesh.positions.len()];
+        let facets = Mesh { colors, ..mesh }.facets(&options).unwrap().expect("facets");
+        assert!(facets.facets.iter().all(|facet| is_flat(facet.normals[0]) == unlit));
     }
 }
 

@@ -1,16 +1,16 @@
 //! The attributes of a point that a user may name (LAS specification 1.4 R15, tables 7 to 17).
 
-use super::{super::shared::attribute, Header};
+use super::{super::shared::attribute, Header, describe, extra::Extra};
 use crate::{Result, about::About, input::Source};
 
 /// An attribute, and what is subtracted from it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Attribute {
     of: Of,
     less: f64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 enum Of {
     Intensity,
     ReturnNumber,
@@ -22,10 +22,11 @@ enum Of {
     Time,
     /// Red, green or blue.
     Channel(usize),
+    Extra(Extra),
 }
 
 impl Of {
-    fn name(self) -> &'static str {
+    fn name(&self) -> &str {
         match self {
             Self::Intensity => "intensity",
             Self::ReturnNumber => "return_number",
@@ -35,11 +36,12 @@ impl Of {
             Self::UserData => "user_data",
             Self::PointSource => "point_source_id",
             Self::Time => "gps_time",
-            Self::Channel(channel) => ["red", "green", "blue"][channel],
+            Self::Channel(channel) => ["red", "green", "blue"][*channel],
+            Self::Extra(extra) => &extra.name,
         }
     }
 
-    fn unit(self) -> &'static str {
+    fn unit(&self) -> &'static str {
         match self {
             Self::ScanAngle => "°",
             Self::Time => "s",
@@ -56,9 +58,10 @@ impl Attribute {
     /// [`Error::Input`](crate::Error::Input) for another name, with the names that there are, and
     /// for times of packed points.
     pub fn named(source: &Source, header: &Header, name: &str) -> Result<Self> {
-        let all = all(header);
-        let names: Vec<&str> = all.iter().map(|of| of.name()).collect();
-        let of = all[attribute::named(source, "points", name, &names)?];
+        let mut all = all(header, &describe::extras(source, header));
+        let names: Vec<&str> = all.iter().map(Of::name).collect();
+        let at = attribute::named(source, "points", name, &names)?;
+        let of = all.swap_remove(at);
         if of != Of::Time {
             return Ok(Self { of, less: 0.0 });
         }
@@ -70,22 +73,22 @@ impl Attribute {
         if first.end > source.len() {
             return Ok(Self { of, less: 0.0 });
         }
-        let less = Self { of, less: 0.0 }.value(header.format, &source.part(first)?);
+        let less = Self { of: of.clone(), less: 0.0 }.value(header.format, &source.part(first)?);
         Ok(Self { of, less })
     }
 
     /// Returns what a scale's title says.
-    pub fn about(self) -> About {
+    pub fn about(&self) -> About {
         let (name, unit) = (self.of.name().into(), self.of.unit().into());
         About { name, unit, ..About::default() }
     }
 
     /// Returns the value in the bytes of a point of a format.
-    pub fn value(self, format: u8, record: &[u8]) -> f64 {
+    pub fn value(&self, format: u8, record: &[u8]) -> f64 {
         let short = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]);
         let byte = |at: usize| f64::from(record[at]);
         let is_late = format >= 6;
-        let value = match self.of {
+        let value = match &self.of {
             Of::Intensity => f64::from(short(12)),
             Of::ReturnNumber => f64::from(record[14] & if is_late { 15 } else { 7 }),
             Of::Returns if is_late => f64::from(record[14] >> 4),
@@ -100,6 +103,7 @@ impl Attribute {
                 let at = if is_late { 22 } else { 20 };
                 record[at..].first_chunk().map_or(f64::NAN, |bytes| f64::from_le_bytes(*bytes))
             }
+            Of::Extra(extra) => extra.value(record),
             Of::Channel(channel) => match color_at(format) {
                 Some(at) => f64::from(short(at + 2 * channel)),
                 None => f64::NAN,
@@ -120,7 +124,7 @@ pub fn color_at(format: u8) -> Option<usize> {
 }
 
 /// Returns the attributes of the points of a file.
-fn all(header: &Header) -> Vec<Of> {
+fn all(header: &Header, extras: &[Extra]) -> Vec<Of> {
     let mut all = vec![
         Of::Intensity,
         Of::ReturnNumber,
@@ -136,5 +140,14 @@ fn all(header: &Header) -> Vec<Of> {
     if header.color_at.is_some() {
         all.extend([0, 1, 2].map(Of::Channel));
     }
+    all.extend(extras.iter().cloned().map(Of::Extra));
     all
+}
+
+/// Returns the names of the attributes that may colour the points of a file.
+pub fn names(header: &Header, extras: &[Extra]) -> Vec<String> {
+    let all = all(header, extras);
+    // The times of packed points are not read.
+    let is_read = |of: &&Of| **of != Of::Time || !header.packed;
+    all.iter().filter(is_read).map(|of| of.name().to_owned()).collect()
 }

@@ -1,7 +1,7 @@
 //! The chunks of points of a LAZ file. The `laz` crate unpacks each chunk. Before that, this module
 //! checks that the chunks lie within the file and how much memory they claim.
 
-use super::{Fields, Header, Point, time::Times};
+use super::{Fields, Header, Point, describe, time::Times};
 use crate::{
     Result,
     input::{Source, isolate::isolated},
@@ -106,6 +106,13 @@ pub(super) fn chunks(source: &Source, header: &Header, layout: &LazVlr) -> Resul
 }
 
 fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
+    // Before version 2 of LASzip there were no chunks: the points are packed as one.
+    const POINT_WISE: [u8; 2] = 1u16.to_le_bytes();
+    let described = describe::record(source, header, LazVlr::USER_ID, LazVlr::RECORD_ID);
+    if header.points > 0 && described.is_some_and(|data| data.starts_with(&POINT_WISE)) {
+        let bytes = header.start..source.len();
+        return Ok(vec![Chunk { number: 0, bytes, points: header.points }]);
+    }
     let (wrong, length) = (|message: String| source.error("chunk table", message), source.len());
     let long = |at: usize| -> Result<i64> {
         let bytes = source.part(at.min(length)..length.min(at + ChunkTable::OFFSET_SIZE))?;

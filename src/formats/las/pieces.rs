@@ -4,6 +4,7 @@ use super::{
     super::{
         form::{Coloring, Counts, Form, StreamPoint, in_batches},
         shared::{
+            brightness::Brightness,
             cloud::{color_of_16_bits, grey},
             found::Found,
         },
@@ -46,7 +47,7 @@ enum Paint {
 struct Seen {
     low: DVec3,
     high: DVec3,
-    largest: u16,
+    brightness: Brightness,
     /// Number of points with each intensity.
     intensities: Vec<u64>,
     bad: Option<(usize, DVec3)>,
@@ -105,7 +106,8 @@ impl Pieces {
                 seen.bad.get_or_insert((row, position));
             }
             (seen.low, seen.high) = (seen.low.min(position), seen.high.max(position));
-            seen.largest = point.color.iter().fold(seen.largest, |a, &b| a.max(b));
+            let [red, green, blue] = point.color;
+            seen.brightness.add(f64::from(red.max(green).max(blue)));
             seen.intensities[usize::from(point.intensity)] += 1;
             seen.points += 1;
         }
@@ -152,7 +154,7 @@ impl Form for Pieces {
 
     fn choose(&mut self, source: &Source, name: &str) -> Result<About> {
         self.header.choose(source, Some(name))?;
-        Ok(self.header.attribute.map_or(About::default(), |attribute| attribute.about()))
+        Ok(self.header.attribute.as_ref().map_or(About::default(), |attribute| attribute.about()))
     }
 
     fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
@@ -182,7 +184,7 @@ impl Form for Pieces {
         Ok((seen.points, [seen.low, seen.high]))
     }
 
-    /// The largest channel of a colour, or the ends of the greys.
+    /// The largest channel of nearly all colours, or the ends of the greys.
     fn coloring(&self) -> Coloring {
         match self.paint {
             Paint::None => [None; 4],
@@ -191,7 +193,7 @@ impl Form for Pieces {
         }
     }
 
-    fn recolor(&mut self, coloring: Coloring) {
+    fn resume(&mut self, coloring: Coloring, _: u64) {
         self.paint = match coloring {
             [Some(largest), ..] => Paint::Color { largest: largest as u16 },
             [_, Some(low), Some(high), _] => Paint::Grey { low: low as f32, high: high as f32 },
@@ -235,7 +237,7 @@ impl Seen {
         Self {
             low: DVec3::INFINITY,
             high: DVec3::NEG_INFINITY,
-            largest: 0,
+            brightness: Brightness::default(),
             intensities: vec![0; 1 << 16],
             bad: None,
             points: 0,
@@ -244,7 +246,7 @@ impl Seen {
 
     fn join(&mut self, other: Self) {
         (self.low, self.high) = (self.low.min(other.low), self.high.max(other.high));
-        self.largest = self.largest.max(other.largest);
+        self.brightness = self.brightness.with(other.brightness);
         self.intensities.iter_mut().zip(other.intensities).for_each(|(sum, more)| *sum += more);
         self.bad = self.bad.or(other.bad);
         self.points += other.points;
@@ -253,8 +255,9 @@ impl Seen {
     /// Returns how to colour the points: by their colours, or by greys from the first to the last
     /// percentile of intensities.
     fn paint(&self, header: &Header) -> Paint {
-        if header.color_at.is_some() && self.largest > 0 {
-            return Paint::Color { largest: self.largest };
+        let largest = self.brightness.largest() as u16;
+        if header.color_at.is_some() && largest > 0 {
+            return Paint::Color { largest };
         }
         let at = |rank: u64| {
             let mut below = 0;

@@ -292,3 +292,76 @@ fn attributes_are_read_by_name() {
     assert!(error.to_string().contains("no attribute “heat”"), "{error}");
     assert!(hint.contains("intensity, return_number") && !hint.contains("gps_time"), "{hint}");
 }
+
+/// Records of format 1 with extra bytes: a height in whole millimetres, a pair, and a quality with
+/// a value that stands for none.
+#[test]
+fn extra_bytes_are_attributes_by_name() {
+    let description = |kind: u8, options: u8, name: &str| {
+        let mut own = vec![0; 192];
+        (own[2], own[3]) = (kind, options);
+        own[4..4 + name.len()].copy_from_slice(name.as_bytes());
+        own[40..48].copy_from_slice(&255u64.to_le_bytes());
+        own[112..120].copy_from_slice(&0.001f64.to_le_bytes());
+        own[136..144].copy_from_slice(&10.0f64.to_le_bytes());
+        own
+    };
+    let vlr = |user: &str, id: u16, data: &[u8]| {
+        let mut head = vec![0; 54];
+        head[2..2 + user.len()].copy_from_slice(user.as_bytes());
+        head[18..20].copy_from_slice(&id.to_le_bytes());
+        head[20..22].copy_from_slice(&(data.len() as u16).to_le_bytes());
+        [head, data.to_vec()].concat()
+    };
+    let fields = [
+        description(6, 0b11000, "height"),
+        description(0, 3, ""),
+        description(13, 0, "pair"),
+        description(1, 1, "quality"),
+    ];
+    let keys: Vec<u8> =
+        [1u16, 1, 0, 1, 3072, 0, 1, 25832].iter().flat_map(|word| word.to_le_bytes()).collect();
+    let records =
+        [vlr("LASF_Spec", 4, &fields.concat()), vlr("LASF_Projection", 34735, &keys)].concat();
+    let points: Vec<Vec<u8>> = (0..10i32)
+        .map(|number| {
+            let mut point = record(1, number, 0, false);
+            point.extend((number * 1000).to_le_bytes());
+            point.extend([9; 3]);
+            point.extend((number as u16).to_le_bytes());
+            point.extend((2 * number as u16).to_le_bytes());
+            point.push(if number == 7 { 255 } else { number as u8 });
+            point
+        })
+        .collect();
+    let mut head = header(2, 1, 227 + records.len(), 2, 10);
+    head[105..107].copy_from_slice(&(points[0].len() as u16).to_le_bytes());
+    let folder = Folder::new();
+    let path = folder.write("a.las", [head, records, points.concat()].concat());
+    let named = |name: &str| read_with(&path, |source| read_named(source, Some(name))).unwrap();
+    assert_eq!(named("height").values[..3], [10.0, 11.0, 12.0]);
+    assert_eq!((named("pair[0]").values[3], named("Pair[1]").values[3]), (3.0, 6.0));
+    let quality = named("quality");
+    assert!(quality.values[7].is_nan() && quality.values[6] == 6.0);
+    let attributes = quality.about.attributes;
+    assert!(attributes.ends_with(&["height", "pair[0]", "pair[1]", "quality"].map(String::from)));
+    assert!(attributes.contains(&"gps_time".to_owned()), "{attributes:?}");
+    assert_eq!(quality.about.crs, "EPSG:25832");
+    assert_eq!(quality.about.layout, "LAS 1.2, point format 1");
+}
+
+/// The oldest packed files have neither chunks nor a table of them.
+#[test]
+fn packed_files_without_chunks_are_read() {
+    let records: Vec<Vec<u8>> = (0..30).map(|number| record(1, number, 0, false)).collect();
+    let whole = in_chunks_of(100, 1, &records, 30);
+    let start = u32::from_le_bytes(*whole[96..].first_chunk().unwrap()) as usize;
+    let table = i64::from_le_bytes(*whole[start..].first_chunk().unwrap()) as usize;
+    let mut old = [&whole[..start], &whole[start + 8..table]].concat();
+    // The first number of the record that describes the packing, after its head.
+    old[227 + 54..227 + 56].copy_from_slice(&1u16.to_le_bytes());
+    let folder = Folder::new();
+    let mesh = read_with(&folder.write("a.laz", &old), read).unwrap();
+    let known = read_with(&folder.write("b.laz", &whole), read).unwrap();
+    assert_eq!((mesh.positions, mesh.origin), (known.positions, known.origin));
+}

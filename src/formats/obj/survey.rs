@@ -1,7 +1,14 @@
 //! Scans an OBJ file before tobj reads it.
 
-use crate::{Result, input::Source};
-use std::io::{BufRead, Read};
+use super::super::shared::unplaced;
+use crate::{
+    Result,
+    input::{Source, copy},
+};
+use std::{
+    borrow::Cow,
+    io::{BufRead, Read},
+};
 
 /// Lines between two checks of the time limit.
 const LINES: usize = 1 << 16;
@@ -31,6 +38,12 @@ pub(super) struct Survey {
     normals: bool,
     /// A face comes before something that it refers to.
     ahead: bool,
+    /// The number of texture coordinates, if a face refers to one that does not exist.
+    stray: Option<i64>,
+    /// Vertices that are not at finite coordinates.
+    unplaced: u64,
+    /// A coordinate is written as only C libraries write it (`nan(ind)`).
+    odd: bool,
 }
 
 impl Survey {
@@ -43,7 +56,7 @@ impl Survey {
             if number.is_multiple_of(LINES) {
                 source.check_time()?;
             }
-            let mut words = line.split_whitespace();
+            let mut words = words(line);
             match words.next() {
                 Some("v") => scan.vertex(source, number, words)?,
                 Some("vt") => scan.counts[1] += 1,
@@ -55,8 +68,19 @@ impl Survey {
             }
         }
         scan.check(source)?;
-        let Scan { mut survey, counts, ahead, .. } = scan;
-        survey.ahead = ahead.is_some();
+        let Scan { mut survey, counts, ahead, strays, .. } = scan;
+        for (kind, stray) in strays.iter().enumerate() {
+            if let Some((line, index)) = stray {
+                tracing::warn!(
+                    "{}: line {line}: {}; such corners have none",
+                    source.path.display(),
+                    wrong(*index, kind, counts[kind])
+                );
+            }
+        }
+        survey.stray = strays[1].map(|_| counts[1]);
+        survey.normals &= strays[2].is_none();
+        survey.ahead = ahead.iter().any(Option::is_some);
         survey.vertices = counts[0] as u64;
         survey.others = (counts[1] + counts[2]) as u64;
         survey.colors &= counts[0] > 0;
@@ -70,6 +94,18 @@ impl Survey {
         Ok(survey)
     }
 
+    /// Says how many vertices are left out because they are not at finite coordinates.
+    pub fn warn_of_unplaced(&self, source: &Source) {
+        if self.unplaced > 0 {
+            unplaced::warn(source, self.unplaced as usize, self.vertices as usize);
+        }
+    }
+
+    /// Returns whether vertices are not at finite coordinates.
+    pub fn has_unplaced(&self) -> bool {
+        self.unplaced > 0
+    }
+
     /// Returns the file's lines for tobj.
     pub fn feed<'a>(&self, text: &'a str) -> Feed<'a> {
         // tobj ends a part of the mesh at each `usemtl`, with the statements it has read so far.
@@ -80,9 +116,13 @@ impl Survey {
             again,
             kinds,
             line: 0,
-            current: &[],
+            current: "".into(),
+            at: 0,
             colors: self.colors,
             normals: self.normals,
+            stray: self.stray,
+            odd: self.odd,
+            passed: 0,
         }
     }
 }
@@ -95,14 +135,16 @@ struct Scan {
     counts: [i64; 3],
     /// The largest index used, and its line.
     largest: [(i64, usize); 3],
-    /// The first reference to a later statement: its line, its index and what it refers to.
-    ahead: Option<(usize, i64, usize)>,
+    /// The first reference of each kind to a later statement: its line and its index.
+    ahead: [Option<(usize, i64)>; 3],
     /// A line with a negative index, which counts back from its own place.
     back: Option<usize>,
+    /// The first reference of each kind to a statement that does not exist: its line and index.
+    strays: [Option<(usize, i64)>; 3],
 }
 
 impl Scan {
-    /// Adds a vertex. Its coordinates must be finite numbers.
+    /// Adds a vertex. Its coordinates must be numbers.
     fn vertex<'a>(
         &mut self,
         source: &Source,
@@ -110,7 +152,7 @@ impl Scan {
         words: impl Iterator<Item = &'a str>,
     ) -> Result<()> {
         self.counts[0] += 1;
-        let mut values = 0;
+        let (mut values, mut is_placed) = (0, true);
         for word in words {
             values += 1;
             let plain = |b: u8| b.is_ascii_digit() || matches!(b, b'.' | b'+' | b'-' | b'e' | b'E');
@@ -118,15 +160,17 @@ impl Scan {
                 continue;
             }
             let place = format!("line {line}");
-            let first = word.trim_start_matches(['-', '+']).bytes().next().unwrap_or(b'?');
-            if matches!(first, b'n' | b'N' | b'i' | b'I') {
-                return Err(source.error(place, format!("the position “{word}” is not finite")));
+            if let Some(number) = copy::float(word.as_bytes()) {
+                self.survey.odd = true;
+                is_placed &= number.is_finite();
+                continue;
             }
             let shown: String = word.chars().take(40).collect();
             return Err(source
                 .error(place, format!("“{shown}” is not a number"))
                 .hint("write numbers with a decimal point, not a comma"));
         }
+        self.survey.unplaced += u64::from(!is_placed);
         self.survey.colors &= values >= 6;
         Ok(())
     }
@@ -163,10 +207,14 @@ impl Scan {
     fn reference(&mut self, line: usize, index: i64, kind: usize) -> Result<(), String> {
         let count = self.counts[kind];
         if index == 0 || -index > count {
-            return Err(wrong(index, kind, count));
+            if kind == 0 {
+                return Err(wrong(index, kind, count));
+            }
+            self.strays[kind].get_or_insert((line, index));
+            return Ok(());
         }
         if index > count {
-            self.ahead.get_or_insert((line, index, kind));
+            self.ahead[kind].get_or_insert((line, index));
         } else if index < 0 {
             self.back = Some(line);
         }
@@ -176,17 +224,22 @@ impl Scan {
         Ok(())
     }
 
-    /// Returns an error if an index has no statement in the whole file, or if the file has both
-    /// references to later statements and negative indices.
-    fn check(&self, source: &Source) -> Result<()> {
+    /// Returns an error if an index of a vertex has no statement in the whole file, or if the file
+    /// has both references to later statements and negative indices.
+    fn check(&mut self, source: &Source) -> Result<()> {
         for kind in 0..3 {
             let (index, line) = self.largest[kind];
-            if index > self.counts[kind] {
+            if index > self.counts[kind] && kind > 0 {
+                self.strays[kind].get_or_insert((line, index));
+                // What does not exist comes not later either.
+                self.ahead[kind] = self.ahead[kind].filter(|(_, at)| *at <= self.counts[kind]);
+            } else if index > self.counts[kind] {
                 let message = wrong(index, kind, self.counts[kind]);
                 return Err(source.error(format!("line {line}"), message));
             }
         }
-        let (Some((line, index, kind)), Some(back)) = (self.ahead, self.back) else {
+        let ahead = (0..3).find_map(|kind| Some((self.ahead[kind]?, kind)));
+        let (Some(((line, index), kind)), Some(back)) = (ahead, self.back) else {
             return Ok(());
         };
         let message = format!(
@@ -211,10 +264,18 @@ pub(super) fn place_of_wide_uv(text: &str) -> String {
     line.map_or_else(|| "texture coordinates".into(), |line| format!("line {}", line + 1))
 }
 
+/// Returns the words of a statement, up to a comment.
+fn words(line: &str) -> impl Iterator<Item = &str> {
+    line.split_whitespace().take_while(|word| !word.starts_with('#'))
+}
+
 const WHAT: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
 fn wrong(index: i64, kind: usize, count: i64) -> String {
     let what = WHAT[kind];
+    if count == 0 {
+        return format!("a face refers to {what} {index}, but there are none");
+    }
     format!(
         "a face refers to {what} {index}, but there are {count} (1 … {count}, or −1 … −{count})"
     )
@@ -237,9 +298,15 @@ pub(super) struct Feed<'a> {
     again: Option<&'a str>,
     kinds: Kinds,
     line: usize,
-    current: &'a [u8],
+    /// The statement that is passed on, and the bytes of it that are passed already.
+    current: Cow<'a, str>,
+    at: usize,
     colors: bool,
     normals: bool,
+    stray: Option<i64>,
+    odd: bool,
+    /// Texture coordinates that were passed on.
+    passed: i64,
 }
 
 impl<'a> Feed<'a> {
@@ -250,22 +317,68 @@ impl<'a> Feed<'a> {
 
     /// Returns the part of a line that tobj gets: without values that not all vertices have. Groups
     /// (`g`, `o`) are left out because tobj would split vertices between them.
-    fn useful(&self, line: &'a str) -> &'a str {
+    fn useful(&mut self, line: &'a str) -> Cow<'a, str> {
         let keep = |words: usize| first_words(line, words + 1);
         let word = line.split_whitespace().next();
         let is_value = matches!(word, Some("v" | "vt" | "vn"));
         if self.kinds == if is_value { Kinds::References } else { Kinds::Values } {
-            return "";
+            return "".into();
         }
         match word {
-            Some("v") if self.colors => keep(6),
-            Some("v") if line.split_whitespace().count() == 5 => keep(4),
-            Some("v") => keep(3),
-            Some("vt" | "f" | "usemtl" | "mtllib") => line,
-            Some("vn") if self.normals => line,
-            _ => "",
+            Some("v") => {
+                let kept = if self.colors {
+                    keep(6)
+                } else if words(line).count() == 5 {
+                    keep(4)
+                } else {
+                    keep(3)
+                };
+                if self.odd { plain(kept).into() } else { kept.into() }
+            }
+            Some("vt") => {
+                self.passed += 1;
+                line.into()
+            }
+            Some("f") if self.stray.is_some() => self.known(line).into(),
+            // A comment ends a face.
+            Some("f") => line.split(" #").next().unwrap_or_default().trim_end().into(),
+            // Faces after `usemtl` without a name have no material.
+            Some("usemtl") => match line["usemtl".len()..].trim() {
+                "" => "usemtl \u{0}".into(),
+                name => format!("usemtl {name}").into(),
+            },
+            Some("mtllib") if line.trim() != "mtllib" => line.into(),
+            Some("vn") if self.normals => line.into(),
+            _ => "".into(),
         }
     }
+
+    /// Returns a face without texture coordinates that do not exist.
+    fn known(&self, line: &str) -> String {
+        let corner = |word: &str| {
+            let mut parts: Vec<&str> = word.split('/').collect();
+            let exists = |part: &&str| {
+                let index = part.parse::<i64>().unwrap_or(0);
+                (1..=self.stray.unwrap_or(0)).contains(&index)
+                    || (-self.passed..=-1).contains(&index)
+            };
+            if let Some(part) = parts.get_mut(1).filter(|part| !exists(part)) {
+                *part = "";
+            }
+            parts.join("/")
+        };
+        let corners = words(line).skip(1).map(corner);
+        std::iter::once("f".to_owned()).chain(corners).collect::<Vec<String>>().join(" ")
+    }
+}
+
+/// Returns a statement with numbers as tobj reads them.
+fn plain(line: &str) -> String {
+    let word = |word: &str| match copy::float(word.as_bytes()) {
+        Some(number) if !number.is_finite() => "nan".to_owned(),
+        _ => word.to_owned(),
+    };
+    line.split_whitespace().map(word).collect::<Vec<String>>().join(" ")
 }
 
 /// Returns the start of a line, up to the end of its `count`-th word.
@@ -292,24 +405,22 @@ fn first_words(line: &str, count: usize) -> &str {
 
 impl BufRead for Feed<'_> {
     fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
-        while self.current.is_empty() {
+        while self.at >= self.current.len() {
             if self.rest.is_empty() {
                 let Some(text) = self.again.take() else { return Ok(&[]) };
                 (self.rest, self.line, self.kinds) = (text, 0, Kinds::References);
+                self.passed = 0;
             }
             let end = self.rest.find('\n').map_or(self.rest.len(), |end| end + 1);
             let (line, rest) = self.rest.split_at(end);
             (self.rest, self.line) = (rest, self.line + 1);
-            self.current = self.useful(line.trim()).as_bytes();
-            if !self.current.is_empty() {
-                break;
-            }
+            (self.current, self.at) = (self.useful(line.trim()), 0);
         }
-        Ok(self.current)
+        Ok(&self.current.as_bytes()[self.at..])
     }
 
     fn consume(&mut self, amount: usize) {
-        self.current = self.current.get(amount..).unwrap_or(&[]);
+        self.at = self.current.len().min(self.at + amount);
     }
 
     // The lines passed on have no line ends, so each is one whole line here.

@@ -2,7 +2,7 @@
 
 use crate::{
     Error, Result,
-    input::{Source, copy},
+    input::{Source, copy, text::without_mark},
 };
 use glam::DVec3;
 
@@ -84,8 +84,8 @@ const LONGEST: usize = 1 << 20;
 
 pub fn read(source: &Source) -> Result<Header> {
     let mut words: [Vec<String>; ENTRIES.len()] = Default::default();
-    let mut at = 0;
     let bytes = source.bytes();
+    let mut at = bytes.len() - without_mark(bytes).len();
     for number in 1.. {
         let place = || format!("line {number}");
         if at > LONGEST {
@@ -104,6 +104,8 @@ pub fn read(source: &Source) -> Result<Header> {
         at += length + 1;
         let mut parts = line.split_ascii_whitespace();
         let Some(name) = parts.next().filter(|name| !name.starts_with('#')) else { continue };
+        // The name in versions up to 0.5.
+        let name = if name == "COLUMNS" { "FIELDS" } else { name };
         let Some(entry) = ENTRIES.iter().position(|entry| *entry == name) else {
             let shown: String = name.chars().take(40).collect();
             return Err(source.error(place(), format!("“{shown}” is not an entry of a PCD header")));
@@ -147,10 +149,10 @@ struct Entries<'a> {
 impl Entries<'_> {
     /// Returns the header, which ends at this byte and has this number of lines.
     fn header(&self, end: usize, lines: usize) -> Result<Header> {
-        let data = match self.words[DATA].iter().map(String::as_str).collect::<Vec<_>>()[..] {
-            ["ascii"] => Data::Text,
-            ["binary"] => Data::Binary,
-            ["binary_compressed"] => Data::Packed,
+        let data = match self.words[DATA].join(" ").to_ascii_lowercase().as_str() {
+            "ascii" => Data::Text,
+            "binary" => Data::Binary,
+            "binary_compressed" => Data::Packed,
             _ => return Err(self.wrong(DATA, "is not ascii, binary or binary_compressed")),
         };
         let (points, height) = self.points()?;

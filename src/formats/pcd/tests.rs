@@ -102,7 +102,7 @@ fn cuts_and_lies_are_errors() {
         (header("DATA ascii", "DATA zipped"), "is not ascii"),
         (header("VERSION", "VERSIONS"), "line 2: “VERSIONS” is not an entry"),
         (header("4.0 5", "4.0 five"), "line 14: “five” is not a number"),
-        (header("1 2 3 7", "inf 2 3 7").replace("4.0", "nan"), "no points"),
+        (header("1 2 3 7", "inf 2 3 7").replace("4.0", "nan"), "none of the 2 points"),
     ] {
         let message = load(content).unwrap_err().to_string();
         assert!(message.contains(word), "{word}: {message}");
@@ -115,6 +115,16 @@ fn cuts_and_lies_are_errors() {
     let path = folder.write("b.pcd", binary());
     let limits = Limits { points: 1, ..Limits::default() };
     assert!(matches!(read(&Source::open(&path, &limits).unwrap()), Err(Error::Limit { .. })));
+}
+
+#[test]
+fn what_other_programs_write_is_read() {
+    let plain = "\u{feff}# .PCD v.5\r\nCOLUMNS X Y Z Intensity\r\nSIZE 4 4 4 4\r\nTYPE F F F F\r\n\
+                 WIDTH 2\r\nHEIGHT 1\r\nDATA ASCII\r\n1 2 3 4\r\n-nan(ind) 0 0 5\r\n";
+    let mesh = load(plain).unwrap();
+    let place = mesh.origin.as_vec3() + mesh.positions[0];
+    assert_eq!((mesh.positions.len(), place), (1, Vec3::new(1.0, 2.0, 3.0)));
+    assert_eq!(mesh.about.attributes, ["Intensity"]);
 }
 
 #[test]

@@ -37,8 +37,9 @@ pub fn holds_gaussians(source: &Source) -> Result<bool> {
 /// and `sh`.
 ///
 /// In a trainer's file, `opacity` is a logit, `scale_…` are logarithms, and `rot_0` is the real
-/// part. Without `scale_2` the Gaussians are flat. Without `f_dc_…`, colours like those of meshes
-/// (`red`) are the same in all directions.
+/// part. Without `scale_2` the Gaussians are flat. Scales and opacities are those after the filter
+/// of Mip-Splatting, `filter_3D`, if the file has one. Without `f_dc_…`, colours like those of
+/// meshes (`red`) are the same in all directions.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed header, for missing properties, for a

@@ -18,6 +18,9 @@ use ply_rs::{
 const LONGEST: usize = 1 << 20;
 const MOST_COLUMNS: usize = 4096;
 
+/// Elements that are read whatever the case of their names.
+const KNOWN: [&str; 3] = ["vertex", "face", "tristrips"];
+
 pub(super) struct Header {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
@@ -52,8 +55,14 @@ impl Element {
         self.columns.iter().map(least).sum()
     }
 
+    /// Returns the column with one of these names. One that differs by case alone is accepted.
     pub fn column(&self, names: &[&str]) -> Option<usize> {
-        names.iter().find_map(|name| self.columns.iter().position(|column| column.name == *name))
+        let find = |is: &dyn Fn(&str, &str) -> bool| {
+            names
+                .iter()
+                .find_map(|name| self.columns.iter().position(|column| is(&column.name, name)))
+        };
+        find(&|own, name| own == name).or_else(|| find(&str::eq_ignore_ascii_case))
     }
 }
 
@@ -155,7 +164,8 @@ impl Clean {
                     return Err(format!("“{shown}” is not a row count"));
                 }
                 self.text.push_str(&format!("element e{} {count}\n", self.names.len()));
-                self.names.push(((*name).to_owned(), Vec::new()));
+                let known = KNOWN.iter().find(|known| known.eq_ignore_ascii_case(name));
+                self.names.push(((*known.unwrap_or(name)).to_owned(), Vec::new()));
                 self.columns += 1;
             }
             ["property", kind @ .., name] => {

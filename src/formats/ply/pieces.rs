@@ -4,16 +4,15 @@
 use super::{
     super::{
         form::{Coloring, Counts, Form, StreamPoint, in_order},
-        shared::found::Found,
+        shared::{found::Found, unplaced},
     },
-    COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale, column_named,
-    gaussians,
+    Brightest, COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale,
+    column_named, gaussians,
     header::{self, Element, Header, width},
-    larger,
     rows::{cut, list_place, number, triangle_stride},
 };
 use crate::{
-    Error, Result,
+    Result,
     about::{About, Stance},
     input::{Source, positions},
 };
@@ -33,6 +32,8 @@ pub struct Pieces {
     has_uvs: bool,
     /// Whether the points are the centres of trained 3D Gaussians.
     are_gaussians: bool,
+    /// Whether vertices that are not at finite coordinates are left out, with their triangles.
+    has_gaps: bool,
     /// The property that the user names: its offset in a row, and its type.
     value: Option<(usize, ScalarType)>,
 }
@@ -89,8 +90,16 @@ impl Pieces {
         let color_kind = color_kind(element, &columns);
         let fields = columns.map(|column| column.and_then(|column| field(element, column)));
         let vertices = Vertices { rows, fields, color_kind, color_scale: [None; 4] };
-        let value = None;
-        Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs, are_gaussians, value }))
+        Ok(Some(Self {
+            vertices,
+            faces,
+            has_normals,
+            has_colors,
+            has_uvs,
+            are_gaussians,
+            has_gaps: false,
+            value: None,
+        }))
     }
 
     /// Returns whether the scale of the colours depends on all of them.
@@ -103,10 +112,9 @@ impl Pieces {
         std::array::from_fn(|channel| self.value(source, row, COLOR + channel))
     }
 
-    /// Sets the scale of the colours from the largest values of all channels. Without it there are
-    /// no colours.
-    fn settle_colors(&mut self, largest: [f64; 4]) {
-        self.vertices.color_scale = color_scale(&self.vertices.color_kind, largest);
+    /// Sets the scale of the colours from the brightness of all. Without it there are no colours.
+    fn settle_colors(&mut self, brightest: &Brightest) {
+        self.vertices.color_scale = color_scale(&self.vertices.color_kind, brightest);
     }
 
     fn points(&self) -> usize {
@@ -130,13 +138,6 @@ impl Pieces {
 
     fn position(&self, source: &Source, row: usize) -> DVec3 {
         DVec3::from_array([0, 1, 2].map(|axis| self.value(source, row, POSITION + axis)))
-    }
-
-    /// Returns the error for a vertex whose position is not finite.
-    fn not_finite(&self, source: &Source, row: usize) -> Error {
-        let byte = self.vertices.rows.at + row * self.vertices.rows.stride;
-        let place = format!("element “vertex”, row {row}, byte {byte}");
-        positions::not_finite(source, place, self.position(source, row))
     }
 
     /// Returns a vertex, converted as by the reader of whole files.
@@ -167,7 +168,7 @@ impl Pieces {
     /// Returns the triangles of a piece, and the index of the first one.
     ///
     /// # Errors
-    /// [`Error::Input`] for a polygon, and for an index without a vertex.
+    /// [`Error::Input`](crate::Error::Input) for a polygon, and for an index without a vertex.
     fn triangle_piece(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)> {
         let Some(faces) = &self.faces else { return Ok((0, Vec::new())) };
         let Rows { at, count, stride, big } = faces.rows;
@@ -194,7 +195,12 @@ impl Pieces {
             }
         };
         let rows = piece * ROWS..((piece + 1) * ROWS).min(count);
-        Ok((rows.start, rows.map(triangle).collect::<Result<_>>()?))
+        let is_whole = |corners: &[u32; 3]| {
+            !self.has_gaps
+                || corners.iter().all(|&row| self.position(source, row as usize).is_finite())
+        };
+        let is_left = |corners: &Result<[u32; 3]>| corners.as_ref().map_or(true, is_whole);
+        Ok((rows.start, rows.map(triangle).filter(is_left).collect::<Result<_>>()?))
     }
 }
 
@@ -240,50 +246,62 @@ impl Form for Pieces {
 
     fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let mut brightest = [0.0; 4];
+        let (mut brightest, mut kept) = (Brightest::default(), 0);
         let asks_for_colors = self.asks_for_colors();
         let of_piece = |piece: usize| {
             let mut around = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-            let mut brightest = [0.0; 4];
+            let (mut brightest, mut kept) = (Brightest::default(), 0);
             for row in self.rows(piece) {
                 let position = self.position(source, row);
                 if !position.is_finite() {
-                    return Err(self.not_finite(source, row));
+                    continue;
                 }
+                kept += 1;
                 around = (around.0.min(position), around.1.max(position));
                 if asks_for_colors {
-                    brightest = larger(brightest, self.channels(source, row));
+                    brightest = brightest.with_color(self.channels(source, row));
                 }
             }
-            Ok((around, brightest, self.rows(piece).end as u64))
+            Ok((around, brightest, kept, self.rows(piece).end as u64))
         };
         in_order(
             source,
             0..self.pieces()[0],
             |_| 0..0,
             of_piece,
-            |(around, of_piece, seen)| {
+            |(around, of_piece, of_kept, seen)| {
                 (low, high) = (low.min(around.0), high.max(around.1));
-                brightest = larger(brightest, of_piece);
+                brightest = brightest.with(of_piece);
+                kept += of_kept;
                 watch(seen);
                 Ok(())
             },
         )?;
-        self.settle_colors(brightest);
-        Ok((self.points() as u64, [low, high]))
+        self.settle_colors(&brightest);
+        if kept == 0 {
+            let message = "none of the vertices is at finite coordinates";
+            return Err(source.error("element “vertex”", message));
+        }
+        self.has_gaps = kept < self.points();
+        if self.has_gaps {
+            unplaced::warn(source, self.points() - kept, self.points());
+        }
+        Ok((kept as u64, [low, high]))
     }
 
     fn coloring(&self) -> Coloring {
         self.vertices.color_scale
     }
 
-    fn recolor(&mut self, coloring: Coloring) {
+    fn resume(&mut self, coloring: Coloring, points: u64) {
+        self.has_gaps = points < self.points() as u64;
         self.vertices.color_scale = coloring;
     }
 
     fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>> {
         let point = |row| StreamPoint::new(&self.vertex(source, row), origin);
-        Ok(self.rows(piece).map(point).collect())
+        let is_placed = |row: &usize| !self.has_gaps || self.position(source, *row).is_finite();
+        Ok(self.rows(piece).filter(is_placed).map(point).collect())
     }
 
     fn triangles(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)> {

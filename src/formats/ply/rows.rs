@@ -276,7 +276,7 @@ fn visit_line(
         if !parse {
             return Ok(0.0);
         }
-        copy::number(word).ok_or_else(|| {
+        copy::float(word).ok_or_else(|| {
             wrong(format!("“{}” is not a number (for “{name}”)", copy::excerpt(word)))
         })
     };

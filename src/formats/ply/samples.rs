@@ -68,6 +68,14 @@ pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
     })
 }
 
+/// Returns the names of the vertices' properties that may colour them: those without another
+/// meaning.
+pub(super) fn attributes(element: &Element) -> Vec<String> {
+    let (candidates, _) = candidates(element);
+    let own = candidates.into_iter().filter(|candidate| candidate.role != Role::Geometry);
+    own.map(|candidate| candidate.name).collect()
+}
+
 /// Returns the property of the vertices that a caller names, and its values.
 pub(super) fn named_values(
     source: &Source,
@@ -119,7 +127,11 @@ fn candidates(element: &Element) -> (Vec<Candidate>, Vec<usize>) {
     let known = |name: &str| {
         let of_group = groups.iter().cloned().any(|group| {
             let has = |role: usize| role == ALPHA || element.column(ROLES[role]).is_some();
-            group.clone().all(has) && ROLES[group].iter().any(|names| names.contains(&name))
+            group.clone().all(has)
+                && ROLES[group]
+                    .iter()
+                    .flat_map(|names| *names)
+                    .any(|own| own.eq_ignore_ascii_case(name))
         });
         of_group || name == RADIUS || COVARIANCE.contains(&name)
     };
@@ -276,7 +288,7 @@ mod tests {
             ("x y z a b", &[1.0; 5], Some("c"), "no array “c”"),
             ("x y a", &[1.0; 3], None, "no scalar property “z”"),
             ("x y z a", &[1.0, 2.0, 3.0, f64::NAN], None, "none of the 1 samples"),
-            ("x y z a", &[1.0, f64::NAN, 3.0, 4.0], None, "not finite"),
+            ("x y z a", &[1.0, f64::NAN, 3.0, 4.0], None, "none is at finite coordinates"),
             ("x y z a radius", &[1.0, 2.0, 3.0, 4.0, -1.0], None, "radius of sample 0"),
         ] {
             let message = load(&file("ascii", properties, &[row]), scalar).unwrap_err().to_string();

@@ -345,6 +345,34 @@ fn message(bytes: impl AsRef<[u8]>) -> String {
     load(bytes).expect_err("an error").to_string()
 }
 
+/// Names in capitals, and vertices that are not at finite coordinates, in every encoding.
+#[test]
+fn what_other_programs_read_is_read() {
+    let head = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement Vertex 4\nproperty float X\nproperty float Y\n\
+             property float Z\nproperty uchar Red\nproperty uchar Green\nproperty uchar Blue\n\
+             element FACE 2\nproperty list uchar int Vertex_Indices\nend_header\n"
+        )
+    };
+    let mut binary = head("binary_little_endian").into_bytes();
+    for place in [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [f32::NAN, 0.0, 0.0], [0.0, 1.0, 0.0f32]] {
+        binary.extend(place.iter().flat_map(|value| value.to_le_bytes()));
+        binary.extend([1, 2, 3]);
+    }
+    for face in [[0, 1, 3], [0, 1, 2i32]] {
+        binary.push(3);
+        binary.extend(face.iter().flat_map(|index| index.to_le_bytes()));
+    }
+    let rows = "0 0 0 1 2 3\n1 0 0 1 2 3\n-nan(ind) 0 0 1 2 3\n0 1 0 1 2 3\n3 0 1 3\n3 0 1 2\n";
+    let text = head("ascii") + rows;
+    for file in [binary, text.into_bytes()] {
+        let mesh = load(file).expect("loads");
+        assert_eq!((mesh.positions.len(), &mesh.triangles[..]), (3, &[[0, 1, 2]][..]));
+        assert_eq!(mesh.colors, [[1, 2, 3, 255]; 3]);
+    }
+}
+
 #[test]
 fn counts_that_lie_and_broken_numbers() {
     let file = |format: &str, count: &str, body: &str| {
@@ -365,7 +393,7 @@ fn counts_that_lie_and_broken_numbers() {
     }
     assert!(
         message(file("ascii", "3", &body.replace("1 0 0", "1 nan 0")))
-            .contains("element “vertex”, row 1")
+            .contains("each uses a point that is not at finite coordinates")
     );
     assert!(
         message(file("ascii", "3", &body.replace("1 0 0", "1 0,5 0")))

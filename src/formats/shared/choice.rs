@@ -89,6 +89,11 @@ impl Candidate {
         self.components == 3 && self.name.to_ascii_lowercase().contains("normal")
     }
 
+    /// Returns whether its values are colours: three or four bytes, or numbers of that name.
+    pub fn is_color(&self) -> bool {
+        matches!(self.components, 3 | 4) && (self.kind == "u8" || names_colors(&self.name))
+    }
+
     fn is_geometry(&self) -> bool {
         let name = self.name.to_ascii_lowercase();
         let is_tuple = |most: usize| (2..=most).contains(&self.components);
@@ -153,6 +158,16 @@ pub(crate) fn is_identifier(name: &str) -> bool {
         || ends.iter().any(|end| name.ends_with(end))
         || matches!(lower.as_str(), "id" | "ids" | "index" | "indices" | "avtghostzones")
         || lower.starts_with("avtoriginal")
+}
+
+/// Returns whether a name is that of colours: a word of it is `rgb`, `rgba` or `color`, with any
+/// end.
+pub(crate) fn names_colors(name: &str) -> bool {
+    let lower = name.to_ascii_lowercase();
+    let words = lower.split(|c: char| !c.is_ascii_alphabetic());
+    words.into_iter().any(|word| {
+        matches!(word, "rgb" | "rgba" | "rgbs" | "color" | "colors" | "colour" | "colours")
+    })
 }
 
 /// Returns whether integers count up by one from any start, as identifiers do.

@@ -1,5 +1,6 @@
 //! Builds a mesh without triangles from the points of a file.
 
+use super::{brightness::Brightness, unplaced};
 use crate::{
     Result,
     about::About,
@@ -25,19 +26,20 @@ pub(crate) struct Cloud {
 }
 
 impl Cloud {
-    /// Chooses the origin and makes the mesh. `place` names a point in an error.
-    pub fn into_mesh(self, source: &Source, place: impl Fn(usize) -> String) -> Result<Mesh> {
+    /// Chooses the origin and makes the mesh. Points that are not at finite coordinates are left
+    /// out.
+    pub fn into_mesh(self, source: &Source) -> Result<Mesh> {
         if self.positions.is_empty() {
             return Err(source.error("file", "contains no points"));
         }
         source.room::<Vec3>("the normals", self.normals.len())?;
         let (origin, positions) =
-            positions::settle(source, self.positions.len(), |point| self.positions[point], place)?;
+            positions::settle_some(source, self.positions.len(), |point| self.positions[point])?;
         let sensors = self
             .sensors
             .into_iter()
             .map(|(position, points)| Sensor { position: (position - origin).as_vec3(), points });
-        Ok(Mesh {
+        let mut mesh = Mesh {
             origin,
             positions,
             normals: self.normals.into_par_iter().map(positions::unit).collect(),
@@ -46,7 +48,9 @@ impl Cloud {
             about: self.about,
             sensors: sensors.filter(|sensor| sensor.position.is_finite()).collect(),
             ..Mesh::default()
-        })
+        };
+        unplaced::leave_out(source, &mut mesh)?;
+        Ok(mesh)
     }
 }
 
@@ -73,24 +77,50 @@ pub(crate) fn grey(value: f32, low: f32, high: f32) -> [u8; 4] {
     [grey, grey, grey, 255]
 }
 
-/// Converts 16-bit colours to bytes. Some writers store bytes in the 16 bits; then no value exceeds
-/// 255. Empty if all are black, as in files without colours.
+/// Converts 16-bit colours to bytes. Some writers store bytes in the 16 bits; then hardly any value
+/// exceeds 255 ([`Brightness`]). Empty if all are black, as in files without colours.
 pub(crate) fn colors_of_16_bits(colors: &[[u16; 3]]) -> Vec<[u8; 4]> {
-    let largest =
-        colors.par_iter().map(|color| color.iter().copied().max().unwrap_or(0)).max().unwrap_or(0);
+    let of_chunk = |colors: &[[u16; 3]]| {
+        let mut seen = Brightness::default();
+        colors.iter().for_each(|color| seen.add(f64::from(color[0].max(color[1]).max(color[2]))));
+        seen
+    };
+    let seen = colors.par_chunks(1 << 14).map(of_chunk);
+    let largest = seen.reduce(Brightness::default, Brightness::with).largest() as u16;
     if largest == 0 {
         return Vec::new();
     }
     colors.par_iter().map(|&color| color_of_16_bits(color, largest)).collect()
 }
 
-/// Converts one 16-bit colour, given the largest value of all colours.
+/// Converts one 16-bit colour, given the largest value of nearly all colours.
 pub(crate) fn color_of_16_bits(color: [u16; 3], largest: u16) -> [u8; 4] {
     let byte = |value: u16| {
-        if largest > 255 { ((u32::from(value) * 255 + 32767) / 65535) as u8 } else { value as u8 }
+        if largest > 255 {
+            ((u32::from(value) * 255 + 32767) / 65535) as u8
+        } else {
+            value.min(255) as u8
+        }
     };
     let [r, g, b] = color.map(byte);
     [r, g, b, 255]
+}
+
+/// Converts rows of colours: three numbers, and a fourth one for the opacity if there are more.
+/// Colours are fractions if none is above 1, 16-bit numbers if one is above 255, and bytes
+/// otherwise.
+pub(crate) fn colors_of_numbers(numbers: &[f64], width: usize) -> Vec<[u8; 4]> {
+    let largest = numbers.iter().copied().fold(0.0, f64::max);
+    let scale = match largest {
+        _ if largest > 255.0 => 255.0 / 65535.0,
+        _ if largest > 1.0 => 1.0,
+        _ => 255.0,
+    };
+    let byte = |number: f64| (number * scale).round() as u8;
+    let color = |row: &[f64]| {
+        [byte(row[0]), byte(row[1]), byte(row[2]), row.get(3).map_or(255, |&alpha| byte(alpha))]
+    };
+    numbers.chunks_exact(width).map(color).collect()
 }
 
 #[cfg(test)]
@@ -115,5 +145,9 @@ mod tests {
             [[0, 128, 255, 255], [1, 1, 0, 255]]
         );
         assert!(colors_of_16_bits(&[[0; 3]; 4]).is_empty());
+        let mut colors = vec![[0, 128, 255]; 500];
+        colors.push([9, 9, 40_000]);
+        let found = colors_of_16_bits(&colors);
+        assert_eq!((found[0], found[500]), ([0, 128, 255, 255], [9, 9, 255, 255]));
     }
 }

@@ -1,20 +1,28 @@
 //! Code that several formats share: the choice among arrays, holes, point clouds, columns of
 //! samples, polygons, textures, sample types.
 
-pub(super) mod attribute;
+pub(super) mod anatomy;
+pub mod attribute;
+pub(super) mod brightness;
 pub(super) mod choice;
 pub(super) mod cloud;
+pub(super) mod colors;
 pub(super) mod found;
 pub(super) mod gather;
 pub(super) mod grid;
 pub(super) mod holes;
+#[cfg(any(feature = "hdf5", feature = "tiff"))]
+pub(super) mod length;
 pub(super) mod luminance;
 pub(super) mod plain;
 pub(super) mod polygon;
 pub(super) mod rescale;
 pub(super) mod sample_type;
+pub(super) mod several;
 pub(super) mod texture;
 pub(super) mod trained;
+pub(super) mod unplaced;
+pub(super) mod visible;
 
 /// Names that a message lists at most.
 const MOST_LISTED: usize = 20;

@@ -15,7 +15,8 @@ const MOST_TEXELS: u64 = 8 * 1032;
 /// picture and in the texture.
 const TEXEL: u64 = 8 + 4 + 4;
 
-/// Decodes a PNG or JPEG picture. `place` names what refers to it.
+/// Decodes a PNG or JPEG picture, or with the feature `gltf` a WebP picture. `place` names what
+/// refers to it.
 pub(crate) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
     isolated(source, place, || decode_here(source, place, bytes))
 }
@@ -26,6 +27,8 @@ fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture
     let reader = image::ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|e| broken(e.into()))?;
+    // WebP packs a picture of one colour into a few bytes, whatever its size.
+    let is_webp = reader.format() == Some(image::ImageFormat::WebP);
     let mut decoder = reader.into_decoder().map_err(broken)?;
     let (width, height) = image::ImageDecoder::dimensions(&decoder);
     let texels = u64::from(width) * u64::from(height);
@@ -35,7 +38,7 @@ fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture
         format!("{place}: the number of texels"),
         texels,
     )?;
-    if texels > (bytes.len() as u64).saturating_mul(MOST_TEXELS) {
+    if !is_webp && texels > (bytes.len() as u64).saturating_mul(MOST_TEXELS) {
         let message = format!(
             "the picture claims {width} × {height} texels, more than {} bytes can hold",
             bytes.len()

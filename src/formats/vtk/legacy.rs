@@ -80,7 +80,7 @@ impl<'a> DataSet<'a> {
         };
         // Where the attributes that follow sit: nowhere yet, at points or at cells.
         let mut at: Option<Place> = None;
-        while let Some((place, text)) = parser.line()? {
+        while let Some((place, text)) = parser.statement()? {
             // No keyword is followed by more words.
             let words: Vec<&str> = text.split_ascii_whitespace().take(MOST_WORDS).collect();
             source.check_time()?;

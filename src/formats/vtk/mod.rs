@@ -65,7 +65,7 @@ pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let survey = Survey::of(source, options)?;
     match survey.drawn(source, options)? {
         (Drawn::Volume, Some(wanted)) => {
-            survey.warn(source, Drawn::Volume);
+            survey.warn(source, options, Drawn::Volume);
             image::read(source, options, &wanted)
         }
         (drawn, _) => Err(other(source, drawn, "a volume")),
@@ -82,7 +82,7 @@ pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
 pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     let survey = Survey::of(source, options)?;
     let (drawn, wanted) = survey.drawn(source, options)?;
-    survey.warn(source, drawn);
+    survey.warn(source, options, drawn);
     if drawn == Drawn::Volume {
         return Err(other(source, drawn, "a mesh"));
     }
@@ -117,7 +117,7 @@ pub fn read_cells(source: &Source, options: &ReadOptions) -> Result<Cells> {
     let Some(wanted) = wanted.filter(|_| drawn == Drawn::Cells) else {
         return Err(other(source, drawn, "a set of cells with values"));
     };
-    survey.warn(source, drawn);
+    survey.warn(source, options, drawn);
     let mut grid = Grid::read(source, options, Some(&wanted))?;
     grid.weld(source, wanted.array.place == Place::Cells)?;
     let mut cells = solid::cells(source, &grid, &wanted, options)?;
@@ -137,6 +137,7 @@ pub fn read_samples(source: &Source, options: &ReadOptions) -> Result<Points> {
     if drawn == Drawn::Volume {
         return Err(other(source, drawn, "a set of scattered samples"));
     }
+    survey.warn(source, options, drawn);
     let wanted = wanted.ok_or_else(|| {
         source.error("file", "contains no values that can be drawn").hint("read it as a mesh")
     })?;

@@ -47,8 +47,13 @@ pub fn cells(
         }
         *own
     };
+    let mut unplaced = 0;
     for cell in 0..grid.types.len() {
         let Some(kind) = CellKind::of_vtk(grid.types[cell].into()) else { continue };
+        if !grid.points_of(cell).all(|point| grid.points[point as usize].is_finite()) {
+            unplaced += 1;
+            continue;
+        }
         let corners = grid.corners_of(cell);
         if grid.types[cell] == POLYHEDRON {
             let faces = super::grid::faces(corners).flat_map(|face| {
@@ -64,6 +69,7 @@ pub fn cells(
             cells.values.push(grid.values[cell] as f32);
         }
     }
+    check_unplaced(source, unplaced, cells.kinds.len())?;
     if !of_cells {
         cells.values = used.iter().map(|&point| grid.values[point as usize] as f32).collect();
     }
@@ -78,6 +84,22 @@ pub fn cells(
     cells.about.holes = holes as u64;
     cells.validate().map_err(|error| source.error("Cells", error.to_string()))?;
     Ok(cells)
+}
+
+/// Says how many cells are left out because a corner is not at finite coordinates.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) if none is left.
+fn check_unplaced(source: &Source, unplaced: usize, left: usize) -> Result<()> {
+    let what = "a corner that is not at finite coordinates";
+    if unplaced > 0 && left == 0 {
+        return Err(source.error("Cells", format!("each has {what}")));
+    }
+    if unplaced > 0 {
+        let file = source.path.display();
+        tracing::warn!("{file}: {unplaced} cells have {what}: they are left out");
+    }
+    Ok(())
 }
 
 /// Returns samples at the points of a grid, or at the centres of its cells. Ghosts are left out.

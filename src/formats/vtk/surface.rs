@@ -1,7 +1,10 @@
 //! Surfaces and point clouds of VTK's cells, with the values or colours that are drawn.
 
 use super::{
-    super::{Place, shared::polygon},
+    super::{
+        Place,
+        shared::{polygon, unplaced},
+    },
     grid::{Grid, POLYHEDRON, faces},
     survey::{Wanted, dimension},
 };
@@ -74,20 +77,21 @@ pub fn cloud(source: &Source, grid: &Grid, wanted: Option<&Wanted>) -> Result<Me
         }
     }
     let kept: Vec<usize> = (0..count).filter(|&point| !grid.ghosts[point]).collect();
-    let place = |row: usize| format!("point {}", kept[row]);
     let (origin, positions) =
-        positions::settle(source, kept.len(), |row| grid.points[kept[row]], place)?;
+        positions::settle_some(source, kept.len(), |row| grid.points[kept[row]])?;
     fn of<T: Copy>(kept: &[usize], list: &[T]) -> Vec<T> {
         if list.is_empty() { Vec::new() } else { kept.iter().map(|&point| list[point]).collect() }
     }
-    Ok(Mesh {
+    let mut mesh = Mesh {
         origin,
         positions,
         normals: of(&kept, &grid.normals).into_iter().map(positions::unit).collect(),
         colors: of(&kept, &colors),
         values: of(&kept, &values).into_iter().map(|value| value as f32).collect(),
         ..Mesh::default()
-    })
+    };
+    unplaced::leave_out(source, &mut mesh)?;
+    Ok(mesh)
 }
 
 /// Makes a mesh of triangles over the points of a grid, each with the number of its cell.
@@ -130,14 +134,13 @@ fn give(
     source.check_points("the number of vertices", vertices.len() as u64)?;
     let vertices = vertices.into_inner();
     let position = |row: usize| grid.points[vertices[row].0 as usize];
-    let place = |row: usize| format!("point {}", vertices[row].0);
-    let (origin, positions) = positions::settle(source, vertices.len(), position, place)?;
+    let (origin, positions) = positions::settle_some(source, vertices.len(), position)?;
     source.room::<(Vec3, [u8; 4], f32)>("the vertices", vertices.len())?;
     let index = |&(point, cell): &(u32, u32)| if of_cells { cell } else { point } as usize;
     let at = |vertex: &(u32, u32)| vertex.0 as usize;
     let has = |length: usize| length > 0;
     let rows = |is_there: bool| vertices.iter().filter(move |_| is_there);
-    Ok(Mesh {
+    let mut mesh = Mesh {
         origin,
         positions,
         normals: rows(has(grid.normals.len()))
@@ -149,7 +152,9 @@ fn give(
             .collect(),
         triangles: out,
         ..Mesh::default()
-    })
+    };
+    unplaced::leave_out(source, &mut mesh)?;
+    Ok(mesh)
 }
 
 /// Passes the polygons of a cell that is a surface to `add`. Those of higher order are cut along

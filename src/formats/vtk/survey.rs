@@ -6,6 +6,7 @@ use super::{
         shared::{
             choice::{self, Candidate, Chosen, Part},
             holes::is_hole,
+            several,
         },
     },
     data::{Block, Kind, ListKind, Numbers},
@@ -32,6 +33,8 @@ pub struct Survey {
     /// Those of lattices, and of lattices and cells that fill space.
     of_lattices: Vec<Candidate>,
     of_solids: Vec<Candidate>,
+    /// The number of times of a collection; 0 if there is none with times.
+    times: u64,
 }
 
 /// What is drawn of a file.
@@ -63,6 +66,7 @@ impl Survey {
             for block in &set.blocks {
                 survey.add(set.source, block, set.whole)?;
             }
+            survey.times = survey.times.max(set.times);
             Ok(true)
         })?;
         Ok(survey)
@@ -160,6 +164,10 @@ impl Survey {
             Drawn::Cloud
         };
         let is_length = options.scalar.as_deref().is_some_and(|name| name.ends_with(":magnitude"));
+        if let (Drawn::Volume, Some(wanted)) = (drawn, &mut wanted) {
+            wanted.is_color =
+                wanted.array.is_color() && wanted.part == Part::Magnitude && !is_length;
+        }
         if let (Drawn::Surface | Drawn::Cloud, Some(wanted)) = (drawn, &mut wanted) {
             let Candidate { kind, components, .. } = &wanted.array;
             let is_tuple = kind == "u8" && matches!(components, 3 | 4);
@@ -192,7 +200,8 @@ impl Survey {
     }
 
     /// Warns of what is in the file but not drawn.
-    pub fn warn(&self, source: &Source, drawn: Drawn) {
+    pub fn warn(&self, source: &Source, options: &ReadOptions, drawn: Drawn) {
+        several::warn_of_times(source, self.times, options, "times");
         let is_solid = matches!(drawn, Drawn::Volume | Drawn::Cells | Drawn::Boundary);
         let mut left = Vec::new();
         let mut add = |count: u64, one: &str, many: &str| {

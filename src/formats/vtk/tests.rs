@@ -91,7 +91,7 @@ fn unstructured_grids() {
         (&whole.replace("4 8", "0 8"), None, "cell 0: has no corners"),
         (&whole.replace("6 7<", "6 8<"), None, "point 8, but there are 8 points"),
         (&whole.replace("10 -20", "10"), None, "1 numbers where 2"),
-        (&whole.replace("0 0 2  5", "0 0 nan 5"), None, "not finite"),
+        (&whole.replace("0 0 2  5", "0 0 nan 5"), None, "not at finite coordinates"),
         (&whole.replace("Name='offsets'", ""), None, "no array “offsets”"),
         (&whole.replace("NumberOfComponents='3'", ""), None, "positions have 3"),
         (&whole.replace("UnstructuredGrid", "HyperTreeGrid"), None, "HyperTreeGrid"),
@@ -505,7 +505,7 @@ fn parallel_files_and_collections() {
         read_with(&path, |source| read_volume(source, &options))
     };
     assert_eq!((at(0).unwrap().range, at(1).unwrap().range), ([0.0, 4.0], [1.0, 9.0]));
-    assert!(message(at(2)).contains("it has 2 times"));
+    assert!(message(at(2)).contains("has 2 times, but number 2"));
     // References stay in the folder, and are not followed for ever.
     for (reference, word) in
         [("../a.vti", "leads out"), ("none.vti", "No such"), ("b.vtm", "itself")]

@@ -2,9 +2,8 @@
 
 use super::{
     super::{
-        ALPHA, COLOR, ColorKind, ROLES, color_kind, color_scale,
+        ALPHA, Brightest, COLOR, ColorKind, ROLES, color_kind, color_scale,
         header::{Element, Header},
-        larger,
         table::Table,
     },
     are_gaussians, named, needed, rest, rest_number, rows_of, scalar,
@@ -17,7 +16,6 @@ use crate::{
         harmonics::{constant_of, terms},
     },
     input::Source,
-    parallel::prelude::*,
 };
 use glam::{DVec3, Quat, Vec3};
 
@@ -28,8 +26,9 @@ const NEEDED: [&str; 10] =
 const OPACITY: usize = 3;
 const TURN: usize = 4;
 const SCALE: usize = 8;
-const CONSTANT: usize = 11;
-const REST: usize = 14;
+const FILTER: usize = 11;
+const CONSTANT: usize = 12;
+const REST: usize = 15;
 
 /// The constant terms of the colours.
 const CONSTANTS: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
@@ -51,6 +50,7 @@ pub(super) fn read(source: &Source, header: &Header) -> Result<Gaussians> {
     let table = Table::read(source, vertex, &rows, &layout.columns)?;
     let scale = layout.is_painted.then(|| painted_scale(vertex, &table));
     let is_flat = layout.columns[SCALE + 2].is_none();
+    let has_filter = layout.columns[FILTER].is_some();
     let terms = terms(layout.degree);
     settle(source, count, layout.degree, |row, colors| {
         let value = |column: usize| table.value(row, column);
@@ -68,14 +68,27 @@ pub(super) fn read(source: &Source, header: &Header) -> Result<Gaussians> {
         if is_flat {
             scale.z = 0.0;
         }
+        let mut share = 1.0;
+        if has_filter {
+            (scale, share) = filtered(scale, value(FILTER) as f32);
+        }
         let [w, x, y, z] = [0, 1, 2, 3].map(|part| value(TURN + part) as f32);
         Ok(Trained {
             center: DVec3::new(value(0), value(1), value(2)),
             scale,
             rotation: Quat::from_xyzw(x, y, z, w),
-            opacity: opacity_of_logit(value(OPACITY) as f32),
+            opacity: opacity_of_logit(value(OPACITY) as f32) * share,
         })
     })
+}
+
+/// Returns the scales of a Gaussian that a filter widens, and the factor on its opacity that keeps
+/// what it absorbs: the low-pass filter that Mip-Splatting trains with and stores beside the scales
+/// (Yu et al. 2024, equation 9). Axes without an extent count for neither.
+fn filtered(scale: Vec3, filter: f32) -> (Vec3, f32) {
+    let wide = (scale * scale + Vec3::splat(filter * filter)).map(f32::sqrt);
+    let share = |axis: usize| if scale[axis] > 0.0 { scale[axis] / wide[axis] } else { 1.0 };
+    (wide, share(0) * share(1) * share(2))
 }
 
 impl Layout {
@@ -93,6 +106,7 @@ impl Layout {
         };
         let mut columns = NEEDED.iter().map(wanted).collect::<Result<Vec<_>>>()?;
         columns.push(scalar(vertex, &["scale_2"]));
+        columns.push(scalar(vertex, &["filter_3D"]));
         if is_painted {
             columns.extend((0..3).map(|channel| scalar(vertex, ROLES[COLOR + channel])));
         } else {
@@ -109,14 +123,14 @@ fn painted_scale(vertex: &Element, table: &Table) -> [f64; 3] {
     let mut roles = ROLES.map(|names| scalar(vertex, names));
     roles[ALPHA] = None;
     let kinds = color_kind(vertex, &roles);
-    let mut largest = [0.0; 4];
+    let mut brightest = Brightest::default();
     if kinds.iter().flatten().any(ColorKind::is_wide) {
         let of_row = |row: usize| {
             let [red, green, blue] = [0, 1, 2].map(|channel| table.value(row, CONSTANT + channel));
             [red, green, blue, 0.0]
         };
-        largest = (0..vertex.count).into_par_iter().map(of_row).reduce(|| [0.0; 4], larger);
+        brightest = Brightest::of(vertex.count, of_row);
     }
-    let scale = color_scale(&kinds, largest);
+    let scale = color_scale(&kinds, &brightest);
     [0, 1, 2].map(|channel| scale[channel].unwrap_or(1.0) / 255.0)
 }

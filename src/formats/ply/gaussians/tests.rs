@@ -74,6 +74,7 @@ fn value(name: &str) -> f64 {
         "green" => 0.0,
         "blue" => 51.0,
         "nx" => 9.0,
+        "filter_3D" => 2.0,
         rest => rest.strip_prefix("f_rest_").unwrap().parse::<f64>().unwrap() / 8.0,
     }
 }
@@ -118,6 +119,19 @@ fn every_encoding_degree_and_order() {
             }
         }
     }
+}
+
+/// Mip-Splatting: the squares of the scales and the filter add up; the opacity shrinks by the ratio
+/// of the volumes.
+#[test]
+fn filters_widen_scales_and_lower_opacities() {
+    let names = names(&[&["scale_2", "filter_3D"], &SHAPE, &CONSTANTS], 0);
+    let set = load(trained("ascii", "float", &names)).unwrap();
+    let plain = [1.0, std::f32::consts::E, 1.0 / std::f32::consts::E];
+    let wide = plain.map(|scale| (scale * scale + 4.0).sqrt());
+    assert!((set.scales[0] - Vec3::from(wide)).length() < 1e-5);
+    let share: f32 = (0..3).map(|axis| plain[axis] / wide[axis]).product();
+    assert!((set.opacities[0] - 0.5 * share).abs() < 1e-6);
 }
 
 #[test]

@@ -47,7 +47,7 @@ impl<'a> Parser<'a> {
             }
         };
         loop {
-            let (place, line) = parser.line()?.ok_or_else(|| cut(&parser))?;
+            let (place, line) = parser.statement()?.ok_or_else(|| cut(&parser))?;
             let words: Vec<&str> = line.split_ascii_whitespace().take(4).collect();
             match words[..] {
                 [keyword, kind] if keyword.eq_ignore_ascii_case("DATASET") => {
@@ -108,14 +108,58 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Skips the next line if it begins with this word. In binary files it must.
+    /// Returns the next keyword with its words, joined by spaces, and its place; `None` at the end
+    /// of the file. Line breaks do not matter: a text is a stream of words. After a keyword that is
+    /// not known, and after those with words that may be missing, the rest of the line is returned.
+    pub fn statement(&mut self) -> Result<Option<(String, String)>> {
+        let first = self.rest().trim_ascii_start();
+        let keyword = first.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        match arguments(keyword) {
+            Some(count) => self.words(1 + count),
+            None => self.line(),
+        }
+    }
+
+    /// Returns the next `count` words, joined by spaces, and the place of the first. In binary
+    /// files the bytes of an array follow on the next line, so the rest of the line is skipped.
+    fn words(&mut self, count: usize) -> Result<Option<(String, String)>> {
+        let rest = self.rest();
+        let start = rest.len() - rest.trim_ascii_start().len();
+        if start == rest.len() {
+            return Ok(None);
+        }
+        let place = format!("byte {}", self.at + start);
+        let mut words: Vec<String> = Vec::new();
+        let mut end = start;
+        while words.len() < count {
+            let blank = rest[end..].iter().take_while(|b| b.is_ascii_whitespace()).count();
+            let window = &rest[end + blank..rest.len().min(end + blank + LONGEST)];
+            let word = window.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+            if word.is_empty() {
+                break;
+            }
+            if word.len() == LONGEST {
+                let message = format!("the word is longer than {LONGEST} bytes");
+                return Err(self.source.error(place, message));
+            }
+            words.push(copy::text(word).map_err(|_| self.source.error(&place, "is not text"))?);
+            end += blank + word.len();
+        }
+        self.at += end;
+        if self.binary {
+            self.raw_line()?;
+        }
+        Ok(Some((place, words.join(" "))))
+    }
+
+    /// Skips the next keyword with its word if it is this one. In binary files it must be.
     pub fn skip_line_of(&mut self, word: &str) -> Result<()> {
         let rest = self.rest().trim_ascii_start();
         match rest
             .get(..word.len())
             .is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes()))
         {
-            true => self.line().map(drop),
+            true => self.words(2).map(drop),
             false if self.binary => Err(self
                 .source
                 .error(self.place(), format!("there is no line “{word}” where it was expected"))),
@@ -159,6 +203,7 @@ impl<'a> Parser<'a> {
                 }
             }
             "string" | "utf8_string" => {
+                self.end_line();
                 for _ in 0..count {
                     self.raw_line()?;
                 }
@@ -172,6 +217,14 @@ impl<'a> Parser<'a> {
             }
         }
         Ok(None)
+    }
+
+    /// Goes to the next line if nothing but white space is left of this one.
+    fn end_line(&mut self) {
+        let line = self.rest().split_inclusive(|&b| b == b'\n').next().unwrap_or_default();
+        if line.trim_ascii().is_empty() {
+            self.at += line.len();
+        }
     }
 
     /// Skips bytes that must be there.
@@ -236,11 +289,11 @@ impl<'a> Parser<'a> {
         size: usize,
     ) -> Result<(Vec<f64>, Vec<f64>)> {
         let before = self.at;
-        if let Ok(Some((place, line))) = self.line()
+        if let Ok(Some((place, line))) = self.words(2)
             && let Some(kind) = line.strip_prefix("OFFSETS")
         {
             let mut ends = self.array(&place, count, kind.trim())?.doubles(self.source)?;
-            let next = self.line()?;
+            let next = self.words(2)?;
             let next = next
                 .as_ref()
                 .and_then(|(place, line)| Some((place, line.strip_prefix("CONNECTIVITY")?.trim())));
@@ -286,15 +339,13 @@ impl<'a> Parser<'a> {
 
     /// Reads an array of a field.
     pub fn field(&mut self) -> Result<FieldArray<'a>> {
-        let Some((mut place, mut line)) = self.line()? else {
+        if self.rest().trim_ascii_start().starts_with(b"METADATA") {
+            self.line()?;
+            self.skip_to_blank()?;
+        }
+        let Some((place, line)) = self.words(4)? else {
             return Err(self.source.error(self.place(), "the file ends inside a FIELD"));
         };
-        if line.starts_with("METADATA") {
-            self.skip_to_blank()?;
-            let next = self.line()?;
-            (place, line) =
-                next.ok_or_else(|| self.source.error(place, "the file ends inside a FIELD"))?;
-        }
         let words: Vec<&str> = line.split_ascii_whitespace().take(5).collect();
         let [name, components, tuples, kind] = words[..] else {
             return Err(self.source.error(place, "needs a name, components, tuples and a type"));
@@ -316,6 +367,39 @@ impl<'a> Parser<'a> {
         let bytes: Vec<u8> = fractions.iter().map(|part| (part * 255.0).round() as u8).collect();
         Ok(Part { kind: SampleType::U8, endian: Endian::Little, bytes: bytes.into() })
     }
+}
+
+/// Returns the number of words that follow a keyword; `None` for other words, and for keywords that
+/// end with their line.
+fn arguments(keyword: &[u8]) -> Option<usize> {
+    const COUNTS: [(&str, usize); 24] = [
+        ("DATASET", 1),
+        ("POINT_DATA", 1),
+        ("CELL_DATA", 1),
+        ("CELL_TYPES", 1),
+        ("POINTS", 2),
+        ("CELLS", 2),
+        ("VERTICES", 2),
+        ("LINES", 2),
+        ("POLYGONS", 2),
+        ("TRIANGLE_STRIPS", 2),
+        ("X_COORDINATES", 2),
+        ("Y_COORDINATES", 2),
+        ("Z_COORDINATES", 2),
+        ("FIELD", 2),
+        ("LOOKUP_TABLE", 2),
+        ("VECTORS", 2),
+        ("NORMALS", 2),
+        ("TENSORS", 2),
+        ("COLOR_SCALARS", 2),
+        ("DIMENSIONS", 3),
+        ("ORIGIN", 3),
+        ("SPACING", 3),
+        ("TEXTURE_COORDINATES", 3),
+        ("EXTENT", 6),
+    ];
+    let found = COUNTS.iter().find(|(name, _)| keyword.eq_ignore_ascii_case(name.as_bytes()));
+    found.map(|(_, count)| *count)
 }
 
 /// An array of a field: `part` is `None` if its values are not numbers that can be read.
