@@ -21,7 +21,8 @@ pub struct Facet {
     /// outside.
     pub corners: [[f32; 3]; 3],
     /// The unit normals at the corners, by which the facet is lit; octahedral
-    /// ([`encode_normal`]). Between the corners they are interpolated (Phong 1975).
+    /// ([`encode_normal`]). Between the corners they are interpolated (Phong 1975). A facet without
+    /// normals ([`NO_NORMAL`]) is not lit.
     pub normals: [u32; 3],
     /// The colours at the corners: red, green and blue, 8 bits each, red in the lowest bits. The
     /// highest 8 bits are not used: a facet is opaque.
@@ -43,9 +44,14 @@ impl Facet {
         }
     }
 
-    /// Returns the unit normals at the corners.
+    /// Returns the facet without normals. It is drawn in its own colours, whatever the light.
+    pub fn unlit(self) -> Self {
+        Self { normals: [NO_NORMAL; 3], ..self }
+    }
+
+    /// Returns the unit normals at the corners; zero if there are none.
     pub fn decoded_normals(&self) -> [Vec3; 3] {
-        self.normals.map(|normal| decode_normal(normal).unwrap_or(Vec3::Z))
+        self.normals.map(|normal| decode_normal(normal).unwrap_or(Vec3::ZERO))
     }
 }
 
@@ -107,5 +113,6 @@ mod tests {
     fn a_facet_without_normals_has_that_of_its_triangle() {
         assert_eq!(set().facets[0].decoded_normals(), [Vec3::Z; 3]);
         assert_eq!(set().facets[0].colors[0].to_le_bytes(), [255, 0, 7, 255]);
+        assert_eq!(set().facets[0].unlit().decoded_normals(), [Vec3::ZERO; 3]);
     }
 }

@@ -4,6 +4,7 @@ use crate::{failure::Failure, own::Own, parse};
 use clap::Args;
 use splatkit::{
     Error,
+    about::Labels,
     color::{ColorMap, ColorScale, Spread},
     glam::DVec3,
     surface::{Mesh, Paint, Values},
@@ -55,6 +56,8 @@ pub struct Bar {
     pub scale: ColorScale,
     /// The colours from the low end of the range to the high one.
     pub colors: Vec<[f32; 3]>,
+    /// The colours and the names of labels. If there are any, they are listed instead of a bar.
+    pub labels: Vec<([f32; 3], String)>,
 }
 
 /// Colours of a bar, enough for one a pixel.
@@ -204,7 +207,7 @@ impl ColorFlags {
         };
         let color = |share: f64| scale.color(scale.value(share));
         let colors = (0..COLORS).map(|i| color(i as f64 / (COLORS - 1) as f64)).collect();
-        Ok(Some(Bar { title, scale, colors }))
+        Ok(Some(Bar { title, scale, colors, labels: Vec::new() }))
     }
 
     /// Takes the colours of classes for values of that name, unless the user chose a map.
@@ -271,7 +274,17 @@ impl ColorFlags {
             let value = scale.value(i as f64 / (COLORS - 1) as f64);
             transfer.color(value).map(|part| part as f32)
         };
-        Bar { title, scale, colors: (0..COLORS).map(color).collect() }
+        let colors = (0..COLORS).map(color).collect();
+        Bar { title, scale, colors, labels: Vec::new() }
+    }
+
+    /// Returns the colours and the names of the labels that a transfer function shows.
+    pub fn legend(transfer: &TransferFunction, labels: &Labels) -> Vec<([f32; 3], String)> {
+        let is_shown = |value: &&i32| transfer.opacity(f64::from(**value)) > 0.0;
+        let entry = |&value: &i32| {
+            (transfer.color(f64::from(value)).map(|part| part as f32), labels.name(value))
+        };
+        labels.present.iter().filter(is_shown).map(entry).collect()
     }
 
     fn scale(&self, usual: ColorMap, range: Option<[f64; 2]>) -> ColorScale {

@@ -46,6 +46,7 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("header", RAW),
     ("scalar", MESH | CLOUD | VOLUME | SAMPLES | CELLS),
     ("missing", VOLUME | SAMPLES | CELLS),
+    ("labels", VOLUME),
     ("radius", SAMPLES),
     ("neighbours", SAMPLES),
     ("no-slopes", SAMPLES),

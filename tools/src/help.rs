@@ -11,7 +11,7 @@ struct Task {
     examples: &'static str,
 }
 
-const TASKS: [Task; 5] = [
+const TASKS: [Task; 7] = [
     Task {
         name: "render",
         flags: DRAWN,
@@ -50,7 +50,24 @@ const TASKS: [Task; 5] = [
         examples: "  splatkit transfer head.nrrd -o head.json
   splatkit transfer head.nrrd --transfer ct-bone --range 200,1500 -o bone.json",
     },
+    Task {
+        name: "info",
+        flags: LOOKED_AT,
+        examples: "  splatkit info scan.laz
+  splatkit info study/ --series 2
+  splatkit info aseg.nii.gz --labels FreeSurferColorLUT.txt",
+    },
+    Task {
+        name: "check",
+        flags: LOOKED_AT,
+        examples: "  splatkit check scan.splk
+  splatkit check ct.raw --dims 512x512x300 --type u16",
+    },
 ];
+
+/// The flags of a look at a file.
+const LOOKED_AT: &str =
+    "json verbose quiet dims type spacing scalar time series dataset missing labels";
 
 /// The flags of a picture.
 const DRAWN: &str = "output overwrite background samples json transfer range iso colormap color \
@@ -96,7 +113,7 @@ mod tests {
         (
             "Input",
             "dims type spacing endian header scalar time series dataset missing radius neighbours \
-            no-slopes",
+            no-slopes labels",
         ),
         ("Limits", "limit-points limit-bytes limit-depth limit-texels limit-seconds"),
         (

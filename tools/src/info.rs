@@ -14,7 +14,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 use splatkit::{
     Error,
-    about::{About, Modality, Stance},
+    about::{About, Frame, Modality, Stance},
     bricks::Bricks,
     cells::{CellKind, Cells, Place},
     formats::{self, Series},
@@ -52,6 +52,9 @@ const ORDER: &[&str] = &[
     "value_unit",
     "bounds",
     "attributes",
+    "color_by",
+    "layout",
+    "crs",
     "materials",
     "textures",
     "splats",
@@ -217,6 +220,15 @@ fn of_mesh(mesh: &Mesh) -> Map<String, Value> {
         "textures".into(),
         json!(mesh.materials.iter().filter(|m| m.texture.is_some()).count()),
     );
+    let about = &mesh.about;
+    if !about.attributes.is_empty() {
+        facts.insert("color_by".into(), json!(about.attributes));
+    }
+    for (name, text) in [("layout", &about.layout), ("crs", &about.crs)] {
+        if !text.is_empty() {
+            facts.insert(name.into(), json!(text));
+        }
+    }
     stand(&mut facts, mesh.about.stance);
     facts.insert("bounds".into(), bounds(mesh.bounds()));
     facts
@@ -229,9 +241,14 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     facts.insert("spacing".into(), json!(volume.lattice.spacing().to_array()));
     facts.insert("type".into(), json!(volume.samples.type_name()));
     facts.insert("range".into(), json!(volume.range));
-    facts.insert("attributes".into(), json!(["value"]));
+    let attributes =
+        if volume.colors.is_some() { json!(["value", "color"]) } else { json!(["value"]) };
+    facts.insert("attributes".into(), attributes);
     stand(&mut facts, volume.about.stance);
     say(&mut facts, &volume.about);
+    if let Some(labels) = &volume.about.labels {
+        facts.insert("labels".into(), json!(labels.listed()));
+    }
     facts.insert("bounds".into(), bounds(Some(volume.bounds())));
     facts
 }
@@ -248,6 +265,9 @@ fn say(facts: &mut Map<String, Value>, about: &About) {
     });
     if let Some(modality) = modality {
         facts.insert("modality".into(), json!(modality));
+    }
+    if about.frame == Frame::Patient {
+        facts.insert("frame".into(), json!("RAS"));
     }
     if let Some(window) = about.window {
         facts.insert("window".into(), json!(window));

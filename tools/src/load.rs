@@ -80,6 +80,10 @@ pub struct LoadFlags {
     /// Take samples of this value as holes, as samples that are not numbers are.
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     missing: Option<f64>,
+    /// Label maps: take names and colours of labels from this table, of ITK-SNAP, FreeSurfer, 3D
+    /// Slicer or with columns index, name, color.
+    #[arg(long, value_name = "FILE", value_parser = parse::input())]
+    labels: Option<PathBuf>,
     /// Scattered samples: use one radius for all samples, in world units. A radius is two standard
     /// deviations [default: the file's radii, or estimated from the neighbours]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
@@ -147,7 +151,12 @@ impl LoadFlags {
             }
             Kind::Volume => {
                 let source = Source::open_any(path, &whole)?;
-                (Input::Volume(formats::read_volume(&source, &self.options())?), source.files())
+                let mut options = self.options();
+                if let Some(table) = &self.labels {
+                    options.labels = formats::read_labels(table, &limits)?;
+                    read.push(table.clone());
+                }
+                (Input::Volume(formats::read_volume(&source, &options)?), source.files())
             }
             Kind::Samples => {
                 let source = Source::open_any(path, &whole)?;
@@ -240,6 +249,7 @@ impl LoadFlags {
             dataset: self.dataset.clone(),
             spacing: self.spacing,
             missing: self.missing,
+            labels: Vec::new(),
         }
     }
 

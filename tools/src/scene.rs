@@ -2,7 +2,7 @@
 
 use crate::{
     camera::{CameraFlags, Origin, Subject, direction_name},
-    color::titled,
+    color::{ColorFlags, titled},
     failure::{Failure, in_file},
     given::{Given, Kinds, kinds_of},
     load::{Input, LoadFlags},
@@ -15,7 +15,7 @@ use clap::Args;
 use glam::DVec3;
 use splatkit::{
     Deadline, Error,
-    about::Stance,
+    about::{Frame, Frames, Stance},
     bricks::Bricks,
     cells::{CellOptions, Cells},
     gaussians::Gaussians,
@@ -25,7 +25,7 @@ use splatkit::{
     memory,
     picture::Edges,
     scattered::Points,
-    scene::{Scene, Settings},
+    scene::{Item, Scene, Settings},
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
 };
@@ -99,7 +99,10 @@ impl SceneFlags {
             kinds: Vec::new(),
             read: self.show.files(),
         };
-        let mut adding = Adding { flags: self, show, facets, progress, loaded };
+        let frames = Frames::default();
+        // Of values alone: colours have no largest one.
+        let optics = ["mip", "x-ray", "optics"].into_iter().find(|flag| given.has(flag));
+        let mut adding = Adding { flags: self, show, facets, optics, progress, loaded, frames };
         let (mut is_scaled, mut unscaled) = (false, None);
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
@@ -181,6 +184,11 @@ impl SceneFlags {
             // The colours are the function's own by now, also those of a map.
             let title = std::mem::take(&mut bar.title);
             *bar = self.show.color.bar(transfer, values, title);
+            if let Item::Volume(volume, ..) = &loaded.scene.items[item]
+                && let Some(labels) = &volume.about.labels
+            {
+                bar.labels = ColorFlags::legend(transfer, labels);
+            }
         }
         facts
     }
@@ -214,8 +222,11 @@ struct Adding<'a> {
     flags: &'a SceneFlags,
     show: Show<'a>,
     facets: bool,
+    /// A flag of optics that is given.
+    optics: Option<&'static str>,
     progress: &'a Progress,
     loaded: Loaded,
+    frames: Frames,
 }
 
 impl Adding<'_> {
@@ -239,7 +250,8 @@ impl Adding<'_> {
     }
 
     fn add_mesh(&mut self, path: &Path, mut mesh: Mesh, deadline: Deadline) -> Result<(), Failure> {
-        self.stand_mesh(path, &mesh);
+        self.frame(path, mesh.about.frame);
+        self.stand_mesh(path, &mut mesh);
         let flags = self.flags;
         let color = flags.show.color.of(path);
         let up = self.loaded.subject.stance.up;
@@ -281,12 +293,18 @@ impl Adding<'_> {
         Ok(())
     }
 
-    fn add_gaussians(&mut self, path: &Path, set: Gaussians) {
-        self.loaded.count_in(set.bounds(), set.len());
+    fn add_gaussians(&mut self, path: &Path, mut set: Gaussians) {
+        self.frame(path, set.about.frame);
         match set.about.stance {
-            Some(stance) => self.stand(path, stance, Origin::File),
-            None => self.stand(path, Stance::Y_DOWN, Origin::Convention),
+            Some(stance) => {
+                if let Some(wanted) = self.stand(stance, Origin::File) {
+                    self.say_turned(path, stance);
+                    set.stand(wanted);
+                }
+            }
+            None => self.stand_as(path, Stance::Y_DOWN, Origin::Convention),
         }
+        self.loaded.count_in(set.bounds(), set.len());
         self.add_unit(&set.about.length);
         self.change(|scene| scene.with_gaussians(set));
     }
@@ -297,8 +315,11 @@ impl Adding<'_> {
         self.add_unit(&header.unit);
         if let Some(stance) = header.stance {
             let origin = if header.is_guessed { Origin::Guess } else { Origin::File };
-            self.stand(path, stance, origin);
+            self.stand_as(path, stance, origin);
         }
+        // No other frame has this stance.
+        let is_patient = header.stance == Some(Stance::RAS);
+        self.frame(path, if is_patient { Frame::Patient } else { Frame::Own });
         self.change(|scene| scene.with_hierarchy(hierarchy));
     }
 
@@ -312,18 +333,32 @@ impl Adding<'_> {
         self.add_bar(&transfer, values, titled("", ""));
         self.add_unit(&bricks.header().unit);
         self.loaded.count_in(bricks.bounds(), bricks.level(0).dims.iter().product());
-        self.stand(path, Stance::SURVEY, Origin::Convention);
+        self.frame(path, bricks.header().frame);
+        self.stand_as_told(path, bricks.header().stance());
         let kernel = self.show.kernel.clone();
         self.change(|scene| scene.with_bricks(bricks, kernel, transfer));
         Ok(())
     }
 
     fn add_volume(&mut self, path: &Path, mut volume: Volume) -> Result<(), Failure> {
+        if volume.colors.is_some() {
+            match self.show.shows_values(path).or(self.optics) {
+                None => return self.add_colors(path, &volume),
+                Some(flag) => self.progress.warn(format_args!(
+                    "{} has colours; --{flag} shows their brightness instead",
+                    path.display()
+                )),
+            }
+        }
         let transfer = self.show.of_volume(path, &volume)?;
         let title = titled(&volume.about.name, &volume.about.unit);
         self.add_bar(&transfer, volume.range, title);
+        if let (Some(labels), Some(bar)) = (&volume.about.labels, self.loaded.facts.bars.last_mut())
+        {
+            bar.labels = ColorFlags::legend(&transfer, labels);
+        }
         self.add_unit(&volume.about.length);
-        self.loaded.facts.patient = volume.about.stance;
+        self.frame(path, volume.about.frame);
         let [min, max] = volume.bounds();
         self.loaded.count_in(Bounds { min, max }, volume.len());
         self.stand_as_told(path, volume.about.stance);
@@ -336,6 +371,19 @@ impl Adding<'_> {
         Ok(())
     }
 
+    /// Adds a volume in its own colours.
+    fn add_colors(&mut self, path: &Path, volume: &Volume) -> Result<(), Failure> {
+        self.progress.stage(format!("Making splats of {}", path.display()));
+        let splats = volume.colored_splats().map_err(|e| in_file(path, e))?;
+        self.add_unit(&volume.about.length);
+        self.frame(path, volume.about.frame);
+        let [min, max] = volume.bounds();
+        self.loaded.count_in(Bounds { min, max }, volume.len());
+        self.stand_as_told(path, volume.about.stance);
+        self.change(|scene| scene.with_splats(splats.expect("the volume has colours")));
+        Ok(())
+    }
+
     fn add_samples(
         &mut self,
         path: &Path,
@@ -343,6 +391,7 @@ impl Adding<'_> {
         deadline: Deadline,
     ) -> Result<(), Failure> {
         let transfer = self.show.of_samples(path, points)?;
+        self.frame(path, points.about.frame);
         self.add_bar(&transfer, points.range(), titled(&points.about.name, &points.about.unit));
         self.progress.stage(format!("Making splats of {}", path.display()));
         let options = self.flags.load.sample_options(deadline);
@@ -356,6 +405,7 @@ impl Adding<'_> {
 
     fn add_cells(&mut self, path: &Path, mut cells: Cells) -> Result<(), Failure> {
         let transfer = self.show.of_cells(path, &cells)?;
+        self.frame(path, cells.about.frame);
         let title = titled(&cells.about.name, &cells.about.unit);
         self.add_bar(&transfer, cells.range(), title);
         self.add_unit(&cells.about.length);
@@ -382,16 +432,22 @@ impl Adding<'_> {
         self.loaded.facts.bars.push(self.flags.show.color.bar(transfer, values, title));
     }
 
-    /// Takes the stance of a mesh, or guesses it.
-    fn stand_mesh(&mut self, path: &Path, mesh: &Mesh) {
+    /// Takes the stance of a mesh, or guesses it. A mesh that stands otherwise than an input before
+    /// is turned.
+    fn stand_mesh(&mut self, path: &Path, mesh: &mut Mesh) {
         match mesh.about.stance {
-            Some(stance) => self.stand(path, stance, Origin::File),
+            Some(stance) => {
+                if let Some(wanted) = self.stand(stance, Origin::File) {
+                    self.say_turned(path, stance);
+                    mesh.stand(wanted);
+                }
+            }
             // A guess would not count.
             None if self.loaded.subject.origin >= Origin::Guess => {}
             None => {
                 self.progress.stage(format!("Finding the way up of {}", path.display()));
                 if let Some(stance) = mesh.guess_stance() {
-                    self.stand(path, stance, Origin::Guess);
+                    self.stand_as(path, stance, Origin::Guess);
                 }
             }
         }
@@ -400,22 +456,45 @@ impl Adding<'_> {
     /// Takes the stance of a volume or of samples, or the convention for them.
     fn stand_as_told(&mut self, path: &Path, told: Option<Stance>) {
         match told {
-            Some(stance) => self.stand(path, stance, Origin::File),
-            None => self.stand(path, Stance::SURVEY, Origin::Convention),
+            Some(stance) => self.stand_as(path, stance, Origin::File),
+            None => self.stand_as(path, Stance::SURVEY, Origin::Convention),
         }
     }
 
-    /// Takes the stance of an input, unless an earlier one counts more. The first statement of a
-    /// file decides, then the convention, then the first guess.
-    fn stand(&mut self, path: &Path, stance: Stance, origin: Origin) {
-        if self.loaded.subject.consider(stance, origin) {
-            let [own, scene] = [stance.up, self.loaded.subject.stance.up].map(direction_name);
+    /// Takes the stance of an input that is not turned.
+    fn stand_as(&mut self, path: &Path, stance: Stance, origin: Origin) {
+        if let Some(scene) = self.stand(stance, origin) {
+            let [own, scene] = [stance.up, scene.up].map(direction_name);
             self.progress.warn(format_args!(
                 "{} says that {own} is up, but the scene stands with {scene} up, as an input \
                  before says; --up sets another",
                 path.display()
             ));
         }
+    }
+
+    /// Takes the stance of an input, unless an earlier one counts more: the first statement of a
+    /// file decides, then the convention, then the first guess. Returns the scene's stance if both
+    /// are stated by files and differ.
+    fn stand(&mut self, stance: Stance, origin: Origin) -> Option<Stance> {
+        let subject = &mut self.loaded.subject;
+        subject.consider(stance, origin).then_some(subject.stance)
+    }
+
+    fn say_turned(&self, path: &Path, own: Stance) {
+        let [own, scene] = [own.up, self.loaded.subject.stance.up].map(direction_name);
+        self.progress.warn(format_args!(
+            "{} is turned: it stands with {own} up, and the input before with {scene} up",
+            path.display()
+        ));
+    }
+
+    /// Takes the frame of an input, and says if it cannot be compared with those before.
+    fn frame(&mut self, path: &Path, frame: Frame) {
+        if let Some(warning) = self.frames.add(&path.display().to_string(), frame) {
+            self.progress.warn(warning);
+        }
+        self.loaded.facts.is_patient = self.frames.have_patient();
     }
 
     fn change(&mut self, change: impl FnOnce(Scene) -> Scene) {

@@ -279,6 +279,19 @@ pub struct Values {
 }
 
 impl Show<'_> {
+    /// Returns a flag that shows values, if one is given for an input, which may have colours of
+    /// its own.
+    pub fn shows_values(&self, path: &Path) -> Option<&'static str> {
+        let has_transfer = Own::of(&self.transfers, path).is_some();
+        let given = [
+            ("transfer", has_transfer),
+            ("iso", !self.flags.surfaces_of(path).is_empty()),
+            ("range", self.flags.range_of(path).is_some()),
+            ("sharp", self.sharp),
+        ];
+        given.into_iter().find(|(_, is_given)| *is_given).map(|(flag, _)| flag)
+    }
+
     /// Returns the transfer function of a volume.
     pub fn of_volume(&self, path: &Path, volume: &Volume) -> Result<TransferFunction, Failure> {
         let [first, last] = volume.bounds();

@@ -12,8 +12,8 @@ use std::path::Path;
 /// A volume to convert.
 pub enum Source {
     /// Read slice by slice.
-    Stream(VolumeStream),
-    Whole(Volume),
+    Stream(Box<VolumeStream>),
+    Whole(Box<Volume>),
 }
 
 impl Source {
@@ -51,7 +51,7 @@ impl Convert {
         }
         if let Some(stream) = self.load.stream(file)? {
             self.check_unneeded(&[stream.path().to_owned()])?;
-            return Ok(Source::Stream(stream));
+            return Ok(Source::Stream(Box::new(stream)));
         }
         // Uncompressed data takes no less memory than its file. What compressed data takes is known
         // once it is unpacked.
@@ -65,7 +65,7 @@ impl Convert {
                 most >> 20
             )));
         }
-        self.whole(file, Some(most)).map(Source::Whole)
+        self.whole(file, Some(most)).map(Box::new).map(Source::Whole)
     }
 
     /// Reads a volume as a whole. `memory` limits its bytes if its need is not known yet.
@@ -74,7 +74,13 @@ impl Convert {
         let input = self.load.open_within(file, memory, &mut read)?;
         self.check_unneeded(&read)?;
         match input {
-            Input::Volume(volume) => Ok(volume),
+            Input::Volume(volume) => {
+                if volume.colors.is_some() {
+                    let file = file.display();
+                    tracing::warn!("{file}: the brightness is written, and the colours are not");
+                }
+                Ok(volume)
+            }
             _ => Err(none(file)),
         }
     }

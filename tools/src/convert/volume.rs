@@ -35,7 +35,7 @@ impl Convert {
         let source = self.source(file, most)?;
         memory::check(file, memory_of(&source, self.lattice), 0, most)?;
         let volume = match source {
-            Source::Whole(volume) => volume,
+            Source::Whole(volume) => *volume,
             Source::Stream(_) => self.whole(file, None)?,
         };
         let count = volume.len();

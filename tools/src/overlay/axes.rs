@@ -7,9 +7,7 @@ use glam::{DMat3, DVec2, DVec3};
 pub type Names = [[&'static str; 2]; 3];
 
 pub const PLAIN: Names = [["X", ""], ["Y", ""], ["Z", ""]];
-/// The frame of DICOM: towards the patient's left, back and head.
-pub const LPS: Names = [["L", "R"], ["P", "A"], ["S", "I"]];
-/// The frame of NIfTI: towards the patient's right, front and head.
+/// The frame of a patient: towards the right, the front and the head.
 pub const RAS: Names = [["R", "L"], ["A", "P"], ["S", "I"]];
 
 /// Red, green and blue that show on light and on dark.

@@ -11,6 +11,8 @@ use glam::DVec2;
 const WIDTH: f64 = 0.9;
 const TICK: f64 = 0.3;
 const GAP: f64 = 0.35;
+/// Distance of the lines of a list of labels.
+const LINE: f64 = 1.5;
 
 /// A bar with its ticks, laid out for a canvas.
 pub struct Laid<'a> {
@@ -18,6 +20,9 @@ pub struct Laid<'a> {
     ticks: Vec<(f64, String)>,
     /// The lines of the title.
     title: Vec<String>,
+    /// The labels that are listed instead of a bar, and the text behind them.
+    labels: Vec<([f32; 3], String)>,
+    rest: String,
     /// How wide the bar with its labels and its title is.
     pub width: f64,
 }
@@ -34,10 +39,41 @@ impl<'a> Laid<'a> {
         };
         let ticks: Vec<(f64, String)> = values.into_iter().zip(texts).collect();
         let widest = ticks.iter().map(|tick| canvas.text_width(&tick.1)).fold(0.0, f64::max);
+        let (labels, rest) = Self::listed(bar, (height / (LINE * canvas.size)) as usize);
+        let ticks = if labels.is_empty() { ticks } else { Vec::new() };
+        let names = labels.iter().map(|label| canvas.text_width(&label.1));
+        let widest = names.fold(widest, f64::max).max(canvas.text_width(&rest));
         let title = canvas.wrapped(&bar.title, most, 2);
         let of_title = title.iter().map(|line| canvas.text_width(line)).fold(0.0, f64::max);
         let width = ((WIDTH + TICK + GAP) * canvas.size + widest).max(of_title);
-        Self { bar, ticks, title, width }
+        Self { bar, ticks, title, labels, rest, width }
+    }
+
+    /// Returns the labels for which there is room, and a text about the others.
+    fn listed(bar: &Bar, room: usize) -> (Vec<([f32; 3], String)>, String) {
+        let count = bar.labels.len();
+        if count <= room {
+            return (bar.labels.clone(), String::new());
+        }
+        let shown = room.saturating_sub(1).max(1);
+        (bar.labels[..shown].to_vec(), format!("… {} more", count - shown))
+    }
+
+    /// Draws the list of labels below the title.
+    fn list(&self, canvas: &mut Canvas, area: Area, top: f64) {
+        let (size, line) = (canvas.size, canvas.line_width());
+        let left = area.right - self.width;
+        for (place, (color, name)) in self.labels.iter().enumerate() {
+            let y = top + (0.5 + place as f64 * LINE) * size;
+            let half = 0.5 * WIDTH * size;
+            let patch = Area { left, top: y - half, right: left + 2.0 * half, bottom: y + half };
+            let ink = canvas.ink;
+            canvas.fill(patch.grown(line), |_, _| (ink.color, 1.0));
+            canvas.fill(patch, |_, _| (*color, 1.0));
+            canvas.text(name, DVec2::new(patch.right + GAP * size, y), Align::Left);
+        }
+        let y = top + (0.5 + self.labels.len() as f64 * LINE) * size;
+        canvas.text(&self.rest, DVec2::new(left, y), Align::Left);
     }
 
     /// Draws it with its right side at the right side of an area. The title takes the upper lines.
@@ -48,9 +84,13 @@ impl<'a> Laid<'a> {
             let y = area.top + (0.5 + (line + missing) as f64 * 1.3) * size;
             canvas.text(text, DVec2::new(area.right, y), Align::Right);
         }
+        let top = area.top + (title_lines as f64 * 1.3 + 0.5) * size;
+        if !self.labels.is_empty() {
+            self.list(canvas, area, top);
+            return;
+        }
         let labels = self.ticks.iter().map(|tick| canvas.text_width(&tick.1)).fold(0.0, f64::max);
         let right = area.right - labels - (TICK + GAP) * size;
-        let top = area.top + (title_lines as f64 * 1.3 + 0.5) * size;
         let bar = Area { left: right - WIDTH * size, top, right, bottom: area.bottom - 0.5 * size };
         let line = canvas.line_width();
         let (ink, edge) = (canvas.ink, canvas.edge_width());
@@ -76,6 +116,10 @@ impl<'a> Laid<'a> {
 
     /// Returns what is drawn, for --json.
     pub fn to_json(&self) -> serde_json::Value {
+        if !self.bar.labels.is_empty() {
+            let names: Vec<&str> = self.bar.labels.iter().map(|label| label.1.as_str()).collect();
+            return serde_json::json!({ "title": self.bar.title, "labels": names });
+        }
         let ticks: Vec<f64> = self.ticks.iter().map(|tick| tick.0).collect();
         serde_json::json!({
             "title": self.bar.title,

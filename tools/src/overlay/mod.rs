@@ -16,7 +16,7 @@ use clap::Args;
 use glam::DVec2;
 use ruler::Ruler;
 use serde_json::{Value, json};
-use splatkit::{Error, about::Stance, math::Camera, picture::Picture};
+use splatkit::{Error, math::Camera, picture::Picture};
 use text::Face;
 
 /// What is written over the picture.
@@ -48,8 +48,8 @@ pub struct Facts {
     pub fields: Vec<usize>,
     /// The unit of lengths; empty if no file says it.
     pub length: String,
-    /// How a patient stands.
-    pub patient: Option<Stance>,
+    /// Whether the world is that of a patient: x to the right, y to the front, z to the head.
+    pub is_patient: bool,
 }
 
 /// The texts of a run's pictures.
@@ -160,11 +160,7 @@ impl Overlay {
 
     /// Returns the names of the axes: those of patients for the frames of patients.
     fn names(&self) -> Names {
-        match self.facts.patient {
-            Some(stance) if stance == Stance::LPS => axes::LPS,
-            Some(stance) if stance == Stance::RAS => axes::RAS,
-            _ => axes::PLAIN,
-        }
+        if self.facts.is_patient { axes::RAS } else { axes::PLAIN }
     }
 
     /// Draws the caption, and returns the height that it takes.
@@ -256,13 +252,14 @@ mod tests {
 
     const SIZES: [[u32; 2]; 4] = [[200, 200], [320, 200], [640, 900], [1600, 1200]];
 
-    fn facts(patient: Option<Stance>) -> Facts {
+    fn facts(is_patient: bool) -> Facts {
         let range = [-1024.0, 3071.0];
         let scale = ColorScale { range, ..ColorScale::new(ColorMap::VIRIDIS) };
         let color = |i: usize| scale.color(scale.value(i as f64 / 255.0));
         let colors: Vec<[f32; 3]> = (0..256).map(color).collect();
-        let bar = Bar { title: titled("Radiodensity", "HU"), scale, colors };
-        Facts { bars: vec![bar], length: "mm".into(), patient, ..Facts::default() }
+        let title = titled("Radiodensity", "HU");
+        let bar = Bar { title, scale, colors, labels: Vec::new() };
+        Facts { bars: vec![bar], length: "mm".into(), is_patient, ..Facts::default() }
     }
 
     fn flags(which: [bool; 4]) -> OverlayFlags {
@@ -280,7 +277,7 @@ mod tests {
         let mut camera = Camera::framing(&bounds, DVec3::Y, DVec3::Z, 1.0);
         camera.azimuth(30.0);
         camera.elevation(20.0);
-        let (flags, facts) = (flags(which), facts(Some(Stance::LPS)));
+        let (flags, facts) = (flags(which), facts(true));
         let overlay = flags.open(&facts, background).unwrap().unwrap();
         overlay.draw(&mut picture, &camera);
         picture
@@ -320,7 +317,7 @@ mod tests {
 
     #[test]
     fn bars_lie_in_the_room_that_is_left_to_them() {
-        let (flags, facts) = (flags([true, false, false, false]), facts(None));
+        let (flags, facts) = (flags([true, false, false, false]), facts(false));
         let overlay = flags.open(&facts, None).unwrap().unwrap();
         for size in SIZES {
             let room = overlay.room(size);
@@ -371,13 +368,12 @@ mod tests {
 
     #[test]
     fn patients_have_letters_and_other_things_axes() {
-        let names = |patient| {
-            let (flags, facts) = (flags([false, true, false, false]), facts(patient));
+        let names = |is_patient| {
+            let (flags, facts) = (flags([false, true, false, false]), facts(is_patient));
             flags.open(&facts, None).unwrap().unwrap().names()
         };
-        assert_eq!(names(Some(Stance::LPS))[0], ["L", "R"]);
-        assert_eq!(names(Some(Stance::RAS))[0], ["R", "L"]);
-        assert_eq!(names(None)[2], ["Z", ""]);
+        assert_eq!(names(true), [["R", "L"], ["A", "P"], ["S", "I"]]);
+        assert_eq!(names(false)[2], ["Z", ""]);
     }
 
     #[test]

@@ -2,10 +2,11 @@
 
 use super::curve::{field, plain};
 use eframe::egui::{
-    Color32, ColorImage, PointerButton, Pos2, Rect, Response, Role, Sense, Slider, TextureHandle,
-    TextureOptions, Ui, WidgetInfo, pos2, vec2,
+    Align2, Color32, ColorImage, PointerButton, Pos2, Rect, Response, Role, Sense, Slider,
+    TextStyle, TextureHandle, TextureOptions, Ui, WidgetInfo, pos2, vec2,
 };
 use splatkit::{
+    about::Frame,
     glam::{DVec2, DVec3},
     interaction::{Shading, Slice},
     math::Kernel,
@@ -160,6 +161,7 @@ impl SlicePanes {
                 area.interact_pointer_pos().map(|at| pane.slice.position(pixel(pane, &area, at)));
         }
         crosshair(ui, pane, &area, chosen.unwrap_or(place));
+        letters(ui, pane, &area);
         ui.label(under_pointer(pane, &area));
         self.window = levelled.filter(|[low, high]| low < high).or(self.window);
         chosen
@@ -259,8 +261,47 @@ fn under_pointer(pane: &Pane, area: &Response) -> String {
     let [x, y, z] = place.to_array().map(plain);
     match value.is_nan() {
         true => format!("No value at {x}, {y}, {z}"),
-        false => format!("{} at {x}, {y}, {z}", plain(f64::from(value))),
+        false => format!("{} at {x}, {y}, {z}", name_of(pane, f64::from(value))),
     }
+}
+
+/// Returns the name of a label, or the number of another value.
+fn name_of(pane: &Pane, value: f64) -> String {
+    let volume = pane.key.volume.upgrade();
+    let labels = volume.as_ref().and_then(|volume| volume.about.labels.as_ref());
+    labels.map_or_else(|| plain(value), |labels| labels.name(value as i32))
+}
+
+/// Writes the sides of a patient at the edges of a slice.
+fn letters(ui: &Ui, pane: &Pane, area: &Response) {
+    let Some(volume) = pane.key.volume.upgrade() else { return };
+    if volume.about.frame != Frame::Patient {
+        return;
+    }
+    let at = |pixel: DVec2| pane.slice.position(pixel);
+    let start = at(DVec2::ZERO);
+    let [right, down] = [DVec2::X, DVec2::Y].map(|way| side_of(at(way) - start));
+    let painter = ui.painter_at(area.rect);
+    let rect = area.rect.shrink(4.0);
+    let ink = Color32::from_rgb(255, 200, 0);
+    let font = TextStyle::Body.resolve(ui.style());
+    for (place, align, letter) in [
+        (rect.left_center(), Align2::LEFT_CENTER, right[1]),
+        (rect.right_center(), Align2::RIGHT_CENTER, right[0]),
+        (rect.center_top(), Align2::CENTER_TOP, down[1]),
+        (rect.center_bottom(), Align2::CENTER_BOTTOM, down[0]),
+    ] {
+        painter.text(place, align, letter, font.clone(), ink);
+    }
+}
+
+/// Returns the letters of the side of a patient that a direction leads to, and of the opposite one.
+fn side_of(way: DVec3) -> [&'static str; 2] {
+    let sides = [["R", "L"], ["A", "P"], ["S", "I"]];
+    let axis =
+        (0..3).fold(0, |most, axis| if way[axis].abs() > way[most].abs() { axis } else { most });
+    let [towards, from] = sides[axis];
+    if way[axis] < 0.0 { [from, towards] } else { [towards, from] }
 }
 
 #[cfg(test)]
@@ -352,6 +393,13 @@ mod tests {
         harness.hover_at(rect.lerp_inside(vec2(2.5 / 8.0, 3.5 / 4.0)));
         harness.run();
         harness.get_by_label("132 at 2, 6, 2");
+    }
+
+    #[test]
+    fn directions_lead_to_sides() {
+        assert_eq!(side_of(DVec3::new(-2.0, 1.0, 0.5)), ["L", "R"]);
+        assert_eq!(side_of(DVec3::new(0.1, -1.0, 0.5)), ["P", "A"]);
+        assert_eq!(side_of(DVec3::Z), ["S", "I"]);
     }
 
     #[test]

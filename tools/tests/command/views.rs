@@ -75,7 +75,10 @@ fn statements_count_more_than_conventions_and_these_more_than_guesses() {
         assert_eq!((found["up"].as_str(), found["up_from"].as_str()), (Some(up), Some(from)));
     }
     let told = folder.run(&format!("render survey.xyz square.glb -o b.png {SMALL}")).stderr();
-    assert!(told.contains("square.glb says that +Y is up, but the scene stands with +Z"), "{told}");
+    assert!(
+        told.contains("square.glb is turned: it stands with +Y up, and the input before with +Z"),
+        "{told}"
+    );
     let told = folder.run(&format!("render y.obj -o c.png {SMALL}")).stderr();
     assert!(told.contains("up: +Y, guessed from the shape; --up sets another"), "{told}");
     let told = folder.run(&format!("render y.obj -o d.png -q {SMALL}")).stderr();
