@@ -66,8 +66,7 @@ const TASKS: [Task; 7] = [
 ];
 
 /// The flags of a look at a file.
-const LOOKED_AT: &str =
-    "json verbose quiet dims type spacing scalar time series dataset missing labels";
+const LOOKED_AT: &str = "json dims type spacing scalar time series dataset missing labels";
 
 /// The flags of a picture.
 const DRAWN: &str = "output overwrite background samples json transfer range iso colormap color \

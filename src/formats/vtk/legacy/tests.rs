@@ -280,9 +280,9 @@ fn arrays_that_are_not_numbers_are_skipped() {
 /// A text is a stream of words: line breaks do not matter, nor does their lack.
 #[test]
 fn a_text_is_a_stream_of_words() {
-    let text = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA POINTS 3 float 0 0 0\n1 0\n0 \
-                0 1 0 POLYGONS 1\n4 3 0 1 2 POINT_DATA 3 FIELD f 1 v 1 3\nfloat 5 6 7 CELL_DATA 1 \
-                NORMALS n float 0 0 1\n";
+    let text = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA POINTS 3 float 0 0 0\n1 0\n\
+                0 0 1 0 POLYGONS 1\n4 3 0 1 2 POINT_DATA 3 FIELD f 1 v 1 3\nfloat 5 6 7 \
+                CELL_DATA 1 NORMALS n float 0 0 1\n";
     let mesh = with(text.as_bytes(), Some("v"), read_mesh).unwrap();
     assert_eq!((mesh.positions.len(), mesh.triangles), (3, vec![[0, 1, 2]]));
     assert_eq!(mesh.values, [5.0, 6.0, 7.0]);
