@@ -161,7 +161,7 @@ impl Texture {
     }
 
     /// Returns the colour at `uv`, interpolated between the four nearest texels, with the texture
-    /// repeated in both directions. Channels are in 0 … 1. Missing texels, in a texture built by
+    /// repeated in both directions. A texel counts by how much of it is seen. Channels are in 0 … 1. Missing texels, in a texture built by
     /// hand, are transparent. Coordinates that are not finite count as 0.
     pub fn sample(&self, uv: Vec2) -> [f32; 4] {
         let axis = |part: f32, size: u32| {
@@ -178,6 +178,18 @@ impl Texture {
             self.texels.get(index).copied().unwrap_or_default().map(f32::from)
         };
         let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
+        if [b, c, d].iter().any(|texel| texel[3] != a[3]) {
+            let mut mean = Mean::default();
+            for (texel, weight) in [
+                (a, (1.0 - fx) * (1.0 - fy)),
+                (b, fx * (1.0 - fy)),
+                (c, (1.0 - fx) * fy),
+                (d, fx * fy),
+            ] {
+                mean.add(texel.map(|part| part / 255.0), weight);
+            }
+            return mean.color();
+        }
         std::array::from_fn(|i| {
             let top = a[i] + (b[i] - a[i]) * fx;
             let bottom = c[i] + (d[i] - c[i]) * fx;

@@ -147,9 +147,13 @@ fn opacities_hold_at_any_size_of_splat() {
             for picture in drawn(&case) {
                 let found = mean_opacity(&picture);
                 println!("{name}, {pitch} px: {found:.3}");
-                // Points without an order, of which the picture shows a few, have no mean.
-                let few = name == "cloud" && pitch > 1.0;
-                let tolerance = if few { 0.1 } else { TOLERANCE };
+                // The area of a point is estimated from its neighbours: less exactly without a
+                // grid, and of a few points there is no mean.
+                let tolerance = match name {
+                    "cloud" if pitch > 1.0 => 0.1,
+                    "cloud" => 0.06,
+                    _ => TOLERANCE,
+                };
                 let is_right = (found - OPACITY).abs() < tolerance;
                 assert!(is_right, "{name}, splats {pitch} pixels apart: {found}");
             }
@@ -175,9 +179,9 @@ fn opacities_hold_at_any_level_of_a_hierarchy() {
     }
 }
 
-/// What a mask hides leaves a hole.
+/// What a mask hides tints nothing, and leaves a hole.
 #[test]
-fn masks_cut_holes() {
+fn masks_cut_holes_and_leave_no_fringe() {
     let texels: Vec<[u8; 4]> = (0..64 * 64)
         .map(|at: i32| {
             let (x, y) = (f64::from(at % 64) - 31.5, f64::from(at / 64) - 31.5);
@@ -201,4 +205,10 @@ fn masks_cut_holes() {
     let picture = CpuRenderer::new(&scene).expect("prepares").render(&camera, &settings).unwrap().0;
     let at = |x: usize, y: usize| picture.color[y * 48 + x];
     assert!(at(24, 24)[3] > 0.99 && at(1, 1)[3] < 0.01, "{:?} {:?}", at(24, 24), at(1, 1));
+    // A fringe would be half green. Colours of splats are bytes.
+    let greenest = picture.color.iter().map(|color| color[1]).fold(0.0, f32::max);
+    assert!(greenest < 0.02, "{greenest}");
+    // The area of the disc, in squares of the picture's side.
+    let area = std::f64::consts::PI * (20.0f64 / 64.0).powi(2);
+    assert!((mean_opacity(&picture) - area).abs() < 0.01, "{}", mean_opacity(&picture));
 }
