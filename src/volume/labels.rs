@@ -1,13 +1,16 @@
 //! Label maps: volumes whose values name things. A place has the label of the nearest sample, so
-//! nothing is mixed, and no label lies between two others. Light follows the gradient of a label's
-//! mask, which is 1 at its samples and 0 at all others.
+//! nothing is mixed, and no label lies between two others. Light follows the shares of labels around
+//! samples ([`own_shares`]), which change smoothly where the labels change in steps.
 
 use super::{Arrangement, Isosurface, Samples, Shade, TransferFunction, Volume, each_type};
 use crate::{
     about::{Label, Labels},
     parallel::prelude::*,
 };
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    ops::Range,
+};
 
 /// Most labels, from the smallest to the largest value. The table of colours has an entry for each
 /// value between.
@@ -16,8 +19,9 @@ const MOST_SPAN: i64 = 1 << 16;
 /// so, and most of one whose regions are small.
 const MOST_GUESSED: usize = 4096;
 const FEW: usize = 64;
-/// Number of pairs of neighbours that are looked at.
+/// Number of pairs of neighbours that are looked at, and of the passes in which they are read.
 const PAIRS: usize = 1 << 19;
+const PASSES: usize = 16;
 /// The optical depth of a label over the least distance of samples.
 const SOLID: f64 = 12.0;
 /// The distance over which a translucent label has its opacity, in least distances of samples.
@@ -151,41 +155,39 @@ impl Volume {
         if self.lattice.arrangement != Arrangement::Cartesian || nx < 2 {
             return false;
         }
-        // Whole rows, evenly spread.
+        // Whole rows, evenly spread. The first of the passes rules out most scans.
         let rows = ny * nz;
         let step = (rows * (nx - 1)).div_ceil(PAIRS).max(1);
-        let mut values = Vec::new();
         let mut pairs = Vec::new();
-        for row in (0..rows).step_by(step) {
-            let mut before = self.value(row * nx);
-            for at in row * nx + 1..(row + 1) * nx {
-                let value = self.value(at);
-                if value.fract() != 0.0 {
-                    return false;
-                }
-                pairs.push([before, value]);
-                before = value;
+        let add = |passes: Range<usize>, pairs: &mut Vec<[f64; 2]>| {
+            for row in passes.flat_map(|pass| (pass * step..rows).step_by(PASSES * step)) {
+                let at = |x: usize| self.value(row * nx + x);
+                pairs.extend((1..nx).map(|x| [at(x - 1), at(x)]));
             }
-            values.extend(pairs[pairs.len() - (nx - 1)..].iter().map(|pair| pair[1]));
-            if row % (64 * step) == 0 {
-                values.sort_by(f64::total_cmp);
-                values.dedup();
-                if values.len() > MOST_GUESSED {
-                    return false;
-                }
-            }
+        };
+        add(0..1, &mut pairs);
+        let values = values_of(&pairs);
+        if values.len() > FEW && !are_labels(&values, &pairs) {
+            return false;
         }
-        values.extend(pairs.iter().map(|pair| pair[0]));
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        are_labels(&values, &pairs)
+        add(1..PASSES, &mut pairs);
+        are_labels(&values_of(&pairs), &pairs)
     }
+}
+
+/// Returns the values of pairs, in ascending order and without repetition.
+fn values_of(pairs: &[[f64; 2]]) -> Vec<f64> {
+    let mut values = pairs.as_flattened().to_vec();
+    values.sort_unstable_by(f64::total_cmp);
+    values.dedup();
+    values
 }
 
 /// Whether values, in ascending order and without repetition, look like labels by pairs of
 /// neighbours.
 fn are_labels(values: &[f64], pairs: &[[f64; 2]]) -> bool {
-    if !(3..=MOST_GUESSED).contains(&values.len()) {
+    let are_whole = values.iter().all(|value| value.fract() == 0.0);
+    if !are_whole || !(3..=MOST_GUESSED).contains(&values.len()) {
         return false;
     }
     let rank = |value: f64| values.partition_point(|other| *other < value);
