@@ -29,7 +29,7 @@ use splatkit::{
 };
 use std::path::{Path, PathBuf};
 
-/// The facts in the order in which they are printed.
+/// The facts in the order in which they are printed. Any others follow.
 const ORDER: &[&str] = &[
     "file",
     "kind",
@@ -52,6 +52,7 @@ const ORDER: &[&str] = &[
     "value_unit",
     "bounds",
     "attributes",
+    "labels",
     "color_by",
     "layout",
     "crs",
@@ -67,6 +68,7 @@ const ORDER: &[&str] = &[
     "lossless",
     "up",
     "up_from",
+    "frame",
     "unit",
     "source",
     "bytes",
@@ -132,8 +134,11 @@ impl Info {
             return output::json(&Value::Object(facts));
         }
         series.iter().try_for_each(|one| output::line(line_of_series(one)))?;
-        for name in ORDER {
-            if let Some(value) = facts.get(*name) {
+        // The series are printed already.
+        let is_other = |name: &&str| !ORDER.contains(name) && *name != "series";
+        let others = facts.keys().map(String::as_str).filter(is_other);
+        for name in ORDER.iter().copied().chain(others) {
+            if let Some(value) = facts.get(name) {
                 output::line(format_args!("{:<16}{}", name.replace('_', " "), plain(value)))?;
             }
         }

@@ -1,4 +1,4 @@
-//! Scans of hospitals: folders of slices, series and times.
+//! Medical scans: folders of slices, series and times.
 
 #[path = "../../../tests/inputs/medical.rs"]
 mod inputs;
@@ -73,4 +73,45 @@ fn wrong_choices_are_told() {
     folder.put("a.nii", inputs::nifti(|_| {}));
     folder.run("info a.nii --time 1").fails(3, &["has 1 time,", "leave out --time"]);
     folder.run("render a.nii -o a.png --engine cpu --size 64x64").ok();
+}
+
+/// A segmentation of two labels, of 4 × 4 × 4 bytes, with the name and the colour of one.
+fn segmentation() -> Vec<u8> {
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\n\
+                  sizes: 4 4 4\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n\
+                  encoding: raw\nSegment0_LabelValue:=7\nSegment0_Name:=left ear\n\
+                  Segment0_Color:=1 0 0\n\n";
+    let label = |at: usize| if at % 4 < 2 { 7 } else { 40 * u8::from(at / 16 == 3) };
+    [header.as_bytes(), &(0..64).map(label).collect::<Vec<u8>>()].concat()
+}
+
+#[test]
+fn labels_are_named_and_lie_in_the_frame_of_the_patient() {
+    let folder = study();
+    folder.write("a.seg.nrrd", segmentation());
+    folder.write("table.txt", "40 bone 250 240 230 0\n");
+    folder.write("wrong.txt", "bone 1\n");
+    let told = folder.run("info a.seg.nrrd --labels table.txt");
+    assert!(told.stdout().contains("labels          7 left ear, 40 bone"), "{}", told.stdout());
+    assert!(told.stdout().contains("frame           RAS"), "{}", told.stdout());
+    let render = |arguments: &str| {
+        folder.run(&format!("render {arguments} -o b.png --engine cpu --overwrite --size 64x64"))
+    };
+    let json = |arguments: &str| -> serde_json::Value {
+        serde_json::from_str(&render(&format!("{arguments} --json")).stdout()).unwrap()
+    };
+    let drawn = json("a.seg.nrrd study --axes --scalar-bar --labels table.txt");
+    assert_eq!(drawn["overlay"]["axes"], "RLAPSI", "{drawn}");
+    let bars = &drawn["overlay"]["scalar_bars"];
+    assert_eq!(bars[0]["labels"], serde_json::json!(["left ear", "bone"]), "{drawn}");
+    // Without a space, the same samples may lie elsewhere.
+    let other = String::from_utf8_lossy(&segmentation())
+        .replace("space: left-posterior-superior", "space dimension: 3");
+    folder.write("other.nrrd", other.replace("Segment0", "Other0"));
+    let warned = render("study other.nrrd").stderr();
+    assert!(warned.contains("other.nrrd does not say how its axes lie in the patient, as study"));
+    let refused = render("a.seg.nrrd --labels wrong.txt");
+    assert!(refused.stderr().contains("wrong.txt: line 1: “bone 1” is not a label"));
+    let refused = folder.run("convert a.seg.nrrd -o a.splv");
+    assert!(refused.stderr().contains("a label map has no coarser levels"), "{}", refused.stderr());
 }
