@@ -208,7 +208,10 @@ fn masks_cut_holes_and_leave_no_fringe() {
     // A fringe would be half green. Colours of splats are bytes.
     let greenest = picture.color.iter().map(|color| color[1]).fold(0.0, f32::max);
     assert!(greenest < 0.02, "{greenest}");
-    // The area of the disc, in squares of the picture's side.
-    let area = std::f64::consts::PI * (20.0f64 / 64.0).powi(2);
-    assert!((mean_opacity(&picture) - area).abs() < 0.01, "{}", mean_opacity(&picture));
+    // The area of the disc, in squares of the picture's side. Opaque splats at its rim are widened,
+    // by less than a pixel.
+    let area = |radius: f64| std::f64::consts::PI * radius.powi(2);
+    let found = mean_opacity(&picture);
+    let radius = 20.0 / 64.0;
+    assert!(area(radius) < found && found < area(radius + 1.0 / 48.0), "{found}");
 }
