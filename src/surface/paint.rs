@@ -161,8 +161,9 @@ impl Texture {
     }
 
     /// Returns the colour at `uv`, interpolated between the four nearest texels, with the texture
-    /// repeated in both directions. A texel counts by how much of it is seen. Channels are in 0 … 1. Missing texels, in a texture built by
-    /// hand, are transparent. Coordinates that are not finite count as 0.
+    /// repeated in both directions. A texel counts by how much of it is seen. Channels are in
+    /// 0 … 1. Missing texels, in a texture built by hand, are transparent. Coordinates that are not
+    /// finite count as 0.
     pub fn sample(&self, uv: Vec2) -> [f32; 4] {
         let axis = |part: f32, size: u32| {
             let part = if part.is_finite() { part - part.floor() } else { 0.0 };

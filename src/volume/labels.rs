@@ -1,6 +1,6 @@
 //! Label maps: volumes whose values name things. A place has the label of the nearest sample, so
-//! nothing is mixed, and no label lies between two others. Light follows the shares of labels around
-//! samples ([`own_shares`]), which change smoothly where the labels change in steps.
+//! nothing is mixed, and no label lies between two others. Light follows the shares of labels
+//! around samples ([`own_shares`]), which change smoothly where the labels change in steps.
 
 use super::{Arrangement, Isosurface, Samples, Shade, TransferFunction, Volume, each_type};
 use crate::{
