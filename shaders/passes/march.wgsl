@@ -181,7 +181,12 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         }
     }
 
-    if all(lane.xy == vec2(0u)) {
+    var tells = all(lane.xy == vec2(0u));
+    if CAN_STOP && atomicLoad(&any_stopped) > 0u {
+        // The others are opaque, and see no more of the field.
+        tells = stopped;
+    }
+    if tells {
         end_field(tile);
     }
     for (var r = 0u; r < ROWS; r++) {
