@@ -104,9 +104,10 @@ fn weights_at(place: f32, first: f32, last: f32) -> vec4<f32> {
     return weights * (1.0 / ((weights.x + weights.y) + (weights.z + weights.w)));
 }
 
-// The data to load and weight the samples around a place: the first word along x and the shift in
-// it; rows and slices; weights.
+// The data to load and weight the samples around a place: the first sample; the first word along x
+// and the shift in it; rows and slices; weights.
 struct Taps {
+    first: vec3<i32>,
     word: i32,
     shift: u32,
     rows: vec4<i32>,
@@ -123,6 +124,7 @@ fn taps_at(r: u32, distance: f32) -> Taps {
     let at = vec3<i32>(first);
     let end = vec3<i32>(frame.fields[0].lattice.xyz) - 1;
     var taps: Taps;
+    taps.first = at;
     taps.word = at.x;
     if SAMPLE_KIND == SAMPLE_U8 {
         taps.word = at.x >> 2u;
@@ -162,8 +164,12 @@ fn slice_with_moment(taps: Taps, z: i32) -> Slice {
 // Sample offsets for moments, relative to the second of four samples.
 const OFFSETS: vec4<f32> = vec4(-1.0, 0.0, 1.0, 2.0);
 
-// Returns the value and the gradient on a plane between two sheets.
+// Returns the value and the gradient on a plane between two sheets. Labels are looked up within
+// sheets, not between them.
 fn face_at(r: u32, plane: u32) -> Face {
+    if LABELS {
+        return Face();
+    }
     return field_at(r, planes[plane]);
 }
 
@@ -178,23 +184,37 @@ fn field_at(r: u32, distance: f32) -> Face {
     let sum_y = (taps.z.x * a.moment + taps.z.y * b.moment)
         + (taps.z.z * c.moment + taps.z.w * d.moment);
     let sum_z = 2.0 * taps.z.w * d.sum + (taps.z.z * c.sum - taps.z.x * a.sum);
-    let mean = dot(taps.x, sum);
-    let moments = vec3(dot(taps.x * OFFSETS, sum), dot(taps.x, sum_y), dot(taps.x, sum_z));
-    let means = vec3(dot(taps.x, OFFSETS), dot(taps.y, OFFSETS), dot(taps.z, OFFSETS));
-    // Per step along each axis.
-    var slopes = (moments - means * mean) * frame.fields[0].taps.x;
+    var face: Face;
+    face.has_value = true;
+    face.value = counted_mean(dot(taps.x, sum));
+    var slopes = slopes_of_sums(taps, sum, sum_y, sum_z);
     if BYTES || HALVES {
         slopes *= frame.fields[0].transfer.y;
     }
+    add_gradient(r, slopes, &face);
+    return face;
+}
+
+// Returns the change of a field per step along each axis, from the weighted sum of the samples of
+// all rows and its first moments along y and z.
+fn slopes_of_sums(
+    taps: Taps,
+    sum: vec4<f32>,
+    sum_y: vec4<f32>,
+    sum_z: vec4<f32>,
+) -> vec3<f32> {
+    let moments = vec3(dot(taps.x * OFFSETS, sum), dot(taps.x, sum_y), dot(taps.x, sum_z));
+    let means = vec3(dot(taps.x, OFFSETS), dot(taps.y, OFFSETS), dot(taps.z, OFFSETS));
+    return (moments - means * dot(taps.x, sum)) * frame.fields[0].taps.x;
+}
+
+// Adds the gradient to a face, given the changes of the field per step along each axis.
+fn add_gradient(r: u32, slopes: vec3<f32>, face: ptr<function, Face>) {
     let gradient = slopes.x * frame.fields[0].axis_x.xyz + slopes.y * frame.fields[0].axis_y.xyz
         + slopes.z * frame.fields[0].axis_z.xyz;
     let direction = direction_of(r);
-    var face: Face;
-    face.has_value = true;
-    face.value = counted_mean(mean);
-    face.along = dot(gradient, direction);
-    face.slope = (gradient - face.along * direction).xy * frame.fields[0].gradients.z;
-    return face;
+    (*face).along = dot(gradient, direction);
+    (*face).slope = (gradient - (*face).along * direction).xy * frame.fields[0].gradients.z;
 }
 
 // Sheets whose field differs from a straight line by fewer entries of the table have the gradients
@@ -245,6 +265,9 @@ fn may_show(r: u32, sheet: u32) -> bool {
 // Whether any value that a sheet may have between the two planes that the pixel's invocation
 // evaluated last is visible.
 fn range_shows(sheet: u32) -> bool {
+    if LABELS {
+        return true;
+    }
     let front = pixels[0].fields[0].front;
     let back = pixels[0].fields[0].behind;
     // Hermite interpolation: the mean of the ends, plus an eighth of the difference of the slopes
@@ -289,6 +312,10 @@ fn next_marked(tile: u32, sheet: u32, end: u32) -> u32 {
 fn resolve_field(r: u32, f: u32, sheet: u32, own: ptr<function, Sheet>) {
     (*own).has_value = shows_field(r, sheet);
     (*own).filling = 1.0;
+    if LABELS {
+        resolve_label(r, sheet, own);
+        return;
+    }
     (*own).front = pixels[r].fields[0].front;
     (*own).back = pixels[r].fields[0].behind;
     (*own).value = mean_of(r, sheet, own);

@@ -12,7 +12,7 @@ use super::{
     plan::{FieldOutline, Plan},
 };
 use crate::{
-    Error, Result,
+    Result,
     bricks::{Bricks, Choice},
     hierarchy::Detail,
     math::{Bounds, Kernel, Sheets, View},
@@ -21,7 +21,7 @@ use crate::{
         shown::{self, Shown},
         weighting::{Weighting, deviation, weighting},
     },
-    scene::{Evaluate, Item, Optics, Scene, Settings},
+    scene::{Item, Optics, Scene, Settings},
     volume::{
         Lattice, Volume, own_shares,
         reach::{EVERYTHING, first_visible},
@@ -46,12 +46,6 @@ pub struct FieldState {
     shown: Option<([u16; 256], Shown)>,
     /// The levels of a gathered volume in bricks, for the bricks of the last picture.
     levels: Option<(Choice, Vec<(Grid, Shown)>)>,
-}
-
-/// Returns the error for what is to be gathered and cannot be.
-pub fn not_gathered(what: &str) -> Error {
-    let message = format!("{what} can't be gathered; scatter instead, or leave it to the engine");
-    Error::Argument(message)
 }
 
 impl FieldState {
@@ -120,22 +114,10 @@ impl FieldState {
         sheets: &Sheets,
         choice: Option<&Choice>,
     ) -> Result<bool> {
-        if settings.evaluate == Evaluate::Scatter {
-            // The sections of tensor products have no known form, and labels no sums.
-            return self.scene.only_gathered().map_or(Ok(false), |what| {
-                Err(Error::Argument(format!(
-                    "{what} can't be scattered; gather instead, or leave it to the engine"
-                )))
-            });
-        }
         let parts = gathering::parts(&self.scene, sheets, choice);
-        match gathering::obstacle(&self.scene, settings, parts, gather::unsuited) {
-            Some(what) if settings.evaluate == Evaluate::Gather => Err(not_gathered(what)),
-            Some(what) if let Some(own) = self.scene.only_gathered() => {
-                Err(Error::Argument(format!("{own} does not draw {what}")))
-            }
-            obstacle => Ok(obstacle.is_none()),
-        }
+        gathering::is_chosen(&self.scene, settings, || {
+            gathering::obstacle(&self.scene, settings, parts, gather::unsuited)
+        })
     }
 
     /// Finds what is visible of a gathered field. `prepared` is that of its item.

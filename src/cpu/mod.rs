@@ -65,7 +65,7 @@ use crate::{
     math::{Camera, View},
     parallel::prelude::*,
     picture::Picture,
-    plan::{FrameStats, TILE, pace::Pace, uniforms::Frame},
+    plan::{FrameStats, TILE, gathering, pace::Pace, uniforms::Frame},
     scene::{Evaluate, Optics, Scene, Settings},
     volume::TransferFunction,
 };
@@ -282,7 +282,7 @@ impl CpuRenderer {
         let own = own.map(|(field, choice)| field.outline(settings, &sheets, choice));
         let fields = own.collect::<Result<Vec<_>>>()?;
         if fields.is_empty() && settings.evaluate == Evaluate::Gather {
-            return Err(fields::not_gathered("a scene without a volume on a lattice"));
+            return Err(gathering::not_gathered("a scene without a volume on a lattice"));
         }
         let stop = settings.stop.clone();
         Ok(Outline { cut_pixels, sheets, fields, stop })

@@ -2,7 +2,7 @@
 //! sheets, in which strips.
 
 use crate::{
-    Error, Result,
+    Result,
     bricks::{Choice, slot_bytes},
     gpu::{
         device::Gpu,
@@ -17,7 +17,8 @@ use crate::{
     },
     hierarchy::Detail,
     math::{Sheets, View},
-    scene::{Evaluate, Settings},
+    plan::gathering,
+    scene::Settings,
 };
 
 /// The plan of a frame.
@@ -64,7 +65,9 @@ impl Request<'_> {
         prepared.update_forests(gpu, view, settings, cut_pixels)?;
         let choice = self.bring_bricks(gpu, passes, prepared)?;
         let sheets = prepared.scene.sheets_of(view, settings, choice.as_slice(), &prepared.bounds);
-        let gather = gathers(gpu, prepared, settings, &sheets)?;
+        let gather = gathering::is_chosen(&prepared.scene, settings, || {
+            field::obstacle(&prepared.scene, settings, &sheets, gpu)
+        })?;
         if gather {
             prepared.update_field(gpu, settings)?;
         } else {
@@ -118,24 +121,6 @@ impl Request<'_> {
             let certain = fit * u64::from(RUN) / u64::from(SLOT_SAMPLES);
             most = Some(alike.max(certain as usize).clamp(1, choice.bricks.len() - 1));
         }
-    }
-}
-
-/// Whether a scene's field is gathered. Returns an error if it should be but can't.
-fn gathers(
-    gpu: &Gpu,
-    prepared: &PreparedScene,
-    settings: &Settings,
-    sheets: &Sheets,
-) -> Result<bool> {
-    if settings.evaluate == Evaluate::Scatter {
-        return Ok(false);
-    }
-    match field::obstacle(&prepared.scene, settings, sheets, gpu) {
-        Some(what) if settings.evaluate == Evaluate::Gather => Err(Error::Argument(format!(
-            "{what} can't be gathered; scatter instead, or leave it to the engine"
-        ))),
-        obstacle => Ok(obstacle.is_none()),
     }
 }
 

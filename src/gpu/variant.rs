@@ -9,7 +9,7 @@ use crate::{
         tables::{self},
         uniforms::{self},
     },
-    scene::{Gradient, Item, Optics, Scene, Settings},
+    scene::{Classification, Gradient, Item, Optics, Scene, Settings},
     volume::{Arrangement, Lattice, TransferFunction},
 };
 
@@ -92,6 +92,7 @@ fn without_items(request: &Request<'_>) -> Variant {
         rectilinear: false,
         gather: gathered.is_some(),
         sample_kind: 0,
+        labels: false,
         two_levels: false,
         radiance: false,
         trained: false,
@@ -152,6 +153,11 @@ fn add_samples(variant: &mut Variant, request: &Request<'_>, item: &Item) {
             variant.rectilinear |= matches!(arrangement, Arrangement::Rectilinear(_));
             variant.table_kernel |= !matches!(kernel.profile, Profile::Gaussian(_));
             variant.sample_kind = gathered.unwrap_or(0);
+            if volume.is_label_map() {
+                variant.labels = true;
+                // Nothing lies between two labels.
+                variant.classification = Classification::Post;
+            }
         }
         Item::Bricks(..) => {
             variant.lattice = true;

@@ -2,9 +2,10 @@
 
 use super::weighting::{LEAST_DEVIATION, Weighting, weighting};
 use crate::{
+    Error, Result,
     bricks::Choice,
     math::{Kernel, Sheets},
-    scene::{Gradient, Item, MOST_GATHERED, Mode, Scene, Settings},
+    scene::{Evaluate, Gradient, Item, MOST_GATHERED, Mode, Scene, Settings},
     volume::{Arrangement, Volume},
 };
 
@@ -43,6 +44,40 @@ pub fn obstacle(
         return Some("samples that are classified before interpolation");
     }
     (settings.gradient == Gradient::Central).then_some("gradients from neighbouring pixels")
+}
+
+/// Whether the field of a scene is gathered. `obstacle` is why it can't be, if so.
+///
+/// # Errors
+/// [`Error::Argument`] if the settings, or what of the scene is never scattered, ask for what
+/// can't be.
+pub fn is_chosen(
+    scene: &Scene,
+    settings: &Settings,
+    obstacle: impl FnOnce() -> Option<&'static str>,
+) -> Result<bool> {
+    let only = scene.only_gathered();
+    if settings.evaluate == Evaluate::Scatter {
+        // The sections of tensor products have no known form, and labels no sums.
+        return only.map_or(Ok(false), |what| {
+            Err(Error::Argument(format!(
+                "{what} can't be scattered; gather instead, or leave it to the engine"
+            )))
+        });
+    }
+    match (obstacle(), only) {
+        (Some(what), _) if settings.evaluate == Evaluate::Gather => Err(not_gathered(what)),
+        (Some(what), Some(own)) => {
+            Err(Error::Argument(format!("{own} is always gathered, and {what} can't be")))
+        }
+        (obstacle, _) => Ok(obstacle.is_none()),
+    }
+}
+
+/// Returns the error for what is to be gathered and cannot be.
+pub fn not_gathered(what: &str) -> Error {
+    let message = format!("{what} can't be gathered; scatter instead, or leave it to the engine");
+    Error::Argument(message)
 }
 
 /// Returns the number of parts of the thickest sheet. It is one if the field at the sheet's ends

@@ -197,8 +197,11 @@ impl Scene {
     /// Returns what of the scene only the CPU engine draws (“the kernel linear”, “cells”, “several
     /// volumes in bricks”); `None` if the GPU engine draws all of it.
     pub fn beyond_gpu(&self) -> Option<String> {
-        if let Some(what) = self.only_gathered() {
-            return Some(what);
+        if let Some(tensor) = self.tensor() {
+            return Some(format!("the kernel {}", tensor.name()));
+        }
+        if self.fields().len() > 1 && self.items.iter().any(Item::is_label_map) {
+            return Some("a label map beside another field".into());
         }
         if self.items.iter().any(|item| matches!(item, Item::Cells(..))) {
             return Some("cells".into());

@@ -1,14 +1,16 @@
-//! Label maps, drawn by the CPU engine, the reference and beside other volumes: each sample's label
+//! Label maps, drawn by both engines and the reference, and beside other items: each sample's label
 //! is visible, and nothing has a colour between two labels.
 
-use crate::testing::psnr::measured;
+use crate::testing::{gpu::gpu, psnr::measured};
 use glam::{DMat3, DVec3};
 use splatkit::{
-    cpu::CpuRenderer,
+    Device, Renderer,
+    gpu::Budget,
     math::{Camera, Kernel, Projection},
     picture::Picture,
     reference,
     scene::{Clip, ClipShape, Evaluate, Gradient, Mode, Optics, Scene, Settings},
+    surface::{Mesh, SurfelOptions},
     volume::{Isosurface, Lattice, Samples, TransferFunction, Volume},
 };
 
@@ -61,16 +63,26 @@ fn scene(transfer: Option<TransferFunction>) -> Scene {
     Scene::new().with_volume(volume, Kernel::default(), transfer)
 }
 
-fn draw(scene: &Scene, camera: &Camera, settings: &Settings) -> Picture {
-    let mut renderer = CpuRenderer::new(scene).expect("a scene");
+/// The engines, by their names.
+fn engines() -> [(&'static str, Device); 2] {
+    [("CPU", Device::Cpu), ("GPU", Device::Gpu(gpu().clone(), Budget::default()))]
+}
+
+fn draw(device: &Device, scene: &Scene, camera: &Camera, settings: &Settings) -> Picture {
+    let mut renderer = Renderer::new(device, scene).expect("a scene");
     renderer.render(camera, settings).expect("a picture").0
 }
 
-/// The agreement of the CPU engine with the reference, in dB.
-fn agreement(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
+/// Draws a scene by both engines, which must agree with the reference. Single pixels at the border
+/// of two labels may differ by rounding.
+fn compare(name: &str, scene: &Scene, camera: &Camera, settings: &Settings) {
     let truth = reference::render(scene, camera, settings).expect("a reference");
     assert!(truth.color.iter().any(|pixel| pixel[3] > 0.3), "an empty picture");
-    measured(&draw(scene, camera, settings), &truth)
+    for (engine, device) in engines() {
+        let near = measured(&draw(&device, scene, camera, settings), &truth);
+        println!("{name}, {engine}: {near:.1} dB");
+        assert!(near > 35.0, "{name}, {engine}: {near} dB");
+    }
 }
 
 /// The labels whose colours a picture without light shows. Nothing else may be opaque in it.
@@ -104,10 +116,7 @@ fn label_maps_are_those_of_the_reference() {
         ("maximum", camera(wide), Settings { optics: Optics::Maximum, ..settings() }),
         ("x-ray", camera(wide), Settings { optics: Optics::XRay, ..settings() }),
     ] {
-        // Single pixels at the border of two labels may differ by rounding.
-        let near = agreement(&scene(None), &camera, &settings);
-        println!("{name}: {near:.1} dB");
-        assert!(near > 35.0, "{name}: {near} dB");
+        compare(name, &scene(None), &camera, &settings);
     }
 }
 
@@ -116,13 +125,15 @@ fn each_label_is_seen_and_nothing_between() {
     let camera = camera(Projection::Perspective { view_angle: 30.0 });
     let settings = Settings { size: [360, 320], volume_shade: Some(None), ..settings() };
     let transfer = TransferFunction::automatic(&labels());
-    let picture = draw(&scene(None), &camera, &settings);
-    assert_eq!(shown(&picture, &transfer), LABELS);
     // An isosurface shows the label of its value alone.
     let surface = Isosurface { value: 1003.0, color: transfer.color(1003.0), opacity: 1.0 };
     let iso = TransferFunction { isosurfaces: vec![surface], ..TransferFunction::default() };
-    let picture = draw(&scene(Some(iso)), &camera, &settings);
-    assert_eq!(shown(&picture, &transfer), [1003]);
+    for (_, device) in engines() {
+        let picture = draw(&device, &scene(None), &camera, &settings);
+        assert_eq!(shown(&picture, &transfer), LABELS);
+        let picture = draw(&device, &scene(Some(iso.clone())), &camera, &settings);
+        assert_eq!(shown(&picture, &transfer), [1003]);
+    }
 }
 
 /// All samples of all labels are framed, also the one far away.
@@ -153,8 +164,41 @@ fn label_maps_are_drawn_beside_volumes() {
     };
     let both = scene(None).with_volume(volume, Kernel::default(), haze);
     let camera = camera(Projection::Perspective { view_angle: 30.0 });
-    let near = agreement(&both, &camera, &settings());
+    let near = measured(
+        &draw(&Device::Cpu, &both, &camera, &settings()),
+        &reference::render(&both, &camera, &settings()).expect("a reference"),
+    );
     assert!(near > 35.0, "{near} dB");
+    assert_eq!(both.beyond_gpu().as_deref(), Some("a label map beside another field"));
+}
+
+/// Labels of every type of samples, among surfaces.
+#[test]
+fn label_maps_are_drawn_among_surfaces() {
+    let mut ball = Mesh { origin: DVec3::new(6.0, 0.0, 12.0), ..Mesh::sphere(3) };
+    ball.positions.iter_mut().for_each(|position| *position *= 1.5);
+    let ball = ball.surfels(&SurfelOptions::default()).expect("surfels");
+    let camera = camera(Projection::Perspective { view_angle: 30.0 });
+    let few = labels();
+    let value = |i: usize| {
+        let label = few.value(i);
+        LABELS.iter().position(|own| f64::from(*own) == label).map_or(0, |at| at + 1)
+    };
+    let values: Vec<usize> = (0..few.lattice.len()).map(value).collect();
+    for samples in [
+        Samples::U8(values.iter().map(|&value| value as u8).collect()),
+        Samples::I16(values.iter().map(|&value| -(value as i16)).collect()),
+        Samples::I32(values.iter().map(|&value| 2_000_000_000 + value as i32).collect()),
+        Samples::F32(values.iter().map(|&value| value as f32).collect()),
+    ] {
+        let name = format!("{:?}", samples.scalar());
+        let volume = Volume::new(few.lattice.clone(), samples).expect("a volume");
+        let volume = volume.with_labels(Vec::new());
+        let transfer = TransferFunction::automatic(&volume);
+        let scene = Scene::new().with_splats(ball.clone());
+        let scene = scene.with_volume(volume, Kernel::default(), transfer);
+        compare(&name, &scene, &camera, &settings());
+    }
 }
 
 /// Methods that mix samples before they are classified are refused.
@@ -167,9 +211,11 @@ fn methods_that_mix_labels_are_refused() {
         Settings { gradient: Gradient::Central, ..settings() },
         Settings { sheet_thickness: Some(3.0), ..settings() },
     ] {
-        let mut renderer = CpuRenderer::new(&scene(None)).expect("a scene");
-        let error = renderer.render(&camera, &settings).unwrap_err().to_string();
-        assert!(error.contains("label map"), "{error}");
+        for (engine, device) in engines() {
+            let mut renderer = Renderer::new(&device, &scene(None)).expect("a scene");
+            let error = renderer.render(&camera, &settings).unwrap_err().to_string();
+            assert!(error.contains("label map"), "{engine}: {error}");
+        }
     }
-    assert_eq!(scene(None).beyond_gpu().as_deref(), Some("a label map"));
+    assert_eq!(scene(None).beyond_gpu(), None);
 }

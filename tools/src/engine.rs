@@ -164,8 +164,10 @@ impl DeviceFlags {
             // If an adapter is named, the GPU engine reports what it does not draw.
             Engine::Auto if !self.asks_gpu() && scene.beyond_gpu().is_some() => Ok(Device::Cpu),
             Engine::Auto if !self.asks_gpu() => Ok(match Device::automatic() {
-                Device::Gpu(gpu, _) => Device::Gpu(gpu, self.passes()),
-                Device::Cpu => Device::Cpu,
+                Device::Gpu(gpu, _) if gpu.beyond(scene).is_none() => {
+                    Device::Gpu(gpu, self.passes())
+                }
+                Device::Gpu(..) | Device::Cpu => Device::Cpu,
             }),
             Engine::Auto | Engine::Gpu => Ok(Device::Gpu(self.gpu()?, self.passes())),
         }

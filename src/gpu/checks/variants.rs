@@ -12,7 +12,7 @@ use crate::{
     hierarchy::Detail,
     math::Projection,
     scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
-    volume::{Shade, Volume},
+    volume::{Shade, TransferFunction, Volume},
 };
 use std::{
     collections::HashSet,
@@ -76,11 +76,26 @@ fn cases() -> Vec<Case> {
         methods::sharp(),
         methods::sharp_body_centred(),
     ];
-    all.extend([0.25, 9.0, 20.0].map(bricks));
+    all.extend([0.25, 9.0, 20.0].map(bricks).into_iter().chain([labels()]));
     all.extend(scenes::facets::all());
     all.extend(scenes::gaussians::all());
     all.extend(scenes::fields::all().into_iter().filter(|case| case.scene.beyond_gpu().is_none()));
     all
+}
+
+/// A label map.
+fn labels() -> Case {
+    let mut case = scenes::blobs_analytic();
+    let Item::Volume(volume, kernel, _) = &case.scene.items[0] else {
+        panic!("{} has a volume", case.name)
+    };
+    let values = (0..volume.lattice.len()).map(|i| volume.value(i).clamp(0.0, 255.0) as u8);
+    let samples = crate::volume::Samples::U8(values.collect());
+    let labels = Volume::new(volume.lattice.clone(), samples).expect("a full lattice");
+    let labels = labels.with_labels(Vec::new());
+    let transfer = TransferFunction::automatic(&labels);
+    case.scene = Scene::new().with_volume(labels, kernel.clone(), transfer);
+    Case { name: "labels", ..case }
 }
 
 /// Blobs in bricks, at a given number of pixels a sample.

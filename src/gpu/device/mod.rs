@@ -9,6 +9,8 @@ pub(crate) mod readback;
 #[cfg(not(target_arch = "wasm32"))]
 pub(crate) mod timestamps;
 
+#[cfg(not(target_arch = "wasm32"))]
+use crate::input::isolate::unless_panics;
 use crate::{Error, Result, memory};
 use fault::{Answers, Condition};
 use pipeline_cache::PipelineCache;
@@ -128,10 +130,11 @@ impl Gpu {
     /// Opens a device without a window, and waits for it.
     ///
     /// # Errors
-    /// Those of [`Self::request`].
+    /// Those of [`Self::request`]; [`Error::Driver`] if the driver gives up, as without memory.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn headless(choice: &AdapterChoice) -> Result<Self> {
-        pollster::block_on(Self::request(choice))
+        unless_panics(|| pollster::block_on(Self::request(choice)))
+            .unwrap_or_else(|panic| Err(Error::Driver(format!("it cannot be opened: {panic}"))))
     }
 
     /// Opens a device without a window. Nothing blocks, so that a browser can await it.

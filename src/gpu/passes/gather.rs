@@ -45,11 +45,12 @@ impl Gather {
             shaders::PICTURE,
             shaders::VALUE,
             shaders::FIELD_LATTICE,
+            own.label_shader(),
             shaders::PROGRESS,
             shaders::GATHER,
         ];
         let bindings = [Uniform, Read, Uniform, Read, Write, Write, Read, Write];
-        Recipe::new("gather", &sources, "gather", &[&bindings, &[Binding::Texture]])
+        Recipe::new("gather", &sources, "gather", &[&bindings, own.textures()])
     }
 
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
@@ -66,7 +67,7 @@ impl Gather {
                 &targets.colors,
             ];
             let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
-            let samples = self.0.bind_texture(gpu, 1, &gathered.samples);
+            let samples = self.0.bind_textures(gpu, 1, &gathered.textures);
             self.0.dispatch(encoder, &[&group, &samples], gathered.tiles.next_multiple_of(LANES));
         }
     }

@@ -41,13 +41,15 @@ impl March {
         let mut bindings =
             vec![Uniform, Read, Uniform, Read, Read, Read, Read, Write, Write, Write];
         if variant.gather {
-            sources.extend([shaders::VALUE, shaders::FIELD_LATTICE, shaders::MARCH_LATTICE]);
+            sources.extend([shaders::VALUE, shaders::FIELD_LATTICE]);
+            sources.extend([variant.label_shader(), shaders::MARCH_LATTICE]);
             bindings.push(Read);
         } else {
             sources.push(shaders::FIELD_SUMS);
         }
-        let texture: &[&[Binding]] = if variant.gather { &[&[Binding::Texture]] } else { &[] };
-        Recipe::new("march", &sources, "march", &[&[bindings.as_slice()], texture].concat())
+        let mut groups = vec![bindings.as_slice()];
+        groups.extend(variant.gather.then(|| variant.textures()));
+        Recipe::new("march", &sources, "march", &groups)
     }
 
     /// Encodes the pass. `arguments` is the byte offset of its dispatch in the buffer of indirect
@@ -71,13 +73,13 @@ impl March {
             targets.depths.as_entire_buffer_binding(),
             targets.progress.as_entire_buffer_binding(),
         ];
-        let mut samples = None;
+        let mut textures = None;
         if let Some(gathered) = &targets.gathered {
             buffers.push(gathered.shown.as_entire_buffer_binding());
-            samples = Some(self.0.bind_texture(gpu, 1, &gathered.samples));
+            textures = Some(self.0.bind_textures(gpu, 1, &gathered.textures));
         }
         let group = self.0.bind(gpu, 0, &buffers);
-        let groups: Vec<_> = std::iter::once(&group).chain(&samples).collect();
+        let groups: Vec<_> = std::iter::once(&group).chain(&textures).collect();
         self.0.dispatch_indirect(encoder, &groups, (&targets.arguments, arguments));
     }
 }

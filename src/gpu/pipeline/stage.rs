@@ -93,20 +93,24 @@ impl Stage {
         })
     }
 
-    /// Binds a texture as the only binding of group `group`.
-    pub fn bind_texture(
+    /// Binds textures as the bindings of group `group`.
+    pub fn bind_textures(
         &self,
         gpu: &Gpu,
         group: usize,
-        texture: &wgpu::TextureView,
+        textures: &[wgpu::TextureView],
     ) -> wgpu::BindGroup {
+        let entries: Vec<_> = (0..)
+            .zip(textures)
+            .map(|(binding, texture)| wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::TextureView(texture),
+            })
+            .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(&self.label),
             layout: &self.compiled.layouts[group],
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::TextureView(texture),
-            }],
+            entries: &entries,
         })
     }
 

@@ -1,5 +1,6 @@
 //! The variant of a picture, and the constants that precede its shaders.
 
+use super::{recipe::Binding, shaders};
 use crate::{
     plan::tables,
     scene::{Classification, Mode, Optics, Order},
@@ -34,6 +35,8 @@ pub struct Variant {
     pub gather: bool,
     /// The layout of a gathered lattice's samples (value.wgsl).
     pub sample_kind: u32,
+    /// The values of a gathered lattice are labels.
+    pub labels: bool,
     /// Two levels of a volume in bricks are drawn together, each with its weight.
     pub two_levels: bool,
     pub radiance: bool,
@@ -98,6 +101,16 @@ impl Variant {
         if self.can_stop() { (most / (6 + pieces)).max(1) } else { u32::MAX }
     }
 
+    /// Returns the shader of a gathered lattice's labels.
+    pub fn label_shader(&self) -> &'static str {
+        if self.labels { shaders::LABELS } else { shaders::NO_LABELS }
+    }
+
+    /// Returns the bindings of a gathered lattice's textures.
+    pub fn textures(&self) -> &'static [Binding] {
+        if self.labels { &[Binding::Texture; 2] } else { &[Binding::Texture] }
+    }
+
     /// Whether splats are scattered.
     pub fn scatters(&self) -> bool {
         !self.gather || self.radiance || self.facets
@@ -128,12 +141,13 @@ impl Variant {
     }
 
     /// The constants that are true or false.
-    fn flags(&self) -> [(&'static str, bool); 35] {
+    fn flags(&self) -> [(&'static str, bool); 36] {
         let radiance = self.radiance || self.classified;
         [
             ("PERSPECTIVE", self.perspective),
             ("SCALAR", self.scalar),
             ("GATHER", self.gather),
+            ("LABELS", self.labels),
             ("SUMS", self.scalar && !self.gather),
             ("CLASSIFIED", self.classified),
             ("LATTICE", self.lattice),

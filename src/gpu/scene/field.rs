@@ -14,10 +14,10 @@ use crate::{
         gathering::unsuited_kernel,
         shown::{Shown, field_ranges},
         uniforms::Frame,
-        weighting::deviation,
+        weighting::{MASK_DEVIATION, deviation},
     },
     scene::{Item, Scene, Settings},
-    volume::{Arrangement, Scalar, Volume},
+    volume::{Arrangement, Scalar, Volume, own_shares},
 };
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
@@ -28,12 +28,18 @@ const MOST_FOURS: u64 = 512 << 20;
 /// The number of that layout (`SAMPLE_FOUR` in value.wgsl).
 pub const FOUR: u32 = 5;
 
+/// The layout of the shares of labels, as labels.wgsl reads them: that of bytes.
+const SHARES: u32 = 0;
+
 /// Capacity behind the samples' bits: a bit for every sheet and tile of a picture (`MOST_BINS` in
 /// pipeline/variant.rs), and the tables.
 const TAIL_BYTES: u64 = 64 << 20;
 
 /// Returns why the engine can't gather a volume, whatever the settings.
 pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
+    if volume.is_label_map() {
+        return None;
+    }
     if volume.lattice.arrangement != Arrangement::Cartesian {
         return Some("body-centred and rectilinear lattices");
     }
@@ -75,8 +81,13 @@ pub fn obstacle(
         Ok(volume) => volume,
         Err(what) => return Some(what),
     };
+    beyond_limits(scene, volume, gpu)
+}
+
+/// Returns why a device can't gather a volume of a scene, or `None` if it can.
+fn beyond_limits(scene: &Scene, volume: &Volume, gpu: &Gpu) -> Option<&'static str> {
     let limits = gpu.device.limits();
-    if texture_size(volume, kind_of(volume.samples.scalar()))
+    if texture_size(volume.lattice.dims, kind_of(volume.samples.scalar()))
         .iter()
         .any(|side| *side > limits.max_texture_dimension_3d as usize)
     {
@@ -92,6 +103,16 @@ pub fn obstacle(
     None
 }
 
+/// Returns why a device can't draw a label map of a scene, which is always gathered; `None` if it
+/// can.
+pub fn label_obstacle(scene: &Scene, gpu: &Gpu) -> Option<&'static str> {
+    let labels = scene.items.iter().find_map(|item| match item {
+        Item::Volume(volume, ..) if volume.is_label_map() => Some(volume),
+        _ => None,
+    });
+    labels.and_then(|volume| beyond_limits(scene, volume, gpu))
+}
+
 /// Returns the type of samples as value.wgsl numbers it.
 pub fn kind_of(scalar: Scalar) -> u32 {
     match scalar {
@@ -105,8 +126,7 @@ pub fn kind_of(scalar: Scalar) -> u32 {
 
 /// Returns the number of texels along the axes. Rows of samples are packed in words, with the words
 /// that the taps of a row may read behind its end.
-fn texture_size(volume: &Volume, kind: u32) -> [usize; 3] {
-    let [width, height, depth] = volume.lattice.dims;
+fn texture_size([width, height, depth]: [usize; 3], kind: u32) -> [usize; 3] {
     let words = match kind {
         0 => width.div_ceil(4) + 1,
         1 | 2 => width.div_ceil(2) + 2,
@@ -126,9 +146,13 @@ fn layout(gpu: &Gpu, volume: &Volume) -> u32 {
     if kind == 0 && gpu.is_software() && fits { FOUR } else { kind }
 }
 
-/// Returns the bytes of a volume's samples.
+/// Returns the bytes of a volume's textures: its samples, and the shares of its labels.
 pub fn texture_bytes(gpu: &Gpu, volume: &Volume) -> u64 {
-    texture_size(volume, layout(gpu, volume)).iter().fold(4, |bytes, side| bytes * *side as u64)
+    let bytes = |kind| {
+        let size = texture_size(volume.lattice.dims, kind);
+        size.iter().fold(4, |bytes, side| bytes * *side as u64)
+    };
+    bytes(layout(gpu, volume)) + if volume.is_label_map() { bytes(SHARES) } else { 0 }
 }
 
 /// Writes a row of samples as a row of texels.
@@ -143,10 +167,11 @@ fn write_row(from: &[u8], kind: u32, to: &mut [u8]) {
     }
 }
 
-fn texture(gpu: &Gpu, volume: &Volume, kind: u32) -> wgpu::Texture {
+/// Makes a texture of samples of a kind, given as bytes in the order of the lattice.
+fn texture(gpu: &Gpu, dims: [usize; 3], (kind, bytes): (u32, &[u8])) -> wgpu::Texture {
     /// Approximate bytes of one copy.
     const COPIED: usize = 16 << 20;
-    let [words, rows, slices] = texture_size(volume, kind);
+    let [words, rows, slices] = texture_size(dims, kind);
     let [width, height, depth] = [words, rows, slices].map(|side| side as u32);
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("samples"),
@@ -158,12 +183,10 @@ fn texture(gpu: &Gpu, volume: &Volume, kind: u32) -> wgpu::Texture {
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    let row = volume.lattice.dims[0] * volume.samples.sample_bytes();
+    let row = bytes.len() / (rows * slices);
     let (to_row, to_slice) = (4 * words, 4 * words * rows);
     let each = (COPIED / to_slice).max(1);
-    for (first, own) in
-        (0..depth).step_by(each).zip(volume.samples.bytes().chunks(row * rows * each))
-    {
+    for (first, own) in (0..depth).step_by(each).zip(bytes.chunks(row * rows * each)) {
         let mut packed = vec![0u8; own.len() / row * to_row];
         packed
             .par_chunks_mut(to_row)
@@ -197,8 +220,9 @@ pub struct Field {
     sigma: f64,
     /// The smallest and the largest value around each sample.
     ranges: Vec<[u8; 2]>,
-    /// The samples, rows packed in words.
-    samples: wgpu::Texture,
+    /// The samples, rows packed in words, and of a label map the shares of each sample's own label
+    /// around it.
+    textures: Vec<wgpu::Texture>,
     texture_bytes: u64,
     /// The layout of the samples (`SAMPLE_KIND` in field_lattice.wgsl).
     pub kind: u32,
@@ -213,7 +237,8 @@ pub struct Field {
 /// The data that the passes of a picture need.
 #[derive(Debug)]
 pub struct Gathered {
-    pub samples: wgpu::TextureView,
+    /// The samples, and the shares of labels.
+    pub textures: Vec<wgpu::TextureView>,
     pub shown: wgpu::Buffer,
     /// The sheets of each dispatch of gather (`Pass` in frame.wgsl).
     pub windows: Vec<wgpu::Buffer>,
@@ -233,12 +258,19 @@ impl Gathered {
 impl Field {
     pub fn new(gpu: &Gpu, volume: &Arc<Volume>, kernel: &Kernel) -> Self {
         let kind = layout(gpu, volume);
+        let dims = volume.lattice.dims;
+        let mut textures = vec![texture(gpu, dims, (kind, volume.samples.bytes()))];
+        let mut sigma = deviation(kernel).unwrap_or(1.0);
+        if volume.is_label_map() {
+            textures.push(texture(gpu, dims, (SHARES, &own_shares(volume))));
+            sigma = MASK_DEVIATION;
+        }
         Self {
             kind,
             volume: volume.clone(),
-            sigma: deviation(kernel).unwrap_or(1.0),
+            sigma,
             ranges: field_ranges(volume, kernel),
-            samples: texture(gpu, volume, kind),
+            textures,
             texture_bytes: texture_bytes(gpu, volume),
             shown: None,
             buffer: buffer(gpu, "shown", 0, Usage::STORAGE),
@@ -303,6 +335,7 @@ impl Field {
         let weight = |steps: f64| (-0.5 * steps * steps * per_variance).exp() as f32;
         field.taps = [per_variance as f32, weight(1.0), weight(2.0), 0.0];
         field.shown = [starts[0] as u32, starts[1] as u32, starts[2] as u32, words as u32];
+        let view_of_all = wgpu::TextureViewDescriptor::default();
         let (last, window) = (sheets.count() as u32 + 1, variant.gathered_sheets());
         let windows = (1..last).step_by(window as usize).map(|first| {
             let end = first.saturating_add(window).min(last);
@@ -310,7 +343,7 @@ impl Field {
             filled_buffer(gpu, "window", bytemuck::cast_slice(&pass), Usage::UNIFORM)
         });
         Some(Gathered {
-            samples: self.samples.create_view(&wgpu::TextureViewDescriptor::default()),
+            textures: self.textures.iter().map(|own| own.create_view(&view_of_all)).collect(),
             shown: self.buffer.clone(),
             windows: windows.collect(),
             tiles: tiles.len() as u32,

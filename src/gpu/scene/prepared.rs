@@ -14,7 +14,7 @@ use crate::{
         },
         scene::{
             bricks::{BrickCache, Listed, Room, Slab},
-            field::{Field, texture_bytes, unsuited},
+            field::{Field, label_obstacle, texture_bytes, unsuited},
             nodes::{Growth, PageCache, Slots},
             select::{Select, Selection},
             select_bricks::SelectBricks,
@@ -105,11 +105,21 @@ pub struct PreparedScene {
     gpu: Gpu,
 }
 
+impl Gpu {
+    /// Returns what of a scene this device does not draw, but the CPU engine does: what
+    /// [`Scene::beyond_gpu`] names, and a label map that is too large for the device. `None` if the
+    /// device draws all of it.
+    pub fn beyond(&self, scene: &Scene) -> Option<String> {
+        let too_large = || label_obstacle(scene, self).map(str::to_owned);
+        scene.beyond_gpu().or_else(too_large)
+    }
+}
+
 impl PreparedScene {
     /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
     pub(crate) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.validate()?;
-        if let Some(what) = scene.beyond_gpu() {
+        if let Some(what) = gpu.beyond(scene) {
             return Err(Error::Argument(format!(
                 "the GPU engine does not draw {what} yet; the CPU engine does"
             )));
