@@ -27,6 +27,26 @@ impl Deadline {
         Self { end: Instant::now().checked_add(Duration::from_secs(seconds)), seconds }
     }
 
+    /// Returns the earlier of two deadlines.
+    #[must_use]
+    pub fn or_earlier(self, other: Self) -> Self {
+        match (self.end, other.end) {
+            (Some(own), Some(end)) if end < own => other,
+            (None, Some(_)) => other,
+            _ => self,
+        }
+    }
+
+    /// Returns the seconds that it allowed when it was made.
+    pub(crate) fn seconds(&self) -> u64 {
+        self.seconds
+    }
+
+    /// Returns the time that is left; `None` if there is no end.
+    pub(crate) fn left(&self) -> Option<Duration> {
+        self.end.map(|end| end.saturating_duration_since(Instant::now()))
+    }
+
     /// Returns whether the deadline has passed.
     pub fn is_over(&self) -> bool {
         self.end.is_some_and(|end| Instant::now() >= end)
@@ -40,7 +60,8 @@ impl Deadline {
         if self.is_over() { Err(self.error(what)) } else { Ok(()) }
     }
 
-    fn error(&self, what: &str) -> Error {
+    /// Returns the error for work that was stopped at the deadline; `what` names it.
+    pub(crate) fn error(&self, what: &str) -> Error {
         Error::Timeout { what: what.into(), limit: self.seconds }
     }
 }
@@ -93,6 +114,11 @@ mod tests {
                 && !Deadline::after(u64::MAX).is_over()
         );
         assert!(Deadline::default().check("nothing").is_ok());
+        let [soon, later] = [7, 70].map(Deadline::after);
+        for (one, other) in [(soon, later), (later, soon), (soon, Deadline::NEVER)] {
+            assert_eq!(one.or_earlier(other), soon);
+        }
+        assert_eq!(Deadline::NEVER.or_earlier(later), later);
         let message = over.check("cutting triangles").unwrap_err().to_string();
         assert_eq!(message, "cutting triangles takes longer than the limit of 0 s");
         let clock = Clock::new(over);

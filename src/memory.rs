@@ -66,8 +66,8 @@ pub(crate) fn room(what: &str, bytes: u64) -> Result<()> {
 }
 
 /// Number and size, in bytes, of the blocks that must remain free for the small lists of all
-/// threads.
-const RESERVE: (usize, usize) = (32, 128 << 10);
+/// threads. They are few, because scenes of thousands of inputs ask several times for each.
+const RESERVE: (usize, usize) = (4, 1 << 20);
 
 /// Reserves capacity for `more` items in a list.
 ///

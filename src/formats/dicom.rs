@@ -7,7 +7,9 @@ mod element;
 mod file;
 mod frames;
 mod head;
+mod label_map;
 mod pixels;
+mod segmentation;
 mod stack;
 mod syntax;
 mod tags;
@@ -38,8 +40,8 @@ const LOOKED_AT: usize = 256;
 ///
 /// Slices are ordered by their positions. Those of a tilted gantry lie on a sheared lattice, and
 /// those at uneven distances on a rectilinear one, so nothing is resampled. Values are scaled by
-/// slope and intercept (for CT to Hounsfield units). Colours are kept, with their luminance as
-/// samples. Values that the files mark as padding are holes.
+/// slope and intercept (for CT to Hounsfield units). Segmentations are label maps. Colours are
+/// kept, with their luminance as samples. Values that the files mark as padding are holes.
 ///
 /// # Errors
 /// [`Error::Input`] with the file and the place of what is wrong or not read;

@@ -1,6 +1,10 @@
 //! What a row of the table of formats says, and how the row of a file is found.
 
-use super::{Array, Kind, RawLayout, ReadOptions, Series, form::Form, shared::plain::Plain};
+use super::{
+    Array, Kind, RawLayout, ReadOptions, Series,
+    form::Form,
+    shared::{plain::Plain, stand_in},
+};
 use crate::{
     Result, cells::Cells, gaussians::Gaussians, input::Source, scattered::Points, surface::Mesh,
     volume::Volume,
@@ -302,6 +306,7 @@ pub(super) fn find<'a>(
     source: &Source,
     may: impl Fn(&Format) -> bool,
 ) -> Result<Option<&'a Format>> {
+    stand_in::check(source)?;
     let may = |format: &Format| format.is_left_out() || may(format);
     if source.folder().is_some() {
         return by_folder(table, source, may);
@@ -320,6 +325,7 @@ pub(super) fn find_volume<'a>(
     source: &Source,
     is_described: bool,
 ) -> Result<Option<&'a Format>> {
+    stand_in::check(source)?;
     let may = |format: &Format| format.is_left_out() || format.volume.is_some();
     if source.folder().is_some() {
         return by_folder(table, source, may);

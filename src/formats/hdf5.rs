@@ -4,6 +4,7 @@
 mod attributes;
 mod coordinates;
 mod file;
+mod span;
 mod vtkhdf;
 
 use super::{

@@ -84,7 +84,15 @@ pub fn load_volume(
 /// Those of [`load_volume`], except those of opening the file.
 pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let volume = source.unless_changed(volume_of(FORMATS, source, options))?;
-    Ok(volume.with_guessed_labels().with_label_table(&options.labels))
+    let volume = volume.with_guessed_labels().with_label_table(&options.labels);
+    if !options.labels.is_empty() && volume.about.labels.is_none() {
+        tracing::warn!(
+            "{}: the table of labels is not used: it lacks some of the values, or they are no \
+             whole numbers",
+            source.path.display()
+        );
+    }
+    Ok(volume)
 }
 
 /// As [`read_volume`], in the formats of a table, but does not check whether the file changed

@@ -43,6 +43,7 @@ const PACKED: i32 = 101;
 /// off; [`Error::Limit`](crate::Error::Limit) for sizes over the limits.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let header = Header::of(source)?;
+    Component::chosen(source, options, 1, false)?;
     let (dims, skipped) = header.chosen(source, options)?;
     let lattice = header.lattice(source, dims)?;
     let packed = header.mode == PACKED;

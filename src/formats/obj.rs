@@ -92,7 +92,8 @@ fn statements(
 ) -> Result<(Vec<tobj::Model>, Vec<Material>, Vec<material::Shift>)> {
     let library = RefCell::new(material::Library::new(source));
     let failure: RefCell<Option<Error>> = RefCell::new(None);
-    let mut feed = survey.feed(text);
+    let is_over = || source.time_left().is_zero();
+    let mut feed = survey.feed(text, &is_over);
     // tobj would triangulate by fans, which also cover area outside a concave polygon.
     let options =
         tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
@@ -112,8 +113,10 @@ fn statements(
     if let Some(error) = failure.into_inner() {
         return Err(error);
     }
-    let (models, materials) =
-        loaded.map_err(|error| source.error(format!("line {line}"), error.to_string()))?;
+    let (models, materials) = loaded.map_err(|error| {
+        let wrong = || source.error(format!("line {line}"), error.to_string());
+        source.check_time().err().unwrap_or_else(wrong)
+    })?;
     let mut library = library.into_inner();
     let materials = materials.unwrap_or_default();
     let materials = materials.iter().map(|material| library.finish(material));

@@ -2,7 +2,7 @@
 
 use super::{
     Endian, ReadOptions, SampleType,
-    shared::{holes, plain::Plain},
+    shared::{grid::Component, holes, plain::Plain},
 };
 use crate::{
     Result,
@@ -38,6 +38,7 @@ pub struct RawLayout {
 /// over the limits.
 pub fn read(source: &Source, layout: &RawLayout, options: &ReadOptions) -> Result<Volume> {
     let (lattice, wanted) = whole(source, layout)?;
+    Component::chosen(source, options, 1, false)?;
     let bytes = source.bytes();
     let mut unpacked: Cow<[u8]> = if is_packed(source, wanted) {
         let unpacked = source.unpack("gzip stream", MultiGzDecoder::new(bytes), wanted);

@@ -18,7 +18,7 @@ use crate::{
 };
 use glam::{DVec3, Quat, Vec3};
 use meta::{Levels, META, Meta, file};
-use planes::{Files, Plane};
+use planes::{Files, Need, Plane};
 use std::{array, f32::consts::SQRT_2};
 
 /// Bytes at the beginning of a file that say whether it is a `meta.json`.
@@ -26,6 +26,9 @@ const HEAD: usize = 4096;
 
 /// Number of harmonics in each row of their palette.
 const ENTRIES_IN_ROW: usize = 64;
+
+/// Most harmonics in their palette.
+const MOST_ENTRIES: usize = 1 << 16;
 
 /// The lowest alpha of a rotation; it says which component is left out.
 const FIRST_TAG: u8 = 252;
@@ -112,7 +115,7 @@ impl Scene {
     fn load(source: &Source, files: &mut Files, meta: &Meta, count: usize) -> Result<Self> {
         let mut plane = |names: &[String], key: &str, at: usize| {
             let place = format!("{key}.files[{at}]");
-            files.plane(source, &place, file(source, names, key, at)?, count)
+            files.plane(source, &place, file(source, names, key, at)?, Need::Texels(count))
         };
         let means = &meta.means;
         let (low, high) = (plane(&means.files, "means", 0)?, plane(&means.files, "means", 1)?);
@@ -205,11 +208,15 @@ impl Palette {
             return Ok(None);
         };
         let levels = rest.levels(source, meta.is_second)?;
-        let mut plane = |at: usize, least: usize| {
+        let mut plane = |at: usize, need: Need| {
             let name = file(source, &rest.files, "shN", at)?;
-            files.plane(source, &format!("shN.files[{at}]"), name, least)
+            files.plane(source, &format!("shN.files[{at}]"), name, need)
         };
-        let (centroids, labels) = (plane(0, 1)?, plane(1, count)?);
+        let claimed = rest.count.and_then(|count| usize::try_from(count).ok());
+        // A label has 16 bits.
+        let entries = claimed.unwrap_or(MOST_ENTRIES).min(MOST_ENTRIES);
+        let centroids = plane(0, Need::Rows(entries.div_ceil(ENTRIES_IN_ROW)))?;
+        let labels = plane(1, Need::Texels(count))?;
         let width = |degree: u32| ENTRIES_IN_ROW * (terms(degree) - 1);
         let found = (1..=MOST_DEGREE).find(|&degree| width(degree) == centroids.width);
         let degree = found.ok_or_else(|| {
@@ -223,7 +230,6 @@ impl Palette {
             return Err(source.error("shN", message));
         }
         let there = centroids.texels.len() / (terms(degree) - 1);
-        let claimed = rest.count.and_then(|count| usize::try_from(count).ok());
         let count = claimed.map_or(there, |claimed| claimed.min(there));
         Ok(Some(Self { degree, count, centroids, labels, levels }))
     }

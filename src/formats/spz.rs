@@ -51,6 +51,12 @@ const MOST_EXTENSIONS: u64 = 1 << 20;
 /// the format's library.
 const RATIO: u64 = 1024;
 
+/// The least and the most window of zstd: powers of two, in bytes. The most is its own default.
+#[cfg(feature = "files")]
+const LEAST_WINDOW: u32 = 10;
+#[cfg(feature = "files")]
+const MOST_WINDOW: u32 = 27;
+
 /// The attributes, in their order.
 const ATTRIBUTES: [&str; 6] =
     ["positions", "opacities", "colours", "scales", "rotations", "harmonics"];
@@ -255,8 +261,11 @@ fn unzstd(source: &Source, what: &str, stream: &[u8], size: usize) -> Result<Vec
     // The decoder is C code, and mapped bytes may change while it reads them.
     source.room::<u8>("the packed attributes", stream.len())?;
     let copy = stream.to_vec();
-    let decoder = zstd::stream::read::Decoder::with_buffer(&copy[..])
-        .map_err(|error| source.error(what, format!("cannot be unpacked: {error}")))?;
+    let broken = |error| source.error(what, format!("cannot be unpacked: {error}"));
+    let mut decoder = zstd::stream::read::Decoder::with_buffer(&copy[..]).map_err(broken)?;
+    // The stream says how much of what was unpacked the decoder keeps.
+    let most = source.limits.bytes.max(1).ilog2().clamp(LEAST_WINDOW, MOST_WINDOW);
+    decoder.window_log_max(most).map_err(broken)?;
     source.unpack(what, decoder, size)
 }
 

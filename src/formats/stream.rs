@@ -40,6 +40,28 @@ pub(crate) struct Settled {
     range: Option<[f64; 2]>,
 }
 
+impl Settled {
+    /// Checks numbers that come from a file. An error names the field.
+    pub fn check(&self) -> Result<(), String> {
+        let Self { points, origin, bounds: [low, high], coloring, range } = self;
+        let is_box = low.is_finite() && high.is_finite() && low.cmple(*high).all();
+        let ascends = |[low, high]: &[f64; 2]| low <= high && (high - low).is_finite();
+        if u32::try_from(*points).is_err() {
+            Err(format!("points is {points}; {} are the most", u32::MAX))
+        } else if !origin.is_finite() {
+            Err(format!("origin is {origin}; finite numbers are expected"))
+        } else if !(is_box && (*high - *low).is_finite()) {
+            Err(format!("bounds is [{low}, {high}]; the corners of a box are expected"))
+        } else if !coloring.iter().flatten().all(|value| value.is_finite()) {
+            Err(format!("coloring is {coloring:?}; finite numbers are expected"))
+        } else if !range.as_ref().is_none_or(ascends) {
+            Err(format!("range is {range:?}; two numbers that ascend are expected"))
+        } else {
+            Ok(())
+        }
+    }
+}
+
 /// A point cloud or mesh file that is read in pieces: binary PLY of points or triangles, LAS and
 /// LAZ.
 ///
@@ -243,6 +265,11 @@ impl<'a> Stream<'a> {
             coloring: self.form.coloring(),
             range: self.scale().map(|scale| scale.range),
         }
+    }
+
+    /// Returns the number of pieces of the points.
+    pub(crate) fn pieces(&self) -> usize {
+        self.form.pieces()[0]
     }
 
     /// Takes what the first pass over the same file has found.

@@ -2,7 +2,7 @@
 //! budget.
 
 use super::Limits;
-use crate::{Result, error::LimitKind};
+use crate::{Error, Result, error::LimitKind};
 use std::{
     path::{Path, PathBuf},
     sync::{
@@ -48,6 +48,15 @@ impl Budget {
         Ok(())
     }
 
+    /// Checks bytes that a step takes and gives back when it ends: they may not exceed the limit
+    /// beside those that were spent, but are not added to them.
+    pub fn lend(&self, limits: &Limits, file: &Path, what: &str, bytes: u64) -> Result<()> {
+        limits.check(LimitKind::Bytes, file, what, bytes)?;
+        let total = self.spent.load(Relaxed).saturating_add(bytes);
+        let what = format!("{what} together with what was read before");
+        limits.check(LimitKind::Bytes, file, what, total)
+    }
+
     /// Records the path of an opened file.
     pub fn opened(&self, file: &Path) {
         self.files.lock().unwrap_or_else(PoisonError::into_inner).push(file.to_owned());
@@ -60,16 +69,66 @@ impl Budget {
 
     /// Returns an error if reading has taken longer than the limit.
     pub fn check_time(&self, limits: &Limits, file: &Path) -> Result<()> {
-        let begun = Duration::from_nanos(self.begun.load(Relaxed));
-        let taken = self.created.elapsed().saturating_sub(begun);
-        if taken <= Duration::from_secs(limits.seconds) {
+        let taken = self.taken();
+        if taken > Duration::from_secs(limits.seconds) {
+            let what = "the reading time in seconds";
+            return limits.check(LimitKind::Seconds, file, what, taken.as_secs() + 1);
+        }
+        if !limits.until.is_over() {
             return Ok(());
         }
-        limits.check(LimitKind::Seconds, file, "the reading time in seconds", taken.as_secs() + 1)
+        let limit = limits.until.seconds();
+        let what = "the time for all inputs together in seconds".into();
+        let (kind, found) = (LimitKind::Seconds, limit.saturating_add(1));
+        Err(Error::Limit { file: file.to_owned(), what, kind, found, limit })
+    }
+
+    /// Returns the time that is left for reading.
+    pub fn left(&self, limits: &Limits) -> Duration {
+        let own = Duration::from_secs(limits.seconds).saturating_sub(self.taken());
+        limits.until.left().map_or(own, |left| left.min(own))
+    }
+
+    fn taken(&self) -> Duration {
+        let begun = Duration::from_nanos(self.begun.load(Relaxed));
+        self.created.elapsed().saturating_sub(begun)
     }
 
     /// Restarts the clock of the time limit.
     pub fn restart(&self) {
         self.begun.store(self.created.elapsed().as_nanos() as u64, Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Deadline;
+
+    #[test]
+    fn inputs_end_with_the_time_of_all() {
+        let (budget, file) = (Budget::new(), Path::new("a.ply"));
+        let limits = Limits::default();
+        assert!(budget.check_time(&limits, file).is_ok() && !budget.left(&limits).is_zero());
+        // Other inputs have used it up.
+        let limits = Limits { until: Deadline::after(0), ..limits };
+        assert!(budget.left(&limits).is_zero());
+        let error = budget.check_time(&limits, file).unwrap_err().to_string();
+        assert!(error.contains("a.ply: the time for all inputs together"), "{error}");
+        budget.restart();
+        assert!(budget.check_time(&limits, file).is_err());
+    }
+
+    #[test]
+    fn what_is_lent_is_not_spent() {
+        let (budget, file) = (Budget::new(), Path::new("a.ply"));
+        let limits = Limits { bytes: 100, ..Limits::default() };
+        budget.spend(&limits, file, "this", 60).unwrap();
+        for _ in 0..9 {
+            budget.lend(&limits, file, "that", 40).unwrap();
+        }
+        assert!(budget.lend(&limits, file, "that", 41).is_err());
+        assert!(budget.lend(&limits, file, "that", u64::MAX).is_err());
+        budget.spend(&limits, file, "this", 40).unwrap();
     }
 }

@@ -21,18 +21,30 @@ pub struct Limits {
     /// Maximum time for reading, in seconds. For a file that is read in pieces, it applies to each
     /// batch of pieces. The steps that follow reading take a [`deadline`](Self::deadline).
     pub seconds: u64,
+    /// The moment by which everything that is read within these limits must be done, however many
+    /// inputs there are. By default there is none, and each input has its own
+    /// [`seconds`](Self::seconds).
+    pub until: Deadline,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { points: 1 << 31, bytes: 32 << 30, depth: 64, texels: 1 << 28, seconds: 600 }
+        Self {
+            points: 1 << 31,
+            bytes: 32 << 30,
+            depth: 64,
+            texels: 1 << 28,
+            seconds: 600,
+            until: Deadline::NEVER,
+        }
     }
 }
 
 impl Limits {
-    /// Returns the deadline of work that begins now and may take [`seconds`](Self::seconds).
+    /// Returns the deadline of work that begins now and may take [`seconds`](Self::seconds), but
+    /// not beyond [`until`](Self::until).
     pub fn deadline(&self) -> Deadline {
-        Deadline::after(self.seconds)
+        Deadline::after(self.seconds).or_earlier(self.until)
     }
 
     /// Returns limits that allow everything, for data that never was a file.
@@ -43,6 +55,7 @@ impl Limits {
             depth: usize::MAX,
             texels: u64::MAX,
             seconds: u64::MAX,
+            until: Deadline::NEVER,
         }
     }
 

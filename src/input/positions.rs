@@ -3,6 +3,7 @@
 use super::Source;
 use crate::{Error, Result, parallel::prelude::*};
 use glam::{DVec3, Vec3};
+use std::ops::Range;
 
 /// The squares of coordinates up to this size still fit in 32-bit floats.
 const LARGEST: f64 = 1e18;
@@ -20,12 +21,18 @@ pub(crate) fn settle_some(
     source.check_time()?;
     source.room::<Vec3>("the positions", count)?;
     let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (low, high) = (0..count)
-        .into_par_iter()
-        .map(&position)
-        .filter(|position| position.is_finite())
-        .map(|position| (position, position))
-        .reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let both = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
+    let (mut low, mut high) = none;
+    for rows in batches(count) {
+        source.check_time()?;
+        let found = rows
+            .into_par_iter()
+            .map(&position)
+            .filter(|position| position.is_finite())
+            .map(|position| (position, position))
+            .reduce(|| none, both);
+        (low, high) = both((low, high), found);
+    }
     if count == 0 {
         return Ok((DVec3::ZERO, Vec::new()));
     }
@@ -43,7 +50,32 @@ pub(crate) fn settle_some(
         position if position.is_finite() => (position - origin).as_vec3(),
         _ => Vec3::NAN,
     };
-    Ok((origin, (0..count).into_par_iter().map(relative).collect()))
+    Ok((origin, collected(source, count, relative)?))
+}
+
+/// Rows between two checks of the time limit.
+const BATCH: usize = 1 << 22;
+
+fn batches(count: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..count).step_by(BATCH).map(move |start| start..count.min(start + BATCH))
+}
+
+/// Returns what is made of each row, in their order, unless the time for reading is over before.
+pub(crate) fn collected<T: Send>(
+    source: &Source,
+    count: usize,
+    one: impl Fn(usize) -> T + Sync,
+) -> Result<Vec<T>> {
+    source.check_time()?;
+    if count <= BATCH {
+        return Ok((0..count).into_par_iter().map(one).collect());
+    }
+    let mut all = Vec::with_capacity(count);
+    for rows in batches(count) {
+        source.check_time()?;
+        all.extend(rows.into_par_iter().map(&one).collect::<Vec<T>>());
+    }
+    Ok(all)
 }
 
 /// Chooses an origin and returns it with the positions relative to it. The origin is zero unless
@@ -57,22 +89,28 @@ pub(crate) fn settle(
 ) -> Result<(DVec3, Vec<Vec3>)> {
     source.check_time()?;
     source.room::<Vec3>("the positions", count)?;
-    let bad = (0..count).into_par_iter().find_first(|&row| !position(row).is_finite());
-    if let Some(row) = bad {
-        return Err(not_finite(source, place(row), position(row)));
-    }
     if count == 0 {
         return Ok((DVec3::ZERO, Vec::new()));
     }
     let start = position(0);
-    let (low, high) = (0..count)
-        .into_par_iter()
-        .map(|row| (position(row), position(row)))
-        .reduce(|| (start, start), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let both = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
+    let (mut low, mut high) = (start, start);
+    for rows in batches(count) {
+        source.check_time()?;
+        let bad = rows.clone().into_par_iter().find_first(|&row| !position(row).is_finite());
+        if let Some(row) = bad {
+            return Err(not_finite(source, place(row), position(row)));
+        }
+        let found = rows
+            .into_par_iter()
+            .map(|row| (position(row), position(row)))
+            .reduce(|| (start, start), both);
+        (low, high) = both((low, high), found);
+    }
     let step = count.div_ceil(LOOKS);
     let looks: Vec<DVec3> = (0..count).step_by(step).map(&position).collect();
     let origin = origin(source, [low, high], &looks)?;
-    Ok((origin, (0..count).into_par_iter().map(|row| (position(row) - origin).as_vec3()).collect()))
+    Ok((origin, collected(source, count, |row| (position(row) - origin).as_vec3())?))
 }
 
 /// Returns the origin for positions between two corners, given some of the positions, spread evenly

@@ -4,6 +4,7 @@ use super::{
     element::{Set, Value},
     file::File,
     frames::{Frame, frames},
+    segmentation::{self, Segmentation},
     syntax::Packing,
     tags,
 };
@@ -19,6 +20,8 @@ pub struct Head {
     pub layout: Layout,
     pub frames: Vec<Frame>,
     pub nature: Nature,
+    /// What the frames are of a segmentation; `None` for pictures.
+    pub segmentation: Option<Segmentation>,
 }
 
 /// What tells a series from others.
@@ -112,7 +115,12 @@ impl Head {
         if let Some(what) = no_slices(&set) {
             return Err(what.error(source));
         }
-        let layout = layout(&file, &set)?;
+        let mut layout = layout(&file, &set)?;
+        let segmentation = segmentation::of(&set)?;
+        if segmentation.is_some() {
+            // Labels are numbers, whatever colours they have.
+            layout.colors = Colors::Grey;
+        }
         let nature = nature(&set, &series);
         Ok(Self {
             path: source.path.to_owned(),
@@ -121,6 +129,7 @@ impl Head {
             frames: frames(source, &set, pixel_bytes(&set))?,
             layout,
             nature,
+            segmentation,
         })
     }
 }

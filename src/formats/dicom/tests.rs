@@ -1,11 +1,13 @@
 //! Files are written by `Made`, a writer of its own; tests/files/medical.rs reads those of pydicom.
 
 mod made;
+mod segmentations;
 mod series_of_files;
 
 use super::*;
 use crate::{
     about::{Modality, Stance},
+    error::LimitKind,
     input::{
         Limits,
         testing::{Folder, every_cut, read_with},
@@ -239,6 +241,71 @@ fn frames_are_found_in_fragments() {
     assert_eq!(two(&parts).unwrap(), [1.0, 2.0, 3.0, 4.0]);
     let error = two(&[&[], &[1, 2], &[3, 4], &[5, 6]]).unwrap_err().to_string();
     assert!(error.contains("is missing: there are 3 fragments for 2 frames"), "{error}");
+}
+
+/// A grey picture of JPEG 2000 with a byte a pixel: five levels, all of them empty.
+fn grey_2000(side: u32) -> Vec<u8> {
+    let mut stream = vec![0xff, 0x4f, 0xff, 0x51, 0, 41, 0, 0];
+    for number in [side, side, 0, 0, side, side, 0, 0] {
+        stream.extend(number.to_be_bytes());
+    }
+    stream.extend([0, 1, 7, 1, 1]);
+    stream.extend([0xff, 0x52, 0, 12, 0, 0, 0, 1, 0, 5, 4, 4, 0, 1]);
+    stream.extend([0xff, 0x5c, 0, 19, 0x40]);
+    stream.extend([0x48; 16]);
+    stream.extend([0xff, 0x90, 0, 10, 0, 0, 0, 0, 0, 20, 0, 1, 0xff, 0x93]);
+    stream.extend([0; 6]);
+    stream.extend([0xff, 0xd9]);
+    stream
+}
+
+#[test]
+fn frames_of_one_file_share_the_time_limit() {
+    let file = |side: u16, frames: usize| {
+        let mut made = Made::slice(".4.90", side, side);
+        made.bits(8, 8, 0).text(tags::FRAMES, &frames.to_string());
+        made.text(tags::SPACING_BETWEEN_SLICES, "3");
+        let frame = grey_2000(side.into());
+        let mut fragments: Vec<&[u8]> = vec![&[]];
+        fragments.extend(std::iter::repeat_n(&frame[..], frames));
+        made.fragments(&fragments);
+        made.file()
+    };
+    let volume = read_bytes(&file(16, 2)).unwrap();
+    assert_eq!(values(&volume), [128.0; 512]);
+    // Minutes of work for each thread.
+    let folder = Folder::new();
+    let path = folder.write("a.dcm", file(1024, 4096));
+    let limits = Limits { seconds: 1, ..Limits::default() };
+    let source = Source::open(&path, &limits).unwrap();
+    let error = read(&source, &ReadOptions::default()).unwrap_err();
+    assert!(matches!(error, Error::Limit { kind: LimitKind::Seconds, .. }), "{error}");
+}
+
+#[test]
+fn tiles_take_memory() {
+    let mut made = Made::slice(".4.90", 1024, 1024);
+    let mut frame = grey_2000(1024);
+    // Tiles of 4 × 4 pixels: 65,536 of them.
+    frame[24..32].copy_from_slice(&[0, 0, 0, 4, 0, 0, 0, 4]);
+    made.bits(8, 8, 0).fragments(&[&[], &frame]);
+    let folder = Folder::new();
+    let path = folder.write("a.dcm", made.file());
+    let limits = Limits { bytes: 64 << 20, ..Limits::default() };
+    let error = read(&Source::open(&path, &limits).unwrap(), &ReadOptions::default()).unwrap_err();
+    assert!(matches!(error, Error::Limit { kind: LimitKind::Bytes, .. }), "{error}");
+    // Also in a file of boxes, of which one only looks like a stream.
+    let mut boxed = vec![0, 0, 0, 12, b'j', b'P', b' ', b' ', 13, 10, 0x87, 10];
+    let decoy = grey_2000(1024);
+    boxed.extend((8 + decoy.len() as u32).to_be_bytes());
+    boxed.extend(b"uuid");
+    boxed.extend(decoy);
+    boxed.extend([0, 0, 0, 0, b'j', b'p', b'2', b'c']);
+    boxed.extend(frame);
+    made.fragments(&[&[], &boxed]);
+    let path = folder.write("b.dcm", made.file());
+    let error = read(&Source::open(&path, &limits).unwrap(), &ReadOptions::default()).unwrap_err();
+    assert!(matches!(error, Error::Limit { kind: LimitKind::Bytes, .. }), "{error}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::{
     file::File,
     head::{Colors, Head, Layout},
-    name,
+    label_map, name,
     pixels::{Decoded, Decoder},
     stack::{Slice, Stack, stacks},
 };
@@ -21,6 +21,9 @@ use crate::{
 
 /// Reads the volume of a series that the options choose.
 pub fn read(source: &Source, heads: Vec<Head>, options: &ReadOptions) -> Result<Volume> {
+    if heads.first().is_some_and(|head| head.segmentation.is_some()) {
+        return label_map::read(source, &heads, options);
+    }
     let mut stack = chosen(source, &heads, options)?;
     let first = &heads[stack.slices[0].file];
     let layout = first.layout;
@@ -176,6 +179,7 @@ fn frames(source: &Source, job: &Job, is_even: bool) -> Result<Vec<(usize, Decod
     let decoder = Decoder::new(&file, job.head.layout)?;
     let expected = job.head.layout.columns * job.head.layout.rows;
     let decode = |&(at, slice): &(usize, &Slice)| {
+        opened.check_time()?;
         let mut decoded = decoder.frame(slice.frame.number)?;
         let count = decoded.samples.len();
         if count != expected || decoded.colors.as_ref().is_some_and(|own| own.len() != expected) {

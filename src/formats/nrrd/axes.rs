@@ -122,7 +122,9 @@ impl Axes {
             components,
             step,
         };
-        let Some((other, role)) = self.other else { return Ok((grid(1, 1), Component::One(0))) };
+        let Some((other, role)) = self.other else {
+            return Ok((grid(1, 1), Component::chosen(header.source, options, 1, false)?));
+        };
         let (count, step) = (self.sizes[other], stride(other));
         let source = header.source;
         if count == 0 {

@@ -106,8 +106,8 @@ impl Survey {
         self.unplaced > 0
     }
 
-    /// Returns the file's lines for tobj.
-    pub fn feed<'a>(&self, text: &'a str) -> Feed<'a> {
+    /// Returns the file's lines for tobj. They end with an error when `is_over` says so.
+    pub fn feed<'a>(&self, text: &'a str, is_over: &'a dyn Fn() -> bool) -> Feed<'a> {
         // tobj ends a part of the mesh at each `usemtl`, with the statements it has read so far.
         let (rest, again) = (text, self.ahead.then_some(text));
         let kinds = if self.ahead { Kinds::Values } else { Kinds::All };
@@ -123,6 +123,7 @@ impl Survey {
             stray: self.stray,
             odd: self.odd,
             passed: 0,
+            is_over,
         }
     }
 }
@@ -307,6 +308,8 @@ pub(super) struct Feed<'a> {
     odd: bool,
     /// Texture coordinates that were passed on.
     passed: i64,
+    /// Whether to give up.
+    is_over: &'a dyn Fn() -> bool,
 }
 
 impl<'a> Feed<'a> {
@@ -413,6 +416,9 @@ impl BufRead for Feed<'_> {
             }
             let end = self.rest.find('\n').map_or(self.rest.len(), |end| end + 1);
             let (line, rest) = self.rest.split_at(end);
+            if self.line.is_multiple_of(LINES) && (self.is_over)() {
+                return Err(std::io::Error::other("the time for reading is over"));
+            }
             (self.rest, self.line) = (rest, self.line + 1);
             (self.current, self.at) = (self.useful(line.trim()), 0);
         }

@@ -19,6 +19,7 @@ pub(super) mod polygon;
 pub(super) mod rescale;
 pub(super) mod sample_type;
 pub(super) mod several;
+pub(super) mod stand_in;
 pub(super) mod texture;
 pub(super) mod trained;
 pub(super) mod unplaced;

@@ -3,9 +3,14 @@
 use crate::{
     Result,
     error::LimitKind,
-    input::{Source, isolate::isolated, neighbour::is_inside},
+    input::{
+        Source,
+        isolate::{FEW_PIXELS, isolated, isolated_in_time},
+        neighbour::is_inside,
+    },
     surface::Texture,
 };
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use std::{io::Cursor, path::PathBuf, sync::Arc};
 
 /// Maximum number of texels per byte: deflate packs at most 1032 bytes into one, and a byte may
@@ -18,19 +23,11 @@ const TEXEL: u64 = 8 + 4 + 4;
 /// Decodes a PNG or JPEG picture, or with the feature `gltf` a WebP picture. `place` names what
 /// refers to it.
 pub(crate) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
-    isolated(source, place, || decode_here(source, place, bytes))
-}
-
-fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
-    let broken =
-        |e: image::ImageError| source.error(place, format!("the picture cannot be decoded: {e}"));
-    let reader = image::ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|e| broken(e.into()))?;
-    // WebP packs a picture of one colour into a few bytes, whatever its size.
-    let is_webp = reader.format() == Some(image::ImageFormat::WebP);
-    let mut decoder = reader.into_decoder().map_err(broken)?;
-    let (width, height) = image::ImageDecoder::dimensions(&decoder);
+    let wrong = |message: String| source.error(place, message);
+    let ((width, height), is_webp) = isolated(source, place, || {
+        let (decoder, is_webp) = open(bytes).map_err(wrong)?;
+        Ok((ImageDecoder::dimensions(&decoder), is_webp))
+    })?;
     let texels = u64::from(width) * u64::from(height);
     source.limits.check(
         LimitKind::Texels,
@@ -46,16 +43,34 @@ fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture
         return Err(source.error(place, message));
     }
     source.spend("the size of a picture in bytes", texels * TEXEL)?;
-    let mut limits = image::Limits::default();
-    // Enough for 16 bits per channel and the decoder's own copy.
-    limits.max_alloc = Some((texels * 16).saturating_add(1 << 20));
-    image::ImageDecoder::set_limits(&mut decoder, limits).map_err(broken)?;
-    let picture = image::DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgba8();
-    let texels: Vec<[u8; 4]> = picture.pixels().map(|pixel| pixel.0).collect();
-    if texels.is_empty() {
-        return Err(source.error(place, "the picture has no texels"));
-    }
-    Ok(Arc::new(Texture { width, height, texels }))
+    let copy = bytes.to_vec();
+    isolated_in_time(source, place, texels > FEW_PIXELS, move || {
+        let (mut decoder, _) = open(&copy)?;
+        let mut limits = image::Limits::default();
+        // Enough for 16 bits per channel and the decoder's own copy.
+        limits.max_alloc = Some((texels * 16).saturating_add(1 << 20));
+        decoder.set_limits(limits).map_err(broken)?;
+        let picture = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgba8();
+        let texels: Vec<[u8; 4]> = picture.pixels().map(|pixel| pixel.0).collect();
+        if texels.is_empty() {
+            return Err("the picture has no texels".into());
+        }
+        Ok(Arc::new(Texture { width, height, texels }))
+    })
+}
+
+/// Returns the decoder of a picture, and whether it is WebP, which packs a picture of one colour
+/// into a few bytes, whatever its size.
+fn open(bytes: &[u8]) -> Result<(impl ImageDecoder + '_, bool), String> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let reader = reader.map_err(|error| broken(error.into()))?;
+    let is_webp = reader.format() == Some(ImageFormat::WebP);
+    Ok((reader.into_decoder().map_err(broken)?, is_webp))
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
+fn broken(error: ImageError) -> String {
+    format!("the picture cannot be decoded: {error}")
 }
 
 /// Reads the picture that a file refers to. Returns `None`, with a warning, if the file does not

@@ -50,8 +50,9 @@ enum Fault {
     WithoutRotation,
 }
 
-/// Gaussians per parallel task.
+/// Gaussians per parallel task, and those that are made before they are put in a row.
 const CHUNK: usize = 1 << 12;
+const BATCH: usize = 1 << 20;
 
 /// Makes the set of `count` Gaussians. `one` returns a Gaussian by its number, and fills in the
 /// coefficients of its colour, in the order of [`Gaussians::harmonics`]. Those that cannot be drawn
@@ -70,26 +71,36 @@ pub(crate) fn settle(
     source.room::<[f32; 3]>("the colours", count.saturating_mul(terms))?;
     source.room::<(Trained, [Vec3; 2], Quat, f32)>("the Gaussians", count)?;
     let mut colors = vec![[0.0; 3]; count * terms];
-    let parts: Vec<Vec<Trained>> = colors
-        .par_chunks_mut(CHUNK * terms)
-        .enumerate()
-        .map(|(part, colors)| {
-            source.check_time()?;
-            let each = colors.chunks_exact_mut(terms).enumerate();
-            each.map(|(at, color)| one(part * CHUNK + at, color)).collect()
-        })
-        .collect::<Result<_>>()?;
-    let mut all = parts.concat();
-    drop(parts);
-    let broken = leave_out_broken(source, &mut all, &mut colors, terms)?;
+    let (mut all, mut faults) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    for (batch, colors) in colors.chunks_mut(BATCH * terms).enumerate() {
+        let parts: Vec<Vec<(Trained, Option<Fault>)>> = colors
+            .par_chunks_mut(CHUNK * terms)
+            .enumerate()
+            .map(|(part, colors)| {
+                source.check_time()?;
+                let each = colors.chunks_exact_mut(terms).enumerate();
+                let made = each.map(|(at, color)| {
+                    let made = one(batch * BATCH + part * CHUNK + at, color)?;
+                    Ok((made, made.fault(color)))
+                });
+                made.collect()
+            })
+            .collect::<Result<_>>()?;
+        for (made, fault) in parts.into_iter().flatten() {
+            all.push(made);
+            faults.push(fault);
+        }
+    }
+    let broken = leave_out_broken(source, &faults, &mut all, &mut colors, terms)?;
+    drop(faults);
     let place = |index| format!("Gaussian {index}");
     let (origin, centers) = positions::settle(source, all.len(), |i| all[i].center, place)?;
     Ok(Gaussians {
         origin,
         centers,
-        scales: all.par_iter().map(|one| one.scale).collect(),
-        rotations: all.par_iter().map(|one| one.rotation.normalize()).collect(),
-        opacities: all.par_iter().map(|one| one.opacity).collect(),
+        scales: positions::collected(source, all.len(), |i| all[i].scale)?,
+        rotations: positions::collected(source, all.len(), |i| all[i].rotation.normalize())?,
+        opacities: positions::collected(source, all.len(), |i| all[i].opacity)?,
         degree,
         harmonics: colors,
         broken,
@@ -100,13 +111,11 @@ pub(crate) fn settle(
 /// Leaves out the Gaussians that cannot be drawn, and counts them.
 fn leave_out_broken(
     source: &Source,
+    faults: &[Option<Fault>],
     all: &mut Vec<Trained>,
     colors: &mut Vec<[f32; 3]>,
     terms: usize,
 ) -> Result<Broken> {
-    let faults: Vec<Option<Fault>> = (all.par_iter().zip(colors.par_chunks_exact(terms)))
-        .map(|(one, color)| one.fault(color))
-        .collect();
     let count = |fault| faults.iter().filter(|own| **own == Some(fault)).count() as u64;
     let broken = Broken {
         not_finite: count(Fault::NotFinite),
@@ -184,6 +193,34 @@ mod tests {
         assert_eq!(set.rotations[0], Quat::IDENTITY);
         let none = settle(&source, 1, 0, |_, _| Ok(all[1])).unwrap_err();
         assert!(none.to_string().contains("none of the 1"), "{none}");
+    }
+
+    #[test]
+    fn sets_of_several_batches_keep_their_order_and_the_time() {
+        let count = BATCH + CHUNK + 7;
+        let one = |i: usize| Trained {
+            center: DVec3::X * i as f64,
+            scale: Vec3::ONE,
+            rotation: Quat::IDENTITY,
+            opacity: if i % 1000 == 1 { f32::NAN } else { 0.5 },
+        };
+        let limits = Limits::default();
+        let source = Source::from_bytes(Path::new("a.ply"), &[], &limits).unwrap();
+        let set = settle(&source, count, 0, |i, color| {
+            color.fill([i as f32; 3]);
+            Ok(one(i))
+        })
+        .unwrap();
+        let kept: Vec<usize> = (0..count).filter(|i| i % 1000 != 1).collect();
+        let left_out = (count - kept.len()) as u64;
+        assert_eq!((set.len(), set.broken.not_finite), (kept.len(), left_out));
+        let places = set.centers.iter().map(|center| set.origin.x + f64::from(center.x));
+        assert!(places.zip(&kept).all(|(x, &i)| x == i as f64));
+        assert!(set.harmonics.iter().zip(&kept).all(|(color, &i)| color[0] == i as f32));
+        let limits = Limits { seconds: 0, ..Limits::default() };
+        let source = Source::from_bytes(Path::new("a.ply"), &[], &limits).unwrap();
+        let error = settle(&source, 10, 0, |i, _| Ok(one(i + 2))).unwrap_err().to_string();
+        assert!(error.contains("the reading time in seconds"), "{error}");
     }
 
     #[test]

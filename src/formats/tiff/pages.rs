@@ -7,7 +7,7 @@ use crate::{
         Endian, SampleType,
         shared::grid::{Element, Grid},
     },
-    input::{Source, isolate::isolated},
+    input::{Source, isolate::isolated, watched::Watched},
 };
 use std::io::Cursor;
 use tiff::{
@@ -56,10 +56,13 @@ pub struct Read {
     pub meaning: Meaning,
 }
 
+/// The bytes of a file. The decoder reads them piece by piece.
+type Stream<'a> = Watched<'a, Cursor<&'a [u8]>>;
+
 /// The pages of an open file.
 pub struct Pages<'a> {
     source: &'a Source<'a>,
-    decoder: Decoder<Cursor<&'a [u8]>>,
+    decoder: Decoder<Stream<'a>>,
     description: String,
     resolution: Option<[f64; 2]>,
 }
@@ -117,7 +120,7 @@ impl<'a> Pages<'a> {
         limits.intermediate_buffer_size = most;
         limits.ifd_value_size = MOST_FIELD;
         let mut decoder = isolated(source, "page 0", || {
-            Decoder::new(Cursor::new(source.bytes()))
+            Decoder::new(Watched::new(source, Cursor::new(source.bytes())))
                 .map(|decoder| decoder.with_limits(limits))
                 .map_err(|error| told(source, 0, &error))
         })?;
@@ -188,7 +191,7 @@ impl<'a> Pages<'a> {
     fn with<T>(
         &mut self,
         page: usize,
-        work: impl FnOnce(&mut Decoder<Cursor<&'a [u8]>>) -> Result<T, TiffError>,
+        work: impl FnOnce(&mut Decoder<Stream<'a>>) -> Result<T, TiffError>,
     ) -> Result<T> {
         let (source, decoder) = (self.source, &mut self.decoder);
         isolated(source, &format!("page {page}"), || {
@@ -257,6 +260,8 @@ impl<'a> Pages<'a> {
 
     /// Decodes the current page.
     fn page(&mut self, page: usize, layout: &Layout, size: usize) -> Result<Vec<u8>> {
+        // By the decoder, and as samples.
+        self.source.lend("the memory to unpack a page in bytes", 2 * size as u64)?;
         let mut result = self.with(page, |decoder| {
             let mut result = DecodingResult::U8(Vec::new());
             decoder.read_image_to_buffer(&mut result)?;
@@ -292,6 +297,9 @@ pub fn one(source: &Source) -> Result<Read> {
 }
 
 fn told(source: &Source, page: usize, error: &TiffError) -> Error {
+    if let Err(error) = source.check_time() {
+        return error;
+    }
     let found = source.error(format!("page {page}"), format!("cannot be read: {error}"));
     match error {
         TiffError::UnsupportedError(_) => {

@@ -12,6 +12,12 @@ use flate2::read::ZlibDecoder;
 use lzma_rust2::XzReader;
 use std::{borrow::Cow, io::Read};
 
+/// Bytes that are unpacked between two checks of the time limit.
+const PORTION: usize = 16 << 20;
+
+/// Most memory of the decoder of LZMA, in KiB: that of VTK's highest level.
+const MOST_LZMA: u32 = 128 << 10;
+
 /// How the arrays of a file are encoded.
 #[derive(Debug, Clone, Copy)]
 pub struct ArrayEncoding {
@@ -55,9 +61,13 @@ impl Packing {
     }
 
     /// Unpacks a block that must fill `part`. The error is a message.
-    fn unpack(self, packed: &[u8], part: &mut [u8]) -> Result<(), String> {
+    fn unpack(self, source: &Source, packed: &[u8], part: &mut [u8]) -> Result<(), String> {
         let stream = |stream: &mut dyn Read, part: &mut [u8]| {
-            stream.read_exact(part).map_err(|e| format!("cannot be unpacked: {e}"))?;
+            for part in part.chunks_mut(PORTION) {
+                // The caller finds the same error.
+                source.check_time().map_err(|error| error.to_string())?;
+                stream.read_exact(part).map_err(|e| format!("cannot be unpacked: {e}"))?;
+            }
             match stream.read(&mut [0]) {
                 Ok(0) => Ok(()),
                 Ok(_) => Err(format!("unpacks to more than its {} bytes", part.len())),
@@ -66,8 +76,10 @@ impl Packing {
         };
         match self {
             Self::Zlib => stream(&mut ZlibDecoder::new(packed), part),
-            // The decoder's own memory is limited to that of VTK's highest level.
-            Self::Lzma => stream(&mut XzReader::new_mem_limit(packed, false, 128 << 10), part),
+            Self::Lzma => {
+                let most = (source.limits.bytes / 1024).min(MOST_LZMA.into()) as u32;
+                stream(&mut XzReader::new_mem_limit(packed, false, most), part)
+            }
             Self::Lz4 => match lz4_flex::block::decompress_into(packed, part) {
                 Ok(size) if size == part.len() => Ok(()),
                 Ok(size) => Err(format!("unpacks to {size} bytes instead of {}", part.len())),
@@ -170,9 +182,10 @@ impl ArrayEncoding {
             |(i, (part, packed))| {
                 source.check_time()?;
                 isolated(source, place, || {
-                    packing
-                        .unpack(packed, part)
-                        .map_err(|message| wrong(format!("block {i} {message}")))
+                    packing.unpack(source, packed, part).map_err(|message| {
+                        let wrong = || wrong(format!("block {i} {message}"));
+                        source.check_time().err().unwrap_or_else(wrong)
+                    })
                 })
             },
         )?;

@@ -27,11 +27,17 @@ struct Frame {
     preset: [i32; 5],
 }
 
-/// Returns the picture of a stream, which must have this size.
+/// Returns the picture of a stream, which must have this size. `is_over` says whether to give up;
+/// it is asked once a line.
 ///
 /// # Errors
-/// A message for a damaged stream, another size, and interleaving by samples.
-pub fn decode(bytes: &[u8], size: [usize; 2], channels: usize) -> Result<Picture, String> {
+/// A message for a damaged stream, another size, interleaving by samples, and for giving up.
+pub fn decode(
+    bytes: &[u8],
+    size: [usize; 2],
+    channels: usize,
+    is_over: &dyn Fn() -> bool,
+) -> Result<Picture, String> {
     let mut frame = Frame::default();
     let mut numbers = Vec::new();
     let mut at = 2;
@@ -69,7 +75,8 @@ pub fn decode(bytes: &[u8], size: [usize; 2], channels: usize) -> Result<Picture
                 if frame.channels == 0 {
                     return Err("a scan comes before the picture's size".into());
                 }
-                let used = scan(&frame, body, &bytes[at + 2 + length..], &mut numbers)?;
+                let rest = &bytes[at + 2 + length..];
+                let used = scan(&frame, body, rest, &mut numbers, is_over)?;
                 at += used;
             }
             0xffd9 => return Err("it ends before all channels".into()),
@@ -85,7 +92,13 @@ pub fn decode(bytes: &[u8], size: [usize; 2], channels: usize) -> Result<Picture
 }
 
 /// Decodes a scan: one channel, or all line by line. Returns the bytes that it took.
-fn scan(frame: &Frame, head: &[u8], bytes: &[u8], out: &mut Vec<u16>) -> Result<usize, String> {
+fn scan(
+    frame: &Frame,
+    head: &[u8],
+    bytes: &[u8],
+    out: &mut Vec<u16>,
+    is_over: &dyn Fn() -> bool,
+) -> Result<usize, String> {
     let count = usize::from(*head.first().ok_or("it is cut off")?);
     let &[near, interleave, ..] = head.get(1 + 2 * count..).unwrap_or_default() else {
         return Err("it is cut off".into());
@@ -101,6 +114,9 @@ fn scan(frame: &Frame, head: &[u8], bytes: &[u8], out: &mut Vec<u16>) -> Result<
     let mut lines = vec![[vec![0i32; columns + 2], vec![0i32; columns + 2]]; count];
     let mut orders = vec![0; count];
     for row in 0..rows {
+        if is_over() {
+            return Err("the time is over".into());
+        }
         for channel in 0..count {
             let [above, line] = &mut lines[channel];
             std::mem::swap(above, line);
@@ -391,5 +407,29 @@ impl Bits<'_> {
         let rest = self.bytes.get(from..).unwrap_or_default();
         let mark = rest.windows(2).position(|pair| pair[0] == 0xff && pair[1] >= 0x80);
         mark.map_or(self.bytes.len(), |at| from + at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn it_is_given_up_between_lines() {
+        const ROWS: u8 = 50;
+        let mut stream = vec![0xff, 0xd8, 0xff, 0xf7, 0, 11, 8, 0, ROWS, 0, 64, 1, 1, 0x11, 0];
+        stream.extend([0xff, 0xda, 0, 8, 1, 1, 0, 0, 0, 0]);
+        // Runs to the end of each line.
+        stream.extend([0xff, 0x7f].repeat(1000));
+        stream.extend([0xff, 0xd9]);
+        let decode = |most: usize| {
+            let asked = Cell::new(0);
+            let is_over = || asked.replace(asked.get() + 1) >= most;
+            let decoded = decode(&stream, [64, ROWS.into()], 1, &is_over);
+            (decoded.map(|picture| picture.numbers), asked.get())
+        };
+        assert_eq!(decode(9999), (Ok(vec![0; 64 * usize::from(ROWS)]), ROWS.into()));
+        assert_eq!(decode(10), (Err("the time is over".into()), 11));
     }
 }

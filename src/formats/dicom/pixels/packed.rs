@@ -1,7 +1,11 @@
 //! Frames that are packed: by run lengths (PS3.5, annex G), JPEG, JPEG-LS or JPEG 2000.
 
 use super::{Colors, Decoder, Packing, Plain, jpeg_ls};
-use crate::{Error, Result, formats::Endian, formats::dicom::tags, input::isolate::isolated};
+use crate::{
+    Error, Result,
+    formats::{Endian, dicom::tags},
+    input::isolate::{FEW_PIXELS, isolated_in_time},
+};
 use jpeg_decoder::{ColorTransform, PixelFormat};
 use std::borrow::Cow;
 
@@ -77,8 +81,8 @@ pub fn unpack<'a>(
     let plain = match packing {
         Packing::Rle => rle(decoder, bytes, place)?,
         Packing::JpegLs => unpacked_ls(decoder, bytes, place)?,
-        Packing::Jpeg => isolated(source, place, || jpeg(decoder, bytes, place))?,
-        _ => isolated(source, place, || jpeg_2000(decoder, bytes, place))?,
+        Packing::Jpeg => jpeg(decoder, bytes, place)?,
+        _ => jpeg_2000(decoder, bytes, place)?,
     };
     if plain.bytes.len() == size {
         return Ok(plain);
@@ -165,12 +169,18 @@ fn colors(decoder: &Decoder) -> Colors {
 fn jpeg<'a>(decoder: &Decoder, bytes: &[u8], place: &str) -> Result<Plain<'a>> {
     let layout = &decoder.layout;
     check_size(decoder, jpeg_size(bytes), place)?;
-    let mut reader = jpeg_decoder::Decoder::new(bytes);
-    if layout.colors == Colors::Rgb {
-        reader.set_color_transform(ColorTransform::RGB);
-    }
-    let unpacked = reader.decode().map_err(|error| refuse(decoder, place, error))?;
-    let format = reader.info().map(|info| info.pixel_format);
+    let numbers = layout.frame_numbers();
+    lend(decoder, numbers.saturating_mul(JPEG))?;
+    let (is_rgb, copy) = (layout.colors == Colors::Rgb, bytes.to_vec());
+    let (unpacked, format) = in_time(decoder, place, move || {
+        let mut reader = jpeg_decoder::Decoder::new(&copy[..]);
+        reader.set_max_decoding_buffer_size(2 * numbers);
+        if is_rgb {
+            reader.set_color_transform(ColorTransform::RGB);
+        }
+        let unpacked = reader.decode().map_err(|error| error.to_string())?;
+        Ok((unpacked, reader.info().map(|info| info.pixel_format)))
+    })?;
     let width = layout.sample_type().bytes();
     let bytes = match (format, layout.channels, width) {
         (Some(PixelFormat::L8), 1, 1) | (Some(PixelFormat::RGB24), 3, 1) => unpacked,
@@ -192,8 +202,12 @@ fn jpeg<'a>(decoder: &Decoder, bytes: &[u8], place: &str) -> Result<Plain<'a>> {
 /// Unpacks JPEG-LS.
 fn unpacked_ls<'a>(decoder: &Decoder, bytes: &[u8], place: &str) -> Result<Plain<'a>> {
     let layout = &decoder.layout;
-    let picture = jpeg_ls::decode(bytes, [layout.columns, layout.rows], layout.channels)
-        .map_err(|message| refuse(decoder, place, message))?;
+    let source = decoder.file.source;
+    let is_over = || source.time_left().is_zero();
+    let size = [layout.columns, layout.rows];
+    let picture = jpeg_ls::decode(bytes, size, layout.channels, &is_over).map_err(|message| {
+        source.check_time().err().unwrap_or_else(|| refuse(decoder, place, message))
+    })?;
     let width = layout.sample_type().bytes();
     if usize::from(picture.bits) > 8 * width || width > 2 {
         let message = format!("{} bits where {} were expected", picture.bits, 8 * width);
@@ -244,41 +258,105 @@ fn check_size(decoder: &Decoder, found: Option<[usize; 2]>, place: &str) -> Resu
 /// Unpacks JPEG 2000.
 fn jpeg_2000<'a>(decoder: &Decoder, bytes: &[u8], place: &str) -> Result<Plain<'a>> {
     let layout = &decoder.layout;
-    check_size(decoder, jpeg_2000_size(bytes), place)?;
-    let image = jpeg2k::Image::from_bytes(bytes).map_err(|error| refuse(decoder, place, error))?;
+    let head = Head::of(bytes);
+    check_size(decoder, head.as_ref().map(|head| head.size), place)?;
+    let tiles = head.map_or(0, |head| head.tiles);
+    let numbers = layout.frame_numbers();
+    lend(decoder, numbers.saturating_mul(JPEG_2000).saturating_add(tiles.saturating_mul(TILE)))?;
     let (count, channels) = (layout.columns * layout.rows, layout.channels);
     let width = layout.sample_type().bytes();
-    let components = image.components();
-    let fits = |part: &jpeg2k::ImageComponent| {
-        let size = [part.width() as usize, part.height() as usize];
-        // The crate makes a slice of data that it has not checked to be there.
-        size == [layout.columns, layout.rows] && !format!("{part:?}").contains("data: 0x0,")
-    };
-    if components.len() < channels || !components[..channels].iter().all(fits) {
-        let message = format!("{} channels of another size or of none", components.len());
-        return Err(refuse(decoder, place, message));
-    }
-    let mut out = vec![0; count * width * channels];
-    for (plane, part) in out.chunks_exact_mut(count * width).zip(components) {
-        for (number, value) in plane.chunks_exact_mut(width).zip(part.data()) {
-            number.copy_from_slice(&value.to_le_bytes()[..width]);
+    let (size, copy) = ([layout.columns, layout.rows], bytes.to_vec());
+    let out = in_time(decoder, place, move || {
+        let image = jpeg2k::Image::from_bytes(&copy).map_err(|error| error.to_string())?;
+        let components = image.components();
+        let fits = |part: &jpeg2k::ImageComponent| {
+            // The crate makes a slice of data that it has not checked to be there.
+            [part.width() as usize, part.height() as usize] == size
+                && !format!("{part:?}").contains("data: 0x0,")
+        };
+        if components.len() < channels || !components[..channels].iter().all(fits) {
+            return Err(format!("{} channels of another size or of none", components.len()));
         }
-    }
+        let mut out = vec![0; count * width * channels];
+        for (plane, part) in out.chunks_exact_mut(count * width).zip(components) {
+            for (number, value) in plane.chunks_exact_mut(width).zip(part.data()) {
+                number.copy_from_slice(&value.to_le_bytes()[..width]);
+            }
+        }
+        Ok(out)
+    })?;
     let colors = colors(decoder);
     Ok(Plain { bytes: out.into(), endian: Endian::Little, is_planar: true, colors })
 }
 
-/// Returns the columns and rows that a stream of JPEG 2000 states, unless it has many channels.
-fn jpeg_2000_size(bytes: &[u8]) -> Option<[usize; 2]> {
-    // The stream may lie in boxes of a file.
-    let start = [0xff, 0x4f, 0xff, 0x51];
-    let within = &bytes[..bytes.len().min(4096)];
-    let at = within.windows(4).position(|mark| mark == start)?;
-    let number = |i: usize| {
-        let number = bytes.get(at + 8 + 4 * i..).and_then(|rest| rest.first_chunk());
-        number.map(|&number| u32::from_be_bytes(number) as usize)
-    };
-    let channels = u16::from_be_bytes(*bytes.get(at + 40..)?.first_chunk()?);
-    let size = [number(0)?.checked_sub(number(2)?)?, number(1)?.checked_sub(number(3)?)?];
-    (1..=4).contains(&channels).then_some(size)
+/// Bytes that a decoder takes for each number: of JPEG, coefficients, lines and the result; of JPEG
+/// 2000, two copies in 32 bits and the result.
+const JPEG: usize = 8;
+const JPEG_2000: usize = 12;
+
+/// Bytes that the decoder of JPEG 2000 takes for each tile that a header claims.
+const TILE: usize = 8 << 10;
+
+/// Checks the memory that a decoder takes for a frame, and gives back.
+fn lend(decoder: &Decoder, bytes: usize) -> Result<()> {
+    decoder.file.source.lend("the memory to unpack a frame in bytes", bytes as u64)
+}
+
+/// Runs a decoder of one frame within the time limit.
+fn in_time<T: Send + 'static>(
+    decoder: &Decoder,
+    place: &str,
+    decode: impl FnOnce() -> Result<T, String> + Send + 'static,
+) -> Result<T> {
+    let long = decoder.layout.frame_numbers() as u64 > FEW_PIXELS;
+    isolated_in_time(decoder.file.source, place, long, || {
+        decode().map_err(|error| format!("cannot be unpacked: {error}"))
+    })
+}
+
+/// What a stream of JPEG 2000 begins with.
+struct Head {
+    /// Columns and rows.
+    size: [usize; 2],
+    tiles: usize,
+}
+
+impl Head {
+    /// Returns `None` for a damaged stream, and for one of many channels.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        let stream = bytes.get(codestream(bytes)?..)?;
+        let stream = stream.strip_prefix(&[0xff, 0x4f, 0xff, 0x51])?;
+        let number = |i: usize| {
+            let number = stream.get(4 + 4 * i..).and_then(|rest| rest.first_chunk());
+            number.map(|&number| u32::from_be_bytes(number) as usize)
+        };
+        let channels = u16::from_be_bytes(*stream.get(36..)?.first_chunk()?);
+        let side = |axis: usize| number(axis)?.checked_sub(number(2 + axis)?);
+        let tiles = |axis: usize| {
+            let covered = number(axis)?.checked_sub(number(6 + axis)?)?;
+            Some(covered.div_ceil(number(4 + axis).filter(|&size| size > 0)?))
+        };
+        let (size, tiles) = ([side(0)?, side(1)?], tiles(0)?.checked_mul(tiles(1)?)?);
+        (1..=4).contains(&channels).then_some(Self { size, tiles })
+    }
+}
+
+/// Returns where a stream of JPEG 2000 begins: at once, or in a box of a file.
+fn codestream(bytes: &[u8]) -> Option<usize> {
+    let mut at = 0;
+    while !bytes.get(at..)?.starts_with(&[0xff, 0x4f]) {
+        let head = bytes.get(at..)?;
+        let (&length, kind) = (head.first_chunk()?, head.get(4..8)?);
+        // Of long boxes, the length follows the kind. The last box may have none.
+        let (length, start) = match u32::from_be_bytes(length) {
+            0 => (head.len(), 8),
+            1 => (usize::try_from(u64::from_be_bytes(*head.get(8..)?.first_chunk()?)).ok()?, 16),
+            length => (length as usize, 8),
+        };
+        if kind == b"jp2c" {
+            return Some(at + start);
+        }
+        at = at.checked_add(length.max(start))?;
+    }
+    Some(at)
 }
