@@ -173,7 +173,7 @@ impl Bricks {
         let begun = bytes.begun(|bytes| begin(path, bytes, limits));
         let (header, directory) = begun.map_err(|error| bytes.why(path, error))?;
         let (path, limits) = (path.to_owned(), limits.clone());
-        Ok(Self { path, header, directory, origin: Origin::File(bytes), limits })
+        Ok(Self { path, header, directory, origin: Origin::File(bytes.ready()), limits })
     }
 
     /// The properties of the volume as a whole.

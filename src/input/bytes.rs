@@ -24,9 +24,18 @@ impl Bytes {
         if !is_remote(path) {
             return Ok(Self::Mapped(Source::map(path, limits)?));
         }
-        let remote = Remote::open(path)?;
+        let remote = Remote::open(path, limits)?;
         limits.check(LimitKind::Bytes, path, "the object's size in bytes", remote.len())?;
         Ok(Self::Remote(remote))
+    }
+
+    /// Says that the beginning was read. Until then, all requests to a server together may take
+    /// the limit of seconds, and then each.
+    pub fn ready(mut self) -> Self {
+        if let Self::Remote(remote) = &mut self {
+            remote.ready();
+        }
+        self
     }
 
     /// The number of all bytes.
@@ -143,7 +152,7 @@ impl Bytes {
 pub fn size(path: impl AsRef<Path>) -> Result<u64> {
     let path = path.as_ref();
     if is_remote(path) {
-        return Ok(Remote::open(path)?.len());
+        return Remote::size(path);
     }
     let found = path.metadata().map_err(|error| Error::file(path, "read", error))?;
     Ok(found.len())

@@ -1,6 +1,6 @@
 //! Fingerprints of inputs, by which a later process sees that an input has changed.
 
-use super::{address::is_remote, remote::Remote};
+use super::{Limits, address::is_remote, remote::Remote};
 use crate::{Error, Result};
 use std::{
     fs::File,
@@ -20,11 +20,11 @@ const PLACES: u64 = 64;
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read, and those of fetching an object.
-pub(crate) fn fingerprint(path: &Path) -> Result<(u64, String)> {
+pub(crate) fn fingerprint(path: &Path, limits: &Limits) -> Result<(u64, String)> {
     if !is_remote(path) {
         return of_file(path).map_err(|e| Error::file(path, "read", e));
     }
-    let remote = Remote::open(path)?;
+    let remote = Remote::open(path, limits)?;
     let (size, stamp) = (remote.len(), remote.stamp());
     let mut hash = begun(size);
     hash.update(stamp.as_deref().unwrap_or_default().as_bytes());

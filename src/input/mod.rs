@@ -31,6 +31,8 @@ mod source;
 #[cfg(test)]
 pub(crate) mod testing;
 pub(crate) mod text;
+#[cfg(feature = "tiff")]
+pub(crate) mod watched;
 
 pub(crate) use address::is_whole;
 pub use address::{address, is_remote};
@@ -40,4 +42,6 @@ pub(crate) use fingerprint::fingerprint;
 pub use limits::Limits;
 pub(crate) use mapping::Mapping;
 pub use source::Source;
+#[cfg(feature = "hdf5")]
+pub(crate) use source::Watch;
 pub(crate) use source::intact;

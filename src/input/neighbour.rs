@@ -54,6 +54,15 @@ pub(crate) fn is_inside(reference: &str) -> bool {
     refusal(reference).is_none()
 }
 
+/// Returns why a reference leads out of a folder, by its text or by its links; `home` is the
+/// folder without links. What does not exist leads nowhere.
+pub(crate) fn leaves(folder: &Path, home: &Path, reference: &str) -> Option<&'static str> {
+    refusal(reference).or_else(|| {
+        let real = folder.join(reference).canonicalize().ok()?;
+        (!real.starts_with(home)).then_some("a link that leaves the file's own folder")
+    })
+}
+
 /// Returns why a reference cannot be a file inside the folder, by its text alone.
 fn refusal(reference: &str) -> Option<&'static str> {
     let parts = || reference.split(['/', '\\']);

@@ -10,6 +10,7 @@ use std::{
     ops::Range,
     path::{Path, PathBuf},
     sync::{Arc, OnceLock},
+    time::Duration,
 };
 
 /// Bytes that are unpacked between two checks of the time limit.
@@ -59,9 +60,11 @@ impl<'a> Source<'a> {
         if !is_remote(path) {
             return Self::open(path, limits);
         }
-        let (remote, budget) = (Remote::open(path)?, Arc::new(Budget::new()));
+        let (mut remote, budget) = (Remote::open(path, limits)?, Arc::new(Budget::new()));
         budget.spend(limits, path, "the object's size in bytes", remote.len())?;
         budget.opened(path);
+        // A file in pieces has the time limit for each batch of them.
+        remote.ready();
         let content = Content::Remote(remote);
         Ok(Self { path, limits, content, text: OnceLock::new(), budget })
     }
@@ -275,6 +278,17 @@ impl<'a> Source<'a> {
         self.budget.check_time(self.limits, self.path)
     }
 
+    /// Returns the time that is left for reading.
+    pub(crate) fn time_left(&self) -> Duration {
+        self.budget.left(self.limits)
+    }
+
+    /// Returns the time limit, for a decoder that outlives this borrow.
+    #[cfg(feature = "hdf5")]
+    pub(crate) fn watch(&self) -> Watch {
+        Watch { budget: self.budget.clone(), limits: self.limits.clone() }
+    }
+
     /// Restarts the clock of the time limit, for the next pieces of a file that is read in pieces.
     pub(crate) fn restart_time(&self) {
         self.budget.restart();
@@ -293,6 +307,16 @@ impl<'a> Source<'a> {
             .and_then(|what| what.strip_suffix(" in bytes"))
             .unwrap_or(what);
         memory::room(&format!("reading {what}"), bytes).map_err(|error| error.in_file(self.path))
+    }
+
+    /// Checks memory that a decoder takes and gives back. It must fit beside what this input
+    /// occupies, but does not add to it.
+    pub(crate) fn lend(&self, what: &str, bytes: u64) -> Result<()> {
+        self.budget.lend(self.limits, self.path, what, bytes)?;
+        if bytes < SMALL {
+            return Ok(());
+        }
+        memory::room(what, bytes).map_err(|error| error.in_file(self.path))
     }
 
     /// As [`spend`](Self::spend), for an array of `count` items. `what` names its contents.
@@ -340,9 +364,24 @@ impl<'a> Source<'a> {
     }
 }
 
+/// The time limit of an input.
+#[cfg(feature = "hdf5")]
+pub(crate) struct Watch {
+    budget: Arc<Budget>,
+    limits: Limits,
+}
+
+#[cfg(feature = "hdf5")]
+impl Watch {
+    /// Returns whether the time is over.
+    pub fn is_over(&self) -> bool {
+        self.budget.left(&self.limits).is_zero()
+    }
+}
+
 fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> {
     if is_remote(path) {
-        let remote = Remote::open(path)?;
+        let remote = Remote::open(path, limits)?;
         budget.spend(limits, path, "the object's size in bytes", remote.len())?;
         budget.opened(path);
         let file = remote.whole()?;

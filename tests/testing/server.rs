@@ -26,7 +26,31 @@ pub enum Fault {
     Stall,
     /// Sends the range with another tag.
     Changed,
+    /// Sends these bytes instead of an answer, then one byte again and again with pauses of so many
+    /// milliseconds for at most this long. Without a pause, it sends as fast as the line takes it.
+    Raw {
+        head: &'static str,
+        then: Then,
+    },
 }
+
+/// What follows the bytes of [`Fault::Raw`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Then {
+    /// The connection ends.
+    End,
+    /// This many bytes more, and the connection ends.
+    Bytes(usize),
+    /// Bytes as fast as the line takes them, until the reader has enough.
+    Endless,
+    /// A byte every this many milliseconds, until the reader has enough.
+    Drip(u64),
+    /// Nothing, until the reader has enough.
+    Silence,
+}
+
+/// A server gives up after so long, so that no test leaves threads behind.
+const GIVE_UP: Duration = Duration::from_secs(20);
 
 /// What decides the fault of an answer: the number of the request, and its range.
 type Decide = Box<dyn Fn(usize, &Range<u64>) -> Fault + Send>;
@@ -187,6 +211,9 @@ fn answer(out: &mut TcpStream, state: &Mutex<State>, range: Option<Range<u64>>) 
         (head + "\r\n", body, fault, state.latency, state.rate)
     };
     std::thread::sleep(latency);
+    if let Fault::Raw { head, then } = fault {
+        return raw(out, head, then);
+    }
     out.write_all(head.as_bytes()).ok()?;
     match fault {
         Fault::Stall => {
@@ -211,4 +238,32 @@ fn answer(out: &mut TcpStream, state: &Mutex<State>, range: Option<Range<u64>>) 
         out.write_all(part).ok()?;
     }
     Some(())
+}
+
+/// Sends what is no proper answer; then the connection is to be closed.
+fn raw(out: &mut TcpStream, head: &str, then: Then) -> Option<()> {
+    out.write_all(head.as_bytes()).ok()?;
+    let begun = Instant::now();
+    let is_over = |connection: &mut TcpStream| {
+        connection.set_read_timeout(Some(Duration::from_millis(20))).ok();
+        let is_closed = connection.read(&mut [0; 64]).is_ok_and(|bytes| bytes == 0);
+        is_closed || begun.elapsed() > GIVE_UP
+    };
+    match then {
+        Then::End => {}
+        Then::Bytes(bytes) => out.write_all(&vec![b'x'; bytes]).ok()?,
+        Then::Endless => {
+            while begun.elapsed() < GIVE_UP {
+                out.write_all(&[b'x'; 1 << 16]).ok()?;
+            }
+        }
+        Then::Drip(pause) => {
+            while !is_over(out) {
+                out.write_all(b"x").ok()?;
+                std::thread::sleep(Duration::from_millis(pause));
+            }
+        }
+        Then::Silence => while !is_over(out) {},
+    }
+    None
 }

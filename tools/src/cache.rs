@@ -2,10 +2,10 @@
 
 use crate::parse;
 use clap::Args;
-use splatkit::input::remote::{Cache, set_cache};
+use splatkit::input::remote::{Cache, allow_redirects, set_cache};
 use std::path::PathBuf;
 
-/// Where the parts of remote inputs are kept.
+/// Where the parts of remote inputs are kept, and which servers are asked.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Remote inputs")]
 pub struct CacheFlags {
@@ -22,6 +22,10 @@ pub struct CacheFlags {
         hide_short_help = true
     )]
     cache_size: Option<u64>,
+    /// Follow redirects to this server too, data.example.org or data.example.org:8443; may be given
+    /// several times. Without it, redirects are followed within the server of an address
+    #[arg(long, global = true, value_name = "HOST", hide_short_help = true)]
+    allow_host: Vec<String>,
 }
 
 /// `8GiB`, or 0.
@@ -30,8 +34,9 @@ fn size(text: &str) -> Result<u64, String> {
 }
 
 impl CacheFlags {
-    /// Sets the cache of this process.
+    /// Sets the cache of this process, and the servers that redirects may lead to.
     pub fn apply(&self) {
+        allow_redirects(self.allow_host.iter().cloned());
         let default = Cache::default();
         set_cache(Cache {
             folder: self.cache.clone().unwrap_or(default.folder),

@@ -1,16 +1,24 @@
 //! Remote inputs in a build without the feature `remote`: opening one is an error.
 
-use crate::{Error, Result};
+use crate::{Error, Result, input::Limits};
 use std::{borrow::Cow, fs::File, ops::Range, path::Path};
 
 #[derive(Clone)]
 pub(crate) enum Remote {}
 
 impl Remote {
-    pub fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path, _: &Limits) -> Result<Self> {
         let message = "is an address, but this program was built without “remote”";
         let hint = "build it with the feature “remote”, or download the file and give its path";
         Err(Error::input(path, "address", message).hint(hint))
+    }
+
+    pub fn size(path: &Path) -> Result<u64> {
+        Ok(Self::open(path, &Limits::default())?.len())
+    }
+
+    pub fn ready(&mut self) {
+        match *self {}
     }
 
     pub fn name(&self) -> &Path {

@@ -19,7 +19,7 @@ pub fn touched(ranges: &[Range<u64>]) -> BTreeSet<u64> {
 
 /// Returns the bytes of a range of blocks of an object.
 pub fn bytes_of(blocks: &Range<u64>, size: u64) -> Range<u64> {
-    blocks.start * BLOCK..(blocks.end * BLOCK).min(size)
+    blocks.start * BLOCK..blocks.end.saturating_mul(BLOCK).min(size)
 }
 
 /// Returns the ranges of blocks to ask for, so that all of these are among them.

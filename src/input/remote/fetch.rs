@@ -1,6 +1,7 @@
 //! Requests for ranges of an object: several at once, retried, and checked against its stamp.
 
-use crate::{Error, Result, input::address};
+use super::transport::{Connector, Refused};
+use crate::{Deadline, Error, Result, input::address};
 use bytes::Bytes;
 use object_store::{
     BackoffConfig, ClientConfigKey, GetOptions, GetRange, ObjectStore, RetryConfig,
@@ -88,15 +89,26 @@ pub(super) struct Link {
     location: object_store::path::Path,
     name: PathBuf,
     patience: Patience,
+    /// The bytes that came.
+    came: Arc<AtomicU64>,
 }
 
 /// Why a range could not be fetched.
 enum Trouble {
     /// The store has repeated the request, if that may help.
     Store(object_store::Error),
-    /// The answer ended early, and the store does not repeat it.
-    Body(object_store::Error),
+    /// The answer has only this many bytes.
     Short(u64),
+}
+
+/// How fetching several ranges ended.
+enum Ended {
+    Done(Vec<(Stamp, Bytes)>),
+    Failed(Range<u64>, Trouble),
+    /// The deadline has passed.
+    Late,
+    /// A thread panicked.
+    Abandoned,
 }
 
 impl Link {
@@ -114,11 +126,14 @@ impl Link {
             return Err(wrong("contains a query, which may be secret".into())
                 .hint("open the path that splatkit::input::address returns"));
         }
-        let (store, location) = open(scheme, &whole, [host, key], &patience).map_err(|error| {
+        let came = Arc::new(AtomicU64::new(0));
+        let connector = Connector { came: came.clone() };
+        let opened = open(scheme, &whole, [host, key], &patience, connector);
+        let (store, location) = opened.map_err(|error| {
             wrong(format!("cannot be used: {}", innermost(&error)))
                 .hint("the form is https://host/path, s3://bucket/key, gs://… or az://…")
         })?;
-        Ok(Self { store, location, name: name.to_owned(), patience })
+        Ok(Self { store, location, name: name.to_owned(), patience, came })
     }
 
     /// Fetches ranges at once, and returns their bytes in the same order, with the stamp of the
@@ -127,28 +142,24 @@ impl Link {
         &self,
         ranges: &[Range<u64>],
         expected: Option<&Stamp>,
+        deadline: Deadline,
     ) -> Result<(Stamp, Vec<Bytes>)> {
-        let (link, wanted) = (self.clone(), ranges.to_vec());
-        let answers = wait(async move {
-            let mut tasks = JoinSet::new();
-            for (number, range) in wanted.iter().cloned().enumerate() {
-                let link = link.clone();
-                tasks.spawn(async move { (number, link.part_patiently(range).await) });
+        let before = self.came.load(Relaxed);
+        let left = deadline.left();
+        let parts = match wait(self.clone().fetched(ranges.to_vec(), left)) {
+            Some(Ended::Done(parts)) => parts,
+            Some(Ended::Failed(range, trouble)) => return Err(self.explained(&range, &trouble)),
+            Some(Ended::Late) => {
+                let came = self.came.load(Relaxed).saturating_sub(before);
+                let place = |range: &Range<u64>| format!("bytes {} to {}", range.start, range.end);
+                let places: Vec<String> = ranges.iter().take(3).map(place).collect();
+                let more = if ranges.len() > 3 { ", …" } else { "" };
+                let what = format!("fetching {}{more} ({came} bytes came)", places.join(", "));
+                return Err(deadline.error(&what).in_file(&self.name));
             }
-            let mut parts: Vec<Option<(Stamp, Bytes)>> = vec![None; wanted.len()];
-            while let Some(done) = tasks.join_next().await {
-                let Ok((number, answer)) = done else { return Err(None) };
-                match answer {
-                    Ok(part) => parts[number] = Some(part),
-                    Err(trouble) => return Err(Some((wanted[number].clone(), trouble))),
-                }
+            Some(Ended::Abandoned) | None => {
+                return Err(self.error("address", "fetching was abandoned"));
             }
-            parts.into_iter().collect::<Option<Vec<_>>>().ok_or(None)
-        });
-        let parts = match answers {
-            Some(Ok(parts)) => parts,
-            Some(Err(Some((range, trouble)))) => return Err(self.explained(&range, &trouble)),
-            Some(Err(None)) | None => return Err(self.error("address", "fetching was abandoned")),
         };
         let stamp = parts.first().map(|(stamp, _)| stamp.clone());
         let Some(stamp) = expected.cloned().or(stamp) else {
@@ -167,13 +178,37 @@ impl Link {
         Ok((stamp, parts.into_iter().map(|(_, bytes)| bytes).collect()))
     }
 
-    /// Fetches a range, again if the answer ends early. The store repeats requests that fail
-    /// before, and answers to objects with a tag.
+    /// Fetches ranges at once, within a time.
+    async fn fetched(self, ranges: Vec<Range<u64>>, time: Option<Duration>) -> Ended {
+        let all = async {
+            let mut tasks = JoinSet::new();
+            for (number, range) in ranges.iter().cloned().enumerate() {
+                let link = self.clone();
+                tasks.spawn(async move { (number, link.part_patiently(range).await) });
+            }
+            let mut parts: Vec<Option<(Stamp, Bytes)>> = vec![None; ranges.len()];
+            while let Some(done) = tasks.join_next().await {
+                let Ok((number, answer)) = done else { return Ended::Abandoned };
+                match answer {
+                    Ok(part) => parts[number] = Some(part),
+                    Err(trouble) => return Ended::Failed(ranges[number].clone(), trouble),
+                }
+            }
+            parts.into_iter().collect::<Option<_>>().map_or(Ended::Abandoned, Ended::Done)
+        };
+        // Dropping the requests ends them.
+        match time {
+            Some(time) => tokio::time::timeout(time, all).await.unwrap_or(Ended::Late),
+            None => all.await,
+        }
+    }
+
+    /// Fetches a range, again if the answer is too short. The store repeats requests that fail.
     async fn part_patiently(&self, range: Range<u64>) -> Result<(Stamp, Bytes), Trouble> {
         let mut pause = self.patience.first_pause;
         for _ in 0..self.patience.retries {
             match self.part(range.clone()).await {
-                Err(Trouble::Body(_) | Trouble::Short(_)) => {}
+                Err(Trouble::Short(_)) => {}
                 other => return other,
             }
             tokio::time::sleep(pause).await;
@@ -194,13 +229,18 @@ impl Link {
             modified: found.meta.last_modified.timestamp(),
         };
         let expected = found.range.end - found.range.start;
-        let wrong = if stamp.tag.is_some() { Trouble::Store } else { Trouble::Body };
-        let bytes = found.bytes().await.map_err(wrong)?;
+        let bytes = found.bytes().await.map_err(Trouble::Store)?;
         BYTES.fetch_add(bytes.len() as u64, Relaxed);
         if bytes.len() as u64 != expected {
             return Err(Trouble::Short(bytes.len() as u64));
         }
         Ok((stamp, bytes))
+    }
+
+    /// The bytes that came so far.
+    #[cfg(test)]
+    pub fn came(&self) -> u64 {
+        self.came.load(Relaxed)
     }
 
     /// The object's name in messages.
@@ -225,18 +265,21 @@ impl Link {
                 "credentials are taken from the environment, for example AWS_ACCESS_KEY_ID; for a \
                  public bucket of S3 set AWS_SKIP_SIGNATURE=true",
             ),
-            Trouble::Store(E::NotSupported { .. }) => (
-                "the server does not support ranges: asked for a part, it sent the whole object \
-                 (200 instead of 206)"
-                    .into(),
-                "download the file and give its path, or use a server that supports ranges",
-            ),
-            Trouble::Store(error) | Trouble::Body(error) => (
-                format!("the server cannot be read: {}", self.without_secrets(innermost(error))),
-                "check the address and the network, then try again",
-            ),
+            Trouble::Store(error) => {
+                if let Some(refused) = Refused::of(error) {
+                    return self.error(place, refused.to_string()).hint(refused.hint());
+                }
+                let why = self.without_secrets(innermost(error));
+                (
+                    format!("the server cannot be read: {why}"),
+                    "check the address and the network, then try again",
+                )
+            }
             Trouble::Short(found) => (
-                format!("the server sent {found} bytes only"),
+                format!(
+                    "the server was asked for {} bytes and sent {found}",
+                    range.end - range.start
+                ),
                 "check the server and the network, then try again",
             ),
         };
@@ -270,6 +313,7 @@ fn open(
     whole: &str,
     [bucket, key]: [&str; 2],
     patience: &Patience,
+    connector: Connector,
 ) -> object_store::Result<Opened> {
     // There may be one already, that of a host application.
     rustls::crypto::ring::default_provider().install_default().ok();
@@ -291,9 +335,10 @@ fn open(
     // The builders have no trait in common.
     macro_rules! patient {
         ($builder:expr, $key:expr) => {
-            times.into_iter().fold($builder.with_retry(retry), |builder, (key, value)| {
-                builder.with_config($key(key), value)
-            })
+            times.into_iter().fold(
+                $builder.with_retry(retry).with_http_connector(connector),
+                |builder, (key, value)| builder.with_config($key(key), value),
+            )
         };
     }
     let store: Arc<dyn ObjectStore> = match scheme {

@@ -12,11 +12,16 @@ mod held;
 #[cfg(test)]
 #[allow(clippy::single_range_in_vec_init, reason = "lists of ranges may have one")]
 mod tests;
+mod transport;
 
 pub use cache::Cache;
 pub use fetch::{Traffic, traffic};
+pub use transport::allow_redirects;
 
-use crate::{Error, Result, input::address};
+use crate::{
+    Deadline, Error, Result,
+    input::{Limits, address},
+};
 use blocks::{BLOCK, bytes_of, joined, touched};
 use bytes::Bytes;
 use cache::Entry;
@@ -25,7 +30,7 @@ use held::held;
 use std::{
     collections::{BTreeSet, HashMap},
     fs::File,
-    io::Write,
+    io::{Seek, Write},
     ops::Range,
     path::Path,
     sync::{
@@ -54,12 +59,24 @@ static OPENED: Mutex<Vec<(Instant, Arc<Object>)>> = Mutex::new(Vec::new());
 /// it, that is [`Cache::default`].
 pub fn set_cache(cache: Cache) {
     *CACHE.lock().unwrap_or_else(PoisonError::into_inner) = Some(cache);
+    forget_opened();
+}
+
+/// Asks the servers when objects are opened again.
+fn forget_opened() {
     OPENED.lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
 
-/// An opened object. Any number of threads may read from it.
+/// An opened object. Any number of threads may read from it. Each call waits for the server no
+/// longer than the limit of seconds; those before [`ready`](Self::ready), together no longer.
 #[derive(Clone)]
-pub(crate) struct Remote(Arc<Object>);
+pub(crate) struct Remote {
+    object: Arc<Object>,
+    /// For each call.
+    seconds: u64,
+    /// For all calls until the object is ready.
+    opening: Option<Deadline>,
+}
 
 struct Object {
     number: u64,
@@ -80,28 +97,31 @@ impl Remote {
     /// # Errors
     /// [`Error::Input`] for an address that cannot be used, and for what the server or the network
     /// does wrong.
-    pub fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
         let whole =
             address::whole(path).map_err(|message| Error::input(path, "address", message))?;
+        let (seconds, opening) = (limits.seconds, Some(limits.deadline()));
         let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
-        opened.retain(|(when, _)| when.elapsed() < FRESH);
-        if let Some((_, object)) = opened.iter().find(|(_, object)| object.address == whole) {
-            return Ok(Self(object.clone()));
+        let same = |object: &Object| object.address == whole;
+        opened.retain(|(when, object)| when.elapsed() < FRESH || !same(object));
+        if let Some((_, object)) = opened.iter().find(|(_, object)| same(object)) {
+            return Ok(Self { object: object.clone(), seconds, opening });
         }
         drop(opened);
         let cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let own = Self::open_in(path, cache.unwrap_or_default(), Patience::default())?;
+        let own = Self::open_in(path, cache.unwrap_or_default(), Patience::default(), limits)?;
         let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
         opened.truncate(RECENT - 1);
-        opened.insert(0, (Instant::now(), own.0.clone()));
+        opened.insert(0, (Instant::now(), own.object.clone()));
         Ok(own)
     }
 
-    fn open_in(path: &Path, cache: Cache, patience: Patience) -> Result<Self> {
+    fn open_in(path: &Path, cache: Cache, patience: Patience, limits: &Limits) -> Result<Self> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
+        let deadline = limits.deadline();
         let link = Link::new(path, patience)?;
         let first = 0..FIRST;
-        let (stamp, parts) = link.parts(std::slice::from_ref(&first), None)?;
+        let (stamp, parts) = link.parts(std::slice::from_ref(&first), None, deadline)?;
         let address = address::whole(path).unwrap_or_default();
         let object = Object {
             number: NEXT.fetch_add(1, Relaxed),
@@ -113,29 +133,56 @@ impl Remote {
             entry: OnceLock::new(),
             whole: Mutex::default(),
         };
-        Ok(Self(Arc::new(object)))
+        let (object, opening) = (Arc::new(object), Some(deadline));
+        Ok(Self { object, seconds: limits.seconds, opening })
+    }
+
+    /// Returns the size of an object. That of one which this process has opened is known, and the
+    /// server is not asked again.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open).
+    pub fn size(path: &Path) -> Result<u64> {
+        let whole = address::whole(path).unwrap_or_default();
+        let opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = opened.iter().find(|(_, object)| object.address == whole);
+        if let Some((_, object)) = known {
+            return Ok(object.stamp.size);
+        }
+        drop(opened);
+        Ok(Self::open(path, &Limits::default())?.len())
+    }
+
+    /// Says that the beginning was read: from now on, each call has the limit of seconds for
+    /// itself.
+    pub fn ready(&mut self) {
+        self.opening = None;
+    }
+
+    fn deadline(&self) -> Deadline {
+        self.opening.unwrap_or_else(|| Deadline::after(self.seconds))
     }
 
     /// The object's name in messages.
     pub fn name(&self) -> &Path {
-        self.0.link.name()
+        self.object.link.name()
     }
 
     /// The object's size in bytes.
     pub fn len(&self) -> u64 {
-        self.0.stamp.size
+        self.object.stamp.size
     }
 
     /// Returns what else than the size shows that the object has changed, as text; `None` if the
     /// server does not say.
     pub fn stamp(&self) -> Option<String> {
-        let stamp = &self.0.stamp;
+        let stamp = &self.object.stamp;
         stamp.shows_changes().then(|| format!("{stamp:?}"))
     }
 
     /// Returns the first bytes, at least [`FIRST`] or all.
     pub fn head(&self) -> Result<Bytes> {
-        let head = self.0.head.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let head = self.object.head.lock().unwrap_or_else(PoisonError::into_inner).clone();
         match head {
             Some(head) => Ok(head),
             None => self.read(0..FIRST.min(self.len())),
@@ -151,12 +198,12 @@ impl Remote {
         if range.is_empty() {
             return Ok(Bytes::new());
         }
-        let head = self.0.head.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let head = self.object.head.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if let Some(head) = head.filter(|head| range.end <= head.len() as u64) {
             return Ok(head.slice(range.start as usize..range.end as usize));
         }
         let numbers = touched(std::slice::from_ref(&range));
-        let found = self.0.obtain(&numbers)?;
+        let found = self.object.obtain(&numbers, self.deadline())?;
         let mut all = Vec::with_capacity((range.end - range.start) as usize);
         for number in numbers {
             let (start, block) = (number * BLOCK, &found[&number]);
@@ -172,13 +219,14 @@ impl Remote {
     /// # Errors
     /// Those of [`read`](Self::read).
     pub fn fetch(&self, ranges: &[Range<u64>]) -> Result<()> {
-        let head = self.0.head.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let head = self.object.head.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let known = head.map_or(0, |head| head.len() as u64);
         let ranges: Vec<Range<u64>> =
             ranges.iter().filter(|range| range.end > known).cloned().collect();
         let numbers: Vec<u64> = touched(&ranges).into_iter().collect();
+        let deadline = self.deadline();
         for group in numbers.chunks(GROUP) {
-            self.0.obtain(&group.iter().copied().collect())?;
+            self.object.obtain(&group.iter().copied().collect(), deadline)?;
         }
         Ok(())
     }
@@ -186,56 +234,67 @@ impl Remote {
     /// Forgets a range whose bytes are wrong, so that it is fetched again.
     pub fn forget(&self, range: Range<u64>) {
         if range.start < FIRST {
-            *self.0.head.lock().unwrap_or_else(PoisonError::into_inner) = None;
+            *self.object.head.lock().unwrap_or_else(PoisonError::into_inner) = None;
         }
         for number in touched(&[range]) {
-            held().remove((self.0.number, number));
-            if let Some(entry) = self.0.entry() {
+            held().remove((self.object.number, number));
+            if let Some(entry) = self.object.entry() {
                 entry.remove_block(number);
             }
         }
     }
 
-    /// Returns a file with all bytes, which is kept in the cache.
+    /// Returns a file with all bytes. It is kept in the cache, or else has no name and goes with
+    /// this process.
     ///
     /// # Errors
-    /// Those of [`read`](Self::read); [`Error::Input`] for an object larger than the cache, and
-    /// [`Error::Output`] if the file cannot be written.
+    /// Those of [`read`](Self::read), and [`Error::Output`] if not even a temporary file can be
+    /// written.
     pub fn whole(&self) -> Result<File> {
-        let mut whole = self.0.whole.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut whole = self.object.whole.lock().unwrap_or_else(PoisonError::into_inner);
         let file = match whole.take() {
             Some(file) => file,
             None => self.whole_file()?,
         };
         let file = whole.insert(file);
-        file.try_clone().map_err(|error| Error::output(&self.0.cache.folder, error))
+        file.try_clone().map_err(|error| Error::output(self.name(), error))
     }
 
     fn whole_file(&self) -> Result<File> {
-        let (object, size) = (&self.0, self.len());
-        if let Some(file) = object.entry().and_then(|entry| entry.whole(size)) {
-            return Ok(file);
+        let (size, most) = (self.len(), self.object.cache.bytes);
+        if let Some(entry) = self.object.entry() {
+            if let Some(file) = entry.whole(size) {
+                return Ok(file);
+            }
+            if size > most {
+                tracing::warn!(
+                    "{}: has {size} bytes, but the cache keeps at most {most} bytes \
+                     (--cache-size): it is read through a temporary file, and is fetched again \
+                     the next time",
+                    self.name().display()
+                );
+            } else {
+                match self.kept(entry) {
+                    // It may be that disk that is full.
+                    Err(Error::Output { source, .. }) => entry.warn(&source),
+                    kept => return kept,
+                }
+            }
         }
-        if size > object.cache.bytes {
-            let message = format!(
-                "has {size} bytes and is read as a whole, but the cache keeps at most {} bytes",
-                object.cache.bytes
-            );
-            return Err(object
-                .link
-                .error("object", message)
-                .hint("raise --cache-size, or download the file and give its path"));
-        }
-        let failed = |error: std::io::Error| Error::output(&object.cache.folder, error);
-        let mut file = match object.entry() {
-            Some(entry) => entry.begin_whole().map_err(failed)?,
-            None => tempfile::NamedTempFile::new().map_err(failed)?,
-        };
-        let hash = object.copy_to(file.as_file_mut(), failed)?;
-        match object.entry() {
-            Some(entry) => entry.keep_whole(file, &hash).map_err(failed),
-            None => file.reopen().map_err(failed),
-        }
+        let failed = |error: std::io::Error| Error::output(&std::env::temp_dir(), error);
+        let mut file = tempfile::tempfile().map_err(failed)?;
+        self.object.copy_to(&mut file, &mut blake3::Hasher::new(), self.deadline(), failed)?;
+        file.rewind().map_err(failed)?;
+        Ok(file)
+    }
+
+    /// Fetches all bytes into a file of the cache.
+    fn kept(&self, entry: &Entry) -> Result<File> {
+        let failed = |error: std::io::Error| Error::output(&self.object.cache.folder, error);
+        let mut hash = entry.hash_of_whole();
+        let mut file = entry.begin_whole().map_err(failed)?;
+        self.object.copy_to(file.as_file_mut(), &mut hash, self.deadline(), failed)?;
+        entry.keep_whole(file, &hash.finalize()).map_err(failed)
     }
 }
 
@@ -246,7 +305,7 @@ impl Object {
     }
 
     /// Returns blocks: from memory, from the disk, or from the server.
-    fn obtain(&self, numbers: &BTreeSet<u64>) -> Result<HashMap<u64, Bytes>> {
+    fn obtain(&self, numbers: &BTreeSet<u64>, deadline: Deadline) -> Result<HashMap<u64, Bytes>> {
         let size_of = |number: u64| {
             let bytes = bytes_of(&(number..number + 1), self.stamp.size);
             bytes.end.saturating_sub(bytes.start) as usize
@@ -271,7 +330,8 @@ impl Object {
         }
         let spans = joined(missing);
         let ranges: Vec<_> = spans.iter().map(|span| bytes_of(span, self.stamp.size)).collect();
-        let (_, parts) = self.link.parts(&ranges, Some(&self.stamp)).inspect_err(|_| self.age())?;
+        let parts = self.link.parts(&ranges, Some(&self.stamp), deadline);
+        let (_, parts) = parts.inspect_err(|_| self.age())?;
         for (span, part) in spans.into_iter().zip(parts) {
             for (place, number) in span.enumerate() {
                 let start = place * BLOCK as usize;
@@ -293,23 +353,25 @@ impl Object {
         opened.retain(|(_, object)| object.number != self.number);
     }
 
-    /// Writes all bytes to a file, and returns their hash.
+    /// Writes all bytes to a file, and adds them to a hash.
     fn copy_to(
         &self,
         file: &mut File,
+        hash: &mut blake3::Hasher,
+        deadline: Deadline,
         failed: impl Fn(std::io::Error) -> Error,
-    ) -> Result<blake3::Hash> {
-        let mut hash = blake3::Hasher::new();
-        let spans = joined(0..self.stamp.size.div_ceil(BLOCK));
-        for group in spans.chunks(8) {
+    ) -> Result<()> {
+        let (mut start, end) = (0, self.stamp.size.div_ceil(BLOCK));
+        while start < end {
+            let group = joined(start..end.min(start + GROUP as u64));
+            start += GROUP as u64;
             let ranges: Vec<_> = group.iter().map(|span| bytes_of(span, self.stamp.size)).collect();
-            let (_, parts) = self.link.parts(&ranges, Some(&self.stamp))?;
+            let (_, parts) = self.link.parts(&ranges, Some(&self.stamp), deadline)?;
             for part in parts {
                 hash.update(&part);
                 file.write_all(&part).map_err(&failed)?;
             }
         }
-        file.sync_data().map_err(failed)?;
-        Ok(hash.finalize())
+        file.sync_data().map_err(failed)
     }
 }

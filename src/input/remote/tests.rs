@@ -1,5 +1,7 @@
 //! Objects on a server of the loopback: what is asked for, what is kept, and every fault.
 
+#[path = "behaviours.rs"]
+mod behaviours;
 #[path = "../../../tests/testing/server.rs"]
 mod server;
 
@@ -27,7 +29,11 @@ fn cache(folder: &Folder, bytes: u64) -> Cache {
 }
 
 fn open(server: &Server, cache: Cache) -> Result<Remote> {
-    Remote::open_in(Path::new(&server.address("a.splk")), cache, impatient())
+    opened(Path::new(&server.address("a.splk")), cache)
+}
+
+fn opened(path: &Path, cache: Cache) -> Result<Remote> {
+    Remote::open_in(path, cache, impatient(), &Limits::default())
 }
 
 /// The error as a user sees it: the message and the hint.
@@ -126,7 +132,7 @@ fn faults_that_stay_are_clear() {
     let gone = server.address("b.splk");
     drop(server);
     std::thread::sleep(Duration::from_millis(50));
-    let error = told(Remote::open_in(Path::new(&gone), Cache::default(), impatient()));
+    let error = told(opened(Path::new(&gone), Cache::default()));
     assert!(error.contains("the server cannot be read"), "{error}");
 }
 
@@ -214,8 +220,95 @@ fn a_cache_that_cannot_be_written_costs_only_time() {
     let (folder, bytes) = (Folder::new(), object(2 << 20));
     let server = Server::of(bytes.clone());
     folder.write("cache", "a file in its place");
-    let remote = open(&server, cache(&folder, 1 << 30)).unwrap();
-    assert_eq!(&remote.read(MIB..MIB + 3).unwrap()[..], &bytes[1 << 20..][..3]);
+    // The last one is that of a user without a home.
+    let nowhere = Cache { folder: std::path::PathBuf::new(), bytes: 1 << 30 };
+    for cache in [cache(&folder, 1 << 30), nowhere] {
+        let remote = open(&server, cache).unwrap();
+        assert_eq!(&remote.read(MIB..MIB + 3).unwrap()[..], &bytes[1 << 20..][..3]);
+        let mut all = Vec::new();
+        std::io::Read::read_to_end(&mut remote.whole().unwrap(), &mut all).unwrap();
+        assert!(all == bytes);
+    }
+    assert!(!Path::new("objects").exists());
+}
+
+/// The names of all files in a folder, without their folders.
+fn names(folder: &Folder) -> Vec<String> {
+    let name = |file: &std::path::PathBuf| file.file_name().unwrap().to_string_lossy().into();
+    files(&folder.path("")).iter().map(name).collect()
+}
+
+/// A user's files beside those of the cache, and behind links in it.
+#[test]
+fn only_what_the_cache_made_is_removed() {
+    let (folder, bytes) = (Folder::new(), object(4 << 20));
+    let server = Server::of(bytes);
+    let most = 16 * BLOCK;
+    open(&server, cache(&folder, most)).unwrap().read(MIB..MIB + 3).unwrap();
+    let objects = folder.path("cache/objects");
+    let object = std::fs::read_dir(&objects).unwrap().next().unwrap().unwrap().path();
+    let digits = "0123456789abcdef".repeat(2);
+    let large = vec![7; 2 * most as usize];
+    let mut users = vec![
+        objects.join("notes.txt"),
+        objects.join(&digits),
+        objects.join("my data/0"),
+        objects.join(digits.to_uppercase()).join("0"),
+        objects.join(&digits[1..]).join("0"),
+        object.join("007"),
+        object.join("1.bak"),
+        object.join("whole-mine"),
+        object.join("part-begun"),
+        object.join("more/0"),
+        folder.path("cache/thesis.pdf"),
+    ];
+    for file in &users {
+        std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+        std::fs::write(file, &large).unwrap();
+    }
+    #[cfg(unix)]
+    {
+        let own = folder.path("own");
+        std::fs::create_dir(&own).unwrap();
+        std::fs::write(own.join("0"), &large).unwrap();
+        std::os::unix::fs::symlink(&own, objects.join("f".repeat(32))).unwrap();
+        std::os::unix::fs::symlink(own.join("0"), object.join("3")).unwrap();
+        users.push(own.join("0"));
+    }
+    let remote = open(&server, cache(&folder, most)).unwrap();
+    remote.fetch(&[MIB..4 * MIB]).unwrap();
+    for file in &users {
+        assert!(std::fs::read(file).is_ok_and(|read| read == large), "{}", file.display());
+    }
+    // None of these counts as the cache's, so that it still keeps something.
+    assert!(object.join("60").exists() && object.join("used").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn links_in_the_place_of_an_objects_folder_are_not_followed() {
+    let (folder, bytes) = (Folder::new(), object(2 << 20));
+    let server = Server::of(bytes.clone());
+    open(&server, cache(&folder, 1 << 30)).unwrap().read(MIB..MIB + 3).unwrap();
+    let objects = folder.path("cache/objects");
+    let object = std::fs::read_dir(&objects).unwrap().next().unwrap().unwrap().path();
+    let outside = folder.path("outside");
+    for link in [&object, &objects] {
+        std::fs::rename(link, &outside).unwrap();
+        std::os::unix::fs::symlink(&outside, link).unwrap();
+        let before = files(&outside);
+        let remote = open(&server, cache(&folder, 4 * BLOCK)).unwrap();
+        assert_eq!(&remote.read(MIB..MIB + 3).unwrap()[..], &bytes[1 << 20..][..3]);
+        remote.forget(MIB..MIB + 3);
+        let last = 2 * MIB - 3..2 * MIB;
+        assert_eq!(&remote.read(last).unwrap()[..], &bytes[bytes.len() - 3..]);
+        assert!(remote.whole().is_ok());
+        assert_eq!(files(&outside), before, "{}", link.display());
+        std::fs::remove_file(link).unwrap();
+        std::fs::rename(&outside, link).unwrap();
+    }
+    let mode = |path: &Path| std::os::unix::fs::MetadataExt::mode(&path.metadata().unwrap());
+    assert_eq!(mode(&objects) & 0o77, 0, "others could read what was fetched");
 }
 
 #[test]
@@ -231,12 +324,28 @@ fn whole_objects_are_files() {
     assert_eq!(server.asked().len(), 3);
     assert!(read(&open(&server, cache(&folder, 1 << 30)).unwrap()) == bytes);
     assert_eq!(server.asked().len(), 1);
-    let files = files(&folder.path("cache"));
-    let whole = files.iter().find(|file| file.to_string_lossy().contains("whole-")).unwrap();
+    let kept = files(&folder.path("cache"));
+    let whole = kept.iter().find(|file| file.to_string_lossy().contains("whole-")).unwrap();
     std::fs::write(whole, "damaged").unwrap();
     assert!(read(&open(&server, cache(&folder, 1 << 30)).unwrap()) == bytes);
-    let error = told(open(&server, cache(&Folder::new(), 1 << 20)).unwrap().whole());
-    assert!(error.contains("--cache-size"), "{error}");
+    // Too large for the cache: a temporary file, and the cache stays as it is.
+    let other = Folder::new();
+    assert!(read(&open(&server, cache(&other, 1 << 20)).unwrap()) == bytes);
+    assert!(!names(&other).iter().any(|name| name.starts_with("whole-")));
+    // A file of the same bytes, but of another object.
+    let moved = Cache { folder: folder.path("moved"), bytes: 1 << 30 };
+    server.tag(Some("\"second\""));
+    assert!(read(&open(&server, moved.clone()).unwrap()) == bytes);
+    let (from, to) = (files(&folder.path("moved")), files(&folder.path("cache")));
+    let named = |all: &[std::path::PathBuf]| {
+        all.iter().find(|file| file.to_string_lossy().contains("whole-")).unwrap().clone()
+    };
+    std::fs::copy(named(&to), named(&from)).unwrap();
+    let foreign = named(&from).with_file_name(named(&to).file_name().unwrap());
+    std::fs::rename(named(&from), &foreign).unwrap();
+    server.asked();
+    assert!(read(&open(&server, moved).unwrap()) == bytes);
+    assert!(server.asked().len() == 3 && !foreign.exists());
     // It fills the cache, which then has no room to spare.
     let all = cache(&Folder::new(), bytes.len() as u64);
     assert!(read(&open(&server, all).unwrap()) == bytes);
@@ -249,16 +358,17 @@ fn whole_objects_are_files() {
 fn secrets_are_not_told() {
     let server = Server::of(object(1000));
     let name = crate::input::address(server.address("c.splk?signature=hidden"));
-    assert!(Remote::open_in(&name, Cache::default(), impatient()).is_ok());
+    assert!(opened(&name, Cache::default()).is_ok());
     for fault in [Fault::Status(404), Fault::Status(500), Fault::Whole, Fault::Cut(3)] {
         server.fail(move |_, _| fault);
-        let error = told(Remote::open_in(&name, Cache::default(), impatient()));
+        let error = told(opened(&name, Cache::default()));
         assert!(!error.contains("hidden") && error.contains("c.splk: "), "{error}");
     }
     for address in ["http://me:hidden@127.0.0.1/d", "http://127.0.0.1/e?hidden", "s3://"] {
-        let error = told(Remote::open(Path::new(address)).map(|_| ()));
+        let error = told(Remote::open(Path::new(address), &Limits::default()).map(|_| ()));
         assert!(address == "s3://" || !error.contains("hidden"), "{error}");
-        let error = told(Remote::open(&crate::input::address(address)).map(|_| ()));
+        let error =
+            told(Remote::open(&crate::input::address(address), &Limits::default()).map(|_| ()));
         assert!(!error.contains("hidden"), "{error}");
     }
 }

@@ -70,8 +70,19 @@ fn other_files_are_fetched_as_a_whole() {
     let [own, far] =
         ["a.obj", &address].map(|path| folder.json(&format!("info {path} --json --cache kept")));
     assert_eq!((&own["count"], &own["bounds"]), (&far["count"], &far["bounds"]));
-    let small = folder.run(&format!("info {address} --cache other --cache-size 1KiB"));
-    small.fails(3, &["read as a whole", "--cache-size"]);
+    // Too small a cache, one that cannot be written, and none: temporary files.
+    folder.put("file", "in the place of a folder");
+    for (flags, words) in [
+        ("--cache other --cache-size 1KiB", "--cache-size"),
+        ("--cache file", "the cache file cannot be written"),
+        ("--cache-size 0", ""),
+    ] {
+        let run = folder.run(&format!("info {address} --json {flags}"));
+        let told = run.stderr();
+        assert!(told.contains(words) && !(words.is_empty() && told.contains("cache")), "{told}");
+        let again: serde_json::Value = serde_json::from_str(&run.stdout()).unwrap();
+        assert_eq!(again["bounds"], own["bounds"], "{flags}");
+    }
 }
 
 /// Stops the server of S3.
