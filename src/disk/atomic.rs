@@ -3,6 +3,7 @@
 use super::{
     BUFFER, folder,
     live::Part,
+    new::{is_done, is_replaceable, taken},
     step::{Step, step, write_step},
 };
 use crate::{Error, Result};
@@ -23,6 +24,8 @@ pub struct AtomicFile {
     wanted: PathBuf,
     /// The path after following symbolic links.
     target: PathBuf,
+    /// Whether it may replace what has its name by then.
+    may_replace: bool,
     part: Part,
 }
 
@@ -40,9 +43,16 @@ impl AtomicFile {
                 "something of this name exists that is not a regular file",
             )));
         }
-        let target = target(wanted).map_err(fail)?;
+        let may_replace = is_replaceable(wanted);
+        let target = if may_replace {
+            target(wanted).map_err(fail)?
+        } else if wanted.symlink_metadata().is_err() {
+            wanted.to_owned()
+        } else {
+            return Err(fail(taken()));
+        };
         let part = Part::create(&target).map_err(fail)?;
-        Ok(Self { wanted: wanted.to_owned(), target, part })
+        Ok(Self { wanted: wanted.to_owned(), target, may_replace, part })
     }
 
     /// Returns the path of the temporary file, for another program that writes it. The program must
@@ -54,19 +64,21 @@ impl AtomicFile {
     /// Gives the file its name, once its whole content is on disk.
     ///
     /// # Errors
-    /// [`Error::Output`]; then the temporary file is removed.
+    /// [`Error::Output`], also if something has the name and may not be replaced
+    /// ([`may_replace`](super::may_replace)); then the temporary file is removed.
     pub fn commit(self) -> Result<()> {
-        let Self { wanted, target, part } = self;
+        let Self { wanted, target, may_replace, part } = self;
         let fail = |e| Error::output(&wanted, e);
         // New content must not change who may read a file. The permissions may have changed since
         // the temporary file was created.
-        if let Ok(old) = target.metadata() {
+        if let Some(old) = may_replace.then(|| target.metadata().ok()).flatten() {
             part.file().set_permissions(old.permissions()).map_err(fail)?;
         }
         // If the name reached the disk before the content, a power cut could leave a file with
         // holes under it.
         sync(part.file(), Step::Sync).map_err(fail)?;
-        part.rename(&target).map_err(fail)?;
+        part.rename(&target, may_replace).map_err(fail)?;
+        is_done(&wanted);
         // The name must reach the disk too. If a folder cannot be synced, that is left to the
         // system.
         if let Ok(folder) = File::open(folder(&target)) {

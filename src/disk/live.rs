@@ -3,6 +3,7 @@
 
 use super::{
     folder,
+    new::rename,
     step::{Step, step},
 };
 use std::{
@@ -112,7 +113,7 @@ impl Part {
     }
 
     /// Renames the file to the requested path.
-    pub fn rename(self, wanted: &Path) -> io::Result<()> {
+    pub fn rename(self, wanted: &Path, may_replace: bool) -> io::Result<()> {
         let mut live = live();
         step(Step::Rename)?;
         if !names(&self.path, &self.file) {
@@ -120,7 +121,7 @@ impl Part {
                 format!("{} was removed or replaced by another program", self.path.display());
             return Err(io::Error::other(message));
         }
-        std::fs::rename(&self.path, wanted)?;
+        rename(&self.path, wanted, may_replace)?;
         live.remove(&self.number);
         Ok(())
     }

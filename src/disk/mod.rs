@@ -6,9 +6,12 @@
 //! [`abandon`]), nothing else remains. If it could not (a kill, a power cut), a file may remain
 //! whose name begins with a dot and ends in `.splatkit-part`. The next process to write the same
 //! file removes it.
+//!
+//! A result replaces a file of its name, unless [`may_replace`] forbids it.
 
 mod atomic;
 mod live;
+mod new;
 mod scratch;
 mod step;
 #[cfg(test)]
@@ -16,6 +19,7 @@ mod tests;
 
 pub use atomic::{AtomicFile, write, write_with};
 pub use live::{Abandoned, abandon};
+pub use new::{may_replace, rename};
 pub(crate) use scratch::Scratch;
 #[cfg(test)]
 pub(crate) use step::faults;

@@ -391,3 +391,64 @@ fn writers_at_once_leave_a_whole_file() {
     });
     assert_eq!(names(&folder), ["a.bin"]);
 }
+
+#[test]
+fn what_appears_meanwhile_is_kept() {
+    let folder = Folder::new();
+    let path = folder.path("a.txt");
+    // Of ten writers of a new name, one wins, and nine say so.
+    super::may_replace(&path, false);
+    let files: Vec<_> = (0..10).map(|_| AtomicFile::create(&path).unwrap()).collect();
+    let barrier = std::sync::Barrier::new(files.len());
+    let done: Vec<(usize, Result<()>)> = std::thread::scope(|threads| {
+        let write = |(number, mut file): (usize, AtomicFile)| {
+            let barrier = &barrier;
+            threads.spawn(move || {
+                file.write_all(number.to_string().as_bytes()).unwrap();
+                barrier.wait();
+                (number, file.commit())
+            })
+        };
+        let threads: Vec<_> = files.into_iter().enumerate().map(write).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+    });
+    let won: Vec<usize> =
+        done.iter().filter(|(_, done)| done.is_ok()).map(|(number, _)| *number).collect();
+    assert_eq!(won.len(), 1, "{done:?}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), won[0].to_string());
+    for (_, error) in done.into_iter().filter(|(_, done)| done.is_err()) {
+        let message = error.unwrap_err().to_string();
+        assert!(message.contains("a.txt") && message.contains("appeared"), "{message}");
+    }
+    assert_eq!(names(&folder), ["a.txt"]);
+}
+
+#[test]
+fn nothing_that_appears_is_replaced() {
+    let folder = Folder::new();
+    folder.write("target.txt", OLD);
+    for kind in ["folder", "file", "link"] {
+        let path = folder.path(kind);
+        super::may_replace(&path, false);
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"new").unwrap();
+        match kind {
+            "folder" => std::fs::create_dir(&path).unwrap(),
+            #[cfg(unix)]
+            "link" => std::os::unix::fs::symlink(folder.path("target.txt"), &path).unwrap(),
+            _ => std::fs::write(&path, OLD).unwrap(),
+        }
+        let before = path.symlink_metadata().unwrap().file_type();
+        file.commit().unwrap_err();
+        assert_eq!(path.symlink_metadata().unwrap().file_type(), before, "{kind}");
+        // Begun again, it ends before the work.
+        assert!(AtomicFile::create(&path).is_err(), "{kind}");
+    }
+    for kept in ["target.txt", "file"] {
+        assert_eq!(std::fs::read(folder.path(kept)).unwrap(), OLD);
+    }
+    // What is allowed again replaces.
+    super::may_replace(folder.path("file"), true);
+    write(&folder.path("file"), b"new").unwrap();
+    assert_eq!(std::fs::read(folder.path("file")).unwrap(), b"new");
+}
