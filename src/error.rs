@@ -59,7 +59,8 @@ pub enum Error {
         source: std::io::Error,
     },
 
-    /// An argument from which no picture can be made (a size of 0, a kernel of no width, …).
+    /// An argument of a caller from which no picture can be made (a size of 0, a kernel of no
+    /// width, …). If a file states the value, [`stated_in`](Self::stated_in) says so.
     #[error("{0}")]
     Argument(String),
 
@@ -180,6 +181,18 @@ impl Error {
             Self::Timeout { what, limit } => Self::Timeout { what: named(what), limit },
             Self::Memory { what, bytes } => Self::Memory { what: named(what), bytes },
             other => other,
+        }
+    }
+
+    /// Makes wrong values the fault of the file that states them: an [`Error::Argument`] or an
+    /// [`Error::Transfer`] becomes an [`Error::Input`] at this place of the file. Callers that hand
+    /// on what a file says use this where they still know the file. Other errors are as
+    /// [`in_file`](Self::in_file) returns them.
+    #[must_use]
+    pub fn stated_in(self, file: &Path, place: impl Into<String>) -> Self {
+        match self {
+            Self::Argument(what) | Self::Transfer(what) => Self::input(file, place, what),
+            other => other.in_file(file),
         }
     }
 

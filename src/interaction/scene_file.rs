@@ -3,8 +3,8 @@
 
 use crate::{
     Error, Result,
-    input::{Limits, Source, address, is_remote},
-    math::{Bounds, Camera, Projection},
+    input::{Limits, Source, address, is_remote, neighbour},
+    math::{Bounds, Camera, Kernel, Projection},
     scene::{Clip, ClipShape},
     volume::TransferFunction,
 };
@@ -15,6 +15,13 @@ use std::path::{Path, PathBuf};
 
 /// The size limit of a scene file. A larger file is something else.
 const MOST_BYTES: usize = 16 << 20;
+
+/// Most bytes of an option's text, and most values of an option.
+const MOST_TEXT: usize = 4 << 10;
+const MOST_VALUES: usize = 1000;
+
+/// Options whose values are files.
+const FILES: [&str; 2] = ["labels", "kernel"];
 
 /// A scene file (docs/scene-files.md, docs/scene.schema.json).
 ///
@@ -132,6 +139,12 @@ impl SceneFile {
     /// The version of the layout.
     pub const VERSION: u32 = 1;
 
+    /// Most inputs of a scene file.
+    pub const MOST_INPUTS: usize = 10_000;
+
+    /// Most letters of a caption.
+    pub const MOST_CAPTION: usize = 1000;
+
     /// A scene of these inputs, with nothing else set.
     pub fn new(inputs: impl IntoIterator<Item = PathBuf>) -> Self {
         Self {
@@ -145,27 +158,57 @@ impl SceneFile {
         }
     }
 
-    /// Reads a scene file. The paths of its inputs are joined with its folder.
+    /// Reads a scene file. The paths of its files are joined with its folder. A scene file is an
+    /// input like any other: the files that it names must lie beside it or below.
     ///
     /// # Errors
     /// [`Error::File`] and [`Error::Limit`] as for every input; [`Error::Input`] if the file is not
-    /// a scene: the message names the line, the column and the field.
+    /// a scene: the message names the line, the column and the field. Also for files elsewhere.
     pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
         let path = path.as_ref();
+        let mut scene = Self::read_text(path, limits)?;
+        let folder = folder_of(path);
+        // In the folder of an address there are no links.
+        let home = if is_remote(path) { Ok(folder.clone()) } else { folder.canonicalize() };
+        let home = home.map_err(|error| Error::file(&folder, "resolve", error))?;
+        scene.change_files(|place, file| {
+            let name = file.to_string_lossy();
+            match neighbour::leaves(&folder, &home, &name) {
+                None => Ok(folder.join(file)),
+                Some(why) => {
+                    let shown: String = name.chars().take(80).collect();
+                    let message = format!("names “{shown}”, {why}");
+                    Err(Error::input(path, place, message)
+                        .hint("if you trust the scene, add --trust-scene"))
+                }
+            }
+        })?;
+        Ok(scene)
+    }
+
+    /// As [`read`](Self::read), but the scene may name any files and addresses: for one that the
+    /// user has made or trusts.
+    ///
+    /// # Errors
+    /// Those of [`read`](Self::read), except for files elsewhere.
+    pub fn read_trusted(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
+        let mut scene = Self::read_text(path, limits)?;
+        let folder = folder_of(path);
+        scene.change_files(|_, file| {
+            Ok(if is_remote(file) { address(file) } else { folder.join(file) })
+        })?;
+        Ok(scene)
+    }
+
+    fn read_text(path: &Path, limits: &Limits) -> Result<Self> {
         let text = Source::open(path, limits)?.small_text("a scene file", MOST_BYTES)?;
-        let mut scene = Self::parse(&text).map_err(|message| {
+        Self::parse(&text).map_err(|message| {
             Error::input(path, "scene", message).hint(
                 "the form is {\"splatkit_scene\": 1, \"inputs\": [{\"file\": \"scan.ply\"}], …}; \
                  docs/scene-files.md lists all fields",
             )
-        })?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let joined = |file: &Path| {
-            if is_remote(file) { address(file) } else { folder.join(file) }
-        };
-        scene.inputs.iter_mut().for_each(|input| input.file = joined(&input.file));
-        scene.change_transfer_files(joined);
-        Ok(scene)
+        })
     }
 
     fn parse(text: &str) -> Result<Self, String> {
@@ -180,6 +223,11 @@ impl SceneFile {
         if scene.inputs.is_empty() {
             return Err("there is no input".into());
         }
+        if scene.inputs.len() > Self::MOST_INPUTS {
+            let (found, most) = (scene.inputs.len(), Self::MOST_INPUTS);
+            return Err(format!("inputs: there are {found}, but a scene may have at most {most}"));
+        }
+        scene.options.iter().try_for_each(|(name, value)| check_text(name, value))?;
         if let Some(camera) = &scene.camera {
             camera.camera()?;
         }
@@ -197,14 +245,30 @@ impl SceneFile {
         Ok(scene)
     }
 
-    /// Changes the paths of transfer functions.
-    fn change_transfer_files(&mut self, change: impl Fn(&Path) -> PathBuf) {
-        let own = self.inputs.iter_mut().map(|input| &mut input.transfer);
-        for transfer in own.chain([&mut self.transfer]) {
+    /// Changes the paths of all files that the scene names. `change` also gets their places, such
+    /// as `inputs[0].file`.
+    fn change_files(&mut self, change: impl Fn(String, &Path) -> Result<PathBuf>) -> Result<()> {
+        let changed = |place: String, transfer: &mut Option<Value>| -> Result<()> {
             if let Some(file) = file_of(transfer.as_ref()) {
-                *transfer = Some(change(&file).to_string_lossy().into());
+                *transfer = Some(change(place, &file)?.to_string_lossy().into());
+            }
+            Ok(())
+        };
+        for (number, input) in self.inputs.iter_mut().enumerate() {
+            input.file = change(format!("inputs[{number}].file"), &input.file)?;
+            changed(format!("inputs[{number}].transfer"), &mut input.transfer)?;
+        }
+        changed("transfer".into(), &mut self.transfer)?;
+        for name in FILES {
+            let Some(value) = self.options.get_mut(name) else { continue };
+            for text in values_of(value) {
+                if let Some(file) = text.as_str().filter(|text| !Kernel::NAMES.contains(text)) {
+                    let file = change(format!("options.{name}"), Path::new(file))?;
+                    *text = file.to_string_lossy().into();
+                }
             }
         }
+        Ok(())
     }
 
     /// Returns the transfer function, if the scene has one of its own, rather than a name or a
@@ -242,10 +306,8 @@ impl SceneFile {
     /// Returns the text of a scene file in a folder. Inputs below the folder get relative paths.
     pub fn to_json(&self, folder: &Path) -> String {
         let mut own = self.clone();
-        for input in &mut own.inputs {
-            input.file = relative(&input.file, folder);
-        }
-        own.change_transfer_files(|file| relative(file, folder));
+        // It never fails.
+        own.change_files(|_, file| Ok(relative(file, folder))).ok();
         // Maps with text keys and numbers always become JSON.
         let mut text = serde_json::to_string_pretty(&own).unwrap_or_default();
         text.push('\n');
@@ -260,6 +322,43 @@ impl SceneFile {
         let path = path.as_ref();
         let folder = path.parent().unwrap_or(Path::new(""));
         crate::disk::write(path, self.to_json(folder).as_bytes())
+    }
+}
+
+/// Returns the folder of a scene file.
+fn folder_of(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    folder.unwrap_or(Path::new(".")).to_owned()
+}
+
+/// Returns the values of an option: those of a list, or the one.
+fn values_of(value: &mut Value) -> &mut [Value] {
+    match value {
+        Value::Array(values) => values,
+        one => std::slice::from_mut(one),
+    }
+}
+
+/// Returns what is wrong with an option that has too many values, or too long ones.
+fn check_text(name: &str, value: &Value) -> Result<(), String> {
+    match value {
+        Value::Array(values) if values.len() > MOST_VALUES => {
+            let found = values.len();
+            Err(format!("options.{name}: has {found} values, but may have at most {MOST_VALUES}"))
+        }
+        Value::Array(values) => values.iter().try_for_each(|value| check_text(name, value)),
+        Value::String(text) if name == "caption" => {
+            let (found, most) = (text.chars().count(), SceneFile::MOST_CAPTION);
+            if found <= most {
+                return Ok(());
+            }
+            Err(format!("options.caption: has {found} letters, but may have at most {most}"))
+        }
+        Value::String(text) if text.len() > MOST_TEXT => {
+            let found = text.len();
+            Err(format!("options.{name}: has {found} bytes, but may have at most {MOST_TEXT}"))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -447,11 +546,115 @@ mod tests {
         scene.write(&file).expect("written");
         let text = std::fs::read_to_string(&file).expect("text");
         assert!(text.contains("../data/a.ply") && text.contains("../data/t.json"), "{text}");
-        let read = SceneFile::read(&file, &Limits::default()).expect("read");
+        let error = SceneFile::read(&file, &Limits::default()).expect_err("outside").to_string();
+        assert!(error.contains("inputs[0].file") && error.contains("leads out"), "{error}");
+        let read = SceneFile::read_trusted(&file, &Limits::default()).expect("read");
         assert!(file_of(read.transfer.as_ref()).is_some_and(|file| file.exists()));
         assert_eq!(
             read.inputs[0].file.canonicalize().unwrap(),
             data.join("a.ply").canonicalize().unwrap()
         );
+    }
+
+    /// Makes files in a folder and in the folder of a scene inside it. Returns the latter, and
+    /// names of what lies elsewhere.
+    fn inside_and_elsewhere(folder: &Path) -> (PathBuf, Vec<&'static str>) {
+        let inside = folder.join("scenes");
+        std::fs::create_dir_all(inside.join("below")).expect("a folder");
+        for file in ["scenes/a.ply", "scenes/below/t.json", "outside.ply"] {
+            std::fs::write(folder.join(file), "{}").expect("a file");
+        }
+        let mut elsewhere = vec![
+            "../outside.ply",
+            "below/../../outside.ply",
+            "/etc/hostname",
+            "..\\outside.ply",
+            "C:\\outside.ply",
+            "//server/share/a.ply",
+            "file:///etc/hostname",
+            "https://example.org/a.ply",
+            "s3://bucket/a.ply",
+            "..",
+        ];
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink("../outside.ply", inside.join("link.ply")).expect("a link");
+            std::os::unix::fs::symlink("..", inside.join("up")).expect("a link");
+            elsewhere.extend(["link.ply", "up/outside.ply"]);
+        }
+        (inside, elsewhere)
+    }
+
+    /// A scene from elsewhere reads no other files of the user's, and asks no server.
+    #[test]
+    fn files_elsewhere_need_the_users_word() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (inside, elsewhere) = inside_and_elsewhere(folder.path());
+        let file = inside.join("s.json");
+        let text = |input: &str, own: &str, all: &str, labels: &str, kernel: &str| {
+            serde_json::json!({
+                "splatkit_scene": 1,
+                "inputs": [{"file": "a.ply"}, {"file": input, "transfer": own, "visible": false}],
+                "transfer": all,
+                "options": {"labels": labels, "kernel": [kernel]},
+            })
+            .to_string()
+        };
+        let good = ["a.ply", "mri", "below/t.json", "below/t.json", "hann"];
+        let write = |[input, own, all, labels, kernel]: [&str; 5]| {
+            std::fs::write(&file, text(input, own, all, labels, kernel)).expect("a file");
+            SceneFile::read(&file, &Limits::default())
+        };
+        let scene = write(good).expect("a scene");
+        assert_eq!(scene.inputs[1].file, inside.join("a.ply"));
+        assert_eq!(scene.inputs[1].transfer, Some("mri".into()));
+        for value in [scene.transfer.as_ref(), scene.options.get("labels")] {
+            assert_eq!(
+                value.and_then(Value::as_str).map(Path::new),
+                inside.join("below/t.json").to_str().map(Path::new)
+            );
+        }
+        assert_eq!(scene.options["kernel"], serde_json::json!(["hann"]));
+        let places = [
+            "inputs[1].file",
+            "inputs[1].transfer",
+            "transfer",
+            "options.labels",
+            "options.kernel",
+        ];
+        for (number, place) in places.into_iter().enumerate() {
+            for name in &elsewhere {
+                let mut names = good;
+                names[number] = name;
+                let error = write(names).expect_err(name);
+                let Error::Input { place: found, hint, .. } = &error else { panic!("{error}") };
+                assert_eq!(found, place, "{name}: {error}");
+                assert!(hint.as_deref().is_some_and(|hint| hint.contains("--trust-scene")));
+                assert!(SceneFile::read_trusted(&file, &Limits::default()).is_ok(), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn counts_and_texts_are_limited() {
+        let scene = |inputs: usize, options: Value| {
+            let inputs = vec![serde_json::json!({"file": "a.ply"}); inputs];
+            let whole =
+                serde_json::json!({"splatkit_scene": 1, "inputs": inputs, "options": options});
+            SceneFile::parse(&whole.to_string())
+        };
+        let none = || serde_json::json!({});
+        assert!(scene(SceneFile::MOST_INPUTS, none()).is_ok());
+        let error = scene(SceneFile::MOST_INPUTS + 1, none()).expect_err("too many");
+        assert!(error.contains("10001") && error.contains("10000"), "{error}");
+        let caption =
+            |letters: usize| scene(1, serde_json::json!({"caption": "ä".repeat(letters)}));
+        assert!(caption(SceneFile::MOST_CAPTION).is_ok());
+        let error = caption(500_000).expect_err("too long");
+        assert!(error.contains("options.caption: has 500000 letters"), "{error}");
+        for value in [Value::from("a".repeat(MOST_TEXT + 1)), vec![1; MOST_VALUES + 1].into()] {
+            let error = scene(1, serde_json::json!({"iso": value})).expect_err("too much");
+            assert!(error.contains("options.iso"), "{error}");
+        }
     }
 }

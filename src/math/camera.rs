@@ -42,6 +42,13 @@ impl Bounds {
         (self.max - self.min).length()
     }
 
+    /// Whether the box is so large that no camera has all of it in reach
+    /// ([`View::validate_for`]), wherever it stands.
+    pub(crate) fn is_beyond_cameras(&self) -> bool {
+        // From the middle, the corners are nearest.
+        0.5 * self.diagonal() > FARTHEST
+    }
+
     /// Returns the corners: x varies fastest, then y, then z.
     pub fn corners(&self) -> [DVec3; 8] {
         std::array::from_fn(|i| {

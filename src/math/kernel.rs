@@ -41,6 +41,9 @@ impl Default for Kernel {
 }
 
 impl Kernel {
+    /// The names of the kernels that need no table.
+    pub const NAMES: [&str; 6] =
+        ["gaussian", "b-spline", "hann", "linear", "catmull-rom", "cubic-b-spline"];
     /// The widest footprint that the engine accepts, in sample spacings.
     pub const MAX_EXTENT: f64 = 16.0;
     /// Most values of a [`Profile::Table`].

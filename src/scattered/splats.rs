@@ -153,7 +153,11 @@ impl Points {
 }
 
 impl SampleOptions {
-    fn validate(&self) -> Result<()> {
+    /// Checks the options.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] that names what [`Points::to_splats`] would refuse.
+    pub fn validate(&self) -> Result<()> {
         let wrong = |message: String| Err(Error::Argument(message));
         if !(4..=MOST).contains(&self.neighbours) {
             return wrong(format!(

@@ -77,6 +77,11 @@ pub(super) fn check_item(item: &Item) -> Result<()> {
             "it reaches from {min} to {max}, beyond what 32-bit numbers hold"
         )));
     }
+    if !is_none && item.bounds().is_beyond_cameras() {
+        return Err(Error::Argument(format!(
+            "it reaches from {min} to {max}, and no camera sees that far"
+        )));
+    }
     Ok(())
 }
 

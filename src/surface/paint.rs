@@ -39,6 +39,26 @@ pub enum Values {
 }
 
 impl Paint {
+    /// Checks numbers that come from a file.
+    pub(crate) fn check(&self) -> std::result::Result<(), String> {
+        let is_direction = |of: &DVec3| of.is_finite() && (of.length() - 1.0).abs() < 1e-6;
+        match self {
+            Self::Plain(color) if !color.iter().all(|part| (0.0..=1.0).contains(part)) => {
+                Err(format!("the colour {color:?} is not in 0 … 1"))
+            }
+            Self::Values { of: Values::Height(up), .. } if !is_direction(up) => {
+                Err(format!("the direction {up} has not the length 1"))
+            }
+            Self::Values { scale, .. }
+                if !(scale.range.iter().all(|value| value.is_finite())
+                    && scale.missing.iter().all(|part| (0.0..=1.0).contains(part))) =>
+            {
+                Err(format!("the scale {scale:?} has numbers that no scale has"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Returns a colour as a mesh has it.
     pub(crate) fn bytes([r, g, b]: [f32; 3]) -> [u8; 4] {
         let [r, g, b] = [r, g, b].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);

@@ -171,24 +171,38 @@ impl MeshPieces {
         Ok((Self { whole, length, closing }, seen))
     }
 
+    /// Checks numbers that come from a file. An error names the field.
+    pub fn check(&self) -> Result<(), String> {
+        let (Whole { unit, outward, .. }, length) = (self.whole, self.length);
+        if !(unit >= 0.0 && unit.is_finite()) {
+            Err(format!("whole.unit is {unit}; a length is expected"))
+        } else if outward.abs() != 1.0 {
+            Err(format!("whole.outward is {outward}; 1 or -1 is expected"))
+        } else if !(length >= unit && length.is_finite()) {
+            Err(format!("length is {length}; at least the unit, {unit}, is expected"))
+        } else {
+            Ok(())
+        }
+    }
+
     /// The longest edge after cutting.
     pub fn longest(&self) -> f32 {
         self.length * STRETCH
     }
 
     /// Makes the surfels of the `owned` vertices of a part, which must contain all triangles at
-    /// them. If `is_long`, also makes the surfels that cutting long edges adds. The part must then
-    /// contain all triangles that are cut.
+    /// them. With `most`, also makes the surfels that cutting long edges adds. The part must then
+    /// contain all triangles that are cut. There are at most that many triangles afterwards.
     pub fn surfels(
         &self,
         part: &Mesh,
         owned: &[bool],
-        is_long: bool,
+        most: Option<usize>,
         options: &SurfelOptions,
     ) -> Result<Vec<Splat>> {
         part.check(options)?;
         let is_wanted = |vertex: usize| owned.get(vertex).is_none_or(|&owned| owned);
-        let cut = is_long.then_some(self.length);
+        let cut = most.map(|most| (self.length, most));
         of_part(part, self.whole, options, cut, is_wanted)
     }
 }

@@ -64,6 +64,39 @@ impl SurfelOptions {
     /// does not fit in 32 bits. From 1 on, no edge is cut.
     pub const SPACINGS: RangeInclusive<f32> = 1e-9..=f32::MAX;
 
+    /// Checks that the options are positive numbers, and within their ranges.
+    ///
+    /// # Errors
+    /// [`Error::Argument`], which names the option.
+    pub fn validate(&self) -> Result<()> {
+        let values = [
+            ("radius_scale", self.radius_scale),
+            ("optical_depth", self.optical_depth),
+            ("crease_angle_degrees", self.crease_angle_degrees),
+            ("largest_spacing", self.largest_spacing),
+        ];
+        for (name, value) in values {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(Error::Argument(format!(
+                    "{name} is {value}; a positive number is needed"
+                )));
+            }
+        }
+        for (name, value, range) in [
+            ("radius_scale", self.radius_scale, Self::RADIUS_SCALES),
+            ("largest_spacing", self.largest_spacing, Self::SPACINGS),
+            ("optical_depth", self.optical_depth, 0.0..=Splat::MOST_OPTICAL_DEPTH),
+        ] {
+            if !range.contains(&value) {
+                let (least, most) = (range.start(), range.end());
+                return Err(Error::Argument(format!(
+                    "{name} is {value:e}; {least:e} to {most:e} are allowed"
+                )));
+            }
+        }
+        Ok(())
+    }
+
     /// Returns the most triangles that cutting `triangles` of them may produce.
     pub(crate) fn most_once_cut(&self, triangles: usize) -> usize {
         budget(self.most_triangles, triangles)
@@ -186,31 +219,7 @@ impl Mesh {
     }
 
     pub(super) fn check(&self, options: &SurfelOptions) -> Result<()> {
-        let values = [
-            ("radius_scale", options.radius_scale),
-            ("optical_depth", options.optical_depth),
-            ("crease_angle_degrees", options.crease_angle_degrees),
-            ("largest_spacing", options.largest_spacing),
-        ];
-        for (name, value) in values {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(Error::Argument(format!(
-                    "{name} is {value}; a positive number is needed"
-                )));
-            }
-        }
-        for (name, value, range) in [
-            ("radius_scale", options.radius_scale, SurfelOptions::RADIUS_SCALES),
-            ("largest_spacing", options.largest_spacing, SurfelOptions::SPACINGS),
-            ("optical_depth", options.optical_depth, 0.0..=Splat::MOST_OPTICAL_DEPTH),
-        ] {
-            if !range.contains(&value) {
-                let (least, most) = (range.start(), range.end());
-                return Err(Error::Argument(format!(
-                    "{name} is {value:e}; {least:e} to {most:e} are allowed"
-                )));
-            }
-        }
+        options.validate()?;
         self.validate()
     }
 
@@ -403,24 +412,24 @@ pub(super) struct Whole {
 }
 
 /// Makes the surfels of the wanted vertices of a part of a mesh, as they are in the whole. With
-/// `cut`, edges of the part longer than that are cut, and the vertices added by this are wanted
-/// too.
+/// `cut`, edges of the part longer than that are cut, into at most that many triangles, and the
+/// vertices added by this are wanted too.
 pub(super) fn of_part(
     part: &Mesh,
     whole: Whole,
     options: &SurfelOptions,
-    cut: Option<f32>,
+    cut: Option<(f32, usize)>,
     is_wanted: impl Fn(usize) -> bool + Sync,
 ) -> Result<Vec<Splat>> {
     let Whole { is_split, is_coarse, unit, outward } = whole;
     let measures = [unit, outward];
-    let Some(length) = cut else {
+    let Some((length, most)) = cut else {
         let sources = (0..part.triangles.len() as u32).collect();
         let origin = is_coarse.then(|| origin_of(part, sources, options)).transpose()?;
         return joined(make(part, origin.as_ref(), is_split, options, measures, is_wanted)?);
     };
     // The caller chose a length that keeps to the budget.
-    let fine = refine(part, length, usize::MAX >> 1, options.deadline)?;
+    let fine = refine(part, length, most, options.deadline)?;
     let origin = fine.sources.map(|sources| origin_of(part, sources, options)).transpose()?;
     joined(make(&fine.mesh, origin.as_ref(), is_split, options, measures, is_wanted)?)
 }

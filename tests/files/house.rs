@@ -335,3 +335,52 @@ fn python_knows_the_package_by_its_own_name() {
     let project = fs::read_to_string(root().join("tools/python/pyproject.toml")).expect("a text");
     assert!(project.contains(&format!("\nname = \"py{taken}\"\n")), "another name in the project");
 }
+
+/// Returns whether a line of source holds unsafe code, rather than speaking of it.
+fn is_unsafe(line: &str) -> bool {
+    let code = line.split("//").next().unwrap_or_default();
+    let follows = |word: &str| {
+        ["{", "impl ", "fn ", "extern ", "trait "]
+            .iter()
+            .any(|next| word.trim_start().starts_with(next))
+    };
+    code.match_indices("unsafe").any(|(at, word)| {
+        let is_word =
+            !code[..at].ends_with(|letter: char| letter == '_' || letter.is_alphanumeric());
+        is_word && follows(&code[at + word.len()..])
+    })
+}
+
+/// SECURITY.md and docs/files.md name every file with unsafe code, and no other.
+#[test]
+fn the_documents_count_unsafe_code() {
+    assert!(is_unsafe("    unsafe { f() };") && is_unsafe("unsafe impl A for B {}"));
+    assert!(!is_unsafe("    // unsafe { f() }") && !is_unsafe("fn is_unsafe() {"));
+    let mut all = Vec::new();
+    ["src", "tools", "tests", "benches", "examples", "fuzz"]
+        .iter()
+        .for_each(|folder| files(&root().join(folder), &mut all));
+    let name = |path: &PathBuf| {
+        path.strip_prefix(root()).expect("below").to_string_lossy().replace('\\', "/")
+    };
+    let is_source = |path: &&PathBuf| {
+        let is_this = path.ends_with(file!().rsplit(['/', '\\']).next().expect("a name"));
+        path.extension().is_some_and(|extension| extension == "rs") && !is_this
+    };
+    let has_code =
+        |path: &&PathBuf| fs::read_to_string(path).is_ok_and(|text| text.lines().any(is_unsafe));
+    let found: BTreeSet<String> = all.iter().filter(is_source).filter(has_code).map(name).collect();
+    for document in ["SECURITY.md", "docs/files.md"] {
+        let text = fs::read_to_string(root().join(document)).expect("a document");
+        let start = text.find("Unsafe code").expect("a section");
+        let end = text[start..].find("\n## ").map_or(text.len(), |end| start + end);
+        let named: BTreeSet<String> = text[start..end]
+            .split('`')
+            .skip(1)
+            .step_by(2)
+            .filter(|word| word.ends_with(".rs"))
+            .map(str::to_owned)
+            .collect();
+        assert_eq!(named, found, "{document}");
+    }
+}

@@ -56,8 +56,11 @@ impl Bench {
         let mut frame = |number: u32| {
             progress.stage(format!("Frame {number} of {frames}"));
             let start = Instant::now();
-            let stats = renderer.draw(&camera(number), &settings)?;
-            Ok::<_, Error>((milliseconds(start), stats))
+            let camera = camera(number);
+            let stats = renderer.draw(&camera, &settings).map_err(|error| {
+                self.scene.undrawn(error, &loaded, (&camera, settings.size), None)
+            })?;
+            Ok::<_, Failure>((milliseconds(start), stats))
         };
         let (first_ms, stats) = frame(0)?;
         if stats.splats == 0 && stats.gathered == 0 {

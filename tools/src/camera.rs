@@ -4,6 +4,7 @@ use crate::parse;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use splatkit::{
+    Error,
     about::Stance,
     interaction::CameraEntry,
     math::{Bounds, Camera},
@@ -223,6 +224,13 @@ impl CameraFlags {
         let mut camera = self.aimed(subject, size, turn);
         camera.zoom(self.zoom.unwrap_or(1.0));
         camera
+    }
+
+    /// Returns why the usual camera, which is that without flags, cannot see a box in a picture of
+    /// `size` pixels. If it cannot, the box is at fault, whatever the flags say.
+    pub fn usual_fault(subject: &Subject, bounds: &Bounds, size: [u32; 2]) -> Option<Error> {
+        let usual = Self::default().camera(subject, size);
+        usual.and_then(|camera| camera.view(size)?.validate_for(bounds)).err()
     }
 
     /// Whether the flags set the camera's distance, so that it is not fitted to the scene.

@@ -1,13 +1,17 @@
 //! `splatkit check`.
 
 use crate::{
+    camera::{CameraFlags, Subject},
     failure::{Failure, in_file},
     load::{Input, LoadFlags},
     output, parse,
     progress::Progress,
+    scene::{is_one_place, out_of_sight},
+    scene_file,
     terminal::safe,
 };
 use clap::Args;
+use glam::DVec3;
 use serde_json::json;
 use splatkit::{
     Deadline, Error, bricks,
@@ -15,9 +19,10 @@ use splatkit::{
     formats::Kind,
     gaussians::Gaussians,
     hierarchy::file,
+    math::Bounds,
     surface::{Mesh, SurfelOptions},
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Args, Debug)]
 pub struct Check {
@@ -33,7 +38,9 @@ pub struct Check {
 }
 
 impl Check {
-    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+    pub fn run(mut self, progress: &Progress) -> Result<(), Failure> {
+        scene_file::refuse(&self.file)?;
+        self.load = self.load.begun();
         progress.stage(format!("Checking {}", self.file.display()));
         let limits = self.load.limits();
         let deadline = limits.deadline();
@@ -44,14 +51,7 @@ impl Check {
                 let watch = |done, all| stages.set("Checking bricks", done, all);
                 bricks::check(&self.file, &limits, Some(&watch)).findings
             }
-            _ => match self.load.open(&self.file)? {
-                Input::Mesh(mesh) => {
-                    of_mesh(&mesh, deadline).map_err(|error| in_file(&self.file, error))?
-                }
-                Input::Gaussians(set) => of_gaussians(&set),
-                // Errors in other inputs are reported when they are read.
-                _ => Vec::new(),
-            },
+            _ => self.of_input(&self.load.open(&self.file)?, deadline)?,
         };
         progress.clear();
         let ok = findings.iter().all(|finding| finding.severity != Severity::Error);
@@ -72,6 +72,42 @@ impl Check {
             Err(Failure::Damaged { file: self.file, findings: findings.len() })
         }
     }
+}
+
+impl Check {
+    /// Returns the oddities of an input that has no checksums. Errors are reported as it is read.
+    fn of_input(&self, input: &Input, deadline: Deadline) -> Result<Vec<Finding>, Failure> {
+        let (mut findings, bounds) = match input {
+            Input::Mesh(mesh) => {
+                let found = of_mesh(mesh, deadline).map_err(|error| in_file(&self.file, error))?;
+                (found, mesh.bounds())
+            }
+            Input::Gaussians(set) => {
+                let Bounds { min, max } = set.bounds();
+                (of_gaussians(set), Some([min, max]))
+            }
+            Input::Volume(volume) => (Vec::new(), Some(volume.bounds())),
+            Input::Samples(points) => (Vec::new(), Some(points.bounds())),
+            Input::Cells(cells) => (Vec::new(), Some(cells.bounds())),
+            Input::Hierarchy(_) | Input::Bricks(_) => (Vec::new(), None),
+        };
+        let bounds = bounds.map(|[min, max]| Bounds { min, max });
+        findings.extend(bounds.and_then(|bounds| of_bounds(&self.file, bounds)));
+        Ok(findings)
+    }
+}
+
+/// Returns the finding on a box that no usual camera sees. `render` refuses it too.
+fn of_bounds(file: &Path, bounds: Bounds) -> Option<Finding> {
+    // Footprints give a place an extent, and nothing to see is no matter of places.
+    if bounds.is_empty() || is_one_place(&bounds) {
+        return None;
+    }
+    let fault = CameraFlags::usual_fault(&Subject::new(bounds, DVec3::Y), &bounds, [1280, 720])?;
+    let Error::Input { place, message, .. } = out_of_sight(file, bounds, &fault) else {
+        return None;
+    };
+    Some(Finding { code: "out-of-sight", severity: Severity::Error, place, message })
 }
 
 fn name_of(severity: Severity) -> &'static str {

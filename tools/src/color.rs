@@ -1,6 +1,10 @@
 //! The flags that colour values and surfaces.
 
-use crate::{failure::Failure, own::Own, parse};
+use crate::{
+    failure::Failure,
+    own::{self, Own},
+    parse,
+};
 use clap::Args;
 use splatkit::{
     Error,
@@ -48,6 +52,19 @@ enum SurfaceColor {
     Attribute(String),
 }
 
+/// [`ColorFlags`] of many inputs.
+pub struct ColorsByInput<'a> {
+    flags: &'a ColorFlags,
+    colors: own::Values<SurfaceColor>,
+}
+
+impl ColorsByInput<'_> {
+    /// Returns the flags of one input.
+    pub fn of(&self, path: &Path) -> ColorFlags {
+        self.flags.with(self.colors.of(path))
+    }
+}
+
 /// The colours of values in a picture, for the bar beside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bar {
@@ -84,8 +101,19 @@ impl SurfaceColor {
 impl ColorFlags {
     /// Returns the flags of one input.
     pub fn of(&self, path: &Path) -> Self {
-        let own = Own::of(&self.color, path).cloned();
-        Self { color: own.map(Own::of_all).into_iter().collect(), ..self.clone() }
+        self.with(Own::of(&self.color, path))
+    }
+
+    /// Returns the colours of inputs, to be found one after the other.
+    pub fn by_input(&self) -> ColorsByInput<'_> {
+        ColorsByInput { flags: self, colors: own::Values::new(self.color.iter().cloned()) }
+    }
+
+    /// Returns the flags with this colour of surfaces.
+    fn with(&self, color: Option<&SurfaceColor>) -> Self {
+        let Self { colormap, color: _, nan_color, log_colors } = *self;
+        let color = color.cloned().map(Own::of_all).into_iter().collect();
+        Self { colormap, color, nan_color, log_colors }
     }
 
     /// Checks the names of inputs.

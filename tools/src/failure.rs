@@ -200,16 +200,14 @@ fn room(error: &io::Error) -> Option<&'static str> {
             Some("write to another folder, or change the folder's permissions")
         }
         ErrorKind::NotFound => Some("make the folder first"),
+        ErrorKind::AlreadyExists => Some("give --overwrite, or another name"),
         _ => None,
     }
 }
 
-/// Adds the file's name to errors that lack it.
+/// Makes wrong values in an input the input's fault, and adds its name to errors that lack it.
 pub fn in_file(path: &Path, error: Error) -> Error {
-    match error {
-        Error::Argument(what) | Error::Transfer(what) => Error::input(path, "content", what),
-        other => other.in_file(path),
-    }
+    error.stated_in(path, "content")
 }
 
 impl From<Error> for Failure {

@@ -137,7 +137,7 @@ mod tests {
         ("Clipping", "clip cut-out"),
         ("Hierarchy", "preset lossless radius-scale up unit degree memory"),
         ("Parts", "plan parts part index join"),
-        ("Remote inputs", "cache cache-size"),
+        ("Remote inputs", "cache cache-size allow-host"),
     ];
 
     /// Flags that have the names of others with a heading, but are a task's own.

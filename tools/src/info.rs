@@ -8,6 +8,7 @@ use crate::{
     load::{Input, LoadFlags},
     output, parse,
     progress::Progress,
+    scene_file,
     terminal::safe,
 };
 use clap::Args;
@@ -89,7 +90,9 @@ pub struct Info {
 }
 
 impl Info {
-    pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
+    pub fn run(mut self, given: &Given, progress: &Progress) -> Result<(), Failure> {
+        scene_file::refuse(&self.file)?;
+        self.load = self.load.begun();
         progress.stage(format!("Reading {}", self.file.display()));
         let series = self.series()?;
         let mut read = Vec::new();

@@ -33,9 +33,6 @@ pub struct KernelFlags {
     sharp: bool,
 }
 
-const NAMES: [&str; 6] =
-    ["gaussian", "b-spline", "hann", "linear", "catmull-rom", "cubic-b-spline"];
-
 /// Largest size of a kernel's table, in bytes.
 const MOST_BYTES: usize = 4 << 20;
 
@@ -85,7 +82,7 @@ impl KernelFlags {
                 })?
             }
             _ => {
-                let names = NAMES.join(", ");
+                let names = Kernel::NAMES.join(", ");
                 return Err(Failure::Usage(format!(
                     "there is no kernel “{name}”; the kernels are {names}, or a file"
                 )));
@@ -103,7 +100,10 @@ impl KernelFlags {
 
     /// Returns the file of the user's own kernel.
     pub fn file(&self) -> Option<PathBuf> {
-        self.kernel.as_ref().filter(|name| !NAMES.contains(&name.as_str())).map(PathBuf::from)
+        self.kernel
+            .as_ref()
+            .filter(|name| !Kernel::NAMES.contains(&name.as_str()))
+            .map(PathBuf::from)
     }
 
     /// Whether the reconstruction must pass through the samples.

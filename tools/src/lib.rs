@@ -139,14 +139,18 @@ pub fn main() -> ExitCode {
         Ok(matches) => matches,
         Err(answer) => return tell(&answer),
     };
-    match scene_file::expanded(&arguments, &matches, &command()) {
-        Ok(None) => {}
-        Ok(Some(expanded)) => match command().try_get_matches_from(expanded) {
-            Ok(own) => matches = own,
+    let stated = match scene_file::expanded(&arguments, &matches, &command()) {
+        Ok(None) => None,
+        Ok(Some(scene)) => match command().try_get_matches_from(scene.arguments) {
+            Ok(own) => {
+                matches = own;
+                Some(scene.stated)
+            }
+            Err(answer) if answer.use_stderr() => return scene.stated.refused(&answer).report(),
             Err(answer) => return tell(&answer),
         },
         Err(failure) => return failure.report(),
-    }
+    };
     let (given, own) = match Command::from_arg_matches(&matches) {
         Ok(own) => (Given::of(&matches), own),
         Err(answer) => return tell(&answer),
@@ -173,6 +177,10 @@ pub fn main() -> ExitCode {
         Task::Completions(task) => task.run(command()),
         Task::Man(task) => task.run(command()),
     };
+    let result = result.map_err(|failure| match &stated {
+        Some(stated) => stated.blamed(failure),
+        None => failure,
+    });
     start::end(result, &progress)
 }
 

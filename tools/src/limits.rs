@@ -2,6 +2,7 @@
 
 use clap::Args;
 use splatkit::{
+    Deadline,
     error::LimitKind,
     formats::Format,
     input::{self, Limits},
@@ -25,11 +26,14 @@ pub struct LimitFlags {
     /// Limit the pixels of an image that is read [default: 268435456]
     #[arg(long, value_name = "COUNT")]
     limit_texels: Option<u64>,
-    /// Limit the seconds for reading an input and making its splats. Building a hierarchy from them
-    /// may take as long again. Conversion in regions applies the limit to each region [default:
-    /// 600]
+    /// Limit the seconds for reading all inputs of a picture and making their splats. A conversion
+    /// applies the limit to each input, and one in regions to each region; building a hierarchy may
+    /// take as long again [default: 600]
     #[arg(long, value_name = "SECONDS")]
     limit_seconds: Option<u64>,
+    /// When everything that is read must be done.
+    #[arg(skip)]
+    until: Deadline,
 }
 
 impl LimitFlags {
@@ -41,7 +45,13 @@ impl LimitFlags {
             depth: self.limit_depth.unwrap_or(default.depth),
             texels: self.limit_texels.unwrap_or(default.texels),
             seconds: self.limit_seconds.unwrap_or(default.seconds),
+            until: self.until,
         }
+    }
+
+    /// Returns these limits for several inputs together: their time begins now.
+    pub fn begun(&self) -> Self {
+        Self { until: self.limits().deadline(), ..self.clone() }
     }
 
     /// Returns the limits of an input that is read as a whole, if `memory` bytes are available.
@@ -52,6 +62,19 @@ impl LimitFlags {
         // bytes.
         Limits { bytes: limits.bytes.min(memory.saturating_mul(2)), ..limits }
     }
+}
+
+/// Returns the default of a limit by its flag's name; `None` for other flags.
+pub fn default_of(flag: &str) -> Option<u64> {
+    let kind = match flag.strip_prefix("limit-")? {
+        "points" => LimitKind::Points,
+        "bytes" => LimitKind::Bytes,
+        "depth" => LimitKind::Depth,
+        "texels" => LimitKind::Texels,
+        "seconds" => LimitKind::Seconds,
+        _ => return None,
+    };
+    Some(Limits::default().of(kind))
 }
 
 /// Returns what the user can do about an exceeded limit. No limit helps a file that claims more
@@ -99,6 +122,19 @@ mod tests {
     use super::*;
     use clap::{Args, FromArgMatches};
 
+    /// Inputs of one scene share the time, and each has its own without one.
+    #[test]
+    fn inputs_share_the_time() {
+        let flags = LimitFlags { limit_seconds: Some(7), ..LimitFlags::default() };
+        assert_eq!(flags.limits().until, Deadline::NEVER);
+        let begun = flags.begun();
+        let until = begun.limits().until;
+        assert!(until != Deadline::NEVER && !until.is_over());
+        assert_eq!((begun.whole(None).until, begun.limits().deadline()), (until, until));
+        let begun = LimitFlags { limit_seconds: Some(0), ..flags }.begun();
+        assert!(begun.limits().until.is_over());
+    }
+
     /// The help contains the library's defaults, and the hints name existing flags.
     #[test]
     fn flags_are_those_of_the_library() {
@@ -113,6 +149,7 @@ mod tests {
         ] {
             let flag =
                 command.get_arguments().find(|flag| flag.get_long() == Some(name)).expect(name);
+            assert_eq!(default_of(name), Some(default.of(kind)));
             let help = flag.get_help().expect("a text").to_string();
             assert!(help.ends_with(&format!("[default: {}]", default.of(kind))), "{help}");
             let told = hint(Path::new("none"), kind, 7);

@@ -104,6 +104,11 @@ impl LoadFlags {
         self.limits.limits()
     }
 
+    /// Returns the flags for several inputs that share one time limit, which begins now.
+    pub fn begun(&self) -> Self {
+        Self { limits: self.limits.begun(), ..self.clone() }
+    }
+
     /// Reads a file.
     pub fn open(&self, path: &Path) -> Result<Input, Failure> {
         self.open_within(path, memory::most(), &mut Vec::new())

@@ -16,6 +16,9 @@ use std::path::{Path, PathBuf};
 /// Most frames of a film.
 const MOST_FRAMES: u32 = 100_000;
 
+/// The usual frames per second.
+const RATE: f64 = 30.0;
+
 /// Largest size of a path's file, in bytes.
 const MOST_BYTES: usize = 16 << 20;
 
@@ -61,7 +64,7 @@ impl MotionFlags {
 
     /// Returns the frames per second.
     pub fn rate(&self) -> f64 {
-        self.fps.unwrap_or(30.0)
+        self.fps.unwrap_or(RATE)
     }
 
     /// Returns a warning if the rate has no effect. `is_film`: the frames go to one file that is
@@ -98,12 +101,16 @@ impl Motion {
     pub fn along(path: CameraPath, rate: f64, file: &Path) -> Result<Self, Failure> {
         let moves = (path.duration() * rate).round();
         if moves >= f64::from(MOST_FRAMES) {
-            return Err(Failure::Usage(format!(
-                "{}: {} s at {rate} frames per second are too many frames; {MOST_FRAMES} are the \
-                 most",
-                file.display(),
+            let message = format!(
+                "{} s at {rate} frames per second are too many frames; {MOST_FRAMES} are the most",
                 path.duration()
-            )));
+            );
+            // At the usual rate, the times are the file's fault.
+            return Err(if path.duration() * RATE >= f64::from(MOST_FRAMES) {
+                Error::input(file, "“time” of the last keyframe", message).into()
+            } else {
+                Failure::Usage(format!("{}: {message}", file.display()))
+            });
         }
         Ok(Self::Path(path, moves as u32 + 1))
     }
@@ -114,6 +121,15 @@ impl Motion {
             Self::Still => 1,
             Self::Turntable(frames) | Self::Path(_, frames) => *frames,
         }
+    }
+
+    /// Returns where the camera of a frame is in the file of a path: between which keyframes.
+    pub fn place(&self, frame: usize) -> String {
+        let Self::Path(path, frames) = self else { return "camera".into() };
+        let step = path.duration() / f64::from((frames - 1).max(1));
+        let time = path.start() + step * frame as f64;
+        let passed = path.keyframes().iter().filter(|keyframe| keyframe.time <= time).count();
+        format!("“camera” of keyframe {}, at {time} s", passed.max(1))
     }
 
     /// Returns whether the camera is fitted to what is seen, unless the camera's flags place it.

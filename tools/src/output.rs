@@ -61,7 +61,8 @@ impl Target {
 }
 
 /// Refuses, before the work is done, an existing file without `overwrite` and a folder that does
-/// not exist.
+/// not exist. Without `overwrite`, a file that appears while the work is done is not replaced
+/// either.
 pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     let refuse = |message: &str, hint| {
         Err(Failure::Output { file: path.to_owned(), message: message.into(), hint: Some(hint) })
@@ -78,6 +79,7 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     if !folder(path).is_dir() {
         return refuse("cannot be written: its folder does not exist", "make the folder first");
     }
+    disk::may_replace(path, overwrite);
     Ok(())
 }
 

@@ -2,7 +2,45 @@
 
 use crate::failure::Failure;
 use splatkit::input;
-use std::path::{Path, PathBuf};
+use std::{
+    collections::{HashMap, HashSet},
+    path::{Path, PathBuf},
+};
+
+/// Values by input. However many inputs have values of their own, each is found at once.
+#[derive(Debug)]
+pub struct Values<T> {
+    own: HashMap<PathBuf, Vec<T>>,
+    shared: Vec<T>,
+}
+
+impl<T> Values<T> {
+    pub fn new(values: impl IntoIterator<Item = Own<T>>) -> Self {
+        let mut all = Self { own: HashMap::new(), shared: Vec::new() };
+        for Own { file, value } in values {
+            match file {
+                Some(file) => all.own.entry(file).or_default().push(value),
+                None => all.shared.push(value),
+            }
+        }
+        all
+    }
+
+    /// Returns an input's own value, or else that of all inputs.
+    pub fn of(&self, path: &Path) -> Option<&T> {
+        self.all_of(path).first()
+    }
+
+    /// Returns all of an input's own values, or else all of those of all inputs.
+    pub fn all_of(&self, path: &Path) -> &[T] {
+        self.own.get(path).unwrap_or(&self.shared)
+    }
+
+    /// Returns the inputs that have values of their own.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.own.keys().map(PathBuf::as_path)
+    }
+}
 
 /// A value for all inputs, or for one.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,16 +91,6 @@ impl<T> Own<T> {
         own.map(|own| &own.value).or_else(|| Self::shared(values))
     }
 
-    /// Returns all of an input's own values, or else all of those of all inputs.
-    pub fn all_of<'a>(values: &'a [Self], path: &Path) -> Vec<&'a T> {
-        let of = |file: Option<&Path>| -> Vec<&'a T> {
-            let own = values.iter().filter(|own| own.file.as_deref() == file);
-            own.map(|own| &own.value).collect()
-        };
-        let own = of(Some(path));
-        if own.is_empty() { of(None) } else { own }
-    }
-
     /// Returns the value of all inputs that have none of their own.
     pub fn shared(values: &[Self]) -> Option<&T> {
         values.iter().find(|own| own.file.is_none()).map(|own| &own.value)
@@ -70,7 +98,11 @@ impl<T> Own<T> {
 
     /// Refuses values of files that are no inputs.
     pub fn check_files(values: &[Self], flag: &str, inputs: &[PathBuf]) -> Result<(), Failure> {
-        match Self::files(values).find(|file| !inputs.iter().any(|input| input == file)) {
+        let known: HashSet<&Path> = match values {
+            [] => return Ok(()),
+            _ => inputs.iter().map(PathBuf::as_path).collect(),
+        };
+        match Self::files(values).find(|file| !known.contains(file)) {
             None => Ok(()),
             Some(file) => Err(Failure::Usage(format!(
                 "--{flag} {}=…: no input has this name; write it as the input is written",
@@ -82,8 +114,9 @@ impl<T> Own<T> {
     /// Refuses values of files that are no inputs, and two values for the same.
     pub fn check(values: &[Self], flag: &str, inputs: &[PathBuf]) -> Result<(), Failure> {
         Self::check_files(values, flag, inputs)?;
-        for (number, own) in values.iter().enumerate() {
-            if values[..number].iter().any(|other| other.file == own.file) {
+        let mut seen = HashSet::new();
+        for own in values {
+            if !seen.insert(own.file.as_deref()) {
                 let whose = own
                     .file
                     .as_ref()
@@ -114,9 +147,24 @@ mod tests {
         assert!(Own::parse("a=x", number).is_err());
         let many = ["1", "a.ply=2", "3", "a.ply=4"].map(|text| Own::parse(text, number).unwrap());
         let [own, other] = ["a.ply", "b.ply"].map(PathBuf::from);
-        assert_eq!(Own::all_of(&many, &own), [&2.0, &4.0]);
-        assert_eq!(Own::all_of(&many, &other), [&1.0, &3.0]);
+        let found = Values::new(many.clone());
+        assert_eq!((found.all_of(&own), found.of(&own)), (&[2.0, 4.0][..], Some(&2.0)));
+        assert_eq!((found.all_of(&other), found.of(&other)), (&[1.0, 3.0][..], Some(&1.0)));
+        assert_eq!(found.files().collect::<Vec<_>>(), [own.as_path()]);
         assert!(Own::check_files(&many, "iso", std::slice::from_ref(&own)).is_ok());
         assert!(Own::check_files(&many, "iso", &[other]).is_err());
+    }
+
+    #[test]
+    fn many_inputs_with_values_of_their_own_are_found_at_once() {
+        let inputs: Vec<PathBuf> = (0..200_000).map(|i| format!("a/{i}.ply").into()).collect();
+        let own = |path: &PathBuf| Own { file: Some(path.clone()), value: path.clone() };
+        let all: Vec<Own<PathBuf>> = inputs.iter().map(own).collect();
+        // A search from the first for each input would take hours.
+        let begin = std::time::Instant::now();
+        assert!(Own::check(&all, "color", &inputs).is_ok());
+        let found = Values::new(all);
+        assert!(inputs.iter().all(|path| found.of(path) == Some(path)));
+        assert!(begin.elapsed().as_secs() < 60, "{:?}", begin.elapsed());
     }
 }

@@ -351,6 +351,12 @@ impl Render {
         Ok((settings, finish))
     }
 
+    /// Checks that the inputs are files that can be read, without reading more than their heads.
+    #[cfg(feature = "window")]
+    pub fn check_files(&self) -> Result<(), Failure> {
+        self.scene.check_files()
+    }
+
     /// Loads the scene.
     pub fn load(&self, given: &Given, progress: &Progress) -> Result<Loaded, Failure> {
         self.engine.check()?;
@@ -487,13 +493,22 @@ impl Render {
         let (mut is_shown, mut missing) = (false, 0);
         let mut writer = frames.open(*film)?;
         let count = cameras.len();
+        let bar = (count > 1).then(|| progress.bar("Drawing frames", count as u64));
+        let tell = |what: &str, frame: usize| match &bar {
+            Some(bar) => bar.set(frame as u64),
+            None => progress.stage(format!("{what} {}", frames.name(frame))),
+        };
         for (frame, camera) in cameras.into_iter().enumerate() {
             if settings.stop.is_requested() {
                 return Err(Error::Stopped.into());
             }
-            progress.stage(format!("Drawing {}", frames.name(frame)));
+            tell("Drawing", frame);
             let start = Instant::now();
-            let (picture, stats) = drawer.draw(loaded, &camera, settings)?;
+            let drawn = drawer.draw(loaded, &camera, settings).map_err(|error| {
+                let path = self.motion.file().map(|file| (file, motion.place(frame)));
+                self.scene.undrawn(error, loaded, (&camera, settings.size), path)
+            });
+            let (picture, stats) = drawn?;
             times.push(milliseconds(start));
             match self.engine.require_content(&picture) {
                 Ok(()) => is_shown = true,
@@ -502,7 +517,7 @@ impl Render {
                 Err(failure) => return Err(failure),
             }
             let mut picture = finish.reduced(picture, &camera, loaded)?;
-            progress.stage(format!("Writing {}", frames.name(frame)));
+            tell("Writing", frame);
             texts = finish.overlaid(&mut picture, &camera);
             let is_wanted = writer.add(&picture)?;
             if let Some(depth) = &self.depth {

@@ -21,7 +21,7 @@ use splatkit::{
     gaussians::Gaussians,
     hierarchy::Hierarchy,
     input::Limits,
-    math::Bounds,
+    math::{Bounds, Camera},
     memory,
     picture::Edges,
     scattered::Points,
@@ -43,6 +43,10 @@ pub struct SceneFlags {
     /// s3://…, gs://…, az://… (docs/remote.md).
     #[arg(value_name = "SCENE", required = true, value_parser = parse::input())]
     pub inputs: Vec<PathBuf>,
+    /// Let a scene file name files outside its folder, and addresses. Give it only for scenes that
+    /// you have made, or whose maker you trust.
+    #[arg(long)]
+    trust_scene: bool,
     #[command(flatten)]
     load: LoadFlags,
     #[command(flatten)]
@@ -73,6 +77,13 @@ impl SceneFlags {
         self.load.limits()
     }
 
+    /// Checks that the inputs are files of known kinds. Addresses are not asked.
+    #[cfg(feature = "window")]
+    pub fn check_files(&self) -> Result<(), Failure> {
+        let files = self.inputs.iter().filter(|path| !splatkit::input::is_remote(path));
+        files.into_iter().try_for_each(|path| self.load.kind(path).map(drop))
+    }
+
     /// Reads the inputs and makes a scene of them. Meshes become surfels.
     pub fn load(&self, given: &Given, progress: &Progress) -> Result<Loaded, Failure> {
         self.load_with(false, given, progress)
@@ -88,7 +99,10 @@ impl SceneFlags {
     ) -> Result<Loaded, Failure> {
         let start = Instant::now();
         self.show.check_inputs(&self.inputs)?;
-        let show = self.show.open(&self.load.limits())?;
+        // One deadline covers reading all inputs and making their splats.
+        let load = self.load.begun();
+        let deadline = load.limits().deadline();
+        let show = self.show.open(&load.limits())?;
         let loaded = Loaded {
             scene: Scene::new(),
             subject: Subject::new(Bounds::EMPTY, DVec3::Y),
@@ -104,20 +118,19 @@ impl SceneFlags {
         let optics = ["mip", "x-ray", "optics"].into_iter().find(|flag| given.has(flag));
         let mut adding = Adding { flags: self, show, facets, optics, progress, loaded, frames };
         let (mut is_scaled, mut unscaled) = (false, None);
+        let memory = memory::most();
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
-            // One deadline covers reading the input and making its splats.
-            let deadline = self.load.limits().deadline();
-            let color = self.show.color.of(path);
+            let color = adding.show.color_of(path);
             let read = &mut adding.loaded.read;
             let attribute = color.attribute();
-            let input = self.load.open_colored(path, attribute, memory::most(), read)?;
+            let input = load.open_colored(path, attribute, memory, read)?;
             match &input {
                 Input::Mesh(_) => is_scaled = true,
                 Input::Hierarchy(_) => unscaled = Some(path),
                 _ => {}
             }
-            adding.loaded.kinds.push(kinds_of(&input, self.load.is_raw(path)?));
+            adding.loaded.kinds.push(kinds_of(&input, load.is_raw(path)?));
             adding.add(path, input, deadline)?;
         }
         let mut loaded = adding.loaded;
@@ -164,6 +177,39 @@ impl SceneFlags {
                 ))
             }
             (Some((path, own)), _) => in_file(path, own).into(),
+        }
+    }
+
+    /// Returns the failure of a picture that an engine did not draw. If the usual camera cannot see
+    /// the scene either, the input that reaches farthest is at fault. If only this camera cannot,
+    /// it is the file of a path, which is named with the place of the camera, or else a flag.
+    pub fn undrawn(
+        &self,
+        error: Error,
+        loaded: &Loaded,
+        (camera, size): (&Camera, [u32; 2]),
+        path: Option<(&Path, String)>,
+    ) -> Failure {
+        let bounds = loaded.scene.bounds();
+        let is_seen = || camera.view(size)?.validate_for(&bounds);
+        if !matches!(error, Error::Argument(_)) || is_seen().is_ok() {
+            return error.into();
+        }
+        let Some(fault) = CameraFlags::usual_fault(&loaded.subject, &bounds, size) else {
+            return match path {
+                Some((file, place)) => error.stated_in(file, place).into(),
+                None => error.into(),
+            };
+        };
+        let reach = |item: &Item| {
+            let Bounds { min, max } = item.bounds();
+            min.abs().max(max.abs()).max_element()
+        };
+        let inputs = self.inputs.iter().zip(&loaded.scene.items);
+        let farthest = inputs.max_by(|(_, a), (_, b)| reach(a).total_cmp(&reach(b)));
+        match farthest {
+            Some((path, item)) => out_of_sight(path, item.bounds(), &fault).into(),
+            None => error.into(),
         }
     }
 
@@ -252,14 +298,13 @@ impl Adding<'_> {
     fn add_mesh(&mut self, path: &Path, mut mesh: Mesh, deadline: Deadline) -> Result<(), Failure> {
         self.frame(path, mesh.about.frame);
         self.stand_mesh(path, &mut mesh);
-        let flags = self.flags;
-        let color = flags.show.color.of(path);
+        let color = self.show.color_of(path);
         let up = self.loaded.subject.stance.up;
         let named = self.flags.load.scalar().is_some();
         self.loaded.facts.bars.extend(color.paint(
             path,
             &mut mesh,
-            self.flags.show.range_of(path),
+            self.show.range_of(path),
             up,
             named,
         )?);
@@ -275,7 +320,7 @@ impl Adding<'_> {
         if self.flags.show.edges && !mesh.triangles.is_empty() {
             self.loaded.edges.push(Edges::of(&mesh));
         }
-        let depth = self.flags.show.optical_depth(path);
+        let depth = self.show.optical_depth(path);
         options.optical_depth = depth.unwrap_or(options.optical_depth);
         // Radii are for surfels, and facets are opaque.
         if !self.facets || self.flags.show.radius_scale.is_some() || depth.is_some() {
@@ -518,7 +563,16 @@ impl Loaded {
     }
 }
 
+/// Returns the error for an input that no usual camera sees.
+pub fn out_of_sight(path: &Path, Bounds { min, max }: Bounds, fault: &Error) -> Error {
+    let text = |place: DVec3| place.to_array().map(|v| format!("{v:e}")).join(", ");
+    let (min, max) = (text(min), text(max));
+    let message = format!("the content reaches from {min} to {max}: {fault}");
+    Error::input(path, "bounds", message)
+        .hint("give positions, sizes and spacings in a unit in which they are moderate numbers")
+}
+
 /// Whether a box is no larger than the rounding error of its coordinates.
-fn is_one_place(bounds: &Bounds) -> bool {
+pub fn is_one_place(bounds: &Bounds) -> bool {
     bounds.diagonal() <= 1e-13 * bounds.center().abs().max_element()
 }

@@ -1,8 +1,11 @@
 //! Scene files on the command line: a scene file stands for its inputs and flags. Flags beside it
 //! count more than its own.
 
-use crate::{failure::Failure, given::Given};
-use clap::{ArgMatches, Command};
+use crate::{failure::Failure, given::Given, limits::default_of};
+use clap::{
+    ArgMatches, Command,
+    error::{ContextKind, ErrorKind},
+};
 use serde_json::Value;
 use splatkit::{
     Error,
@@ -11,6 +14,7 @@ use splatkit::{
     interaction::{ClipEntry, InputEntry, SceneFile},
 };
 use std::{
+    error::Error as _,
     ffi::{OsStr, OsString},
     path::{Path, PathBuf},
 };
@@ -43,7 +47,28 @@ const NOT_OF_PICTURES: &[&str] = &[
     "threads",
     "cache",
     "cache-size",
+    "allow-host",
+    "trust-scene",
     "reference",
+];
+
+/// Flags that say what the command may take. The user decides that, not a file.
+const SPENDING: &[&str] = &["memory", "gpu-memory", "gpu-timeout"];
+
+/// Flags whose values no picture is made of, beside those: they say how it is made.
+const NOT_VALUES: &[&str] = &[
+    "inputs",
+    "engine",
+    "gpu",
+    "gpu-timeout",
+    "gpu-memory",
+    "pass-entries",
+    "memory",
+    "limit-points",
+    "limit-bytes",
+    "limit-depth",
+    "limit-texels",
+    "limit-seconds",
 ];
 
 /// Flags of the camera, any of which replaces that of a scene file.
@@ -68,12 +93,21 @@ pub fn is_scene(path: &Path) -> bool {
     path.extension() == Some(OsStr::new("json")) && !matches!(kind(), Ok(Some(Kind::Gaussians)))
 }
 
+/// Refuses a scene file where a file of data is needed.
+pub fn refuse(path: &Path) -> Result<(), Failure> {
+    if !is_scene(path) || SceneFile::read_trusted(path, &Limits::default()).is_err() {
+        return Ok(());
+    }
+    let error = Error::input(path, "file", "is a scene file, which names files of data");
+    Err(error.hint("splatkit render draws it; name one of its inputs here").into())
+}
+
 /// Returns the arguments with a scene file replaced by what it stands for; `None` if there is none.
 pub fn expanded(
     arguments: &[OsString],
     matches: &ArgMatches,
     command: &Command,
-) -> Result<Option<Vec<OsString>>, Failure> {
+) -> Result<Option<Expanded>, Failure> {
     let Some((task, own)) = matches.subcommand().filter(|(task, _)| TASKS.contains(task)) else {
         return Ok(None);
     };
@@ -86,8 +120,10 @@ pub fn expanded(
             path.display()
         )));
     }
-    let scene = SceneFile::read(path, &Limits::default())?;
-    let flags = flags(&scene, path, command, task, &Given::of(matches))?;
+    let is_trusted = own.get_flag("trust_scene");
+    let scene = read(path, command, is_trusted)?;
+    let given = Given::of(matches);
+    let flags = flags(&scene, path, command, task, &given)?;
     let Some(at) = arguments.iter().rposition(|argument| Path::new(argument) == path.as_path())
     else {
         return Ok(None);
@@ -95,7 +131,164 @@ pub fn expanded(
     let mut expanded = arguments[..at].to_vec();
     expanded.extend(flags);
     expanded.extend(arguments[at + 1..].iter().cloned());
-    Ok(Some(expanded))
+    let written = ["output", "depth"].into_iter().filter_map(|flag| own.try_get_raw(flag).ok()?);
+    let written = written.flatten().map(|file| file.to_string_lossy().into_owned()).collect();
+    let stated = Stated { path: path.to_path_buf(), scene, given, written };
+    Ok(Some(Expanded { arguments: expanded, stated }))
+}
+
+/// The command line that a scene file stands for.
+#[derive(Debug)]
+pub struct Expanded {
+    pub arguments: Vec<OsString>,
+    pub stated: Stated,
+}
+
+/// Which flags a scene file states, and which the user. The command line is read before a scene
+/// file and again with it, so this is where the origin of a value is known.
+#[derive(Debug)]
+pub struct Stated {
+    path: PathBuf,
+    scene: SceneFile,
+    given: Given,
+    /// The files that the user wants written, as messages name them.
+    written: Vec<String>,
+}
+
+impl Stated {
+    /// Returns the failure for flags of the scene that clap refuses. Those of the user alone were
+    /// read before.
+    pub fn refused(&self, answer: &clap::Error) -> Failure {
+        let of = |kind| answer.get(kind).map(ToString::to_string);
+        let flag = of(ContextKind::InvalidArg);
+        let field = flag.as_deref().map_or("scene".into(), |flag| self.field(flag_name(flag)));
+        let whole = answer.to_string();
+        let message = match (of(ContextKind::InvalidValue), answer.source()) {
+            (Some(value), Some(why)) => format!("is {value:?}: {why}"),
+            _ => {
+                let lines = whole.lines().map(str::trim).take_while(|line| !line.is_empty());
+                let line = lines.collect::<Vec<_>>().join(" ");
+                line.strip_prefix("error: ").unwrap_or(&line).to_owned()
+            }
+        };
+        // The scene's flags are sound if only one of the user's does not go with them.
+        let is_users = answer.kind() == ErrorKind::ArgumentConflict
+            && flags_in(&message).any(|flag| self.given.has(flag));
+        if is_users { Failure::Usage(message) } else { wrong(&self.path, &field, message) }
+    }
+
+    /// Makes a failure that looks like wrong usage the scene's, if the scene states the flags that
+    /// it names. If it names none, it is about values, which are the scene's unless the user has
+    /// given some.
+    pub fn blamed(&self, failure: Failure) -> Failure {
+        let (Failure::Usage(what)
+        | Failure::Library(Error::Argument(what) | Error::Transfer(what))) = &failure
+        else {
+            return failure;
+        };
+        let flags: Vec<&str> = flags_in(what).collect();
+        let of_camera = what.starts_with("the camera");
+        let is_users = match &flags[..] {
+            [] if of_camera => {
+                CAMERA.iter().chain(&["zoom", "up"]).any(|flag| self.given.has(flag))
+            }
+            [] => {
+                let others = [NOT_OF_PICTURES, NOT_VALUES].concat();
+                matches!(failure, Failure::Usage(_))
+                    || self.written.iter().any(|file| what.contains(file.as_str()))
+                    || self.given.other_than(&others).is_some()
+            }
+            named => named.iter().any(|flag| self.given.has(flag)),
+        };
+        if is_users {
+            return failure;
+        }
+        let field = match flags.first() {
+            Some(flag) => self.field(flag),
+            None if of_camera && self.scene.camera.is_some() => "camera".into(),
+            None if of_camera && self.scene.options.contains_key("zoom") => "options.zoom".into(),
+            None => "scene".into(),
+        };
+        wrong(&self.path, &field, what.clone())
+    }
+
+    /// Returns the field of a flag that the scene states.
+    fn field(&self, flag: &str) -> String {
+        let scene = &self.scene;
+        let own = |input: &InputEntry| {
+            own_values(input).iter().any(|(name, value)| *name == flag && value.is_some())
+        };
+        match flag {
+            "size" | "camera" => flag.into(),
+            "transfer" if scene.transfer.is_some() => flag.into(),
+            "clip" | "cut-out" => "clips".into(),
+            _ if scene.options.contains_key(flag) => format!("options.{flag}"),
+            _ => match scene.inputs.iter().position(own) {
+                Some(number) => format!("inputs[{number}].{flag}"),
+                None => flag.into(),
+            },
+        }
+    }
+}
+
+/// Returns the names of the flags that a message names.
+fn flags_in(message: &str) -> impl Iterator<Item = &str> {
+    let words = message.split(|c: char| c.is_whitespace() || "(),;:'".contains(c));
+    words.filter(|word| word.starts_with("--")).map(flag_name)
+}
+
+/// Returns the name of a flag as messages write it, `--name`, `--name=VALUE` or `--name <VALUE>`.
+fn flag_name(text: &str) -> &str {
+    let name = text.trim_start_matches('-');
+    name.split([' ', '=', '<']).next().unwrap_or(name)
+}
+
+/// Reads a scene file, and checks the options that it sets. Only a trusted one may name files
+/// outside its folder, and addresses.
+pub fn read(path: &Path, command: &Command, is_trusted: bool) -> Result<SceneFile, Failure> {
+    let limits = Limits::default();
+    let scene = match is_trusted {
+        true => SceneFile::read_trusted(path, &limits)?,
+        false => SceneFile::read(path, &limits)?,
+    };
+    for (name, value) in &scene.options {
+        check_option(name, path, command)?;
+        check_limit(name, value).map_err(|why| wrong(path, &format!("options.{name}"), why))?;
+    }
+    Ok(scene)
+}
+
+/// Returns what is wrong with an option that raises a limit, or says what the command may take. A
+/// scene may only lower limits.
+fn check_limit(name: &str, value: &Value) -> Result<(), String> {
+    if SPENDING.contains(&name) {
+        return Err(format!(
+            "is not an option of a scene: it says what the command may take; give --{name} on the \
+             command line"
+        ));
+    }
+    let Some(most) = default_of(name) else { return Ok(()) };
+    let found = match value {
+        Value::Number(number) => number.as_f64(),
+        Value::String(text) => text.trim().parse().ok(),
+        Value::Array(values) => {
+            return values.iter().try_for_each(|value| check_limit(name, value));
+        }
+        _ => None,
+    };
+    match found.filter(|found| *found > most as f64) {
+        None => Ok(()),
+        Some(_) => Err(format!(
+            "is {value}, but a scene may only lower this limit, which is {most}; if you trust the \
+             scene, give --{name} on the command line"
+        )),
+    }
+}
+
+/// Returns whether a flag limits what the command may take, so that a scene file leaves it out.
+#[cfg(feature = "window")]
+pub fn is_limit(name: &str) -> bool {
+    SPENDING.contains(&name) || default_of(name).is_some()
 }
 
 #[cfg(feature = "window")]
@@ -259,7 +452,8 @@ mod tests {
         let matches = command.clone().try_get_matches_from(&words).expect("arguments");
         let all = expanded(&words, &matches, &command)?.expect("a scene");
         // What it stands for can be parsed.
-        command.try_get_matches_from(&all).map_err(|error| Failure::Usage(error.to_string()))?;
+        let Expanded { arguments: all, stated } = all;
+        command.try_get_matches_from(&all).map_err(|error| stated.refused(&error))?;
         Ok(all.iter().map(|word| word.to_string_lossy().into_owned()).collect())
     }
 
@@ -302,6 +496,30 @@ mod tests {
         assert!(wrong(r#"{"bakground": "red"}"#).contains("no such flag"));
         assert!(wrong(r#"{"axes": false}"#).contains("true"));
         assert!(wrong(r#"{"background": "nocolour"}"#).contains("nocolour"));
+    }
+
+    #[test]
+    fn scenes_lower_limits_only() {
+        let error = |options: &str| {
+            let text = format!(
+                r#"{{"splatkit_scene": 1, "inputs": [{{"file": "a.ply"}}], "options": {options}}}"#
+            );
+            scene(&text).err().map(|error| format!("{error:?}"))
+        };
+        let flags = ["points", "bytes", "depth", "texels", "seconds"];
+        for name in flags.map(|name| format!("limit-{name}")) {
+            assert_eq!(error(&format!(r#"{{"{name}": 7}}"#)), None);
+            for value in ["9999999999999", "\"9999999999999\"", "[1, 9999999999999]", "1e300"] {
+                let error = error(&format!(r#"{{"{name}": {value}}}"#)).expect(&name);
+                let place = format!("options.{name}");
+                assert!(error.contains(&place) && error.contains("only lower"), "{error}");
+            }
+        }
+        for name in ["memory", "gpu-memory", "gpu-timeout", "trust-scene", "allow-host", "threads"]
+        {
+            let error = error(&format!(r#"{{"{name}": "1"}}"#)).expect(name);
+            assert!(error.contains(&format!("options.{name}")), "{error}");
+        }
     }
 
     #[cfg(feature = "window")]

@@ -1,6 +1,12 @@
 //! The flags that set how values and surfaces are shown.
 
-use crate::{color::ColorFlags, failure::Failure, kernel::KernelFlags, own::Own, parse};
+use crate::{
+    color::{ColorFlags, ColorsByInput},
+    failure::Failure,
+    kernel::KernelFlags,
+    own::{self, Own},
+    parse,
+};
 use clap::Args;
 use splatkit::{
     Error,
@@ -103,7 +109,12 @@ pub struct Show<'a> {
     flags: &'a ShowFlags,
     pub kernel: Kernel,
     pub sharp: bool,
-    transfers: Vec<Own<Transfer<'a>>>,
+    /// What inputs have of their own.
+    transfers: own::Values<Transfer<'a>>,
+    ranges: own::Values<[f64; 2]>,
+    surfaces: own::Values<&'a [Surface]>,
+    opacities: own::Values<f32>,
+    colors: ColorsByInput<'a>,
 }
 
 enum Transfer<'a> {
@@ -127,8 +138,7 @@ impl ShowFlags {
         range.map(|[low, high]| format!("--range {},{}", plain(low), plain(high)))
     }
 
-    /// Returns the range of values that an input's colours are spread over, if it is given.
-    pub fn range_of(&self, path: &Path) -> Option<[f64; 2]> {
+    fn range_of(&self, path: &Path) -> Option<[f64; 2]> {
         Own::of(&self.range, path).copied()
     }
 
@@ -151,12 +161,6 @@ impl ShowFlags {
         self.radius_scale.map(|_| "--radius-scale").or(opacity).or_else(|| self.kernel.first())
     }
 
-    /// Returns the optical depth of a surface, if it is not opaque.
-    pub fn optical_depth(&self, path: &Path) -> Option<f32> {
-        let opacity = *Own::of(&self.opacity, path)?;
-        (opacity < 1.0).then(|| -(1.0 - opacity).ln())
-    }
-
     /// Checks the names of inputs in flags.
     pub fn check_inputs(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
         self.color.check(inputs)?;
@@ -164,11 +168,6 @@ impl ShowFlags {
         Own::check(&self.range, "range", inputs)?;
         Own::check_files(&self.iso, "iso", inputs)?;
         Own::check(&self.opacity, "opacity", inputs)
-    }
-
-    /// Returns the isosurfaces of an input.
-    fn surfaces_of(&self, path: &Path) -> Vec<Surface> {
-        Own::all_of(&self.iso, path).into_iter().flatten().copied().collect()
     }
 
     /// Returns the files that flags name.
@@ -181,33 +180,19 @@ impl ShowFlags {
         let own = self.transfer.iter();
         let own = own.map(|own| own.try_map(|text| Transfer::open(text, limits)));
         let transfers = own.collect::<Result<Vec<_>, _>>()?;
-        self.check_surfaces(&transfers)?;
-        Ok(Show {
+        let surfaces = self.iso.iter().map(|own| own.try_map(|surfaces| Ok(&surfaces[..])));
+        let show = Show {
             flags: self,
             kernel: self.kernel.kernel(limits)?,
             sharp: self.kernel.is_sharp(),
-            transfers,
-        })
-    }
-
-    /// Refuses more isosurfaces of an input than a transfer function can have.
-    fn check_surfaces(&self, transfers: &[Own<Transfer>]) -> Result<(), Failure> {
-        // No input has an empty path: that stands for the inputs without values of their own.
-        let files = Own::files(&self.iso).chain(Own::files(transfers)).chain([Path::new("")]);
-        for file in files {
-            let more = match Own::of(transfers, file) {
-                Some(Transfer::Read(transfer)) => transfer.isosurfaces.len(),
-                _ => 0,
-            };
-            let count = self.surfaces_of(file).len() + more;
-            let most = TransferFunction::MAX_ISOSURFACES;
-            if count > most {
-                return Err(Failure::Usage(format!(
-                    "{count} isosurfaces are given; at most {most} are allowed"
-                )));
-            }
-        }
-        Ok(())
+            transfers: own::Values::new(transfers),
+            ranges: own::Values::new(self.range.iter().cloned()),
+            surfaces: own::Values::new(surfaces.collect::<Result<Vec<_>, _>>()?),
+            opacities: own::Values::new(self.opacity.iter().cloned()),
+            colors: self.color.by_input(),
+        };
+        show.check_surfaces()?;
+        Ok(show)
     }
 }
 
@@ -279,14 +264,55 @@ pub struct Values {
 }
 
 impl Show<'_> {
+    /// Refuses more isosurfaces of an input than a transfer function can have.
+    fn check_surfaces(&self) -> Result<(), Failure> {
+        // No input has an empty path: that stands for the inputs without values of their own.
+        let files = self.surfaces.files().chain(self.transfers.files()).chain([Path::new("")]);
+        for file in files {
+            let more = match self.transfers.of(file) {
+                Some(Transfer::Read(transfer)) => transfer.isosurfaces.len(),
+                _ => 0,
+            };
+            let count = self.surfaces_of(file).len() + more;
+            let most = TransferFunction::MAX_ISOSURFACES;
+            if count > most {
+                return Err(Failure::Usage(format!(
+                    "{count} isosurfaces are given; at most {most} are allowed"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the flags that colour an input.
+    pub fn color_of(&self, path: &Path) -> ColorFlags {
+        self.colors.of(path)
+    }
+
+    /// Returns the range of values that an input's colours are spread over, if it is given.
+    pub fn range_of(&self, path: &Path) -> Option<[f64; 2]> {
+        self.ranges.of(path).copied()
+    }
+
+    /// Returns the optical depth of a surface, if it is not opaque.
+    pub fn optical_depth(&self, path: &Path) -> Option<f32> {
+        let opacity = *self.opacities.of(path)?;
+        (opacity < 1.0).then(|| -(1.0 - opacity).ln())
+    }
+
+    /// Returns the isosurfaces of an input.
+    fn surfaces_of(&self, path: &Path) -> Vec<Surface> {
+        self.surfaces.all_of(path).concat()
+    }
+
     /// Returns a flag that shows values, if one is given for an input, which may have colours of
     /// its own.
     pub fn shows_values(&self, path: &Path) -> Option<&'static str> {
-        let has_transfer = Own::of(&self.transfers, path).is_some();
+        let has_transfer = self.transfers.of(path).is_some();
         let given = [
             ("transfer", has_transfer),
-            ("iso", !self.flags.surfaces_of(path).is_empty()),
-            ("range", self.flags.range_of(path).is_some()),
+            ("iso", !self.surfaces_of(path).is_empty()),
+            ("range", self.range_of(path).is_some()),
             ("sharp", self.sharp),
         ];
         given.into_iter().find(|(_, is_given)| *is_given).map(|(flag, _)| flag)
@@ -330,8 +356,8 @@ impl Show<'_> {
         Values { range: values, diagonal }: Values,
         automatic: impl FnOnce() -> TransferFunction,
     ) -> Result<TransferFunction, Failure> {
-        let surfaces = self.flags.surfaces_of(path);
-        let transfer = match Own::of(&self.transfers, path) {
+        let surfaces = self.surfaces_of(path);
+        let transfer = match self.transfers.of(path) {
             None if values[0] >= values[1] && surfaces.is_empty() => {
                 return Err(same(path, values[0]).into());
             }
@@ -345,7 +371,7 @@ impl Show<'_> {
             }
             Some(Transfer::Read(transfer)) => transfer.clone(),
         };
-        let range = self.flags.range_of(path);
+        let range = self.range_of(path);
         let mut transfer = match range {
             Some(range) => transfer.spread_over(range),
             None => transfer,
@@ -395,7 +421,7 @@ impl Show<'_> {
             let color = color.unwrap_or_else(|| transfer.color(value));
             transfer.isosurfaces.push(Isosurface { value, color, opacity });
         }
-        if Own::of(&self.transfers, path).is_none() {
+        if self.transfers.of(path).is_none() {
             transfer.opacity = vec![(0.0, 0.0)];
         }
     }
@@ -513,8 +539,9 @@ mod tests {
     fn surfaces_of_one_input_are_read() {
         let [own, other] = ["a=b.nrrd", "c.nrrd"].map(Path::new);
         let all = ["-5,50%:red", "a=b.nrrd=7:0.5"].map(|text| surfaces(text).unwrap());
+        let all = own::Values::new(all);
         let of = |path| -> Vec<Value> {
-            Own::all_of(&all, path).into_iter().flatten().map(|surface| surface.value).collect()
+            all.all_of(path).iter().flatten().map(|surface| surface.value).collect()
         };
         assert_eq!(of(own), [Value::Own(7.0)]);
         assert_eq!(of(other), [Value::Own(-5.0), Value::Share(0.5)]);

@@ -62,18 +62,34 @@ pub fn end(result: Result<(), Failure>, progress: &Progress) -> ExitCode {
 }
 
 /// Sets `XDG_RUNTIME_DIR`, the folder for a user's sockets, if it is unset, as on servers. Mesa's
-/// drivers complain on stderr if it is missing, although they do not need it.
+/// drivers complain on stderr if it is missing, although they do not need it. It is a folder of the
+/// user's alone; where there is none, the variable stays unset.
 #[cfg_attr(
-    unix,
+    target_os = "linux",
     expect(unsafe_code, reason = "changing the environment is sound while there is one thread")
 )]
 pub fn quiet_drivers() {
-    #[cfg(unix)]
-    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-        let folder = std::env::temp_dir();
+    #[cfg(target_os = "linux")]
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none()
+        && let Some(folder) = runtime_folder(&std::env::temp_dir())
+    {
         // SAFETY: the process does this first, so no other thread reads the environment.
         unsafe { std::env::set_var("XDG_RUNTIME_DIR", folder) };
     }
+}
+
+/// Returns a folder below `temporary` that belongs to the user and that nobody else may enter. If
+/// somebody else has made one of its name, there is none.
+#[cfg(target_os = "linux")]
+fn runtime_folder(temporary: &Path) -> Option<std::path::PathBuf> {
+    use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+    // The owner of a process is the user that it runs as.
+    let user = std::fs::metadata("/proc/self").ok()?.uid();
+    let folder = temporary.join(format!("splatkit-{user}"));
+    std::fs::DirBuilder::new().mode(0o700).create(&folder).ok();
+    // Not of what a link leads to.
+    let found = folder.symlink_metadata().ok()?;
+    (found.is_dir() && found.uid() == user && found.mode() & 0o077 == 0).then_some(folder)
 }
 
 /// Prints what clap returns instead of a command: a help text, the version, or an error in the
@@ -99,19 +115,28 @@ pub fn tell(answer: &clap::Error) -> ExitCode {
     }
 }
 
-/// Logs the library's events to stderr. `RUST_LOG` sets the filter if it is present.
+impl StartFlags {
+    /// Returns which events are logged: those of the library. Those of other crates name neither
+    /// the file nor what to do, and an error says what they mean.
+    fn events(&self) -> Targets {
+        let own = match (self.quiet, self.verbose) {
+            (true, _) => LevelFilter::OFF,
+            (_, 0) => LevelFilter::WARN,
+            (_, 1) => LevelFilter::INFO,
+            (_, _) => LevelFilter::TRACE,
+        };
+        Targets::new().with_target("splatkit", own)
+    }
+}
+
+/// Logs the library's events to stderr. `RUST_LOG` sets the filter if it is present, also for other
+/// crates.
 fn start_log(flags: &StartFlags) {
-    let (others, own) = match (flags.quiet, flags.verbose) {
-        (true, _) => (LevelFilter::OFF, LevelFilter::OFF),
-        (_, 0) => (LevelFilter::ERROR, LevelFilter::WARN),
-        (_, 1) => (LevelFilter::ERROR, LevelFilter::INFO),
-        (_, _) => (LevelFilter::WARN, LevelFilter::TRACE),
-    };
     let filter: Targets = std::env::var("RUST_LOG")
         .ok()
         .filter(|text| !text.is_empty())
         .and_then(|text| text.parse().ok())
-        .unwrap_or_else(|| Targets::new().with_default(others).with_target("splatkit", own));
+        .unwrap_or_else(|| flags.events());
     let levels = filter.iter().map(|(_, level)| level).chain(filter.default_level());
     let colored = std::io::stderr().is_terminal()
         && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
@@ -128,4 +153,45 @@ fn start_log(flags: &StartFlags) {
         .finish()
         .with(filter)
         .init();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tracing::Level;
+
+    #[test]
+    fn other_crates_log_nothing() {
+        for (quiet, verbose) in [(true, 0), (false, 0), (false, 1), (false, 2), (false, 9)] {
+            let events = StartFlags { verbose, quiet, threads: None }.events();
+            for target in ["jpeg2k::codec", "wgpu_core::device", "naga", "log", ""] {
+                assert!(!events.would_enable(target, &Level::ERROR), "{target}, -v {verbose}");
+            }
+            assert_eq!(events.would_enable("splatkit::formats", &Level::WARN), !quiet);
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn sockets_have_a_folder_of_the_users_alone() {
+        use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+        let temporary = tempfile::tempdir().expect("a folder");
+        let folder = runtime_folder(temporary.path()).expect("a folder");
+        assert_eq!(folder.metadata().expect("a folder").mode() & 0o777, 0o700);
+        assert_eq!(runtime_folder(temporary.path()), Some(folder.clone()));
+        // One that others may enter, a link, and a file.
+        let open = std::fs::Permissions::from_mode(0o755);
+        std::fs::set_permissions(&folder, open).expect("permissions");
+        assert_eq!(runtime_folder(temporary.path()), None);
+        std::fs::remove_dir(&folder).expect("removed");
+        let other = temporary.path().join("other");
+        std::fs::create_dir(&other).expect("a folder");
+        let own = std::fs::Permissions::from_mode(0o700);
+        std::fs::set_permissions(&other, own).expect("permissions");
+        symlink(&other, &folder).expect("a link");
+        assert_eq!(runtime_folder(temporary.path()), None);
+        std::fs::remove_file(&folder).expect("removed");
+        std::fs::write(&folder, "").expect("a file");
+        assert_eq!(runtime_folder(temporary.path()), None);
+    }
 }

@@ -121,6 +121,11 @@ struct Line<'writer> {
 
 impl Line<'_> {
     fn add(&mut self, field: &Field, text: &str) {
+        // Events of the crate `log` come with the path of their source, on the machine that built
+        // the command.
+        if field.name().starts_with("log.") {
+            return;
+        }
         let text = safe(text);
         let space = if self.is_empty { "" } else { " " };
         self.result = self.result.and_then(|()| match field.name() {

@@ -29,7 +29,8 @@ pub struct Transfer {
 }
 
 impl Transfer {
-    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+    pub fn run(mut self, progress: &Progress) -> Result<(), Failure> {
+        self.load = self.load.begun();
         if let Some(flag) = self.show.unused_by_values() {
             return Err(Failure::Usage(format!("{flag} has no effect on a transfer function")));
         }

@@ -69,7 +69,12 @@ impl<W: Write> Work<'_, W> {
             memory::room(WORK, OF_POINT.saturating_mul(shares.points.count(bin) as u64))?;
             let piece = Piece::read(input, &mut shares, region, bin)?;
             let splats = match &input.facts.mesh {
-                Some(mesh) => piece.of_mesh(mesh, Some(region) == input.long_region(), &surfels)?,
+                Some(mesh) => {
+                    let whole = input.stream.counts().triangles as usize;
+                    let is_long = Some(region) == input.long_region();
+                    let most = is_long.then(|| surfels.most_once_cut(whole));
+                    piece.of_mesh(mesh, most, &surfels)?
+                }
                 None => piece.of_cloud(input, &surfels)?,
             };
             let owned = piece.owned.iter().filter(|owned| **owned).count() as u64;
@@ -151,13 +156,13 @@ impl Piece {
     fn of_mesh(
         &self,
         mesh: &Triangulated,
-        is_long: bool,
+        most: Option<usize>,
         options: &SurfelOptions,
     ) -> Result<Vec<Splat>> {
         if self.mesh.triangles.is_empty() {
             return Ok(Vec::new());
         }
-        mesh.pieces.surfels(&self.mesh, &self.owned, is_long, options)
+        mesh.pieces.surfels(&self.mesh, &self.owned, most, options)
     }
 
     fn of_cloud(&self, input: &Surveyed, options: &SurfelOptions) -> Result<Vec<Splat>> {

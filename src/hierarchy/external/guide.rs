@@ -26,7 +26,7 @@ pub struct Sample {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct Side {
-    point: u32,
+    pub point: u32,
     normal: u32,
 }
 

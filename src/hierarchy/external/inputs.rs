@@ -2,19 +2,24 @@
 
 use super::{
     ExternalOptions,
-    regions::Ranges,
-    survey::{Facts, Surveyed, Tables},
+    guide::Side,
+    regions::{CELLS, Ranges, Reach},
+    sound::{check, within},
+    survey::{Facts, PieceBox, Surveyed, Tables},
 };
 use crate::{
     Error, Result,
     container::{Cursor, Put, pack},
+    formats::Counts,
     input::{Limits, fingerprint, is_remote},
+    memory,
 };
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
 use std::{
     fs::File,
     io::{self, Read, Seek, SeekFrom},
+    ops::Range,
     path::{Path, PathBuf},
 };
 
@@ -46,12 +51,17 @@ struct Place {
 
 impl PlannedInput {
     /// Describes an input, and appends its tables to those of others.
-    pub fn new(path: &Path, input: &Surveyed, all_tables: &mut Vec<u8>) -> Result<Self> {
+    pub fn new(
+        path: &Path,
+        input: &Surveyed,
+        limits: &Limits,
+        all_tables: &mut Vec<u8>,
+    ) -> Result<Self> {
         let absolute = match is_remote(path) {
             true => path.to_owned(),
             false => std::path::absolute(path).map_err(|e| Error::file(path, "find", e))?,
         };
-        let (bytes, fingerprint) = fingerprint(path)?;
+        let (bytes, fingerprint) = fingerprint(path, limits)?;
         // What has changed since it was surveyed must not get a fingerprint.
         input.stream.intact()?;
         let unpacked = input.tables().to_bytes();
@@ -74,6 +84,28 @@ impl PlannedInput {
         })
     }
 
+    /// Checks its numbers.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        within("facts", self.facts.check())?;
+        let settled = &self.facts.settled;
+        within("regions", self.regions.check(settled.points, settled.bounds))?;
+        let Place { at, bytes, .. } = &self.tables;
+        let end = at.checked_add(*bytes).filter(|end| i64::try_from(*end).is_ok());
+        check(end.is_some(), "tables.bytes", bytes, "it ends nowhere")
+    }
+
+    /// Returns its points, its regions that own some, and whether it is a solid mesh.
+    pub fn outline(&self) -> (u64, usize, Option<bool>) {
+        let mesh = self.facts.mesh.as_ref();
+        (self.facts.settled.points, self.regions.starts.len(), mesh.map(|mesh| mesh.is_solid))
+    }
+
+    /// Returns the points of some regions, which exist, or are the one that owns none.
+    pub fn points_of(&self, regions: Range<u32>) -> u64 {
+        let own = &self.regions.points;
+        regions.map(|region| own.get(region as usize).copied().unwrap_or(0)).sum()
+    }
+
     /// Opens the input, with its tables out of the file that holds all.
     ///
     /// # Errors
@@ -88,7 +120,7 @@ impl PlannedInput {
             Error::input(&self.path, "file", message)
                 .hint("make the plan again, with --overwrite, and its parts")
         };
-        let (bytes, fingerprint) = fingerprint(&self.path)?;
+        let (bytes, fingerprint) = fingerprint(&self.path, limits)?;
         if bytes != self.bytes {
             let planned = self.bytes;
             return Err(changed(format!(
@@ -98,13 +130,24 @@ impl PlannedInput {
         if fingerprint != self.fingerprint {
             return Err(changed("has changed since the plan was made".into()));
         }
-        let own = self.read_tables(tables)?;
         let stream = options.open(&self.path, limits)?;
         let stream = stream.ok_or_else(|| changed("can no longer be read in pieces".into()))?;
-        Ok(Surveyed::resume(stream, self.facts.clone(), self.regions.clone(), own))
+        let (points, counts) = (self.facts.settled.points, stream.counts());
+        if points > counts.points || self.facts.mesh.is_some() != (counts.triangles > 0) {
+            return Err(changed(format!(
+                "has not the {points} points of the plan, or no such mesh"
+            )));
+        }
+        let own = self.read_tables(tables, counts)?;
+        let surveyed = Surveyed::resume(stream, self.facts.clone(), self.regions.clone(), own);
+        surveyed.map_err(|message| {
+            let message = format!("those of {}: {message}", self.path.display());
+            Error::input(tables, "tables", message).hint("make the plan again, with --overwrite")
+        })
     }
 
-    fn read_tables(&self, path: &Path) -> Result<Tables> {
+    /// Reads the tables of an input with these counts.
+    fn read_tables(&self, path: &Path, counts: Counts) -> Result<Tables> {
         let read = || -> io::Result<Vec<u8>> {
             let mut file = File::open(path)?;
             file.seek(SeekFrom::Start(self.tables.at))?;
@@ -117,15 +160,31 @@ impl PlannedInput {
             Error::input(path, "tables", "are not those of the plan, or damaged")
                 .hint("make the plan again, with --overwrite; finished parts are kept")
         };
+        let unpacked = self.tables.unpacked;
+        if unpacked > Tables::most_bytes(counts) {
+            return Err(damaged());
+        }
         if blake3::hash(&packed).to_hex().as_str() != self.tables.hash {
             return Err(damaged());
         }
-        let bytes = pack::decompress(&packed, self.tables.unpacked as usize);
+        memory::room("the tables of a plan", unpacked)?;
+        let bytes = pack::decompress(&packed, unpacked as usize);
         bytes.ok().and_then(|bytes| Tables::from_bytes(&bytes)).ok_or_else(damaged)
     }
 }
 
 impl Tables {
+    /// Returns the most bytes of the tables of an input with these counts.
+    fn most_bytes(Counts { points, triangles }: Counts) -> u64 {
+        // Beside the cells of a grid, there is at most one cell, box and side a point.
+        let of_point = (size_of::<Reach>() + size_of::<PieceBox>() + size_of::<Side>()) as u64;
+        let grid = size_of::<Reach>() as u64 * (CELLS + 1);
+        let long = 3 * size_of::<[u32; 3]>() as u64;
+        [points.saturating_mul(of_point), triangles.saturating_mul(long)]
+            .into_iter()
+            .fold(grid + 1024, u64::saturating_add)
+    }
+
     fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
         put(&mut out, &self.reaches);

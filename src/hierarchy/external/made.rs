@@ -14,6 +14,7 @@ use crate::{
 };
 use std::{
     io::{BufWriter, Write},
+    ops::Range,
     path::{Path, PathBuf},
 };
 
@@ -84,6 +85,17 @@ impl Made {
         out.u64(self.blocks.len() as u64);
         self.blocks.iter().for_each(|block| put_block(&mut out, block));
         out
+    }
+
+    /// Whether it can be what a conversion makes, with pages in this part of the file.
+    pub fn is_sound(&self, pages: Range<u64>) -> bool {
+        let leaves =
+            self.blocks.iter().map(|block| u128::from(block.contents.leaves)).sum::<u128>();
+        let Bounds { min, max } = self.bounds;
+        let is_box = min.is_finite() && max.is_finite() && !self.bounds.is_empty();
+        u128::from(self.splats) == leaves
+            && (is_box || self.splats == 0)
+            && self.blocks.iter().all(|block| block.is_sound(&pages))
     }
 
     /// Reads the bytes that [`to_bytes`](Self::to_bytes) returns. Returns `None` for others.

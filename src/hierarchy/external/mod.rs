@@ -28,6 +28,7 @@ mod part_file;
 mod plan;
 mod regions;
 mod solid;
+mod sound;
 mod survey;
 mod triangles;
 
@@ -186,7 +187,7 @@ pub fn convert(
     };
     for (input, file) in inputs.into_iter().zip(files) {
         let all = 0..input.count();
-        work.input(&input, all, path).map_err(|error| error.in_file(file))?;
+        work.input(&input, all, path).map_err(|error| error.stated_in(file, "content"))?;
     }
     tell(watch, Stage::Writing, 0, 0);
     let (pages, length, made) = work.part.end()?;
@@ -226,6 +227,7 @@ fn survey_all<'a>(
             ))
         })
     };
+    options.surfels.validate()?;
     let streams: Vec<Stream> = files.iter().map(open).collect::<Result<_>>()?;
     let points = streams.iter().map(|stream| stream.counts().points).sum();
     let most = most_points(points, options);
@@ -237,7 +239,7 @@ fn survey_all<'a>(
         let surfels = SurfelOptions { deadline: limits.deadline(), ..options.surfels.clone() };
         let options = &ExternalOptions { surfels, ..options.clone() };
         let input = Surveyed::new(stream, most, options, watch);
-        let input = input.map_err(|error| error.in_file(file))?;
+        let input = input.map_err(|error| error.stated_in(file, "content"))?;
         tracing::info!(file = %file.display(), regions = input.count(), "split into regions");
         inputs.push(input);
     }

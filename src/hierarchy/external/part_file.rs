@@ -105,13 +105,19 @@ impl PartFile {
         file.read_exact(&mut end)?;
         let start = Cursor::new(&end).u64().unwrap_or(u64::MAX);
         let Some(length) = (bytes - SEAL as u64).checked_sub(start) else { return Ok(CUT) };
-        let mut about = vec![0; length as usize];
         file.seek(SeekFrom::Start(start))?;
-        file.read_exact(&mut about)?;
-        if seal(&header, &about, start) != end[8..] {
+        // It takes memory as it is there, whatever the length of the file says.
+        let mut about = Vec::new();
+        Read::by_ref(file).take(length).read_to_end(&mut about)?;
+        if about.len() as u64 != length || seal(&header, &about, start) != end[8..] {
             return Ok(CUT);
         }
-        let Some(made) = Made::from_bytes(&about) else { return Ok(CUT) };
+        // The seal only says that nobody has changed it by accident.
+        let Some(made) =
+            Made::from_bytes(&about).filter(|made| made.is_sound(HEADER as u64..start))
+        else {
+            return Ok(CUT);
+        };
         Ok(Ok(Self { path: path.to_owned(), bytes, made }))
     }
 
@@ -136,4 +142,28 @@ impl PartFile {
         };
         all().map_err(|e| Error::file(&self.path, "read", e))
     }
+}
+
+#[cfg(test)]
+impl Label {
+    /// Returns the label of a part.
+    pub fn of_bytes(bytes: &[u8]) -> Self {
+        let index = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
+        Self { plan: bytes[12..HEADER].try_into().unwrap(), index }
+    }
+
+    /// Seals a part whose description was changed.
+    pub fn seal_again(self, bytes: &mut [u8]) {
+        let (about, at) = (about(bytes), bytes.len() - SEAL + 8);
+        let start = about.start as u64;
+        let seal = seal(&self.header(), &bytes[about], start);
+        bytes[at..].copy_from_slice(&seal);
+    }
+}
+
+/// Returns where the description of the blocks is in a part.
+#[cfg(test)]
+pub fn about(bytes: &[u8]) -> std::ops::Range<usize> {
+    let end = bytes.len() - SEAL;
+    u64::from_le_bytes(bytes[end..end + 8].try_into().unwrap()) as usize..end
 }

@@ -5,6 +5,7 @@ use super::{
     inputs::PlannedInput,
     join,
     part_file::{self, Label, PartFile},
+    sound::{check, check_write, within},
     survey::Surveyed,
     survey_all, tell,
 };
@@ -125,7 +126,7 @@ impl Plan {
         let inputs: Result<Vec<PlannedInput>> = files
             .iter()
             .zip(&surveyed)
-            .map(|(file, input)| PlannedInput::new(file, input, &mut tables))
+            .map(|(file, input)| PlannedInput::new(file, input, limits, &mut tables))
             .collect();
         let mut plan = Self {
             format: FORMAT,
@@ -175,13 +176,67 @@ impl Plan {
         }
         let mut plan: Self = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
         plan.path = path.to_owned();
-        let is_known = |of: &InputRegions| (of.input as usize) < plan.inputs.len();
-        if plan.own_hash()? != plan.hash
-            || !plan.parts.iter().flat_map(|part| &part.regions).all(is_known)
-        {
+        if plan.own_hash()? != plan.hash {
             return Err(wrong("does not match its hash: it was changed or is damaged".into()));
         }
+        plan.check().map_err(wrong)?;
         Ok(plan)
+    }
+
+    /// Checks all numbers. An error names the field, its value and what is expected.
+    fn check(&self) -> std::result::Result<(), String> {
+        within("options", self.options.check())?;
+        within("write", check_write(&self.write))?;
+        within("shape", self.shape.check())?;
+        let (mut points, mut is_closed) = (0, true);
+        for (number, input) in self.inputs.iter().enumerate() {
+            within(format!("inputs[{number}]"), input.check())?;
+            let (own, _, solid) = input.outline();
+            points += own;
+            is_closed &= solid == Some(true);
+        }
+        let Shape { points: told, closed, regions, .. } = self.shape;
+        check(told == points, "shape.points", told, format!("the inputs have {points}"))?;
+        check(closed == is_closed, "shape.closed", closed, "the inputs say otherwise")?;
+        let planned = self.check_parts()?;
+        check(regions == planned, "shape.regions", regions, format!("the parts have {planned}"))
+    }
+
+    /// Checks that the parts have each region of each input once, in order. Returns how many.
+    fn check_parts(&self) -> std::result::Result<usize, String> {
+        let count = self.parts.len();
+        let wanted = self.options.parts.map_or(count, |parts| parts as usize);
+        check(count > 0 && count == wanted, "the number of parts", count, "another is expected")?;
+        let mut next = vec![0u32; self.inputs.len()];
+        let mut last = 0;
+        for (number, part) in self.parts.iter().enumerate() {
+            let mut points = 0;
+            for (at, InputRegions { input, regions }) in part.regions.iter().enumerate() {
+                let place = format!("parts[{number}].regions[{at}]");
+                let own = self.inputs.get(*input as usize).filter(|_| *input >= last);
+                let Some(own) = own else {
+                    return check(false, place + ".input", input, "there is none").map(|()| 0);
+                };
+                last = *input;
+                let (_, most, solid) = own.outline();
+                let end = &mut next[*input as usize];
+                // Triangles to be subdivided have a region of their own.
+                let most = most + usize::from(solid.is_some());
+                let follows = regions.start == *end && regions.start < regions.end;
+                let is_known = follows && regions.end as usize <= most;
+                check(is_known, place, regions, format!("{end} is the next of up to {most}"))?;
+                *end = regions.end;
+                points += own.points_of(regions.clone());
+            }
+            let place = format!("parts[{number}].points");
+            check(part.points == points, place, part.points, format!("{points} are expected"))?;
+        }
+        for (number, (input, end)) in self.inputs.iter().zip(&next).enumerate() {
+            let most = input.outline().1;
+            let place = format!("the number of regions of inputs[{number}]");
+            check(*end as usize >= most, place, end, format!("there are at least {most}"))?;
+        }
+        Ok(next.iter().map(|end| *end as usize).sum())
     }
 
     /// Returns the path of the plan.
@@ -260,14 +315,19 @@ impl Plan {
             deadline: Deadline::NEVER,
         };
         for InputRegions { input, regions } in &part.regions {
-            let input = &self.inputs[*input as usize];
+            let number = *input as usize;
+            let input = &self.inputs[number];
             let tables = disk::folder(&self.path).join(TABLES);
             let surveyed = input.open(&tables, &self.options, limits)?;
-            if regions.end > surveyed.count() {
-                return Err(Error::input(&self.path, "plan", "names regions that do not exist"));
+            let planned = self.parts.iter().flat_map(|part| &part.regions);
+            let own = planned.filter(|own| own.input as usize == number);
+            let end = own.map(|own| own.regions.end).max();
+            if end != Some(surveyed.count()) {
+                let message = "names other regions than there are";
+                return Err(Error::input(&self.path, "plan", message));
             }
             let built = work.input(&surveyed, regions.clone(), &path);
-            built.map_err(|error| error.in_file(&input.path))?;
+            built.map_err(|error| error.stated_in(&input.path, "content"))?;
         }
         let splats = work.part.made.splats;
         let bytes = part_file::finish(work.part, label)?;
@@ -294,6 +354,8 @@ impl Plan {
         let made = || parts.iter().zip(starts).map(|(part, start)| (&part.made, start));
         join::write(&self.shape, made(), pages, path, &self.options, &self.write).map_err(|error| {
             use io::ErrorKind::{InvalidData, NotFound, UnexpectedEof};
+            // Blocks that cannot be joined are in parts that no conversion makes.
+            let error = error.stated_in(&self.path, "parts");
             let is_of_part = matches!(&error, Error::Output { source, .. }
                 if matches!(source.kind(), InvalidData | NotFound | UnexpectedEof));
             if !is_of_part {
@@ -387,4 +449,18 @@ fn parts(inputs: &[Surveyed], wanted: Option<u32>) -> Vec<PlannedPart> {
         }
     }
     parts
+}
+
+/// What tests do to the text of a plan.
+#[cfg(test)]
+pub struct PlanText;
+
+#[cfg(test)]
+impl PlanText {
+    /// Gives a plan the hash of what it says, if it still has the form of a plan.
+    pub fn sealed(text: &mut serde_json::Value) {
+        if let Ok(plan) = serde_json::from_value::<Plan>(text.clone()) {
+            text["hash"] = plan.own_hash().unwrap().into();
+        }
+    }
 }

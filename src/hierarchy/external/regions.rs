@@ -5,7 +5,10 @@
 //! are split as evenly as others. Only points at the same position, or nearly, stay together
 //! however many there are.
 
-use super::super::partition::{Cube, FINE_BITS, fine_cell, fine_key_of};
+use super::{
+    super::partition::{Cube, FINE_BITS, fine_cell, fine_key_of},
+    sound::check,
+};
 use crate::Result;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
@@ -14,6 +17,8 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Bits of a fine key below those of a coarse cell.
 const BELOW_COARSE: u32 = 3 * (FINE_BITS - 7);
+/// The number of coarse cells.
+pub const CELLS: u64 = 1 << (3 * FINE_BITS - BELOW_COARSE);
 /// Bits by which a cell is subdivided at a time.
 const CUT: u32 = 12;
 /// How far the neighbours of a point may be, in mean spacings of the points in its cell. Their
@@ -47,12 +52,69 @@ pub struct Regions {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ranges {
     /// The first key of each region.
-    starts: Vec<u64>,
+    pub starts: Vec<u64>,
     /// The number of points in each.
     pub points: Vec<u64>,
     /// Approximate median distance to the neighbour by which points are judged, estimated as on a
     /// surface.
     pub spacing: f32,
+}
+
+impl Ranges {
+    /// Checks the regions of this many points in a box.
+    pub fn check(&self, points: u64, [low, high]: [Vec3; 2]) -> Result<(), String> {
+        let Self { starts, points: counts, spacing } = self;
+        let regions = starts.len();
+        check(
+            regions > 0 && u32::try_from(regions).is_ok(),
+            "starts",
+            regions,
+            "no number of them",
+        )?;
+        check(starts[0] == 0, "starts[0]", starts[0], "0 is expected")?;
+        if let Some(at) = (1..regions).find(|&at| starts[at] <= starts[at - 1]) {
+            return check(false, format!("starts[{at}]"), starts[at], "they must ascend");
+        }
+        let last = starts[regions - 1];
+        let end = 1u64 << (3 * FINE_BITS);
+        check(last < end, format!("starts[{}]", regions - 1), last, format!("{end} is the end"))?;
+        let wanted = format!("there are {regions} regions");
+        check(counts.len() == regions, "the number of points", counts.len(), wanted)?;
+        let sum: u128 = counts.iter().copied().map(u128::from).sum();
+        check(sum == points.into(), "the sum of points", sum, format!("{points} are expected"))?;
+        // Points at one place have none.
+        let is_length = *spacing >= 0.0 && spacing.is_finite();
+        let is_small = Cube::around(low, high).edge() < 1e-30;
+        check(
+            is_length && (*spacing > 0.0 || points == 0 || is_small),
+            "spacing",
+            spacing,
+            "a length above 0 is expected",
+        )
+    }
+
+    /// Checks how far the neighbours of points in a box may be.
+    pub fn check_reaches(&self, [low, high]: [Vec3; 2], reaches: &[Reach]) -> Result<(), String> {
+        let (regions, edge) = (self.starts.len(), Cube::around(low, high).edge());
+        let wanted = format!("there are {regions} regions");
+        check(
+            reaches.is_empty() == (regions == 1),
+            "the number of reaches",
+            reaches.len(),
+            wanted,
+        )?;
+        let is_sound = |Reach { start, below, reach }: &Reach| {
+            let is_whole = *below == BELOW_COARSE && start.is_multiple_of(1 << BELOW_COARSE);
+            *start < 1 << (3 * FINE_BITS)
+                && (is_whole || *below == 0)
+                && *reach >= 0.0
+                && *reach <= edge * 1.001
+        };
+        match reaches.iter().find(|reach| !is_sound(reach)) {
+            Some(reach) => check(false, "a reach", reach, "it is of no cell, or too far"),
+            None => Ok(()),
+        }
+    }
 }
 
 /// How far the neighbours of the points in a cell may be.

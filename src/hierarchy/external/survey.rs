@@ -138,13 +138,22 @@ impl<'a> Surveyed<'a> {
     }
 
     /// Continues with what the first passes over the same file found.
-    pub fn resume(mut stream: Stream<'a>, facts: Facts, ranges: Ranges, tables: Tables) -> Self {
+    ///
+    /// # Errors
+    /// A message if this cannot be what they found.
+    pub fn resume(
+        mut stream: Stream<'a>,
+        facts: Facts,
+        ranges: Ranges,
+        tables: Tables,
+    ) -> Result<Self, String> {
+        tables.check(&facts, &ranges, stream.pieces())?;
         stream.resume(&facts.settled);
         let [low, high] = stream.bounds();
         let regions = Regions::new(Cube::around(low, high), ranges, &tables.reaches);
         let long = tables.long.into_iter().collect();
         let (guide, pieces) = (Guide(tables.guide), tables.pieces);
-        Self { stream, facts, regions, long, guide, pieces }
+        Ok(Self { stream, facts, regions, long, guide, pieces })
     }
 
     /// Returns the facts that take many numbers.
@@ -189,6 +198,12 @@ impl PieceBox {
         }
         let reach = regions.reach_in([low, high]) * (1.0 + 1e-5);
         Self([(low - reach).to_array(), (high + reach).to_array()])
+    }
+
+    /// Whether it is empty, or from a low to a high corner.
+    pub fn is_sound(&self) -> bool {
+        let [low, high] = self.0.map(Vec3::from);
+        *self == Self::EMPTY || low.is_finite() && high.is_finite() && low.cmple(high).all()
     }
 
     fn meets(&self, [low, high]: &[Vec3; 2]) -> bool {

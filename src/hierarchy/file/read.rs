@@ -174,7 +174,7 @@ impl Hierarchy {
     fn new(path: &Path, bytes: Bytes, limits: &Limits, may_be_cut: bool) -> Result<Self> {
         let begun = bytes.begun(|bytes| begin(path, bytes, limits, may_be_cut));
         let begun = begun.map_err(|error| bytes.why(path, error))?;
-        Ok(Self::assemble(path, Store::File(bytes), begun, limits.clone()))
+        Ok(Self::assemble(path, Store::File(bytes.ready()), begun, limits.clone()))
     }
 
     /// Uses a tree directly, without encoding it.

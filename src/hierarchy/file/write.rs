@@ -1,7 +1,7 @@
 //! Writes a hierarchy block by block. Only the blocks being written are in memory.
 
 use super::{
-    HASH,
+    HASH, PAGE_NODES,
     drafts::{Drafts, Joint},
     header::{Header, Stored},
     page::{self, Coded},
@@ -12,7 +12,7 @@ use crate::{
     about::Stance,
     gaussians::Colors,
     hierarchy::{
-        Block, Node, Tree,
+        Block, MOST_CHILDREN, Node, Tree,
         validate::{fault, fault_of_box, fault_of_extent},
     },
     math::Bounds,
@@ -29,6 +29,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::{
     io::{self, Write},
+    ops::Range,
     path::{Path, PathBuf},
 };
 
@@ -344,6 +345,47 @@ impl Placed {
         let mut contents = Contents::default();
         contents.add(&coded.nodes);
         Self { root: coded.nodes[0], runs: coded.runs.clone(), around, places, contents }
+    }
+
+    /// Whether it can be what [`new`](Self::new) returns, with pages in this part of a file. One
+    /// that was read from a file may be anything.
+    pub fn is_sound(&self, pages: &Range<u64>) -> bool {
+        let Self { root, runs, around, places, contents } = self;
+        // Nodes follow each other from the root on, and every node but the root is a child.
+        let (mut nodes, mut children) = (0, 1);
+        for run in runs {
+            let is_next = run.nodes.start == nodes
+                && (1..=PAGE_NODES).contains(&run.nodes.end.saturating_sub(nodes))
+                && run.children.start == children
+                && run.children.end >= children
+                && run.children.start > run.nodes.start;
+            if !is_next {
+                return false;
+            }
+            (nodes, children) = (run.nodes.end, run.children.end);
+        }
+        let of_around = |(at, around): (usize, &Around)| {
+            let lengths = [around.radius, around.largest_size];
+            let is_bounded = around.center.iter().chain(&lengths).all(|value| value.is_finite())
+                && lengths.iter().all(|length| *length >= 0.0);
+            if at == 0 { *around == Around::EVERYTHING } else { is_bounded }
+        };
+        let of_place = |place: &Place| {
+            let end = place.offset.checked_add(place.bytes.into());
+            place.offset >= pages.start && end.is_some_and(|end| end <= pages.end)
+        };
+        let has_children = root.children > 0;
+        nodes > 0
+            && children == nodes
+            && u32::try_from(nodes).is_ok()
+            && (around.len(), places.len()) == (runs.len(), runs.len())
+            && around.iter().enumerate().all(of_around)
+            && places.iter().all(of_place)
+            && (1..=nodes as u64).contains(&contents.leaves)
+            && root.children as usize <= MOST_CHILDREN
+            && has_children == (nodes > 1)
+            && root.first_child == u32::from(has_children)
+            && check_nodes(std::slice::from_ref(root)).is_ok()
     }
 }
 

@@ -12,7 +12,7 @@ use serde::Deserialize;
 use splatkit::{
     Deadline, Error, Stop,
     about::Stance,
-    bricks,
+    bricks, disk,
     formats::{self, Kind, Stream},
     gaussians::Gaussians,
     glam::DVec3,
@@ -87,7 +87,10 @@ pub fn convert(
         look.check()?;
         own.preset()?;
         let load = Load::parse(load)?;
-        Ok(Work { files, output, own, load, look })
+        let work = Work { files, output, own, load, look };
+        // From here on, numbers that are wrong are those of files.
+        work.surfel_options(Deadline::NEVER).validate()?;
+        Ok(work)
     };
     let work = made().map_err(|error| raise(py, &error))?;
     let stop = Stop::default();
@@ -126,7 +129,8 @@ impl Work {
             if stop.is_requested() {
                 return Err(Error::Stopped);
             }
-            fs::rename(&part, &self.output).map_err(|error| Error::output(&self.output, error))
+            let renamed = disk::rename(&part, &self.output, self.own.overwrite);
+            renamed.map_err(|error| Error::output(&self.output, error))
         });
         if done.is_err() {
             // It may not be there.
@@ -269,7 +273,7 @@ impl Work {
         let mut gathered: Option<Gathered> = None;
         for path in &self.files {
             let own = self.splats_of(path)?;
-            hierarchy::check_splats(&own.set).map_err(|error| error.in_file(path))?;
+            hierarchy::check_splats(&own.set).map_err(|error| error.stated_in(path, "content"))?;
             match &mut gathered {
                 None => gathered = Some(own),
                 Some(all) => all.join(own, path)?,
@@ -279,7 +283,7 @@ impl Work {
         let build = self.build_options(all.closed, all.points)?;
         let write = self.write_options(&all.frame)?;
         hierarchy::build_file(&all.set, part, &build, &write, None)
-            .map_err(|error| error.in_file(&self.files[0]))
+            .map_err(|error| error.stated_in(&self.files[0], "content"))
     }
 
     /// Whether the files can be read in pieces, and need more memory than may be used as a whole.
@@ -335,7 +339,7 @@ impl Work {
                 let named = self.load.scalar().is_some();
                 self.look.paint(&path.display().to_string(), &mut mesh, up, named)?;
                 let set = mesh.surfels(&self.surfel_options(deadline));
-                let set = set.map_err(|error| error.in_file(path))?;
+                let set = set.map_err(|error| error.stated_in(path, "content"))?;
                 let points = mesh.positions.len() as u64;
                 Ok(Gathered { set, closed: mesh.is_solid(), frame, points })
             }
@@ -385,7 +389,7 @@ impl Work {
             match &mut gathered {
                 None => gathered = Some((own, points)),
                 Some((all, count)) => {
-                    all.join(own).map_err(|error| error.in_file(path))?;
+                    all.join(own).map_err(|error| error.stated_in(path, "content"))?;
                     *count += points;
                 }
             }
@@ -419,8 +423,9 @@ impl Work {
             return Ok((set, points));
         }
         let Gathered { set, points, frame, .. } = self.splats_of(path)?;
-        hierarchy::check_splats(&set).map_err(|error| error.in_file(path))?;
-        let mut set = Gaussians::from_splats(&set).map_err(|error| error.in_file(path))?;
+        hierarchy::check_splats(&set).map_err(|error| error.stated_in(path, "content"))?;
+        let mut set =
+            Gaussians::from_splats(&set).map_err(|error| error.stated_in(path, "content"))?;
         set.about.stance = frame.stance;
         Ok((set, points))
     }
@@ -431,7 +436,7 @@ impl Work {
             Frame { stance: set.about.stance, is_guessed: false, unit: set.about.length.clone() };
         let (build, write) = (self.build_options(false, points)?, self.write_options(&frame)?);
         hierarchy::build_gaussians(&set, part, &build, &write, None)
-            .map_err(|error| error.in_file(&self.files[0]))
+            .map_err(|error| error.stated_in(&self.files[0], "content"))
     }
 
     fn gaussians(&self, part: &Path) -> Result<(), Error> {
@@ -463,7 +468,7 @@ impl Gathered {
             return Err(Error::input(path, "splats", message));
         }
         let mut set = other.set;
-        set.move_origin(self.set.origin).map_err(|error| error.in_file(path))?;
+        set.move_origin(self.set.origin).map_err(|error| error.stated_in(path, "content"))?;
         self.set.splats.append(&mut set.splats);
         // A statement counts more than a guess before it.
         let frame = other.frame;

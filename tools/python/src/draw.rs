@@ -367,9 +367,12 @@ impl Stage {
         let sheet = settings.sheet_thickness.or_else(|| sheet_of(&kept.scene));
         let done = renderer.render(&camera, &effort.settings(&settings, sheet));
         kept.renderer = Some(renderer);
-        let factor = draw.factor(&kept.scene);
+        let (factor, scene) = (draw.factor(&kept.scene), kept.scene.clone());
         self.put(kept, draw.draws_facets());
-        let (mut picture, stats) = done?;
+        let (mut picture, stats) = done.map_err(|error| match error {
+            Error::Argument(_) if is_fitted => locked(&self.items).out_of_sight(&scene, error),
+            other => other,
+        })?;
         // An opacity that rounds to 0 in a file of 8 bits counts as none.
         if is_fitted && picture.color.iter().all(|pixel| pixel[3] < 0.5 / 255.0) {
             return Err(Error::NothingToDraw("the picture is empty: nothing has opacity".into()));

@@ -34,6 +34,8 @@ pub struct Items {
     pub look: usize,
     /// What was added: kind, name, and the number of splats or samples.
     pub contents: Vec<(&'static str, String, u64)>,
+    /// Whether each input is a file.
+    are_files: Vec<bool>,
 }
 
 /// An item, or a mesh, which is drawn as facets in the usual pictures and as surfels in others.
@@ -43,21 +45,39 @@ enum Entry {
 }
 
 struct Faceted {
-    name: String,
+    name: Name,
     facets: Arc<FacetSet>,
     mesh: Mesh,
     options: SurfelOptions,
     surfels: OnceLock<Arc<SplatSet>>,
 }
 
+/// What an input is called in messages.
+#[derive(Clone)]
+pub struct Name {
+    pub text: String,
+    /// Whether it is the path of a file. Otherwise the values are the caller's.
+    pub is_file: bool,
+}
+
 /// An input with its looks.
 pub struct Added {
-    pub name: String,
+    pub name: Name,
     pub input: Input,
     pub load: Load,
     pub look: Look,
     /// By when its splats must be made.
     pub deadline: Deadline,
+}
+
+impl Name {
+    /// Returns an error that its values cause: the fault of the file, or of the caller.
+    fn fault(&self, error: Error) -> Error {
+        match self.is_file {
+            true => error.stated_in(self.text.as_ref(), "content"),
+            false => error.in_file(self.text.as_ref()),
+        }
+    }
 }
 
 impl Items {
@@ -85,7 +105,8 @@ impl Items {
                 }
                 // No other frame has this stance.
                 let is_patient = header.stance == Some(Stance::RAS);
-                self.subject.frame(&name, if is_patient { Frame::Patient } else { Frame::Own });
+                self.subject
+                    .frame(&name.text, if is_patient { Frame::Patient } else { Frame::Own });
                 let bounds = header.bounds;
                 self.push("hierarchy", name, count, bounds, Item::Hierarchy(hierarchy));
                 Ok(())
@@ -97,36 +118,38 @@ impl Items {
     pub fn restore(&mut self, count: usize, subject: Subject) {
         self.entries.truncate(count);
         self.contents.truncate(count);
+        self.are_files.truncate(count);
         self.subject = subject;
     }
 
     fn push(
         &mut self,
         kind: &'static str,
-        name: String,
+        name: Name,
         count: u64,
         bounds: Bounds,
         item: impl Into<Entry>,
     ) {
         self.subject.count_in(bounds);
-        self.contents.push((kind, name, count));
+        self.contents.push((kind, name.text, count));
+        self.are_files.push(name.is_file);
         self.entries.push(item.into());
     }
 
     fn add_mesh(
         &mut self,
-        name: String,
+        name: Name,
         mut mesh: Mesh,
         look: &Look,
         named: bool,
         deadline: Deadline,
     ) -> Result<(), Error> {
         let mut subject = self.subject.clone();
-        subject.frame(&name, mesh.about.frame);
+        subject.frame(&name.text, mesh.about.frame);
         match mesh.about.stance {
             Some(stance) => {
                 if let Some(wanted) = subject.consider(stance, Origin::File) {
-                    say_turned(&name, stance, wanted);
+                    say_turned(&name.text, stance, wanted);
                     mesh.stand(wanted);
                 }
             }
@@ -138,11 +161,11 @@ impl Items {
                 }
             }
         }
-        look.paint(&name, &mut mesh, subject.stance.up, named)?;
+        look.paint(&name.text, &mut mesh, subject.stance.up, named)?;
         let options = SurfelOptions { deadline, ..look.surfel_options() };
         let kind = if mesh.triangles.is_empty() { "points" } else { "mesh" };
         let bounds = mesh.bounds().map(|[min, max]| Bounds { min, max });
-        let wrong = |error: Error| error.in_file(name.as_ref());
+        let wrong = |error: Error| name.fault(error);
         if let Some(facets) = mesh.facets(&options).map_err(wrong)? {
             let (count, own) = (facets.facets.len() as u64, facets.bounds());
             let options = SurfelOptions { deadline: Deadline::NEVER, ..options };
@@ -159,12 +182,12 @@ impl Items {
         Ok(())
     }
 
-    fn add_gaussians(&mut self, name: String, mut set: Gaussians) {
-        self.subject.frame(&name, set.about.frame);
+    fn add_gaussians(&mut self, name: Name, mut set: Gaussians) {
+        self.subject.frame(&name.text, set.about.frame);
         match set.about.stance {
             Some(stance) => {
                 if let Some(wanted) = self.subject.consider(stance, Origin::File) {
-                    say_turned(&name, stance, wanted);
+                    say_turned(&name.text, stance, wanted);
                     set.stand(wanted);
                 }
             }
@@ -174,35 +197,36 @@ impl Items {
         self.push("gaussians", name, count, bounds, Item::Gaussians(set.into()));
     }
 
-    fn add_bricks(&mut self, name: String, bricks: Arc<Bricks>, look: &Look) -> Result<(), Error> {
+    fn add_bricks(&mut self, name: Name, bricks: Arc<Bricks>, look: &Look) -> Result<(), Error> {
         if look.sharp {
             return Err(Error::Argument("a volume in bricks cannot be sharpened".into()));
         }
-        let transfer = look.of_bricks(&name, &bricks)?;
+        let transfer = look.of_bricks(&name.text, &bricks)?;
         let count = bricks.level(0).dims.iter().product::<usize>() as u64;
         let (bounds, kernel) = (bricks.bounds(), look.kernel()?);
-        self.subject.frame(&name, bricks.header().frame);
+        self.subject.frame(&name.text, bricks.header().frame);
         self.subject.stand(bricks.header().stance(), Stance::SURVEY);
         self.push("bricks", name, count, bounds, Item::Bricks(bricks, kernel, transfer));
         Ok(())
     }
 
-    fn add_volume(&mut self, name: String, mut volume: Volume, look: &Look) -> Result<(), Error> {
+    fn add_volume(&mut self, name: Name, mut volume: Volume, look: &Look) -> Result<(), Error> {
         if volume.colors.is_some() {
             match look.shows_values() {
                 None => return self.add_colors(name, &volume),
                 Some(option) => notes::add(format!(
-                    "{name} has colours; {option} shows their brightness instead"
+                    "{} has colours; {option} shows their brightness instead",
+                    name.text
                 )),
             }
         }
-        let transfer = look.of_volume(&name, &volume)?;
+        let transfer = look.of_volume(&name.text, &volume)?;
         let kernel = look.kernel()?;
         let [min, max] = volume.bounds();
         if look.sharp {
             volume = volume.sharpened(&kernel)?;
         }
-        self.subject.frame(&name, volume.about.frame);
+        self.subject.frame(&name.text, volume.about.frame);
         self.subject.stand(volume.about.stance, Stance::SURVEY);
         let (count, bounds) = (volume.len() as u64, Bounds { min, max });
         self.push("volume", name, count, bounds, Item::Volume(volume.into(), kernel, transfer));
@@ -210,8 +234,8 @@ impl Items {
     }
 
     /// Adds a volume in its own colours.
-    fn add_colors(&mut self, name: String, volume: &Volume) -> Result<(), Error> {
-        let splats = volume.colored_splats().map_err(|error| error.in_file(name.as_ref()))?;
+    fn add_colors(&mut self, name: Name, volume: &Volume) -> Result<(), Error> {
+        let splats = volume.colored_splats().map_err(|error| name.fault(error))?;
         let splats = splats.expect("the volume has colours");
         self.subject.stand(volume.about.stance, Stance::SURVEY);
         let [min, max] = volume.bounds();
@@ -222,32 +246,35 @@ impl Items {
 
     fn add_samples(
         &mut self,
-        name: String,
+        name: Name,
         points: &Points,
         load: &Load,
         look: &Look,
         deadline: Deadline,
     ) -> Result<(), Error> {
-        let transfer = look.of_samples(&name, points)?;
-        let splats = points.to_splats(&load.sample_options(deadline));
-        let splats = splats.map_err(|error| error.in_file(name.as_ref()))?;
+        let transfer = look.of_samples(&name.text, points)?;
+        // Options are the caller's, whatever holds the samples.
+        let options = load.sample_options(deadline);
+        options.validate()?;
+        let splats = points.to_splats(&options);
+        let splats = splats.map_err(|error| name.fault(error))?;
         let [min, max] = points.bounds();
         let bounds = Bounds { min, max }.union(splats.bounds());
-        self.subject.frame(&name, points.about.frame);
+        self.subject.frame(&name.text, points.about.frame);
         self.subject.stand(points.about.stance, Stance::SURVEY);
         let item = Item::Scalar(splats.into(), transfer);
         self.push("samples", name, points.len() as u64, bounds, item);
         Ok(())
     }
 
-    fn add_cells(&mut self, name: String, mut cells: Cells, look: &Look) -> Result<(), Error> {
-        let transfer = look.of_cells(&name, &cells)?;
+    fn add_cells(&mut self, name: Name, mut cells: Cells, look: &Look) -> Result<(), Error> {
+        let transfer = look.of_cells(&name.text, &cells)?;
         if !transfer.isosurfaces.is_empty() {
             cells = cells.with_values_of_points();
         }
         let tetrahedra = cells.tetrahedra(&CellOptions::default());
-        let tetrahedra = tetrahedra.map_err(|error| error.in_file(name.as_ref()))?;
-        self.subject.frame(&name, cells.about.frame);
+        let tetrahedra = tetrahedra.map_err(|error| name.fault(error))?;
+        self.subject.frame(&name.text, cells.about.frame);
         self.subject.stand(cells.about.stance, Stance::SURVEY);
         let (count, bounds) = (cells.len() as u64, tetrahedra.bounds());
         self.push("cells", name, count, bounds, Item::Cells(tetrahedra.into(), transfer));
@@ -293,8 +320,36 @@ impl Items {
                 Entry::Mesh(own) => Item::Radiance(own.surfels()?),
             });
         }
-        scene.validate()?;
+        scene.validate().map_err(|error| self.at_fault(&scene, error))?;
         Ok(scene)
+    }
+
+    /// Returns the error for a scene that cannot be drawn: that of the file whose item cannot be
+    /// drawn by itself, if there is one.
+    fn at_fault(&self, scene: &Scene, error: Error) -> Error {
+        let names = self.contents.iter().zip(&self.are_files);
+        let found = names.zip(&scene.items).find_map(|(name, item)| match item.validate() {
+            Err(own @ Error::Argument(_)) => Some((name, own)),
+            _ => None,
+        });
+        match found {
+            Some(((content, true), own)) => own.stated_in(content.1.as_ref(), "content"),
+            _ => error,
+        }
+    }
+
+    /// Returns the error for a scene that its own usual camera cannot see: that of the file that
+    /// reaches farthest.
+    pub fn out_of_sight(&self, scene: &Scene, error: Error) -> Error {
+        let reach = |item: &Item| {
+            let Bounds { min, max } = item.bounds();
+            min.abs().max(max.abs()).max_element()
+        };
+        let names = self.contents.iter().zip(&self.are_files).zip(&scene.items);
+        match names.max_by(|(_, a), (_, b)| reach(a).total_cmp(&reach(b))) {
+            Some(((content, true), _)) => error.stated_in(content.1.as_ref(), "bounds"),
+            _ => error,
+        }
     }
 }
 
@@ -304,7 +359,7 @@ impl Faceted {
             return Ok(surfels.clone());
         }
         let made = self.mesh.surfels(&self.options);
-        let made = made.map_err(|error| error.in_file(self.name.as_ref()))?;
+        let made = made.map_err(|error| self.name.fault(error))?;
         Ok(self.surfels.get_or_init(|| made.into()).clone())
     }
 }

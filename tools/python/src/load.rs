@@ -90,6 +90,7 @@ impl Load {
             depth: self.limits.depth.unwrap_or(default.depth),
             texels: self.limits.texels.unwrap_or(default.texels),
             seconds: self.limits.seconds.unwrap_or(default.seconds),
+            until: default.until,
         }
     }
 

@@ -102,7 +102,7 @@ impl Look {
             return Err(wrong("crease is an angle from 0 to 180 degrees"));
         }
         self.map()?;
-        Ok(())
+        self.surfel_options().validate()
     }
 
     /// Returns the attribute of a surface to read, if the look names one.

@@ -1,8 +1,7 @@
 //! Warnings of the library, such as of elements that were left out, as warnings of Python.
 
-use pyo3::{ffi::c_str, prelude::*};
+use pyo3::{intern, prelude::*};
 use std::{
-    ffi::CString,
     fmt::Write,
     sync::{Mutex, Once, PoisonError},
 };
@@ -41,14 +40,8 @@ pub fn warn(py: Python<'_>) -> PyResult<()> {
     if messages.is_empty() {
         return Ok(());
     }
-    let class = py.import("pysplatkit._errors")?.getattr("DataWarning")?;
-    for message in messages {
-        let message = CString::new(message.replace('\0', " "));
-        let text = message.as_deref().unwrap_or(c_str!("a warning"));
-        // The level of the caller of the package.
-        PyErr::warn(py, &class, text, 2)?;
-    }
-    Ok(())
+    let warn = py.import(intern!(py, "pysplatkit._errors"))?.getattr(intern!(py, "warn"))?;
+    messages.into_iter().try_for_each(|message| warn.call1((message,)).map(drop))
 }
 
 struct Collector;

@@ -6,7 +6,7 @@ use crate::{
     cells::CellArrays,
     draw::{Draw, Stage},
     errors::{options, raise, wrong},
-    items::Added,
+    items::{Added, Name},
     load::{Input, Load, warn_of_holes},
     look::Look,
     picture::Picture,
@@ -17,9 +17,11 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 use splatkit::{
     Deadline, Error, Stop,
-    about::{About, Frame, Modality, Stance},
+    about::{About, Frame, Label, Modality, Stance},
+    formats,
     gaussians::{Gaussians, harmonics},
     glam::{DMat3, DVec3, Quat, Vec3},
+    input::Limits,
     interaction::Effort,
     scattered::Points,
     surface::Mesh,
@@ -52,6 +54,37 @@ struct Told {
     up: Option<[f64; 3]>,
     /// The frame of a patient, `lps` or `ras`.
     frame: Option<String>,
+    labels: Option<ArrayLabels>,
+}
+
+/// What a caller says of the values of a volume: whether they are labels, the labels' names, or a
+/// file of them.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged)]
+enum ArrayLabels {
+    Are(bool),
+    Table(PathBuf),
+    Names(Vec<(i32, String)>),
+}
+
+impl ArrayLabels {
+    /// Returns a volume with labels as the caller says; without a word, they are guessed.
+    fn apply(own: Option<&Self>, volume: Volume) -> Result<Volume, Error> {
+        let named = |(value, name): &(i32, String)| Label {
+            value: *value,
+            name: name.clone(),
+            ..Label::default()
+        };
+        Ok(match own {
+            None => volume.with_guessed_labels(),
+            Some(Self::Are(false)) => volume,
+            Some(Self::Are(true)) => volume.with_labels(Vec::new()),
+            Some(Self::Names(names)) => volume.with_labels(names.iter().map(named).collect()),
+            Some(Self::Table(path)) => {
+                volume.with_labels(formats::read_labels(path, &Limits::default())?)
+            }
+        })
+    }
 }
 
 impl Told {
@@ -274,7 +307,8 @@ impl Scene {
     fn add(&self, py: Python<'_>, input: Input, told: Told, more: (Load, Look)) -> PyResult<()> {
         let (stage, (load, look)) = (self.0.clone(), more);
         warn_of_holes(&told.name, &input);
-        let added = Added { name: told.name, input, load, look, deadline: Deadline::NEVER };
+        let name = Name { text: told.name, is_file: false };
+        let added = Added { name, input, load, look, deadline: Deadline::NEVER };
         let stop = Stop::default();
         let own = stop.clone();
         run(py, &stop, move || stage.add(added, &own))
@@ -306,7 +340,7 @@ impl Scene {
             let deadline = load.limits().deadline();
             let attribute = look.attribute();
             let input = load.open(&path, attribute.as_deref(), &mut Vec::new())?;
-            let name = path.display().to_string();
+            let name = Name { text: path.display().to_string(), is_file: true };
             stage.add(Added { name, input, load, look, deadline }, &own)
         })
     }
@@ -324,10 +358,14 @@ impl Scene {
         let made = samples(&array).and_then(|(dims, samples)| Ok((dims, samples, told.about()?)));
         let (dims, samples, about) = made.map_err(|error| raise(py, &error))?;
         let (lattice, missing) = (told.lattice(dims), told.missing);
-        let measured = move || Volume::with_missing(lattice, samples, missing);
-        let mut volume: Volume = run(py, &Stop::default(), measured)?;
-        let holes = std::mem::replace(&mut volume.about, about).holes;
-        volume.about.holes = holes;
+        let labels = told.labels.clone();
+        let measured = move || {
+            let mut volume = Volume::with_missing(lattice, samples, missing)?;
+            let holes = std::mem::replace(&mut volume.about, about).holes;
+            volume.about.holes = holes;
+            ArrayLabels::apply(labels.as_ref(), volume)
+        };
+        let volume: Volume = run(py, &Stop::default(), measured)?;
         self.add(py, Input::Volume(volume), told, more)
     }
 

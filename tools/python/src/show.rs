@@ -16,6 +16,7 @@ use splatkit::{
     color::ColorMap,
     glam::{DVec2, DVec3},
     interaction::{Effort, Orbit, Probe},
+    math::Camera,
     volume::TransferFunction,
 };
 
@@ -103,6 +104,7 @@ fn moved(scene: &Scene, own: &str, size: [u32; 2], gesture: &str) -> Result<Stri
         depth.filter(|depth| *depth > 0.0)
     };
     let (up, diagonal) = scene.stage().stance();
+    let up = axis_of(&own, up);
     let mut orbit = Orbit::new(own, up, diagonal);
     match options(gesture)? {
         Gesture::Turn { drag } => orbit.turn(DVec2::from_array(drag), size),
@@ -119,6 +121,22 @@ fn moved(scene: &Scene, own: &str, size: [u32; 2], gesture: &str) -> Result<Stri
     // A camera that cannot be used is refused here, not when it draws.
     orbit.camera().view(size)?;
     Ok(to_json(orbit.camera()))
+}
+
+/// Returns the direction about which a hand turns a camera: the scene's way up if it points up in
+/// the picture, and otherwise that of the camera, which somebody has chosen.
+fn axis_of(camera: &Camera, scene: DVec3) -> DVec3 {
+    let forward = (camera.focal_point - camera.position).normalize_or_zero();
+    // Near a pole, the picture says nothing of the way up.
+    let in_picture = |up: DVec3| {
+        let up = up.normalize_or_zero();
+        let part = up - forward * up.dot(forward);
+        (part.length() > 0.02).then(|| part.normalize())
+    };
+    match (in_picture(camera.view_up), in_picture(scene)) {
+        (Some(own), Some(usual)) if own.dot(usual) < 0.999 => camera.view_up,
+        _ => scene,
+    }
 }
 
 /// Returns the world point that a picture shows at a place of the view, in pixels of a picture of

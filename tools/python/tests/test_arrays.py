@@ -237,3 +237,68 @@ def test_wrong_meshes_are_refused():
     ]:
         with pytest.raises(ArgumentError, match=message):
             call()
+
+
+def test_labels(tmp_path):
+    labels = np.zeros((20, 20, 20), np.uint16)
+    labels[4:16, 4:16, 4:10], labels[4:16, 4:16, 10:16] = 3, 1003
+    table = tmp_path / "table.txt"
+    table.write_text("3 left 255 0 0 255\n1003 right 0 0 255 255\n")
+
+    def drawn(**options):
+        return Scene().add_volume(labels, **options).render(SIZE, shade=False).color
+
+    # Names change nothing.
+    assert np.array_equal(drawn(labels=True), drawn(labels={3: "left", 1003: "right"}))
+    assert not np.array_equal(drawn(labels=True), drawn(labels=False))
+    # The colours of a table.
+    red, green, blue = (drawn(labels=table)[..., channel] for channel in range(3))
+    assert red.max() > 0.9
+    assert blue.max() > 0.9
+    assert green.max() < 0.05
+    with pytest.raises(pysplatkit.Error, match="missing"):
+        Scene().add_volume(labels, labels=tmp_path / "missing.txt")
+
+
+def test_directions_are_taken_as_the_command_takes_them():
+    from pysplatkit import _options
+
+    for text, wanted in [
+        ("+Y", [0, 1, 0]),
+        ("-x", [-1, 0, 0]),
+        ("Z", [0, 0, 1]),
+        ("1,2,3", [1, 2, 3]),
+        ((1, 2, 3), [1, 2, 3]),
+    ]:
+        assert _options.direction(text) == wanted
+    scene = Scene().add_points(np.random.default_rng(1).random((50, 3)))
+    assert tuple(scene.camera(up="+Y", view="front").view_up) == (0, 1, 0)
+    volume = Scene().add_volume(np.arange(64.0).reshape(4, 4, 4), isosurfaces=30)
+    assert volume.contents[0][0] == "volume"
+
+
+def test_all_errors_are_ours():
+    scene = Scene().add_points(np.random.default_rng(1).random((50, 3)))
+    for call in (
+        lambda: scene.camera(up="up"),
+        lambda: scene.camera(up="a,b,c"),
+        lambda: scene.camera(focal_point="middle"),
+        lambda: scene.camera(focal_point=object()),
+        lambda: scene.render((8, 8), background=5),
+        lambda: scene.render((8, 8), background="nocolour"),
+        lambda: Scene().add_volume(np.zeros((2, 2, 2)), spacing="wide"),
+        lambda: Scene().add_volume(np.zeros((2, 2, 2)), isosurfaces=["one"]),
+        lambda: Scene().add_volume(np.zeros((2, 2, 2)), shine=3),
+        lambda: Scene().add(object()),
+    ):
+        with pytest.raises(pysplatkit.Error):
+            call()
+
+
+def test_warnings_name_the_line_of_the_program():
+    holes = np.arange(64.0).reshape(4, 4, 4)
+    holes[0, 0, 0] = np.nan
+    for call in (lambda: Scene().add(holes), lambda: pysplatkit.render(holes, size=(8, 8))):
+        with pytest.warns(pysplatkit.DataWarning, match="missing") as caught:
+            call()
+        assert {own.filename for own in caught} == {__file__}

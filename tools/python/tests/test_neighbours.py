@@ -479,6 +479,38 @@ def test_dictionaries():
         Scene().add({"corners": vertices})
 
 
+def test_points_of_laspy():
+    """Points as laspy has them: scaled coordinates, and dimensions by name."""
+
+    class Format:
+        dimension_names = ("X", "Y", "Z", "intensity", "red", "green", "blue")
+
+    class LasData:
+        point_format = Format()
+
+        def __init__(self, places, most):
+            self.x, self.y, self.z = places.T
+            ramp = np.linspace(0, most, len(places)).astype(np.uint16)
+            self._own = {"red": ramp, "green": ramp, "blue": ramp, "intensity": ramp}
+
+        def __getitem__(self, name):
+            return self._own[name]
+
+    LasData.__module__ = "laspy.lasdata"
+    places = np.random.default_rng(1).random((500, 3)) * (3, 3, 0.2)
+    for most, kind in ((65535, np.uint16), (255, np.uint8)):
+        ramp = np.linspace(0, most, len(places)).astype(kind)
+        colors = np.stack([ramp] * 3, axis=1)
+        wanted = Scene().add_points(places, colors=colors, up=(0, 0, 1))
+        assert np.array_equal(picture(Scene().add(LasData(places, most))), picture(wanted))
+    cloud = LasData(places, 65535)
+    values = cloud["intensity"].astype(float)
+    wanted = Scene().add_points(places, values=values, up="+Z")
+    assert np.array_equal(picture(Scene().add(cloud, scalar="intensity")), picture(wanted))
+    with pytest.raises(pysplatkit.ArgumentError, match="no 'height', but X, Y"):
+        Scene().add(cloud, scalar="height")
+
+
 def test_unknown_objects_are_refused():
     for call in (
         lambda: Scene().add(object()),

@@ -111,7 +111,7 @@ impl Convert {
         }
         progress.stage(format!("Writing {}", self.output().display()));
         let start = Instant::now();
-        target.write(&set, self.output())?;
+        target.write(&set, self.output()).map_err(|error| self.at_fault(error))?;
         progress.clear();
         let write_ms = milliseconds(start);
         let bytes =
@@ -199,7 +199,7 @@ impl Convert {
             return self.expect_gaussians(&set, points, &build, &write, read_ms);
         }
         let built = hierarchy::build_gaussians(&set, self.output(), &build, &write, Some(&watch));
-        built.map_err(|error| error.in_file(&self.files[0]))?;
+        built.map_err(|error| self.at_fault(error))?;
         progress.clear();
         let bytes =
             self.output().metadata().map_err(|e| Error::file(self.output(), "read", e))?.len();
@@ -216,7 +216,8 @@ impl Convert {
         read_ms: f64,
     ) -> Result<(), Failure> {
         let part = set.part(0..set.len().min(SAMPLE));
-        let tree = hierarchy::Tree::of_gaussians(&part, build, None)?;
+        let tree = hierarchy::Tree::of_gaussians(&part, build, None);
+        let tree = tree.map_err(|error| self.at_fault(error))?;
         let share = set.len() as f64 / part.len() as f64;
         let bytes = hierarchy::file::to_bytes(&tree, write)?.len() as f64 * share;
         self.say_expected(set, points, bytes as u64, "about", read_ms)

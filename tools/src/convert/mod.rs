@@ -11,13 +11,14 @@ mod volume;
 
 use crate::{
     color::ColorFlags,
-    failure::Failure,
+    failure::{Failure, in_file},
     given::{self, Given},
     load::LoadFlags,
     output, parse,
     progress::Progress,
 };
 use clap::Args;
+use splatkit::Error;
 use std::path::{Path, PathBuf};
 
 #[derive(Args, Debug)]
@@ -133,6 +134,12 @@ impl Convert {
     /// Refuses to replace a file that was read.
     fn check_unneeded(&self, read: &[PathBuf]) -> Result<(), Failure> {
         if self.dry_run { Ok(()) } else { output::check_unneeded(self.output(), read) }
+    }
+
+    /// Returns an error that the values of the inputs cause. The flags are checked by then.
+    fn at_fault(&self, error: Error) -> Error {
+        let names = self.files.iter().map(|file| file.to_string_lossy());
+        in_file(Path::new(&names.collect::<Vec<_>>().join(", ")), error)
     }
 
     /// Returns the bytes of memory that a conversion may use.

@@ -4,7 +4,10 @@ use super::{Convert, external::name_of};
 use crate::{failure::Failure, given::Given, output, progress::Progress, timing::milliseconds};
 use clap::Args;
 use serde_json::json;
-use splatkit::hierarchy::external::{PartMade, Plan};
+use splatkit::{
+    disk,
+    hierarchy::external::{PartMade, Plan},
+};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -96,6 +99,7 @@ impl Convert {
     /// Refuses to replace a plan, unless that is allowed.
     pub(super) fn check_plan(&self, folder: &Path) -> Result<(), Failure> {
         let plan = folder.join("plan.json");
+        disk::may_replace(&plan, self.overwrite);
         if folder.exists() && !folder.is_dir() || plan.exists() {
             return output::check(if folder.is_dir() { &plan } else { folder }, self.overwrite);
         }

@@ -147,7 +147,7 @@ impl Convert {
         );
         let built =
             hierarchy::build_file(&gathered.set, self.output(), &build, &write, Some(&watch));
-        built.map_err(|error| error.in_file(&self.files[0]))?;
+        built.map_err(|error| self.at_fault(error))?;
         progress.clear();
         let build_ms = milliseconds(start);
         let bytes =
@@ -292,7 +292,7 @@ impl Convert {
         );
         let start = Instant::now();
         let built = hierarchy::Tree::build(&part, &build, None);
-        let tree = built.map_err(|error| error.in_file(&self.files[0]))?;
+        let tree = built.map_err(|error| self.at_fault(error))?;
         let bytes = hierarchy::file::to_bytes(&tree, &write)?.len() as f64;
         let share = splats.len() as f64 / count as f64;
         let build_ms = milliseconds(start) * share;

@@ -1,6 +1,6 @@
 //! Draws shapes and texts over a picture.
 
-use super::text::{Face, Mask};
+use super::text::{Face, Mask, Pen};
 use glam::DVec2;
 use splatkit::picture::Picture;
 
@@ -146,6 +146,24 @@ impl Canvas<'_> {
         self.face.width(text, self.size)
     }
 
+    /// Cuts a line that is too wide. It ends with “…” then.
+    pub fn shortened(&self, line: String, most: f64) -> String {
+        let (mut pen, mut end) = (Pen::default(), None);
+        for (at, letter) in line.char_indices() {
+            // What fits with the mark of a cut behind it.
+            let mut cut = pen;
+            self.face.advance(&mut cut, '…', self.size);
+            if f64::from(cut.width) <= most {
+                end = Some(at);
+            }
+            self.face.advance(&mut pen, letter, self.size);
+            if f64::from(pen.width) > most {
+                return end.map_or_else(String::new, |end| format!("{}…", &line[..end]));
+            }
+        }
+        line
+    }
+
     /// Draws a line of text; `at` is where its middle line meets the point that `align` says.
     pub fn text(&mut self, text: &str, at: DVec2, align: Align) {
         let color = self.ink.color;
@@ -154,6 +172,8 @@ impl Canvas<'_> {
 
     /// As [`text`](Self::text), in a colour of its own.
     pub fn colored_text(&mut self, text: &str, at: DVec2, align: Align, color: [f32; 3]) {
+        // Files name some texts, and letters beside the picture would take memory.
+        let text = &self.shortened(text.to_owned(), f64::from(self.picture.width));
         let left = match align {
             Align::Left => at.x,
             Align::Middle => at.x - 0.5 * self.text_width(text),

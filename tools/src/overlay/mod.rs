@@ -16,8 +16,8 @@ use clap::Args;
 use glam::DVec2;
 use ruler::Ruler;
 use serde_json::{Value, json};
-use splatkit::{Error, math::Camera, picture::Picture};
-use text::Face;
+use splatkit::{Error, interaction::SceneFile, math::Camera, picture::Picture};
+use text::{Face, Pen};
 
 /// What is written over the picture.
 #[derive(Args, Debug, Clone)]
@@ -34,8 +34,8 @@ pub struct OverlayFlags {
     /// point; with --orthographic, everywhere.
     #[arg(long)]
     scale_bar: bool,
-    /// Write this text above the picture's content; \n begins a new line.
-    #[arg(long, value_name = "TEXT")]
+    /// Write this text above the picture's content; \n begins a new line. At most 1000 characters.
+    #[arg(long, value_name = "TEXT", value_parser = caption)]
     caption: Option<String>,
 }
 
@@ -58,6 +58,16 @@ pub struct Overlay {
     facts: Facts,
     face: Face,
     ink: Ink,
+}
+
+const MOST_CAPTION: usize = SceneFile::MOST_CAPTION;
+
+/// Takes a caption, unless it is too long.
+fn caption(text: &str) -> Result<String, String> {
+    match text.chars().count() {
+        ..=MOST_CAPTION => Ok(text.to_owned()),
+        count => Err(format!("a caption has at most {MOST_CAPTION} characters, not {count}")),
+    }
 }
 
 /// Most scalar bars; more would hide the picture.
@@ -205,38 +215,37 @@ impl Canvas<'_> {
     /// not fit ends with “…”.
     pub(self) fn wrapped(&self, text: &str, most: f64, count: usize) -> Vec<String> {
         let mut lines = Vec::new();
-        for paragraph in text.replace("\\n", "\n").lines() {
-            let mut line = String::new();
+        let text = text.replace("\\n", "\n");
+        // Each letter is looked at a few times, however long the text is.
+        'text: for paragraph in text.lines() {
+            let (mut line, mut pen) = (String::new(), Pen::default());
             for word in paragraph.split_whitespace() {
-                let longer = if line.is_empty() { word.into() } else { format!("{line} {word}") };
-                if line.is_empty() || self.text_width(&longer) <= most {
-                    line = longer;
-                } else {
+                let before = (line.len(), pen);
+                let space = (!line.is_empty()).then_some(' ');
+                for letter in space.into_iter().chain(word.chars()) {
+                    line.push(letter);
+                    self.face.advance(&mut pen, letter, self.size);
+                }
+                if before.0 > 0 && f64::from(pen.width) > most {
+                    line.truncate(before.0);
                     lines.push(std::mem::replace(&mut line, word.into()));
+                    if lines.len() > count {
+                        break 'text;
+                    }
+                    pen = Pen::default();
+                    word.chars().for_each(|letter| self.face.advance(&mut pen, letter, self.size));
                 }
             }
             lines.push(line);
+            if lines.len() > count {
+                break;
+            }
         }
         if lines.len() > count {
             lines.truncate(count);
             lines.iter_mut().next_back().into_iter().for_each(|last| last.push('…'));
         }
         lines.into_iter().map(|line| self.shortened(line, most)).collect()
-    }
-
-    /// Cuts a line that is too wide.
-    fn shortened(&self, line: String, most: f64) -> String {
-        if self.text_width(&line) <= most {
-            return line;
-        }
-        let mut letters: Vec<char> = line.chars().collect();
-        while letters.pop().is_some() {
-            let text: String = letters.iter().chain(&['…']).collect();
-            if self.text_width(&text) <= most {
-                return text;
-            }
-        }
-        String::new()
     }
 }
 
@@ -387,5 +396,34 @@ mod tests {
         assert!(lines.iter().all(|line| canvas.text_width(line) <= 120.0), "{lines:?}");
         assert_eq!(canvas.wrapped("a\\nb", 120.0, 3), ["a", "b"]);
         assert!(canvas.wrapped("Donaudampfschifffahrt", 60.0, 1)[0].ends_with('…'));
+    }
+
+    #[test]
+    fn texts_of_any_length_are_drawn() {
+        // Files name values and labels. A text of this length took days.
+        let (long, face) = ("A".repeat(1 << 20), Face::open().unwrap());
+        let count = 80 * 40;
+        let (color, depth) = (vec![[0.0; 4]; count], vec![0.0; count]);
+        let mut picture = Picture { width: 80, height: 40, color, depth };
+        let ink = Ink::over(None);
+        let mut canvas = Canvas { picture: &mut picture, face: &face, ink, size: 20.0 };
+        for text in [long.clone(), "A ".repeat(1 << 19), "\u{300}".repeat(1 << 20)] {
+            let lines = canvas.wrapped(&text, 60.0, 2);
+            assert!(lines.len() <= 2);
+            assert!(lines.iter().all(|line| canvas.text_width(line) <= 60.0), "{lines:?}");
+        }
+        canvas.text(&long, DVec2::new(0.0, 20.0), Align::Left);
+        assert!(canvas.picture.color.iter().any(|pixel| pixel[3] > 0.5));
+    }
+
+    #[test]
+    fn captions_have_a_length() {
+        assert_eq!(caption(&"é".repeat(MOST_CAPTION)).map(|text| text.len()), Ok(2000));
+        let error = caption(&"A".repeat(500_000)).unwrap_err();
+        assert_eq!(error, "a caption has at most 1000 characters, not 500000");
+        let flag = OverlayFlags::augment_args(clap::Command::new("test"));
+        let flag = flag.get_arguments().find(|flag| flag.get_long() == Some("caption"));
+        let help = flag.unwrap().get_help().unwrap().to_string();
+        assert!(help.contains(&format!("At most {MOST_CAPTION} characters")), "{help}");
     }
 }

@@ -1,11 +1,18 @@
 //! Letters, drawn with the Ubuntu font (Ubuntu Font Licence 1.0).
 
-use ab_glyph::{Font, FontRef, PxScale, ScaleFont};
+use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont};
 use glam::DVec2;
 
 /// The font, opened once.
 pub struct Face {
     font: FontRef<'static>,
+}
+
+/// Where the next letter of a text begins.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pen {
+    pub width: f32,
+    before: Option<GlyphId>,
 }
 
 /// How much of each pixel of a rectangle a text covers, 0 to 1, row by row.
@@ -27,16 +34,18 @@ impl Face {
 
     /// Returns the width of a text whose letters have this height.
     pub fn width(&self, text: &str, size: f64) -> f64 {
+        let mut pen = Pen::default();
+        text.chars().for_each(|letter| self.advance(&mut pen, letter, size));
+        pen.width.into()
+    }
+
+    /// Moves a pen behind the next letter of a text.
+    pub fn advance(&self, pen: &mut Pen, letter: char, size: f64) {
         let font = self.font.as_scaled(PxScale::from(size as f32));
-        let mut width = 0.0;
-        let mut before = None;
-        for letter in text.chars() {
-            let glyph = font.glyph_id(letter);
-            width += before.map_or(0.0, |before| font.kern(before, glyph));
-            width += font.h_advance(glyph);
-            before = Some(glyph);
-        }
-        f64::from(width)
+        let glyph = font.glyph_id(letter);
+        pen.width += pen.before.map_or(0.0, |before| font.kern(before, glyph));
+        pen.width += font.h_advance(glyph);
+        pen.before = Some(glyph);
     }
 
     /// Draws a text that begins at the left of a line; `at.y` is the middle of its capitals.

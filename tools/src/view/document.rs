@@ -45,11 +45,14 @@ pub struct Document {
     pending: Vec<OsString>,
     /// The file that the scene was read from or saved to.
     pub path: Option<PathBuf>,
+    /// Whether scene files may name files outside their folders, and addresses.
+    pub is_trusting: bool,
 }
 
 impl Document {
     pub fn new(now: SceneFile) -> Self {
-        Self { now, undone: Vec::new(), done: Vec::new(), pending: Vec::new(), path: None }
+        let (undone, done, pending) = (Vec::new(), Vec::new(), Vec::new());
+        Self { now, undone, done, pending, path: None, is_trusting: false }
     }
 
     /// Takes the inputs and flags of a command line. `task` is its subcommand.
@@ -91,7 +94,8 @@ impl Document {
                 let flags = values.iter().map(|value| format!("--{name}={value}").into());
                 self.pending.extend(flags);
             }
-            "quiet" | "verbose" | "threads" => {}
+            "quiet" | "verbose" | "threads" | "cache" | "cache-size" | "allow-host" => {}
+            "trust-scene" => self.is_trusting = true,
             "color" | "opacity" | "transfer" | "range" | "iso" => self.take_own(name, values),
             _ if scene_file::is_option(name) => {
                 let value = match &values[..] {
@@ -290,7 +294,10 @@ impl Document {
 
     /// Saves the scene, and remembers the file.
     pub fn save(&mut self, path: &Path) -> splatkit::Result<()> {
-        self.now.write(path)?;
+        let mut scene = self.now.clone();
+        // The next user decides what may be taken.
+        scene.options.retain(|name, _| !scene_file::is_limit(name));
+        scene.write(path)?;
         self.path = Some(path.to_owned());
         Ok(())
     }

@@ -6,7 +6,7 @@ use super::{
     loader::text_of,
     window::Window,
 };
-use crate::motion::read_path;
+use crate::{motion::read_path, scene_file};
 use splatkit::{
     input::Limits, interaction::CameraEntry, picture::PictureFormat, volume::TransferFunction,
 };
@@ -28,7 +28,12 @@ impl Window {
     pub fn save_scene(&mut self, path: &Path) {
         self.fix_view();
         let done = self.document.save(path);
+        let is_saved = done.is_ok();
         self.say_saved(path, done);
+        if is_saved && scene_file::read(path, &crate::command(), false).is_err() {
+            let name = path.display();
+            self.say(format!("{name} names files elsewhere: open it with --trust-scene"), false);
+        }
     }
 
     /// Copies the command that draws what is shown.

@@ -45,12 +45,14 @@ const SIZE: [f32; 2] = [1280.0, 800.0];
 )]
 pub struct View {
     #[command(flatten)]
-    _scene: Render,
+    scene: Render,
 }
 
 impl View {
     pub fn run(self, matches: &ArgMatches, progress: &Progress) -> Result<(), Failure> {
         let own = matches.subcommand().map_or(matches, |(_, own)| own);
+        // What cannot be opened is said here, as `render` says it, and not in a window.
+        self.scene.check_files()?;
         let document = Document::of_command(own, "view")?;
         progress.clear();
         open(document)

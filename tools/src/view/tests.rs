@@ -174,7 +174,8 @@ fn pictures_and_scenes_are_saved() {
     let command = Command::command();
     let matches = command.clone().try_get_matches_from(&words).expect("arguments");
     let words = scene_file::expanded(&words, &matches, &command).expect("a scene");
-    let matches = command.try_get_matches_from(words.expect("a scene")).expect("arguments");
+    let matches =
+        command.try_get_matches_from(words.expect("a scene").arguments).expect("arguments");
     let Task::Render(render) = Command::from_arg_matches(&matches).expect("a command").task else {
         panic!("another task");
     };

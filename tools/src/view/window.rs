@@ -183,13 +183,18 @@ impl Window {
     /// Adds files to the scene, or opens a scene file in place of it.
     pub fn open(&mut self, files: Vec<PathBuf>) {
         if let Some(path) = files.iter().find(|path| scene_file::is_scene(path)) {
-            match SceneFile::read(path, &splatkit::input::Limits::default()) {
+            let is_trusting = self.document.is_trusting;
+            match scene_file::read(path, &crate::command(), is_trusting) {
                 Ok(scene) => {
                     self.document = Document::new(scene);
+                    self.document.is_trusting = is_trusting;
                     self.document.path = Some(path.clone());
                     self.loaded_by = None;
                 }
-                Err(error) => self.say(error.to_string(), true),
+                Err(error) => {
+                    let hint = error.hint().map_or_else(String::new, |hint| format!("; {hint}"));
+                    self.say(format!("{error}{hint}"), true);
+                }
             }
             return;
         }

@@ -356,3 +356,31 @@ fn phantoms_become_files() {
     folder.run("generate egg -o egg.nrrd").fails(2, &["marschner-lobb", "head"]);
     folder.run("generate ball -o none.nrrd --dims 0x2x2").fails(2, &["holds none"]);
 }
+
+/// Ten processes begin a result of one new name: one wins, the others say so, and nothing of
+/// theirs is left.
+#[test]
+fn one_of_ten_writers_of_a_new_name_wins() {
+    let folder = Folder::new();
+    folder.put("a.ply", PLY);
+    let begin = |_| {
+        let mut command = folder.command();
+        command.args(["convert", "a.ply", "-o", "new.splk"]);
+        command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped());
+        command.spawn().unwrap()
+    };
+    let all: Vec<_> = (0..10).map(begin).collect();
+    let done: Vec<_> = all.into_iter().map(|one| one.wait_with_output().unwrap()).collect();
+    let (won, lost): (Vec<_>, Vec<_>) = done.into_iter().partition(|one| one.status.success());
+    assert_eq!(won.len(), 1);
+    for one in lost {
+        let told = String::from_utf8_lossy(&one.stderr).into_owned();
+        assert_eq!(one.status.code(), Some(1), "{told}");
+        let is_named = told.contains("appeared while") || told.contains("exists already");
+        assert!(is_named && told.contains("new.splk") && told.contains("--overwrite"), "{told}");
+    }
+    folder.run("check new.splk").ok();
+    let mut left: Vec<_> = std::fs::read_dir(folder.path("")).unwrap().flatten().collect();
+    left.retain(|file| file.file_name().to_string_lossy().ends_with("splatkit-part"));
+    assert!(left.is_empty(), "{left:?}");
+}

@@ -28,6 +28,7 @@ mod scene_files;
 mod transfer;
 mod video;
 mod views;
+mod whose_fault;
 mod wrong_uses;
 
 /// The command that is tested.

@@ -43,23 +43,26 @@ fn a_scene_file_draws_what_its_flags_draw() {
             "flags.png",
         ])
         .ok();
-    folder.run("render scenes/s.json -o scene.png").ok();
+    folder
+        .run("render scenes/s.json -o scene.png")
+        .fails(3, &["scenes/s.json: inputs[0].file", "../a.nrrd", "--trust-scene"]);
+    folder.run("render scenes/s.json -o scene.png --trust-scene").ok();
     let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
     assert!(is_png(&read("scene.png"), 64, 48));
     assert_eq!(read("flags.png"), read("scene.png"));
     // Flags beside the scene count more.
-    folder.run("render scenes/s.json -o other.png --size 32x32 --azimuth 70").ok();
+    folder.run("render scenes/s.json --trust-scene -o other.png --size 32x32 --azimuth 70").ok();
     assert!(is_png(&read("other.png"), 32, 32));
     // A transfer function in a file of its own, seen from the scene's folder.
     folder.put("scenes/t.json", transfer);
     let named = std::fs::read_to_string(folder.path("scenes/s.json")).unwrap();
     folder.put("scenes/n.json", named.replace(transfer, "\"t.json\""));
-    folder.run("render scenes/n.json -o named.png").ok();
+    folder.run("render scenes/n.json -o named.png --trust-scene").ok();
     assert_eq!(read("named.png"), read("scene.png"));
     // The file itself draws beside itself.
-    folder.run("scenes/s.json -o same.png").ok();
+    folder.run("scenes/s.json -o same.png --trust-scene").ok();
     assert_eq!(read("same.png"), read("scene.png"));
-    let found = folder.json("bench scenes/s.json --frames 1 --json");
+    let found = folder.json("bench scenes/s.json --trust-scene --frames 1 --json");
     assert!(found.is_object());
 }
 
@@ -106,4 +109,40 @@ fn wrong_scenes_name_what_is_wrong() {
     folder.put("s.json", format!("{{{input}}}"));
     folder.run("render s.json a.ply -o x.png").fails(2, &["drawn alone"]);
     folder.run("render none.json -o x.png").fails(3, &["none.json"]);
+}
+
+/// A scene is an input: it raises no limits, reads nothing elsewhere, asks no server, and says as
+/// much as a picture can show.
+#[test]
+fn scenes_of_strangers_are_bounded() {
+    let folder = folder();
+    std::fs::create_dir(folder.path("s")).unwrap();
+    folder.put("s/a.ply", PLY);
+    let scene = |inputs: &str, more: &str| {
+        let text = format!(r#"{{"splatkit_scene": 1, "inputs": [{inputs}]{more}}}"#);
+        folder.put("s/s.json", text);
+        folder.run("render s/s.json -o s.png --engine cpu --size 8x8")
+    };
+    let own = r#"{"file": "a.ply"}"#;
+    scene(own, r#", "options": {"limit-bytes": 1000000, "limit-seconds": 60}"#).ok();
+    let many = vec![own; 10_001].join(",");
+    let letters = "A".repeat(500_000);
+    for (inputs, more, words) in [
+        (r#"{"file": "../a.ply"}"#, "", ["inputs[0].file", "--trust-scene"]),
+        (r#"{"file": "https://127.0.0.1:1/a.ply"}"#, "", ["inputs[0].file", "--trust-scene"]),
+        (own, r#", "transfer": "/etc/hostname""#, ["“/etc/hostname”", "--trust-scene"]),
+        (own, r#", "options": {"labels": "../a.ply"}"#, ["options.labels", "--trust-scene"]),
+        (own, r#", "options": {"limit-bytes": 9e12}"#, ["options.limit-bytes", "only lower"]),
+        (own, r#", "options": {"gpu-timeout": 1e9}"#, ["options.gpu-timeout", "--gpu-timeout"]),
+        (own, r#", "options": {"trust-scene": true}"#, ["options.trust-scene", "not an option"]),
+        (&many, "", ["there are 10001", "at most 10000"]),
+        (
+            own,
+            &format!(r#", "options": {{"caption": "{letters}"}}"#),
+            ["options.caption", "has 500000 letters"],
+        ),
+    ] {
+        let words = [&["s/s.json"], &words[..]].concat();
+        scene(inputs, more).fails(3, &words);
+    }
 }

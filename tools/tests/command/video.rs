@@ -247,7 +247,7 @@ fn wrong_films_are_refused() {
         ("-o out.png --path path.json --depth d.png", 2, &["--depth", "--path"]),
         ("-o out.gif --path typo.json", 3, &["typo.json", "viewup", "line 2"]),
         ("-o out.gif --path late.json", 3, &["late.json", "keyframe 3"]),
-        ("-o out.gif --path long.json", 2, &["long.json", "too many frames"]),
+        ("-o out.gif --path long.json", 3, &["long.json", "too many frames"]),
         ("-o out.gif --path gone.json", 3, &["gone.json"]),
         ("-o out.gif --turntable 3 --fps 0", 2, &["0.1"]),
     ] {

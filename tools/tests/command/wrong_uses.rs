@@ -165,6 +165,97 @@ const USES: &[(&str, &str, i32, &str)] = &[
         2,
         "a hierarchy keeps the radii that it was converted with",
     ),
+    (
+        "a pointer of Git LFS",
+        "render pointer.ply -o out.png",
+        3,
+        "pointer.ply: file: is a pointer of Git LFS, not the data",
+    ),
+    (
+        "a web page that was downloaded instead",
+        "render page.nrrd -o out.png",
+        3,
+        "page.nrrd: file: is a web page, not the data",
+    ),
+    ("a grid of OpenVDB", "render grid.vdb -o out.png", 3, "numpy.save('volume.npy', array)"),
+    ("a scene of Blender", "render room.blend -o out.png", 3, "export glTF or PLY"),
+    (
+        "NetCDF 3",
+        "render flow.nc -o out.png",
+        3,
+        "python -m pysplatkit render flow.nc -o out.png draws it",
+    ),
+    ("a model of CAD", "render model.step -o out.png", 3, "gmsh MODEL.step -2 -format stl"),
+    ("a picture", "render old.png -o out.png", 3, "pictures are not drawn"),
+    ("an archive", "render all.zip -o out.png", 3, "unpack it, and name the file inside"),
+    ("a folder of other files", "render . -o out.png", 3, "no series of pictures was found"),
+    (
+        "points that are no numbers",
+        "render nan.xyz -o out.png",
+        0,
+        "3 of 63 points are not at finite coordinates: they are left out",
+    ),
+    (
+        "a face without its vertex",
+        "render lacks.obj -o out.png",
+        3,
+        "line 4: a face refers to vertex 9, but there are 3",
+    ),
+    ("a mesh without vertices", "render nothing.obj -o out.png", 3, "has no vertices"),
+    (
+        "fewer samples than stated",
+        "render short.nrrd -o out.png",
+        3,
+        "there are 4096 bytes where 262144 were expected",
+    ),
+    (
+        "a table of labels that is not there",
+        "render a.nrrd -o out.png --labels no.txt",
+        3,
+        "no.txt",
+    ),
+    (
+        "a text as a table of labels",
+        "render a.nrrd -o out.png --labels pointer.ply",
+        3,
+        "a line holds a number, a name, and red, green and blue",
+    ),
+    (
+        "a table that lacks labels",
+        "render a.nrrd -o out.png --labels labels.txt",
+        0,
+        "the table of labels is not used: it lacks some of the values",
+    ),
+    (
+        "labels of a mesh",
+        "render a.ply -o out.png --labels labels.txt",
+        0,
+        "--labels has no effect: it is for volumes, but a.ply is a mesh",
+    ),
+    (
+        "an array that a volume does not have",
+        "render a.nrrd -o out.png --scalar density",
+        3,
+        "nothing has the name “density”",
+    ),
+    (
+        "an attribute that a mesh does not have",
+        "render a.ply -o out.png --color intensity",
+        3,
+        "name one of them: x (f32, points)",
+    ),
+    (
+        "a time of a file without times",
+        "render a.nrrd -o out.png --time 3",
+        0,
+        "--time has no effect: only files of these have one",
+    ),
+    (
+        "an opacity above 1",
+        "render a.ply -o out.png --opacity 2",
+        2,
+        "an opacity lies above 0, up to 1",
+    ),
 ];
 
 fn folder() -> Folder {
@@ -176,7 +267,22 @@ fn folder() -> Folder {
     folder.put("notes.docx", "PK notes");
     folder.put("empty.ply", "");
     folder.put("cut.ply", &PLY[..PLY.len() - 30]);
-    folder.put("old.png", "a picture");
+    folder.put("old.png", "\u{89}PNG");
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+    folder.put("pointer.ply", pointer);
+    folder.put("page.nrrd", "<!DOCTYPE html>\n<html><body>404 not found</body></html>\n");
+    folder.put("grid.vdb", " BDV and more");
+    folder.put("room.blend", "BLENDER-v300");
+    folder.put("flow.nc", "CDF\u{1} and more");
+    folder.put("model.step", "ISO-10303-21;\n");
+    folder.put("all.zip", "PK\u{3}\u{4} and more");
+    let points = (0..60).map(|i| format!("{} {} {}\n", i % 7, i / 7, i * 3 % 5));
+    folder.put("nan.xyz", points.collect::<String>() + &"nan nan nan\n".repeat(3));
+    folder.put("lacks.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+    folder.put("nothing.obj", "# nothing\n");
+    let short = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 64 64 64\nencoding: raw\n\n";
+    folder.put("short.nrrd", [short.as_bytes(), &[7; 4096]].concat());
+    folder.put("labels.txt", "1 left 255 0 0 0\n2 right 0 0 255 0\n");
     folder.run("convert a.ply -o a.splk").ok();
     folder
 }

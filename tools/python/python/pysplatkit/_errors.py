@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from pathlib import Path
 
 
@@ -11,6 +13,10 @@ class Error(Exception):
 
 class ArgumentError(Error, ValueError):
     """An argument from which no picture can be made: an array of the wrong shape, a size of 0."""
+
+
+class KindError(ArgumentError, TypeError):
+    """An argument of a kind that is not taken, or of a name that there is not."""
 
 
 class TransferError(ArgumentError):
@@ -128,3 +134,14 @@ class OutOfMemoryError(Error, MemoryError):
 
 class DataWarning(UserWarning):
     """What a file holds and a picture does not show: missing values, elements left out."""
+
+
+_FOLDER = str(Path(__file__).parent)
+
+
+def warn(message: str) -> None:
+    """Warns at the line outside this package that has called it, however deep inside it is."""
+    frame, level = sys._getframe(), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_FOLDER):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, DataWarning, stacklevel=level)

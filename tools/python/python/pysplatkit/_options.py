@@ -11,7 +11,7 @@ from typing import Any, TypedDict, Union
 import numpy as np
 
 from . import _pysplatkit
-from ._errors import ArgumentError
+from ._errors import ArgumentError, KindError
 from ._transfer import TransferFunction
 
 #: A path of a file or folder.
@@ -31,8 +31,8 @@ class FieldLook(TypedDict, total=False):
     range: tuple[float, float]
     #: The length that opacities hold for, in world units.
     opacity_unit: float
-    #: Values of surfaces: numbers, or (value, colour, opacity) with None for the usual colour.
-    isosurfaces: Sequence[float | tuple[float, Color | None, float]]
+    #: Values of surfaces: a number, or a list of numbers, or of (value, colour, opacity) with None for the usual colour.
+    isosurfaces: float | Sequence[float | tuple[float, Color | None, float]]
     #: Factors on the opacity by the magnitude of the gradient: (magnitude, factor), ….
     gradient_opacity: Sequence[tuple[float, float]]
     #: Colour values by this map (`pysplatkit.COLOR_MAPS`; `_r` at the end reverses it).
@@ -95,7 +95,7 @@ class Reading(TypedDict, total=False):
     #: Volumes at several times: which one, from 0.
     time: int
     #: DICOM: the series to read: its number, UID or a part of its description.
-    series: str
+    series: str | int
     #: HDF5 and NPZ: the data set to read.
     dataset: str
     #: Volumes: the distances between samples along x, y and z, instead of the file's.
@@ -125,12 +125,13 @@ READING = frozenset(Reading.__annotations__)
 
 
 def checked(given: Mapping[str, Any], known: frozenset[str], where: str) -> dict[str, Any]:
-    """Returns the options that are given. An unknown one is a `TypeError`, as in any call."""
+    """Returns the options that are given. An unknown one is a `KindError`, which is a `TypeError`
+    as in any call."""
     for name in given:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise TypeError(f"{where}() got an unexpected keyword argument {name!r}{hint}")
+            raise KindError(f"{where}() got an unexpected keyword argument {name!r}{hint}")
     return {name: value for name, value in given.items() if value is not None}
 
 
@@ -157,7 +158,10 @@ def color(value: Color) -> list[float]:
     """Returns red, green and blue from 0 to 1."""
     if isinstance(value, str):
         return list(_pysplatkit.color(value))
-    parts = [float(part) for part in value]
+    try:
+        parts = [float(part) for part in value]
+    except (TypeError, ValueError):
+        parts = []
     if len(parts) != 3 or not all(0.0 <= part <= 1.0 for part in parts):
         form = "a colour is a name, '#rrggbb' or three numbers from 0 to 1"
         raise ArgumentError(f"{form}, not {value}")
@@ -171,9 +175,12 @@ def background(value: Color | None) -> list[float] | None:
     return color(value)
 
 
-def vector(value: float | Vector) -> list[float]:
+def vector(value: float | Vector | Sequence[str]) -> list[float]:
     """Returns three numbers, or one number three times."""
-    parts = np.asarray(value, dtype=float).ravel().tolist()
+    try:
+        parts = np.asarray(value, dtype=float).ravel().tolist()
+    except (TypeError, ValueError):
+        parts = []
     if len(parts) == 1:
         parts *= 3
     if len(parts) != 3:
@@ -181,9 +188,17 @@ def vector(value: float | Vector) -> list[float]:
     return parts
 
 
-def direction(value: Vector | None) -> list[float] | None:
-    """Returns three numbers; None for none."""
-    return None if value is None else vector(value)
+def direction(value: str | Vector | None) -> list[float] | None:
+    """Returns three numbers of a direction, which may be an axis such as “+Y”; None for none."""
+    if not isinstance(value, str):
+        return None if value is None else vector(value)
+    if "," in value:
+        return vector(value.split(","))
+    sign, name = (-1.0, value[1:]) if value.startswith("-") else (1.0, value.removeprefix("+"))
+    if name.upper() not in ("X", "Y", "Z"):
+        form = "an axis is one of +X, -X, +Y, -Y, +Z, -Z, and a direction is three numbers"
+        raise ArgumentError(f"{form}, not {value!r}")
+    return [sign if axis == name.upper() else 0.0 for axis in "XYZ"]
 
 
 def look(options: Mapping[str, Any]) -> str:
@@ -193,7 +208,9 @@ def look(options: Mapping[str, Any]) -> str:
     if transfer is not None:
         given["transfer"] = TransferFunction.of(transfer)
     if "isosurfaces" in given:
-        given["isosurfaces"] = [_surface(surface) for surface in given["isosurfaces"]]
+        own = given["isosurfaces"]
+        surfaces = [own] if isinstance(own, (int, float, np.number)) else own
+        given["isosurfaces"] = [_surface(surface) for surface in surfaces]
     if given.get("nan_color") is not None:
         given["nan_color"] = color(given["nan_color"])
     own = given.get("color")
@@ -219,6 +236,8 @@ def reading(options: Mapping[str, Any]) -> str:
     given = {name: options[name] for name in options if name in READING}
     if "sample_type" in given:
         given["type"] = given.pop("sample_type")
+    if given.get("series") is not None:
+        given["series"] = str(given["series"])
     if given.get("spacing") is not None:
         given["spacing"] = vector(given["spacing"])
     return text(given)

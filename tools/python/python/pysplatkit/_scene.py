@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _arrays, _neighbours, _options, _pysplatkit
 from ._camera import Camera, Clip
-from ._errors import ArgumentError
+from ._errors import ArgumentError, KindError
 from ._options import Color, FieldLook, FileOptions, SurfaceLook, Vector, VolumeLook
 from ._picture import Picture
 
@@ -91,7 +91,8 @@ class Scene:
         value_name: str | None = None,
         value_unit: str | None = None,
         unit: str | None = None,
-        up: Vector | None = None,
+        up: str | Vector | None = None,
+        labels: bool | Mapping[int, str] | str | os.PathLike[str] | None = None,
         name: str = "volume",
         **look: Unpack[VolumeLook],
     ) -> Scene:
@@ -113,7 +114,10 @@ class Scene:
                 lists of ascending numbers, in units of the spacing.
             missing: A value that stands for “no value”.
             modality: ct, mr, emission, ultrasound or microscopy: for the automatic colours.
-            up: The world direction that is up. Default: z.
+            up: The world direction that is up: x, y, z, or an axis such as “+Y”. Default: z.
+            labels: Whether the values are labels, each drawn where its samples are nearest; their
+                names as {value: name}; or the path of a table with names and colours. Default:
+                values that look like labels are.
         """
         given = _options.checked(look, _options.VOLUME, "add_volume")
         own = _neighbours.of_kind(_neighbours.Volume, array, scalar, "add_volume")
@@ -139,6 +143,7 @@ class Scene:
             "unit": own.unit if unit is None else unit,
             "up": _options.direction(up),
             "frame": own.frame,
+            "labels": _labels(labels),
         }
         self._own.add_volume(samples, _options.text(told), "{}", _options.look(given))
         return self
@@ -152,7 +157,7 @@ class Scene:
         normals: Any = None,
         colors: Any = None,
         values: Any = None,
-        up: Vector | None = None,
+        up: str | Vector | None = None,
         name: str = "mesh",
         **look: Unpack[SurfaceLook],
     ) -> Scene:
@@ -175,7 +180,7 @@ class Scene:
         if faces is not None:
             own.faces = faces
         if own.faces is None:
-            raise TypeError("add_mesh() needs faces: add_points() adds points without")
+            raise KindError("add_mesh() needs faces: add_points() adds points without")
         return self._add_mesh(own.with_given(normals, colors, values), up, name, given)
 
     def add_points(
@@ -186,7 +191,7 @@ class Scene:
         colors: Any = None,
         values: Any = None,
         normals: Any = None,
-        up: Vector | None = None,
+        up: str | Vector | None = None,
         name: str = "points",
         **look: Unpack[SurfaceLook],
     ) -> Scene:
@@ -199,12 +204,13 @@ class Scene:
         given = _options.checked(look, _options.SURFACE, "add_points")
         own = _neighbours.points(positions, scalar, "add_points")
         own = own or _neighbours.Surface(positions)
+        up = own.up if up is None else up
         return self._add_mesh(own.with_given(normals, colors, values), up, name, given)
 
     def _add_mesh(
         self,
         own: _neighbours.Surface,
-        up: Vector | None,
+        up: str | Vector | None,
         name: str,
         given: Mapping[str, Any],
     ) -> Scene:
@@ -234,7 +240,7 @@ class Scene:
         kinds: Any = None,
         scalar: str | None = None,
         missing: float | None = None,
-        up: Vector | None = None,
+        up: str | Vector | None = None,
         name: str = "cells",
         **look: Unpack[FieldLook],
     ) -> Scene:
@@ -254,7 +260,7 @@ class Scene:
         own = _neighbours.of_kind(_neighbours.Cells, points, scalar, "add_cells")
         if own is None:
             if cells is None or values is None:
-                raise TypeError("add_cells() needs points, cells and values, or a grid")
+                raise KindError("add_cells() needs points, cells and values, or a grid")
             arrays = _arrays.cells(cells, kinds)
         else:
             points = own.positions
@@ -290,7 +296,7 @@ class Scene:
         radius: float | None = None,
         neighbours: int | None = None,
         slopes: bool | None = None,
-        up: Vector | None = None,
+        up: str | Vector | None = None,
         name: str = "samples",
         **look: Unpack[FieldLook],
     ) -> Scene:
@@ -331,7 +337,7 @@ class Scene:
         *,
         colors: Any = None,
         harmonics: Any = None,
-        up: Vector | None = None,
+        up: str | Vector | None = None,
         name: str = "gaussians",
     ) -> Scene:
         """Adds trained 3D Gaussians.
@@ -378,11 +384,11 @@ class Scene:
         elevation: float | None = None,
         zoom: float | None = None,
         focal_point: Vector | None = None,
-        view_up: Vector | None = None,
+        view_up: str | Vector | None = None,
         view_angle: float | None = None,
         distance: float | None = None,
         orthographic: bool = False,
-        up: Vector | None = None,
+        up: str | Vector | None = None,
         clips: Sequence[Clip] = (),
     ) -> Camera:
         """Returns the camera that sees the whole scene in a picture of this size.
@@ -519,6 +525,12 @@ DRAWING = frozenset(inspect.signature(Scene.render).parameters) - {"self"}
 _DRAW = DRAWING - {"camera", "background"}
 
 
+def _labels(given: bool | Mapping[int, str] | str | os.PathLike[str] | None) -> Any:
+    if isinstance(given, Mapping):
+        return [(int(value), str(name)) for value, name in given.items()]
+    return given if given is None or isinstance(given, bool) else os.fspath(given)
+
+
 def _coordinates(given: Sequence[Any] | None, shape: tuple[int, ...]) -> list[Any] | None:
     if given is None:
         return None
@@ -532,9 +544,10 @@ def _coordinates(given: Sequence[Any] | None, shape: tuple[int, ...]) -> list[An
 
 
 def _fit(**given: Any) -> str:
-    for name in ("focal_point", "view_up", "up"):
-        if given.get(name) is not None:
-            given[name] = _options.vector(given[name])
+    if given.get("focal_point") is not None:
+        given["focal_point"] = _options.vector(given["focal_point"])
+    for name in ("view_up", "up"):
+        given[name] = _options.direction(given.get(name))
     return _options.text(given)
 
 

@@ -122,7 +122,25 @@ fn view_menu(window: &mut Window, ui: &mut Ui) {
     }
     ui.separator();
     ui.checkbox(&mut window.panels.shows_side, "panels (Tab)");
-    egui::global_theme_preference_buttons(ui);
+    theme_switch(ui);
+}
+
+/// Chooses between light and dark by words: the fonts have no signs for these.
+fn theme_switch(ui: &mut egui::Ui) {
+    let now = ui.ctx().options(|options| options.theme_preference);
+    let mut wanted = now;
+    ui.horizontal(|ui| {
+        for (theme, name) in [
+            (egui::ThemePreference::System, "as the system"),
+            (egui::ThemePreference::Light, "light"),
+            (egui::ThemePreference::Dark, "dark"),
+        ] {
+            ui.selectable_value(&mut wanted, theme, name);
+        }
+    });
+    if wanted != now {
+        ui.ctx().set_theme(wanted);
+    }
 }
 
 pub fn menu(window: &mut Window, ui: &mut Ui) {

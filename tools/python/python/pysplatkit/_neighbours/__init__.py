@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .._errors import KindError
 from . import images, meshes, vtk
 from .parts import Cells, Parts, Surface, Volume
 
@@ -26,6 +27,7 @@ _FAMILIES = {
     "trimesh": meshes.of_trimesh,
     "open3d": meshes.of_open3d,
     "plyfile": meshes.of_plyfile,
+    "laspy": meshes.of_laspy,
 }
 
 
@@ -51,13 +53,13 @@ def of_kind(kind: type[Parts], source: Any, scalar: str | None, method: str) -> 
     own = found(source, scalar)
     if own is None:
         if scalar is not None:
-            raise TypeError(
+            raise KindError(
                 f"{method}(): scalar names an array of an object, not of {_kind(source)}"
             )
         return None
     if isinstance(own, kind):
         return own
-    raise TypeError(
+    raise KindError(
         f"{method}() takes {kind.ARTICLE}, but {_kind(source)} is {own.ARTICLE}: call "
         f"{own.method}() or add()"
     )
@@ -73,7 +75,7 @@ def points(source: Any, scalar: str | None, method: str) -> Surface | None:
     return cloud
 
 
-def unknown(source: Any, what: str, also: str = "") -> TypeError:
+def unknown(source: Any, what: str, also: str = "") -> KindError:
     """Returns the error for an object that nothing here knows.
 
     Args:
@@ -81,9 +83,9 @@ def unknown(source: Any, what: str, also: str = "") -> TypeError:
         what: The argument that it was given for.
         also: What else the argument may be, with a comma behind each.
     """
-    return TypeError(
+    return KindError(
         f"{what}: {also}an array of numbers, or a volume, mesh or point cloud of PyVista, VTK, "
-        "nibabel, ITK, SimpleITK, xarray, zarr, trimesh, Open3D or plyfile is needed, not "
+        "nibabel, ITK, SimpleITK, xarray, zarr, trimesh, Open3D, plyfile or laspy is needed, not "
         f"{_kind(source)}"
     )
 

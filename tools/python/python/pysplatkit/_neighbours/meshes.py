@@ -1,4 +1,4 @@
-"""Meshes and point clouds of trimesh, Open3D and plyfile."""
+"""Meshes and point clouds of trimesh, Open3D, plyfile and laspy."""
 
 from __future__ import annotations
 
@@ -131,3 +131,22 @@ def _faces_of_ply(elements: dict[str, Array]) -> Array | None:
 def _no_arrays(scalar: str | None, what: str) -> None:
     if scalar is not None:
         raise ArgumentError(f"{what} has no array {scalar!r}: pass values instead")
+
+
+def of_laspy(source: Any, scalar: str | None) -> Surface | None:
+    """Returns the points of a LAS or LAZ file that laspy has read, z up as the format has it."""
+    if not all(hasattr(source, name) for name in ("x", "y", "z", "point_format")):
+        return None
+    positions = np.stack([np.asarray(getattr(source, axis), float) for axis in "xyz"], axis=1)
+    names = list(source.point_format.dimension_names)
+    own = Surface(positions, up="+Z")
+    if scalar is not None:
+        if scalar not in names:
+            raise ArgumentError(f"the points have no {scalar!r}, but {', '.join(names)}")
+        own.values = np.asarray(source[scalar], float)
+    elif {"red", "green", "blue"} <= set(names):
+        colors = np.stack([np.asarray(source[name]) for name in ("red", "green", "blue")], axis=1)
+        # Many programs write bytes into the fields of 16 bits.
+        is_bytes = colors.size > 0 and colors.max() <= 255
+        own.colors = colors.astype(np.uint8 if is_bytes else np.uint16)
+    return own

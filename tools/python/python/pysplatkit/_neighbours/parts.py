@@ -58,6 +58,8 @@ class Surface(Parts):
     normals: Array | None = None
     colors: Array | None = None
     values: Array | None = None
+    #: The direction that is up, if the object's format says so.
+    up: str | None = None
 
     @property
     def method(self) -> str:
