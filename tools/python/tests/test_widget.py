@@ -90,21 +90,6 @@ def test_wrong_options_are_refused_at_once(scene):
             scene.show(camera, SIZE, optic="light")
 
 
-def test_a_hand_turns_about_the_way_up_of_the_camera(scene):
-    """The scene's own way up, which is z, unless the camera has been given another."""
-    for camera, up in [
-        (None, (0, 0, 1)),
-        (scene.camera(SIZE, up="+Y"), (0, 1, 0)),
-        (scene.camera(SIZE, view="top"), (0, 0, 1)),
-        (scene.camera(SIZE).elevation(20), (0, 0, 1)),
-    ]:
-        widget = rest(scene.show(camera, SIZE))
-        for drag in ([20, 0], [0, 8], [5, -3]):
-            tell(widget, ("turn", {"drag": drag}))
-            assert tuple(widget.camera.view_up) == up
-        widget.close()
-
-
 def test_gestures_move_the_camera(scene, widget):
     home = widget.camera
     distance = np.linalg.norm(np.subtract(home.position, home.focal_point))
