@@ -155,14 +155,14 @@ fn patient() -> Patience {
 }
 
 /// Returns the message of a server's behaviour, and the bytes that were taken.
-fn tried(head: String, then: Then) -> (String, u64) {
+fn tried(head: String, then: Then, seconds: u64) -> (String, u64) {
     let server = Server::of(vec![0; 9]);
     let head: &'static str = head.leak();
     server.fail(move |_, _| Fault::Raw { head, then });
     let name = crate::input::address(server.address("a.splk?signature=hidden"));
     let link = Link::new(&name, patient()).unwrap();
     let first = 0..FIRST;
-    let parts = link.parts(std::slice::from_ref(&first), None, Deadline::after(1));
+    let parts = link.parts(std::slice::from_ref(&first), None, Deadline::after(seconds));
     (told(parts), link.came())
 }
 
@@ -174,7 +174,11 @@ fn what_a_server_does_ends_soon_and_is_named() {
     std::thread::scope(|threads| {
         for (name, head, then, words) in cases {
             threads.spawn(move || {
-                let (message, came) = tried(head, then);
+                // Where nothing else ends it, the deadline does. The others end at once, but not
+                // within a second on a busy machine.
+                let is_slow = words.is_empty() || words.contains("takes longer");
+                let seconds = if is_slow { 1 } else { 30 };
+                let (message, came) = tried(head, then, seconds);
                 assert!(message.contains(words), "{name}: {message}");
                 assert!(message.contains("a.splk: "), "{name}: {message}");
                 assert!(!message.contains("hidden"), "{name}: {message}");
@@ -184,7 +188,7 @@ fn what_a_server_does_ends_soon_and_is_named() {
             });
         }
     });
-    // One second each, all at once; machines may be busy.
+    // All at once; machines may be busy.
     assert!(begun.elapsed() < Duration::from_secs(60), "{:?}", begun.elapsed());
 }
 
@@ -239,13 +243,13 @@ fn huge_sizes_are_refused() {
 #[test]
 fn opening_has_one_deadline() {
     let server = Server::of(object(2 << 20));
-    let limits = Limits { seconds: 1, ..Limits::default() };
+    let limits = Limits { seconds: 3, ..Limits::default() };
     let name = server.address("a.splk");
     let open = || Remote::open_in(Path::new(&name), cache(&Folder::new(), 0), patient(), &limits);
     let mut remote = open().unwrap();
-    std::thread::sleep(Duration::from_millis(1100));
+    std::thread::sleep(Duration::from_millis(3100));
     let error = told(remote.read(MIB..MIB + 3));
-    assert!(error.contains("takes longer than the limit of 1 s"), "{error}");
+    assert!(error.contains("takes longer than the limit of 3 s"), "{error}");
     remote.ready();
     assert!(remote.read(MIB..MIB + 3).is_ok());
 }

@@ -11,10 +11,11 @@ use object_store::{
     http::HttpBuilder,
 };
 use std::{
+    collections::BTreeMap,
     ops::Range,
     path::{Path, PathBuf},
     sync::{
-        Arc, LazyLock,
+        Arc, LazyLock, Mutex, PoisonError, Weak,
         atomic::{AtomicU64, Ordering::Relaxed},
         mpsc,
     },
@@ -22,8 +23,9 @@ use std::{
 };
 use tokio::{runtime::Runtime, sync::Semaphore, task::JoinSet};
 
-/// Requests of this process that run at once.
-static IN_FLIGHT: Semaphore = Semaphore::const_new(8);
+/// Requests of this process to one server that run at once. A slow one does not keep others
+/// waiting.
+const IN_FLIGHT: usize = 8;
 
 static REQUESTS: AtomicU64 = AtomicU64::new(0);
 static BYTES: AtomicU64 = AtomicU64::new(0);
@@ -91,6 +93,20 @@ pub(super) struct Link {
     patience: Patience,
     /// The bytes that came.
     came: Arc<AtomicU64>,
+    /// The requests to its server that may begin.
+    turns: Arc<Semaphore>,
+}
+
+/// Returns the turns that all objects of a server share.
+fn turns_of(server: String) -> Arc<Semaphore> {
+    static SERVERS: Mutex<BTreeMap<String, Weak<Semaphore>>> = Mutex::new(BTreeMap::new());
+    let mut servers = SERVERS.lock().unwrap_or_else(PoisonError::into_inner);
+    servers.retain(|_, turns| turns.strong_count() > 0);
+    servers.get(&server).and_then(Weak::upgrade).unwrap_or_else(|| {
+        let turns = Arc::new(Semaphore::new(IN_FLIGHT));
+        servers.insert(server, Arc::downgrade(&turns));
+        turns
+    })
 }
 
 /// Why a range could not be fetched.
@@ -133,7 +149,8 @@ impl Link {
             wrong(format!("cannot be used: {}", innermost(&error)))
                 .hint("the form is https://host/path, s3://bucket/key, gs://… or az://…")
         })?;
-        Ok(Self { store, location, name: name.to_owned(), patience, came })
+        let turns = turns_of(format!("{scheme}://{host}"));
+        Ok(Self { store, location, name: name.to_owned(), patience, came, turns })
     }
 
     /// Fetches ranges at once, and returns their bytes in the same order, with the stamp of the
@@ -219,7 +236,7 @@ impl Link {
 
     async fn part(&self, range: Range<u64>) -> Result<(Stamp, Bytes), Trouble> {
         // Nobody closes the semaphore.
-        let _permit = IN_FLIGHT.acquire().await;
+        let _permit = self.turns.acquire().await;
         REQUESTS.fetch_add(1, Relaxed);
         let options = GetOptions { range: Some(GetRange::Bounded(range)), ..GetOptions::default() };
         let found = self.store.get_opts(&self.location, options).await.map_err(Trouble::Store)?;
