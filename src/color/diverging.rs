@@ -1,7 +1,10 @@
 //! Diverging colour maps: from one hue over a light grey to another (Moreland 2009, “Diverging
 //! color maps for scientific visualization”).
 
-use super::Points;
+use super::{
+    Points,
+    lab::{of_lab, to_lab},
+};
 use std::f64::consts::FRAC_PI_3;
 
 /// The number of points of a map, odd so that one is the middle.
@@ -14,21 +17,6 @@ struct Msh {
     saturation: f64,
     hue: f64,
 }
-
-/// The white of sRGB, D65, in CIE XYZ.
-const WHITE: [f64; 3] = [0.95047, 1.0, 1.08883];
-
-/// Linear sRGB to CIE XYZ, and back.
-const TO_XYZ: [[f64; 3]; 3] = [
-    [0.4124564, 0.3575761, 0.1804375],
-    [0.2126729, 0.7151522, 0.0721750],
-    [0.0193339, 0.1191920, 0.9503041],
-];
-const TO_RGB: [[f64; 3]; 3] = [
-    [3.2404542, -1.5371385, -0.4985314],
-    [-0.9692660, 1.8760108, 0.0415560],
-    [0.0556434, -0.2040259, 1.0572252],
-];
 
 /// Returns the map from one display colour to another. Both must be saturated and of different
 /// hues.
@@ -53,18 +41,7 @@ pub fn points(ends: [[f64; 3]; 2]) -> Points {
 
 impl Msh {
     fn of(rgb: [f64; 3]) -> Self {
-        let linear =
-            rgb.map(
-                |part| {
-                    if part > 0.04045 { ((part + 0.055) / 1.055).powf(2.4) } else { part / 12.92 }
-                },
-            );
-        let xyz = times(TO_XYZ, linear);
-        let [x, y, z] = [0, 1, 2].map(|axis| {
-            let share = xyz[axis] / WHITE[axis];
-            if share > 0.008856 { share.cbrt() } else { 7.787 * share + 16.0 / 116.0 }
-        });
-        let (l, a, b) = (116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z));
+        let [l, a, b] = to_lab(rgb);
         let magnitude = (l * l + a * a + b * b).sqrt();
         Self { magnitude, saturation: (l / magnitude).acos(), hue: b.atan2(a) }
     }
@@ -94,22 +71,6 @@ impl Msh {
         let l = self.magnitude * self.saturation.cos();
         let a = self.magnitude * self.saturation.sin() * self.hue.cos();
         let b = self.magnitude * self.saturation.sin() * self.hue.sin();
-        let y = (l + 16.0) / 116.0;
-        let parts = [y + a / 500.0, y, y - b / 200.0];
-        let xyz = [0, 1, 2].map(|axis| {
-            let part: f64 = parts[axis];
-            let share =
-                if part.powi(3) > 0.008856 { part.powi(3) } else { (part - 16.0 / 116.0) / 7.787 };
-            share * WHITE[axis]
-        });
-        times(TO_RGB, xyz).map(|part| {
-            let display =
-                if part > 0.0031308 { 1.055 * part.powf(1.0 / 2.4) - 0.055 } else { 12.92 * part };
-            display.clamp(0.0, 1.0)
-        })
+        of_lab([l, a, b])
     }
-}
-
-fn times(matrix: [[f64; 3]; 3], vector: [f64; 3]) -> [f64; 3] {
-    matrix.map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum())
 }

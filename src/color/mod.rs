@@ -1,6 +1,7 @@
 //! Colour maps: colours of numbers, by name.
 
 mod diverging;
+pub(crate) mod lab;
 mod tables;
 
 use crate::{Error, Result, parallel::prelude::*};

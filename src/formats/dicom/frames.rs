@@ -28,6 +28,25 @@ pub struct Frame {
     pub order: f64,
 }
 
+impl Frame {
+    /// Returns the directions of columns and rows; along x and y if the file does not say.
+    pub fn axes(&self) -> [DVec3; 2] {
+        self.directions.unwrap_or([DVec3::X, DVec3::Y])
+    }
+
+    /// Returns the direction across the frame.
+    pub fn normal(&self) -> DVec3 {
+        let [x, y] = self.axes();
+        x.cross(y).normalize_or(DVec3::Z)
+    }
+
+    /// Returns whether another frame has the same directions.
+    pub fn is_parallel(&self, other: &Self) -> bool {
+        let [a, b] = [self.axes(), other.axes()];
+        (0..2).all(|axis| a[axis].dot(b[axis]) > 1.0 - 1e-4)
+    }
+}
+
 /// The index of a time, an echo, and so on.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {

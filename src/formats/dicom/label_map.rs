@@ -98,28 +98,19 @@ pub fn read(source: &Source, heads: &[Head], options: &ReadOptions) -> Result<Vo
     Ok(volume.with_labels(tables.flat_map(|own| own.table.clone()).collect()))
 }
 
-fn directions(frame: &Frame) -> [DVec3; 2] {
-    frame.directions.unwrap_or([DVec3::X, DVec3::Y])
-}
-
-fn normal(frame: &Frame) -> DVec3 {
-    let [x, y] = directions(frame);
-    x.cross(y).normalize_or(DVec3::Z)
-}
-
 /// Returns where the frames lie. Those without positions follow each other within a segment.
 fn places(heads: &[Head]) -> Vec<Place<'_>> {
     let mut places: Vec<Place<'_>> = Vec::new();
-    let normal = heads.iter().find_map(|head| head.frames.first()).map_or(DVec3::Z, normal);
+    let normal = heads.iter().find_map(|head| head.frames.first()).map_or(DVec3::Z, Frame::normal);
+    // Successive frames of one segment.
+    let mut run = (0, -1);
     for (file, head) in heads.iter().enumerate() {
         for frame in &head.frames {
             // The segment is the second mark of a frame.
             let segment = if let Mark::Number(number) = frame.marks[1] { number as u16 } else { 1 };
-            let step = frame.step.unwrap_or(1.0);
-            let depth = frame.position.map(|position| position.dot(normal)).unwrap_or_else(|| {
-                let before = places.iter().rev().take_while(|other| other.segment == segment);
-                step * before.count() as f64
-            });
+            run = if run.0 == segment { (segment, run.1 + 1) } else { (segment, 0) };
+            let in_order = || frame.step.unwrap_or(1.0) * f64::from(run.1);
+            let depth = frame.position.map_or_else(in_order, |position| position.dot(normal));
             places.push(Place { file, frame, depth, segment });
         }
     }
@@ -134,8 +125,7 @@ fn slices(source: &Source, heads: &[Head], places: &[Place]) -> Result<Slices> {
     let own = [first.layout.columns, first.layout.rows];
     let is_alike = |place: &Place| {
         let layout = heads[place.file].layout;
-        let [a, b] = [directions(lowest.frame), directions(place.frame)];
-        [layout.columns, layout.rows] == own && (0..2).all(|i| a[i].dot(b[i]) > 1.0 - 1e-4)
+        [layout.columns, layout.rows] == own && lowest.frame.is_parallel(place.frame)
     };
     if let Some(other) = places.iter().find(|place| !is_alike(place)) {
         let name = name(&heads[other.file].path);
@@ -169,8 +159,8 @@ fn slices(source: &Source, heads: &[Head], places: &[Place]) -> Result<Slices> {
         return Err(source.error("segmentation", message));
     }
     let [dx, dy] = lowest.frame.spacing.unwrap_or([1.0; 2]);
-    let [x, y] = directions(lowest.frame);
-    let axes = DMat3::from_cols(x * dx, y * dy, normal(lowest.frame) * step);
+    let [x, y] = lowest.frame.axes();
+    let axes = DMat3::from_cols(x * dx, y * dy, lowest.frame.normal() * step);
     let dims = [own[0], own[1], count as usize];
     let lattice = Lattice::cartesian(dims, lowest.frame.position.unwrap_or(DVec3::ZERO), axes);
     lattice.check().map_err(|message| source.error("positions", message))?;

@@ -26,23 +26,9 @@ pub struct Stack {
 }
 
 impl Slice {
-    fn directions(&self) -> [DVec3; 2] {
-        self.frame.directions.unwrap_or([DVec3::X, DVec3::Y])
-    }
-
-    fn normal(&self) -> DVec3 {
-        let [x, y] = self.directions();
-        x.cross(y).normalize_or(DVec3::Z)
-    }
-
     /// Returns where the slice lies along the normal of its stack; its order if it says nothing.
     fn depth(&self, normal: DVec3) -> f64 {
         self.frame.position.map_or(self.frame.order, |position| position.dot(normal))
-    }
-
-    fn is_parallel(&self, other: &Self) -> bool {
-        let [a, b] = [self.directions(), other.directions()];
-        (0..2).all(|axis| a[axis].dot(b[axis]) > 1.0 - 1e-4)
     }
 }
 
@@ -52,7 +38,7 @@ pub fn stacks(heads: &[Head]) -> Vec<Stack> {
     let mut words = Vec::new();
     let slices = main_slices(heads, &mut words);
     let Some(first) = slices.first() else { return Vec::new() };
-    let normal = first.normal();
+    let normal = first.frame.normal();
     let mut parts = Vec::new();
     divide(slices, normal, 0, &mut parts);
     let of = |mut slices: Vec<Slice>| {
@@ -93,7 +79,7 @@ fn main_slices(heads: &[Head], words: &mut Vec<String>) -> Vec<Slice> {
                 size(own) == size(head)
                     && own.layout.channels == head.layout.channels
                     && own.nature.is_localizer == head.nature.is_localizer
-                    && group[0].is_parallel(&slice)
+                    && group[0].frame.is_parallel(&slice.frame)
             };
             match groups.iter_mut().find(fits) {
                 Some(group) => group.push(slice),
@@ -177,8 +163,8 @@ impl Stack {
     /// gantry, give a sheared lattice. Nothing is resampled.
     pub fn lattice(&mut self, columns: usize, rows: usize) -> Lattice {
         let first = &self.slices[0];
-        let [x, y] = first.directions();
-        let normal = first.normal();
+        let [x, y] = first.frame.axes();
+        let normal = first.frame.normal();
         let [dx, dy] = first.frame.spacing.unwrap_or([1.0, 1.0]);
         let count = self.slices.len();
         let dims = [columns, rows, count];
@@ -216,7 +202,7 @@ impl Stack {
 
     /// Says how far slices lie from the line through the first and the last.
     fn tell_displaced(&mut self, places: &[DVec3], along: DVec3, pixel: f64) {
-        let normal = self.slices[0].normal();
+        let normal = self.slices[0].frame.normal();
         let far = |place: &DVec3| {
             let offset = *place - places[0];
             (offset - along * offset.dot(normal)).length()
