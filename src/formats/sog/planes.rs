@@ -169,8 +169,8 @@ fn decode(source: &Source, place: &str, bytes: &[u8], need: Need) -> Result<Plan
     let most = need.most(width);
     if count > most {
         let message = format!(
-            "the plane has {width} × {height} pixels, many times more than the scene needs; at most \
-             {most} are read"
+            "the plane has {width} × {height} pixels, many times more than the scene needs; at \
+             most {most} are read"
         );
         return Err(source.error(place, message).hint(again));
     }

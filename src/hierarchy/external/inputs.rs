@@ -2,9 +2,9 @@
 
 use super::{
     ExternalOptions,
+    field::{check, within},
     guide::Side,
     regions::{CELLS, Ranges, Reach},
-    sound::{check, within},
     survey::{Facts, PieceBox, Surveyed, Tables},
 };
 use crate::{

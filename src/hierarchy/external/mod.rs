@@ -19,6 +19,7 @@
 mod bins;
 mod build;
 mod distribute;
+mod field;
 mod guide;
 mod inputs;
 mod join;

@@ -2,10 +2,11 @@
 
 use super::{
     BLOCKS, Converted, ExternalOptions, Shape, Stage, StageWatch, Work,
+    field::{check, within},
     inputs::PlannedInput,
     join,
     part_file::{self, Label, PartFile},
-    sound::{check, check_write, within},
+    sound::check_write,
     survey::Surveyed,
     survey_all, tell,
 };

@@ -7,7 +7,7 @@
 
 use super::{
     super::partition::{Cube, FINE_BITS, fine_cell, fine_key_of},
-    sound::check,
+    field::check,
 };
 use crate::Result;
 use bytemuck::{Pod, Zeroable};

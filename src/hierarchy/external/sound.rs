@@ -4,6 +4,7 @@
 
 use super::{
     ExternalOptions, FEWEST_POINTS, MOST_POINTS, Shape,
+    field::{check, within},
     regions::Ranges,
     survey::{Facts, Tables, Triangulated},
 };
@@ -12,25 +13,9 @@ use crate::{
     hierarchy::{file::WriteOptions, sphere::Sphere},
 };
 use glam::DVec3;
-use std::fmt::{Debug, Display};
 
 /// The most splats in a block; a region has no more points.
 const MOST_BLOCK: usize = MOST_POINTS as usize;
-
-/// Refuses a field's value unless it is sound.
-pub fn check(
-    is_sound: bool,
-    field: impl Display,
-    value: impl Debug,
-    wanted: impl Display,
-) -> Result<(), String> {
-    if is_sound { Ok(()) } else { Err(format!("{field} is {value:?}; {wanted}")) }
-}
-
-/// Adds where the field of an error is.
-pub fn within<T>(place: impl Display, result: Result<T, String>) -> Result<T, String> {
-    result.map_err(|message| format!("{place}.{message}"))
-}
 
 impl ExternalOptions {
     pub(super) fn check(&self) -> Result<(), String> {

@@ -215,6 +215,8 @@ impl Link {
         };
         // Dropping the requests ends them.
         match time {
+            // A fast server might still answer.
+            Some(Duration::ZERO) => Ended::Late,
             Some(time) => tokio::time::timeout(time, all).await.unwrap_or(Ended::Late),
             None => all.await,
         }
