@@ -65,7 +65,8 @@ impl Mesh {
     /// table. Considers the six directions of the coordinate axes. Returns `None` for shapes that
     /// rest no better one way than the other, because they have no extent or are flat.
     ///
-    /// The front is the convention's: −Y if Z is up, otherwise +Z. The time is linear in the
+    /// The front is where an animal on four legs or a person on two looks, if the shape is one, else
+    /// the convention's: −Y if Z is up, otherwise +Z. The time is linear in the
     /// number of vertices and triangles, and below 0.1 s for a million.
     ///
     /// Source: Fu, Cohen-Or, Dror & Sheffer (2008), with other measures of stability.
@@ -141,18 +142,21 @@ fn guess(samples: Vec<Vec3>) -> Option<Stance> {
     let judge = |(axis, sign): (usize, f64)| Pose { axis, sign, score: shape.score(axis, sign) };
     let mut poses: Vec<Pose> = poses.into_par_iter().map(judge).collect();
     poses.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let mut best: Option<(f64, DVec3)> = None;
+    let mut best: Option<(f64, usize, f64)> = None;
     for Pose { axis, sign, score } in poses {
         // Openness only lowers the score.
-        if best.is_some_and(|(best, _)| best >= score) {
+        if best.is_some_and(|(best, ..)| best >= score) {
             break;
         }
         let score = score * shape.openness(axis, sign).powi(4);
-        if best.is_none_or(|(best, _)| score > best) {
-            best = Some((score, sign * DVec3::AXES[axis]));
+        if best.is_none_or(|(best, ..)| score > best) {
+            best = Some((score, axis, sign));
         }
     }
-    best.map(|(_, up)| Stance::with_up(up))
+    best.map(|(_, axis, sign)| {
+        let usual = Stance::with_up(sign * DVec3::AXES[axis]);
+        Stance { front: shape.front(axis, sign).unwrap_or(usual.front), ..usual }
+    })
 }
 
 impl Shape {
@@ -258,7 +262,7 @@ impl Shape {
             is_touched[(at.y + 1) * width + at.x + 1] = true;
         }
         let filled = is_touched.iter().filter(|touched| **touched).count() as f64 * size * size;
-        if parts(&mut is_touched, width) < 3 { 0.0 } else { (1.0 - filled / base).max(0.0) }
+        if parts(&mut is_touched, width).len() < 3 { 0.0 } else { (1.0 - filled / base).max(0.0) }
     }
 
     /// Returns the share of the samples that a viewer sees from above, or from two of sixteen
@@ -343,17 +347,18 @@ fn across(axis: usize) -> [usize; 2] {
     [(axis + 1) % 3, (axis + 2) % 3]
 }
 
-/// Counts the connected parts of a grid with an empty border, and empties it.
-fn parts(grid: &mut [bool], width: usize) -> usize {
-    let mut count = 0;
+/// Returns the sizes of the connected parts of a grid with an empty border, and empties it.
+fn parts(grid: &mut [bool], width: usize) -> Vec<usize> {
+    let mut sizes = Vec::new();
     let mut open = Vec::new();
     for start in 0..grid.len() {
         if !std::mem::replace(&mut grid[start], false) {
             continue;
         }
-        count += 1;
+        let mut size = 0;
         open.push(start);
         while let Some(at) = open.pop() {
+            size += 1;
             for row in [at - width, at, at + width] {
                 for (next, is_set) in (row - 1..).zip(&mut grid[row - 1..=row + 1]) {
                     if std::mem::replace(is_set, false) {
@@ -362,9 +367,11 @@ fn parts(grid: &mut [bool], width: usize) -> usize {
                 }
             }
         }
+        sizes.push(size);
     }
-    count
+    sizes
 }
 
+mod front;
 #[cfg(test)]
 mod tests;

@@ -343,8 +343,12 @@ impl Render {
             loaded.find_seen(&self.camera, &settings)?;
             let (stance, origin) = self.camera.stance(&loaded.subject);
             if origin == Origin::Guess {
-                let up = direction_name(stance.up);
-                progress.note(format_args!("up: {up}, guessed from the shape; --up sets another"));
+                progress.note(format_args!(
+                    "up: {}, front: {}, guessed from the shape; --up sets another up, and the \
+                     front that is usual for it",
+                    direction_name(stance.up),
+                    direction_name(stance.front)
+                ));
             }
         }
         let finish = self.finish(loaded)?;

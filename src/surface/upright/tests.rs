@@ -215,3 +215,68 @@ fn balls_stand_and_flat_and_empty_shapes_do_not() {
     };
     assert_eq!(broken.guess_stance(), None);
 }
+
+/// An animal that looks along +X: a body on four legs, a neck and a head, and a tail.
+fn animal() -> Mesh {
+    of(|mesh| {
+        add_box(mesh, [0.0, 0.0, 1.1], [1.8, 0.6, 0.6]);
+        for (x, y) in [(-0.75, -0.22), (0.75, -0.22), (-0.75, 0.22), (0.75, 0.22)] {
+            add_box(mesh, [x, y, 0.4], [0.16, 0.14, 0.8]);
+        }
+        add_box(mesh, [0.95, 0.0, 1.6], [0.3, 0.25, 0.7]);
+        add_box(mesh, [1.2, 0.0, 1.9], [0.7, 0.3, 0.3]);
+        add_box(mesh, [-0.95, 0.0, 1.1], [0.1, 0.1, 0.7]);
+    })
+}
+
+/// A person who looks along +X, with feet.
+fn person() -> Mesh {
+    of(|mesh| {
+        for side in [-1.0, 1.0] {
+            add_box(mesh, [0.0, 0.15 * side, 0.45], [0.2, 0.2, 0.9]);
+            add_box(mesh, [0.08, 0.15 * side, 0.04], [0.36, 0.14, 0.08]);
+            add_box(mesh, [0.0, 0.4 * side, 1.2], [0.15, 0.12, 0.7]);
+        }
+        add_box(mesh, [0.0, 0.0, 1.25], [0.3, 0.6, 0.7]);
+        add_box(mesh, [0.03, 0.0, 1.75], [0.25, 0.25, 0.3]);
+    })
+}
+
+#[test]
+fn animals_and_people_look_at_the_camera() {
+    for (name, mesh) in [("animal", animal()), ("person", person())] {
+        for quarter in 0..4 {
+            let turn = DQuat::from_rotation_z(f64::from(quarter) * std::f64::consts::FRAC_PI_2);
+            let stance = rotated(&mesh, turn).guess_stance().unwrap();
+            assert_eq!(stance.up, DVec3::Z, "{name}, {quarter}");
+            let front = turn * DVec3::X;
+            assert!(stance.front.distance(front) < 1e-9, "{name}, {quarter}: {stance:?}");
+        }
+        let turn = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+        let stance = rotated(&mesh, turn).guess_stance().unwrap();
+        assert_eq!((stance.up, stance.front), (DVec3::Y, DVec3::X), "{name}");
+    }
+}
+
+#[test]
+fn what_has_no_face_is_seen_from_the_usual_side() {
+    // A bed has a high end above two of its four feet, which is no head.
+    let bed = of(|mesh| {
+        add_box(mesh, [0.0, 0.0, 0.5], [2.0, 1.0, 0.3]);
+        add_box(mesh, [-0.95, 0.0, 0.9], [0.1, 1.0, 0.9]);
+        for (x, y) in [(-0.95, -0.45), (0.95, -0.45), (-0.95, 0.45), (0.95, 0.45)] {
+            add_box(mesh, [x, y, 0.2], [0.1, 0.1, 0.4]);
+        }
+    });
+    let shapes = [
+        ("table", table()),
+        ("chair", chair()),
+        ("bed", bed),
+        ("car", car()),
+        ("figure", figure()),
+        ("bottle", bottle()),
+    ];
+    for (name, mesh) in shapes {
+        assert_eq!(mesh.guess_stance(), Some(Stance::SURVEY), "{name}");
+    }
+}

@@ -80,7 +80,10 @@ fn statements_count_more_than_conventions_and_these_more_than_guesses() {
         "{told}"
     );
     let told = folder.run(&format!("render y.obj -o c.png {SMALL}")).stderr();
-    assert!(told.contains("up: +Y, guessed from the shape; --up sets another"), "{told}");
+    assert!(
+        told.contains("up: +Y, front: +Z, guessed from the shape; --up sets another"),
+        "{told}"
+    );
     let told = folder.run(&format!("render y.obj -o d.png -q {SMALL}")).stderr();
     assert_eq!(told, "");
 }
