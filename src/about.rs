@@ -185,6 +185,19 @@ impl Stance {
     }
 }
 
+/// Returns the name of a direction: of an axis if it is one (`+X`, `-Z`), else its coordinates.
+pub fn direction_name(direction: DVec3) -> String {
+    for (axis, name) in DVec3::AXES.into_iter().zip(["X", "Y", "Z"]) {
+        for (sign, prefix) in [(1.0, '+'), (-1.0, '-')] {
+            if direction == sign * axis {
+                return format!("{prefix}{name}");
+            }
+        }
+    }
+    let [x, y, z] = direction.to_array();
+    format!("{x:.3},{y:.3},{z:.3}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -121,6 +121,7 @@ pub mod reference;
 mod renderer;
 pub mod scattered;
 pub mod scene;
+pub mod session;
 pub mod splat;
 mod stop;
 pub mod surface;

@@ -28,6 +28,26 @@ impl Finding {
     pub fn error(code: &'static str, place: impl Into<String>, message: impl Into<String>) -> Self {
         Self { code, severity: Severity::Error, place: place.into(), message: message.into() }
     }
+
+    /// Returns the finding as JSON: `code`, `severity`, `where` and `message`.
+    pub fn to_json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "code": self.code,
+            "severity": self.severity.name(),
+            "where": self.place,
+            "message": self.message,
+        })
+    }
+}
+
+impl Severity {
+    /// Returns `warning` or `error`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
 }
 
 /// Findings, with at most `MOST` of each kind; the rest are counted.

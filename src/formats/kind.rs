@@ -56,25 +56,28 @@ impl Kind {
         options: &ReadOptions,
     ) -> Result<Option<Self>> {
         let path = path.as_ref();
-        match Self::of_remote(path, limits)? {
+        match Self::at_once(path, limits)? {
             Some(kind) => Ok(Some(kind)),
             None => Self::of_source(&Source::open_any(path, limits)?, options),
         }
     }
 
-    /// Returns the kind of a remote object if its name or its first bytes determine it, so that the
-    /// rest need not be fetched.
-    fn of_remote(path: &Path, limits: &Limits) -> Result<Option<Self>> {
-        if !is_remote(path) {
+    /// Returns the kind of an input if its name or its first bytes determine it, so that a remote
+    /// object need not be fetched, and a large file need not fit in memory.
+    pub(crate) fn at_once(path: &Path, limits: &Limits) -> Result<Option<Self>> {
+        let is_remote = is_remote(path);
+        if !is_remote && !path.is_file() {
             return Ok(None);
         }
         let format = match by_extension(FORMATS, path, |_| true) {
             Some(format) => Some(format),
             None => by_magic(FORMATS, &Bytes::open(path, limits)?.beginning(0)?, |_| true),
         };
-        Ok(format.filter(|format| !format.is_left_out()).and_then(|format| match format.kind {
-            Which::Always(kind) => Some(kind),
-            Which::Rule(_) => None,
+        let format = format.filter(|format| !format.is_left_out());
+        Ok(format.and_then(|format| match format.kind {
+            Which::Always(kind @ (Self::Hierarchy | Self::Bricks)) => Some(kind),
+            Which::Always(kind) if is_remote => Some(kind),
+            Which::Always(_) | Which::Rule(_) => None,
         }))
     }
 

@@ -1,24 +1,7 @@
 //! The arrays of a file, as `info` lists them.
 
 use crate::{failure::Failure, output, terminal::safe};
-use serde_json::{Value, json};
 use splatkit::formats::Array;
-
-/// Returns the arrays as JSON.
-pub fn facts(arrays: &[Array]) -> Value {
-    arrays.iter().map(of_array).collect()
-}
-
-fn of_array(array: &Array) -> Value {
-    json!({
-        "name": array.name,
-        "place": array.place.name(),
-        "type": array.kind,
-        "components": array.components,
-        "range": array.range,
-        "drawn": array.is_drawn,
-    })
-}
 
 /// Prints a table of the arrays, with a star before the one that is drawn.
 pub fn print(arrays: &[Array]) -> Result<(), Failure> {

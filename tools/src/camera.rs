@@ -309,16 +309,3 @@ fn given_camera(text: &str) -> Result<Camera, String> {
 pub fn to_json(camera: &Camera) -> serde_json::Value {
     serde_json::json!(CameraEntry::from(camera))
 }
-
-/// Returns the name of a direction: of an axis if it is one.
-pub fn direction_name(direction: DVec3) -> String {
-    for (axis, name) in DVec3::AXES.into_iter().zip(["X", "Y", "Z"]) {
-        for (sign, prefix) in [(1.0, '+'), (-1.0, '-')] {
-            if direction == sign * axis {
-                return format!("{prefix}{name}");
-            }
-        }
-    }
-    let [x, y, z] = direction.to_array();
-    format!("{x:.3},{y:.3},{z:.3}")
-}

@@ -1,14 +1,15 @@
 //! `splatkit generate`: phantoms and large scans as files, to try the other commands on.
 
-use crate::{failure::Failure, limits::LimitFlags, output, parse, progress::Progress, scan};
+use crate::{failure::Failure, output, parse, progress::Progress, scan};
 use clap::{Args, ValueEnum};
 use glam::{DMat3, DVec3};
 use splatkit::{
     Error,
     cells::{CellKind, Cells},
     disk, formats, gaussians,
-    input::{Limits, Source},
+    input::Limits,
     memory,
+    session::{Data, Reading},
     volume::{Arrangement, Lattice, Volume, phantoms::Phantom},
 };
 use std::{io::Write, path::PathBuf};
@@ -144,10 +145,13 @@ impl Generate {
             self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         match (self.what, &self.from, extension) {
             (What::Scan, Some(from), "ply") => {
-                let limits = LimitFlags::default().whole(memory::most());
-                let source = Source::open(from, &limits)?;
-                let mesh = formats::read_mesh(&source, &formats::ReadOptions::default())?;
-                output::check_unneeded(&self.output, &source.files())?;
+                let reading = Reading::default().within_memory(memory::most());
+                let opened = reading.open(from)?;
+                let data = opened.read()?;
+                output::check_unneeded(&self.output, &opened.files())?;
+                let Data::Mesh(mesh) = data else {
+                    return Err(Error::input(from, "file", "holds no mesh").into());
+                };
                 if mesh.triangles.is_empty() {
                     let message = format!("{} has no triangles to subdivide", from.display());
                     return Err(Error::Argument(message).into());

@@ -1,8 +1,8 @@
 //! Flags that have no effect on the inputs: a table of what each flag needs, and the warnings.
 
-use crate::{load::Input, progress::Progress};
+use crate::progress::Progress;
 use clap::{ArgMatches, parser::ValueSource};
-use splatkit::formats::Format;
+use splatkit::{formats::Format, session::Data};
 use std::{collections::BTreeSet, path::Path};
 
 /// The flags that the user has given, by their names without dashes.
@@ -197,17 +197,17 @@ impl Given {
 }
 
 /// Returns what an input is. `is_raw`: the flags give its layout.
-pub fn kinds_of(input: &Input, is_raw: bool) -> Kinds {
+pub fn kinds_of(input: &Data, is_raw: bool) -> Kinds {
     match input {
-        Input::Mesh(mesh) if mesh.triangles.is_empty() => CLOUD,
-        Input::Mesh(_) => MESH,
-        Input::Volume(_) if is_raw => VOLUME | RAW,
-        Input::Volume(_) => VOLUME,
-        Input::Samples(_) => SAMPLES,
-        Input::Hierarchy(_) => HIERARCHY,
-        Input::Bricks(_) => BRICKS,
-        Input::Cells(_) => CELLS,
-        Input::Gaussians(_) => GAUSSIANS,
+        Data::Mesh(mesh) if mesh.triangles.is_empty() => CLOUD,
+        Data::Mesh(_) => MESH,
+        Data::Volume(_) if is_raw => VOLUME | RAW,
+        Data::Volume(_) => VOLUME,
+        Data::Samples(_) => SAMPLES,
+        Data::Hierarchy(_) => HIERARCHY,
+        Data::Bricks(_) => BRICKS,
+        Data::Cells(_) => CELLS,
+        Data::Gaussians(_) => GAUSSIANS,
     }
 }
 

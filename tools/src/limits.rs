@@ -54,13 +54,9 @@ impl LimitFlags {
         Self { until: self.limits().deadline(), ..self.clone() }
     }
 
-    /// Returns the limits of an input that is read as a whole, if `memory` bytes are available.
-    pub fn whole(&self, memory: Option<u64>) -> Limits {
-        let limits = self.limits();
-        let memory = memory.filter(|_| self.limit_bytes.is_none()).unwrap_or(u64::MAX);
-        // The limit also counts data that is dropped on the way, such as the file and its unpacked
-        // bytes.
-        Limits { bytes: limits.bytes.min(memory.saturating_mul(2)), ..limits }
+    /// Returns whether the user limits bytes, so that memory does not.
+    pub fn has_bytes(&self) -> bool {
+        self.limit_bytes.is_some()
     }
 }
 
@@ -130,7 +126,7 @@ mod tests {
         let begun = flags.begun();
         let until = begun.limits().until;
         assert!(until != Deadline::NEVER && !until.is_over());
-        assert_eq!((begun.whole(None).until, begun.limits().deadline()), (until, until));
+        assert_eq!(begun.limits().deadline(), until);
         let begun = LimitFlags { limit_seconds: Some(0), ..flags }.begun();
         assert!(begun.limits().until.is_over());
     }

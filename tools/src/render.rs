@@ -1,7 +1,7 @@
 //! `splatkit render`.
 
 use crate::{
-    camera::{CameraFlags, Origin, direction_name},
+    camera::{CameraFlags, Origin},
     describe,
     engine::EngineFlags,
     failure::Failure,
@@ -19,7 +19,9 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    Error, FrameStats, Renderer, disk,
+    Error, FrameStats, Renderer,
+    about::direction_name,
+    disk,
     input::is_remote,
     math::Camera,
     picture::{Picture, PictureFormat},

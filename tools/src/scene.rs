@@ -1,11 +1,11 @@
 //! The flags of a scene, and loading the scene that they describe.
 
 use crate::{
-    camera::{CameraFlags, Origin, Subject, direction_name},
+    camera::{CameraFlags, Origin, Subject},
     color::{ColorFlags, titled},
     failure::{Failure, in_file},
     given::{Given, Kinds, kinds_of},
-    load::{Input, LoadFlags},
+    load::LoadFlags,
     overlay::Facts,
     parse,
     progress::Progress,
@@ -15,6 +15,7 @@ use clap::Args;
 use glam::DVec3;
 use splatkit::{
     Deadline, Error,
+    about::direction_name,
     about::{Frame, Frames, Stance},
     bricks::Bricks,
     cells::{CellOptions, Cells},
@@ -26,6 +27,7 @@ use splatkit::{
     picture::Edges,
     scattered::Points,
     scene::{Item, Scene, Settings},
+    session::Data,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
 };
@@ -118,19 +120,21 @@ impl SceneFlags {
         let optics = ["mip", "x-ray", "optics"].into_iter().find(|flag| given.has(flag));
         let mut adding = Adding { flags: self, show, facets, optics, progress, loaded, frames };
         let (mut is_scaled, mut unscaled) = (false, None);
-        let memory = memory::most();
+        let reading = load.reading(memory::most());
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
             let color = adding.show.color_of(path);
             let read = &mut adding.loaded.read;
             let attribute = color.attribute();
-            let input = load.open_colored(path, attribute, memory, read)?;
+            let opened = reading.open_colored(path, attribute)?;
+            let input = opened.read()?;
+            read.extend(opened.files());
             match &input {
-                Input::Mesh(_) => is_scaled = true,
-                Input::Hierarchy(_) => unscaled = Some(path),
+                Data::Mesh(_) => is_scaled = true,
+                Data::Hierarchy(_) => unscaled = Some(path),
                 _ => {}
             }
-            adding.loaded.kinds.push(kinds_of(&input, load.is_raw(path)?));
+            adding.loaded.kinds.push(kinds_of(&input, opened.is_raw()));
             adding.add(path, input, deadline)?;
         }
         let mut loaded = adding.loaded;
@@ -277,18 +281,18 @@ struct Adding<'a> {
 
 impl Adding<'_> {
     /// Adds an input to the scene. Its splats must be made by the deadline.
-    fn add(&mut self, path: &Path, input: Input, deadline: Deadline) -> Result<(), Failure> {
+    fn add(&mut self, path: &Path, input: Data, deadline: Deadline) -> Result<(), Failure> {
         match input {
-            Input::Mesh(mesh) => self.add_mesh(path, mesh, deadline),
-            Input::Hierarchy(hierarchy) => {
+            Data::Mesh(mesh) => self.add_mesh(path, mesh, deadline),
+            Data::Hierarchy(hierarchy) => {
                 self.add_hierarchy(path, hierarchy);
                 Ok(())
             }
-            Input::Bricks(bricks) => self.add_bricks(path, bricks),
-            Input::Volume(volume) => self.add_volume(path, volume),
-            Input::Samples(points) => self.add_samples(path, &points, deadline),
-            Input::Cells(cells) => self.add_cells(path, cells),
-            Input::Gaussians(set) => {
+            Data::Bricks(bricks) => self.add_bricks(path, bricks),
+            Data::Volume(volume) => self.add_volume(path, volume),
+            Data::Samples(points) => self.add_samples(path, &points, deadline),
+            Data::Cells(cells) => self.add_cells(path, cells),
+            Data::Gaussians(set) => {
                 self.add_gaussians(path, set);
                 Ok(())
             }

@@ -2,13 +2,13 @@
 
 use crate::{
     failure::Failure,
-    load::{Input, LoadFlags},
+    load::LoadFlags,
     output, parse,
     progress::Progress,
     show::{Show, ShowFlags},
 };
 use clap::Args;
-use splatkit::{Error, disk, volume::TransferFunction};
+use splatkit::{Error, disk, session::Data, volume::TransferFunction};
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
@@ -43,8 +43,10 @@ impl Transfer {
         let show = self.show.open(&self.load.limits())?;
         progress.stage(format!("Reading {}", self.input.display()));
         let mut read = self.show.files();
-        let memory = splatkit::memory::most();
-        let input = self.load.open_within(&self.input, memory, &mut read)?;
+        let reading = self.load.reading(splatkit::memory::most());
+        let opened = reading.open(&self.input)?;
+        let input = opened.read()?;
+        read.extend(opened.files());
         progress.stage("Looking at its values");
         let text = text(&self.of(&show, &input)?);
         progress.clear();
@@ -68,14 +70,14 @@ impl Transfer {
     }
 
     /// Returns the transfer function that shows an input.
-    fn of(&self, show: &Show, input: &Input) -> Result<TransferFunction, Failure> {
+    fn of(&self, show: &Show, input: &Data) -> Result<TransferFunction, Failure> {
         let path = &self.input;
         match input {
-            Input::Volume(volume) => show.of_volume(path, volume),
-            Input::Samples(points) => show.of_samples(path, points),
-            Input::Cells(cells) => show.of_cells(path, cells),
-            Input::Bricks(bricks) => show.of_bricks(path, bricks),
-            Input::Mesh(_) | Input::Gaussians(_) | Input::Hierarchy(_) => {
+            Data::Volume(volume) => show.of_volume(path, volume),
+            Data::Samples(points) => show.of_samples(path, points),
+            Data::Cells(cells) => show.of_cells(path, cells),
+            Data::Bricks(bricks) => show.of_bricks(path, bricks),
+            Data::Mesh(_) | Data::Gaussians(_) | Data::Hierarchy(_) => {
                 let message = "has colours of its own, and no values for a transfer function";
                 let error = Error::input(path, "content", message);
                 Err(error.hint("give a volume, or name a value with --scalar").into())

@@ -2,7 +2,7 @@
 
 use crate::{
     errors::{options, raise, wrong},
-    load::{Input, Load},
+    load::Load,
     look::Look,
     notes,
     worker::run,
@@ -22,6 +22,7 @@ use splatkit::{
         file::WriteOptions,
     },
     memory,
+    session::{Data, warn_of_holes},
     splat::SplatSet,
     surface::SurfelOptions,
     volume,
@@ -190,7 +191,7 @@ impl Work {
         let [file] = &self.files[..] else {
             return Err(wrong("volumes are converted one by one; give a single file"));
         };
-        match self.load.kind(file)? {
+        match self.load.reading().kind(file)? {
             Kind::Volume => Ok(file),
             _ => Err(wrong(format!("{} holds no volume to convert", file.display()))),
         }
@@ -202,12 +203,10 @@ impl Work {
             unit: self.own.unit.clone().unwrap_or_default(),
             source: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         };
-        if let Some(stream) = self.load.stream(file)? {
+        if let Some(stream) = self.load.reading().stream(file)? {
             let range = stream.range(None)?;
-            if stream.holes() > 0 {
-                let (name, holes) = (file.display(), stream.holes());
-                notes::add(format!("{name}: {holes} values missing: read as the lowest value"));
-            }
+            let (name, all) = (file.display().to_string(), stream.lattice().len() as u64);
+            warn_of_holes(&name, stream.holes(), all, "read as the lowest value");
             return bricks::convert(&stream, range, part, &options, None);
         }
         bricks::write(&self.volume(file)?, part, &options, None)
@@ -224,8 +223,8 @@ impl Work {
     }
 
     fn volume(&self, file: &Path) -> Result<volume::Volume, Error> {
-        match self.load.open(file, None, &mut Vec::new())? {
-            Input::Volume(volume) => {
+        match self.load.reading().open(file)?.read()? {
+            Data::Volume(volume) => {
                 if volume.colors.is_some() {
                     let name = file.display();
                     notes::add(format!(
@@ -331,8 +330,8 @@ impl Work {
         let deadline = self.load.limits().deadline();
         let attribute = self.look.attribute();
         let attribute = attribute.as_deref().or(self.load.scalar());
-        match self.load.open(path, attribute, &mut Vec::new())? {
-            Input::Mesh(mut mesh) => {
+        match self.load.reading().open_colored(path, attribute)?.read()? {
+            Data::Mesh(mut mesh) => {
                 let frame = Frame::of(mesh.about.stance, || Ok(mesh.guess_stance()))?;
                 let up = self.own.up.map(DVec3::from_array).and_then(DVec3::try_normalize);
                 let up = up.unwrap_or(frame.stance.map_or(DVec3::Y, |stance| stance.up));
@@ -343,7 +342,7 @@ impl Work {
                 let points = mesh.positions.len() as u64;
                 Ok(Gathered { set, closed: mesh.is_solid(), frame, points })
             }
-            Input::Hierarchy(own) => {
+            Data::Hierarchy(own) => {
                 let (header, mut set) = (own.header(), own.leaves()?);
                 let scale = self.own.radius_scale();
                 let larger = |factor: [f32; 6]| factor.map(|entry| entry * scale);
@@ -352,7 +351,7 @@ impl Work {
                 let frame = Frame { stance: header.stance, is_guessed: header.is_guessed, unit };
                 Ok(Gathered { set, closed: header.closed, frame, points: header.source_points })
             }
-            Input::Gaussians(_) => Err(wrong(format!(
+            Data::Gaussians(_) => Err(wrong(format!(
                 "{} holds trained Gaussians, and another input does not",
                 path.display()
             ))),
@@ -367,7 +366,7 @@ impl Work {
     /// Whether all inputs hold trained Gaussians, also in hierarchies.
     fn are_gaussians(&self) -> Result<bool, Error> {
         for path in &self.files {
-            let is_one = match self.load.kind(path)? {
+            let is_one = match self.load.reading().kind(path)? {
                 Kind::Gaussians => true,
                 Kind::Hierarchy => {
                     Hierarchy::open(path, &self.load.limits())?.header().degree.is_some()
@@ -403,11 +402,11 @@ impl Work {
 
     /// Returns the Gaussians of an input: its own, or those of its splats.
     fn gaussians_of(&self, path: &Path) -> Result<(Gaussians, u64), Error> {
-        let kind = self.load.kind(path)?;
+        let kind = self.load.reading().kind(path)?;
         let own = match kind {
             Kind::Hierarchy => Hierarchy::open(path, &self.load.limits())?.gaussians()?,
-            Kind::Gaussians => match self.load.open(path, None, &mut Vec::new())? {
-                Input::Gaussians(mut set) => {
+            Kind::Gaussians => match self.load.reading().open(path)?.read()? {
+                Data::Gaussians(mut set) => {
                     // Files of trainers do not say what is up: it is −y.
                     set.about.stance = set.about.stance.or(Some(Stance::Y_DOWN));
                     Some(set)

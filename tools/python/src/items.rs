@@ -3,7 +3,7 @@
 use crate::{
     camera::{Origin, Subject},
     errors::wrong,
-    load::{Input, Load},
+    load::Load,
     look::Look,
     notes,
 };
@@ -17,6 +17,7 @@ use splatkit::{
     math::Bounds,
     scattered::Points,
     scene::{Item, Scene},
+    session::Data,
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
@@ -63,7 +64,7 @@ pub struct Name {
 /// An input with its looks.
 pub struct Added {
     pub name: Name,
-    pub input: Input,
+    pub input: Data,
     pub load: Load,
     pub look: Look,
     /// By when its splats must be made.
@@ -85,18 +86,16 @@ impl Items {
     pub fn add(&mut self, added: Added) -> Result<(), Error> {
         let Added { name, input, load, look, deadline } = added;
         match input {
-            Input::Mesh(mesh) => {
-                self.add_mesh(name, mesh, &look, load.scalar().is_some(), deadline)
-            }
-            Input::Volume(volume) => self.add_volume(name, volume, &look),
-            Input::Samples(points) => self.add_samples(name, &points, &load, &look, deadline),
-            Input::Cells(cells) => self.add_cells(name, cells, &look),
-            Input::Bricks(bricks) => self.add_bricks(name, bricks, &look),
-            Input::Gaussians(set) => {
+            Data::Mesh(mesh) => self.add_mesh(name, mesh, &look, load.scalar().is_some(), deadline),
+            Data::Volume(volume) => self.add_volume(name, volume, &look),
+            Data::Samples(points) => self.add_samples(name, &points, &load, &look, deadline),
+            Data::Cells(cells) => self.add_cells(name, cells, &look),
+            Data::Bricks(bricks) => self.add_bricks(name, bricks, &look),
+            Data::Gaussians(set) => {
                 self.add_gaussians(name, set);
                 Ok(())
             }
-            Input::Hierarchy(hierarchy) => {
+            Data::Hierarchy(hierarchy) => {
                 let header = hierarchy.header();
                 let count = header.leaves;
                 if let Some(stance) = header.stance {

@@ -7,7 +7,7 @@ use crate::{
     draw::{Draw, Stage},
     errors::{options, raise, wrong},
     items::{Added, Name},
-    load::{Input, Load, warn_of_holes},
+    load::Load,
     look::Look,
     picture::Picture,
     worker::run,
@@ -24,6 +24,7 @@ use splatkit::{
     input::Limits,
     interaction::Effort,
     scattered::Points,
+    session::Data,
     surface::Mesh,
     volume::{Arrangement, Lattice, Volume},
 };
@@ -304,9 +305,9 @@ impl Scene {
     }
 
     /// Adds what an array has become, with its looks.
-    fn add(&self, py: Python<'_>, input: Input, told: Told, more: (Load, Look)) -> PyResult<()> {
+    fn add(&self, py: Python<'_>, input: Data, told: Told, more: (Load, Look)) -> PyResult<()> {
         let (stage, (load, look)) = (self.0.clone(), more);
-        warn_of_holes(&told.name, &input);
+        input.warn_of_holes(&told.name);
         let name = Name { text: told.name, is_file: false };
         let added = Added { name, input, load, look, deadline: Deadline::NEVER };
         let stop = Stop::default();
@@ -339,7 +340,7 @@ impl Scene {
             // One deadline covers reading the input and making its splats.
             let deadline = load.limits().deadline();
             let attribute = look.attribute();
-            let input = load.open(&path, attribute.as_deref(), &mut Vec::new())?;
+            let input = load.reading().open_colored(&path, attribute.as_deref())?.read()?;
             let name = Name { text: path.display().to_string(), is_file: true };
             stage.add(Added { name, input, load, look, deadline }, &own)
         })
@@ -366,7 +367,7 @@ impl Scene {
             ArrayLabels::apply(labels.as_ref(), volume)
         };
         let volume: Volume = run(py, &Stop::default(), measured)?;
-        self.add(py, Input::Volume(volume), told, more)
+        self.add(py, Data::Volume(volume), told, more)
     }
 
     /// Adds a mesh, or points if there are no faces.
@@ -381,7 +382,7 @@ impl Scene {
         let made = self::told(told, load, look)
             .and_then(|(told, more)| Ok((arrays.mesh(told.about()?)?, told, more)));
         let (mesh, told, more) = made.map_err(|error| raise(py, &error))?;
-        self.add(py, Input::Mesh(mesh), told, more)
+        self.add(py, Data::Mesh(mesh), told, more)
     }
 
     /// Adds cells.
@@ -395,7 +396,7 @@ impl Scene {
         let made = self::told(told, "{}", look)
             .and_then(|(told, more)| Ok((arrays.cells(told.about()?, told.missing)?, told, more)));
         let (cells, told, more) = made.map_err(|error| raise(py, &error))?;
-        self.add(py, Input::Cells(cells), told, more)
+        self.add(py, Data::Cells(cells), told, more)
     }
 
     /// Adds samples at any positions.
@@ -410,7 +411,7 @@ impl Scene {
         let made = self::told(told, load, look)
             .and_then(|(told, more)| Ok((arrays.points(told.about()?, told.missing)?, told, more)));
         let (points, told, more) = made.map_err(|error| raise(py, &error))?;
-        self.add(py, Input::Samples(points), told, more)
+        self.add(py, Data::Samples(points), told, more)
     }
 
     /// Adds trained Gaussians.
@@ -423,7 +424,7 @@ impl Scene {
         let made = self::told(told, "{}", "{}")
             .and_then(|(told, more)| Ok((arrays.set(told.about()?)?, told, more)));
         let (set, told, more) = made.map_err(|error| raise(py, &error))?;
-        self.add(py, Input::Gaussians(set), told, more)
+        self.add(py, Data::Gaussians(set), told, more)
     }
 
     /// What the scene holds: kind, name, and the number of splats or samples.

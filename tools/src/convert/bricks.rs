@@ -3,7 +3,6 @@
 use super::{Convert, memory, source::Source};
 use crate::{
     failure::{Failure, in_file},
-    load::grouped,
     output,
     progress::Progress,
     timing::milliseconds,
@@ -12,17 +11,9 @@ use serde_json::json;
 use splatkit::{
     Error,
     bricks::{self, WriteOptions},
+    session::warn_of_holes,
 };
-use std::{path::Path, time::Instant};
-
-/// Warns that some of all values of a file are missing.
-fn warn_of_holes(file: &Path, holes: u64, all: usize) {
-    if holes > 0 {
-        let (holes, all) = (grouped(holes), grouped(all as u64));
-        let file = file.display();
-        tracing::warn!("{file}: {holes} of {all} values missing: read as the lowest value");
-    }
-}
+use std::time::Instant;
 
 impl Convert {
     /// Writes the volume as .splv.
@@ -55,7 +46,8 @@ impl Convert {
             Source::Stream(stream) => {
                 let range =
                     stream.range(Some(&|done, all| stages.set("Scanning the input", done, all)))?;
-                warn_of_holes(file, stream.holes(), lattice.len());
+                let (name, all) = (file.display().to_string(), lattice.len() as u64);
+                warn_of_holes(&name, stream.holes(), all, "read as the lowest value");
                 bricks::convert(stream, range, self.output(), &options, Some(&watch))
             }
         }

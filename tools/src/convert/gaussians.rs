@@ -3,7 +3,6 @@
 use super::{Convert, surface::Frame};
 use crate::{
     failure::{Failure, in_file},
-    load::Input,
     output,
     progress::Progress,
     timing::milliseconds,
@@ -17,6 +16,7 @@ use splatkit::{
     gaussians::{Gaussians, harmonics},
     hierarchy::{self, BuildOptions, Hierarchy, file::WriteOptions},
     memory,
+    session::Data,
 };
 use std::{
     path::{Path, PathBuf},
@@ -260,10 +260,8 @@ impl Convert {
         }
         progress.stage(format!("Reading {}", path.display()));
         self.color.check_effect(false, false)?;
-        let (most, mut read) = (self.surface.memory.or_else(memory::most), Vec::new());
-        let input = self.load.open_within(path, most, &mut read)?;
-        self.check_unneeded(&read)?;
-        let Input::Gaussians(mut set) = input else {
+        let most = self.surface.memory.or_else(memory::most);
+        let Data::Gaussians(mut set) = self.data(path, most)? else {
             return Err(Error::input(path, "file", "holds no Gaussians").into());
         };
         // Files of trainers do not say what is up: it is −y.

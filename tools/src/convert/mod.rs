@@ -18,7 +18,7 @@ use crate::{
     progress::Progress,
 };
 use clap::Args;
-use splatkit::Error;
+use splatkit::{Error, session::Data};
 use std::path::{Path, PathBuf};
 
 #[derive(Args, Debug)]
@@ -126,9 +126,21 @@ impl Convert {
     /// Warns of flags that change nothing in any conversion of these files.
     fn warn(&self, given: &Given, progress: &Progress) {
         // What cannot be read fails later.
-        let is_raw = |path: &PathBuf| self.load.is_raw(path).unwrap_or(true);
+        let reading = self.load.reading(None);
+        let is_raw = |path: &PathBuf| {
+            reading.layout().is_some() && reading.open(path).map_or(true, |opened| opened.is_raw())
+        };
         let raw = if self.files.iter().any(is_raw) { 0 } else { given::RAW };
         given.warn_of_file(&self.files[0], given::ALL & !raw, progress);
+    }
+
+    /// Reads an input, which may take `memory` bytes.
+    fn data(&self, path: &Path, memory: Option<u64>) -> Result<Data, Failure> {
+        let reading = self.load.reading(memory);
+        let opened = reading.open(path)?;
+        let data = opened.read()?;
+        self.check_unneeded(&opened.files())?;
+        Ok(data)
     }
 
     /// Refuses to replace a file that was read.

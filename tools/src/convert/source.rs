@@ -1,10 +1,11 @@
 //! The volume to convert, read slice by slice if possible, or as a whole.
 
 use super::Convert;
-use crate::{failure::Failure, load::Input};
+use crate::failure::Failure;
 use splatkit::{
     formats::{Kind, VolumeStream},
     input,
+    session::Data,
     volume::{Lattice, Scalar, Volume},
 };
 use std::path::Path;
@@ -49,7 +50,7 @@ impl Convert {
             }
             Kind::Mesh | Kind::Gaussians | Kind::Hierarchy => return Err(none(file)),
         }
-        if let Some(stream) = self.load.stream(file)? {
+        if let Some(stream) = self.load.reading(None).stream(file)? {
             self.check_unneeded(&[stream.path().to_owned()])?;
             return Ok(Source::Stream(Box::new(stream)));
         }
@@ -70,11 +71,8 @@ impl Convert {
 
     /// Reads a volume as a whole. `memory` limits its bytes if its need is not known yet.
     pub(super) fn whole(&self, file: &Path, memory: Option<u64>) -> Result<Volume, Failure> {
-        let mut read = Vec::new();
-        let input = self.load.open_within(file, memory, &mut read)?;
-        self.check_unneeded(&read)?;
-        match input {
-            Input::Volume(volume) => {
+        match self.data(file, memory)? {
+            Data::Volume(volume) => {
                 if volume.colors.is_some() {
                     let file = file.display();
                     tracing::warn!("{file}: the brightness is written, and the colours are not");

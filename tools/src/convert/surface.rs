@@ -3,7 +3,6 @@
 use super::{Convert, SURFACES, memory};
 use crate::{
     failure::{Failure, in_file},
-    load::Input,
     output, parse,
     progress::Progress,
     timing::milliseconds,
@@ -19,6 +18,7 @@ use splatkit::{
         external::{memory_of_mesh, memory_of_splats},
         file::WriteOptions,
     },
+    session::Data,
     splat::SplatSet,
     surface::SurfelOptions,
 };
@@ -215,13 +215,14 @@ impl Convert {
         // One deadline covers reading the input and making its splats.
         let deadline = self.load.limits().deadline();
         let most = self.most_memory();
-        let mut read = Vec::new();
-        let input = self.load.open_colored(path, self.attribute(), Some(most), &mut read)?;
-        self.check_unneeded(&read)?;
+        let reading = self.load.reading(Some(most));
+        let opened = reading.open_colored(path, self.attribute())?;
+        let input = opened.read()?;
+        self.check_unneeded(&opened.files())?;
         let read_ms = milliseconds(start);
         let start = Instant::now();
         let (set, closed, frame, points) = match input {
-            Input::Mesh(mut mesh) => {
+            Data::Mesh(mut mesh) => {
                 let frame = Frame::of(mesh.about.stance, || Ok(mesh.guess_stance()))?;
                 let up = self.surface.up_of(&frame);
                 let named = self.load.scalar().is_some();
@@ -236,7 +237,7 @@ impl Convert {
                 let set = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
                 (set, closed, frame, mesh.positions.len() as u64)
             }
-            Input::Hierarchy(hierarchy) => {
+            Data::Hierarchy(hierarchy) => {
                 self.color.check_effect(false, false)?;
                 progress.stage("Reading the splats of the finest level");
                 let header = hierarchy.header();
@@ -250,14 +251,14 @@ impl Convert {
                 let frame = Frame { stance: header.stance, is_guessed: header.is_guessed, unit };
                 (set, header.closed, frame, header.source_points)
             }
-            Input::Gaussians(_) => {
+            Data::Gaussians(_) => {
                 let file = path.display();
                 return Err(Failure::Usage(format!(
                     "{file} holds trained Gaussians, and another input does not; a hierarchy is \
                      built of either"
                 )));
             }
-            Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) | Input::Cells(_) => {
+            Data::Volume(_) | Data::Samples(_) | Data::Bricks(_) | Data::Cells(_) => {
                 let file = path.display();
                 return Err(Failure::Usage(format!(
                     "{file} holds a volume, cells or samples; hierarchies are built from meshes \

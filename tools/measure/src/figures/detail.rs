@@ -9,12 +9,12 @@ use splatkit::{
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
     math::Camera,
     scene::{Scene, Settings},
+    session::Data,
     surface::SurfelOptions,
 };
 use splatkit_tools::{
     camera::{CameraFlags, Subject},
     failure::Failure,
-    load::Input,
     progress::Progress,
     timing::milliseconds,
 };
@@ -35,10 +35,10 @@ const CUT: f64 = Detail::PIXELS;
 pub const OTHER: &str = "is not a mesh, point cloud or hierarchy";
 
 /// Returns the hierarchy in a file, or builds it from a mesh or point cloud.
-fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
+fn hierarchy(source: &Source, input: Data) -> Result<Arc<Hierarchy>, Failure> {
     match input {
-        Input::Hierarchy(hierarchy) => Ok(hierarchy),
-        Input::Mesh(mesh) => {
+        Data::Hierarchy(hierarchy) => Ok(hierarchy),
+        Data::Mesh(mesh) => {
             let options = BuildOptions { closed: mesh.is_solid(), ..BuildOptions::default() };
             let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, None)?;
             Ok(Arc::new(Hierarchy::from_tree(tree)?))
@@ -63,7 +63,7 @@ fn camera(
 pub fn tables(
     stage: &mut Stage,
     sources: &[Source],
-    open: impl Fn(&Path) -> Result<Input, Failure>,
+    open: impl Fn(&Path) -> Result<Data, Failure>,
     progress: &Progress,
 ) -> Result<[Table; 2], Failure> {
     let mut cost = Table::new(

@@ -19,13 +19,9 @@ use splatkit::{
     math::Camera,
     picture::Picture,
     scene::{Scene, Settings},
+    session::Data,
 };
-use splatkit_tools::{
-    failure::Failure,
-    load::{Input, LoadFlags},
-    output, parse,
-    progress::Progress,
-};
+use splatkit_tools::{failure::Failure, load::LoadFlags, output, parse, progress::Progress};
 use std::path::{Path, PathBuf};
 
 #[derive(Args, Debug)]
@@ -217,7 +213,7 @@ impl Figures {
     fn case_of_gaussians(&self, file: &Path) -> Result<gaussians::Case, Failure> {
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         match self.load.open(file)? {
-            Input::Gaussians(set) => Ok(gaussians::Case { name, set }),
+            Data::Gaussians(set) => Ok(gaussians::Case { name, set }),
             _ => Err(Error::input(file, "file", gaussians::OTHER).into()),
         }
     }
@@ -248,7 +244,7 @@ impl Figures {
         for file in &self.files {
             progress.stage(format!("Reading {}", file.display()));
             match self.load.open(file)? {
-                Input::Volume(volume) => {
+                Data::Volume(volume) => {
                     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                     cases.push(dense::Case::automatic(name, volume));
                 }

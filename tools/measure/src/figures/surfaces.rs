@@ -11,12 +11,12 @@ use splatkit::{
     picture::Picture,
     reference,
     scene::{Scene, Settings},
+    session::Data,
     surface::{Mesh, SurfelOptions},
 };
 use splatkit_tools::{
     camera::{CameraFlags, Subject},
     failure::Failure,
-    load::Input,
     output, parse,
     progress::Progress,
 };
@@ -242,7 +242,7 @@ pub fn pictures(
 pub fn tables(
     stage: &mut Stage,
     sources: &[Source],
-    open: impl Fn(&Path) -> Result<Input, Failure>,
+    open: impl Fn(&Path) -> Result<Data, Failure>,
     keep: &[[PathBuf; 2]],
     progress: &Progress,
 ) -> Result<[Table; 2], Failure> {
@@ -274,7 +274,7 @@ pub fn tables(
     );
     for (at, source) in sources.iter().enumerate() {
         progress.stage(format!("Reading {}", source.path.display()));
-        let Input::Mesh(mesh) = open(&source.path)? else {
+        let Data::Mesh(mesh) = open(&source.path)? else {
             return Err(Error::input(&source.path, "file", OTHER).into());
         };
         progress.stage(format!("Tracing {}", source.path.display()));

@@ -1,0 +1,24 @@
+//! One way in: any file, opened once and read as what it holds.
+//!
+//! [`Reading`] says how inputs are read. It opens a file, a folder or a remote object of any kind;
+//! [`Opened`] knows the kind, and reads it into [`Data`]. The functions of [`formats`](crate::formats)
+//! read one kind each, from files or from bytes in memory.
+//!
+//! ```no_run
+//! use splatkit::session::{Data, Reading};
+//!
+//! match Reading::default().open("scan.ply".as_ref())?.read()? {
+//!     Data::Mesh(mesh) => println!("{} points", mesh.positions.len()),
+//!     data => println!("{:?}", data.kind()),
+//! }
+//! # Ok::<(), splatkit::Error>(())
+//! ```
+
+mod data;
+mod facts;
+mod oddities;
+mod reading;
+
+pub use data::{Data, warn_of_holes};
+pub use facts::Facts;
+pub use reading::{Opened, Reading};

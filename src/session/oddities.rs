@@ -1,0 +1,78 @@
+//! The oddities of an input without checksums: parts that draw nothing, or that are drawn
+//! differently than meant.
+
+use super::Data;
+use crate::{
+    Deadline, Error, Result,
+    container::{Finding, Severity},
+    gaussians::Gaussians,
+    surface::{Mesh, SurfelOptions},
+};
+
+impl Data {
+    /// Returns the oddities of a mesh, of a point cloud and of trained Gaussians; none of other
+    /// data, whose readers report what is wrong. Hierarchies and bricks have checks of their own:
+    /// [`hierarchy::file::check`](crate::hierarchy::file::check) and
+    /// [`bricks::check`](crate::bricks::check).
+    ///
+    /// # Errors
+    /// [`Error::Timeout`] after the deadline, [`Error::Memory`] for splats that do not fit.
+    pub fn oddities(&self, deadline: Deadline) -> Result<Vec<Finding>> {
+        match self {
+            Self::Mesh(mesh) => in_mesh(mesh, deadline),
+            Self::Gaussians(set) => Ok(in_gaussians(set)),
+            _ => Ok(Vec::new()),
+        }
+    }
+}
+
+/// Returns a warning if something was found.
+fn warning(code: &'static str, place: &str, found: Option<String>) -> Option<Finding> {
+    let (severity, place) = (Severity::Warning, place.to_owned());
+    found.map(|message| Finding { code, severity, place, message })
+}
+
+/// Returns the oddities of trained Gaussians.
+fn in_gaussians(set: &Gaussians) -> Vec<Finding> {
+    let (survey, all) = (set.survey(), set.len() as u64 + set.broken.all());
+    let of = |count: u64, what: &str| (count > 0).then(|| format!("{count} of {all} {what}"));
+    let found = [
+        ("not-finite", of(set.broken.not_finite, "have numbers that are not finite; left out")),
+        ("no-rotation", of(set.broken.without_rotation, "have a zero quaternion; left out")),
+        ("invisible", of(survey.invisible, "cover less than 1/255 of any pixel")),
+        ("needles", of(survey.needles, "are at least 25 times as long as they are wide")),
+    ];
+    found.into_iter().filter_map(|(code, found)| warning(code, "Gaussians", found)).collect()
+}
+
+/// Returns findings on a mesh or point cloud: parts that draw nothing, or that are drawn
+/// differently than meant.
+fn in_mesh(mesh: &Mesh, deadline: Deadline) -> Result<Vec<Finding>> {
+    let survey = mesh.survey();
+    let (points, triangles) = (mesh.positions.len(), mesh.triangles.len());
+    let of = |count: usize, all: usize, what: &str| {
+        (count > 0).then(|| format!("{count} of {all} {what}"))
+    };
+    let open = "the surface has borders; its back is visible through them";
+    let open = (triangles > 0 && !mesh.is_closed()).then(|| open.to_owned());
+    let found = [
+        ("not-finite", "positions", of(survey.not_finite, points, "are not finite")),
+        (
+            "duplicates",
+            "positions",
+            of(survey.duplicates, points, "lie at the position of another"),
+        ),
+        ("no-area", "triangles", of(survey.without_area, triangles, "have no area")),
+        ("unused", "positions", of(survey.unused, points, "belong to no triangle")),
+        ("open", "triangles", open),
+    ];
+    let found = found.into_iter().filter_map(|(code, place, found)| warning(code, place, found));
+    let mut findings: Vec<Finding> = found.collect();
+    match mesh.surfels(&SurfelOptions { deadline, ..SurfelOptions::default() }) {
+        // These errors say nothing about the file.
+        Err(error @ (Error::Timeout { .. } | Error::Memory { .. })) => return Err(error),
+        Err(error) => findings.push(Finding::error("nothing", "content", error.to_string())),
+        Ok(_) => {}
+    }
+    Ok(findings)
+}

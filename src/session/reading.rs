@@ -1,0 +1,257 @@
+//! Opening an input of any kind, which its name decides, then its first bytes.
+
+use super::Data;
+use crate::{
+    Error, Result,
+    bricks::Bricks,
+    formats::{
+        self, Array, Content, FORMATS, Format, Kind, RawLayout, ReadOptions, Series, VolumeStream,
+    },
+    hierarchy::Hierarchy,
+    input::{Limits, Source},
+};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// How inputs are read: what of them, what their bytes mean, and what they may take.
+#[derive(Debug, Clone, Default)]
+pub struct Reading {
+    /// What to read, and what files do not say themselves. Label maps also take names and colours
+    /// from the [table](Self::with_label_table), if there is one.
+    pub options: ReadOptions,
+    label_table: Option<PathBuf>,
+    limits: Limits,
+    /// The limits of an input that is read as a whole.
+    whole: Limits,
+}
+
+impl Reading {
+    /// Creates the way to read inputs within these limits.
+    pub fn new(options: ReadOptions, limits: Limits) -> Self {
+        Self { options, label_table: None, whole: limits.clone(), limits }
+    }
+
+    /// Lets an input that is read as a whole take no more than these bytes of memory. Hierarchies
+    /// and bricks are read in parts.
+    pub fn within_memory(mut self, bytes: Option<u64>) -> Self {
+        // The limit also counts data that is dropped on the way, such as the file and its unpacked
+        // bytes.
+        let most = bytes.map_or(u64::MAX, |bytes| bytes.saturating_mul(2));
+        self.whole.bytes = self.limits.bytes.min(most);
+        self
+    }
+
+    /// Takes names and colours of labels from this file ([`formats::read_labels`]).
+    pub fn with_label_table(mut self, file: Option<PathBuf>) -> Self {
+        self.label_table = file;
+        self
+    }
+
+    /// Returns the limits of every file.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Opens a file, the pictures of a folder, or a remote object.
+    ///
+    /// # Errors
+    /// Those of [`Source::open_any`]; [`Error::Input`] for a file of no kind that is read.
+    pub fn open<'a>(&'a self, path: &'a Path) -> Result<Opened<'a>> {
+        self.open_colored(path, None)
+    }
+
+    /// As [`open`](Self::open). A mesh or point cloud has the values of this attribute, if one is
+    /// named. Unlike [`ReadOptions::scalar`], an attribute makes no samples of points.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open).
+    pub fn open_colored<'a>(
+        &'a self,
+        path: &'a Path,
+        attribute: Option<&'a str>,
+    ) -> Result<Opened<'a>> {
+        let opened =
+            |source, kind, is_raw| Opened { reading: self, path, attribute, source, kind, is_raw };
+        if let Some(kind @ (Kind::Hierarchy | Kind::Bricks)) = Kind::at_once(path, &self.limits)? {
+            return Ok(opened(None, kind, false));
+        }
+        let source = Source::open_any(path, &self.whole)?;
+        let kind = match attribute {
+            None => Kind::of_source(&source, &self.options)?,
+            Some(_) => {
+                let options = ReadOptions { scalar: None, ..self.options.clone() };
+                Kind::of_source(&source, &options)?.map(|kind| as_cloud(path, kind))
+            }
+        };
+        match kind {
+            Some(kind) => Ok(opened(Some(source), kind, false)),
+            None if self.options.raw.is_some() => Ok(opened(Some(source), Kind::Volume, true)),
+            None => Err(foreign(&source).unwrap_or_else(|| unknown(path))),
+        }
+    }
+
+    /// Returns the kind of an input, even if it is damaged. What its name and its first bytes decide
+    /// is not fetched from a server.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open).
+    pub fn kind(&self, path: &Path) -> Result<Kind> {
+        match Kind::at_once(path, &self.limits)? {
+            Some(kind) => Ok(kind),
+            None => self.open(path).map(|opened| opened.kind),
+        }
+    }
+
+    /// Opens a volume that can be read slice by slice. Returns `None` for volumes that are read as
+    /// a whole.
+    ///
+    /// # Errors
+    /// Those of [`VolumeStream::open`].
+    pub fn stream(&self, path: &Path) -> Result<Option<VolumeStream>> {
+        let options = &self.options;
+        let stream = VolumeStream::open(path, &self.limits, options.raw.as_ref())?;
+        let stream = stream.map(|stream| stream.with_missing(options.missing));
+        Ok(match (stream, options.spacing) {
+            (Some(stream), Some(spacing)) => Some(stream.with_spacing(spacing)?),
+            (stream, _) => stream,
+        })
+    }
+
+    /// Returns the layout of raw volumes.
+    pub fn layout(&self) -> Option<&RawLayout> {
+        self.options.raw.as_ref()
+    }
+}
+
+/// An input whose kind is known.
+pub struct Opened<'a> {
+    reading: &'a Reading,
+    path: &'a Path,
+    attribute: Option<&'a str>,
+    /// None for hierarchies and bricks, which map or fetch parts.
+    source: Option<Source<'a>>,
+    kind: Kind,
+    is_raw: bool,
+}
+
+impl Opened<'_> {
+    /// Returns what it holds.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Returns whether the caller gave the layout of the file, because it has no format of its own.
+    pub fn is_raw(&self) -> bool {
+        self.is_raw
+    }
+
+    /// Returns its path, or the address of a remote object.
+    pub fn path(&self) -> &Path {
+        self.path
+    }
+
+    /// Reads it, and warns of missing values.
+    ///
+    /// # Errors
+    /// Those of the kind's reader in [`formats`].
+    pub fn read(&self) -> Result<Data> {
+        let Reading { limits, options, label_table, .. } = self.reading;
+        let data = match (self.kind, &self.source) {
+            (Kind::Bricks, _) => Data::Bricks(Arc::new(Bricks::open(self.path, limits)?)),
+            (Kind::Hierarchy, _) | (_, None) => {
+                Data::Hierarchy(Arc::new(Hierarchy::open(self.path, limits)?))
+            }
+            (Kind::Mesh, Some(source)) => {
+                let mut options = options.clone();
+                options.scalar = self.attribute.map(str::to_owned).or(options.scalar);
+                Data::Mesh(formats::read_mesh(source, &options)?)
+            }
+            (Kind::Volume, Some(source)) => {
+                let mut options = options.clone();
+                if let Some(table) = label_table {
+                    options.labels = formats::read_labels(table, limits)?;
+                }
+                Data::Volume(formats::read_volume(source, &options)?)
+            }
+            (Kind::Samples, Some(source)) => Data::Samples(formats::read_samples(source, options)?),
+            (Kind::Cells, Some(source)) => Data::Cells(formats::read_cells(source, options)?),
+            (Kind::Gaussians, Some(source)) => Data::Gaussians(formats::read_gaussians(source)?),
+        };
+        data.warn_of_holes(&self.path.display().to_string());
+        Ok(data)
+    }
+
+    /// Returns the files opened so far: its own, those it refers to, and a table of labels.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let own = self.source.as_ref().map_or_else(|| vec![self.path.to_owned()], Source::files);
+        let table = self.reading.label_table.clone().filter(|_| self.kind == Kind::Volume);
+        own.into_iter().chain(table).collect()
+    }
+
+    /// Returns the arrays of a file that holds several; none for the kinds that name none.
+    ///
+    /// # Errors
+    /// Those of [`formats::arrays`].
+    pub fn arrays(&self) -> Result<Vec<Array>> {
+        match (&self.source, self.kind) {
+            (None, _) | (_, Kind::Gaussians | Kind::Hierarchy | Kind::Bricks) => Ok(Vec::new()),
+            (Some(source), _) => formats::arrays(source, &self.reading.options),
+        }
+    }
+
+    /// Returns the series of a folder of pictures, or of a file that lists others; none for other
+    /// inputs.
+    ///
+    /// # Errors
+    /// Those of [`formats::series`].
+    pub fn series(&self) -> Result<Vec<Series>> {
+        let source = self.source.as_ref();
+        source.map_or(Ok(Vec::new()), |source| formats::series(source, &self.reading.options))
+    }
+}
+
+/// Returns the kind of a file of which an attribute is named to colour it: a point cloud, if it can
+/// be read as one.
+fn as_cloud(path: &Path, kind: Kind) -> Kind {
+    let holds_cloud =
+        |format: &Format| format.holds.iter().any(|one| one.content == Content::PointCloud);
+    let may_be_cloud = Format::of_path(path).is_some_and(holds_cloud);
+    if kind == Kind::Samples && may_be_cloud { Kind::Mesh } else { kind }
+}
+
+/// Returns the error for a file of a kind that is known, but not read.
+fn foreign(source: &Source) -> Option<Error> {
+    let advice = match source.folder() {
+        Some(_) => formats::folder_advice(source.path)?,
+        None => formats::advice(source)?,
+    };
+    let message = format!("is {}, which is not read", advice.what);
+    Some(source.error("file", message).hint(advice.hint))
+}
+
+/// Returns the error for a file in no known format, with a hint that lists the known ones.
+fn unknown(path: &Path) -> Error {
+    if path.is_dir() {
+        let message =
+            "is not a regular file but a folder, in which no series of pictures was found";
+        let hint = "name one of its files, or a folder with slices as DICOM or TIFF files";
+        return Error::input(path, "path", message).hint(hint);
+    }
+    let lists = Content::ALL.map(|content| {
+        let holds = |format: &&Format| format.holds.iter().any(|one| one.content == content);
+        let extensions: Vec<String> = FORMATS
+            .iter()
+            .filter(holds)
+            .flat_map(|format| format.extensions)
+            .map(|extension| format!(".{extension}"))
+            .collect();
+        let raw = match content {
+            Content::Volume => ", and raw samples (also packed by gzip) with their dims and type",
+            _ => "",
+        };
+        format!("{}: {}{raw}", content.plural(), extensions.join(", "))
+    });
+    Error::input(path, "file", "is in no format that can be read").hint(lists.join("; "))
+}
