@@ -2,11 +2,7 @@
 
 use super::{Limits, Source};
 use crate::{Error, Result};
-use std::{
-    fmt,
-    path::Path,
-    sync::{Arc, Mutex},
-};
+use std::{cell::RefCell, fmt, path::Path, sync::Once};
 use tracing::{Event, Level, Metadata, Subscriber, field, span};
 
 #[path = "../../tests/testing/folder.rs"]
@@ -52,9 +48,14 @@ pub fn png(width: u32, height: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     out.into_inner()
 }
 
-/// Keeps the texts of warnings.
-#[derive(Clone, Default)]
-struct Warnings(Arc<Mutex<Vec<String>>>);
+thread_local! {
+    /// The texts of the warnings that a thread asked for.
+    static HEARD: RefCell<Option<Vec<String>>> = const { RefCell::new(None) };
+}
+
+/// Keeps the texts of warnings for the threads that ask for them. The whole process has one, since
+/// places in the code that threads reach at once may miss one that comes and goes.
+struct Warnings;
 
 impl Subscriber for Warnings {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
@@ -70,7 +71,11 @@ impl Subscriber for Warnings {
     fn record_follows_from(&self, _: &span::Id, _: &span::Id) {}
 
     fn event(&self, event: &Event<'_>) {
-        event.record(&mut Message(&self.0));
+        HEARD.with_borrow_mut(|heard| {
+            if let Some(heard) = heard {
+                event.record(&mut Message(heard));
+            }
+        });
     }
 
     fn enter(&self, _: &span::Id) {}
@@ -79,20 +84,21 @@ impl Subscriber for Warnings {
 }
 
 /// Takes the text of an event.
-struct Message<'a>(&'a Mutex<Vec<String>>);
+struct Message<'a>(&'a mut Vec<String>);
 
 impl field::Visit for Message<'_> {
     fn record_debug(&mut self, field: &field::Field, value: &dyn fmt::Debug) {
         if field.name() == "message" {
-            self.0.lock().expect("no test panics here").push(format!("{value:?}"));
+            self.0.push(format!("{value:?}"));
         }
     }
 }
 
 /// Returns the result of `act` and the warnings that this thread gives meanwhile.
 pub fn warnings_of<T>(act: impl FnOnce() -> T) -> (T, Vec<String>) {
-    let warnings = Warnings::default();
-    let result = tracing::subscriber::with_default(warnings.clone(), act);
-    let words = warnings.0.lock().expect("no test panics here").clone();
-    (result, words)
+    static SET: Once = Once::new();
+    SET.call_once(|| tracing::subscriber::set_global_default(Warnings).expect("the only one"));
+    HEARD.set(Some(Vec::new()));
+    let result = act();
+    (result, HEARD.take().unwrap_or_default())
 }

@@ -19,6 +19,9 @@ mod facts;
 mod oddities;
 mod reading;
 
+#[cfg(test)]
+mod tests;
+
 pub use data::{Data, warn_of_holes};
 pub use facts::Facts;
 pub use reading::{Opened, Reading};

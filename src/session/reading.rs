@@ -248,7 +248,7 @@ fn unknown(path: &Path) -> Error {
             .map(|extension| format!(".{extension}"))
             .collect();
         let raw = match content {
-            Content::Volume => ", and raw samples (also packed by gzip) with their dims and type",
+            Content::Volume => ", and raw samples (also packed by gzip) with --dims and --type",
             _ => "",
         };
         format!("{}: {}{raw}", content.plural(), extensions.join(", "))

@@ -1,0 +1,99 @@
+//! Inputs of all kinds through one door.
+
+use super::*;
+use crate::{
+    Deadline, Error,
+    formats::{Kind, RawLayout, ReadOptions, SampleType},
+    input::{
+        Limits,
+        testing::{Folder, warnings_of},
+    },
+};
+use glam::DVec3;
+
+const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+const TABLE: &str = "x,y,z,value\n0,0,0,1\n1,0,0,2\n0,1,0,3\n0,0,1,nan\n";
+
+fn raw() -> ReadOptions {
+    ReadOptions::raw(Some(&RawLayout {
+        dims: [2, 2, 2],
+        sample_type: SampleType::U8,
+        spacing: DVec3::ONE,
+        endian: Default::default(),
+        header: 0,
+    }))
+}
+
+#[test]
+fn each_kind_is_found_and_read() {
+    let folder = Folder::new();
+    let files = [
+        (folder.write("a.obj", MESH.as_bytes()), Kind::Mesh, 3),
+        (folder.write("b.csv", TABLE.as_bytes()), Kind::Samples, 3),
+        (folder.write("c.bin", &[0, 1, 2, 3, 4, 5, 6, 7]), Kind::Volume, 8),
+    ];
+    for (path, kind, count) in files {
+        let reading = Reading::new(raw(), Limits::default());
+        assert_eq!(reading.kind(&path).unwrap(), kind);
+        let opened = reading.open(&path).unwrap();
+        assert_eq!((opened.kind(), opened.is_raw()), (kind, path.ends_with("c.bin")));
+        let data = opened.read().unwrap();
+        assert_eq!((data.kind(), data.count()), (kind, count), "{path:?}");
+        assert_eq!(opened.files(), [path.clone()]);
+        let facts = opened.facts(&data).unwrap().to_json();
+        assert_eq!(facts["bytes"], std::fs::metadata(&path).unwrap().len());
+        assert_eq!(facts["count"], count);
+    }
+}
+
+/// An attribute colours points, and a scalar makes samples of them.
+#[test]
+fn an_attribute_makes_no_samples() {
+    let folder = Folder::new();
+    let path = folder.write("a.csv", TABLE.as_bytes());
+    let reading = Reading::default();
+    assert_eq!(reading.open_colored(&path, Some("value")).unwrap().kind(), Kind::Mesh);
+    let reading = Reading::new(ReadOptions::scalar(Some("value")), Limits::default());
+    assert_eq!(reading.open(&path).unwrap().kind(), Kind::Samples);
+}
+
+#[test]
+fn missing_values_are_told() {
+    let folder = Folder::new();
+    let path = folder.write("a.csv", TABLE.as_bytes());
+    let (data, told) = warnings_of(|| Reading::default().open(&path).unwrap().read().unwrap());
+    assert_eq!(data.holes(), 1);
+    assert!(told.iter().any(|line| line.ends_with("1 of 4 values missing: left out")), "{told:?}");
+}
+
+#[test]
+fn what_is_read_whole_fits_in_memory() {
+    let folder = Folder::new();
+    let path = folder.write("a.obj", MESH.as_bytes());
+    let reading = Reading::default().within_memory(Some(4));
+    let error = reading.open(&path).and_then(|opened| opened.read()).err().unwrap();
+    assert!(matches!(error, Error::Limit { limit: 8, .. }), "{error}");
+}
+
+#[test]
+fn files_of_no_kind_name_what_is_read() {
+    let folder = Folder::new();
+    let path = folder.write("a.doc", b"words");
+    let Err(Error::Input { file, message, hint, .. }) = Reading::default().open(&path) else {
+        panic!("is opened");
+    };
+    assert_eq!((file, message.as_str()), (path, "is in no format that can be read"));
+    let hint = hint.unwrap();
+    assert!(hint.contains(".nrrd") && hint.contains("--dims and --type"), "{hint}");
+    assert!(Reading::default().open(&folder.path("")).is_err());
+}
+
+#[test]
+fn oddities_are_found() {
+    let folder = Folder::new();
+    let path = folder.write("a.obj", MESH.as_bytes());
+    let data = Reading::default().open(&path).unwrap().read().unwrap();
+    let codes: Vec<_> =
+        data.oddities(Deadline::NEVER).unwrap().iter().map(|finding| finding.code).collect();
+    assert_eq!(codes, ["open"]);
+}
