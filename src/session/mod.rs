@@ -16,12 +16,16 @@
 
 mod data;
 mod facts;
+mod framing;
 mod oddities;
 mod reading;
+mod subject;
 
 #[cfg(test)]
 mod tests;
 
 pub use data::{Data, warn_of_holes};
 pub use facts::Facts;
+pub use framing::{Framing, Side};
 pub use reading::{Opened, Reading};
+pub use subject::{Origin, Subject};

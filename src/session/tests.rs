@@ -9,6 +9,10 @@ use crate::{
         testing::{Folder, warnings_of},
     },
 };
+use crate::{
+    about::{Frame, Stance},
+    math::Bounds,
+};
 use glam::DVec3;
 
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
@@ -30,7 +34,7 @@ fn each_kind_is_found_and_read() {
     let files = [
         (folder.write("a.obj", MESH.as_bytes()), Kind::Mesh, 3),
         (folder.write("b.csv", TABLE.as_bytes()), Kind::Samples, 3),
-        (folder.write("c.bin", &[0, 1, 2, 3, 4, 5, 6, 7]), Kind::Volume, 8),
+        (folder.write("c.bin", [0, 1, 2, 3, 4, 5, 6, 7]), Kind::Volume, 8),
     ];
     for (path, kind, count) in files {
         let reading = Reading::new(raw(), Limits::default());
@@ -39,7 +43,7 @@ fn each_kind_is_found_and_read() {
         assert_eq!((opened.kind(), opened.is_raw()), (kind, path.ends_with("c.bin")));
         let data = opened.read().unwrap();
         assert_eq!((data.kind(), data.count()), (kind, count), "{path:?}");
-        assert_eq!(opened.files(), [path.clone()]);
+        assert_eq!(opened.files(), std::slice::from_ref(&path));
         let facts = opened.facts(&data).unwrap().to_json();
         assert_eq!(facts["bytes"], std::fs::metadata(&path).unwrap().len());
         assert_eq!(facts["count"], count);
@@ -96,4 +100,66 @@ fn oddities_are_found() {
     let codes: Vec<_> =
         data.oddities(Deadline::NEVER).unwrap().iter().map(|finding| finding.code).collect();
     assert_eq!(codes, ["open"]);
+}
+
+/// The first statement of a file decides how a scene stands, then the convention.
+#[test]
+fn the_first_statement_decides() {
+    let mut subject = Subject::default();
+    assert_eq!(subject.stand_as_told("a.raw", None, Stance::SURVEY), None);
+    assert_eq!((subject.stance, subject.origin), (Stance::SURVEY, Origin::Convention));
+    assert_eq!(subject.stand_as_told("b.glb", Some(Stance::Y_UP), Stance::SURVEY), None);
+    assert_eq!((subject.stance, subject.origin), (Stance::Y_UP, Origin::File));
+    let told = subject.stand_as_told("c.las", Some(Stance::SURVEY), Stance::SURVEY).unwrap();
+    assert!(
+        told.starts_with("c.las says that +Z is up, but the scene stands with +Y up"),
+        "{told}"
+    );
+    assert_eq!(subject.stance, Stance::Y_UP);
+    let mut mesh = crate::surface::Mesh::default();
+    mesh.positions.push(glam::Vec3::Z);
+    mesh.about.stance = Some(Stance::SURVEY);
+    let told = subject.stand_mesh("d.ply", &mut mesh).unwrap();
+    assert!(told.starts_with("d.ply is turned: it stands with +Z up"), "{told}");
+    assert!(mesh.positions[0].distance(glam::Vec3::Y) < 1e-6);
+    assert_eq!(subject.frame("d.ply", Frame::Own), None);
+    assert!(subject.frame("e.nii", Frame::Patient).is_some() && subject.is_patient());
+}
+
+#[test]
+fn a_camera_looks_from_the_side_that_is_asked_for() {
+    let cube = Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE };
+    let subject = Subject::new(cube, DVec3::Z);
+    let toward = |framing: Framing| {
+        let camera = framing.camera(&subject, [64, 48]).unwrap();
+        (camera.position - camera.focal_point).normalize()
+    };
+    let side = |view| Framing { view: Some(view), ..Framing::default() };
+    let usual = [(Side::Front, DVec3::NEG_Y), (Side::Right, DVec3::X), (Side::Top, DVec3::Z)];
+    for (view, direction) in usual {
+        assert!(toward(side(view)).distance(direction) < 1e-9, "{view:?}");
+    }
+    assert!(toward(side(Side::Iso)).distance(DVec3::new(1.0, -1.0, 1.0).normalize()) < 1e-9);
+    let usual = toward(Framing::default());
+    assert!(usual.x > 0.4 && usual.y < -0.8 && usual.z > 0.3, "{usual}");
+    // The up axis brings the front that is usual for it.
+    let turned = toward(Framing { up: Some(DVec3::Y), ..side(Side::Front) });
+    assert!(turned.distance(DVec3::Z) < 1e-9, "{turned}");
+    let names: Vec<_> = Side::ALL.map(Side::name).to_vec();
+    let told = serde_json::to_value(Side::ALL).unwrap();
+    assert_eq!(told, serde_json::json!(names));
+}
+
+#[test]
+fn numbers_of_a_camera_are_checked() {
+    let wrong = [
+        Framing { distance: Some(0.0), ..Framing::default() },
+        Framing { azimuth: Some(f64::NAN), ..Framing::default() },
+        Framing { view_angle: Some(180.0), ..Framing::default() },
+        Framing { up: Some(DVec3::ZERO), ..Framing::default() },
+    ];
+    for framing in wrong {
+        assert!(framing.validate().is_err(), "{framing:?}");
+    }
+    assert_eq!(Framing::default().validate(), Ok(()));
 }

@@ -49,9 +49,9 @@ impl Bench {
         let start = Instant::now();
         let mut renderer = Renderer::new(&device, &loaded.scene)?;
         let upload_ms = milliseconds(start);
-        let camera = |frame: u32| {
-            self.camera.turned(&loaded.subject, settings.size, STEP * f64::from(frame))
-        };
+        let framing = self.camera.framing();
+        let camera =
+            |frame: u32| framing.turned(&loaded.subject, settings.size, STEP * f64::from(frame));
 
         let mut frame = |number: u32| {
             progress.stage(format!("Frame {number} of {frames}"));

@@ -1,12 +1,11 @@
 //! `splatkit check`.
 
 use crate::{
-    camera::{CameraFlags, Subject},
     failure::{Failure, in_file},
     load::LoadFlags,
     output, parse,
     progress::Progress,
-    scene::{is_one_place, out_of_sight},
+    scene::out_of_sight,
     scene_file,
     terminal::safe,
 };
@@ -20,7 +19,7 @@ use splatkit::{
     hierarchy::file,
     math::Bounds,
     memory,
-    session::Data,
+    session::{Data, Framing, Subject},
 };
 use std::path::{Path, PathBuf};
 
@@ -89,10 +88,11 @@ impl Check {
 /// Returns the finding on a box that no usual camera sees. `render` refuses it too.
 fn of_bounds(file: &Path, bounds: Bounds) -> Option<Finding> {
     // Footprints give a place an extent, and nothing to see is no matter of places.
-    if bounds.is_empty() || is_one_place(&bounds) {
+    let subject = Subject::new(bounds, DVec3::Y);
+    if bounds.is_empty() || subject.is_one_place() {
         return None;
     }
-    let fault = CameraFlags::usual_fault(&Subject::new(bounds, DVec3::Y), &bounds, [1280, 720])?;
+    let fault = Framing::usual_fault(&subject, &bounds, [1280, 720])?;
     let Error::Input { place, message, .. } = out_of_sight(file, bounds, &fault) else {
         return None;
     };

@@ -158,8 +158,9 @@ impl Demo {
         let mut loaded = flags.scene.load_with(facets, &Given::default(), progress)?;
         let mut drawer = Drawer::engine(&flags.engine, &loaded, progress)?;
         let settings = flags.engine.settings(&loaded, Samples::Factor(1))?;
-        loaded.find_seen(&flags.camera, &settings)?;
-        let camera = flags.camera.camera(&loaded.subject, settings.size)?;
+        let framing = flags.camera.framing();
+        loaded.find_seen(&framing, &settings)?;
+        let camera = framing.camera(&loaded.subject, settings.size)?;
         progress.stage(format!("Drawing {}", shot.name));
         let mut draw = || {
             let start = Instant::now();

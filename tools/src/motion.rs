@@ -1,15 +1,12 @@
 //! How the camera moves from frame to frame.
 
-use crate::{
-    camera::{CameraFlags, Subject},
-    failure::Failure,
-    parse,
-};
+use crate::{failure::Failure, parse};
 use clap::Args;
 use splatkit::{
     Error,
     input::{Limits, Source},
     math::{Camera, CameraPath},
+    session::{Framing, Subject},
 };
 use std::path::{Path, PathBuf};
 
@@ -141,13 +138,13 @@ impl Motion {
     /// to.
     pub fn cameras(
         &self,
-        flags: &CameraFlags,
+        framing: &Framing,
         subject: &Subject,
         size: [u32; 2],
     ) -> splatkit::Result<Vec<Camera>> {
         match self {
-            Self::Still => Ok(vec![flags.camera(subject, size)?]),
-            Self::Turntable(frames) => flags.turntable(subject, size, *frames),
+            Self::Still => Ok(vec![framing.camera(subject, size)?]),
+            Self::Turntable(frames) => framing.turntable(subject, size, *frames),
             Self::Path(path, frames) => {
                 // The last frame is the last keyframe.
                 let step = path.duration() / f64::from((frames - 1).max(1));
@@ -181,7 +178,7 @@ mod tests {
         let flags = MotionFlags { turntable: None, path: Some(file), fps: Some(rate) };
         let motion = flags.open(&Limits::default())?;
         let subject = Subject::new(splatkit::math::Bounds::EMPTY, glam::DVec3::Y);
-        let cameras = motion.cameras(&CameraFlags::default(), &subject, [4, 3])?;
+        let cameras = motion.cameras(&Framing::default(), &subject, [4, 3])?;
         Ok((motion, cameras))
     }
 

@@ -1,7 +1,7 @@
 //! `splatkit render`.
 
 use crate::{
-    camera::{CameraFlags, Origin},
+    camera::CameraFlags,
     describe,
     engine::EngineFlags,
     failure::Failure,
@@ -27,6 +27,7 @@ use splatkit::{
     picture::{Picture, PictureFormat},
     reference,
     scene::Settings,
+    session::Origin,
 };
 #[cfg(feature = "window")]
 use splatkit::{Stop, math::CameraPath, volume::TransferFunction};
@@ -274,7 +275,7 @@ impl Render {
     fn facts(&self, run: &Run, drawn: &Drawn) -> serde_json::Value {
         let Run { ready: Ready { loaded, settings, .. }, film, frames, .. } = run;
         let Drawn { stats, camera, frame_ms, overlay } = drawn;
-        let (stance, origin) = self.camera.stance(&loaded.subject);
+        let (stance, origin) = self.camera.framing().stance(&loaded.subject);
         serde_json::json!({
             "width": self.engine.size[0],
             "height": self.engine.size[1],
@@ -342,8 +343,8 @@ impl Render {
         }
         if motion.is_fitted() {
             progress.stage("Framing the scene");
-            loaded.find_seen(&self.camera, &settings)?;
-            let (stance, origin) = self.camera.stance(&loaded.subject);
+            loaded.find_seen(&self.camera.framing(), &settings)?;
+            let (stance, origin) = self.camera.framing().stance(&loaded.subject);
             if origin == Origin::Guess {
                 progress.note(format_args!(
                     "up: {}, front: {}, guessed from the shape; --up sets another up, and the \
@@ -405,7 +406,7 @@ impl Render {
         settings: &Settings,
         finish: &Finish,
     ) -> splatkit::Result<Camera> {
-        self.camera.camera(&loaded.subject, self.free(settings, finish))
+        self.camera.framing().camera(&loaded.subject, self.free(settings, finish))
     }
 
     /// Sets the size of the picture in pixels.
@@ -423,7 +424,7 @@ impl Render {
     /// Finds the points that the camera is fitted to.
     #[cfg(feature = "window")]
     pub fn find_seen(&self, loaded: &mut Loaded, settings: &Settings) -> splatkit::Result<()> {
-        loaded.find_seen(&self.camera, settings)
+        loaded.find_seen(&self.camera.framing(), settings)
     }
 
     /// Opens the device that draws a scene.
@@ -435,7 +436,7 @@ impl Render {
     /// Returns the scene's way up.
     #[cfg(feature = "window")]
     pub fn up(&self, loaded: &Loaded) -> glam::DVec3 {
-        self.camera.stance(&loaded.subject).0.up
+        self.camera.framing().stance(&loaded.subject).0.up
     }
 
     /// Returns the default name of the picture: that of the first input, with a number if there is
@@ -494,7 +495,7 @@ impl Render {
         let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
         let free = self.free(settings, finish);
-        let cameras = motion.cameras(&self.camera, &loaded.subject, free)?;
+        let cameras = motion.cameras(&self.camera.framing(), &loaded.subject, free)?;
         let mut last = (FrameStats::default(), cameras[0].clone());
         let (mut is_shown, mut missing) = (false, 0);
         let mut writer = frames.open(*film)?;

@@ -1,7 +1,6 @@
 //! The flags of a scene, and loading the scene that they describe.
 
 use crate::{
-    camera::{CameraFlags, Origin, Subject},
     color::{ColorFlags, titled},
     failure::{Failure, in_file},
     given::{Given, Kinds, kinds_of},
@@ -15,8 +14,7 @@ use clap::Args;
 use glam::DVec3;
 use splatkit::{
     Deadline, Error,
-    about::direction_name,
-    about::{Frame, Frames, Stance},
+    about::{Frame, Stance},
     bricks::Bricks,
     cells::{CellOptions, Cells},
     gaussians::Gaussians,
@@ -27,7 +25,7 @@ use splatkit::{
     picture::Edges,
     scattered::Points,
     scene::{Item, Scene, Settings},
-    session::Data,
+    session::{Data, Framing, Subject},
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
 };
@@ -107,7 +105,7 @@ impl SceneFlags {
         let show = self.show.open(&load.limits())?;
         let loaded = Loaded {
             scene: Scene::new(),
-            subject: Subject::new(Bounds::EMPTY, DVec3::Y),
+            subject: Subject::default(),
             count: 0,
             load_ms: 0.0,
             facts: Facts::default(),
@@ -115,10 +113,9 @@ impl SceneFlags {
             kinds: Vec::new(),
             read: self.show.files(),
         };
-        let frames = Frames::default();
         // Of values alone: colours have no largest one.
         let optics = ["mip", "x-ray", "optics"].into_iter().find(|flag| given.has(flag));
-        let mut adding = Adding { flags: self, show, facets, optics, progress, loaded, frames };
+        let mut adding = Adding { flags: self, show, facets, optics, progress, loaded };
         let (mut is_scaled, mut unscaled) = (false, None);
         let reading = load.reading(memory::most());
         for path in &self.inputs {
@@ -149,7 +146,7 @@ impl SceneFlags {
         }
         loaded.scene.validate().map_err(|error| self.at_fault(&loaded.scene, error))?;
         // Points that all lie at one place have no extent, but their splats have one.
-        if is_one_place(&loaded.subject.bounds) {
+        if loaded.subject.is_one_place() {
             loaded.subject.bounds = loaded.scene.bounds();
         }
         let paths = self.inputs.iter().map(PathBuf::as_path);
@@ -199,7 +196,7 @@ impl SceneFlags {
         if !matches!(error, Error::Argument(_)) || is_seen().is_ok() {
             return error.into();
         }
-        let Some(fault) = CameraFlags::usual_fault(&loaded.subject, &bounds, size) else {
+        let Some(fault) = Framing::usual_fault(&loaded.subject, &bounds, size) else {
             return match path {
                 Some((file, place)) => error.stated_in(file, place).into(),
                 None => error.into(),
@@ -276,7 +273,6 @@ struct Adding<'a> {
     optics: Option<&'static str>,
     progress: &'a Progress,
     loaded: Loaded,
-    frames: Frames,
 }
 
 impl Adding<'_> {
@@ -301,7 +297,9 @@ impl Adding<'_> {
 
     fn add_mesh(&mut self, path: &Path, mut mesh: Mesh, deadline: Deadline) -> Result<(), Failure> {
         self.frame(path, mesh.about.frame);
-        self.stand_mesh(path, &mut mesh);
+        self.progress.stage(format!("Finding the way up of {}", path.display()));
+        let warning = self.loaded.subject.stand_mesh(&named_as(path), &mut mesh);
+        self.warn(warning);
         let color = self.show.color_of(path);
         let up = self.loaded.subject.stance.up;
         let named = self.flags.load.scalar().is_some();
@@ -344,15 +342,8 @@ impl Adding<'_> {
 
     fn add_gaussians(&mut self, path: &Path, mut set: Gaussians) {
         self.frame(path, set.about.frame);
-        match set.about.stance {
-            Some(stance) => {
-                if let Some(wanted) = self.stand(stance, Origin::File) {
-                    self.say_turned(path, stance);
-                    set.stand(wanted);
-                }
-            }
-            None => self.stand_as(path, Stance::Y_DOWN, Origin::Convention),
-        }
+        let warning = self.loaded.subject.stand_gaussians(&named_as(path), &mut set);
+        self.warn(warning);
         self.loaded.count_in(set.bounds(), set.len());
         self.add_unit(&set.about.length);
         self.change(|scene| scene.with_gaussians(set));
@@ -362,13 +353,9 @@ impl Adding<'_> {
         let header = hierarchy.header();
         self.loaded.count_in(header.bounds, header.leaves as usize);
         self.add_unit(&header.unit);
-        if let Some(stance) = header.stance {
-            let origin = if header.is_guessed { Origin::Guess } else { Origin::File };
-            self.stand_as(path, stance, origin);
-        }
-        // No other frame has this stance.
-        let is_patient = header.stance == Some(Stance::RAS);
-        self.frame(path, if is_patient { Frame::Patient } else { Frame::Own });
+        let warnings = self.loaded.subject.stand_hierarchy(&named_as(path), &hierarchy);
+        self.warn(warnings);
+        self.loaded.facts.is_patient = self.loaded.subject.is_patient();
         self.change(|scene| scene.with_hierarchy(hierarchy));
     }
 
@@ -481,69 +468,22 @@ impl Adding<'_> {
         self.loaded.facts.bars.push(self.flags.show.color.bar(transfer, values, title));
     }
 
-    /// Takes the stance of a mesh, or guesses it. A mesh that stands otherwise than an input before
-    /// is turned.
-    fn stand_mesh(&mut self, path: &Path, mesh: &mut Mesh) {
-        match mesh.about.stance {
-            Some(stance) => {
-                if let Some(wanted) = self.stand(stance, Origin::File) {
-                    self.say_turned(path, stance);
-                    mesh.stand(wanted);
-                }
-            }
-            // A guess would not count.
-            None if self.loaded.subject.origin >= Origin::Guess => {}
-            None => {
-                self.progress.stage(format!("Finding the way up of {}", path.display()));
-                if let Some(stance) = mesh.guess_stance() {
-                    self.stand_as(path, stance, Origin::Guess);
-                }
-            }
-        }
-    }
-
     /// Takes the stance of a volume or of samples, or the convention for them.
     fn stand_as_told(&mut self, path: &Path, told: Option<Stance>) {
-        match told {
-            Some(stance) => self.stand_as(path, stance, Origin::File),
-            None => self.stand_as(path, Stance::SURVEY, Origin::Convention),
-        }
-    }
-
-    /// Takes the stance of an input that is not turned.
-    fn stand_as(&mut self, path: &Path, stance: Stance, origin: Origin) {
-        if let Some(scene) = self.stand(stance, origin) {
-            let [own, scene] = [stance.up, scene.up].map(direction_name);
-            self.progress.warn(format_args!(
-                "{} says that {own} is up, but the scene stands with {scene} up, as an input \
-                 before says; --up sets another",
-                path.display()
-            ));
-        }
-    }
-
-    /// Takes the stance of an input, unless an earlier one counts more: the first statement of a
-    /// file decides, then the convention, then the first guess. Returns the scene's stance if both
-    /// are stated by files and differ.
-    fn stand(&mut self, stance: Stance, origin: Origin) -> Option<Stance> {
-        let subject = &mut self.loaded.subject;
-        subject.consider(stance, origin).then_some(subject.stance)
-    }
-
-    fn say_turned(&self, path: &Path, own: Stance) {
-        let [own, scene] = [own.up, self.loaded.subject.stance.up].map(direction_name);
-        self.progress.warn(format_args!(
-            "{} is turned: it stands with {own} up, and the input before with {scene} up",
-            path.display()
-        ));
+        let name = named_as(path);
+        let warning = self.loaded.subject.stand_as_told(&name, told, Stance::SURVEY);
+        self.warn(warning);
     }
 
     /// Takes the frame of an input, and says if it cannot be compared with those before.
     fn frame(&mut self, path: &Path, frame: Frame) {
-        if let Some(warning) = self.frames.add(&path.display().to_string(), frame) {
-            self.progress.warn(warning);
-        }
-        self.loaded.facts.is_patient = self.frames.have_patient();
+        let warning = self.loaded.subject.frame(&named_as(path), frame);
+        self.warn(warning);
+        self.loaded.facts.is_patient = self.loaded.subject.is_patient();
+    }
+
+    fn warn(&self, warnings: impl IntoIterator<Item = String>) {
+        warnings.into_iter().for_each(|warning| self.progress.warn(warning));
     }
 
     fn change(&mut self, change: impl FnOnce(Scene) -> Scene) {
@@ -553,7 +493,7 @@ impl Adding<'_> {
 
 impl Loaded {
     /// Finds the points that span what is seen, if the camera is fitted to them.
-    pub fn find_seen(&mut self, camera: &CameraFlags, settings: &Settings) -> splatkit::Result<()> {
+    pub fn find_seen(&mut self, camera: &Framing, settings: &Settings) -> splatkit::Result<()> {
         if !camera.is_placed() {
             self.subject.seen = self.scene.seen(&settings.clips)?;
         }
@@ -562,7 +502,7 @@ impl Loaded {
 
     /// Adds the bounds and the number of splats or samples of an input.
     fn count_in(&mut self, bounds: Bounds, count: usize) {
-        self.subject.bounds = self.subject.bounds.union(bounds);
+        self.subject.count_in(bounds);
         self.count += count as u64;
     }
 }
@@ -576,7 +516,7 @@ pub fn out_of_sight(path: &Path, Bounds { min, max }: Bounds, fault: &Error) -> 
         .hint("give positions, sizes and spacings in a unit in which they are moderate numbers")
 }
 
-/// Whether a box is no larger than the rounding error of its coordinates.
-pub fn is_one_place(bounds: &Bounds) -> bool {
-    bounds.diagonal() <= 1e-13 * bounds.center().abs().max_element()
+/// Returns what an input is called in warnings.
+fn named_as(path: &Path) -> String {
+    path.display().to_string()
 }

@@ -1,7 +1,7 @@
 //! Drawing a scene: the settings of a picture, and renderers that are used again.
 
 use crate::{
-    camera::{Fit, Subject, camera},
+    camera::camera,
     errors::{options, wrong},
     items::{Added, Items},
     weights,
@@ -18,6 +18,7 @@ use splatkit::{
         Classification, Clip, Evaluate, Gradient, Item, Mode, Optics, Order, Region, Scene,
         Settings,
     },
+    session::{Framing, Subject},
     volume::TransferFunction,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -321,21 +322,21 @@ impl Stage {
     }
 
     /// Returns the fitted camera of a picture.
-    pub fn camera(&self, fit: &Fit, draw: &Draw) -> Result<Camera, Error> {
+    pub fn camera(&self, fit: &Framing, draw: &Draw) -> Result<Camera, Error> {
         let mut kept = self.take(draw.draws_facets())?;
         let settings = draw.settings(&kept.scene, &Stop::default())?;
         let seen = kept.fitted(fit, &settings.clips)?;
-        let camera = fit.camera(&kept.subject, &seen, settings.size);
+        let camera = fit.camera(&kept.seen_by(&seen), settings.size);
         self.put(kept, draw.draws_facets());
         camera
     }
 
     /// Returns the cameras of a turntable.
-    pub fn turntable(&self, fit: &Fit, draw: &Draw, frames: u32) -> Result<Vec<Camera>, Error> {
+    pub fn turntable(&self, fit: &Framing, draw: &Draw, frames: u32) -> Result<Vec<Camera>, Error> {
         let mut kept = self.take(draw.draws_facets())?;
         let settings = draw.settings(&kept.scene, &Stop::default())?;
         let seen = kept.fitted(fit, &settings.clips)?;
-        let cameras = fit.turntable(&kept.subject, &seen, settings.size, frames);
+        let cameras = fit.turntable(&kept.seen_by(&seen), settings.size, frames);
         self.put(kept, draw.draws_facets());
         cameras
     }
@@ -357,7 +358,7 @@ impl Stage {
             Some(camera) => camera,
             None => {
                 let seen = kept.seen(&settings.clips)?;
-                Fit::default().camera(&kept.subject, &seen, settings.size)?
+                Framing::default().camera(&kept.seen_by(&seen), settings.size)?
             }
         };
         let mut renderer = match kept.renderer.take() {
@@ -407,7 +408,7 @@ impl Stage {
         let scene = Arc::new(items.scene(facets)?);
         let mut subject = items.subject.clone();
         // Points that all lie at one place have no extent, but their splats have one.
-        if is_one_place(&subject.bounds) {
+        if subject.is_one_place() {
             subject.bounds = scene.bounds();
         }
         let look = items.look;
@@ -439,8 +440,15 @@ impl Kept {
     }
 
     /// Returns the points that a camera is fitted to; none if it has a distance already.
-    fn fitted(&mut self, fit: &Fit, clips: &[Clip]) -> Result<Arc<Vec<DVec3>>, Error> {
+    fn fitted(&mut self, fit: &Framing, clips: &[Clip]) -> Result<Arc<Vec<DVec3>>, Error> {
         if fit.is_placed() { Ok(Arc::default()) } else { self.seen(clips) }
+    }
+
+    /// Returns the subject of which these points span what is seen.
+    fn seen_by(&self, seen: &[DVec3]) -> Subject {
+        let mut subject = self.subject.clone();
+        subject.seen = seen.to_vec();
+        subject
     }
 
     /// Returns the points that span what is seen with these clips.
@@ -463,9 +471,4 @@ fn sheet_of(scene: &Scene) -> Option<f64> {
         _ => None,
     });
     own.reduce(f64::min)
-}
-
-/// Whether a box is no larger than the rounding error of its coordinates.
-fn is_one_place(bounds: &Bounds) -> bool {
-    bounds.diagonal() <= 1e-13 * bounds.center().abs().max_element()
 }

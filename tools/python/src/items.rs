@@ -1,15 +1,9 @@
 //! The items of a scene, and the stance and the bounds that they give it.
 
-use crate::{
-    camera::{Origin, Subject},
-    errors::wrong,
-    load::Load,
-    look::Look,
-    notes,
-};
+use crate::{errors::wrong, load::Load, look::Look, notes};
 use splatkit::{
     Deadline, Error,
-    about::{Frame, Stance},
+    about::Stance,
     bricks::Bricks,
     cells::{CellOptions, Cells},
     facet::FacetSet,
@@ -17,7 +11,7 @@ use splatkit::{
     math::Bounds,
     scattered::Points,
     scene::{Item, Scene},
-    session::Data,
+    session::{Data, Subject},
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
@@ -98,15 +92,8 @@ impl Items {
             Data::Hierarchy(hierarchy) => {
                 let header = hierarchy.header();
                 let count = header.leaves;
-                if let Some(stance) = header.stance {
-                    let origin = if header.is_guessed { Origin::Guess } else { Origin::File };
-                    self.subject.consider(stance, origin);
-                }
-                // No other frame has this stance.
-                let is_patient = header.stance == Some(Stance::RAS);
-                self.subject
-                    .frame(&name.text, if is_patient { Frame::Patient } else { Frame::Own });
                 let bounds = header.bounds;
+                warn(self.subject.stand_hierarchy(&name.text, &hierarchy));
                 self.push("hierarchy", name, count, bounds, Item::Hierarchy(hierarchy));
                 Ok(())
             }
@@ -144,22 +131,8 @@ impl Items {
         deadline: Deadline,
     ) -> Result<(), Error> {
         let mut subject = self.subject.clone();
-        subject.frame(&name.text, mesh.about.frame);
-        match mesh.about.stance {
-            Some(stance) => {
-                if let Some(wanted) = subject.consider(stance, Origin::File) {
-                    say_turned(&name.text, stance, wanted);
-                    mesh.stand(wanted);
-                }
-            }
-            // A guess would not count.
-            None if subject.origin >= Origin::Guess => {}
-            None => {
-                if let Some(stance) = mesh.guess_stance() {
-                    subject.consider(stance, Origin::Guess);
-                }
-            }
-        }
+        warn(subject.frame(&name.text, mesh.about.frame));
+        warn(subject.stand_mesh(&name.text, &mut mesh));
         look.paint(&name.text, &mut mesh, subject.stance.up, named)?;
         let options = SurfelOptions { deadline, ..look.surfel_options() };
         let kind = if mesh.triangles.is_empty() { "points" } else { "mesh" };
@@ -182,16 +155,8 @@ impl Items {
     }
 
     fn add_gaussians(&mut self, name: Name, mut set: Gaussians) {
-        self.subject.frame(&name.text, set.about.frame);
-        match set.about.stance {
-            Some(stance) => {
-                if let Some(wanted) = self.subject.consider(stance, Origin::File) {
-                    say_turned(&name.text, stance, wanted);
-                    set.stand(wanted);
-                }
-            }
-            None => self.subject.stand(None, Stance::Y_DOWN),
-        }
+        warn(self.subject.frame(&name.text, set.about.frame));
+        warn(self.subject.stand_gaussians(&name.text, &mut set));
         let (count, bounds) = (set.len() as u64, set.bounds());
         self.push("gaussians", name, count, bounds, Item::Gaussians(set.into()));
     }
@@ -203,8 +168,8 @@ impl Items {
         let transfer = look.of_bricks(&name.text, &bricks)?;
         let count = bricks.level(0).dims.iter().product::<usize>() as u64;
         let (bounds, kernel) = (bricks.bounds(), look.kernel()?);
-        self.subject.frame(&name.text, bricks.header().frame);
-        self.subject.stand(bricks.header().stance(), Stance::SURVEY);
+        warn(self.subject.frame(&name.text, bricks.header().frame));
+        warn(self.subject.stand_as_told(&name.text, bricks.header().stance(), Stance::SURVEY));
         self.push("bricks", name, count, bounds, Item::Bricks(bricks, kernel, transfer));
         Ok(())
     }
@@ -225,8 +190,8 @@ impl Items {
         if look.sharp {
             volume = volume.sharpened(&kernel)?;
         }
-        self.subject.frame(&name.text, volume.about.frame);
-        self.subject.stand(volume.about.stance, Stance::SURVEY);
+        warn(self.subject.frame(&name.text, volume.about.frame));
+        warn(self.subject.stand_as_told(&name.text, volume.about.stance, Stance::SURVEY));
         let (count, bounds) = (volume.len() as u64, Bounds { min, max });
         self.push("volume", name, count, bounds, Item::Volume(volume.into(), kernel, transfer));
         Ok(())
@@ -236,7 +201,7 @@ impl Items {
     fn add_colors(&mut self, name: Name, volume: &Volume) -> Result<(), Error> {
         let splats = volume.colored_splats().map_err(|error| name.fault(error))?;
         let splats = splats.expect("the volume has colours");
-        self.subject.stand(volume.about.stance, Stance::SURVEY);
+        warn(self.subject.stand_as_told(&name.text, volume.about.stance, Stance::SURVEY));
         let [min, max] = volume.bounds();
         let (count, bounds) = (volume.len() as u64, Bounds { min, max });
         self.push("volume", name, count, bounds, Item::Radiance(splats.into()));
@@ -259,8 +224,8 @@ impl Items {
         let splats = splats.map_err(|error| name.fault(error))?;
         let [min, max] = points.bounds();
         let bounds = Bounds { min, max }.union(splats.bounds());
-        self.subject.frame(&name.text, points.about.frame);
-        self.subject.stand(points.about.stance, Stance::SURVEY);
+        warn(self.subject.frame(&name.text, points.about.frame));
+        warn(self.subject.stand_as_told(&name.text, points.about.stance, Stance::SURVEY));
         let item = Item::Scalar(splats.into(), transfer);
         self.push("samples", name, points.len() as u64, bounds, item);
         Ok(())
@@ -273,8 +238,8 @@ impl Items {
         }
         let tetrahedra = cells.tetrahedra(&CellOptions::default());
         let tetrahedra = tetrahedra.map_err(|error| name.fault(error))?;
-        self.subject.frame(&name.text, cells.about.frame);
-        self.subject.stand(cells.about.stance, Stance::SURVEY);
+        warn(self.subject.frame(&name.text, cells.about.frame));
+        warn(self.subject.stand_as_told(&name.text, cells.about.stance, Stance::SURVEY));
         let (count, bounds) = (cells.len() as u64, tetrahedra.bounds());
         self.push("cells", name, count, bounds, Item::Cells(tetrahedra.into(), transfer));
         Ok(())
@@ -369,11 +334,7 @@ impl From<Item> for Entry {
     }
 }
 
-/// Says that an input is turned, because it stands otherwise than one before.
-fn say_turned(name: &str, own: Stance, scene: Stance) {
-    tracing::warn!(
-        "{name} is turned: its {} is up, and the input before has {} up",
-        own.up,
-        scene.up
-    );
+/// Passes warnings on.
+fn warn(warnings: impl IntoIterator<Item = String>) {
+    warnings.into_iter().for_each(notes::add);
 }

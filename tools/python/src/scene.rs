@@ -2,7 +2,7 @@
 
 use crate::{
     arrays::{numbers, positions, rows, samples},
-    camera::{Fit, to_json},
+    camera::{framing, to_json},
     cells::CellArrays,
     draw::{Draw, Stage},
     errors::{options, raise, wrong},
@@ -455,7 +455,7 @@ impl Scene {
 
     /// The camera that is fitted to the scene, as JSON.
     fn camera(&self, py: Python<'_>, fit: &str, draw: &str) -> PyResult<String> {
-        let own = Fit::parse(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
+        let own = framing(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
         let (fit, draw) = own.map_err(|error| raise(py, &error))?;
         let stage = self.0.clone();
         run(py, &Stop::default(), move || stage.camera(&fit, &draw).map(|own| to_json(&own)))
@@ -469,7 +469,7 @@ impl Scene {
         fit: &str,
         draw: &str,
     ) -> PyResult<Vec<String>> {
-        let own = Fit::parse(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
+        let own = framing(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
         let (fit, draw) = own.map_err(|error| raise(py, &error))?;
         let stage = self.0.clone();
         run(py, &Stop::default(), move || {

@@ -111,7 +111,7 @@ def test_missing_values(whole):
     holes = whole.astype("f4")
     holes[2, 3, 4], holes[5, 5, 5], holes[1, 1, 1] = np.nan, np.inf, -np.inf
     filled = np.where(np.isfinite(holes), holes, holes[np.isfinite(holes)].min())
-    with pytest.warns(pysplatkit.DataWarning, match="3 of 1080 values missing"):
+    with pytest.warns(pysplatkit.DataWarning, match="3 of 1,080 values missing"):
         assert np.array_equal(drawn(holes), drawn(filled))
     masked = np.ma.masked_array(whole.astype("i2"), whole > 90)
     with pytest.warns(pysplatkit.DataWarning, match="missing"):

@@ -9,15 +9,10 @@ use splatkit::{
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
     math::Camera,
     scene::{Scene, Settings},
-    session::Data,
+    session::{Data, Framing, Subject},
     surface::SurfelOptions,
 };
-use splatkit_tools::{
-    camera::{CameraFlags, Subject},
-    failure::Failure,
-    progress::Progress,
-    timing::milliseconds,
-};
+use splatkit_tools::{failure::Failure, progress::Progress, timing::milliseconds};
 use std::{path::Path, sync::Arc, time::Instant};
 
 /// Pixels along each side of the pictures that are timed, and of those of the sweep.
@@ -55,7 +50,7 @@ fn camera(
     farther: f64,
 ) -> splatkit::Result<Camera> {
     let subject = Subject::new(hierarchy.bounds(), source.up);
-    let mut camera = CameraFlags::default().camera(&subject, size)?;
+    let mut camera = Framing::default().camera(&subject, size)?;
     camera.position = camera.focal_point + (camera.position - camera.focal_point) * farther;
     Ok(camera)
 }

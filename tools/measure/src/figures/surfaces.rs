@@ -11,15 +11,10 @@ use splatkit::{
     picture::Picture,
     reference,
     scene::{Scene, Settings},
-    session::Data,
+    session::{Data, Framing, Subject},
     surface::{Mesh, SurfelOptions},
 };
-use splatkit_tools::{
-    camera::{CameraFlags, Subject},
-    failure::Failure,
-    output, parse,
-    progress::Progress,
-};
+use splatkit_tools::{failure::Failure, output, parse, progress::Progress};
 use std::path::{Path, PathBuf};
 
 /// Pixels along each side of the pictures.
@@ -69,7 +64,7 @@ impl Truth {
         let [min, max] =
             mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
         let subject = Subject::new(Bounds { min, max }, up);
-        let camera = CameraFlags::default().camera(&subject, settings.size)?;
+        let camera = Framing::default().camera(&subject, settings.size)?;
         let crease = SurfelOptions::default().crease_angle_degrees;
         let picture = reference::trace(mesh, crease, &camera, &settings, RAYS)?;
         Ok(Self { camera, settings, picture })

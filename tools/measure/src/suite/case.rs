@@ -1,11 +1,11 @@
 //! A case of the suite: a scene and its view.
 
+use splatkit::session::{Framing, Subject};
 use splatkit::{
     math::{Camera, Kernel},
     scene::{Evaluate, Scene, Settings},
     volume::{TransferFunction, Volume, reach::first_visible},
 };
-use splatkit_tools::camera::{CameraFlags, Subject};
 use std::sync::Arc;
 
 /// A case before its scene is made, so that only one scene is in memory at a time.
@@ -79,7 +79,7 @@ impl Case {
 
     /// Returns the camera of `bench`, turned by `turn` degrees about the up axis.
     pub fn camera(&self, turn: f64) -> Camera {
-        let mut camera = CameraFlags::default().turned(&self.subject, self.settings.size, turn);
+        let mut camera = Framing::default().turned(&self.subject, self.settings.size, turn);
         camera.position =
             camera.focal_point + self.distance * (camera.position - camera.focal_point);
         camera

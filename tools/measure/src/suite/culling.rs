@@ -6,13 +6,13 @@ use super::{
     surfaces,
 };
 use glam::DVec3;
+use splatkit::session::Subject;
 use splatkit::{
     Result,
     scene::{Scene, Settings},
     surface::Mesh,
     volume::{Shade, TransferFunction, phantoms::Phantom},
 };
-use splatkit_tools::camera::Subject;
 use std::sync::Arc;
 
 /// Samples along each side of the volume.

@@ -7,6 +7,7 @@ use super::{
     surfaces,
 };
 use glam::DVec3;
+use splatkit::session::Subject;
 use splatkit::{
     Result,
     bricks::Bricks,
@@ -14,7 +15,6 @@ use splatkit::{
     scene::{Scene, Settings},
     volume::{TransferFunction, phantoms::Phantom},
 };
-use splatkit_tools::camera::Subject;
 use std::sync::Arc;
 
 /// Samples along each side of the volumes.

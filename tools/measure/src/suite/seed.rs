@@ -7,6 +7,7 @@ use super::{
     case::{self, Case, Plan, Seed},
 };
 use glam::{DMat3, DVec3};
+use splatkit::session::Subject;
 use splatkit::{
     Error, Result,
     formats::{self, Kind},
@@ -18,7 +19,6 @@ use splatkit::{
         phantoms::Phantom,
     },
 };
-use splatkit_tools::camera::Subject;
 use std::{
     path::{Path, PathBuf},
     sync::Arc,

@@ -6,6 +6,7 @@ use super::{
     case::{Case, Plan, Series},
 };
 use glam::DVec3;
+use splatkit::session::Subject;
 use splatkit::{
     Error, Result,
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
@@ -13,7 +14,6 @@ use splatkit::{
     scene::{Scene, Settings},
     surface::{Mesh, SurfelOptions},
 };
-use splatkit_tools::camera::Subject;
 
 /// Points of the models.
 const POINTS: [u32; 4] = [35_000, 150_000, 650_000, 2_600_000];

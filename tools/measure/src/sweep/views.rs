@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use splatkit::math::{Bounds, Camera};
-use splatkit_tools::camera::{CameraFlags, Subject};
+use splatkit::session::{Framing, Subject};
 
 /// From far away to the centre, in multiples of the distance at which the sphere around the scene
 /// fills the picture. The sphere's surface lies at 0.26.
@@ -39,7 +39,7 @@ pub const ZOOMS: [f64; 8] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 
 /// Returns the camera of `bench`.
 pub fn usual(bounds: &Bounds, up: DVec3) -> Camera {
-    CameraFlags::default().turned(&Subject::new(*bounds, up), [1; 2], 0.0)
+    Framing::default().turned(&Subject::new(*bounds, up), [1; 2], 0.0)
 }
 
 /// Returns the same camera at `times` the distance, which may be 0. The direction stays.

@@ -1,0 +1,163 @@
+//! A scene as its camera needs it: where it is, how it stands, and what of it is seen.
+
+use crate::{
+    about::{Frame, Frames, Stance, direction_name},
+    gaussians::Gaussians,
+    hierarchy::Hierarchy,
+    math::Bounds,
+    surface::Mesh,
+};
+use glam::DVec3;
+
+/// Where a scene's stance comes from, from the least certain on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Origin {
+    /// The default for shapes that rest no better one way than the other.
+    Default,
+    /// Guessed from the shape.
+    Guess,
+    /// The convention for volumes, samples and trained Gaussians.
+    Convention,
+    /// The file, or the convention of its format.
+    File,
+    /// The user.
+    Flag,
+}
+
+impl Origin {
+    /// Returns the name in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::Guess => "guess",
+            Self::Convention => "convention",
+            Self::File => "file",
+            Self::Flag => "flag",
+        }
+    }
+}
+
+/// The scene as the camera needs it. Inputs are added in their order: the first statement of a file
+/// decides how the scene stands, then the convention, then the first guess. Functions that take an
+/// input's name return a warning that names it, if the input contradicts those before.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// The box around samples and vertices, in world units; footprints reach further.
+    pub bounds: Bounds,
+    /// How the scene stands unless the user says how.
+    pub stance: Stance,
+    /// Where the stance comes from.
+    pub origin: Origin,
+    /// Points that span what is seen; if there are none, the box is seen.
+    pub seen: Vec<DVec3>,
+    frames: Frames,
+}
+
+impl Default for Subject {
+    fn default() -> Self {
+        Self::new(Bounds::EMPTY, DVec3::Y)
+    }
+}
+
+impl Subject {
+    /// A subject whose box is seen, and which stands with this direction up.
+    pub fn new(bounds: Bounds, up: DVec3) -> Self {
+        let (stance, seen) = (Stance::with_up(up), Vec::new());
+        Self { bounds, stance, origin: Origin::Default, seen, frames: Frames::default() }
+    }
+
+    /// Adds the box of an input.
+    pub fn count_in(&mut self, bounds: Bounds) {
+        self.bounds = self.bounds.union(bounds);
+    }
+
+    /// Whether the box is no larger than the rounding error of its coordinates.
+    pub fn is_one_place(&self) -> bool {
+        self.bounds.diagonal() <= 1e-13 * self.bounds.center().abs().max_element()
+    }
+
+    /// Adds the frame of an input.
+    pub fn frame(&mut self, name: &str, frame: Frame) -> Option<String> {
+        self.frames.add(name, frame)
+    }
+
+    /// Whether an input is in the frame of a patient.
+    pub fn is_patient(&self) -> bool {
+        self.frames.have_patient()
+    }
+
+    /// Takes the stance of an input that is not turned.
+    pub fn stand(&mut self, name: &str, stance: Stance, origin: Origin) -> Option<String> {
+        self.consider(stance, origin).then(|| {
+            let [own, scene] = [stance.up, self.stance.up].map(direction_name);
+            format!(
+                "{name} says that {own} is up, but the scene stands with {scene} up, as an input \
+                 before says; --up sets another"
+            )
+        })
+    }
+
+    /// Takes what a file says of its stance, or the convention for its kind.
+    pub fn stand_as_told(
+        &mut self,
+        name: &str,
+        told: Option<Stance>,
+        usual: Stance,
+    ) -> Option<String> {
+        match told {
+            Some(stance) => self.stand(name, stance, Origin::File),
+            None => self.stand(name, usual, Origin::Convention),
+        }
+    }
+
+    /// Takes the stance of a mesh, or guesses it. A mesh that stands otherwise than an input before
+    /// is turned.
+    pub fn stand_mesh(&mut self, name: &str, mesh: &mut Mesh) -> Option<String> {
+        match mesh.about.stance {
+            Some(stance) => self.turn(name, stance, |wanted| mesh.stand(wanted)),
+            // A guess would not count.
+            None if self.origin >= Origin::Guess => None,
+            None => mesh.guess_stance().and_then(|own| self.stand(name, own, Origin::Guess)),
+        }
+    }
+
+    /// Takes the stance of trained Gaussians, or the convention of trainers. Gaussians that stand
+    /// otherwise than an input before are turned.
+    pub fn stand_gaussians(&mut self, name: &str, set: &mut Gaussians) -> Option<String> {
+        match set.about.stance {
+            Some(stance) => self.turn(name, stance, |wanted| set.stand(wanted)),
+            None => self.stand(name, Stance::Y_DOWN, Origin::Convention),
+        }
+    }
+
+    /// Takes the stance and the frame of a hierarchy.
+    pub fn stand_hierarchy(&mut self, name: &str, hierarchy: &Hierarchy) -> Vec<String> {
+        let header = hierarchy.header();
+        let origin = if header.is_guessed { Origin::Guess } else { Origin::File };
+        let stance = header.stance.and_then(|stance| self.stand(name, stance, origin));
+        // No other frame has this stance.
+        let is_patient = header.stance == Some(Stance::RAS);
+        let frame = self.frame(name, if is_patient { Frame::Patient } else { Frame::Own });
+        stance.into_iter().chain(frame).collect()
+    }
+
+    /// Takes a stance that a file states. If the scene stands otherwise, `turn` turns the input.
+    fn turn(&mut self, name: &str, own: Stance, turn: impl FnOnce(Stance)) -> Option<String> {
+        self.consider(own, Origin::File).then(|| {
+            turn(self.stance);
+            let [own, scene] = [own.up, self.stance.up].map(direction_name);
+            format!(
+                "{name} is turned: it stands with {own} up, and the input before with {scene} up"
+            )
+        })
+    }
+
+    /// Takes a stance if it comes from a more certain origin than the one before. Returns whether
+    /// it contradicts that one, although both come from files.
+    fn consider(&mut self, stance: Stance, origin: Origin) -> bool {
+        if origin > self.origin {
+            (self.stance, self.origin) = (stance, origin);
+        }
+        origin == Origin::File && self.stance.up.dot(stance.up) < 0.999
+    }
+}
