@@ -1,4 +1,4 @@
-//! The facts of an input: what it holds, in names and values, as `splatkit info --json` prints them.
+//! The facts of an input: what it holds, in names and values. `splatkit info --json` prints them.
 
 use super::{Data, Opened};
 use crate::{
@@ -47,7 +47,7 @@ impl Opened<'_> {
     /// Returns what is known of this input and of the data that it holds.
     ///
     /// # Errors
-    /// Those of [`series`](Self::series), [`arrays`](Self::arrays) and of asking for sizes of files.
+    /// Those of [`series`](Self::series), of [`arrays`](Self::arrays) and of asking for sizes.
     pub fn facts(&self, data: &Data) -> Result<Facts> {
         let mut named = match data {
             Data::Mesh(mesh) => of_mesh(mesh),

@@ -1,8 +1,9 @@
 //! One way in: any file, opened once and read as what it holds.
 //!
 //! [`Reading`] says how inputs are read. It opens a file, a folder or a remote object of any kind;
-//! [`Opened`] knows the kind, and reads it into [`Data`]. The functions of [`formats`](crate::formats)
-//! read one kind each, from files or from bytes in memory.
+//! [`Opened`] knows the kind, and reads it into [`Data`]. The functions of
+//! [`formats`](crate::formats) read one kind each, from files or from bytes in memory. [`Subject`]
+//! gathers where a scene is and how it stands, and [`Framing`] is the camera that shows it.
 //!
 //! ```no_run
 //! use splatkit::session::{Data, Reading};

@@ -92,15 +92,19 @@ impl Reading {
         }
     }
 
-    /// Returns the kind of an input, even if it is damaged. What its name and its first bytes decide
-    /// is not fetched from a server.
+    /// Returns the kind of an input, even if it is damaged, or larger than memory. An object on a
+    /// server is not fetched if its name or its first bytes decide.
     ///
     /// # Errors
     /// Those of [`open`](Self::open).
     pub fn kind(&self, path: &Path) -> Result<Kind> {
-        match Kind::at_once(path, &self.limits)? {
+        match Kind::of(path, &self.limits, &self.options)? {
             Some(kind) => Ok(kind),
-            None => self.open(path).map(|opened| opened.kind),
+            None if self.options.raw.is_some() => Ok(Kind::Volume),
+            None => {
+                let source = Source::open_any(path, &self.limits)?;
+                Err(foreign(&source).unwrap_or_else(|| unknown(path)))
+            }
         }
     }
 

@@ -75,6 +75,8 @@ fn what_is_read_whole_fits_in_memory() {
     let folder = Folder::new();
     let path = folder.write("a.obj", MESH.as_bytes());
     let reading = Reading::default().within_memory(Some(4));
+    // Its kind is known all the same: a volume of any size is converted slice by slice.
+    assert_eq!(reading.kind(&path).unwrap(), Kind::Mesh);
     let error = reading.open(&path).and_then(|opened| opened.read()).err().unwrap();
     assert!(matches!(error, Error::Limit { limit: 8, .. }), "{error}");
 }

@@ -65,9 +65,9 @@ impl Mesh {
     /// table. Considers the six directions of the coordinate axes. Returns `None` for shapes that
     /// rest no better one way than the other, because they have no extent or are flat.
     ///
-    /// The front is where an animal on four legs or a person on two looks, if the shape is one, else
-    /// the convention's: −Y if Z is up, otherwise +Z. The time is linear in the
-    /// number of vertices and triangles, and below 0.1 s for a million.
+    /// The front is where an animal on four legs or a person on two looks, if the shape is one,
+    /// else the convention's: −Y if Z is up, otherwise +Z. The time is linear in the number of
+    /// vertices and triangles, and below 0.1 s for a million.
     ///
     /// Source: Fu, Cohen-Or, Dror & Sheffer (2008), with other measures of stability.
     pub fn guess_stance(&self) -> Option<Stance> {

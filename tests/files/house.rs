@@ -9,7 +9,7 @@ use std::{
 use syn::{Attribute, Item, ItemMod, ItemUse, Meta, UseTree, visit::Visit};
 
 /// The rooms of src. Each imports only from rooms before it.
-const ROOMS: [&str; 31] = [
+const ROOMS: [&str; 32] = [
     "error",
     "parallel",
     "deadline",
@@ -36,6 +36,7 @@ const ROOMS: [&str; 31] = [
     "compare",
     "scene",
     "interaction",
+    "session",
     "plan",
     "cpu",
     "gpu",

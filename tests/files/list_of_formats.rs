@@ -1,5 +1,5 @@
-//! The README's table of formats is the one that the library follows, and its table of features is
-//! that of `Cargo.toml`.
+//! The table of formats in docs/formats.md is the one that the library follows, and the table of
+//! features in docs/library.md is that of `Cargo.toml`.
 //!
 //! To update the table of formats, run
 //! `SPLATKIT_WRITE=1 cargo test --release --test files list_of_formats`.
@@ -40,19 +40,19 @@ fn table() -> String {
 
 #[test]
 fn the_list_of_formats_is_current() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
-    let text = fs::read_to_string(&page).expect("README.md").replace('\r', "");
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/formats.md");
+    let text = fs::read_to_string(&page).expect("docs/formats.md").replace('\r', "");
     let (before, rest) = text.split_once(START).expect("the block's first line");
     let (inside, after) = rest.split_once(END).expect("the block's last line");
     let found = table();
     if std::env::var_os("SPLATKIT_WRITE").is_some() {
-        fs::write(&page, format!("{before}{START}{found}{END}{after}")).expect("README.md");
+        fs::write(&page, format!("{before}{START}{found}{END}{after}")).expect("docs/formats.md");
         return;
     }
     for (old, new) in inside.lines().zip(found.lines()) {
-        assert_eq!(old, new, "README.md is out of date; SPLATKIT_WRITE=1 updates it");
+        assert_eq!(old, new, "docs/formats.md is out of date; SPLATKIT_WRITE=1 updates it");
     }
-    assert_eq!(inside, found, "README.md is out of date; SPLATKIT_WRITE=1 updates it");
+    assert_eq!(inside, found, "docs/formats.md is out of date; SPLATKIT_WRITE=1 updates it");
 }
 
 /// The features that are not of formats.
@@ -105,7 +105,7 @@ fn the_list_of_features_is_current() {
         on.insert(name);
         open.extend(list.iter().map(String::as_str).filter(|name| features.contains_key(*name)));
     }
-    let page = read("README.md");
+    let page = read("docs/library.md");
     let (_, rest) = page.split_once("| feature | brings | default |\n").expect("the table");
     let rows = rest.lines().skip(1).take_while(|line| line.starts_with('|'));
     let listed: BTreeSet<(&str, &str)> = rows

@@ -1,5 +1,5 @@
 //! Files: what is read from them and written to them. Also the files of the project itself: its
-//! modules, and the tables of its README.
+//! modules, and the tables of its documentation.
 
 mod external;
 #[path = "../regressions/flat.rs"]
