@@ -9,6 +9,7 @@ use std::{
 };
 use tracing_subscriber::{
     filter::{LevelFilter, Targets},
+    fmt::format,
     layer::SubscriberExt,
     util::SubscriberInitExt,
 };
@@ -147,9 +148,9 @@ fn start_log(flags: &StartFlags) {
         // If stderr is closed, reporting that on stderr would panic.
         .log_internal_errors(false)
         .with_ansi(colored)
-        .with_target(false)
+        .event_format(terminal::Events(format().with_ansi(colored).with_target(false)))
         // A span logs its duration when it closes.
-        .with_span_events(tracing_subscriber::fmt::format::FmtSpan::CLOSE)
+        .with_span_events(format::FmtSpan::CLOSE)
         .finish()
         .with(filter)
         .init();

@@ -7,10 +7,18 @@
 //! afterwards.
 
 use std::{borrow::Cow, fmt, fmt::Write};
-use tracing::field::{Field, Visit};
+use tracing::{
+    Event, Level, Subscriber,
+    field::{Field, Visit},
+};
 use tracing_subscriber::{
     field::RecordFields,
-    fmt::{FormatFields, format::Writer},
+    fmt::{
+        FmtContext, FormatEvent, FormatFields,
+        format::{Format, Full, Writer},
+        time::SystemTime,
+    },
+    registry::LookupSpan,
 };
 
 /// Most characters shown of a text from outside. The middle of a longer text is left out.
@@ -99,6 +107,29 @@ fn shortened(text: &str) -> Cow<'_, str> {
     let (start, end) = (&text[..at(MOST - END)], &text[from..]);
     let left = text.chars().count() - MOST;
     Cow::Owned(format!("{start} … ({left} characters left out) … {end}"))
+}
+
+/// Writes the library's warnings as those of the command look, and other events as log lines.
+pub struct Events(pub Format<Full, SystemTime>);
+
+impl<S, N> FormatEvent<S, N> for Events
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(
+        &self,
+        context: &FmtContext<'_, S, N>,
+        mut writer: Writer<'_>,
+        event: &Event<'_>,
+    ) -> fmt::Result {
+        if *event.metadata().level() != Level::WARN {
+            return self.0.format_event(context, writer, event);
+        }
+        write!(writer, "warning: ")?;
+        context.format_fields(writer.by_ref(), event)?;
+        writeln!(writer)
+    }
 }
 
 /// Writes the fields of log lines, escaped.

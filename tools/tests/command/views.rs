@@ -84,6 +84,11 @@ fn statements_count_more_than_conventions_and_these_more_than_guesses() {
         told.contains("up: +Y, front: +Z, guessed from the shape; --up sets another"),
         "{told}"
     );
+    // Warnings of the library look as those of the command do.
+    let text = std::fs::read_to_string(folder.path("y.obj")).expect("text");
+    folder.write("m.obj", &format!("mtllib none.mtl\n{text}"));
+    let told = folder.run(&format!("render m.obj -o e.png {SMALL}")).stderr();
+    assert!(told.lines().any(|line| line.starts_with("warning: m.obj: mtllib")), "{told}");
     let told = folder.run(&format!("render y.obj -o d.png -q {SMALL}")).stderr();
     assert_eq!(told, "");
 }
