@@ -148,9 +148,9 @@ fn start_log(flags: &StartFlags) {
         // If stderr is closed, reporting that on stderr would panic.
         .log_internal_errors(false)
         .with_ansi(colored)
-        .event_format(terminal::Events(format().with_ansi(colored).with_target(false)))
         // A span logs its duration when it closes.
         .with_span_events(format::FmtSpan::CLOSE)
+        .event_format(terminal::Events(format().with_ansi(colored).with_target(false)))
         .finish()
         .with(filter)
         .init();

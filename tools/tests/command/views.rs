@@ -86,7 +86,7 @@ fn statements_count_more_than_conventions_and_these_more_than_guesses() {
     );
     // Warnings of the library look as those of the command do.
     let text = std::fs::read_to_string(folder.path("y.obj")).expect("text");
-    folder.write("m.obj", &format!("mtllib none.mtl\n{text}"));
+    folder.write("m.obj", format!("mtllib none.mtl\n{text}"));
     let told = folder.run(&format!("render m.obj -o e.png {SMALL}")).stderr();
     assert!(told.lines().any(|line| line.starts_with("warning: m.obj: mtllib")), "{told}");
     let told = folder.run(&format!("render y.obj -o d.png -q {SMALL}")).stderr();
