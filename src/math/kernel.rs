@@ -49,6 +49,41 @@ impl Kernel {
     /// Most values of a [`Profile::Table`].
     pub const MAX_TABLE: usize = 65_536;
 
+    /// Returns a kernel by its name ([`NAMES`](Self::NAMES)). By default, the Gaussian has the
+    /// deviation of [`Kernel::default`], and footprints reach as far as is usual for the kernel. All
+    /// lengths are in sample spacings.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a name that is none, and for lengths that the kernel does not have.
+    pub fn named(name: &str, sigma: Option<f64>, extent: Option<f64>) -> Result<Self> {
+        if sigma.is_some() && name != "gaussian" {
+            let message = format!("sigma applies to the gaussian kernel only, not to {name}");
+            return Err(Error::Argument(message));
+        }
+        if let Some(tensor) = Tensor::ALL.into_iter().find(|tensor| tensor.name() == name) {
+            return match extent {
+                Some(_) => Err(Error::Argument(format!("the kernel {name} has a fixed extent"))),
+                None => Ok(Self::tensor(tensor)),
+            };
+        }
+        match name {
+            "gaussian" => {
+                let default = Self::default();
+                let sigma = sigma.unwrap_or(default.unit());
+                // A wider kernel keeps its shape unless the caller sets the extent.
+                let least = default.extent.max(default.radius() * sigma);
+                Self::gaussian(sigma, extent.unwrap_or(least))
+            }
+            "b-spline" => Self::b_spline(extent.unwrap_or(2.0)),
+            "hann" => Self::hann(extent.unwrap_or(3.0)),
+            _ => {
+                let names = Self::NAMES.join(", ");
+                let message = format!("there is no kernel “{name}”; the kernels are {names}");
+                Err(Error::Argument(message))
+            }
+        }
+    }
+
     /// A Gaussian of standard deviation `sigma` truncated at radius `extent`, both in sample
     /// spacings.
     pub fn gaussian(sigma: f64, extent: f64) -> Result<Self> {

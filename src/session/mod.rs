@@ -2,8 +2,8 @@
 //!
 //! [`Reading`] says how inputs are read. It opens a file, a folder or a remote object of any kind;
 //! [`Opened`] knows the kind, and reads it into [`Data`]. The functions of
-//! [`formats`](crate::formats) read one kind each, from files or from bytes in memory. [`Subject`]
-//! gathers where a scene is and how it stands, and [`Framing`] is the camera that shows it.
+//! [`formats`](crate::formats) read one kind each, from files or from bytes in memory. [`Appearance`]
+//! and [`Coloring`] say how values and surfaces are shown. [`Subject`] gathers where a scene is and how it stands, and [`Framing`] is the camera that shows it.
 //!
 //! ```no_run
 //! use splatkit::session::{Data, Reading};
@@ -15,6 +15,8 @@
 //! # Ok::<(), splatkit::Error>(())
 //! ```
 
+mod appearance;
+mod coloring;
 mod data;
 mod facts;
 mod framing;
@@ -25,6 +27,8 @@ mod subject;
 #[cfg(test)]
 mod tests;
 
+pub use appearance::{Appearance, Surface, SurfaceValue, Transfer};
+pub use coloring::{Coloring, SurfaceColor, check_log, shown_of};
 pub use data::{Data, warn_of_holes};
 pub use facts::Facts;
 pub use framing::{Framing, Side};

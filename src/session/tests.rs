@@ -165,3 +165,35 @@ fn numbers_of_a_camera_are_checked() {
     }
     assert_eq!(Framing::default().validate(), Ok(()));
 }
+
+#[test]
+fn values_are_shown_as_asked() {
+    let volume = crate::volume::phantoms::Phantom::Specimen.sample_bytes([16; 3]).unwrap();
+    let surface = Surface { value: SurfaceValue::Share(0.5), color: None, opacity: 1.0 };
+    let alone = Appearance { isosurfaces: vec![surface], ..Appearance::default() };
+    let transfer = alone.of_volume("a.nrrd", &volume).unwrap();
+    let [low, high] = volume.range;
+    assert_eq!(transfer.isosurfaces[0].value, 0.5 * (low + high));
+    assert_eq!(transfer.opacity, [(0.0, 0.0)], "nothing else is shown");
+    let preset = Appearance { transfer: Some(Transfer::Named("generic".into())), ..alone };
+    let transfer = preset.of_volume("a.nrrd", &volume).unwrap();
+    assert!(transfer.opacity.len() > 1 && transfer.isosurfaces.len() == 1);
+    let coloring = Coloring { range: Some([-20.0, -10.0]), ..Coloring::default() };
+    let beyond = Appearance { isosurfaces: Vec::new(), coloring, ..preset };
+    let error = beyond.of_volume("a.nrrd", &volume).unwrap_err().to_string();
+    assert!(error.contains("spread over the range -20, -10, the transfer function"), "{error}");
+}
+
+#[test]
+fn a_surface_needs_the_values_that_colour_it() {
+    let orange = SurfaceColor::Plain([1.0, 0.5, 0.0]);
+    assert_eq!(SurfaceColor::of("orange", Some([1.0, 0.5, 0.0])), orange);
+    assert_eq!(SurfaceColor::of("Height", None), SurfaceColor::Height);
+    let heat = Coloring { surface: Some(SurfaceColor::of(" heat", None)), ..Coloring::default() };
+    assert_eq!(heat.attribute(), Some("heat"));
+    let mut mesh = crate::surface::Mesh::default();
+    assert!(heat.paint(&mesh, DVec3::Z, true).unwrap_err().contains("“heat” is neither"));
+    assert_eq!(Coloring::default().paint(&mesh, DVec3::Z, true), Ok(None));
+    mesh.values = vec![1.0];
+    assert!(heat.paint(&mesh, DVec3::Z, true).unwrap().is_some());
+}

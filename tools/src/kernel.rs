@@ -6,8 +6,9 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
+    Error,
     input::{Limits, Source},
-    math::{Kernel, Tensor},
+    math::Kernel,
 };
 use std::path::{Path, PathBuf};
 
@@ -50,52 +51,31 @@ impl KernelFlags {
 
     pub fn kernel(&self, limits: &Limits) -> Result<Kernel, Failure> {
         let name = self.kernel.as_deref().unwrap_or("gaussian");
-        if self.sigma.is_some() && name != "gaussian" {
-            return Err(Failure::Usage(format!(
-                "--sigma applies to the gaussian kernel only, not to {name}"
-            )));
+        let is_file = Path::new(name).extension().is_some() || Path::new(name).exists();
+        if Kernel::NAMES.contains(&name) || !is_file {
+            return Kernel::named(name, self.sigma, self.extent).map_err(|error| match error {
+                Error::Argument(message) if !Kernel::NAMES.contains(&name) => {
+                    Failure::Usage(format!("{message}, or a file"))
+                }
+                other => other.into(),
+            });
         }
-        if let Some(tensor) = Tensor::ALL.into_iter().find(|tensor| tensor.name() == name) {
-            return match self.extent {
-                Some(_) => Err(Failure::Usage(format!(
-                    "the kernel {name} has a fixed extent; leave out --extent"
-                ))),
-                None => Ok(Kernel::tensor(tensor)),
-            };
+        if self.sigma.is_some() {
+            let message = format!("sigma applies to the gaussian kernel only, not to {name}");
+            return Err(Failure::Usage(message));
         }
-        Ok(match name {
-            "gaussian" => self.gaussian()?,
-            "b-spline" => Kernel::b_spline(self.extent.unwrap_or(2.0))?,
-            "hann" => Kernel::hann(self.extent.unwrap_or(3.0))?,
-            file if Path::new(file).extension().is_some() || Path::new(file).exists() => {
-                let extent = self.extent.ok_or_else(|| {
-                    Failure::Usage(format!(
-                        "{file}: a kernel from a file needs --extent, the distance of its last \
-                         value"
-                    ))
-                })?;
-                // A wrong extent is not the file's fault.
-                Kernel::table(vec![1.0, 0.0], extent)?;
-                let file = Path::new(file);
-                Kernel::table(read_table(file, limits)?, extent).map_err(|error| {
-                    in_file(file, error).hint("the form is a JSON array, or one number per line")
-                })?
-            }
-            _ => {
-                let names = Kernel::NAMES.join(", ");
-                return Err(Failure::Usage(format!(
-                    "there is no kernel “{name}”; the kernels are {names}, or a file"
-                )));
-            }
-        })
-    }
-
-    fn gaussian(&self) -> splatkit::Result<Kernel> {
-        let default = Kernel::default();
-        let sigma = self.sigma.unwrap_or(default.unit());
-        // A wider kernel keeps its shape unless the user sets the extent.
-        let extent = self.extent.unwrap_or(default.extent.max(default.radius() * sigma));
-        Kernel::gaussian(sigma, extent)
+        let extent = self.extent.ok_or_else(|| {
+            Failure::Usage(format!(
+                "{name}: a kernel from a file needs --extent, the distance of its last value"
+            ))
+        })?;
+        // A wrong extent is not the file's fault.
+        Kernel::table(vec![1.0, 0.0], extent)?;
+        let file = Path::new(name);
+        let kernel = Kernel::table(read_table(file, limits)?, extent);
+        Ok(kernel.map_err(|error| {
+            in_file(file, error).hint("the form is a JSON array, or one number per line")
+        })?)
     }
 
     /// Returns the file of the user's own kernel.

@@ -1,7 +1,7 @@
 //! The flags of a scene, and loading the scene that they describe.
 
 use crate::{
-    color::{ColorFlags, titled},
+    color::{self, ColorFlags, titled},
     failure::{Failure, in_file},
     given::{Given, Kinds, kinds_of},
     load::LoadFlags,
@@ -120,9 +120,9 @@ impl SceneFlags {
         let reading = load.reading(memory::most());
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
-            let color = adding.show.color_of(path);
+            let coloring = adding.show.coloring_of(path);
             let read = &mut adding.loaded.read;
-            let attribute = color.attribute();
+            let attribute = coloring.attribute();
             let opened = reading.open_colored(path, attribute)?;
             let input = opened.read()?;
             read.extend(opened.files());
@@ -300,21 +300,15 @@ impl Adding<'_> {
         self.progress.stage(format!("Finding the way up of {}", path.display()));
         let warning = self.loaded.subject.stand_mesh(&named_as(path), &mut mesh);
         self.warn(warning);
-        let color = self.show.color_of(path);
+        let coloring = self.show.coloring_of(path);
         let up = self.loaded.subject.stance.up;
         let named = self.flags.load.scalar().is_some();
-        self.loaded.facts.bars.extend(color.paint(
-            path,
-            &mut mesh,
-            self.show.range_of(path),
-            up,
-            named,
-        )?);
+        self.loaded.facts.bars.extend(color::paint(&coloring, path, &mut mesh, up, named)?);
         self.progress.stage(format!("Making splats of {}", path.display()));
         self.add_unit(&mesh.about.length);
         let mut options = SurfelOptions { deadline, ..SurfelOptions::default() };
         options.radius_scale *= self.flags.show.radius_scale.unwrap_or(1.0);
-        options.color_by_normal = color.by_normal();
+        options.color_by_normal = coloring.by_normal();
         if let Some(crease) = self.flags.show.crease {
             // Triangles of one plane still join.
             options.crease_angle_degrees = crease.max(0.01);

@@ -1,7 +1,7 @@
 //! The flags that set how values and surfaces are shown.
 
 use crate::{
-    color::{ColorFlags, ColorsByInput},
+    color::{ColorFlags, of_log},
     failure::Failure,
     kernel::KernelFlags,
     own::{self, Own},
@@ -9,13 +9,13 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    Error,
-    bricks::{Bricks, Level},
+    bricks::Bricks,
     cells::Cells,
     input::Limits,
     math::Kernel,
     scattered::Points,
-    volume::{Isosurface, Shade, TransferFunction, Volume},
+    session::{Appearance, Coloring, Surface, SurfaceColor, SurfaceValue, Transfer},
+    volume::{TransferFunction, Volume},
 };
 use std::path::{Path, PathBuf};
 
@@ -83,22 +83,6 @@ pub struct ShowFlags {
     kernel: KernelFlags,
 }
 
-/// An isosurface. Without a colour, it has the transfer function's.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Surface {
-    /// A value, or its share of the range of values.
-    value: Value,
-    color: Option<[f64; 3]>,
-    opacity: f64,
-}
-
-/// The value of an isosurface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Value {
-    Own(f64),
-    Share(f64),
-}
-
 /// [`TransferFunction::gradient`].
 #[derive(Debug, Clone, PartialEq)]
 struct Factors(Vec<(f64, f64)>);
@@ -110,16 +94,11 @@ pub struct Show<'a> {
     pub kernel: Kernel,
     pub sharp: bool,
     /// What inputs have of their own.
-    transfers: own::Values<Transfer<'a>>,
+    transfers: own::Values<Transfer>,
     ranges: own::Values<[f64; 2]>,
     surfaces: own::Values<&'a [Surface]>,
     opacities: own::Values<f32>,
-    colors: ColorsByInput<'a>,
-}
-
-enum Transfer<'a> {
-    Named(&'a str),
-    Read(TransferFunction),
+    colors: own::Values<SurfaceColor>,
 }
 
 impl ShowFlags {
@@ -178,7 +157,7 @@ impl ShowFlags {
 
     pub fn open(&self, limits: &Limits) -> Result<Show<'_>, Failure> {
         let own = self.transfer.iter();
-        let own = own.map(|own| own.try_map(|text| Transfer::open(text, limits)));
+        let own = own.map(|own| own.try_map(|text| open(text, limits)));
         let transfers = own.collect::<Result<Vec<_>, _>>()?;
         let surfaces = self.iso.iter().map(|own| own.try_map(|surfaces| Ok(&surfaces[..])));
         let show = Show {
@@ -196,19 +175,17 @@ impl ShowFlags {
     }
 }
 
-impl<'a> Transfer<'a> {
-    /// Reads the transfer function that a name, a file or a text of JSON stands for.
-    fn open(text: &'a str, limits: &Limits) -> Result<Self, Failure> {
-        if is_json(text) {
-            return Ok(Self::Read(TransferFunction::from_json(text)?));
-        }
-        if !TransferFunction::NAMES.contains(&text) && is_file(text) {
-            return Ok(Self::Read(TransferFunction::read(Path::new(text), limits)?));
-        }
-        // An unknown name fails here. The range comes later, with the volume.
-        TransferFunction::named(text, [0.0, 1.0])?;
-        Ok(Self::Named(text))
+/// Reads the transfer function that a name, a file or a text of JSON stands for.
+fn open(text: &str, limits: &Limits) -> Result<Transfer, Failure> {
+    if is_json(text) {
+        return Ok(Transfer::Whole(TransferFunction::from_json(text)?));
     }
+    if !TransferFunction::NAMES.contains(&text) && is_file(text) {
+        return Ok(Transfer::Whole(TransferFunction::read(Path::new(text), limits)?));
+    }
+    // An unknown name fails here. The range comes later, with the volume.
+    TransferFunction::named(text, [0.0, 1.0])?;
+    Ok(Transfer::Named(text.to_owned()))
 }
 
 /// Parses how values are shown. A text of JSON has no `=`.
@@ -226,7 +203,7 @@ fn range(text: &str) -> Result<Own<[f64; 2]>, String> {
 
 /// Parses isosurfaces.
 fn surfaces(text: &str) -> Result<Own<Vec<Surface>>, String> {
-    Own::parse(text, |text| text.split(',').map(Surface::parse).collect())
+    Own::parse(text, |text| text.split(',').map(surface).collect())
 }
 
 /// Parses an opacity.
@@ -255,14 +232,6 @@ fn is_file(text: &str) -> bool {
     !is_json(text) && (Path::new(text).extension().is_some() || Path::new(text).exists())
 }
 
-/// Values that a transfer function shows.
-pub struct Values {
-    /// The smallest and the largest one.
-    pub range: [f64; 2],
-    /// The diagonal of the box around them, in world units.
-    pub diagonal: f64,
-}
-
 impl Show<'_> {
     /// Refuses more isosurfaces of an input than a transfer function can have.
     fn check_surfaces(&self) -> Result<(), Failure> {
@@ -270,7 +239,7 @@ impl Show<'_> {
         let files = self.surfaces.files().chain(self.transfers.files()).chain([Path::new("")]);
         for file in files {
             let more = match self.transfers.of(file) {
-                Some(Transfer::Read(transfer)) => transfer.isosurfaces.len(),
+                Some(Transfer::Whole(transfer)) => transfer.isosurfaces.len(),
                 _ => 0,
             };
             let count = self.surfaces_of(file).len() + more;
@@ -284,9 +253,9 @@ impl Show<'_> {
         Ok(())
     }
 
-    /// Returns the flags that colour an input.
-    pub fn color_of(&self, path: &Path) -> ColorFlags {
-        self.colors.of(path)
+    /// Returns how an input is coloured.
+    pub fn coloring_of(&self, path: &Path) -> Coloring {
+        self.flags.color.coloring_by(self.colors.of(path), self.range_of(path))
     }
 
     /// Returns the range of values that an input's colours are spread over, if it is given.
@@ -320,159 +289,69 @@ impl Show<'_> {
 
     /// Returns the transfer function of a volume.
     pub fn of_volume(&self, path: &Path, volume: &Volume) -> Result<TransferFunction, Failure> {
-        let [first, last] = volume.bounds();
-        let values = Values { range: volume.range, diagonal: (last - first).length() };
-        self.transfer(path, values, || TransferFunction::automatic(volume))
+        self.of(path, |appearance, name| appearance.of_volume(name, volume))
     }
 
     /// Returns the transfer function of scattered samples.
     pub fn of_samples(&self, path: &Path, points: &Points) -> Result<TransferFunction, Failure> {
-        let [first, last] = points.bounds();
-        let values = Values { range: points.range(), diagonal: (last - first).length() };
-        self.transfer(path, values, || points.automatic_transfer())
+        self.of(path, |appearance, name| appearance.of_samples(name, points))
     }
 
     /// Returns the transfer function of cells.
     pub fn of_cells(&self, path: &Path, cells: &Cells) -> Result<TransferFunction, Failure> {
-        let [first, last] = cells.bounds();
-        let values = Values { range: cells.range(), diagonal: (last - first).length() };
-        self.transfer(path, values, || cells.automatic_transfer())
+        self.of(path, |appearance, name| appearance.of_cells(name, cells))
     }
 
-    /// Returns the transfer function of a volume in bricks. The automatic one is that of a level
-    /// which can be read quickly.
+    /// Returns the transfer function of a volume in bricks.
     pub fn of_bricks(&self, path: &Path, bricks: &Bricks) -> Result<TransferFunction, Failure> {
-        let overview = bricks.volume(overview(bricks))?;
-        let [first, last] = bricks.header().lattice.bounds();
-        let values = Values { range: bricks.header().range, diagonal: (last - first).length() };
-        self.transfer(path, values, || TransferFunction::automatic(&overview))
+        self.of(path, |appearance, name| appearance.of_bricks(name, bricks))
     }
 
-    /// Returns the transfer function for values. If it shows none of them, that is an error. So is
-    /// an automatic one for values that are all the same.
-    pub fn transfer(
+    fn of(
         &self,
         path: &Path,
-        Values { range: values, diagonal }: Values,
-        automatic: impl FnOnce() -> TransferFunction,
+        transfer: impl FnOnce(&Appearance, &str) -> splatkit::Result<TransferFunction>,
     ) -> Result<TransferFunction, Failure> {
-        let surfaces = self.surfaces_of(path);
-        let transfer = match self.transfers.of(path) {
-            None if values[0] >= values[1] && surfaces.is_empty() => {
-                return Err(same(path, values[0]).into());
-            }
-            None => automatic(),
-            Some(Transfer::Named(name)) => {
-                let mut named = TransferFunction::named(name, values)?.for_size(diagonal);
-                // Light fades where the gradient is noise, whatever the colours are.
-                let certain = automatic().shade.and_then(|shade| shade.certain);
-                named.shade = named.shade.map(|shade| Shade { certain, ..shade });
-                named
-            }
-            Some(Transfer::Read(transfer)) => transfer.clone(),
+        let factors = self.flags.gradient_opacity.clone();
+        let appearance = Appearance {
+            transfer: self.transfers.of(path).cloned(),
+            opacity_unit: self.flags.opacity_unit,
+            isosurfaces: self.surfaces_of(path),
+            gradient: factors.map(|Factors(factors)| factors).unwrap_or_default(),
+            coloring: self.coloring_of(path),
         };
-        let range = self.range_of(path);
-        let mut transfer = match range {
-            Some(range) => transfer.spread_over(range),
-            None => transfer,
-        };
-        self.flags.color.color_transfer(&mut transfer, range, values)?;
-        if let Some(unit) = self.flags.opacity_unit {
-            transfer.unit = unit;
-        }
-        if let Some(Factors(factors)) = &self.flags.gradient_opacity {
-            transfer.gradient.clone_from(factors);
-        }
-        self.add_surfaces(path, &mut transfer, &surfaces, values);
-        if transfer.visible(values) {
-            return Ok(transfer);
-        }
-        let [low, high] = values;
-        let shown = match transfer.shown_range() {
-            Some([from, to]) if from == to => format!("shows only the value {from}"),
-            Some([from, to]) => format!("shows values between {from} and {to}"),
-            None => "shows no value".to_owned(),
-        };
-        let spread = self.flags.range_text(path);
-        let spread = spread.map_or(String::new(), |range| format!("spread over {range}, "));
-        Err(Error::NothingToDraw(format!(
-            "{spread}the transfer function {shown}, but the values of {} lie between {low} and \
-             {high}",
-            path.display()
-        ))
-        .into())
-    }
-
-    fn add_surfaces(
-        &self,
-        path: &Path,
-        transfer: &mut TransferFunction,
-        surfaces: &[Surface],
-        [low, high]: [f64; 2],
-    ) {
-        if surfaces.is_empty() {
-            return;
-        }
-        for &Surface { value, color, opacity } in surfaces {
-            let value = match value {
-                Value::Own(value) => value,
-                Value::Share(share) => low + share * (high - low),
-            };
-            let color = color.unwrap_or_else(|| transfer.color(value));
-            transfer.isosurfaces.push(Isosurface { value, color, opacity });
-        }
-        if self.transfers.of(path).is_none() {
-            transfer.opacity = vec![(0.0, 0.0)];
-        }
+        transfer(&appearance, &path.display().to_string()).map_err(of_log)
     }
 }
 
-/// Returns the error for values that are all the same.
-fn same(path: &Path, value: f64) -> Error {
-    Error::NothingToDraw(format!(
-        "all values of {} are {value}, so that nothing can be told apart; --transfer gives them a \
-         colour and an opacity",
-        path.display()
-    ))
-}
-
-/// Returns the finest level of a volume that can be read quickly as a whole, or the coarsest level.
-fn overview(bricks: &Bricks) -> usize {
-    const QUICK: usize = 1 << 24;
-    let is_quick = |level: &Level| level.dims.iter().product::<usize>() <= QUICK;
-    bricks.levels().iter().position(is_quick).unwrap_or(bricks.levels().len() - 1)
-}
-
-impl Surface {
-    /// `80`, `50%`, `80:orange`, `80:0.5` or `80:#ff8800:0.5`.
-    fn parse(text: &str) -> Result<Self, String> {
-        let form = "the form is VALUE, VALUE:COLOR, VALUE:OPACITY or VALUE:COLOR:OPACITY, such \
-                    as 400:orange:0.5";
-        let mut parts = text.split(':').peekable();
-        let text = parts.next().unwrap_or_default().trim();
-        let number = |text: &str| parse::finite(text).map_err(|_| form);
-        let value = match text.strip_suffix('%') {
-            None => Value::Own(number(text)?),
-            Some(share) => Value::Share(number(share)? / 100.0),
-        };
-        if matches!(value, Value::Share(share) if !(0.0..=1.0).contains(&share)) {
-            return Err("a share of the range of values lies between 0% and 100%".into());
-        }
-        // A number is an opacity, although its digits may look like a colour.
-        let is_color = |part: &&str| !part.is_empty() && parse::finite(part).is_err();
-        let color = match parts.next_if(is_color) {
-            Some(text) => Some(parse::color(text)?.map(f64::from)),
-            None => None,
-        };
-        let opacity = match parts.next() {
-            Some(text) => parse::finite(text).map_err(|_| form)?,
-            None => 1.0,
-        };
-        if !(opacity > 0.0 && opacity <= 1.0) {
-            return Err("the opacity of a surface must be above 0 and at most 1".into());
-        }
-        if parts.next().is_some() { Err(form.into()) } else { Ok(Self { value, color, opacity }) }
+/// Parses an isosurface: `80`, `50%`, `80:orange`, `80:0.5` or `80:#ff8800:0.5`.
+fn surface(text: &str) -> Result<Surface, String> {
+    let form = "the form is VALUE, VALUE:COLOR, VALUE:OPACITY or VALUE:COLOR:OPACITY, such \
+                as 400:orange:0.5";
+    let mut parts = text.split(':').peekable();
+    let text = parts.next().unwrap_or_default().trim();
+    let number = |text: &str| parse::finite(text).map_err(|_| form);
+    let value = match text.strip_suffix('%') {
+        None => SurfaceValue::Own(number(text)?),
+        Some(share) => SurfaceValue::Share(number(share)? / 100.0),
+    };
+    if matches!(value, SurfaceValue::Share(share) if !(0.0..=1.0).contains(&share)) {
+        return Err("a share of the range of values lies between 0% and 100%".into());
     }
+    // A number is an opacity, although its digits may look like a colour.
+    let is_color = |part: &&str| !part.is_empty() && parse::finite(part).is_err();
+    let color = match parts.next_if(is_color) {
+        Some(text) => Some(parse::color(text)?.map(f64::from)),
+        None => None,
+    };
+    let opacity = match parts.next() {
+        Some(text) => parse::finite(text).map_err(|_| form)?,
+        None => 1.0,
+    };
+    if !(opacity > 0.0 && opacity <= 1.0) {
+        return Err("the opacity of a surface must be above 0 and at most 1".into());
+    }
+    if parts.next().is_some() { Err(form.into()) } else { Ok(Surface { value, color, opacity }) }
 }
 
 impl Factors {
@@ -497,27 +376,34 @@ mod tests {
 
     #[test]
     fn surfaces_are_read() {
-        let surface = |text| Surface::parse(text);
         assert_eq!(
             surface("-500"),
-            Ok(Surface { value: Value::Own(-500.0), color: None, opacity: 1.0 })
+            Ok(Surface { value: SurfaceValue::Own(-500.0), color: None, opacity: 1.0 })
         );
         assert_eq!(
             surface("0.5:0.25"),
-            Ok(Surface { value: Value::Own(0.5), color: None, opacity: 0.25 })
+            Ok(Surface { value: SurfaceValue::Own(0.5), color: None, opacity: 0.25 })
         );
         assert_eq!(
             surface("80:#ff0000"),
-            Ok(Surface { value: Value::Own(80.0), color: Some([1.0, 0.0, 0.0]), opacity: 1.0 })
+            Ok(Surface {
+                value: SurfaceValue::Own(80.0),
+                color: Some([1.0, 0.0, 0.0]),
+                opacity: 1.0
+            })
         );
         assert_eq!(
             surface("80:#00ff00:0.5"),
-            Ok(Surface { value: Value::Own(80.0), color: Some([0.0, 1.0, 0.0]), opacity: 0.5 })
+            Ok(Surface {
+                value: SurfaceValue::Own(80.0),
+                color: Some([0.0, 1.0, 0.0]),
+                opacity: 0.5
+            })
         );
         for text in ["80:lime:0.5", "80:0f0:0.5"] {
             assert_eq!(surface(text), surface("80:#00ff00:0.5"), "{text}");
         }
-        assert_eq!(surface("50%:0.5").map(|surface| surface.value), Ok(Value::Share(0.5)));
+        assert_eq!(surface("50%:0.5").map(|surface| surface.value), Ok(SurfaceValue::Share(0.5)));
         assert!(surface("150%").unwrap_err().contains("between 0% and 100%"));
         for bad in [
             "",
@@ -540,11 +426,11 @@ mod tests {
         let [own, other] = ["a=b.nrrd", "c.nrrd"].map(Path::new);
         let all = ["-5,50%:red", "a=b.nrrd=7:0.5"].map(|text| surfaces(text).unwrap());
         let all = own::Values::new(all);
-        let of = |path| -> Vec<Value> {
+        let of = |path| -> Vec<SurfaceValue> {
             all.all_of(path).iter().flatten().map(|surface| surface.value).collect()
         };
-        assert_eq!(of(own), [Value::Own(7.0)]);
-        assert_eq!(of(other), [Value::Own(-5.0), Value::Share(0.5)]);
+        assert_eq!(of(own), [SurfaceValue::Own(7.0)]);
+        assert_eq!(of(other), [SurfaceValue::Own(-5.0), SurfaceValue::Share(0.5)]);
         assert!(surfaces("a.nrrd=x").is_err() && surfaces("1,").is_err());
         let whole = r#"{"color": [], "opacity": []}"#;
         assert_eq!(transfer(whole), Ok(Own::of_all(whole.to_owned())));

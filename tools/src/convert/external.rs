@@ -62,7 +62,7 @@ impl Convert {
             block_splats: BuildOptions::default().block_splats,
             // Each region has its own deadline.
             surfels: SurfelOptions {
-                color_by_normal: self.color.by_normal(),
+                color_by_normal: self.color.coloring(None).by_normal(),
                 ..self.surface.surfel_options(Deadline::NEVER)
             },
             paint: self.paint_in_regions(&frame)?,
@@ -99,9 +99,10 @@ impl Convert {
         let is_cloud = first.is_some_and(|file| file.counts().triangles == 0);
         let up = self.surface.up_of(frame);
         let named = self.attribute().is_some();
-        let paint = self.color.surface_paint(self.range, up, [named, false, is_cloud]);
+        let coloring = self.color.coloring(self.range);
+        let paint = coloring.surface_paint(up, [named, false, is_cloud]);
         let name = self.attribute().unwrap_or_default();
-        let paint = paint.map(|paint| self.color.with_classes(paint, name));
+        let paint = paint.map(|paint| coloring.with_classes(paint, name));
         let has_values = matches!(paint, Some(Paint::Values { .. }));
         self.color.check_effect(true, has_values)?;
         Ok(paint)

@@ -2,6 +2,7 @@
 
 use super::{Convert, SURFACES, memory};
 use crate::{
+    color,
     failure::{Failure, in_file},
     output, parse,
     progress::Progress,
@@ -226,11 +227,12 @@ impl Convert {
                 let frame = Frame::of(mesh.about.stance, || Ok(mesh.guess_stance()))?;
                 let up = self.surface.up_of(&frame);
                 let named = self.load.scalar().is_some();
-                let bar = self.color.paint(path, &mut mesh, self.range, up, named)?;
+                let coloring = self.color.coloring(self.range);
+                let bar = color::paint(&coloring, path, &mut mesh, up, named)?;
                 self.color.check_effect(true, bar.is_some())?;
                 progress.stage(format!("Making splats of {} points", mesh.positions.len()));
                 let mut options = self.surface.surfel_options(deadline);
-                options.color_by_normal = self.color.by_normal();
+                options.color_by_normal = coloring.by_normal();
                 let need = memory_of_mesh(&mesh, &options, most.saturating_sub(taken));
                 memory::check(path, need.map_err(|e| in_file(path, e))?, taken, most)?;
                 let closed = mesh.is_solid();

@@ -155,11 +155,7 @@ const WRONG: &[(&str, i32, &str)] = &[
         2,
         "the kernel linear is classified after interpolation",
     ),
-    (
-        "a.nrrd --kernel hann --sigma 1",
-        2,
-        "--sigma applies to the gaussian kernel only, not to hann",
-    ),
+    ("a.nrrd --kernel hann --sigma 1", 2, "sigma applies to the gaussian kernel only, not to hann"),
     (
         "a.nrrd --kernel cone.csv",
         2,
@@ -219,7 +215,7 @@ const WRONG: &[(&str, i32, &str)] = &[
     (
         "a.nrrd --range=-20,-10 --iso 300",
         3,
-        "nothing to draw: spread over --range -20,-10, the transfer function shows only the value \
+        "nothing to draw: spread over the range -20, -10, the transfer function shows only the value \
          300, but the values of a.nrrd lie",
     ),
     // Clips.

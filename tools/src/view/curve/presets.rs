@@ -1,9 +1,8 @@
 //! The menu of functions and colour maps by name.
 
 use super::plot::Zoom;
-use crate::color::shown_of;
 use eframe::egui::Ui;
-use splatkit::{color::ColorMap, volume::TransferFunction};
+use splatkit::{color::ColorMap, session::shown_of, volume::TransferFunction};
 
 /// Shows the menu. A function by name replaces all but the factors of the gradient; `diagonal` is
 /// that of the data's box. A colour map replaces the colours of the values that are shown.
