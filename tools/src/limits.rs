@@ -18,7 +18,7 @@ pub struct LimitFlags {
     limit_points: Option<u64>,
     /// Limit the bytes of an input: its files, and everything made from them until it is read. If
     /// unset, inputs that are read whole must also fit in memory [default: 34359738368]
-    #[arg(long, value_name = "BYTES")]
+    #[arg(long, value_name = "BYTES", value_parser = crate::parse::bytes)]
     limit_bytes: Option<u64>,
     /// Limit the nesting of nodes and elements [default: 64]
     #[arg(long, value_name = "COUNT")]
