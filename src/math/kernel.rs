@@ -50,8 +50,8 @@ impl Kernel {
     pub const MAX_TABLE: usize = 65_536;
 
     /// Returns a kernel by its name ([`NAMES`](Self::NAMES)). By default, the Gaussian has the
-    /// deviation of [`Kernel::default`], and footprints reach as far as is usual for the kernel. All
-    /// lengths are in sample spacings.
+    /// deviation of [`Kernel::default`], and footprints reach as far as is usual for the kernel.
+    /// All lengths are in sample spacings.
     ///
     /// # Errors
     /// [`Error::Argument`] for a name that is none, and for lengths that the kernel does not have.
@@ -62,7 +62,10 @@ impl Kernel {
         }
         if let Some(tensor) = Tensor::ALL.into_iter().find(|tensor| tensor.name() == name) {
             return match extent {
-                Some(_) => Err(Error::Argument(format!("the kernel {name} has a fixed extent"))),
+                Some(_) => {
+                    let message = "has a fixed extent; leave out the extent";
+                    Err(Error::Argument(format!("the kernel {name} {message}")))
+                }
                 None => Ok(Self::tensor(tensor)),
             };
         }

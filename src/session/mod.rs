@@ -2,8 +2,9 @@
 //!
 //! [`Reading`] says how inputs are read. It opens a file, a folder or a remote object of any kind;
 //! [`Opened`] knows the kind, and reads it into [`Data`]. The functions of
-//! [`formats`](crate::formats) read one kind each, from files or from bytes in memory. [`Appearance`]
-//! and [`Coloring`] say how values and surfaces are shown. [`Subject`] gathers where a scene is and how it stands, and [`Framing`] is the camera that shows it.
+//! [`formats`](crate::formats) read one kind each, from files or from bytes in memory.
+//! [`Appearance`] and [`Coloring`] say how values and surfaces are shown. [`Subject`] gathers where
+//! a scene is and how it stands, and [`Framing`] is the camera that shows it.
 //!
 //! ```no_run
 //! use splatkit::session::{Data, Reading};

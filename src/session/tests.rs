@@ -179,7 +179,8 @@ fn values_are_shown_as_asked() {
     let transfer = preset.of_volume("a.nrrd", &volume).unwrap();
     assert!(transfer.opacity.len() > 1 && transfer.isosurfaces.len() == 1);
     let coloring = Coloring { range: Some([-20.0, -10.0]), ..Coloring::default() };
-    let beyond = Appearance { isosurfaces: Vec::new(), coloring, ..preset };
+    let surface = Surface { value: SurfaceValue::Own(300.0), ..surface };
+    let beyond = Appearance { isosurfaces: vec![surface], coloring, ..Appearance::default() };
     let error = beyond.of_volume("a.nrrd", &volume).unwrap_err().to_string();
     assert!(error.contains("spread over the range -20, -10, the transfer function"), "{error}");
 }

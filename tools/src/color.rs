@@ -66,6 +66,12 @@ fn surface(text: &str) -> Result<Own<SurfaceColor>, String> {
 }
 
 impl ColorFlags {
+    /// Returns the flags of one input.
+    pub fn of(&self, path: &Path) -> Self {
+        let color = Own::of(&self.color, path).cloned().map(Own::of_all);
+        Self { color: color.into_iter().collect(), ..self.clone() }
+    }
+
     /// Returns how values become colours, and by what the surfaces are coloured that have no colour
     /// of their own here.
     pub fn coloring(&self, range: Option<[f64; 2]>) -> Coloring {

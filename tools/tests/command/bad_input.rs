@@ -149,7 +149,7 @@ const WRONG: &[(&str, i32, &str)] = &[
         "there is no kernel “sinc”; the kernels are gaussian, b-spline, hann, linear, \
          catmull-rom, cubic-b-spline, or a file",
     ),
-    ("a.nrrd --kernel linear --extent 1", 2, "leave out --extent"),
+    ("a.nrrd --kernel linear --extent 1", 2, "leave out the extent"),
     (
         "a.nrrd --kernel linear --classify pre",
         2,
@@ -215,8 +215,8 @@ const WRONG: &[(&str, i32, &str)] = &[
     (
         "a.nrrd --range=-20,-10 --iso 300",
         3,
-        "nothing to draw: spread over the range -20, -10, the transfer function shows only the value \
-         300, but the values of a.nrrd lie",
+        "nothing to draw: spread over the range -20, -10, the transfer function shows only the \
+         value 300, but the values of a.nrrd lie",
     ),
     // Clips.
     (
