@@ -92,7 +92,7 @@ impl Subject {
             let [own, scene] = [stance.up, self.stance.up].map(direction_name);
             format!(
                 "{name} says that {own} is up, but the scene stands with {scene} up, as an input \
-                 before says; --up sets another"
+                 before says; --up (in Python, up) sets another"
             )
         })
     }

@@ -248,21 +248,11 @@ impl Shape {
         // About one sample in each cell of a dense contact.
         let cells = 24.0 * (self.samples.len() as f64 / SAMPLES as f64).sqrt();
         let size = shadow.sqrt() / cells.max(6.0);
-        let low = touching.iter().fold(DVec2::INFINITY, |low, place| low.min(*place));
-        let high = touching.iter().fold(DVec2::NEG_INFINITY, |high, place| high.max(*place));
-        let cell = |place: DVec2| ((place - low) / size).as_usizevec2();
-        let last = cell(high);
-        if last.max_element() > 4096 {
+        let Some(contacts) = contacts(touching, size).filter(|contacts| contacts.len() > 2) else {
             return 0.0;
-        }
-        let (width, rows) = (last.x + 3, last.y + 3);
-        let mut is_touched = vec![false; width * rows];
-        for place in touching {
-            let at = cell(*place);
-            is_touched[(at.y + 1) * width + at.x + 1] = true;
-        }
-        let filled = is_touched.iter().filter(|touched| **touched).count() as f64 * size * size;
-        if parts(&mut is_touched, width).len() < 3 { 0.0 } else { (1.0 - filled / base).max(0.0) }
+        };
+        let filled = contacts.iter().sum::<usize>() as f64 * size * size;
+        (1.0 - filled / base).max(0.0)
     }
 
     /// Returns the share of the samples that a viewer sees from above, or from two of sixteen
@@ -345,6 +335,25 @@ impl Shape {
 /// Returns the other two axes.
 fn across(axis: usize) -> [usize; 2] {
     [(axis + 1) % 3, (axis + 2) % 3]
+}
+
+/// Returns the sizes of the connected contacts that touch these places on the ground, in cells of
+/// this size; `None` for no place, or for far too many cells.
+fn contacts(touching: &[DVec2], size: f64) -> Option<Vec<usize>> {
+    let low = touching.iter().copied().reduce(DVec2::min)?;
+    let high = touching.iter().copied().reduce(DVec2::max)?;
+    let cell = |place: DVec2| ((place - low) / size).as_usizevec2();
+    let last = cell(high);
+    if last.max_element() > 4096 {
+        return None;
+    }
+    let (width, rows) = (last.x + 3, last.y + 3);
+    let mut is_touched = vec![false; width * rows];
+    for place in touching {
+        let at = cell(*place);
+        is_touched[(at.y + 1) * width + at.x + 1] = true;
+    }
+    Some(parts(&mut is_touched, width))
 }
 
 /// Returns the sizes of the connected parts of a grid with an empty border, and empties it.

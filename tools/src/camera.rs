@@ -1,7 +1,10 @@
 //! The flags of the camera.
 
 use crate::parse;
-use clap::{Args, ValueEnum};
+use clap::{
+    Args,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 use glam::DVec3;
 use splatkit::{
     interaction::CameraEntry,
@@ -28,8 +31,8 @@ pub struct CameraFlags {
     /// Look from this side. right is at the right of a viewer who looks at the front; iso is a
     /// corner of the box around the scene. --azimuth and --elevation turn the view further
     /// [default: from the front, 30 degrees to the right and 20 upwards]
-    #[arg(long, value_enum, value_name = "SIDE", conflicts_with = "camera_position")]
-    view: Option<View>,
+    #[arg(long, value_parser = sides(), value_name = "SIDE", conflicts_with = "camera_position")]
+    view: Option<Side>,
     /// Place the camera at this point.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true)]
     camera_position: Option<DVec3>,
@@ -77,24 +80,12 @@ pub struct CameraFlags {
     up: Option<DVec3>,
 }
 
-/// A side to look from.
-#[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
-enum View {
-    Front,
-    Back,
-    Left,
-    Right,
-    Top,
-    Bottom,
-    Iso,
-}
-
 impl CameraFlags {
     /// Returns how the camera looks at the scene.
     pub fn framing(&self) -> Framing {
         Framing {
             camera: self.camera.clone(),
-            view: self.view.map(View::side),
+            view: self.view,
             camera_position: self.camera_position,
             focal_point: self.focal_point,
             view_up: self.view_up,
@@ -109,18 +100,11 @@ impl CameraFlags {
     }
 }
 
-impl View {
-    fn side(self) -> Side {
-        match self {
-            Self::Front => Side::Front,
-            Self::Back => Side::Back,
-            Self::Left => Side::Left,
-            Self::Right => Side::Right,
-            Self::Top => Side::Top,
-            Self::Bottom => Side::Bottom,
-            Self::Iso => Side::Iso,
-        }
-    }
+/// Parses a side to look from.
+fn sides() -> impl TypedValueParser<Value = Side> {
+    PossibleValuesParser::new(Side::ALL.map(Side::name)).map(|name| {
+        Side::ALL.into_iter().find(|side| side.name() == name).expect("a name of the list")
+    })
 }
 
 /// Parses a camera that [`to_json`] has written.

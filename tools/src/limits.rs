@@ -16,8 +16,9 @@ pub struct LimitFlags {
     /// Limit the vertices, points or faces that a file may claim [default: 2147483648]
     #[arg(long, value_name = "COUNT")]
     limit_points: Option<u64>,
-    /// Limit the bytes of an input: its files, and everything made from them until it is read. If
-    /// unset, inputs that are read whole must also fit in memory [default: 34359738368]
+    /// Limit the bytes of an input, such as 512MiB: its files, and everything made from them until
+    /// it is read. If unset, inputs that are read whole must also fit in memory [default:
+    /// 34359738368]
     #[arg(long, value_name = "BYTES", value_parser = crate::parse::bytes)]
     limit_bytes: Option<u64>,
     /// Limit the nesting of nodes and elements [default: 64]

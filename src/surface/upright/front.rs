@@ -4,7 +4,7 @@
 //! than its body and reaches beyond its front feet; a person's feet point forward. Chairs, beds and
 //! cars have neither, and keep the front of the convention, as do figures without feet.
 
-use super::{Shape, across, parts};
+use super::{Shape, across, contacts};
 use glam::{DVec2, DVec3};
 
 /// How badly the halves of a figure may fit each other, as a share of its diagonal, and as a share
@@ -40,31 +40,17 @@ impl Shape {
             .collect();
         let feet: Vec<DVec2> =
             places.iter().filter(|(above, _)| *above < 0.03).map(|(_, place)| *place).collect();
-        let ahead = match self.contacts(&feet, [along, side])?.as_slice() {
+        let sides = self.high - self.low;
+        let sizes = contacts(&feet, (sides[along] * sides[side]).sqrt() / 30.0)?;
+        if sizes.iter().max()? > &(3 * sizes.iter().min()?) {
+            return None;
+        }
+        let ahead = match sizes.as_slice() {
             [_, _] => toes(&places, height)?,
             [_, _, _, _] => self.head(&places, &feet, [along, side])?,
             _ => return None,
         };
         Some(ahead * DVec3::AXES[along])
-    }
-
-    /// Returns the sizes of the places where a figure touches the ground, if they are alike.
-    fn contacts(&self, feet: &[DVec2], [along, side]: [usize; 2]) -> Option<Vec<usize>> {
-        let sides = self.high - self.low;
-        let size = (sides[along] * sides[side]).sqrt() / 30.0;
-        let low = feet.iter().copied().reduce(DVec2::min)?;
-        let high = feet.iter().copied().reduce(DVec2::max)?;
-        let cell = |place: DVec2| ((place - low) / size).as_usizevec2();
-        let last = cell(high);
-        let (width, rows) = (last.x + 3, last.y + 3);
-        let mut is_touched = vec![false; width * rows];
-        for place in feet {
-            let at = cell(*place);
-            is_touched[(at.y + 1) * width + at.x + 1] = true;
-        }
-        let sizes = parts(&mut is_touched, width);
-        let alike = sizes.iter().max()? <= &(3 * sizes.iter().min()?);
-        alike.then_some(sizes)
     }
 
     /// Returns the sign of the direction in which the head of an animal lies.
