@@ -12,7 +12,10 @@
 // A tile with very many entries stops among them and continues in another dispatch, because some
 // drivers silently end long loops (see docs/engine.md). Its sums are saved meanwhile (saved.wgsl).
 //
-// An invocation has ROWS pixels, one below the other, which share the loads of an entry.
+// An invocation has ROWS pixels, one below the other, which share the loads of an entry. On a GPU
+// the whole tile shares them instead (STAGED): each of its 64 invocations loads one of the next 64
+// entries into workgroup memory, so that the tile waits for memory once for all of them (as the
+// tiles of Kerbl et al. 2023 do).
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
@@ -36,6 +39,20 @@ var<private> slopes: array<array<vec2<f32>, FIELDS>, ROWS>;
 // Whether an invocation of the tile stopped, and the tile's slot.
 var<workgroup> any_stopped: atomic<u32>;
 var<workgroup> own_slot: u32;
+
+// Invocations of a workgroup that loads entries together, and entries that it loads at once.
+const STAGED_ENTRIES: u32 = 64u;
+// Words of a record that are loaded.
+const STAGED_WORDS: u32 = select(1u, 4u, GENERAL_RECORDS);
+
+// The entries that were loaded last, their bins, and their records word by word.
+var<workgroup> staged_entries: array<u32, STAGED_ENTRIES>;
+var<workgroup> staged_bins: array<u32, STAGED_ENTRIES>;
+var<workgroup> staged_words: array<vec4<f32>, STAGED_ENTRIES * STAGED_WORDS>;
+// Whether light passes any pixel of the tile: of this load and of the next, in turn.
+var<workgroup> is_light: array<atomic<u32>, 2>;
+// The place of the first of these entries.
+var<private> staged_first: u32;
 
 @compute @workgroup_size(8, LANE_ROWS)
 fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
@@ -99,53 +116,84 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     var group_end = bin_end(bin);
     var entries_left = MOST_ENTRIES;
     var stopped = false;
+    // The tile's entries from `first` on are in workgroup memory up to `loaded`.
+    var first = at;
+    var loaded = end;
+    var turn = 0u;
+    if STAGED && all(lane.xy == vec2(0u)) {
+        atomicStore(&is_light[0], 0u);
+    }
     loop {
-        if at >= end {
-            break;
-        }
-        if CAN_STOP && entries_left == 0u {
-            stopped = true;
-            break;
-        }
-        while group_end <= at {
-            bin++;
-            group_end = bin_end(bin);
-        }
-        let entry_sheet = entries[at] >> ENTRY_SHEET_SHIFT;
-        let sheet = origin + ((bin - tile_bins) << stage.group_shift) + entry_sheet;
-        if open > 0u {
-            let closed = min(sheet - front, open);
-            let sheets = closed + close(front, closed, lane.xy);
-            entries_left -= min(entries_left, sheets * CLOSING_ENTRIES);
-            open -= closed;
-        }
-        front = sheet;
-        // With differences between pixels, all lanes must reach every barrier.
-        if !CENTRAL && !BACK_TO_FRONT {
-            var light = 0.0;
-            for (var r = 0u; r < ROWS; r++) {
-                light = max(light, pixels[r].transmittance);
-            }
-            if light < OPAQUE {
-                at = end;
+        if STAGED {
+            if first >= end {
                 break;
             }
+            load_entries(first, end, tile_bins, lane.y * 8u + lane.x, at < end, turn);
+            loaded = min(first + STAGED_ENTRIES, end);
+            if atomicLoad(&is_light[turn]) == 0u {
+                break;
+            }
+            turn = 1u - turn;
         }
-        // On a GPU, MOST_ENTRIES is the largest u32: clamped before it is added, or the sum wraps.
-        let stop = min(group_end, at + clamp(entries_left, 1u, end - at));
-        // One call for each field, so that the field's number is a constant in the code that adds
-        // to it. Fields may alternate within a sheet; the next iterations add the rest.
-        at = add_entries(0u, at, stop, entry_sheet, front, first_pixel, &entries_left);
-        if FIELDS > 1u {
-            at = add_entries(1u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+        loop {
+            if at >= loaded {
+                break;
+            }
+            if CAN_STOP && entries_left == 0u {
+                stopped = true;
+                break;
+            }
+            if STAGED {
+                bin = staged_bins[at - staged_first];
+                group_end = bin_end(bin);
+            } else {
+                while group_end <= at {
+                    bin++;
+                    group_end = bin_end(bin);
+                }
+            }
+            let entry_sheet = entry_at(at) >> ENTRY_SHEET_SHIFT;
+            let sheet = origin + ((bin - tile_bins) << stage.group_shift) + entry_sheet;
+            if open > 0u {
+                let closed = min(sheet - front, open);
+                let sheets = closed + close(front, closed, lane.xy);
+                entries_left -= min(entries_left, sheets * CLOSING_ENTRIES);
+                open -= closed;
+            }
+            front = sheet;
+            // With differences between pixels, all lanes must reach every barrier.
+            if !CENTRAL && !BACK_TO_FRONT {
+                var light = 0.0;
+                for (var r = 0u; r < ROWS; r++) {
+                    light = max(light, pixels[r].transmittance);
+                }
+                if light < OPAQUE {
+                    at = end;
+                    break;
+                }
+            }
+            // On a GPU, MOST_ENTRIES is the largest u32: clamped before it is added, or the sum
+            // wraps.
+            let stop =
+                min(min(group_end, loaded), at + clamp(entries_left, 1u, end - at));
+            // One call for each field, so that the field's number is a constant in the code that
+            // adds to it. Fields may alternate within a sheet; the next iterations add the rest.
+            at = add_entries(0u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+            if FIELDS > 1u {
+                at = add_entries(1u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+            }
+            if FIELDS > 2u {
+                at = add_entries(2u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+            }
+            if FIELDS > 3u {
+                at = add_entries(3u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+            }
+            open = 4u;
         }
-        if FIELDS > 2u {
-            at = add_entries(2u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+        if !STAGED {
+            break;
         }
-        if FIELDS > 3u {
-            at = add_entries(3u, at, stop, entry_sheet, front, first_pixel, &entries_left);
-        }
-        open = 4u;
+        first = loaded;
     }
     if !stopped {
         // Sheets behind the pass's last one belong to the next pass.
@@ -199,6 +247,61 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     }
 }
 
+// Loads the tile's next entries into workgroup memory, each lane one of them. `light` is whether
+// light passes the lane's pixel.
+fn load_entries(first: u32, end: u32, tile_bins: u32, lane: u32, light: bool, turn: u32) {
+    // Nobody reads the entries before any more.
+    workgroupBarrier();
+    if lane == 0u {
+        atomicStore(&is_light[1u - turn], 0u);
+    }
+    if light {
+        atomicStore(&is_light[turn], 1u);
+    }
+    staged_first = first;
+    let at = first + lane;
+    if at < end {
+        let entry = entries[at];
+        staged_entries[lane] = entry;
+        staged_bins[lane] = bin_of(at, tile_bins);
+        let words = select(STAGED_WORDS, 1u, (entry & ENTRY_ISOTROPIC) != 0u);
+        for (var word = 0u; word < words; word++) {
+            staged_words[word * STAGED_ENTRIES + lane] = records[(entry & ENTRY_RECORD) + word];
+        }
+    }
+    workgroupBarrier();
+}
+
+// Returns the bin of an entry: the first of the tile's that ends behind it.
+fn bin_of(at: u32, tile_bins: u32) -> u32 {
+    var low = tile_bins;
+    var high = tile_bins + stage.groups - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if bin_end(middle) > at {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    return low;
+}
+
+fn entry_at(at: u32) -> u32 {
+    if STAGED {
+        return staged_entries[at - staged_first];
+    }
+    return entries[at];
+}
+
+// Returns a word of the record of the entry at a place.
+fn word_of(at: u32, entry: u32, word: u32) -> vec4<f32> {
+    if STAGED {
+        return staged_words[word * STAGED_ENTRIES + at - staged_first];
+    }
+    return records[(entry & ENTRY_RECORD) + word];
+}
+
 // Adds the entries from `first` on that lie in sheet `entry_sheet` and belong to field `f`.
 // Radiance belongs to field 0. Returns the index of the first entry that was not added.
 fn add_entries(
@@ -211,27 +314,27 @@ fn add_entries(
     entries_left: ptr<function, u32>,
 ) -> u32 {
     var at = first;
-    if FIELDS > 1u && !(at < stop && is_of(entries[at], f, entry_sheet)) {
+    if FIELDS > 1u && !(at < stop && is_of(entry_at(at), f, entry_sheet)) {
         return at;
     }
     loop {
-        let entry = entries[at];
+        let entry = entry_at(at);
         var taken = 1u;
         if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
             for (var i = 1u; i < TOGETHER; i++) {
-                if taken == i && at + i < stop && is_alike(entries[at + i], entry) {
+                if taken == i && at + i < stop && is_alike(entry_at(at + i), entry) {
                     taken++;
                 }
             }
             add_isotropic(f, at, taken, front, first_pixel);
         } else if HAS_FACETS && (entry & ENTRY_COARSE) != 0u {
-            add_facet(entry, front, first_pixel);
+            add_facet(at, front, first_pixel);
         } else if GENERAL_RECORDS {
-            add_general(f, entry, front, first_pixel);
+            add_general(f, at, front, first_pixel);
         }
         at += taken;
         *entries_left -= min(*entries_left, 1u);
-        if at >= stop || !is_of(entries[at], f, entry_sheet) {
+        if at >= stop || !is_of(entry_at(at), f, entry_sheet) {
             break;
         }
     }

@@ -15,7 +15,13 @@
 @group(0) @binding(6) var<storage, read> records: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read> progress: array<u32>;
 
-const SHORT: u32 = 2048u;
+// Entries of a bin that one invocation sorts. Those of a GPU are slow alone.
+const SHORT: u32 = select(2048u, 12u, STAGED);
+// Entries that a workgroup sorts in its own memory.
+const ROOM: u32 = select(1u, 1024u, STAGED);
+
+var<workgroup> held: array<u32, ROOM>;
+var<workgroup> held_keys: array<f32, select(1u, ROOM, SINGLE_SPLATS)>;
 
 var<workgroup> shared_number: u32;
 
@@ -25,11 +31,28 @@ fn key_of(entry: u32) -> f32 {
 }
 
 fn goes_before(a: u32, b: u32) -> bool {
-    if SINGLE_SPLATS && (a >> ENTRY_SHEET_SHIFT) == (b >> ENTRY_SHEET_SHIFT) {
-        let of_a = key_of(a);
-        let of_b = key_of(b);
-        // Splats with equal keys keep the order of the scene, in either direction.
-        return of_a < of_b || (of_a == of_b && (a < b) != BACK_TO_FRONT);
+    if is_of_one_sheet(a, b) {
+        return is_nearer(a, key_of(a), b, key_of(b));
+    }
+    return a < b;
+}
+
+// Whether the keys of two entries decide.
+fn is_of_one_sheet(a: u32, b: u32) -> bool {
+    return SINGLE_SPLATS && (a >> ENTRY_SHEET_SHIFT) == (b >> ENTRY_SHEET_SHIFT);
+}
+
+fn is_nearer(a: u32, key_of_a: f32, b: u32, key_of_b: f32) -> bool {
+    // Splats with equal keys keep the order of the scene, in either direction.
+    return key_of_a < key_of_b || (key_of_a == key_of_b && (a < b) != BACK_TO_FRONT);
+}
+
+// The same of two entries that the workgroup holds.
+fn held_goes_before(i: u32, j: u32) -> bool {
+    let a = held[i];
+    let b = held[j];
+    if is_of_one_sheet(a, b) {
+        return is_nearer(a, held_keys[i], b, held_keys[j]);
     }
     return a < b;
 }
@@ -85,7 +108,7 @@ fn order(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
 }
 
 // Maximum number of workgroups that share the long bins.
-const LONG_WORKGROUPS: u32 = 4096u;
+const LONG_WORKGROUPS: u32 = select(4096u, 32768u, STAGED);
 
 @compute @workgroup_size(1)
 fn count_long() {
@@ -116,17 +139,25 @@ fn order_long(
     }
 }
 
+// Returns the two places that a pair of a step of the network compares.
+fn compared(pair: u32, half: u32, block: u32) -> vec2<u32> {
+    let within = pair % half;
+    let low = (pair / half) * 2u * half + within;
+    return vec2(low, select(low + half, low + block - 1u - 2u * within, half == block / 2u));
+}
+
 fn sort_bin(start: u32, end: u32, lane: u32) {
     let count = end - start;
+    if STAGED && count <= ROOM {
+        sort_held(start, count, lane);
+        return;
+    }
     for (var block = 2u; block < 2u * count; block *= 2u) {
         for (var half = block / 2u; half > 0u; half /= 2u) {
             for (var pair = lane; pair < count; pair += 64u) {
-                let within = pair % half;
-                let low = (pair / half) * 2u * half + within;
-                var high = low + half;
-                if half == block / 2u {
-                    high = low + block - 1u - 2u * within;
-                }
+                let at = compared(pair, half, block);
+                let low = at.x;
+                let high = at.y;
                 if high < count {
                     let a = entries[start + low];
                     let b = entries[start + high];
@@ -139,4 +170,38 @@ fn sort_bin(start: u32, end: u32, lane: u32) {
             storageBarrier();
         }
     }
+}
+
+// Sorts a bin that the workgroup's memory holds.
+fn sort_held(start: u32, count: u32, lane: u32) {
+    for (var i = lane; i < count; i += 64u) {
+        let entry = entries[start + i];
+        held[i] = entry;
+        if SINGLE_SPLATS {
+            held_keys[i] = key_of(entry);
+        }
+    }
+    workgroupBarrier();
+    for (var block = 2u; block < 2u * count; block *= 2u) {
+        for (var half = block / 2u; half > 0u; half /= 2u) {
+            for (var pair = lane; pair < count; pair += 64u) {
+                let at = compared(pair, half, block);
+                if at.y < count && held_goes_before(at.y, at.x) {
+                    let entry = held[at.x];
+                    held[at.x] = held[at.y];
+                    held[at.y] = entry;
+                    if SINGLE_SPLATS {
+                        let key = held_keys[at.x];
+                        held_keys[at.x] = held_keys[at.y];
+                        held_keys[at.y] = key;
+                    }
+                }
+            }
+            workgroupBarrier();
+        }
+    }
+    for (var i = lane; i < count; i += 64u) {
+        entries[start + i] = held[i];
+    }
+    workgroupBarrier();
 }

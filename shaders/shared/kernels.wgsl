@@ -92,8 +92,9 @@ struct Round {
     extent2: f32,
 }
 
-fn load_isotropic(f: u32, entry: u32, is_one: bool, near: vec3<f32>) -> Round {
-    let record = records[entry & ENTRY_RECORD];
+fn load_isotropic(f: u32, at: u32, is_one: bool, near: vec3<f32>) -> Round {
+    let entry = entry_at(at);
+    let record = word_of(at, entry, 0u);
     let c = record.xyz;
     let isotropic = frame.fields[f].isotropic;
     var sigma = isotropic.x;
@@ -137,7 +138,7 @@ fn add_isotropic(f: u32, at: u32, count: u32, front: u32, first_pixel: vec2<i32>
     let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
     var samples: array<Round, TOGETHER>;
     for (var i = 0u; i < TOGETHER; i++) {
-        samples[i] = load_isotropic(f, entries[at + min(i, count - 1u)], i < count, near);
+        samples[i] = load_isotropic(f, at + min(i, count - 1u), i < count, near);
     }
     for (var r = 0u; r < ROWS; r++) {
         let cosine2 = pixels[r].cosine * pixels[r].cosine;
@@ -253,12 +254,12 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
 // closest approach is where |β|²·z = L, at v × β / |β|² in whitened space. All of these are exact
 // in perspective. They are computed from vectors, not from expanded polynomials, which cancel
 // beside the eye. See docs/engine.md.
-fn add_general(f: u32, entry: u32, front: u32, first_pixel: vec2<i32>) {
-    let index = entry & ENTRY_RECORD;
-    let a = records[index];
-    let b = records[index + 1u];
-    let c = records[index + 2u];
-    let splat = load(a, c, records[index + 3u]);
+fn add_general(f: u32, place: u32, front: u32, first_pixel: vec2<i32>) {
+    let entry = entry_at(place);
+    let a = word_of(place, entry, 0u);
+    let b = word_of(place, entry, 1u);
+    let c = word_of(place, entry, 2u);
+    let splat = load(a, c, word_of(place, entry, 3u));
     // With several fields, high.w marks those whose kernel is in tables.
     let is_table = TABLE_KERNEL && !splat.is_radiance
         && (FIELDS == 1u || frame.fields[f].high.w > 0.0);
@@ -299,6 +300,11 @@ fn add_general(f: u32, entry: u32, front: u32, first_pixel: vec2<i32>) {
         let size2 = dot(beta, beta);
         let inverse = inverseSqrt(max(size2, 1e-37));
         let rho2 = dot(v, v) * inverse * inverse;
+        // A small splat meets few pixels. Lanes of a GPU that all miss it go on at once; where a
+        // driver only masks them, that would save nothing.
+        if STAGED && !is_table && rho2 > splat.extent2 {
+            continue;
+        }
         let t = clamp((size2 * (near * pixels[r].cosine) - l) * inverse, -FAR, FAR);
         // The kernel at the closest approach and on the planes, −h′/r on the planes, and the
         // sections.

@@ -16,11 +16,21 @@ pub struct Budget {
     /// Entries of a tile that one dispatch of march adds up. A tile with more continues in another
     /// dispatch. `None`: as many as the adapter's driver allows.
     pub tile_entries: Option<u32>,
+    /// Whether the 64 invocations of a tile load and sort its entries together, in the memory of
+    /// their workgroup. It is faster on a GPU, slower on a processor, and the picture is the same.
+    /// `None`: on a GPU.
+    pub staged: Option<bool>,
 }
 
 impl Default for Budget {
     fn default() -> Self {
-        Self { entries: 1 << 24, record_words: 1 << 22, least_share: None, tile_entries: None }
+        Self {
+            entries: 1 << 24,
+            record_words: 1 << 22,
+            least_share: None,
+            tile_entries: None,
+            staged: None,
+        }
     }
 }
 

@@ -188,6 +188,11 @@ impl PendingFrame {
         self.start.elapsed().as_secs_f64() * 1e3
     }
 
+    /// Counts the time since `start` as the processor's.
+    pub(super) fn spend(&mut self, start: Instant) {
+        self.stats.host_ms += start.elapsed().as_secs_f64() * 1e3;
+    }
+
     /// What the GPU has been asked for.
     pub(super) fn answer(&self) -> Option<&Readback> {
         self.answer.as_ref()
@@ -462,6 +467,7 @@ impl PendingFrame {
             // Already counted for the whole picture.
             read_bricks: 0,
             brick_bytes: prepared.brick_cache.as_ref().map_or(0, |cache| cache.bytes()),
+            host_ms: 0.0,
             steps: Vec::new(),
         });
         tracing::debug!(passes = state.passes, device = engine.gpu.info.name, "strip drawn");

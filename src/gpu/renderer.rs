@@ -210,7 +210,11 @@ impl Renderer {
             };
             let number = PICTURES.fetch_add(1, Ordering::Relaxed);
             (renderer.engine.picture, prepared.picture) = (number, number);
-            PendingFrame::new(&renderer.engine, prepared, view, settings, detail, sink)
+            let start = web_time::Instant::now();
+            let mut frame =
+                PendingFrame::new(&renderer.engine, prepared, view, settings, detail, sink)?;
+            frame.spend(start);
+            Ok(frame)
         })
     }
 
@@ -332,6 +336,7 @@ impl Renderer {
         let gpu = self.engine.gpu.clone();
         loop {
             let progress = self.guarded(prepared, |renderer, prepared| {
+                let start = web_time::Instant::now();
                 let mut encoder = renderer.encoder();
                 frame.encode(
                     &mut renderer.engine,
@@ -346,6 +351,7 @@ impl Renderer {
                     },
                 )?;
                 gpu.queue.submit([encoder.finish()]);
+                frame.spend(start);
                 if let Some(answer) = frame.answer() {
                     gpu.receive(answer)?;
                 }

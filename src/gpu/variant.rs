@@ -58,6 +58,8 @@ pub fn variant(request: &Request<'_>) -> Variant {
     variant.least_share =
         budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
     variant.central = variant.gradients() && settings.gradient == Gradient::Central;
+    // With differences between pixels, a tile's invocations wait for each other already.
+    variant.staged = variant.staged && !variant.central;
     if gathered.is_some() && variant.rows > 1 {
         // Each pixel evaluates the samples around its own ray, so the pixels of an invocation would
         // share nothing.
@@ -76,7 +78,8 @@ pub fn variant(request: &Request<'_>) -> Variant {
 /// Returns the variant of a picture without any item.
 fn without_items(request: &Request<'_>) -> Variant {
     let &Request { scene, view, settings, budget, gathered, is_software, .. } = request;
-    let most_entries = if is_software { SOFTWARE_ENTRIES } else { u32::MAX };
+    let staged = budget.staged.unwrap_or(!is_software) && budget.tile_entries.is_none();
+    let most_entries = if is_software && !staged { SOFTWARE_ENTRIES } else { u32::MAX };
     let [clips, holes] = uniforms::clip_counts(settings);
     Variant {
         perspective: view.perspective,
@@ -112,7 +115,8 @@ fn without_items(request: &Request<'_>) -> Variant {
         central: false,
         // A software adapter runs eight invocations at once: eight columns of eight pixels fill a
         // tile.
-        rows: if is_software { 8 } else { 1 },
+        rows: if is_software && !staged { 8 } else { 1 },
+        staged,
         most_entries: budget.tile_entries.unwrap_or(most_entries),
     }
 }

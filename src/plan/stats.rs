@@ -32,6 +32,9 @@ pub struct FrameStats {
     pub read_bricks: u64,
     /// GPU memory of the slots that hold bricks, in bytes.
     pub brick_bytes: u64,
+    /// GPU engine: milliseconds in which the processor planned the frame, and encoded and submitted
+    /// its work, without waiting for the device.
+    pub host_ms: f64,
     /// Milliseconds of each step, in order; only from
     /// [`Renderer::profile`](crate::Renderer::profile).
     pub steps: Vec<(&'static str, f64)>,
@@ -52,6 +55,7 @@ impl FrameStats {
         self.bricks = self.bricks.max(other.bricks);
         self.read_bricks += other.read_bricks;
         self.brick_bytes = self.brick_bytes.max(other.brick_bytes);
+        self.host_ms += other.host_ms;
         for (name, time) in other.steps {
             match self.steps.iter_mut().find(|step| step.0 == name) {
                 Some(step) => step.1 += time,

@@ -372,3 +372,27 @@ fn a_new_transfer_function_needs_no_new_upload() {
         assert!(psnr(&found, &expected) > 50.0, "{evaluate:?}: {:.1} dB", psnr(&found, &expected));
     }
 }
+
+/// The invocations of a tile may load and sort its entries together, as they do on a GPU.
+#[test]
+fn entries_that_a_tile_loads_together_give_the_same_picture() {
+    for case in [
+        scenes::ellipsoids_in_perspective(),
+        scenes::scattered_samples(),
+        by(Evaluate::Scatter, scenes::blobs_analytic()),
+        scenes::facets::facets_in_a_volume(),
+        methods::single_splats(Order::BackToFront),
+        fields::two_volumes(),
+    ]
+    .into_iter()
+    .chain(
+        scenes::gaussians::all()
+            .into_iter()
+            .filter(|case| ["whole_gaussians", "gaussians_among_everything"].contains(&case.name)),
+    ) {
+        let draw = |staged| drawn(&case, Budget { staged: Some(staged), ..Budget::default() });
+        let agreement = psnr(&draw(false), &draw(true));
+        println!("{}: {agreement:.1} dB", case.name);
+        assert!(agreement > 80.0, "{}: {agreement:.1} dB", case.name);
+    }
+}

@@ -68,9 +68,11 @@ impl Bench {
                 Error::NothingToDraw("the camera sees no splat that has opacity".into()).into()
             );
         }
-        let mut times = Vec::new();
+        let (mut times, mut host) = (Vec::new(), Vec::new());
         for number in 1..=frames {
-            times.push(frame(number)?.0);
+            let (time, stats) = frame(number)?;
+            times.push(time);
+            host.push(stats.host_ms);
         }
         progress.stage("Measuring the passes");
         let profile = renderer.profile(&camera(0), &settings)?;
@@ -81,6 +83,7 @@ impl Bench {
             upload_ms,
             first_ms,
             times: Times::of(times),
+            host_ms: Times::of(host).median,
             stats,
             profile,
         };
@@ -107,6 +110,7 @@ impl Bench {
             "height": height,
             "frames": measured.frames,
             "frame_ms": { "min": min, "median": median, "max": max },
+            "host_ms": measured.host_ms,
             "first_ms": measured.first_ms,
             "load_ms": loaded.load_ms,
             "upload_ms": measured.upload_ms,
@@ -136,6 +140,9 @@ impl Bench {
         output::line(format_args!(
             "frame     {median:10.1} ms  ({min:.1} to {max:.1}, {frames} frames)"
         ))?;
+        if measured.host_ms > 0.0 {
+            output::line(format_args!("  processor {:8.1} ms", measured.host_ms))?;
+        }
         for (name, ms) in &profile.steps {
             output::line(format_args!("  {name:<10}{ms:8.1} ms"))?;
         }
@@ -172,6 +179,8 @@ struct Measured<'a> {
     upload_ms: f64,
     first_ms: f64,
     times: Times,
+    /// Of the processor, in a frame on the GPU.
+    host_ms: f64,
     /// Of the first frame.
     stats: FrameStats,
     /// Of the frame whose passes were measured.

@@ -34,6 +34,7 @@ impl Gather {
             trained: false,
             facets: false,
             surface_shaded: false,
+            staged: false,
             ..*variant
         };
         let sources = [

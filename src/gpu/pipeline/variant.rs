@@ -69,6 +69,9 @@ pub struct Variant {
     pub central: bool,
     /// Pixels per invocation of march, one below the other: 1, 2, 4 or 8.
     pub rows: u32,
+    /// The invocations of a tile load and sort its entries together, in the memory of their
+    /// workgroup.
+    pub staged: bool,
     /// Entries after which march stops a tile and continues in another dispatch.
     pub most_entries: u32,
 }
@@ -141,7 +144,7 @@ impl Variant {
     }
 
     /// The constants that are true or false.
-    fn flags(&self) -> [(&'static str, bool); 36] {
+    fn flags(&self) -> [(&'static str, bool); 37] {
         let radiance = self.radiance || self.classified;
         [
             ("PERSPECTIVE", self.perspective),
@@ -180,6 +183,7 @@ impl Variant {
             ("MAXIMUM", self.optics == Optics::Maximum),
             ("XRAY", self.optics == Optics::XRay),
             ("CAN_STOP", self.can_stop()),
+            ("STAGED", self.staged),
         ]
     }
 
