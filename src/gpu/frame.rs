@@ -12,7 +12,9 @@ use crate::gpu::{
         state::{AGAIN_ARGUMENTS, MARCH_ARGUMENTS, SCAN_ARGUMENTS},
         variant::Variant,
     },
-    scene::{PreparedScene, chunk::Origin, select::Select, select_bricks::SelectBricks},
+    scene::{
+        PreparedScene, chunk::Origin, recolor::Recolor, select::Select, select_bricks::SelectBricks,
+    },
     targets::Targets,
 };
 
@@ -67,6 +69,7 @@ pub struct Passes {
     pub select: Select,
     pub select_bricks: SelectBricks,
     pub cut: Cut,
+    pub recolor: Recolor,
     scan: Scan,
     clear: Clear,
     resume: Resume,
@@ -80,6 +83,7 @@ impl Passes {
             select: Select::new(gpu, &scan),
             select_bricks: SelectBricks::new(gpu, &scan),
             cut: Cut::new(gpu),
+            recolor: Recolor::new(gpu),
             scan,
             clear: Clear::new(gpu),
             resume: Resume::new(gpu),

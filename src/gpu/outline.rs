@@ -60,7 +60,7 @@ impl Request<'_> {
         let before = reads(prepared);
         let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
         prepared.update_levels(gpu, view, pixels)?;
-        prepared.update_seen(gpu, view)?;
+        prepared.update_seen(gpu, &passes.recolor, view)?;
         prepared.update_facets(view, settings);
         prepared.update_forests(gpu, view, settings, cut_pixels)?;
         let choice = self.bring_bricks(gpu, passes, prepared)?;

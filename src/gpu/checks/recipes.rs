@@ -7,7 +7,7 @@ use crate::gpu::{
         project::Project, resume::Resume, tiles::Tiles,
     },
     pipeline::{recipe::Recipe, scan::Scan, variant::Variant},
-    scene::{select::Select, select_bricks::SelectBricks},
+    scene::{recolor::Recolor, select::Select, select_bricks::SelectBricks},
 };
 use naga::{Expression, Literal, Module, ShaderStage};
 
@@ -16,7 +16,7 @@ const MOST_WORKGROUPS: u32 = 65_535;
 
 /// Returns the pipelines that serve all variants.
 pub fn shared() -> Vec<Recipe> {
-    let mut all = vec![Clear::recipe()];
+    let mut all = vec![Clear::recipe(), Recolor::recipe()];
     all.extend(Select::recipes());
     all.extend(SelectBricks::recipes());
     all.extend(Cut::recipes());

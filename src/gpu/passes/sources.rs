@@ -100,7 +100,7 @@ impl Sources<Stage> {
         buffers: &[wgpu::BufferBinding<'_>],
     ) -> (&Stage, [wgpu::BindGroup; 2]) {
         let (stage, own) = match &chunk.origin {
-            Origin::Splats(_) => (&self.splats, vec![&chunk.uniform, &chunk.data]),
+            Origin::Splats { .. } => (&self.splats, vec![&chunk.uniform, &chunk.data]),
             Origin::Facets { .. } => (&self.facets, vec![&chunk.uniform, &chunk.data]),
             Origin::Nodes { slots, .. } => {
                 (&self.nodes, vec![&chunk.uniform, &chunk.data, &slots.selected])

@@ -9,6 +9,7 @@ use crate::{
             bricks::Slab,
             field::kind_of,
             nodes::{PageCache, Slots},
+            recolor::Harmonics,
             select::Selection,
         },
     },
@@ -28,17 +29,18 @@ pub const WORKGROUP_CANDIDATES: u32 = 64 * RUN;
 /// The source of a chunk's candidates.
 #[derive(Debug)]
 pub enum Origin {
-    Splats(Arc<SplatSet>),
+    Splats {
+        set: Arc<SplatSet>,
+        /// Of trained Gaussians whose colours depend on the eye.
+        harmonics: Option<Box<Harmonics>>,
+    },
     Facets {
         set: Arc<FacetSet>,
         /// Whether the view leaves out backs.
         is_culled: bool,
     },
     /// Slots for pages of the hierarchy with this number.
-    Nodes {
-        page_cache: usize,
-        slots: Box<Slots>,
-    },
+    Nodes { page_cache: usize, slots: Box<Slots> },
     Lattice {
         volume: Arc<Volume>,
         kernel: Kernel,
@@ -49,12 +51,7 @@ pub enum Origin {
         places: wgpu::Buffer,
     },
     /// The bricks of one level that lie in a chunk of slots.
-    Bricks {
-        bricks: Arc<Bricks>,
-        kernel: Kernel,
-        slab: Box<Slab>,
-        level: usize,
-    },
+    Bricks { bricks: Arc<Bricks>, kernel: Kernel, slab: Box<Slab>, level: usize },
 }
 
 /// A part of an item that fits a binding.
@@ -81,7 +78,11 @@ pub struct Chunk {
 impl Chunk {
     /// Returns the bytes of the splats or samples, and of their spans.
     pub(super) fn bytes(&self) -> u64 {
-        self.data.size() + self.spans.size()
+        let harmonics = match &self.origin {
+            Origin::Splats { harmonics: Some(harmonics), .. } => harmonics.bytes(),
+            _ => 0,
+        };
+        self.data.size() + self.spans.size() + harmonics
     }
 
     /// Returns the bytes of the lists of candidates, and of their spans.
@@ -90,7 +91,7 @@ impl Chunk {
             Origin::Lattice { selection, .. } => selection.selected.size(),
             Origin::Bricks { slab, .. } => slab.selected.size(),
             Origin::Nodes { slots, .. } => slots.bytes(),
-            Origin::Splats(_) | Origin::Facets { .. } => 0,
+            Origin::Splats { .. } | Origin::Facets { .. } => 0,
         };
         selected + self.spans.size()
     }
@@ -102,7 +103,7 @@ impl Chunk {
                 let header = page_caches[*page_cache].hierarchy.header();
                 Source::of_nodes(view, header)
             }
-            Origin::Splats(set) => Source::of_splats(view, set),
+            Origin::Splats { set, .. } => Source::of_splats(view, set),
             Origin::Facets { set, is_culled } => Source::of_facets(view, set, *is_culled),
             Origin::Bricks { bricks, kernel, slab, level } => {
                 let lattice = bricks.lattice(*level);

@@ -16,6 +16,7 @@ use crate::{
             bricks::{BrickCache, Listed, Room, Slab},
             field::{Field, label_obstacle, texture_bytes, unsuited},
             nodes::{Growth, PageCache, Slots},
+            recolor::{Harmonics, Recolor},
             select::{Select, Selection},
             select_bricks::SelectBricks,
         },
@@ -57,22 +58,13 @@ struct LevelledSet {
     set: Option<Arc<SplatSet>>,
 }
 
-/// Trained Gaussians. The GPU holds the splats that the eye of the last view saw.
+/// Trained Gaussians, which are uploaded for the first picture.
 #[derive(Debug)]
 struct SeenSet {
     item: usize,
     set: Arc<Gaussians>,
-    /// The numbers of the Gaussians, in the order of the splats on the GPU.
-    order: Vec<u32>,
+    /// The eye of the last view.
     eye: Option<Eye>,
-    /// The splats with the colours of the first view.
-    drawn: Option<Arc<SplatSet>>,
-}
-
-impl SeenSet {
-    fn new(item: usize, set: &Arc<Gaussians>) -> Self {
-        Self { item, set: set.clone(), order: Vec::new(), eye: None, drawn: None }
-    }
 }
 
 /// A scene whose splats and samples lie on the GPU. Cameras, settings and transfer functions may
@@ -152,7 +144,9 @@ impl PreparedScene {
                     prepared.add_splats(gpu, &in_space_order(set), number);
                 }
                 // They are uploaded as the first picture sees them.
-                Item::Gaussians(set) => prepared.seen.push(SeenSet::new(number, set)),
+                Item::Gaussians(set) => {
+                    prepared.seen.push(SeenSet { item: number, set: set.clone(), eye: None });
+                }
                 Item::Facets(set) => prepared.add_facets(gpu, set, number),
                 Item::Hierarchy(hierarchy) => {
                     prepared.page_caches.push(PageCache::new(gpu, hierarchy, number));
@@ -338,7 +332,7 @@ impl PreparedScene {
         let held = self.chunks.iter().map(|chunk| match &chunk.origin {
             Origin::Nodes { .. } => chunk.data.size() + chunk.list_bytes(),
             Origin::Bricks { slab, .. } => slab.slots.size() + chunk.list_bytes(),
-            Origin::Splats(_) | Origin::Facets { .. } | Origin::Lattice { .. } => 0,
+            Origin::Splats { .. } | Origin::Facets { .. } | Origin::Lattice { .. } => 0,
         });
         let slots = self.brick_cache.as_ref().map_or(0, BrickCache::bytes);
         let readers = self.page_caches.len() + usize::from(self.brick_cache.is_some());
@@ -457,49 +451,52 @@ impl PreparedScene {
     }
 
     /// Gives Gaussians the colours for a view's eye.
-    pub(crate) fn update_seen(&mut self, gpu: &Gpu, view: &View) -> Result<()> {
+    pub(crate) fn update_seen(&mut self, gpu: &Gpu, recolor: &Recolor, view: &View) -> Result<()> {
         let eye = Eye::of(view);
-        let mut seen = std::mem::take(&mut self.seen);
-        let done = seen.iter_mut().try_for_each(|own| self.update_seen_set(gpu, own, eye));
-        self.seen = seen;
-        self.number_runs();
-        done
-    }
-
-    fn update_seen_set(&mut self, gpu: &Gpu, own: &mut SeenSet, eye: Eye) -> Result<()> {
-        let Some(last) = own.eye else {
-            let set = own.set.seen_from(eye);
-            gpu.check_memory(self.bytes + splat_bytes(&set))?;
-            own.order = space_order(&set.splats);
-            let set = Arc::new(ordered(&set, &own.order));
-            self.add_splats(gpu, &set, own.item);
-            (own.eye, own.drawn) = (Some(eye), Some(set));
-            return Ok(());
-        };
-        let (Some(drawn), true) = (&own.drawn, last != eye && own.set.depends_on_eye()) else {
-            return Ok(());
-        };
-        own.eye = Some(eye);
-        let colored = |(splat, index): (&Splat, &u32)| {
-            let [color, normal] = own.set.color(*index as usize, eye);
-            Splat { color, normal, ..*splat }
-        };
-        let splats: Vec<Splat> = drawn.splats.par_iter().zip(&own.order).map(colored).collect();
-        let mut rest = &splats[..];
-        for chunk in &self.chunks {
-            if chunk.item == own.item {
-                let (part, behind) = rest.split_at(chunk.count as usize);
-                gpu.queue.write_buffer(&chunk.data, 0, bytemuck::cast_slice(part));
-                rest = behind;
+        for number in 0..self.seen.len() {
+            let SeenSet { item, set, eye: last } = &mut self.seen[number];
+            let (item, set, last) = (*item, set.clone(), last.replace(eye));
+            if last.is_none() {
+                gpu.check_memory(self.bytes + gaussian_bytes(&set))?;
+                self.add_gaussians(gpu, &set, item, eye);
             }
+            if last == Some(eye) || !set.depends_on_eye() {
+                continue;
+            }
+            let descriptor = wgpu::CommandEncoderDescriptor { label: Some("recolor") };
+            let mut encoder = gpu.device.create_command_encoder(&descriptor);
+            for chunk in self.chunks.iter().filter(|chunk| chunk.item == item) {
+                if let Origin::Splats { harmonics: Some(harmonics), .. } = &chunk.origin {
+                    recolor.encode(gpu, &mut encoder, (harmonics, &chunk.data), eye);
+                }
+            }
+            gpu.queue.submit([encoder.finish()]);
         }
         Ok(())
+    }
+
+    /// Uploads trained Gaussians, with their harmonics if their colours depend on the eye.
+    fn add_gaussians(&mut self, gpu: &Gpu, set: &Gaussians, item: usize, eye: Eye) {
+        let seen = set.seen_from(eye);
+        let order = space_order(&seen.splats);
+        let kind = Arc::new(seen.empty());
+        let each = Harmonics::bytes_of(set).max(size_of::<Splat>() as u64);
+        // Whole blocks of harmonics.
+        let most = (gpu.binding_size() / each) as usize / 64 * 64;
+        for order in order.chunks(most) {
+            let splats: Vec<Splat> =
+                order.par_iter().map(|index| seen.splats[*index as usize]).collect();
+            let harmonics = set.depends_on_eye().then(|| Box::new(Harmonics::new(gpu, set, order)));
+            self.bytes += harmonics.as_ref().map_or(0, |own| own.bytes());
+            let origin = Origin::Splats { set: kind.clone(), harmonics };
+            self.add_chunk(gpu, item, origin, bytemuck::cast_slice(&splats), order.len() as u32);
+        }
     }
 
     fn add_splats(&mut self, gpu: &Gpu, set: &Arc<SplatSet>, item: usize) {
         let most = (gpu.binding_size() / size_of::<Splat>() as u64) as usize;
         for splats in set.splats.chunks(most) {
-            let origin = Origin::Splats(set.clone());
+            let origin = Origin::Splats { set: set.clone(), harmonics: None };
             self.add_chunk(gpu, item, origin, bytemuck::cast_slice(splats), splats.len() as u32);
         }
     }
@@ -718,7 +715,7 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
 fn bytes_of(item: &Item) -> u64 {
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => splat_bytes(set),
-        Item::Gaussians(set) => set.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES),
+        Item::Gaussians(set) => gaussian_bytes(set),
         Item::Volume(volume, ..) => {
             let sample =
                 volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
@@ -732,4 +729,10 @@ fn bytes_of(item: &Item) -> u64 {
 /// Returns the bytes of a set's splats on the GPU, and of their spans.
 fn splat_bytes(set: &SplatSet) -> u64 {
     set.splats.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES)
+}
+
+/// Returns the bytes of trained Gaussians on the GPU, with their harmonics and spans.
+fn gaussian_bytes(set: &Gaussians) -> u64 {
+    let each = size_of::<Splat>() as u64 + SPAN_BYTES + Harmonics::bytes_of(set);
+    set.len() as u64 * each
 }

@@ -1,0 +1,117 @@
+//! Recolor: gives trained Gaussians the colours that an eye sees (shaders/passes/recolor.wgsl). The
+//! harmonics stay on the device, so that nothing is computed or uploaded as the eye moves.
+
+use crate::{
+    gaussians::{Eye, Gaussians, harmonics::terms},
+    gpu::{
+        device::{
+            Gpu,
+            buffers::{buffer, upload},
+        },
+        pipeline::{
+            recipe::{Binding, Recipe},
+            shaders,
+            stage::Stage,
+        },
+    },
+    parallel::prelude::*,
+};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+/// Gaussians of a block, which a workgroup colours.
+const BLOCK: usize = 64;
+
+/// The harmonics of a chunk's Gaussians.
+#[derive(Debug)]
+pub struct Harmonics {
+    /// The origin of the centres.
+    origin: DVec3,
+    count: u32,
+    terms: u32,
+    /// By blocks of Gaussians, number by number.
+    numbers: wgpu::Buffer,
+    eye: wgpu::Buffer,
+}
+
+/// The uniform of the pass.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Uniform {
+    place: [f32; 4],
+    count: u32,
+    terms: u32,
+    unused: [u32; 2],
+}
+
+impl Harmonics {
+    /// Uploads the harmonics of some of the Gaussians, in this order.
+    pub fn new(gpu: &Gpu, set: &Gaussians, order: &[u32]) -> Self {
+        let each = 3 * terms(set.degree);
+        let mut numbers = vec![0f32; order.len().div_ceil(BLOCK) * BLOCK * each];
+        let fill = |(block, order): (&mut [f32], &[u32])| {
+            for (lane, &index) in order.iter().enumerate() {
+                let own = set.harmonics_of(index as usize).as_flattened();
+                for (number, value) in own.iter().enumerate() {
+                    block[number * BLOCK + lane] = *value;
+                }
+            }
+        };
+        numbers.par_chunks_mut(BLOCK * each).zip(order.par_chunks(BLOCK)).for_each(fill);
+        Self {
+            origin: set.origin,
+            count: order.len() as u32,
+            terms: terms(set.degree) as u32,
+            numbers: upload(gpu, "harmonics", bytemuck::cast_slice(&numbers)),
+            eye: buffer(gpu, "eye", size_of::<Uniform>() as u64, wgpu::BufferUsages::UNIFORM),
+        }
+    }
+
+    /// Returns the bytes of one Gaussian on the device; none if its colour is the same from
+    /// everywhere.
+    pub fn bytes_of(set: &Gaussians) -> u64 {
+        if set.depends_on_eye() { 12 * terms(set.degree) as u64 } else { 0 }
+    }
+
+    /// Returns the bytes on the device.
+    pub fn bytes(&self) -> u64 {
+        self.numbers.size()
+    }
+}
+
+/// The pass.
+#[derive(Debug)]
+pub struct Recolor(Stage);
+
+impl Recolor {
+    pub fn new(gpu: &Gpu) -> Self {
+        Self(Stage::new(gpu, &Self::recipe()))
+    }
+
+    pub fn recipe() -> Recipe {
+        use Binding::{Read, Uniform, Write};
+        let sources = [shaders::SPLAT, shaders::RECOLOR];
+        Recipe::new("recolor", &sources, "recolor", &[&[Uniform, Read, Write]])
+    }
+
+    /// Encodes the pass for a chunk's splats.
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        (harmonics, splats): (&Harmonics, &wgpu::Buffer),
+        eye: Eye,
+    ) {
+        let Harmonics { origin, count, terms, numbers, eye: buffer } = harmonics;
+        let (at, w) = match eye {
+            Eye::At(place) => (place - *origin, 1.0),
+            Eye::Along(direction) => (direction, 0.0),
+        };
+        let place = at.as_vec3().extend(w).to_array();
+        let uniform = Uniform { place, count: *count, terms: *terms, unused: [0; 2] };
+        gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&uniform));
+        let buffers = [buffer, numbers, splats].map(|b| b.as_entire_buffer_binding());
+        let group = self.0.bind(gpu, 0, &buffers);
+        self.0.dispatch(encoder, &[&group], count.div_ceil(BLOCK as u32));
+    }
+}
