@@ -1,7 +1,7 @@
 // Gather: draws the field of a lattice without splats. Each pixel follows its own ray through the
 // sheets, front to back, and evaluates the field on the planes between them. It runs after the
 // passes that scatter the splats of other items, and draws the rest of each tile that march has not
-// drawn. A dispatch draws the sheets of `stage`; its `stage.groups` tiles are listed in `shown`.
+// drawn. A dispatch draws the sheets of `stage`, in all `stage.groups` tiles.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
@@ -39,7 +39,10 @@ fn gather(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id)
     if all(lane.xy == vec2(0u)) {
         atomicAdd(&progress[gathered_word()], 1u);
     }
-    let tile = shown[frame.fields[0].shown.z + number];
+    let tile = number;
+    if next_marked(tile, stage.first_sheet, stage.end_sheet) >= stage.end_sheet {
+        return;
+    }
     let pixel = vec2(tile % frame.tiles.x, tile / frame.tiles.x) * 8u + lane.xy;
     if any(pixel >= frame.size) {
         return;

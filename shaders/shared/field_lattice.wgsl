@@ -4,10 +4,10 @@
 // first moments: ∂E[f]/∂p = (E[n·f] − E[n]·E[f])/σ², with n the sample's index along the axis.
 //
 // The shader that includes this file declares `shown`. It has a bit for each sample: whether
-// something may be visible at the places nearest to that sample. Behind these bits it has, for each
-// entry of the transfer function's table, the number of visible entries before it. Then follow, for
-// each tile, the sheets in which something may be visible, as bits, and the list of tiles with such
-// sheets.
+// something may be visible at the places nearest to that sample. The bits of each block of 4 × 4 × 4
+// samples are two words. Behind them it has, for each entry of the transfer function's table, the
+// number of visible entries before it. Then follow, for each tile, the sheets in which something may
+// be visible, as bits (mark.wgsl).
 
 // The samples in the type of their file. Each row along x is packed in 32-bit words, with padding
 // behind its end. It is a texture, because Mesa's software Vulkan reads eight elements of a buffer
@@ -246,8 +246,11 @@ fn mean_of(r: u32, sheet: u32, own: ptr<function, Sheet>) -> f32 {
 fn sample_shows(place: vec3<f32>) -> bool {
     let dims = frame.fields[0].lattice.xyz;
     let at = vec3<u32>(clamp(floor(place + 0.5), vec3(0.0), vec3<f32>(dims - 1u)));
-    let number = (at.z * dims.y + at.y) * dims.x + at.x;
-    return ((shown[number >> 5u] >> (number & 31u)) & 1u) != 0u;
+    let blocks = (dims + 3u) >> vec3(2u);
+    let block = at >> vec3(2u);
+    let word = 2u * ((block.z * blocks.y + block.y) * blocks.x + block.x) + ((at.z >> 1u) & 1u);
+    let bit = ((at.z & 1u) << 4u) | ((at.y & 3u) << 2u) | (at.x & 3u);
+    return ((shown[word] >> bit) & 1u) != 0u;
 }
 
 // Whether something may be visible at a pixel in a sheet: around its front, its middle and its
@@ -294,7 +297,7 @@ fn next_marked(tile: u32, sheet: u32, end: u32) -> u32 {
     if sheet >= end {
         return end;
     }
-    let marks = frame.fields[0].shown.y + tile * frame.fields[0].shown.w;
+    let marks = frame.fields[0].shown.y + tile * frame.fields[0].shown.z;
     var word = sheet >> 5u;
     var bits = shown[marks + word] & (0xffffffffu << (sheet & 31u));
     loop {

@@ -1,8 +1,8 @@
 // The progress of the tiles of a pass. Each tile has 0, or one more than the slot that holds its
 // sums (saved.wgsl), or FINISHED. Behind the tiles: whether any is unfinished, how often one
 // stopped, which slots are taken, how many tiles have entries, and the list of these tiles. For a
-// gathered lattice also: how many tiles gather.wgsl has drawn, and for each tile the first sheet
-// whose field is not drawn yet.
+// gathered lattice also: how many tiles gather.wgsl has drawn, how many sheets of tiles are marked
+// (mark.wgsl), and for each tile the first sheet whose field is not drawn yet.
 
 // A tile that needs no more work.
 const FINISHED: u32 = 0xffffffffu;
@@ -27,6 +27,10 @@ fn gathered_word() -> u32 {
     return listed_tile(frame.tiles.x * frame.tiles.y);
 }
 
+fn marked_word() -> u32 {
+    return gathered_word() + 1u;
+}
+
 fn next_of(tile: u32) -> u32 {
-    return gathered_word() + 1u + tile;
+    return gathered_word() + 2u + tile;
 }

@@ -4,8 +4,8 @@ use crate::gpu::{
     device::Gpu,
     passes::{
         bin::Bin, clear::Clear, cull::Cull, cut::Cut, gather::Gather, large::Large, march::March,
-        measure::Measure, occlusion::Occlusion, order::Order, plan::Plan, project::Project,
-        resume::Resume, tiles::Tiles,
+        mark::Mark, measure::Measure, occlusion::Occlusion, order::Order, plan::Plan,
+        project::Project, resume::Resume, tiles::Tiles,
     },
     pipeline::{
         scan::Scan,
@@ -72,6 +72,7 @@ pub struct Passes {
     pub recolor: Recolor,
     scan: Scan,
     clear: Clear,
+    mark: Mark,
     resume: Resume,
     tiles: Tiles,
 }
@@ -86,6 +87,7 @@ impl Passes {
             recolor: Recolor::new(gpu),
             scan,
             clear: Clear::new(gpu),
+            mark: Mark::new(gpu),
             resume: Resume::new(gpu),
             tiles: Tiles::new(gpu),
         }
@@ -118,6 +120,8 @@ impl<'a> Work<'a> {
                 }
             };
             steps.push(("clear", Box::new(clear)));
+            steps
+                .push(("mark", Box::new(move |encoder| passes.mark.encode(gpu, encoder, targets))));
         }
         let Some(scatter) = &pipelines.scatter else { return steps };
         for chunk in &prepared.chunks {

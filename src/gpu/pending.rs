@@ -368,7 +368,7 @@ impl PendingFrame {
             presenter.encode(gpu, encoder, output, &strip);
         }
         let part = match self.stage {
-            Stage::Gather => (&targets.progress, 4 * word_of(targets), 4),
+            Stage::Gather => (&targets.progress, 4 * word_of(targets), 8),
             _ => (&targets.state, 0, size_of::<State>() as u64),
         };
         Ok(Some(Readback::encode(gpu, encoder, &[part])))
@@ -395,7 +395,8 @@ impl PendingFrame {
             }
             Stage::Scatter | Stage::Resume => self.scattered(engine, prepared, &bytes)?,
             Stage::Gather => {
-                let drawn: u32 = bytemuck::pod_read_unaligned(&bytes);
+                let [drawn, marked]: [u32; 2] = bytemuck::pod_read_unaligned(&bytes);
+                self.stats.gathered += u64::from(marked);
                 let targets = self.strip.as_ref().map(|strip| &strip.targets);
                 let gathered = targets.and_then(|targets| targets.gathered.as_ref());
                 if gathered.is_some_and(|gathered| drawn != gathered.workgroups()) {
@@ -458,7 +459,8 @@ impl PendingFrame {
             hidden: u64::from(state.hidden),
             entries: u64::from(state.binned),
             passes: state.passes,
-            gathered: targets.gathered.as_ref().map_or(0, |gathered| gathered.pairs),
+            // Already counted.
+            gathered: 0,
             gpu_bytes: prepared.bytes + targets.bytes(),
             cut_pixels: outline.cut_pixels,
             missing_pages: prepared.page_caches.iter().map(|cache| cache.missing as u64).sum(),
@@ -497,7 +499,8 @@ impl PendingFrame {
     }
 }
 
-/// The word of `progress` that counts the tiles that gather has drawn.
+/// The word of `progress` that counts the tiles that gather has drawn. The next one counts the
+/// sheets of tiles that were marked.
 fn word_of(targets: &Targets) -> u64 {
     targets::gathered_word(targets.tiles[0] * targets.tiles[1])
 }

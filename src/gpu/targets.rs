@@ -14,10 +14,10 @@ use crate::{
             state::{ARGUMENT_BYTES, HELD_RECORD_STARTS, PASS_BYTES, State},
             variant::{MOST_BINS, MOST_GROUP_SHIFT, Variant},
         },
-        scene::{PreparedScene, chunk::RUN, field::Gathered},
+        scene::{PreparedScene, chunk::RUN, field::Gathered, tables::FieldTables},
     },
     math::{Sheets, View},
-    plan::{tables::Tables, uniforms::Frame},
+    plan::uniforms::Frame,
     scene::{Scene, Settings},
 };
 use wgpu::BufferUsages as Usage;
@@ -203,8 +203,11 @@ impl Request<'_> {
         self.check(gpu, prepared.runs)?;
         let (budget, tiles) = (self.budget.within(gpu), self.tiles());
         let mut frame = self.frame(prepared, budget);
-        let table = tables_of(prepared, self.settings, self.view, self.sheets, &mut frame);
-        let gathered = self.gathered(gpu, prepared, &table, &mut frame);
+        let tables = FieldTables::of(gpu, &prepared.scene, prepared.tables.take());
+        tables.describe(self.settings, self.view, self.sheets, &mut frame);
+        let gathered = self.gathered(gpu, prepared, tables.entries(), &mut frame);
+        let table = tables.buffer.clone();
+        prepared.tables = Some(tables);
         let uniform = |label, bytes: &[u8]| filled_buffer(gpu, label, bytes, Usage::UNIFORM);
         let sizes = Sizes::of(self, gpu, budget, prepared.runs);
         let Sizes { tile_count, pixels, slots, bin_count, words, runs, .. } = sizes;
@@ -216,7 +219,7 @@ impl Request<'_> {
                 Usage::UNIFORM | Usage::COPY_DST,
             ),
             planes: upload(gpu, "planes", bytemuck::cast_slice(&planes(self.sheets))),
-            tables: upload(gpu, "tables", bytemuck::cast_slice(&table)),
+            tables: table,
             run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
             run_spans: pool.take(gpu, "run spans", RUN_BYTES * runs),
             needs: pool.take(gpu, "needs", RUN_BYTES * runs),
@@ -241,7 +244,7 @@ impl Request<'_> {
             progress: pool.take(
                 gpu,
                 "progress",
-                4 * (gathered_word(tile_count) + 1 + u64::from(tile_count)),
+                4 * (gathered_word(tile_count) + 2 + u64::from(tile_count)),
             ),
             colors: pool.take(gpu, "colors", 16 * pixels + slots),
             depths: pool.take(gpu, "depths", 4 * pixels),
@@ -302,7 +305,7 @@ impl Request<'_> {
         frame
     }
 
-    /// Lists what a gathered lattice shows in the strip.
+    /// Brings what a gathered lattice needs in the strip.
     fn gathered(
         &self,
         gpu: &Gpu,
@@ -312,7 +315,9 @@ impl Request<'_> {
     ) -> Option<Gathered> {
         let field = prepared.field.as_mut().filter(|_| self.variant.gather)?;
         let before = field.bytes();
-        let gathered = field.list(gpu, (self.view, self.sheets), self.variant, table, frame)?;
+        let [columns, rows] = self.tiles();
+        let place = (self.sheets, columns * rows);
+        let gathered = field.gathered(gpu, place, self.variant, table, frame)?;
         prepared.bytes += field.bytes() - before;
         Some(gathered)
     }
@@ -369,28 +374,6 @@ fn planes(sheets: &Sheets) -> Vec<f32> {
 /// Returns the word of `progress` that counts the tiles that gather has drawn (progress.wgsl).
 pub fn gathered_word(tiles: u32) -> u64 {
     2 * u64::from(tiles) + SLOTS / 32 + 3
-}
-
-/// Returns the tables of the scene's fields one behind the other, or unused placeholders if there
-/// are no fields.
-fn tables_of(
-    prepared: &PreparedScene,
-    settings: &Settings,
-    view: &View,
-    sheets: &Sheets,
-    frame: &mut Frame,
-) -> Vec<[f32; 4]> {
-    let mut all = Vec::new();
-    let scene = &prepared.scene;
-    for (field, number) in frame.fields.iter_mut().zip(scene.fields()) {
-        let item = &scene.items[number];
-        let (Some(transfer), Some(range)) = (item.transfer(), item.value_range()) else { continue };
-        let tables = Tables::of(item, transfer, range);
-        let start = all.len() as u32;
-        field.set_tables((&tables, start), transfer, item.light(settings), view, sheets);
-        all.extend(tables.entries);
-    }
-    if all.is_empty() { vec![[0.0; 4]; 2] } else { all }
 }
 
 /// Returns the bytes of the counts by sheet and band (census.wgsl) for a number of sheets: 6 counts

@@ -92,24 +92,6 @@ impl Shown {
         size_of_val(self.words.as_slice()) as u64
     }
 
-    /// Returns a bit for each sample in the order of the volume, 32 per word, the first in the
-    /// lowest bit.
-    pub fn bits(&self) -> Vec<u32> {
-        let [nx, ny, _] = self.dims;
-        let [columns, rows, _] = self.blocks;
-        let count = self.dims.iter().product::<usize>();
-        let word = |word: usize| {
-            let own = (32 * word..count.min(32 * word + 32)).map(|sample| {
-                let at = [sample % nx, sample / nx % ny, sample / (nx * ny)];
-                let block = (at[2] / BLOCK * rows + at[1] / BLOCK) * columns + at[0] / BLOCK;
-                let (half, bit) = bit_of(at);
-                self.words[block][half] >> bit & 1
-            });
-            own.enumerate().fold(0, |word, (place, bit)| word | bit << place)
-        };
-        (0..count.div_ceil(32)).into_par_iter().map(word).collect()
-    }
-
     /// Returns for each tile, row by row, the sheets in which something may be visible, as bits.
     pub fn sheets_of_tiles(
         &self,
@@ -228,16 +210,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bits_are_in_the_order_of_the_samples() {
+    fn bits_are_in_blocks() {
         let (dims, odd) = ([5, 3, 6], |sample: usize| sample * sample % 7 == 2);
         let ranges: Vec<[u8; 2]> =
             (0..90).map(|sample| [0, if odd(sample) { 200 } else { 10 }]).collect();
         let shown = Shown::new(dims, &ranges, &[100; 256]);
-        for (word, bits) in shown.bits().into_iter().enumerate() {
-            for bit in 0..32 {
-                let sample = 32 * word + bit;
-                assert_eq!(bits >> bit & 1 != 0, sample < 90 && odd(sample), "{sample}");
-            }
+        assert_eq!(shown.blocks, [2, 1, 2]);
+        for (sample, _) in ranges.iter().enumerate() {
+            let at = [sample % 5, sample / 5 % 3, sample / 15];
+            let block = at[2] / BLOCK * 2 + at[0] / BLOCK;
+            let (half, bit) = bit_of(at);
+            assert_eq!(shown.words[block][half] >> bit & 1 != 0, odd(sample), "{at:?}");
         }
     }
 }

@@ -127,12 +127,16 @@ impl Item {
         }
     }
 
-    /// Returns how the item's field is lit, with the gradients that are certain
-    /// ([`Shade::certain`]). `None` if the field is not lit, or the item has no field. Scattered
-    /// samples are searched for their range and bounds.
+    /// Returns how the item's field is lit. `None` if the field is not lit, or the item has no
+    /// field. Scattered samples are searched for their range and bounds.
     pub(crate) fn light(&self, settings: &Settings) -> Option<Shade> {
-        let transfer = self.transfer()?;
-        let shade = settings.shade_of(transfer)?;
+        let (transfer, range) = (self.transfer()?, self.value_range()?);
+        settings.light_of(transfer, range, self.field_diagonal())
+    }
+
+    /// Returns the length of the diagonal of the box around the field's samples. Scattered samples
+    /// are searched for it.
+    pub(crate) fn field_diagonal(&self) -> f64 {
         let bounds = self.lattice().map_or_else(
             || self.bounds(),
             |lattice| {
@@ -140,8 +144,7 @@ impl Item {
                 Bounds { min, max }
             },
         );
-        let certain = shade.certain_in(transfer, self.value_range()?, bounds.diagonal());
-        Some(Shade { certain: Some(certain), ..shade })
+        bounds.diagonal()
     }
 
     /// Returns the box around the item, footprints included.

@@ -239,4 +239,16 @@ impl Settings {
             Some(shade) => shade.map(|shade| Shade { certain: shade.certain.or(own), ..shade }),
         }
     }
+
+    /// Returns how a field is lit, with the gradients that are certain ([`Shade::certain`]), from
+    /// the range of its samples and the diagonal of the box around them. `None` if it is not lit.
+    pub(crate) fn light_of(
+        &self,
+        transfer: &TransferFunction,
+        range: [f64; 2],
+        diagonal: f64,
+    ) -> Option<Shade> {
+        let shade = self.shade_of(transfer)?;
+        Some(Shade { certain: Some(shade.certain_in(transfer, range, diagonal)), ..shade })
+    }
 }

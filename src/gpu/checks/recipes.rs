@@ -3,8 +3,8 @@
 use crate::gpu::{
     passes::{
         bin::Bin, clear::Clear, cull::Cull, cut::Cut, gather::Gather, large::Large, march::March,
-        measure::Measure, occlusion::Occlusion, order::Order, plan::Plan, present::Presenter,
-        project::Project, resume::Resume, tiles::Tiles,
+        mark::Mark, measure::Measure, occlusion::Occlusion, order::Order, plan::Plan,
+        present::Presenter, project::Project, resume::Resume, tiles::Tiles,
     },
     pipeline::{recipe::Recipe, scan::Scan, variant::Variant},
     scene::{recolor::Recolor, select::Select, select_bricks::SelectBricks},
@@ -16,7 +16,7 @@ const MOST_WORKGROUPS: u32 = 65_535;
 
 /// Returns the pipelines that serve all variants.
 pub fn shared() -> Vec<Recipe> {
-    let mut all = vec![Clear::recipe(), Recolor::recipe()];
+    let mut all = vec![Clear::recipe(), Mark::recipe(), Recolor::recipe()];
     all.extend(Select::recipes());
     all.extend(SelectBricks::recipes());
     all.extend(Cut::recipes());

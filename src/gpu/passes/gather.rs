@@ -69,7 +69,8 @@ impl Gather {
             ];
             let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
             let samples = self.0.bind_textures(gpu, 1, &gathered.textures);
-            self.0.dispatch(encoder, &[&group, &samples], gathered.tiles.next_multiple_of(LANES));
+            let tiles = gathered.tiles.next_multiple_of(LANES);
+            self.0.dispatch(encoder, &[&group, &samples], tiles);
         }
     }
 }

@@ -8,6 +8,7 @@ pub(crate) mod cut;
 pub(crate) mod gather;
 pub(crate) mod large;
 pub(crate) mod march;
+pub(crate) mod mark;
 pub(crate) mod measure;
 pub(crate) mod occlusion;
 pub(crate) mod order;

@@ -14,6 +14,7 @@ pub const BIN: &str = include_str!("../../../shaders/passes/bin.wgsl");
 pub const CLEAR: &str = include_str!("../../../shaders/passes/clear.wgsl");
 pub const CULL: &str = include_str!("../../../shaders/passes/cull.wgsl");
 pub const OCCLUSION: &str = include_str!("../../../shaders/passes/occlusion.wgsl");
+pub const MARK: &str = include_str!("../../../shaders/passes/mark.wgsl");
 pub const RECOLOR: &str = include_str!("../../../shaders/passes/recolor.wgsl");
 pub const RESUME: &str = include_str!("../../../shaders/passes/resume.wgsl");
 pub const TILES: &str = include_str!("../../../shaders/passes/tiles.wgsl");

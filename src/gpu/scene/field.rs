@@ -8,11 +8,11 @@ use crate::{
         },
         pipeline::variant::Variant,
     },
-    math::{Kernel, Sheets, View},
+    math::{Kernel, Sheets},
     parallel::prelude::*,
     plan::{
         gathering::unsuited_kernel,
-        shown::{Shown, field_ranges},
+        shown::{BLOCK, Shown, field_ranges},
         uniforms::Frame,
         weighting::{MASK_DEVIATION, deviation},
     },
@@ -94,7 +94,7 @@ fn beyond_limits(scene: &Scene, volume: &Volume, gpu: &Gpu) -> Option<&'static s
         return Some("a volume with more samples along an axis than the device's textures have");
     }
     // A bit for each sample, and the data of tiles and of the transfer function.
-    if volume.lattice.len() as u64 / 8 + TAIL_BYTES > gpu.binding_size() {
+    if shown_words(volume.lattice.dims) * 4 + TAIL_BYTES > gpu.binding_size() {
         return Some("a volume larger than the device's bindings allow");
     }
     if scene.items.len() > 1 && limits.max_storage_buffers_per_shader_stage < MOST_BUFFERS {
@@ -222,7 +222,7 @@ pub struct Field {
     ranges: Vec<[u8; 2]>,
     /// The samples, rows packed in words, and of a label map the shares of each sample's own label
     /// around it.
-    textures: Vec<wgpu::Texture>,
+    textures: Vec<wgpu::TextureView>,
     texture_bytes: u64,
     /// The layout of the samples (`SAMPLE_KIND` in field_lattice.wgsl).
     pub kind: u32,
@@ -232,6 +232,11 @@ pub struct Field {
     buffer: wgpu::Buffer,
     /// Whether the buffer contains the samples' bits.
     has_bits: bool,
+    /// The visible entries that the buffer contains.
+    visible_before: Vec<u32>,
+    /// The sheets of each dispatch of gather, and what they were made for: the number of sheets,
+    /// the sheets of a dispatch, the tiles.
+    windows: Option<([u32; 3], Vec<wgpu::Buffer>)>,
 }
 
 /// The data that the passes of a picture need.
@@ -242,10 +247,9 @@ pub struct Gathered {
     pub shown: wgpu::Buffer,
     /// The sheets of each dispatch of gather (`Pass` in frame.wgsl).
     pub windows: Vec<wgpu::Buffer>,
-    /// Tiles in which the field may be visible.
     pub tiles: u32,
-    /// (tile, sheet) pairs in which the field may be visible.
-    pub pairs: u64,
+    /// Words of the marks of all tiles.
+    pub mark_words: u32,
 }
 
 impl Gathered {
@@ -265,6 +269,8 @@ impl Field {
             textures.push(texture(gpu, dims, (SHARES, &own_shares(volume))));
             sigma = MASK_DEVIATION;
         }
+        let view_of_all = wgpu::TextureViewDescriptor::default();
+        let textures = textures.iter().map(|own| own.create_view(&view_of_all)).collect();
         Self {
             kind,
             volume: volume.clone(),
@@ -275,6 +281,8 @@ impl Field {
             shown: None,
             buffer: buffer(gpu, "shown", 0, Usage::STORAGE),
             has_bits: false,
+            visible_before: Vec::new(),
+            windows: None,
         }
     }
 
@@ -292,64 +300,74 @@ impl Field {
         }
     }
 
-    /// Lists the tiles and sheets that a picture must evaluate, and sets in `frame` where the lists
-    /// lie.
-    pub fn list(
+    /// Brings what a picture with this number of tiles needs, and sets in `frame` where it lies.
+    pub fn gathered(
         &mut self,
         gpu: &Gpu,
-        (view, sheets): (&View, &Sheets),
+        (sheets, tiles): (&Sheets, u32),
         variant: &Variant,
         table: &[[f32; 4]],
         frame: &mut Frame,
     ) -> Option<Gathered> {
         let (_, shown) = self.shown.as_ref()?;
         // Shaders number sheets from 1.
-        let words = (sheets.count() + 1).div_ceil(32);
-        let marks = shown.sheets_of_tiles(&self.volume.lattice, view, sheets);
-        let mut tail = visible_before(variant, table, frame);
-        let bits = self.volume.lattice.len().div_ceil(32);
-        let starts = [bits, bits + tail.len(), bits + tail.len() + marks.len() * words];
-        let (mut tiles, mut pairs) = (Vec::new(), 0);
-        for (tile, own) in (0u32..).zip(&marks) {
-            let count: u32 = own.iter().map(|word| word.count_ones()).sum();
-            if count > 0 {
-                tiles.push(tile);
-                pairs += u64::from(count);
-            }
-            tail.extend(numbered_from_one(own).take(words));
-        }
-        tail.extend(&tiles);
-        let bytes = 4 * (bits + tail.len()) as u64;
+        let words = (sheets.count() as u32 + 1).div_ceil(32);
+        let visible_before = visible_before(variant, table, frame);
+        let bits = shown_words(self.volume.lattice.dims) as u32;
+        let marks = bits + visible_before.len() as u32;
+        let bytes = 4 * (u64::from(marks) + u64::from(tiles) * u64::from(words));
         if self.buffer.size() < bytes {
             self.buffer = buffer(gpu, "shown", bytes, Usage::STORAGE);
             self.has_bits = false;
+            self.visible_before.clear();
         }
         if !std::mem::replace(&mut self.has_bits, true) {
-            gpu.queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&shown.bits()));
+            gpu.queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&shown.words));
         }
-        gpu.queue.write_buffer(&self.buffer, 4 * bits as u64, bytemuck::cast_slice(&tail));
+        if self.visible_before != visible_before {
+            let at = 4 * u64::from(bits);
+            gpu.queue.write_buffer(&self.buffer, at, bytemuck::cast_slice(&visible_before));
+            self.visible_before = visible_before;
+        }
         let [width, height, depth] = self.volume.lattice.dims.map(|n| n as u32);
         let field = &mut frame.fields[0];
         field.lattice = [width, height, depth, 0];
         let per_variance = 1.0 / (self.sigma * self.sigma);
         let weight = |steps: f64| (-0.5 * steps * steps * per_variance).exp() as f32;
         field.taps = [per_variance as f32, weight(1.0), weight(2.0), 0.0];
-        field.shown = [starts[0] as u32, starts[1] as u32, starts[2] as u32, words as u32];
-        let view_of_all = wgpu::TextureViewDescriptor::default();
-        let (last, window) = (sheets.count() as u32 + 1, variant.gathered_sheets());
-        let windows = (1..last).step_by(window as usize).map(|first| {
-            let end = first.saturating_add(window).min(last);
-            let pass = [first, end, 0, 0, tiles.len() as u32, 0, 0, 0];
-            filled_buffer(gpu, "window", bytemuck::cast_slice(&pass), Usage::UNIFORM)
-        });
+        field.shown = [bits, marks, words, 0];
         Some(Gathered {
-            textures: self.textures.iter().map(|own| own.create_view(&view_of_all)).collect(),
+            textures: self.textures.clone(),
             shown: self.buffer.clone(),
-            windows: windows.collect(),
-            tiles: tiles.len() as u32,
-            pairs,
+            windows: self.windows(gpu, [sheets.count() as u32, variant.gathered_sheets(), tiles]),
+            tiles,
+            mark_words: tiles * words,
         })
     }
+
+    /// Returns the sheets of each dispatch of gather.
+    fn windows(&mut self, gpu: &Gpu, request: [u32; 3]) -> Vec<wgpu::Buffer> {
+        if let Some((own, windows)) = &self.windows
+            && *own == request
+        {
+            return windows.clone();
+        }
+        let [sheets, window, tiles] = request;
+        let last = sheets + 1;
+        let windows = (1..last).step_by(window as usize).map(|first| {
+            let end = first.saturating_add(window).min(last);
+            let pass = [first, end, 0, 0, tiles, 0, 0, 0];
+            filled_buffer(gpu, "window", bytemuck::cast_slice(&pass), Usage::UNIFORM)
+        });
+        let windows: Vec<_> = windows.collect();
+        self.windows = Some((request, windows.clone()));
+        windows
+    }
+}
+
+/// Returns the words of the samples' bits: two for each block.
+fn shown_words(dims: [usize; 3]) -> u64 {
+    2 * dims.iter().map(|n| n.div_ceil(BLOCK) as u64).product::<u64>()
 }
 
 /// Returns, for each entry of the transfer function's table and for one behind the last, how many
@@ -367,28 +385,4 @@ fn visible_before(variant: &Variant, table: &[[f32; 4]], frame: &Frame) -> Vec<u
         Some(*sum)
     });
     std::iter::once(0).chain(sums).collect()
-}
-
-/// Returns bits numbered from 0 as words in which they are numbered from 1.
-fn numbered_from_one(words: &[u64]) -> impl Iterator<Item = u32> {
-    let halves = words.iter().flat_map(|word| [*word as u32, (*word >> 32) as u32]).chain([0]);
-    halves.scan(0, |carried, half| {
-        let own = half << 1 | *carried;
-        *carried = half >> 31;
-        Some(own)
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sheets_are_numbered_from_one_across_words() {
-        let marks = [1 << 31 | 1 << 63 | 1, 1u64 << 30];
-        let words: Vec<u32> = numbered_from_one(&marks).collect();
-        let found: Vec<usize> =
-            (0..32 * words.len()).filter(|bit| words[bit / 32] >> (bit % 32) & 1 != 0).collect();
-        assert_eq!(found, [1, 32, 64, 95]);
-    }
 }

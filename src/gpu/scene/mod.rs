@@ -12,5 +12,6 @@ pub(crate) mod recolor;
 pub(crate) mod select;
 pub(crate) mod select_bricks;
 pub(crate) mod slots;
+pub(crate) mod tables;
 
 pub use prepared::PreparedScene;

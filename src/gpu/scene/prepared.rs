@@ -19,6 +19,7 @@ use crate::{
             recolor::{Harmonics, Recolor},
             select::{Select, Selection},
             select_bricks::SelectBricks,
+            tables::FieldTables,
         },
     },
     hierarchy::{Cut, Levels},
@@ -83,6 +84,8 @@ pub struct PreparedScene {
     pub(crate) brick_cache: Option<BrickCache>,
     /// The data to gather the scene's volume. It is made for the first picture that gathers.
     pub(crate) field: Option<Field>,
+    /// The tables of the last picture's fields.
+    pub(crate) tables: Option<FieldTables>,
     /// Batches of candidates in all chunks.
     pub(crate) runs: u32,
     /// Bytes of GPU memory that the scene holds.
@@ -124,6 +127,7 @@ impl PreparedScene {
             page_caches: Vec::new(),
             brick_cache: None,
             field: None,
+            tables: None,
             runs: 0,
             bytes: 0,
             broken: false,

@@ -1,0 +1,35 @@
+//! Mark: finds the sheets of each tile in which a gathered lattice may be visible
+//! (shaders/passes/mark.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        recipe::{Binding, Recipe},
+        shaders,
+        stage::Stage,
+    },
+    targets::Targets,
+};
+
+/// The pass.
+#[derive(Debug)]
+pub struct Mark(Stage);
+
+impl Mark {
+    pub fn new(gpu: &Gpu) -> Self {
+        Self(Stage::new(gpu, &Self::recipe()))
+    }
+
+    pub fn recipe() -> Recipe {
+        use Binding::{Read, Uniform, Write};
+        let sources = [shaders::FRAME, shaders::PROGRESS, shaders::MARK];
+        Recipe::new("mark", &sources, "mark", &[&[Uniform, Read, Write, Write]])
+    }
+
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let Some(gathered) = &targets.gathered else { return };
+        let buffers = [&targets.frame, &targets.planes, &gathered.shown, &targets.progress];
+        let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
+        self.0.dispatch(encoder, &[&group], gathered.mark_words.div_ceil(64));
+    }
+}

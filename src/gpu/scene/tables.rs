@@ -1,0 +1,77 @@
+//! The tables of a scene's fields on the GPU: they are made again only for another transfer
+//! function.
+
+use crate::{
+    gpu::device::{Gpu, buffers::upload},
+    math::{Sheets, View},
+    plan::{tables::Tables, uniforms::Frame},
+    scene::{Scene, Settings},
+    volume::TransferFunction,
+};
+
+/// The tables of all fields, one behind the other.
+#[derive(Debug)]
+pub struct FieldTables {
+    fields: Vec<Own>,
+    entries: Vec<[f32; 4]>,
+    pub buffer: wgpu::Buffer,
+}
+
+/// The tables of one field, whose entries lie with the others.
+#[derive(Debug)]
+struct Own {
+    item: usize,
+    transfer: TransferFunction,
+    range: [f64; 2],
+    diagonal: f64,
+    tables: Tables,
+    start: u32,
+}
+
+impl FieldTables {
+    /// Makes the tables of a scene, unless `last` has them.
+    pub fn of(gpu: &Gpu, scene: &Scene, last: Option<Self>) -> Self {
+        let numbers = scene.fields();
+        let fields = || numbers.iter().map(|number| (*number, &scene.items[*number]));
+        let is_same = |last: &Self| {
+            last.fields.len() == numbers.len()
+                && last.fields.iter().zip(fields()).all(|(own, (number, item))| {
+                    own.item == number && item.transfer() == Some(&own.transfer)
+                })
+        };
+        if let Some(last) = last
+            && is_same(&last)
+        {
+            return last;
+        }
+        let mut entries = Vec::new();
+        let made = fields().filter_map(|(number, item)| {
+            let (transfer, range) = (item.transfer()?, item.value_range()?);
+            let mut tables = Tables::of(item, transfer, range);
+            let start = entries.len() as u32;
+            entries.append(&mut tables.entries);
+            let (transfer, diagonal) = (transfer.clone(), item.field_diagonal());
+            Some(Own { item: number, transfer, range, diagonal, tables, start })
+        });
+        let fields = made.collect();
+        if entries.is_empty() {
+            // A binding must hold something.
+            entries = vec![[0.0; 4]; 2];
+        }
+        let buffer = upload(gpu, "tables", bytemuck::cast_slice(&entries));
+        Self { fields, entries, buffer }
+    }
+
+    /// Returns the entries of the first field's transfer function, and of all tables behind them.
+    pub fn entries(&self) -> &[[f32; 4]] {
+        &self.entries
+    }
+
+    /// Sets in `frame` where the tables lie and how they are read.
+    pub fn describe(&self, settings: &Settings, view: &View, sheets: &Sheets, frame: &mut Frame) {
+        for (field, own) in frame.fields.iter_mut().zip(&self.fields) {
+            let light = settings.light_of(&own.transfer, own.range, own.diagonal);
+            field.set_tables((&own.tables, own.start), &own.transfer, light, view, sheets);
+        }
+    }
+}
