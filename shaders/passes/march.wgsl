@@ -40,20 +40,6 @@ var<private> slopes: array<array<vec2<f32>, FIELDS>, ROWS>;
 var<workgroup> any_stopped: atomic<u32>;
 var<workgroup> own_slot: u32;
 
-// Invocations of a workgroup that loads entries together, and entries that it loads at once.
-const STAGED_ENTRIES: u32 = 64u;
-// Words of a record that are loaded.
-const STAGED_WORDS: u32 = select(1u, 4u, GENERAL_RECORDS);
-
-// The entries that were loaded last, their bins, and their records word by word.
-var<workgroup> staged_entries: array<u32, STAGED_ENTRIES>;
-var<workgroup> staged_bins: array<u32, STAGED_ENTRIES>;
-var<workgroup> staged_words: array<vec4<f32>, STAGED_ENTRIES * STAGED_WORDS>;
-// Whether light passes any pixel of the tile: of this load and of the next, in turn.
-var<workgroup> is_light: array<atomic<u32>, 2>;
-// The place of the first of these entries.
-var<private> staged_first: u32;
-
 @compute @workgroup_size(8, LANE_ROWS)
 fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
     let tile_count = atomicLoad(&progress[progress_word(LISTED)]);
@@ -97,13 +83,12 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
 
     let tile_bins = ((row - stage.first_row) * frame.tiles.x + column) * stage.groups;
     let end = bin_end(tile_bins + stage.groups - 1u);
-    let origin = stage.first_sheet - 1u;
     var bin = tile_bins;
     var at = 0u;
     if bin > 0u {
         at = bin_end(bin - 1u);
     }
-    var front = origin;
+    var front = stage.first_sheet - 1u;
     // Number of sheets, from `front` on, that may have sums.
     var open = 0u;
     if CAN_STOP && resumed > 0u {
@@ -145,7 +130,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             }
             if STAGED {
                 bin = staged_bins[at - staged_first];
-                group_end = bin_end(bin);
+                group_end = staged_ends[at - staged_first];
             } else {
                 while group_end <= at {
                     bin++;
@@ -153,7 +138,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
                 }
             }
             let entry_sheet = entry_at(at) >> ENTRY_SHEET_SHIFT;
-            let sheet = origin + ((bin - tile_bins) << stage.group_shift) + entry_sheet;
+            let sheet = sheet_of(entry_at(at), bin - tile_bins);
             if open > 0u {
                 let closed = min(sheet - front, open);
                 let sheets = closed + close(front, closed, lane.xy);
@@ -247,61 +232,6 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     }
 }
 
-// Loads the tile's next entries into workgroup memory, each lane one of them. `light` is whether
-// light passes the lane's pixel.
-fn load_entries(first: u32, end: u32, tile_bins: u32, lane: u32, light: bool, turn: u32) {
-    // Nobody reads the entries before any more.
-    workgroupBarrier();
-    if lane == 0u {
-        atomicStore(&is_light[1u - turn], 0u);
-    }
-    if light {
-        atomicStore(&is_light[turn], 1u);
-    }
-    staged_first = first;
-    let at = first + lane;
-    if at < end {
-        let entry = entries[at];
-        staged_entries[lane] = entry;
-        staged_bins[lane] = bin_of(at, tile_bins);
-        let words = select(STAGED_WORDS, 1u, (entry & ENTRY_ISOTROPIC) != 0u);
-        for (var word = 0u; word < words; word++) {
-            staged_words[word * STAGED_ENTRIES + lane] = records[(entry & ENTRY_RECORD) + word];
-        }
-    }
-    workgroupBarrier();
-}
-
-// Returns the bin of an entry: the first of the tile's that ends behind it.
-fn bin_of(at: u32, tile_bins: u32) -> u32 {
-    var low = tile_bins;
-    var high = tile_bins + stage.groups - 1u;
-    while low < high {
-        let middle = (low + high) / 2u;
-        if bin_end(middle) > at {
-            high = middle;
-        } else {
-            low = middle + 1u;
-        }
-    }
-    return low;
-}
-
-fn entry_at(at: u32) -> u32 {
-    if STAGED {
-        return staged_entries[at - staged_first];
-    }
-    return entries[at];
-}
-
-// Returns a word of the record of the entry at a place.
-fn word_of(at: u32, entry: u32, word: u32) -> vec4<f32> {
-    if STAGED {
-        return staged_words[word * STAGED_ENTRIES + at - staged_first];
-    }
-    return records[(entry & ENTRY_RECORD) + word];
-}
-
 // Adds the entries from `first` on that lie in sheet `entry_sheet` and belong to field `f`.
 // Radiance belongs to field 0. Returns the index of the first entry that was not added.
 fn add_entries(
@@ -351,6 +281,11 @@ fn is_alike(a: u32, b: u32) -> bool {
     let same = ((a ^ b) >> ENTRY_SHEET_SHIFT) == 0u
         && field_of(a & ENTRY_RECORD) == field_of(b & ENTRY_RECORD);
     return same && (!GENERAL_RECORDS || ((a ^ b) & ENTRY_ISOTROPIC) == 0u);
+}
+
+// Returns the sheet of an entry in a group of sheets.
+fn sheet_of(entry: u32, group: u32) -> u32 {
+    return stage.first_sheet - 1u + (group << stage.group_shift) + (entry >> ENTRY_SHEET_SHIFT);
 }
 
 fn bin_end(bin: u32) -> u32 {
@@ -468,6 +403,6 @@ fn composite_single(r: u32, depth: f32, splat: Loaded) {
     // Back to front, the absorption of the splats in front is not known yet. There, the nearest
     // splat that absorbs half of the light by itself counts.
     if select(before > 0.5 && before * left <= 0.5, left <= 0.5, BACK_TO_FRONT) {
-        pixels[r].hit = select(splat.center.z, length(splat.center), PERSPECTIVE);
+        pixels[r].hit = splat.distance;
     }
 }

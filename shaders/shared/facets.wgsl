@@ -59,10 +59,11 @@ fn part_left(start: vec2<f32>, end: vec2<f32>) -> f32 {
 
 fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
     let entry = entry_at(place);
-    let first = word_of(place, entry, 0u);
-    let second = word_of(place, entry, 1u);
-    let third = word_of(place, entry, 2u);
-    let last = word_of(place, entry, 3u);
+    let index = entry & ENTRY_RECORD;
+    let first = records[index];
+    let second = records[index + 1u];
+    let third = records[index + 2u];
+    let last = records[index + 3u];
     let a = first.xyz;
     let b = second.xyz;
     let c = third.xyz;

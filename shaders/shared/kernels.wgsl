@@ -92,9 +92,9 @@ struct Round {
     extent2: f32,
 }
 
-fn load_isotropic(f: u32, at: u32, is_one: bool, near: vec3<f32>) -> Round {
-    let entry = entry_at(at);
-    let record = word_of(at, entry, 0u);
+// Returns the sample of an entry. `near` has the distances of the window's inner planes.
+fn round_of(f: u32, entry: u32, near: vec3<f32>) -> Round {
+    let record = records[entry & ENTRY_RECORD];
     let c = record.xyz;
     let isotropic = frame.fields[f].isotropic;
     var sigma = isotropic.x;
@@ -124,7 +124,7 @@ fn load_isotropic(f: u32, at: u32, is_one: bool, near: vec3<f32>) -> Round {
     sample.along = sections(t, base) * (SQRT_TAU * sigma * share);
     sample.on_plane = exp(-0.5 * t * t) * share;
     sample.value = record.w;
-    sample.extent2 = select(-1.0, isotropic.z, is_one);
+    sample.extent2 = isotropic.z;
     return sample;
 }
 
@@ -133,12 +133,25 @@ fn load_isotropic(f: u32, at: u32, is_one: bool, near: vec3<f32>) -> Round {
 // (docs/performance.md).
 const TOGETHER: u32 = 2u;
 
+// Returns the distances of the three planes inside a window.
+fn inner_planes(front: u32) -> vec3<f32> {
+    return vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+}
+
 // Adds `count` entries of a field from `at` on to all pixels.
 fn add_isotropic(f: u32, at: u32, count: u32, front: u32, first_pixel: vec2<i32>) {
-    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    let near = inner_planes(front);
     var samples: array<Round, TOGETHER>;
     for (var i = 0u; i < TOGETHER; i++) {
-        samples[i] = load_isotropic(f, at + min(i, count - 1u), i < count, near);
+        let place = at + min(i, count - 1u);
+        if STAGED {
+            samples[i] = staged_round(place);
+        } else {
+            samples[i] = round_of(f, entries[place], near);
+        }
+        if i >= count {
+            samples[i].extent2 = -1.0;
+        }
     }
     for (var r = 0u; r < ROWS; r++) {
         let cosine2 = pixels[r].cosine * pixels[r].cosine;
@@ -196,9 +209,10 @@ fn trained_depth(share: f32) -> f32 {
     return select(0.0, depth, alpha >= TRAINED_OPACITIES.x);
 }
 
-// A general record, unpacked.
+// A general record, unpacked: what it adds, and what all pixels share of where it adds it.
 struct Loaded {
-    center: vec3<f32>,
+    // The distance of the centre from the eye, or from its plane in parallel views.
+    distance: f32,
     strength: f32,
     extent2: f32,
     // Whether the payload is radiance. That includes samples classified before interpolation.
@@ -209,11 +223,25 @@ struct Loaded {
     // Scalars.
     weight: f32,
     slope: vec3<f32>,
+    // The projected centre, and the centre in whitened space.
+    at: vec2<f32>,
+    whitened: vec3<f32>,
+    // The whitened ray: its change per pixel to the right and down, and its constant part. The
+    // second has no x, the third only z.
+    m0: vec3<f32>,
+    m1: vec3<f32>,
+    m2: vec3<f32>,
+    // The cross products of the centre with the first two.
+    v0: vec3<f32>,
+    v1: vec3<f32>,
+    // The distances of the window's inner planes, and the sections in front of the window: 0 or 1.
+    near: vec3<f32>,
+    base: f32,
 }
 
-fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
+fn payload_of(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
     var splat: Loaded;
-    splat.center = a.xyz;
+    splat.distance = select(a.z, length(a.xyz), PERSPECTIVE);
     splat.strength = a.w;
     splat.extent2 = abs(c.z);
     splat.weight = 1.0;
@@ -255,36 +283,56 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
 // in perspective. They are computed from vectors, not from expanded polynomials, which cancel
 // beside the eye. See docs/engine.md.
 fn add_general(f: u32, place: u32, front: u32, first_pixel: vec2<i32>) {
-    let entry = entry_at(place);
-    let a = word_of(place, entry, 0u);
-    let b = word_of(place, entry, 1u);
-    let c = word_of(place, entry, 2u);
-    let splat = load(a, c, word_of(place, entry, 3u));
-    // With several fields, high.w marks those whose kernel is in tables.
-    let is_table = TABLE_KERNEL && !splat.is_radiance
-        && (FIELDS == 1u || frame.fields[f].high.w > 0.0);
-    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
-    let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
-    // The change of the whitened ray per pixel to the right and down, and its constant part.
-    let m0 = b.xyz / frame.scale;
-    let m1 = vec3(0.0, b.w, c.x) / frame.scale;
-    let m2 = vec3(0.0, 0.0, c.y);
-    var at = frame.center + frame.scale * a.xy;
-    var whitened = m2 * a.z;
-    var v0 = cross(m2, m0);
-    var v1 = cross(m2, m1);
+    if STAGED {
+        add_loaded(f, staged_general(place), first_pixel);
+    } else {
+        add_loaded(f, general_of(entries[place], inner_planes(front)), first_pixel);
+    }
+}
+
+// Returns the splat of an entry.
+fn general_of(entry: u32, near: vec3<f32>) -> Loaded {
+    let index = entry & ENTRY_RECORD;
+    let a = records[index];
+    let b = records[index + 1u];
+    let c = records[index + 2u];
+    var splat = payload_of(a, c, records[index + 3u]);
+    splat.near = near;
+    splat.base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
+    splat.m0 = b.xyz / frame.scale;
+    splat.m1 = vec3(0.0, b.w, c.x) / frame.scale;
+    splat.m2 = vec3(0.0, 0.0, c.y);
+    splat.at = frame.center + frame.scale * a.xy;
+    splat.whitened = splat.m2 * a.z;
+    splat.v0 = cross(splat.m2, splat.m0);
+    splat.v1 = cross(splat.m2, splat.m1);
     if PERSPECTIVE {
         // A centre beside the eye projects to infinity. Moving it by a thousandth of its distance
         // is invisible.
         let least = 1e-3 * length(a.xyz);
         let z = select(a.z, select(-least, least, a.z >= 0.0), abs(a.z) < least);
-        at = frame.center + frame.scale * a.xy / z;
-        whitened = (m0 * a.x + m1 * a.y) * frame.scale + m2 * z;
-        v0 = cross(whitened, m0);
-        v1 = cross(whitened, m1);
+        splat.at = frame.center + frame.scale * a.xy / z;
+        splat.whitened = (splat.m0 * a.x + splat.m1 * a.y) * frame.scale + splat.m2 * z;
+        splat.v0 = cross(splat.whitened, splat.m0);
+        splat.v1 = cross(splat.whitened, splat.m1);
     }
+    return splat;
+}
+
+fn add_loaded(f: u32, splat: Loaded, first_pixel: vec2<i32>) {
+    // With several fields, high.w marks those whose kernel is in tables.
+    let is_table = TABLE_KERNEL && !splat.is_radiance
+        && (FIELDS == 1u || frame.fields[f].high.w > 0.0);
+    let near = splat.near;
+    let base = splat.base;
+    let at = splat.at;
+    let whitened = splat.whitened;
+    let m0 = splat.m0;
+    let m1 = splat.m1;
+    let m2 = splat.m2;
+    let v1 = splat.v1;
     let dx = f32(first_pixel.x) + 0.5 - at.x;
-    let v_column = v0 * dx;
+    let v_column = splat.v0 * dx;
     let beta_column = m2 + m0 * (f32(first_pixel.x) + 0.5 - frame.center.x);
     for (var r = 0u; r < ROWS; r++) {
         let y = f32(first_pixel.y) + (f32(r) + 0.5);

@@ -31,6 +31,7 @@ impl March {
             shaders::TABLES,
             shaders::PIXEL,
             shaders::KERNELS,
+            shaders::STAGED,
             shaders::SHEET,
             if variant.facets { shaders::FACETS } else { shaders::NO_FACETS },
             shaders::PICTURE,
