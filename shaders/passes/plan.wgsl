@@ -195,6 +195,10 @@ fn begin(first: u32, end: u32, first_band: u32, end_band: u32, entries: u32) {
     stage = Pass(first, end, first_row, end_row, select(0u, groups, tiles > 0u), shift, vec2(0u));
     state[PASSES] += 1u;
     state[ADVANCED] += 1u;
+    if state[NEXT_SHEET] > frame.sheet_count {
+        // Nothing is left for another pass.
+        state[DONE] = 1u;
+    }
     let bins = groups * tiles;
     bin_size.x = bins + 1u;
     arguments[SCAN_ARGUMENTS] = max(bins, progress_word(LISTED)) / SEGMENTS + 1u;

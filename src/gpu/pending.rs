@@ -432,8 +432,7 @@ impl PendingFrame {
             return Err(Error::EntriesExhausted { budget: engine.budget.entries });
         }
         if is_done {
-            // One more pass finds that nothing is left.
-            engine.batch = (state.passes + 1).min(MOST_PASSES);
+            engine.batch = state.passes.clamp(1, MOST_PASSES);
             let gathers = strip.targets.gathered.is_some();
             return Ok(if gathers { Stage::Gather } else { self.close(engine, prepared) });
         }

@@ -81,7 +81,10 @@ const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, use the C
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     // wgpu turns its debug layers on in debug builds; environment variables override that.
-    descriptor.flags = wgpu::InstanceFlags::from_env_or_default();
+    // The engine's own dispatches never exceed the limits (`rows_of` in frame.wgsl), so wgpu need
+    // not look at their numbers of workgroups in a dispatch of its own before each.
+    let own = wgpu::InstanceFlags::default() - wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
+    descriptor.flags = own.with_env();
     wgpu::Instance::new(descriptor)
 }
 
