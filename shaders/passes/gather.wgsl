@@ -12,12 +12,12 @@
 // Binding 6: the tables of tables.wgsl.
 @group(0) @binding(7) var<storage, read_write> colors: array<vec4<f32>>;
 
-// Returns the next sheet in which something may be visible at a pixel.
+// Returns the next sheet in which something may be visible at a pixel, or at least in its tile.
 fn next_sheet(tile: u32, sheet: u32, end: u32) -> u32 {
     var next = sheet;
     loop {
         next = next_marked(tile, next, end);
-        if next >= end || may_show(0u, next) {
+        if next >= end || !ASKS_FIRST || may_show(0u, next) {
             break;
         }
         next++;

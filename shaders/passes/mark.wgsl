@@ -1,6 +1,7 @@
 // Mark: finds the sheets of each tile in which a gathered lattice may be visible. An invocation
-// looks at 32 sheets of one tile: what the tile sees of a sheet lies in a box of samples, and if
-// something may be visible in any block of that box, the sheet is marked.
+// looks at eight sheets of one tile: what the tile sees of a sheet lies in a box of samples, and if
+// something may be visible in any block of that box, the sheet is marked. Four invocations find a
+// word.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
@@ -94,24 +95,35 @@ fn may_show(beam: Beam, near: f32, far: f32) -> bool {
     return false;
 }
 
+var<workgroup> parts: array<u32, 64>;
+
 @compute @workgroup_size(64)
-fn mark(@builtin(global_invocation_id) id: vec3<u32>) {
+fn mark(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
     let words = frame.fields[0].shown.z;
-    let number = number_of(id);
-    if number >= frame.tiles.x * frame.tiles.y * words {
-        return;
-    }
-    let beam = beam_of(number / words);
-    let first = (number % words) * 32u;
+    let number = number_of(id) / 4u;
+    let first = (number % words) * 32u + 8u * (lane % 4u);
     var bits = 0u;
-    for (var bit = 0u; bit < 32u; bit++) {
-        let sheet = first + bit;
-        if sheet >= 1u && sheet <= frame.sheet_count {
-            bits |= u32(may_show(beam, planes[sheet], planes[sheet + 1u])) << bit;
+    if number < frame.tiles.x * frame.tiles.y * words {
+        let beam = beam_of(number / words);
+        for (var bit = 0u; bit < 8u; bit++) {
+            let sheet = first + bit;
+            if sheet >= 1u && sheet <= frame.sheet_count {
+                bits |= u32(may_show(beam, planes[sheet], planes[sheet + 1u])) << bit;
+            }
         }
     }
-    shown[frame.fields[0].shown.y + number] = bits;
-    if bits != 0u {
-        atomicAdd(&progress[marked_word()], countOneBits(bits));
+    parts[lane] = bits;
+    workgroupBarrier();
+    if lane % 4u != 0u || number >= frame.tiles.x * frame.tiles.y * words {
+        return;
+    }
+    let word = bits | (parts[lane + 1u] << 8u) | (parts[lane + 2u] << 16u)
+        | (parts[lane + 3u] << 24u);
+    shown[frame.fields[0].shown.y + number] = word;
+    if word != 0u {
+        atomicAdd(&progress[marked_word()], countOneBits(word));
     }
 }

@@ -17,8 +17,9 @@ pub struct Budget {
     /// dispatch. `None`: as many as the adapter's driver allows.
     pub tile_entries: Option<u32>,
     /// Whether the 64 invocations of a tile load and sort its entries together, in the memory of
-    /// their workgroup. It is faster on a GPU, slower on a processor, and the picture is the same.
-    /// `None`: on a GPU.
+    /// their workgroup, and evaluate a gathered field without asking first what its samples show.
+    /// That is faster on a GPU and slower on a processor; the picture is the same. `None`: on a
+    /// GPU.
     pub staged: Option<bool>,
 }
 

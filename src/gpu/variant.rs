@@ -78,7 +78,8 @@ pub fn variant(request: &Request<'_>) -> Variant {
 /// Returns the variant of a picture without any item.
 fn without_items(request: &Request<'_>) -> Variant {
     let &Request { scene, view, settings, budget, gathered, is_software, .. } = request;
-    let staged = budget.staged.unwrap_or(!is_software) && budget.tile_entries.is_none();
+    let like_gpu = budget.staged.unwrap_or(!is_software);
+    let staged = like_gpu && budget.tile_entries.is_none();
     let most_entries = if is_software && !staged { SOFTWARE_ENTRIES } else { u32::MAX };
     let [clips, holes] = uniforms::clip_counts(settings);
     Variant {
@@ -117,6 +118,8 @@ fn without_items(request: &Request<'_>) -> Variant {
         // tile.
         rows: if is_software && !staged { 8 } else { 1 },
         staged,
+        // The answer takes a GPU longer than the field.
+        asks_first: !like_gpu,
         most_entries: budget.tile_entries.unwrap_or(most_entries),
     }
 }

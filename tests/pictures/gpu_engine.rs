@@ -380,6 +380,7 @@ fn entries_that_a_tile_loads_together_give_the_same_picture() {
         scenes::ellipsoids_in_perspective(),
         scenes::scattered_samples(),
         by(Evaluate::Scatter, scenes::blobs_analytic()),
+        by(Evaluate::Gather, scenes::blobs_analytic()),
         scenes::facets::facets_in_a_volume(),
         methods::single_splats(Order::BackToFront),
         fields::two_volumes(),

@@ -41,7 +41,8 @@ impl Bench {
     pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
         self.engine.check()?;
         let frames = self.frames;
-        let loaded = self.scene.load(given, progress)?;
+        let facets = self.engine.draws_facets();
+        let loaded = self.scene.load(facets, given, progress)?;
         let settings = self.engine.settings(&loaded, Samples::Factor(1))?;
         progress.stage("Opening the device");
         let device = self.engine.device(&loaded.scene)?;

@@ -154,8 +154,8 @@ impl Demo {
             arguments.extend(["--gpu".into(), gpu.into()]);
         }
         let flags = Flags::try_parse_from(&arguments).map_err(|e| Failure::Usage(e.to_string()))?;
-        let facets = flags.engine.draws_facets()?;
-        let mut loaded = flags.scene.load_with(facets, &Given::default(), progress)?;
+        let facets = flags.engine.draws_facets();
+        let mut loaded = flags.scene.load(facets, &Given::default(), progress)?;
         let mut drawer = Drawer::engine(&flags.engine, &loaded, progress)?;
         let settings = flags.engine.settings(&loaded, Samples::Factor(1))?;
         let framing = flags.camera.framing();

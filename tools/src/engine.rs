@@ -214,14 +214,11 @@ impl EngineFlags {
         self.device.open(scene)
     }
 
-    /// Whether meshes can be drawn as facets: by the CPU engine, in sheets that emit and absorb
-    /// light.
-    pub fn draws_facets(&self) -> splatkit::Result<bool> {
+    /// Whether meshes can be drawn as facets: in sheets that emit and absorb light.
+    pub fn draws_facets(&self) -> bool {
         let mut settings = Settings::new([1, 1]);
         self.method.apply(&mut settings);
-        let is_usual = settings.mode == scene::Mode::Sheets
-            && settings.optics == scene::Optics::EmissionAbsorption;
-        Ok(is_usual && matches!(self.device(&Scene::new())?, Device::Cpu))
+        settings.mode == scene::Mode::Sheets && settings.optics == scene::Optics::EmissionAbsorption
     }
 
     /// Checks what does not depend on the scene.

@@ -367,8 +367,8 @@ impl Render {
     /// Loads the scene.
     pub fn load(&self, given: &Given, progress: &Progress) -> Result<Loaded, Failure> {
         self.engine.check()?;
-        let facets = self.engine.draws_facets()?;
-        self.scene.load_with(facets, given, progress)
+        let facets = self.engine.draws_facets();
+        self.scene.load(facets, given, progress)
     }
 
     /// Returns how pictures of a scene are finished.

@@ -84,14 +84,9 @@ impl SceneFlags {
         files.into_iter().try_for_each(|path| self.load.kind(path).map(drop))
     }
 
-    /// Reads the inputs and makes a scene of them. Meshes become surfels.
-    pub fn load(&self, given: &Given, progress: &Progress) -> Result<Loaded, Failure> {
-        self.load_with(false, given, progress)
-    }
-
-    /// Like [`load`](Self::load). With `facets`, meshes whose triangles can be larger than pixels
-    /// become facets.
-    pub fn load_with(
+    /// Reads the inputs and makes a scene of them. Meshes become surfels; with `facets`, those whose
+    /// triangles can be larger than pixels become facets.
+    pub fn load(
         &self,
         facets: bool,
         given: &Given,

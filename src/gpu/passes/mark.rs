@@ -11,6 +11,9 @@ use crate::gpu::{
     targets::Targets,
 };
 
+/// Words of marks that a workgroup finds.
+const WORDS: u32 = 16;
+
 /// The pass.
 #[derive(Debug)]
 pub struct Mark(Stage);
@@ -30,6 +33,6 @@ impl Mark {
         let Some(gathered) = &targets.gathered else { return };
         let buffers = [&targets.frame, &targets.planes, &gathered.shown, &targets.progress];
         let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
-        self.0.dispatch(encoder, &[&group], gathered.mark_words.div_ceil(64));
+        self.0.dispatch(encoder, &[&group], gathered.mark_words.div_ceil(WORDS));
     }
 }

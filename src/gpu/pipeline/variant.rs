@@ -72,6 +72,8 @@ pub struct Variant {
     /// The invocations of a tile load and sort its entries together, in the memory of their
     /// workgroup.
     pub staged: bool,
+    /// A pixel of a gathered lattice asks what the samples show before it evaluates a sheet.
+    pub asks_first: bool,
     /// Entries after which march stops a tile and continues in another dispatch.
     pub most_entries: u32,
 }
@@ -144,7 +146,7 @@ impl Variant {
     }
 
     /// The constants that are true or false.
-    fn flags(&self) -> [(&'static str, bool); 37] {
+    fn flags(&self) -> [(&'static str, bool); 38] {
         let radiance = self.radiance || self.classified;
         [
             ("PERSPECTIVE", self.perspective),
@@ -184,6 +186,7 @@ impl Variant {
             ("XRAY", self.optics == Optics::XRay),
             ("CAN_STOP", self.can_stop()),
             ("STAGED", self.staged),
+            ("ASKS_FIRST", self.asks_first),
         ]
     }
 
