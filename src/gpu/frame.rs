@@ -8,6 +8,7 @@ use crate::gpu::{
         project::Project, resume::Resume, tiles::Tiles,
     },
     pipeline::{
+        commands::Commands,
         scan::Scan,
         state::{AGAIN_ARGUMENTS, MARCH_ARGUMENTS, SCAN_ARGUMENTS},
         variant::Variant,
@@ -95,7 +96,13 @@ impl Passes {
 }
 
 /// A step of a frame, with its name for profiles.
-pub type Step<'a> = (&'static str, Box<dyn Fn(&mut wgpu::CommandEncoder) + 'a>);
+pub type Step<'a> = (&'static str, Box<dyn Fn(&mut Commands<'_>) + 'a>);
+
+/// Encodes all steps.
+pub fn encode_all(steps: &[Step<'_>], encoder: &mut wgpu::CommandEncoder) {
+    let mut commands = Commands::new(encoder);
+    steps.iter().for_each(|(_, encode)| encode(&mut commands));
+}
 
 /// The resources that the steps of a frame use.
 #[derive(Clone, Copy)]
@@ -114,14 +121,16 @@ impl<'a> Work<'a> {
         let Self { gpu, passes, pipelines, targets, prepared } = self;
         let mut steps: Vec<Step<'a>> = Vec::new();
         if targets.gathered.is_some() {
-            let clear = |encoder: &mut wgpu::CommandEncoder| {
+            let clear = |commands: &mut Commands<'_>| {
                 for buffer in [&targets.colors, &targets.depths, &targets.progress] {
-                    encoder.clear_buffer(buffer, 0, None);
+                    commands.clear(buffer);
                 }
             };
             steps.push(("clear", Box::new(clear)));
-            steps
-                .push(("mark", Box::new(move |encoder| passes.mark.encode(gpu, encoder, targets))));
+            steps.push((
+                "mark",
+                Box::new(move |commands| passes.mark.encode(gpu, commands, targets)),
+            ));
         }
         let Some(scatter) = &pipelines.scatter else { return steps };
         for chunk in &prepared.chunks {
@@ -129,22 +138,22 @@ impl<'a> Work<'a> {
                 let own = slots.chunk(&chunk.uniform, &chunk.data);
                 steps.push((
                     "cut",
-                    Box::new(move |encoder| passes.cut.encode(gpu, encoder, &passes.scan, &own)),
+                    Box::new(move |commands| passes.cut.encode(gpu, commands, &passes.scan, &own)),
                 ));
             }
         }
         steps.push((
             "measure",
-            Box::new(move |encoder| {
+            Box::new(move |commands| {
                 for buffer in [&targets.needs, &targets.colors, &targets.depths, &targets.map] {
-                    encoder.clear_buffer(buffer, 0, None);
+                    commands.clear(buffer);
                 }
                 for chunk in &prepared.chunks {
-                    scatter.measure.encode(gpu, encoder, targets, chunk);
+                    scatter.measure.encode(gpu, commands, targets, chunk);
                 }
             }),
         ));
-        steps.push(("plan", Box::new(move |encoder| scatter.plan.encode(gpu, encoder, targets))));
+        steps.push(("plan", Box::new(move |commands| scatter.plan.encode(gpu, commands, targets))));
         steps
     }
 
@@ -157,38 +166,45 @@ impl<'a> Work<'a> {
         let mut steps: Vec<Step<'a>> = vec![
             (
                 "cull",
-                Box::new(move |encoder| {
-                    scatter.plan.encode_advance(gpu, encoder, targets);
-                    scatter.cull.encode(gpu, encoder, targets, chunks);
-                    scan.encode(gpu, encoder, &targets.runs, targets.run_total + 1);
-                    targets.copy_record_starts(encoder);
+                Box::new(move |commands| {
+                    scatter.plan.encode_advance(gpu, commands, targets);
+                    scatter.cull.encode(gpu, commands, targets, chunks);
+                    let size = (&targets.run_size, targets.run_total + 1);
+                    scan.encode_sized(gpu, commands, &targets.runs, size);
+                    targets.copy_record_starts(commands);
                 }),
             ),
             (
                 "project",
-                Box::new(move |encoder| scatter.project.encode(gpu, encoder, targets, chunks)),
+                Box::new(move |commands| scatter.project.encode(gpu, commands, targets, chunks)),
             ),
             (
                 "bin",
-                Box::new(move |encoder| {
-                    clear.encode(gpu, encoder, targets);
-                    scatter.bin.encode_count(gpu, encoder, targets);
-                    scatter.large.encode_count(gpu, encoder, targets);
+                Box::new(move |commands| {
+                    clear.encode(gpu, commands, targets);
+                    scatter.bin.encode_count(gpu, commands, targets);
+                    scatter.large.encode_count(gpu, commands, targets);
                     let arguments = (&targets.arguments, SCAN_ARGUMENTS);
-                    scan.encode_indirect(gpu, encoder, &targets.bins, &targets.bin_size, arguments);
-                    scatter.bin.encode_fill(gpu, encoder, targets);
-                    scatter.large.encode_fill(gpu, encoder, targets);
-                    tiles.encode(gpu, encoder, targets);
+                    scan.encode_indirect(
+                        gpu,
+                        commands,
+                        &targets.bins,
+                        &targets.bin_size,
+                        arguments,
+                    );
+                    scatter.bin.encode_fill(gpu, commands, targets);
+                    scatter.large.encode_fill(gpu, commands, targets);
+                    tiles.encode(gpu, commands, targets);
                 }),
             ),
-            ("order", Box::new(move |encoder| scatter.order.encode(gpu, encoder, targets))),
+            ("order", Box::new(move |commands| scatter.order.encode(gpu, commands, targets))),
             (
                 "march",
-                Box::new(move |encoder| {
-                    scatter.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
-                    resume.encode_again(gpu, encoder, targets);
-                    scatter.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
-                    resume.encode_hold(gpu, encoder, targets);
+                Box::new(move |commands| {
+                    scatter.march.encode(gpu, commands, targets, MARCH_ARGUMENTS);
+                    resume.encode_again(gpu, commands, targets);
+                    scatter.march.encode(gpu, commands, targets, AGAIN_ARGUMENTS);
+                    resume.encode_hold(gpu, commands, targets);
                 }),
             ),
         ];
@@ -204,14 +220,14 @@ impl<'a> Work<'a> {
         let Some(scatter) = &pipelines.scatter else { return Vec::new() };
         let march: Step<'a> = (
             "march",
-            Box::new(move |encoder| {
-                resume.encode_resume(gpu, encoder, targets);
-                scatter.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
+            Box::new(move |commands| {
+                resume.encode_resume(gpu, commands, targets);
+                scatter.march.encode(gpu, commands, targets, MARCH_ARGUMENTS);
                 for _ in 1..MARCHES {
-                    resume.encode_again(gpu, encoder, targets);
-                    scatter.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
+                    resume.encode_again(gpu, commands, targets);
+                    scatter.march.encode(gpu, commands, targets, AGAIN_ARGUMENTS);
                 }
-                resume.encode_hold(gpu, encoder, targets);
+                resume.encode_hold(gpu, commands, targets);
             }),
         );
         [march].into_iter().chain(self.occlusion()).collect()
@@ -221,12 +237,12 @@ impl<'a> Work<'a> {
     pub fn gathered(self) -> Vec<Step<'a>> {
         let Self { gpu, pipelines, targets, .. } = self;
         let Some(gather) = &pipelines.gather else { return Vec::new() };
-        vec![("gather", Box::new(move |encoder| gather.encode(gpu, encoder, targets)))]
+        vec![("gather", Box::new(move |commands| gather.encode(gpu, commands, targets)))]
     }
 
     fn occlusion(self) -> Option<Step<'a>> {
         let Self { gpu, pipelines, targets, .. } = self;
         let occlusion = pipelines.scatter.as_ref()?.occlusion.as_ref()?;
-        Some(("occlusion", Box::new(move |encoder| occlusion.encode(gpu, encoder, targets))))
+        Some(("occlusion", Box::new(move |commands| occlusion.encode(gpu, commands, targets))))
     }
 }

@@ -13,7 +13,7 @@ use crate::{
             cut::{finest_within, tally_bytes},
             present::{Presenter, Strip},
         },
-        pipeline::{state::State, variant::Variant},
+        pipeline::{commands::Commands, state::State, variant::Variant},
         scene::{PreparedScene, chunk::Origin},
         targets::{self, Pool, Targets},
         variant,
@@ -316,15 +316,16 @@ impl PendingFrame {
         let gpu = &engine.gpu;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let counters = buffer(gpu, "tally", tally_bytes(), usage);
+        let mut commands = Commands::new(encoder);
         for chunk in &prepared.chunks {
             if let Origin::Nodes { slots, .. } = &chunk.origin {
                 let source = chunk.source(&self.view, false, &prepared.page_caches);
                 gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
                 let own = slots.chunk(&chunk.uniform, &chunk.data);
-                engine.passes.cut.encode_tally(gpu, encoder, &own, &counters);
+                engine.passes.cut.encode_tally(gpu, &mut commands, &own, &counters);
             }
         }
-        Readback::encode(gpu, encoder, &[(&counters, 0, tally_bytes())])
+        Readback::encode(gpu, commands.encoder(), &[(&counters, 0, tally_bytes())])
     }
 
     /// Encodes the passes of the stage, and what shows how far they got.

@@ -6,9 +6,10 @@ use crate::{
     gpu::{
         budget::Budget,
         device::Gpu,
-        frame::Step,
+        frame::{Step, encode_all},
         output::Output,
         pending::{Engine, PendingFrame, Sink},
+        pipeline::commands::Commands,
         scene::PreparedScene,
     },
     hierarchy::Detail,
@@ -141,7 +142,7 @@ impl Renderer {
         self.check(prepared, frame)?;
         self.guarded(prepared, |renderer, prepared| {
             frame.encode(&mut renderer.engine, prepared, encoder, &mut |steps, encoder| {
-                steps.into_iter().for_each(|(_, encode)| encode(encoder));
+                encode_all(&steps, encoder);
                 Ok(())
             })
         })
@@ -345,7 +346,7 @@ impl Renderer {
                     &mut |steps, encoder| match times.as_deref_mut() {
                         Some(times) => measure(&gpu, steps, times),
                         None => {
-                            steps.into_iter().for_each(|(_, encode)| encode(encoder));
+                            encode_all(&steps, encoder);
                             Ok(())
                         }
                     },
@@ -395,7 +396,7 @@ fn measure(gpu: &Gpu, steps: Vec<Step<'_>>, times: &mut Times) -> Result<()> {
     if let Some(clock) = Timestamps::new(gpu, steps.len()) {
         clock.mark(&mut encoder, 0);
         for (index, (_, encode)) in (1..).zip(&steps) {
-            encode(&mut encoder);
+            encode(&mut Commands::new(&mut encoder));
             clock.mark(&mut encoder, index);
         }
         let own = clock.finish(gpu, encoder)?;
@@ -403,7 +404,7 @@ fn measure(gpu: &Gpu, steps: Vec<Step<'_>>, times: &mut Times) -> Result<()> {
         return Ok(());
     }
     for (label, encode) in steps {
-        encode(&mut encoder);
+        encode(&mut Commands::new(&mut encoder));
         let start = web_time::Instant::now();
         gpu.queue.submit([std::mem::replace(&mut encoder, new()).finish()]);
         gpu.wait()?;

@@ -5,11 +5,9 @@ use crate::{
     bricks::Choice,
     gpu::{
         budget::Budget,
-        device::{
-            Gpu,
-            buffers::{buffer, filled_buffer, upload},
-        },
+        device::{Gpu, buffers::buffer},
         pipeline::{
+            commands::Commands,
             scan::SCAN_CAPACITY,
             state::{ARGUMENT_BYTES, HELD_RECORD_STARTS, PASS_BYTES, State},
             variant::{MOST_BINS, MOST_GROUP_SHIFT, Variant},
@@ -83,6 +81,8 @@ pub struct Targets {
     pub bin_size: wgpu::Buffer,
     pub map: wgpu::Buffer,
     pub run_count: wgpu::Buffer,
+    /// The number of elements of `runs` that are summed.
+    pub run_size: wgpu::Buffer,
     pub runs: wgpu::Buffer,
     pub active: wgpu::Buffer,
     pub records: wgpu::Buffer,
@@ -109,7 +109,7 @@ pub struct Targets {
 impl Targets {
     /// Encodes the copy of each field's first record word, from the sums over the batches, to the
     /// frame.
-    pub fn copy_record_starts(&self, encoder: &mut wgpu::CommandEncoder) {
+    pub fn copy_record_starts(&self, commands: &mut Commands<'_>) {
         // With a single field, march does not read these words.
         if self.first_runs.len() < 2 {
             return;
@@ -118,17 +118,17 @@ impl Targets {
         let offset = std::mem::offset_of!(Frame, record_starts) as u64;
         for (field, run) in (0..Scene::MAX_FIELDS as u64).zip(all) {
             let (from, to) = (4 * u64::from(run), offset + 4 * field);
-            encoder.copy_buffer_to_buffer(&self.runs, from, &self.frame, to, 4);
+            commands.encoder().copy_buffer_to_buffer(&self.runs, from, &self.frame, to, 4);
         }
     }
 
     /// Encodes the copy of these words as they were when the pass was held. Later passes that draw
     /// nothing overwrite them.
-    pub fn restore_record_starts(&self, encoder: &mut wgpu::CommandEncoder) {
+    pub fn restore_record_starts(&self, commands: &mut Commands<'_>) {
         let offset = std::mem::offset_of!(Frame, record_starts) as u64;
         let bytes = size_of_val(&Frame::default().record_starts) as u64;
         let (state, frame) = (&self.state, &self.frame);
-        encoder.copy_buffer_to_buffer(state, HELD_RECORD_STARTS, frame, offset, bytes);
+        commands.encoder().copy_buffer_to_buffer(state, HELD_RECORD_STARTS, frame, offset, bytes);
     }
 
     /// Returns the bytes of GPU memory.
@@ -179,6 +179,13 @@ impl Pool {
         self.0.push((label, buffer.clone()));
         buffer
     }
+
+    /// Returns a buffer that begins with these bytes once the next work is submitted.
+    fn fill(&mut self, gpu: &Gpu, label: &'static str, bytes: &[u8]) -> wgpu::Buffer {
+        let buffer = self.take(gpu, label, bytes.len() as u64);
+        gpu.queue.write_buffer(&buffer, 0, bytes);
+        buffer
+    }
 }
 
 /// What a strip shows, and within which capacity.
@@ -208,19 +215,14 @@ impl Request<'_> {
         let gathered = self.gathered(gpu, prepared, tables.entries(), &mut frame);
         let table = tables.buffer.clone();
         prepared.tables = Some(tables);
-        let uniform = |label, bytes: &[u8]| filled_buffer(gpu, label, bytes, Usage::UNIFORM);
         let sizes = Sizes::of(self, gpu, budget, prepared.runs);
         let Sizes { tile_count, pixels, slots, bin_count, words, runs, .. } = sizes;
         Ok(Targets {
-            frame: filled_buffer(
-                gpu,
-                "frame",
-                bytemuck::bytes_of(&frame),
-                Usage::UNIFORM | Usage::COPY_DST,
-            ),
-            planes: upload(gpu, "planes", bytemuck::cast_slice(&planes(self.sheets))),
+            frame: pool.fill(gpu, "frame", bytemuck::bytes_of(&frame)),
+            planes: pool.fill(gpu, "planes", bytemuck::cast_slice(&planes(self.sheets))),
             tables: table,
-            run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
+            run_count: pool.fill(gpu, "run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
+            run_size: pool.fill(gpu, "run size", bytemuck::bytes_of(&[prepared.runs + 1, 0, 0, 0])),
             run_spans: pool.take(gpu, "run spans", RUN_BYTES * runs),
             needs: pool.take(gpu, "needs", RUN_BYTES * runs),
             census: pool.take(gpu, "census", sizes.census),

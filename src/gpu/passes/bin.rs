@@ -3,6 +3,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -59,21 +60,21 @@ impl Bin {
 
     /// Counts the sizes of the bins, without the entries of large splats, and lists the large
     /// splats.
-    pub fn encode_count(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode_count(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let buffers = Self::buffers(targets);
         let arguments =
             self.prepare.bind(gpu, 1, &[targets.bin_arguments.as_entire_buffer_binding()]);
-        self.prepare.dispatch(encoder, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
+        self.prepare.dispatch(commands, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
         self.count.dispatch_indirect(
-            encoder,
+            commands,
             &[&self.count.bind(gpu, 0, &buffers)],
             (&targets.bin_arguments, 0),
         );
     }
 
     /// Fills the bins.
-    pub fn encode_fill(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode_fill(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let group = self.fill.bind(gpu, 0, &Self::buffers(targets));
-        self.fill.dispatch_indirect(encoder, &[&group], (&targets.bin_arguments, 0));
+        self.fill.dispatch_indirect(commands, &[&group], (&targets.bin_arguments, 0));
     }
 }

@@ -4,6 +4,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -27,9 +28,9 @@ impl Clear {
         Recipe::new("clear", &sources, "clear", &[&[Uniform, Uniform, Write, Write]])
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let buffers = [&targets.frame, &targets.bin_size, &targets.bins, &targets.progress];
         let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
-        self.0.dispatch_indirect(encoder, &[&group], (&targets.arguments, SCAN_ARGUMENTS));
+        self.0.dispatch_indirect(commands, &[&group], (&targets.arguments, SCAN_ARGUMENTS));
     }
 }

@@ -4,6 +4,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -52,14 +53,14 @@ impl Cull {
     pub fn encode(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         targets: &Targets,
         chunks: &[Chunk],
     ) {
         // Batches behind a hierarchy's last drawn node, and the element after the last batch, count
         // as 0.
-        encoder.clear_buffer(&targets.runs, 0, None);
-        encoder.clear_buffer(&targets.active, 0, None);
+        commands.clear(&targets.runs);
+        commands.clear(&targets.active);
         for chunk in chunks {
             let buffers = [
                 &targets.frame,
@@ -81,11 +82,11 @@ impl Cull {
             let groups = [self.cull.bind(gpu, 0, &buffers), self.cull.bind(gpu, 1, &own)];
             let workgroups =
                 chunk.candidates.div_ceil(WORKGROUP_CANDIDATES).next_multiple_of(LANES);
-            self.cull.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
+            self.cull.dispatch(commands, &[&groups[0], &groups[1]], workgroups);
             let arguments =
                 self.prepare.bind(gpu, 2, &[chunk.active_arguments.as_entire_buffer_binding()]);
             let groups = [self.prepare.bind(gpu, 0, &buffers), self.prepare.bind(gpu, 1, &own)];
-            self.prepare.dispatch(encoder, &[&groups[0], &groups[1], &arguments], 1);
+            self.prepare.dispatch(commands, &[&groups[0], &groups[1], &arguments], 1);
         }
     }
 }

@@ -4,6 +4,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         scan::Scan,
         shaders,
@@ -62,7 +63,7 @@ impl Cut {
     pub fn encode(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         scan: &Scan,
         chunk: &NodeChunk<'_>,
     ) {
@@ -70,22 +71,22 @@ impl Cut {
         let groups = chunk.slots.active();
         let at_hand = groups * SLOT_NODES;
         let bound = [self.count.bind(gpu, 0, &nodes), self.count.bind(gpu, 1, &list[..3])];
-        self.count.dispatch(encoder, &[&bound[0], &bound[1]], groups);
-        scan.encode(gpu, encoder, &chunk.slots.counts, counts_of(at_hand));
+        self.count.dispatch(commands, &[&bound[0], &bound[1]], groups);
+        scan.encode(gpu, commands, &chunk.slots.counts, counts_of(at_hand));
         let bound = [self.write.bind(gpu, 0, &nodes[..1]), self.write.bind(gpu, 1, &list)];
-        self.write.dispatch(encoder, &[&bound[0], &bound[1]], groups);
+        self.write.dispatch(commands, &[&bound[0], &bound[1]], groups);
     }
 
     /// Encodes the commands that count a chunk's nodes into `counters`, of [`tally_bytes`] bytes.
     pub fn encode_tally(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         chunk: &NodeChunk<'_>,
         counters: &wgpu::Buffer,
     ) {
         let buffers = [chunk.nodes().as_slice(), &[counters.as_entire_buffer_binding()]].concat();
-        self.tally.dispatch(encoder, &[&self.tally.bind(gpu, 0, &buffers)], chunk.slots.active());
+        self.tally.dispatch(commands, &[&self.tally.bind(gpu, 0, &buffers)], chunk.slots.active());
     }
 }
 

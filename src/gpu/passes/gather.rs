@@ -5,6 +5,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -54,7 +55,7 @@ impl Gather {
         Recipe::new("gather", &sources, "gather", &[&bindings, own.textures()])
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let Some(gathered) = &targets.gathered else { return };
         for window in &gathered.windows {
             let buffers = [
@@ -70,7 +71,7 @@ impl Gather {
             let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
             let samples = self.0.bind_textures(gpu, 1, &gathered.textures);
             let tiles = gathered.tiles.next_multiple_of(LANES);
-            self.0.dispatch(encoder, &[&group, &samples], tiles);
+            self.0.dispatch(commands, &[&group, &samples], tiles);
         }
     }
 }

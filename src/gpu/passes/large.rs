@@ -3,6 +3,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -54,23 +55,23 @@ impl Large {
     }
 
     /// Counts the entries of the splats that bin has listed.
-    pub fn encode_count(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode_count(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let buffers = Self::buffers(targets);
         let arguments =
             self.prepare.bind(gpu, 1, &[targets.large_arguments.as_entire_buffer_binding()]);
-        self.prepare.dispatch(encoder, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
+        self.prepare.dispatch(commands, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
         self.count.dispatch_indirect(
-            encoder,
+            commands,
             &[&self.count.bind(gpu, 0, &buffers)],
             (&targets.large_arguments, 0),
         );
     }
 
     /// Writes their entries.
-    pub fn encode_fill(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode_fill(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let buffers = Self::buffers(targets);
         self.fill.dispatch_indirect(
-            encoder,
+            commands,
             &[&self.fill.bind(gpu, 0, &buffers)],
             (&targets.large_arguments, 0),
         );

@@ -4,6 +4,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -58,7 +59,7 @@ impl March {
     pub fn encode(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         targets: &Targets,
         arguments: u64,
     ) {
@@ -81,6 +82,6 @@ impl March {
         }
         let group = self.0.bind(gpu, 0, &buffers);
         let groups: Vec<_> = std::iter::once(&group).chain(&textures).collect();
-        self.0.dispatch_indirect(encoder, &groups, (&targets.arguments, arguments));
+        self.0.dispatch_indirect(commands, &groups, (&targets.arguments, arguments));
     }
 }

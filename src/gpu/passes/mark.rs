@@ -4,6 +4,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -29,10 +30,10 @@ impl Mark {
         Recipe::new("mark", &sources, "mark", &[&[Uniform, Read, Write, Write]])
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let Some(gathered) = &targets.gathered else { return };
         let buffers = [&targets.frame, &targets.planes, &gathered.shown, &targets.progress];
         let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
-        self.0.dispatch(encoder, &[&group], gathered.mark_words.div_ceil(WORDS));
+        self.0.dispatch(commands, &[&group], gathered.mark_words.div_ceil(WORDS));
     }
 }

@@ -5,6 +5,7 @@ use crate::gpu::{
     device::Gpu,
     passes::sources::{Sources, per_source},
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -43,16 +44,10 @@ impl Measure {
         })
     }
 
-    pub fn encode(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        targets: &Targets,
-        chunk: &Chunk,
-    ) {
+    pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets, chunk: &Chunk) {
         let buffers =
             [&targets.frame, &targets.planes, &chunk.spans, &targets.run_spans, &targets.needs];
         let buffers = buffers.map(|b| b.as_entire_buffer_binding());
-        self.0.dispatch(gpu, encoder, chunk, &buffers);
+        self.0.dispatch(gpu, commands, chunk, &buffers);
     }
 }

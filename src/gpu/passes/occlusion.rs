@@ -3,6 +3,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -45,16 +46,16 @@ impl Occlusion {
         ]
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let buffers = [&targets.frame, &targets.colors, &targets.progress, &targets.map];
         let buffers = buffers.map(|b| b.as_entire_buffer_binding());
         // A workgroup checks 64 tiles, and march has a workgroup for each tile. So most workgroups
         // of this dispatch have nothing to do.
         let group = self.look.bind(gpu, 0, &buffers);
-        self.look.dispatch_indirect(encoder, &[&group], (&targets.arguments, MARCH_ARGUMENTS));
+        self.look.dispatch_indirect(commands, &[&group], (&targets.arguments, MARCH_ARGUMENTS));
         let [columns, rows] = targets.tiles;
         for (stage, count) in [(&self.sum_rows, rows), (&self.sum_columns, columns)] {
-            stage.dispatch(encoder, &[&stage.bind(gpu, 0, &buffers)], count.div_ceil(64));
+            stage.dispatch(commands, &[&stage.bind(gpu, 0, &buffers)], count.div_ceil(64));
         }
     }
 }

@@ -4,6 +4,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -44,8 +45,8 @@ impl Order {
         ]
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
-        encoder.clear_buffer(&targets.long_count, 0, None);
+    pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
+        commands.clear(&targets.long_count);
         let buffers = [
             targets.frame.as_entire_buffer_binding(),
             targets.pass.as_entire_buffer_binding(),
@@ -57,16 +58,16 @@ impl Order {
             targets.progress.as_entire_buffer_binding(),
         ];
         let group = self.short.bind(gpu, 0, &buffers);
-        self.short.dispatch_indirect(encoder, &[&group], (&targets.arguments, ORDER_ARGUMENTS));
+        self.short.dispatch_indirect(commands, &[&group], (&targets.arguments, ORDER_ARGUMENTS));
         let arguments =
             self.count_long.bind(gpu, 1, &[targets.long_arguments.as_entire_buffer_binding()]);
         self.count_long.dispatch(
-            encoder,
+            commands,
             &[&self.count_long.bind(gpu, 0, &buffers), &arguments],
             1,
         );
         self.long.dispatch_indirect(
-            encoder,
+            commands,
             &[&self.long.bind(gpu, 0, &buffers)],
             (&targets.long_arguments, 0),
         );

@@ -4,6 +4,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -61,10 +62,10 @@ impl Plan {
     }
 
     /// Sums the results of measure.
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let buffers = Self::buffers(targets);
-        self.total.dispatch(encoder, &[&self.total.bind(gpu, 0, &buffers)], 1);
-        encoder.clear_buffer(&targets.census, 0, None);
+        self.total.dispatch(commands, &[&self.total.bind(gpu, 0, &buffers)], 1);
+        commands.clear(&targets.census);
         let own = [
             &targets.frame,
             &targets.run_spans,
@@ -73,12 +74,12 @@ impl Plan {
             &targets.census,
         ];
         let survey = self.survey.bind(gpu, 0, &own.map(|b| b.as_entire_buffer_binding()));
-        self.survey.dispatch(encoder, &[&survey], targets.run_total.div_ceil(64));
-        self.accumulate.dispatch(encoder, &[&self.accumulate.bind(gpu, 0, &buffers)], 1);
+        self.survey.dispatch(commands, &[&survey], targets.run_total.div_ceil(64));
+        self.accumulate.dispatch(commands, &[&self.accumulate.bind(gpu, 0, &buffers)], 1);
     }
 
     /// Decides how far the next depth pass reaches.
-    pub fn encode_advance(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
-        self.advance.dispatch(encoder, &[&self.advance.bind(gpu, 0, &Self::buffers(targets))], 1);
+    pub fn encode_advance(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
+        self.advance.dispatch(commands, &[&self.advance.bind(gpu, 0, &Self::buffers(targets))], 1);
     }
 }

@@ -4,6 +4,7 @@ use crate::gpu::{
     device::Gpu,
     passes::sources::{Sources, per_source},
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -45,7 +46,7 @@ impl Project {
     pub fn encode(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         targets: &Targets,
         chunks: &[Chunk],
     ) {
@@ -59,7 +60,7 @@ impl Project {
         ]
         .map(|b| b.as_entire_buffer_binding());
         for chunk in chunks {
-            self.0.dispatch_indirect(gpu, encoder, chunk, &buffers, &chunk.active_arguments);
+            self.0.dispatch_indirect(gpu, commands, chunk, &buffers, &chunk.active_arguments);
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -37,26 +38,26 @@ impl Resume {
         ]
     }
 
-    fn encode(stage: &Stage, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    fn encode(stage: &Stage, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let buffers =
             [&targets.frame, &targets.state, &targets.pass, &targets.arguments, &targets.progress];
         let group = stage.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
-        stage.dispatch(encoder, &[&group], 1);
+        stage.dispatch(commands, &[&group], 1);
     }
 
     /// Prepares another march if any tiles are unfinished.
-    pub fn encode_again(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
-        Self::encode(&self.again, gpu, encoder, targets);
+    pub fn encode_again(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
+        Self::encode(&self.again, gpu, commands, targets);
     }
 
     /// Stops the frame if tiles are still unfinished.
-    pub fn encode_hold(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
-        Self::encode(&self.hold, gpu, encoder, targets);
+    pub fn encode_hold(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
+        Self::encode(&self.hold, gpu, commands, targets);
     }
 
     /// Continues the pass at which the frame stopped.
-    pub fn encode_resume(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
-        Self::encode(&self.resume, gpu, encoder, targets);
-        targets.restore_record_starts(encoder);
+    pub fn encode_resume(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
+        Self::encode(&self.resume, gpu, commands, targets);
+        targets.restore_record_starts(commands);
     }
 }

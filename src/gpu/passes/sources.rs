@@ -6,6 +6,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -63,19 +64,19 @@ impl Sources<Stage> {
     pub fn dispatch(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         chunk: &Chunk,
         buffers: &[wgpu::BufferBinding<'_>],
     ) {
         match &chunk.origin {
             // Only the GPU knows the number of drawn nodes.
             Origin::Nodes { slots, .. } => {
-                self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments);
+                self.dispatch_indirect(gpu, commands, chunk, buffers, &slots.arguments);
             }
             _ => {
                 let (stage, groups) = self.bound(gpu, chunk, buffers);
                 let workgroups = chunk.candidates.div_ceil(WORKGROUP_CANDIDATES);
-                stage.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
+                stage.dispatch(commands, &[&groups[0], &groups[1]], workgroups);
             }
         }
     }
@@ -84,13 +85,13 @@ impl Sources<Stage> {
     pub fn dispatch_indirect(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         chunk: &Chunk,
         buffers: &[wgpu::BufferBinding<'_>],
         arguments: &wgpu::Buffer,
     ) {
         let (stage, groups) = self.bound(gpu, chunk, buffers);
-        stage.dispatch_indirect(encoder, &[&groups[0], &groups[1]], (arguments, 0));
+        stage.dispatch_indirect(commands, &[&groups[0], &groups[1]], (arguments, 0));
     }
 
     fn bound(

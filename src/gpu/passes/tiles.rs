@@ -3,6 +3,7 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -37,16 +38,16 @@ impl Tiles {
         ]
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+    pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let buffers = [&targets.frame, &targets.pass, &targets.bins, &targets.progress];
         let buffers = buffers.map(|b| b.as_entire_buffer_binding());
         let group = self.list.bind(gpu, 0, &buffers);
-        self.list.dispatch_indirect(encoder, &[&group], (&targets.arguments, TILE_ARGUMENTS));
+        self.list.dispatch_indirect(commands, &[&group], (&targets.arguments, TILE_ARGUMENTS));
         let arguments = self.prepare.bind(
             gpu,
             1,
             &[&targets.arguments, &targets.state].map(|b| b.as_entire_buffer_binding()),
         );
-        self.prepare.dispatch(encoder, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
+        self.prepare.dispatch(commands, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
     }
 }

@@ -1,6 +1,7 @@
-//! Compute pipelines: the shader files, the constants of a variant that precede them, the bindings,
+//! Compute pipelines: the commands of a frame, the shader files, the constants of a variant that precede them, the bindings,
 //! the state of a frame that shaders update, and the prefix sum that several passes share.
 
+pub(crate) mod commands;
 pub(crate) mod recipe;
 pub(crate) mod scan;
 pub(crate) mod shaders;

@@ -6,6 +6,7 @@ use crate::gpu::{
         buffers::{buffer, filled_buffer},
     },
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
@@ -60,33 +61,44 @@ impl Scan {
     pub fn encode_indirect(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         numbers: &wgpu::Buffer,
         size: &wgpu::Buffer,
         arguments: (&wgpu::Buffer, u64),
     ) {
         let buffers = [size, numbers, &self.segments].map(|b| b.as_entire_buffer_binding());
-        self.sum.dispatch_indirect(encoder, &[&self.sum.bind(gpu, 0, &buffers)], arguments);
-        self.spine.dispatch(encoder, &[&self.spine.bind(gpu, 0, &buffers)], 1);
-        self.spread.dispatch_indirect(encoder, &[&self.spread.bind(gpu, 0, &buffers)], arguments);
+        self.sum.dispatch_indirect(commands, &[&self.sum.bind(gpu, 0, &buffers)], arguments);
+        self.spine.dispatch(commands, &[&self.spine.bind(gpu, 0, &buffers)], 1);
+        self.spread.dispatch_indirect(commands, &[&self.spread.bind(gpu, 0, &buffers)], arguments);
     }
 
     /// Replaces each of the first `count` numbers with the sum of those before it.
     pub fn encode(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         numbers: &wgpu::Buffer,
         count: u32,
     ) {
-        debug_assert!(count <= SCAN_CAPACITY);
         let size = [count, 0, 0, 0];
         let size =
             filled_buffer(gpu, "scan size", bytemuck::bytes_of(&size), wgpu::BufferUsages::UNIFORM);
-        let buffers = [&size, numbers, &self.segments].map(|b| b.as_entire_buffer_binding());
+        self.encode_sized(gpu, commands, numbers, (&size, count));
+    }
+
+    /// The same, with `count` in a uniform buffer too.
+    pub fn encode_sized(
+        &self,
+        gpu: &Gpu,
+        commands: &mut Commands<'_>,
+        numbers: &wgpu::Buffer,
+        (size, count): (&wgpu::Buffer, u32),
+    ) {
+        debug_assert!(count <= SCAN_CAPACITY);
+        let buffers = [size, numbers, &self.segments].map(|b| b.as_entire_buffer_binding());
         let groups = count.div_ceil(SEGMENT * 64);
-        self.sum.dispatch(encoder, &[&self.sum.bind(gpu, 0, &buffers)], groups);
-        self.spine.dispatch(encoder, &[&self.spine.bind(gpu, 0, &buffers)], 1);
-        self.spread.dispatch(encoder, &[&self.spread.bind(gpu, 0, &buffers)], groups);
+        self.sum.dispatch(commands, &[&self.sum.bind(gpu, 0, &buffers)], groups);
+        self.spine.dispatch(commands, &[&self.spine.bind(gpu, 0, &buffers)], 1);
+        self.spread.dispatch(commands, &[&self.spread.bind(gpu, 0, &buffers)], groups);
     }
 }

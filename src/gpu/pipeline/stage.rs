@@ -1,6 +1,9 @@
 //! One compute pipeline with its bindings, compiled from its recipe.
 
-use super::recipe::{Binding, Recipe};
+use super::{
+    commands::Commands,
+    recipe::{Binding, Recipe},
+};
 use crate::gpu::device::{Gpu, pipeline_cache::Compiled};
 
 /// A compute pipeline, ready to be bound and dispatched.
@@ -119,13 +122,13 @@ impl Stage {
     /// may contain a few too many.
     pub fn dispatch(
         &self,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         groups: &[&wgpu::BindGroup],
         workgroups: u32,
     ) {
         let columns = workgroups.min(self.most_workgroups);
         if columns > 0 {
-            self.begin(encoder, groups).dispatch_workgroups(
+            self.begin(commands, groups).dispatch_workgroups(
                 columns,
                 workgroups.div_ceil(columns),
                 1,
@@ -136,22 +139,19 @@ impl Stage {
     /// Encodes a dispatch whose number of workgroups is stored in `arguments`, at a byte offset.
     pub fn dispatch_indirect(
         &self,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         groups: &[&wgpu::BindGroup],
         (arguments, offset): (&wgpu::Buffer, u64),
     ) {
-        self.begin(encoder, groups).dispatch_workgroups_indirect(arguments, offset);
+        self.begin(commands, groups).dispatch_workgroups_indirect(arguments, offset);
     }
 
     fn begin<'a>(
         &self,
-        encoder: &'a mut wgpu::CommandEncoder,
+        commands: &'a mut Commands<'_>,
         groups: &[&wgpu::BindGroup],
-    ) -> wgpu::ComputePass<'a> {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some(&self.label),
-            timestamp_writes: None,
-        });
+    ) -> &'a mut wgpu::ComputePass<'static> {
+        let pass = commands.pass();
         pass.set_pipeline(&self.compiled.pipeline);
         for (index, group) in (0..).zip(groups) {
             pass.set_bind_group(index, *group, &[]);

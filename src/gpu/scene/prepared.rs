@@ -12,6 +12,7 @@ use crate::{
             Gpu,
             buffers::{buffer, filled_buffer, upload},
         },
+        pipeline::commands::Commands,
         scene::{
             bricks::{BrickCache, Listed, Room, Slab},
             field::{Field, label_obstacle, texture_bytes, unsuited},
@@ -467,14 +468,13 @@ impl PreparedScene {
             if last == Some(eye) || !set.depends_on_eye() {
                 continue;
             }
-            let descriptor = wgpu::CommandEncoderDescriptor { label: Some("recolor") };
-            let mut encoder = gpu.device.create_command_encoder(&descriptor);
-            for chunk in self.chunks.iter().filter(|chunk| chunk.item == item) {
-                if let Origin::Splats { harmonics: Some(harmonics), .. } = &chunk.origin {
-                    recolor.encode(gpu, &mut encoder, (harmonics, &chunk.data), eye);
+            Commands::submit(gpu, "recolor", |commands| {
+                for chunk in self.chunks.iter().filter(|chunk| chunk.item == item) {
+                    if let Origin::Splats { harmonics: Some(harmonics), .. } = &chunk.origin {
+                        recolor.encode(gpu, commands, (harmonics, &chunk.data), eye);
+                    }
                 }
-            }
-            gpu.queue.submit([encoder.finish()]);
+            });
         }
         Ok(())
     }

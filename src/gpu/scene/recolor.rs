@@ -9,6 +9,7 @@ use crate::{
             buffers::{buffer, upload},
         },
         pipeline::{
+            commands::Commands,
             recipe::{Binding, Recipe},
             shaders,
             stage::Stage,
@@ -98,7 +99,7 @@ impl Recolor {
     pub fn encode(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         (harmonics, splats): (&Harmonics, &wgpu::Buffer),
         eye: Eye,
     ) {
@@ -112,6 +113,6 @@ impl Recolor {
         gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&uniform));
         let buffers = [buffer, numbers, splats].map(|b| b.as_entire_buffer_binding());
         let group = self.0.bind(gpu, 0, &buffers);
-        self.0.dispatch(encoder, &[&group], count.div_ceil(BLOCK as u32));
+        self.0.dispatch(commands, &[&group], count.div_ceil(BLOCK as u32));
     }
 }

@@ -10,6 +10,7 @@ use crate::{
             buffers::{buffer, upload},
         },
         pipeline::{
+            commands::Commands,
             recipe::{Binding, Recipe},
             scan::{SCAN_CAPACITY, Scan},
             shaders,
@@ -121,14 +122,12 @@ impl Select {
             stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
         };
         let (blocks, groups) = (selection.block_count, selection.block_count.div_ceil(64));
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") });
-        encoder.clear_buffer(&selection.blocks, 0, None);
-        self.count.dispatch(&mut encoder, &[&bind(&self.count)], groups);
-        self.scan.encode(gpu, &mut encoder, &selection.blocks, blocks + 1);
-        self.write.dispatch(&mut encoder, &[&bind(&self.write)], groups);
-        gpu.queue.submit([encoder.finish()]);
+        Commands::submit(gpu, "select", |commands| {
+            commands.clear(&selection.blocks);
+            self.count.dispatch(commands, &[&bind(&self.count)], groups);
+            self.scan.encode(gpu, commands, &selection.blocks, blocks + 1);
+            self.write.dispatch(commands, &[&bind(&self.write)], groups);
+        });
         selection.shown = Some(*shown);
         Ok(())
     }

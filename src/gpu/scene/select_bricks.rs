@@ -8,6 +8,7 @@ use crate::gpu::{
         buffers::{buffer, upload},
     },
     pipeline::{
+        commands::Commands,
         recipe::{Binding, Recipe},
         scan::Scan,
         shaders,
@@ -52,25 +53,24 @@ impl SelectBricks {
         // All slabs count in the same buffer, one after the other.
         let most = slabs.iter().map(|(slab, ..)| slab.blocks()).max().unwrap_or(0);
         let blocks = buffer(gpu, "select blocks", 4 * (u64::from(most) + 1), Usage::STORAGE);
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") });
-        for (slab, uniform, count) in slabs {
-            slab.count = *count;
-            slab.selected = buffer(gpu, "selected", 4 * u64::from(*count), Usage::STORAGE);
-            if *count == 0 {
-                continue;
+        Commands::submit(gpu, "select", |commands| {
+            for (slab, uniform, count) in slabs {
+                slab.count = *count;
+                slab.selected = buffer(gpu, "selected", 4 * u64::from(*count), Usage::STORAGE);
+                if *count == 0 {
+                    continue;
+                }
+                let buffers =
+                    [uniform, &slab.ranges, &visible, &blocks, &slab.selected, &slab.slots];
+                let bind = |stage: &Stage| {
+                    stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
+                };
+                let groups = slab.blocks().div_ceil(64);
+                commands.clear(&blocks);
+                self.count.dispatch(commands, &[&bind(&self.count)], groups);
+                self.scan.encode(gpu, commands, &blocks, slab.blocks() + 1);
+                self.write.dispatch(commands, &[&bind(&self.write)], groups);
             }
-            let buffers = [uniform, &slab.ranges, &visible, &blocks, &slab.selected, &slab.slots];
-            let bind = |stage: &Stage| {
-                stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
-            };
-            let groups = slab.blocks().div_ceil(64);
-            encoder.clear_buffer(&blocks, 0, None);
-            self.count.dispatch(&mut encoder, &[&bind(&self.count)], groups);
-            self.scan.encode(gpu, &mut encoder, &blocks, slab.blocks() + 1);
-            self.write.dispatch(&mut encoder, &[&bind(&self.write)], groups);
-        }
-        gpu.queue.submit([encoder.finish()]);
+        });
     }
 }
