@@ -17,13 +17,18 @@
 // The workgroups of `count` and `fill`.
 @group(1) @binding(0) var<storage, read_write> workgroups: array<u32, 3>;
 
+// Returns the number of places for boxes, one for each RECORD_UNIT words of records.
+fn box_count() -> u32 {
+    return min(runs[run_count.x], frame.record_capacity) / RECORD_UNIT;
+}
+
 @compute @workgroup_size(1)
 fn prepare() {
     let words = select(0u, runs[run_count.x], stage.groups > 0u);
     if words > frame.record_capacity {
         atomicStore(&state[OVERFLOW], 1u);
     }
-    workgroups[0] = min((min(words, frame.record_capacity) + 63u) / 64u, MOST_WORKGROUPS);
+    workgroups[0] = min((box_count() + 63u) / 64u, MOST_WORKGROUPS);
     workgroups[1] = 1u;
     workgroups[2] = 1u;
     atomicStore(&large[0], 0u);
@@ -33,8 +38,8 @@ fn prepare() {
 // `order` needs.
 @compute @workgroup_size(64)
 fn count(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let words = min(runs[run_count.x], frame.record_capacity);
-    for (var at = id.x; at < words; at += groups.x * 64u) {
+    let count = box_count();
+    for (var at = id.x; at < count; at += groups.x * 64u) {
         let box = boxes[at];
         if box.sheets == NO_BOX {
             continue;
@@ -69,8 +74,8 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
             atomicStore(&state[OVERFLOW], 1u);
         }
     }
-    let words = min(runs[run_count.x], frame.record_capacity);
-    for (var at = id.x; at < words; at += groups.x * 64u) {
+    let count = box_count();
+    for (var at = id.x; at < count; at += groups.x * 64u) {
         let box = boxes[at];
         if box.sheets == NO_BOX {
             continue;

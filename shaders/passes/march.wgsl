@@ -273,13 +273,13 @@ fn add_entries(
 
 // Whether an entry lies in a sheet and belongs to a field.
 fn is_of(entry: u32, f: u32, entry_sheet: u32) -> bool {
-    return (entry >> ENTRY_SHEET_SHIFT) == entry_sheet && field_of(entry & ENTRY_RECORD) == f;
+    return (entry >> ENTRY_SHEET_SHIFT) == entry_sheet && field_of(entry) == f;
 }
 
 // Whether two entries of a group have the same sheet, the same field and the same kind of record.
 fn is_alike(a: u32, b: u32) -> bool {
     let same = ((a ^ b) >> ENTRY_SHEET_SHIFT) == 0u
-        && field_of(a & ENTRY_RECORD) == field_of(b & ENTRY_RECORD);
+        && field_of(a) == field_of(b);
     return same && (!GENERAL_RECORDS || ((a ^ b) & ENTRY_ISOTROPIC) == 0u);
 }
 

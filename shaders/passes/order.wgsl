@@ -26,7 +26,7 @@ var<workgroup> held_keys: array<f32, select(1u, ROOM, SINGLE_SPLATS)>;
 var<workgroup> shared_number: u32;
 
 fn key_of(entry: u32) -> f32 {
-    let key = single_key(records[entry & ENTRY_RECORD].xyz);
+    let key = single_key(records[(entry & ENTRY_RECORD) * RECORD_UNIT].xyz);
     return select(key, -key, BACK_TO_FRONT);
 }
 

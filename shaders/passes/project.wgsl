@@ -106,8 +106,9 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
             box.first_tile |= select(0u, BOX_COARSE, is_coarse);
         }
         box.first_tile |= select(0u, BOX_COARSE, (source.flags & FACETS) != 0u);
-        boxes[at] = box;
-        for (var word = 1u; word < words; word++) {
+        boxes[at / RECORD_UNIT] = box;
+        // Among records of one word, one of four fills the places behind its own.
+        for (var word = RECORD_UNIT; word < words; word++) {
             boxes[at + word].sheets = NO_BOX;
         }
         at += words;

@@ -7,7 +7,7 @@
 const BOX_ISOTROPIC: u32 = 0x80000000u;
 const BOX_COARSE: u32 = 0x40000000u;
 const BOX_MARKS: u32 = 0xc0000000u;
-// The sheets of a word that begins no record.
+// The sheets of a place that begins no record.
 const NO_BOX: u32 = 0xffffffffu;
 
 struct Box {

@@ -59,7 +59,7 @@ fn part_left(start: vec2<f32>, end: vec2<f32>) -> f32 {
 
 fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
     let entry = entry_at(place);
-    let index = entry & ENTRY_RECORD;
+    let index = first_word(entry);
     let first = records[index];
     let second = records[index + 1u];
     let third = records[index + 2u];

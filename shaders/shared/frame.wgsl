@@ -211,7 +211,7 @@ const ONE_SPLAT: u32 = 0x10000u;
 
 // An entry: sheet within its group (7 bits), window after the splat's first (1), isotropic record
 // (1), isotropic record of the coarser level, or general record of a facet (1), place of the record
-// (22).
+// in units of RECORD_UNIT words (22).
 const ENTRY_SHEET_SHIFT: u32 = 25u;
 const ENTRY_CONTINUED: u32 = 0x1000000u;
 const ENTRY_ISOTROPIC: u32 = 0x800000u;

@@ -45,12 +45,17 @@ fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
     return vec4(f.x - base, f.y - f.x, f.z - f.y, 1.0 - f.z);
 }
 
-// Returns the number of the field to which a record belongs.
-fn field_of(record: u32) -> u32 {
+// Returns the place of an entry's record.
+fn first_word(entry: u32) -> u32 {
+    return (entry & ENTRY_RECORD) * RECORD_UNIT;
+}
+
+// Returns the number of the field to which an entry belongs.
+fn field_of(entry: u32) -> u32 {
     if FIELDS == 1u {
         return 0u;
     }
-    return dot(vec3<u32>(vec3(record) >= frame.record_starts.yzw), vec3(1u));
+    return dot(vec3<u32>(vec3(first_word(entry)) >= frame.record_starts.yzw), vec3(1u));
 }
 
 // What samples add to the open sheets of a field.
@@ -94,7 +99,7 @@ struct Round {
 
 // Returns the sample of an entry. `near` has the distances of the window's inner planes.
 fn round_of(f: u32, entry: u32, near: vec3<f32>) -> Round {
-    let record = records[entry & ENTRY_RECORD];
+    let record = records[first_word(entry)];
     let c = record.xyz;
     let isotropic = frame.fields[f].isotropic;
     var sigma = isotropic.x;
@@ -292,7 +297,7 @@ fn add_general(f: u32, place: u32, front: u32, first_pixel: vec2<i32>) {
 
 // Returns the splat of an entry.
 fn general_of(entry: u32, near: vec3<f32>) -> Loaded {
-    let index = entry & ENTRY_RECORD;
+    let index = first_word(entry);
     let a = records[index];
     let b = records[index + 1u];
     let c = records[index + 2u];

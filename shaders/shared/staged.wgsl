@@ -44,7 +44,7 @@ fn load_entries(first: u32, end: u32, tile_bins: u32, lane: u32, light: bool, tu
         staged_ends[lane] = bin_end(bin);
         let near = inner_planes(sheet_of(entry, bin - tile_bins));
         if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
-            stage_round(lane, round_of(field_of(entry & ENTRY_RECORD), entry, near));
+            stage_round(lane, round_of(field_of(entry), entry, near));
         } else if GENERAL_RECORDS && !(HAS_FACETS && (entry & ENTRY_COARSE) != 0u) {
             stage_general(lane, general_of(entry, near));
         }

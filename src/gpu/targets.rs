@@ -208,7 +208,9 @@ impl Request<'_> {
         prepared: &mut PreparedScene,
     ) -> Result<Targets> {
         self.check(gpu, prepared.runs)?;
-        let (budget, tiles) = (self.budget.within(gpu), self.tiles());
+        let (tiles, unit) = (self.tiles(), self.variant.record_unit());
+        let splats = prepared.runs.saturating_mul(RUN);
+        let budget = self.budget.within(gpu, splats, unit);
         let mut frame = self.frame(prepared, budget);
         let tables = FieldTables::of(gpu, &prepared.scene, prepared.tables.take());
         tables.describe(self.settings, self.view, self.sheets, &mut frame);
@@ -234,11 +236,11 @@ impl Request<'_> {
             runs: pool.take(gpu, "runs", 4 * (runs + 1)),
             active: pool.take(gpu, "active", 8 * runs),
             records: pool.take(gpu, "records", 16 * words),
-            boxes: pool.take(gpu, "boxes", 12 * words),
+            boxes: pool.take(gpu, "boxes", 12 * (words / u64::from(unit) + 1)),
             bins: pool.take(gpu, "bins", 4 * bin_count),
             entries: pool.take(gpu, "entries", sizes.entries),
             bin_arguments: pool.take(gpu, "bin arguments", 12),
-            large: pool.take(gpu, "large", 4 * (words + 1)),
+            large: pool.take(gpu, "large", 4 * (words / u64::from(unit) + 1)),
             large_arguments: pool.take(gpu, "large arguments", 12),
             long_bins: pool.take(gpu, "long bins", 4 * bin_count),
             long_count: pool.take(gpu, "long count", 4),

@@ -81,6 +81,9 @@ pub struct Variant {
 /// Parts of a sheet in which the transfer function is integrated. docs/engine.md has measurements.
 const PARTS: u32 = 3;
 
+/// Words of a general record.
+pub const RECORD_WORDS: u32 = 4;
+
 /// Maximum number of loop iterations of an entry.
 const ENTRY_ITERATIONS: u32 = 6;
 
@@ -114,6 +117,11 @@ impl Variant {
     /// Returns the bindings of a gathered lattice's textures.
     pub fn textures(&self) -> &'static [Binding] {
         if self.labels { &[Binding::Texture; 2] } else { &[Binding::Texture] }
+    }
+
+    /// Returns the words of the shortest record. Records begin at multiples of it.
+    pub fn record_unit(&self) -> u32 {
+        if self.isotropic { 1 } else { RECORD_WORDS }
     }
 
     /// Whether splats are scattered.
@@ -191,7 +199,7 @@ impl Variant {
     }
 
     /// The constants that are whole numbers.
-    fn counts(&self) -> [(&'static str, u32); 14] {
+    fn counts(&self) -> [(&'static str, u32); 15] {
         let parts = if self.parabola() { PARTS } else { 1 };
         // The cost of closing a sheet, in entries, against the driver's limit on iterations (see
         // docs/engine.md).
@@ -211,6 +219,7 @@ impl Variant {
             ("MOST_ENTRIES", self.most_entries),
             ("CLOSING_ENTRIES", closing),
             ("SAMPLE_KIND", self.sample_kind),
+            ("RECORD_UNIT", self.record_unit()),
             ("ROWS", self.rows),
             ("LANE_ROWS", 8 / self.rows),
         ]
