@@ -106,18 +106,19 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     var loaded = end;
     var turn = 0u;
     if STAGED && all(lane.xy == vec2(0u)) {
-        atomicStore(&is_light[0], 0u);
+        begin_loads();
     }
     loop {
         if STAGED {
             if first >= end {
                 break;
             }
-            load_entries(first, end, tile_bins, lane.y * 8u + lane.x, at < end, turn);
-            loaded = min(first + STAGED_ENTRIES, end);
-            if atomicLoad(&is_light[turn]) == 0u {
+            // Lanes that are opaque have no entries left.
+            let lights = load_entries(first, end, tile_bins, lane.y * 8u + lane.x, at < end, turn);
+            if !lights {
                 break;
             }
+            loaded = min(first + STAGED_ENTRIES, end);
             turn = 1u - turn;
         }
         loop {
@@ -129,8 +130,8 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
                 break;
             }
             if STAGED {
-                bin = staged_bins[at - staged_first];
-                group_end = staged_ends[at - staged_first];
+                bin = staged_bin(at);
+                group_end = staged_end(at);
             } else {
                 while group_end <= at {
                     bin++;

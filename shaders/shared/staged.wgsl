@@ -1,6 +1,7 @@
 // The entries of a tile that its 64 invocations load together, into the memory of their workgroup:
 // each loads one, and finds what all pixels share of it.
 
+// Entries that are loaded together.
 const STAGED_ENTRIES: u32 = 64u;
 // Vectors of a loaded entry.
 const STAGED_VECTORS: u32 = select(4u, 9u, GENERAL_RECORDS);
@@ -17,15 +18,32 @@ var<workgroup> is_light: array<atomic<u32>, 2>;
 var<private> staged_first: u32;
 
 fn entry_at(at: u32) -> u32 {
-    if STAGED {
-        return staged_entries[at - staged_first];
-    }
-    return entries[at];
+    return staged_entries[at - staged_first];
+}
+
+fn staged_bin(at: u32) -> u32 {
+    return staged_bins[at - staged_first];
+}
+
+fn staged_end(at: u32) -> u32 {
+    return staged_ends[at - staged_first];
+}
+
+// One lane calls it before the first load.
+fn begin_loads() {
+    atomicStore(&is_light[0], 0u);
 }
 
 // Loads the tile's next entries, each lane one of them. `light` is whether light passes the lane's
-// pixel.
-fn load_entries(first: u32, end: u32, tile_bins: u32, lane: u32, light: bool, turn: u32) {
+// pixel. Returns whether it passes any.
+fn load_entries(
+    first: u32,
+    end: u32,
+    tile_bins: u32,
+    lane: u32,
+    light: bool,
+    turn: u32,
+) -> bool {
     // Nobody reads the entries before any more.
     workgroupBarrier();
     if lane == 0u {
@@ -50,6 +68,7 @@ fn load_entries(first: u32, end: u32, tile_bins: u32, lane: u32, light: bool, tu
         }
     }
     workgroupBarrier();
+    return atomicLoad(&is_light[turn]) != 0u;
 }
 
 // Returns the bin of an entry: the first of the tile's that ends behind it.

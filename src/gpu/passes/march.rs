@@ -32,7 +32,7 @@ impl March {
             shaders::TABLES,
             shaders::PIXEL,
             shaders::KERNELS,
-            shaders::STAGED,
+            if variant.staged { shaders::STAGED } else { shaders::NO_STAGED },
             shaders::SHEET,
             if variant.facets { shaders::FACETS } else { shaders::NO_FACETS },
             shaders::PICTURE,

@@ -48,6 +48,7 @@ pub const MAP: &str = include_str!("../../../shaders/shared/map.wgsl");
 pub const PROGRESS: &str = include_str!("../../../shaders/shared/progress.wgsl");
 pub const SAVED: &str = include_str!("../../../shaders/shared/saved.wgsl");
 pub const STAGED: &str = include_str!("../../../shaders/shared/staged.wgsl");
+pub const NO_STAGED: &str = include_str!("../../../shaders/shared/no_staged.wgsl");
 pub const STATE: &str = include_str!("../../../shaders/shared/state.wgsl");
 pub const TABLES: &str = include_str!("../../../shaders/shared/tables.wgsl");
 pub const PIXEL: &str = include_str!("../../../shaders/shared/pixel.wgsl");
