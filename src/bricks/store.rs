@@ -5,7 +5,7 @@ use super::{
     Brick, EMPTY, Level,
     cut::Slices,
     file::{
-        Entry, HASH, Listing, Numbers, Refusal, Stored, VERSION, decode, flat_length, read_flat,
+        Entry, HASH, Listing, Numbers, Refusal, Stored, VERSION, decode,
         too_short,
     },
     halve::halve,
@@ -420,8 +420,7 @@ impl Slices<'_> {
     }
 }
 
-/// Reads and checks the beginning of a file: the header and the root of the directory, or all of a
-/// flat one.
+/// Reads and checks the beginning of a file: the header and the root of the directory.
 fn begin(path: &Path, file: &Bytes, limits: &Limits) -> Result<(Header, Directory<Listing>)> {
     let stored = Stored::decode(&file.beginning(0)?).map_err(|refusal| refused(path, refusal))?;
     let present = file.len();
@@ -439,33 +438,21 @@ fn begin(path: &Path, file: &Bytes, limits: &Limits) -> Result<(Header, Director
     let fail = |message| damaged(path, "directory", message);
     let numbers = Numbers::new(level::levels(stored.header.lattice.dims));
     let count = numbers.count;
-    let kind = |start: u64| Listing {
-        numbers: numbers.clone(),
+    // Each brick has a record, so that the time to read them is bounded by the file.
+    if end / (Listing::ENTRY as u64) < u64::from(count) {
+        return Err(fail(too_short(count)));
+    }
+    let start = (stored.length() + Shape::of(count).root_length::<Listing>()) as u64;
+    let kind = Listing {
+        numbers,
         scalar: stored.header.scalar,
         start,
         end: end.saturating_sub(HASH as u64),
     };
-    let (directory, memory) = if stored.is_flat {
-        let start = flat_length(count).saturating_add(stored.length() as u64);
-        let entries = read_flat(&file.beginning(start)?, &stored, &numbers).map_err(fail)?;
-        let memory = 2 * u64::from(count) * size_of::<Entry>() as u64;
-        (Directory::held(kind(start), &entries), memory)
-    } else {
-        // Each brick has a record, so that the time to read them is bounded by the file.
-        if end / (Listing::ENTRY as u64) < u64::from(count) {
-            return Err(fail(too_short(count)));
-        }
-        let start = (stored.length() + Shape::of(count).root_length::<Listing>()) as u64;
-        let (head, place) = (file.beginning(start)?, (stored.length(), kind(start).end));
-        let directory = Directory::open(kind(start), count, place, &head);
-        (directory.map_err(|fault| told(path, fault))?, 0)
-    };
-    limits.check(
-        LimitKind::Bytes,
-        path,
-        "the size of the file and its directory in bytes",
-        present + memory,
-    )?;
+    let (head, place) = (file.beginning(start)?, (stored.length(), kind.end));
+    let directory =
+        Directory::open(kind, count, place, &head).map_err(|fault| told(path, fault))?;
+    limits.check(LimitKind::Bytes, path, "the size of the file in bytes", present)?;
     Ok((stored.header, directory))
 }
 
@@ -496,7 +483,7 @@ fn refused(path: &Path, refusal: Refusal) -> Error {
         Refusal::Version(version) => Error::input(
             path,
             "header",
-            format!("has version {version}; versions 1 and {VERSION} can be read"),
+            format!("has version {version}; version {VERSION} can be read"),
         )
         .hint("convert the source again, or use the release that wrote the file"),
         Refusal::Damaged(message) => damaged(path, "header", message),

@@ -1,8 +1,6 @@
 //! Bricks in memory, in files and built by hand.
 
 #[allow(clippy::duplicate_mod, reason = "both rooms rewrite files")]
-#[path = "../../tests/regressions/flat.rs"]
-mod flat_files;
 
 use super::{
     file::{to_bytes, with_changes},
@@ -107,26 +105,6 @@ fn files_hold_what_memory_does() {
                     "{scalar:?} {at:?}"
                 );
             }
-        }
-    }
-}
-
-#[test]
-fn both_layouts_hold_the_same() {
-    let folder = Folder::new();
-    for dims in [[70, 40, 33], [300, 40, 33], [5, 300, 31]] {
-        let bytes = to_bytes(&volume(Scalar::I16, dims), &options()).unwrap();
-        let flat = flat_files::flat_bricks(&bytes);
-        assert_eq!((bytes[8], flat[8]), (2, 1));
-        let [paged, old] = [&bytes, &flat].map(|bytes| open(bytes).unwrap());
-        assert_eq!(paged.header(), old.header());
-        for level in 0..paged.levels().len() {
-            assert_eq!(paged.ranges(level), old.ranges(level));
-            assert_eq!(every(&paged, level), every(&old, level));
-        }
-        for bytes in [bytes, flat] {
-            let path = folder.write("a.splv", bytes);
-            assert_eq!(check(path, &Limits::default(), None).findings, []);
         }
     }
 }

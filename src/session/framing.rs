@@ -9,6 +9,7 @@ use crate::{
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Share of the picture that is left free around a scene that the camera is fitted to.
 const MARGIN: f64 = 0.04;
@@ -180,6 +181,15 @@ impl Framing {
     pub fn usual_fault(subject: &Subject, bounds: &Bounds, size: [u32; 2]) -> Option<Error> {
         let usual = Self::default().camera(subject, size);
         usual.and_then(|camera| camera.view(size)?.validate_for(bounds)).err()
+    }
+
+    /// Returns the error for an input that no usual camera sees, because of such a fault.
+    pub fn out_of_sight(path: &Path, Bounds { min, max }: Bounds, fault: &Error) -> Error {
+        let text = |place: DVec3| place.to_array().map(|v| format!("{v:e}")).join(", ");
+        let (min, max) = (text(min), text(max));
+        let message = format!("the content reaches from {min} to {max}: {fault}");
+        Error::input(path, "bounds", message)
+            .hint("give positions, sizes and spacings in a unit in which they are moderate numbers")
     }
 
     /// Whether the camera's distance is given, so that it is not fitted to the scene.

@@ -1,29 +1,51 @@
 //! The oddities of an input without checksums: parts that draw nothing, or that are drawn
 //! differently than meant.
 
-use super::Data;
+use super::{Data, Framing, Subject};
 use crate::{
     Deadline, Error, Result,
     container::{Finding, Severity},
     gaussians::Gaussians,
+    math::Bounds,
     surface::{Mesh, SurfelOptions},
 };
+use glam::DVec3;
+use std::path::Path;
 
 impl Data {
-    /// Returns the oddities of a mesh, of a point cloud and of trained Gaussians; none of other
-    /// data, whose readers report what is wrong. Hierarchies and bricks have checks of their own:
+    /// Returns the oddities of a mesh, of a point cloud and of trained Gaussians, and of any data
+    /// whether it is out of sight of the usual camera; other readers report what is wrong.
+    /// Hierarchies and bricks have checks of their own:
     /// [`hierarchy::file::check`](crate::hierarchy::file::check) and
     /// [`bricks::check`](crate::bricks::check).
     ///
     /// # Errors
     /// [`Error::Timeout`] after the deadline, [`Error::Memory`] for splats that do not fit.
     pub fn oddities(&self, deadline: Deadline) -> Result<Vec<Finding>> {
-        match self {
-            Self::Mesh(mesh) => in_mesh(mesh, deadline),
-            Self::Gaussians(set) => Ok(in_gaussians(set)),
-            _ => Ok(Vec::new()),
-        }
+        let mut findings = match self {
+            Self::Mesh(mesh) => in_mesh(mesh, deadline)?,
+            Self::Gaussians(set) => in_gaussians(set),
+            _ => Vec::new(),
+        };
+        findings.extend(self.bounds().and_then(of_bounds));
+        Ok(findings)
     }
+}
+
+/// Returns the finding on a box that no usual camera sees. Nothing draws it.
+fn of_bounds(bounds: Bounds) -> Option<Finding> {
+    // Footprints give a place an extent, and nothing to see is no matter of places.
+    let subject = Subject::new(bounds, DVec3::Y);
+    if bounds.is_empty() || subject.is_one_place() {
+        return None;
+    }
+    let fault = Framing::usual_fault(&subject, &bounds, [1280, 720])?;
+    let Error::Input { place, message, .. } =
+        Framing::out_of_sight(Path::new(""), bounds, &fault)
+    else {
+        return None;
+    };
+    Some(Finding::error("out-of-sight", place, message))
 }
 
 /// Returns a warning if something was found.

@@ -98,10 +98,15 @@ fn files_of_no_kind_name_what_is_read() {
 fn oddities_are_found() {
     let folder = Folder::new();
     let path = folder.write("a.obj", MESH.as_bytes());
-    let data = Reading::default().open(&path).unwrap().read().unwrap();
-    let codes: Vec<_> =
-        data.oddities(Deadline::NEVER).unwrap().iter().map(|finding| finding.code).collect();
-    assert_eq!(codes, ["open"]);
+    let codes = |path| -> Vec<_> {
+        let data = Reading::default().open(path).unwrap().read().unwrap();
+        data.oddities(Deadline::NEVER).unwrap().iter().map(|finding| finding.code).collect()
+    };
+    assert_eq!(codes(&path), ["open"]);
+    // Positions so far out that 32 bits do not hold their squares.
+    let far = MESH.replace("v 1", "v 1e30");
+    assert_ne!(far, MESH);
+    assert!(codes(&folder.write("far.obj", far.as_bytes())).contains(&"out-of-sight"));
 }
 
 /// The first statement of a file decides how a scene stands, then the convention.

@@ -2,8 +2,6 @@
 //! modules, and the tables of its documentation.
 
 mod external;
-#[path = "../regressions/flat.rs"]
-mod flat;
 mod frames;
 mod house;
 mod laboratories;

@@ -1,10 +1,7 @@
-//! Directories in pages: pictures are those of a flat directory, and damage is reported where it
+//! Directories in pages: pictures are those of the tree in memory, and damage is reported where it
 //! is.
 
-use crate::{
-    flat::{flat, levels, root},
-    testing::folder::Folder,
-};
+use crate::testing::folder::Folder;
 use glam::DVec3;
 use splatkit::{
     Device, Error, Renderer,
@@ -17,10 +14,27 @@ use splatkit::{
     scene::{Scene, Settings},
     surface::{Mesh, SurfelOptions},
 };
-use std::{path::Path, sync::Arc};
+use std::path::Path;
 
 /// Bytes of a record of the root, if there are two levels.
 const OF_DIRECTORY: usize = 36;
+/// Records in a directory page.
+const RECORDS: usize = 512;
+
+/// Where the root begins: after the header and its checksum (docs/splk.md).
+fn root(bytes: &[u8]) -> usize {
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+    164 + word(136) as usize + word(140) as usize
+}
+
+/// The number of directory pages of each level, the lowest first.
+fn levels(pages: usize) -> Vec<usize> {
+    let mut levels = vec![pages.div_ceil(RECORDS)];
+    while let Some(&below) = levels.last().filter(|below| **below > 1) {
+        levels.push(below.div_ceil(RECORDS));
+    }
+    levels
+}
 
 /// A knotted tube in many small blocks, so that the directory has two levels.
 fn many_pages(lossless: bool) -> Vec<u8> {
@@ -42,28 +56,24 @@ fn long(bytes: &[u8], at: usize) -> usize {
 }
 
 #[test]
-fn pictures_are_those_of_a_flat_directory() {
-    let paged = many_pages(false);
-    let flat = flat(&paged);
-    assert_eq!((paged[8], flat[8]), (3, 1));
-    let [paged, flat] = [paged, flat].map(|bytes| Arc::new(open(bytes)));
-    let [mut own, mut other] = [paged, flat].map(|hierarchy| {
+fn pictures_are_those_of_the_tree_in_memory() {
+    let file = open(many_pages(true));
+    let tree = Hierarchy::from_tree(file.read_tree().expect("reads")).expect("a hierarchy");
+    let [mut own, mut other] = [file, tree].map(|hierarchy| {
         let scene = Scene::new().with_hierarchy(hierarchy);
         (Renderer::new(&Device::Cpu, &scene).expect("a renderer"), scene.bounds())
     });
     let camera = Camera::framing(&own.1, DVec3::new(1.0, -2.0, 0.7), DVec3::Z, 1.0);
     let away = camera.position - camera.focal_point;
-    for (part, detail, page_memory) in [
-        (1.0, Detail::Pixels(2.0), 1 << 30),
-        (1.0, Detail::Pixels(0.0), 1 << 30),
-        (0.1, Detail::Pixels(0.0), 1 << 30),
-        (20.0, Detail::Pixels(4.0), 1 << 30),
-        (0.3, Detail::Splats(3000), 1 << 30),
-        // Not all pages fit: the coarse ones are drawn.
-        (0.5, Detail::Pixels(0.0), 1 << 20),
+    for (part, detail) in [
+        (1.0, Detail::Pixels(2.0)),
+        (1.0, Detail::Pixels(0.0)),
+        (0.1, Detail::Pixels(0.0)),
+        (20.0, Detail::Pixels(4.0)),
+        (0.3, Detail::Splats(3000)),
     ] {
         let camera = Camera { position: camera.focal_point + away * part, ..camera };
-        let settings = Settings { detail, page_memory, ..Settings::new([80; 2]) };
+        let settings = Settings { detail, ..Settings::new([80; 2]) };
         let draw = |renderer: &mut Renderer| renderer.render(&camera, &settings).expect("draws");
         let (found, wanted) = (draw(&mut own.0), draw(&mut other.0));
         assert!(found.0.color == wanted.0.color, "{part}, {detail:?}");
@@ -72,19 +82,10 @@ fn pictures_are_those_of_a_flat_directory() {
 }
 
 #[test]
-fn both_layouts_have_the_same_tree_and_are_sound() {
+fn a_file_with_a_directory_of_two_levels_is_sound() {
     let folder = Folder::new();
-    let paged = many_pages(true);
-    let flat = flat(&paged);
-    let [own, other] = [&paged, &flat].map(|bytes| open(bytes.clone()).read_tree().expect("reads"));
-    for (own, other) in own.blocks.iter().zip(&other.blocks) {
-        assert!(own.nodes == other.nodes && own.portal == other.portal);
-    }
-    assert_eq!(own.blocks.len(), other.blocks.len());
-    for (name, bytes) in [("paged.splk", paged), ("flat.splk", flat)] {
-        let path = folder.write(name, bytes);
-        assert_eq!(file::check(&path, &Limits::default()).findings, []);
-    }
+    let path = folder.write("a.splk", many_pages(true));
+    assert_eq!(file::check(&path, &Limits::default()).findings, []);
 }
 
 /// Reads every page. Returns the first error.
@@ -167,32 +168,4 @@ fn records_that_lie_are_found() {
     assert!(found.iter().any(|f| f.code == "directory"), "{found:?}");
     let error = told(read_all(with(second + 28, &f32::NAN.to_le_bytes())));
     assert!(error.contains("its bounds are not valid"), "{error}");
-}
-
-#[test]
-fn a_prefix_has_the_pages_whose_directory_is_there() {
-    let folder = Folder::new();
-    let bytes = many_pages(false);
-    let whole = open(bytes.clone());
-    let mut last = 0;
-    for part in [20, 40, 70, 95] {
-        let cut = &bytes[..bytes.len() * part / 100];
-        let path = folder.write("cut.splk", cut);
-        assert!(Hierarchy::open(&path, &Limits::default()).is_err());
-        let prefix = Hierarchy::open_prefix(&path, &Limits::default()).expect("a prefix");
-        let present = |page: &u32| prefix.is_present(*page);
-        let present: Vec<u32> = (0..whole.page_count()).filter(present).collect();
-        for &page in &present {
-            let own = prefix.read_page(page).expect("a page");
-            assert!(own.nodes == whole.read_page(page).expect("a page").nodes);
-        }
-        assert!(present.len() > last && present.len() < whole.page_count() as usize);
-        last = present.len();
-        let scene = Scene::new().with_hierarchy(prefix);
-        let camera = Camera::framing(&scene.bounds(), DVec3::Y, DVec3::Z, 1.0);
-        let mut renderer = Renderer::new(&Device::Cpu, &scene).expect("a renderer");
-        let settings = Settings { detail: Detail::Pixels(0.0), ..Settings::new([40; 2]) };
-        let picture = renderer.render(&camera, &settings).expect("draws").0;
-        assert!(picture.color.iter().any(|color| color[3] > 0.1));
-    }
 }

@@ -2,7 +2,6 @@
 //! same bytes, or a clear error.
 
 use crate::{
-    flat,
     testing::{
         folder::Folder,
         grid::grid,
@@ -195,34 +194,32 @@ fn the_first_request_has_the_first_picture() {
     assert!(matches!(&asked[..], [first] if *first == (0..256 << 10)), "{asked:?}");
 }
 
-/// Prints what the first picture of a file with many pages takes, with both layouts.
+/// Prints what the first picture of a file with many pages takes.
 #[test]
 #[ignore = "figures, not a check"]
 fn first_picture_of_many_pages() {
-    let paged = file::to_bytes(&grid(6), &WriteOptions::default()).unwrap();
-    for (layout, bytes) in [("flat", flat::flat(&paged)), ("paged", paged)] {
-        let folder = Folder::new();
-        set_cache(Cache { folder: folder.path("cache"), bytes: 1 << 30 });
-        println!("{layout}: a file of {} bytes", bytes.len());
-        let server = Server::of(bytes);
-        let before = traffic();
-        let told = |what: &str, begun: Instant| {
-            let (now, seconds) = (traffic(), begun.elapsed().as_secs_f64());
-            let [requests, bytes] = [now.requests - before.requests, now.bytes - before.bytes];
-            println!("{layout}, {what}: {requests} requests, {bytes} bytes, {seconds:.3} s");
-        };
-        let begun = Instant::now();
-        let hierarchy = Hierarchy::open(server.address("many.splk"), &limits()).unwrap();
-        told("open", begun);
-        println!("{} pages", hierarchy.page_count());
-        let scene = Scene::new().with_hierarchy(Arc::new(hierarchy));
-        let camera = Camera::framing(&scene.bounds(), DVec3::X, DVec3::Z, 1.0);
-        let mut renderer = Renderer::new(&Device::Cpu, &scene).unwrap();
-        for pixels in [8.0, 1.0, 0.25] {
-            let settings = Settings { detail: Detail::Pixels(pixels), ..Settings::new([32; 2]) };
-            renderer.render(&camera, &settings).unwrap();
-            told(&format!("picture with a cut of {pixels} pixels"), begun);
-        }
+    let bytes = file::to_bytes(&grid(6), &WriteOptions::default()).unwrap();
+    let folder = Folder::new();
+    set_cache(Cache { folder: folder.path("cache"), bytes: 1 << 30 });
+    println!("a file of {} bytes", bytes.len());
+    let server = Server::of(bytes);
+    let before = traffic();
+    let told = |what: &str, begun: Instant| {
+        let (now, seconds) = (traffic(), begun.elapsed().as_secs_f64());
+        let [requests, bytes] = [now.requests - before.requests, now.bytes - before.bytes];
+        println!("{what}: {requests} requests, {bytes} bytes, {seconds:.3} s");
+    };
+    let begun = Instant::now();
+    let hierarchy = Hierarchy::open(server.address("many.splk"), &limits()).unwrap();
+    told("open", begun);
+    println!("{} pages", hierarchy.page_count());
+    let scene = Scene::new().with_hierarchy(Arc::new(hierarchy));
+    let camera = Camera::framing(&scene.bounds(), DVec3::X, DVec3::Z, 1.0);
+    let mut renderer = Renderer::new(&Device::Cpu, &scene).unwrap();
+    for pixels in [8.0, 1.0, 0.25] {
+        let settings = Settings { detail: Detail::Pixels(pixels), ..Settings::new([32; 2]) };
+        renderer.render(&camera, &settings).unwrap();
+        told(&format!("picture with a cut of {pixels} pixels"), begun);
     }
 }
 

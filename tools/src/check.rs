@@ -5,23 +5,19 @@ use crate::{
     load::LoadFlags,
     output, parse,
     progress::Progress,
-    scene::out_of_sight,
     scene_file,
     terminal::safe,
 };
 use clap::Args;
-use glam::DVec3;
 use serde_json::json;
 use splatkit::{
-    Deadline, Error, bricks,
+    bricks,
     container::{Finding, Severity},
     formats::Kind,
     hierarchy::file,
-    math::Bounds,
     memory,
-    session::{Data, Framing, Subject},
 };
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Check {
@@ -52,7 +48,7 @@ impl Check {
                 let watch = |done, all| stages.set("Checking bricks", done, all);
                 bricks::check(&self.file, &limits, Some(&watch)).findings
             }
-            _ => self.of_input(&opened.read()?, deadline)?,
+            _ => opened.read()?.oddities(deadline).map_err(|error| in_file(&self.file, error))?,
         };
         progress.clear();
         let ok = findings.iter().all(|finding| finding.severity != Severity::Error);
@@ -73,28 +69,4 @@ impl Check {
             Err(Failure::Damaged { file: self.file, findings: findings.len() })
         }
     }
-}
-
-impl Check {
-    /// Returns the oddities of an input that has no checksums. Errors are reported as it is read.
-    fn of_input(&self, input: &Data, deadline: Deadline) -> Result<Vec<Finding>, Failure> {
-        let mut findings = input.oddities(deadline).map_err(|error| in_file(&self.file, error))?;
-        let bounds = input.bounds();
-        findings.extend(bounds.and_then(|bounds| of_bounds(&self.file, bounds)));
-        Ok(findings)
-    }
-}
-
-/// Returns the finding on a box that no usual camera sees. `render` refuses it too.
-fn of_bounds(file: &Path, bounds: Bounds) -> Option<Finding> {
-    // Footprints give a place an extent, and nothing to see is no matter of places.
-    let subject = Subject::new(bounds, DVec3::Y);
-    if bounds.is_empty() || subject.is_one_place() {
-        return None;
-    }
-    let fault = Framing::usual_fault(&subject, &bounds, [1280, 720])?;
-    let Error::Input { place, message, .. } = out_of_sight(file, bounds, &fault) else {
-        return None;
-    };
-    Some(Finding { code: "out-of-sight", severity: Severity::Error, place, message })
 }

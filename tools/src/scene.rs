@@ -11,7 +11,6 @@ use crate::{
     show::{Show, ShowFlags},
 };
 use clap::Args;
-use glam::DVec3;
 use splatkit::{
     Deadline, Error,
     about::{Frame, Stance},
@@ -204,7 +203,7 @@ impl SceneFlags {
         let inputs = self.inputs.iter().zip(&loaded.scene.items);
         let farthest = inputs.max_by(|(_, a), (_, b)| reach(a).total_cmp(&reach(b)));
         match farthest {
-            Some((path, item)) => out_of_sight(path, item.bounds(), &fault).into(),
+            Some((path, item)) => Framing::out_of_sight(path, item.bounds(), &fault).into(),
             None => error.into(),
         }
     }
@@ -494,15 +493,6 @@ impl Loaded {
         self.subject.count_in(bounds);
         self.count += count as u64;
     }
-}
-
-/// Returns the error for an input that no usual camera sees.
-pub fn out_of_sight(path: &Path, Bounds { min, max }: Bounds, fault: &Error) -> Error {
-    let text = |place: DVec3| place.to_array().map(|v| format!("{v:e}")).join(", ");
-    let (min, max) = (text(min), text(max));
-    let message = format!("the content reaches from {min} to {max}: {fault}");
-    Error::input(path, "bounds", message)
-        .hint("give positions, sizes and spacings in a unit in which they are moderate numbers")
 }
 
 /// Returns what an input is called in warnings.

@@ -1,7 +1,6 @@
 //! The directory: how each brick is stored, its size, and the range of its values. Bricks are
 //! numbered from the coarsest level to the finest, in each level group by group.
 
-use super::Stored;
 use crate::{
     bricks::{BRICK_BLOCKS, Level, SIDE, joined},
     container::{
@@ -57,10 +56,6 @@ impl Entry {
     /// Appends the record of the entry.
     pub fn put(&self, out: &mut Vec<u8>) {
         self.place.put(out);
-        self.put_rest(out);
-    }
-
-    fn put_rest(&self, out: &mut Vec<u8>) {
         out.put(&self.value);
         out.put(&self.range);
         out.put(&[self.flags, 0]);
@@ -69,10 +64,6 @@ impl Entry {
     /// Reads a record.
     pub fn read(record: &mut Cursor) -> Option<Self> {
         let place = Place::read(record)?;
-        Self::read_rest(place, record)
-    }
-
-    fn read_rest(place: Place, record: &mut Cursor) -> Option<Self> {
         let (value, range, [flags, 0]) = (record.array()?, record.array()?, record.array()?) else {
             return None;
         };
@@ -172,45 +163,6 @@ impl Kind for Listing {
 
 fn contradicts(level: usize, brick: u32) -> String {
     format!("the values of level {level}, brick {brick} contradict each other")
-}
-
-/// Returns the bytes of the directory of version 1, with its checksum.
-pub fn flat_length(bricks: u32) -> u64 {
-    FLAT_ENTRY as u64 * u64::from(bricks) + 4
-}
-
-/// Bytes of an entry of version 1.
-const FLAT_ENTRY: usize = 16;
-
-/// Reads the directory of version 1 after a header, as entries by their numbers. The error is a
-/// message. No memory is allocated that the file does not have bytes for.
-pub fn read_flat(bytes: &[u8], stored: &Stored, numbers: &Numbers) -> Result<Vec<Entry>, String> {
-    let scalar = stored.header.scalar;
-    let start = stored.length();
-    let short = || too_short(numbers.count);
-    let end = usize::try_from(start as u64 + flat_length(numbers.count)).map_err(|_| short())?;
-    let (text, crc) = bytes.get(start..end).ok_or_else(short)?.split_at(end - start - 4);
-    if Cursor::new(crc).u32() != Some(crc32fast::hash(text)) {
-        return Err("its checksum does not match".into());
-    }
-    let mut entries = vec![Entry::in_memory([0; 2]); numbers.count as usize];
-    let (mut cursor, mut offset) = (Cursor::new(text), end as u64);
-    for (number, level) in numbers.levels.iter().enumerate().rev() {
-        for brick in 0..level.bricks() as u32 {
-            let mut read = || {
-                let place = Place { offset, bytes: cursor.u32()?, crc: cursor.u32()? };
-                Entry::read_rest(place, &mut cursor).filter(|entry| entry.is_sound(scalar))
-            };
-            let entry = read().ok_or_else(|| contradicts(number, brick))?;
-            offset += u64::from(entry.place.bytes);
-            entries[numbers.number(number, brick) as usize] = entry;
-        }
-    }
-    if offset + super::HASH as u64 != stored.file_bytes {
-        let hash = super::HASH;
-        return Err(format!("its bricks end at byte {offset}, not {hash} before the end"));
-    }
-    Ok(entries)
 }
 
 /// The message for a file that has no room for its bricks' entries.

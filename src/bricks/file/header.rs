@@ -10,9 +10,6 @@ use crate::{
 };
 use glam::DMat3;
 
-/// The version of files with a flat directory.
-const FLAT: u32 = 1;
-
 /// Bytes before the texts.
 const FIXED: usize = 192;
 
@@ -22,8 +19,6 @@ pub struct Stored {
     pub header: Header,
     /// Bytes of the whole file.
     pub file_bytes: u64,
-    /// Whether the directory is not divided into pages, as in version 1.
-    pub is_flat: bool,
 }
 
 /// Why a header is refused.
@@ -48,7 +43,7 @@ impl Stored {
         let Header { lattice, scalar, range, frame, unit, source } = &self.header;
         let mut out = Vec::with_capacity(self.length());
         out.put(&MAGIC);
-        out.u32(if self.is_flat { FLAT } else { VERSION });
+        out.u32(VERSION);
         out.u32(Scalar::ALL.iter().position(|known| known == scalar).unwrap_or_default() as u32);
         out.u64(self.file_bytes);
         lattice.dims.iter().for_each(|&n| out.u64(n as u64));
@@ -85,7 +80,7 @@ impl Stored {
             return Err(Refusal::Foreign);
         }
         let version = cursor.u32().ok_or(Refusal::Incomplete)?;
-        if ![FLAT, VERSION].contains(&version) {
+        if version != VERSION {
             return Err(Refusal::Version(version));
         }
         // The lengths of the texts determine where the checksum is, and the checksum then confirms
@@ -98,17 +93,12 @@ impl Stored {
         if Cursor::new(&bytes[end..]).u32().ok_or(Refusal::Incomplete)? != crc32fast::hash(text) {
             return Err(Refusal::Damaged("its checksum does not match".into()));
         }
-        Self::fields(cursor, &text[FIXED..], unit, version == FLAT)
+        Self::fields(cursor, &text[FIXED..], unit)
             .ok_or(Refusal::Incomplete)?
             .map_err(Refusal::Damaged)
     }
 
-    fn fields(
-        mut cursor: Cursor,
-        texts: &[u8],
-        unit: usize,
-        is_flat: bool,
-    ) -> Option<Result<Self, String>> {
+    fn fields(mut cursor: Cursor, texts: &[u8], unit: usize) -> Option<Result<Self, String>> {
         let scalar = cursor.u32()?;
         let file_bytes = cursor.u64()?;
         let dims = [cursor.u64()?, cursor.u64()?, cursor.u64()?];
@@ -140,7 +130,7 @@ impl Stored {
             {
                 return Err(wrong("number of levels, or the size of its bricks,"));
             }
-            Ok(Self { header, file_bytes, is_flat })
+            Ok(Self { header, file_bytes })
         };
         Some(sound())
     }

@@ -14,7 +14,7 @@ pub use check::check;
 pub use write::{WriteOptions, convert, memory_of, write};
 
 pub(super) use brick::decode;
-pub(super) use directory::{Entry, Listing, Numbers, flat_length, read_flat, too_short};
+pub(super) use directory::{Entry, Listing, Numbers, too_short};
 pub(super) use header::{Refusal, Stored};
 #[cfg(test)]
 pub(super) use write::{to_bytes, with_changes};
@@ -22,7 +22,7 @@ pub(super) use write::{to_bytes, with_changes};
 /// How a file begins: a name, and line ends that a transfer as text would change.
 const MAGIC: [u8; 8] = *b"SPLV\r\n\x1a\n";
 
-/// The version that is written, and the newest that is read. Version 1 has a flat directory.
+/// The version of the files.
 pub(super) const VERSION: u32 = 2;
 
 /// Bytes of the BLAKE3 hash at the end of a file.

@@ -242,7 +242,7 @@ impl Kept {
 
     /// Assembles the file.
     fn finish(self, header: &Header, mut out: Target) -> io::Result<Target> {
-        let mut stored = Stored { header: header.clone(), file_bytes: 0, is_flat: false };
+        let mut stored = Stored { header: header.clone(), file_bytes: 0 };
         let numbers = Numbers::new(level::levels(header.lattice.dims));
         let count = numbers.count;
         let spilled = self.entries.into_iter().map(Spill::end).collect::<io::Result<Vec<_>>>()?;

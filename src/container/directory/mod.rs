@@ -299,10 +299,7 @@ impl<K: Kind> Directory<K> {
             unreachable!("higher levels list directory pages")
         };
         let numbered = (number * RECORDS..).zip(records.iter());
-        // A place that no file has is an error, not a page that has not come yet.
-        let passes = |(_, (place, bounds)): &(u32, &(Place, _))| {
-            (is_present(file, *place) || !self.is_within(*place)) && wanted(bounds)
-        };
+        let passes = |(_, (_, bounds)): &(u32, &(Place, _))| wanted(bounds);
         let below: Vec<(u32, Place)> =
             numbered.filter(passes).map(|(number, (place, _))| (number, *place)).collect();
         let within = below.iter().copied().filter(|(_, place)| self.is_within(*place));
@@ -329,14 +326,6 @@ impl<K: Kind> Directory<K> {
     /// Returns whether a place is behind the root.
     fn is_within(&self, place: Place) -> bool {
         place.offset >= self.bytes.start && place.range().end <= self.bytes.end
-    }
-
-    /// Returns whether a page and the directory pages above it are present.
-    pub fn is_present(&self, file: Option<&Bytes>, page: u32) -> bool {
-        (0..self.shape.root()).all(|level| match self.place(file, level, self.above(page, level)) {
-            Ok(place) => is_present(file, place),
-            Err(_) => false,
-        })
     }
 
     /// The directory page of a level that lists a page, directly or below.
@@ -371,7 +360,7 @@ impl<K: Kind> Directory<K> {
             let message = format!("it is not among the pages, from byte {start} to byte {end}");
             return Err(Fault::Damaged(place(), message));
         }
-        let file = file.filter(|_| is_present(file, stored));
+        let file = file.filter(|file| stored.range().end <= file.len());
         let file = file.ok_or_else(|| Fault::Incomplete(place()))?;
         if stored.bytes as usize != self.shape.length::<K>(level, number) {
             let message = format!("it has {} bytes, not those of its records", stored.bytes);
@@ -452,10 +441,6 @@ impl<K: Kind> Directory<K> {
 
 fn name(level: usize, number: u32, place: Place) -> String {
     format!("directory page {number} of level {level} (byte {})", place.offset)
-}
-
-fn is_present(file: Option<&Bytes>, place: Place) -> bool {
-    file.is_none_or(|file| place.range().end <= file.len())
 }
 
 /// Decodes a directory page.

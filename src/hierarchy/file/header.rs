@@ -60,13 +60,7 @@ pub struct Stored {
     pub file_bytes: u64,
     pub blocks: u32,
     pub pages: u32,
-    /// Whether the directory is not divided into pages, as in versions 1 and 2.
-    pub is_flat: bool,
 }
-
-/// The version of files with a flat directory, and of those of trained Gaussians.
-const FLAT: u32 = 1;
-const FLAT_TRAINED: u32 = 2;
 
 impl Stored {
     /// Returns the size in bytes of the header with its checksum.
@@ -79,11 +73,7 @@ impl Stored {
         let mut out = Vec::with_capacity(self.length());
         out.put(&MAGIC);
         let is_trained = header.degree.is_some();
-        out.u32(match (self.is_flat, is_trained) {
-            (false, _) => VERSION,
-            (true, false) => FLAT,
-            (true, true) => FLAT_TRAINED,
-        });
+        out.u32(VERSION);
         let flags =
             [header.closed, header.has_color, header.has_normals, header.lossless, is_trained];
         out.u32(flags.iter().enumerate().map(|(bit, &flag)| u32::from(flag) << bit).sum());
@@ -120,7 +110,7 @@ impl Stored {
             return Err(Refusal::Foreign);
         }
         let version = cursor.u32().ok_or(Refusal::Incomplete)?;
-        if !(FLAT..=VERSION).contains(&version) {
+        if version != VERSION {
             return Err(Refusal::Version(version));
         }
         // The lengths of the texts decide where the checksum is, and the checksum whether the
@@ -132,21 +122,15 @@ impl Stored {
         if stated != crc32fast::hash(text) {
             return Err(Refusal::Damaged("its checksum does not match"));
         }
-        Self::fields(cursor, text, unit, version).ok_or(Refusal::Incomplete)?
+        Self::fields(cursor, text, unit).ok_or(Refusal::Incomplete)?
     }
 
     /// Reads the fields from a cursor behind the version. `text` is the header without its
     /// checksum.
-    fn fields(
-        mut cursor: Cursor,
-        text: &[u8],
-        unit: usize,
-        version: u32,
-    ) -> Option<Result<Self, Refusal>> {
+    fn fields(mut cursor: Cursor, text: &[u8], unit: usize) -> Option<Result<Self, Refusal>> {
         let (fixed, texts) = text.split_at_checked(FIXED)?;
         let flags = cursor.u32()?;
         let is_trained = flags >> 4 & 1 == 1;
-        let is_flat = version != VERSION;
         let file_bytes = cursor.u64()?;
         let origin = cursor.dvec3()?;
         let bounds = Bounds { min: cursor.dvec3()?, max: cursor.dvec3()? };
@@ -172,14 +156,13 @@ impl Stored {
             return Some(Err(Refusal::Damaged("its texts are not UTF-8")));
         };
         let sound = flags < 32
-            && (!is_flat || is_trained == (version == FLAT_TRAINED))
             && degree.is_none_or(|degree| degree <= MOST_DEGREE)
             && fault_of_box(origin, &bounds).is_none()
             && fault_of_extent(extent).is_none()
             && (1..=nodes).contains(&leaves)
             && (1..=pages).contains(&blocks)
             // Each page has a record, so that the time to read them is bounded by the file.
-            && (is_flat || file_bytes / Listing::ENTRY as u64 >= u64::from(pages));
+            && file_bytes / Listing::ENTRY as u64 >= u64::from(pages);
         if !sound {
             return Some(Err(Refusal::Damaged("its values contradict each other")));
         }
@@ -201,7 +184,7 @@ impl Stored {
             unit,
             source,
         };
-        Some(Ok(Self { header, file_bytes, blocks, pages, is_flat }))
+        Some(Ok(Self { header, file_bytes, blocks, pages }))
     }
 }
 

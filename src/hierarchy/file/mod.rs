@@ -14,7 +14,6 @@ mod direction;
 mod drafts;
 mod entropy;
 mod entry;
-mod flat;
 mod header;
 mod lossless;
 mod lossy;
@@ -47,7 +46,7 @@ const GROWTH: usize = 4;
 /// The first bytes of a file: a name, and line ends that a transfer as text would change.
 const MAGIC: [u8; 8] = *b"SPLK\r\n\x1a\n";
 
-/// The version that is written. Versions 1 and 2 have a flat directory.
+/// The version of the files.
 const VERSION: u32 = 3;
 
 /// Bytes of the BLAKE3 hash at the end of a file.

@@ -4,7 +4,6 @@
 use super::{
     HASH,
     entry::{self, Listing, NO_PORTAL, PageEntry},
-    flat::{Flat, Trouble},
     header::{Header, Refusal, Stored},
     page::{self, Frame},
     pages::{Around, in_order, pages},
@@ -150,17 +149,7 @@ impl Hierarchy {
     /// and incomplete files; [`Error::Limit`] and [`Error::File`] as for every input.
     pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
         let path = &input::address(path.as_ref());
-        Self::new(path, Bytes::open(path, limits)?, limits, false)
-    }
-
-    /// Opens the beginning of a file that is still being transferred, or was cut off, as a coarser
-    /// model. [`is_present`](Self::is_present) returns which pages are available.
-    ///
-    /// # Errors
-    /// Those of [`open`](Self::open), if the header or the directory is not complete.
-    pub fn open_prefix(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
-        let path = &input::address(path.as_ref());
-        Self::new(path, Bytes::open(path, limits)?, limits, true)
+        Self::new(path, Bytes::open(path, limits)?, limits)
     }
 
     /// Opens the bytes of a file, which errors call `name`.
@@ -168,11 +157,11 @@ impl Hierarchy {
     /// # Errors
     /// Those of [`open`](Self::open).
     pub fn from_bytes(bytes: Vec<u8>, name: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
-        Self::new(name.as_ref(), Bytes::Held(bytes), limits, false)
+        Self::new(name.as_ref(), Bytes::Held(bytes), limits)
     }
 
-    fn new(path: &Path, bytes: Bytes, limits: &Limits, may_be_cut: bool) -> Result<Self> {
-        let begun = bytes.begun(|bytes| begin(path, bytes, limits, may_be_cut));
+    fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
+        let begun = bytes.begun(|bytes| begin(path, bytes, limits));
         let begun = begun.map_err(|error| bytes.why(path, error))?;
         Ok(Self::assemble(path, Store::File(bytes.ready()), begun, limits.clone()))
     }
@@ -269,24 +258,11 @@ impl Hierarchy {
         self.blocks > 1
     }
 
-    /// Returns whether a page is available. In a complete file all pages are; if only its beginning
-    /// is open, some are not. `false` for a page that the directory does not contain.
-    pub fn is_present(&self, page: u32) -> bool {
-        page < self.page_count()
-            && self.directory.is_present(self.bytes(), page)
-            && self.entry(page).is_ok_and(|entry| self.has(&entry))
-    }
-
-    /// Returns whether the page of an entry is available.
-    pub(in crate::hierarchy) fn has(&self, entry: &PageEntry) -> bool {
-        self.bytes().is_none_or(|file| entry.place.range().end <= file.len())
-    }
-
     /// Reads and decodes a page, and verifies its checksum. Can be called from any thread. Pages
     /// whose parents were read recently are faster.
     ///
     /// # Errors
-    /// [`Error::Input`] if the page, or a page above it, is damaged or not available;
+    /// [`Error::Input`] if the page, or a page above it, is damaged;
     /// [`Error::Argument`] if there is no such page.
     pub fn read_page(&self, page: u32) -> Result<Page> {
         let entry = self.entry(page)?;
@@ -647,27 +623,21 @@ struct Begun {
 }
 
 /// Reads and checks the beginning of a file.
-fn begin(path: &Path, file: &Bytes, limits: &Limits, may_be_cut: bool) -> Result<Begun> {
+fn begin(path: &Path, file: &Bytes, limits: &Limits) -> Result<Begun> {
     let stored = Stored::decode(&file.beginning(0)?).map_err(|refusal| refused(path, refusal))?;
-    let (directory, portals, memory) = match stored.is_flat {
-        true => flat_directory(path, file, &stored)?,
-        false => {
-            let root = Shape::of(stored.pages).root_length::<Listing>();
-            let kind = listing(&stored, (stored.length() + root) as u64);
-            let most = (stored.length() + MOST_ROOT) as u64;
-            let head = file.beginning(most)?;
-            let place = (stored.length(), kind.end);
-            let directory = Directory::open(kind, stored.pages, place, &head);
-            (directory.map_err(|fault| told(path, fault))?, None, 0)
-        }
-    };
+    let root = Shape::of(stored.pages).root_length::<Listing>();
+    let kind = listing(&stored, (stored.length() + root) as u64);
+    let head = file.beginning((stored.length() + MOST_ROOT) as u64)?;
+    let place = (stored.length(), kind.end);
+    let directory = Directory::open(kind, stored.pages, place, &head);
+    let directory = directory.map_err(|fault| told(path, fault))?;
     let Stored { header, file_bytes, blocks, .. } = stored;
     let present = file.len();
     if present > file_bytes {
         let message = format!("the file has {} bytes after its end", present - file_bytes);
         return Err(damaged(path, format!("byte {file_bytes}"), message));
     }
-    if present < file_bytes && !may_be_cut {
+    if present < file_bytes {
         return Err(incomplete(path, format!("byte {present} of {file_bytes}")));
     }
     for (what, found) in
@@ -675,33 +645,14 @@ fn begin(path: &Path, file: &Bytes, limits: &Limits, may_be_cut: bool) -> Result
     {
         limits.check(LimitKind::Points, path, what, found)?;
     }
-    limits.check(
-        LimitKind::Bytes,
-        path,
-        "the size of the file and its directory in bytes",
-        present + memory,
-    )?;
-    Ok(Begun { header, blocks, directory, portals })
+    limits.check(LimitKind::Bytes, path, "the size of the file in bytes", present)?;
+    Ok(Begun { header, blocks, directory, portals: None })
 }
 
 /// What the directory of a file lists, whose pages begin at byte `start`.
 fn listing(stored: &Stored, start: u64) -> Listing {
     let end = stored.file_bytes.saturating_sub(HASH as u64);
     Listing { blocks: stored.blocks, pages: stored.pages, start, end }
-}
-
-/// A directory of versions 1 and 2: with the page for each portal, and its size in memory.
-type FlatDirectory = (Directory<Listing>, Option<HashMap<u32, u32>>, u64);
-
-fn flat_directory(path: &Path, file: &Bytes, stored: &Stored) -> Result<FlatDirectory> {
-    let length = Flat::length(stored.blocks as usize, stored.pages as usize);
-    let head = file.beginning(length.saturating_add(stored.length() as u64))?;
-    let flat = Flat::decode(&head, stored).map_err(|trouble| match trouble {
-        Trouble::Incomplete => incomplete(path, "directory"),
-        Trouble::Damaged(message) => damaged(path, "directory", message),
-    })?;
-    let directory = Directory::held(listing(stored, stored.length() as u64 + length), &flat.pages);
-    Ok((directory, Some(flat.portals()), flat.memory()))
 }
 
 /// The error for a fault of the directory.
@@ -777,7 +728,7 @@ pub(super) fn refused(path: &Path, refusal: Refusal) -> Error {
         Refusal::Version(version) => Error::input(
             path,
             "header",
-            format!("has version {version}; versions 1 to {} can be read", super::VERSION),
+            format!("has version {version}; version {} can be read", super::VERSION),
         )
         .hint("convert the source again, or use the release that wrote the file"),
         Refusal::Damaged(message) => damaged(path, "header", message),
@@ -785,10 +736,8 @@ pub(super) fn refused(path: &Path, refusal: Refusal) -> Error {
 }
 
 pub(super) fn incomplete(path: &Path, place: impl Into<String>) -> Error {
-    Error::input(path, place, "the file is incomplete: it ends before its last page").hint(
-        "copy or convert it again; once the header and the directory are complete, the \
-             available part can be opened as a prefix",
-    )
+    Error::input(path, place, "the file is incomplete: it ends before its last page")
+        .hint("copy or convert it again")
 }
 
 pub(super) fn damaged(path: &Path, place: impl Into<String>, message: impl Into<String>) -> Error {

@@ -1,8 +1,6 @@
 //! Whole files: what is read is what was written, and damage is reported.
 
 #[allow(clippy::duplicate_mod, reason = "both rooms rewrite files")]
-#[path = "../../../tests/regressions/flat.rs"]
-mod flat_files;
 
 use super::{entry::Listing, page::Frame, *};
 use crate::{
@@ -152,8 +150,6 @@ fn pages_tell_their_parents(hierarchy: &Hierarchy) {
 #[test]
 fn pages_know_what_is_above_and_below() {
     for tree in trees() {
-        let flat = flat_files::flat(&to_bytes(&tree, &options(true)).unwrap());
-        pages_tell_their_parents(&open(flat));
         pages_tell_their_parents(&open(to_bytes(&tree, &options(true)).unwrap()));
         pages_tell_their_parents(&open(to_bytes(&tree, &options(false)).unwrap()));
         pages_tell_their_parents(&Hierarchy::from_tree(tree).unwrap());
@@ -241,48 +237,12 @@ fn every_prefix_is_incomplete() {
     }
 }
 
-#[test]
-fn the_beginning_of_a_file_is_a_coarse_model() {
-    let folder = Folder::new();
-    let bytes = to_bytes(&joined(&surface(40_000, 3), 3), &options(false)).unwrap();
-    let whole = open(bytes.clone());
-    let mut most = 0;
-    for part in 1..10 {
-        let path = folder.write(&format!("{part}.splk"), &bytes[..bytes.len() * part / 10]);
-        let prefix = Hierarchy::open_prefix(&path, &Limits::default()).unwrap();
-        let mut present = 0;
-        for page in 0..prefix.page_count() {
-            if prefix.is_present(page) {
-                assert_eq!(
-                    prefix.read_page(page).unwrap().nodes,
-                    whole.read_page(page).unwrap().nodes
-                );
-                let above = prefix.entry(page).unwrap().parent_pages;
-                assert!(
-                    above.into_iter().all(|above| prefix.is_present(above)),
-                    "parents come first"
-                );
-                present += 1;
-            } else {
-                input_error(prefix.read_page(page), "a page that is not there");
-            }
-        }
-        assert!(present >= most);
-        most = present;
-    }
-    assert!(most > 5);
-}
-
 /// Changes a file, and corrects the checksums of its header and its root, and the hash.
 fn forged(bytes: &[u8], change: impl Fn(&mut [u8])) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let stored = header::Stored::decode(&bytes).unwrap();
     let start = stored.length();
-    let end = start
-        + match stored.is_flat {
-            true => flat::Flat::length(stored.blocks as usize, stored.pages as usize) as usize,
-            false => Shape::of(stored.pages).root_length::<Listing>(),
-        };
+    let end = start + Shape::of(stored.pages).root_length::<Listing>();
     change(&mut bytes);
     for range in [0..start, start..end] {
         let crc = crc32fast::hash(&bytes[range.start..range.end - 4]);
@@ -296,36 +256,31 @@ fn forged(bytes: &[u8], change: impl Fn(&mut [u8])) -> Vec<u8> {
 
 #[test]
 fn lies_are_told_though_checksums_fit() {
-    let paged = to_bytes(&joined(&surface(9_000, 8), 2), &options(false)).unwrap();
-    let flat = flat_files::flat(&paged);
-    let pages = open(paged.clone()).page_count();
-    let start = header::Stored::decode(&paged).unwrap().length();
-    for (bytes, end) in [
-        (paged, start + 68 * pages as usize),
-        (flat, start + flat::Flat::length(3, pages as usize) as usize - 4),
-    ] {
-        assert!(try_all(forged(&bytes, |_| ())).is_ok());
-        // The version, the counts of leaves, nodes, blocks and pages; then every word of the
-        // directory.
-        for at in [8, 16, 104, 112, 124, 128].into_iter().chain((start..end).step_by(4)) {
-            for change in [1u32, 0x0100_0000, u32::MAX] {
-                let broken = forged(&bytes, |bytes| {
-                    let word = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) ^ change;
-                    bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
-                });
-                let folder = Folder::new();
-                let path = folder.write("forged.splk", &broken);
-                assert!(!check(&path, &Limits::default()).is_sound(), "word {at} ^ {change:x}");
-                try_all(broken).ok();
-            }
+    let bytes = to_bytes(&joined(&surface(9_000, 8), 2), &options(false)).unwrap();
+    let pages = open(bytes.clone()).page_count();
+    let start = header::Stored::decode(&bytes).unwrap().length();
+    let end = start + 68 * pages as usize;
+    assert!(try_all(forged(&bytes, |_| ())).is_ok());
+    // The version, the counts of leaves, nodes, blocks and pages; then every word of the
+    // directory.
+    for at in [8, 16, 104, 112, 124, 128].into_iter().chain((start..end).step_by(4)) {
+        for change in [1u32, 0x0100_0000, u32::MAX] {
+            let broken = forged(&bytes, |bytes| {
+                let word = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) ^ change;
+                bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
+            });
+            let folder = Folder::new();
+            let path = folder.write("forged.splk", &broken);
+            assert!(!check(&path, &Limits::default()).is_sound(), "word {at} ^ {change:x}");
+            try_all(broken).ok();
         }
-        let future = forged(&bytes, |bytes| bytes[8] = 9);
-        match try_all(future) {
-            Err(crate::Error::Input { message, .. }) => {
-                assert!(message.contains("version 9"), "{message}");
-            }
-            other => panic!("{other:?}"),
+    }
+    let future = forged(&bytes, |bytes| bytes[8] = 9);
+    match try_all(future) {
+        Err(crate::Error::Input { message, .. }) => {
+            assert!(message.contains("version 9"), "{message}");
         }
+        other => panic!("{other:?}"),
     }
 }
 
@@ -502,8 +457,6 @@ fn disorder_is_refused() {
     let mut torn = sound.clone();
     torn.blocks[0].nodes[0].first_child = u32::MAX;
     assert!(matches!(torn.cut(&view, Detail::Pixels(1.0), None), Err(crate::Error::Argument(_))));
-    let whole = Hierarchy::from_tree(sound).expect("a hierarchy");
-    assert!(whole.is_present(0) && !whole.is_present(u32::MAX));
 }
 
 #[test]

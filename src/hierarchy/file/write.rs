@@ -229,7 +229,6 @@ impl Writer {
             file_bytes: 0,
             blocks: self.drafts.blocks() + u32::from(!joint.pages.is_empty()),
             pages: self.drafts.pages + joint.pages.len() as u32,
-            is_flat: false,
         };
         let mut out = target()?;
         let written = self.assemble(&mut stored, joint, &mut out);

@@ -11,7 +11,7 @@ use splatkit::{
     math::Bounds,
     scattered::Points,
     scene::{Item, Scene},
-    session::{Data, Subject},
+    session::{Data, Framing, Subject},
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
@@ -311,7 +311,9 @@ impl Items {
         };
         let names = self.contents.iter().zip(&self.are_files).zip(&scene.items);
         match names.max_by(|(_, a), (_, b)| reach(a).total_cmp(&reach(b))) {
-            Some(((content, true), _)) => error.stated_in(content.1.as_ref(), "bounds"),
+            Some(((content, true), item)) => {
+                Framing::out_of_sight(content.1.as_ref(), item.bounds(), &error)
+            }
             _ => error,
         }
     }
