@@ -217,8 +217,8 @@ fn add_gradient(r: u32, slopes: vec3<f32>, face: ptr<function, Face>) {
     (*face).slope = (gradient - (*face).along * direction).xy * frame.fields[0].gradients.z;
 }
 
-// Sheets whose field differs from a straight line by fewer entries of the table have the gradients
-// of the cubic between their faces.
+// Sheets whose field differs from a straight line by fewer entries of the table have gradients that
+// are linear across the ray, and along it the derivative of the parabola of the values.
 const STRAIGHT: f32 = 64.0;
 
 // Returns the mean of a sheet: that of the cubic with the values and slopes along the ray of both
@@ -238,8 +238,11 @@ fn mean_of(r: u32, sheet: u32, own: ptr<function, Sheet>) -> f32 {
         (*own).inside = field_at(r, 0.5 * (planes[sheet] + planes[sheet + 1u]));
         return (sum * 7.0 + (*own).inside.value * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
     }
+    let along = (back.value - front.value) / thickness;
+    (*own).front.along = along + 0.5 * bend / thickness;
+    (*own).back.along = along - 0.5 * bend / thickness;
+    (*own).inside.along = along;
     (*own).inside.slope = 0.5 * (front.slope + back.slope);
-    (*own).inside.along = 0.5 * (front.along + back.along) + 1.5 * skew / thickness;
     return 0.5 * sum + bend * (1.0 / 12.0);
 }
 
