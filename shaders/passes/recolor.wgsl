@@ -1,5 +1,5 @@
-// Recolor: gives trained Gaussians the colours that an eye sees. Their harmonics lie in blocks of 64
-// Gaussians, number by number, so that neighbouring invocations read neighbouring words.
+// Recolor: gives trained Gaussians the colours that an eye sees. Their harmonics lie in blocks of
+// 64 Gaussians, number by number, so that neighbouring invocations read neighbouring words.
 // src/gaussians/harmonics.rs has the same sum.
 
 struct Eye {
@@ -9,6 +9,7 @@ struct Eye {
     count: u32,
     // (degree + 1)².
     terms: u32,
+    unused: vec2<u32>,
 }
 
 @group(0) @binding(0) var<uniform> eye: Eye;

@@ -4,10 +4,10 @@
 // first moments: ∂E[f]/∂p = (E[n·f] − E[n]·E[f])/σ², with n the sample's index along the axis.
 //
 // The shader that includes this file declares `shown`. It has a bit for each sample: whether
-// something may be visible at the places nearest to that sample. The bits of each block of 4 × 4 × 4
+// something may be visible at the places nearest to that sample. The bits of each block of 4³
 // samples are two words. Behind them it has, for each entry of the transfer function's table, the
-// number of visible entries before it. Then follow, for each tile, the sheets in which something may
-// be visible, as bits (mark.wgsl).
+// number of visible entries before it. Then follow, for each tile, the sheets in which something
+// may be visible, as bits (mark.wgsl).
 
 // The samples in the type of their file. Each row along x is packed in 32-bit words, with padding
 // behind its end. It is a texture, because Mesa's software Vulkan reads eight elements of a buffer

@@ -4,10 +4,7 @@
 use super::{
     Brick, EMPTY, Level,
     cut::Slices,
-    file::{
-        Entry, HASH, Listing, Numbers, Refusal, Stored, VERSION, decode,
-        too_short,
-    },
+    file::{Entry, HASH, Listing, Numbers, Refusal, Stored, VERSION, decode, too_short},
     halve::halve,
     level,
 };

@@ -1,7 +1,5 @@
 //! Bricks in memory, in files and built by hand.
 
-#[allow(clippy::duplicate_mod, reason = "both rooms rewrite files")]
-
 use super::{
     file::{to_bytes, with_changes},
     *,

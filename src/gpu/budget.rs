@@ -7,9 +7,9 @@ use crate::gpu::{device::Gpu, pipeline::variant::RECORD_WORDS};
 pub struct Budget {
     /// (splat, tile, window) triples of a pass, of 4 bytes each.
     pub entries: u32,
-    /// Record words of a pass, of 16 bytes each, and as many bytes again where all records have one.
-    /// An isotropic lattice sample takes one, any other splat four. A pass has no more than the
-    /// scene's splats could take, and no more records than an entry can number (4 million).
+    /// Record words of a pass, of 16 bytes each, with 16 bytes more for each record. An isotropic
+    /// lattice sample takes one word, any other splat four. A pass has no more than the scene's
+    /// splats could take, and no more records than an entry can number (4 million).
     pub record_words: u32,
     /// Minimum number of entries in a pass that could end earlier to find out which splats it
     /// hides. `None`: as many as make another pass worthwhile.

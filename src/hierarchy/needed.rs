@@ -133,9 +133,7 @@ fn found(
     let mut all = All::default();
     hierarchy.visit(around, |runs| {
         let of_run = |(first, entries): &(u32, std::sync::Arc<[PageEntry]>)| {
-            let test = |(page, entry): &(u32, &PageEntry)| {
-                hierarchy.has(entry) && (*page == 0 || wanted(&parents_of(entry)))
-            };
+            let test = |(page, entry): &(u32, &PageEntry)| *page == 0 || wanted(&parents_of(entry));
             let own = (*first..).zip(entries.iter()).filter(test);
             own.map(|(page, entry)| (page, Found::of(entry))).collect::<Vec<_>>()
         };

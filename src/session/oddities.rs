@@ -40,8 +40,7 @@ fn of_bounds(bounds: Bounds) -> Option<Finding> {
         return None;
     }
     let fault = Framing::usual_fault(&subject, &bounds, [1280, 720])?;
-    let Error::Input { place, message, .. } =
-        Framing::out_of_sight(Path::new(""), bounds, &fault)
+    let Error::Input { place, message, .. } = Framing::out_of_sight(Path::new(""), bounds, &fault)
     else {
         return None;
     };

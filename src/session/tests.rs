@@ -18,11 +18,11 @@ use glam::DVec3;
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 const TABLE: &str = "x,y,z,value\n0,0,0,1\n1,0,0,2\n0,1,0,3\n0,0,1,nan\n";
 
-fn raw() -> ReadOptions {
+fn raw(spacing: f64) -> ReadOptions {
     ReadOptions::raw(Some(&RawLayout {
         dims: [2, 2, 2],
         sample_type: SampleType::U8,
-        spacing: DVec3::ONE,
+        spacing: DVec3::splat(spacing),
         endian: Default::default(),
         header: 0,
     }))
@@ -37,7 +37,7 @@ fn each_kind_is_found_and_read() {
         (folder.write("c.bin", [0, 1, 2, 3, 4, 5, 6, 7]), Kind::Volume, 8),
     ];
     for (path, kind, count) in files {
-        let reading = Reading::new(raw(), Limits::default());
+        let reading = Reading::new(raw(1.0), Limits::default());
         assert_eq!(reading.kind(&path).unwrap(), kind);
         let opened = reading.open(&path).unwrap();
         assert_eq!((opened.kind(), opened.is_raw()), (kind, path.ends_with("c.bin")));
@@ -98,15 +98,14 @@ fn files_of_no_kind_name_what_is_read() {
 fn oddities_are_found() {
     let folder = Folder::new();
     let path = folder.write("a.obj", MESH.as_bytes());
-    let codes = |path| -> Vec<_> {
-        let data = Reading::default().open(path).unwrap().read().unwrap();
+    let codes = |options, path| -> Vec<_> {
+        let data = Reading::new(options, Limits::default()).open(path).unwrap().read().unwrap();
         data.oddities(Deadline::NEVER).unwrap().iter().map(|finding| finding.code).collect()
     };
-    assert_eq!(codes(&path), ["open"]);
-    // Positions so far out that 32 bits do not hold their squares.
-    let far = MESH.replace("v 1", "v 1e30");
-    assert_ne!(far, MESH);
-    assert!(codes(&folder.write("far.obj", far.as_bytes())).contains(&"out-of-sight"));
+    assert_eq!(codes(ReadOptions::default(), &path), ["open"]);
+    let path = folder.write("c.bin", [0, 1, 2, 3, 4, 5, 6, 7]);
+    assert_eq!(codes(raw(1.0), &path), [""; 0]);
+    assert_eq!(codes(raw(1e30), &path), ["out-of-sight"]);
 }
 
 /// The first statement of a file decides how a scene stands, then the convention.

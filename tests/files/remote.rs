@@ -1,12 +1,10 @@
 //! Pictures of remote objects are those of the local files, whatever the server does wrong: the
 //! same bytes, or a clear error.
 
-use crate::{
-    testing::{
-        folder::Folder,
-        grid::grid,
-        server::{Fault, Server},
-    },
+use crate::testing::{
+    folder::Folder,
+    grid::grid,
+    server::{Fault, Server},
 };
 use glam::DVec3;
 use splatkit::{
@@ -31,7 +29,7 @@ use splatkit::{
 use std::{
     io::Cursor,
     path::{Path, PathBuf},
-    sync::{Arc, OnceLock},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -44,11 +42,19 @@ fn knot(count: u32) -> Vec<u8> {
     file::to_bytes(&tree, &WriteOptions::default()).expect("a file")
 }
 
-/// Keeps what all tests of this process fetch in one temporary folder.
-fn keep() {
+/// Keeps the process's cache for one test as long as the result lives.
+fn alone() -> MutexGuard<'static, ()> {
+    static CACHE: Mutex<()> = Mutex::new(());
+    CACHE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Keeps what tests fetch in one temporary folder, for one test at a time.
+fn keep() -> MutexGuard<'static, ()> {
     static FOLDER: OnceLock<Folder> = OnceLock::new();
+    let own = alone();
     let folder = FOLDER.get_or_init(Folder::new);
     set_cache(Cache { folder: folder.path("cache"), bytes: 1 << 30 });
+    own
 }
 
 /// A LAZ file of 80,000 points along a bumpy strip, in chunks of 4,000 from one end to the other,
@@ -97,7 +103,7 @@ fn strip() -> Vec<u8> {
 
 #[test]
 fn clouds_are_converted_piece_by_piece() {
-    let folder = Folder::new();
+    let (_cache, folder) = (alone(), Folder::new());
     // Too small for the object as a whole.
     let forget = || set_cache(Cache { folder: folder.path("kept"), bytes: 1 << 20 });
     let bytes = strip();
@@ -157,7 +163,7 @@ fn limits() -> Limits {
 
 #[test]
 fn a_hierarchy_is_drawn_in_ranges() {
-    keep();
+    let _cache = keep();
     let bytes = knot(60_000);
     let local = picture_of(Hierarchy::from_bytes(bytes.clone(), "a.splk", &limits())).unwrap();
     let server = Server::of(bytes.clone());
@@ -176,7 +182,7 @@ fn a_hierarchy_is_drawn_in_ranges() {
 
 #[test]
 fn the_first_request_has_the_first_picture() {
-    keep();
+    let _cache = keep();
     let bytes = file::to_bytes(&grid(4), &WriteOptions::default()).unwrap();
     assert!(bytes.len() > 3 * (256 << 10), "{}", bytes.len());
     let server = Server::of(bytes);
@@ -225,7 +231,7 @@ fn first_picture_of_many_pages() {
 
 #[test]
 fn a_hierarchy_is_never_drawn_wrong() {
-    keep();
+    let _cache = keep();
     let bytes = knot(60_000);
     let local = picture_of(Hierarchy::from_bytes(bytes.clone(), "a.splk", &limits())).unwrap();
     for fault in [Fault::Cut(70_000), Fault::Status(500), Fault::Wrong] {
@@ -260,7 +266,7 @@ fn a_hierarchy_is_never_drawn_wrong() {
 
 #[test]
 fn volumes_in_bricks_are_drawn_in_ranges() {
-    keep();
+    let _cache = keep();
     let folder = Folder::new();
     // Noise, which cannot be packed into the first request.
     let mixed = |at: u32| (at ^ at >> 7).wrapping_mul(2_654_435_761);
@@ -294,7 +300,7 @@ fn volumes_in_bricks_are_drawn_in_ranges() {
 
 #[test]
 fn other_formats_are_fetched_as_a_whole() {
-    keep();
+    let _cache = keep();
     let folder = Folder::new();
     formats::ply::write(&Mesh::sphere(4), folder.path("a.ply")).unwrap();
     let server = Server::of(std::fs::read(folder.path("a.ply")).unwrap());

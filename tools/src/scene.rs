@@ -83,8 +83,8 @@ impl SceneFlags {
         files.into_iter().try_for_each(|path| self.load.kind(path).map(drop))
     }
 
-    /// Reads the inputs and makes a scene of them. Meshes become surfels; with `facets`, those whose
-    /// triangles can be larger than pixels become facets.
+    /// Reads the inputs and makes a scene of them. Meshes become surfels; with `facets`, those
+    /// whose triangles can be larger than pixels become facets.
     pub fn load(
         &self,
         facets: bool,

@@ -9,7 +9,10 @@ use crate::{
             AGAIN_ARGUMENTS, ARGUMENT_BYTES, MARCH_ARGUMENTS, ORDER_ARGUMENTS, PASS_BYTES,
             SCAN_ARGUMENTS, State, TILE_ARGUMENTS,
         },
-        scene::nodes::{GpuBounds, GpuCut, GpuNode},
+        scene::{
+            nodes::{GpuBounds, GpuCut, GpuNode},
+            recolor::GpuEye,
+        },
     },
     plan::uniforms::{Frame, FrameClip, FrameField, FrameIsosurface, Source},
     splat::Splat,
@@ -151,7 +154,9 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
         size, first_row, is_srgb, center, scale, perspective, word, wanted, stalled, far, has_depth,
         unused,
     );
+    let eye = layout!(GpuEye: place, count, terms, unused);
     [
+        ("Eye", eye),
         ("Frame", frame),
         ("Field", field),
         ("Clip", layout!(FrameClip: low, high)),

@@ -1,5 +1,6 @@
-//! Compute pipelines: the commands of a frame, the shader files, the constants of a variant that precede them, the bindings,
-//! the state of a frame that shaders update, and the prefix sum that several passes share.
+//! Compute pipelines: the commands of a frame, the shader files, the constants of a variant that
+//! precede them, the bindings, the state of a frame that shaders update, and the prefix sum that
+//! several passes share.
 
 pub(crate) mod commands;
 pub(crate) mod recipe;

@@ -35,14 +35,14 @@ pub struct Harmonics {
     eye: wgpu::Buffer,
 }
 
-/// The uniform of the pass.
+/// The uniform of the pass (`Eye` in recolor.wgsl).
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Uniform {
-    place: [f32; 4],
-    count: u32,
-    terms: u32,
-    unused: [u32; 2],
+pub struct GpuEye {
+    pub place: [f32; 4],
+    pub count: u32,
+    pub terms: u32,
+    pub unused: [u32; 2],
 }
 
 impl Harmonics {
@@ -64,7 +64,7 @@ impl Harmonics {
             count: order.len() as u32,
             terms: terms(set.degree) as u32,
             numbers: upload(gpu, "harmonics", bytemuck::cast_slice(&numbers)),
-            eye: buffer(gpu, "eye", size_of::<Uniform>() as u64, wgpu::BufferUsages::UNIFORM),
+            eye: buffer(gpu, "eye", size_of::<GpuEye>() as u64, wgpu::BufferUsages::UNIFORM),
         }
     }
 
@@ -109,7 +109,7 @@ impl Recolor {
             Eye::Along(direction) => (direction, 0.0),
         };
         let place = at.as_vec3().extend(w).to_array();
-        let uniform = Uniform { place, count: *count, terms: *terms, unused: [0; 2] };
+        let uniform = GpuEye { place, count: *count, terms: *terms, unused: [0; 2] };
         gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&uniform));
         let buffers = [buffer, numbers, splats].map(|b| b.as_entire_buffer_binding());
         let group = self.0.bind(gpu, 0, &buffers);

@@ -352,8 +352,7 @@ impl Hierarchy {
     fn fetch(&self, pages: impl Iterator<Item = u32>) -> Result<()> {
         let Store::File(file) = &self.store else { return Ok(()) };
         let entries = pages.map(|page| self.entry(page)).collect::<Result<Vec<_>>>()?;
-        let places = entries.iter().filter(|entry| self.has(entry));
-        file.fetch(places.map(|entry| entry.place.range()))
+        file.fetch(entries.iter().map(|entry| entry.place.range()))
     }
 
     /// Reads the whole tree.
@@ -477,7 +476,7 @@ impl Hierarchy {
         };
         let Place { offset, crc, .. } = entry.place;
         let place = || format!("page {page} (byte {offset})");
-        if !self.has(entry) {
+        if entry.place.range().end > file.len() {
             return Err(incomplete(&self.path, place()));
         }
         let has_links = self.portals.is_none() && self.has_portals(entry);

@@ -1,7 +1,5 @@
 //! Whole files: what is read is what was written, and damage is reported.
 
-#[allow(clippy::duplicate_mod, reason = "both rooms rewrite files")]
-
 use super::{entry::Listing, page::Frame, *};
 use crate::{
     about::Stance,
