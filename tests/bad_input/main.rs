@@ -323,15 +323,15 @@ fn shared_pieces(count: usize, bytes: usize) -> Vec<u8> {
 /// A hierarchy file of few bytes and many nodes stays within the limit, however it is read.
 #[test]
 fn equal_pages_are_read_within_limits() {
-    let limits = Limits { bytes: 256 << 20, ..Limits::default() };
-    let bytes = crafted::pages_of_one_node(100);
+    let limits = Limits { bytes: 64 << 20, ..Limits::default() };
+    let bytes = crafted::pages_of_one_node(56);
     let hierarchy =
         Hierarchy::from_bytes(bytes, Path::new("equal.splk"), &limits).expect("a directory");
     let told = [
         hierarchy.read_tree().map(|_| ()).expect_err("too much").to_string(),
         hierarchy.leaves().map(|_| ()).expect_err("too much").to_string(),
     ];
-    assert!(told.iter().all(|told| told.contains("over the limit of 268435456")), "{told:?}");
+    assert!(told.iter().all(|told| told.contains("over the limit of 67108864")), "{told:?}");
     assert_eq!(hierarchy.read_page(0).expect("a page").nodes.len(), 4089);
 }
 
@@ -349,9 +349,9 @@ fn worst_inputs() -> Vec<Input> {
         ("bomb.png", png(8000, 8000)),
         ("large.png", png(2000, 2000)),
         ("bomb.splk", crafted::page_of_zeros(1 << 30)),
-        ("equal.splk", crafted::pages_of_one_node(100)),
+        ("equal.splk", crafted::pages_of_one_node(56)),
         ("bomb.splv", crafted::brick_of_zeros(1 << 30)),
-        ("equal.splv", crafted::bricks_of_one_value([4096, 4096, 64])),
+        ("equal.splv", crafted::bricks_of_one_value([448, 448, 64])),
     ]);
     inputs
 }

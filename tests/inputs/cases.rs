@@ -1291,12 +1291,12 @@
         (
             "future.splk",
             at(splk(true), 8, &99u32.to_le_bytes()),
-            "future.splk: header: has version 99; versions 1 to 3 can be read",
+            "future.splk: header: has version 99; version 3 can be read",
         ),
         (
             "future.splv",
             at(bricks(), 8, &99u32.to_le_bytes()),
-            "future.splv: header: has version 99; versions 1 and 2 can be read",
+            "future.splv: header: has version 99; version 2 can be read",
         ),
         (
             "tail.splk",

@@ -113,8 +113,8 @@ pub fn far_page() -> Vec<u8> {
 }
 
 /// A tree of equal nodes with eight children each: `full` pages of inner nodes, and eight times as
-/// many pages of leaves below them, in version 1. Each page takes 100 bytes in the file and 320 KiB
-/// in memory.
+/// many pages of leaves below them; at most 512 in all. Each page takes 120 bytes in the file and
+/// 320 KiB in memory.
 pub fn pages_of_one_node(full: u32) -> Vec<u8> {
     // 45 columns of one number each, and no symbols: the four states as they begin.
     let page = |children: u8| {
@@ -136,30 +136,40 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
     let nodes = 1 + 8 * inner;
     let count = 1 + (nodes - first_page).div_ceil(PAGE_NODES);
     let mut head = splk(false)[..160].to_vec();
-    head[8..12].copy_from_slice(&1u32.to_le_bytes());
     head[104..112].copy_from_slice(&u64::from(nodes - inner).to_le_bytes());
     head[112..120].copy_from_slice(&u64::from(nodes).to_le_bytes());
     head[128..132].copy_from_slice(&count.to_le_bytes());
     head[136..144].fill(0);
-    let block = [0, count, nodes, u32::MAX];
+    let page_of = |node: u32| node.checked_sub(first_page).map_or(0, |at| 1 + at / PAGE_NODES);
     let (mut directory, mut contents) = (Vec::new(), Vec::new());
     let mut begin = 0;
     for number in 0..count {
         let content = page(u8::from(number < full));
         let own = if number == 0 { first_page } else { PAGE_NODES.min(nodes - begin) };
         let first_child = nodes.min(1 + 8 * begin);
-        begin += own;
-        // Entries in the order of the file.
+        let child_page = if number < full { page_of(first_child) } else { u32::MAX };
+        let parents = match number {
+            0 => [0, 0],
+            _ => {
+                let [first, last] = [begin - 1, begin + own - 2].map(|node| page_of(node / 8));
+                [first, last - first + 1]
+            }
+        };
+        // Records in the order of the file.
         directory.extend(u64::from(number).to_le_bytes());
+        let [parent, parents] = parents;
         directory.extend(
-            [content.len() as u32, 0, own, first_child].iter().flat_map(|v| v.to_le_bytes()),
+            [content.len() as u32, 0, 0, begin, own, first_child, child_page, parent, parents]
+                .iter()
+                .chain(&[u32::MAX])
+                .flat_map(|v| v.to_le_bytes()),
         );
         let around = if number == 0 { f32::INFINITY } else { 1.0 };
         directory.extend([0f32, 0.0, 0.0, around, around].iter().flat_map(|v| v.to_le_bytes()));
         contents.extend(content);
+        begin += own;
     }
-    let block: Vec<u8> = block.iter().flat_map(|v: &u32| v.to_le_bytes()).collect();
-    summed([&head[..], &[0; 4], &block, &directory, &[0; 4], &contents, &[0; 32]].concat())
+    summed([&head[..], &[0; 4], &directory, &[0; 4], &contents, &[0; 32]].concat())
 }
 
 /// Numbers of bricks and of levels of a volume of `dims` samples.
@@ -175,17 +185,17 @@ fn bricks_and_levels(dims: [u64; 3]) -> [u64; 2] {
     }
 }
 
-/// A bricked volume of version 1, of bytes that all have one value: 16 bytes in the file for each
-/// brick of 32 KiB.
+/// A bricked volume of bytes that all have one value: 24 bytes in the file for each brick of 32 KiB,
+/// of which there are at most 512.
 pub fn bricks_of_one_value(dims: [u64; 3]) -> Vec<u8> {
     let [bricks, levels] = bricks_and_levels(dims);
     let mut head = splv(&Folder::new())[..192].to_vec();
-    head[8..12].copy_from_slice(&1u32.to_le_bytes());
     head[24..48].copy_from_slice(&dims.map(u64::to_le_bytes).concat());
     head[144..160].fill(0);
     head[160..164].copy_from_slice(&(levels as u32).to_le_bytes());
     head[172..180].fill(0);
-    let entry = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0];
+    let mut entry = [0; OF_BRICK];
+    entry[22] = 3;
     let mut bytes = [&head[..], &[0; 4], &entry.repeat(bricks as usize), &[0; 4 + 32]].concat();
     sum_bricks(&mut bytes).expect("bricks");
     bytes

@@ -24,40 +24,33 @@ fn hash(bytes: &mut [u8]) -> Option<()> {
     put(bytes, end, &hash)
 }
 
-/// Corrects a `.splk` of any version; docs/splk.md describes its layout. Returns `None` if there
-/// are fewer bytes than the file claims.
+/// Corrects a `.splk`; docs/splk.md describes its layout. Returns `None` if there are fewer bytes
+/// than the file claims.
 pub fn sum_hierarchy(bytes: &mut [u8]) -> Option<()> {
     put(bytes, 0, b"SPLK\r\n\x1a\n")?;
-    let version = word(bytes, 8).filter(|version| [1, 2].contains(version)).unwrap_or(3);
-    put(bytes, 8, &(version as u32).to_le_bytes())?;
+    put(bytes, 8, &3u32.to_le_bytes())?;
     let length = bytes.len() as u64;
     put(bytes, 16, &length.to_le_bytes())?;
     let header_end = word(bytes, 136)?.checked_add(word(bytes, 140)?)?.checked_add(160)?;
-    let (blocks, pages) = (word(bytes, 124)?, word(bytes, 128)?);
+    let pages = word(bytes, 128)?;
     sum(bytes, 0, header_end)?;
     let start = header_end + 4;
-    match version {
-        3 if pages > RECORDS => sum_directory(bytes, start, pages, [68, 36])?,
-        3 => sum_pages(bytes, start, [start, 68], pages)?,
-        _ => sum_pages(bytes, start, [start + 16 * blocks, 44], pages)?,
+    match pages > RECORDS {
+        true => sum_directory(bytes, start, pages, [68, 36])?,
+        false => sum_pages(bytes, start, 68, pages)?,
     }
     hash(bytes)
 }
 
-/// Corrects a directory at byte `start`, whose `pages` records begin at byte `entries` and have
-/// `stride` bytes each, and the places of the pages behind it.
-fn sum_pages(
-    bytes: &mut [u8],
-    start: usize,
-    [entries, stride]: [usize; 2],
-    pages: usize,
-) -> Option<()> {
-    let directory_end = entries + stride * pages;
+/// Corrects a directory at byte `start`, of `pages` records of `stride` bytes each, and the places
+/// of the pages behind it.
+fn sum_pages(bytes: &mut [u8], start: usize, stride: usize, pages: usize) -> Option<()> {
+    let directory_end = start + stride * pages;
     let mut at = directory_end + 4;
     let end = bytes.len().checked_sub(32).filter(|&end| end >= at)?;
     let mut order: Vec<(u64, usize)> = Vec::new();
     for page in 0..pages {
-        let entry = entries + stride * page;
+        let entry = start + stride * page;
         order.push((u64::from_le_bytes(*bytes.get(entry..)?.first_chunk()?), entry));
     }
     order.sort_unstable();
@@ -113,12 +106,11 @@ fn sum_below(
     Some(())
 }
 
-/// Corrects a `.splv` of any version; docs/splv.md describes its layout. Returns `None` if there
-/// are fewer bytes than the file claims.
+/// Corrects a `.splv`; docs/splv.md describes its layout. Returns `None` if there are fewer bytes
+/// than the file claims.
 pub fn sum_bricks(bytes: &mut [u8]) -> Option<()> {
     put(bytes, 0, b"SPLV\r\n\x1a\n")?;
-    let version = word(bytes, 8).filter(|version| *version == 1).unwrap_or(2);
-    put(bytes, 8, &(version as u32).to_le_bytes())?;
+    put(bytes, 8, &2u32.to_le_bytes())?;
     let length = bytes.len() as u64;
     put(bytes, 16, &length.to_le_bytes())?;
     let header_end = word(bytes, 172)?.checked_add(word(bytes, 176)?)?.checked_add(192)?;
@@ -133,26 +125,10 @@ pub fn sum_bricks(bytes: &mut [u8]) -> Option<()> {
         }
         dims = dims.map(|n| n.div_ceil(2));
     }
-    if version == 2 {
-        let start = header_end + 4;
-        match count > RECORDS {
-            true => sum_directory(bytes, start, count, [24, 20])?,
-            false => sum_pages(bytes, start, [start, 24], count)?,
-        }
-        return hash(bytes);
+    let start = header_end + 4;
+    match count > RECORDS {
+        true => sum_directory(bytes, start, count, [24, 20])?,
+        false => sum_pages(bytes, start, 24, count)?,
     }
-    let directory_end = count.checked_mul(16)?.checked_add(header_end + 4)?;
-    let mut at = directory_end.checked_add(4)?;
-    let end = bytes.len().checked_sub(32).filter(|&end| end >= at)?;
-    for brick in 0..count {
-        let entry = header_end + 4 + 16 * brick;
-        let rest = end - at;
-        let length = if brick + 1 == count { rest } else { word(bytes, entry)?.min(rest) };
-        let crc = crc32fast::hash(&bytes[at..at + length]);
-        put(bytes, entry, &(length as u32).to_le_bytes())?;
-        put(bytes, entry + 4, &crc.to_le_bytes())?;
-        at += length;
-    }
-    sum(bytes, header_end + 4, directory_end)?;
     hash(bytes)
 }
