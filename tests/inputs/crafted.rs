@@ -185,8 +185,8 @@ fn bricks_and_levels(dims: [u64; 3]) -> [u64; 2] {
     }
 }
 
-/// A bricked volume of bytes that all have one value: 24 bytes in the file for each brick of 32 KiB,
-/// of which there are at most 512.
+/// A bricked volume of bytes that all have one value: 24 bytes in the file for each brick of 32
+/// KiB, of which there are at most 512.
 pub fn bricks_of_one_value(dims: [u64; 3]) -> Vec<u8> {
     let [bricks, levels] = bricks_and_levels(dims);
     let mut head = splv(&Folder::new())[..192].to_vec();
