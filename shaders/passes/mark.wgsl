@@ -18,8 +18,8 @@ const MOST_BLOCKS: u32 = 512u;
 struct Beam {
     starts: mat4x3<f32>,
     directions: mat4x3<f32>,
-    // The smallest cosine between a corner's ray and the middle one. Between the corners, rays
-    // of one length end outside the plane through the corners' ends, by at most this factor.
+    // The smallest cosine between the ray of a corner and the middle ray. A sheet ends at one
+    // distance from the eye, so it bulges out between the corners: by one over this at most.
     bulge: f32,
 }
 

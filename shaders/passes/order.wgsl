@@ -15,7 +15,7 @@
 @group(0) @binding(6) var<storage, read> records: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read> progress: array<u32>;
 
-// Entries of a bin that one invocation sorts. Those of a GPU are slow alone.
+// The most entries of a bin that one invocation sorts; few on a GPU, where one alone is slow.
 const SHORT: u32 = select(2048u, 12u, STAGED);
 // Entries that a workgroup sorts in its own memory.
 const ROOM: u32 = select(1u, 1024u, STAGED);

@@ -107,7 +107,7 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
         }
         box.first_tile |= select(0u, BOX_COARSE, (source.flags & FACETS) != 0u);
         boxes[at / RECORD_UNIT] = box;
-        // Among records of one word, one of four fills the places behind its own.
+        // If other records have one word, this one has places where no record begins.
         for (var word = RECORD_UNIT; word < words; word++) {
             boxes[at + word].sheets = NO_BOX;
         }
