@@ -54,9 +54,12 @@ pub fn variant(request: &Request<'_>) -> Variant {
         }
     }
     // At the end of a pass, march meets splats again and closes sheets twice. That costs more for a
-    // field than for a surface.
-    variant.least_share =
-        budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
+    // field than for a surface. A GPU draws most before it is worth while to wait and look.
+    variant.least_share = budget.least_share.unwrap_or(match (variant.staged, variant.scalar) {
+        (true, _) => 1 << 23,
+        (false, true) => 1 << 21,
+        (false, false) => 1 << 18,
+    });
     variant.central = variant.gradients() && settings.gradient == Gradient::Central;
     // With differences between pixels, a tile's invocations wait for each other already.
     variant.staged = variant.staged && !variant.central;

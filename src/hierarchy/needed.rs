@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{Result, parallel::prelude::*};
 use glam::Vec3;
-use std::{collections::BTreeMap, ops::Range};
+use std::ops::Range;
 
 /// Margin for rounding in the bounds of several nodes.
 const ROOM: f32 = 1.00001;
@@ -25,7 +25,7 @@ pub struct Needed {
 /// Those of [`Hierarchy::entry`].
 pub fn needed(hierarchy: &Hierarchy, cut: &Cut) -> Result<Vec<Needed>> {
     let around = |sphere: &CutSphere| cut.may_refine_below(sphere);
-    Ok(found(hierarchy, around, |sphere| cut.may_refine(sphere), u64::MAX)?.in_order(hierarchy))
+    Ok(found(hierarchy, around, |sphere| cut.may_refine(sphere), u64::MAX)?.in_order())
 }
 
 /// Returns the coarsest pages, `most` of them, coarse ones first.
@@ -36,7 +36,7 @@ pub fn coarsest(hierarchy: &Hierarchy, most: usize) -> Result<Vec<Needed>> {
     let mut size = (hierarchy.bounds().diagonal() as f32).min(f32::MAX);
     loop {
         let large = |sphere: &CutSphere| sphere.size >= size;
-        let mut found = found(hierarchy, large, large, u64::MAX)?.in_order(hierarchy);
+        let mut found = found(hierarchy, large, large, u64::MAX)?.in_order();
         if found.len() >= most || size == 0.0 {
             found.truncate(most);
             return Ok(found);
@@ -83,42 +83,54 @@ impl Found {
 }
 
 /// Pages with all pages above them.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct All {
-    pages: BTreeMap<u32, Found>,
+    pages: Vec<(u32, Found)>,
+    /// Whether each page of the file is among them.
+    holds: Vec<bool>,
     nodes: u64,
 }
 
 impl All {
+    /// Returns none of a file's pages.
+    fn none_of(hierarchy: &Hierarchy) -> Self {
+        let holds = vec![false; hierarchy.page_count() as usize];
+        Self { pages: Vec::new(), holds, nodes: 0 }
+    }
+
     /// Adds a page and the pages above it, which may be on other pages of the directory.
     fn add(&mut self, hierarchy: &Hierarchy, page: u32, own: Found) -> Result<()> {
         let mut rest = vec![(page, own)];
         while let Some((page, own)) = rest.pop() {
-            if self.pages.contains_key(&page) {
+            if std::mem::replace(&mut self.holds[page as usize], true) {
                 continue;
             }
-            for above in own.parents.clone().filter(|above| !self.pages.contains_key(above)) {
+            for above in own.parents.clone().filter(|above| !self.holds[*above as usize]) {
                 rest.push((above, Found::of(&hierarchy.entry(above)?)));
             }
             self.nodes += u64::from(own.nodes);
-            self.pages.insert(page, own);
+            self.pages.push((page, own));
         }
         Ok(())
     }
 
     /// Returns the pages by descending size of the nodes that they refine, each after the pages of
     /// its parents.
-    fn in_order(self, hierarchy: &Hierarchy) -> Vec<Needed> {
-        debug_assert!(self.pages.keys().all(|page| *page < hierarchy.page_count()));
-        let mut sizes: BTreeMap<u32, f32> = BTreeMap::new();
+    fn in_order(mut self) -> Vec<Needed> {
+        // Parents are on earlier pages.
+        self.pages.sort_unstable_by_key(|(page, _)| *page);
+        let mut sizes = vec![f32::INFINITY; self.holds.len()];
         for (page, own) in &self.pages {
-            let above = own.parents.clone().filter_map(|above| sizes.get(&above).copied());
-            sizes.insert(*page, above.fold(own.size, f32::min));
+            let above = own.parents.clone().map(|above| sizes[above as usize]);
+            sizes[*page as usize] = above.fold(own.size, f32::min);
         }
-        let mut order: Vec<(u32, f32)> = sizes.into_iter().collect();
-        order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let needed = |(page, _): (u32, f32)| Needed { page, nodes: self.pages[&page].nodes };
-        order.into_iter().map(needed).collect()
+        let size = |page: u32| sizes[page as usize];
+        let order = |(a, _): &(u32, Found), (b, _): &(u32, Found)| {
+            size(*b).total_cmp(&size(*a)).then(a.cmp(b))
+        };
+        self.pages.sort_unstable_by(order);
+        let needed = |(page, own): (u32, Found)| Needed { page, nodes: own.nodes };
+        self.pages.into_iter().map(needed).collect()
     }
 }
 
@@ -130,7 +142,7 @@ fn found(
     wanted: impl Fn(&CutSphere) -> bool + Sync,
     most: u64,
 ) -> Result<All> {
-    let mut all = All::default();
+    let mut all = All::none_of(hierarchy);
     hierarchy.visit(around, |runs| {
         let of_run = |(first, entries): &(u32, std::sync::Arc<[PageEntry]>)| {
             let test = |(page, entry): &(u32, &PageEntry)| *page == 0 || wanted(&parents_of(entry));
