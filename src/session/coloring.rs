@@ -1,5 +1,6 @@
 //! How values become colours, and by what surfaces are coloured.
 
+use super::{Legend, Name};
 use crate::{
     Error, Result,
     color::{ColorMap, ColorScale, Spread},
@@ -113,11 +114,43 @@ impl Coloring {
         paint
     }
 
-    /// Returns what colours a mesh or point cloud that was read; `None` for the file's colours.
+    /// Colours a mesh or point cloud that was read. Returns the legend if values colour it. `up` is
+    /// the direction of heights, and `named` says whether the user named the values.
     ///
     /// # Errors
-    /// A message for values that it does not have.
+    /// [`Error::Input`] for values that a file does not have, [`Error::Argument`] for those that
+    /// a caller's arrays do not have, and for logarithms of values that have none.
     pub fn paint(
+        &self,
+        name: &Name,
+        mesh: &mut Mesh,
+        up: DVec3,
+        named: bool,
+    ) -> Result<Option<Legend>> {
+        let paint = self.paint_of(mesh, up, named).map_err(|message| {
+            let hint = "colours are written as orange or '#ff8800'; the colours height and normal \
+                        suit any surface; values needs --scalar (in Python, scalar)";
+            name.unfit("attributes", &message, hint)
+        })?;
+        let Some(paint) = paint else { return Ok(None) };
+        mesh.paint(&paint).map_err(|error| {
+            let hint = "logarithms need values above 0; the colour height suits any surface";
+            name.unfit("values", &error.to_string(), hint)
+        })?;
+        let Some(scale) = mesh.scale else { return Ok(None) };
+        check_log(&scale)?;
+        let title = match paint {
+            Paint::Values { of: Values::Height(_), .. } => {
+                Legend::title("height", &mesh.about.length)
+            }
+            _ => Legend::title(&mesh.about.name, &mesh.about.unit),
+        };
+        Ok(Some(Legend::of_scale(scale, title)))
+    }
+
+    /// Returns what colours a mesh or point cloud that was read; `None` for the file's colours. The
+    /// error is a message for values that it does not have.
+    fn paint_of(
         &self,
         mesh: &Mesh,
         up: DVec3,
@@ -183,8 +216,9 @@ pub fn check_log(scale: &ColorScale) -> Result<()> {
         return Ok(());
     }
     Err(Error::Argument(format!(
-        "colours over logarithms need a range above 0, such as {},{high}, but the values shown are \
-         {low} to {high}",
+        "colours over logarithms (--log-colors; in Python, log_colors) need a range above 0, such \
+         as {},{high}, but the values shown are {low} to {high}; --range (in Python, range) sets \
+         it",
         if high > 0.0 { high / 1000.0 } else { 1.0 }
     )))
 }

@@ -3,8 +3,9 @@
 //! [`Reading`] says how inputs are read. It opens a file, a folder or a remote object of any kind;
 //! [`Opened`] knows the kind, and reads it into [`Data`]. The functions of
 //! [`formats`](crate::formats) read one kind each, from files or from bytes in memory.
-//! [`Appearance`] and [`Coloring`] say how values and surfaces are shown. [`Subject`] gathers where
-//! a scene is and how it stands, and [`Framing`] is the camera that shows it.
+//! [`Showing`] says how an input is shown: [`Appearance`] its values, and [`Coloring`] its colours.
+//! [`Items`] makes a scene of inputs: one item of each, with its [`Legend`]. [`Subject`]
+//! gathers where the scene is and how it stands, and [`Framing`] is the camera that shows it.
 //!
 //! ```no_run
 //! use splatkit::session::{Data, Reading};
@@ -21,8 +22,12 @@ mod coloring;
 mod data;
 mod facts;
 mod framing;
+mod items;
+mod legend;
+mod name;
 mod oddities;
 mod reading;
+mod showing;
 mod subject;
 
 #[cfg(test)]
@@ -33,5 +38,9 @@ pub use coloring::{Coloring, SurfaceColor, check_log, shown_of};
 pub use data::{Data, warn_of_holes};
 pub use facts::Facts;
 pub use framing::{Framing, Side};
+pub use items::{Captions, Content, Items};
+pub use legend::Legend;
+pub use name::Name;
 pub use reading::{Opened, Reading};
+pub use showing::{Showing, Surfaces};
 pub use subject::{Origin, Subject};

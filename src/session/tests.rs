@@ -12,8 +12,11 @@ use crate::{
 use crate::{
     about::{Frame, Stance},
     math::Bounds,
+    scene::Item,
+    surface::Mesh,
+    volume::{Lattice, Samples, Volume},
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3, Vec3};
 
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 const TABLE: &str = "x,y,z,value\n0,0,0,1\n1,0,0,2\n0,1,0,3\n0,0,1,nan\n";
@@ -196,9 +199,83 @@ fn a_surface_needs_the_values_that_colour_it() {
     assert_eq!(SurfaceColor::of("Height", None), SurfaceColor::Height);
     let heat = Coloring { surface: Some(SurfaceColor::of(" heat", None)), ..Coloring::default() };
     assert_eq!(heat.attribute(), Some("heat"));
-    let mut mesh = crate::surface::Mesh::default();
-    assert!(heat.paint(&mesh, DVec3::Z, true).unwrap_err().contains("“heat” is neither"));
-    assert_eq!(Coloring::default().paint(&mesh, DVec3::Z, true), Ok(None));
-    mesh.values = vec![1.0];
-    assert!(heat.paint(&mesh, DVec3::Z, true).unwrap().is_some());
+    let mut mesh = triangle();
+    let [file, own] = [true, false].map(|is_file| Name { text: "a.ply".into(), is_file });
+    let error = heat.paint(&file, &mut mesh, DVec3::Z, true).unwrap_err();
+    assert!(
+        matches!(&error, Error::Input { message, .. } if message.contains("“heat” is neither"))
+    );
+    let error = heat.paint(&own, &mut mesh, DVec3::Z, true).unwrap_err();
+    assert!(matches!(&error, Error::Argument(message) if message.contains("a.ply: “heat”")));
+    assert_eq!(Coloring::default().paint(&file, &mut mesh, DVec3::Z, true).unwrap(), None);
+    mesh.values = vec![1.0, 2.0, 4.0];
+    let legend = heat.paint(&file, &mut mesh, DVec3::Z, true).unwrap().unwrap();
+    assert_eq!(legend.scale.range, [1.0, 4.0]);
+}
+
+fn triangle() -> Mesh {
+    Mesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    }
+}
+
+fn cube(first: f64) -> Volume {
+    let lattice = Lattice::cartesian([3; 3], DVec3::splat(first), DMat3::IDENTITY);
+    Volume::new(lattice, Samples::F32((0..27).map(|i| i as f32).collect())).unwrap()
+}
+
+/// Two fields without names are called as their files are, and a surface keeps its own legend.
+#[test]
+fn each_input_becomes_an_item_with_its_legend() {
+    let mut items = Items::new(Surfaces::Both);
+    let height = Coloring { surface: Some(SurfaceColor::Height), ..Coloring::default() };
+    let appearance = Appearance { coloring: height, ..Appearance::default() };
+    let showing = Showing { appearance, ..Showing::default() };
+    let inputs = [
+        ("in/a.nrrd", Data::Volume(cube(0.0))),
+        ("b.ply", Data::Mesh(triangle())),
+        ("c.nrrd", Data::Volume(cube(5.0))),
+    ];
+    for (name, data) in inputs {
+        items.add(&Name::of_file(name.as_ref()), data, &showing, &|_| ()).unwrap();
+    }
+    let titles: Vec<(usize, String)> =
+        items.captions().legends.into_iter().map(|(item, legend)| (item, legend.title)).collect();
+    let wanted = [(0, "a"), (1, "height"), (2, "c")].map(|(item, name)| (item, name.to_owned()));
+    assert_eq!(titles, wanted);
+    let kinds: Vec<&str> = items.contents.iter().map(|content| content.kind).collect();
+    assert_eq!(kinds, ["volume", "mesh", "volume"]);
+    assert_eq!(items.count(), 27 + items.contents[1].count + 27);
+    assert_eq!(items.subject.bounds.max, DVec3::splat(7.0));
+    let [facets, surfels] = [true, false].map(|facets| items.scene(facets).unwrap());
+    assert!(matches!(facets.items[1], Item::Facets(_)));
+    assert!(matches!(surfels.items[1], Item::Radiance(_)));
+}
+
+#[test]
+fn an_input_that_cannot_be_shown_changes_nothing() {
+    let mut items = Items::new(Surfaces::Facets);
+    let heat = Coloring { surface: Some(SurfaceColor::of("heat", None)), ..Coloring::default() };
+    let appearance = Appearance { coloring: heat, ..Appearance::default() };
+    let showing = Showing { appearance, draws_edges: true, ..Showing::default() };
+    let name = Name::of_file("a.ply".as_ref());
+    let mut turned = triangle();
+    turned.about.stance = Some(Stance::RAS);
+    turned.about.frame = Frame::Patient;
+    assert!(items.add(&name, Data::Mesh(turned), &showing, &|_| ()).is_err());
+    assert_eq!(items.captions(), Captions::default());
+    assert_eq!((items.count(), items.edges().len(), items.contents.len()), (0, 0, 0));
+    assert_eq!(items.subject.origin, Origin::Default);
+    // Later, it is as if it had never been tried.
+    let plain = Showing { draws_edges: true, ..Showing::default() };
+    items.add(&name, Data::Mesh(triangle()), &plain, &|_| ()).unwrap();
+    let count = items.count();
+    assert_eq!((count > 0, items.edges().len()), (true, 1));
+    let subject = items.subject.clone();
+    items.add(&name, Data::Volume(cube(0.0)), &plain, &|_| ()).unwrap();
+    items.remove_last(subject);
+    assert_eq!((items.count(), items.captions().legends.len()), (count, 0));
+    assert!(items.set_transfer(0, Default::default()).is_err());
 }

@@ -7,13 +7,8 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    Error,
-    about::Labels,
-    color::{ColorMap, ColorScale},
-    glam::DVec3,
-    session::{Coloring, SurfaceColor, check_log},
-    surface::{Mesh, Paint, Values},
-    volume::TransferFunction,
+    color::ColorMap,
+    session::{Coloring, SurfaceColor},
 };
 use std::path::{Path, PathBuf};
 
@@ -41,21 +36,6 @@ pub struct ColorFlags {
     #[arg(long)]
     log_colors: bool,
 }
-
-/// The colours of values in a picture, for the bar beside it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Bar {
-    /// The name and the unit of the values.
-    pub title: String,
-    pub scale: ColorScale,
-    /// The colours from the low end of the range to the high one.
-    pub colors: Vec<[f32; 3]>,
-    /// The colours and the names of labels. If there are any, they are listed instead of a bar.
-    pub labels: Vec<([f32; 3], String)>,
-}
-
-/// Colours of a bar, enough for one a pixel.
-const COLORS: usize = 1024;
 
 /// Parses what colours surfaces, of all inputs or of one.
 fn surface(text: &str) -> Result<Own<SurfaceColor>, String> {
@@ -145,83 +125,6 @@ impl ColorFlags {
             ))),
         }
     }
-
-    /// Returns the colours of a transfer function from its first to its last point, within the
-    /// `values` that there are.
-    pub fn bar(&self, transfer: &TransferFunction, values: [f64; 2], title: String) -> Bar {
-        let ends = transfer.color.first().zip(transfer.color.last());
-        let range = match ends.map(|(first, last)| [first.0, last.0]) {
-            // A map spans what the user or the function asks for; a function's own points may lie
-            // far beyond the values.
-            Some(span) if self.colormap.is_some() => span,
-            Some([low, high]) if low < high => [low.max(values[0]), high.min(values[1])],
-            _ => values,
-        };
-        let range = if range[0] < range[1] { range } else { values };
-        let mut scale = self.coloring(None).scale(ColorMap::VIRIDIS, Some(range));
-        scale.is_log &= self.colormap.is_some() && range[0] > 0.0;
-        let color = |i: usize| {
-            let value = scale.value(i as f64 / (COLORS - 1) as f64);
-            transfer.color(value).map(|part| part as f32)
-        };
-        let colors = (0..COLORS).map(color).collect();
-        Bar { title, scale, colors, labels: Vec::new() }
-    }
-
-    /// Returns the colours and the names of the labels that a transfer function shows.
-    pub fn legend(transfer: &TransferFunction, labels: &Labels) -> Vec<([f32; 3], String)> {
-        let is_shown = |value: &&i32| transfer.opacity(f64::from(**value)) > 0.0;
-        let entry = |&value: &i32| {
-            (transfer.color(f64::from(value)).map(|part| part as f32), labels.name(value))
-        };
-        labels.present.iter().filter(is_shown).map(entry).collect()
-    }
-}
-
-/// Colours a mesh or point cloud that was read. `up` is the direction of heights, and `named` says
-/// whether the user named the values.
-pub fn paint(
-    coloring: &Coloring,
-    path: &Path,
-    mesh: &mut Mesh,
-    up: DVec3,
-    named: bool,
-) -> Result<Option<Bar>, Failure> {
-    let paint = coloring.paint(mesh, up, named).map_err(|message| {
-        let hint = "colours are written as orange or '#ff8800'; --color height and --color normal \
-                    colour any surface; --color values needs --scalar";
-        Failure::from(Error::input(path, "attributes", message).hint(hint))
-    })?;
-    let Some(paint) = paint else { return Ok(None) };
-    mesh.paint(&paint).map_err(|error| {
-        let hint = "--log-colors needs values above 0; --color height colours any surface";
-        Failure::from(Error::input(path, "values", error.to_string()).hint(hint))
-    })?;
-    let Some(scale) = mesh.scale else { return Ok(None) };
-    check_log(&scale).map_err(of_log)?;
-    let title = match paint {
-        Paint::Values { of: Values::Height(_), .. } => titled("height", &mesh.about.length),
-        _ => titled(&mesh.about.name, &mesh.about.unit),
-    };
-    let color = |share: f64| scale.color(scale.value(share));
-    let colors = (0..COLORS).map(|i| color(i as f64 / (COLORS - 1) as f64)).collect();
-    Ok(Some(Bar { title, scale, colors, labels: Vec::new() }))
-}
-
-/// Returns the failure of colours over logarithms.
-pub fn of_log(error: Error) -> Failure {
-    match error {
-        Error::Argument(message) => {
-            Failure::Usage(format!("--log-colors: {message}; --range sets it"))
-        }
-        other => other.into(),
-    }
-}
-
-/// Returns “name (unit)”.
-pub fn titled(name: &str, unit: &str) -> String {
-    let name = if name.is_empty() { "value" } else { name };
-    if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
 }
 
 /// Parses the name of a colour map.
@@ -232,6 +135,7 @@ fn map(text: &str) -> Result<ColorMap, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use splatkit::{session::Legend, volume::TransferFunction};
 
     #[test]
     fn colours_are_told_from_attributes() {
@@ -265,7 +169,9 @@ mod tests {
             log.coloring(Some([0.0, 100.0])).color_transfer(&mut transfer, [0.0, 255.0]).is_err()
         );
         log.coloring(Some([1.0, 100.0])).color_transfer(&mut transfer, [0.0, 255.0]).unwrap();
-        let bar = log.bar(&transfer, [0.0, 255.0], titled("CT", "HU"));
-        assert_eq!((bar.scale.range, bar.title.as_str()), ([1.0, 100.0], "CT (HU)"));
+        let title = Legend::title("CT", "HU");
+        let own = log.coloring(None);
+        let legend = Legend::of_transfer(&own, &transfer, [0.0, 255.0], (title, None));
+        assert_eq!((legend.scale.range, legend.title.as_str()), ([1.0, 100.0], "CT (HU)"));
     }
 }

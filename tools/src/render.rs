@@ -177,7 +177,7 @@ impl Finish {
         let view = camera.view([picture.width, picture.height])?;
         // A line is a pixel wide, and wider in large pictures.
         let width = (f64::from(picture.height) / 720.0).max(1.0);
-        loaded.edges.iter().for_each(|edges| picture.draw_edges(edges, &view, width));
+        loaded.items.edges().iter().for_each(|edges| picture.draw_edges(edges, &view, width));
         Ok(picture)
     }
 
@@ -374,7 +374,7 @@ impl Render {
     /// Returns how pictures of a scene are finished.
     pub fn finish(&self, loaded: &Loaded) -> Result<Finish, Failure> {
         let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
-        let overlay = self.overlay.open(&loaded.facts, self.background.0)?;
+        let overlay = self.overlay.open(&loaded.captions, self.background.0)?;
         Ok(Finish { factor, background: self.background.0, overlay })
     }
 
@@ -385,8 +385,8 @@ impl Render {
         loaded: &Loaded,
         transfers: &[(usize, TransferFunction)],
     ) -> Result<Finish, Failure> {
-        let facts = self.scene.facts_with(loaded, transfers);
-        let overlay = self.overlay.open(&facts, self.background.0)?;
+        let captions = self.scene.captions_with(loaded, transfers);
+        let overlay = self.overlay.open(&captions, self.background.0)?;
         Ok(Finish { overlay, ..self.finish(loaded)? })
     }
 

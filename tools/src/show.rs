@@ -1,7 +1,7 @@
 //! The flags that set how values and surfaces are shown.
 
 use crate::{
-    color::{ColorFlags, of_log},
+    color::ColorFlags,
     failure::Failure,
     kernel::KernelFlags,
     own::{self, Own},
@@ -9,13 +9,10 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    bricks::Bricks,
-    cells::Cells,
     input::Limits,
     math::Kernel,
-    scattered::Points,
-    session::{Appearance, Coloring, Surface, SurfaceColor, SurfaceValue, Transfer},
-    volume::{TransferFunction, Volume},
+    session::{Appearance, Coloring, Showing, Surface, SurfaceColor, SurfaceValue, Transfer},
+    volume::TransferFunction,
 };
 use std::path::{Path, PathBuf};
 
@@ -68,10 +65,10 @@ pub struct ShowFlags {
     /// crease looks sharp. 0 draws flat facets; from 60 on, creases are split at 60 degrees
     /// [default: 60]
     #[arg(long, value_name = "DEGREES", value_parser = parse::crease)]
-    pub crease: Option<f32>,
+    crease: Option<f32>,
     /// Meshes: draw the edges of the triangles as thin dark lines.
     #[arg(long)]
-    pub edges: bool,
+    edges: bool,
     /// Meshes and point clouds: let this share of the light be absorbed where a ray meets a
     /// surface once, above 0 to 1. FILE=OPACITY is for one input, and the flag can be given
     /// several times [default: 1]
@@ -91,8 +88,8 @@ struct Factors(Vec<(f64, f64)>);
 /// its files are read.
 pub struct Show<'a> {
     flags: &'a ShowFlags,
-    pub kernel: Kernel,
-    pub sharp: bool,
+    kernel: Kernel,
+    sharp: bool,
     /// What inputs have of their own.
     transfers: own::Values<Transfer>,
     ranges: own::Values<[f64; 2]>,
@@ -255,18 +252,7 @@ impl Show<'_> {
 
     /// Returns how an input is coloured.
     pub fn coloring_of(&self, path: &Path) -> Coloring {
-        self.flags.color.coloring_by(self.colors.of(path), self.range_of(path))
-    }
-
-    /// Returns the range of values that an input's colours are spread over, if it is given.
-    pub fn range_of(&self, path: &Path) -> Option<[f64; 2]> {
-        self.ranges.of(path).copied()
-    }
-
-    /// Returns the optical depth of a surface, if it is not opaque.
-    pub fn optical_depth(&self, path: &Path) -> Option<f32> {
-        let opacity = *self.opacities.of(path)?;
-        (opacity < 1.0).then(|| -(1.0 - opacity).ln())
+        self.flags.color.coloring_by(self.colors.of(path), self.ranges.of(path).copied())
     }
 
     /// Returns the isosurfaces of an input.
@@ -276,51 +262,42 @@ impl Show<'_> {
 
     /// Returns a flag that shows values, if one is given for an input, which may have colours of
     /// its own.
-    pub fn shows_values(&self, path: &Path) -> Option<&'static str> {
+    fn shows_values(&self, path: &Path) -> Option<&'static str> {
         let has_transfer = self.transfers.of(path).is_some();
         let given = [
-            ("transfer", has_transfer),
-            ("iso", !self.surfaces_of(path).is_empty()),
-            ("range", self.range_of(path).is_some()),
-            ("sharp", self.sharp),
+            ("--transfer", has_transfer),
+            ("--iso", !self.surfaces_of(path).is_empty()),
+            ("--range", self.ranges.of(path).is_some()),
+            ("--sharp", self.sharp),
         ];
         given.into_iter().find(|(_, is_given)| *is_given).map(|(flag, _)| flag)
     }
 
-    /// Returns the transfer function of a volume.
-    pub fn of_volume(&self, path: &Path, volume: &Volume) -> Result<TransferFunction, Failure> {
-        self.of(path, |appearance, name| appearance.of_volume(name, volume))
-    }
-
-    /// Returns the transfer function of scattered samples.
-    pub fn of_samples(&self, path: &Path, points: &Points) -> Result<TransferFunction, Failure> {
-        self.of(path, |appearance, name| appearance.of_samples(name, points))
-    }
-
-    /// Returns the transfer function of cells.
-    pub fn of_cells(&self, path: &Path, cells: &Cells) -> Result<TransferFunction, Failure> {
-        self.of(path, |appearance, name| appearance.of_cells(name, cells))
-    }
-
-    /// Returns the transfer function of a volume in bricks.
-    pub fn of_bricks(&self, path: &Path, bricks: &Bricks) -> Result<TransferFunction, Failure> {
-        self.of(path, |appearance, name| appearance.of_bricks(name, bricks))
-    }
-
-    fn of(
-        &self,
-        path: &Path,
-        transfer: impl FnOnce(&Appearance, &str) -> splatkit::Result<TransferFunction>,
-    ) -> Result<TransferFunction, Failure> {
+    /// Returns how the values and the surfaces of an input are shown.
+    pub fn appearance(&self, path: &Path) -> Appearance {
         let factors = self.flags.gradient_opacity.clone();
-        let appearance = Appearance {
+        Appearance {
             transfer: self.transfers.of(path).cloned(),
             opacity_unit: self.flags.opacity_unit,
             isosurfaces: self.surfaces_of(path),
             gradient: factors.map(|Factors(factors)| factors).unwrap_or_default(),
             coloring: self.coloring_of(path),
-        };
-        transfer(&appearance, &path.display().to_string()).map_err(of_log)
+        }
+    }
+
+    /// Returns how an input is shown.
+    pub fn showing(&self, path: &Path) -> Showing {
+        Showing {
+            appearance: self.appearance(path),
+            kernel: self.kernel.clone(),
+            is_sharp: self.sharp,
+            radius_scale: self.flags.radius_scale,
+            crease: self.flags.crease,
+            opacity: self.opacities.of(path).copied(),
+            draws_edges: self.flags.edges,
+            values_by: self.shows_values(path).map(str::to_owned),
+            ..Showing::default()
+        }
     }
 }
 

@@ -72,17 +72,18 @@ impl Transfer {
     /// Returns the transfer function that shows an input.
     fn of(&self, show: &Show, input: &Data) -> Result<TransferFunction, Failure> {
         let path = &self.input;
-        match input {
-            Data::Volume(volume) => show.of_volume(path, volume),
-            Data::Samples(points) => show.of_samples(path, points),
-            Data::Cells(cells) => show.of_cells(path, cells),
-            Data::Bricks(bricks) => show.of_bricks(path, bricks),
+        let (own, name) = (show.appearance(path), path.display().to_string());
+        Ok(match input {
+            Data::Volume(volume) => own.of_volume(&name, volume)?,
+            Data::Samples(points) => own.of_samples(&name, points)?,
+            Data::Cells(cells) => own.of_cells(&name, cells)?,
+            Data::Bricks(bricks) => own.of_bricks(&name, bricks)?,
             Data::Mesh(_) | Data::Gaussians(_) | Data::Hierarchy(_) => {
                 let message = "has colours of its own, and no values for a transfer function";
                 let error = Error::input(path, "content", message);
-                Err(error.hint("give a volume, or name a value with --scalar").into())
+                return Err(error.hint("give a volume, or name a value with --scalar").into());
             }
-        }
+        })
     }
 }
 

@@ -22,7 +22,7 @@ use splatkit::{
         file::WriteOptions,
     },
     memory,
-    session::{Data, warn_of_holes},
+    session::{Data, Name, warn_of_holes},
     splat::SplatSet,
     surface::SurfelOptions,
     volume,
@@ -239,7 +239,7 @@ impl Work {
 
     fn surfel_options(&self, deadline: Deadline) -> SurfelOptions {
         let radius_scale = self.own.radius_scale();
-        let color_by_normal = self.look.surfel_options().color_by_normal;
+        let color_by_normal = self.look.coloring().is_ok_and(|own| own.by_normal());
         SurfelOptions { radius_scale, color_by_normal, deadline, ..SurfelOptions::default() }
     }
 
@@ -328,15 +328,15 @@ impl Work {
     /// Returns the splats of an input that is no trained scene.
     fn splats_of(&self, path: &Path) -> Result<Gathered, Error> {
         let deadline = self.load.limits().deadline();
-        let attribute = self.look.attribute();
-        let attribute = attribute.as_deref().or(self.load.scalar());
+        let coloring = self.look.coloring()?;
+        let attribute = coloring.attribute().or(self.load.scalar());
         match self.load.reading().open_colored(path, attribute)?.read()? {
             Data::Mesh(mut mesh) => {
                 let frame = Frame::of(mesh.about.stance, || Ok(mesh.guess_stance()))?;
                 let up = self.own.up.map(DVec3::from_array).and_then(DVec3::try_normalize);
                 let up = up.unwrap_or(frame.stance.map_or(DVec3::Y, |stance| stance.up));
                 let named = self.load.scalar().is_some();
-                self.look.paint(&path.display().to_string(), &mut mesh, up, named)?;
+                coloring.paint(&Name::of_file(path), &mut mesh, up, named)?;
                 let set = mesh.surfels(&self.surfel_options(deadline));
                 let set = set.map_err(|error| error.stated_in(path, "content"))?;
                 let points = mesh.positions.len() as u64;

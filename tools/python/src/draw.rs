@@ -3,7 +3,6 @@
 use crate::{
     camera::camera,
     errors::{options, wrong},
-    items::{Added, Items},
     weights,
 };
 use serde::Deserialize;
@@ -18,7 +17,7 @@ use splatkit::{
         Classification, Clip, Evaluate, Gradient, Item, Mode, Optics, Order, Region, Scene,
         Settings,
     },
-    session::{Framing, Subject},
+    session::{Content, Data, Framing, Items, Name, Showing, Subject},
     volume::TransferFunction,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -70,9 +69,26 @@ impl From<Part> for Region {
 /// A scene that several threads may change and draw.
 #[derive(Default)]
 pub struct Stage {
-    items: Mutex<Items>,
+    items: Mutex<Versioned>,
     /// What is kept for the next picture: for pictures with facets, and for others.
     kept: Mutex<[Option<Kept>; 2]>,
+}
+
+/// The items of a scene, and how often they have changed.
+#[derive(Default)]
+struct Versioned {
+    items: Items,
+    /// Grows with each input.
+    version: usize,
+    /// Grows with each change of a transfer function.
+    look: usize,
+}
+
+/// An input, and how it is shown.
+pub struct Added {
+    pub name: Name,
+    pub input: Data,
+    pub showing: Showing,
 }
 
 /// A renderer and what the camera is fitted to, of one version of the scene.
@@ -250,41 +266,47 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Stage {
     /// Adds an input, unless the caller has stopped waiting for it.
     pub fn add(&self, added: Added, stop: &Stop) -> Result<(), Error> {
-        let mut items = locked(&self.items);
-        let (count, subject) = (items.contents.len(), items.subject.clone());
-        items.add(added)?;
-        if stop.is_requested() {
-            items.restore(count, subject);
-            return Err(Error::Stopped);
+        let mut own = locked(&self.items);
+        let subject = own.items.subject.clone();
+        let Added { name, input, showing } = added;
+        own.items.add(&name, input, &showing, &|_| ())?;
+        let last = own.items.contents.len() - 1;
+        let field = own.items.fields().last().filter(|(number, _)| *number == last);
+        let checked = field.and_then(|(_, item)| item.transfer()).map_or(Ok(()), |t| t.validate());
+        let checked = if stop.is_requested() { Err(Error::Stopped) } else { checked };
+        if checked.is_err() {
+            own.items.remove_last(subject);
+            return checked;
         }
-        items.version += 1;
+        own.version += 1;
         *locked(&self.kept) = [None, None];
         Ok(())
     }
 
     /// Returns what the scene holds: kind, name, and the number of splats or samples.
     pub fn contents(&self) -> Vec<(&'static str, String, u64)> {
-        locked(&self.items).contents.clone()
+        let short = |own: &Content| (own.kind, own.name.text.clone(), own.count);
+        locked(&self.items).items.contents.iter().map(short).collect()
     }
 
     /// Returns the box around samples and vertices; `None` if the scene is empty.
     pub fn bounds(&self) -> Option<Bounds> {
-        let bounds = locked(&self.items).subject.bounds;
+        let bounds = locked(&self.items).items.subject.bounds;
         (!bounds.is_empty()).then_some(bounds)
     }
 
     /// Returns the way up, and the diagonal of the box around the scene in world units.
     pub fn stance(&self) -> (DVec3, f64) {
-        let items = locked(&self.items);
-        (items.subject.stance.up, items.subject.bounds.diagonal())
+        let subject = &locked(&self.items).items.subject;
+        (subject.stance.up, subject.bounds.diagonal())
     }
 
     /// Returns the fields of the scene.
     pub fn fields(&self) -> Vec<Field> {
-        let items = locked(&self.items);
+        let items = &locked(&self.items).items;
         let field = |(number, item): (usize, &Item)| Field {
             item: number,
-            name: items.contents[number].1.clone(),
+            name: items.contents[number].name.text.clone(),
             range: item.value_range().unwrap_or([0.0, 1.0]),
             diagonal: item.bounds().diagonal(),
             transfer: item.transfer().cloned().unwrap_or_default(),
@@ -294,15 +316,19 @@ impl Stage {
 
     /// Returns how often the values of an item's field are; nothing if it has no field.
     pub fn histogram(&self, number: usize) -> Vec<u64> {
-        let item =
-            locked(&self.items).fields().find(|own| own.0 == number).map(|own| own.1.clone());
+        let field =
+            |items: &Items| items.fields().find(|own| own.0 == number).map(|own| own.1.clone());
+        let item = field(&locked(&self.items).items);
         let histogram = item.and_then(|item| Histogram::of_item(&item));
         histogram.map(|own| own.counts).unwrap_or_default()
     }
 
     /// Sets the transfer function of an item's field.
     pub fn set_transfer(&self, number: usize, transfer: TransferFunction) -> Result<(), Error> {
-        locked(&self.items).set_transfer(number, transfer)
+        let mut own = locked(&self.items);
+        own.items.set_transfer(number, transfer)?;
+        own.look += 1;
+        Ok(())
     }
 
     /// Returns where the work of a picture lies: rows of x, y, z and a weight.
@@ -371,7 +397,9 @@ impl Stage {
         let (factor, scene) = (draw.factor(&kept.scene), kept.scene.clone());
         self.put(kept, draw.draws_facets());
         let (mut picture, stats) = done.map_err(|error| match error {
-            Error::Argument(_) if is_fitted => locked(&self.items).out_of_sight(&scene, error),
+            Error::Argument(_) if is_fitted => {
+                locked(&self.items).items.out_of_sight(&scene, error)
+            }
             other => other,
         })?;
         // An opacity that rounds to 0 in a file of 8 bits counts as none.
@@ -405,8 +433,8 @@ impl Stage {
             _ => {}
         }
         drop(kept);
-        let scene = Arc::new(items.scene(facets)?);
-        let mut subject = items.subject.clone();
+        let scene = items.scene(facets)?;
+        let mut subject = items.items.subject.clone();
         // Points that all lie at one place have no extent, but their splats have one.
         if subject.is_one_place() {
             subject.bounds = scene.bounds();
@@ -424,10 +452,19 @@ impl Stage {
     }
 }
 
+impl Versioned {
+    /// Returns the scene. `facets` says whether its pictures can show facets.
+    fn scene(&self, facets: bool) -> Result<Arc<Scene>, Error> {
+        let scene = self.items.scene(facets)?;
+        scene.validate().map_err(|error| self.items.at_fault(&scene, error))?;
+        Ok(Arc::new(scene))
+    }
+}
+
 impl Kept {
     /// Takes over the transfer functions of a scene that has not changed otherwise.
-    fn shown_by(mut self, items: &Items, facets: bool) -> Result<Self, Error> {
-        let scene = Arc::new(items.scene(facets)?);
+    fn shown_by(mut self, items: &Versioned, facets: bool) -> Result<Self, Error> {
+        let scene = items.scene(facets)?;
         if let Some(renderer) = &mut self.renderer {
             for number in scene.fields() {
                 let [old, new] = [&self.scene, &scene].map(|own| own.items[number].transfer());

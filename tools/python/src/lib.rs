@@ -9,7 +9,6 @@ mod draw;
 mod errors;
 mod files;
 mod hierarchy;
-mod items;
 mod load;
 mod look;
 mod notes;

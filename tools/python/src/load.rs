@@ -9,7 +9,7 @@ use splatkit::{
     input::Limits,
     memory,
     scattered::SampleOptions,
-    session::Reading,
+    session::{Reading, Showing},
 };
 use std::path::PathBuf;
 
@@ -89,14 +89,19 @@ impl Load {
         }
     }
 
+    /// Completes how an input is shown by what files say, and by when its splats must be made.
+    pub fn complete(&self, showing: Showing, deadline: Deadline) -> Showing {
+        let (samples, is_named) = (self.sample_options(), self.scalar.is_some());
+        Showing { samples, is_named, deadline, ..showing }
+    }
+
     /// Returns how scattered samples become splats.
-    pub fn sample_options(&self, deadline: Deadline) -> SampleOptions {
+    fn sample_options(&self) -> SampleOptions {
         let default = SampleOptions::default();
         SampleOptions {
             neighbours: self.neighbours.unwrap_or(default.neighbours),
             radius: self.radius,
             slopes: self.slopes.unwrap_or(default.slopes),
-            deadline,
             ..default
         }
     }

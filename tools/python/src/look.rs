@@ -5,17 +5,12 @@ use serde::Deserialize;
 use serde_json::Value;
 use splatkit::{
     Error,
-    bricks::Bricks,
-    cells::Cells,
     color::ColorMap,
-    glam::DVec3,
     math::Kernel,
-    scattered::Points,
     session::{
-        self, Appearance, Coloring, SurfaceColor, SurfaceValue, Transfer, check_log, shown_of,
+        self, Appearance, Coloring, Showing, SurfaceColor, SurfaceValue, Transfer, shown_of,
     },
-    surface::{Mesh, SurfelOptions},
-    volume::{TransferFunction, Volume},
+    volume::TransferFunction,
 };
 
 /// The looks of one item.
@@ -86,16 +81,7 @@ impl Look {
         if self.crease.is_some_and(|angle| !(0.0..=180.0).contains(&angle)) {
             return Err(wrong("crease is an angle from 0 to 180 degrees"));
         }
-        self.map()?;
-        self.surfel_options().validate()
-    }
-
-    /// Returns the attribute of a surface to read, if the look names one.
-    pub fn attribute(&self) -> Option<String> {
-        match self.surface() {
-            Some(SurfaceColor::Attribute(name)) => Some(name),
-            _ => None,
-        }
+        self.showing()?.validate()
     }
 
     /// Whether something else than its own colours colours a surface.
@@ -111,19 +97,8 @@ impl Look {
         self.colormap.as_deref().map(ColorMap::named).transpose()
     }
 
-    /// Returns how values become colours, and by what surfaces are coloured.
-    fn coloring(&self) -> Result<Coloring, Error> {
-        Ok(Coloring {
-            surface: self.surface(),
-            map: self.map()?,
-            range: self.range,
-            is_log: self.log_colors,
-            missing: self.nan_color,
-        })
-    }
-
-    /// Returns how values are shown.
-    fn appearance(&self) -> Result<Appearance, Error> {
+    /// Returns how an input is shown.
+    pub fn showing(&self) -> Result<Showing, Error> {
         let transfer = match &self.transfer {
             None => None,
             Some(Value::String(preset)) => Some(Transfer::Named(preset.clone())),
@@ -134,12 +109,33 @@ impl Look {
             color: own.color,
             opacity: own.opacity,
         };
-        Ok(Appearance {
+        let appearance = Appearance {
             transfer,
             opacity_unit: self.opacity_unit,
             isosurfaces: self.isosurfaces.iter().map(surface).collect(),
             gradient: self.gradient_opacity.clone(),
             coloring: self.coloring()?,
+        };
+        Ok(Showing {
+            appearance,
+            kernel: self.kernel()?,
+            is_sharp: self.sharp,
+            radius_scale: self.radius_scale,
+            crease: self.crease,
+            opacity: self.opacity,
+            values_by: self.shows_values().map(str::to_owned),
+            ..Showing::default()
+        })
+    }
+
+    /// Returns how values become colours, and by what surfaces are coloured.
+    pub fn coloring(&self) -> Result<Coloring, Error> {
+        Ok(Coloring {
+            surface: self.surface(),
+            map: self.map()?,
+            range: self.range,
+            is_log: self.log_colors,
+            missing: self.nan_color,
         })
     }
 
@@ -167,56 +163,6 @@ impl Look {
         ];
         given.into_iter().find(|(_, is_given)| *is_given).map(|(option, _)| option)
     }
-
-    /// Returns the transfer function of a volume.
-    pub fn of_volume(&self, name: &str, volume: &Volume) -> Result<TransferFunction, Error> {
-        validated(self.appearance()?.of_volume(name, volume))
-    }
-
-    /// Returns the transfer function of scattered samples.
-    pub fn of_samples(&self, name: &str, points: &Points) -> Result<TransferFunction, Error> {
-        validated(self.appearance()?.of_samples(name, points))
-    }
-
-    /// Returns the transfer function of cells.
-    pub fn of_cells(&self, name: &str, cells: &Cells) -> Result<TransferFunction, Error> {
-        validated(self.appearance()?.of_cells(name, cells))
-    }
-
-    /// Returns the transfer function of a volume in bricks.
-    pub fn of_bricks(&self, name: &str, bricks: &Bricks) -> Result<TransferFunction, Error> {
-        validated(self.appearance()?.of_bricks(name, bricks))
-    }
-
-    /// Colours a mesh or point cloud. `up` is the direction of heights, and `named` says whether
-    /// the user named the values.
-    pub fn paint(&self, name: &str, mesh: &mut Mesh, up: DVec3, named: bool) -> Result<(), Error> {
-        let paint = self.coloring()?.paint(mesh, up, named);
-        let Some(paint) = paint.map_err(|message| wrong(format!("{name}: {message}")))? else {
-            return Ok(());
-        };
-        mesh.paint(&paint)?;
-        mesh.scale.as_ref().map_or(Ok(()), check_log)
-    }
-
-    /// Returns how a mesh or point cloud becomes surfels or facets.
-    pub fn surfel_options(&self) -> SurfelOptions {
-        let mut options = SurfelOptions::default();
-        options.radius_scale *= self.radius_scale.unwrap_or(1.0);
-        options.color_by_normal = matches!(self.surface(), Some(SurfaceColor::Normal));
-        // Triangles of one plane still join.
-        let crease = self.crease.map(|crease| crease.max(0.01));
-        options.crease_angle_degrees = crease.unwrap_or(options.crease_angle_degrees);
-        let opacity = self.opacity.filter(|opacity| *opacity < 1.0);
-        if let Some(opacity) = opacity {
-            options.optical_depth = -(1.0 - opacity).ln();
-        }
-        // Radii are for surfels, and facets are opaque.
-        if self.radius_scale.is_some() || opacity.is_some() {
-            options.most_facets = 0;
-        }
-        options
-    }
 }
 
 /// Returns a transfer function with the colours of a map, spread over the values that it shows.
@@ -228,13 +174,6 @@ pub fn recolored(
     let [low, high] = shown_of(&transfer, values);
     let point = |(share, color)| (low + (high - low) * share, color);
     transfer.color = map.points().into_iter().map(point).collect();
-    transfer.validate()?;
-    Ok(transfer)
-}
-
-/// Checks a transfer function that looks have changed.
-fn validated(made: Result<TransferFunction, Error>) -> Result<TransferFunction, Error> {
-    let transfer = made?;
     transfer.validate()?;
     Ok(transfer)
 }

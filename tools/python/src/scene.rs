@@ -4,9 +4,8 @@ use crate::{
     arrays::{numbers, positions, rows, samples},
     camera::{framing, to_json},
     cells::CellArrays,
-    draw::{Draw, Stage},
+    draw::{Added, Draw, Stage},
     errors::{options, raise, wrong},
-    items::{Added, Name},
     load::Load,
     look::Look,
     picture::Picture,
@@ -24,7 +23,7 @@ use splatkit::{
     input::Limits,
     interaction::Effort,
     scattered::Points,
-    session::Data,
+    session::{Data, Name},
     surface::Mesh,
     volume::{Arrangement, Lattice, Volume},
 };
@@ -309,10 +308,12 @@ impl Scene {
         let (stage, (load, look)) = (self.0.clone(), more);
         input.warn_of_holes(&told.name);
         let name = Name { text: told.name, is_file: false };
-        let added = Added { name, input, load, look, deadline: Deadline::NEVER };
         let stop = Stop::default();
         let own = stop.clone();
-        run(py, &stop, move || stage.add(added, &own))
+        run(py, &stop, move || {
+            let showing = load.complete(look.showing()?, Deadline::NEVER);
+            stage.add(Added { name, input, showing }, &own)
+        })
     }
 }
 
@@ -339,10 +340,10 @@ impl Scene {
         run(py, &stop, move || {
             // One deadline covers reading the input and making its splats.
             let deadline = load.limits().deadline();
-            let attribute = look.attribute();
-            let input = load.reading().open_colored(&path, attribute.as_deref())?.read()?;
-            let name = Name { text: path.display().to_string(), is_file: true };
-            stage.add(Added { name, input, load, look, deadline }, &own)
+            let showing = load.complete(look.showing()?, deadline);
+            let attribute = showing.coloring().attribute();
+            let input = load.reading().open_colored(&path, attribute)?.read()?;
+            stage.add(Added { name: Name::of_file(&path), input, showing }, &own)
         })
     }
 

@@ -2,7 +2,6 @@
 
 use super::{Convert, SURFACES, memory};
 use crate::{
-    color,
     failure::{Failure, in_file},
     output, parse,
     progress::Progress,
@@ -19,7 +18,7 @@ use splatkit::{
         external::{memory_of_mesh, memory_of_splats},
         file::WriteOptions,
     },
-    session::Data,
+    session::{Data, Name},
     splat::SplatSet,
     surface::SurfelOptions,
 };
@@ -228,8 +227,8 @@ impl Convert {
                 let up = self.surface.up_of(&frame);
                 let named = self.load.scalar().is_some();
                 let coloring = self.color.coloring(self.range);
-                let bar = color::paint(&coloring, path, &mut mesh, up, named)?;
-                self.color.check_effect(true, bar.is_some())?;
+                let legend = coloring.paint(&Name::of_file(path), &mut mesh, up, named)?;
+                self.color.check_effect(true, legend.is_some())?;
                 progress.stage(format!("Making splats of {} points", mesh.positions.len()));
                 let mut options = self.surface.surfel_options(deadline);
                 options.color_by_normal = coloring.by_normal();

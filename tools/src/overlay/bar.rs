@@ -4,8 +4,8 @@ use super::{
     canvas::{Align, Area, Canvas},
     ticks::{labels, ticks},
 };
-use crate::color::Bar;
 use glam::DVec2;
+use splatkit::session::Legend;
 
 /// Sizes in heights of letters.
 const WIDTH: f64 = 0.9;
@@ -16,7 +16,7 @@ const LINE: f64 = 1.5;
 
 /// A bar with its ticks, laid out for a canvas.
 pub struct Laid<'a> {
-    bar: &'a Bar,
+    bar: &'a Legend,
     ticks: Vec<(f64, String)>,
     /// The lines of the title.
     title: Vec<String>,
@@ -29,7 +29,7 @@ pub struct Laid<'a> {
 
 impl<'a> Laid<'a> {
     /// Lays out a bar that is so high, and with its title at most so wide.
-    pub fn new(canvas: &Canvas, bar: &'a Bar, height: f64, most: f64) -> Self {
+    pub fn new(canvas: &Canvas, bar: &'a Legend, height: f64, most: f64) -> Self {
         let count = (height / (2.2 * canvas.size)).clamp(2.0, 10.0) as usize;
         let is_classes = bar.scale.map.is_categorical();
         let values = ticks(bar.scale.range, count, bar.scale.is_log);
@@ -50,7 +50,7 @@ impl<'a> Laid<'a> {
     }
 
     /// Returns the labels for which there is room, and a text about the others.
-    fn listed(bar: &Bar, room: usize) -> (Vec<([f32; 3], String)>, String) {
+    fn listed(bar: &Legend, room: usize) -> (Vec<([f32; 3], String)>, String) {
         let count = bar.labels.len();
         if count <= room {
             return (bar.labels.clone(), String::new());

@@ -8,7 +8,7 @@ mod ruler;
 mod text;
 mod ticks;
 
-use crate::{color::Bar, failure::Failure};
+use crate::failure::Failure;
 use axes::Names;
 use bar::Laid;
 use canvas::{Align, Area, Canvas, Ink};
@@ -16,7 +16,7 @@ use clap::Args;
 use glam::DVec2;
 use ruler::Ruler;
 use serde_json::{Value, json};
-use splatkit::{Error, interaction::SceneFile, math::Camera, picture::Picture};
+use splatkit::{Error, interaction::SceneFile, math::Camera, picture::Picture, session::Captions};
 use text::{Face, Pen};
 
 /// What is written over the picture.
@@ -39,23 +39,10 @@ pub struct OverlayFlags {
     caption: Option<String>,
 }
 
-/// What the inputs of a scene say for texts.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Facts {
-    /// The colours of values, in the order of the inputs.
-    pub bars: Vec<Bar>,
-    /// The bars of the fields, by their numbers: they follow the transfer functions.
-    pub fields: Vec<usize>,
-    /// The unit of lengths; empty if no file says it.
-    pub length: String,
-    /// Whether the world is that of a patient: x to the right, y to the front, z to the head.
-    pub is_patient: bool,
-}
-
 /// The texts of a run's pictures.
 pub struct Overlay {
     flags: OverlayFlags,
-    facts: Facts,
+    captions: Captions,
     face: Face,
     ink: Ink,
 }
@@ -82,13 +69,13 @@ impl OverlayFlags {
     /// A flag that has nothing to draw is an error.
     pub fn open(
         &self,
-        facts: &Facts,
+        captions: &Captions,
         background: Option<[f32; 3]>,
     ) -> Result<Option<Overlay>, Failure> {
         if !(self.scalar_bar || self.axes || self.scale_bar || self.caption.is_some()) {
             return Ok(None);
         }
-        if self.scalar_bar && facts.bars.is_empty() {
+        if self.scalar_bar && captions.legends.is_empty() {
             return Err(Failure::Usage(
                 "--scalar-bar has nothing to show, because nothing here is coloured by values; \
                  --color height or --color with an attribute of the file colours surfaces"
@@ -97,8 +84,8 @@ impl OverlayFlags {
         }
         let face = Face::open();
         let face = face.ok_or_else(|| Error::Argument("the built-in font is damaged".into()))?;
-        let (flags, facts) = (self.clone(), facts.clone());
-        Ok(Some(Overlay { flags, facts, face, ink: Ink::over(background) }))
+        let (flags, captions) = (self.clone(), captions.clone());
+        Ok(Some(Overlay { flags, captions, face, ink: Ink::over(background) }))
     }
 }
 
@@ -118,7 +105,7 @@ impl Overlay {
 
     #[cfg(all(test, feature = "window"))]
     pub fn bar_colors(&self) -> Vec<[f32; 3]> {
-        self.facts.bars.iter().flat_map(|bar| bar.colors.clone()).collect()
+        self.captions.legends.iter().flat_map(|own| own.1.colors.clone()).collect()
     }
 
     /// Returns a picture to draw on, and its area without a margin.
@@ -155,7 +142,7 @@ impl Overlay {
         }
         if self.flags.scale_bar {
             let most = 0.3 * area.width();
-            if let Some(ruler) = Ruler::new(camera, pixels, most, &self.facts.length) {
+            if let Some(ruler) = Ruler::new(camera, pixels, most, &self.captions.length) {
                 ruler.draw(&mut canvas, area);
                 area.bottom -= 2.4 * size;
                 let Ruler { length, pixels, text } = ruler;
@@ -170,7 +157,7 @@ impl Overlay {
 
     /// Returns the names of the axes: those of patients for the frames of patients.
     fn names(&self) -> Names {
-        if self.facts.is_patient { axes::RAS } else { axes::PLAIN }
+        if self.captions.is_patient { axes::RAS } else { axes::PLAIN }
     }
 
     /// Draws the caption, and returns the height that it takes.
@@ -188,9 +175,9 @@ impl Overlay {
     fn laid(&self, canvas: &Canvas, area: Area) -> (Vec<Laid<'_>>, f64) {
         let size = canvas.size;
         let height = (0.62 * area.height()).max(8.0 * size).min(area.height());
-        let shown = self.facts.bars.len().min(MOST_BARS);
+        let shown = self.captions.legends.len().min(MOST_BARS);
         let most = (0.5 * area.width() / shown as f64).max(5.0 * size);
-        let bars = self.facts.bars.iter().take(MOST_BARS);
+        let bars = self.captions.legends.iter().map(|own| &own.1).take(MOST_BARS);
         (bars.map(|bar| Laid::new(canvas, bar, height, most)).collect(), height)
     }
 
@@ -252,23 +239,23 @@ impl Canvas<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::titled;
     use splatkit::{
         color::{ColorMap, ColorScale},
         glam::DVec3,
         math::Bounds,
+        session::Legend,
     };
 
     const SIZES: [[u32; 2]; 4] = [[200, 200], [320, 200], [640, 900], [1600, 1200]];
 
-    fn facts(is_patient: bool) -> Facts {
+    fn captions(is_patient: bool) -> Captions {
         let range = [-1024.0, 3071.0];
         let scale = ColorScale { range, ..ColorScale::new(ColorMap::VIRIDIS) };
         let color = |i: usize| scale.color(scale.value(i as f64 / 255.0));
         let colors: Vec<[f32; 3]> = (0..256).map(color).collect();
-        let title = titled("Radiodensity", "HU");
-        let bar = Bar { title, scale, colors, labels: Vec::new() };
-        Facts { bars: vec![bar], length: "mm".into(), is_patient, ..Facts::default() }
+        let title = Legend::title("Radiodensity", "HU");
+        let legend = Legend { title, scale, colors, labels: Vec::new() };
+        Captions { legends: vec![(0, legend)], length: "mm".into(), is_patient }
     }
 
     fn flags(which: [bool; 4]) -> OverlayFlags {
@@ -286,8 +273,8 @@ mod tests {
         let mut camera = Camera::framing(&bounds, DVec3::Y, DVec3::Z, 1.0);
         camera.azimuth(30.0);
         camera.elevation(20.0);
-        let (flags, facts) = (flags(which), facts(true));
-        let overlay = flags.open(&facts, background).unwrap().unwrap();
+        let (flags, captions) = (flags(which), captions(true));
+        let overlay = flags.open(&captions, background).unwrap().unwrap();
         overlay.draw(&mut picture, &camera);
         picture
     }
@@ -326,8 +313,8 @@ mod tests {
 
     #[test]
     fn bars_lie_in_the_room_that_is_left_to_them() {
-        let (flags, facts) = (flags([true, false, false, false]), facts(false));
-        let overlay = flags.open(&facts, None).unwrap().unwrap();
+        let (flags, captions) = (flags([true, false, false, false]), captions(false));
+        let overlay = flags.open(&captions, None).unwrap().unwrap();
         for size in SIZES {
             let room = overlay.room(size);
             assert!(room > 20 && room <= size[0] / 4, "{size:?}: {room}");
@@ -378,8 +365,8 @@ mod tests {
     #[test]
     fn patients_have_letters_and_other_things_axes() {
         let names = |is_patient| {
-            let (flags, facts) = (flags([false, true, false, false]), facts(is_patient));
-            flags.open(&facts, None).unwrap().unwrap().names()
+            let (flags, captions) = (flags([false, true, false, false]), captions(is_patient));
+            flags.open(&captions, None).unwrap().unwrap().names()
         };
         assert_eq!(names(true), [["R", "L"], ["A", "P"], ["S", "I"]]);
         assert_eq!(names(false)[2], ["Z", ""]);

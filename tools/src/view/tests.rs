@@ -239,8 +239,8 @@ fn transfer_functions_are_saved_and_loaded() {
     harness.get_by_label("Scalar bar").click();
     harness.step();
     assert!(picture_of(&mut harness) != unlit, "there is no bar");
-    let facts = window(&mut harness).shown.as_ref().expect("a scene").finish.clone();
-    assert!(facts.bar_colors().iter().all(|color| color[2] > 0.9), "the bar is an old one");
+    let finish = window(&mut harness).shown.as_ref().expect("a scene").finish.clone();
+    assert!(finish.bar_colors().iter().all(|color| color[2] > 0.9), "the bar is an old one");
     window(&mut harness).document.undo();
     window(&mut harness).document.undo();
     harness.step();

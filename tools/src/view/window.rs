@@ -533,7 +533,7 @@ impl Window {
         }
         if let ([a, b], [first, second]) = (&points[..], &self.measured[..]) {
             ui.painter().line_segment([*a, *b], egui::Stroke::new(1.5, ink));
-            let unit = &shown.stage.loaded.facts.length;
+            let unit = &shown.stage.loaded.captions.length;
             let text = format!("{:.4} {unit}", (*second - *first).length());
             let at = a.lerp(*b, 0.5);
             let font = FontId::proportional(14.0);

@@ -1,0 +1,465 @@
+//! The items of a scene, made from inputs.
+
+use super::{Data, Framing, Legend, Name, Showing, Subject, Surfaces};
+use crate::{
+    Deadline, Error, Result,
+    about::{About, Frame, Labels, Stance},
+    bricks::Bricks,
+    cells::{CellOptions, Cells},
+    facet::FacetSet,
+    gaussians::Gaussians,
+    hierarchy::Hierarchy,
+    math::Bounds,
+    picture::Edges,
+    scattered::Points,
+    scene::{Item, Scene},
+    splat::SplatSet,
+    surface::{Mesh, SurfelOptions},
+    volume::{TransferFunction, Volume},
+};
+use std::{
+    path::Path,
+    sync::{Arc, OnceLock},
+};
+
+/// What a scene is made of, in the order in which it was added: each input becomes one item.
+#[derive(Default)]
+pub struct Items {
+    /// Where the scene is, and how it stands.
+    pub subject: Subject,
+    /// What was added.
+    pub contents: Vec<Content>,
+    surfaces: Surfaces,
+    entries: Vec<Entry>,
+    legends: Vec<(usize, Legend)>,
+    edges: Vec<Edges>,
+    /// The unit of lengths; empty if no input says it.
+    length: String,
+}
+
+/// An input in short.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Content {
+    /// `mesh`, `points`, `volume`, `samples`, `cells`, `gaussians`, `hierarchy` or `bricks`.
+    pub kind: &'static str,
+    /// What the input is called.
+    pub name: Name,
+    /// The number of splats, facets, samples or cells.
+    pub count: u64,
+}
+
+/// What the inputs say for texts over a picture.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Captions {
+    /// The colours of values: the number of the item, and the legend.
+    pub legends: Vec<(usize, Legend)>,
+    /// The unit of lengths; empty if no input says it.
+    pub length: String,
+    /// Whether the world is that of a patient: x to the right, y to the front, z to the head.
+    pub is_patient: bool,
+}
+
+/// An item, or a mesh, which is drawn as facets in the usual pictures and as surfels in others.
+enum Entry {
+    Ready(Item),
+    Mesh(Box<Faceted>),
+}
+
+struct Faceted {
+    name: Name,
+    facets: Arc<FacetSet>,
+    mesh: Mesh,
+    options: SurfelOptions,
+    surfels: OnceLock<Arc<SplatSet>>,
+}
+
+/// An input that becomes an item.
+struct Adding<'a> {
+    items: &'a mut Items,
+    name: &'a Name,
+    showing: &'a Showing,
+    /// Hears what is done, for a display of progress.
+    does: &'a dyn Fn(String),
+}
+
+impl Items {
+    /// Returns a scene without items.
+    pub fn new(surfaces: Surfaces) -> Self {
+        Self { surfaces, ..Self::default() }
+    }
+
+    /// Adds an input. `does` hears what is done, for a display of progress. After an error, the
+    /// scene is as before.
+    ///
+    /// # Errors
+    /// Those of [`Appearance`](super::Appearance) and of making splats; [`Error::Input`] for a file
+    /// that cannot be shown as asked, [`Error::Argument`] for the values of a caller.
+    pub fn add(
+        &mut self,
+        name: &Name,
+        data: Data,
+        showing: &Showing,
+        does: &dyn Fn(String),
+    ) -> Result<()> {
+        let before = (self.subject.clone(), self.length.clone(), self.edges.len());
+        let mut adding = Adding { items: self, name, showing, does };
+        let added = match data {
+            Data::Mesh(mesh) => adding.add_mesh(mesh),
+            Data::Volume(volume) => adding.add_volume(volume),
+            Data::Samples(points) => adding.add_samples(&points),
+            Data::Cells(cells) => adding.add_cells(cells),
+            Data::Bricks(bricks) => adding.add_bricks(bricks),
+            Data::Gaussians(set) => {
+                adding.add_gaussians(set);
+                Ok(())
+            }
+            Data::Hierarchy(hierarchy) => {
+                adding.add_hierarchy(hierarchy);
+                Ok(())
+            }
+        };
+        if added.is_err() {
+            self.legends.truncate_to(self.entries.len());
+            (self.subject, self.length) = (before.0, before.1);
+            self.edges.truncate(before.2);
+        }
+        added
+    }
+
+    /// Removes the last item, with which the scene stands as `subject` says.
+    pub fn remove_last(&mut self, subject: Subject) {
+        self.entries.pop();
+        self.contents.pop();
+        self.legends.truncate_to(self.entries.len());
+        self.subject = subject;
+    }
+
+    /// Returns the number of splats, facets, samples and cells.
+    pub fn count(&self) -> u64 {
+        self.contents.iter().map(|content| content.count).sum()
+    }
+
+    /// Returns the edges of meshes that are to be drawn.
+    pub fn edges(&self) -> &[Edges] {
+        &self.edges
+    }
+
+    /// Returns what the inputs say for texts. Several fields without names are called as their
+    /// inputs are.
+    pub fn captions(&self) -> Captions {
+        let mut legends = self.legends.clone();
+        let fields: Vec<usize> = self.fields().map(|(number, _)| number).collect();
+        if fields.len() > 1 {
+            for (item, legend) in legends.iter_mut().filter(|(item, _)| fields.contains(item)) {
+                let name = Path::new(&self.contents[*item].name.text);
+                if let Some(name) = name.file_stem() {
+                    legend.name(&name.to_string_lossy());
+                }
+            }
+        }
+        Captions { legends, length: self.length.clone(), is_patient: self.subject.is_patient() }
+    }
+
+    /// Returns the items with a field, and their numbers.
+    pub fn fields(&self) -> impl Iterator<Item = (usize, &Item)> {
+        self.entries.iter().enumerate().filter_map(|(number, entry)| match entry {
+            Entry::Ready(item) => item.transfer().map(|_| (number, item)),
+            Entry::Mesh(_) => None,
+        })
+    }
+
+    /// Sets the transfer function of an item's field. A function that cannot show the field
+    /// changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a number without a field; those of [`Item::validate`].
+    pub fn set_transfer(&mut self, number: usize, new: TransferFunction) -> Result<()> {
+        let Some(Entry::Ready(item)) = self.entries.get_mut(number) else {
+            return Err(Error::Argument(format!("the scene has no field {number}")));
+        };
+        let mut changed = item.clone();
+        match &mut changed {
+            Item::Scalar(_, own)
+            | Item::Volume(_, _, own)
+            | Item::Bricks(_, _, own)
+            | Item::Cells(_, own) => *own = new,
+            _ => return Err(Error::Argument(format!("item {number} of the scene has no field"))),
+        }
+        changed.validate()?;
+        *item = changed;
+        Ok(())
+    }
+
+    /// Returns the scene. `facets` says whether its pictures can show facets.
+    ///
+    /// # Errors
+    /// Those of [`Mesh::surfels`] for a mesh whose surfels were not made yet.
+    pub fn scene(&self, facets: bool) -> Result<Scene> {
+        let mut scene = Scene::new();
+        for entry in &self.entries {
+            scene.items.push(match entry {
+                Entry::Ready(item) => item.clone(),
+                Entry::Mesh(own) if facets => Item::Facets(own.facets.clone()),
+                Entry::Mesh(own) => Item::Radiance(own.surfels()?),
+            });
+        }
+        Ok(scene)
+    }
+
+    /// Returns the first item of a scene that cannot be drawn by itself, and why.
+    pub fn unfit(scene: &Scene) -> Option<(usize, Error)> {
+        scene.items.iter().enumerate().find_map(|(at, item)| Some((at, item.validate().err()?)))
+    }
+
+    /// Returns the error for a scene that cannot be drawn: that of the file whose item cannot be
+    /// drawn by itself, if there is one.
+    pub fn at_fault(&self, scene: &Scene, error: Error) -> Error {
+        match Self::unfit(scene).map(|(item, own)| (&self.contents[item].name, own)) {
+            Some((name, own)) if name.is_file => name.fault(own),
+            _ => error,
+        }
+    }
+
+    /// Returns the error for a scene that its own usual camera cannot see, for the reason `fault`:
+    /// that of the file that reaches farthest.
+    pub fn out_of_sight(&self, scene: &Scene, fault: Error) -> Error {
+        let reach = |item: &Item| {
+            let Bounds { min, max } = item.bounds();
+            min.abs().max(max.abs()).max_element()
+        };
+        let named = self.contents.iter().map(|content| &content.name).zip(&scene.items);
+        match named.max_by(|(_, a), (_, b)| reach(a).total_cmp(&reach(b))) {
+            Some((name, item)) if name.is_file => {
+                Framing::out_of_sight(name.text.as_ref(), item.bounds(), &fault)
+            }
+            _ => fault,
+        }
+    }
+}
+
+/// Drops what belongs to items that are not there.
+trait TruncateTo {
+    fn truncate_to(&mut self, items: usize);
+}
+
+impl TruncateTo for Vec<(usize, Legend)> {
+    fn truncate_to(&mut self, items: usize) {
+        self.retain(|(item, _)| *item < items);
+    }
+}
+
+impl Adding<'_> {
+    fn add_mesh(&mut self, mut mesh: Mesh) -> Result<()> {
+        let Self { name, showing, .. } = *self;
+        self.frame(mesh.about.frame);
+        self.does("Finding the way up of");
+        warn(self.items.subject.stand_mesh(&name.text, &mut mesh));
+        let up = self.items.subject.stance.up;
+        let legend = showing.coloring().paint(name, &mut mesh, up, showing.is_named)?;
+        self.items.legends.extend(legend.map(|legend| (self.items.entries.len(), legend)));
+        self.unit(&mesh.about);
+        self.does("Making splats of");
+        if showing.draws_edges && !mesh.triangles.is_empty() {
+            self.items.edges.push(Edges::of(&mesh));
+        }
+        let options = showing.surfel_options(self.items.surfaces);
+        let kind = if mesh.triangles.is_empty() { "points" } else { "mesh" };
+        let bounds = mesh.bounds().map(|[min, max]| Bounds { min, max });
+        let fault = |error| name.fault(error);
+        if let Some(facets) = mesh.facets(&options).map_err(fault)? {
+            let (count, own) = (facets.facets.len(), facets.bounds());
+            let facets = Arc::new(facets);
+            let entry = if self.items.surfaces == Surfaces::Both {
+                let options = SurfelOptions { deadline: Deadline::NEVER, ..options };
+                let (name, surfels) = (name.clone(), OnceLock::new());
+                Entry::Mesh(Box::new(Faceted { name, facets, mesh, options, surfels }))
+            } else {
+                Entry::Ready(Item::Facets(facets))
+            };
+            self.push(kind, count, bounds.unwrap_or(own), entry);
+        } else {
+            let splats = mesh.surfels(&options).map_err(fault)?;
+            let (count, own) = (splats.splats.len(), splats.bounds());
+            self.push(kind, count, bounds.unwrap_or(own), Item::Radiance(splats.into()));
+        }
+        Ok(())
+    }
+
+    fn add_gaussians(&mut self, mut set: Gaussians) {
+        self.frame(set.about.frame);
+        warn(self.items.subject.stand_gaussians(&self.name.text, &mut set));
+        self.unit(&set.about);
+        let (count, bounds) = (set.len(), set.bounds());
+        self.push("gaussians", count, bounds, Item::Gaussians(set.into()));
+    }
+
+    fn add_hierarchy(&mut self, hierarchy: Arc<Hierarchy>) {
+        let header = hierarchy.header();
+        let (count, bounds) = (header.leaves as usize, header.bounds);
+        self.length(&header.unit);
+        warn(self.items.subject.stand_hierarchy(&self.name.text, &hierarchy));
+        self.push("hierarchy", count, bounds, Item::Hierarchy(hierarchy));
+    }
+
+    fn add_bricks(&mut self, bricks: Arc<Bricks>) -> Result<()> {
+        let Self { name, showing, .. } = *self;
+        if showing.is_sharp {
+            let message = "a volume in bricks cannot be sharpened";
+            return Err(name.unfit("content", message, "leave that out, or draw the original"));
+        }
+        let transfer = showing.appearance.of_bricks(&name.text, &bricks)?;
+        let header = bricks.header();
+        self.values(&transfer, header.range, Legend::title("", ""), None);
+        self.length(&header.unit);
+        self.stand(header.frame, header.stance());
+        let (count, bounds) = (bricks.level(0).dims.iter().product(), bricks.bounds());
+        let item = Item::Bricks(bricks.clone(), showing.kernel.clone(), transfer);
+        self.push("bricks", count, bounds, item);
+        Ok(())
+    }
+
+    fn add_volume(&mut self, mut volume: Volume) -> Result<()> {
+        let Self { name, showing, .. } = *self;
+        if volume.colors.is_some() {
+            match &showing.values_by {
+                None => return self.add_colors(&volume),
+                Some(option) => tracing::warn!(
+                    "{} has colours; {option} shows their brightness instead",
+                    name.text
+                ),
+            }
+        }
+        let transfer = showing.appearance.of_volume(&name.text, &volume)?;
+        let About { name: title, unit, labels, frame, stance, .. } = &volume.about;
+        self.values(&transfer, volume.range, Legend::title(title, unit), labels.as_ref());
+        self.unit(&volume.about);
+        self.stand(*frame, *stance);
+        let [min, max] = volume.bounds();
+        let kernel = showing.kernel.clone();
+        if showing.is_sharp {
+            self.does("Sharpening");
+            volume = volume.sharpened(&kernel)?;
+        }
+        let count = volume.len();
+        let item = Item::Volume(volume.into(), kernel, transfer);
+        self.push("volume", count, Bounds { min, max }, item);
+        Ok(())
+    }
+
+    /// Adds a volume in its own colours.
+    fn add_colors(&mut self, volume: &Volume) -> Result<()> {
+        self.does("Making splats of");
+        let splats = volume.colored_splats().map_err(|error| self.name.fault(error))?;
+        let splats = splats.expect("the volume has colours");
+        self.unit(&volume.about);
+        self.stand(volume.about.frame, volume.about.stance);
+        let [min, max] = volume.bounds();
+        self.push("volume", volume.len(), Bounds { min, max }, Item::Radiance(splats.into()));
+        Ok(())
+    }
+
+    fn add_samples(&mut self, points: &Points) -> Result<()> {
+        let Self { name, showing, .. } = *self;
+        let transfer = showing.appearance.of_samples(&name.text, points)?;
+        let About { name: title, unit, frame, stance, .. } = &points.about;
+        self.values(&transfer, points.range(), Legend::title(title, unit), None);
+        self.unit(&points.about);
+        self.does("Making splats of");
+        let mut options = showing.samples.clone();
+        options.deadline = showing.deadline;
+        // Options are the caller's, whatever holds the samples.
+        options.validate()?;
+        let splats = points.to_splats(&options).map_err(|error| name.fault(error))?;
+        self.stand(*frame, *stance);
+        let [min, max] = points.bounds();
+        let bounds = Bounds { min, max }.union(splats.bounds());
+        self.push("samples", points.len(), bounds, Item::Scalar(splats.into(), transfer));
+        Ok(())
+    }
+
+    fn add_cells(&mut self, mut cells: Cells) -> Result<()> {
+        let Self { name, showing, .. } = *self;
+        let transfer = showing.appearance.of_cells(&name.text, &cells)?;
+        let About { name: title, unit, frame, stance, .. } = &cells.about;
+        self.values(&transfer, cells.range(), Legend::title(title, unit), None);
+        self.unit(&cells.about);
+        self.stand(*frame, *stance);
+        self.does("Dividing the cells of");
+        if !transfer.isosurfaces.is_empty() {
+            cells = cells.with_values_of_points();
+        }
+        let tetrahedra = cells.tetrahedra(&CellOptions::default());
+        let tetrahedra = tetrahedra.map_err(|error| name.fault(error))?;
+        let bounds = tetrahedra.bounds();
+        self.push("cells", cells.len(), bounds, Item::Cells(tetrahedra.into(), transfer));
+        Ok(())
+    }
+
+    /// Adds the legend of a field.
+    fn values(
+        &mut self,
+        transfer: &TransferFunction,
+        range: [f64; 2],
+        title: String,
+        labels: Option<&Labels>,
+    ) {
+        let coloring = self.showing.coloring();
+        self.legend(Legend::of_transfer(coloring, transfer, range, (title, labels)));
+    }
+
+    fn legend(&mut self, legend: Legend) {
+        self.items.legends.push((self.items.entries.len(), legend));
+    }
+
+    fn unit(&mut self, about: &About) {
+        self.length(&about.length);
+    }
+
+    fn length(&mut self, unit: &str) {
+        if self.items.length.is_empty() {
+            self.items.length = unit.to_owned();
+        }
+    }
+
+    fn frame(&mut self, frame: Frame) {
+        warn(self.items.subject.frame(&self.name.text, frame));
+    }
+
+    /// Takes the frame and the stance of a field, or the convention for fields.
+    fn stand(&mut self, frame: Frame, stance: Option<Stance>) {
+        self.frame(frame);
+        warn(self.items.subject.stand_as_told(&self.name.text, stance, Stance::SURVEY));
+    }
+
+    fn does(&self, what: &str) {
+        (self.does)(format!("{what} {}", self.name.text));
+    }
+
+    fn push(&mut self, kind: &'static str, count: usize, bounds: Bounds, entry: impl Into<Entry>) {
+        let Self { items, name, .. } = self;
+        items.subject.count_in(bounds);
+        items.contents.push(Content { kind, name: name.clone(), count: count as u64 });
+        items.entries.push(entry.into());
+    }
+}
+
+impl Faceted {
+    fn surfels(&self) -> Result<Arc<SplatSet>> {
+        if let Some(surfels) = self.surfels.get() {
+            return Ok(surfels.clone());
+        }
+        let made = self.mesh.surfels(&self.options).map_err(|error| self.name.fault(error))?;
+        Ok(self.surfels.get_or_init(|| made.into()).clone())
+    }
+}
+
+impl From<Item> for Entry {
+    fn from(item: Item) -> Self {
+        Self::Ready(item)
+    }
+}
+
+/// Passes warnings on.
+fn warn(warnings: impl IntoIterator<Item = String>) {
+    warnings.into_iter().for_each(|warning| tracing::warn!("{warning}"));
+}
