@@ -10,13 +10,14 @@ use super::{
     vector::{Lanes, exp, three},
 };
 use crate::{
-    facet::{Facet, FacetSet, NEARER, Sides},
+    facet::{FacetSet, Image, NEARER, Sides},
     plan::uniforms::Source,
     scene::Settings,
     splat::{NO_NORMAL, decode_normal, encode_normal},
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
 use glam::{Vec2, Vec3};
+use std::sync::Arc;
 
 /// A facet further behind the front of its sheet than this, over the length by which nearness is
 /// measured, counts as this far.
@@ -27,23 +28,27 @@ const LEAST_SHARE: f32 = 1e-6;
 /// Facets of a set in a view.
 pub struct FacetProjector<'a> {
     plan: &'a Plan<'a>,
+    set: &'a FacetSet,
+    /// One more than the place of the set among those with images; 0 without.
+    images: u32,
     source: Source,
-    sides: Sides,
     is_culled: bool,
 }
 
 impl<'a> FacetProjector<'a> {
-    pub fn new(plan: &'a Plan<'a>, set: &FacetSet, settings: &Settings) -> Self {
+    pub fn new(plan: &'a Plan<'a>, set: &'a Arc<FacetSet>, settings: &Settings) -> Self {
         let view = plan.view;
         let is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
         let source = Source::of_radiance(view, set.origin, 0.0);
-        Self { plan, source, sides: set.sides, is_culled }
+        let place = plan.with_images.iter().position(|own| Arc::ptr_eq(own, set));
+        let images = place.map_or(0, |place| place as u32 + 1);
+        Self { plan, set, images, source, is_culled }
     }
 
     /// Returns the record of a facet, or `None` if it meets no pixel or no sheet, or faces away and
     /// its back is never seen.
-    pub fn record(&self, facet: &Facet) -> Option<Record> {
-        let plan = self.plan;
+    pub fn record(&self, number: u32) -> Option<Record> {
+        let (plan, facet) = (self.plan, &self.set.facets[number as usize]);
         let turn = to_view(&self.source);
         let corners = facet.corners.map(|corner| turn * Vec3::from(corner) + origin(&self.source));
         let [a, b, c] = corners;
@@ -55,7 +60,7 @@ impl<'a> FacetProjector<'a> {
         let pixels = pixels(plan, corners)?;
         let sheets = sheets(plan, corners)?;
         // On a set that winds in any way, all facets count as fronts.
-        let is_front = away < 0.0 || self.sides == Sides::Mixed;
+        let is_front = away < 0.0 || self.set.sides == Sides::Mixed;
         let normals = facet.normals.map(|normal| {
             let turned = decode_normal(normal).map(|normal| encode_normal(turn * normal));
             f32::from_bits(turned.unwrap_or(NO_NORMAL))
@@ -68,7 +73,14 @@ impl<'a> FacetProjector<'a> {
             extent2: 0.0,
             kind: Kind::Facet,
             payload: [
-                normals[0], normals[1], normals[2], colors[0], colors[1], colors[2], 0.0, 0.0,
+                normals[0],
+                normals[1],
+                normals[2],
+                colors[0],
+                colors[1],
+                colors[2],
+                f32::from_bits(self.images),
+                f32::from_bits(number),
             ],
             pixels,
             sheets,
@@ -140,7 +152,9 @@ fn sheets(plan: &Plan, corners: [Vec3; 3]) -> Option<[u16; 2]> {
 }
 
 /// A facet on its way to the pixels of a tile.
-struct Shown {
+struct Shown<'a> {
+    /// The image that it shows, and where.
+    image: Option<Showing<'a>>,
     corners: [Vec3; 3],
     /// The corners in the picture, in pixels, if all lie in front of the eye.
     places: Option<[Vec2; 3]>,
@@ -153,9 +167,40 @@ struct Shown {
     turn: f32,
 }
 
-impl Shown {
+/// The image that a facet shows. The weights of the corners at a place in the picture are linear
+/// there, up to a factor that they share.
+struct Showing<'a> {
+    image: &'a Image,
+    /// The weights' values at pixel (0, 0), and their changes per pixel to the right and down.
+    weights: [[f32; 3]; 3],
+    /// The corners' places in the image.
+    places: [Vec2; 3],
+}
+
+impl Showing<'_> {
+    /// Returns the colour of a pixel, by the place of its centre, and the share that is seen.
+    fn at(&self, x: f32, y: f32) -> [f32; 4] {
+        let [start, right, down] = self.weights;
+        let own: [f32; 3] = std::array::from_fn(|i| start[i] + x * right[i] + y * down[i]);
+        // Beside the facet, its nearest place counts.
+        let inside = own.map(|weight| weight.max(0.0));
+        let sum = |values: [f32; 3]| values[0] + values[1] + values[2];
+        let of = |values: [f32; 3]| {
+            self.places[0] * values[0] + self.places[1] * values[1] + self.places[2] * values[2]
+        };
+        let all = sum(inside);
+        let (uv, all) = match all > 1e-30 {
+            true => (of(inside) / all, all),
+            false => (of([1.0 / 3.0; 3]), 1.0),
+        };
+        let change = |by: [f32; 3]| (of(by) - uv * sum(by)) / all;
+        self.image.mean(uv, change(right), change(down))
+    }
+}
+
+impl<'a> Shown<'a> {
     #[inline(always)]
-    fn new(plan: &Plan, record: &Record) -> Self {
+    fn new(plan: &'a Plan, record: &Record) -> Self {
         let [bx, by, bz, cx, cy, cz] = record.whitening;
         let corners = [Vec3::from(record.center), Vec3::new(bx, by, bz), Vec3::new(cx, cy, cz)];
         let frame = &plan.frame;
@@ -169,18 +214,26 @@ impl Shown {
             let [red, green, blue, _] = bits.to_bits().to_le_bytes();
             [red, green, blue].map(|part| f32::from(part) * (1.0 / 255.0))
         };
-        let [a, b, c, d, e, f, ..] = record.payload;
+        let [a, b, c, d, e, f, images, number] = record.payload;
         let [p, q, r] = corners;
         let across = (q - p).cross(r - p);
         let away = if plan.view.perspective { across.dot(p) } else { across.z };
+        let turn = if away < 0.0 { -1.0 } else { 1.0 };
+        let set = (images.to_bits() as usize).checked_sub(1).map(|set| &plan.with_images[set]);
+        let image = set.and_then(|set| set.image_of(number.to_bits() as usize));
+        let image = image.map(|(image, places)| {
+            let weights = linear_weights(plan, corners).map(|part| part.map(|own| own * turn));
+            Showing { image, weights, places }
+        });
         Self {
+            image,
             corners,
             places,
             nearness,
             normals: [a, b, c].map(|bits| decode_normal(bits.to_bits()).unwrap_or(Vec3::ZERO)),
             colors: [d, e, f].map(unpack),
             is_front: record.strength > 0.0,
-            turn: if away < 0.0 { -1.0 } else { 1.0 },
+            turn,
         }
     }
 
@@ -227,6 +280,27 @@ impl Shown {
     }
 }
 
+/// Returns the weights of a facet's corners at pixel (0, 0), and their changes per pixel to the right
+/// and down, for a facet whose front is not seen. They need not add up to 1 (Olano & Greer 1997).
+fn linear_weights(plan: &Plan, corners: [Vec3; 3]) -> [[f32; 3]; 3] {
+    let frame = &plan.frame;
+    let edges = [0, 1, 2].map(|i| {
+        let [from, to] = [1, 2].map(|next| corners[(i + next) % 3]);
+        match plan.view.perspective {
+            true => from.cross(to),
+            // Through the places in the picture, where z counts as 1.
+            false => from.with_z(1.0).cross(to.with_z(1.0)),
+        }
+    });
+    let of = |part: fn(Vec3) -> f32| edges.map(part);
+    let (right, down) = (of(|edge| edge.x), of(|edge| edge.y));
+    let [right, down] = [right, down].map(|part| part.map(|own| own / frame.scale));
+    let start = std::array::from_fn(|i| {
+        edges[i].z - frame.center[0] * right[i] - frame.center[1] * down[i]
+    });
+    [start, right, down]
+}
+
 /// Returns the integral of the part of pixels to the left of an edge, over the edge's rise inside
 /// them: positive if the edge goes down. Added up over a polygon's edges it is the area of the
 /// pixel inside the polygon. Places are relative to the pixels' centres.
@@ -265,7 +339,7 @@ impl<S: Simd> OpenTile<'_, S> {
         packet: &Packet<S>,
         sums: &mut Sums<S>,
     ) {
-        let (share, weights) = facet.at(simd, packet);
+        let (mut share, weights) = facet.at(simd, packet);
         let rays = &packet.rays;
         let mut covers = share.simd_gt(LEAST_SHARE);
         if !covers.any_true() {
@@ -278,6 +352,30 @@ impl<S: Simd> OpenTile<'_, S> {
             covers &= is_kept(plan, rays, distance);
         }
         let mut color = three!(I => of(facet.colors.map(|color| color[I])));
+        if let Some(image) = &facet.image {
+            // Only what lies in this window is needed.
+            covers &= distance.simd_lt(plan.planes[window.front + WINDOW]);
+            if window.is_continued {
+                covers &= distance.simd_ge(plan.planes[window.front + 1]);
+            }
+            let none = Lanes::splat(simd, 0.0);
+            let wanted = covers.select(Lanes::splat(simd, 1.0), none);
+            let mut seen = [[0.0f32; 8]; 4];
+            for lane in (0..8).filter(|lane| wanted[*lane] > 0.0) {
+                let own = image.at(rays.pixel[0][lane], rays.pixel[1][lane]);
+                seen.iter_mut().zip(own).for_each(|(seen, own)| seen[lane] = own);
+            }
+            let [red, green, blue, alpha] = seen;
+            let tint: [Lanes<S>; 3] =
+                [red.simd_into(simd), green.simd_into(simd), blue.simd_into(simd)];
+            color = three!(I => color[I] * tint[I]);
+            let alpha: Lanes<S> = alpha.simd_into(simd);
+            share = share * alpha;
+            covers &= share.simd_gt(LEAST_SHARE);
+            if !covers.any_true() {
+                return;
+            }
+        }
         if plan.lit_surfaces {
             let normal = three!(I => of(facet.normals.map(|normal| normal[I])));
             // Facets without normals keep their colours.

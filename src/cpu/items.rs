@@ -148,8 +148,9 @@ impl Prepared {
             }
             Self::Facets(set) => {
                 let projector = FacetProjector::new(plan, set, settings);
-                Ok(batches(&set.facets, spare, |batch, records| {
-                    records.extend(batch.iter().filter_map(|facet| projector.record(facet)));
+                let numbers: Vec<u32> = (0..set.facets.len() as u32).collect();
+                Ok(batches(&numbers, spare, |batch, records| {
+                    records.extend(batch.iter().filter_map(|number| projector.record(*number)));
                 }))
             }
             Self::Hierarchy(pages) => {

@@ -4,6 +4,7 @@
 use crate::{
     Stop,
     bricks::Choice,
+    facet::FacetSet,
     math::{Profile, Sheets, View},
     plan::{
         TILE,
@@ -14,6 +15,7 @@ use crate::{
     volume::Arrangement,
 };
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// The place of a plane in front of or behind all others.
 const NOWHERE: f32 = 3e38;
@@ -76,6 +78,8 @@ pub struct Plan<'a> {
     pub has_radiance: bool,
     /// The scene has facets.
     pub has_facets: bool,
+    /// The sets of facets that show images.
+    pub with_images: Vec<Arc<FacetSet>>,
     pub lit_surfaces: bool,
     /// The scene has trained Gaussians, which are not lit.
     pub has_trained: bool,
@@ -120,6 +124,7 @@ impl<'a> Plan<'a> {
             isosurfaces: 0,
             has_radiance: false,
             has_facets: false,
+            with_images: Vec::new(),
             lit_surfaces: false,
             has_trained: scene.items.iter().any(Item::is_trained),
             brightest: scene.brightest(),
@@ -130,6 +135,11 @@ impl<'a> Plan<'a> {
         // Only emission and absorption is lit.
         let emits = settings.optics == Optics::EmissionAbsorption;
         for item in &scene.items {
+            if let Item::Facets(set) = item
+                && !set.shown.is_empty()
+            {
+                plan.with_images.push(set.clone());
+            }
             match item {
                 Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
                     plan.has_facets |= matches!(item, Item::Facets(_));

@@ -2,18 +2,23 @@
 
 use super::{Frame, clip, ray::Ray, shade};
 use crate::{
-    facet::{FacetSet, NEARER, Sides},
+    facet::{FacetSet, Image, NEARER, Sides},
     math::View,
     scene::{Item, Scene, Settings},
 };
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec2};
 
 /// Within a sheet, facets further behind its front than this, over the length by which nearness is
 /// measured, count as this far.
 const FARTHEST: f64 = 60.0;
 
+/// Rays along each side of a pixel that see an image.
+const RAYS: usize = 16;
+
 /// A facet in view space.
-pub(super) struct Facet {
+pub(super) struct Facet<'a> {
+    /// The image that it shows, and the corners' places there.
+    image: Option<(&'a Image, [Vec2; 3])>,
     corners: [DVec3; 3],
     normals: [DVec3; 3],
     colors: [DVec3; 3],
@@ -51,19 +56,20 @@ impl Cover {
 }
 
 /// Returns the facets of a scene that a view shows.
-pub(super) fn gather(scene: &Scene, view: &View, settings: &Settings) -> Vec<Facet> {
+pub(super) fn gather<'a>(scene: &'a Scene, view: &View, settings: &Settings) -> Vec<Facet<'a>> {
     let mut facets = Vec::new();
     for item in &scene.items {
         let Item::Facets(set) = item else { continue };
         let is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
-        let seen = set.facets.iter().filter_map(|facet| Facet::new(facet, set, view));
+        let seen = (0..set.facets.len()).filter_map(|number| Facet::new(number, set, view));
         facets.extend(seen.filter(|facet| facet.turn < 0.0 || !is_culled));
     }
     facets
 }
 
-impl Facet {
-    fn new(facet: &crate::facet::Facet, set: &FacetSet, view: &View) -> Option<Self> {
+impl<'a> Facet<'a> {
+    fn new(number: usize, set: &'a FacetSet, view: &View) -> Option<Self> {
+        let facet = &set.facets[number];
         let corners = facet
             .corners
             .map(|corner| view.to_view(set.origin + DVec3::from(corner.map(f64::from))));
@@ -74,6 +80,7 @@ impl Facet {
         let rows = rows
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)]);
         Some(Self {
+            image: set.image_of(number),
             corners,
             normals: facet.decoded_normals().map(|normal| view.rotation * normal.as_dvec3()),
             colors: facet.colors.map(|color| {
@@ -91,21 +98,49 @@ impl Facet {
         self.rows[0] <= row as f64 + 1.0 && self.rows[1] >= row as f64
     }
 
+    /// Returns the mean colour of the image over a facet's part of a pixel, and the share that is
+    /// seen, from many rays. Without an image, it is white.
+    fn tint(&self, ray: impl Fn(DVec2) -> Ray, view: &View) -> (DVec3, f64) {
+        let Some((image, places)) = self.image else { return (DVec3::ONE, 1.0) };
+        let sample = |weights: [f64; 3]| {
+            let uv = (0..3).map(|i| places[i].as_dvec2() * weights[i]).sum::<DVec2>();
+            let [r, g, b, a] = image.texture().sample(uv.as_vec2()).map(f64::from);
+            (a * DVec3::new(r, g, b), a)
+        };
+        let (mut sum, mut seen, mut count) = (DVec3::ZERO, 0.0, 0.0);
+        for number in 0..RAYS * RAYS {
+            let at = DVec2::new((number % RAYS) as f64, (number / RAYS) as f64);
+            let ray = ray((at + 0.5) / RAYS as f64 - 0.5);
+            if self.edges(&ray, view).iter().all(|edge| *edge >= 0.0) {
+                let (color, own) = sample(self.weights(&ray, view));
+                (sum, seen, count) = (sum + color, seen + own, count + 1.0);
+            }
+        }
+        if count == 0.0 {
+            ((sum, seen), count) = (sample(self.weights(&ray(DVec2::ZERO), view)), 1.0);
+        }
+        (if seen > 0.0 { sum / seen } else { DVec3::ZERO }, seen / count)
+    }
+
     /// Returns the weights of the corners where a ray meets the facet's plane. If that is outside
     /// the facet, weights below 0 count as 0.
     fn weights(&self, ray: &Ray, view: &View) -> [f64; 3] {
+        let weights = self.edges(ray, view).map(|edge| edge.max(0.0));
+        let sum: f64 = weights.iter().sum();
+        if sum > 0.0 { weights.map(|weight| weight / sum) } else { [1.0 / 3.0; 3] }
+    }
+
+    /// Returns on which side of each edge a ray passes: positive within the facet. The edges lie
+    /// opposite to the corners, and the numbers are the corners' weights up to a common factor.
+    fn edges(&self, ray: &Ray, view: &View) -> [f64; 3] {
         let place = |i: usize| {
             let corner = self.corners[i % 3];
             if view.perspective { corner } else { corner - ray.origin }
         };
-        let edge = |i: usize| {
+        [0, 1, 2].map(|i| {
             let cross = place(i + 1).cross(place(i + 2));
-            let own = if view.perspective { cross.dot(ray.direction) } else { cross.z };
-            (own * self.turn).max(0.0)
-        };
-        let weights = [edge(0), edge(1), edge(2)];
-        let sum: f64 = weights.iter().sum();
-        if sum > 0.0 { weights.map(|weight| weight / sum) } else { [1.0 / 3.0; 3] }
+            self.turn * if view.perspective { cross.dot(ray.direction) } else { cross.z }
+        })
     }
 }
 
@@ -187,7 +222,10 @@ impl Frame<'_> {
             let pixel = if view.perspective { front } else { 1.0 } / view.scale;
             let behind = (NEARER * (distance - front) / pixel).clamp(0.0, FARTHEST);
             let weight = share * (-behind).exp();
-            let color = of(facet.colors);
+            let pixel = DVec2::new(column as f64, row as f64) + 0.5;
+            let (tint, seen) = facet.tint(|at| Ray::new(view, pixel + at), view);
+            let (color, share) = (of(facet.colors) * tint, share * seen);
+            let weight = weight * seen;
             let color = match &self.shade {
                 // Facets without normals keep their colours.
                 Some(shade) if facet.normals != [DVec3::ZERO; 3] => {

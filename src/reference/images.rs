@@ -18,7 +18,7 @@ use std::ops::Range;
 pub(super) struct Row<'f> {
     number: i64,
     kernels: Vec<&'f Kernel<'f>>,
-    facets: Vec<&'f Facet>,
+    facets: Vec<&'f Facet<'f>>,
     fields: Vec<FieldRow<'f>>,
 }
 

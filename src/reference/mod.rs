@@ -322,7 +322,7 @@ struct Frame<'a> {
     near: f64,
     /// The kernels of radiance.
     kernels: Vec<Kernel<'a>>,
-    facets: Vec<facets::Facet>,
+    facets: Vec<facets::Facet<'a>>,
     /// The fields that are classified after interpolation.
     fields: Vec<Drawn<'a>>,
     /// The lattice of a volume's samples.
@@ -337,7 +337,7 @@ struct Frame<'a> {
 
 impl<'a> Frame<'a> {
     /// `flat` is the scene with its hierarchies cut.
-    fn new(scene: &Scene, flat: &'a Scene, view: View, settings: &Settings) -> Self {
+    fn new(scene: &'a Scene, flat: &'a Scene, view: View, settings: &Settings) -> Self {
         let sheets = scene.sheets(&view, settings);
         let is_dark = settings.optics == Optics::XRay;
         let before =

@@ -5,7 +5,7 @@
 use super::{Item, Settings};
 use crate::{
     Error, Result,
-    facet::{Facet, FacetSet},
+    facet::{Facet, FacetSet, Shown},
     hierarchy::Detail,
     math::{Bounds, Kernel},
     parallel::prelude::*,
@@ -91,11 +91,20 @@ fn check_facets(set: &FacetSet) -> Result<(), String> {
     }
     let is_finite =
         |facet: &Facet| facet.corners.iter().flatten().all(|v| v.is_finite() && v.abs() <= 1e18);
-    match set.facets.par_iter().position_first(|facet| !is_finite(facet)) {
-        Some(index) => {
-            let corners = set.facets[index].corners;
-            Err(format!("facet {index}: the corners {corners:?} are not finite, or beyond 1e18"))
-        }
+    if let Some(index) = set.facets.par_iter().position_first(|facet| !is_finite(facet)) {
+        let corners = set.facets[index].corners;
+        return Err(format!(
+            "facet {index}: the corners {corners:?} are not finite, or beyond 1e18"
+        ));
+    }
+    if !set.shown.is_empty() && set.shown.len() != set.facets.len() {
+        let [facets, shown] = [set.facets.len(), set.shown.len()];
+        return Err(format!("{shown} facets show images, but there are {facets} facets"));
+    }
+    let exists = |image: u32| image == Shown::PLAIN || (image as usize) < set.images.len();
+    let is_sound = |own: &Shown| exists(own.image) && own.places.iter().all(|at| at.is_finite());
+    match set.shown.par_iter().position_first(|own| !is_sound(own)) {
+        Some(index) => Err(format!("facet {index} shows no part of an image that there is")),
         None => Ok(()),
     }
 }

@@ -3,19 +3,20 @@
 use super::{
     Mesh, SurfelOptions,
     adjacency::{Connected, is_split},
-    paint::{corner_color, of_normal, pack},
-    refine::{Origin, Refined, refine},
+    paint::{corner_tint, of_normal, pack, texture_of},
+    refine::{Cutting, Origin, Refined, refine},
     smooth::corner_normals,
     surfels::largest_edge,
 };
 use crate::{
     Result,
-    facet::{Facet, FacetSet, Sides},
+    facet::{Facet, FacetSet, Image, Shown, Sides},
     memory,
     parallel::prelude::*,
     splat::encode_normal,
 };
 use glam::Vec3;
+use std::{collections::HashMap, sync::Arc};
 
 /// Facets may be this many times as long as the triangles that surfels are made of: the sheets that
 /// a facet meets, not its outline, limit its size.
@@ -33,13 +34,14 @@ enum Normals<'a> {
 impl Mesh {
     /// Makes facets of the triangles, which have their outlines exactly. Returns `None` for what
     /// surfels draw better: a point cloud, a mesh of more than
-    /// [`most_facets`](SurfelOptions::most_facets) triangles, and one that is not opaque. Lengths
-    /// are in world units and corners are relative to the mesh's origin. The order depends on the
-    /// input only.
+    /// [`most_facets`](SurfelOptions::most_facets) triangles, and one whose vertices or materials
+    /// are not opaque. Lengths are in world units and corners are relative to the mesh's origin.
+    /// The order depends on the input only.
     ///
-    /// Colours are vertex colour × material × texture, normals the file's, or those that
-    /// [`surfels`](Self::surfels) have, interpolated over each triangle. Long triangles and
-    /// textured ones are cut. If the mesh is [solid](Self::is_solid), facets are turned outward.
+    /// Colours are vertex colour × material, normals the file's, or those that
+    /// [`surfels`](Self::surfels) have, interpolated over each triangle. Textures are images that
+    /// the facets show, also where they are partly clear. Long triangles are cut. If the mesh is
+    /// [solid](Self::is_solid), facets are turned outward.
     ///
     /// # Errors
     /// As [`surfels`](Self::surfels), except
@@ -49,18 +51,16 @@ impl Mesh {
         self.check(options)?;
         let count = self.triangles.len();
         let is_opaque =
-            || self.colors.par_iter().all(|color| color[3] == 255) && self.has_opaque_materials();
+            || self.colors.par_iter().all(|color| color[3] == 255) && self.has_opaque_tints();
         if count == 0 || count > options.most_facets || !is_opaque() {
             return Ok(None);
         }
         let Some(bounds) = self.local_bounds() else { return Ok(None) };
-        let is_textured =
-            !self.uvs.is_empty() && self.materials.iter().any(|own| own.texture.is_some());
         let largest = largest_edge(bounds, self.area(), options);
         self.check_extent(largest)?;
-        let longest = if is_textured { largest } else { largest * LONGER };
+        let cutting = Cutting { length: largest * LONGER, to_texels: false };
         let Refined { mesh, sources } =
-            refine(self, longest, options.most_triangles, options.deadline)?;
+            refine(self, cutting, options.most_triangles, options.deadline)?;
         let crease = options.crease_angle_degrees;
         let normals = match sources {
             Some(sources) => {
@@ -72,12 +72,16 @@ impl Mesh {
         let is_turned = sides == Sides::Closed && self.is_inside_out();
         let traits = [is_turned, options.color_by_normal];
         memory::room(WORK, (size_of::<Facet>() * mesh.triangles.len()) as u64)?;
-        let facets: Vec<Facet> = (0..mesh.triangles.len())
-            .into_par_iter()
-            .filter_map(|number| facet(&mesh, number, &normals, traits))
-            .collect();
+        let facet = |number| Some((number, facet(&mesh, number, &normals, traits)?));
+        let (numbers, facets): (Vec<usize>, Vec<Facet>) =
+            (0..mesh.triangles.len()).into_par_iter().filter_map(facet).unzip();
         options.deadline.check(WORK)?;
-        Ok((!facets.is_empty()).then_some(FacetSet { origin: self.origin, facets, sides }))
+        let (images, shown) = match options.color_by_normal {
+            true => Default::default(),
+            false => images(&mesh, &numbers, is_turned),
+        };
+        let set = FacetSet { origin: self.origin, facets, sides, images, shown };
+        Ok((!set.facets.is_empty()).then_some(set))
     }
 
     /// Returns which sides of the mesh's triangles are seen.
@@ -136,11 +140,37 @@ fn facet(
             let [red, green, blue, _] = pack(of_normal(encode_normal(outward))).to_le_bytes();
             return [red, green, blue];
         }
-        let [red, green, blue, _] = corner_color(mesh, number, corner);
+        let [red, green, blue, _] = corner_tint(mesh, number, corner);
         [red, green, blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8)
     });
-    let order = if is_turned { [0, 2, 1] } else { [0, 1, 2] };
+    let order = order(is_turned);
     let facet =
         Facet::new(order.map(|i| corners[i]), order.map(|i| own[i]), order.map(|i| colors[i]));
     Some(if mesh.is_unlit(number) { facet.unlit() } else { facet })
+}
+
+/// Returns the order of a facet's corners among those of its triangle.
+fn order(is_turned: bool) -> [usize; 3] {
+    if is_turned { [0, 2, 1] } else { [0, 1, 2] }
+}
+
+/// Returns the images of a mesh, and what the facets of these triangles show of them.
+fn images(mesh: &Mesh, triangles: &[usize], is_turned: bool) -> (Vec<Arc<Image>>, Vec<Shown>) {
+    let textured = |triangle: &usize| texture_of(mesh, *triangle);
+    if mesh.uvs.is_empty() || !triangles.iter().any(|own| textured(own).is_some()) {
+        return Default::default();
+    }
+    let (mut images, mut numbers) = (Vec::new(), HashMap::new());
+    let shown = triangles.iter().map(|triangle| {
+        let image = textured(triangle).map_or(Shown::PLAIN, |texture| {
+            *numbers.entry(Arc::as_ptr(texture)).or_insert_with(|| {
+                images.push(Arc::new(Image::new(texture)));
+                images.len() as u32 - 1
+            })
+        });
+        let vertices = order(is_turned).map(|corner| mesh.triangles[*triangle][corner]);
+        Shown { image, places: vertices.map(|vertex| mesh.uvs[vertex as usize]) }
+    });
+    let shown = shown.collect();
+    (images, shown)
 }

@@ -9,6 +9,7 @@ use crate::{
 };
 use glam::{DVec3, Vec2};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// The colour of a mesh that defines none.
 pub(super) const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
@@ -187,10 +188,13 @@ impl Texture {
     pub fn sample(&self, uv: Vec2) -> [f32; 4] {
         let axis = |part: f32, size: u32| {
             let part = if part.is_finite() { part - part.floor() } else { 0.0 };
+            // From −0.5 to half a texel before the end, where the first texel follows the last.
             let at = part * size as f32 - 0.5;
             let first = at.floor();
-            let wrap = |i: f32| (i as i64).rem_euclid(i64::from(size.max(1))) as usize;
-            (wrap(first), wrap(first + 1.0), at - first)
+            let last = size.max(1) - 1;
+            let from = if first < 0.0 { last } else { (first as u32).min(last) };
+            let to = if from == last { 0 } else { from + 1 };
+            (from as usize, to as usize, at - first)
         };
         let (x0, x1, fx) = axis(uv.x, self.width);
         let (y0, y1, fy) = axis(uv.y, self.height);
@@ -223,18 +227,31 @@ impl Texture {
 pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32; 4] {
     let [vertex, next, last] =
         [0, 1, 2].map(|i| mesh.triangles[triangle][(corner + i) % 3] as usize);
+    let mut color = corner_tint(mesh, triangle, corner);
+    if let (Some(texture), Some(&uv)) = (texture_of(mesh, triangle), mesh.uvs.get(vertex)) {
+        let [a, b] = [next, last].map(|other| (mesh.uvs[other] - uv) * 0.5);
+        color.iter_mut().zip(texture.mean(uv, a, b)).for_each(|(part, by)| *part *= by);
+    }
+    color
+}
+
+/// Returns the colour of a corner of a triangle without its texture; channels in 0 … 1.
+pub(super) fn corner_tint(mesh: &Mesh, triangle: usize, corner: usize) -> [f32; 4] {
+    let vertex = mesh.triangles[triangle][corner] as usize;
     let material =
         mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
     let mut color = base_color(mesh, material);
-    let mut multiply = |by: [f32; 4]| color.iter_mut().zip(by).for_each(|(part, by)| *part *= by);
     if let Some(own) = mesh.vertex_color(vertex) {
-        multiply(own.map(|part| f32::from(part) / 255.0));
-    }
-    let texture = material.and_then(|material| material.texture.as_ref());
-    if let (Some(texture), Some(&uv)) = (texture, mesh.uvs.get(vertex)) {
-        multiply(texture.mean(uv, (mesh.uvs[next] - uv) * 0.5, (mesh.uvs[last] - uv) * 0.5));
+        let own = own.map(|part| f32::from(part) / 255.0);
+        color.iter_mut().zip(own).for_each(|(part, by)| *part *= by);
     }
     color
+}
+
+/// Returns the texture of a triangle.
+pub(super) fn texture_of(mesh: &Mesh, triangle: usize) -> Option<&Arc<Texture>> {
+    let material = mesh.triangle_materials.get(triangle)?;
+    mesh.materials[*material as usize].texture.as_ref()
 }
 
 /// Returns the colour at a position in a triangle, given by barycentric coordinates; channels in 0

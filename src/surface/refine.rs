@@ -37,12 +37,28 @@ struct Wanted<'a> {
     mesh: &'a Mesh,
     /// The longest edge that the caller asked for.
     asked: f32,
+    to_texels: bool,
     length: f32,
     /// Factor on [`TEXELS`] and [`FINEST`] that keeps to the budget.
     coarser: f32,
     steps: i32,
     /// Triangles whose texture cannot be resolved; empty if the mesh has no texture.
     is_blurred: Vec<bool>,
+}
+
+/// How far a mesh is cut.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cutting {
+    /// The longest edge, in the mesh's unit.
+    pub length: f32,
+    /// Whether textured triangles are cut to about the size of the texels.
+    pub to_texels: bool,
+}
+
+impl From<f32> for Cutting {
+    fn from(length: f32) -> Self {
+        Self { length, to_texels: true }
+    }
 }
 
 /// A mesh of small triangles.
@@ -52,19 +68,18 @@ pub(super) struct Refined<'a> {
     pub sources: Option<Vec<u32>>,
 }
 
-/// Returns the mesh with no edge longer than `length` (in its unit), and textured triangles cut to
-/// about the size of the texels. If there would be more triangles than the [`budget`], lengths
-/// grow.
+/// Returns the mesh with triangles cut so far. If there would be more triangles than the
+/// [`budget`], lengths grow.
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
 pub(super) fn refine(
     mesh: &Mesh,
-    length: f32,
+    cutting: impl Into<Cutting>,
     most: usize,
     deadline: Deadline,
 ) -> Result<Refined<'_>> {
-    let mut fine = match refined(mesh, length, most, usize::MAX, deadline) {
+    let mut fine = match refined(mesh, cutting.into(), most, usize::MAX, deadline) {
         Ok(Some(fine)) => fine,
         Ok(None) | Err(Stop::TooMany(_)) => {
             return Ok(Refined { mesh: Cow::Borrowed(mesh), sources: None });
@@ -141,12 +156,12 @@ impl From<crate::Error> for Stop {
 /// [`Stop::TooMany`] for more than `room` triangles, before there are that many.
 fn refined(
     mesh: &Mesh,
-    length: f32,
+    cutting: Cutting,
     most: usize,
     room: usize,
     deadline: Deadline,
 ) -> std::result::Result<Option<Mesh>, Stop> {
-    let mut wanted = Wanted::new(mesh, length);
+    let mut wanted = Wanted::new(mesh, cutting);
     if wanted.are_small() {
         return Ok(None);
     }
@@ -241,7 +256,7 @@ pub(super) fn count_of_refined(
         materials: materials.clone(),
         ..Mesh::default()
     };
-    match refined(&bare, length, most, room, deadline) {
+    match refined(&bare, length.into(), most, room, deadline) {
         Ok(fine) => Ok(fine.unwrap_or(bare).triangles.len()),
         Err(Stop::TooMany(about)) => Ok(about),
         Err(Stop::Failed(error)) => Err(error),
@@ -323,9 +338,10 @@ fn cut_all(
 }
 
 impl<'a> Wanted<'a> {
-    fn new(mesh: &'a Mesh, length: f32) -> Self {
+    fn new(mesh: &'a Mesh, Cutting { length, to_texels }: Cutting) -> Self {
+        let (coarser, steps, is_blurred) = (1.0, 0, Vec::new());
         let mut wanted =
-            Self { mesh, asked: length, length, coarser: 1.0, steps: 0, is_blurred: Vec::new() };
+            Self { mesh, asked: length, length, to_texels, coarser, steps, is_blurred };
         wanted.coarsen(0);
         if wanted.is_textured() {
             let triangles = mesh.triangles.par_iter().enumerate();
@@ -360,7 +376,8 @@ impl<'a> Wanted<'a> {
     }
 
     fn is_textured(&self) -> bool {
-        !self.mesh.uvs.is_empty()
+        self.to_texels
+            && !self.mesh.uvs.is_empty()
             && self.mesh.materials.iter().any(|material| material.texture.is_some())
     }
 
@@ -374,9 +391,11 @@ impl<'a> Wanted<'a> {
 
     /// Returns the length of an edge in texels of its triangle's texture; 0 without one.
     fn texels(&self, mesh: &Mesh, source: usize, a: u32, b: u32) -> f32 {
-        let Some(texture) = self.texture(source).filter(|_| !self.is_blurred[source]) else {
+        // Empty without textures, or if they do not count.
+        if self.is_blurred.get(source).is_none_or(|is_blurred| *is_blurred) {
             return 0.0;
-        };
+        }
+        let Some(texture) = self.texture(source) else { return 0.0 };
         let (Some(&a), Some(&b)) = (mesh.uvs.get(a as usize), mesh.uvs.get(b as usize)) else {
             return 0.0;
         };
@@ -449,7 +468,7 @@ pub(super) fn stretch(edges: [f32; 3], length: f32) -> f32 {
 
 /// Returns whether no edge of the mesh has to be cut if `length` is the longest allowed.
 pub(super) fn is_fine(mesh: &Mesh, length: f32) -> bool {
-    Wanted::new(mesh, length).are_small()
+    Wanted::new(mesh, length.into()).are_small()
 }
 
 /// Estimates the pieces of a triangle whose edges are these many times too long.

@@ -5,7 +5,7 @@
 //! part point inward, its front faces away. The sign of the enclosed volume determines which side
 //! of a part is outside.
 
-use super::{Mesh, fan::Sums, mesh::given, parts::Joining, survey::Closing};
+use super::{Material, Mesh, fan::Sums, mesh::given, parts::Joining, survey::Closing};
 use crate::{memory, parallel::prelude::*};
 use glam::Vec3;
 
@@ -193,25 +193,36 @@ impl Mesh {
 
     /// Returns whether all materials that triangles use are opaque.
     pub(super) fn has_opaque_materials(&self) -> bool {
-        let mut is_used = vec![false; self.materials.len()];
-        for &material in &self.triangle_materials {
-            if let Some(used) = is_used.get_mut(material as usize) {
-                *used = true;
-            }
-        }
-        self.materials.iter().zip(is_used).filter(|(_, used)| *used).all(|(material, _)| {
+        self.used_materials().all(|material| {
             let is_opaque = |texel: &[u8; 4]| texel[3] == 255;
             let texture = material.texture.as_deref();
             material.color[3] >= 1.0
                 && texture.is_none_or(|texture| texture.texels.par_iter().all(is_opaque))
         })
     }
+
+    /// Whether all materials that triangles use are opaque, apart from their textures.
+    pub(super) fn has_opaque_tints(&self) -> bool {
+        self.used_materials().all(|material| material.color[3] >= 1.0)
+    }
+
+    /// Returns the materials that triangles use.
+    fn used_materials(&self) -> impl Iterator<Item = &Material> {
+        let mut is_used = vec![false; self.materials.len()];
+        for &material in &self.triangle_materials {
+            if let Some(used) = is_used.get_mut(material as usize) {
+                *used = true;
+            }
+        }
+        let used = self.materials.iter().zip(is_used).filter(|(_, used)| *used);
+        used.map(|(material, _)| material)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Material, Texture};
+    use crate::surface::Texture;
     use glam::Vec2;
     use std::sync::Arc;
 

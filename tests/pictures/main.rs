@@ -11,6 +11,7 @@ mod gaussians;
 mod gpu_engine;
 mod hierarchies;
 mod hosts;
+mod images;
 mod labels;
 mod near;
 mod occlusion;

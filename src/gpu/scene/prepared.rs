@@ -507,7 +507,8 @@ impl PreparedScene {
 
     fn add_facets(&mut self, gpu: &Gpu, set: &Arc<FacetSet>, item: usize) {
         let most = (gpu.binding_size() / size_of::<Facet>() as u64) as usize;
-        for facets in set.facets.chunks(most) {
+        // The shaders draw no images.
+        for facets in set.baked().facets.chunks(most) {
             let origin = Origin::Facets { set: set.clone(), is_culled: false };
             self.add_chunk(gpu, item, origin, bytemuck::cast_slice(facets), facets.len() as u32);
         }

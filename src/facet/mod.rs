@@ -1,12 +1,18 @@
 //! Splats with a polygonal footprint: triangles whose outline is exact at any distance.
 
+mod baked;
+mod image;
+
+pub use image::Image;
+
 use crate::{
     math::Bounds,
     parallel::prelude::*,
     splat::{NO_NORMAL, decode_normal, encode_normal},
 };
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use std::sync::Arc;
 
 /// A triangle as stored in memory and on the GPU (60 bytes): a splat whose footprint in the picture
 /// is the triangle itself. Round splats approximate flat faces, creases and boundaries; a facet has
@@ -55,6 +61,22 @@ impl Facet {
     }
 }
 
+/// What a facet shows of an image. The image's colours are multiplied with those of the corners,
+/// and a pixel is covered less where less of the image is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shown {
+    /// The number of the image; [`PLAIN`](Self::PLAIN) if the facet shows none.
+    pub image: u32,
+    /// The places of the corners in the image; (0, 0) is its top left corner, (1, 1) the bottom
+    /// right one.
+    pub places: [Vec2; 3],
+}
+
+impl Shown {
+    /// Stands for no image.
+    pub const PLAIN: u32 = u32::MAX;
+}
+
 /// Which sides of facets are seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Sides {
@@ -77,9 +99,19 @@ pub struct FacetSet {
     pub facets: Vec<Facet>,
     /// Which of their sides are seen.
     pub sides: Sides,
+    /// The images that facets show.
+    pub images: Vec<Arc<Image>>,
+    /// What each facet shows of them; empty if none shows anything.
+    pub shown: Vec<Shown>,
 }
 
 impl FacetSet {
+    /// Returns the image that a facet shows, and the places of its corners there.
+    pub(crate) fn image_of(&self, facet: usize) -> Option<(&Image, [Vec2; 3])> {
+        let shown = self.shown.get(facet)?;
+        Some((self.images.get(shown.image as usize)?, shown.places))
+    }
+
     /// Returns the box around all facets, in world coordinates.
     pub fn bounds(&self) -> Bounds {
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
@@ -106,7 +138,12 @@ mod tests {
     fn set() -> FacetSet {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let facet = Facet::new(corners, [Vec3::ZERO; 3], [[255, 0, 7]; 3]);
-        FacetSet { origin: DVec3::Y, facets: vec![facet], sides: Sides::Oriented }
+        FacetSet {
+            origin: DVec3::Y,
+            facets: vec![facet],
+            sides: Sides::Oriented,
+            ..FacetSet::default()
+        }
     }
 
     #[test]
