@@ -264,8 +264,11 @@ fn add_entries(
             add_general(f, at, front, first_pixel);
         }
         at += taken;
-        *entries_left -= min(*entries_left, 1u);
+        *entries_left -= min(*entries_left, 1u + image_entries());
         if at >= stop || !is_of(entry_at(at), f, entry_sheet) {
+            break;
+        }
+        if CAN_STOP && HAS_IMAGES && *entries_left == 0u {
             break;
         }
     }

@@ -91,6 +91,13 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
     let place_a = frame.center + a.xy * (frame.scale * nearness.x);
     let place_b = frame.center + b.xy * (frame.scale * nearness.y);
     let place_c = frame.center + c.xy * (frame.scale * nearness.z);
+    // The weights of the corners along a ray, up to a common factor (Olano & Greer 1997).
+    let toward = select(vec3(1.0), z, PERSPECTIVE);
+    let edges = mat3x3<f32>(
+        cross(vec3(b.xy, toward.y), vec3(c.xy, toward.z)),
+        cross(vec3(c.xy, toward.z), vec3(a.xy, toward.x)),
+        cross(vec3(a.xy, toward.x), vec3(b.xy, toward.y)),
+    );
     let continued = (entry & ENTRY_CONTINUED) != 0u;
     let ahead = vec4(
         planes[front],
@@ -130,8 +137,24 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
         if CLIPS + HOLES > 0u {
             counts = counts && is_kept(r, distance);
         }
+        var tint = vec4(1.0);
+        if HAS_IMAGES && counts && abs(last.w) > 1.0 {
+            // Only what lies in this window is needed.
+            counts = distance < behind.w && (!continued || distance >= ahead.y);
+            if counts {
+                let ray = vec3((pixel - frame.center) / frame.scale, 1.0);
+                tint = facet_tint(
+                    u32(abs(last.w)) - 2u,
+                    (ray * edges) * turn,
+                    vec3(edges[0].x, edges[1].x, edges[2].x) * (turn / frame.scale),
+                    vec3(edges[0].y, edges[1].y, edges[2].y) * (turn / frame.scale),
+                );
+                share *= tint.w;
+                counts = share > LEAST_SHARE_ADDED;
+            }
+        }
         if counts {
-            var color = tints * weights;
+            var color = (tints * weights) * tint.xyz;
             // Facets without normals keep their colours.
             if SURFACE_SHADED && any(normals[0] != vec3(0.0)) {
                 color = lit(color, normals * weights, direction_of(r), frame.surface_shade);

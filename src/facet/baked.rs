@@ -1,4 +1,4 @@
-//! Facets that show images, cut into plain ones: for engines that draw no images.
+//! Facets that show images, cut into plain ones: for devices that have no room for the images.
 
 use super::{Facet, FacetSet, Image};
 use crate::parallel::prelude::*;

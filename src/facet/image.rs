@@ -37,6 +37,11 @@ impl Image {
         self.coarser.iter().map(|level| 4 * level.texels.len() as u64).sum()
     }
 
+    /// Returns the levels, the texture itself first.
+    pub fn levels(&self) -> impl Iterator<Item = &Texture> {
+        std::iter::once(&*self.finest).chain(&self.coarser)
+    }
+
     /// Returns the texture itself.
     pub fn texture(&self) -> &Texture {
         &self.finest

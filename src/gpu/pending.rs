@@ -282,6 +282,7 @@ impl PendingFrame {
             budget: engine.budget,
             choice,
             gathered: outline.gather.then_some(kind),
+            images: prepared.images.is_some(),
             is_software: gpu.is_software(),
         };
         let variant = variant::variant(&request);

@@ -98,6 +98,8 @@ pub struct Targets {
     pub progress: wgpu::Buffer,
     pub colors: wgpu::Buffer,
     pub depths: wgpu::Buffer,
+    /// The images that facets show, and what they show of them (images.wgsl).
+    pub images: Option<[wgpu::TextureView; 2]>,
     /// The lattice that is gathered, if any.
     pub gathered: Option<Gathered>,
     pub run_total: u32,
@@ -252,6 +254,7 @@ impl Request<'_> {
             ),
             colors: pool.take(gpu, "colors", 16 * pixels + slots),
             depths: pool.take(gpu, "depths", 4 * pixels),
+            images: prepared.images.as_ref().map(|images| images.textures.clone()),
             gathered,
             run_total: prepared.runs,
             first_runs: prepared.first_runs(),

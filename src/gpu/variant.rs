@@ -24,6 +24,8 @@ pub struct Request<'a> {
     pub choice: Option<&'a Choice>,
     /// The type of the samples (value.wgsl), if the field is gathered.
     pub gathered: Option<u32>,
+    /// Whether facets show images.
+    pub images: bool,
     /// Whether the adapter runs on the processor.
     pub is_software: bool,
 }
@@ -36,6 +38,7 @@ pub fn variant(request: &Request<'_>) -> Variant {
         match item {
             Item::Facets(_) => {
                 variant.facets = true;
+                variant.images = request.images;
                 variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
             }
             Item::Radiance(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
@@ -104,6 +107,7 @@ fn without_items(request: &Request<'_>) -> Variant {
         radiance: false,
         trained: false,
         facets: false,
+        images: false,
         isotropic: false,
         general: false,
         table_kernel: false,

@@ -1,13 +1,14 @@
 //! Scenes of facets: closed, open, seen from within, clipped, and beside other items.
 
 use super::{Case, ORIGIN, PERSPECTIVE, SLANT, camera, methods, mixed_scene, settings};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use splatkit::{
     facet::{FacetSet, Sides},
     math::Projection,
     scene::{Scene, Settings},
-    surface::{Mesh, SurfelOptions},
+    surface::{Material, Mesh, SurfelOptions, Texture},
 };
+use std::sync::Arc;
 
 /// The facets of a mesh around the origin of the scenes, coloured by place.
 fn facets(mesh: Mesh, sides: Sides) -> FacetSet {
@@ -68,6 +69,35 @@ pub fn facets_in_a_volume() -> Case {
     mesh.positions.iter_mut().for_each(|p| *p = *p * 0.8 + Vec3::new(0.2, 0.0, 0.1));
     let scene = mixed_scene().with_facets(facets(mesh, Sides::Closed));
     case("facets_in_a_volume", scene, PERSPECTIVE)
+}
+
+/// A leaning square that shows a picture with holes.
+pub fn textured() -> Case {
+    let (width, height) = (60, 90);
+    let texel = |i: u32| {
+        let (x, y) = (i % width, i / width);
+        let wave = |at: u32| (128.0 + 100.0 * (at as f32 / 6.0).sin()) as u8;
+        [wave(x), wave(y), wave(x + y), if (x / 11 + y / 13) % 3 == 0 { 0 } else { 255 }]
+    };
+    let texels = (0..width * height).map(texel).collect();
+    let corners = [[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9]];
+    let material = Material {
+        color: [1.0, 0.9, 0.8, 1.0],
+        texture: Some(Arc::new(Texture { width, height, texels })),
+        ..Material::default()
+    };
+    let mesh = Mesh {
+        origin: ORIGIN,
+        positions: corners.map(|[x, y]| Vec3::new(x, y, 0.3 * x)).to_vec(),
+        uvs: corners.map(|[x, y]| Vec2::new(x, y)).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        triangle_materials: vec![0; 2],
+        materials: vec![material],
+        ..Mesh::default()
+    };
+    let set = mesh.facets(&SurfelOptions::default()).expect("facets").expect("a mesh of facets");
+    assert!(!set.shown.is_empty());
+    case("textured", Scene::new().with_facets(set), PERSPECTIVE)
 }
 
 pub fn all() -> [Case; 5] {

@@ -74,7 +74,8 @@ fn check(recipe: &Recipe) -> Outcome {
 /// The bindings of a recipe, with their numbers.
 fn bindings(recipe: &Recipe) -> impl Iterator<Item = (ResourceBinding, Binding)> {
     (0..).zip(&recipe.groups).flat_map(|(group, bindings)| {
-        (0..).zip(bindings).map(move |(binding, &kind)| (ResourceBinding { group, binding }, kind))
+        let used = (0..).zip(bindings).filter(|(_, kind)| **kind != Binding::Unused);
+        used.map(move |(binding, &kind)| (ResourceBinding { group, binding }, kind))
     })
 }
 
@@ -85,14 +86,14 @@ fn check_bindings(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcom
     let entry = info.get_entry_point(entry.ok_or(format!("no entry point {}", recipe.entry))?);
     for (handle, global) in module.global_variables.iter() {
         let Some(place) = global.binding.filter(|_| !entry[handle].is_empty()) else { continue };
-        let texture = matches!(
-            module.types[global.ty].inner,
+        let texture = match module.types[global.ty].inner {
             TypeInner::Image {
-                dim: ImageDimension::D3,
+                dim,
                 arrayed: false,
                 class: ImageClass::Sampled { kind: ScalarKind::Uint, multi: false },
-            }
-        );
+            } => Some(if dim == ImageDimension::D3 { Binding::Texture } else { Binding::Words }),
+            _ => None,
+        };
         let both = StorageAccess::LOAD | StorageAccess::STORE;
         let declared = match global.space {
             AddressSpace::Uniform => Some(Binding::Uniform),
@@ -100,7 +101,7 @@ fn check_bindings(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcom
                 Some(Binding::Read)
             }
             AddressSpace::Storage { access } if access == both => Some(Binding::Write),
-            AddressSpace::Handle if texture => Some(Binding::Texture),
+            AddressSpace::Handle => texture,
             _ => None,
         };
         let given = bound.get(&place).copied();
@@ -133,7 +134,7 @@ fn write_spirv(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
 
 fn write_msl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
     let target = |slot: u8, kind| {
-        let is_texture = kind == Binding::Texture;
+        let is_texture = matches!(kind, Binding::Texture | Binding::Words);
         msl::BindTarget {
             buffer: (!is_texture).then_some(slot),
             texture: is_texture.then_some(slot),

@@ -75,6 +75,7 @@ fn cases() -> Vec<Case> {
         methods::clipped_surface_in_a_volume(),
         methods::sharp(),
         methods::sharp_body_centred(),
+        scenes::facets::textured(),
     ];
     all.extend([0.25, 9.0, 20.0].map(bricks).into_iter().chain([labels()]));
     all.extend(scenes::facets::all());
@@ -179,9 +180,20 @@ fn add(case: &Case, settings: &Settings, is_usual: bool, found: &mut Found) {
             [(false, Budget::default()), (true, Budget::default()), (false, stopping)]
         {
             let (scene, view, choice) = (&case.scene, &view, choice.as_ref());
+            let shows = |item: &Item| matches!(item, Item::Facets(set) if !set.shown.is_empty());
+            let images = scene.items.iter().any(shows);
             found.add(
                 case.name,
-                variant(&Request { scene, view, settings, budget, choice, gathered, is_software }),
+                variant(&Request {
+                    scene,
+                    view,
+                    settings,
+                    budget,
+                    choice,
+                    gathered,
+                    images,
+                    is_software,
+                }),
             );
         }
     }

@@ -13,6 +13,9 @@ use crate::gpu::{
     targets::Targets,
 };
 
+/// The number of the first binding of images (images.wgsl).
+const FIRST_IMAGE: u32 = 11;
+
 /// The pass.
 #[derive(Debug)]
 pub struct March(Stage);
@@ -35,6 +38,7 @@ impl March {
             if variant.staged { shaders::STAGED } else { shaders::NO_STAGED },
             shaders::SHEET,
             if variant.facets { shaders::FACETS } else { shaders::NO_FACETS },
+            if variant.images { shaders::IMAGES } else { shaders::NO_IMAGES },
             shaders::PICTURE,
             shaders::PROGRESS,
             shaders::SAVED,
@@ -48,6 +52,10 @@ impl March {
             bindings.push(Read);
         } else {
             sources.push(shaders::FIELD_SUMS);
+        }
+        if variant.images {
+            bindings.resize(FIRST_IMAGE as usize, Binding::Unused);
+            bindings.extend([Binding::Words; 2]);
         }
         let mut groups = vec![bindings.as_slice()];
         groups.extend(variant.gather.then(|| variant.textures()));
@@ -80,7 +88,8 @@ impl March {
             buffers.push(gathered.shown.as_entire_buffer_binding());
             textures = Some(self.0.bind_textures(gpu, 1, &gathered.textures));
         }
-        let group = self.0.bind(gpu, 0, &buffers);
+        let images = targets.images.as_ref().map_or(&[][..], |images| images);
+        let group = self.0.bind_both(gpu, 0, &buffers, (FIRST_IMAGE, images));
         let groups: Vec<_> = std::iter::once(&group).chain(&textures).collect();
         self.0.dispatch_indirect(commands, &groups, (&targets.arguments, arguments));
     }

@@ -10,6 +10,10 @@ pub enum Binding {
     Write,
     /// A three-dimensional texture of 32-bit words.
     Texture,
+    /// A two-dimensional texture of 32-bit words.
+    Words,
+    /// A number that this pipeline does not bind.
+    Unused,
 }
 
 /// The description of a compute pipeline. Shaders are joined from whole files: shared declarations

@@ -82,12 +82,23 @@ impl Stage {
         group: usize,
         buffers: &[wgpu::BufferBinding<'_>],
     ) -> wgpu::BindGroup {
+        self.bind_both(gpu, group, buffers, (0, &[]))
+    }
+
+    /// Binds buffers as [`bind`](Self::bind) does, and textures from number `first` on.
+    pub fn bind_both(
+        &self,
+        gpu: &Gpu,
+        group: usize,
+        buffers: &[wgpu::BufferBinding<'_>],
+        (first, textures): (u32, &[wgpu::TextureView]),
+    ) -> wgpu::BindGroup {
+        let buffers = buffers.iter().cloned().map(wgpu::BindingResource::Buffer);
+        let textures = textures.iter().map(wgpu::BindingResource::TextureView);
         let entries: Vec<_> = (0..)
             .zip(buffers)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry {
-                binding,
-                resource: wgpu::BindingResource::Buffer(buffer.clone()),
-            })
+            .chain((first..).zip(textures))
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
             .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(&self.label),
@@ -103,18 +114,7 @@ impl Stage {
         group: usize,
         textures: &[wgpu::TextureView],
     ) -> wgpu::BindGroup {
-        let entries: Vec<_> = (0..)
-            .zip(textures)
-            .map(|(binding, texture)| wgpu::BindGroupEntry {
-                binding,
-                resource: wgpu::BindingResource::TextureView(texture),
-            })
-            .collect();
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(&self.label),
-            layout: &self.compiled.layouts[group],
-            entries: &entries,
-        })
+        self.bind_both(gpu, group, &[], (0, textures))
     }
 
     /// Encodes a dispatch of a fixed number of workgroups. Workgroups that do not fit one dimension
@@ -169,8 +169,14 @@ pub fn layout_of(
 ) -> wgpu::BindGroupLayout {
     let buffer =
         |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let words = |view_dimension| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Uint,
+        view_dimension,
+        multisampled: false,
+    };
     let entries: Vec<_> = (0..)
         .zip(bindings)
+        .filter(|(_, kind)| **kind != Binding::Unused)
         .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
             binding,
             visibility,
@@ -178,11 +184,8 @@ pub fn layout_of(
                 Binding::Uniform => buffer(wgpu::BufferBindingType::Uniform),
                 Binding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
                 Binding::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-                Binding::Texture => wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Uint,
-                    view_dimension: wgpu::TextureViewDimension::D3,
-                    multisampled: false,
-                },
+                Binding::Texture => words(wgpu::TextureViewDimension::D3),
+                _ => words(wgpu::TextureViewDimension::D2),
             },
             count: None,
         })

@@ -44,6 +44,8 @@ pub struct Variant {
     pub trained: bool,
     /// The scene has facets.
     pub facets: bool,
+    /// Facets show images.
+    pub images: bool,
     /// Lattice samples are drawn with sections that do not depend on the pixel.
     pub isotropic: bool,
     /// Samples are drawn with sections that depend on the pixel.
@@ -154,7 +156,7 @@ impl Variant {
     }
 
     /// The constants that are true or false.
-    fn flags(&self) -> [(&'static str, bool); 38] {
+    fn flags(&self) -> [(&'static str, bool); 39] {
         let radiance = self.radiance || self.classified;
         [
             ("PERSPECTIVE", self.perspective),
@@ -176,6 +178,7 @@ impl Variant {
             ("ISOTROPIC_RECORDS", self.isotropic),
             ("GENERAL_RECORDS", radiance || self.facets || self.general),
             ("HAS_FACETS", self.facets),
+            ("HAS_IMAGES", self.images),
             ("TABLE_KERNEL", self.table_kernel),
             ("BEYOND", self.beyond),
             ("VOLUME_SHADED", self.volume_shaded),

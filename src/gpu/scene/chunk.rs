@@ -38,6 +38,9 @@ pub enum Origin {
         set: Arc<FacetSet>,
         /// Whether the view leaves out backs.
         is_culled: bool,
+        /// One more than the number of the chunk's first facet among those that show images; 0 if
+        /// they show none.
+        shown: u32,
     },
     /// Slots for pages of the hierarchy with this number.
     Nodes { page_cache: usize, slots: Box<Slots> },
@@ -104,7 +107,10 @@ impl Chunk {
                 Source::of_nodes(view, header)
             }
             Origin::Splats { set, .. } => Source::of_splats(view, set),
-            Origin::Facets { set, is_culled } => Source::of_facets(view, set, *is_culled),
+            Origin::Facets { set, is_culled, shown } => {
+                let lattice = [*shown, 0, 0, 0];
+                Source { lattice, ..Source::of_facets(view, set, *is_culled) }
+            }
             Origin::Bricks { bricks, kernel, slab, level } => {
                 let lattice = bricks.lattice(*level);
                 let [width, height, depth] = lattice.dims.map(|n| n as u32);

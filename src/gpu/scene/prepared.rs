@@ -16,6 +16,7 @@ use crate::{
         scene::{
             bricks::{BrickCache, Listed, Room, Slab},
             field::{Field, label_obstacle, texture_bytes, unsuited},
+            images::Images,
             nodes::{Growth, PageCache, Slots},
             recolor::{Harmonics, Recolor},
             select::{Select, Selection},
@@ -35,7 +36,7 @@ use crate::{
     },
 };
 use glam::{UVec3, Vec3};
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 /// Maximum number of voxels in a chunk, apart from those of its neighbours. The spans of all its
 /// voxels then fit a binding of 128 MiB.
@@ -85,6 +86,8 @@ pub struct PreparedScene {
     pub(crate) brick_cache: Option<BrickCache>,
     /// The data to gather the scene's volume. It is made for the first picture that gathers.
     pub(crate) field: Option<Field>,
+    /// The images that facets show.
+    pub(crate) images: Option<Images>,
     /// The tables of the last picture's fields.
     pub(crate) tables: Option<FieldTables>,
     /// Batches of candidates in all chunks.
@@ -129,6 +132,7 @@ impl PreparedScene {
             brick_cache: None,
             field: None,
             tables: None,
+            images: None,
             runs: 0,
             bytes: 0,
             broken: false,
@@ -136,6 +140,9 @@ impl PreparedScene {
             bounds: scene.bounds(),
             gpu: gpu.clone(),
         };
+        gpu.check_memory(Images::bytes_of(scene))?;
+        prepared.images = Images::of(gpu, scene);
+        prepared.bytes += prepared.images.as_ref().map_or(0, |images| images.bytes);
         for (number, item) in scene.items.iter().enumerate() {
             if let Item::Radiance(set) | Item::Scalar(set, _) = item
                 && let Some(levels) = Levels::new(set)
@@ -507,9 +514,12 @@ impl PreparedScene {
 
     fn add_facets(&mut self, gpu: &Gpu, set: &Arc<FacetSet>, item: usize) {
         let most = (gpu.binding_size() / size_of::<Facet>() as u64) as usize;
-        // The shaders draw no images.
-        for facets in set.baked().facets.chunks(most) {
-            let origin = Origin::Facets { set: set.clone(), is_culled: false };
+        let first = self.images.as_ref().and_then(|images| images.first(item));
+        // Without room for the images, facets are cut to texels.
+        let plain = if first.is_some() { Cow::Borrowed(&**set) } else { set.baked() };
+        for (number, facets) in plain.facets.chunks(most).enumerate() {
+            let shown = first.map_or(0, |first| first + 1 + (number * most) as u32);
+            let origin = Origin::Facets { set: set.clone(), is_culled: false, shown };
             self.add_chunk(gpu, item, origin, bytemuck::cast_slice(facets), facets.len() as u32);
         }
     }
@@ -517,7 +527,7 @@ impl PreparedScene {
     /// Decides for each set of facets whether a view leaves out backs.
     pub(crate) fn update_facets(&mut self, view: &View, settings: &Settings) {
         for chunk in &mut self.chunks {
-            if let Origin::Facets { set, is_culled } = &mut chunk.origin {
+            if let Origin::Facets { set, is_culled, .. } = &mut chunk.origin {
                 *is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
             }
         }
