@@ -2,7 +2,7 @@
 // sheets. src/cpu/facets.rs does the same; src/reference/facets.rs has the definition.
 
 // Vectors of a pixel that saved.wgsl saves.
-const FACET_VECTORS: u32 = 10u;
+const FACET_VECTORS: u32 = 11u;
 // Of surfaces behind each other in one sheet, each counts less by e to the power of minus this for
 // every pixel that another is nearer; no more than by this power in all.
 const NEARER: f32 = 4.0;
@@ -15,7 +15,9 @@ struct Cover {
     // The shares of the pixel that fronts and backs fill.
     front: vec4<f32>,
     back: vec4<f32>,
-    // Lit colours times shares.
+    // The shares of what is seen of their images.
+    seen: vec4<f32>,
+    // Lit colours times shares that are seen.
     red: vec4<f32>,
     green: vec4<f32>,
     blue: vec4<f32>,
@@ -138,6 +140,8 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
             counts = counts && is_kept(r, distance);
         }
         var tint = vec4(1.0);
+        // The share that is seen.
+        var seen = share;
         if HAS_IMAGES && counts && abs(last.w) > 1.0 {
             // Only what lies in this window is needed.
             counts = distance < behind.w && (!continued || distance >= ahead.y);
@@ -149,8 +153,8 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
                     vec3(edges[0].x, edges[1].x, edges[2].x) * (turn / frame.scale),
                     vec3(edges[0].y, edges[1].y, edges[2].y) * (turn / frame.scale),
                 );
-                share *= tint.w;
-                counts = share > LEAST_SHARE_ADDED;
+                seen *= tint.w;
+                counts = seen > LEAST_SHARE_ADDED;
             }
         }
         if counts {
@@ -172,15 +176,20 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
                 size = max(start, 1e-30);
             }
             let afar = clamp((distance - start) * (NEARER * frame.scale / size), 0.0, FARTHEST);
-            let near = lanes * exp(-afar);
+            // Of the shares, what is seen.
+            let own = lanes * select(1.0, tint.w, HAS_IMAGES);
+            let near = own * exp(-afar);
             if last.w > 0.0 {
                 covers[r].front += lanes;
             } else {
                 covers[r].back += lanes;
             }
-            covers[r].red += lanes * color.x;
-            covers[r].green += lanes * color.y;
-            covers[r].blue += lanes * color.z;
+            if HAS_IMAGES {
+                covers[r].seen += own;
+            }
+            covers[r].red += own * color.x;
+            covers[r].green += own * color.y;
+            covers[r].blue += own * color.z;
             covers[r].weight += near;
             covers[r].distance += near * distance;
             covers[r].near_red += near * color.x;
@@ -196,6 +205,9 @@ fn cover(r: u32, sheet: u32) {
     let own = covers[r];
     covers[r].front = shift(own.front);
     covers[r].back = shift(own.back);
+    if HAS_IMAGES {
+        covers[r].seen = shift(own.seen);
+    }
     covers[r].red = shift(own.red);
     covers[r].green = shift(own.green);
     covers[r].blue = shift(own.blue);
@@ -210,12 +222,16 @@ fn cover(r: u32, sheet: u32) {
     }
     let weight = max(own.weight.x, 1e-37);
     let hidden = clamp(all - 1.0, 0.0, 1.0);
-    let mean = vec3(own.red.x, own.green.x, own.blue.x) / all;
+    let seen = select(all, max(own.seen.x, 1e-37), HAS_IMAGES);
+    let mean = vec3(own.red.x, own.green.x, own.blue.x) / seen;
     let nearest = vec3(own.near_red.x, own.near_green.x, own.near_blue.x) / weight;
     let color = clamp(mix(mean, nearest, hidden * hidden), vec3(0.0), vec3(1.0));
     let before = pixels[r].transmittance;
     // At a fold, both sides fill the same part of a pixel.
-    let share = min(min(max(own.front.x, own.back.x), 1.0), before);
+    let filled = min(max(own.front.x, own.back.x), 1.0);
+    let opacity = select(1.0, min(seen / filled, 1.0), HAS_IMAGES);
+    let whole = opacity * opacity;
+    let share = min(filled * mix(before, 1.0, whole * whole), before) * opacity;
     let left = before - share;
     pixels[r].color += share * color;
     if before > 0.5 && left <= 0.5 {
@@ -236,6 +252,7 @@ fn save_facets(r: u32, at: u32) {
     colors[at + 7u] = own.near_red;
     colors[at + 8u] = own.near_green;
     colors[at + 9u] = own.near_blue;
+    colors[at + 10u] = own.seen;
 }
 
 fn restore_facets(r: u32, at: u32) {
@@ -249,4 +266,5 @@ fn restore_facets(r: u32, at: u32) {
     covers[r].near_red = colors[at + 7u];
     covers[r].near_green = colors[at + 8u];
     covers[r].near_blue = colors[at + 9u];
+    covers[r].seen = colors[at + 10u];
 }

@@ -339,7 +339,9 @@ impl<S: Simd> OpenTile<'_, S> {
         packet: &Packet<S>,
         sums: &mut Sums<S>,
     ) {
-        let (mut share, weights) = facet.at(simd, packet);
+        let (share, weights) = facet.at(simd, packet);
+        // The share that is seen, if the facet shows an image.
+        let mut seen_share = share;
         let rays = &packet.rays;
         let mut covers = share.simd_gt(LEAST_SHARE);
         if !covers.any_true() {
@@ -370,8 +372,8 @@ impl<S: Simd> OpenTile<'_, S> {
                 [red.simd_into(simd), green.simd_into(simd), blue.simd_into(simd)];
             color = three!(I => color[I] * tint[I]);
             let alpha: Lanes<S> = alpha.simd_into(simd);
-            share = share * alpha;
-            covers &= share.simd_gt(LEAST_SHARE);
+            seen_share = share * alpha;
+            covers &= seen_share.simd_gt(LEAST_SHARE);
             if !covers.any_true() {
                 return;
             }
@@ -393,19 +395,20 @@ impl<S: Simd> OpenTile<'_, S> {
             if !inside.any_true() {
                 continue;
             }
-            let share = inside.select(share, none);
+            let [share, seen] = [share, seen_share].map(|own| inside.select(own, none));
             let pixel = if plan.view.perspective { front.max(1e-30) } else { 1.0 };
             let per_pixel = NEARER as f32 * plan.frame.scale / pixel;
             let behind =
                 ((distance - front) * per_pixel).max(none).min(Lanes::splat(simd, FARTHEST));
-            let weight = share * exp(simd, none - behind);
+            let weight = seen * exp(simd, none - behind);
             let slot = (window.front + own) % WINDOW;
             sums.has_facets[slot] |= packet.bit();
             let sums = &mut sums.facets[slot][packet.number];
             sums.shares[usize::from(!facet.is_front)] += share;
+            sums.seen += seen;
             sums.weight += weight;
             sums.distance = weight.mul_add(distance, sums.distance);
-            sums.color = three!(I => share.mul_add(color[I], sums.color[I]));
+            sums.color = three!(I => seen.mul_add(color[I], sums.color[I]));
             sums.nearest = three!(I => weight.mul_add(color[I], sums.nearest[I]));
         }
     }

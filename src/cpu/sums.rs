@@ -44,7 +44,9 @@ pub struct FaceSums<S: Simd> {
 pub struct FacetSums<S: Simd> {
     /// The shares of the pixels that fronts and backs fill.
     pub shares: [Lanes<S>; 2],
-    /// Lit colours times shares.
+    /// The shares of what is seen of their images.
+    pub seen: Lanes<S>,
+    /// Lit colours times shares that are seen.
     pub color: [Lanes<S>; 3],
     /// Shares that count less the farther a facet is; distances and lit colours times these.
     pub weight: Lanes<S>,
@@ -56,6 +58,8 @@ pub struct FacetSums<S: Simd> {
 /// distance and colour.
 pub struct Cover<S: Simd> {
     pub share: Lanes<S>,
+    /// The opacity of this share.
+    pub opacity: Lanes<S>,
     pub distance: Lanes<S>,
     pub color: [Lanes<S>; 3],
 }
@@ -66,7 +70,12 @@ impl<S: Simd> Cover<S> {
     #[inline(always)]
     pub fn absorb(&self, simd: S, pixels: &mut Pixels<S>) {
         let before = pixels.through;
-        let share = self.share.min(before);
+        let one = Lanes::splat(simd, 1.0);
+        // Neighbours that are clear take less from the light that translucent ones have left.
+        let whole = self.opacity * self.opacity;
+        let light = (one - before).mul_add(whole * whole, before);
+        let light = self.opacity.simd_ge(one).select(one, light);
+        let share = (self.share * light).min(before) * self.opacity;
         pixels.color = three!(I => share.mul_add(self.color[I], pixels.color[I]));
         pixels.through = before - share;
         let half = Lanes::splat(simd, 0.5);
@@ -83,6 +92,8 @@ pub struct Sums<S: Simd> {
     /// Empty in a scene without facets.
     pub facets: Vec<[FacetSums<S>; PACKETS]>,
     pub has_facets: [u8; WINDOW],
+    /// Facets show images, of which parts may not be seen.
+    has_images: bool,
     none: Lanes<S>,
 }
 
@@ -106,6 +117,7 @@ impl<S: Simd> FacetSums<S> {
     fn none(none: Lanes<S>) -> Self {
         Self {
             shares: [none; 2],
+            seen: none,
             color: [none; 3],
             weight: none,
             distance: none,
@@ -123,6 +135,7 @@ impl<S: Simd> Sums<S> {
             radiance: [[[none; 8]; PACKETS]; WINDOW],
             has_radiance: [0; WINDOW],
             facets: if plan.has_facets { vec![no_facets; WINDOW] } else { Vec::new() },
+            has_images: !plan.with_images.is_empty(),
             has_facets: [0; WINDOW],
             none,
         }
@@ -184,7 +197,9 @@ impl<S: Simd> Sums<S> {
         let one = Lanes::splat(simd, 1.0);
         let inverse = one / sums.weight.max(Lanes::splat(simd, 1e-37));
         let all = front + back;
-        let per_share = one / all.max(Lanes::splat(simd, 1e-37));
+        let seen = if self.has_images { sums.seen } else { all };
+        let least = Lanes::splat(simd, 1e-37);
+        let per_share = one / seen.max(least);
         // What is more than the whole pixel lies behind something.
         let hidden = (all - one).max(self.none).min(one);
         let part = hidden * hidden;
@@ -194,7 +209,8 @@ impl<S: Simd> Sums<S> {
         });
         // At a fold, both sides fill the same part of a pixel.
         let share = front.max(back).min(one);
-        Some(Cover { share, distance: sums.distance * inverse, color })
+        let opacity = if self.has_images { (seen / share.max(least)).min(one) } else { one };
+        Some(Cover { share, opacity, distance: sums.distance * inverse, color })
     }
 
     /// Clears the slot of a sheet, for the sheet four further on.

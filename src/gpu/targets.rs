@@ -56,7 +56,7 @@ const SLOTS: u64 = 1024;
 
 /// Returns the bytes of a tile's saved sums (`SAVED_VECTORS` in saved.wgsl, with facets).
 fn slot_bytes(fields: usize) -> u64 {
-    64 * (19 + 8 * fields.max(1) as u64) * 16
+    64 * (20 + 8 * fields.max(1) as u64) * 16
 }
 
 /// Returns the maximum bytes of the slots for a scene with this number of fields. They lie behind

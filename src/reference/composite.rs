@@ -59,9 +59,10 @@ impl Composite {
 
     /// Adds an opaque surface at a distance, which fills a share of the pixel: it absorbs that
     /// share of the light, or as much as is left.
-    pub fn cover(&mut self, share: f64, distance: f64, color: DVec3) {
+    pub fn cover(&mut self, [share, opacity]: [f64; 2], distance: f64, color: DVec3) {
         let before = self.opacity;
-        let share = share.min(1.0 - before);
+        let left = 1.0 - before;
+        let share = (share * (left + before * opacity.powi(4))).min(left) * opacity;
         self.color += share * color;
         self.opacity += share;
         if before < 0.5 && self.opacity >= 0.5 {

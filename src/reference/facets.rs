@@ -35,7 +35,9 @@ pub(super) struct Facet<'a> {
 pub(super) struct Cover {
     /// The shares that fronts and backs fill.
     shares: [f64; 2],
-    /// Lit colours times shares.
+    /// The shares of what is seen of their images.
+    seen: f64,
+    /// Lit colours times shares that are seen.
     color: DVec3,
     /// Weights; distances and lit colours times weights.
     weight: f64,
@@ -44,14 +46,16 @@ pub(super) struct Cover {
 }
 
 impl Cover {
-    /// Returns the share of the pixel that is filled, at most all of it, and the mean distance and
-    /// colour; `None` without facets.
-    pub fn mean(&self) -> Option<(f64, f64, DVec3)> {
+    /// Returns the share of the pixel that is filled, at most all of it, its opacity, and the mean
+    /// distance and colour; `None` without facets.
+    pub fn mean(&self) -> Option<([f64; 2], f64, DVec3)> {
         let [front, back] = self.shares;
         let all = front + back;
         let hidden = (all - 1.0).clamp(0.0, 1.0);
-        let color = (self.color / all).lerp(self.nearest / self.weight, hidden * hidden);
-        (self.weight > 0.0).then(|| (front.max(back).min(1.0), self.distance / self.weight, color))
+        let color = (self.color / self.seen).lerp(self.nearest / self.weight, hidden * hidden);
+        let share = front.max(back).min(1.0);
+        let filled = [share, (self.seen / share).min(1.0)];
+        (self.weight > 0.0).then(|| (filled, self.distance / self.weight, color))
     }
 }
 
@@ -221,11 +225,10 @@ impl Frame<'_> {
             let front = self.planes[sheet - 1];
             let pixel = if view.perspective { front } else { 1.0 } / view.scale;
             let behind = (NEARER * (distance - front) / pixel).clamp(0.0, FARTHEST);
-            let weight = share * (-behind).exp();
             let pixel = DVec2::new(column as f64, row as f64) + 0.5;
             let (tint, seen) = facet.tint(|at| Ray::new(view, pixel + at), view);
-            let (color, share) = (of(facet.colors) * tint, share * seen);
-            let weight = weight * seen;
+            let (color, seen) = (of(facet.colors) * tint, share * seen);
+            let weight = seen * (-behind).exp();
             let color = match &self.shade {
                 // Facets without normals keep their colours.
                 Some(shade) if facet.normals != [DVec3::ZERO; 3] => {
@@ -234,10 +237,14 @@ impl Frame<'_> {
                 _ => color,
             };
             let cover = &mut covers[sheet - 1];
+            if seen <= 0.0 {
+                continue;
+            }
             cover.shares[usize::from(!facet.is_front)] += share;
+            cover.seen += seen;
             cover.weight += weight;
             cover.distance += weight * distance;
-            cover.color += share * color;
+            cover.color += seen * color;
             cover.nearest += weight * color;
         }
         covers

@@ -145,8 +145,8 @@ impl Frame<'_> {
                     composite.pass(all, self.span(k));
                 }
             }
-            if let Some((share, distance, color)) = covers.get(k).and_then(Cover::mean) {
-                composite.cover(share, distance, color);
+            if let Some((filled, distance, color)) = covers.get(k).and_then(Cover::mean) {
+                composite.cover(filled, distance, color);
             }
         }
         composite
