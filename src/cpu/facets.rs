@@ -178,6 +178,26 @@ struct Showing<'a> {
 }
 
 impl Showing<'_> {
+    /// Returns the colours of the pixels of a packet that are covered, and the shares that are
+    /// seen.
+    #[inline(always)]
+    fn of_packet<S: Simd>(
+        &self,
+        simd: S,
+        packet: &Packet<S>,
+        covers: mask32x8<S>,
+    ) -> [Lanes<S>; 4] {
+        let wanted = covers.select(Lanes::splat(simd, 1.0), Lanes::splat(simd, 0.0));
+        let [x, y] = &packet.rays.pixel;
+        let mut seen = [[0.0f32; 8]; 4];
+        for lane in (0..8).filter(|lane| wanted[*lane] > 0.0) {
+            let own = self.at(x[lane], y[lane]);
+            seen.iter_mut().zip(own).for_each(|(seen, own)| seen[lane] = own);
+        }
+        let [red, green, blue, alpha] = seen;
+        [red.simd_into(simd), green.simd_into(simd), blue.simd_into(simd), alpha.simd_into(simd)]
+    }
+
     /// Returns the colour of a pixel, by the place of its centre, and the share that is seen.
     fn at(&self, x: f32, y: f32) -> [f32; 4] {
         let [start, right, down] = self.weights;
@@ -360,18 +380,8 @@ impl<S: Simd> OpenTile<'_, S> {
             if window.is_continued {
                 covers &= distance.simd_ge(plan.planes[window.front + 1]);
             }
-            let none = Lanes::splat(simd, 0.0);
-            let wanted = covers.select(Lanes::splat(simd, 1.0), none);
-            let mut seen = [[0.0f32; 8]; 4];
-            for lane in (0..8).filter(|lane| wanted[*lane] > 0.0) {
-                let own = image.at(rays.pixel[0][lane], rays.pixel[1][lane]);
-                seen.iter_mut().zip(own).for_each(|(seen, own)| seen[lane] = own);
-            }
-            let [red, green, blue, alpha] = seen;
-            let tint: [Lanes<S>; 3] =
-                [red.simd_into(simd), green.simd_into(simd), blue.simd_into(simd)];
-            color = three!(I => color[I] * tint[I]);
-            let alpha: Lanes<S> = alpha.simd_into(simd);
+            let [red, green, blue, alpha] = image.of_packet(simd, packet, covers);
+            color = [color[0] * red, color[1] * green, color[2] * blue];
             seen_share = share * alpha;
             covers &= seen_share.simd_gt(LEAST_SHARE);
             if !covers.any_true() {

@@ -21,13 +21,14 @@ impl Image {
     pub fn new(finest: &Arc<Texture>) -> Self {
         let mut coarser: Vec<Texture> = Vec::new();
         // A texture that lacks texels has one level.
-        let is_whole = finest.texels.len() == finest.width as usize * finest.height as usize;
-        while is_whole {
-            let last = coarser.last().unwrap_or(finest);
-            if last.width.max(last.height) <= 1 {
-                break;
+        if finest.texels.len() == finest.width as usize * finest.height as usize {
+            loop {
+                let last = coarser.last().unwrap_or(finest);
+                if last.width.max(last.height) <= 1 {
+                    break;
+                }
+                coarser.push(halved(last));
             }
-            coarser.push(halved(last));
         }
         Self { finest: finest.clone(), coarser }
     }

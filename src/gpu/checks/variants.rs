@@ -75,10 +75,9 @@ fn cases() -> Vec<Case> {
         methods::clipped_surface_in_a_volume(),
         methods::sharp(),
         methods::sharp_body_centred(),
-        scenes::facets::textured(),
     ];
     all.extend([0.25, 9.0, 20.0].map(bricks).into_iter().chain([labels()]));
-    all.extend(scenes::facets::all());
+    all.extend(scenes::facets::all().into_iter().chain([scenes::facets::textured()]));
     all.extend(scenes::gaussians::all());
     all.extend(scenes::fields::all().into_iter().filter(|case| case.scene.beyond_gpu().is_none()));
     all
