@@ -300,8 +300,9 @@ impl<'a> Shown<'a> {
     }
 }
 
-/// Returns the weights of a facet's corners at pixel (0, 0), and their changes per pixel to the right
-/// and down, for a facet whose front is not seen. They need not add up to 1 (Olano & Greer 1997).
+/// Returns the weights of a facet's corners at pixel (0, 0), and their changes per pixel to the
+/// right and down, for a facet whose front is not seen. They need not add up to 1 (Olano & Greer
+/// 1997).
 fn linear_weights(plan: &Plan, corners: [Vec3; 3]) -> [[f32; 3]; 3] {
     let frame = &plan.frame;
     let edges = [0, 1, 2].map(|i| {

@@ -120,7 +120,7 @@ fn piece(corners: [&Corner; 3], facet: &Facet) -> Option<Facet> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{facet::Shown, surface::Texture};
+    use crate::facet::{Shown, Texture};
     use std::sync::Arc;
 
     #[test]

@@ -1,6 +1,7 @@
 //! Images on facets, and their means over pixels.
 
-use crate::{parallel::prelude::*, surface::Texture};
+use super::Texture;
+use crate::parallel::prelude::*;
 use glam::Vec2;
 use std::sync::Arc;
 

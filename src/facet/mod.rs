@@ -2,8 +2,11 @@
 
 mod baked;
 mod image;
+mod texture;
 
 pub use image::Image;
+pub(crate) use texture::Mean;
+pub use texture::Texture;
 
 use crate::{
     math::Bounds,

@@ -142,9 +142,9 @@
 //! With S the sum of all shares, the second mean counts by x² with x = S − 1, clamped to 0 … 1. So
 //! facets side by side mix by their shares, and a surface that fills a part x of the pixel in front
 //! of another shows by x. A facet whose place is clipped away does not count. Behind the rest of
-//! its sheet, a share a adds x·c to C, and x to A, with x = o·min(1 − A, a·(1 − A + A·o⁴)) and o the
-//! opacity, 1 without images. So what fills the rest of a pixel in another sheet leaves no gap if it
-//! is opaque, and takes its share of the light that is left if it is clear. A facet that
+//! its sheet, a share a adds x·c to C, and x to A, with x = o·min(1 − A, a·(1 − A + A·o⁴)) and o
+//! the opacity, 1 without images. So what fills the rest of a pixel in another sheet leaves no gap
+//! if it is opaque, and takes its share of the light that is left if it is clear. A facet that
 //! shows an image has the mean colour of the image over its part of the pixel, times its own, and
 //! the image's mean opacity there; where that is 0 it does not count. Colours are then weighted by
 //! share·opacity, and o is the sum of share·opacity over a, 1 at most. Other modes and optics draw

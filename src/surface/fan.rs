@@ -10,12 +10,13 @@ use super::{
         THICKNESS, mixed,
     },
     opacity::{Absorbed, OPAQUE, share_of},
-    paint::{Mean, NEUTRAL, corner_color, of_normal, pack},
+    paint::{NEUTRAL, corner_color, of_normal, pack},
     refine::Origin,
     smooth::Groups,
 };
 use crate::{
     deadline::Clock,
+    facet::Mean,
     splat::{NO_NORMAL, STEP_BACK, Splat, encode_normal},
 };
 use fearless_simd::{Level, Simd, dispatch};

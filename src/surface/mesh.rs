@@ -3,6 +3,7 @@
 use crate::{
     about::{About, Stance},
     color::ColorScale,
+    facet::Texture,
     parallel::prelude::*,
 };
 use glam::{DMat3, DVec3, Vec2, Vec3};
@@ -135,15 +136,4 @@ pub struct Material {
     pub texture: Option<Arc<Texture>>,
     /// Whether the colour is drawn as it is, whatever the light.
     pub unlit: bool,
-}
-
-/// A decoded picture, rows from the top; `uv` (0, 0) is its top left corner.
-#[derive(Debug, Clone)]
-pub struct Texture {
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-    /// Red, green, blue and opacity of each pixel, as displayed (not linear light).
-    pub texels: Vec<[u8; 4]>,
 }

@@ -23,7 +23,8 @@ mod surfels;
 mod survey;
 mod upright;
 
-pub use mesh::{Material, Mesh, Sensor, Texture};
+pub use crate::facet::Texture;
+pub use mesh::{Material, Mesh, Sensor};
 pub(crate) use orient::Known;
 pub(crate) use paint::color_at;
 pub use paint::{Paint, Values};
