@@ -148,18 +148,12 @@ fn compared(pair: u32, half: u32, block: u32) -> vec2<u32> {
 
 fn sort_bin(start: u32, end: u32, lane: u32) {
     let count = end - start;
-    if STAGED {
-        // Parts of ROOM entries are sorted in the workgroup's memory.
-        for (var part = 0u; part < count; part += ROOM) {
-            hold(start + part, min(ROOM, count - part), lane);
-            for (var block = 2u; block < 2u * min(ROOM, count - part); block *= 2u) {
-                exchange_held(min(ROOM, count - part), lane, block / 2u, block);
-            }
-            give_back(start + part, min(ROOM, count - part), lane);
-        }
+    if STAGED && count <= ROOM {
+        sort_held(start, count, lane);
+        return;
     }
-    for (var block = 2u * ROOM; block < 2u * count; block *= 2u) {
-        for (var half = block / 2u; half >= ROOM; half /= 2u) {
+    for (var block = 2u; block < 2u * count; block *= 2u) {
+        for (var half = block / 2u; half > 0u; half /= 2u) {
             for (var pair = lane; pair < count; pair += 64u) {
                 let at = compared(pair, half, block);
                 let low = at.x;
@@ -175,20 +169,11 @@ fn sort_bin(start: u32, end: u32, lane: u32) {
             }
             storageBarrier();
         }
-        if STAGED {
-            // The nearer pairs lie within these parts.
-            for (var part = 0u; part < count; part += ROOM) {
-                hold(start + part, min(ROOM, count - part), lane);
-                exchange_held(min(ROOM, count - part), lane, ROOM / 2u, 0u);
-                give_back(start + part, min(ROOM, count - part), lane);
-            }
-            storageBarrier();
-        }
     }
 }
 
-// Takes entries into the workgroup's memory.
-fn hold(start: u32, count: u32, lane: u32) {
+// Sorts a bin that the workgroup's memory holds.
+fn sort_held(start: u32, count: u32, lane: u32) {
     for (var i = lane; i < count; i += 64u) {
         let entry = entries[start + i];
         held[i] = entry;
@@ -197,31 +182,24 @@ fn hold(start: u32, count: u32, lane: u32) {
         }
     }
     workgroupBarrier();
-}
-
-// Does the steps of a block of the network on what the workgroup holds, from a distance of pairs
-// down to 1.
-fn exchange_held(count: u32, lane: u32, furthest: u32, block: u32) {
-    for (var half = furthest; half > 0u; half /= 2u) {
-        for (var pair = lane; pair < count; pair += 64u) {
-            let at = compared(pair, half, block);
-            if at.y < count && held_goes_before(at.y, at.x) {
-                let entry = held[at.x];
-                held[at.x] = held[at.y];
-                held[at.y] = entry;
-                if SINGLE_SPLATS {
-                    let key = held_keys[at.x];
-                    held_keys[at.x] = held_keys[at.y];
-                    held_keys[at.y] = key;
+    for (var block = 2u; block < 2u * count; block *= 2u) {
+        for (var half = block / 2u; half > 0u; half /= 2u) {
+            for (var pair = lane; pair < count; pair += 64u) {
+                let at = compared(pair, half, block);
+                if at.y < count && held_goes_before(at.y, at.x) {
+                    let entry = held[at.x];
+                    held[at.x] = held[at.y];
+                    held[at.y] = entry;
+                    if SINGLE_SPLATS {
+                        let key = held_keys[at.x];
+                        held_keys[at.x] = held_keys[at.y];
+                        held_keys[at.y] = key;
+                    }
                 }
             }
+            workgroupBarrier();
         }
-        workgroupBarrier();
     }
-}
-
-// Writes what the workgroup holds back to its place.
-fn give_back(start: u32, count: u32, lane: u32) {
     for (var i = lane; i < count; i += 64u) {
         entries[start + i] = held[i];
     }
