@@ -3,7 +3,7 @@
 @group(1) @binding(0) var<uniform> source: Source;
 @group(1) @binding(1) var<storage, read> facets: array<Facet>;
 
-// A facet as it is stored. Mirrors src/facet.rs.
+// A facet as it is stored. Mirrors src/facet/mod.rs.
 struct Facet {
     // The corners one after another.
     corners: array<f32, 9>,

@@ -47,8 +47,8 @@ impl<'a> FacetProjector<'a> {
 
     /// Returns the record of a facet, or `None` if it meets no pixel or no sheet, or faces away and
     /// its back is never seen.
-    pub fn record(&self, number: u32) -> Option<Record> {
-        let (plan, facet) = (self.plan, &self.set.facets[number as usize]);
+    pub fn record(&self, number: usize) -> Option<Record> {
+        let (plan, facet) = (self.plan, &self.set.facets[number]);
         let turn = to_view(&self.source);
         let corners = facet.corners.map(|corner| turn * Vec3::from(corner) + origin(&self.source));
         let [a, b, c] = corners;
@@ -80,7 +80,7 @@ impl<'a> FacetProjector<'a> {
                 colors[1],
                 colors[2],
                 f32::from_bits(self.images),
-                f32::from_bits(number),
+                f32::from_bits(number as u32),
             ],
             pixels,
             sheets,
@@ -154,7 +154,7 @@ fn sheets(plan: &Plan, corners: [Vec3; 3]) -> Option<[u16; 2]> {
 /// A facet on its way to the pixels of a tile.
 struct Shown<'a> {
     /// The image that it shows, and where.
-    image: Option<Showing<'a>>,
+    image: Option<Mapped<'a>>,
     corners: [Vec3; 3],
     /// The corners in the picture, in pixels, if all lie in front of the eye.
     places: Option<[Vec2; 3]>,
@@ -169,7 +169,7 @@ struct Shown<'a> {
 
 /// The image that a facet shows. The weights of the corners at a place in the picture are linear
 /// there, up to a factor that they share.
-struct Showing<'a> {
+struct Mapped<'a> {
     image: &'a Image,
     /// The weights' values at pixel (0, 0), and their changes per pixel to the right and down.
     weights: [[f32; 3]; 3],
@@ -177,7 +177,7 @@ struct Showing<'a> {
     places: [Vec2; 3],
 }
 
-impl Showing<'_> {
+impl Mapped<'_> {
     /// Returns the colours of the pixels of a packet that are covered, and the shares that are
     /// seen.
     #[inline(always)]
@@ -243,7 +243,7 @@ impl<'a> Shown<'a> {
         let image = set.and_then(|set| set.image_of(number.to_bits() as usize));
         let image = image.map(|(image, places)| {
             let weights = linear_weights(plan, corners).map(|part| part.map(|own| own * turn));
-            Showing { image, weights, places }
+            Mapped { image, weights, places }
         });
         Self {
             image,
@@ -301,8 +301,8 @@ impl<'a> Shown<'a> {
 }
 
 /// Returns the weights of a facet's corners at pixel (0, 0), and their changes per pixel to the
-/// right and down, for a facet whose front is not seen. They need not add up to 1 (Olano & Greer
-/// 1997).
+/// right and down, up to a common factor (Olano & Greer 1997). They are positive within the facet
+/// if its back is seen, and negative if its front is.
 fn linear_weights(plan: &Plan, corners: [Vec3; 3]) -> [[f32; 3]; 3] {
     let frame = &plan.frame;
     let edges = [0, 1, 2].map(|i| {

@@ -142,15 +142,15 @@ impl Prepared {
             Self::Set { drawn, .. } => {
                 let source = Source::of_splats(view, drawn);
                 let own = |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
-                Ok(batches(&drawn.splats, spare, |batch, records| {
+                Ok(batches(&drawn.splats, spare, |_, batch, records| {
                     records.extend(batch.iter().filter_map(own));
                 }))
             }
             Self::Facets(set) => {
                 let projector = FacetProjector::new(plan, set, settings);
-                let numbers: Vec<u32> = (0..set.facets.len() as u32).collect();
-                Ok(batches(&numbers, spare, |batch, records| {
-                    records.extend(batch.iter().filter_map(|number| projector.record(*number)));
+                Ok(batches(&set.facets, spare, |first, batch, records| {
+                    let numbers = first..first + batch.len();
+                    records.extend(numbers.filter_map(|number| projector.record(number)));
                 }))
             }
             Self::Hierarchy(pages) => {
@@ -166,7 +166,7 @@ impl Prepared {
                 let Some((_, list)) = listed else { return Ok(Vec::new()) };
                 let lattice = LatticeSource::new(plan, volume, kernel);
                 let own = |index: &u32| lattice.record(plan, *index as usize);
-                Ok(batches(list, spare, |batch, records| {
+                Ok(batches(list, spare, |_, batch, records| {
                     records.extend(batch.iter().filter_map(own));
                 }))
             }
@@ -182,7 +182,7 @@ impl Prepared {
 /// Returns the records of splats that carry their own colour.
 fn radiance(plan: &Plan, set: &SplatSet, spare: &mut Spare) -> Vec<Vec<Record>> {
     let projector = Projector::new(plan, Source::of_splats(plan.view, set));
-    batches(&set.splats, spare, |batch: &[Splat], records| {
+    batches(&set.splats, spare, |_, batch: &[Splat], records| {
         lanes!(Level::new(), simd => projector.add(
             simd,
             batch.iter().map(|splat| (splat, 1.0)),
@@ -191,17 +191,18 @@ fn radiance(plan: &Plan, set: &SplatSet, spare: &mut Spare) -> Vec<Vec<Record>> 
     })
 }
 
-/// Returns the records of candidates; `add` appends those of a batch.
+/// Returns the records of candidates; `add` appends those of a batch, which begins with a number.
 fn batches<T: Sync>(
     candidates: &[T],
     spare: &mut Spare,
-    add: impl Fn(&[T], &mut Vec<Record>) + Sync,
+    add: impl Fn(usize, &[T], &mut Vec<Record>) + Sync,
 ) -> Vec<Vec<Record>> {
     let mut records = spare_for(spare, candidates.len().div_ceil(BATCH));
     records
         .par_iter_mut()
         .zip(candidates.par_chunks(BATCH))
-        .for_each(|(records, batch)| add(batch, records));
+        .enumerate()
+        .for_each(|(number, (records, batch))| add(number * BATCH, batch, records));
     records
 }
 

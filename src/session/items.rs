@@ -59,6 +59,15 @@ pub struct Captions {
     pub is_patient: bool,
 }
 
+/// How a scene was before inputs were added.
+#[derive(Debug, Clone)]
+pub struct Mark {
+    items: usize,
+    edges: usize,
+    subject: Subject,
+    length: String,
+}
+
 /// An item, or a mesh, which is drawn as facets in the usual pictures and as surfels in others.
 enum Entry {
     Ready(Item),
@@ -101,7 +110,7 @@ impl Items {
         showing: &Showing,
         does: &dyn Fn(String),
     ) -> Result<()> {
-        let before = (self.subject.clone(), self.length.clone(), self.edges.len());
+        let before = self.mark();
         let mut adding = Adding { items: self, name, showing, does };
         let added = match data {
             Data::Mesh(mesh) => adding.add_mesh(mesh),
@@ -119,19 +128,28 @@ impl Items {
             }
         };
         if added.is_err() {
-            self.legends.truncate_to(self.entries.len());
-            (self.subject, self.length) = (before.0, before.1);
-            self.edges.truncate(before.2);
+            self.restore(before);
         }
         added
     }
 
-    /// Removes the last item, with which the scene stands as `subject` says.
-    pub fn remove_last(&mut self, subject: Subject) {
-        self.entries.pop();
-        self.contents.pop();
-        self.legends.truncate_to(self.entries.len());
-        self.subject = subject;
+    /// Returns how the scene is, for [`restore`](Self::restore).
+    pub fn mark(&self) -> Mark {
+        Mark {
+            items: self.entries.len(),
+            edges: self.edges.len(),
+            subject: self.subject.clone(),
+            length: self.length.clone(),
+        }
+    }
+
+    /// Removes what was added since a mark.
+    pub fn restore(&mut self, mark: Mark) {
+        self.entries.truncate(mark.items);
+        self.contents.truncate(mark.items);
+        self.legends.retain(|(item, _)| *item < mark.items);
+        self.edges.truncate(mark.edges);
+        (self.subject, self.length) = (mark.subject, mark.length);
     }
 
     /// Returns the number of splats, facets, samples and cells.
@@ -234,17 +252,6 @@ impl Items {
             }
             _ => fault,
         }
-    }
-}
-
-/// Drops what belongs to items that are not there.
-trait TruncateTo {
-    fn truncate_to(&mut self, items: usize);
-}
-
-impl TruncateTo for Vec<(usize, Legend)> {
-    fn truncate_to(&mut self, items: usize) {
-        self.retain(|(item, _)| *item < items);
     }
 }
 

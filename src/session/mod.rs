@@ -38,7 +38,7 @@ pub use coloring::{Coloring, SurfaceColor, check_log, shown_of};
 pub use data::{Data, warn_of_holes};
 pub use facts::Facts;
 pub use framing::{Framing, Side};
-pub use items::{Captions, Content, Items};
+pub use items::{Captions, Content, Items, Mark};
 pub use legend::Legend;
 pub use name::Name;
 pub use reading::{Opened, Reading};

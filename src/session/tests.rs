@@ -273,9 +273,9 @@ fn an_input_that_cannot_be_shown_changes_nothing() {
     items.add(&name, Data::Mesh(triangle()), &plain, &|_| ()).unwrap();
     let count = items.count();
     assert_eq!((count > 0, items.edges().len()), (true, 1));
-    let subject = items.subject.clone();
+    let mark = items.mark();
     items.add(&name, Data::Volume(cube(0.0)), &plain, &|_| ()).unwrap();
-    items.remove_last(subject);
+    items.restore(mark);
     assert_eq!((items.count(), items.captions().legends.len()), (count, 0));
     assert!(items.set_transfer(0, Default::default()).is_err());
 }

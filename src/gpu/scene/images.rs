@@ -37,8 +37,7 @@ impl Images {
             firsts.insert(item, first);
             let images: Vec<[u32; 4]> =
                 set.images.iter().map(|image| add(image, &mut texels)).collect();
-            let none = [0; 4];
-            shown.extend(set.shown.iter().flat_map(|own| words(own, &images, none)));
+            shown.extend(set.shown.iter().flat_map(|own| words(own, &images)));
         }
         if shown.is_empty() {
             return None;
@@ -98,9 +97,9 @@ fn add(image: &Image, texels: &mut Vec<[u8; 4]>) -> [u32; 4] {
 }
 
 /// Returns what a facet shows, as the shader reads it.
-fn words(shown: &Shown, images: &[[u32; 4]], none: [u32; 4]) -> [[u32; 4]; SHOWN_WORDS] {
+fn words(shown: &Shown, images: &[[u32; 4]]) -> [[u32; 4]; SHOWN_WORDS] {
     let [a, b, c] = shown.places.map(|place| place.to_array().map(f32::to_bits));
-    let image = images.get(shown.image as usize).copied().unwrap_or(none);
+    let image = images.get(shown.image as usize).copied().unwrap_or_default();
     [[a[0], a[1], b[0], b[1]], [c[0], c[1], 0, 0], image]
 }
 

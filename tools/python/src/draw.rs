@@ -267,7 +267,7 @@ impl Stage {
     /// Adds an input, unless the caller has stopped waiting for it.
     pub fn add(&self, added: Added, stop: &Stop) -> Result<(), Error> {
         let mut own = locked(&self.items);
-        let subject = own.items.subject.clone();
+        let before = own.items.mark();
         let Added { name, input, showing } = added;
         own.items.add(&name, input, &showing, &|_| ())?;
         let last = own.items.contents.len() - 1;
@@ -275,7 +275,7 @@ impl Stage {
         let checked = field.and_then(|(_, item)| item.transfer()).map_or(Ok(()), |t| t.validate());
         let checked = if stop.is_requested() { Err(Error::Stopped) } else { checked };
         if checked.is_err() {
-            own.items.remove_last(subject);
+            own.items.restore(before);
             return checked;
         }
         own.version += 1;
