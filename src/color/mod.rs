@@ -2,7 +2,10 @@
 
 mod diverging;
 pub(crate) mod lab;
+mod name;
 mod tables;
+
+pub use name::{hex, parse};
 
 use crate::{Error, Result, parallel::prelude::*};
 use serde::{Deserialize, Deserializer, Serialize, de};

@@ -7,6 +7,7 @@ use crate::{
     volume::{Shade, TransferFunction},
 };
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// The layers that are composited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -35,7 +36,9 @@ pub enum Order {
 }
 
 /// When the values of a field are mapped to colour and opacity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum Classification {
     /// Everywhere along the ray inside a sheet. The values at its two faces and its mean define a
@@ -50,14 +53,18 @@ pub enum Classification {
 }
 
 /// How a ray through a field becomes the colour of a pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub enum Optics {
-    /// Emission and absorption (Max 1995).
+    /// Emission and absorption (Max 1995). In JSON `light`.
     #[default]
+    #[serde(rename = "light")]
     EmissionAbsorption,
     /// The colour and opacity of the largest value on the ray.
     Maximum,
     /// The light that the field absorbs, in white: opacity only, without colour and lighting.
+    #[serde(rename = "x-ray")]
     XRay,
 }
 
@@ -100,7 +107,9 @@ pub struct Region {
 }
 
 /// How the gradient across the picture is computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum Gradient {
     /// From the derivative of the kernels.
@@ -112,7 +121,9 @@ pub enum Gradient {
 }
 
 /// How the field of a lattice is evaluated in a sheet. The pictures agree.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum Evaluate {
     /// Gathers a volume if possible, and scatters everything else.

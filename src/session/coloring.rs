@@ -8,9 +8,11 @@ use crate::{
     volume::TransferFunction,
 };
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// What colours a surface.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub enum SurfaceColor {
     /// The file's own colours.
     File,

@@ -22,37 +22,58 @@ const ELEVATION: f64 = 20.0;
 /// units, angles in degrees.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Framing {
     /// A whole camera. All else but the zoom and the up axis is ignored then.
     #[serde(skip)]
     pub camera: Option<Camera>,
     /// The side to look from. The azimuth and the elevation turn the view further.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub view: Option<Side>,
     /// The place of the camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, schemars(with = "Option<[f64; 3]>"))]
     pub camera_position: Option<DVec3>,
     /// The point that the camera aims at; by default the middle of what is seen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, schemars(with = "Option<[f64; 3]>"))]
     pub focal_point: Option<DVec3>,
     /// The direction that is up in the picture; by default the scene's up axis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, schemars(with = "Option<[f64; 3]>"))]
     pub view_up: Option<DVec3>,
     /// The vertical view angle at a zoom of 1; by default [`Camera::DEFAULT_VIEW_ANGLE`].
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub view_angle: Option<f64>,
     /// The distance of the camera from its focal point; by default the scene fills the picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub distance: Option<f64>,
     /// The turn to the right around the up axis; by default 30, or 0 with a side or a position.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth: Option<f64>,
     /// The turn upwards; by default 20, or 0 with a side or a position.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub elevation: Option<f64>,
     /// How often the middle of the picture is enlarged; by default 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub zoom: Option<f64>,
     /// Whether to draw without perspective.
+    #[serde(skip_serializing_if = "is_perspective")]
     pub orthographic: bool,
     /// The scene's up axis; by default that of the [`Subject`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, schemars(with = "Option<[f64; 3]>"))]
     pub up: Option<DVec3>,
+}
+
+fn is_perspective(orthographic: &bool) -> bool {
+    !orthographic
 }
 
 /// A side to look from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum Side {
     /// Against the scene's front.

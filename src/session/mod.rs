@@ -20,6 +20,7 @@
 mod appearance;
 mod coloring;
 mod data;
+mod description;
 mod facts;
 mod framing;
 mod items;
@@ -36,6 +37,11 @@ mod tests;
 pub use appearance::{Appearance, Surface, SurfaceValue, Transfer};
 pub use coloring::{Coloring, SurfaceColor, check_log, shown_of};
 pub use data::{Data, warn_of_holes};
+pub use description::{
+    AppearanceEntry, Axis, Background, CameraEntry, ClipEntry, ClipSide, ColorEntry, Composite,
+    Description, Engine, InputEntry, IsosurfaceEntry, KernelEntry, LimitsEntry, Loaded,
+    LoadedInput, OverlayEntry, PictureEntry, Place, ReadingEntry, Samples, TransferEntry,
+};
 pub use facts::Facts;
 pub use framing::{Framing, Side};
 pub use items::{Captions, Content, Items, Mark};

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 /// the cosine counts as 1 and the highlight vanishes: the colour is that of a field without light.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Shade {
     /// Light that reaches every surface, whatever its direction.
     pub ambient: f64,

@@ -35,7 +35,10 @@ use std::path::Path;
 /// assert!(!bone.visible([-1000.0, 200.0]));
 /// # Ok::<(), splatkit::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Document", into = "Document")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[cfg_attr(test, schemars(with = "Document"))]
 pub struct TransferFunction {
     /// Value, and red, green, blue in 0 … 1. Values ascend.
     pub color: Vec<(f64, [f64; 3])>,
@@ -55,6 +58,7 @@ pub struct TransferFunction {
 /// A surface of one value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Isosurface {
     /// The value of the field on the surface.
     pub value: f64,
@@ -92,6 +96,7 @@ const MOST_BYTES: usize = 1 << 20;
 /// The layout of the JSON.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Document {
     color: Vec<[f64; 4]>,
     opacity: Vec<[f64; 2]>,
@@ -126,6 +131,14 @@ impl TransferFunction {
     /// place.
     fn parse(text: &str) -> Result<Self, String> {
         let document: Document = serde_json::from_str(text).map_err(|e| e.to_string())?;
+        Self::try_from(document)
+    }
+}
+
+impl TryFrom<Document> for TransferFunction {
+    type Error = String;
+
+    fn try_from(document: Document) -> Result<Self, String> {
         let transfer = Self {
             color: document.color.iter().map(|&[value, r, g, b]| (value, [r, g, b])).collect(),
             opacity: document.opacity.iter().map(|&[value, opacity]| (value, opacity)).collect(),
@@ -141,22 +154,26 @@ impl TransferFunction {
         transfer.check()?;
         Ok(transfer)
     }
+}
 
+impl From<TransferFunction> for Document {
+    fn from(transfer: TransferFunction) -> Self {
+        let pair = |(value, share): (f64, f64)| [value, share];
+        Self {
+            color: transfer.color.iter().map(|&(value, [r, g, b])| [value, r, g, b]).collect(),
+            opacity: transfer.opacity.into_iter().map(pair).collect(),
+            unit: transfer.unit,
+            shade: transfer.shade,
+            gradient: transfer.gradient.into_iter().map(pair).collect(),
+            isosurfaces: transfer.isosurfaces,
+        }
+    }
+}
+
+impl TransferFunction {
     /// Returns the JSON form, which [`from_json`](Self::from_json) reads back.
     pub fn to_json(&self) -> String {
-        let document = Document {
-            color: self.color.iter().map(|&(value, [r, g, b])| [value, r, g, b]).collect(),
-            opacity: self.opacity.iter().map(|&(value, opacity)| [value, opacity]).collect(),
-            unit: self.unit,
-            shade: self.shade,
-            gradient: self
-                .gradient
-                .iter()
-                .map(|&(magnitude, factor)| [magnitude, factor])
-                .collect(),
-            isosurfaces: self.isosurfaces.clone(),
-        };
-        serde_json::json!(document).to_string()
+        serde_json::json!(self).to_string()
     }
 
     /// Reads a JSON file.

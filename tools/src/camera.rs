@@ -7,9 +7,8 @@ use clap::{
 };
 use glam::DVec3;
 use splatkit::{
-    interaction::CameraEntry,
     math::Camera,
-    session::{Framing, Side},
+    session::{CameraEntry, Description, Framing, Side},
 };
 
 /// The camera's flags. By default, the camera sees the whole scene from the front, from the right
@@ -27,7 +26,7 @@ pub struct CameraFlags {
             "azimuth", "elevation", "orthographic",
         ]
     )]
-    camera: Option<Camera>,
+    camera: Option<CameraEntry>,
     /// Look from this side. right is at the right of a viewer who looks at the front; iso is a
     /// corner of the box around the scene. --azimuth and --elevation turn the view further
     /// [default: from the front, 30 degrees to the right and 20 upwards]
@@ -84,7 +83,7 @@ impl CameraFlags {
     /// Returns how the camera looks at the scene.
     pub fn framing(&self) -> Framing {
         Framing {
-            camera: self.camera.clone(),
+            camera: None,
             view: self.view,
             camera_position: self.camera_position,
             focal_point: self.focal_point,
@@ -98,6 +97,32 @@ impl CameraFlags {
             up: self.up,
         }
     }
+
+    /// Changes where the picture of a scene is taken from: by the flags that are given. Any of
+    /// those that place the camera replaces the scene's own camera.
+    pub fn apply(&self, scene: &mut Description) {
+        let own = self.framing();
+        let placing = Framing { zoom: None, up: None, ..own.clone() };
+        if placing != Framing::default() {
+            scene.camera = None;
+        }
+        scene.camera = self.camera.or(scene.camera);
+        let before = std::mem::take(&mut scene.framing);
+        scene.framing = Framing {
+            camera: None,
+            view: own.view.or(before.view),
+            camera_position: own.camera_position.or(before.camera_position),
+            focal_point: own.focal_point.or(before.focal_point),
+            view_up: own.view_up.or(before.view_up),
+            view_angle: own.view_angle.or(before.view_angle),
+            distance: own.distance.or(before.distance),
+            azimuth: own.azimuth.or(before.azimuth),
+            elevation: own.elevation.or(before.elevation),
+            zoom: own.zoom.or(before.zoom),
+            orthographic: own.orthographic || before.orthographic,
+            up: own.up.or(before.up),
+        };
+    }
 }
 
 /// Parses a side to look from.
@@ -108,11 +133,12 @@ fn sides() -> impl TypedValueParser<Value = Side> {
 }
 
 /// Parses a camera that [`to_json`] has written.
-fn given_camera(text: &str) -> Result<Camera, String> {
+fn given_camera(text: &str) -> Result<CameraEntry, String> {
     let form = "the form is {\"position\": [x, y, z], \"focal_point\": [x, y, z], \"view_up\": \
                 [x, y, z], \"view_angle\": 30}, or with \"height\" without perspective";
     let entry: CameraEntry = serde_json::from_str(text).map_err(|e| format!("{e}; {form}"))?;
-    entry.camera()
+    entry.camera()?;
+    Ok(entry)
 }
 
 /// Returns the camera with the flags' names as keys.

@@ -2,13 +2,13 @@
 
 use crate::{
     failure::Failure,
-    own::{self, Own},
+    own::{Own, Shared},
     parse,
 };
 use clap::Args;
 use splatkit::{
     color::ColorMap,
-    session::{Coloring, SurfaceColor},
+    session::{ColorEntry, Coloring, Description, SurfaceColor},
 };
 use std::path::{Path, PathBuf};
 
@@ -39,10 +39,7 @@ pub struct ColorFlags {
 
 /// Parses what colours surfaces, of all inputs or of one.
 fn surface(text: &str) -> Result<Own<SurfaceColor>, String> {
-    Own::parse(text, |text| match text.trim() {
-        "" => Err("name an attribute or a colour, such as intensity or orange".into()),
-        text => Ok(SurfaceColor::of(text, parse::color(text).ok())),
-    })
+    Own::parse(text, str::parse)
 }
 
 impl ColorFlags {
@@ -55,13 +52,8 @@ impl ColorFlags {
     /// Returns how values become colours, and by what the surfaces are coloured that have no colour
     /// of their own here.
     pub fn coloring(&self, range: Option<[f64; 2]>) -> Coloring {
-        self.coloring_by(self.surface(), range)
-    }
-
-    /// Returns how values become colours, with this colour of surfaces.
-    pub fn coloring_by(&self, surface: Option<&SurfaceColor>, range: Option<[f64; 2]>) -> Coloring {
         Coloring {
-            surface: surface.cloned(),
+            surface: self.surface().cloned(),
             map: self.colormap,
             range,
             is_log: self.log_colors,
@@ -69,9 +61,18 @@ impl ColorFlags {
         }
     }
 
-    /// Returns the colours of inputs, to be found one after the other.
-    pub fn by_input(&self) -> own::Values<SurfaceColor> {
-        own::Values::new(self.color.iter().cloned())
+    /// Refuses flags without effect on a scene, which may have a mesh or point cloud, and values.
+    pub fn check_effect(&self, has_mesh: bool, has_values: bool) -> Result<(), Failure> {
+        check_given(!self.color.is_empty(), self.of_values(), has_mesh, has_values)
+    }
+
+    /// Changes how the inputs of a scene are shown: by the flags that are given.
+    pub fn apply(&self, scene: &mut Description) {
+        Shared::set(scene, |appearance| &mut appearance.colormap, self.colormap);
+        let missing = self.nan_color.map(ColorEntry);
+        Shared::set(scene, |appearance| &mut appearance.nan_color, missing);
+        Shared::set_each(scene, |appearance| &mut appearance.color, &self.color, |_, _| {});
+        scene.appearance.log_colors |= self.log_colors;
     }
 
     /// Checks the names of inputs.
@@ -107,23 +108,40 @@ impl ColorFlags {
         let all = color.into_iter().chain(self.of_values());
         all.into_iter().find_map(|(name, is_given)| is_given.then_some(name))
     }
+}
 
-    /// Refuses flags without effect on a scene, which may have a mesh or point cloud, and values.
-    pub fn check_effect(&self, has_mesh: bool, has_values: bool) -> Result<(), Failure> {
-        if !self.color.is_empty() && !has_mesh {
-            return Err(Failure::Usage(
-                "--color colours meshes and point clouds, but there are none; volumes and samples \
-                 take --colormap, and hierarchies keep the colours that they were converted with"
-                    .into(),
-            ));
-        }
-        match self.of_values().into_iter().find(|(_, is_given)| *is_given && !has_values) {
-            None => Ok(()),
-            Some((flag, _)) => Err(Failure::Usage(format!(
-                "{flag} has no effect, because nothing here is coloured by values; --color height \
-                 or --color with an attribute of the file gives surfaces values"
-            ))),
-        }
+/// Refuses colours without effect on a scene, which may have a mesh or point cloud, and values.
+pub fn check_effect(scene: &Description, has_mesh: bool, has_values: bool) -> Result<(), Failure> {
+    let all = || scene.visible().map(|input| &input.appearance).chain([&scene.appearance]);
+    let of_values = [
+        ("--colormap", all().any(|own| own.colormap.is_some())),
+        ("--nan-color", all().any(|own| own.nan_color.is_some())),
+        ("--log-colors", all().any(|own| own.log_colors)),
+    ];
+    let has_color = all().any(|own| own.color.is_some());
+    check_given(has_color, of_values, has_mesh, has_values)
+}
+
+/// Refuses `--color`, or the flags that colour values, if they are given without effect.
+fn check_given(
+    has_color: bool,
+    of_values: [(&'static str, bool); 3],
+    has_mesh: bool,
+    has_values: bool,
+) -> Result<(), Failure> {
+    if has_color && !has_mesh {
+        return Err(Failure::Usage(
+            "--color colours meshes and point clouds, but there are none; volumes and samples \
+             take --colormap, and hierarchies keep the colours that they were converted with"
+                .into(),
+        ));
+    }
+    match of_values.into_iter().find(|(_, is_given)| *is_given && !has_values) {
+        None => Ok(()),
+        Some((flag, _)) => Err(Failure::Usage(format!(
+            "{flag} has no effect, because nothing here is coloured by values; --color height \
+             or --color with an attribute of the file gives surfaces values"
+        ))),
     }
 }
 

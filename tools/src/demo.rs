@@ -2,14 +2,15 @@
 //! any other file.
 
 use crate::{
-    camera::CameraFlags, engine::EngineFlags, failure::Failure, given::Given, output,
-    progress::Progress, render::Drawer, samples::Samples, scene::SceneFlags, timing::milliseconds,
+    camera::CameraFlags, engine::EngineFlags, failure::Failure, given::Given, job::Job, output,
+    progress::Progress, render::Drawer, scene::SceneFlags, timing::milliseconds,
 };
 use clap::{Args, Parser};
 use splatkit::{
     Error, disk, formats, gaussians,
     hierarchy::{BuildOptions, build_file, file::WriteOptions},
     picture::PictureFormat,
+    session::Samples,
     surface::{Mesh, SurfelOptions},
     volume::phantoms::Phantom,
 };
@@ -154,11 +155,17 @@ impl Demo {
             arguments.extend(["--gpu".into(), gpu.into()]);
         }
         let flags = Flags::try_parse_from(&arguments).map_err(|e| Failure::Usage(e.to_string()))?;
-        let facets = flags.engine.draws_facets();
-        let mut loaded = flags.scene.load(facets, &Given::default(), progress)?;
-        let mut drawer = Drawer::engine(&flags.engine, &loaded, progress)?;
-        let settings = flags.engine.settings(&loaded, Samples::Factor(1))?;
-        let framing = flags.camera.framing();
+        let given = Given::default();
+        let (mut scene, _) = flags.scene.open(&given)?;
+        flags.scene.apply(&mut scene)?;
+        flags.camera.apply(&mut scene);
+        flags.engine.apply(&mut scene);
+        scene.picture.samples = Some(Samples::Factor(1));
+        let job = Job::new(scene.clone(), flags.engine.device(&scene), &given, None)?;
+        let mut loaded = job.load(progress)?;
+        let mut drawer = Drawer::engine(&job, &loaded, progress)?;
+        let settings = job.settings(&loaded)?;
+        let framing = job.framing()?;
         loaded.find_seen(&framing, &settings)?;
         let camera = framing.camera(&loaded.subject, settings.size)?;
         progress.stage(format!("Drawing {}", shot.name));
@@ -169,7 +176,7 @@ impl Demo {
         };
         let (first_ms, ..) = draw()?;
         let (later_ms, picture, stats) = draw()?;
-        flags.engine.require_content(&picture)?;
+        job.require_content(&picture)?;
         let path = self.folder.join(shot.name);
         disk::write(&path, &picture.encode(PictureFormat::Png, BACKGROUND)?)?;
         progress.clear();

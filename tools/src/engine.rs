@@ -1,15 +1,12 @@
 //! The engine's flags: the device, and the settings of a picture.
 
-use crate::{
-    clip::ClipFlags, failure::Failure, method::MethodFlags, parse, samples::Samples, scene::Loaded,
-};
+use crate::{clip::ClipFlags, failure::Failure, method::MethodFlags, parse};
 use clap::{Args, ValueEnum};
 use splatkit::{
-    Device, Error,
+    Device,
     gpu::{AdapterChoice, Budget, Gpu},
-    hierarchy::Detail,
-    picture::Picture,
-    scene::{self, Item, Scene, Settings},
+    scene::{self, Item, Scene},
+    session::{self, Description, PictureEntry},
 };
 use std::time::Duration;
 
@@ -17,13 +14,13 @@ use std::time::Duration;
 const LONGEST: f64 = 1e9;
 
 /// The device that draws.
-#[derive(Args, Debug, Clone)]
+#[derive(Args, Debug, Clone, Default)]
 #[command(next_help_heading = "Engine")]
 pub struct DeviceFlags {
     /// Choose the engine: gpu for GPUs, or cpu for processors, which needs no driver. auto uses the
-    /// GPU if there is one, or if --pass-entries or one of the --gpu options is set.
-    #[arg(long, value_enum, default_value_t = Engine::Auto)]
-    engine: Engine,
+    /// GPU if there is one, or if --pass-entries or one of the --gpu options is set [default: auto]
+    #[arg(long, value_enum)]
+    engine: Option<Engine>,
     /// Choose the adapter: its number in `splatkit gpus`, part of its name, or `software` [default:
     /// the fastest]
     #[arg(long, value_name = "N|NAME|software")]
@@ -46,17 +43,17 @@ pub struct DeviceFlags {
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Engine")]
 pub struct EngineFlags {
-    /// Set the width and height of the picture, in pixels.
-    #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1280x720")]
-    pub size: [u32; 2],
+    /// Set the width and height of the picture, in pixels [default: 1280x720]
+    #[arg(long, value_name = "WxH", value_parser = parse::size)]
+    size: Option<[u32; 2]>,
     #[command(flatten)]
     device: DeviceFlags,
-    /// Choose how the gradient of a volume across the picture is computed.
-    #[arg(long, value_enum, default_value_t = Gradient::Analytic)]
-    gradient: Gradient,
-    /// Choose how the samples of a volume are summed; the picture is the same.
-    #[arg(long, value_enum, default_value_t = Evaluate::Auto)]
-    evaluate: Evaluate,
+    /// Choose how the gradient of a volume across the picture is computed [default: analytic]
+    #[arg(long, value_enum)]
+    gradient: Option<Gradient>,
+    /// Choose how the samples of a volume are summed; the picture is the same [default: auto]
+    #[arg(long, value_enum)]
+    evaluate: Option<Evaluate>,
     /// Light volumes even if the transfer function has no light.
     #[arg(long, overrides_with = "no_shade")]
     shade: bool,
@@ -146,10 +143,30 @@ impl From<Evaluate> for scene::Evaluate {
     }
 }
 
+impl From<Engine> for session::Engine {
+    fn from(engine: Engine) -> Self {
+        match engine {
+            Engine::Auto => Self::Auto,
+            Engine::Gpu => Self::Gpu,
+            Engine::Cpu => Self::Cpu,
+        }
+    }
+}
+
 impl DeviceFlags {
+    /// Returns the flags with the engine of a scene.
+    pub fn of_scene(&self, scene: &Description) -> Self {
+        let engine = match scene.engine {
+            session::Engine::Gpu => Engine::Gpu,
+            session::Engine::Cpu => Engine::Cpu,
+            _ => Engine::Auto,
+        };
+        Self { engine: Some(engine), ..self.clone() }
+    }
+
     /// Checks that the flags go together.
     pub fn check(&self) -> Result<(), Failure> {
-        if self.engine == Engine::Cpu && self.asks_gpu() {
+        if self.engine() == Engine::Cpu && self.asks_gpu() {
             let message = "--engine cpu cannot be used with --gpu, --gpu-timeout, --gpu-memory or \
                  --pass-entries";
             return Err(Failure::Usage(message.into()));
@@ -159,7 +176,7 @@ impl DeviceFlags {
 
     /// Opens the device that draws the scene.
     pub fn open(&self, scene: &Scene) -> splatkit::Result<Device> {
-        match self.engine {
+        match self.engine() {
             Engine::Cpu => Ok(Device::Cpu),
             // If an adapter is named, the GPU engine reports what it does not draw.
             Engine::Auto if !self.asks_gpu() && scene.beyond_gpu().is_some() => Ok(Device::Cpu),
@@ -171,6 +188,10 @@ impl DeviceFlags {
             }),
             Engine::Auto | Engine::Gpu => Ok(Device::Gpu(self.gpu()?, self.passes())),
         }
+    }
+
+    fn engine(&self) -> Engine {
+        self.engine.unwrap_or(Engine::Auto)
     }
 
     /// Opens the adapter that the flags choose.
@@ -209,97 +230,53 @@ impl DeviceFlags {
 }
 
 impl EngineFlags {
-    /// Opens the device that draws the scene.
-    pub fn device(&self, scene: &Scene) -> splatkit::Result<Device> {
-        self.device.open(scene)
-    }
-
-    /// Whether meshes can be drawn as facets: in sheets that emit and absorb light.
-    pub fn draws_facets(&self) -> bool {
-        let mut settings = Settings::new([1, 1]);
-        self.method.apply(&mut settings);
-        settings.mode == scene::Mode::Sheets && settings.optics == scene::Optics::EmissionAbsorption
-    }
-
-    /// Checks what does not depend on the scene.
-    pub fn check(&self) -> Result<(), Failure> {
-        self.device.check()?;
-        self.method.check()?;
-        self.clip.check()
-    }
-
-    /// Returns the settings of a picture before it is averaged down. Settings that the scene cannot
-    /// be drawn with are an error.
-    pub fn settings(&self, loaded: &Loaded, samples: Samples) -> splatkit::Result<Settings> {
-        let factor = samples.factor(self.size, loaded.scene.has_splats());
-        let mut settings = Settings::new(self.size.map(|side| side.saturating_mul(factor)));
-        settings.sheet_thickness = self.sheet_thickness;
-        // Explicit extra pixels do not change sheets and cuts: thinner sheets would separate splats
-        // that overlap on a surface. With `auto`, a small picture is drawn like a larger one.
-        let wider = if let Samples::Factor(factor) = samples { f64::from(factor) } else { 1.0 };
-        settings.sheet_pixels *= wider;
-        settings.occlusion = !self.no_occlusion;
-        settings.gradient = match self.gradient {
+    /// Changes how the picture of a scene is drawn: by the flags that are given.
+    pub fn apply(&self, scene: &mut Description) {
+        let picture = &mut scene.picture;
+        picture.size = self.size.or(picture.size);
+        let gradient = self.gradient.map(|gradient| match gradient {
             Gradient::Analytic => scene::Gradient::Analytic,
             Gradient::Central => scene::Gradient::Central,
-        };
-        settings.evaluate = self.evaluate.into();
-        if self.no_shade {
-            settings.volume_shade = Some(None);
-            settings.surface_shade = None;
+        });
+        picture.gradient = gradient.or(picture.gradient);
+        picture.evaluate = self.evaluate.map(Into::into).or(picture.evaluate);
+        let shade = self.shade.then_some(true).or(self.no_shade.then_some(false));
+        picture.shade = shade.or(picture.shade);
+        picture.sheet_thickness = self.sheet_thickness.or(picture.sheet_thickness);
+        if self.cut.is_some() || self.budget.is_some() || self.frame_time.is_some() {
+            picture.cut = self.cut;
+            picture.budget = self.budget;
+            picture.frame_time = self.frame_time;
         }
-        if self.shade {
-            let fields = loaded.scene.items.iter().filter_map(Item::transfer);
-            let own = fields.clone().find_map(|transfer| transfer.shade);
-            let mut shade = own.unwrap_or_default();
-            if fields.count() > 1 {
-                // Each field knows itself which of its gradients are certain.
-                shade.certain = None;
-            }
-            settings.volume_shade = Some(Some(shade));
+        picture.memory = self.memory.or(picture.memory);
+        picture.cull_backfaces = self.cull_backfaces.or(picture.cull_backfaces);
+        picture.occlusion = self.no_occlusion.then_some(false).or(picture.occlusion);
+        self.method.apply(picture);
+        self.clip.apply(scene);
+        if let Some(engine) = self.device.engine {
+            scene.engine = engine.into();
         }
-        settings.detail = match (self.budget, self.frame_time) {
-            (Some(splats), _) => Detail::Splats(splats),
-            (_, Some(milliseconds)) => Detail::Milliseconds(milliseconds),
-            _ => Detail::Pixels(self.cut.unwrap_or(Detail::PIXELS) * wider),
-        };
-        settings.cull_backfaces = self.cull_backfaces;
-        if let Some(memory) = self.memory {
-            settings.page_memory = memory;
-        }
-        self.method.apply(&mut settings);
-        settings.clips = self.clip.clips(&loaded.scene, &loaded.subject.bounds)?;
-        loaded.scene.validate_settings(&settings)?;
-        Ok(settings)
     }
 
-    /// Returns a warning if the flags of light or of optics change nothing.
-    pub fn idle(&self, scene: &Scene) -> Option<&'static str> {
-        if self.method.is_maximum() && scene.items.iter().all(|item| item.transfer().is_none()) {
-            return Some("--optics maximum (--mip) has no effect: it is for values");
-        }
-        let fields = || scene.items.iter().filter_map(Item::transfer);
-        let is_lit = |item: &Item| item.transfer().is_none() && !item.is_trained();
-        let has_surfaces = scene.items.iter().any(is_lit);
-        if self.shade && fields().count() > 0 && fields().all(|field| field.shade.is_some()) {
-            return Some("--shade has no effect: the transfer function has its own light");
-        }
-        let is_dark = !has_surfaces && fields().all(|field| field.shade.is_none());
-        (self.no_shade && is_dark)
-            .then_some("--no-shade (--flat) has no effect: nothing in the scene is lit")
+    /// Returns the device that draws a scene.
+    pub fn device(&self, scene: &Description) -> DeviceFlags {
+        self.device.of_scene(scene)
     }
+}
 
-    /// Returns an error if a picture shows nothing.
-    pub fn require_content(&self, picture: &Picture) -> Result<(), Failure> {
-        // An opacity that rounds to 0 in a file of 8 bits counts as none.
-        if picture.color.iter().any(|pixel| pixel[3] >= 0.5 / 255.0) {
-            return Ok(());
-        }
-        let left =
-            self.clip.text().map_or(String::new(), |clips| format!(" after clipping by {clips}"));
-        Err(Error::NothingToDraw(format!(
-            "the picture is empty: the camera sees no splat that has opacity{left}"
-        ))
-        .into())
+/// Returns a warning if light or optics that a picture asks for change nothing in a scene.
+pub fn idle(picture: &PictureEntry, scene: &Scene) -> Option<&'static str> {
+    let fields = || scene.items.iter().filter_map(Item::transfer);
+    if picture.optics == Some(scene::Optics::Maximum) && fields().count() == 0 {
+        return Some("--optics maximum (--mip) has no effect: it is for values");
     }
+    let is_lit = |item: &Item| item.transfer().is_none() && !item.is_trained();
+    let has_surfaces = scene.items.iter().any(is_lit);
+    let all_lit = fields().count() > 0 && fields().all(|field| field.shade.is_some());
+    if picture.shade == Some(true) && all_lit {
+        return Some("--shade has no effect: the transfer function has its own light");
+    }
+    let is_dark = !has_surfaces && fields().all(|field| field.shade.is_none());
+    (picture.shade == Some(false) && is_dark)
+        .then_some("--no-shade (--flat) has no effect: nothing in the scene is lit")
 }

@@ -1,8 +1,11 @@
 //! Flags that have no effect on the inputs: a table of what each flag needs, and the warnings.
 
-use crate::progress::Progress;
+use crate::{progress::Progress, scene_file};
 use clap::{ArgMatches, parser::ValueSource};
-use splatkit::{formats::Format, session::Data};
+use splatkit::{
+    formats::{Format, Kind},
+    session::{Data, Description, LoadedInput},
+};
 use std::{collections::BTreeSet, path::Path};
 
 /// The flags that the user has given, by their names without dashes.
@@ -123,6 +126,28 @@ impl Given {
         Self(own.ids().map(clap::Id::as_str).filter(is_given).map(name).collect())
     }
 
+    /// Returns these flags and those that a scene stands for.
+    pub fn with(&self, scene: &Description) -> Self {
+        let mut all = self.0.clone();
+        let scene = serde_json::json!(scene);
+        let inputs = scene["inputs"].as_array().into_iter().flatten();
+        for part in inputs.chain([&scene]) {
+            let parts = ["reading", "appearance", "framing", "picture", "overlay"];
+            for (field, value) in
+                parts.into_iter().filter_map(|name| part[name].as_object()).flatten()
+            {
+                let limits = value.as_object().filter(|_| field == "limits");
+                all.extend(limits.into_iter().flatten().map(|(limit, _)| format!("limit-{limit}")));
+                let is_negated = *value == serde_json::json!(false) && field != "cull_backfaces";
+                all.insert(match is_negated {
+                    true => format!("no-{}", field.replace('_', "-")),
+                    false => scene_file::flag_of(field),
+                });
+            }
+        }
+        Self(all)
+    }
+
     pub fn has(&self, flag: &str) -> bool {
         self.0.contains(flag)
     }
@@ -193,6 +218,21 @@ impl Given {
     /// Prints these warnings.
     pub fn warn(&self, inputs: &[(&Path, Kinds)], progress: &Progress) {
         self.idle(inputs).into_iter().for_each(|warning| progress.warn(warning));
+    }
+}
+
+/// Returns what a loaded input is.
+pub fn kinds_of_input(input: &LoadedInput) -> Kinds {
+    match (input.kind, input.is_cloud) {
+        (Kind::Mesh, true) => CLOUD,
+        (Kind::Mesh, false) => MESH,
+        (Kind::Volume, _) if input.is_raw => VOLUME | RAW,
+        (Kind::Volume, _) => VOLUME,
+        (Kind::Samples, _) => SAMPLES,
+        (Kind::Hierarchy, _) => HIERARCHY,
+        (Kind::Bricks, _) => BRICKS,
+        (Kind::Cells, _) => CELLS,
+        (Kind::Gaussians, _) => GAUSSIANS,
     }
 }
 

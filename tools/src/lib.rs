@@ -32,6 +32,7 @@ mod gpus;
 mod help;
 mod info;
 mod interrupt;
+mod job;
 mod kernel;
 mod limits;
 #[doc(hidden)]
@@ -48,7 +49,6 @@ pub mod parse;
 #[doc(hidden)]
 pub mod progress;
 mod render;
-mod samples;
 mod scan;
 mod scene;
 mod scene_file;
@@ -66,6 +66,7 @@ mod view;
 #[cfg(not(feature = "window"))]
 #[path = "view_absent.rs"]
 mod view;
+mod words;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use given::Given;
@@ -135,21 +136,9 @@ fn command() -> clap::Command {
 pub fn main() -> ExitCode {
     quiet_drivers();
     let arguments = with_task(std::env::args_os().collect());
-    let mut matches = match command().try_get_matches_from(&arguments) {
+    let matches = match command().try_get_matches_from(&arguments) {
         Ok(matches) => matches,
         Err(answer) => return tell(&answer),
-    };
-    let stated = match scene_file::expanded(&arguments, &matches, &command()) {
-        Ok(None) => None,
-        Ok(Some(scene)) => match command().try_get_matches_from(scene.arguments) {
-            Ok(own) => {
-                matches = own;
-                Some(scene.stated)
-            }
-            Err(answer) if answer.use_stderr() => return scene.stated.refused(&answer).report(),
-            Err(answer) => return tell(&answer),
-        },
-        Err(failure) => return failure.report(),
     };
     let (given, own) = match Command::from_arg_matches(&matches) {
         Ok(own) => (Given::of(&matches), own),
@@ -163,7 +152,7 @@ pub fn main() -> ExitCode {
     own.cache.apply();
     let result = match own.task {
         Task::Render(task) => task.run(&given, &progress),
-        Task::View(task) => task.run(&matches, &progress),
+        Task::View(task) => task.run(&given, &progress),
         Task::Info(task) => task.run(&given, &progress),
         Task::Convert(task) => task.run(&given, &progress),
         Task::Check(task) => task.run(&progress),
@@ -177,10 +166,6 @@ pub fn main() -> ExitCode {
         Task::Completions(task) => task.run(command()),
         Task::Man(task) => task.run(command()),
     };
-    let result = result.map_err(|failure| match &stated {
-        Some(stated) => stated.blamed(failure),
-        None => failure,
-    });
     start::end(result, &progress)
 }
 

@@ -2,10 +2,10 @@
 
 use clap::Args;
 use splatkit::{
-    Deadline,
     error::LimitKind,
     formats::Format,
     input::{self, Limits},
+    session::{LimitsEntry, ReadingEntry},
 };
 use std::path::Path;
 
@@ -32,46 +32,22 @@ pub struct LimitFlags {
     /// take as long again [default: 600]
     #[arg(long, value_name = "SECONDS")]
     limit_seconds: Option<u64>,
-    /// When everything that is read must be done.
-    #[arg(skip)]
-    until: Deadline,
 }
 
 impl LimitFlags {
     pub fn limits(&self) -> Limits {
-        let default = Limits::default();
-        Limits {
-            points: self.limit_points.unwrap_or(default.points),
-            bytes: self.limit_bytes.unwrap_or(default.bytes),
-            depth: self.limit_depth.unwrap_or(default.depth),
-            texels: self.limit_texels.unwrap_or(default.texels),
-            seconds: self.limit_seconds.unwrap_or(default.seconds),
-            until: self.until,
+        ReadingEntry { limits: self.entry(), ..ReadingEntry::default() }.limits()
+    }
+
+    pub fn entry(&self) -> LimitsEntry {
+        LimitsEntry {
+            points: self.limit_points,
+            bytes: self.limit_bytes,
+            depth: self.limit_depth,
+            texels: self.limit_texels,
+            seconds: self.limit_seconds,
         }
     }
-
-    /// Returns these limits for several inputs together: their time begins now.
-    pub fn begun(&self) -> Self {
-        Self { until: self.limits().deadline(), ..self.clone() }
-    }
-
-    /// Returns whether the user limits bytes, so that memory does not.
-    pub fn has_bytes(&self) -> bool {
-        self.limit_bytes.is_some()
-    }
-}
-
-/// Returns the default of a limit by its flag's name; `None` for other flags.
-pub fn default_of(flag: &str) -> Option<u64> {
-    let kind = match flag.strip_prefix("limit-")? {
-        "points" => LimitKind::Points,
-        "bytes" => LimitKind::Bytes,
-        "depth" => LimitKind::Depth,
-        "texels" => LimitKind::Texels,
-        "seconds" => LimitKind::Seconds,
-        _ => return None,
-    };
-    Some(Limits::default().of(kind))
 }
 
 /// Returns what the user can do about an exceeded limit. No limit helps a file that claims more
@@ -119,19 +95,6 @@ mod tests {
     use super::*;
     use clap::{Args, FromArgMatches};
 
-    /// Inputs of one scene share the time, and each has its own without one.
-    #[test]
-    fn inputs_share_the_time() {
-        let flags = LimitFlags { limit_seconds: Some(7), ..LimitFlags::default() };
-        assert_eq!(flags.limits().until, Deadline::NEVER);
-        let begun = flags.begun();
-        let until = begun.limits().until;
-        assert!(until != Deadline::NEVER && !until.is_over());
-        assert_eq!(begun.limits().deadline(), until);
-        let begun = LimitFlags { limit_seconds: Some(0), ..flags }.begun();
-        assert!(begun.limits().until.is_over());
-    }
-
     /// The help contains the library's defaults, and the hints name existing flags.
     #[test]
     fn flags_are_those_of_the_library() {
@@ -146,7 +109,6 @@ mod tests {
         ] {
             let flag =
                 command.get_arguments().find(|flag| flag.get_long() == Some(name)).expect(name);
-            assert_eq!(default_of(name), Some(default.of(kind)));
             let help = flag.get_help().expect("a text").to_string();
             assert!(help.ends_with(&format!("[default: {}]", default.of(kind))), "{help}");
             let told = hint(Path::new("none"), kind, 7);

@@ -5,11 +5,9 @@ use clap::Args;
 use glam::DVec3;
 use splatkit::{
     Deadline,
-    formats::{Endian, Kind, RawLayout, ReadOptions, SampleType},
+    formats::{Endian, Kind, SampleType},
     input::Limits,
-    memory,
-    scattered::SampleOptions,
-    session::{Data, Reading},
+    session::{Data, Description, LimitsEntry, Reading, ReadingEntry},
 };
 use std::path::{Path, PathBuf};
 
@@ -75,34 +73,35 @@ pub struct LoadFlags {
     no_slopes: bool,
     #[command(flatten)]
     limits: LimitFlags,
+    /// When everything that is read must be done.
+    #[arg(skip)]
+    until: Deadline,
 }
 
 impl LoadFlags {
     pub fn limits(&self) -> Limits {
-        self.limits.limits()
+        self.entry().limits()
     }
 
     /// Returns the flags for several inputs that share one time limit, which begins now.
     pub fn begun(&self) -> Self {
-        Self { limits: self.limits.begun(), ..self.clone() }
+        Self { until: self.limits().deadline(), ..self.clone() }
     }
 
     /// Returns the way to read files. An input that is read as a whole may take `memory` bytes,
     /// unless a flag allows more.
     pub fn reading(&self, memory: Option<u64>) -> Reading {
-        Reading::new(self.options(), self.limits())
-            .within_memory(memory.filter(|_| !self.limits.has_bytes()))
-            .with_label_table(self.labels.clone())
+        self.entry().reading_within(memory)
     }
 
     /// Reads a file.
     pub fn open(&self, path: &Path) -> Result<Data, Failure> {
-        Ok(self.reading(memory::most()).open(path)?.read()?)
+        Ok(self.entry().reading().open(path)?.read()?)
     }
 
     /// Returns the kind of a file, even if the file is damaged.
     pub fn kind(&self, path: &Path) -> Result<Kind, Failure> {
-        Ok(self.reading(memory::most()).kind(path)?)
+        Ok(self.entry().reading().kind(path)?)
     }
 
     /// Returns the name of the values to read, if the user named them.
@@ -110,39 +109,49 @@ impl LoadFlags {
         self.scalar.as_deref()
     }
 
-    /// Returns what to read of a file.
-    fn options(&self) -> ReadOptions {
-        ReadOptions {
+    /// Returns how inputs are read.
+    pub fn entry(&self) -> ReadingEntry {
+        ReadingEntry {
             scalar: self.scalar.clone(),
-            raw: self.layout(),
+            dims: self.dims,
+            r#type: self.sample_type,
+            endian: self.endian,
+            header: self.header,
             time: self.time,
             series: self.series.clone(),
             dataset: self.dataset.clone(),
-            spacing: self.spacing,
+            spacing: self.spacing.map(|spacing| spacing.to_array()),
             missing: self.missing,
-            labels: Vec::new(),
-        }
-    }
-
-    fn layout(&self) -> Option<RawLayout> {
-        self.dims.zip(self.sample_type).map(|(dims, sample_type)| RawLayout {
-            dims,
-            sample_type,
-            spacing: self.spacing.unwrap_or(DVec3::ONE),
-            endian: self.endian.unwrap_or_default(),
-            header: self.header.unwrap_or(0),
-        })
-    }
-
-    /// Returns how scattered samples become splats.
-    pub fn sample_options(&self, deadline: Deadline) -> SampleOptions {
-        let default = SampleOptions::default();
-        SampleOptions {
-            neighbours: self.neighbours.unwrap_or(default.neighbours),
+            labels: self.labels.clone(),
             radius: self.radius,
-            slopes: !self.no_slopes,
-            deadline,
-            ..default
+            neighbours: self.neighbours,
+            slopes: self.no_slopes.then_some(false),
+            limits: self.limits.entry(),
+            until: self.until,
         }
+    }
+
+    /// Changes how the inputs of a scene are read: by the flags that are given.
+    pub fn apply(&self, scene: &mut Description) {
+        let own = self.entry();
+        macro_rules! share {
+            ($($field:ident),*) => {$(
+                if own.$field.is_some() {
+                    scene.inputs.iter_mut().for_each(|input| input.reading.$field = None);
+                    scene.reading.$field = own.$field;
+                }
+            )*};
+        }
+        share!(
+            scalar, dims, r#type, endian, header, time, series, dataset, spacing, missing, labels,
+            radius, neighbours, slopes
+        );
+        let LimitsEntry { points, bytes, depth, texels, seconds } = own.limits;
+        let limits = &mut scene.reading.limits;
+        limits.points = points.or(limits.points);
+        limits.bytes = bytes.or(limits.bytes);
+        limits.depth = depth.or(limits.depth);
+        limits.texels = texels.or(limits.texels);
+        limits.seconds = seconds.or(limits.seconds);
     }
 }

@@ -1,26 +1,28 @@
 //! The flags that choose how splats are composited into a picture.
 
-use crate::failure::Failure;
 use clap::{Args, ValueEnum};
-use splatkit::scene::{self, Order, Settings};
+use splatkit::{
+    scene,
+    session::{Composite, PictureEntry},
+};
 
 /// How splats are composited into a picture.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Method")]
 pub struct MethodFlags {
-    /// Choose the elements that are composited.
-    #[arg(long, value_enum, default_value_t = Mode::Sheets)]
-    mode: Mode,
+    /// Choose the elements that are composited [default: sheets]
+    #[arg(long, value_enum)]
+    mode: Option<Mode>,
     /// Composite single splats from back to front; the picture is the same. Needs --mode splats.
     #[arg(long)]
     back_to_front: bool,
     /// Choose when a volume's values become colour and opacity. --mode axis-sheets and splats
-    /// always classify before interpolation.
-    #[arg(long, value_enum, default_value_t = Classify::PreIntegrated)]
-    classify: Classify,
-    /// Choose the quantity that a ray computes from a volume.
-    #[arg(long, value_enum, default_value_t = Optics::Light)]
-    optics: Optics,
+    /// always classify before interpolation [default: pre-integrated]
+    #[arg(long, value_enum)]
+    classify: Option<Classify>,
+    /// Choose the quantity that a ray computes from a volume [default: light]
+    #[arg(long, value_enum)]
+    optics: Option<Optics>,
     /// Short for --optics maximum.
     #[arg(long, conflicts_with_all = ["optics", "x_ray"])]
     mip: bool,
@@ -30,7 +32,7 @@ pub struct MethodFlags {
 }
 
 /// [`scene::Mode`] as a flag.
-#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+#[derive(Debug, Clone, Copy, ValueEnum)]
 enum Mode {
     /// Sheets parallel to the picture; each takes one section of every kernel.
     Sheets,
@@ -63,37 +65,27 @@ enum Optics {
 }
 
 impl MethodFlags {
-    /// Checks what does not depend on the scene.
-    pub fn check(&self) -> Result<(), Failure> {
-        if self.back_to_front && self.mode != Mode::Splats {
-            return Err(Failure::Usage(
-                "--back-to-front needs --mode splats: it sets the order of single splats".into(),
-            ));
-        }
-        Ok(())
-    }
-
-    /// Returns whether rays take the largest value.
-    pub fn is_maximum(&self) -> bool {
-        self.mip || matches!(self.optics, Optics::Maximum)
-    }
-
-    pub fn apply(&self, settings: &mut Settings) {
-        let order = if self.back_to_front { Order::BackToFront } else { Order::FrontToBack };
-        settings.mode = match self.mode {
-            Mode::Sheets => scene::Mode::Sheets,
-            Mode::AxisSheets => scene::Mode::AxisSheets,
-            Mode::Splats => scene::Mode::Splats(order),
-        };
-        settings.classification = match self.classify {
+    /// Changes how the picture of a scene is composited: by the flags that are given.
+    pub fn apply(&self, picture: &mut PictureEntry) {
+        let mode = self.mode.map(|mode| match mode {
+            Mode::Sheets => Composite::Sheets,
+            Mode::AxisSheets => Composite::AxisSheets,
+            Mode::Splats => Composite::Splats,
+        });
+        let classify = self.classify.map(|classify| match classify {
             Classify::PreIntegrated => scene::Classification::PreIntegrated,
             Classify::Post => scene::Classification::Post,
             Classify::Pre => scene::Classification::Pre,
+        });
+        let optics = match (self.mip, self.x_ray, self.optics) {
+            (true, _, _) | (_, _, Some(Optics::Maximum)) => Some(scene::Optics::Maximum),
+            (_, true, _) | (_, _, Some(Optics::XRay)) => Some(scene::Optics::XRay),
+            (_, _, Some(Optics::Light)) => Some(scene::Optics::EmissionAbsorption),
+            (_, _, None) => None,
         };
-        settings.optics = match (self.mip, self.x_ray, self.optics) {
-            (true, _, _) | (_, _, Optics::Maximum) => scene::Optics::Maximum,
-            (_, true, _) | (_, _, Optics::XRay) => scene::Optics::XRay,
-            (_, _, Optics::Light) => scene::Optics::EmissionAbsorption,
-        };
+        picture.mode = mode.or(picture.mode);
+        picture.back_to_front |= self.back_to_front;
+        picture.classify = classify.or(picture.classify);
+        picture.optics = optics.or(picture.optics);
     }
 }

@@ -1,46 +1,14 @@
 //! Values of flags for all inputs, or for one: `VALUE` or `FILE=VALUE`.
 
 use crate::failure::Failure;
-use splatkit::input;
+use splatkit::{
+    input,
+    session::{AppearanceEntry, Description},
+};
 use std::{
     collections::{HashMap, HashSet},
     path::{Path, PathBuf},
 };
-
-/// Values by input. However many inputs have values of their own, each is found at once.
-#[derive(Debug)]
-pub struct Values<T> {
-    own: HashMap<PathBuf, Vec<T>>,
-    shared: Vec<T>,
-}
-
-impl<T> Values<T> {
-    pub fn new(values: impl IntoIterator<Item = Own<T>>) -> Self {
-        let mut all = Self { own: HashMap::new(), shared: Vec::new() };
-        for Own { file, value } in values {
-            match file {
-                Some(file) => all.own.entry(file).or_default().push(value),
-                None => all.shared.push(value),
-            }
-        }
-        all
-    }
-
-    /// Returns an input's own value, or else that of all inputs.
-    pub fn of(&self, path: &Path) -> Option<&T> {
-        self.all_of(path).first()
-    }
-
-    /// Returns all of an input's own values, or else all of those of all inputs.
-    pub fn all_of(&self, path: &Path) -> &[T] {
-        self.own.get(path).unwrap_or(&self.shared)
-    }
-
-    /// Returns the inputs that have values of their own.
-    pub fn files(&self) -> impl Iterator<Item = &Path> {
-        self.own.keys().map(PathBuf::as_path)
-    }
-}
 
 /// A value for all inputs, or for one.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,21 +31,11 @@ impl<T> Own<T> {
     }
 
     /// Returns what is made of the value, for the same inputs.
-    pub fn try_map<'a, U>(
-        &'a self,
-        make: impl FnOnce(&'a T) -> Result<U, Failure>,
-    ) -> Result<Own<U>, Failure> {
+    pub fn try_map<U>(
+        &self,
+        make: impl FnOnce(&T) -> splatkit::Result<U>,
+    ) -> splatkit::Result<Own<U>> {
         Ok(Own { file: self.file.clone(), value: make(&self.value)? })
-    }
-
-    /// Returns the inputs that have values of their own.
-    pub fn files(values: &[Self]) -> impl Iterator<Item = &Path> {
-        values.iter().filter_map(|own| own.file.as_deref())
-    }
-
-    /// Returns all values.
-    pub fn values(values: &[Self]) -> impl Iterator<Item = &T> {
-        values.iter().map(|own| &own.value)
     }
 
     /// A value for all inputs.
@@ -102,7 +60,8 @@ impl<T> Own<T> {
             [] => return Ok(()),
             _ => inputs.iter().map(PathBuf::as_path).collect(),
         };
-        match Self::files(values).find(|file| !known.contains(file)) {
+        let files = values.iter().filter_map(|own| own.file.as_deref());
+        match files.into_iter().find(|file| !known.contains(file)) {
             None => Ok(()),
             Some(file) => Err(Failure::Usage(format!(
                 "--{flag} {}=…: no input has this name; write it as the input is written",
@@ -128,6 +87,53 @@ impl<T> Own<T> {
     }
 }
 
+/// What a flag sets for all inputs of a scene, instead of what each has of its own.
+pub struct Shared;
+
+impl Shared {
+    /// Sets a field of how inputs are shown, if there is a value.
+    pub fn set<T>(
+        scene: &mut Description,
+        field: impl Fn(&mut AppearanceEntry) -> &mut Option<T>,
+        value: Option<T>,
+    ) {
+        if let Some(value) = value {
+            scene.inputs.iter_mut().for_each(|input| *field(&mut input.appearance) = None);
+            *field(&mut scene.appearance) = Some(value);
+        }
+    }
+
+    /// Sets a field to the values of all inputs and of single ones, if there are any. Several
+    /// values of one input are joined.
+    pub fn set_each<T: Clone>(
+        scene: &mut Description,
+        field: impl Fn(&mut AppearanceEntry) -> &mut Option<T>,
+        values: &[Own<T>],
+        join: impl Fn(&mut T, T),
+    ) {
+        if values.is_empty() {
+            return;
+        }
+        let add = |place: &mut Option<T>, value: T| match place {
+            Some(before) => join(before, value),
+            None => *place = Some(value),
+        };
+        scene.inputs.iter_mut().for_each(|input| *field(&mut input.appearance) = None);
+        *field(&mut scene.appearance) = None;
+        // However many inputs have values of their own, each is found at once.
+        let mut of_files: HashMap<&Path, Option<T>> = HashMap::new();
+        for Own { file, value } in values {
+            match file {
+                Some(file) => add(of_files.entry(file).or_default(), value.clone()),
+                None => add(field(&mut scene.appearance), value.clone()),
+            }
+        }
+        for input in &mut scene.inputs {
+            *field(&mut input.appearance) = of_files.get(input.file.as_path()).cloned().flatten();
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,24 +153,30 @@ mod tests {
         assert!(Own::parse("a=x", number).is_err());
         let many = ["1", "a.ply=2", "3", "a.ply=4"].map(|text| Own::parse(text, number).unwrap());
         let [own, other] = ["a.ply", "b.ply"].map(PathBuf::from);
-        let found = Values::new(many.clone());
-        assert_eq!((found.all_of(&own), found.of(&own)), (&[2.0, 4.0][..], Some(&2.0)));
-        assert_eq!((found.all_of(&other), found.of(&other)), (&[1.0, 3.0][..], Some(&1.0)));
-        assert_eq!(found.files().collect::<Vec<_>>(), [own.as_path()]);
         assert!(Own::check_files(&many, "iso", std::slice::from_ref(&own)).is_ok());
-        assert!(Own::check_files(&many, "iso", &[other]).is_err());
+        assert!(Own::check_files(&many, "iso", std::slice::from_ref(&other)).is_err());
+        let mut scene = Description::new([own, other]);
+        scene.inputs[1].appearance.opacity = Some(0.1);
+        Shared::set_each(&mut scene, |own| &mut own.opacity, &many, |before, more| *before += more);
+        let found: Vec<_> = scene.inputs.iter().map(|input| input.appearance.opacity).collect();
+        assert_eq!((found, scene.appearance.opacity), (vec![Some(6.0), None], Some(4.0)));
     }
 
     #[test]
     fn many_inputs_with_values_of_their_own_are_found_at_once() {
         let inputs: Vec<PathBuf> = (0..200_000).map(|i| format!("a/{i}.ply").into()).collect();
-        let own = |path: &PathBuf| Own { file: Some(path.clone()), value: path.clone() };
-        let all: Vec<Own<PathBuf>> = inputs.iter().map(own).collect();
+        let own = |(number, path): (usize, &PathBuf)| Own {
+            file: Some(path.clone()),
+            value: number as f32,
+        };
+        let all: Vec<Own<f32>> = inputs.iter().enumerate().map(own).collect();
         // A search from the first for each input would take hours.
         let begin = std::time::Instant::now();
-        assert!(Own::check(&all, "color", &inputs).is_ok());
-        let found = Values::new(all);
-        assert!(inputs.iter().all(|path| found.of(path) == Some(path)));
+        assert!(Own::check(&all, "opacity", &inputs).is_ok());
+        let mut scene = Description::new(inputs);
+        Shared::set_each(&mut scene, |own| &mut own.opacity, &all, |_, _| {});
+        let found = scene.inputs.iter().map(|input| input.appearance.opacity);
+        assert!(found.enumerate().all(|(number, own)| own == Some(number as f32)));
         assert!(begin.elapsed().as_secs() < 60, "{:?}", begin.elapsed());
     }
 }

@@ -1,7 +1,6 @@
 //! Values of flags that are more than a word or a number.
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use color::{Rgba8, Srgb, parse_color};
 use glam::DVec3;
 use splatkit::{
     formats::{Endian, SampleType},
@@ -71,34 +70,10 @@ pub fn range(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// A colour, as [`color`]. `none` keeps the picture's opacity.
-pub fn background(text: &str) -> Result<Background, String> {
-    if text.trim().eq_ignore_ascii_case("none") {
-        return Ok(Background(None));
-    }
-    color(text).map(|color| Background(Some(color))).map_err(|message| message + ", or none")
-}
-
-/// A colour as in CSS: a name, `#rgb`, `#rrggbb` (also without `#`) or `rgb(…)`, without opacity.
+/// A colour, as [`splatkit::color::parse`] reads it.
 pub fn color(text: &str) -> Result<[f32; 3], String> {
-    // The crate knows the names in American spelling only.
-    let text = text.trim().to_ascii_lowercase().replace("grey", "gray");
-    let is_plain =
-        matches!(text.len(), 3 | 4 | 6 | 8) && text.bytes().all(|byte| byte.is_ascii_hexdigit());
-    let parsed = parse_color(&if is_plain { format!("#{text}") } else { text });
-    let parsed =
-        parsed.map_err(|_| "a colour is a name, #rgb or #rrggbb, such as orange or '#ff8800'")?;
-    let color = parsed.to_alpha_color::<Srgb>();
-    if color.components[3] < 1.0 {
-        return Err("a colour has no opacity here: write '#rrggbb', such as '#ff8800'".into());
-    }
-    let Rgba8 { r, g, b, .. } = color.to_rgba8();
-    Ok([r, g, b].map(|channel| f32::from(channel) / 255.0))
+    splatkit::color::parse(text)
 }
-
-/// The colour behind the picture; `None` for transparency.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Background(pub Option<[f32; 3]>);
 
 /// `+X`, `-y`, `Z`, …
 pub fn axis(text: &str) -> Result<DVec3, String> {
@@ -233,23 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_and_axes() {
-        assert_eq!(background("#ff0080"), Ok(Background(Some([1.0, 0.0, 128.0 / 255.0]))));
-        assert_eq!(background("NONE"), Ok(Background(None)));
-        let orange = Ok([1.0, 136.0 / 255.0, 0.0]);
-        for text in ["#ff8800", "ff8800", "#F80", " #f80 ", "rgb(255 136 0)"] {
-            assert_eq!(color(text), orange, "{text}");
-        }
-        assert_eq!((color("White"), color("black")), (Ok([1.0; 3]), Ok([0.0; 3])));
-        for bad in ["", "+ff008", "#gg0000", "#ff000", "whitish", "ff", "nan"] {
-            let message = background(bad).unwrap_err();
-            assert!(message.contains("such as orange or '#ff8800', or none"), "{bad}: {message}");
-        }
-        assert!(color("#ff880080").unwrap_err().contains("no opacity"));
-        assert!(color("transparent").is_err());
-        assert_eq!(color("hsl(120 100% 50%)"), Ok([0.0, 1.0, 0.0]));
-        assert_eq!(color("RebeccaPurple"), color("#663399"));
-        assert_eq!(color("LightSlateGrey"), color("#778899"));
+    fn axes_are_read() {
         assert_eq!(
             (axis("+Z"), axis("-x"), axis("Y")),
             (Ok(DVec3::Z), Ok(DVec3::NEG_X), Ok(DVec3::Y))

@@ -7,13 +7,12 @@ use crate::{
     failure::Failure,
     frames::{Frames, numbered},
     given::Given,
+    job::{Finish, Job, Loaded},
     motion::{Motion, MotionFlags},
     output,
-    overlay::{Overlay, OverlayFlags},
-    parse::{self, Background},
+    overlay::OverlayFlags,
     progress::Progress,
-    samples::Samples,
-    scene::{Loaded, SceneFlags},
+    scene::SceneFlags,
     timing::milliseconds,
     video::{Film, Format},
 };
@@ -27,7 +26,7 @@ use splatkit::{
     picture::{Picture, PictureFormat},
     reference,
     scene::Settings,
-    session::Origin,
+    session::{Background, Description, Origin, Samples},
 };
 #[cfg(feature = "window")]
 use splatkit::{Stop, math::CameraPath, volume::TransferFunction};
@@ -36,8 +35,9 @@ use std::{
     time::Instant,
 };
 
-#[derive(Args, Debug)]
-pub struct Render {
+/// Where the picture goes.
+#[derive(Args, Debug, Default)]
+struct OutputFlags {
     /// Write the picture to this .png or .jpg file, or to stdout as PNG if it is `-`. With
     /// --turntable or --path, write an animation to this .gif, .webp or .apng file, or with ffmpeg,
     /// if it is installed, to this .mp4, .webm or .mov file. Or write numbered pictures: out.png
@@ -57,17 +57,24 @@ pub struct Render {
     /// Replace existing files.
     #[arg(long)]
     overwrite: bool,
-    /// Set the background colour: a name, '#rgb', '#rrggbb', or none for transparent pixels: of
-    /// .png, .gif, .webp, .apng, .webm and .mov files.
-    #[arg(long, value_name = "COLOR", value_parser = parse::background, default_value = "#000000")]
-    background: Background,
-    /// Draw this many pixels for each pixel of the picture and average them: 1, 4, 9, 16 or 64.
-    /// auto draws as many as fit into 512x512 pixels in all, at most 16 for volumes.
-    #[arg(long, value_name = "N|auto", default_value = "auto")]
-    samples: Samples,
     /// Print statistics to stdout, as JSON.
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Render {
+    #[command(flatten)]
+    output: OutputFlags,
+    /// Set the background colour: a name, '#rgb', '#rrggbb', or none for transparent pixels: of
+    /// .png, .gif, .webp, .apng, .webm and .mov files.
+    /// [default: black]
+    #[arg(long, value_name = "COLOR")]
+    background: Option<Background>,
+    /// Draw this many pixels for each pixel of the picture and average them: 1, 4, 9, 16 or 64.
+    /// auto draws as many as fit into 512x512 pixels in all, at most 16 for volumes [default: auto]
+    #[arg(long, value_name = "N|auto")]
+    samples: Option<Samples>,
     #[command(flatten)]
     scene: SceneFlags,
     #[command(flatten)]
@@ -91,13 +98,9 @@ pub enum Drawer {
 
 impl Drawer {
     /// Opens the device and prepares the scene on it.
-    pub fn engine(
-        flags: &EngineFlags,
-        loaded: &Loaded,
-        progress: &Progress,
-    ) -> Result<Self, Failure> {
+    pub fn engine(job: &Job, loaded: &Loaded, progress: &Progress) -> Result<Self, Failure> {
         progress.stage("Opening the device");
-        let device = flags.device(&loaded.scene)?;
+        let device = job.open_device(&loaded.scene)?;
         progress.stage("Preparing the scene");
         Ok(Self::Engine(Box::new(Renderer::new(&device, &loaded.scene)?)))
     }
@@ -136,6 +139,7 @@ impl Drawer {
 
 /// A scene that is ready to be drawn, and how its pictures are finished.
 struct Ready<'a> {
+    job: &'a Job,
     loaded: &'a Loaded,
     /// The settings of a picture before it is averaged down.
     settings: Settings,
@@ -156,61 +160,13 @@ pub struct Export<'a> {
     pub stop: Stop,
 }
 
-/// How a drawn picture becomes the final one.
-pub struct Finish {
-    /// Pixels drawn along each side of a pixel of the picture.
-    pub factor: u32,
-    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "for the window"))]
-    pub background: Option<[f32; 3]>,
-    overlay: Option<Overlay>,
-}
-
-impl Finish {
-    /// Averages a picture down and draws edges over it.
-    fn reduced(
-        &self,
-        picture: Picture,
-        camera: &Camera,
-        loaded: &Loaded,
-    ) -> splatkit::Result<Picture> {
-        let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
-        let view = camera.view([picture.width, picture.height])?;
-        // A line is a pixel wide, and wider in large pictures.
-        let width = (f64::from(picture.height) / 720.0).max(1.0);
-        loaded.items.edges().iter().for_each(|edges| picture.draw_edges(edges, &view, width));
-        Ok(picture)
-    }
-
-    /// Draws the texts over a picture, and returns what they say.
-    fn overlaid(&self, picture: &mut Picture, camera: &Camera) -> serde_json::Value {
-        let overlay = self.overlay.as_ref();
-        overlay.map_or(serde_json::Value::Null, |overlay| overlay.draw(picture, camera))
-    }
-
-    /// Returns the colours of the scalar bars.
-    #[cfg(all(test, feature = "window"))]
-    pub fn bar_colors(&self) -> Vec<[f32; 3]> {
-        self.overlay.as_ref().map_or(Vec::new(), Overlay::bar_colors)
-    }
-
-    /// Returns the final picture of a drawn one.
-    #[cfg(feature = "window")]
-    pub fn finished(
-        &self,
-        picture: Picture,
-        camera: &Camera,
-        loaded: &Loaded,
-    ) -> splatkit::Result<Picture> {
-        let mut picture = self.reduced(picture, camera, loaded)?;
-        self.overlaid(&mut picture, camera);
-        Ok(picture)
-    }
-}
-
 /// What is drawn, and where it goes.
 struct Run<'a> {
     ready: &'a Ready<'a>,
+    output: &'a OutputFlags,
     motion: Motion,
+    /// The file of the camera's path.
+    path: Option<&'a Path>,
     film: Film,
     frames: Frames,
 }
@@ -226,30 +182,78 @@ struct Drawn {
 
 impl Render {
     pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
+        let job = self.job(given)?;
+        let written: Vec<&Path> = [&self.output.output, &self.output.depth]
+            .into_iter()
+            .filter_map(Option::as_deref)
+            .collect();
+        self.draw(&job, progress).map_err(|failure| job.blamed(failure, &written))
+    }
+
+    /// Returns what the flags and a scene file among the inputs say.
+    pub fn job(&self, given: &Given) -> Result<Job, Failure> {
+        let (mut scene, stated) = self.scene.open(given)?;
+        self.apply(&mut scene)?;
+        let device = self.engine.device(&scene);
+        Job::new(scene, device, given, stated)
+    }
+
+    /// Changes a scene by the flags that are given.
+    fn apply(&self, scene: &mut Description) -> Result<(), Failure> {
+        self.scene.apply(scene)?;
+        self.camera.apply(scene);
+        self.engine.apply(scene);
+        self.overlay.apply(scene);
+        scene.picture.background = self.background.or(scene.picture.background);
+        scene.picture.samples = self.samples.or(scene.picture.samples);
+        Ok(())
+    }
+
+    /// Returns the scene file among the inputs.
+    #[cfg(feature = "window")]
+    pub fn scene_file(&self) -> Option<&Path> {
+        self.scene
+            .inputs
+            .iter()
+            .map(PathBuf::as_path)
+            .find(|path| crate::scene_file::is_scene(path))
+    }
+
+    /// Whether scene files may name files outside their folders, and addresses.
+    #[cfg(feature = "window")]
+    pub fn trusts_scenes(&self) -> bool {
+        self.scene.trust_scene
+    }
+
+    fn draw(&self, job: &Job, progress: &Progress) -> Result<(), Failure> {
         let begun = Instant::now();
-        let output = self.output.clone().unwrap_or_else(|| self.beside());
-        let motion = self.motion.open(&self.scene.limits())?;
+        let inputs = job.inputs();
+        let output = self.output.output.clone();
+        let is_moving = self.motion.is_moving();
+        let output = output.unwrap_or_else(|| self.output.beside(&inputs[0], is_moving));
+        let motion = self.motion.open(&job.scene.reading.limits())?;
         let film = Film {
-            size: self.engine.size,
+            size: job.size(),
             frames: motion.frames(),
             rate: self.motion.rate(),
-            background: self.background.0,
+            background: job.scene.picture.background(),
         };
-        let frames = self.frames(&output, &motion, &film, progress)?;
+        let frames = self.output.frames(&output, &motion, &film, (&inputs, progress))?;
         if let Some(warning) = self.motion.idle(frames.is_played()) {
             progress.warn(warning);
         }
-        let mut loaded = self.load(given, progress)?;
-        let (settings, finish) = self.prepare(&mut loaded, &frames, &motion, progress)?;
-        let ready = Ready { loaded: &loaded, settings, finish };
+        let mut loaded = job.load(progress)?;
+        let (settings, finish) = self.prepare(job, &mut loaded, (&frames, &motion), progress)?;
+        let ready = Ready { job, loaded: &loaded, settings, finish };
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
-            false => Drawer::engine(&self.engine, ready.loaded, progress)?,
+            false => Drawer::engine(job, ready.loaded, progress)?,
         };
         let upload_ms = milliseconds(start);
-        let run = Run { ready: &ready, motion, film, frames };
-        let drawn = self.draw_frames(&mut drawer, &run, progress)?;
+        let path = self.motion.file();
+        let run = Run { ready: &ready, output: &self.output, motion, path, film, frames };
+        let drawn = run.draw_frames(&mut drawer, progress)?;
         progress.clear();
         let stats = &drawn.stats;
         tracing::info!(
@@ -260,25 +264,85 @@ impl Render {
             gathered = stats.gathered,
             "drawn"
         );
-        if self.json {
-            let mut facts = self.facts(&run, &drawn);
+        if self.output.json {
+            let mut facts = run.facts(&drawn)?;
             facts["output"] = output.to_string_lossy().into();
             facts["adapter"] = drawer.adapter().into();
             facts["upload_ms"] = upload_ms.into();
             output::json(&facts)?;
         }
-        self.report(&run, begun, progress);
+        run.report(begun, progress);
         Ok(())
     }
 
+    /// Finds what the camera of a loaded scene needs. Returns the settings and how pictures are
+    /// finished.
+    fn prepare(
+        &self,
+        job: &Job,
+        loaded: &mut Loaded,
+        (frames, motion): (&Frames, &Motion),
+        progress: &Progress,
+    ) -> Result<(Settings, Finish), Failure> {
+        loaded.files.extend(self.motion.file().map(Path::to_owned));
+        let mut files = frames.files().into_iter().chain(self.output.depth.as_deref());
+        files.try_for_each(|file| output::check_unneeded(file, &loaded.files))?;
+        let settings = job.settings(loaded)?;
+        if let Some(warning) = job.idle(&loaded.scene) {
+            progress.warn(warning);
+        }
+        if motion.is_fitted() {
+            progress.stage("Framing the scene");
+            let framing = job.framing()?;
+            loaded.find_seen(&framing, &settings)?;
+            let (stance, origin) = framing.stance(&loaded.subject);
+            if origin == Origin::Guess {
+                progress.note(format_args!(
+                    "up: {}, front: {}, guessed from the shape; --up sets another up, and the \
+                     front that is usual for it",
+                    direction_name(stance.up),
+                    direction_name(stance.front)
+                ));
+            }
+        }
+        let finish = job.finish(loaded)?;
+        Ok((settings, finish))
+    }
+}
+
+/// Draws and writes a film of a scene that is loaded already. Existing files are replaced.
+#[cfg(feature = "window")]
+pub fn export(job: &Job, export: Export<'_>, progress: &Progress) -> Result<(), Failure> {
+    let Export { loaded, transfers, path, rate, output, stop } = export;
+    let begun = Instant::now();
+    let flags = OutputFlags { overwrite: true, ..OutputFlags::default() };
+    let motion = Motion::along(path, rate, output)?;
+    let background = job.scene.picture.background();
+    let film = Film { size: job.size(), frames: motion.frames(), rate, background };
+    let frames = flags.frames(output, &motion, &film, (&job.inputs(), progress))?;
+    let files = frames.files();
+    files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.files))?;
+    let settings = Settings { stop, ..job.settings(loaded)? };
+    let ready = Ready { job, loaded, settings, finish: job.finish(loaded)? };
+    let mut drawer = Drawer::engine(job, loaded, progress)?;
+    for (item, transfer) in transfers {
+        drawer.set_transfer(*item, transfer)?;
+    }
+    let run = Run { ready: &ready, output: &flags, motion, path: None, film, frames };
+    run.draw_frames(&mut drawer, progress)?;
+    run.report(begun, progress);
+    Ok(())
+}
+
+impl Run<'_> {
     /// Returns what `--json` prints about the frames.
-    fn facts(&self, run: &Run, drawn: &Drawn) -> serde_json::Value {
-        let Run { ready: Ready { loaded, settings, .. }, film, frames, .. } = run;
+    fn facts(&self, drawn: &Drawn) -> Result<serde_json::Value, Failure> {
+        let Run { ready: Ready { job, loaded, settings, .. }, film, frames, .. } = self;
         let Drawn { stats, camera, frame_ms, overlay } = drawn;
-        let (stance, origin) = self.camera.framing().stance(&loaded.subject);
-        serde_json::json!({
-            "width": self.engine.size[0],
-            "height": self.engine.size[1],
+        let (stance, origin) = job.framing()?.stance(&loaded.subject);
+        Ok(serde_json::json!({
+            "width": film.size[0],
+            "height": film.size[1],
             "frames": film.frames,
             "fps": frames.is_film().then_some(film.rate),
             "splats": stats.splats,
@@ -295,185 +359,20 @@ impl Render {
             "up": direction_name(stance.up),
             "up_from": origin.name(),
             "settings": describe::settings(&loaded.scene, settings),
-        })
-    }
-
-    /// Draws and writes a film of a scene that is loaded already. Existing files are replaced.
-    #[cfg(feature = "window")]
-    pub fn export(&self, export: Export<'_>, progress: &Progress) -> Result<(), Failure> {
-        let Export { loaded, transfers, path, rate, output, stop } = export;
-        let begun = Instant::now();
-        let motion = Motion::along(path, rate, output)?;
-        let film = Film {
-            size: self.engine.size,
-            frames: motion.frames(),
-            rate,
-            background: self.background.0,
-        };
-        let frames = self.frames(output, &motion, &film, progress)?;
-        let files = frames.files();
-        files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
-        let settings = Settings { stop, ..self.engine.settings(loaded, self.samples)? };
-        let ready = Ready { loaded, settings, finish: self.finish(loaded)? };
-        let mut drawer = Drawer::engine(&self.engine, loaded, progress)?;
-        for (item, transfer) in transfers {
-            drawer.set_transfer(*item, transfer)?;
-        }
-        let run = Run { ready: &ready, motion, film, frames };
-        self.draw_frames(&mut drawer, &run, progress)?;
-        self.report(&run, begun, progress);
-        Ok(())
-    }
-
-    /// Finds what the camera of a loaded scene needs. Returns the settings and how pictures are
-    /// finished.
-    fn prepare(
-        &self,
-        loaded: &mut Loaded,
-        frames: &Frames,
-        motion: &Motion,
-        progress: &Progress,
-    ) -> Result<(Settings, Finish), Failure> {
-        loaded.read.extend(self.motion.file().map(Path::to_owned));
-        let mut files = frames.files().into_iter().chain(self.depth.as_deref());
-        files.try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
-        let settings = self.engine.settings(loaded, self.samples)?;
-        if let Some(warning) = self.engine.idle(&loaded.scene) {
-            progress.warn(warning);
-        }
-        if motion.is_fitted() {
-            progress.stage("Framing the scene");
-            loaded.find_seen(&self.camera.framing(), &settings)?;
-            let (stance, origin) = self.camera.framing().stance(&loaded.subject);
-            if origin == Origin::Guess {
-                progress.note(format_args!(
-                    "up: {}, front: {}, guessed from the shape; --up sets another up, and the \
-                     front that is usual for it",
-                    direction_name(stance.up),
-                    direction_name(stance.front)
-                ));
-            }
-        }
-        let finish = self.finish(loaded)?;
-        Ok((settings, finish))
-    }
-
-    /// Checks that the inputs are files that can be read, without reading more than their heads.
-    #[cfg(feature = "window")]
-    pub fn check_files(&self) -> Result<(), Failure> {
-        self.scene.check_files()
-    }
-
-    /// Loads the scene.
-    pub fn load(&self, given: &Given, progress: &Progress) -> Result<Loaded, Failure> {
-        self.engine.check()?;
-        let facets = self.engine.draws_facets();
-        self.scene.load(facets, given, progress)
-    }
-
-    /// Returns how pictures of a scene are finished.
-    pub fn finish(&self, loaded: &Loaded) -> Result<Finish, Failure> {
-        let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
-        let overlay = self.overlay.open(&loaded.captions, self.background.0)?;
-        Ok(Finish { factor, background: self.background.0, overlay })
-    }
-
-    /// The same, if other transfer functions show the fields of these items.
-    #[cfg(feature = "window")]
-    pub fn finish_with(
-        &self,
-        loaded: &Loaded,
-        transfers: &[(usize, TransferFunction)],
-    ) -> Result<Finish, Failure> {
-        let captions = self.scene.captions_with(loaded, transfers);
-        let overlay = self.overlay.open(&captions, self.background.0)?;
-        Ok(Finish { overlay, ..self.finish(loaded)? })
-    }
-
-    /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,
-    /// beside the bars.
-    fn free(&self, settings: &Settings, finish: &Finish) -> [u32; 2] {
-        let room = finish.overlay.as_ref().map_or(0, |overlay| overlay.room(self.engine.size));
-        let [width, height] = settings.size;
-        [width.saturating_sub(2 * finish.factor * room).max(1), height]
-    }
-
-    /// Returns the camera of a single picture.
-    #[cfg(feature = "window")]
-    pub fn camera(
-        &self,
-        loaded: &Loaded,
-        settings: &Settings,
-        finish: &Finish,
-    ) -> splatkit::Result<Camera> {
-        self.camera.framing().camera(&loaded.subject, self.free(settings, finish))
-    }
-
-    /// Sets the size of the picture in pixels.
-    #[cfg(feature = "window")]
-    pub fn set_size(&mut self, size: [u32; 2]) {
-        self.engine.size = size;
-    }
-
-    /// Returns the settings of a picture of a scene before it is averaged down.
-    #[cfg(feature = "window")]
-    pub fn settings(&self, loaded: &Loaded) -> splatkit::Result<Settings> {
-        self.engine.settings(loaded, self.samples)
-    }
-
-    /// Finds the points that the camera is fitted to.
-    #[cfg(feature = "window")]
-    pub fn find_seen(&self, loaded: &mut Loaded, settings: &Settings) -> splatkit::Result<()> {
-        loaded.find_seen(&self.camera.framing(), settings)
-    }
-
-    /// Opens the device that draws a scene.
-    #[cfg(feature = "window")]
-    pub fn device(&self, loaded: &Loaded) -> splatkit::Result<splatkit::Device> {
-        self.engine.device(&loaded.scene)
-    }
-
-    /// Returns the scene's way up.
-    #[cfg(feature = "window")]
-    pub fn up(&self, loaded: &Loaded) -> glam::DVec3 {
-        self.camera.framing().stance(&loaded.subject).0.up
-    }
-
-    /// Returns the default name of the picture: that of the first input, with a number if there is
-    /// such a file already.
-    fn beside(&self) -> PathBuf {
-        let first = &self.scene.inputs[0];
-        let stem = first.file_stem().unwrap_or("picture".as_ref());
-        let named = |number: u32| {
-            let mut name = stem.to_owned();
-            if number > 1 {
-                name.push(format!("_{number}"));
-            }
-            name.push(".png");
-            // Nothing is written beside an address.
-            if is_remote(first) { name.into() } else { first.with_file_name(name) }
-        };
-        let is_free = |path: &PathBuf| {
-            let path = match self.motion.is_moving() {
-                true => numbered(path, 0),
-                false => Ok(path.clone()),
-            };
-            self.overwrite || path.is_ok_and(|path| path.symlink_metadata().is_err())
-        };
-        (1..).map(named).find(is_free).unwrap_or_else(|| named(1))
+        }))
     }
 
     /// Prints what was written: path, size and time.
-    fn report(&self, run: &Run, begun: Instant, progress: &Progress) {
-        let files = run.frames.files();
+    fn report(&self, begun: Instant, progress: &Progress) {
+        let files = self.frames.files();
         let [Some(first), Some(last)] = [files.first(), files.last()] else { return };
-        let [width, height] = self.engine.size;
+        let [width, height] = self.film.size;
         let seconds = begun.elapsed().as_secs_f64();
         let bytes = files.iter().filter_map(|file| file.metadata().ok()).map(|file| file.len());
         let size = format!("{width} × {height} pixels, {}", size_of_file(bytes.sum()));
         let (first, last) = (first.display(), last.display());
-        let count = run.film.frames;
-        if run.frames.is_film() {
+        let count = self.film.frames;
+        if self.frames.is_film() {
             progress.note(format_args!("{first}: {count} frames of {size}, {seconds:.1} s"));
         } else if count == 1 {
             progress.note(format_args!("{first}: {size}, {seconds:.1} s"));
@@ -485,17 +384,12 @@ impl Render {
     }
 
     /// Draws and writes the frames.
-    fn draw_frames(
-        &self,
-        drawer: &mut Drawer,
-        run: &Run,
-        progress: &Progress,
-    ) -> Result<Drawn, Failure> {
-        let Run { ready: Ready { loaded, settings, finish }, motion, film, frames } = run;
+    fn draw_frames(&self, drawer: &mut Drawer, progress: &Progress) -> Result<Drawn, Failure> {
+        let Run { ready: Ready { job, loaded, settings, finish }, motion, film, frames, .. } = self;
         let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
-        let free = self.free(settings, finish);
-        let cameras = motion.cameras(&self.camera.framing(), &loaded.subject, free)?;
+        let free = job.free(settings, finish);
+        let cameras = motion.cameras(&job.framing()?, &loaded.subject, free)?;
         let mut last = (FrameStats::default(), cameras[0].clone());
         let (mut is_shown, mut missing) = (false, 0);
         let mut writer = frames.open(*film)?;
@@ -512,12 +406,12 @@ impl Render {
             tell("Drawing", frame);
             let start = Instant::now();
             let drawn = drawer.draw(loaded, &camera, settings).map_err(|error| {
-                let path = self.motion.file().map(|file| (file, motion.place(frame)));
-                self.scene.undrawn(error, loaded, (&camera, settings.size), path)
+                let path = self.path.map(|file| (file, motion.place(frame)));
+                job.undrawn(error, loaded, (&camera, settings.size), path)
             });
             let (picture, stats) = drawn?;
             times.push(milliseconds(start));
-            match self.engine.require_content(&picture) {
+            match job.require_content(&picture) {
                 Ok(()) => is_shown = true,
                 // A camera on a path may look past the scene for a while.
                 Err(_) if !motion.is_fitted() && (is_shown || frame + 1 < count) => {}
@@ -527,7 +421,7 @@ impl Render {
             tell("Writing", frame);
             texts = finish.overlaid(&mut picture, &camera);
             let is_wanted = writer.add(&picture)?;
-            if let Some(depth) = &self.depth {
+            if let Some(depth) = &self.output.depth {
                 disk::write(depth, &picture.encode_depth()?)?;
             }
             missing = missing.max(stats.missing_pages);
@@ -547,6 +441,28 @@ impl Render {
         let (stats, camera) = last;
         Ok(Drawn { stats, camera, frame_ms: times[times.len() / 2], overlay: texts })
     }
+}
+
+impl OutputFlags {
+    /// Returns the default name of the picture: that of the first input, with a number if there is
+    /// such a file already.
+    fn beside(&self, first: &Path, is_moving: bool) -> PathBuf {
+        let stem = first.file_stem().unwrap_or("picture".as_ref());
+        let named = |number: u32| {
+            let mut name = stem.to_owned();
+            if number > 1 {
+                name.push(format!("_{number}"));
+            }
+            name.push(".png");
+            // Nothing is written beside an address.
+            if is_remote(first) { name.into() } else { first.with_file_name(name) }
+        };
+        let is_free = |path: &PathBuf| {
+            let path = if is_moving { numbered(path, 0) } else { Ok(path.clone()) };
+            self.overwrite || path.is_ok_and(|path| path.symlink_metadata().is_err())
+        };
+        (1..).map(named).find(is_free).unwrap_or_else(|| named(1))
+    }
 
     /// Returns where the frames go. Fails if one of the files exists and may not be replaced, or
     /// if the first file cannot be written.
@@ -555,7 +471,7 @@ impl Render {
         output: &Path,
         motion: &Motion,
         film: &Film,
-        progress: &Progress,
+        (inputs, progress): (&[PathBuf], &Progress),
     ) -> Result<Frames, Failure> {
         let frames = self.unchecked_frames(output, motion, film)?;
         if let Frames::Film(path, format) = &frames {
@@ -570,7 +486,7 @@ impl Render {
         // All numbered pictures go to the same folder, so the first one is enough.
         let files = frames.files();
         for file in files.first().copied().into_iter().chain(self.depth.as_deref()) {
-            output::try_writing(file, &self.scene.inputs)?;
+            output::try_writing(file, inputs)?;
         }
         Ok(frames)
     }

@@ -4,17 +4,15 @@ use crate::{
     color::ColorFlags,
     failure::Failure,
     kernel::KernelFlags,
-    own::{self, Own},
+    own::{Own, Shared},
     parse,
 };
 use clap::Args;
 use splatkit::{
-    input::Limits,
-    math::Kernel,
-    session::{Appearance, Coloring, Showing, Surface, SurfaceColor, SurfaceValue, Transfer},
+    session::{Description, IsosurfaceEntry, TransferEntry},
     volume::TransferFunction,
 };
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// How a scene's values and surfaces are shown.
 #[derive(Args, Debug, Clone)]
@@ -52,7 +50,7 @@ pub struct ShowFlags {
         value_parser = surfaces,
         allow_hyphen_values = true
     )]
-    iso: Vec<Own<Vec<Surface>>>,
+    iso: Vec<Own<Vec<IsosurfaceEntry>>>,
     /// Multiply the opacity by factors of 0 to 1, given by the gradient's magnitude (value per
     /// world length) and linear in between.
     #[arg(long, value_name = "MAGNITUDE,FACTOR:…", value_parser = Factors::parse)]
@@ -60,7 +58,7 @@ pub struct ShowFlags {
     /// Scale the radii of the surfels of meshes and point clouds. Hierarchies keep the radii that
     /// they were converted with.
     #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
-    pub radius_scale: Option<f32>,
+    radius_scale: Option<f32>,
     /// Meshes: split the normals where two triangles meet at more than this angle, so that the
     /// crease looks sharp. 0 draws flat facets; from 60 on, creases are split at 60 degrees
     /// [default: 60]
@@ -84,110 +82,47 @@ pub struct ShowFlags {
 #[derive(Debug, Clone, PartialEq)]
 struct Factors(Vec<(f64, f64)>);
 
-/// [`ShowFlags`] with their files read, so that errors that do not depend on the scene show before
-/// its files are read.
-pub struct Show<'a> {
-    flags: &'a ShowFlags,
-    kernel: Kernel,
-    sharp: bool,
-    /// What inputs have of their own.
-    transfers: own::Values<Transfer>,
-    ranges: own::Values<[f64; 2]>,
-    surfaces: own::Values<&'a [Surface]>,
-    opacities: own::Values<f32>,
-    colors: own::Values<SurfaceColor>,
-}
-
 impl ShowFlags {
-    /// Returns the flags that change the transfer function of an input as given, for messages;
-    /// `None` if there are none.
-    pub fn transfer_text(&self, path: &Path) -> Option<String> {
-        let transfer = Own::of(&self.transfer, path);
-        let transfer = transfer.map(|transfer| format!("--transfer {transfer}"));
-        let unit = self.opacity_unit.map(|unit| format!("--opacity-unit {}", plain(unit)));
-        let texts: Vec<_> = [transfer, self.range_text(path), unit].into_iter().flatten().collect();
-        (!texts.is_empty()).then(|| texts.join(" "))
-    }
-
-    fn range_text(&self, path: &Path) -> Option<String> {
-        let range = self.range_of(path);
-        range.map(|[low, high]| format!("--range {},{}", plain(low), plain(high)))
-    }
-
-    fn range_of(&self, path: &Path) -> Option<[f64; 2]> {
-        Own::of(&self.range, path).copied()
-    }
-
-    /// Whether the range of some input is given.
-    pub fn has_range(&self) -> bool {
-        !self.range.is_empty()
-    }
-
-    /// Returns the file of an input's transfer function if no other flag changes its content.
-    pub fn own_transfer(&self, path: &Path) -> Option<&Path> {
-        let is_changed = self.range_of(path).is_some() || self.opacity_unit.is_some();
-        let named =
-            |name: &&String| !TransferFunction::NAMES.contains(&name.as_str()) && is_file(name);
-        Own::of(&self.transfer, path).filter(named).filter(|_| !is_changed).map(Path::new)
-    }
-
     /// Returns a flag that was given and does not change how values are shown.
     pub fn unused_by_values(&self) -> Option<&'static str> {
         let opacity = (!self.opacity.is_empty()).then_some("--opacity");
         self.radius_scale.map(|_| "--radius-scale").or(opacity).or_else(|| self.kernel.first())
     }
 
-    /// Checks the names of inputs in flags.
-    pub fn check_inputs(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
-        self.color.check(inputs)?;
-        Own::check(&self.transfer, "transfer", inputs)?;
-        Own::check(&self.range, "range", inputs)?;
-        Own::check_files(&self.iso, "iso", inputs)?;
-        Own::check(&self.opacity, "opacity", inputs)
+    /// Changes how the inputs of a scene are shown: by the flags that are given.
+    pub fn apply(&self, scene: &mut Description) -> Result<(), Failure> {
+        let inputs: Vec<PathBuf> = scene.visible().map(|input| input.file.clone()).collect();
+        self.color.check(&inputs)?;
+        Own::check(&self.transfer, "transfer", &inputs)?;
+        Own::check(&self.range, "range", &inputs)?;
+        Own::check_files(&self.iso, "iso", &inputs)?;
+        Own::check(&self.opacity, "opacity", &inputs)?;
+        let transfers: Vec<Own<TransferEntry>> = self
+            .transfer
+            .iter()
+            .map(|own| own.try_map(|text| TransferEntry::parse(text)))
+            .collect::<Result<_, _>>()?;
+        let keep = |_: &mut _, _| {};
+        Shared::set_each(scene, |appearance| &mut appearance.transfer, &transfers, keep);
+        Shared::set_each(scene, |appearance| &mut appearance.range, &self.range, |_, _| {});
+        Shared::set_each(scene, |appearance| &mut appearance.opacity, &self.opacity, |_, _| {});
+        let join = |before: &mut Vec<IsosurfaceEntry>, more: Vec<_>| before.extend(more);
+        Shared::set_each(scene, |appearance| &mut appearance.isosurfaces, &self.iso, join);
+        Shared::set(scene, |appearance| &mut appearance.opacity_unit, self.opacity_unit);
+        let factors = self.gradient_opacity.clone().map(|Factors(factors)| factors);
+        Shared::set(scene, |appearance| &mut appearance.gradient_opacity, factors);
+        Shared::set(scene, |appearance| &mut appearance.radius_scale, self.radius_scale);
+        Shared::set(scene, |appearance| &mut appearance.crease, self.crease);
+        scene.appearance.edges |= self.edges;
+        self.color.apply(scene);
+        self.kernel.apply(scene);
+        Ok(())
     }
-
-    /// Returns the files that flags name.
-    pub fn files(&self) -> Vec<PathBuf> {
-        let transfers = Own::values(&self.transfer).filter(|transfer| is_file(transfer));
-        transfers.map(PathBuf::from).chain(self.kernel.file()).collect()
-    }
-
-    pub fn open(&self, limits: &Limits) -> Result<Show<'_>, Failure> {
-        let own = self.transfer.iter();
-        let own = own.map(|own| own.try_map(|text| open(text, limits)));
-        let transfers = own.collect::<Result<Vec<_>, _>>()?;
-        let surfaces = self.iso.iter().map(|own| own.try_map(|surfaces| Ok(&surfaces[..])));
-        let show = Show {
-            flags: self,
-            kernel: self.kernel.kernel(limits)?,
-            sharp: self.kernel.is_sharp(),
-            transfers: own::Values::new(transfers),
-            ranges: own::Values::new(self.range.iter().cloned()),
-            surfaces: own::Values::new(surfaces.collect::<Result<Vec<_>, _>>()?),
-            opacities: own::Values::new(self.opacity.iter().cloned()),
-            colors: self.color.by_input(),
-        };
-        show.check_surfaces()?;
-        Ok(show)
-    }
-}
-
-/// Reads the transfer function that a name, a file or a text of JSON stands for.
-fn open(text: &str, limits: &Limits) -> Result<Transfer, Failure> {
-    if is_json(text) {
-        return Ok(Transfer::Whole(TransferFunction::from_json(text)?));
-    }
-    if !TransferFunction::NAMES.contains(&text) && is_file(text) {
-        return Ok(Transfer::Whole(TransferFunction::read(Path::new(text), limits)?));
-    }
-    // An unknown name fails here. The range comes later, with the volume.
-    TransferFunction::named(text, [0.0, 1.0])?;
-    Ok(Transfer::Named(text.to_owned()))
 }
 
 /// Parses how values are shown. A text of JSON has no `=`.
 fn transfer(text: &str) -> Result<Own<String>, String> {
-    match is_json(text) {
+    match text.trim_start().starts_with('{') {
         true => Ok(Own::of_all(text.to_owned())),
         false => Own::parse(text, |text| Ok(text.to_owned())),
     }
@@ -199,7 +134,7 @@ fn range(text: &str) -> Result<Own<[f64; 2]>, String> {
 }
 
 /// Parses isosurfaces.
-fn surfaces(text: &str) -> Result<Own<Vec<Surface>>, String> {
+fn surfaces(text: &str) -> Result<Own<Vec<IsosurfaceEntry>>, String> {
     Own::parse(text, |text| text.split(',').map(surface).collect())
 }
 
@@ -211,124 +146,30 @@ fn opacity(text: &str) -> Result<Own<f32>, String> {
     })
 }
 
-/// Formats a number as people type it.
-fn plain(value: f64) -> String {
-    if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
-        format!("{value}")
-    } else {
-        format!("{value:e}")
-    }
-}
-
-/// Whether a text is a transfer function itself, rather than the name of one.
-fn is_json(text: &str) -> bool {
-    text.trim_start().starts_with('{')
-}
-
-fn is_file(text: &str) -> bool {
-    !is_json(text) && (Path::new(text).extension().is_some() || Path::new(text).exists())
-}
-
-impl Show<'_> {
-    /// Refuses more isosurfaces of an input than a transfer function can have.
-    fn check_surfaces(&self) -> Result<(), Failure> {
-        // No input has an empty path: that stands for the inputs without values of their own.
-        let files = self.surfaces.files().chain(self.transfers.files()).chain([Path::new("")]);
-        for file in files {
-            let more = match self.transfers.of(file) {
-                Some(Transfer::Whole(transfer)) => transfer.isosurfaces.len(),
-                _ => 0,
-            };
-            let count = self.surfaces_of(file).len() + more;
-            let most = TransferFunction::MAX_ISOSURFACES;
-            if count > most {
-                return Err(Failure::Usage(format!(
-                    "{count} isosurfaces are given; at most {most} are allowed"
-                )));
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns how an input is coloured.
-    pub fn coloring_of(&self, path: &Path) -> Coloring {
-        self.flags.color.coloring_by(self.colors.of(path), self.ranges.of(path).copied())
-    }
-
-    /// Returns the isosurfaces of an input.
-    fn surfaces_of(&self, path: &Path) -> Vec<Surface> {
-        self.surfaces.all_of(path).concat()
-    }
-
-    /// Returns a flag that shows values, if one is given for an input, which may have colours of
-    /// its own.
-    fn shows_values(&self, path: &Path) -> Option<&'static str> {
-        let has_transfer = self.transfers.of(path).is_some();
-        let given = [
-            ("--transfer", has_transfer),
-            ("--iso", !self.surfaces_of(path).is_empty()),
-            ("--range", self.ranges.of(path).is_some()),
-            ("--sharp", self.sharp),
-        ];
-        given.into_iter().find(|(_, is_given)| *is_given).map(|(flag, _)| flag)
-    }
-
-    /// Returns how the values and the surfaces of an input are shown.
-    pub fn appearance(&self, path: &Path) -> Appearance {
-        let factors = self.flags.gradient_opacity.clone();
-        Appearance {
-            transfer: self.transfers.of(path).cloned(),
-            opacity_unit: self.flags.opacity_unit,
-            isosurfaces: self.surfaces_of(path),
-            gradient: factors.map(|Factors(factors)| factors).unwrap_or_default(),
-            coloring: self.coloring_of(path),
-        }
-    }
-
-    /// Returns how an input is shown.
-    pub fn showing(&self, path: &Path) -> Showing {
-        Showing {
-            appearance: self.appearance(path),
-            kernel: self.kernel.clone(),
-            is_sharp: self.sharp,
-            radius_scale: self.flags.radius_scale,
-            crease: self.flags.crease,
-            opacity: self.opacities.of(path).copied(),
-            draws_edges: self.flags.edges,
-            values_by: self.shows_values(path).map(str::to_owned),
-            ..Showing::default()
-        }
-    }
-}
-
 /// Parses an isosurface: `80`, `50%`, `80:orange`, `80:0.5` or `80:#ff8800:0.5`.
-fn surface(text: &str) -> Result<Surface, String> {
+pub fn surface(text: &str) -> Result<IsosurfaceEntry, String> {
     let form = "the form is VALUE, VALUE:COLOR, VALUE:OPACITY or VALUE:COLOR:OPACITY, such \
                 as 400:orange:0.5";
     let mut parts = text.split(':').peekable();
     let text = parts.next().unwrap_or_default().trim();
     let number = |text: &str| parse::finite(text).map_err(|_| form);
-    let value = match text.strip_suffix('%') {
-        None => SurfaceValue::Own(number(text)?),
-        Some(share) => SurfaceValue::Share(number(share)? / 100.0),
+    let (value, percent) = match text.strip_suffix('%') {
+        None => (Some(number(text)?), None),
+        Some(share) => (None, Some(number(share)?)),
     };
-    if matches!(value, SurfaceValue::Share(share) if !(0.0..=1.0).contains(&share)) {
-        return Err("a share of the range of values lies between 0% and 100%".into());
-    }
     // A number is an opacity, although its digits may look like a colour.
     let is_color = |part: &&str| !part.is_empty() && parse::finite(part).is_err();
-    let color = match parts.next_if(is_color) {
-        Some(text) => Some(parse::color(text)?.map(f64::from)),
-        None => None,
-    };
+    let color = parts.next_if(is_color).map(str::parse).transpose()?;
     let opacity = match parts.next() {
         Some(text) => parse::finite(text).map_err(|_| form)?,
         None => 1.0,
     };
-    if !(opacity > 0.0 && opacity <= 1.0) {
-        return Err("the opacity of a surface must be above 0 and at most 1".into());
+    if parts.next().is_some() {
+        return Err(form.into());
     }
-    if parts.next().is_some() { Err(form.into()) } else { Ok(Surface { value, color, opacity }) }
+    let surface = IsosurfaceEntry { value, percent, color, opacity };
+    surface.check()?;
+    Ok(surface)
 }
 
 impl Factors {
@@ -351,36 +192,21 @@ impl Factors {
 mod tests {
     use super::*;
 
+    fn of(value: f64, color: Option<&str>, opacity: f64) -> IsosurfaceEntry {
+        let color = color.map(|text| text.parse().unwrap());
+        IsosurfaceEntry { value: Some(value), percent: None, color, opacity }
+    }
+
     #[test]
     fn surfaces_are_read() {
-        assert_eq!(
-            surface("-500"),
-            Ok(Surface { value: SurfaceValue::Own(-500.0), color: None, opacity: 1.0 })
-        );
-        assert_eq!(
-            surface("0.5:0.25"),
-            Ok(Surface { value: SurfaceValue::Own(0.5), color: None, opacity: 0.25 })
-        );
-        assert_eq!(
-            surface("80:#ff0000"),
-            Ok(Surface {
-                value: SurfaceValue::Own(80.0),
-                color: Some([1.0, 0.0, 0.0]),
-                opacity: 1.0
-            })
-        );
-        assert_eq!(
-            surface("80:#00ff00:0.5"),
-            Ok(Surface {
-                value: SurfaceValue::Own(80.0),
-                color: Some([0.0, 1.0, 0.0]),
-                opacity: 0.5
-            })
-        );
-        for text in ["80:lime:0.5", "80:0f0:0.5"] {
-            assert_eq!(surface(text), surface("80:#00ff00:0.5"), "{text}");
+        assert_eq!(surface("-500"), Ok(of(-500.0, None, 1.0)));
+        assert_eq!(surface("0.5:0.25"), Ok(of(0.5, None, 0.25)));
+        assert_eq!(surface("80:#ff0000"), Ok(of(80.0, Some("red"), 1.0)));
+        for text in ["80:#00ff00:0.5", "80:lime:0.5", "80:0f0:0.5"] {
+            assert_eq!(surface(text), Ok(of(80.0, Some("lime"), 0.5)), "{text}");
         }
-        assert_eq!(surface("50%:0.5").map(|surface| surface.value), Ok(SurfaceValue::Share(0.5)));
+        let half = surface("50%:0.5").unwrap();
+        assert_eq!((half.value, half.percent), (None, Some(50.0)));
         assert!(surface("150%").unwrap_err().contains("between 0% and 100%"));
         for bad in [
             "",
@@ -400,19 +226,18 @@ mod tests {
 
     #[test]
     fn surfaces_of_one_input_are_read() {
-        let [own, other] = ["a=b.nrrd", "c.nrrd"].map(Path::new);
-        let all = ["-5,50%:red", "a=b.nrrd=7:0.5"].map(|text| surfaces(text).unwrap());
-        let all = own::Values::new(all);
-        let of = |path| -> Vec<SurfaceValue> {
-            all.all_of(path).iter().flatten().map(|surface| surface.value).collect()
-        };
-        assert_eq!(of(own), [SurfaceValue::Own(7.0)]);
-        assert_eq!(of(other), [SurfaceValue::Own(-5.0), SurfaceValue::Share(0.5)]);
+        let parsed = ["-5,50%:red", "a=b.nrrd=7:0.5", "a=b.nrrd=9"];
+        let flags = parsed.map(|text| surfaces(text).unwrap());
+        let mut scene = Description::new(["a=b.nrrd".into(), "c.nrrd".into()]);
+        let join = |before: &mut Vec<IsosurfaceEntry>, more: Vec<_>| before.extend(more);
+        Shared::set_each(&mut scene, |own| &mut own.isosurfaces, &flags, join);
+        let found = [0, 1].map(|number| scene.appearance_of(&scene.inputs[number]).isosurfaces);
+        assert_eq!(found[0], Some(vec![of(7.0, None, 0.5), of(9.0, None, 1.0)]));
+        assert_eq!(found[1].as_ref().map(Vec::len), Some(2));
         assert!(surfaces("a.nrrd=x").is_err() && surfaces("1,").is_err());
         let whole = r#"{"color": [], "opacity": []}"#;
         assert_eq!(transfer(whole), Ok(Own::of_all(whole.to_owned())));
-        let text = transfer(&format!("a=b.nrrd={whole}")).unwrap();
-        assert_eq!(Own::of(std::slice::from_ref(&text), own).map(String::as_str), Some(whole));
+        assert!(transfer(&format!("a=b.nrrd={whole}")).is_ok());
     }
 
     #[test]

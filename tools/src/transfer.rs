@@ -1,14 +1,15 @@
 //! `splatkit transfer`: the transfer function that a picture would have, as a file to start from.
 
 use crate::{
-    failure::Failure,
-    load::LoadFlags,
-    output, parse,
-    progress::Progress,
-    show::{Show, ShowFlags},
+    failure::Failure, load::LoadFlags, output, parse, progress::Progress, scene_file,
+    show::ShowFlags,
 };
 use clap::Args;
-use splatkit::{Error, disk, session::Data, volume::TransferFunction};
+use splatkit::{
+    Error, disk,
+    session::{Appearance, Data, Description},
+    volume::TransferFunction,
+};
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
@@ -34,21 +35,26 @@ impl Transfer {
         if let Some(flag) = self.show.unused_by_values() {
             return Err(Failure::Usage(format!("{flag} has no effect on a transfer function")));
         }
+        let mut scene = Description::new([self.input.clone()]);
+        self.show.apply(&mut scene)?;
+        self.load.apply(&mut scene);
         self.show.color.check_effect(false, true)?;
-        self.show.check_inputs(std::slice::from_ref(&self.input))?;
+        scene.check().map_err(|(place, message)| {
+            Failure::Usage(format!("--{}: {message}", scene_file::flag_of(&place)))
+        })?;
         let is_stdout = self.output.as_os_str() == "-";
         if !is_stdout {
             self.check_output()?;
         }
-        let show = self.show.open(&self.load.limits())?;
+        let appearance = scene.showing(&scene.inputs[0])?.appearance;
         progress.stage(format!("Reading {}", self.input.display()));
-        let mut read = self.show.files();
+        let mut read = scene.files();
         let reading = self.load.reading(splatkit::memory::most());
         let opened = reading.open(&self.input)?;
         let input = opened.read()?;
         read.extend(opened.files());
         progress.stage("Looking at its values");
-        let text = text(&self.of(&show, &input)?);
+        let text = text(&self.of(&appearance, &input)?);
         progress.clear();
         if is_stdout {
             return output::stdout(text.as_bytes());
@@ -70,9 +76,9 @@ impl Transfer {
     }
 
     /// Returns the transfer function that shows an input.
-    fn of(&self, show: &Show, input: &Data) -> Result<TransferFunction, Failure> {
+    fn of(&self, own: &Appearance, input: &Data) -> Result<TransferFunction, Failure> {
         let path = &self.input;
-        let (own, name) = (show.appearance(path), path.display().to_string());
+        let name = path.display().to_string();
         Ok(match input {
             Data::Volume(volume) => own.of_volume(&name, volume)?,
             Data::Samples(points) => own.of_samples(&name, points)?,

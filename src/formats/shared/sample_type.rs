@@ -1,10 +1,13 @@
 //! Sample types of volume files, and how their bytes and texts become [`Samples`].
 
 use crate::{parallel::prelude::*, volume::Samples};
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// The type of a sample in a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub enum SampleType {
     /// 8 bits, unsigned.
     U8,
@@ -29,7 +32,9 @@ pub enum SampleType {
 }
 
 /// The byte order of numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub enum Endian {
     /// The lowest byte comes first.
     #[default]

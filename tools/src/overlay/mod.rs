@@ -16,7 +16,12 @@ use clap::Args;
 use glam::DVec2;
 use ruler::Ruler;
 use serde_json::{Value, json};
-use splatkit::{Error, interaction::SceneFile, math::Camera, picture::Picture, session::Captions};
+use splatkit::{
+    Error,
+    math::Camera,
+    picture::Picture,
+    session::{Captions, Description, OverlayEntry},
+};
 use text::{Face, Pen};
 
 /// What is written over the picture.
@@ -41,13 +46,13 @@ pub struct OverlayFlags {
 
 /// The texts of a run's pictures.
 pub struct Overlay {
-    flags: OverlayFlags,
+    entry: OverlayEntry,
     captions: Captions,
     face: Face,
     ink: Ink,
 }
 
-const MOST_CAPTION: usize = SceneFile::MOST_CAPTION;
+const MOST_CAPTION: usize = Description::MOST_CAPTION;
 
 /// Takes a caption, unless it is too long.
 fn caption(text: &str) -> Result<String, String> {
@@ -65,17 +70,28 @@ const BETWEEN: f64 = 1.2;
 const MOST_ROOM: f64 = 0.25;
 
 impl OverlayFlags {
-    /// Returns the texts to draw over pictures with a background; `None` if no flag asks for any.
-    /// A flag that has nothing to draw is an error.
+    /// Changes what is written over the picture of a scene: by the flags that are given.
+    pub fn apply(&self, scene: &mut Description) {
+        let overlay = &mut scene.overlay;
+        overlay.scalar_bar |= self.scalar_bar;
+        overlay.axes |= self.axes;
+        overlay.scale_bar |= self.scale_bar;
+        overlay.caption = self.caption.clone().or(overlay.caption.take());
+    }
+}
+
+impl Overlay {
+    /// Returns the texts to draw over pictures with a background; `None` if none are asked for. A
+    /// text that has nothing to say is an error.
     pub fn open(
-        &self,
+        entry: &OverlayEntry,
         captions: &Captions,
         background: Option<[f32; 3]>,
-    ) -> Result<Option<Overlay>, Failure> {
-        if !(self.scalar_bar || self.axes || self.scale_bar || self.caption.is_some()) {
+    ) -> Result<Option<Self>, Failure> {
+        if *entry == OverlayEntry::default() {
             return Ok(None);
         }
-        if self.scalar_bar && captions.legends.is_empty() {
+        if entry.scalar_bar && captions.legends.is_empty() {
             return Err(Failure::Usage(
                 "--scalar-bar has nothing to show, because nothing here is coloured by values; \
                  --color height or --color with an attribute of the file colours surfaces"
@@ -84,16 +100,14 @@ impl OverlayFlags {
         }
         let face = Face::open();
         let face = face.ok_or_else(|| Error::Argument("the built-in font is damaged".into()))?;
-        let (flags, captions) = (self.clone(), captions.clone());
-        Ok(Some(Overlay { flags, captions, face, ink: Ink::over(background) }))
+        let (entry, captions) = (entry.clone(), captions.clone());
+        Ok(Some(Self { entry, captions, face, ink: Ink::over(background) }))
     }
-}
 
-impl Overlay {
     /// Returns how many pixels at its left and at its right a scene that is fitted to a picture
     /// leaves free, so that bars do not hide it.
     pub fn room(&self, [width, height]: [u32; 2]) -> u32 {
-        if !self.flags.scalar_bar {
+        if !self.entry.scalar_bar {
             return 0;
         }
         let mut blank = Picture { width, height, color: Vec::new(), depth: Vec::new() };
@@ -123,11 +137,11 @@ impl Overlay {
         let (mut canvas, mut area) = self.canvas(picture);
         let size = canvas.size;
         let mut drawn = json!({});
-        if let Some(text) = &self.flags.caption {
+        if let Some(text) = &self.entry.caption {
             drawn["caption"] = json!(text);
             area.top += self.caption(&mut canvas, area, text);
         }
-        if self.flags.axes {
+        if self.entry.axes {
             let side = (7.0 * size).min(0.42 * area.width()).min(area.height());
             let square = Area {
                 left: area.left,
@@ -140,7 +154,7 @@ impl Overlay {
                 drawn["axes"] = json!(self.names().concat().concat());
             }
         }
-        if self.flags.scale_bar {
+        if self.entry.scale_bar {
             let most = 0.3 * area.width();
             if let Some(ruler) = Ruler::new(camera, pixels, most, &self.captions.length) {
                 ruler.draw(&mut canvas, area);
@@ -149,7 +163,7 @@ impl Overlay {
                 drawn["scale_bar"] = json!({ "length": length, "pixels": pixels, "text": text });
             }
         }
-        if self.flags.scalar_bar {
+        if self.entry.scalar_bar {
             drawn["scalar_bars"] = self.bars(&mut canvas, area);
         }
         drawn
@@ -258,10 +272,11 @@ mod tests {
         Captions { legends: vec![(0, legend)], length: "mm".into(), is_patient }
     }
 
-    fn flags(which: [bool; 4]) -> OverlayFlags {
+    fn overlay(which: [bool; 4], is_patient: bool, background: Option<[f32; 3]>) -> Overlay {
         let [scalar_bar, axes, scale_bar, has_caption] = which;
         let caption = has_caption.then(|| "A chest, from the front".to_owned());
-        OverlayFlags { scalar_bar, axes, scale_bar, caption }
+        let entry = OverlayEntry { scalar_bar, axes, scale_bar, caption };
+        Overlay::open(&entry, &captions(is_patient), background).unwrap().unwrap()
     }
 
     fn drawn(which: [bool; 4], size: [u32; 2], background: Option<[f32; 3]>) -> Picture {
@@ -273,9 +288,7 @@ mod tests {
         let mut camera = Camera::framing(&bounds, DVec3::Y, DVec3::Z, 1.0);
         camera.azimuth(30.0);
         camera.elevation(20.0);
-        let (flags, captions) = (flags(which), captions(true));
-        let overlay = flags.open(&captions, background).unwrap().unwrap();
-        overlay.draw(&mut picture, &camera);
+        overlay(which, true, background).draw(&mut picture, &camera);
         picture
     }
 
@@ -313,8 +326,7 @@ mod tests {
 
     #[test]
     fn bars_lie_in_the_room_that_is_left_to_them() {
-        let (flags, captions) = (flags([true, false, false, false]), captions(false));
-        let overlay = flags.open(&captions, None).unwrap().unwrap();
+        let overlay = overlay([true, false, false, false], false, None);
         for size in SIZES {
             let room = overlay.room(size);
             assert!(room > 20 && room <= size[0] / 4, "{size:?}: {room}");
@@ -364,10 +376,7 @@ mod tests {
 
     #[test]
     fn patients_have_letters_and_other_things_axes() {
-        let names = |is_patient| {
-            let (flags, captions) = (flags([false, true, false, false]), captions(is_patient));
-            flags.open(&captions, None).unwrap().unwrap().names()
-        };
+        let names = |is_patient| overlay([false, true, false, false], is_patient, None).names();
         assert_eq!(names(true), [["R", "L"], ["A", "P"], ["S", "I"]]);
         assert_eq!(names(false)[2], ["Z", ""]);
     }

@@ -2,8 +2,9 @@
 
 use super::{loader::text_of, painter::Stage};
 use crate::{
+    job::Job,
     progress::Progress,
-    render::{Export, Render},
+    render::{self, Export},
 };
 use splatkit::{Stop, math::CameraPath, volume::TransferFunction};
 use std::{
@@ -17,7 +18,7 @@ use std::{
 
 /// A film that is to be written.
 pub struct Film {
-    pub render: Render,
+    pub job: Job,
     pub stage: Arc<Stage>,
     /// The transfer functions of the fields, with the numbers of their items.
     pub transfers: Vec<(usize, TransferFunction)>,
@@ -50,7 +51,7 @@ impl Exporting {
                 output: &film.output,
                 stop: own_stop,
             };
-            let done = film.render.export(export, &own).map_err(|failure| text_of(&failure));
+            let done = render::export(&film.job, export, &own).map_err(|failure| text_of(&failure));
             // Nobody waits any more if the film was cancelled.
             send.send(done).ok();
             tell();

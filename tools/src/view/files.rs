@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{motion::read_path, scene_file};
 use splatkit::{
-    input::Limits, interaction::CameraEntry, picture::PictureFormat, volume::TransferFunction,
+    input::Limits, picture::PictureFormat, session::CameraEntry, volume::TransferFunction,
 };
 use std::{
     path::{Path, PathBuf},
@@ -30,7 +30,7 @@ impl Window {
         let done = self.document.save(path);
         let is_saved = done.is_ok();
         self.say_saved(path, done);
-        if is_saved && scene_file::read(path, &crate::command(), false).is_err() {
+        if is_saved && scene_file::read(path, false).is_err() {
             let name = path.display();
             self.say(format!("{name} names files elsewhere: open it with --trust-scene"), false);
         }
@@ -44,7 +44,7 @@ impl Window {
                 self.context.copy_text(line);
                 self.say("the command is in the clipboard", false);
             }
-            Err(failure) => self.say(text_of(&failure), true),
+            Err(message) => self.say(message, true),
         }
     }
 
@@ -53,7 +53,7 @@ impl Window {
         let Some(shown) = &self.shown else { return };
         let (camera, size) = (CameraEntry::from(shown.orbit.camera()), self.size);
         self.document.set_camera(camera);
-        self.document.adjust(|scene| scene.size = Some(size));
+        self.document.adjust(|scene| scene.picture.size = Some(size));
     }
 
     /// Says that a file was written, or why not.
@@ -103,12 +103,12 @@ impl Window {
         let repaint = self.context.clone();
         let started = self
             .document
-            .render_of_film(self.size)
-            .and_then(|render| Ok((render, self.panels.flight.path()?)))
+            .job_of_film(self.size)
+            .and_then(|job| Ok((job, self.panels.flight.path()?)))
             .map_err(|failure| text_of(&failure))
-            .and_then(|(render, path)| {
+            .and_then(|(job, path)| {
                 let (transfers, rate) = (self.transfers(), self.panels.flight.rate);
-                let film = Film { render, stage, transfers, path, rate, output };
+                let film = Film { job, stage, transfers, path, rate, output };
                 Exporting::start(film, move || repaint.request_repaint())
                     .map_err(|error| error.to_string())
             });

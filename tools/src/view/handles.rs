@@ -5,7 +5,7 @@ use eframe::egui::{
     Color32, CursorIcon, Pos2, Rect, Response, Role, Sense, Stroke, Ui, Vec2, WidgetInfo,
 };
 use glam::DVec3;
-use splatkit::{interaction::ClipEntry, math::Bounds};
+use splatkit::{math::Bounds, session::ClipEntry};
 
 const INK: Color32 = Color32::from_rgb(255, 210, 60);
 /// The size of a handle in points.
@@ -104,8 +104,8 @@ fn handles(clips: &[ClipEntry], bounds: &Bounds) -> Vec<Handle> {
             let axis = normal.normalize_or_zero();
             handles.push(Handle { clip: number, part: Part::Offset, at, axis });
         }
-        if let Some(cuboid) = clip.cuboid {
-            let ends = cuboid.map(DVec3::from_array);
+        if let Some(corners) = clip.corners() {
+            let ends = corners.map(DVec3::from_array);
             let middle = 0.5 * (ends[0] + ends[1]);
             for axis in 0..3 {
                 for (end, place) in ends.iter().enumerate() {
@@ -122,21 +122,23 @@ fn handles(clips: &[ClipEntry], bounds: &Bounds) -> Vec<Handle> {
 
 /// Moves a part of a clip by a length in world units, within the scene.
 fn change(clip: &mut ClipEntry, part: Part, step: f64, bounds: &Bounds) {
-    match (part, &mut clip.plane, &mut clip.cuboid) {
+    let corners = clip.corners();
+    match (part, &mut clip.plane, corners) {
         (Part::Offset, Some(plane), _) => {
             let normal = normal_of(*plane);
             let [low, high] = offsets(bounds, normal);
             plane[3] = (plane[3] + step * normal.length()).clamp(low, high);
         }
-        (Part::End(axis, end), _, Some(cuboid)) => {
+        (Part::End(axis, end), _, Some(mut corners)) => {
             // A box keeps an inside.
             let least = 1e-3 * (bounds.max[axis] - bounds.min[axis]);
-            let other = cuboid[1 - end][axis];
-            let moved = cuboid[end][axis] + step;
-            cuboid[end][axis] = match end {
+            let other = corners[1 - end][axis];
+            let moved = corners[end][axis] + step;
+            corners[end][axis] = match end {
                 0 => moved.min(other - least),
                 _ => moved.max(other + least),
             };
+            *clip = ClipEntry { inside: clip.inside, ..ClipEntry::of_box(corners) };
         }
         _ => {}
     }
@@ -184,8 +186,8 @@ fn outline(ui: &Ui, screen: &Screen, bounds: &Bounds, clip: &ClipEntry) {
             painter.line_segment([a, b], Stroke::new(1.0, INK));
         }
     };
-    if let Some(cuboid) = clip.cuboid {
-        let ends = cuboid.map(DVec3::from_array);
+    if let Some(corners) = clip.corners() {
+        let ends = corners.map(DVec3::from_array);
         EDGES.iter().for_each(|[a, b]| line(corner(ends, *a), corner(ends, *b)));
     }
     if let Some(plane) = clip.plane {
@@ -223,7 +225,7 @@ mod tests {
     const BOX: Bounds = Bounds { min: DVec3::ZERO, max: DVec3::new(2.0, 4.0, 6.0) };
 
     fn plane(plane: [f64; 4]) -> ClipEntry {
-        ClipEntry { plane: Some(plane), cuboid: None, inside: true }
+        ClipEntry::of_plane(plane)
     }
 
     #[test]
@@ -249,12 +251,11 @@ mod tests {
         assert_eq!(clip.plane, Some([0.0, 0.0, 3.0, 12.0]));
         change(&mut clip, Part::Offset, 100.0, &BOX);
         assert_eq!(clip.plane, Some([0.0, 0.0, 3.0, 18.0]));
-        let cuboid = Some([[0.0; 3], [2.0, 4.0, 6.0]]);
-        let mut clip = ClipEntry { plane: None, cuboid, inside: true };
+        let mut clip = ClipEntry::of_box([[0.0; 3], [2.0, 4.0, 6.0]]);
         assert_eq!(handles(&[clip], &BOX).len(), 6);
         change(&mut clip, Part::End(1, 1), -1.0, &BOX);
         change(&mut clip, Part::End(0, 0), 9.0, &BOX);
-        let [low, high] = clip.cuboid.unwrap();
+        let [low, high] = clip.corners().unwrap();
         assert_eq!(high, [2.0, 3.0, 6.0]);
         assert!(low[0] < high[0] && low[0] > 1.9);
     }

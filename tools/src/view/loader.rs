@@ -1,7 +1,7 @@
 //! Loading a scene in the background.
 
 use super::painter::Stage;
-use crate::{failure::Failure, given::Given, progress::Progress, render::Render};
+use crate::{failure::Failure, job::Job, progress::Progress};
 use splatkit::{
     interaction::Histogram,
     scene::{Item, Scene},
@@ -24,17 +24,13 @@ pub struct Loading {
 
 impl Loading {
     /// Starts to load. `tell` is called at the end.
-    pub fn start(
-        given: Given,
-        render: Render,
-        tell: impl Fn() + Send + 'static,
-    ) -> std::io::Result<Self> {
+    pub fn start(job: Job, tell: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let progress = Arc::new(Progress::kept());
         let (send, result) = channel();
         let own = Arc::clone(&progress);
         std::thread::Builder::new().name("loader".into()).spawn(move || {
             let loaded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                load(&given, &render, &own).map_err(|failure| text_of(&failure))
+                load(&job, &own).map_err(|failure| text_of(&failure))
             }));
             let loaded = loaded.unwrap_or_else(|_| Err("the file could not be read".into()));
             // Nobody waits any more if loading was cancelled.
@@ -64,13 +60,13 @@ impl Loading {
     }
 }
 
-fn load(given: &Given, render: &Render, progress: &Progress) -> Result<Stage, Failure> {
-    let mut loaded = render.load(given, progress)?;
+fn load(job: &Job, progress: &Progress) -> Result<Stage, Failure> {
+    let mut loaded = job.load(progress)?;
     progress.stage("Framing the scene");
-    let settings = render.settings(&loaded)?;
-    render.find_seen(&mut loaded, &settings)?;
+    let settings = job.settings(&loaded)?;
+    loaded.find_seen(&job.framing()?, &settings)?;
     progress.stage("Opening the device");
-    let device = render.device(&loaded)?;
+    let device = job.open_device(&loaded.scene)?;
     progress.stage("Counting values");
     let items = &loaded.scene.items;
     let of_item = |item: usize| Some((item, Histogram::of_item(&items[item])?));

@@ -19,15 +19,20 @@ mod slices;
 mod tests;
 mod window;
 
-use crate::{failure::Failure, progress::Progress, render::Render};
-use clap::{ArgMatches, Args};
+use crate::{failure::Failure, given::Given, progress::Progress, render::Render};
+use clap::Args;
 use document::Document;
 use eframe::egui;
 use splatkit::Error;
+use std::path::Path;
 use window::Window;
 
 /// The size of the window at first, in points.
 const SIZE: [f32; 2] = [1280.0, 800.0];
+
+/// Flags of `render` that say what is written.
+const OF_FILES: [&str; 9] =
+    ["output", "depth", "overwrite", "turntable", "path", "fps", "raw", "reference", "json"];
 
 #[derive(Args, Debug)]
 // A window may open without anything; the flags that write files are `render`'s.
@@ -49,11 +54,18 @@ pub struct View {
 }
 
 impl View {
-    pub fn run(self, matches: &ArgMatches, progress: &Progress) -> Result<(), Failure> {
-        let own = matches.subcommand().map_or(matches, |(_, own)| own);
+    pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
+        if let Some(flag) = OF_FILES.into_iter().find(|flag| given.has(flag)) {
+            return Err(Failure::Usage(format!(
+                "--{flag} is for `splatkit render`; the window saves pictures itself"
+            )));
+        }
+        let job = self.scene.job(given)?;
         // What cannot be opened is said here, as `render` says it, and not in a window.
-        self.scene.check_files()?;
-        let document = Document::of_command(own, "view")?;
+        job.check_files().map_err(|failure| job.blamed(failure, &[]))?;
+        let mut document = Document::new(job.scene, job.device);
+        document.is_trusting = self.scene.trusts_scenes();
+        document.path = self.scene.scene_file().map(Path::to_owned);
         progress.clear();
         open(document)
     }
@@ -67,7 +79,7 @@ fn open(document: Document) -> Result<(), Failure> {
                        `splatkit render` draws without one";
         return Err(Failure::Usage(message.into()));
     }
-    let size = document.scene().size.map_or(SIZE, |size| size.map(|side| side as f32));
+    let size = document.scene().picture.size.map_or(SIZE, |size| size.map(|side| side as f32));
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("splatkit")

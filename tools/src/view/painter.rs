@@ -1,6 +1,6 @@
 //! The thread that draws: a coarse frame at once, then finer ones, up to the exact picture.
 
-use crate::{render::Finish, scene::Loaded};
+use crate::job::{Finish, Loaded};
 use splatkit::{
     Device, Error, FrameStats, Renderer, Stop,
     interaction::{Effort, Histogram, Pace},

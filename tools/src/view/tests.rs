@@ -1,11 +1,11 @@
 //! The window without a screen: it is driven by events, and draws on the CPU engine.
 
 use super::{document::Document, window::Window};
-use crate::{Command, Task, given::Given, progress::Progress, scene_file};
+use crate::{Command, Task, engine::DeviceFlags, given::Given, progress::Progress};
 use clap::{CommandFactory, FromArgMatches};
 use eframe::egui;
 use egui_kittest::{Harness, kittest::Queryable};
-use splatkit::interaction::SceneFile;
+use splatkit::session::{Description, Engine};
 use std::path::Path;
 
 /// A window that shows a small volume in a folder.
@@ -13,9 +13,9 @@ fn harness(folder: &Path) -> Harness<'static, Option<Window>> {
     let volume = splatkit::volume::phantoms::Phantom::Specimen.sample([16; 3]).expect("a volume");
     let file = folder.join("v.nrrd");
     splatkit::formats::nrrd::write(&volume, &file).expect("written");
-    let mut scene = SceneFile::new([file]);
-    scene.options.insert("engine".into(), "cpu".into());
-    let mut document = Some(Document::new(scene));
+    let mut scene = Description::new([file]);
+    scene.engine = Engine::Cpu;
+    let mut document = Some(Document::new(scene, DeviceFlags::default()));
     Harness::builder().with_size(egui::vec2(800.0, 1600.0)).build_ui_state(
         move |ui, window: &mut Option<Window>| {
             let context = ui.ctx().clone();
@@ -103,10 +103,10 @@ fn a_clip_is_added_and_cuts() {
     harness.step();
     let cut = picture_of(&mut harness);
     assert!(cut != before, "nothing is cut");
-    assert_eq!(window(&mut harness).document.scene().clips.len(), 1);
+    assert_eq!(window(&mut harness).document.scene().picture.clips.len(), 1);
     // Its handle moves it, as one step.
     let offset = |harness: &mut Harness<'static, Option<Window>>| {
-        window(harness).document.scene().clips[0].plane.expect("a plane")[3]
+        window(harness).document.scene().picture.clips[0].plane.expect("a plane")[3]
     };
     let old = offset(&mut harness);
     let at = harness.get_by_label("Handle of clip 1").rect().center();
@@ -164,18 +164,14 @@ fn pictures_and_scenes_are_saved() {
     window(&mut harness).save_scene(&scene);
     rest(&mut harness);
     assert!(picture.exists() && scene.exists());
-    let own = SceneFile::read(&scene, &splatkit::input::Limits::default()).expect("a scene");
-    assert!(own.camera.is_some() && own.size.is_some());
+    let own = Description::read(&scene, &splatkit::input::Limits::default()).expect("a scene");
+    assert!(own.camera.is_some() && own.picture.size.is_some());
     let text = std::fs::read_to_string(&scene).expect("text");
     assert!(text.contains("\"v.nrrd\""), "{text}");
     let again = folder.path().join("again.png");
     let words = ["splatkit".into(), "render".into(), scene, "-o".into(), again.clone()];
     let words = words.map(std::path::PathBuf::into_os_string);
-    let command = Command::command();
-    let matches = command.clone().try_get_matches_from(&words).expect("arguments");
-    let words = scene_file::expanded(&words, &matches, &command).expect("a scene");
-    let matches =
-        command.try_get_matches_from(words.expect("a scene").arguments).expect("arguments");
+    let matches = Command::command().try_get_matches_from(&words).expect("arguments");
     let Task::Render(render) = Command::from_arg_matches(&matches).expect("a command").task else {
         panic!("another task");
     };
@@ -266,11 +262,11 @@ fn surfaces_have_a_colour_and_an_opacity() {
     harness.step();
     harness.key_press(egui::Key::Enter);
     harness.step();
-    let color = window(&mut harness).document.scene().inputs[0].color.clone();
-    assert_eq!(color.as_deref(), Some("red"));
+    let color = window(&mut harness).document.scene().inputs[0].appearance.color.clone();
+    assert_eq!(color.map(|color| color.to_string()).as_deref(), Some("#ff0000"));
     let red = picture_of(&mut harness);
     assert!(red != gray, "the colour is the same");
-    window(&mut harness).document.change(|scene| scene.inputs[0].opacity = Some(0.3));
+    window(&mut harness).document.change(|scene| scene.inputs[0].appearance.opacity = Some(0.3));
     harness.step();
     let faint = picture_of(&mut harness);
     let most = |picture: &[[f32; 4]]| picture.iter().map(|c| c[3]).fold(0.0, f32::max);
@@ -315,7 +311,7 @@ fn a_deleted_file_does_no_harm() {
     assert!(picture_of(&mut harness) != before);
     // What must be read again says so, and the picture stays.
     window(&mut harness).document.change(|scene| {
-        scene.options.insert("sharp".into(), true.into());
+        scene.appearance.sharp = true;
     });
     for _ in 0..200 {
         harness.step();
@@ -356,7 +352,8 @@ fn one_of_several_fields_is_edited() {
     assert_eq!(window(&mut harness).transfer_of(1), Some(transfer));
     assert_eq!(window(&mut harness).transfer_of(0), Some(first));
     let scene = window(&mut harness).document.scene().clone();
-    assert!(scene.transfer.is_none() && scene.inputs.iter().all(|input| input.transfer.is_some()));
+    assert!(scene.appearance.transfer.is_none());
+    assert!(scene.inputs.iter().all(|input| input.appearance.transfer.is_some()));
     window(&mut harness).document.undo();
     harness.step();
     assert!(picture_of(&mut harness) == before);

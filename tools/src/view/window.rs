@@ -2,14 +2,14 @@
 
 use super::{
     canvas::Canvas,
-    document::{Document, LoadedBy},
+    document::{Document, LoadedBy, unplaced},
     handles::{self, Moved},
     loader::{Loading, text_of},
     painter::{Frame, Order, Painter, Stage},
     panels,
     screen::Screen,
 };
-use crate::{render::Finish, scene_file};
+use crate::{job::Finish, scene_file};
 use eframe::{
     egui::{
         self, Align2, CentralPanel, Color32, Context, CursorIcon, FontId, Key, Modifiers, Panel,
@@ -19,8 +19,9 @@ use eframe::{
 };
 use glam::{DVec2, DVec3};
 use splatkit::{
-    interaction::{CameraEntry, ClipEntry, Orbit, Probe, SceneFile},
+    interaction::{Orbit, Probe},
     scene::Settings,
+    session::{CameraEntry, ClipEntry, Description, Framing, InputEntry, Side},
     volume::TransferFunction,
 };
 use std::{path::PathBuf, sync::Arc};
@@ -64,7 +65,7 @@ pub enum Tool {
 #[derive(PartialEq)]
 struct SetFor {
     /// The scene without its camera and its transfer function.
-    look: SceneFile,
+    look: Description,
     size: [u32; 2],
     /// Whether the camera is fitted to the scene.
     is_fitted: bool,
@@ -93,7 +94,7 @@ pub struct Window {
     loaded_by: Option<LoadedBy>,
     /// What the settings were made for, and what was ordered last.
     set_for: Option<SetFor>,
-    ordered: Option<SceneFile>,
+    ordered: Option<Description>,
     last_order: u64,
     /// The size of the picture in pixels.
     pub size: [u32; 2],
@@ -184,21 +185,16 @@ impl Window {
     pub fn open(&mut self, files: Vec<PathBuf>) {
         if let Some(path) = files.iter().find(|path| scene_file::is_scene(path)) {
             let is_trusting = self.document.is_trusting;
-            match scene_file::read(path, &crate::command(), is_trusting) {
+            match scene_file::read(path, is_trusting) {
                 Ok(scene) => {
-                    self.document = Document::new(scene);
-                    self.document.is_trusting = is_trusting;
-                    self.document.path = Some(path.clone());
+                    self.document.open(scene, path.clone());
                     self.loaded_by = None;
                 }
-                Err(error) => {
-                    let hint = error.hint().map_or_else(String::new, |hint| format!("; {hint}"));
-                    self.say(format!("{error}{hint}"), true);
-                }
+                Err(error) => self.say(text_of(&error.into()), true),
             }
             return;
         }
-        let entries = SceneFile::new(files).inputs;
+        let entries = files.into_iter().map(InputEntry::new);
         self.document.change(|scene| scene.inputs.extend(entries));
     }
 
@@ -217,16 +213,11 @@ impl Window {
         }
     }
 
-    /// Looks at the whole scene from a side, by its name.
-    pub fn look_from(&mut self, side: &str) {
+    /// Looks at the whole scene from a side, or as usual.
+    pub fn look_from(&mut self, side: Option<Side>) {
         self.document.adjust(|scene| {
             scene.camera = None;
-            scene_file::CAMERA.iter().for_each(|flag| {
-                scene.options.remove(*flag);
-            });
-            if !side.is_empty() {
-                scene.options.insert("view".into(), side.into());
-            }
+            scene.framing = Framing { view: side, ..unplaced(&scene.framing) };
         });
         self.set_for = None;
     }
@@ -340,22 +331,22 @@ impl Window {
     fn take_sides(&mut self, ui: &Ui) {
         let pressed = |modifiers, key| ui.input_mut(|input| input.consume_key(modifiers, key));
         let sides = [
-            (Key::Num1, "front", "back"),
-            (Key::Num3, "right", "left"),
-            (Key::Num7, "top", "bottom"),
+            (Key::Num1, Side::Front, Side::Back),
+            (Key::Num3, Side::Right, Side::Left),
+            (Key::Num7, Side::Top, Side::Bottom),
         ];
         for (key, side, other) in sides {
             if pressed(Modifiers::COMMAND, key) {
-                self.look_from(other);
+                self.look_from(Some(other));
             } else if pressed(Modifiers::NONE, key) {
-                self.look_from(side);
+                self.look_from(Some(side));
             }
         }
         if pressed(Modifiers::NONE, Key::Num0) {
-            self.look_from("iso");
+            self.look_from(Some(Side::Iso));
         }
         if pressed(Modifiers::NONE, Key::Home) {
-            self.look_from("");
+            self.look_from(None);
         }
         if pressed(Modifiers::NONE, Key::O) {
             self.move_camera(|orbit| {
@@ -444,7 +435,7 @@ impl Window {
         {
             // Moving the camera is no step.
             before.camera = self.document.scene().camera;
-            before.options.clone_from(&self.document.scene().options);
+            before.framing.clone_from(&self.document.scene().framing);
             self.document.keep(before);
         }
         if let Some(at) = response.hover_pos() {
@@ -504,7 +495,7 @@ impl Window {
         let Ok(view) = shown.orbit.camera().view(self.size) else { return };
         let screen = Screen { view, area, scale };
         self.draw_measured(ui, &screen);
-        let mut clips = self.document.scene().clips.clone();
+        let mut clips = self.document.scene().picture.clips.clone();
         let (true, Some(bounds), false) =
             (self.panels.shows_handles, self.panels.bounds, clips.is_empty())
         else {
@@ -514,7 +505,7 @@ impl Window {
         if moved == Moved::Begun {
             self.panels.before_drag = Some(self.document.scene().clone());
         }
-        self.document.adjust(|scene| scene.clips = clips);
+        self.document.adjust(|scene| scene.picture.clips = clips);
         if moved == Moved::Ended
             && let Some(before) = self.panels.before_drag.take()
         {
@@ -565,18 +556,15 @@ impl Window {
         }
         self.loading = None;
         self.loaded_by = Some(wanted.clone());
-        if wanted.0.is_empty() {
+        if wanted.0.inputs.is_empty() {
             self.clear();
             return;
         }
         let repaint = self.context.clone();
-        let started = self.document.render().map_err(|failure| text_of(&failure)).and_then(
-            |(given, mut render)| {
-                render.set_size(self.size.map(|side| side.max(1)));
-                Loading::start(given, render, move || repaint.request_repaint())
-                    .map_err(|error| error.to_string())
-            },
-        );
+        let job = self.document.job(self.size).map_err(|failure| text_of(&failure));
+        let started = job.and_then(|job| {
+            Loading::start(job, move || repaint.request_repaint()).map_err(|e| e.to_string())
+        });
         match started {
             Ok(loading) => self.loading = Some(loading),
             Err(message) => {
@@ -618,17 +606,14 @@ impl Window {
 
     /// Shows a loaded scene.
     fn show(&mut self, stage: Stage) {
-        let made = self.document.render().map_err(|failure| text_of(&failure)).and_then(
-            |(_, mut render)| {
-                render.set_size(self.size.map(|side| side.max(1)));
-                let settings = render.settings(&stage.loaded).map_err(|e| e.to_string())?;
-                let finish = render.finish(&stage.loaded).map_err(|f| text_of(&f))?;
-                let camera =
-                    render.camera(&stage.loaded, &settings, &finish).map_err(|e| e.to_string())?;
-                let up = render.up(&stage.loaded);
-                Ok((settings, finish, camera, up))
-            },
-        );
+        let made = self.document.job(self.size).and_then(|job| {
+            let settings = job.settings(&stage.loaded)?;
+            let finish = job.finish(&stage.loaded)?;
+            let camera = job.camera(&stage.loaded, &settings, &finish)?;
+            let up = job.up(&stage.loaded)?;
+            Ok((settings, finish, camera, up))
+        });
+        let made = made.map_err(|failure| text_of(&failure));
         let (settings, finish, camera, up) = match made {
             Ok(made) => made,
             Err(message) => return self.say(message, true),
@@ -661,9 +646,9 @@ impl Window {
         }
         let mut look = self.document.scene().clone();
         let is_fitted = look.camera.is_none();
-        (look.camera, look.transfer) = (None, None);
-        look.inputs.iter_mut().for_each(|input| input.transfer = None);
-        let shows_bars = look.options.contains_key("scalar-bar");
+        (look.camera, look.appearance.transfer) = (None, None);
+        look.inputs.iter_mut().for_each(|input| input.appearance.transfer = None);
+        let shows_bars = look.overlay.scalar_bar;
         let bars = if shows_bars { self.edited_transfers() } else { Vec::new() };
         let Some(shown) = &mut self.shown else { return Ok(()) };
         // A fitted camera follows from the settings.
@@ -671,16 +656,15 @@ impl Window {
         let is_set = self.set_for.as_ref() == Some(&wanted);
         if !is_set {
             self.set_for = Some(wanted);
-            let (_, mut render) = self.document.render().map_err(|failure| text_of(&failure))?;
-            render.set_size(self.size);
+            let job = self.document.job(self.size).map_err(|failure| text_of(&failure))?;
             let loaded = &shown.stage.loaded;
-            shown.settings = render.settings(loaded).map_err(|error| error.to_string())?;
+            shown.settings = job.settings(loaded).map_err(|error| error.to_string())?;
             let finish = match &bars[..] {
-                [] => render.finish(loaded),
-                bars => render.finish_with(loaded, bars),
+                [] => job.finish(loaded),
+                bars => job.finish_with(loaded, bars),
             };
             shown.finish = Arc::new(finish.map_err(|failure| text_of(&failure))?);
-            let camera = render.camera(loaded, &shown.settings, &shown.finish);
+            let camera = job.camera(loaded, &shown.settings, &shown.finish);
             shown.orbit.set_camera(camera.map_err(|error| error.to_string())?);
         } else if let Some(camera) = &self.document.scene().camera {
             shown.orbit.set_camera(camera.camera()?);
@@ -723,6 +707,6 @@ impl Window {
 
     /// Adds a clip through the middle of the scene, or removes one.
     pub fn change_clips(&mut self, change: impl FnOnce(&mut Vec<ClipEntry>)) {
-        self.document.change(|scene| change(&mut scene.clips));
+        self.document.change(|scene| change(&mut scene.picture.clips));
     }
 }

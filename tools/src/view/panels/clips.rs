@@ -3,7 +3,7 @@
 use crate::view::{handles::offsets, window::Window};
 use eframe::egui::{self, Ui};
 use glam::DVec3;
-use splatkit::{interaction::ClipEntry, math::Bounds};
+use splatkit::{math::Bounds, session::ClipEntry};
 
 pub fn show(window: &mut Window, ui: &mut Ui) {
     let Some(bounds) = window.panels.bounds else { return };
@@ -14,19 +14,19 @@ pub fn show(window: &mut Window, ui: &mut Ui) {
                 let mut plane = [0.0; 4];
                 (plane[axis], plane[3]) = (1.0, middle[axis]);
                 window.change_clips(|clips| {
-                    clips.push(ClipEntry { plane: Some(plane), cuboid: None, inside: true });
+                    clips.push(ClipEntry::of_plane(plane));
                 });
             }
         }
         if ui.button("Box").clicked() {
-            let cuboid = Some([bounds.min.to_array(), bounds.max.to_array()]);
+            let corners = [bounds.min.to_array(), bounds.max.to_array()];
             window.change_clips(|clips| {
-                clips.push(ClipEntry { plane: None, cuboid, inside: true });
+                clips.push(ClipEntry::of_box(corners));
             });
         }
     });
     ui.checkbox(&mut window.panels.shows_handles, "Handles in the picture");
-    let mut entries = window.document.scene().clips.clone();
+    let mut entries = window.document.scene().picture.clips.clone();
     let (mut is_changed, mut removed) = (false, None);
     for (number, clip) in entries.iter_mut().enumerate() {
         ui.push_id(number, |ui| {
@@ -49,7 +49,7 @@ pub fn show(window: &mut Window, ui: &mut Ui) {
         if window.panels.before_drag.is_none() {
             window.panels.before_drag = Some(window.document.scene().clone());
         }
-        window.document.adjust(|scene| scene.clips = entries);
+        window.document.adjust(|scene| scene.picture.clips = entries);
     }
     if !ui.input(|input| input.pointer.any_down())
         && let Some(before) = window.panels.before_drag.take()
@@ -67,7 +67,7 @@ fn clip_sliders(clip: &mut ClipEntry, bounds: &Bounds, ui: &mut Ui) -> bool {
         let slider = egui::Slider::new(&mut plane[3], low..=high).text("offset");
         is_changed |= ui.add(slider).changed();
     }
-    if let Some([first, last]) = &mut clip.cuboid {
+    if let Some([mut first, mut last]) = clip.corners() {
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             let range = bounds.min[axis]..=bounds.max[axis];
             for (end, value) in [("from", &mut first[axis]), ("to", &mut last[axis])] {
@@ -78,6 +78,7 @@ fn clip_sliders(clip: &mut ClipEntry, bounds: &Bounds, ui: &mut Ui) -> bool {
             let least = 1e-3 * (bounds.max[axis] - bounds.min[axis]);
             last[axis] = last[axis].max(first[axis] + least);
         }
+        *clip = ClipEntry { inside: clip.inside, ..ClipEntry::of_box([first, last]) };
     }
     is_changed
 }

@@ -3,11 +3,11 @@
 use super::{Ask, look::edited};
 use crate::{given, view::window::Window};
 use eframe::egui::{DragValue, Ui};
-use splatkit::interaction::InputEntry;
+use splatkit::session::InputEntry;
 
 pub fn show(window: &mut Window, ui: &mut Ui) {
     let entries = window.document.scene().inputs.clone();
-    let kinds = window.shown.as_ref().map_or(Vec::new(), |s| s.stage.loaded.kinds.clone());
+    let kinds = window.shown.as_ref().map_or(Vec::new(), |s| s.stage.loaded.kinds());
     let mut kinds = kinds.into_iter();
     for (number, entry) in entries.iter().enumerate() {
         // Kinds are known of what is loaded.
@@ -49,16 +49,16 @@ fn head(ui: &mut Ui, entry: &mut InputEntry) -> bool {
 fn surface(ui: &mut Ui, entry: &mut InputEntry) {
     ui.horizontal(|ui| {
         ui.add_space(18.0);
-        let own = entry.color.clone().unwrap_or_default();
+        let own = entry.appearance.color.as_ref().map(ToString::to_string).unwrap_or_default();
         let hint = "colour, attribute, height, …";
         if let Some(color) = edited(ui, "color", "Own colour", &own, hint) {
-            entry.color = Some(color).filter(|color| !color.is_empty());
+            entry.appearance.color = color.parse().ok();
         }
     });
     ui.horizontal(|ui| {
         ui.add_space(18.0);
         let id = ui.scope_id().with("opacity");
-        let own = entry.opacity.unwrap_or(1.0);
+        let own = f64::from(entry.appearance.opacity.unwrap_or(1.0));
         let mut opacity = ui.data(|data| data.get_temp::<f64>(id)).unwrap_or(own);
         let label = ui.label("Opacity");
         let field = DragValue::new(&mut opacity).range(0.01..=1.0).speed(0.005);
@@ -69,7 +69,7 @@ fn surface(ui: &mut Ui, entry: &mut InputEntry) {
         } else {
             ui.data_mut(|data| data.remove::<f64>(id));
             if opacity != own {
-                entry.opacity = Some(opacity).filter(|opacity| *opacity < 1.0);
+                entry.appearance.opacity = Some(opacity as f32).filter(|own| *own < 1.0);
             }
         }
     });

@@ -1,38 +1,26 @@
 //! How the scene looks: background, light, texts, and flags with values.
 
-use crate::view::window::Window;
+use crate::{parse, show::surface, view::window::Window, words::surfaces};
 use eframe::egui::{self, Grid, Ui};
-use serde_json::Value;
+use splatkit::{
+    about::direction_name,
+    session::{Background, Description},
+};
 
 /// Backgrounds to choose from.
 const BACKGROUNDS: [&str; 5] = ["black", "white", "#10141c", "gray", "none"];
 
-/// Returns an option as a text.
-fn text_option(window: &Window, name: &str) -> String {
-    match window.document.scene().options.get(name) {
-        Some(Value::String(text)) => text.clone(),
-        Some(other) => other.to_string(),
-        None => String::new(),
-    }
-}
-
-/// Sets or removes an option as a step.
-fn set_option(window: &mut Window, name: &str, value: Option<Value>) {
-    window.document.change(|scene| match value {
-        Some(value) => {
-            scene.options.insert(name.to_owned(), value);
-        }
-        None => {
-            scene.options.remove(name);
-        }
-    });
-}
-
-/// Shows a switch for a flag without a value.
-fn switch(window: &mut Window, ui: &mut Ui, name: &str, label: &str) {
-    let mut on = window.document.scene().options.contains_key(name);
+/// Shows a switch.
+fn switch(
+    window: &mut Window,
+    ui: &mut Ui,
+    label: &str,
+    is_on: bool,
+    set: impl FnOnce(&mut Description, bool),
+) {
+    let mut on = is_on;
     if ui.checkbox(&mut on, label).changed() {
-        set_option(window, name, on.then_some(Value::Bool(true)));
+        window.document.change(|scene| set(scene, on));
     }
 }
 
@@ -52,11 +40,105 @@ pub fn edited(ui: &mut Ui, name: &str, label: &str, own: &str, hint: &str) -> Op
     (response.lost_focus() && text != own).then(|| text.trim().to_owned())
 }
 
-/// Shows a field for a flag with a value.
-fn field(window: &mut Window, ui: &mut Ui, name: &str, label: &str, hint: &str) {
-    let own = text_option(window, name);
-    if let Some(text) = edited(ui, name, label, &own, hint) {
-        set_option(window, name, Some(text).filter(|text| !text.is_empty()).map(Value::String));
+/// A value that is edited as a text.
+struct Field {
+    name: &'static str,
+    label: &'static str,
+    hint: &'static str,
+    /// Returns the text; an empty one stands for nothing.
+    text: fn(&Description) -> String,
+    /// Takes a text that is not empty, or nothing.
+    set: fn(&mut Description, Option<&str>) -> Result<(), String>,
+}
+
+const FIELDS: [Field; 8] = [
+    Field {
+        name: "color",
+        label: "Colour",
+        hint: "a colour, height, an attribute, …",
+        text: |scene| shown(&scene.appearance.color),
+        set: |scene, text| taken(text, str::parse, &mut scene.appearance.color),
+    },
+    Field {
+        name: "scalar",
+        label: "Array",
+        hint: "the file's first",
+        text: |scene| shown(&scene.reading.scalar),
+        set: |scene, text| taken(text, |text| Ok(text.to_owned()), &mut scene.reading.scalar),
+    },
+    Field {
+        name: "range",
+        label: "Range",
+        hint: "LOW,HIGH",
+        text: |scene| {
+            scene.appearance.range.map_or(String::new(), |[low, high]| format!("{low},{high}"))
+        },
+        set: |scene, text| taken(text, parse::range, &mut scene.appearance.range),
+    },
+    Field {
+        name: "iso",
+        label: "Isosurface",
+        hint: "VALUE or 50%",
+        text: |scene| scene.appearance.isosurfaces.as_deref().map_or(String::new(), surfaces),
+        set: |scene, text| {
+            let all = |text: &str| text.split(',').map(surface).collect();
+            taken(text, all, &mut scene.appearance.isosurfaces)
+        },
+    },
+    Field {
+        name: "radius-scale",
+        label: "Radius",
+        hint: "1",
+        text: |scene| shown(&scene.appearance.radius_scale),
+        set: |scene, text| taken(text, parse::radius_scale, &mut scene.appearance.radius_scale),
+    },
+    Field {
+        name: "cut",
+        label: "Cut (pixels)",
+        hint: "2",
+        text: |scene| shown(&scene.picture.cut),
+        set: |scene, text| taken(text, parse::not_negative, &mut scene.picture.cut),
+    },
+    Field {
+        name: "up",
+        label: "Up",
+        hint: "+Z",
+        text: |scene| scene.framing.up.map_or(String::new(), direction_name),
+        set: |scene, text| taken(text, parse::direction, &mut scene.framing.up),
+    },
+    Field {
+        name: "caption",
+        label: "Caption",
+        hint: "",
+        text: |scene| shown(&scene.overlay.caption),
+        set: |scene, text| taken(text, |text| Ok(text.to_owned()), &mut scene.overlay.caption),
+    },
+];
+
+fn shown(value: &Option<impl ToString>) -> String {
+    value.as_ref().map(ToString::to_string).unwrap_or_default()
+}
+
+/// Puts what a text stands for in its place.
+fn taken<T>(
+    text: Option<&str>,
+    parse: impl Fn(&str) -> Result<T, String>,
+    place: &mut Option<T>,
+) -> Result<(), String> {
+    *place = text.map(parse).transpose()?;
+    Ok(())
+}
+
+/// Shows a value that is edited as a text.
+fn field(window: &mut Window, ui: &mut Ui, field: &Field) {
+    let own = (field.text)(window.document.scene());
+    if let Some(text) = edited(ui, field.name, field.label, &own, field.hint) {
+        let text = Some(text.as_str()).filter(|text| !text.is_empty());
+        let mut changed = window.document.scene().clone();
+        match (field.set)(&mut changed, text) {
+            Ok(()) => window.document.change(|scene| *scene = changed),
+            Err(message) => window.say(format!("{}: {message}", field.label), true),
+        }
     }
     ui.end_row();
 }
@@ -64,30 +146,31 @@ fn field(window: &mut Window, ui: &mut Ui, name: &str, label: &str, hint: &str) 
 pub fn show(window: &mut Window, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let label = ui.label("Background");
-        let own = text_option(window, "background");
-        let own = if own.is_empty() { "black".to_owned() } else { own };
-        let choice = egui::ComboBox::from_id_salt("background").selected_text(&own);
-        let shown = choice.show_ui(ui, |ui| {
-            for name in BACKGROUNDS {
-                if ui.selectable_label(own == name, name).clicked() {
-                    set_option(window, "background", Some(Value::String(name.into())));
+        let own = window.document.scene().picture.background;
+        let is_own = |name: &str| name.parse::<Background>().ok() == own;
+        let name = BACKGROUNDS.into_iter().find(|name| is_own(name)).unwrap_or(match own {
+            None => "black",
+            Some(_) => "another colour",
+        });
+        let choice = egui::ComboBox::from_id_salt("background").selected_text(name);
+        let list = choice.show_ui(ui, |ui| {
+            for choice in BACKGROUNDS {
+                if ui.selectable_label(choice == name, choice).clicked() {
+                    window.document.change(|scene| scene.picture.background = choice.parse().ok());
                 }
             }
         });
-        shown.response.labelled_by(label.id);
+        list.response.labelled_by(label.id);
     });
-    switch(window, ui, "no-shade", "Without light");
-    switch(window, ui, "axes", "Axes");
-    switch(window, ui, "scale-bar", "Scale bar");
-    switch(window, ui, "scalar-bar", "Scalar bar");
+    let scene = window.document.scene();
+    let (overlay, is_dark) = (scene.overlay.clone(), scene.picture.shade == Some(false));
+    switch(window, ui, "Without light", is_dark, |scene, on| {
+        scene.picture.shade = on.then_some(false);
+    });
+    switch(window, ui, "Axes", overlay.axes, |scene, on| scene.overlay.axes = on);
+    switch(window, ui, "Scale bar", overlay.scale_bar, |scene, on| scene.overlay.scale_bar = on);
+    switch(window, ui, "Scalar bar", overlay.scalar_bar, |scene, on| scene.overlay.scalar_bar = on);
     Grid::new("look").num_columns(2).show(ui, |ui| {
-        field(window, ui, "color", "Colour", "a colour, a map, height, …");
-        field(window, ui, "scalar", "Array", "the file's first");
-        field(window, ui, "range", "Range", "LOW,HIGH");
-        field(window, ui, "iso", "Isosurface", "VALUE or 50%");
-        field(window, ui, "radius-scale", "Radius", "1");
-        field(window, ui, "cut", "Cut (pixels)", "2");
-        field(window, ui, "up", "Up", "+Z");
-        field(window, ui, "caption", "Caption", "");
+        FIELDS.iter().for_each(|own| field(window, ui, own));
     });
 }

@@ -21,9 +21,10 @@ use eframe::egui::{self, Color32, Grid, Ui};
 use flight::Flight;
 use glam::DVec3;
 use splatkit::{
-    interaction::{Probe, SceneFile},
+    interaction::Probe,
     math::Bounds,
     scene::Item,
+    session::{Description, Side},
 };
 use std::sync::Arc;
 
@@ -33,9 +34,9 @@ pub struct State {
     pub shows_help: bool,
     /// The depth of the point where a drag began.
     pub grabbed: Option<f64>,
-    pub before_drag: Option<SceneFile>,
+    pub before_drag: Option<Description>,
     /// The scene before a point of the transfer function was dragged.
-    before_edit: Option<SceneFile>,
+    before_edit: Option<Description>,
     /// The world point under the cursor.
     pub under_cursor: Option<DVec3>,
     asked: Option<Asked>,
@@ -110,14 +111,14 @@ fn file_menu(window: &mut Window, ui: &mut Ui) {
 }
 
 fn view_menu(window: &mut Window, ui: &mut Ui) {
-    for side in ["front", "back", "left", "right", "top", "bottom", "iso"] {
-        if ui.button(side).clicked() {
-            window.look_from(side);
+    for side in Side::ALL {
+        if ui.button(side.name()).clicked() {
+            window.look_from(Some(side));
             ui.close();
         }
     }
     if ui.button("whole scene (Home)").clicked() {
-        window.look_from("");
+        window.look_from(None);
         ui.close();
     }
     ui.separator();

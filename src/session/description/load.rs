@@ -1,0 +1,155 @@
+//! Making a scene of a description.
+
+use super::{Description, InputEntry, TransferEntry};
+use crate::{
+    Error, Result,
+    formats::Kind,
+    math::Camera,
+    memory,
+    scene::{Scene, Settings},
+    session::{Captions, Data, Framing, Items, Name, Subject, Surfaces},
+};
+use std::path::PathBuf;
+
+/// A scene that was read, and what is known of it.
+pub struct Loaded {
+    /// What is drawn.
+    pub scene: Scene,
+    /// Where the scene is, and how it stands.
+    pub subject: Subject,
+    /// The items of the scene, with their names.
+    pub items: Items,
+    /// What the inputs say for texts over a picture.
+    pub captions: Captions,
+    /// What each input is, in the order of the visible ones.
+    pub inputs: Vec<LoadedInput>,
+    /// The files that were read: the inputs, those that they refer to, and those that the
+    /// description names beside them.
+    pub files: Vec<PathBuf>,
+}
+
+/// What an input turned out to be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedInput {
+    /// Its path, or the address of a remote object.
+    pub file: PathBuf,
+    /// What it holds.
+    pub kind: Kind,
+    /// Whether it is a point cloud: of the kind of meshes, without triangles.
+    pub is_cloud: bool,
+    /// Whether the description gave its layout, because the file has no format of its own.
+    pub is_raw: bool,
+}
+
+impl LoadedInput {
+    fn new(file: PathBuf, data: &Data, is_raw: bool) -> Self {
+        let is_cloud = matches!(data, Data::Mesh(mesh) if mesh.triangles.is_empty());
+        Self { file, kind: data.kind(), is_cloud, is_raw }
+    }
+}
+
+impl Description {
+    /// Reads the inputs and makes a scene of them. Meshes become facets where the picture can show
+    /// them, else surfels. `does` hears what is done, for a display of progress.
+    ///
+    /// # Errors
+    /// Those of [`check`](Self::check) as [`Error::Argument`], of reading the inputs
+    /// ([`Reading`](crate::session::Reading)) and of adding them ([`Items::add`]).
+    pub fn load(&self, does: &dyn Fn(String)) -> Result<Loaded> {
+        let checked = self.check();
+        checked.map_err(|(place, message)| Error::Argument(format!("{place} {message}")))?;
+        // One deadline covers reading all inputs and making their splats.
+        let mut own = self.clone();
+        own.reading = self.reading.begun();
+        let facets = self.picture.draws_facets();
+        let surfaces = if facets { Surfaces::Facets } else { Surfaces::Surfels };
+        let mut items = Items::new(surfaces);
+        let (mut inputs, mut files) = (Vec::new(), self.files());
+        for input in own.visible() {
+            let (data, read) = own.add(input, &mut items, does)?;
+            inputs.push(data);
+            files.extend(read);
+        }
+        let scene = items.scene(facets)?;
+        scene.validate().map_err(|error| self.at_fault(&items, &scene, error))?;
+        let mut subject = items.subject.clone();
+        // Points that all lie at one place have no extent, but their splats have one.
+        if subject.is_one_place() {
+            subject.bounds = scene.bounds();
+        }
+        let captions = items.captions();
+        Ok(Loaded { scene, subject, items, captions, inputs, files })
+    }
+
+    /// Returns the error for a scene that cannot be drawn. If an item cannot be drawn by itself, its
+    /// file is at fault, or what says how it is shown.
+    fn at_fault(&self, items: &Items, scene: &Scene, error: Error) -> Error {
+        let Some((number, Error::Transfer(what))) = Items::unfit(scene) else {
+            return items.at_fault(scene, error);
+        };
+        let Some(input) = self.visible().nth(number) else { return error };
+        let own = self.appearance_of(input);
+        let is_changed = own.range.is_some() || own.opacity_unit.is_some();
+        let message = format!("{what}; the values are those of {}", input.file.display());
+        match own.transfer.as_ref().and_then(TransferEntry::file) {
+            Some(file) if !is_changed => Error::input(file, "content", message),
+            _ if own.transfer.is_some() || is_changed => Error::Transfer(message),
+            _ => items.at_fault(scene, error),
+        }
+    }
+
+    /// Reads an input and adds it. Returns what it is, and the files that were read.
+    fn add(
+        &self,
+        input: &InputEntry,
+        items: &mut Items,
+        does: &dyn Fn(String),
+    ) -> Result<(LoadedInput, Vec<PathBuf>)> {
+        let path = &input.file;
+        does(format!("Reading {}", path.display()));
+        let mut showing = self.showing(input)?;
+        let reading = self.reading_of(input);
+        showing.deadline = reading.limits().deadline();
+        let reading = reading.reading_within(memory::most());
+        let opened = reading.open_colored(path, showing.coloring().attribute())?;
+        let data = opened.read()?;
+        let loaded = LoadedInput::new(path.clone(), &data, opened.is_raw());
+        let files = opened.files();
+        items.add(&Name::of_file(path), data, &showing, does)?;
+        Ok((loaded, files))
+    }
+}
+
+impl Loaded {
+    /// Returns the number of splats, facets, samples and cells.
+    pub fn count(&self) -> u64 {
+        self.items.count()
+    }
+
+    /// Finds the points that span what is seen with these settings, if the camera is fitted to
+    /// them.
+    ///
+    /// # Errors
+    /// Those of [`Scene::seen`].
+    pub fn find_seen(&mut self, framing: &Framing, settings: &Settings) -> Result<()> {
+        if !framing.is_placed() {
+            self.subject.seen = self.scene.seen(&settings.clips)?;
+        }
+        Ok(())
+    }
+
+    /// Returns the error for a picture of `size` pixels that an engine did not draw: that of the
+    /// input that reaches farthest, if the usual camera cannot see the scene either. Also returns
+    /// whether only this camera cannot see it.
+    pub fn undrawn(&self, error: Error, camera: &Camera, size: [u32; 2]) -> (Error, bool) {
+        let bounds = self.scene.bounds();
+        let is_seen = || camera.view(size)?.validate_for(&bounds);
+        if !matches!(error, Error::Argument(_)) || is_seen().is_ok() {
+            return (error, false);
+        }
+        match Framing::usual_fault(&self.subject, &bounds, size) {
+            Some(fault) => (self.items.out_of_sight(&self.scene, fault), false),
+            None => (error, true),
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! How a picture is drawn, as a description says it.
+
+use super::{Background, ClipEntry, appearance::Wrong};
+use crate::{
+    Result,
+    hierarchy::Detail,
+    scene::{Classification, Evaluate, Gradient, Item, Mode, Optics, Order, Scene, Settings},
+    session::Subject,
+};
+use serde::{Deserialize, Serialize};
+
+/// How a picture is drawn. What is not given is as usual.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct PictureEntry {
+    /// Width and height in pixels; by default [`SIZE`](Self::SIZE).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u32; 2]>,
+    /// The colour behind the picture; by default black.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub background: Option<Background>,
+    /// Pixels that are drawn for each pixel and averaged; by default more for small pictures.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub samples: Option<Samples>,
+    /// What is composited; by default sheets.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode: Option<Composite>,
+    /// Whether single splats are composited from back to front.
+    #[serde(skip_serializing_if = "is_false")]
+    pub back_to_front: bool,
+    /// When values become colour and opacity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub classify: Option<Classification>,
+    /// The quantity that a ray computes from a field.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub optics: Option<Optics>,
+    /// How the gradient across the picture is computed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gradient: Option<Gradient>,
+    /// How the samples of a volume are summed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub evaluate: Option<Evaluate>,
+    /// Whether volumes are lit even if their transfer functions have no light (true), or volumes
+    /// and surfaces are shown without light (false).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shade: Option<bool>,
+    /// The largest thickness of a sheet, in world units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sheet_thickness: Option<f64>,
+    /// Hierarchies and bricks: the largest width of a splat at half its height, in pixels; by
+    /// default [`Detail::PIXELS`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cut: Option<f64>,
+    /// Hierarchies and bricks: about the number of splats of a picture, instead of `cut`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<u64>,
+    /// Hierarchies and bricks: about the milliseconds of a frame, instead of `cut`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_time: Option<f64>,
+    /// Bytes for the pages of each hierarchy, or for the bricks of a volume. Only the user says
+    /// what may be taken: a file may not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory: Option<u64>,
+    /// Hierarchies: whether splats that face away are left out; by default as the surface allows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cull_backfaces: Option<bool>,
+    /// Whether what opaque parts hide is left out, which changes no picture; by default true.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub occlusion: Option<bool>,
+    /// Shapes that cut the scene, at most [`Settings::MAX_CLIPS`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub clips: Vec<ClipEntry>,
+}
+
+/// What is composited into a picture: [`Mode`] without its order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub enum Composite {
+    /// [`Mode::Sheets`].
+    Sheets,
+    /// [`Mode::AxisSheets`].
+    AxisSheets,
+    /// [`Mode::Splats`].
+    Splats,
+}
+
+/// Pixels that are drawn for each pixel of a picture, and averaged to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "SamplesText", into = "SamplesText")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[cfg_attr(test, schemars(with = "SamplesText"))]
+pub enum Samples {
+    /// More for smaller pictures. In JSON `auto`.
+    Auto,
+    /// This many along each side. In JSON the number of pixels: 1, 4, 9, 16 or 64.
+    Factor(u32),
+}
+
+/// [`Samples`] in JSON.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+enum SamplesText {
+    Count(u32),
+    Name(String),
+}
+
+impl TryFrom<SamplesText> for Samples {
+    type Error = String;
+
+    fn try_from(text: SamplesText) -> std::result::Result<Self, String> {
+        match text {
+            SamplesText::Count(count) => count.to_string().parse(),
+            SamplesText::Name(name) => name.parse(),
+        }
+    }
+}
+
+impl From<Samples> for SamplesText {
+    fn from(samples: Samples) -> Self {
+        match samples {
+            Samples::Auto => Self::Name("auto".into()),
+            Samples::Factor(factor) => Self::Count(factor * factor),
+        }
+    }
+}
+
+impl std::str::FromStr for Samples {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "1" => Ok(Self::Factor(1)),
+            "4" => Ok(Self::Factor(2)),
+            "9" => Ok(Self::Factor(3)),
+            "16" => Ok(Self::Factor(4)),
+            "64" => Ok(Self::Factor(8)),
+            _ => Err("use auto, 1, 4, 9, 16 or 64".into()),
+        }
+    }
+}
+
+impl Samples {
+    /// Most pixels drawn if the picture's size decides.
+    const MOST_PIXELS: u64 = 1 << 18;
+
+    /// Returns how many pixels are drawn along each side of a pixel. Explicit splats have edges and
+    /// are widened, which takes more pixels than a volume does.
+    pub fn factor(self, [width, height]: [u32; 2], has_splats: bool) -> u32 {
+        let pixels = u64::from(width) * u64::from(height);
+        let drawn = |factor: u32| u64::from(factor * factor).saturating_mul(pixels);
+        let most = if has_splats { 8 } else { 4 };
+        match self {
+            Self::Auto => {
+                (2..=most).rev().find(|factor| drawn(*factor) <= Self::MOST_PIXELS).unwrap_or(1)
+            }
+            Self::Factor(factor) => factor,
+        }
+    }
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
+impl PictureEntry {
+    /// The size of a picture of which nobody says it.
+    pub const SIZE: [u32; 2] = [1280, 720];
+
+    /// Checks what does not depend on the scene.
+    pub(super) fn check(&self) -> std::result::Result<(), Wrong> {
+        if self.size.is_some_and(|size| size.contains(&0)) {
+            return Err(("size", "a picture needs a width and a height above 0".into()));
+        }
+        if self.back_to_front && self.mode != Some(Composite::Splats) {
+            let message = "needs the mode splats (--mode splats): it sets the order of single \
+                           splats";
+            return Err(("back_to_front", message.into()));
+        }
+        let lengths = [("sheet_thickness", self.sheet_thickness), ("frame_time", self.frame_time)];
+        let is_length = |length: &f64| *length > 0.0 && length.is_finite();
+        if let Some((name, _)) = lengths.iter().find(|(_, length)| !length.iter().all(is_length)) {
+            return Err((*name, "must be a number above 0".into()));
+        }
+        if self.cut.is_some_and(|cut| !(cut >= 0.0 && cut.is_finite())) {
+            return Err(("cut", "must be a number of at least 0".into()));
+        }
+        if self.budget == Some(0) {
+            return Err(("budget", "must be a number above 0".into()));
+        }
+        let details = [self.cut.is_some(), self.budget.is_some(), self.frame_time.is_some()];
+        if details.into_iter().filter(|is_given| *is_given).count() > 1 {
+            return Err(("budget", "only one of cut, budget and frame_time can be given".into()));
+        }
+        let (count, most) = (self.clips.len(), Settings::MAX_CLIPS);
+        if count > most {
+            return Err(("clips", format!("{count} shapes are given; at most {most} are allowed")));
+        }
+        self.clips.iter().try_for_each(ClipEntry::check).map_err(|message| ("clips", message))
+    }
+
+    /// Returns width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size.unwrap_or(Self::SIZE)
+    }
+
+    /// Returns the colour behind the picture: red, green and blue in 0 … 1; `None` for
+    /// transparency.
+    pub fn background(&self) -> Option<[f32; 3]> {
+        self.background.map_or(Some([0.0; 3]), Background::color)
+    }
+
+    /// Returns how many pixels are drawn along each side of a pixel of the picture.
+    pub fn factor(&self, scene: &Scene) -> u32 {
+        self.samples.unwrap_or(Samples::Auto).factor(self.size(), scene.has_splats())
+    }
+
+    /// Returns whether meshes can be drawn as facets: in sheets that emit and absorb light.
+    pub fn draws_facets(&self) -> bool {
+        self.mode() == Mode::Sheets && self.optics.unwrap_or_default() == Optics::EmissionAbsorption
+    }
+
+    fn mode(&self) -> Mode {
+        let order = if self.back_to_front { Order::BackToFront } else { Order::FrontToBack };
+        match self.mode {
+            None | Some(Composite::Sheets) => Mode::Sheets,
+            Some(Composite::AxisSheets) => Mode::AxisSheets,
+            Some(Composite::Splats) => Mode::Splats(order),
+        }
+    }
+
+    /// Returns the settings of the picture of a scene, before it is averaged down.
+    ///
+    /// # Errors
+    /// Those of [`Scene::validate_settings`]; [`Error::NothingToDraw`](crate::Error::NothingToDraw)
+    /// for a clip that leaves nothing of the scene.
+    pub fn settings(&self, scene: &Scene, subject: &Subject) -> Result<Settings> {
+        let factor = self.factor(scene);
+        let mut settings = Settings::new(self.size().map(|side| side.saturating_mul(factor)));
+        settings.mode = self.mode();
+        settings.classification = self.classify.unwrap_or_default();
+        settings.optics = self.optics.unwrap_or_default();
+        settings.gradient = self.gradient.unwrap_or_default();
+        settings.evaluate = self.evaluate.unwrap_or_default();
+        settings.sheet_thickness = self.sheet_thickness;
+        // Explicit extra pixels do not change sheets and cuts: thinner sheets would separate splats
+        // that overlap on a surface. If their number is automatic, a small picture is drawn like a
+        // larger one.
+        let wider =
+            if let Some(Samples::Factor(_)) = self.samples { f64::from(factor) } else { 1.0 };
+        settings.sheet_pixels *= wider;
+        settings.occlusion = self.occlusion.unwrap_or(true);
+        self.light(scene, &mut settings);
+        settings.detail = match (self.budget, self.frame_time) {
+            (Some(splats), _) => Detail::Splats(splats),
+            (_, Some(milliseconds)) => Detail::Milliseconds(milliseconds),
+            _ => Detail::Pixels(self.cut.unwrap_or(Detail::PIXELS) * wider),
+        };
+        settings.cull_backfaces = self.cull_backfaces;
+        settings.page_memory = self.memory.unwrap_or(settings.page_memory);
+        // Footprints reach beyond the samples, so something may be left there.
+        settings.clips = ClipEntry::all(&self.clips, &subject.bounds, &scene.bounds())?;
+        scene.validate_settings(&settings)?;
+        Ok(settings)
+    }
+
+    fn light(&self, scene: &Scene, settings: &mut Settings) {
+        match self.shade {
+            None => {}
+            Some(false) => {
+                settings.volume_shade = Some(None);
+                settings.surface_shade = None;
+            }
+            Some(true) => {
+                let fields = scene.items.iter().filter_map(Item::transfer);
+                let mut shade = fields.clone().find_map(|field| field.shade).unwrap_or_default();
+                if fields.count() > 1 {
+                    // Each field knows itself which of its gradients are certain.
+                    shade.certain = None;
+                }
+                settings.volume_shade = Some(Some(shade));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_pictures_take_more_pixels() {
+        let factor =
+            |text: &str, size| text.parse().map(|samples: Samples| samples.factor(size, true));
+        assert_eq!(factor("auto", [1, 1]), Ok(8));
+        assert_eq!(factor("auto", [64, 64]), Ok(8));
+        assert_eq!(factor("auto", [128, 128]), Ok(4));
+        assert_eq!(Samples::Auto.factor([64, 64], false), 4);
+        assert_eq!(factor("auto", [160, 160]), Ok(3));
+        assert_eq!(factor("auto", [256, 256]), Ok(2));
+        assert_eq!(factor("auto", [257, 256]), Ok(1));
+        assert_eq!(factor("auto", [u32::MAX, u32::MAX]), Ok(1));
+        assert_eq!(factor("9", [2000, 2000]), Ok(3));
+        assert!(factor("2", [1, 1]).is_err());
+        for samples in [Samples::Auto, Samples::Factor(3)] {
+            let json = serde_json::to_string(&samples).unwrap();
+            assert_eq!(serde_json::from_str::<Samples>(&json).unwrap(), samples);
+        }
+    }
+}

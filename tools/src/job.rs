@@ -1,0 +1,374 @@
+//! A picture to be drawn: the scene that flags and scene files describe, and the device.
+
+use crate::{
+    color,
+    engine::{self, DeviceFlags},
+    failure::Failure,
+    given::{self, Given, Kinds},
+    overlay::Overlay,
+    progress::Progress,
+    scene_file::Stated,
+};
+use splatkit::{
+    Device, Error,
+    formats::Kind,
+    math::Camera,
+    picture::Picture,
+    scene::{Scene, Settings},
+    session::{self, Description, Framing, TransferEntry},
+};
+#[cfg(feature = "window")]
+use splatkit::{
+    scene::Item,
+    session::{Captions, Legend},
+    volume::TransferFunction,
+};
+use std::{
+    ops::{Deref, DerefMut},
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+/// A picture to be drawn.
+#[derive(Debug, Clone)]
+pub struct Job {
+    pub scene: Description,
+    pub device: DeviceFlags,
+    /// Where the scene is stated, if a scene file states it.
+    stated: Option<Stated>,
+    /// The flags that are given, and those that the scene stands for.
+    given: Given,
+}
+
+/// A loaded scene, and how long that took.
+pub struct Loaded {
+    session: session::Loaded,
+    pub load_ms: f64,
+}
+
+impl Deref for Loaded {
+    type Target = session::Loaded;
+
+    fn deref(&self) -> &session::Loaded {
+        &self.session
+    }
+}
+
+impl DerefMut for Loaded {
+    fn deref_mut(&mut self) -> &mut session::Loaded {
+        &mut self.session
+    }
+}
+
+impl Loaded {
+    /// Returns what each input is.
+    pub fn kinds(&self) -> Vec<Kinds> {
+        self.inputs.iter().map(given::kinds_of_input).collect()
+    }
+}
+
+/// How a drawn picture becomes the final one.
+pub struct Finish {
+    /// Pixels drawn along each side of a pixel of the picture.
+    pub factor: u32,
+    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "for the window"))]
+    pub background: Option<[f32; 3]>,
+    overlay: Option<Overlay>,
+}
+
+impl Finish {
+    /// Averages a picture down and draws edges over it.
+    pub fn reduced(
+        &self,
+        picture: Picture,
+        camera: &Camera,
+        loaded: &Loaded,
+    ) -> splatkit::Result<Picture> {
+        let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
+        let view = camera.view([picture.width, picture.height])?;
+        // A line is a pixel wide, and wider in large pictures.
+        let width = (f64::from(picture.height) / 720.0).max(1.0);
+        loaded.items.edges().iter().for_each(|edges| picture.draw_edges(edges, &view, width));
+        Ok(picture)
+    }
+
+    /// Draws the texts over a picture, and returns what they say.
+    pub fn overlaid(&self, picture: &mut Picture, camera: &Camera) -> serde_json::Value {
+        let overlay = self.overlay.as_ref();
+        overlay.map_or(serde_json::Value::Null, |overlay| overlay.draw(picture, camera))
+    }
+
+    /// Returns the colours of the scalar bars.
+    #[cfg(all(test, feature = "window"))]
+    pub fn bar_colors(&self) -> Vec<[f32; 3]> {
+        self.overlay.as_ref().map_or(Vec::new(), Overlay::bar_colors)
+    }
+
+    /// Returns the final picture of a drawn one.
+    #[cfg(feature = "window")]
+    pub fn finished(
+        &self,
+        picture: Picture,
+        camera: &Camera,
+        loaded: &Loaded,
+    ) -> splatkit::Result<Picture> {
+        let mut picture = self.reduced(picture, camera, loaded)?;
+        self.overlaid(&mut picture, camera);
+        Ok(picture)
+    }
+}
+
+impl Job {
+    /// Returns the job of drawing a scene with these flags. Checks what does not depend on its
+    /// inputs.
+    pub fn new(
+        scene: Description,
+        device: DeviceFlags,
+        given: &Given,
+        stated: Option<Stated>,
+    ) -> Result<Self, Failure> {
+        let given = given.with(&scene);
+        let job = Self { scene, device, stated, given };
+        job.device.check()?;
+        // A window may open without anything.
+        if job.scene.inputs.is_empty() {
+            return Ok(job);
+        }
+        job.scene.check().map_err(|(place, message)| match &job.stated {
+            Some(stated) => stated.wrong(place, message),
+            None => {
+                let flag = crate::scene_file::flag_of(&place);
+                Failure::Usage(format!("--{flag}: {message}"))
+            }
+        })?;
+        Ok(job)
+    }
+
+    /// Makes a failure the scene file's, if that states what is wrong. `written` are the files that
+    /// the user wants written.
+    pub fn blamed(&self, failure: Failure, written: &[&Path]) -> Failure {
+        match &self.stated {
+            Some(stated) => stated.blamed(failure, written),
+            None => failure,
+        }
+    }
+
+    /// Returns the paths of the inputs that are drawn.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        self.scene.visible().map(|input| input.file.clone()).collect()
+    }
+
+    /// Returns the inputs as a line of text.
+    pub fn name(&self) -> String {
+        let names = self.scene.visible().map(|input| input.file.display().to_string());
+        names.collect::<Vec<_>>().join(", ")
+    }
+
+    /// Returns the size of the picture in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.scene.picture.size()
+    }
+
+    /// Reads the inputs and makes a scene of them.
+    pub fn load(&self, progress: &Progress) -> Result<Loaded, Failure> {
+        let start = Instant::now();
+        let session = self.scene.load(&|step| progress.stage(step));
+        let session = session.map_err(|error| self.with_flags(error))?;
+        let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        let loaded = Loaded { session, load_ms };
+        self.check_effect(&loaded, progress)?;
+        Ok(loaded)
+    }
+
+    /// Names the flags that change a transfer function in an error about it.
+    fn with_flags(&self, error: Error) -> Failure {
+        match error {
+            Error::Transfer(what) => {
+                let own = self.scene.visible().map(|input| self.scene.appearance_of(input));
+                let flags = own.map(|own| {
+                    let transfer = own.transfer.map(|transfer| match transfer {
+                        TransferEntry::Name(name) => format!("--transfer {name}"),
+                        TransferEntry::Whole(_) => "--transfer".to_owned(),
+                    });
+                    let range = own
+                        .range
+                        .map(|[low, high]| format!("--range {},{}", plain(low), plain(high)));
+                    let unit =
+                        own.opacity_unit.map(|unit| format!("--opacity-unit {}", plain(unit)));
+                    [transfer, range, unit].into_iter().flatten().collect::<Vec<_>>().join(" ")
+                });
+                match flags.into_iter().find(|flags| !flags.is_empty()) {
+                    Some(flags) => Failure::Usage(format!("{flags}: {what}")),
+                    None => Error::Transfer(what).into(),
+                }
+            }
+            other => other.into(),
+        }
+    }
+
+    /// Refuses what has no effect on the loaded inputs, or warns of it.
+    fn check_effect(&self, loaded: &Loaded, progress: &Progress) -> Result<(), Failure> {
+        let inputs = &loaded.inputs;
+        let is_scaled = inputs.iter().any(|input| input.kind == Kind::Mesh);
+        let unscaled = inputs.iter().rfind(|input| input.kind == Kind::Hierarchy);
+        let has_legends = !loaded.captions.legends.is_empty();
+        color::check_effect(&self.scene, is_scaled, has_legends)?;
+        let has_scale = self.given.has("radius-scale");
+        if let (true, Some(input), false) = (has_scale, unscaled, is_scaled) {
+            return Err(Failure::Usage(format!(
+                "--radius-scale does not apply to {}: a hierarchy keeps the radii that it was \
+                 converted with; convert it with --radius-scale",
+                input.file.display()
+            )));
+        }
+        let paths = inputs.iter().map(|input| input.file.as_path());
+        self.given.warn(&paths.zip(loaded.kinds()).collect::<Vec<_>>(), progress);
+        if self.given.has("range") && !has_legends {
+            progress.warn("--range has no effect: nothing here is coloured or shown by values");
+        }
+        Ok(())
+    }
+
+    /// Returns the failure of a picture that an engine did not draw. If the usual camera cannot see
+    /// the scene either, the input that reaches farthest is at fault. If only this camera cannot,
+    /// it is the file of a path, which is named with the place of the camera, or else a flag.
+    pub fn undrawn(
+        &self,
+        error: Error,
+        loaded: &Loaded,
+        (camera, size): (&Camera, [u32; 2]),
+        path: Option<(&Path, String)>,
+    ) -> Failure {
+        match (loaded.undrawn(error, camera, size), path) {
+            ((error, true), Some((file, place))) => error.stated_in(file, place).into(),
+            ((error, _), _) => error.into(),
+        }
+    }
+
+    /// Returns the settings of a picture before it is averaged down.
+    pub fn settings(&self, loaded: &Loaded) -> splatkit::Result<Settings> {
+        self.scene.picture.settings(&loaded.scene, &loaded.subject)
+    }
+
+    /// Returns a warning if light or optics that the picture asks for change nothing.
+    pub fn idle(&self, scene: &Scene) -> Option<&'static str> {
+        engine::idle(&self.scene.picture, scene)
+    }
+
+    /// Returns how the camera looks at the scene.
+    pub fn framing(&self) -> splatkit::Result<Framing> {
+        self.scene.framing()
+    }
+
+    /// Opens the device that draws a scene.
+    pub fn open_device(&self, scene: &Scene) -> splatkit::Result<Device> {
+        self.device.open(scene)
+    }
+
+    /// Returns how pictures of a scene are finished.
+    pub fn finish(&self, loaded: &Loaded) -> Result<Finish, Failure> {
+        let picture = &self.scene.picture;
+        let (factor, background) = (picture.factor(&loaded.scene), picture.background());
+        let overlay = Overlay::open(&self.scene.overlay, &loaded.captions, background)?;
+        Ok(Finish { factor, background, overlay })
+    }
+
+    /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,
+    /// beside the bars.
+    pub fn free(&self, settings: &Settings, finish: &Finish) -> [u32; 2] {
+        let room = finish.overlay.as_ref().map_or(0, |overlay| overlay.room(self.size()));
+        let [width, height] = settings.size;
+        [width.saturating_sub(2 * finish.factor * room).max(1), height]
+    }
+
+    /// Returns an error if a picture shows nothing.
+    pub fn require_content(&self, picture: &Picture) -> Result<(), Failure> {
+        // An opacity that rounds to 0 in a file of 8 bits counts as none.
+        if picture.color.iter().any(|pixel| pixel[3] >= 0.5 / 255.0) {
+            return Ok(());
+        }
+        let clips: Vec<String> = self.scene.picture.clips.iter().map(ToString::to_string).collect();
+        let left = match &clips[..] {
+            [] => String::new(),
+            clips => format!(" after clipping by {}", clips.join(" ")),
+        };
+        Err(Error::NothingToDraw(format!(
+            "the picture is empty: the camera sees no splat that has opacity{left}"
+        ))
+        .into())
+    }
+}
+
+/// What a window asks.
+#[cfg(feature = "window")]
+impl Job {
+    /// Checks that the inputs are files of known kinds, without reading more than their heads.
+    /// Addresses are not asked.
+    pub fn check_files(&self) -> Result<(), Failure> {
+        let is_here = |path: &&std::path::PathBuf| !splatkit::input::is_remote(path);
+        let files = self.scene.visible().filter(|input| is_here(&&input.file));
+        files.into_iter().try_for_each(|input| {
+            self.scene.reading_of(input).reading().kind(&input.file).map(drop)
+        })?;
+        Ok(())
+    }
+
+    /// Returns the camera of a single picture.
+    pub fn camera(
+        &self,
+        loaded: &Loaded,
+        settings: &Settings,
+        finish: &Finish,
+    ) -> splatkit::Result<Camera> {
+        self.framing()?.camera(&loaded.subject, self.free(settings, finish))
+    }
+
+    /// Returns how pictures are finished if other transfer functions show the fields of these
+    /// items.
+    pub fn finish_with(
+        &self,
+        loaded: &Loaded,
+        transfers: &[(usize, TransferFunction)],
+    ) -> Result<Finish, Failure> {
+        let captions = self.captions_with(loaded, transfers);
+        let background = self.scene.picture.background();
+        let overlay = Overlay::open(&self.scene.overlay, &captions, background)?;
+        Ok(Finish { overlay, ..self.finish(loaded)? })
+    }
+
+    /// Returns what a loaded scene says for texts if other transfer functions show the fields of
+    /// these items.
+    fn captions_with(&self, loaded: &Loaded, transfers: &[(usize, TransferFunction)]) -> Captions {
+        let mut captions = loaded.captions.clone();
+        for (item, legend) in &mut captions.legends {
+            let item = *item;
+            let own = transfers.iter().find(|(own, _)| *own == item);
+            let values = loaded.scene.items[item].value_range();
+            let (Some((_, transfer)), Some(values)) = (own, values) else { continue };
+            let labels = match &loaded.scene.items[item] {
+                Item::Volume(volume, ..) => volume.about.labels.as_ref(),
+                _ => None,
+            };
+            // The colours are the function's own by now, also those of a map.
+            let named = (std::mem::take(&mut legend.title), labels);
+            let mut coloring = self.scene.appearance.coloring();
+            coloring.range = None;
+            *legend = Legend::of_transfer(&coloring, transfer, values, named);
+        }
+        captions
+    }
+
+    /// Returns the scene's way up.
+    pub fn up(&self, loaded: &Loaded) -> splatkit::Result<glam::DVec3> {
+        Ok(self.framing()?.stance(&loaded.subject).0.up)
+    }
+}
+
+/// Formats a number as people type it.
+fn plain(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}

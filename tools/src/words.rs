@@ -1,0 +1,134 @@
+//! The flags that say what a description says: for a shell, and for warnings about flags without
+//! effect.
+
+use serde_json::Value;
+use splatkit::session::{ClipEntry, Description, IsosurfaceEntry, TransferEntry};
+use std::path::Path;
+
+/// Returns the inputs and flags of `render` that draw a scene. An error names a field that no flag
+/// sets.
+pub fn words_of(scene: &Description) -> Result<Vec<String>, String> {
+    let mut words = Vec::new();
+    for part in ["framing", "picture", "overlay", "reading", "appearance"] {
+        of_part(&mut words, &serde_json::json!(scene)[part], part)?;
+    }
+    if let Some(camera) = &scene.camera {
+        words.push(format!("--camera={}", serde_json::json!(camera)));
+    }
+    let engine = serde_json::json!(scene.engine);
+    if scene.engine != Default::default() {
+        words.push(format!("--engine={}", plain(&engine)));
+    }
+    words.extend(scene.picture.clips.iter().map(flag_of_clip));
+    let shared = scene.appearance.isosurfaces.iter();
+    words.extend(shared.map(|own| format!("--iso={}", surfaces(own))));
+    words.extend(scene.appearance.transfer.iter().map(|own| format!("--transfer={}", text(own))));
+    for input in scene.visible() {
+        let file = input.file.to_string_lossy();
+        let mut own = input.appearance.clone();
+        let values = [
+            ("color", own.color.take().map(|color| color.to_string())),
+            ("opacity", own.opacity.take().map(|opacity| opacity.to_string())),
+            ("transfer", own.transfer.take().map(|transfer| text(&transfer))),
+            ("range", own.range.take().map(|[low, high]| format!("{low},{high}"))),
+            ("iso", own.isosurfaces.take().map(|own| surfaces(&own))),
+        ];
+        if own != Default::default() || input.reading != Default::default() {
+            return Err(format!(
+                "{file} is read or shown in a way of its own that no flag says; save the scene, \
+                 which splatkit render draws"
+            ));
+        }
+        let file_of = |path: &Path| {
+            let is_like_flag = path.as_os_str().as_encoded_bytes().starts_with(b"-");
+            if is_like_flag { Path::new(".").join(path) } else { path.to_owned() }
+        };
+        let file = file_of(&input.file).to_string_lossy().into_owned();
+        let given = values.into_iter().filter_map(|(name, value)| Some((name, value?)));
+        words.extend(given.map(|(name, value)| format!("--{name}={file}={value}")));
+        words.push(file);
+    }
+    Ok(words)
+}
+
+/// Adds the flags of one part, apart from those that [`words_of`] adds itself.
+fn of_part(words: &mut Vec<String>, part: &Value, name: &str) -> Result<(), String> {
+    for (field, value) in part.as_object().into_iter().flatten() {
+        let flag = field.replace('_', "-");
+        match (field.as_str(), value) {
+            ("clips" | "isosurfaces" | "transfer", _) => {}
+            ("limits", limits) => {
+                let limits = limits.as_object().into_iter().flatten();
+                words.extend(limits.map(|(limit, most)| format!("--limit-{limit}={most}")));
+            }
+            ("gradient_opacity", points) => {
+                let points = points.as_array().into_iter().flatten();
+                let points: Vec<String> = points.map(|point| joined(point, ",")).collect();
+                words.push(format!("--{flag}={}", points.join(":")));
+            }
+            ("kernel", Value::Array(_)) => {
+                return Err(format!("{name}.{field} is a table, which no flag says"));
+            }
+            ("size" | "dims", numbers) => words.push(format!("--{flag}={}", joined(numbers, "x"))),
+            (_, Value::Bool(true)) => words.push(format!("--{flag}")),
+            (_, Value::Bool(false)) if field == "cull_backfaces" => {
+                words.push(format!("--{flag}=false"));
+            }
+            (_, Value::Bool(false)) => words.push(format!("--no-{flag}")),
+            (_, Value::Array(_)) => words.push(format!("--{flag}={}", joined(value, ","))),
+            _ => words.push(format!("--{flag}={}", plain(value))),
+        }
+    }
+    Ok(())
+}
+
+/// Returns a text without quotes, and anything else as JSON.
+fn plain(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+fn joined(list: &Value, separator: &str) -> String {
+    let items = list.as_array().into_iter().flatten();
+    items.map(plain).collect::<Vec<_>>().join(separator)
+}
+
+/// Returns a transfer function as a flag takes it.
+fn text(transfer: &TransferEntry) -> String {
+    match transfer {
+        TransferEntry::Name(name) => name.clone(),
+        TransferEntry::Whole(transfer) => transfer.to_json(),
+    }
+}
+
+/// Returns isosurfaces as a flag takes them.
+pub fn surfaces(entries: &[IsosurfaceEntry]) -> String {
+    let surface = |own: &IsosurfaceEntry| {
+        let mut text = match (own.value, own.percent) {
+            (Some(value), _) => value.to_string(),
+            (None, share) => format!("{}%", share.unwrap_or_default()),
+        };
+        if let Some(color) = &own.color {
+            text += &format!(":{}", plain(&serde_json::json!(color)));
+        }
+        if own.opacity < 1.0 {
+            text += &format!(":{}", own.opacity);
+        }
+        text
+    };
+    entries.iter().map(surface).collect::<Vec<_>>().join(",")
+}
+
+fn flag_of_clip(clip: &ClipEntry) -> String {
+    let flag = if clip.inside { "clip" } else { "cut-out" };
+    format!("--{flag}={}", clip.text())
+}
+
+/// Quotes a word for a shell, if it needs that.
+#[cfg(feature = "window")]
+pub fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
