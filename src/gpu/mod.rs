@@ -29,6 +29,7 @@
 //! |---|---|
 //! | `device` | adapters and their limits, errors of a device, buffers and timestamps |
 //! | `pipeline` | shader files, pipelines with their bindings and constants, prefix sums |
+//! | `uniforms` | the plan's numbers, packed as shaders read them |
 //! | `scene` | the data of a scene on the GPU |
 //! | `targets`, `budget` | the buffers of a frame, and the capacity of a depth pass |
 //! | `variant` | which features of the shaders a picture needs |
@@ -53,6 +54,7 @@ mod pipeline;
 mod renderer;
 mod scene;
 mod targets;
+mod uniforms;
 mod variant;
 
 pub use budget::Budget;

@@ -65,7 +65,7 @@ impl Request<'_> {
         prepared.update_forests(gpu, view, settings, cut_pixels)?;
         let choice = self.bring_bricks(gpu, passes, prepared)?;
         let sheets = prepared.scene.sheets_of(view, settings, choice.as_slice(), &prepared.bounds);
-        let gather = gathering::is_chosen(&prepared.scene, settings, || {
+        let gather = gathering::is_chosen(&prepared.scene.items, settings, || {
             field::obstacle(&prepared.scene, settings, &sheets, gpu)
         })?;
         if gather {

@@ -13,8 +13,8 @@ use crate::{
             nodes::{GpuBounds, GpuCut, GpuNode},
             recolor::GpuEye,
         },
+        uniforms::{Frame, FrameClip, FrameField, FrameIsosurface, Source},
     },
-    plan::uniforms::{Frame, FrameClip, FrameField, FrameIsosurface, Source},
     splat::Splat,
 };
 use bytemuck::Zeroable;

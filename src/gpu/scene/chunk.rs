@@ -12,9 +12,9 @@ use crate::{
             recolor::Harmonics,
             select::Selection,
         },
+        uniforms::{COARSE, NODES, Source},
     },
     math::{Kernel, View},
-    plan::uniforms::{COARSE, NODES, Source},
     splat::SplatSet,
     volume::{Scalar, Volume},
 };

@@ -23,11 +23,11 @@ use crate::{
             select_bricks::SelectBricks,
             tables::FieldTables,
         },
+        uniforms::Source,
     },
     hierarchy::{Cut, Levels},
     math::{Bounds, Kernel, View},
     parallel::prelude::*,
-    plan::uniforms::Source,
     scene::{Item, Optics, Scene, Settings},
     splat::{Splat, SplatSet},
     volume::{
