@@ -4,16 +4,15 @@ use crate::{
     Error, Result,
     bricks::Choice,
     gpu::{
-        budget::Budget,
+        budget::{Budget, SCAN_CAPACITY},
         device::{Gpu, buffers::buffer},
         pipeline::{
             commands::Commands,
-            scan::SCAN_CAPACITY,
             state::{ARGUMENT_BYTES, HELD_RECORD_STARTS, PASS_BYTES, State},
-            variant::{MOST_BINS, MOST_GROUP_SHIFT, Variant},
         },
         scene::{PreparedScene, chunk::RUN, field::Gathered, tables::FieldTables},
         uniforms::Frame,
+        variant::{MOST_BINS, MOST_GROUP_SHIFT, Variant},
     },
     math::{Sheets, View},
     plan::{field::Field, frame},

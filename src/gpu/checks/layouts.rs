@@ -10,8 +10,8 @@ use crate::{
             SCAN_ARGUMENTS, State, TILE_ARGUMENTS,
         },
         scene::{
+            harmonics::GpuEye,
             nodes::{GpuBounds, GpuCut, GpuNode},
-            recolor::GpuEye,
         },
         uniforms::{Frame, FrameClip, FrameField, FrameIsosurface, Source},
     },

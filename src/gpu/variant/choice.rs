@@ -1,9 +1,10 @@
 //! Chooses the variant of a picture: the features of the shaders that its scene, view and settings
 //! need.
 
+use super::Variant;
 use crate::{
     bricks::Choice,
-    gpu::{budget::Budget, pipeline::variant::Variant},
+    gpu::budget::Budget,
     math::{Kernel, Profile, View},
     plan::{frame::clip_counts, tables},
     scene::{Classification, Gradient, Item, Optics, Scene, Settings},
