@@ -91,8 +91,13 @@ impl LoadFlags {
     /// unless a flag allows more.
     pub fn reading(&self, memory: Option<u64>) -> Reading {
         Reading::new(self.options(), self.limits())
-            .within_memory(memory.filter(|_| !self.limits.has_bytes()))
+            .within_memory(memory.filter(|_| !self.has_bytes()))
             .with_label_table(self.labels.clone())
+    }
+
+    /// Whether a flag limits the bytes of inputs.
+    pub fn has_bytes(&self) -> bool {
+        self.limits.has_bytes()
     }
 
     /// Reads a file.

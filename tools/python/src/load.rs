@@ -70,11 +70,6 @@ impl Load {
         }
     }
 
-    /// Returns the name of the values to read, if the caller named them.
-    pub fn scalar(&self) -> Option<&str> {
-        self.scalar.as_deref()
-    }
-
     /// Returns what to read of a file.
     fn read_options(&self) -> ReadOptions {
         ReadOptions {
@@ -127,9 +122,14 @@ impl Load {
         Ok(Some(RawLayout { dims, sample_type, spacing, endian, header }))
     }
 
+    /// Whether the caller limits the bytes of inputs.
+    pub fn has_bytes(&self) -> bool {
+        self.limits.bytes.is_some()
+    }
+
     /// Returns the way to read files.
     pub fn reading(&self) -> Reading {
-        let memory = memory::most().filter(|_| self.limits.bytes.is_none());
+        let memory = memory::most().filter(|_| !self.has_bytes());
         Reading::new(self.read_options(), self.limits())
             .within_memory(memory)
             .with_label_table(self.labels.clone())

@@ -84,11 +84,6 @@ impl Look {
         self.showing()?.validate()
     }
 
-    /// Whether something else than its own colours colours a surface.
-    pub fn is_painted(&self) -> bool {
-        !matches!(self.surface(), None | Some(SurfaceColor::File | SurfaceColor::Normal))
-    }
-
     fn surface(&self) -> Option<SurfaceColor> {
         self.color.as_deref().map(|text| SurfaceColor::of(text, color(text).ok()))
     }
