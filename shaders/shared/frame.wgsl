@@ -1,5 +1,5 @@
 // The data of the picture for every pass: the view, the sheets, the light. Mirrors
-// src/plan/uniforms.rs.
+// src/gpu/uniforms.rs.
 
 struct Frame {
     // Size of the picture in pixels, and in tiles.
@@ -117,7 +117,7 @@ struct Pass {
     unused: vec2<u32>,
 }
 
-// The placement of one item in the view. Mirrors src/plan/uniforms.rs.
+// The placement of one item in the view. Mirrors src/gpu/uniforms.rs.
 struct Source {
     // Columns of the matrix to view space, from the item's local frame (explicit splats) or from
     // lattice steps.

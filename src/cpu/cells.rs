@@ -77,7 +77,8 @@ struct Linear {
 
 impl<'a> CellField<'a> {
     pub fn new(plan: &Plan, tetrahedra: &'a Tetrahedra, visible: &Visible) -> Self {
-        let [zero, per_value, ..] = plan.frame.field().transfer.map(f64::from);
+        let [zero, per_value] =
+            [plan.field.values.zero, plan.field.values.per_value].map(f64::from);
         let entry = |value: f32| ((f64::from(value) - zero) * per_value) as f32;
         let of_points = tetrahedra.place() == Place::Points;
         let point = |(number, at): (usize, &Vec3)| {
@@ -86,7 +87,7 @@ impl<'a> CellField<'a> {
             [x, y, z, if of_points { entry(tetrahedra.values[number]) } else { 0.0 }]
         };
         let points: Vec<[f32; 4]> = tetrahedra.points.par_iter().enumerate().map(point).collect();
-        let turn = plan.view.rotation * (per_value * f64::from(plan.frame.field().gradients[2]));
+        let turn = plan.view.rotation * (per_value * f64::from(plan.field.gradients.length));
         let turn: Mat3 = turn.as_mat3();
         let needs = plan.has_gradients() && of_points;
         let own = if needs { &tetrahedra.gradients[..] } else { &[] };
@@ -630,7 +631,8 @@ impl CellField<'_> {
     /// maximum intensity picture, the value.
     #[inline(always)]
     fn light<S: Simd>(&self, simd: S, plan: &Plan, number: u32) -> [Lanes<S>; 4] {
-        let [zero, per_value, ..] = plan.frame.field().transfer.map(f64::from);
+        let [zero, per_value] =
+            [plan.field.values.zero, plan.field.values.per_value].map(f64::from);
         let value = f64::from(self.tetrahedra.values[number as usize]);
         let value = Lanes::splat(simd, ((value - zero) * per_value) as f32);
         if plan.optics == Optics::Maximum { [value; 4] } else { plan.of_value(simd, value) }

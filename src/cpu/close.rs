@@ -7,7 +7,13 @@ use super::{
     rays::Rays,
     vector::{self, Lanes, dot, each, exp, four, log2, three, words},
 };
-use crate::{plan::uniforms::FrameIsosurface, scene::Optics};
+use crate::{
+    plan::{
+        frame::Light,
+        tables::{Factors, Values},
+    },
+    scene::Optics,
+};
 use fearless_simd::{Simd, f32x4, i32x8, mask32x8, prelude::*};
 
 /// Number of parts of a sheet in which the transfer function is integrated.
@@ -201,7 +207,7 @@ impl Visible {
     /// Whether any value between two values, in entries of the table, is visible.
     pub fn may_show_between(&self, plan: &Plan, low: f32, high: f32) -> bool {
         let slack = 0.5 * NARROW + 1.0;
-        let [_, _, last, place] = plan.frame.field().transfer;
+        let Values { last, place, .. } = plan.field.values;
         let at = |value: f32| (value + place).clamp(0.0, last) as usize;
         self.0[at(high + slack) + 1] > self.0[at(low - slack)]
     }
@@ -210,11 +216,11 @@ impl Visible {
         if !plan.has_field {
             return Self(Vec::new());
         }
-        let [_, _, last, place] = plan.frame.field().transfer;
+        let Values { last, place, .. } = plan.field.values;
         let mut shows: Vec<bool> =
             plan.tables.entries[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
-        for surface in &plan.frame.field().isosurfaces[..plan.isosurfaces] {
-            let at = (surface.value[0] + place).clamp(0.0, last) as usize;
+        for surface in &plan.field.isosurfaces[..plan.isosurfaces] {
+            let at = (surface.value + place).clamp(0.0, last) as usize;
             let end = (at + 2).min(shows.len());
             shows[at..end].fill(true);
         }
@@ -235,7 +241,7 @@ impl Visible {
         // A parabola exceeds the range of its values at both ends and the middle by at most an
         // eighth of that range. Integrals cover at least NARROW entries.
         let slack = (high - low) * 0.125 + (0.5 * NARROW + 1.0);
-        let [_, _, last, place] = plan.frame.field().transfer;
+        let Values { last, place, .. } = plan.field.values;
         let (none, last) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, last));
         let low: [i32; 8] = i32x8::truncate_from((low - slack + place).max(none).min(last)).into();
         let high: [i32; 8] =
@@ -251,7 +257,7 @@ impl Plan<'_> {
     /// values.
     #[inline(always)]
     fn between<S: Simd>(&self, simd: S, a: Lanes<S>, b: Lanes<S>) -> [Lanes<S>; 4] {
-        let [_, _, end, place] = self.frame.field().transfer;
+        let Values { last: end, place, .. } = self.field.values;
         let none = Lanes::splat(simd, 0.0);
         let all = Lanes::splat(simd, end);
         let middle = (a + b) * 0.5 + place;
@@ -261,7 +267,7 @@ impl Plan<'_> {
         let inverse = Lanes::splat(simd, 1.0) / (high - low);
         let (first, last) = (low.max(none).min(all), high.max(none).min(all));
         let [first_at, last_at]: [[f32; 8]; 2] = [first.into(), last.into()];
-        let integrals = &self.tables.entries[self.tables.starts[0] as usize..];
+        let integrals = &self.tables.entries[self.tables.starts.integrals..];
         let within = columns(
             simd,
             each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
@@ -273,14 +279,14 @@ impl Plan<'_> {
         // Values before and behind the table count as those of its ends.
         let before = (high.min(none) - low.min(none)) * inverse;
         let behind = (high.max(all) - low.max(all)) * inverse;
-        let [first, last] = self.frame.field().beyond();
+        let [first, last] = self.field.beyond;
         four!(I => within[I] * inverse + before * first[I] + behind * last[I])
     }
 
     /// Returns extinction times colour, and extinction, for one value.
     #[inline(always)]
     fn one<S: Simd>(&self, simd: S, value: Lanes<S>) -> [Lanes<S>; 4] {
-        let [_, _, end, place] = self.frame.field().transfer;
+        let Values { last: end, place, .. } = self.field.values;
         let at = (value + place).max(Lanes::splat(simd, 0.0)).min(Lanes::splat(simd, end));
         let places: [f32; 8] = at.into();
         let [red, green, blue, extinction] = columns(
@@ -309,9 +315,8 @@ impl Plan<'_> {
     /// Returns the factor on the extinction for a gradient's magnitude.
     #[inline(always)]
     fn gradient_factor<S: Simd>(&self, simd: S, magnitude: Lanes<S>) -> Lanes<S> {
-        let [first, per_magnitude, ..] = self.frame.field().gradients;
-        let factors =
-            &self.tables.entries[self.tables.starts[1] as usize..self.tables.starts[2] as usize];
+        let Factors { first, per_magnitude } = self.field.gradients.factors;
+        let factors = &self.tables.entries[self.tables.starts.factors..self.tables.starts.radii];
         let last = Lanes::splat(simd, (factors.len() - 2) as f32);
         let at: [f32; 8] =
             ((magnitude - first) * per_magnitude).max(Lanes::splat(simd, 0.0)).min(last).into();
@@ -331,7 +336,7 @@ impl Plan<'_> {
         color: [Lanes<S>; 3],
         normal: [Lanes<S>; 3],
         direction: [Lanes<S>; 3],
-        [ambient, diffuse, specular, power]: [f32; 4],
+        Light { ambient, diffuse, specular, power }: Light,
     ) -> [Lanes<S>; 3] {
         let one = Lanes::splat(simd, 1.0);
         let size = dot(normal, normal).sqrt();
@@ -368,8 +373,8 @@ impl Plan<'_> {
         direction: [Lanes<S>; 3],
     ) -> [Lanes<S>; 2] {
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-        let [ambient, diffuse, specular, power] = self.frame.field().shade;
-        let [low, per_magnitude, ..] = self.frame.field().certain;
+        let Light { ambient, diffuse, specular, power } = self.field.light;
+        let (low, per_magnitude) = (self.field.certain_from, self.field.per_certain);
         let size = dot(gradient, gradient).sqrt();
         let certainty = ((size - low) * per_magnitude).max(none).min(one);
         let has_direction = size.simd_gt(LEAST_GRADIENT);
@@ -594,17 +599,11 @@ impl Plan<'_> {
         for number in 0..self.isosurfaces {
             // In the order from the front value to the back value.
             let rises = next.simd_gt(value);
-            let [up, down] = [number, self.isosurfaces - 1 - number].map(|i| {
-                let FrameIsosurface { value, color } = self.frame.field().isosurfaces[i];
-                [value, color]
-            });
-            let own = |row: usize, column: usize| {
-                rises.select(
-                    Lanes::splat(simd, up[row][column]),
-                    Lanes::splat(simd, down[row][column]),
-                )
-            };
-            let level = own(0, 0);
+            let [up, down] = [number, self.isosurfaces - 1 - number]
+                .map(|surface| &self.field.isosurfaces[surface]);
+            let of_met =
+                |up: f32, down: f32| rises.select(Lanes::splat(simd, up), Lanes::splat(simd, down));
+            let level = of_met(up.value, down.value);
             let crosses = (value.simd_lt(level) ^ next.simd_lt(level)) & piece.mask;
             if !crosses.any_true() {
                 continue;
@@ -612,16 +611,17 @@ impl Plan<'_> {
             let share = crosses.select((level - value) / (next - value), done);
             medium.pass(simd, depth * (share - done), color);
             done = share;
-            let opacity = crosses.select(own(0, 1), none);
+            let opacity = crosses.select(of_met(up.opacity, down.opacity), none);
             let taken = medium.through * opacity;
             let outside = medium.before * medium.through;
             medium.through -= taken;
-            medium.depth += crosses.select(own(0, 2), none);
+            medium.depth += crosses.select(of_met(up.depth, down.depth), none);
             let inside = medium.before * medium.through;
             let hits = outside.simd_gt(0.5) & inside.simd_le(0.5) & crosses;
             medium.hit = hits.select(piece.begin + piece.length * share, medium.hit);
             medium.has_hit |= hits;
-            let mut surface = [0, 1, 2].map(|channel| own(1, channel));
+            let mut surface =
+                [0, 1, 2].map(|channel| of_met(up.color[channel], down.color[channel]));
             if self.is_lit {
                 let normal = self.gradient(layer, place + (next_place - place) * share);
                 surface = self.lit_field(simd, surface, normal, layer.direction);
@@ -689,7 +689,7 @@ impl Plan<'_> {
     pub fn gradient_of_faces<S: Simd>(&self, layer: &Layer<S>, u: Lanes<S>) -> [Lanes<S>; 3] {
         let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
         let slope = a * (u * 4.0 - 3.0) + b * (4.0 - u * 8.0) + c * (u * 4.0 - 1.0);
-        let along = slope * self.frame.field().gradients[2] / layer.thickness;
+        let along = slope * self.field.gradients.length / layer.thickness;
         let (front, back) = (layer.front.across, layer.back.across);
         three!(I => (back[I] - front[I]).mul_add(u, front[I]) + along * layer.direction[I])
     }

@@ -3,7 +3,7 @@
 
 use super::{
     close::Packet,
-    footprint::{Kind, Record, origin, to_view},
+    footprint::{Kind, Record},
     plan::Plan,
     scatter::{OpenTile, Window, is_kept},
     sums::{Sums, WINDOW},
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     facet::{FacetSet, Image, NEARER, Sides},
-    plan::uniforms::Source,
+    plan::source::Source,
     scene::Settings,
     splat::{NO_NORMAL, decode_normal, encode_normal},
 };
@@ -49,8 +49,8 @@ impl<'a> FacetProjector<'a> {
     /// its back is never seen.
     pub fn record(&self, number: usize) -> Option<Record> {
         let (plan, facet) = (self.plan, &self.set.facets[number]);
-        let turn = to_view(&self.source);
-        let corners = facet.corners.map(|corner| turn * Vec3::from(corner) + origin(&self.source));
+        let Source { to_view, origin, .. } = self.source;
+        let corners = facet.corners.map(|corner| to_view * Vec3::from(corner) + origin);
         let [a, b, c] = corners;
         let across = (b - a).cross(c - a);
         let away = if plan.view.perspective { across.dot(a) } else { across.z };
@@ -62,7 +62,7 @@ impl<'a> FacetProjector<'a> {
         // On a set that winds in any way, all facets count as fronts.
         let is_front = away < 0.0 || self.set.sides == Sides::Mixed;
         let normals = facet.normals.map(|normal| {
-            let turned = decode_normal(normal).map(|normal| encode_normal(turn * normal));
+            let turned = decode_normal(normal).map(|normal| encode_normal(to_view * normal));
             f32::from_bits(turned.unwrap_or(NO_NORMAL))
         });
         let colors = facet.colors.map(f32::from_bits);
@@ -371,7 +371,7 @@ impl<S: Simd> OpenTile<'_, S> {
         let of =
             |parts: [f32; 3]| weights[0] * parts[0] + weights[1] * parts[1] + weights[2] * parts[2];
         let distance = of(facet.corners.map(|corner| corner.z)) / rays.cosine;
-        if plan.clips + plan.holes > 0 {
+        if plan.has_clips() {
             covers &= is_kept(plan, rays, distance);
         }
         let mut color = three!(I => of(facet.colors.map(|color| color[I])));
@@ -393,7 +393,7 @@ impl<S: Simd> OpenTile<'_, S> {
             let normal = three!(I => of(facet.normals.map(|normal| normal[I])));
             // Facets without normals keep their colours.
             if facet.normals != [Vec3::ZERO; 3] {
-                color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_shade);
+                color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
             }
         }
         let none = Lanes::splat(simd, 0.0);

@@ -27,14 +27,14 @@ use crate::{
         reach::{EVERYTHING, first_visible},
     },
 };
+use std::slice;
 
 /// A field of a scene.
 #[derive(Debug)]
 pub struct FieldState {
     /// The number of its item.
-    pub item: usize,
-    /// The scene without the other fields.
-    pub scene: Scene,
+    pub number: usize,
+    pub item: Item,
     /// The ranges of the field around the samples of a gathered lattice.
     ranges: Option<Vec<[u8; 2]>>,
     /// The kernel sums of a gathered lattice, if four weights an axis do not suffice.
@@ -51,9 +51,9 @@ pub struct FieldState {
 impl FieldState {
     /// Returns the fields of a scene.
     pub fn all(scene: &Scene) -> Vec<Self> {
-        let field = |item: usize| Self {
-            item,
-            scene: scene.with_one_field(item),
+        let field = |number: usize| Self {
+            number,
+            item: scene.items[number].clone(),
             ranges: None,
             blend: None,
             shares: None,
@@ -70,20 +70,19 @@ impl FieldState {
         shown + ranges + self.shares.as_ref().map_or(0, |shares| shares.len() as u64)
     }
 
-    /// Returns the bricks that a view needs, if the field is a volume in bricks. `bounds` are those
-    /// of the whole scene.
+    /// Returns the bricks that a view of the scene needs, if the field is a volume in bricks.
+    /// `bounds` are those of the whole scene.
     pub fn choice(
         &self,
+        scene: &Scene,
         view: &View,
         settings: &Settings,
         detail: Detail,
         bounds: &Bounds,
     ) -> Option<Choice> {
-        let most = self.scene.items.iter().find_map(|item| match item {
-            Item::Bricks(bricks, ..) => Some(most_bricks(bricks, settings)),
-            _ => None,
-        });
-        self.scene.choice(view, settings, detail, most.unwrap_or(usize::MAX), bounds)
+        let Item::Bricks(bricks, ..) = &self.item else { return None };
+        let most = most_bricks(bricks, settings);
+        scene.with_one_field(self.number).choice(view, settings, detail, most, bounds)
     }
 
     /// Returns what a picture draws of the field.
@@ -97,9 +96,8 @@ impl FieldState {
         choice: Option<Choice>,
     ) -> Result<FieldOutline> {
         let mut shown = EVERYTHING;
-        if let Some(Item::Volume(volume, _, transfer)) =
-            self.scene.items.iter().find(|i| matches!(i, Item::Volume(..)))
-            && !self.scene.mixes_afar(settings, sheets, choice.as_ref())
+        if let Item::Volume(volume, _, transfer) = &self.item
+            && !self.item.mixes_afar(settings, sheets, choice.as_ref())
         {
             shown = first_visible(transfer, volume.range);
         }
@@ -114,46 +112,44 @@ impl FieldState {
         sheets: &Sheets,
         choice: Option<&Choice>,
     ) -> Result<bool> {
-        let parts = gathering::parts(&self.scene, sheets, choice);
-        gathering::is_chosen(&self.scene, settings, || {
-            gathering::obstacle(&self.scene, settings, parts, gather::unsuited)
+        let items = slice::from_ref(&self.item);
+        let parts = gathering::parts(items, sheets, choice);
+        gathering::is_chosen(items, settings, || {
+            gathering::obstacle(items, settings, parts, gather::unsuited)
         })
     }
 
     /// Finds what is visible of a gathered field. `prepared` is that of its item.
     pub fn prepare_gather(&mut self, plan: &Plan, outline: &FieldOutline, prepared: &Prepared) {
-        for item in &self.scene.items {
-            match (item, prepared, &outline.choice) {
-                (Item::Volume(volume, kernel, transfer), ..) => {
-                    let first = match plan.optics {
-                        Optics::Maximum => EVERYTHING,
-                        _ => first_visible(transfer, volume.range),
-                    };
-                    if let (None, Ok(Way::Blend(taps))) = (&self.blend, Way::of(volume, kernel)) {
-                        self.blend = Some(Blend::new(volume, kernel, taps));
-                    }
-                    if volume.is_label_map() {
-                        self.shares.get_or_insert_with(|| own_shares(volume));
-                    }
-                    let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
-                        Some(blend) => blend.ranges(volume, kernel),
-                        None => shown::field_ranges(volume, kernel),
-                    });
-                    let dims =
-                        self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
-                    self.shown.take_if(|(own, _)| *own != first);
-                    self.shown.get_or_insert_with(|| (first, Shown::new(dims, ranges, &first)));
+        match (&self.item, prepared, &outline.choice) {
+            (Item::Volume(volume, kernel, transfer), ..) => {
+                let first = match plan.optics {
+                    Optics::Maximum => EVERYTHING,
+                    _ => first_visible(transfer, volume.range),
+                };
+                if let (None, Ok(Way::Blend(taps))) = (&self.blend, Way::of(volume, kernel)) {
+                    self.blend = Some(Blend::new(volume, kernel, taps));
                 }
-                (Item::Bricks(..), Prepared::Bricks(cache), Some(choice))
-                    if self.levels.as_ref().is_none_or(|(own, _)| own != choice) =>
-                {
-                    let level = |(level, _): &(usize, f64)| {
-                        (Grid::new(cache, choice, *level), Shown::of_bricks(cache, choice, *level))
-                    };
-                    self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
+                if volume.is_label_map() {
+                    self.shares.get_or_insert_with(|| own_shares(volume));
                 }
-                _ => {}
+                let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
+                    Some(blend) => blend.ranges(volume, kernel),
+                    None => shown::field_ranges(volume, kernel),
+                });
+                let dims = self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
+                self.shown.take_if(|(own, _)| *own != first);
+                self.shown.get_or_insert_with(|| (first, Shown::new(dims, ranges, &first)));
             }
+            (Item::Bricks(..), Prepared::Bricks(cache), Some(choice))
+                if self.levels.as_ref().is_none_or(|(own, _)| own != choice) =>
+            {
+                let level = |(level, _): &(usize, f64)| {
+                    (Grid::new(cache, choice, *level), Shown::of_bricks(cache, choice, *level))
+                };
+                self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
+            }
+            _ => {}
         }
     }
 
@@ -167,11 +163,7 @@ impl FieldState {
         visible: &'a Visible,
     ) -> DrawnField<'a> {
         let (mut means, mut marks) = (Means::Nothing, Vec::new());
-        let cells = self.scene.items.iter().find_map(|item| match item {
-            Item::Cells(own, _) => Some(own),
-            _ => None,
-        });
-        if let Some(cells) = cells {
+        if let Item::Cells(cells, _) = &self.item {
             means = Means::Cells(CellField::new(plan, cells, visible));
         } else if !outline.gathers {
             means = if plan.has_field { Means::Scattered } else { Means::Nothing };
@@ -191,34 +183,29 @@ impl FieldState {
         prepared: &'a Prepared,
         visible: &'a Visible,
     ) -> Option<Gather<'a>> {
-        let zero = plan.tables.values[0];
-        let mut levels = Vec::new();
-        for item in &self.scene.items {
-            match (item, prepared) {
-                (Item::Volume(volume, kernel, _), _) => {
-                    levels.push(self.whole_level(volume, kernel, zero)?);
-                }
-                (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache))
-                    if !cache.samples().is_empty() =>
-                {
-                    levels = self.levels_of_bricks(bricks, cache, weighting(kernel)?, zero)?;
-                }
-                _ => {}
+        let zero = plan.tables.values.zero;
+        let levels = match (&self.item, prepared) {
+            (Item::Volume(volume, kernel, _), _) => vec![self.whole_level(volume, kernel, zero)?],
+            (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache))
+                if !cache.samples().is_empty() =>
+            {
+                self.levels_of_bricks(bricks, cache, weighting(kernel)?, zero)?
             }
-        }
+            _ => return None,
+        };
         let [finest, _] = levels.first()?.cells;
         let steps = (0..3).map(|axis| {
-            let [x, y, z, _] = plan.frame.field().axes()[axis];
+            let [x, y, z] = plan.field.axes[axis];
             f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis])
         });
         let steps = steps.fold(0.0, f64::max) * sheets.step;
         let looks =
             if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
-        let parts = gathering::parts(&self.scene, sheets, outline.choice.as_ref());
-        let deviation = self.scene.items.iter().find_map(|item| deviation(item.kernel()?));
+        let parts = gathering::parts(slice::from_ref(&self.item), sheets, outline.choice.as_ref());
+        let deviation = self.item.kernel().and_then(deviation);
         let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
         let (is_blended, zero) = (self.blend.is_some(), zero as f32);
-        let is_label_map = self.scene.items.iter().any(Item::is_label_map);
+        let is_label_map = self.item.is_label_map();
         Some(Gather { plan, levels, parts, ends, looks, is_blended, is_label_map, visible, zero })
     }
 
@@ -287,16 +274,15 @@ impl FieldState {
 
     /// Returns the lattices of the gathered levels.
     fn lattices(&self, outline: &FieldOutline) -> Vec<Lattice> {
-        let own = |item: &Item| match (item, &outline.choice) {
+        match (&self.item, &outline.choice) {
             (Item::Volume(volume, ..), _) => {
-                Some(vec![self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).clone()])
+                vec![self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).clone()]
             }
             (Item::Bricks(bricks, ..), Some(choice)) => {
-                Some(choice.levels.iter().map(|(level, _)| bricks.lattice(*level)).collect())
+                choice.levels.iter().map(|(level, _)| bricks.lattice(*level)).collect()
             }
-            _ => None,
-        };
-        self.scene.items.iter().find_map(own).unwrap_or_default()
+            _ => Vec::new(),
+        }
     }
 
     /// Returns a bit for each sheet of each tile in which the gathered field may be visible.

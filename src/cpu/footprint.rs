@@ -3,7 +3,7 @@
 
 use super::plan::Plan;
 use crate::{
-    plan::uniforms::{ENDS, ISOTROPIC, RADIANCE, Source, TRAINED},
+    plan::{source::Source, tables::Values},
     scene::{Mode, Order},
     splat::{STEP_BACK, Splat, decode_normal, decode_trained_color},
 };
@@ -77,8 +77,8 @@ struct Place {
 /// Returns a splat of a set or a hierarchy in view space, widened so that it cannot fall between
 /// pixels (shaders/shared/splats.wgsl).
 pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
-    let to_view = to_view(source);
-    let mut center = to_view * Vec3::from(splat.center) + origin(source);
+    let to_view = source.to_view;
+    let mut center = to_view * Vec3::from(splat.center) + source.origin;
     let [b00, b10, b11, b20, b21, b22] = splat.factor;
     let factor = Mat3::from_cols(
         Vec3::new(b00, b10, b20),
@@ -86,16 +86,15 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
         Vec3::new(0.0, 0.0, b22),
     );
     let turned = to_view * factor;
-    let is_trained = source.flags & TRAINED != 0;
-    let distance = if is_trained { center.z.abs() } else { center.length() };
+    let distance = if source.is_trained { center.z.abs() } else { center.length() };
     let pixel = if plan.view.perspective { distance } else { 1.0 } / plan.frame.scale;
     let [blur2, along2] = source.blur().map(|blur| (blur * pixel).powi(2));
     let covariance =
         turned * turned.transpose() + Mat3::from_diagonal(Vec3::new(blur2, blur2, along2));
     let mut strength = splat.strength;
-    let carried = if is_trained {
+    let carried = if source.is_trained {
         Carried::Radiance { color: decode_trained_color(splat), normal: Vec3::ZERO }
-    } else if source.flags & RADIANCE != 0 {
+    } else if source.has_radiance {
         let [red, green, blue, opacity] =
             splat.color.to_le_bytes().map(|part| f32::from(part) / 255.0);
         strength *= opacity;
@@ -122,8 +121,7 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
         let slope_z = slope.z / b22;
         let slope_y = (slope.y - b21 * slope_z) / b11;
         let slope_x = (slope.x - b10 * slope_y - b20 * slope_z) / b00;
-        let gradient =
-            to_view * Vec3::new(slope_x, slope_y, slope_z) * plan.frame.field().transfer[1];
+        let gradient = to_view * Vec3::new(slope_x, slope_y, slope_z) * plan.field.values.per_value;
         strength = counted(plan, strength);
         Carried::Scalar { weight: weight * before / after, gradient }
     };
@@ -146,22 +144,12 @@ fn thinned(axes: Mat3, toward: Vec3, blur2: f32) -> f32 {
 
 /// Returns a value in entries of the transfer function's table, clamped so that it stays finite.
 pub fn counted(plan: &Plan, value: f32) -> f32 {
-    ((value - plan.frame.field().transfer[0]) * plan.frame.field().transfer[1]).clamp(-1e30, 1e30)
-}
-
-pub fn to_view(source: &Source) -> Mat3 {
-    let [x, y, z] = source.axes().map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
-    Mat3::from_cols(x, y, z)
-}
-
-pub fn origin(source: &Source) -> Vec3 {
-    Vec3::new(source.origin[0], source.origin[1], source.origin[2])
+    ((value - plan.field.values.zero) * plan.field.values.per_value).clamp(-1e30, 1e30)
 }
 
 /// Returns the record of a splat, or `None` if the splat meets no pixel or no sheet.
 pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record> {
-    let ends = source.flags & (ISOTROPIC | ENDS) != 0;
-    let Place { pixels, sheets } = locate(plan, splat, ends)?;
+    let Place { pixels, sheets } = locate(plan, splat, source.ends)?;
     let s = &splat.covariance;
     // The minimum keeps discs much thinner than wide invertible in 32 bits.
     let least = 1e-7 * s.x_axis.x.max(s.y_axis.y.max(s.z_axis.z)) + 1e-37;
@@ -184,7 +172,7 @@ pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record>
         Carried::Radiance { color, normal } => (Kind::Radiance, radiance(color, normal)),
         Carried::Scalar { weight, gradient } if plan.is_classified => {
             let [red, green, blue, extinction] = classify(plan, splat.strength);
-            strength = extinction * weight * plan.frame.field().kernel[2];
+            strength = extinction * weight * plan.field.kernel.per_overlap;
             let size = gradient.length();
             // The normal points to smaller values: outward.
             let has_direction = plan.lit_surfaces && size > LEAST_GRADIENT;
@@ -215,7 +203,7 @@ pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record>
 
 /// Looks up the colour and extinction of a value.
 fn classify(plan: &Plan, value: f32) -> [f32; 4] {
-    let [_, _, end, place] = plan.frame.field().transfer;
+    let Values { last: end, place, .. } = plan.field.values;
     let at = (value + place).clamp(0.0, end);
     let (low, part) = (at as usize, at.fract());
     let (a, b) = (plan.tables.entries[low], plan.tables.entries[low + 1]);
@@ -334,8 +322,7 @@ fn pixels(plan: &Plan, bounds: [[f32; 2]; 2]) -> Option<[[i32; 2]; 2]> {
 fn whole_sheet(plan: &Plan, center: Vec3, distance: f32) -> Option<usize> {
     let mut place = distance;
     if plan.mode == Mode::AxisSheets {
-        let [x, y, z, _] = plan.frame.sheet_normal;
-        place = Vec3::new(x, y, z).dot(center);
+        place = plan.frame.sheet_normal.dot(center);
         place = if plan.view.perspective { place.abs() } else { place };
     }
     let is_within = place >= plan.planes[1] && place < plan.planes[plan.sheets + 1];

@@ -151,7 +151,7 @@ impl<S: Simd> Last<S> {
 fn outside2<S: Simd>(simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
     let none = Lanes::splat(simd, 0.0);
     let outside = three!(I => {
-        (plan.frame.field().low[I] - place[I]).max(place[I] - plan.frame.field().high[I]).max(none)
+        (plan.field.low[I] - place[I]).max(place[I] - plan.field.high[I]).max(none)
     });
     dot(outside, outside)
 }
@@ -245,7 +245,7 @@ impl Gather<'_> {
         }
         // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with
         // slopes).
-        let inside = inside.value * plan.frame.field().transfer[1];
+        let inside = inside.value * plan.field.values.per_value;
         let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
         layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
@@ -280,7 +280,7 @@ impl Gather<'_> {
         let none = Lanes::splat(simd, 0.0);
         let place = rays.places((begin + end) * 0.5);
         let Point { value, slopes, .. } = self.at_place(simd, rays, place);
-        let value = value * self.plan.frame.field().transfer[1];
+        let value = value * self.plan.field.values.per_value;
         let face = Face { value, across: [none; 3] };
         let of_sheet = [start, stop - start].map(
             #[inline(always)]
@@ -343,7 +343,7 @@ impl Gather<'_> {
                     let [enter, leave] = rays.in_lattice(simd, plan, reach);
                     (from, to) = (enter.max(start).min(stop), leave.min(stop).max(start));
                 }
-                let least = plan.frame.field().isotropic[3];
+                let least = plan.field.least_sum;
                 let step = (to - from) * (1.0 / self.parts as f32);
                 let (mut sum, mut all) = (none, none);
                 for part in 0..self.parts {
@@ -360,7 +360,7 @@ impl Gather<'_> {
                     }
                 }
                 let mean = sum / all.max(Lanes::splat(simd, f32::MIN_POSITIVE))
-                    * plan.frame.field().transfer[1];
+                    * plan.field.values.per_value;
                 let (front, back) = (layer.front, layer.back);
                 let has_value = if self.is_blended {
                     each!([0, 1], I => weights[I].simd_gt(0.0))
@@ -390,8 +390,8 @@ impl Gather<'_> {
     fn kernels_at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> Lanes<S> {
         let mut all = Lanes::splat(simd, 1.0);
         let Some(per_deviation) = self.ends else { return all };
-        let frame = &self.plan.frame;
-        let ends = frame.field().low.iter().zip(frame.field().high);
+        let field = &self.plan.field;
+        let ends = field.low.iter().zip(field.high);
         for (place, (low, high)) in place.into_iter().zip(ends) {
             let after = place - *low;
             let before = high - place;
@@ -512,14 +512,14 @@ impl Gather<'_> {
     /// Evaluates the field on a plane, and its change along the rays per world unit.
     #[inline(always)]
     fn face<S: Simd>(&self, simd: S, rays: &Rays<S>, plane: usize, last: &mut Last<S>) {
-        let frame = &self.plan.frame;
-        let per_value = frame.field().transfer[1];
+        let field = &self.plan.field;
+        let per_value = field.values.per_value;
         let Point { value, slopes, weight } = self.at(simd, rays, self.plan.planes[plane]);
         let gradient = self.gradient(slopes);
         let along = dot(gradient, rays.direction);
         let across = three!(I => gradient[I] - along * rays.direction[I]);
         (last.plane, last.gradient, last.weight) = (plane, gradient, weight);
-        last.along = along * (1.0 / frame.field().gradients[2]);
+        last.along = along * (1.0 / field.gradients.length);
         last.face = Face { value: value * per_value, across };
     }
 
@@ -527,9 +527,8 @@ impl Gather<'_> {
     /// per thickness of a sheet.
     #[inline(always)]
     fn gradient<S: Simd>(&self, slopes: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
-        let frame = &self.plan.frame;
-        let (axes, scale) =
-            (frame.field().axes(), frame.field().transfer[1] * frame.field().gradients[2]);
+        let field = &self.plan.field;
+        let (axes, scale) = (field.axes, field.values.per_value * field.gradients.length);
         three!(I => {
             (slopes[0] * axes[0][I] + slopes[1] * axes[1][I] + slopes[2] * axes[2][I]) * scale
         })
@@ -575,13 +574,13 @@ impl<S: Simd> Layer<S> {
         inside: &Point<S>,
     ) -> mask32x8<S> {
         let none = Lanes::splat(simd, 0.0);
-        let least = plan.frame.field().isotropic[3];
+        let least = plan.field.least_sum;
         let [has_front, has_inside, has_back] = [front, inside.weight, back].map(
             #[inline(always)]
             |weight| weight.simd_gt(0.0),
         );
         let values =
-            [self.front.value, inside.value * plan.frame.field().transfer[1], self.back.value];
+            [self.front.value, inside.value * plan.field.values.per_value, self.back.value];
         // Simpson's rule for the sums of weights and of values. A place without a value does not
         // count.
         let shares = [

@@ -4,7 +4,7 @@ use super::{
     bins::BATCH,
     brick_cache::{BESIDE, BrickCache, SLOT, SLOT_SIDE},
     facets::FacetProjector,
-    footprint::{Candidate, Carried, Record, counted, origin, record, to_view, widened},
+    footprint::{Candidate, Carried, Record, counted, record, widened},
     page_cache::PageCache,
     plan::{FieldOutline, Outline, Plan},
     project::Projector,
@@ -19,12 +19,10 @@ use crate::{
     hierarchy::{Cut, Levels},
     math::{Kernel, View},
     parallel::prelude::*,
-    plan::uniforms::Source,
-    scene::{Item, Scene, Settings},
+    plan::{source::Source, tables::Values},
+    scene::{Item, Settings},
     splat::{Payload, Splat, SplatSet},
-    volume::{
-        Arrangement, Lattice, SampleSlice, Samples, TransferFunction, Volume, reach::EVERYTHING,
-    },
+    volume::{Arrangement, Lattice, SampleSlice, Samples, Volume, reach::EVERYTHING},
 };
 use fearless_simd::Level;
 use glam::{Mat3, Vec3};
@@ -239,8 +237,6 @@ struct LatticeSource<'a> {
     volume: &'a Volume,
     lattice: &'a Lattice,
     source: Source,
-    to_view: Mat3,
-    origin: Vec3,
     /// The map from steps of the lattice to gradients in view space.
     field_axes: Mat3,
 }
@@ -248,16 +244,8 @@ struct LatticeSource<'a> {
 impl<'a> LatticeSource<'a> {
     fn new(plan: &Plan, volume: &'a Volume, kernel: &Kernel) -> Self {
         let lattice = volume.drawn_lattice();
-        let source = Source::of_lattice(plan.view, lattice, kernel, false);
-        let [x, y, z] = plan.frame.field().axes().map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
-        Self {
-            volume,
-            lattice,
-            to_view: to_view(&source),
-            origin: origin(&source),
-            field_axes: Mat3::from_cols(x, y, z),
-            source,
-        }
+        let source = Source::of_lattice(plan.view, lattice, kernel);
+        Self { volume, lattice, field_axes: Mat3::from_cols_array_2d(&plan.field.axes), source }
     }
 
     fn value(&self, plan: &Plan, index: usize) -> f32 {
@@ -271,7 +259,7 @@ impl<'a> LatticeSource<'a> {
         let [nx, ny, _] = self.lattice.dims;
         let index = [number % nx, number / nx % ny, number / (nx * ny)];
         let mut steps = Vec3::from_array(index.map(|n| n as f32));
-        let mut covariance = symmetric(&self.source.covariance());
+        let mut covariance = self.source.covariance;
         match &self.lattice.arrangement {
             Arrangement::Cartesian => {}
             Arrangement::BodyCentred => {
@@ -282,8 +270,8 @@ impl<'a> LatticeSource<'a> {
                 steps = Vec3::from_array(std::array::from_fn(|axis| {
                     (coordinates[axis][index[axis]] - coordinates[axis][0]) as f32
                 }));
-                let unit = self.lattice.unit(index).as_vec3() * self.source.covariance_b[3];
-                let own = self.to_view * Mat3::from_diagonal(unit);
+                let unit = self.lattice.unit(index).as_vec3() * self.source.unit;
+                let own = self.source.to_view * Mat3::from_diagonal(unit);
                 covariance = own * own.transpose();
             }
         }
@@ -294,7 +282,7 @@ impl<'a> LatticeSource<'a> {
             gradient = self.field_axes * Vec3::from_array(slopes);
         }
         let candidate = Candidate {
-            center: self.origin + self.to_view * steps,
+            center: self.source.origin + self.source.to_view * steps,
             covariance,
             extent: self.source.extent,
             strength: value,
@@ -341,17 +329,13 @@ impl<'a> LatticeSource<'a> {
     }
 }
 
-fn symmetric([[xx, xy, xz, yy], [yz, zz, ..]]: &[[f32; 4]; 2]) -> Mat3 {
-    Mat3::from_cols(Vec3::new(*xx, *xy, *xz), Vec3::new(*xy, *yy, *yz), Vec3::new(*xz, *yz, *zz))
-}
-
 /// Returns the records of the samples in bricks.
 fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Record>> {
     let sources: Vec<Source> = choice
         .levels
         .iter()
         .map(|(level, _)| {
-            Source::of_lattice(plan.view, &cache.bricks.lattice(*level), &cache.kernel, false)
+            Source::of_lattice(plan.view, &cache.bricks.lattice(*level), &cache.kernel)
         })
         .collect();
     // A batch is a quarter of a brick.
@@ -371,8 +355,7 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
         let Some(slot) = cache.slot(level, brick) else { return Vec::new() };
         let blocks = cache.blocks(slot);
         let (source, weight) = (&sources[part], choice.levels[part].1 as f32);
-        let (to_view, origin, covariance) =
-            (to_view(source), origin(source), symmetric(&source.covariance()));
+        let &Source { to_view, origin, covariance, .. } = source;
         let dims = cache.bricks.level(level).dims;
         let first = cache.bricks.level(level).place(brick).map(|at| at * SIDE);
         let mut records = Vec::new();
@@ -415,16 +398,11 @@ fn sample(plan: &Plan, samples: &Samples, index: usize) -> f32 {
         // A 32-bit float cannot hold the whole integer.
         SampleSlice::I32(values) => {
             let low = values[index] & 0xffff;
-            let [zero, per_value, ..] = plan.frame.field().transfer;
+            let Values { zero, per_value, .. } = plan.field.values;
             ((((values[index] - low) as f32 - zero) + low as f32) * per_value).clamp(-1e30, 1e30)
         }
         _ => counted(plan, samples.value(index) as f32),
     }
-}
-
-/// Returns the transfer function of a scene's first field, or `None` without a field.
-pub fn transfer_of(scene: &Scene) -> Option<&TransferFunction> {
-    scene.items.iter().find_map(Item::transfer)
 }
 
 /// Returns an error if there are more records than record numbers.

@@ -376,7 +376,7 @@ impl March<'_> {
             let mut hit = pixels.hit;
             if plan.mode == Mode::AxisSheets {
                 // Convert the place along the sheets' normal to the distance along the ray.
-                let normal = plan.frame.sheet_normal;
+                let normal = plan.frame.sheet_normal.to_array();
                 let slope = super::vector::dot_with(normal, rays.direction);
                 hit = if plan.view.perspective {
                     hit / slope.abs().max(fearless_simd::f32x8::splat(simd, 1e-6))

@@ -65,7 +65,7 @@ use crate::{
     math::{Camera, View},
     parallel::prelude::*,
     picture::Picture,
-    plan::{FrameStats, TILE, gathering, pace::Pace, uniforms::Frame},
+    plan::{FrameStats, TILE, gathering, pace::Pace, tables::Values},
     scene::{Evaluate, Optics, Scene, Settings},
     volume::TransferFunction,
 };
@@ -143,7 +143,7 @@ impl CpuRenderer {
     pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
         self.scene = self.scene.shown_by(item, transfer)?;
         for field in &mut self.fields {
-            field.scene = self.scene.with_one_field(field.item);
+            field.item = self.scene.items[field.number].clone();
         }
         Ok(())
     }
@@ -204,11 +204,12 @@ impl CpuRenderer {
     fn plans<'a>(&self, view: &'a View, settings: &Settings, outline: &Outline) -> Vec<Plan<'a>> {
         let sheets = &outline.sheets;
         let own = |(field, own): (&FieldState, &FieldOutline)| {
-            Plan::new(&field.scene, view, sheets, settings, own.choice.as_ref())
+            let choice = own.choice.as_ref();
+            Plan::new(&self.scene, Some((field.number, choice)), view, sheets, settings)
         };
         let mut plans: Vec<_> = self.fields.iter().zip(&outline.fields).map(own).collect();
         if plans.is_empty() {
-            plans.push(Plan::new(&self.scene, view, sheets, settings, None));
+            plans.push(Plan::new(&self.scene, None, view, sheets, settings));
         }
         Plan::join(&mut plans);
         plans
@@ -224,7 +225,7 @@ impl CpuRenderer {
         let mut records = Vec::new();
         let mut spare = std::mem::take(&mut self.spare);
         for (number, prepared) in self.prepared.iter_mut().enumerate() {
-            let field = self.fields.iter().position(|field| field.item == number);
+            let field = self.fields.iter().position(|field| field.number == number);
             let own = field.map(|field| &outline.fields[field]);
             if let (Prepared::Bricks(cache), Some(choice)) =
                 (&mut *prepared, own.and_then(|own| own.choice.as_ref()))
@@ -274,7 +275,8 @@ impl CpuRenderer {
         let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
         self.prepared.iter_mut().try_for_each(|prepared| prepared.update_levels(view, pixels))?;
         let bounds = self.scene.bounds();
-        let choice = |field: &FieldState| field.choice(view, settings, detail, &bounds);
+        let scene = &self.scene;
+        let choice = |field: &FieldState| field.choice(scene, view, settings, detail, &bounds);
         let choices: Vec<Option<Choice>> = self.fields.iter().map(choice).collect();
         let in_bricks: Vec<Choice> = choices.iter().flatten().cloned().collect();
         let sheets = self.scene.sheets_of(view, settings, &in_bricks, &bounds);
@@ -291,7 +293,7 @@ impl CpuRenderer {
     fn prepare_gather(&mut self, plans: &[Plan], outline: &Outline) {
         for ((field, plan), own) in self.fields.iter_mut().zip(plans).zip(&outline.fields) {
             if own.gathers {
-                field.prepare_gather(plan, own, &self.prepared[field.item]);
+                field.prepare_gather(plan, own, &self.prepared[field.number]);
             }
         }
     }
@@ -305,7 +307,7 @@ impl CpuRenderer {
     ) -> Vec<DrawnField<'a>> {
         let all = self.fields.iter().zip(plans).zip(&outline.fields).zip(visible);
         all.map(|(((field, plan), own), visible)| {
-            field.drawn(plan, &outline.sheets, own, &self.prepared[field.item], visible)
+            field.drawn(plan, &outline.sheets, own, &self.prepared[field.number], visible)
         })
         .collect()
     }
@@ -330,7 +332,7 @@ impl CpuRenderer {
         let mut bins = Bins::new(plan, records, &mut spare);
         clock.step("bin");
         let drawn = AtomicU64::new(0);
-        let transfer = items::transfer_of(&self.scene);
+        let transfer = self.fields.first().and_then(|field| field.item.transfer());
         let [width, height] = plan.view.size;
         let mut color = vec![[0.0f32; 4]; width as usize * height as usize];
         let mut depth = vec![0.0f32; color.len()];
@@ -411,7 +413,7 @@ fn write_band(
             for ((color, depth), (own, hit)) in color.iter_mut().zip(depth).zip(own) {
                 if plan.optics == Optics::Maximum {
                     *color = transfer
-                        .map_or([0.0; 4], |transfer| of_largest(*hit, transfer, &plan.frame));
+                        .map_or([0.0; 4], |transfer| of_largest(*hit, transfer, plan.field.values));
                     *depth = f32::INFINITY;
                     continue;
                 }
@@ -424,12 +426,11 @@ fn write_band(
 
 /// Returns the colour of a pixel from the largest value on its ray. Its opacity is that of a unit
 /// of length.
-fn of_largest(value: f32, transfer: &TransferFunction, frame: &Frame) -> [f32; 4] {
+fn of_largest(value: f32, transfer: &TransferFunction, values: Values<f32>) -> [f32; 4] {
     if value <= NO_VALUE {
         return [0.0; 4];
     }
-    let value = f64::from(frame.field().transfer[0])
-        + f64::from(value) / f64::from(frame.field().transfer[1]);
+    let value = f64::from(values.zero) + f64::from(value) / f64::from(values.per_value);
     let opacity = 1.0 - (-transfer.extinction(value) * transfer.unit).exp();
     let [red, green, blue] = transfer.color(value);
     [red, green, blue, 1.0].map(|part| (part * opacity) as f32)

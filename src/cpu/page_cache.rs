@@ -17,7 +17,7 @@ use crate::{
     },
     math::View,
     parallel::prelude::*,
-    plan::uniforms::Source,
+    plan::source::Source,
     scene::Settings,
     splat::Splat,
 };

@@ -5,16 +5,17 @@ use crate::{
     Stop,
     bricks::Choice,
     facet::FacetSet,
-    math::{Profile, Sheets, View},
+    math::{Bounds, Profile, Sheets, View},
     plan::{
         TILE,
+        field::Field,
+        frame::{Frame, from_eye},
         tables::Tables,
-        uniforms::{Frame, clip_counts},
     },
     scene::{Classification, Gradient, Item, Mode, Optics, Order, Region, Scene, Settings},
     volume::Arrangement,
 };
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use std::sync::Arc;
 
 /// The place of a plane in front of or behind all others.
@@ -49,6 +50,7 @@ pub struct Plan<'a> {
     pub number: u8,
     pub view: &'a View,
     pub frame: Frame,
+    pub field: Field,
     pub tables: Tables,
     pub planes: Vec<f32>,
     /// The number of the last sheet.
@@ -85,27 +87,29 @@ pub struct Plan<'a> {
     pub has_trained: bool,
     /// The largest channel of a colour of radiance.
     pub brightest: f32,
-    /// The number of convex regions that are kept, and of boxes that are cut out.
-    pub clips: usize,
+    /// The number of boxes that are cut out.
     pub holes: usize,
     /// The lower and the upper corner of the region that is drawn, relative to the eye.
-    pub region: Option<[[f32; 4]; 2]>,
+    pub region: Option<[Vec3; 2]>,
 }
 
 impl<'a> Plan<'a> {
-    /// Returns the plan of a scene with one field, or without any.
+    /// Returns the plan of one field of a scene, by the number of its item and with its choice of
+    /// bricks; or of a scene without fields.
     pub fn new(
         scene: &Scene,
+        field: Option<(usize, Option<&Choice>)>,
         view: &'a View,
         sheets: &Sheets,
         settings: &Settings,
-        choice: Option<&Choice>,
     ) -> Self {
-        let [clips, holes] = clip_counts(settings).map(|count| count as usize);
+        let frame = Frame::new(scene, view, sheets, settings);
         let mut plan = Self {
             number: 0,
             view,
-            frame: Frame::new(scene, view, sheets, settings, choice),
+            holes: frame.holes.len(),
+            frame,
+            field: Field::default(),
             tables: Tables::default(),
             planes: planes_of(sheets),
             sheets: sheets.count(),
@@ -128,9 +132,9 @@ impl<'a> Plan<'a> {
             lit_surfaces: false,
             has_trained: scene.items.iter().any(Item::is_trained),
             brightest: scene.brightest(),
-            clips,
-            holes,
-            region: settings.region.map(|region| from_eye(view, region)),
+            region: settings
+                .region
+                .map(|Region { bounds: Bounds { min, max }, .. }| from_eye(view, [min, max])),
         };
         // Only emission and absorption is lit.
         let emits = settings.optics == Optics::EmissionAbsorption;
@@ -146,16 +150,11 @@ impl<'a> Plan<'a> {
                     plan.has_radiance |= !matches!(item, Item::Facets(_));
                     plan.lit_surfaces |= emits && settings.surface_shade.is_some();
                 }
-                Item::Scalar(..) => plan.has_slopes = true,
-                Item::Cells(..) => {}
-                Item::Volume(volume, ..) => {
-                    plan.on_lattice = true;
-                    plan.has_slopes =
-                        matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
-                }
-                Item::Bricks(..) => plan.on_lattice = true,
+                Item::Scalar(..) | Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {}
             }
-            plan.set_field(sheets, settings, item);
+        }
+        if let Some((number, choice)) = field {
+            plan.set_field(sheets, settings, &scene.items[number], choice);
         }
         plan.has_apron = plan.central;
         plan
@@ -171,12 +170,27 @@ impl<'a> Plan<'a> {
     }
 
     /// Sets what an item's field needs, if it has one.
-    fn set_field(&mut self, sheets: &Sheets, settings: &Settings, item: &Item) {
+    fn set_field(
+        &mut self,
+        sheets: &Sheets,
+        settings: &Settings,
+        item: &Item,
+        choice: Option<&Choice>,
+    ) {
         let (Some(transfer), Some(range)) = (item.transfer(), item.value_range()) else { return };
         let kernel = item.kernel();
+        self.on_lattice = item.lattice().is_some();
+        self.has_slopes = match item {
+            Item::Scalar(..) => true,
+            Item::Volume(volume, ..) => {
+                matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_))
+            }
+            _ => false,
+        };
         self.tables = Tables::of(item, transfer, range);
+        self.field = Field::new(item, self.view, settings, choice);
         let light = item.light(settings);
-        self.frame.fields[0].set_tables((&self.tables, 0), transfer, light, self.view, sheets);
+        self.field.set_tables(&self.tables, transfer, light, self.view, sheets);
         self.table_kernel =
             kernel.is_some_and(|kernel| !matches!(kernel.profile, Profile::Gaussian(_)));
         let emits = settings.optics == Optics::EmissionAbsorption;
@@ -200,6 +214,11 @@ impl<'a> Plan<'a> {
     /// Whether the field's gradient is used.
     pub fn has_gradients(&self) -> bool {
         self.has_field && (self.is_lit || self.has_gradient_opacity)
+    }
+
+    /// Whether clips leave anything out.
+    pub fn has_clips(&self) -> bool {
+        !self.frame.clips.is_empty() || self.holes > 0
     }
 
     /// Whether splats are drawn whole, in the sheet of their centre.
@@ -248,9 +267,9 @@ impl<'a> Plan<'a> {
         let geometric = frame.geometric_sheets as usize;
         let turn = self.planes[1 + geometric];
         let estimate = if distance < turn {
-            1.0 + ((distance / near).log2() * frame.ratio_log2_inverse).floor()
+            1.0 + ((distance / near).log2() * frame.per_ratio_log2).floor()
         } else {
-            1.0 + geometric as f32 + ((distance - turn) * frame.step_inverse).floor()
+            1.0 + geometric as f32 + ((distance - turn) * frame.per_step).floor()
         };
         let mut sheet = estimate.clamp(1.0, self.sheets as f32) as usize;
         // The closed form may be off by one where rounding meets a plane. The list decides.
@@ -261,12 +280,6 @@ impl<'a> Plan<'a> {
         }
         sheet
     }
-}
-
-/// Returns the corners of a region, relative to the eye.
-fn from_eye(view: &View, Region { bounds, .. }: Region) -> [[f32; 4]; 2] {
-    let corner = |corner: DVec3| (corner - view.position).as_vec3().extend(0.0).to_array();
-    [corner(bounds.min), corner(bounds.max)]
 }
 
 /// Returns the planes between all sheets: one before the first sheet, and four behind the last.

@@ -2,12 +2,12 @@
 //! at a time.
 
 use super::{
-    footprint::{Kind, Record, SECTION_OVERREACH, origin, record, to_view, widened},
+    footprint::{Kind, Record, SECTION_OVERREACH, record, widened},
     plan::Plan,
     vector::{Lanes, dot, each, log2, three},
 };
 use crate::{
-    plan::uniforms::{Source, TRAINED},
+    plan::source::Source,
     splat::{NO_NORMAL, STEP_BACK, Splat, TRAINED_COLOR},
 };
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
@@ -55,14 +55,12 @@ type Symmetric<S> = [Lanes<S>; 6];
 
 impl<'a> Projector<'a> {
     pub fn new(plan: &'a Plan<'a>, source: Source) -> Self {
-        let turn = to_view(&source);
-        let axes = [turn.x_axis, turn.y_axis, turn.z_axis].map(|axis| axis.to_array());
-        let origin = origin(&source).to_array();
-        Self { plan, source, axes, origin }
+        let axes = source.to_view.to_cols_array_2d();
+        Self { plan, source, axes, origin: source.origin.to_array() }
     }
 
     fn is_trained(&self) -> bool {
-        self.source.flags & TRAINED != 0
+        self.source.is_trained
     }
 
     /// Adds the records of splats, each with a share of its strength.
@@ -385,8 +383,8 @@ impl<'a> Projector<'a> {
         let near = plan.planes[1];
         let geometric = frame.geometric_sheets as usize;
         let turn = plan.planes[1 + geometric];
-        let log = log2(simd, (distance * (1.0 / near)).max(one)) * frame.ratio_log2_inverse;
-        let even = (distance - turn) * frame.step_inverse + geometric as f32;
+        let log = log2(simd, (distance * (1.0 / near)).max(one)) * frame.per_ratio_log2;
+        let even = (distance - turn) * frame.per_step + geometric as f32;
         let estimate = distance.simd_lt(turn).select(log, even).floor() + 1.0;
         let estimate = estimate.max(one).min(Lanes::splat(simd, plan.sheets as f32));
         let [distances, estimates]: [[f32; 8]; 2] = [distance.into(), estimate.into()];

@@ -5,10 +5,11 @@ use super::{
     vector::{Lanes, dot_with, three},
 };
 use crate::{
-    plan::{TILE, uniforms::FrameClip},
+    plan::{TILE, frame::Convex},
     scene::Settings,
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
+use glam::Vec3;
 
 /// Packets of a tile.
 pub const PACKETS: usize = TILE * TILE / 8;
@@ -61,33 +62,33 @@ impl<S: Simd> Rays<S> {
         } else {
             ([right, down, none], [none, none, one])
         };
-        let rows: [[f32; 4]; 3] =
-            three!(I => [frame.world_x[I], frame.world_y[I], frame.world_z[I], 0.0]);
+        let rows: [[f32; 3]; 3] = three!(I => frame.to_world.row(I).to_array());
         let (from, toward) =
             (three!(I => dot_with(rows[I], origin)), three!(I => dot_with(rows[I], direction)));
         let mut kept = [Lanes::splat(simd, BEFORE), Lanes::splat(simd, BEHIND)];
-        for FrameClip { low, high } in &frame.clips[..plan.clips] {
-            let part = if high[3] > 0.0 {
-                part_in_box(simd, *low, *high, from, toward)
-            } else {
-                part_in_half_space(simd, *low, high[0], from, toward)
+        for convex in &frame.clips {
+            let part = match convex {
+                Convex::Box(corners) => part_in_box(simd, corners_of(corners), from, toward),
+                Convex::HalfSpace { normal, offset } => {
+                    part_in_half_space(simd, normal.to_array(), *offset, from, toward)
+                }
             };
             kept = [kept[0].max(part[0]), kept[1].min(part[1])];
         }
         let mut holes = [[none; 2]; Settings::MAX_CLIPS];
-        for (own, FrameClip { low, high }) in holes.iter_mut().zip(&frame.holes[..plan.holes]) {
-            *own = part_in_box(simd, *low, *high, from, toward);
+        for (part, corners) in holes.iter_mut().zip(&frame.holes) {
+            *part = part_in_box(simd, corners_of(corners), from, toward);
         }
-        let region = match plan.region {
-            Some([low, high]) => part_in_box(simd, low, high, from, toward),
+        let region = match &plan.region {
+            Some(corners) => part_in_box(simd, corners_of(corners), from, toward),
             None => [Lanes::splat(simd, BEFORE), Lanes::splat(simd, BEHIND)],
         };
-        let axes = frame.field().axes();
-        let start = three!(I => dot_with(axes[I], origin) + frame.field().origin[I]);
-        let way = three!(I => dot_with(axes[I], direction));
+        let field = &plan.field;
+        let start = three!(I => dot_with(field.axes[I], origin) + field.origin[I]);
+        let way = three!(I => dot_with(field.axes[I], direction));
         let mut inside = kept;
         if plan.has_field && plan.on_lattice {
-            let part = part_in_box(simd, frame.field().low, frame.field().high, start, way);
+            let part = part_in_box(simd, [field.low, field.high], start, way);
             inside = [kept[0].max(part[0]), kept[1].min(part[1])];
         }
         Self {
@@ -107,11 +108,9 @@ impl<S: Simd> Rays<S> {
     /// Returns the part of each ray in the box of the samples, widened by `wider` steps.
     #[inline(always)]
     pub fn in_lattice(&self, simd: S, plan: &Plan, wider: f32) -> Part<S> {
-        let (low, high) = (
-            plan.frame.field().low.map(|low| low - wider),
-            plan.frame.field().high.map(|high| high + wider),
-        );
-        part_in_box(simd, low, high, self.start, self.way)
+        let (low, high) =
+            (plan.field.low.map(|low| low - wider), plan.field.high.map(|high| high + wider));
+        part_in_box(simd, [low, high], self.start, self.way)
     }
 
     /// Returns the rays on which a sheet between two planes belongs to the region that is drawn:
@@ -135,12 +134,15 @@ impl<S: Simd> Rays<S> {
     }
 }
 
-/// Returns the distances between which rays are inside a box.
+fn corners_of(corners: &[Vec3; 2]) -> [[f32; 3]; 2] {
+    corners.map(|corner| corner.to_array())
+}
+
+/// Returns the distances between which rays are inside a box with these corners.
 #[inline(always)]
 fn part_in_box<S: Simd>(
     simd: S,
-    low: [f32; 4],
-    high: [f32; 4],
+    [low, high]: [[f32; 3]; 2],
     origin: [Lanes<S>; 3],
     direction: [Lanes<S>; 3],
 ) -> Part<S> {
@@ -160,7 +162,7 @@ fn part_in_box<S: Simd>(
 #[inline(always)]
 fn part_in_half_space<S: Simd>(
     simd: S,
-    normal: [f32; 4],
+    normal: [f32; 3],
     offset: f32,
     origin: [Lanes<S>; 3],
     direction: [Lanes<S>; 3],

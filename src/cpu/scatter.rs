@@ -12,7 +12,7 @@ use super::{
     vector::{Lanes, dot, each, exp, log2, three},
 };
 use crate::{
-    plan::TILE,
+    plan::{TILE, field::FieldKernel},
     scene::{Optics, Order},
     splat::TRAINED_OPACITIES,
 };
@@ -239,7 +239,7 @@ impl<'a> Projected<'a> {
             }
         }
         let mut counts = along.inside;
-        if plan.clips + plan.holes > 0 {
+        if plan.has_clips() {
             counts &= is_kept(plan, rays, along.l * along.inverse * along.inverse / rays.cosine);
         }
         if plan.is_whole() && plan.view.perspective {
@@ -500,7 +500,7 @@ fn single<S: Simd>(
     let normal = [x, y, z].map(|part| Lanes::splat(simd, part));
     let mut color = [red, green, blue].map(|part| Lanes::splat(simd, part));
     if plan.lit_surfaces && [x, y, z] != [0.0; 3] {
-        color = plan.lit(simd, color, normal, packet.rays.direction, plan.frame.surface_shade);
+        color = plan.lit(simd, color, normal, packet.rays.direction, plan.frame.surface_light);
     }
     let one = Lanes::splat(simd, 1.0);
     let left = exp(simd, -depth);
@@ -538,9 +538,9 @@ pub fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask
 /// Returns the kernel and −h′(r)/r at radii in kernel space; 0 beyond its extent.
 #[inline(always)]
 fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
-    let [length, per_length, ..] = plan.frame.field().kernel;
+    let FieldKernel { extent: length, per_extent: per_length, .. } = plan.field.kernel;
     let last = (RADII - 1) as f32;
-    let start = plan.tables.starts[2] as usize;
+    let start = plan.tables.starts.radii;
     let radii: [f32; 8] = radius.into();
     let mut found = [[0.0f32; 8]; 2];
     for (lane, radius) in radii.into_iter().enumerate() {
@@ -558,9 +558,9 @@ fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
 /// approach to t.
 #[inline(always)]
 fn kernel_integral<S: Simd>(simd: S, plan: &Plan, rho: Lanes<S>, t: Lanes<S>) -> Lanes<S> {
-    let per_length = plan.frame.field().kernel[1];
+    let per_length = plan.field.kernel.per_extent;
     let cells = SECTIONS as f32;
-    let start = plan.tables.starts[3] as usize;
+    let start = plan.tables.starts.sections;
     let ([rhos, ts], mut found): ([[f32; 8]; 2], _) = ([rho.into(), t.into()], [0.0f32; 8]);
     for lane in 0..8 {
         let place = |value: f32| (value * per_length * cells).min(cells - 1e-3);

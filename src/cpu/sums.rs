@@ -167,7 +167,7 @@ impl<S: Simd> Sums<S> {
         if plan.lit_surfaces {
             let normal = [x, y, z];
             let direction = packet.rays.direction;
-            let lit = plan.lit(simd, color, normal, direction, plan.frame.surface_shade);
+            let lit = plan.lit(simd, color, normal, direction, plan.frame.surface_light);
             let size2 = x * x + y * y + z * z;
             let has_normal = size2.simd_gt(0.0);
             if plan.has_trained {
@@ -269,7 +269,7 @@ impl<S: Simd> ScalarSums<S> {
         let [start, stop] = [plan.planes[sheet], plan.planes[sheet + 1]];
         let thickness = stop - start;
         let own = &self.field[slot][packet.number];
-        let has_value = own.weight.simd_gt(plan.frame.field().isotropic[3] * thickness);
+        let has_value = own.weight.simd_gt(plan.field.least_sum * thickness);
         let value = own.value / own.weight.max(Lanes::splat(simd, 1e-37));
         let one = Lanes::splat(simd, 1.0);
         let filling = if plan.on_lattice { one } else { (own.weight * (1.0 / thickness)).min(one) };
@@ -310,7 +310,7 @@ impl<S: Simd> ScalarSums<S> {
         differences: Option<[Lanes<S>; 2]>,
     ) -> Resolved<S> {
         let own = &self.faces[plane % WINDOW][packet.number];
-        let has_value = own.weight.simd_gt(plan.frame.field().isotropic[3]);
+        let has_value = own.weight.simd_gt(plan.field.least_sum);
         let inverse = Lanes::splat(simd, 1.0) / own.weight.max(Lanes::splat(simd, 1e-37));
         let value = own.value * inverse;
         let mut across = [self.none; 3];
@@ -329,7 +329,7 @@ impl<S: Simd> ScalarSums<S> {
     pub fn values_on(&self, simd: S, plan: &Plan, plane: usize) -> [[f32; TILE]; TILE] {
         let mut values = [[f32::NAN; TILE]; TILE];
         for (packet, own) in self.faces[plane % WINDOW].iter().enumerate() {
-            let has_value = own.weight.simd_gt(plan.frame.field().isotropic[3]);
+            let has_value = own.weight.simd_gt(plan.field.least_sum);
             let value = own.value / own.weight.max(Lanes::splat(simd, 1e-37));
             let value: [f32; 8] = has_value.select(value, Lanes::splat(simd, f32::NAN)).into();
             for (lane, value) in value.into_iter().enumerate() {
@@ -368,7 +368,7 @@ fn across_of<S: Simd>(
     slopes: [Lanes<S>; 2],
     distance: f32,
 ) -> [Lanes<S>; 3] {
-    let [.., to_world] = plan.frame.field().gradients;
+    let to_world = plan.field.gradients.pixels;
     let scale = if plan.view.perspective {
         Lanes::splat(simd, to_world) / (rays.cosine * distance)
     } else {

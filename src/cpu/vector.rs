@@ -154,7 +154,7 @@ pub fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
 
 /// The same with one vector for all lanes.
 #[inline(always)]
-pub fn dot_with<S: Simd>(a: [f32; 4], b: [Lanes<S>; 3]) -> Lanes<S> {
+pub fn dot_with<S: Simd, const N: usize>(a: [f32; N], b: [Lanes<S>; 3]) -> Lanes<S> {
     b[0] * a[0] + b[1] * a[1] + b[2] * a[2]
 }
 

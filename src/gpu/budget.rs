@@ -1,6 +1,12 @@
 //! The capacity of a depth pass of the GPU engine.
 
-use crate::gpu::{device::Gpu, pipeline::variant::RECORD_WORDS};
+use crate::gpu::device::Gpu;
+
+/// Words of a general record.
+pub const RECORD_WORDS: u32 = 4;
+
+/// Maximum number of elements of one prefix sum.
+pub const SCAN_CAPACITY: u32 = 1 << 24;
 
 /// The capacity of a depth pass. A frame that needs more is drawn in several passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,18 +5,16 @@ use crate::gpu::{
     passes::{
         bin::Bin, clear::Clear, cull::Cull, cut::Cut, gather::Gather, large::Large, march::March,
         mark::Mark, measure::Measure, occlusion::Occlusion, order::Order, plan::Plan,
-        project::Project, resume::Resume, tiles::Tiles,
+        project::Project, recolor::Recolor, resume::Resume, scan::Scan, select::Select,
+        select_bricks::SelectBricks, tiles::Tiles,
     },
     pipeline::{
         commands::Commands,
-        scan::Scan,
         state::{AGAIN_ARGUMENTS, MARCH_ARGUMENTS, SCAN_ARGUMENTS},
-        variant::Variant,
     },
-    scene::{
-        PreparedScene, chunk::Origin, recolor::Recolor, select::Select, select_bricks::SelectBricks,
-    },
+    scene::{PreparedScene, chunk::Origin},
     targets::Targets,
+    variant::Variant,
 };
 
 /// The pipelines of a variant: those that scatter splats, and the one that gathers a lattice.

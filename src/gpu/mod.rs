@@ -1,13 +1,13 @@
 //! The GPU engine: draws a scene, sheet by sheet, on wgpu.
 //!
-//! A frame runs through these passes. Each has a Rust file in `passes` (`select` and
-//! `select_bricks` in `scene`, `scan` in `pipeline`) and a shader of the same name in
-//! shaders/passes/:
+//! A frame runs through these passes. Each has a Rust file in `passes` and a shader of the same name
+//! in shaders/passes/:
 //!
 //! | pass | purpose |
 //! |---|---|
 //! | `select` | which samples of a volume the transfer function can show (only when it changes) |
 //! | `select_bricks` | the same for a volume in bricks (also when other bricks are drawn) |
+//! | `recolor` | the colours of trained Gaussians that the eye sees (only when the eye moves) |
 //! | `cut` | which nodes of a hierarchy are drawn in this view |
 //! | `measure` | the tiles and sheets that each splat meets, and the capacity that it needs |
 //! | `plan` | divides the frame into depth passes that fit the buffers |
@@ -28,10 +28,11 @@
 //! | module | purpose |
 //! |---|---|
 //! | `device` | adapters and their limits, errors of a device, buffers and timestamps |
-//! | `pipeline` | shader files, pipelines with their bindings and constants, prefix sums |
+//! | `pipeline` | shader files, and pipelines with their bindings |
+//! | `variant` | which features of the shaders a picture needs, and the constants that say so |
+//! | `uniforms` | the plan's numbers, packed as shaders read them |
 //! | `scene` | the data of a scene on the GPU |
 //! | `targets`, `budget` | the buffers of a frame, and the capacity of a depth pass |
-//! | `variant` | which features of the shaders a picture needs |
 //! | `output` | where a host application gets the picture |
 //! | `frame` | the order of the passes |
 //! | `outline` | the plan of a frame: detail, bricks, sheets, strips |
@@ -53,6 +54,7 @@ mod pipeline;
 mod renderer;
 mod scene;
 mod targets;
+mod uniforms;
 mod variant;
 
 pub use budget::Budget;

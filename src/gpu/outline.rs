@@ -60,19 +60,19 @@ impl Request<'_> {
         let before = reads(prepared);
         let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
         prepared.update_levels(gpu, view, pixels)?;
-        prepared.update_seen(gpu, &passes.recolor, view)?;
+        passes.recolor.update(gpu, prepared, view)?;
         prepared.update_facets(view, settings);
         prepared.update_forests(gpu, view, settings, cut_pixels)?;
         let choice = self.bring_bricks(gpu, passes, prepared)?;
         let sheets = prepared.scene.sheets_of(view, settings, choice.as_slice(), &prepared.bounds);
-        let gather = gathering::is_chosen(&prepared.scene, settings, || {
+        let gather = gathering::is_chosen(&prepared.scene.items, settings, || {
             field::obstacle(&prepared.scene, settings, &sheets, gpu)
         })?;
         if gather {
             prepared.update_field(gpu, settings)?;
         } else {
             let all = prepared.scene.mixes_afar(settings, &sheets, choice.as_ref());
-            prepared.update_selections(gpu, &passes.select, view, all)?;
+            passes.select.list(gpu, prepared, view, all)?;
         }
         Ok(Outline { cut_pixels, choice, read_bricks: reads(prepared) - before, sheets, gather })
     }
@@ -108,7 +108,7 @@ impl Request<'_> {
             let runs = if choice.bricks.len() > 1 { most_runs } else { u64::MAX };
             let room = Room { bytes, runs };
             let Listed::TooMany { runs, most: fit } =
-                prepared.update_bricks(gpu, &passes.select_bricks, view, &choice, room)?
+                passes.select_bricks.list(gpu, prepared, view, &choice, room)?
             else {
                 if let (Some(most), Some(brick_cache)) = (most, &mut prepared.brick_cache) {
                     brick_cache.set_fitting(&wanted, most_runs, most);

@@ -4,18 +4,18 @@ use crate::{
     Error, Result,
     bricks::Choice,
     gpu::{
-        budget::Budget,
+        budget::{Budget, SCAN_CAPACITY},
         device::{Gpu, buffers::buffer},
         pipeline::{
             commands::Commands,
-            scan::SCAN_CAPACITY,
             state::{ARGUMENT_BYTES, HELD_RECORD_STARTS, PASS_BYTES, State},
-            variant::{MOST_BINS, MOST_GROUP_SHIFT, Variant},
         },
         scene::{PreparedScene, chunk::RUN, field::Gathered, tables::FieldTables},
+        uniforms::Frame,
+        variant::{MOST_BINS, MOST_GROUP_SHIFT, Variant},
     },
     math::{Sheets, View},
-    plan::uniforms::Frame,
+    plan::{field::Field, frame},
     scene::{Scene, Settings},
 };
 use wgpu::BufferUsages as Usage;
@@ -213,10 +213,12 @@ impl Request<'_> {
         let (tiles, unit) = (self.tiles(), self.variant.record_unit());
         let splats = prepared.runs.saturating_mul(RUN);
         let budget = self.budget.within(gpu, splats, unit);
-        let mut frame = self.frame(prepared, budget);
+        let mut frame = self.frame(&prepared.scene, budget);
         let tables = FieldTables::of(gpu, &prepared.scene, prepared.tables.take());
-        tables.describe(self.settings, self.view, self.sheets, &mut frame);
-        let gathered = self.gathered(gpu, prepared, tables.entries(), &mut frame);
+        let view = (self.view, self.choice);
+        let fields = tables.in_view(&prepared.scene, self.settings, view, self.sheets);
+        tables.pack(&fields, &mut frame);
+        let gathered = self.gathered(gpu, prepared, (tables.entries(), &fields), &mut frame);
         let table = tables.buffer.clone();
         prepared.tables = Some(tables);
         let sizes = Sizes::of(self, gpu, budget, prepared.runs);
@@ -300,11 +302,11 @@ impl Request<'_> {
     }
 
     /// Returns the constants of the frame, without its tables.
-    fn frame(&self, prepared: &PreparedScene, budget: Budget) -> Frame {
-        let Self { view, sheets, settings, choice, .. } = *self;
+    fn frame(&self, scene: &Scene, budget: Budget) -> Frame {
+        let Self { view, sheets, settings, .. } = *self;
         let tiles = self.tiles();
         let most_tiles = tiles[0].max(tiles[1]);
-        let mut frame = Frame::new(&prepared.scene, view, sheets, settings, choice);
+        let mut frame = Frame::new(&frame::Frame::new(scene, view, sheets, settings));
         frame.tiles = tiles;
         frame.tile_shift = most_tiles.div_ceil(SPAN_TILES).next_power_of_two().trailing_zeros();
         frame.entry_capacity = budget.entries;
@@ -317,14 +319,15 @@ impl Request<'_> {
         &self,
         gpu: &Gpu,
         prepared: &mut PreparedScene,
-        table: &[[f32; 4]],
+        (table, fields): (&[[f32; 4]], &[Field]),
         frame: &mut Frame,
     ) -> Option<Gathered> {
         let field = prepared.field.as_mut().filter(|_| self.variant.gather)?;
         let before = field.bytes();
         let [columns, rows] = self.tiles();
         let place = (self.sheets, columns * rows);
-        let gathered = field.gathered(gpu, place, self.variant, table, frame)?;
+        let table = (table, fields.first()?);
+        let gathered = field.gathered(gpu, place, self.variant, table, &mut frame.fields[0])?;
         prepared.bytes += field.bytes() - before;
         Some(gathered)
     }

@@ -5,23 +5,24 @@ use crate::{
     Error, Result,
     bricks::Choice,
     math::{Kernel, Sheets},
-    scene::{Evaluate, Gradient, Item, MOST_GATHERED, Mode, Scene, Settings},
+    scene::{Evaluate, Gradient, Item, MOST_GATHERED, Mode, Settings},
     volume::{Arrangement, Volume},
 };
 
 /// Maximum thickness of a part of a thick sheet, in sample spacings.
 const PART: f64 = 1.5;
 
-/// Returns why the field of a scene can't be gathered, or `None` if it can. `parts` is the result
-/// of [`parts`]. `unsuited` returns why a volume and its kernel can't be gathered, if so.
+/// Returns why the field of a scene can't be gathered, or `None` if it can. `items` are those of
+/// the scene. `parts` is the result of [`parts`]. `unsuited` returns why a volume and its kernel
+/// can't be gathered, if so.
 pub fn obstacle(
-    scene: &Scene,
+    items: &[Item],
     settings: &Settings,
     parts: usize,
     unsuited: impl Fn(&Volume, &Kernel) -> Option<&'static str>,
 ) -> Option<&'static str> {
-    let fields = scene.items.iter().filter(|item| item.transfer().is_some());
-    if parts > 1 && scene.items.iter().any(Item::is_label_map) {
+    let fields = items.iter().filter(|item| item.transfer().is_some());
+    if parts > 1 && items.iter().any(Item::is_label_map) {
         return Some("sheets thicker than two samples");
     }
     let unsuited = match fields.collect::<Vec<_>>()[..] {
@@ -37,7 +38,7 @@ pub fn obstacle(
         let arrangement = item.lattice().map(|lattice| &lattice.arrangement);
         matches!(arrangement, Some(Arrangement::Rectilinear(_)))
     };
-    if parts > 1 && scene.items.iter().any(is_rectilinear) {
+    if parts > 1 && items.iter().any(is_rectilinear) {
         return Some("sheets thicker than two samples of a rectilinear lattice");
     }
     if settings.mode != Mode::Sheets || settings.classifies_samples() {
@@ -46,17 +47,24 @@ pub fn obstacle(
     (settings.gradient == Gradient::Central).then_some("gradients from neighbouring pixels")
 }
 
-/// Whether the field of a scene is gathered. `obstacle` is why it can't be, if so.
+/// Returns what of items is gathered, but never scattered (“the kernel linear”, “a label map”).
+fn only_gathered(items: &[Item]) -> Option<String> {
+    let tensor = items.iter().find_map(|item| item.kernel()?.as_tensor());
+    let labels = || items.iter().any(Item::is_label_map).then(|| "a label map".to_owned());
+    tensor.map(|tensor| format!("the kernel {}", tensor.name())).or_else(labels)
+}
+
+/// Whether the field of a scene with these items is gathered. `obstacle` is why it can't be, if so.
 ///
 /// # Errors
 /// [`Error::Argument`] if the settings, or what of the scene is never scattered, ask for what
 /// can't be.
 pub fn is_chosen(
-    scene: &Scene,
+    items: &[Item],
     settings: &Settings,
     obstacle: impl FnOnce() -> Option<&'static str>,
 ) -> Result<bool> {
-    let only = scene.only_gathered();
+    let only = only_gathered(items);
     if settings.evaluate == Evaluate::Scatter {
         // The sections of tensor products have no known form, and labels no sums.
         return only.map_or(Ok(false), |what| {
@@ -82,8 +90,8 @@ pub fn not_gathered(what: &str) -> Error {
 
 /// Returns the number of parts of the thickest sheet. It is one if the field at the sheet's ends
 /// and middle determines its mean. Otherwise each part is so thin that two places in it do.
-pub fn parts(scene: &Scene, sheets: &Sheets, choice: Option<&Choice>) -> usize {
-    let spacing = scene.items.iter().find_map(|item| match item {
+pub fn parts(items: &[Item], sheets: &Sheets, choice: Option<&Choice>) -> usize {
+    let spacing = items.iter().find_map(|item| match item {
         Item::Volume(volume, ..) => Some(volume.lattice.least_kernel_spacing()),
         Item::Bricks(bricks, ..) => {
             let coarser = choice.map_or(0.0, |choice| choice.lambda).exp2();

@@ -1,12 +1,15 @@
-//! The plan of a frame, which both engines share: its numbers and tables, the weights and visible
-//! parts of a lattice, and the pace of resting and moving views.
+//! The plan of a frame, which both engines share: the numbers of its view, of its fields and of
+//! their tables, the weights and visible parts of a lattice, and the pace of resting and moving
+//! views. The CPU engine reads the numbers by name, and the GPU engine packs them for its shaders.
 
+pub(crate) mod field;
+pub(crate) mod frame;
 pub(crate) mod gathering;
 pub(crate) mod pace;
 pub(crate) mod shown;
+pub(crate) mod source;
 mod stats;
 pub(crate) mod tables;
-pub(crate) mod uniforms;
 pub(crate) mod weighting;
 
 pub use stats::FrameStats;

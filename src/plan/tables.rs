@@ -49,18 +49,62 @@ pub fn constants() -> String {
 #[derive(Debug, Default)]
 pub struct Tables {
     pub entries: Vec<[f32; 4]>,
-    /// Where the parts behind the transfer function start: its integrals, the gradient's factors,
-    /// the kernel, its sections.
-    pub starts: [u32; 4],
-    /// The value that counts as 0, which 32 bits represent exactly; entries per value; the last
-    /// entry; the place among the entries of the value that counts as 0.
-    pub values: [f64; 4],
-    /// The gradient's magnitude at the first factor, and factors per magnitude. Magnitudes are
-    /// values per world length.
-    pub gradients: [f64; 2],
+    pub starts: Starts,
+    pub values: Values<f64>,
+    /// Magnitudes are values per world length.
+    pub factors: Factors<f64>,
     /// Extinction times colour, and extinction, of all values before the first entry and of all
     /// behind the last one.
     pub beyond: [[f32; 4]; 2],
+}
+
+/// Where the parts behind the transfer function start.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Starts {
+    pub integrals: usize,
+    /// The gradient's factors.
+    pub factors: usize,
+    /// The kernel along its radius.
+    pub radii: usize,
+    /// The kernel's sections.
+    pub sections: usize,
+}
+
+/// How a value becomes a place among the entries of the transfer function.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Values<T> {
+    /// The value that counts as 0, which 32 bits represent exactly.
+    pub zero: T,
+    /// Entries per value.
+    pub per_value: T,
+    /// The number of the last entry.
+    pub last: T,
+    /// The place among the entries of the value that counts as 0.
+    pub place: T,
+}
+
+impl Values<f64> {
+    pub fn narrow(self) -> Values<f32> {
+        let [zero, per_value, last, place] =
+            [self.zero, self.per_value, self.last, self.place].map(|number| number as f32);
+        Values { zero, per_value, last, place }
+    }
+}
+
+/// How a gradient's magnitude becomes a place among the factors.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Factors<T> {
+    /// The magnitude at the first factor.
+    pub first: T,
+    /// Factors per magnitude.
+    pub per_magnitude: T,
+}
+
+impl Factors<f64> {
+    pub fn narrow(self) -> Factors<f32> {
+        let Self { first, per_magnitude } = self;
+        Factors { first: first as f32, per_magnitude: per_magnitude as f32 }
+    }
 }
 
 impl Tables {
@@ -92,24 +136,24 @@ impl Tables {
         let mut entries = transfer.table([low, high], count);
         // The last entry again, for interpolation at the upper end.
         entries.push(entries[count - 1]);
-        let mut starts = [entries.len() as u32; 4];
+        let mut starts = Starts { integrals: entries.len(), ..Starts::default() };
         entries.extend(integrals(transfer, [low, high], count));
-        starts[1] = entries.len() as u32;
-        let (first, per_magnitude) = factors(transfer, &mut entries);
-        starts[2] = entries.len() as u32;
+        starts.factors = entries.len();
+        let factors = factors(transfer, &mut entries);
+        starts.radii = entries.len();
         let is_radial_table =
             |kernel: &&Kernel| !matches!(kernel.profile, Profile::Gaussian(_) | Profile::Tensor(_));
         if let Some(kernel) = kernel.filter(is_radial_table) {
             entries.extend(radial(kernel));
-            starts[3] = entries.len() as u32;
+            starts.sections = entries.len();
             entries.extend(sections(kernel));
         }
         let (zero, per_value) = (zero(range), last / (high - low));
         Self {
             entries,
             starts,
-            values: [zero, per_value, last, (zero - low) * per_value],
-            gradients: [first, per_magnitude],
+            values: Values { zero, per_value, last, place: (zero - low) * per_value },
+            factors,
             beyond: [low, high].map(|value| shown(transfer, value).map(|v| v as f32)),
         }
     }
@@ -218,9 +262,9 @@ fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2], count: usize) -
     all
 }
 
-/// Adds the gradient's factors at the magnitudes between which they change. Returns the first of
-/// these magnitudes, and factors per magnitude.
-fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> (f64, f64) {
+/// Adds the gradient's factors at the magnitudes between which they change. Returns how they are
+/// looked up.
+fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> Factors<f64> {
     let changing = transfer.gradient.windows(2).filter(|pair| pair[0].1 != pair[1].1);
     let [first, last] = changing.fold([f64::INFINITY, 0.0], |[low, high], pair| {
         [f64::min(low, pair[0].0), f64::max(high, pair[1].0)]
@@ -234,7 +278,7 @@ fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> (f64, f6
     let start = first - 0.5 * step;
     let factor = |i: usize| transfer.gradient_factor(start + step * i.min(GRADIENTS - 1) as f64);
     entries.extend((0..=GRADIENTS).map(|i| [factor(i) as f32, 0.0, 0.0, 0.0]));
-    (start, 1.0 / step)
+    Factors { first: start, per_magnitude: 1.0 / step }
 }
 
 /// Returns value and −h′(r)/r at each radius, beside those at the next.
@@ -306,7 +350,7 @@ mod tests {
             ..TransferFunction::default()
         };
         let tables = Tables::new(&transfer, [0.0, 1.0], Some(&Kernel::b_spline(2.0).unwrap()));
-        let [integrals, factors, radii, sections] = tables.starts.map(|start| start as usize);
+        let Starts { integrals, factors, radii, sections } = tables.starts;
         assert_eq!(tables.entries.len(), sections + SECTIONS * SECTIONS);
         assert_eq!(tables.entries[integrals], [0.0; 4]);
         assert_eq!(tables.entries[radii][0], 1.0);
@@ -319,10 +363,9 @@ mod tests {
         let opacity = vec![(0.0, 0.0), (0.5, 0.0), (0.5, 0.9), (1.0, 0.9)];
         let transfer = TransferFunction { opacity, ..TransferFunction::default() };
         let tables = Tables::new(&transfer, [0.0, 1.0], None);
-        let [zero, per_value, last, place] = tables.values;
+        let Values { zero, per_value, last, place } = tables.values;
         let low = zero - place / per_value;
-        let whole =
-            f64::from(tables.entries[tables.starts[0] as usize + VALUES - 1][3]) / per_value;
+        let whole = f64::from(tables.entries[tables.starts.integrals + VALUES - 1][3]) / per_value;
         let expected = (low + last / per_value - 0.5) * transfer.extinction(0.9);
         assert!((whole / expected - 1.0).abs() < 1e-3, "{whole} {expected}");
     }

@@ -187,13 +187,6 @@ impl Scene {
         self.items.iter().find_map(|item| item.kernel()?.as_tensor())
     }
 
-    /// Returns what of the scene is gathered, but never scattered (“the kernel linear”, “a label
-    /// map”).
-    pub(crate) fn only_gathered(&self) -> Option<String> {
-        let labels = || self.items.iter().any(Item::is_label_map).then(|| "a label map".to_owned());
-        self.tensor().map(|tensor| format!("the kernel {}", tensor.name())).or_else(labels)
-    }
-
     /// Returns what of the scene only the CPU engine draws (“the kernel linear”, “cells”, “several
     /// volumes in bricks”); `None` if the GPU engine draws all of it.
     pub fn beyond_gpu(&self) -> Option<String> {

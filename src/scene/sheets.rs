@@ -186,6 +186,18 @@ impl Scene {
 }
 
 impl Scene {
+    /// Whether sheets are thicker than the kernels of an item reach ([`Item::mixes_afar`]).
+    pub(crate) fn mixes_afar(
+        &self,
+        settings: &Settings,
+        sheets: &Sheets,
+        choice: Option<&Choice>,
+    ) -> bool {
+        self.items.iter().any(|item| item.mixes_afar(settings, sheets, choice))
+    }
+}
+
+impl Item {
     /// Whether sheets are thicker than kernels reach. If so, no sample may be left out: a sheet
     /// then mixes visible samples with samples whose whole neighbourhood is invisible, and these
     /// change its mean. Sheets of the default thickness exceed the reach only along the shortest
@@ -201,16 +213,15 @@ impl Scene {
             Some(_) => lattice.least_kernel_spacing(),
             None => lattice.kernel_spacing(),
         };
-        let reach = |item: &Item| match item {
-            Item::Volume(volume, kernel, _) => Some(kernel.extent * step(&volume.lattice)),
-            Item::Bricks(bricks, kernel, _) => {
+        let reach = match self {
+            Self::Volume(volume, kernel, _) => Some(kernel.extent * step(&volume.lattice)),
+            Self::Bricks(bricks, kernel, _) => {
                 let coarser = choice.map_or(0.0, |choice| choice.lambda).exp2();
                 Some(kernel.extent * step(&bricks.header().lattice) * coarser)
             }
             _ => None,
         };
-        !settings.classifies_samples()
-            && self.items.iter().filter_map(reach).any(|reach| reach < sheets.step)
+        !settings.classifies_samples() && reach.is_some_and(|reach| reach < sheets.step)
     }
 }
 

@@ -9,8 +9,8 @@ use crate::{
     facet::FacetSet,
     gaussians::Gaussians,
     hierarchy::Hierarchy,
-    math::Bounds,
-    picture::Edges,
+    math::{Bounds, Camera},
+    picture::{Edges, Picture},
     scattered::Points,
     scene::{Item, Scene},
     splat::SplatSet,
@@ -157,9 +157,21 @@ impl Items {
         self.contents.iter().map(|content| content.count).sum()
     }
 
-    /// Returns the edges of meshes that are to be drawn.
-    pub fn edges(&self) -> &[Edges] {
-        &self.edges
+    #[cfg(test)]
+    pub(super) fn edge_count(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// Draws the edges of meshes over a finished picture, where they are asked for.
+    ///
+    /// # Errors
+    /// Those of [`Camera::view`].
+    pub fn draw_edges(&self, picture: &mut Picture, camera: &Camera) -> Result<()> {
+        let view = camera.view([picture.width, picture.height])?;
+        // A line is a pixel wide, and wider in large pictures.
+        let width = (f64::from(picture.height) / 720.0).max(1.0);
+        self.edges.iter().for_each(|edges| picture.draw_edges(edges, &view, width));
+        Ok(())
     }
 
     /// Returns what the inputs say for texts. Several fields without names are called as their

@@ -6,6 +6,7 @@
 //! [`Showing`] says how an input is shown: [`Appearance`] its values, and [`Coloring`] its colours.
 //! [`Items`] makes a scene of inputs: one item of each, with its [`Legend`]. [`Subject`]
 //! gathers where the scene is and how it stands, and [`Framing`] is the camera that shows it.
+//! [`convert`] makes other files of inputs.
 //!
 //! ```no_run
 //! use splatkit::session::{Data, Reading};
@@ -19,6 +20,7 @@
 
 mod appearance;
 mod coloring;
+pub mod convert;
 mod data;
 mod description;
 mod facts;

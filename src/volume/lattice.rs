@@ -19,6 +19,17 @@ pub enum Arrangement {
     Rectilinear(Arc<[Vec<f64>; 3]>),
 }
 
+impl Arrangement {
+    /// Returns the name: `cartesian`, `bcc` or `rectilinear`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Cartesian => "cartesian",
+            Self::BodyCentred => "bcc",
+            Self::Rectilinear(_) => "rectilinear",
+        }
+    }
+}
+
 /// Where the samples of a volume lie. Sample (i, j, k) is at `origin + axes · steps(i, j, k)`, and
 /// the arrangement defines the steps. On a Cartesian lattice they are (i, j, k) itself.
 #[derive(Debug, Clone, PartialEq)]

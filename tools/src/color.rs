@@ -85,14 +85,6 @@ impl ColorFlags {
         Own::shared(&self.color)
     }
 
-    /// Returns the attribute of a surface to read, if the flags name one.
-    pub fn attribute(&self) -> Option<&str> {
-        match self.surface() {
-            Some(SurfaceColor::Attribute(name)) => Some(name),
-            _ => None,
-        }
-    }
-
     /// Returns the flags that colour values, and whether they are given.
     fn of_values(&self) -> [(&'static str, bool); 3] {
         [

@@ -85,10 +85,7 @@ impl Finish {
         loaded: &Loaded,
     ) -> splatkit::Result<Picture> {
         let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
-        let view = camera.view([picture.width, picture.height])?;
-        // A line is a pixel wide, and wider in large pictures.
-        let width = (f64::from(picture.height) / 720.0).max(1.0);
-        loaded.items.edges().iter().for_each(|edges| picture.draw_edges(edges, &view, width));
+        loaded.items.draw_edges(&mut picture, camera)?;
         Ok(picture)
     }
 

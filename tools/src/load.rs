@@ -94,6 +94,11 @@ impl LoadFlags {
         self.entry().reading_within(memory)
     }
 
+    /// Whether a flag limits the bytes of inputs.
+    pub fn has_bytes(&self) -> bool {
+        self.entry().limits.bytes.is_some()
+    }
+
     /// Reads a file.
     pub fn open(&self, path: &Path) -> Result<Data, Failure> {
         Ok(self.entry().reading().open(path)?.read()?)

@@ -145,6 +145,14 @@ pub struct Stages<'a> {
 }
 
 impl Stages<'_> {
+    /// Names the stage that begins now.
+    pub fn begin(&self, name: &str) {
+        if let Ok(mut now) = self.now.lock() {
+            *now = None;
+            self.progress.stage(name);
+        }
+    }
+
     /// Sets how much of a stage is done, and its total; 0 if the total is not known. Another name
     /// or another total begins another stage.
     pub fn set(&self, name: &'static str, done: u64, total: u64) {

@@ -10,11 +10,11 @@ use crate::{
             SCAN_ARGUMENTS, State, TILE_ARGUMENTS,
         },
         scene::{
+            harmonics::GpuEye,
             nodes::{GpuBounds, GpuCut, GpuNode},
-            recolor::GpuEye,
         },
+        uniforms::{Frame, FrameClip, FrameField, FrameIsosurface, Source},
     },
-    plan::uniforms::{Frame, FrameClip, FrameField, FrameIsosurface, Source},
     splat::Splat,
 };
 use bytemuck::Zeroable;

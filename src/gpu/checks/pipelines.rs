@@ -6,8 +6,8 @@ use super::{
     recipes::{self, parse, source_of, stage_of},
     variants,
 };
-use crate::gpu::pipeline::{
-    recipe::{Binding, Recipe, split, words},
+use crate::gpu::{
+    pipeline::recipe::{Binding, Recipe, split, words},
     variant::Variant,
 };
 use naga::{

@@ -4,10 +4,11 @@ use crate::gpu::{
     passes::{
         bin::Bin, clear::Clear, cull::Cull, cut::Cut, gather::Gather, large::Large, march::March,
         mark::Mark, measure::Measure, occlusion::Occlusion, order::Order, plan::Plan,
-        present::Presenter, project::Project, resume::Resume, tiles::Tiles,
+        present::Presenter, project::Project, recolor::Recolor, resume::Resume, scan::Scan,
+        select::Select, select_bricks::SelectBricks, tiles::Tiles,
     },
-    pipeline::{recipe::Recipe, scan::Scan, variant::Variant},
-    scene::{recolor::Recolor, select::Select, select_bricks::SelectBricks},
+    pipeline::recipe::Recipe,
+    variant::Variant,
 };
 use naga::{Expression, Literal, Module, ShaderStage};
 

@@ -5,9 +5,8 @@ use crate::{
     bricks::Bricks,
     gpu::{
         budget::Budget,
-        pipeline::variant::Variant,
         scene::field::{FOUR, gathered_volume, kind_of},
-        variant::{Request, variant},
+        variant::{Request, Variant, variant},
     },
     hierarchy::Detail,
     math::Projection,

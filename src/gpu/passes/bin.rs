@@ -7,9 +7,9 @@ use crate::gpu::{
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
-        variant::Variant,
     },
     targets::Targets,
+    variant::Variant,
 };
 
 /// The pass. The number of its workgroups follows from the number of records, which only the GPU

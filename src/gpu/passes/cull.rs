@@ -8,10 +8,10 @@ use crate::gpu::{
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
-        variant::Variant,
     },
     scene::chunk::{Chunk, Origin, WORKGROUP_CANDIDATES},
     targets::Targets,
+    variant::Variant,
 };
 
 /// Number of lanes to which workgroups are dealt (`LANES` in frame.wgsl).

@@ -3,10 +3,10 @@
 
 use crate::gpu::{
     device::Gpu,
+    passes::scan::Scan,
     pipeline::{
         commands::Commands,
         recipe::{Binding, Recipe},
-        scan::Scan,
         shaders,
         stage::Stage,
     },

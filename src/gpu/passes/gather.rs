@@ -9,9 +9,9 @@ use crate::gpu::{
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
-        variant::Variant,
     },
     targets::Targets,
+    variant::Variant,
 };
 
 /// Number of lanes to which tiles are dealt (`LANES` in frame.wgsl).

@@ -7,9 +7,9 @@ use crate::gpu::{
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
-        variant::Variant,
     },
     targets::Targets,
+    variant::Variant,
 };
 
 /// The pass. Its first half runs before the bins are scanned, its second half after bin has filled

@@ -8,9 +8,9 @@ use crate::gpu::{
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
-        variant::Variant,
     },
     targets::Targets,
+    variant::Variant,
 };
 
 /// The number of the first binding of images (images.wgsl).

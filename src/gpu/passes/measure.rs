@@ -9,10 +9,10 @@ use crate::gpu::{
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
-        variant::Variant,
     },
     scene::chunk::Chunk,
     targets::Targets,
+    variant::Variant,
 };
 
 /// The pass, once per kind of source.

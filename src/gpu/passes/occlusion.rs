@@ -8,9 +8,9 @@ use crate::gpu::{
         shaders,
         stage::Stage,
         state::MARCH_ARGUMENTS,
-        variant::Variant,
     },
     targets::Targets,
+    variant::Variant,
 };
 
 /// The pass.

@@ -9,9 +9,9 @@ use crate::gpu::{
         shaders,
         stage::Stage,
         state::ORDER_ARGUMENTS,
-        variant::Variant,
     },
     targets::Targets,
+    variant::Variant,
 };
 
 /// The pass. One invocation sorts a short bin, one workgroup a long bin.

@@ -8,9 +8,9 @@ use crate::gpu::{
         recipe::{Binding, Recipe},
         shaders,
         stage::Stage,
-        variant::Variant,
     },
     targets::Targets,
+    variant::Variant,
 };
 
 /// The stages of the pass. `advance` runs before each depth pass, the others once per frame.

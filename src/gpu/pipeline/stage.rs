@@ -199,7 +199,7 @@ pub fn layout_of(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::{device::AdapterChoice, pipeline::scan::Scan};
+    use crate::gpu::{device::AdapterChoice, passes::scan::Scan};
 
     #[test]
     fn a_device_compiles_each_recipe_once() {

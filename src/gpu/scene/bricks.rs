@@ -50,7 +50,7 @@ impl Slots {
 /// A chunk of slots, for one of the drawn levels.
 #[derive(Debug)]
 pub struct Slab {
-    pub(super) ranges: wgpu::Buffer,
+    pub ranges: wgpu::Buffer,
     first: usize,
     count_slots: usize,
     /// 0 for the finer level, 1 for the coarser.
@@ -86,7 +86,7 @@ impl Slab {
         self.first..self.first + self.count_slots
     }
 
-    pub(super) fn blocks(&self) -> u32 {
+    pub fn blocks(&self) -> u32 {
         (self.count_slots * BRICK_BLOCKS) as u32
     }
 }

@@ -8,13 +8,13 @@ use crate::{
         scene::{
             bricks::Slab,
             field::kind_of,
+            harmonics::Harmonics,
             nodes::{PageCache, Slots},
-            recolor::Harmonics,
-            select::Selection,
+            selection::Selection,
         },
+        uniforms::{COARSE, NODES, Source},
     },
     math::{Kernel, View},
-    plan::uniforms::{COARSE, NODES, Source},
     splat::SplatSet,
     volume::{Scalar, Volume},
 };
@@ -89,7 +89,7 @@ impl Chunk {
     }
 
     /// Returns the bytes of the lists of candidates, and of their spans.
-    pub(super) fn list_bytes(&self) -> u64 {
+    pub fn list_bytes(&self) -> u64 {
         let selected = match &self.origin {
             Origin::Lattice { selection, .. } => selection.selected.size(),
             Origin::Bricks { slab, .. } => slab.selected.size(),
@@ -141,7 +141,7 @@ impl Chunk {
     }
 }
 
-pub(super) fn spans(gpu: &Gpu, candidates: u32) -> wgpu::Buffer {
+pub fn spans(gpu: &Gpu, candidates: u32) -> wgpu::Buffer {
     buffer(gpu, "spans", SPAN_BYTES * u64::from(candidates), wgpu::BufferUsages::STORAGE)
 }
 

@@ -6,14 +6,16 @@ use crate::{
             Gpu, MOST_BUFFERS,
             buffers::{buffer, filled_buffer},
         },
-        pipeline::variant::Variant,
+        uniforms::FrameField,
+        variant::Variant,
     },
     math::{Kernel, Sheets},
     parallel::prelude::*,
     plan::{
+        field,
         gathering::unsuited_kernel,
         shown::{BLOCK, Shown, field_ranges},
-        uniforms::Frame,
+        tables::Values,
         weighting::{MASK_DEVIATION, deviation},
     },
     scene::{Item, Scene, Settings},
@@ -56,8 +58,8 @@ pub fn gathered_volume<'a>(
     settings: &Settings,
     sheets: &Sheets,
 ) -> Result<&'a Volume, &'static str> {
-    let parts = crate::plan::gathering::parts(scene, sheets, None);
-    if let Some(what) = crate::plan::gathering::obstacle(scene, settings, parts, unsuited) {
+    let parts = crate::plan::gathering::parts(&scene.items, sheets, None);
+    if let Some(what) = crate::plan::gathering::obstacle(&scene.items, settings, parts, unsuited) {
         return Err(what);
     }
     if parts > 1 {
@@ -300,19 +302,20 @@ impl Field {
         }
     }
 
-    /// Brings what a picture with this number of tiles needs, and sets in `frame` where it lies.
+    /// Brings what a picture with this number of tiles needs, and packs where it lies. `field` is
+    /// the field in the view, and `table` its entries.
     pub fn gathered(
         &mut self,
         gpu: &Gpu,
         (sheets, tiles): (&Sheets, u32),
         variant: &Variant,
-        table: &[[f32; 4]],
-        frame: &mut Frame,
+        (table, field): (&[[f32; 4]], &field::Field),
+        packed: &mut FrameField,
     ) -> Option<Gathered> {
         let (_, shown) = self.shown.as_ref()?;
         // Shaders number sheets from 1.
         let words = (sheets.count() as u32 + 1).div_ceil(32);
-        let visible_before = visible_before(variant, table, frame);
+        let visible_before = visible_before(variant, table, field);
         let bits = shown_words(self.volume.lattice.dims) as u32;
         let marks = bits + visible_before.len() as u32;
         let bytes = 4 * (u64::from(marks) + u64::from(tiles) * u64::from(words));
@@ -330,12 +333,11 @@ impl Field {
             self.visible_before = visible_before;
         }
         let [width, height, depth] = self.volume.lattice.dims.map(|n| n as u32);
-        let field = &mut frame.fields[0];
-        field.lattice = [width, height, depth, 0];
+        packed.lattice = [width, height, depth, 0];
         let per_variance = 1.0 / (self.sigma * self.sigma);
         let weight = |steps: f64| (-0.5 * steps * steps * per_variance).exp() as f32;
-        field.taps = [per_variance as f32, weight(1.0), weight(2.0), 0.0];
-        field.shown = [bits, marks, words, 0];
+        packed.taps = [per_variance as f32, weight(1.0), weight(2.0), 0.0];
+        packed.shown = [bits, marks, words, 0];
         Some(Gathered {
             textures: self.textures.clone(),
             shown: self.buffer.clone(),
@@ -372,11 +374,11 @@ fn shown_words(dims: [usize; 3]) -> u64 {
 
 /// Returns, for each entry of the transfer function's table and for one behind the last, how many
 /// entries before it show something.
-fn visible_before(variant: &Variant, table: &[[f32; 4]], frame: &Frame) -> Vec<u32> {
-    let [_, _, last, place] = frame.field().transfer;
+fn visible_before(variant: &Variant, table: &[[f32; 4]], field: &field::Field) -> Vec<u32> {
+    let Values { last, place, .. } = field.values;
     let mut shows: Vec<bool> = table[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
-    for surface in &frame.field().isosurfaces[..variant.isosurfaces as usize] {
-        let at = (surface.value[0] + place).clamp(0.0, last) as usize;
+    for surface in &field.isosurfaces[..variant.isosurfaces as usize] {
+        let at = (surface.value + place).clamp(0.0, last) as usize;
         let end = (at + 2).min(shows.len());
         shows[at..end].fill(true);
     }

@@ -1,7 +1,7 @@
 //! A prepared scene: its items are divided into chunks that fit a binding, uploaded, and updated
 //! for each view.
 
-use super::chunk::{Chunk, Origin, SPAN_BYTES, list_bytes, runs_of, spans};
+use super::chunk::{Chunk, Origin, SPAN_BYTES, runs_of, spans};
 use crate::{
     Error, Result,
     bricks::Choice,
@@ -12,22 +12,20 @@ use crate::{
             Gpu,
             buffers::{buffer, filled_buffer, upload},
         },
-        pipeline::commands::Commands,
         scene::{
             bricks::{BrickCache, Listed, Room, Slab},
             field::{Field, label_obstacle, texture_bytes, unsuited},
+            harmonics::Harmonics,
             images::Images,
             nodes::{Growth, PageCache, Slots},
-            recolor::{Harmonics, Recolor},
-            select::{Select, Selection},
-            select_bricks::SelectBricks,
+            selection::Selection,
             tables::FieldTables,
         },
+        uniforms::Source,
     },
     hierarchy::{Cut, Levels},
     math::{Bounds, Kernel, View},
     parallel::prelude::*,
-    plan::uniforms::Source,
     scene::{Item, Optics, Scene, Settings},
     splat::{Splat, SplatSet},
     volume::{
@@ -63,11 +61,11 @@ struct LevelledSet {
 
 /// Trained Gaussians, which are uploaded for the first picture.
 #[derive(Debug)]
-struct SeenSet {
-    item: usize,
-    set: Arc<Gaussians>,
+pub struct SeenSet {
+    pub item: usize,
+    pub set: Arc<Gaussians>,
     /// The eye of the last view.
-    eye: Option<Eye>,
+    pub eye: Option<Eye>,
 }
 
 /// A scene whose splats and samples lie on the GPU. Cameras, settings and transfer functions may
@@ -79,7 +77,7 @@ pub struct PreparedScene {
     /// The sets that pictures may show in levels of detail.
     levels: Vec<LevelledSet>,
     /// The trained Gaussians.
-    seen: Vec<SeenSet>,
+    pub(crate) seen: Vec<SeenSet>,
     /// The hierarchies, in the scene's order.
     pub(crate) page_caches: Vec<PageCache>,
     /// The brick cache of the scene's volume in bricks.
@@ -243,7 +241,7 @@ impl PreparedScene {
     }
 
     /// Uploads the samples of volumes that are scattered for the first time.
-    fn bring_lattices(&mut self, gpu: &Gpu) -> Result<()> {
+    pub(crate) fn bring_lattices(&mut self, gpu: &Gpu) -> Result<()> {
         let items = self.scene.items.iter().enumerate();
         let is_missing = |(number, item): &(usize, &Item)| {
             matches!(item, Item::Volume(..))
@@ -259,57 +257,19 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Lists the visible samples of lattices again if others have become visible. `all` lists all
-    /// samples.
-    pub(crate) fn update_selections(
+    /// Brings the bricks of a choice to the GPU, within `room`. Returns the list of their visible
+    /// samples if there is one.
+    pub(crate) fn bring_bricks(
         &mut self,
         gpu: &Gpu,
-        select: &Select,
-        view: &View,
-        all: bool,
-    ) -> Result<()> {
-        if !self.scene.items.iter().any(|item| matches!(item, Item::Volume(..))) {
-            return Ok(());
-        }
-        self.bring_lattices(gpu)?;
-        for chunk in &mut self.chunks {
-            let (source, before) =
-                (chunk.source(view, false, &self.page_caches), chunk.list_bytes());
-            let Origin::Lattice { volume, selection, .. } = &mut chunk.origin else { continue };
-            let shown = match self.scene.items[chunk.item].transfer() {
-                Some(transfer) if !all => first_visible(transfer, volume.range),
-                _ => EVERYTHING,
-            };
-            if selection.is_for(&shown) {
-                continue;
-            }
-            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
-            let rest = self.bytes - before;
-            select.update(gpu, selection, &chunk.uniform, &shown, |count| {
-                gpu.check_memory(rest + list_bytes(u64::from(count)))
-            })?;
-            chunk.candidates = selection.count;
-            chunk.spans = spans(gpu, selection.count);
-            self.bytes = rest + chunk.list_bytes();
-        }
-        self.number_runs();
-        Ok(())
-    }
-
-    /// Brings the bricks of a choice to the GPU and lists their visible samples, unless these
-    /// exceed `room`. Returns whether they were listed.
-    pub(crate) fn update_bricks(
-        &mut self,
-        gpu: &Gpu,
-        select: &SelectBricks,
-        view: &View,
         choice: &Choice,
         room: Room,
-    ) -> Result<Listed> {
-        let Some(brick_cache) = &mut self.brick_cache else { return Ok(Listed::All) };
+    ) -> Result<Option<Listed>> {
+        let Some(brick_cache) = &mut self.brick_cache else { return Ok(Some(Listed::All)) };
         if brick_cache.draws(choice) {
             let (runs, most) = (self.brick_runs(), room.runs);
-            return Ok(if runs <= most { Listed::All } else { Listed::TooMany { runs, most } });
+            let is_listed = runs <= most;
+            return Ok(Some(if is_listed { Listed::All } else { Listed::TooMany { runs, most } }));
         }
         let grown = brick_cache.update(gpu, choice, room.bytes)?;
         let (bricks, kernel) = (brick_cache.bricks.clone(), brick_cache.kernel.clone());
@@ -327,7 +287,7 @@ impl PreparedScene {
             self.bytes += samples.ranges.size();
             self.bytes -= samples.data.size();
         }
-        self.select_bricks(gpu, select, view, choice, room.runs)
+        Ok(None)
     }
 
     /// Returns the batches of candidates in bricks.
@@ -357,53 +317,11 @@ impl PreparedScene {
         u64::from(self.runs) - self.brick_runs()
     }
 
-    /// Lists the samples of all used slots that can add to the picture.
-    fn select_bricks(
-        &mut self,
-        gpu: &Gpu,
-        select: &SelectBricks,
-        view: &View,
-        choice: &Choice,
-        most: u64,
-    ) -> Result<Listed> {
-        let Some(brick_cache) = &mut self.brick_cache else { return Ok(Listed::All) };
-        let (mut own, mut before, mut samples, mut runs) = (Vec::new(), 0, 0, 0);
-        for chunk in &mut self.chunks {
-            let Origin::Bricks { slab, level, .. } = &mut chunk.origin else { continue };
-            let drawn = choice.levels.get(slab.part).map(|(level, _)| *level);
-            *level = drawn.unwrap_or(0);
-            let count = brick_cache.count(slab, drawn, &choice.shown);
-            samples += u64::from(count);
-            runs += u64::from(runs_of(count));
-            brick_cache.describe(gpu, slab, drawn);
-            let source = chunk.source(view, false, &self.page_caches);
-            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
-            before += chunk.list_bytes();
-            let Origin::Bricks { slab, .. } = &mut chunk.origin else { continue };
-            own.push((slab.as_mut(), &chunk.uniform, count));
-        }
-        if runs > most {
-            return Ok(Listed::TooMany { runs, most });
-        }
-        gpu.check_memory(self.bytes - before + list_bytes(samples))?;
-        select.update(gpu, &mut own, &choice.shown);
-        self.bytes -= before;
-        for chunk in &mut self.chunks {
-            let Origin::Bricks { slab, .. } = &chunk.origin else { continue };
-            chunk.candidates = slab.count;
-            chunk.spans = spans(gpu, slab.count);
-            self.bytes += chunk.list_bytes();
-        }
-        brick_cache.set_drawn(choice);
-        self.number_runs();
-        Ok(Listed::All)
-    }
-
     /// Sorts the chunks, and numbers the batches of candidates through all of them. Sums depend on
     /// the order of the splats, which must not depend on earlier views. The chunks of fields lie
     /// behind the others, field by field, and so do their records (`record_starts` in frame.wgsl).
     /// One number stays free before the batches of each chunk (active.wgsl).
-    fn number_runs(&mut self) {
+    pub(crate) fn number_runs(&mut self) {
         let items = &self.scene.items;
         self.chunks.sort_by_key(|chunk| (items[chunk.item].transfer().is_some(), chunk.item));
         self.runs = 0;
@@ -462,32 +380,8 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Gives Gaussians the colours for a view's eye.
-    pub(crate) fn update_seen(&mut self, gpu: &Gpu, recolor: &Recolor, view: &View) -> Result<()> {
-        let eye = Eye::of(view);
-        for number in 0..self.seen.len() {
-            let SeenSet { item, set, eye: last } = &mut self.seen[number];
-            let (item, set, last) = (*item, set.clone(), last.replace(eye));
-            if last.is_none() {
-                gpu.check_memory(self.bytes + gaussian_bytes(&set))?;
-                self.add_gaussians(gpu, &set, item, eye);
-            }
-            if last == Some(eye) || !set.depends_on_eye() {
-                continue;
-            }
-            Commands::submit(gpu, "recolor", |commands| {
-                for chunk in self.chunks.iter().filter(|chunk| chunk.item == item) {
-                    if let Origin::Splats { harmonics: Some(harmonics), .. } = &chunk.origin {
-                        recolor.encode(gpu, commands, (harmonics, &chunk.data), eye);
-                    }
-                }
-            });
-        }
-        Ok(())
-    }
-
     /// Uploads trained Gaussians, with their harmonics if their colours depend on the eye.
-    fn add_gaussians(&mut self, gpu: &Gpu, set: &Gaussians, item: usize, eye: Eye) {
+    pub(crate) fn add_gaussians(&mut self, gpu: &Gpu, set: &Gaussians, item: usize, eye: Eye) {
         let seen = set.seen_from(eye);
         let order = space_order(&seen.splats);
         let kind = Arc::new(seen.empty());
@@ -747,7 +641,7 @@ fn splat_bytes(set: &SplatSet) -> u64 {
 }
 
 /// Returns the bytes of trained Gaussians on the GPU, with their harmonics and spans.
-fn gaussian_bytes(set: &Gaussians) -> u64 {
+pub fn gaussian_bytes(set: &Gaussians) -> u64 {
     let each = size_of::<Splat>() as u64 + SPAN_BYTES + Harmonics::bytes_of(set);
     set.len() as u64 * each
 }

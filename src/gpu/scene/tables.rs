@@ -2,9 +2,13 @@
 //! function.
 
 use crate::{
-    gpu::device::{Gpu, buffers::upload},
+    bricks::Choice,
+    gpu::{
+        device::{Gpu, buffers::upload},
+        uniforms::{Frame, FrameField},
+    },
     math::{Sheets, View},
-    plan::{tables::Tables, uniforms::Frame},
+    plan::{field::Field, tables::Tables},
     scene::{Scene, Settings},
     volume::TransferFunction,
 };
@@ -67,11 +71,27 @@ impl FieldTables {
         &self.entries
     }
 
-    /// Sets in `frame` where the tables lie and how they are read.
-    pub fn describe(&self, settings: &Settings, view: &View, sheets: &Sheets, frame: &mut Frame) {
-        for (field, own) in frame.fields.iter_mut().zip(&self.fields) {
+    /// Returns the fields of the scene in a view. `choice` is that of a volume in bricks.
+    pub fn in_view(
+        &self,
+        scene: &Scene,
+        settings: &Settings,
+        (view, choice): (&View, Option<&Choice>),
+        sheets: &Sheets,
+    ) -> Vec<Field> {
+        let field = |own: &Own| {
             let light = settings.light_of(&own.transfer, own.range, own.diagonal);
-            field.set_tables((&own.tables, own.start), &own.transfer, light, view, sheets);
+            let mut field = Field::new(&scene.items[own.item], view, settings, choice);
+            field.set_tables(&own.tables, &own.transfer, light, view, sheets);
+            field
+        };
+        self.fields.iter().map(field).collect()
+    }
+
+    /// Packs the fields of a view, with the places of their tables.
+    pub fn pack(&self, fields: &[Field], frame: &mut Frame) {
+        for ((slot, field), own) in frame.fields.iter_mut().zip(fields).zip(&self.fields) {
+            *slot = FrameField::new(field, own.tables.starts, own.start);
         }
     }
 }

@@ -67,6 +67,18 @@ pub enum Stage {
     Writing,
 }
 
+impl Stage {
+    /// Returns what a progress bar calls the stage.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reading => "Scanning the input",
+            Self::Distributing => "Distributing to regions",
+            Self::Building => "Building the hierarchy",
+            Self::Writing => "Writing the file",
+        }
+    }
+}
+
 /// Called after each finished part, with the stage, its progress and its total, in points,
 /// triangles or splats. A stage may start again for the next input, or for the next pass over it.
 /// `None`: nobody wants to know.

@@ -152,6 +152,13 @@ impl AppearanceEntry {
     }
 
     /// Checks what does not depend on the inputs.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the name of the field that is wrong.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(|(field, message)| Error::Argument(format!("{field}: {message}")))
+    }
+
     pub(super) fn check(&self) -> std::result::Result<(), Wrong> {
         if let Some([low, high]) = self.range
             && !(low <= high && (high - low).is_finite())

@@ -107,10 +107,8 @@ impl Description {
     ) -> Result<(LoadedInput, Vec<PathBuf>)> {
         let path = &input.file;
         does(format!("Reading {}", path.display()));
-        let mut showing = self.showing(input)?;
-        let reading = self.reading_of(input);
-        showing.deadline = reading.limits().deadline();
-        let reading = reading.reading_within(memory::most());
+        let showing = self.showing(input)?;
+        let reading = self.reading_of(input).reading_within(memory::most());
         let opened = reading.open_colored(path, showing.coloring().attribute())?;
         let data = opened.read()?;
         let loaded = LoadedInput::new(path.clone(), &data, opened.is_raw());

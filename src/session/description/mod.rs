@@ -181,12 +181,12 @@ impl Description {
     /// Returns how an input is shown. Reads the files that its appearance names.
     ///
     /// # Errors
-    /// Those of [`AppearanceEntry::showing`] and [`ReadingEntry::samples`].
+    /// Those of [`AppearanceEntry::showing`] and [`ReadingEntry::complete`].
     pub fn showing(&self, input: &InputEntry) -> Result<Showing> {
         let reading = self.reading_of(input);
-        let mut showing = self.appearance_of(input).showing(&reading.limits())?;
-        showing.samples = reading.samples()?;
-        showing.is_named = reading.scalar.is_some();
+        let limits = reading.limits();
+        let showing = self.appearance_of(input).showing(&limits)?;
+        let mut showing = reading.complete(showing, limits.deadline())?;
         // Of values alone: colours have no largest one.
         if self.picture.optics.is_some_and(|optics| optics != Default::default()) {
             showing.values_by = showing.values_by.or_else(|| Some("optics".into()));

@@ -2,7 +2,7 @@
 
 use super::{Background, ClipEntry, appearance::Wrong};
 use crate::{
-    Result,
+    Error, Result,
     hierarchy::Detail,
     scene::{Classification, Evaluate, Gradient, Item, Mode, Optics, Order, Scene, Settings},
     session::Subject,
@@ -172,6 +172,13 @@ impl PictureEntry {
     pub const SIZE: [u32; 2] = [1280, 720];
 
     /// Checks what does not depend on the scene.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the name of the field that is wrong.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(|(field, message)| Error::Argument(format!("{field}: {message}")))
+    }
+
     pub(super) fn check(&self) -> std::result::Result<(), Wrong> {
         if self.size.is_some_and(|size| size.contains(&0)) {
             return Err(("size", "a picture needs a width and a height above 0".into()));

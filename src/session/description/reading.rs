@@ -1,12 +1,12 @@
 //! How inputs are read, as a description says it.
 
 use crate::{
-    Deadline, Result,
+    Deadline, Error, Result,
     formats::{Endian, RawLayout, ReadOptions, SampleType},
     input::Limits,
     memory,
     scattered::SampleOptions,
-    session::Reading,
+    session::{Reading, Showing},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -135,6 +135,13 @@ impl ReadingEntry {
     }
 
     /// Checks what does not depend on the inputs.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the name of the field that is wrong.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(|(field, message)| Error::Argument(format!("{field}: {message}")))
+    }
+
     pub(super) fn check(&self) -> std::result::Result<(), super::appearance::Wrong> {
         if self.dims.is_some() != self.r#type.is_some() {
             return Err(("dims", "a raw volume needs both dims and type".into()));
@@ -204,11 +211,17 @@ impl ReadingEntry {
         }
     }
 
-    /// Returns how scattered samples become splats.
+    /// Completes how an input is shown by what says how it is read, and by when its splats must be
+    /// made.
     ///
     /// # Errors
     /// Those of [`SampleOptions::validate`].
-    pub fn samples(&self) -> Result<SampleOptions> {
+    pub fn complete(&self, showing: Showing, deadline: Deadline) -> Result<Showing> {
+        let is_named = self.scalar.is_some();
+        Ok(Showing { samples: self.samples()?, is_named, deadline, ..showing })
+    }
+
+    fn samples(&self) -> Result<SampleOptions> {
         let default = SampleOptions::default();
         let options = SampleOptions {
             neighbours: self.neighbours.unwrap_or(default.neighbours),

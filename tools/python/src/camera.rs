@@ -1,7 +1,11 @@
 //! Cameras, and how they are fitted to scenes, as Python says it.
 
 use crate::errors::{options, wrong};
-use splatkit::{Error, interaction::CameraEntry, math::Camera, session::Framing};
+use splatkit::{
+    Error,
+    math::Camera,
+    session::{CameraEntry, Framing},
+};
 
 /// Reads how a camera looks at a scene.
 pub fn framing(text: &str) -> Result<Framing, Error> {

@@ -1,50 +1,24 @@
 //! Drawing a scene: the settings of a picture, and renderers that are used again.
 
-use crate::{
-    camera::camera,
-    errors::{options, wrong},
-    weights,
-};
+use crate::{camera::camera, errors::options, parts::picture, weights};
 use serde::Deserialize;
+use serde_json::{Map, Value};
 use splatkit::{
     Device, Error, FrameStats, Renderer, Stop,
     glam::DVec3,
-    hierarchy::Detail,
-    interaction::{ClipEntry, Effort, Histogram},
+    interaction::{Effort, Histogram},
     math::{Bounds, Camera},
     picture::Picture,
-    scene::{
-        Classification, Clip, Evaluate, Gradient, Item, Mode, Optics, Order, Region, Scene,
-        Settings,
-    },
-    session::{Content, Data, Framing, Items, Name, Showing, Subject},
+    scene::{Clip, Item, Region, Scene, Settings},
+    session::{Content, Data, Framing, Items, Name, PictureEntry, Showing, Subject},
     volume::TransferFunction,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Most pixels drawn if the picture's size decides how many are averaged.
-const MOST_PIXELS: u64 = 1 << 18;
-
 /// How a picture is drawn.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone)]
 pub struct Draw {
-    size: [u32; 2],
-    mode: Option<String>,
-    back_to_front: bool,
-    classify: Option<String>,
-    optics: Option<String>,
-    samples: Option<u32>,
-    shade: Option<bool>,
-    gradient: Option<String>,
-    evaluate: Option<String>,
-    sheet_thickness: Option<f64>,
-    cut: Option<f64>,
-    budget: Option<u64>,
-    memory: Option<u64>,
-    cull_backfaces: Option<bool>,
-    occlusion: Option<bool>,
-    clips: Vec<ClipEntry>,
+    picture: PictureEntry,
     region: Option<Part>,
     /// Whether the picture keeps all pixels that are drawn, instead of their means.
     keep_samples: bool,
@@ -124,139 +98,33 @@ pub struct Drawn {
 impl Draw {
     /// Reads the options.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let own: Self = options(text)?;
-        if own.size.contains(&0) {
-            return Err(wrong("a picture needs a width and a height above 0"));
-        }
-        if own.samples.is_some_and(|samples| ![1, 4, 9, 16, 64].contains(&samples)) {
-            return Err(wrong("samples is “auto”, 1, 4, 9, 16 or 64"));
-        }
-        if own.back_to_front && own.mode.as_deref() != Some("splats") {
-            return Err(wrong("back_to_front needs the mode “splats”"));
-        }
-        own.method(&mut Settings::new(own.size))?;
-        Ok(own)
+        let mut all: Map<String, Value> = options(text)?;
+        let mut taken = |name: &str| all.remove(name).unwrap_or(Value::Null).to_string();
+        let (region, keep_samples) = (taken("region"), taken("keep_samples"));
+        let picture = picture(&Value::Object(all).to_string())?;
+        let keep_samples: Option<bool> = options(&keep_samples)?;
+        let keep_samples = keep_samples.unwrap_or(false);
+        Ok(Self { picture, region: options(&region)?, keep_samples })
     }
 
     /// Returns how many pixels are drawn along each side of a pixel.
     pub fn factor(&self, scene: &Scene) -> u32 {
-        let [width, height] = self.size.map(u64::from);
-        let drawn = |factor: u32| u64::from(factor * factor).saturating_mul(width * height);
-        // Explicit splats have edges and are widened, which takes more pixels than a volume does.
-        let most = if scene.has_splats() { 8 } else { 4 };
-        match self.samples {
-            None => (2..=most).rev().find(|factor| drawn(*factor) <= MOST_PIXELS).unwrap_or(1),
-            Some(samples) => samples.isqrt(),
-        }
-    }
-
-    fn method(&self, settings: &mut Settings) -> Result<(), Error> {
-        let order = if self.back_to_front { Order::BackToFront } else { Order::FrontToBack };
-        settings.mode = choose(
-            "mode",
-            self.mode.as_deref(),
-            [
-                ("sheets", Mode::Sheets),
-                ("axis-sheets", Mode::AxisSheets),
-                ("splats", Mode::Splats(order)),
-            ],
-        )?;
-        settings.classification = choose(
-            "classify",
-            self.classify.as_deref(),
-            [
-                ("pre-integrated", Classification::PreIntegrated),
-                ("post", Classification::Post),
-                ("pre", Classification::Pre),
-            ],
-        )?;
-        settings.optics = choose(
-            "optics",
-            self.optics.as_deref(),
-            [
-                ("light", Optics::EmissionAbsorption),
-                ("maximum", Optics::Maximum),
-                ("x-ray", Optics::XRay),
-            ],
-        )?;
-        settings.gradient = choose(
-            "gradient",
-            self.gradient.as_deref(),
-            [("analytic", Gradient::Analytic), ("central", Gradient::Central)],
-        )?;
-        settings.evaluate = choose(
-            "evaluate",
-            self.evaluate.as_deref(),
-            [
-                ("auto", Evaluate::Auto),
-                ("gather", Evaluate::Gather),
-                ("scatter", Evaluate::Scatter),
-            ],
-        )?;
-        Ok(())
+        self.picture.factor(scene)
     }
 
     /// Whether meshes can be drawn as facets: in sheets that emit and absorb light.
     fn draws_facets(&self) -> bool {
-        let is = |text: &Option<String>, usual| text.as_deref().is_none_or(|text| text == usual);
-        is(&self.mode, "sheets") && is(&self.optics, "light")
+        self.picture.draws_facets()
     }
 
     /// Returns the settings of a picture before it is averaged down.
-    fn settings(&self, scene: &Scene, stop: &Stop) -> Result<Settings, Error> {
-        let factor = self.factor(scene);
-        let mut settings = Settings::new(self.size.map(|side| side.saturating_mul(factor)));
+    fn settings(&self, kept: &Kept, stop: &Stop) -> Result<Settings, Error> {
+        let mut settings = self.picture.settings(&kept.scene, &kept.subject)?;
         settings.stop = stop.clone();
-        settings.sheet_thickness = self.sheet_thickness;
-        // Explicit extra pixels do not change sheets and cuts. If their number is automatic, a
-        // small picture is drawn like a larger one.
-        let wider = if self.samples.is_some() { f64::from(factor) } else { 1.0 };
-        settings.sheet_pixels *= wider;
-        settings.occlusion = self.occlusion.unwrap_or(true);
-        self.method(&mut settings)?;
-        match self.shade {
-            Some(false) => {
-                settings.volume_shade = Some(None);
-                settings.surface_shade = None;
-            }
-            Some(true) => {
-                let fields = scene.items.iter().filter_map(Item::transfer);
-                let own = fields.clone().find_map(|transfer| transfer.shade);
-                let mut shade = own.unwrap_or_default();
-                if fields.count() > 1 {
-                    // Each field knows itself which of its gradients are certain.
-                    shade.certain = None;
-                }
-                settings.volume_shade = Some(Some(shade));
-            }
-            None => {}
-        }
-        settings.detail = match self.budget {
-            Some(splats) => Detail::Splats(splats),
-            None => Detail::Pixels(self.cut.unwrap_or(Detail::PIXELS) * wider),
-        };
-        settings.cull_backfaces = self.cull_backfaces;
-        settings.page_memory = self.memory.unwrap_or(settings.page_memory);
-        let clips = self.clips.iter().map(|entry| entry.clip().map_err(wrong));
-        settings.clips = clips.collect::<Result<_, _>>()?;
         settings.region = self.region.map(Region::from);
-        scene.validate_settings(&settings)?;
+        kept.scene.validate_settings(&settings)?;
         Ok(settings)
     }
-}
-
-/// Returns what a name stands for; without a name, the first.
-fn choose<T: Copy, const N: usize>(
-    what: &str,
-    name: Option<&str>,
-    choices: [(&str, T); N],
-) -> Result<T, Error> {
-    let Some(name) = name else { return Ok(choices[0].1) };
-    let found = choices.iter().find(|(own, _)| *own == name);
-    found.map(|(_, choice)| *choice).ok_or_else(|| {
-        let names = choices.map(|(name, _)| name).join(", ");
-        wrong(format!("{what} is one of {names}, not “{name}”"))
-    })
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -342,7 +210,7 @@ impl Stage {
     /// Refuses options that the scene cannot be drawn with.
     pub fn check(&self, draw: &Draw) -> Result<(), Error> {
         let kept = self.take(draw.draws_facets())?;
-        let checked = draw.settings(&kept.scene, &Stop::default());
+        let checked = draw.settings(&kept, &Stop::default());
         self.put(kept, draw.draws_facets());
         checked.map(|_| ())
     }
@@ -350,7 +218,7 @@ impl Stage {
     /// Returns the fitted camera of a picture.
     pub fn camera(&self, fit: &Framing, draw: &Draw) -> Result<Camera, Error> {
         let mut kept = self.take(draw.draws_facets())?;
-        let settings = draw.settings(&kept.scene, &Stop::default())?;
+        let settings = draw.settings(&kept, &Stop::default())?;
         let seen = kept.fitted(fit, &settings.clips)?;
         let camera = fit.camera(&kept.seen_by(&seen), settings.size);
         self.put(kept, draw.draws_facets());
@@ -360,7 +228,7 @@ impl Stage {
     /// Returns the cameras of a turntable.
     pub fn turntable(&self, fit: &Framing, draw: &Draw, frames: u32) -> Result<Vec<Camera>, Error> {
         let mut kept = self.take(draw.draws_facets())?;
-        let settings = draw.settings(&kept.scene, &Stop::default())?;
+        let settings = draw.settings(&kept, &Stop::default())?;
         let seen = kept.fitted(fit, &settings.clips)?;
         let cameras = fit.turntable(&kept.seen_by(&seen), settings.size, frames);
         self.put(kept, draw.draws_facets());
@@ -379,7 +247,7 @@ impl Stage {
         let own = own.map(camera).transpose()?;
         let is_fitted = own.is_none();
         let mut kept = self.take(draw.draws_facets())?;
-        let settings = draw.settings(&kept.scene, stop)?;
+        let settings = draw.settings(&kept, stop)?;
         let camera = match own {
             Some(camera) => camera,
             None => {
@@ -406,8 +274,11 @@ impl Stage {
         if is_fitted && picture.color.iter().all(|pixel| pixel[3] < 0.5 / 255.0) {
             return Err(Error::NothingToDraw("the picture is empty: nothing has opacity".into()));
         }
-        if factor > 1 && effort == Effort::EXACT && !draw.keep_samples {
-            picture = picture.reduced(factor)?;
+        if effort == Effort::EXACT && !draw.keep_samples {
+            if factor > 1 {
+                picture = picture.reduced(factor)?;
+            }
+            locked(&self.items).items.draw_edges(&mut picture, &camera)?;
         }
         Ok(Drawn { picture, stats, camera })
     }

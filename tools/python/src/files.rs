@@ -1,6 +1,6 @@
 //! What files hold, and whether they are sound.
 
-use crate::{errors::raise, load::Load, worker::run};
+use crate::{errors::raise, parts::reading, worker::run};
 use pyo3::prelude::*;
 use serde_json::{Map, Value, json};
 use splatkit::{
@@ -8,20 +8,21 @@ use splatkit::{
     container::{Finding, Severity},
     formats::{self, FORMATS, Kind},
     hierarchy::file,
+    session::ReadingEntry,
 };
 use std::path::{Path, PathBuf};
 
 /// Returns the facts of a file as JSON: those of the command's `info --json`.
 #[pyfunction]
 pub fn info(py: Python<'_>, path: PathBuf, load: &str) -> PyResult<String> {
-    let load = Load::parse(load).map_err(|error| raise(py, &error))?;
+    let load = reading(load).map_err(|error| raise(py, &error))?;
     run(py, &Stop::default(), move || Ok(Value::Object(facts(&path, &load)?).to_string()))
 }
 
 /// Returns the findings in a file as JSON: those of the command's `check --json`.
 #[pyfunction]
 pub fn check(py: Python<'_>, path: PathBuf, load: &str) -> PyResult<String> {
-    let load = Load::parse(load).map_err(|error| raise(py, &error))?;
+    let load = reading(load).map_err(|error| raise(py, &error))?;
     run(py, &Stop::default(), move || {
         let findings = findings(&path, &load)?;
         let ok = findings.iter().all(|finding| finding.severity != Severity::Error);
@@ -37,13 +38,13 @@ pub fn known_formats() -> Vec<(&'static str, Vec<&'static str>, Option<&'static 
     FORMATS.iter().map(of).collect()
 }
 
-fn facts(path: &Path, load: &Load) -> Result<Map<String, Value>, Error> {
+fn facts(path: &Path, load: &ReadingEntry) -> Result<Map<String, Value>, Error> {
     let reading = load.reading();
     let opened = reading.open(path)?;
     Ok(opened.facts(&opened.read()?)?.to_json())
 }
 
-fn findings(path: &Path, load: &Load) -> Result<Vec<Finding>, Error> {
+fn findings(path: &Path, load: &ReadingEntry) -> Result<Vec<Finding>, Error> {
     let (reading, limits) = (load.reading(), load.limits());
     let deadline = limits.deadline();
     let opened = reading.open(path)?;

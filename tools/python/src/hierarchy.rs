@@ -1,6 +1,6 @@
 //! Hierarchies of splats: the half of `pysplatkit.Hierarchy` that holds the file.
 
-use crate::{errors::raise, load::Load, worker::run};
+use crate::{errors::raise, parts::reading, worker::run};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use splatkit::{
@@ -27,7 +27,7 @@ type Leaves<'py> = (
 impl Hierarchy {
     #[new]
     fn new(py: Python<'_>, path: PathBuf, load: &str) -> PyResult<Self> {
-        let load = Load::parse(load).map_err(|error| raise(py, &error))?;
+        let load = reading(load).map_err(|error| raise(py, &error))?;
         let open = move || File::open(path, &load.limits()).map(Arc::new);
         run(py, &Stop::default(), open).map(Self)
     }

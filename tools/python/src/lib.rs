@@ -9,9 +9,8 @@ mod draw;
 mod errors;
 mod files;
 mod hierarchy;
-mod load;
-mod look;
 mod notes;
+mod parts;
 mod picture;
 mod scene;
 mod show;
@@ -26,7 +25,7 @@ use std::path::PathBuf;
 /// Returns red, green and blue of a colour as in CSS.
 #[pyfunction]
 fn color(py: Python<'_>, text: &str) -> PyResult<[f32; 3]> {
-    look::color(text).map_err(|error| raise(py, &error))
+    splatkit::color::parse(text).map_err(|message| raise(py, &errors::wrong(message)))
 }
 
 /// Returns a transfer function by name, as JSON.
@@ -109,6 +108,7 @@ fn _pysplatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(files::check, module)?)?;
     module.add_function(wrap_pyfunction!(files::known_formats, module)?)?;
     module.add_function(wrap_pyfunction!(convert::convert, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::write_scene, module)?)?;
     module.add_function(wrap_pyfunction!(abandon, module)?)?;
     show::register(module)
 }

@@ -6,8 +6,7 @@ use crate::{
     cells::CellArrays,
     draw::{Added, Draw, Stage},
     errors::{options, raise, wrong},
-    load::Load,
-    look::Look,
+    parts::{appearance, picture, reading},
     picture::Picture,
     worker::run,
 };
@@ -23,7 +22,7 @@ use splatkit::{
     input::Limits,
     interaction::Effort,
     scattered::Points,
-    session::{Data, Name},
+    session::{AppearanceEntry, Data, Description, InputEntry, Name, ReadingEntry},
     surface::Mesh,
     volume::{Arrangement, Lattice, Volume},
 };
@@ -304,24 +303,32 @@ impl Scene {
     }
 
     /// Adds what an array has become, with its looks.
-    fn add(&self, py: Python<'_>, input: Data, told: Told, more: (Load, Look)) -> PyResult<()> {
+    fn add(
+        &self,
+        py: Python<'_>,
+        input: Data,
+        told: Told,
+        more: (ReadingEntry, AppearanceEntry),
+    ) -> PyResult<()> {
         let (stage, (load, look)) = (self.0.clone(), more);
         input.warn_of_holes(&told.name);
         let name = Name { text: told.name, is_file: false };
         let stop = Stop::default();
         let own = stop.clone();
         run(py, &stop, move || {
-            let showing = load.complete(look.showing()?, Deadline::NEVER);
+            let showing = load.complete(look.showing(&load.limits())?, Deadline::NEVER)?;
             stage.add(Added { name, input, showing }, &own)
         })
     }
 }
 
 /// Reads the options of an array.
-fn told(told: &str, load: &str, look: &str) -> Result<(Told, (Load, Look)), Error> {
-    let look: Look = options(look)?;
-    look.check()?;
-    Ok((options(told)?, (Load::parse(load)?, look)))
+fn told(
+    told: &str,
+    load: &str,
+    look: &str,
+) -> Result<(Told, (ReadingEntry, AppearanceEntry)), Error> {
+    Ok((options(told)?, (reading(load)?, appearance(look)?)))
 }
 
 #[pymethods]
@@ -340,10 +347,38 @@ impl Scene {
         run(py, &stop, move || {
             // One deadline covers reading the input and making its splats.
             let deadline = load.limits().deadline();
-            let showing = load.complete(look.showing()?, deadline);
+            let showing = load.complete(look.showing(&load.limits())?, deadline)?;
             let attribute = showing.coloring().attribute();
             let input = load.reading().open_colored(&path, attribute)?.read()?;
             stage.add(Added { name: Name::of_file(&path), input, showing }, &own)
+        })
+    }
+
+    /// Adds the inputs of a scene file. Returns how the file says that the picture is drawn, as
+    /// JSON: its camera, how one is fitted, the picture, and what is written over it.
+    fn add_scene(&self, py: Python<'_>, path: PathBuf, is_trusted: bool) -> PyResult<String> {
+        let (stage, stop) = (self.0.clone(), Stop::default());
+        let own = stop.clone();
+        run(py, &stop, move || {
+            let limits = Limits::default();
+            let mut scene = match is_trusted {
+                true => Description::read_trusted(&path, &limits)?,
+                false => Description::read(&path, &limits)?,
+            };
+            scene.reading = scene.reading.begun();
+            for input in scene.visible() {
+                let showing = scene.showing(input)?;
+                let reading = scene.reading_of(input).reading();
+                let attribute = showing.coloring().attribute();
+                let data = reading.open_colored(&input.file, attribute)?.read()?;
+                stage
+                    .add(Added { name: Name::of_file(&input.file), input: data, showing }, &own)?;
+            }
+            let Description { camera, framing, picture, overlay, .. } = &scene;
+            let drawn = serde_json::json!({
+                "camera": camera, "framing": framing, "picture": picture, "overlay": overlay,
+            });
+            Ok(drawn.to_string())
         })
     }
 
@@ -487,4 +522,31 @@ impl Scene {
             run(py, &stop, move || stage.draw(camera.as_deref(), &draw, Effort::EXACT, &own))?;
         Ok(drawn.into())
     }
+}
+
+/// Writes a scene file: inputs with how each is read and shown, a camera, and how the picture is
+/// drawn, all as JSON.
+#[pyfunction]
+pub fn write_scene(
+    py: Python<'_>,
+    path: PathBuf,
+    inputs: Vec<(PathBuf, String, String)>,
+    camera: Option<String>,
+    fit: &str,
+    draw: &str,
+) -> PyResult<()> {
+    let made = || -> Result<Description, Error> {
+        let mut scene = Description::new([]);
+        for (file, load, look) in inputs {
+            let (reading, appearance) = (reading(&load)?, appearance(&look)?);
+            scene.inputs.push(InputEntry { reading, appearance, ..InputEntry::new(file) });
+        }
+        scene.camera = camera.as_deref().map(options).transpose()?;
+        scene.framing = framing(fit)?;
+        scene.picture = picture(draw)?;
+        scene.check().map_err(|(place, message)| wrong(format!("{place}: {message}")))?;
+        Ok(scene)
+    };
+    let scene = made().map_err(|error| raise(py, &error))?;
+    run(py, &Stop::default(), move || scene.write(&path))
 }

@@ -17,6 +17,7 @@ use splatkit::{
     glam::{DVec2, DVec3},
     interaction::{Effort, Orbit, Probe},
     math::Camera,
+    session::Coloring,
     volume::TransferFunction,
 };
 
@@ -208,9 +209,14 @@ pub fn set_transfer(py: Python<'_>, scene: &Scene, item: usize, transfer: &str) 
 /// Returns a transfer function with the colours of a map, spread over the values that it shows.
 #[pyfunction]
 pub fn recolored(py: Python<'_>, transfer: &str, map: &str, values: [f64; 2]) -> PyResult<String> {
-    let read = TransferFunction::from_json(transfer)
-        .and_then(|transfer| crate::look::recolored(transfer, &ColorMap::named(map)?, values));
-    Ok(read.map_err(|error| raise(py, &error))?.to_json())
+    let read = || {
+        let mut transfer = TransferFunction::from_json(transfer)?;
+        let coloring = Coloring { map: Some(ColorMap::named(map)?), ..Coloring::default() };
+        coloring.color_transfer(&mut transfer, values)?;
+        transfer.validate()?;
+        Ok(transfer.to_json())
+    };
+    read().map_err(|error: Error| raise(py, &error))
 }
 
 /// Adds these functions and classes to the module.

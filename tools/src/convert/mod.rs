@@ -1,25 +1,24 @@
 //! `splatkit convert`: the output's extension decides what the inputs become.
 
-mod bricks;
-mod external;
-mod gaussians;
-mod memory;
 mod parts;
-mod source;
+mod report;
 mod surface;
-mod volume;
 
 use crate::{
     color::ColorFlags,
-    failure::{Failure, in_file},
+    failure::Failure,
     given::{self, Given},
     load::LoadFlags,
     output, parse,
-    progress::Progress,
+    progress::{Progress, Stages},
+    timing::milliseconds,
 };
-use clap::Args;
-use splatkit::{Error, session::Data};
-use std::path::{Path, PathBuf};
+use clap::{Args, ValueEnum};
+use splatkit::session::convert::{Conversion, Resampled, Watch};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 #[derive(Args, Debug)]
 pub struct Convert {
@@ -39,7 +38,7 @@ pub struct Convert {
     /// Resample a Cartesian volume. bcc is the body-centred cubic lattice, which has 29.3 % fewer
     /// samples for the same detail in all directions [default: the file's lattice]
     #[arg(long, value_name = "NAME")]
-    lattice: Option<volume::Wanted>,
+    lattice: Option<Wanted>,
     /// Replace an existing file.
     #[arg(long)]
     overwrite: bool,
@@ -70,7 +69,41 @@ pub struct Convert {
     load: LoadFlags,
 }
 
-/// The extensions of outputs; `run` has an arm for each.
+/// The lattices that can be chosen.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
+enum Wanted {
+    Cartesian,
+    Bcc,
+}
+
+/// What the command hears of a conversion.
+struct Hearing<'a> {
+    convert: &'a Convert,
+    stages: Stages<'a>,
+}
+
+impl Watch for Hearing<'_> {
+    type Error = Failure;
+
+    fn stage(&self, name: &str) {
+        self.stages.begin(name);
+    }
+
+    fn progress(&self, stage: &'static str, done: u64, all: u64) {
+        self.stages.set(stage, done, all);
+    }
+
+    fn has_read(&self, files: &[PathBuf]) -> Result<(), Failure> {
+        let Convert { dry_run, .. } = self.convert;
+        if *dry_run { Ok(()) } else { output::check_unneeded(self.convert.output(), files) }
+    }
+
+    fn has_colored(&self, is_mesh: bool, has_values: bool) -> Result<(), Failure> {
+        self.convert.color.check_effect(is_mesh, has_values)
+    }
+}
+
+/// The extensions of outputs.
 const WRITTEN: [&str; 7] = ["splk", "ply", "splat", "spz", "glb", "nrrd", "splv"];
 
 /// Those that hold surfaces.
@@ -106,10 +139,47 @@ impl Convert {
             output::check(self.output(), self.overwrite)?;
             output::try_writing(self.output(), &self.files)?;
         }
-        match extension.as_str() {
-            "nrrd" => self.volume(progress),
-            "splv" => self.bricks(progress),
-            _ => self.surface(&extension, progress),
+        if self.lattice.is_some() && extension != "nrrd" {
+            return Err(Failure::Usage("--lattice is for volumes written as .nrrd".into()));
+        }
+        self.make(progress)
+    }
+
+    /// Converts the files, or finds what that would take, and prints it.
+    fn make(&self, progress: &Progress) -> Result<(), Failure> {
+        let (conversion, start) = (self.conversion(), Instant::now());
+        let hearing = Hearing { convert: self, stages: progress.stages() };
+        if self.dry_run {
+            let expected = conversion.expect(&self.files, self.output(), &hearing)?;
+            drop(hearing);
+            progress.clear();
+            return self.print_expected(&expected);
+        }
+        if let Some(folder) = &self.parts.plan {
+            let may_write = || self.check_plan(folder);
+            let plan = conversion.plan(&self.files, folder, &hearing, may_write)?;
+            drop(hearing);
+            progress.clear();
+            return self.print_plan(&plan);
+        }
+        let converted = conversion.convert(&self.files, self.output(), &hearing)?;
+        drop(hearing);
+        progress.clear();
+        self.print(&converted, milliseconds(start))
+    }
+
+    fn conversion(&self) -> Conversion {
+        Conversion {
+            reading: self.load.reading(None),
+            fits_memory: !self.load.has_bytes(),
+            coloring: self.color.coloring(self.range),
+            lattice: self.lattice.map(|lattice| match lattice {
+                Wanted::Cartesian => Resampled::Cartesian,
+                Wanted::Bcc => Resampled::BodyCentred,
+            }),
+            in_regions: self.parts.divide(),
+            parts: self.parts.parts,
+            ..self.surface.conversion()
         }
     }
 
@@ -132,31 +202,6 @@ impl Convert {
         };
         let raw = if self.files.iter().any(is_raw) { 0 } else { given::RAW };
         given.warn_of_file(&self.files[0], given::ALL & !raw, progress);
-    }
-
-    /// Reads an input, which may take `memory` bytes.
-    fn data(&self, path: &Path, memory: Option<u64>) -> Result<Data, Failure> {
-        let reading = self.load.reading(memory);
-        let opened = reading.open(path)?;
-        let data = opened.read()?;
-        self.check_unneeded(&opened.files())?;
-        Ok(data)
-    }
-
-    /// Refuses to replace a file that was read.
-    fn check_unneeded(&self, read: &[PathBuf]) -> Result<(), Failure> {
-        if self.dry_run { Ok(()) } else { output::check_unneeded(self.output(), read) }
-    }
-
-    /// Returns an error that the values of the inputs cause. The flags are checked by then.
-    fn at_fault(&self, error: Error) -> Error {
-        let names = self.files.iter().map(|file| file.to_string_lossy());
-        in_file(Path::new(&names.collect::<Vec<_>>().join(", ")), error)
-    }
-
-    /// Returns the bytes of memory that a conversion may use.
-    fn most_memory(&self) -> u64 {
-        self.surface.memory.or_else(splatkit::memory::most).unwrap_or(u64::MAX)
     }
 }
 

@@ -1,12 +1,12 @@
 //! Conversion in parts, which any number of machines make.
 
-use super::{Convert, external::name_of};
+use super::Convert;
 use crate::{failure::Failure, given::Given, output, progress::Progress, timing::milliseconds};
 use clap::Args;
 use serde_json::json;
 use splatkit::{
     disk,
-    hierarchy::external::{PartMade, Plan},
+    hierarchy::external::{PartMade, Plan, Stage},
 };
 use std::{
     path::{Path, PathBuf},
@@ -143,7 +143,7 @@ impl Convert {
         let plan = Plan::open(plan)?;
         let index = self.parts.index.unwrap_or(0);
         let stages = progress.stages();
-        let watch = |stage, done, total| stages.set(name_of(stage), done, total);
+        let watch = |stage, done, total| stages.set(Stage::name(stage), done, total);
         let made = plan.part(index, &self.load.limits(), Some(&watch))?;
         drop(stages);
         progress.clear();
@@ -191,10 +191,10 @@ impl Convert {
         let read: Vec<PathBuf> = read.chain([plan.path().to_owned()]).collect();
         output::try_writing(self.output(), &read)?;
         let stages = progress.stages();
-        let watch = |stage, done, total| stages.set(name_of(stage), done, total);
+        let watch = |stage, done, total| stages.set(Stage::name(stage), done, total);
         let done = plan.join(self.output(), Some(&watch))?;
         drop(stages);
         progress.clear();
-        self.print_converted(&done, milliseconds(start))
+        self.print_regions(&done, milliseconds(start))
     }
 }

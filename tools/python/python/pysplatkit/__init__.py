@@ -14,6 +14,8 @@ A `Scene` holds several items, and is drawn from any side:
 from __future__ import annotations
 
 import atexit
+import os
+from pathlib import Path
 from typing import Any
 
 from . import _pysplatkit
@@ -50,9 +52,15 @@ COLOR_MAPS: tuple[str, ...] = tuple(_pysplatkit.COLOR_MAPS)
 def render(source: Any, **options: Any) -> Picture:
     """Draws a file or an array: a volume [z, y, x], or points (n, 3).
 
-    The options are those of `Scene.add` and of `Scene.render`.
+    The options are those of `Scene.add` and of `Scene.render`. A scene file is drawn as it says;
+    then the options are those of `Scene.render`.
     """
     drawing = {name: options.pop(name) for name in list(options) if name in DRAWING}
+    # The `meta.json` of trained Gaussians (SOG) is no scene.
+    if isinstance(source, (str, os.PathLike)):
+        path = Path(source)
+        if path.suffix == ".json" and path.name != "meta.json" and not options:
+            return Scene.open(path).render(**drawing)
     return Scene().add(source, **options).render(**drawing)
 
 

@@ -73,6 +73,8 @@ class SurfaceLook(TypedDict, total=False):
     radius_scale: float
     #: Split normals where two triangles meet at more than this angle, in degrees. Default: 60.
     crease: float
+    #: Draw the edges of triangles as thin dark lines.
+    edges: bool
 
 
 class VolumeLook(FieldLook, KernelLook):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import json
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -11,7 +13,7 @@ import numpy as np
 
 from . import _arrays, _neighbours, _options, _pysplatkit
 from ._camera import Camera, Clip
-from ._errors import ArgumentError, KindError
+from ._errors import ArgumentError, DataWarning, KindError
 from ._options import Color, FieldLook, FileOptions, SurfaceLook, Vector, VolumeLook
 from ._picture import Picture
 
@@ -29,6 +31,52 @@ class Scene:
 
     def __init__(self) -> None:
         self._own = _pysplatkit.Scene()
+        # The files that were added, with how each is read and shown; None beside arrays.
+        self._files: list[tuple[str, str, str]] | None = []
+        # What a scene file says of the picture.
+        self._described: dict[str, Any] = {}
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str], *, trusted: bool = False) -> Scene:
+        """Opens a scene file: that of the window, of `save` or by hand (docs/scene-files.md).
+
+        `render` then draws the picture that the file describes, as `splatkit render scene.json`
+        does; its arguments count more than the file. Texts over the picture are the command's.
+
+        Args:
+            trusted: Whether the scene may name files outside its folder, and addresses.
+        """
+        scene = cls()
+        scene._described = json.loads(scene._own.add_scene(os.fspath(path), trusted))
+        scene._files = None
+        if scene._described["overlay"]:
+            message = f"{os.fspath(path)}: the texts over the picture are drawn by the command alone"
+            warnings.warn(message, DataWarning, stacklevel=2)
+        return scene
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        camera: Camera | None = None,
+        size: tuple[int, int] | None = None,
+        **drawing: Any,
+    ) -> None:
+        """Writes a scene file, which the command, the window and `open` draw alike.
+
+        Only scenes of files can be written; save arrays as files first. The arguments are those of
+        `render`.
+        """
+        if self._files is None:
+            raise ArgumentError("a scene file names files: a scene of arrays cannot be saved")
+        if not self._files:
+            raise ArgumentError("the scene is empty")
+        known = frozenset(_DRAW) - {"size"} | {"background"}
+        given = _options.checked(drawing, known, "save")
+        if "background" in given or drawing.get("background", "") is None:
+            given["background"] = _options.background(drawing["background"]) or "none"
+        own = None if camera is None else camera.to_json()
+        draw = _drawn(size=size, **given)
+        _pysplatkit.write_scene(os.fspath(path), self._files, own, "{}", draw)
 
     def add(self, source: Any, **options: Unpack[FileOptions]) -> Scene:
         """Adds a file, a folder of DICOM slices, an array, or an object of another package.
@@ -41,7 +89,10 @@ class Scene:
             known = _options.VOLUME | _options.SURFACE | _options.READING
             given = _options.checked(options, known, "add")
             path = os.fspath(source)
-            self._own.add_file(path, _options.reading(given), _options.look(given))
+            reading, look = _options.reading(given), _options.look(given)
+            self._own.add_file(path, reading, look)
+            if self._files is not None:
+                self._files.append((path, reading, look))
             return self
         own = _neighbours.found(source, options.get("scalar"))
         if own is not None:
@@ -145,6 +196,7 @@ class Scene:
             "frame": own.frame,
             "labels": _labels(labels),
         }
+        self._files = None
         self._own.add_volume(samples, _options.text(told), "{}", _options.look(given))
         return self
 
@@ -228,6 +280,7 @@ class Scene:
         told = _options.text({"name": name, "up": _options.direction(up)})
         # Values colour a surface even if it has colours.
         named = {"scalar": "values"} if values is not None else {}
+        self._files = None
         self._own.add_mesh(arrays, told, _options.text(named), _options.look(given))
         return self
 
@@ -282,6 +335,7 @@ class Scene:
             "of_cells": of_cells,
         }
         told = {"name": name, "missing": missing, "up": _options.direction(up)}
+        self._files = None
         self._own.add_cells(given_arrays, _options.text(told), _options.look(given))
         return self
 
@@ -323,6 +377,7 @@ class Scene:
             arrays["covariances"] = _arrays.rows(covariances, 6, "covariances")
         told = {"name": name, "missing": missing, "up": _options.direction(up)}
         load = {"radius": radius, "neighbours": neighbours, "slopes": slopes}
+        self._files = None
         self._own.add_samples(
             arrays, _options.text(told), _options.text(load), _options.look(given)
         )
@@ -372,6 +427,7 @@ class Scene:
             "harmonics": np.ascontiguousarray(terms.reshape(-1, 3), dtype=np.float32),
         }
         told = {"name": name, "up": _options.direction(up)}
+        self._files = None
         self._own.add_gaussians(arrays, _options.text(told))
         return self
 
@@ -416,46 +472,67 @@ class Scene:
 
     def render(
         self,
-        size: tuple[int, int] = (1280, 720),
+        size: tuple[int, int] | None = None,
         camera: Camera | None = None,
         *,
-        background: Color | None = "black",
-        samples: int | str = "auto",
-        mode: str = "sheets",
-        back_to_front: bool = False,
-        classify: str = "pre-integrated",
-        optics: str = "light",
+        background: Color | None = "auto",
+        samples: int | str | None = None,
+        mode: str | None = None,
+        back_to_front: bool | None = None,
+        classify: str | None = None,
+        optics: str | None = None,
         shade: bool | None = None,
-        clips: Sequence[Clip] = (),
-        gradient: str = "analytic",
-        evaluate: str = "auto",
+        clips: Sequence[Clip] | None = None,
+        gradient: str | None = None,
+        evaluate: str | None = None,
         sheet_thickness: float | None = None,
         cut: float | None = None,
         budget: int | None = None,
         memory: int | None = None,
         cull_backfaces: bool | None = None,
-        occlusion: bool = True,
+        occlusion: bool | None = None,
     ) -> Picture:
-        """Draws a picture. The defaults are those of `splatkit render --engine cpu`.
+        """Draws a picture. What is not given is as a scene file says (`open`), or as usual: as
+        `splatkit render --engine cpu` does.
 
         Ctrl-C stops it. Other threads of Python go on meanwhile.
 
         Args:
-            size: Width and height in pixels.
+            size: Width and height in pixels. Default: 1280 × 720.
             camera: Default: that of `Scene.camera`. If nothing is seen then, that is a
                 `NothingToDrawError`; with a camera of one's own, the picture is empty.
-            background: A colour; None for transparent pixels.
+            background: A colour; None for transparent pixels. Default: black.
             samples: Pixels that are drawn for each pixel and averaged: 1, 4, 9, 16, 64 or auto.
-            mode: sheets, axis-sheets or splats.
-            classify: pre-integrated, post or pre.
-            optics: light, maximum or x-ray.
+                Default: auto.
+            mode: sheets, axis-sheets or splats. Default: sheets.
+            back_to_front: Whether single splats are composited from back to front.
+            classify: pre-integrated, post or pre. Default: pre-integrated.
+            optics: light, maximum or x-ray. Default: light.
             shade: False draws without light, True lights volumes in any case.
             clips: Shapes that cut the scene.
             cut, budget: The width of splats of hierarchies, in pixels, or about how many.
         """
         given = dict(locals())
-        behind = _options.background(background)
-        return Picture(self._pixels(camera, {name: given[name] for name in _DRAW}), behind)
+        said: dict[str, Any] = dict(self._described.get("picture", {}))
+        behind = said.pop("background", "black") if background == "auto" else background
+        # What is given counts more than what the scene file says.
+        own = {name: given[name] for name in _DRAW if given[name] is not None}
+        if {"cut", "budget"} & own.keys():
+            for name in ("cut", "budget", "frame_time"):
+                said.pop(name, None)
+        draw = {**said, **own}
+        if camera is None:
+            camera = self._described_camera(draw)
+        return Picture(self._pixels(camera, draw), _options.background(behind))
+
+    def _described_camera(self, draw: Mapping[str, Any]) -> Camera | None:
+        """Returns the camera of a scene file; None if the usual one is drawn."""
+        camera, framing = self._described.get("camera"), self._described.get("framing")
+        if camera is not None:
+            return Camera.from_json(json.dumps(camera))
+        if not framing:
+            return None
+        return Camera.from_json(self._own.camera(json.dumps(framing), _drawn(**draw)))
 
     def _pixels(self, camera: Camera | None, draw: Mapping[str, Any]) -> _pysplatkit.Picture:
         """Draws with options by their names."""
@@ -552,8 +629,8 @@ def _fit(**given: Any) -> str:
 
 
 def _drawn(
-    size: tuple[int, int], clips: Sequence[Clip] = (), samples: int | str = "auto", **draw: Any
+    size: tuple[int, int] | None = None, clips: Sequence[Clip | dict[str, Any]] = (), **draw: Any
 ) -> str:
     """Returns how a picture is drawn, as JSON."""
-    own = {"size": size, "clips": [clip._entry() for clip in clips]}
-    return _options.text({**own, **draw, "samples": None if samples == "auto" else samples})
+    entries = [clip._entry() if isinstance(clip, Clip) else clip for clip in clips or ()]
+    return _options.text({**draw, "size": size, "clips": entries})

@@ -1,7 +1,8 @@
 //! How much memory a conversion may use, and how much it needs.
 
-use crate::failure::Failure;
-use splatkit::{
+use super::wrong;
+use crate::{
+    Result,
     formats::Stream,
     hierarchy::external::{BLOCKS, memory_between, memory_of_stream},
     input::{self, Limits},
@@ -15,7 +16,7 @@ pub struct Need {
     /// Approximate number of bytes. If a file's header has no counts, the file's size decides.
     pub bytes: u64,
     /// The first file that cannot be read in pieces, or the error of a file that cannot be opened.
-    pub whole: splatkit::Result<Option<PathBuf>>,
+    pub whole: Result<Option<PathBuf>>,
 }
 
 /// Memory for each byte of a file whose header has no counts: the byte and what is made from it.
@@ -57,7 +58,7 @@ pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough:
         }
         let [least_of_this, most_of_this] = between[index];
         if least_of_this < most_of_this {
-            match looked_through(file, limits, options, enough - (least - least_of_this)) {
+            match scanned(file, limits, options, enough - (least - least_of_this)) {
                 Ok(bytes) => between[index] = [bytes; 2],
                 // As above, the reader reports this error.
                 Err(error) => {
@@ -77,12 +78,7 @@ fn sums(between: &[[u64; 2]], blocks: u64) -> [u64; 2] {
 
 /// Scans a file that is read in pieces and returns the memory that it needs. A need above `enough`
 /// may be larger than the result.
-fn looked_through(
-    file: &Path,
-    limits: &Limits,
-    options: &SurfelOptions,
-    enough: u64,
-) -> splatkit::Result<u64> {
+fn scanned(file: &Path, limits: &Limits, options: &SurfelOptions, enough: u64) -> Result<u64> {
     let own = file_bytes(file);
     let Some(mut stream) = Stream::open(file, limits)? else { return Ok(own) };
     Ok(memory_of_stream(&mut stream, options, enough.saturating_sub(own))?.saturating_add(own))
@@ -90,7 +86,7 @@ fn looked_through(
 
 /// Refuses an input that needs more than `most` bytes of memory, together with the bytes that
 /// earlier inputs have `taken`.
-pub fn check(file: &Path, need: u64, taken: u64, most: u64) -> Result<(), Failure> {
+pub fn check(file: &Path, need: u64, taken: u64, most: u64) -> Result<()> {
     if need.saturating_add(taken) <= most {
         return Ok(());
     }
@@ -100,7 +96,7 @@ pub fn check(file: &Path, need: u64, taken: u64, most: u64) -> Result<(), Failur
     } else {
         String::new()
     };
-    Err(Failure::Usage(format!(
+    Err(wrong(format!(
         "{}: this takes about {need} MiB{before}, but only {most} MiB may be used; --memory allows \
          more",
         file.display()

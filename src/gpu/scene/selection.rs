@@ -1,20 +1,11 @@
-//! Select: lists the samples of a lattice that can add to the picture under the current transfer
-//! function (shaders/passes/select.wgsl). Runs when the transfer function makes other samples
-//! visible. Explicit splats have no such list: all are candidates.
+//! The visible samples of a chunk of a lattice: the ranges from which `select` lists them.
 
 use crate::{
-    Result,
     gpu::{
+        budget::SCAN_CAPACITY,
         device::{
             Gpu,
             buffers::{buffer, upload},
-        },
-        pipeline::{
-            commands::Commands,
-            recipe::{Binding, Recipe},
-            scan::{SCAN_CAPACITY, Scan},
-            shaders,
-            stage::Stage,
         },
     },
     parallel::prelude::*,
@@ -27,16 +18,16 @@ const SIDE: u32 = 4;
 /// The selected samples of one chunk of a lattice.
 #[derive(Debug)]
 pub struct Selection {
-    ranges: wgpu::Buffer,
-    blocks: wgpu::Buffer,
-    block_count: u32,
-    counts: Counts,
+    pub ranges: wgpu::Buffer,
+    pub blocks: wgpu::Buffer,
+    pub block_count: u32,
+    pub counts: Counts,
     /// Indices within the chunk, block by block.
     pub selected: wgpu::Buffer,
     /// The number of selected samples.
     pub count: u32,
     /// The visible ranges that the list was made for; `None` if there is no list.
-    shown: Option<[u16; 256]>,
+    pub shown: Option<[u16; 256]>,
 }
 
 impl Selection {
@@ -76,67 +67,10 @@ impl Selection {
     }
 }
 
-/// The pass.
-#[derive(Debug)]
-pub struct Select {
-    count: Stage,
-    write: Stage,
-    scan: Scan,
-}
-
-impl Select {
-    pub fn new(gpu: &Gpu, scan: &Scan) -> Self {
-        let [count, write] = Stage::all(gpu, Self::recipes());
-        Self { count, write, scan: scan.clone() }
-    }
-
-    pub fn recipes() -> [Recipe; 2] {
-        use Binding::{Read, Uniform, Write};
-        let sources = [shaders::FRAME, shaders::SELECT];
-        let bindings: &[&[Binding]] = &[&[Uniform, Read, Read, Write, Write]];
-        [
-            Recipe::new("select: count", &sources, "count", bindings),
-            Recipe::new("select: write", &sources, "write", bindings),
-        ]
-    }
-
-    /// Makes the list of a chunk, in a buffer of its size, unless `check` refuses the number of
-    /// samples. `uniform` is the chunk's source. `shown` contains the visible ranges
-    /// ([`first_visible`](crate::volume::reach::first_visible)).
-    pub fn update(
-        &self,
-        gpu: &Gpu,
-        selection: &mut Selection,
-        uniform: &wgpu::Buffer,
-        shown: &[u16; 256],
-        check: impl Fn(u32) -> Result<()>,
-    ) -> Result<()> {
-        selection.count = selection.counts.shown(shown);
-        check(selection.count)?;
-        selection.selected =
-            buffer(gpu, "selected", 4 * u64::from(selection.count), Usage::STORAGE);
-        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
-        let buffers =
-            [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
-        let bind = |stage: &Stage| {
-            stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
-        };
-        let (blocks, groups) = (selection.block_count, selection.block_count.div_ceil(64));
-        Commands::submit(gpu, "select", |commands| {
-            commands.clear(&selection.blocks);
-            self.count.dispatch(commands, &[&bind(&self.count)], groups);
-            self.scan.encode(gpu, commands, &selection.blocks, blocks + 1);
-            self.write.dispatch(commands, &[&bind(&self.write)], groups);
-        });
-        selection.shown = Some(*shown);
-        Ok(())
-    }
-}
-
 /// How many samples have each range of values around them. With it, the length of a list is known
 /// without waiting for the GPU.
 #[derive(Debug)]
-struct Counts {
+pub struct Counts {
     /// The ranges that occur, with their numbers of samples.
     ranges: Vec<([u8; 2], u32)>,
 }
@@ -159,7 +93,7 @@ impl Counts {
     }
 
     /// Returns the number of samples that show something, as select.wgsl counts them.
-    fn shown(&self, first_visible: &[u16; 256]) -> u32 {
+    pub fn shown(&self, first_visible: &[u16; 256]) -> u32 {
         let shows = |[low, high]: [u8; 2]| u16::from(high) >= first_visible[usize::from(low)];
         self.ranges.iter().filter(|(range, _)| shows(*range)).map(|(_, count)| count).sum()
     }

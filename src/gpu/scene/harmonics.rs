@@ -1,19 +1,10 @@
-//! Recolor: gives trained Gaussians the colours that an eye sees (shaders/passes/recolor.wgsl). The
-//! harmonics stay on the device, so that nothing is computed or uploaded as the eye moves.
+//! The harmonics of trained Gaussians, from which `recolor` makes the colours that an eye sees.
 
 use crate::{
     gaussians::{Eye, Gaussians, harmonics::terms},
-    gpu::{
-        device::{
-            Gpu,
-            buffers::{buffer, upload},
-        },
-        pipeline::{
-            commands::Commands,
-            recipe::{Binding, Recipe},
-            shaders,
-            stage::Stage,
-        },
+    gpu::device::{
+        Gpu,
+        buffers::{buffer, upload},
     },
     parallel::prelude::*,
 };
@@ -31,8 +22,8 @@ pub struct Harmonics {
     count: u32,
     terms: u32,
     /// By blocks of Gaussians, number by number.
-    numbers: wgpu::Buffer,
-    eye: wgpu::Buffer,
+    pub numbers: wgpu::Buffer,
+    pub eye: wgpu::Buffer,
 }
 
 /// The uniform of the pass (`Eye` in recolor.wgsl).
@@ -78,41 +69,20 @@ impl Harmonics {
     pub fn bytes(&self) -> u64 {
         self.numbers.size()
     }
-}
 
-/// The pass.
-#[derive(Debug)]
-pub struct Recolor(Stage);
-
-impl Recolor {
-    pub fn new(gpu: &Gpu) -> Self {
-        Self(Stage::new(gpu, &Self::recipe()))
-    }
-
-    pub fn recipe() -> Recipe {
-        use Binding::{Read, Uniform, Write};
-        let sources = [shaders::SPLAT, shaders::RECOLOR];
-        Recipe::new("recolor", &sources, "recolor", &[&[Uniform, Read, Write]])
-    }
-
-    /// Encodes the pass for a chunk's splats.
-    pub fn encode(
-        &self,
-        gpu: &Gpu,
-        commands: &mut Commands<'_>,
-        (harmonics, splats): (&Harmonics, &wgpu::Buffer),
-        eye: Eye,
-    ) {
-        let Harmonics { origin, count, terms, numbers, eye: buffer } = harmonics;
+    /// Writes the eye that sees the colours.
+    pub fn look_from(&self, gpu: &Gpu, eye: Eye) {
         let (at, w) = match eye {
-            Eye::At(place) => (place - *origin, 1.0),
+            Eye::At(place) => (place - self.origin, 1.0),
             Eye::Along(direction) => (direction, 0.0),
         };
         let place = at.as_vec3().extend(w).to_array();
-        let uniform = GpuEye { place, count: *count, terms: *terms, unused: [0; 2] };
-        gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&uniform));
-        let buffers = [buffer, numbers, splats].map(|b| b.as_entire_buffer_binding());
-        let group = self.0.bind(gpu, 0, &buffers);
-        self.0.dispatch(commands, &[&group], count.div_ceil(BLOCK as u32));
+        let uniform = GpuEye { place, count: self.count, terms: self.terms, unused: [0; 2] };
+        gpu.queue.write_buffer(&self.eye, 0, bytemuck::bytes_of(&uniform));
+    }
+
+    /// Returns the number of blocks.
+    pub fn blocks(&self) -> u32 {
+        self.count.div_ceil(BLOCK as u32)
     }
 }

@@ -1,6 +1,7 @@
 //! Scan: exclusive prefix sums in place (shaders/passes/scan.wgsl).
 
 use crate::gpu::{
+    budget::SCAN_CAPACITY,
     device::{
         Gpu,
         buffers::{buffer, filled_buffer},
@@ -12,9 +13,6 @@ use crate::gpu::{
         stage::Stage,
     },
 };
-
-/// Maximum number of elements of one scan.
-pub const SCAN_CAPACITY: u32 = 1 << 24;
 
 /// Numbers per invocation (`SEGMENT` in scan.wgsl).
 const SEGMENT: u32 = 64;

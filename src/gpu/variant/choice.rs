@@ -1,14 +1,12 @@
 //! Chooses the variant of a picture: the features of the shaders that its scene, view and settings
 //! need.
 
+use super::Variant;
 use crate::{
     bricks::Choice,
-    gpu::{budget::Budget, pipeline::variant::Variant},
+    gpu::budget::Budget,
     math::{Kernel, Profile, View},
-    plan::{
-        tables::{self},
-        uniforms::{self},
-    },
+    plan::{frame::clip_counts, tables},
     scene::{Classification, Gradient, Item, Optics, Scene, Settings},
     volume::{Arrangement, Lattice, TransferFunction},
 };
@@ -87,7 +85,7 @@ fn without_items(request: &Request<'_>) -> Variant {
     let like_gpu = budget.staged.unwrap_or(!is_software);
     let staged = like_gpu && budget.tile_entries.is_none();
     let most_entries = if is_software && !staged { SOFTWARE_ENTRIES } else { u32::MAX };
-    let [clips, holes] = uniforms::clip_counts(settings);
+    let [clips, holes] = clip_counts(settings);
     Variant {
         perspective: view.perspective,
         mode: settings.mode,

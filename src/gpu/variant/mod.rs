@@ -1,6 +1,13 @@
-//! The variant of a picture, and the constants that precede its shaders.
+//! The variant of a picture, and the constants that precede its shaders. `choice` chooses it.
 
-use super::{recipe::Binding, shaders};
+mod choice;
+
+pub use choice::{Request, variant};
+
+use super::{
+    budget::RECORD_WORDS,
+    pipeline::{recipe::Binding, shaders},
+};
 use crate::{
     plan::tables,
     scene::{Classification, Mode, Optics, Order},
@@ -82,9 +89,6 @@ pub struct Variant {
 
 /// Parts of a sheet in which the transfer function is integrated. docs/engine.md has measurements.
 const PARTS: u32 = 3;
-
-/// Words of a general record.
-pub const RECORD_WORDS: u32 = 4;
 
 /// Maximum number of loop iterations of an entry.
 const ENTRY_ITERATIONS: u32 = 6;

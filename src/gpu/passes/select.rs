@@ -1,0 +1,123 @@
+//! Select: lists the samples of a lattice that can add to the picture under the current transfer
+//! function (shaders/passes/select.wgsl). Runs when the transfer function makes other samples
+//! visible. Explicit splats have no such list: all are candidates.
+
+use super::scan::Scan;
+use crate::{
+    Result,
+    gpu::{
+        device::{
+            Gpu,
+            buffers::{buffer, upload},
+        },
+        pipeline::{
+            commands::Commands,
+            recipe::{Binding, Recipe},
+            shaders,
+            stage::Stage,
+        },
+        scene::{
+            PreparedScene,
+            chunk::{Origin, list_bytes, spans},
+            selection::Selection,
+        },
+    },
+    math::View,
+    scene::Item,
+    volume::reach::{EVERYTHING, first_visible},
+};
+use wgpu::BufferUsages as Usage;
+
+/// The pass.
+#[derive(Debug)]
+pub struct Select {
+    count: Stage,
+    write: Stage,
+    scan: Scan,
+}
+
+impl Select {
+    pub fn new(gpu: &Gpu, scan: &Scan) -> Self {
+        let [count, write] = Stage::all(gpu, Self::recipes());
+        Self { count, write, scan: scan.clone() }
+    }
+
+    pub fn recipes() -> [Recipe; 2] {
+        use Binding::{Read, Uniform, Write};
+        let sources = [shaders::FRAME, shaders::SELECT];
+        let bindings: &[&[Binding]] = &[&[Uniform, Read, Read, Write, Write]];
+        [
+            Recipe::new("select: count", &sources, "count", bindings),
+            Recipe::new("select: write", &sources, "write", bindings),
+        ]
+    }
+
+    /// Lists the visible samples of lattices again if others have become visible. `all` lists all
+    /// samples.
+    pub fn list(
+        &self,
+        gpu: &Gpu,
+        prepared: &mut PreparedScene,
+        view: &View,
+        all: bool,
+    ) -> Result<()> {
+        if !prepared.scene.items.iter().any(|item| matches!(item, Item::Volume(..))) {
+            return Ok(());
+        }
+        prepared.bring_lattices(gpu)?;
+        for chunk in &mut prepared.chunks {
+            let (source, before) =
+                (chunk.source(view, false, &prepared.page_caches), chunk.list_bytes());
+            let Origin::Lattice { volume, selection, .. } = &mut chunk.origin else { continue };
+            let shown = match prepared.scene.items[chunk.item].transfer() {
+                Some(transfer) if !all => first_visible(transfer, volume.range),
+                _ => EVERYTHING,
+            };
+            if selection.is_for(&shown) {
+                continue;
+            }
+            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
+            let rest = prepared.bytes - before;
+            self.update(gpu, selection, &chunk.uniform, &shown, |count| {
+                gpu.check_memory(rest + list_bytes(u64::from(count)))
+            })?;
+            chunk.candidates = selection.count;
+            chunk.spans = spans(gpu, selection.count);
+            prepared.bytes = rest + chunk.list_bytes();
+        }
+        prepared.number_runs();
+        Ok(())
+    }
+
+    /// Makes the list of a chunk, in a buffer of its size, unless `check` refuses the number of
+    /// samples. `uniform` is the chunk's source. `shown` contains the visible ranges
+    /// ([`first_visible`](crate::volume::reach::first_visible)).
+    fn update(
+        &self,
+        gpu: &Gpu,
+        selection: &mut Selection,
+        uniform: &wgpu::Buffer,
+        shown: &[u16; 256],
+        check: impl Fn(u32) -> Result<()>,
+    ) -> Result<()> {
+        selection.count = selection.counts.shown(shown);
+        check(selection.count)?;
+        selection.selected =
+            buffer(gpu, "selected", 4 * u64::from(selection.count), Usage::STORAGE);
+        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
+        let buffers =
+            [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
+        let bind = |stage: &Stage| {
+            stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
+        };
+        let (blocks, groups) = (selection.block_count, selection.block_count.div_ceil(64));
+        Commands::submit(gpu, "select", |commands| {
+            commands.clear(&selection.blocks);
+            self.count.dispatch(commands, &[&bind(&self.count)], groups);
+            self.scan.encode(gpu, commands, &selection.blocks, blocks + 1);
+            self.write.dispatch(commands, &[&bind(&self.write)], groups);
+        });
+        selection.shown = Some(*shown);
+        Ok(())
+    }
+}

@@ -1,0 +1,145 @@
+//! The numbers of a frame that every part of a picture needs: the view, the sheets, the light of
+//! surfaces, and what the clips keep.
+
+use crate::{
+    math::{Bounds, Sheets, View},
+    scene::{Clip, ClipShape, Mode, Scene, Settings},
+    volume::Shade,
+};
+use glam::{DVec2, DVec3, Mat3, Vec3};
+
+/// A view with its sheets, its light and its clips, in 32 bits.
+#[derive(Debug, Clone, Default)]
+pub struct Frame {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Pixel coordinates of the optical axis.
+    pub center: [f32; 2],
+    /// Focal length in pixels (perspective), or pixels per world unit.
+    pub scale: f32,
+    pub is_perspective: bool,
+    pub sheet_count: u32,
+    /// The number of sheets at the front whose thickness grows with the distance.
+    pub geometric_sheets: u32,
+    /// One over the binary logarithm of the ratio of successive planes of geometric sheets.
+    pub per_ratio_log2: f32,
+    /// One over the thickness of the other sheets.
+    pub per_step: f32,
+    /// Smallest z in view space that any pixel sees (perspective).
+    pub z_near: f32,
+    pub surface_light: Light,
+    /// The normal of axis-aligned sheets in view space.
+    pub sheet_normal: Vec3,
+    /// The rotation from view space to the world's axes.
+    pub to_world: Mat3,
+    /// The convex regions that the clips keep.
+    pub clips: Vec<Convex>,
+    /// The corners of the boxes that the clips cut out.
+    pub holes: Vec<[Vec3; 2]>,
+}
+
+/// A convex region, relative to the eye and along the world's axes.
+#[derive(Debug, Clone, Copy)]
+pub enum Convex {
+    /// The points x with `normal`·x ≤ `offset`.
+    HalfSpace { normal: Vec3, offset: f32 },
+    /// The points between two corners.
+    Box([Vec3; 2]),
+}
+
+/// Blinn's light at the eye, in 32 bits.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Light {
+    pub ambient: f32,
+    pub diffuse: f32,
+    pub specular: f32,
+    pub power: f32,
+}
+
+impl Light {
+    /// Returns a light of these shares. Without them, colours stay as they are.
+    pub fn new(shade: Option<Shade>) -> Self {
+        let unlit = Self { ambient: 1.0, diffuse: 0.0, specular: 0.0, power: 1.0 };
+        shade.map_or(unlit, |shade| Self {
+            ambient: shade.ambient as f32,
+            diffuse: shade.diffuse as f32,
+            specular: shade.specular as f32,
+            power: shade.power as f32,
+        })
+    }
+}
+
+/// Returns the smallest cosine between a ray of the picture and the optical axis.
+fn smallest_cosine(view: &View) -> f64 {
+    let size = DVec2::new(f64::from(view.size[0]), f64::from(view.size[1]));
+    [DVec2::ZERO, DVec2::new(size.x, 0.0), DVec2::new(0.0, size.y), size]
+        .map(|corner| view.ray(corner).1.z)
+        .into_iter()
+        .fold(1.0, f64::min)
+}
+
+impl Frame {
+    /// Returns the frame of a view of a scene.
+    pub fn new(scene: &Scene, view: &View, sheets: &Sheets, settings: &Settings) -> Self {
+        let sheet_normal = match settings.mode {
+            Mode::AxisSheets => scene.sheet_normal(view).as_vec3(),
+            Mode::Sheets | Mode::Splats(_) => Vec3::ZERO,
+        };
+        // Samples that are classified first are lit as surfaces are. They have the only field.
+        let classified = scene.items.iter().find_map(|item| item.transfer());
+        let classified = classified.filter(|_| settings.classifies_samples());
+        let shade =
+            classified.map_or(settings.surface_shade, |transfer| settings.shade_of(transfer));
+        let mut frame = Self {
+            size: view.size,
+            center: [view.center.x as f32, view.center.y as f32],
+            scale: view.scale as f32,
+            is_perspective: view.perspective,
+            sheet_count: sheets.count() as u32,
+            geometric_sheets: sheets.turn as u32,
+            per_ratio_log2: if sheets.turn > 0 { (1.0 / sheets.ratio.log2()) as f32 } else { 0.0 },
+            per_step: (1.0 / sheets.step) as f32,
+            // Axis-aligned sheets may begin behind an eye that lies among them.
+            z_near: (sheets.planes[0] * smallest_cosine(view)).max(1e-6 * sheets.step) as f32,
+            surface_light: Light::new(shade),
+            sheet_normal,
+            to_world: view.rotation.transpose().as_mat3(),
+            clips: Vec::new(),
+            holes: Vec::new(),
+        };
+        settings.clips.iter().for_each(|clip| frame.add_clip(view, clip));
+        frame
+    }
+
+    fn add_clip(&mut self, view: &View, clip: &Clip) {
+        match clip.shape {
+            ClipShape::HalfSpace { normal, offset } => {
+                // The complement of a half-space is a half-space.
+                let size = if clip.inside { normal.length() } else { -normal.length() };
+                let offset = (offset - normal.dot(view.position)) / size;
+                let normal = (normal / size).as_vec3();
+                self.clips.push(Convex::HalfSpace { normal, offset: offset as f32 });
+            }
+            ClipShape::Box(Bounds { min, max }) => {
+                let corners = from_eye(view, [min, max]);
+                if clip.inside {
+                    self.clips.push(Convex::Box(corners));
+                } else {
+                    self.holes.push(corners);
+                }
+            }
+        }
+    }
+}
+
+/// Returns places relative to the eye.
+pub fn from_eye(view: &View, places: [DVec3; 2]) -> [Vec3; 2] {
+    places.map(|place| (place - view.position).as_vec3())
+}
+
+/// Returns how many convex regions the clips keep, and how many boxes they cut out.
+pub fn clip_counts(settings: &Settings) -> [u32; 2] {
+    let is_hole = |clip: &&Clip| !clip.inside && matches!(clip.shape, ClipShape::Box(_));
+    let holes = settings.clips.iter().filter(is_hole).count();
+    [(settings.clips.len() - holes) as u32, holes as u32]
+}
