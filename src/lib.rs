@@ -59,7 +59,7 @@
 //! | draw data larger than memory | [`hierarchy`], [`bricks`] |
 //! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |
 //! | use the device of a host application | [`gpu::Gpu::from_wgpu`] |
-//! | move a camera by hand, keep a pace, read and write scene files | [`interaction`] |
+//! | move a camera by hand, keep a pace | [`interaction`] |
 //! | compare pictures | [`compare`] |
 //! | count values, look under a cursor, cut slices: what windows need | [`interaction`] |
 //! | look up what a picture is, exactly | [`mod@reference`] |

@@ -137,6 +137,9 @@ impl Framing {
         if !are_finite || !are_positive {
             return Err("a camera needs finite numbers; angles and lengths are above 0".into());
         }
+        if self.camera_position.is_some() && (self.view.is_some() || self.distance.is_some()) {
+            return Err("a camera has either a position, or a side and a distance".into());
+        }
         if self.view_angle.is_some_and(|angle| angle >= 180.0) {
             return Err("view_angle is an angle between 0 and 180 degrees".into());
         }

@@ -107,7 +107,13 @@ impl CameraFlags {
             scene.camera = None;
         }
         scene.camera = self.camera.or(scene.camera);
-        let before = std::mem::take(&mut scene.framing);
+        let mut before = std::mem::take(&mut scene.framing);
+        if own.camera_position.is_some() {
+            (before.view, before.distance) = (None, None);
+        }
+        if own.view.is_some() || own.distance.is_some() {
+            before.camera_position = None;
+        }
         scene.framing = Framing {
             camera: None,
             view: own.view.or(before.view),

@@ -132,3 +132,72 @@ pub fn quoted(word: &str) -> String {
     }
     format!("'{}'", word.replace('\'', r"'\''"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Command, Task, given::Given};
+    use clap::{CommandFactory, FromArgMatches};
+
+    fn scene_of(words: &[String]) -> Description {
+        let command = ["splatkit".to_owned(), "render".to_owned()];
+        let words = command.iter().chain(words);
+        let matches = Command::command().try_get_matches_from(words).expect("flags");
+        let Task::Render(render) = Command::from_arg_matches(&matches).expect("a command").task
+        else {
+            panic!("another task");
+        };
+        render.job(&Given::of(&matches)).expect("a job").scene
+    }
+
+    /// Flags become a scene, the scene a file, and the file the same scene and the same flags.
+    #[test]
+    fn flags_scene_files_and_flags_say_the_same() {
+        for flags in [
+            "",
+            "--iso 1,2:red,50%:#00ff00:0.5 --no-shade",
+            "--iso a.nrrd=3 --iso 7 --range a.nrrd=-1,4.5",
+            "--transfer mri --opacity-unit 2.5 --colormap viridis_r --log-colors",
+            "--transfer b.ply=ct-bone --nan-color orange",
+            r#"--transfer {"color":[[0,1,1,1]],"opacity":[[0,0],[5,0.125]]}"#,
+            "--gradient-opacity 0,0:50,0.2:200,1 --kernel hann --extent 2.5 --sharp",
+            "--kernel gaussian --sigma 0.7 --edges --crease 30 --radius-scale 1.5",
+            "--color height --opacity 0.5 --color b.ply=#ff8800 --opacity b.ply=0.25",
+            "--size 64x48 --background white --samples 4",
+            "--background none --samples auto --axes --scale-bar --scalar-bar --caption bone",
+            "--mode splats --back-to-front --classify pre --shade",
+            "--mode axis-sheets --gradient central --evaluate scatter --sheet-thickness 0.5",
+            "--mip --cull-backfaces false --no-occlusion",
+            "--x-ray --cut 3.5 --engine cpu",
+            "--budget 1000 --engine gpu",
+            "--frame-time 16.5",
+            "--clip x<50% --cut-out box:0,0,0%:1,2,50% --clip plane:1,0,0,2.5",
+            "--view iso --azimuth -20 --elevation 5 --zoom 1.5 --orthographic --up +Z",
+            "--camera-position 1,2,3 --focal-point 0,0,0.5 --view-up 0,1,0 --view-angle 50",
+            r#"--camera {"position":[1,2,3],"focal_point":[0,0,0],"view_up":[0,0,1],"height":2}"#,
+            "--scalar heat --dims 4x5x6 --type u8 --spacing 1,1,2.5 --endian big --header 12",
+            "--time 3 --series 2 --dataset a/b --missing -999 --radius 0.4 --neighbours 9 --no-slopes",
+        ] {
+            let words: Vec<String> = ["a.nrrd", "b.ply"]
+                .into_iter()
+                .chain(flags.split_whitespace())
+                .map(Into::into)
+                .collect();
+            let scene = scene_of(&words);
+            let text = scene.to_json(Path::new(""));
+            let again: Description = serde_json::from_str(&text).expect(flags);
+            assert_eq!(again, scene, "{flags}: {text}");
+            let words = words_of(&scene).expect(flags);
+            assert_eq!(scene_of(&words), scene, "{flags}: {words:?}");
+            assert!(flags.is_empty() || scene != scene_of(&words[words.len() - 2..]), "{flags}");
+        }
+    }
+
+    #[cfg(feature = "window")]
+    #[test]
+    fn words_are_quoted_for_a_shell() {
+        assert_eq!(quoted("--size=3x4"), "--size=3x4");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+        assert_eq!(quoted("a b"), "'a b'");
+    }
+}

@@ -168,6 +168,13 @@ impl AppearanceEntry {
         if self.opacity_unit.is_some_and(|unit| !(unit > 0.0 && unit.is_finite())) {
             return Err(("opacity_unit", "must be a length above 0".into()));
         }
+        let is_length = |length: &f64| *length > 0.0 && length.is_finite();
+        if !self.sigma.iter().all(is_length) {
+            return Err(("sigma", "must be a standard deviation above 0".into()));
+        }
+        if !self.extent.iter().all(is_length) {
+            return Err(("extent", "must be a length above 0".into()));
+        }
         if self.opacity.is_some_and(|opacity| !(opacity > 0.0 && opacity <= 1.0)) {
             return Err(("opacity", "must be above 0 and at most 1".into()));
         }

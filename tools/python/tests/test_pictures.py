@@ -230,3 +230,66 @@ def test_an_own_camera_may_see_nothing():
     turned = camera.copy().azimuth(20).elevation(5).zoom(2)
     assert turned.view_angle == camera.view_angle / 2 and turned != camera
     assert camera.copy().orthographic().height > 0
+
+
+#: Scenes: inputs, and the other parts of a scene file.
+SCENES = [
+    (["bytes.npy"], {}),
+    (["bytes.npy"], {"appearance": {"transfer": "generic", "range": [20, 200]}}),
+    (["bytes.npy"], {"appearance": {"isosurfaces": [{"percent": 50, "color": "orange"}]}}),
+    (["bytes.npy"], {"appearance": {"kernel": "linear", "colormap": "coolwarm_r"}}),
+    (["bytes.npy"], {"appearance": {"kernel": [1, 0.5, 0], "extent": 2}}),
+    (["bytes.npy"], {"picture": {"optics": "maximum"}}),
+    (["bytes.npy"], {"picture": {"mode": "axis-sheets", "shade": False}}),
+    (["bytes.npy"], {"picture": {"mode": "splats", "back_to_front": True, "samples": 4}}),
+    (["bytes.npy"], {"picture": {"clips": [{"side": {"axis": "x", "below": True, "at": "50%"}}]}}),
+    (["bytes.npy"], {"reading": {"spacing": [1, 1, 2]}, "framing": {"view": "left"}}),
+    (["colors.ply"], {"appearance": {"color": "height", "colormap": "turbo"}}),
+    (["colors.ply"], {"appearance": {"color": "#ff8800", "opacity": 0.5, "edges": True}}),
+    (["colors.ply"], {"framing": {"azimuth": 70, "elevation": -10, "orthographic": True}}),
+    (["cloud.ply"], {"picture": {"background": "white"}, "framing": {"zoom": 1.5}}),
+    (["samples.npy"], {"reading": {"radius": 0.4, "slopes": False}}),
+    (["cells.vtk"], {"appearance": {"range": [0.2, 0.8]}}),
+    (["tree.splk"], {"picture": {"cut": 8, "background": "none"}}),
+    (["bricks.splv"], {"picture": {"sheet_thickness": 1.5}}),
+    (["trained.spz"], {"framing": {"distance": 9, "up": [0, 0, 1]}}),
+    (["bytes.npy", "colors.ply"], {"camera": {"position": [60, -40, 30], "focal_point": [7, 7, 7], "view_up": [0, 0, 1], "view_angle": 30}}),
+]
+
+
+@pytest.mark.parametrize("number", range(len(SCENES)))
+def test_scene_files_are_drawn_as_by_the_command(command, data, tmp_path, number):
+    names, parts = SCENES[number]
+    picture = {"size": SIZE, **parts.get("picture", {})}
+    scene = {"splatkit_scene": 2, "inputs": [{"file": name} for name in names], **parts}
+    path = data / f"scene{number}.json"
+    path.write_text(json.dumps({**scene, "picture": picture}))
+    out = [tmp_path / name for name in ("command.png", "python.png")]
+    command("render", path, "--engine", "cpu", "-o", out[0])
+    pysplatkit.render(path).save(out[1])
+    assert out[0].read_bytes() == out[1].read_bytes()
+
+
+def test_scenes_are_saved_for_the_command(command, data, tmp_path):
+    scene = Scene().add(data / "bytes.npy", isosurfaces=[(90, "red", 0.5)], spacing=(1, 1, 2))
+    scene.add(data / "colors.ply", color="ivory", opacity=0.7)
+    clip = pysplatkit.Clip.box((0, 0, 0), (9, 99, 99))
+    camera = scene.camera(SIZE, view="iso")
+    drawn = {"size": SIZE, "background": "white", "clips": [clip], "samples": 4}
+    path = data / "saved.json"
+    scene.save(path, camera, **drawn)
+    out = tmp_path / "command.png"
+    command("render", path, "--engine", "cpu", "-o", out)
+    own = scene.render(camera=camera, **drawn)
+    assert np.array_equal(read_png(out), own.rgba)
+    opened = Scene.open(path)
+    assert np.array_equal(opened.render().rgba, own.rgba)
+    assert opened.render((20, 10)).size == (20, 10)
+    with pytest.raises(pysplatkit.ArgumentError, match="arrays"):
+        Scene().add_points(np.eye(3)).save(path)
+    with pytest.raises(pysplatkit.InputError, match="leads out"):
+        (data / "other").mkdir(exist_ok=True)
+        other = data / "other" / "s.json"
+        other.write_text('{"splatkit_scene": 2, "inputs": [{"file": "../bytes.npy"}]}')
+        Scene.open(other)
+    assert len(Scene.open(other, trusted=True)) == 1

@@ -20,10 +20,11 @@ fn a_scene_file_draws_what_its_flags_draw() {
     folder.put(
         "scenes/s.json",
         format!(
-            r#"{{"splatkit_scene": 1, "inputs": [{{"file": "../a.nrrd"}}, {{"file": "../a.ply"}}],
-                "size": [64, 48], "camera": {camera}, "transfer": {transfer},
-                "clips": [{{"plane": [1, 0, 0, 9.5]}}],
-                "options": {{"background": "white", "engine": "cpu"}}}}"#
+            r#"{{"splatkit_scene": 2, "inputs": [{{"file": "../a.nrrd"}}, {{"file": "../a.ply"}}],
+                "camera": {camera}, "appearance": {{"transfer": {transfer}}},
+                "picture": {{"size": [64, 48], "background": "white",
+                             "clips": [{{"plane": [1, 0, 0, 9.5]}}]}},
+                "engine": "cpu"}}"#
         ),
     );
     folder
@@ -96,15 +97,16 @@ fn wrong_scenes_name_what_is_wrong() {
         folder.put("s.json", text);
         folder.run("render s.json -o x.png").fails(3, &[&["s.json"], words].concat());
     };
-    let input = r#""splatkit_scene": 1, "inputs": [{"file": "a.ply"}]"#;
+    let input = r#""splatkit_scene": 2, "inputs": [{"file": "a.ply"}]"#;
     wrong("{", &["EOF", "line 1"]);
-    wrong(r#"{"splatkit_scene": 2, "inputs": [{"file": "a.ply"}]}"#, &["version 1"]);
-    wrong(r#"{"splatkit_scene": 1, "inputs": []}"#, &["no input"]);
+    wrong(r#"{"splatkit_scene": 1, "inputs": [{"file": "a.ply"}]}"#, &["version 2"]);
+    wrong(r#"{"splatkit_scene": 2, "inputs": []}"#, &["no input"]);
     wrong(&format!("{{{input}, \"sise\": [1, 1]}}"), &["sise"]);
-    wrong(&format!("{{{input}, \"options\": {{\"output\": \"y.png\"}}}}"), &["options.output"]);
-    wrong(&format!("{{{input}, \"options\": {{\"colour\": \"red\"}}}}"), &["options.colour"]);
-    wrong(&format!("{{{input}, \"clips\": [{{}}]}}"), &["plane or a box"]);
-    let hidden = r#"{"splatkit_scene": 1, "inputs": [{"file": "a.ply", "visible": false}]}"#;
+    let picture = |text: &str| format!("{{{input}, \"picture\": {text}}}");
+    wrong(&picture(r#"{"output": "y.png"}"#), &["picture", "output"]);
+    wrong(&picture(r#"{"backgroud": "red"}"#), &["picture", "backgroud"]);
+    wrong(&picture(r#"{"clips": [{}]}"#), &["picture.clips", "a plane, a side or a box"]);
+    let hidden = r#"{"splatkit_scene": 2, "inputs": [{"file": "a.ply", "visible": false}]}"#;
     wrong(hidden, &["visible"]);
     folder.put("s.json", format!("{{{input}}}"));
     folder.run("render s.json a.ply -o x.png").fails(2, &["drawn alone"]);
@@ -119,27 +121,35 @@ fn scenes_of_strangers_are_bounded() {
     std::fs::create_dir(folder.path("s")).unwrap();
     folder.put("s/a.ply", PLY);
     let scene = |inputs: &str, more: &str| {
-        let text = format!(r#"{{"splatkit_scene": 1, "inputs": [{inputs}]{more}}}"#);
+        let text = format!(r#"{{"splatkit_scene": 2, "inputs": [{inputs}]{more}}}"#);
         folder.put("s/s.json", text);
         folder.run("render s/s.json -o s.png --engine cpu --size 8x8")
     };
     let own = r#"{"file": "a.ply"}"#;
-    scene(own, r#", "options": {"limit-bytes": 1000000, "limit-seconds": 60}"#).ok();
+    scene(own, r#", "reading": {"limits": {"bytes": 1000000, "seconds": 60}}"#).ok();
     let many = vec![own; 10_001].join(",");
     let letters = "A".repeat(500_000);
     for (inputs, more, words) in [
         (r#"{"file": "../a.ply"}"#, "", ["inputs[0].file", "--trust-scene"]),
         (r#"{"file": "https://127.0.0.1:1/a.ply"}"#, "", ["inputs[0].file", "--trust-scene"]),
-        (own, r#", "transfer": "/etc/hostname""#, ["“/etc/hostname”", "--trust-scene"]),
-        (own, r#", "options": {"labels": "../a.ply"}"#, ["options.labels", "--trust-scene"]),
-        (own, r#", "options": {"limit-bytes": 9e12}"#, ["options.limit-bytes", "only lower"]),
-        (own, r#", "options": {"gpu-timeout": 1e9}"#, ["options.gpu-timeout", "--gpu-timeout"]),
-        (own, r#", "options": {"trust-scene": true}"#, ["options.trust-scene", "not an option"]),
+        (
+            own,
+            r#", "appearance": {"transfer": "/etc/hostname"}"#,
+            ["“/etc/hostname”", "--trust-scene"],
+        ),
+        (own, r#", "reading": {"labels": "../a.ply"}"#, ["reading.labels", "--trust-scene"]),
+        (
+            own,
+            r#", "reading": {"limits": {"bytes": 9000000000000}}"#,
+            ["reading.limits.bytes", "only lower"],
+        ),
+        (own, r#", "picture": {"memory": 1000000000}"#, ["picture.memory", "--memory"]),
+        (own, r#", "gpu_timeout": 1e9"#, ["gpu_timeout", "unknown field"]),
         (&many, "", ["there are 10001", "at most 10000"]),
         (
             own,
-            &format!(r#", "options": {{"caption": "{letters}"}}"#),
-            ["options.caption", "has 500000 letters"],
+            &format!(r#", "overlay": {{"caption": "{letters}"}}"#),
+            ["overlay.caption", "has 500000 letters"],
         ),
     ] {
         let words = [&["s/s.json"], &words[..]].concat();

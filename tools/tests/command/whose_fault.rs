@@ -91,25 +91,24 @@ fn values_of_a_scene_are_the_scenes_fault() {
     folder.put("near.mha", volume("1 1 1", "0 0 0"));
     let render = "render s.json -o a.png --engine cpu";
     for (rest, words) in [
-        (r#""options": {"crease": 255}"#, ["options.crease", "255", "0 to 180 degrees"]),
-        (r#""options": {"sigma": -1}"#, ["options.sigma", "-1", "number"]),
-        (r#""options": {"view-angle": "wide"}"#, ["options.view-angle", "wide", "is"]),
-        (r#""options": {"view": "inside"}"#, ["options.view", "inside", "front"]),
-        (r#""options": {"range": "5,1"}"#, ["options.range", "5,1", "is"]),
-        (r#""options": {"zoom": 1e30}"#, ["options.zoom", "the camera", "1e18"]),
-        (r#""size": [0, 5]"#, ["“size”", "0x5", "is"]),
-        (r#""clips": [{"plane": [0, 0, 0, 1]}]"#, ["clips", "plane", "is"]),
+        (r#""appearance": {"crease": 255}"#, ["appearance.crease", "angle", "0 to 180 degrees"]),
+        (r#""appearance": {"sigma": -1}"#, ["appearance.sigma", "standard deviation", "0"]),
+        (r#""framing": {"view_angle": "wide"}"#, ["framing.view_angle", "wide", "f64"]),
+        (r#""framing": {"view": "inside"}"#, ["framing.view", "inside", "front"]),
+        (r#""appearance": {"range": [5, 1]}"#, ["appearance.range", "5 to 1", "ascend"]),
+        (r#""framing": {"zoom": 1e30}"#, ["framing", "the camera", "1e18"]),
+        (r#""picture": {"size": [0, 5]}"#, ["picture.size", "width", "above 0"]),
+        (r#""picture": {"clips": [{"plane": [0, 0, 0, 1]}]}"#, ["picture.clips", "plane", "0,0,0"]),
         (
             r#""camera": {"position": [1e30, 0, 0], "focal_point": [0, 0, 0],
             "view_up": [0, 0, 1], "view_angle": 30}"#,
             ["“camera”", "away from", "1e18"],
         ),
-        (r#""transfer": "no-such-name""#, ["s.json", "no-such-name", "mri"]),
+        (r#""appearance": {"transfer": "no-such-name"}"#, ["s.json", "no-such-name", "mri"]),
     ] {
-        let rest = rest.replace("\"zoom\": 1e30", "\"zoom\": \"1e30\"");
         folder.put(
             "s.json",
-            format!(r#"{{"splatkit_scene": 1, "inputs": [{{"file": "near.mha"}}], {rest}}}"#),
+            format!(r#"{{"splatkit_scene": 2, "inputs": [{{"file": "near.mha"}}], {rest}}}"#),
         );
         let run = folder.run(render);
         assert!(!run.stderr().contains("--help"), "{}", run.stderr());
@@ -117,10 +116,11 @@ fn values_of_a_scene_are_the_scenes_fault() {
     }
     folder.put(
         "s.json",
-        r#"{"splatkit_scene": 1, "inputs": [{"file": "near.mha", "range": [4, 1]}]}"#,
+        r#"{"splatkit_scene": 2,
+            "inputs": [{"file": "near.mha", "appearance": {"range": [4, 1]}}]}"#,
     );
-    folder.run(render).fails(3, &["s.json", "inputs[0].range"]);
-    folder.put("s.json", r#"{"splatkit_scene": 1, "inputs": [{"file": "near.mha"}]}"#);
+    folder.run(render).fails(3, &["s.json", "inputs[0].appearance.range"]);
+    folder.put("s.json", r#"{"splatkit_scene": 2, "inputs": [{"file": "near.mha"}]}"#);
     // A scene is no file of data.
     for task in ["info", "check"] {
         folder.run(&format!("{task} s.json")).fails(3, &["s.json", "is a scene file"]);
@@ -133,9 +133,10 @@ fn values_of_a_scene_are_the_scenes_fault() {
     }
     folder.put(
         "s.json",
-        r#"{"splatkit_scene": 1, "inputs": [{"file": "near.mha"}], "options": {"view": "top"}}"#,
+        r#"{"splatkit_scene": 2, "inputs": [{"file": "near.mha"}], "framing": {"view": "top"}}"#,
     );
-    folder.run(&format!("{render} --camera-position 9,9,9")).fails(2, &["--view"]);
+    // The position counts more than the scene's view.
+    folder.run(&format!("{render} --camera-position 9,9,9")).ok();
     folder.run("render s.json -o a.bmp --engine cpu").fails(2, &["a.bmp"]);
 }
 
