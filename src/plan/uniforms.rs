@@ -123,6 +123,8 @@ pub const MIXED: u32 = 128;
 
 pub const TRAINED: u32 = 256;
 
+pub const CUT: u32 = 2048;
+
 pub const BODY_CENTRED: u32 = 512;
 
 pub const RECTILINEAR: u32 = 1024;
@@ -182,7 +184,8 @@ impl Source {
     pub fn of_facets(view: &View, set: &FacetSet, is_culled: bool) -> Self {
         let culled = if is_culled { CULLED } else { 0 };
         let mixed = if set.sides == Sides::Mixed { MIXED } else { 0 };
-        Self { flags: FACETS | culled | mixed, ..Self::of_radiance(view, set.origin, 1.0) }
+        let cut = if set.whole.is_some() { CUT } else { 0 };
+        Self { flags: FACETS | culled | mixed | cut, ..Self::of_radiance(view, set.origin, 1.0) }
     }
 
     /// Returns the source of nodes of a hierarchy.
@@ -346,6 +349,7 @@ impl FrameField {
             Item::Cells(..)
             | Item::Radiance(_)
             | Item::Facets(_)
+            | Item::Solid(_)
             | Item::Gaussians(_)
             | Item::Hierarchy(_) => {}
         }

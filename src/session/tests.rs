@@ -266,13 +266,13 @@ fn an_input_that_cannot_be_shown_changes_nothing() {
     turned.about.frame = Frame::Patient;
     assert!(items.add(&name, Data::Mesh(turned), &showing, &|_| ()).is_err());
     assert_eq!(items.captions(), Captions::default());
-    assert_eq!((items.count(), items.edges().len(), items.contents.len()), (0, 0, 0));
+    assert_eq!((items.count(), items.edges(&[]).len(), items.contents.len()), (0, 0, 0));
     assert_eq!(items.subject.origin, Origin::Default);
     // Later, it is as if it had never been tried.
     let plain = Showing { draws_edges: true, ..Showing::default() };
     items.add(&name, Data::Mesh(triangle()), &plain, &|_| ()).unwrap();
     let count = items.count();
-    assert_eq!((count > 0, items.edges().len()), (true, 1));
+    assert_eq!((count > 0, items.edges(&[]).len()), (true, 1));
     let mark = items.mark();
     items.add(&name, Data::Volume(cube(0.0)), &plain, &|_| ()).unwrap();
     items.restore(mark);

@@ -112,8 +112,9 @@ impl ColorFlags {
     pub fn check_effect(&self, has_mesh: bool, has_values: bool) -> Result<(), Failure> {
         if !self.color.is_empty() && !has_mesh {
             return Err(Failure::Usage(
-                "--color colours meshes and point clouds, but there are none; volumes and samples \
-                 take --colormap, and hierarchies keep the colours that they were converted with"
+                "--color colours meshes, point clouds and the boundary of cells, but there are none; \
+                 volumes and samples take --colormap, and hierarchies keep the colours that they \
+                 were converted with"
                     .into(),
             ));
         }

@@ -268,9 +268,14 @@ impl EngineFlags {
             settings.page_memory = memory;
         }
         self.method.apply(&mut settings);
-        settings.clips = self.clip.clips(&loaded.scene, &loaded.subject.bounds)?;
+        settings.clips = self.clips(loaded)?;
         loaded.scene.validate_settings(&settings)?;
         Ok(settings)
+    }
+
+    /// Returns the clips of a scene.
+    pub fn clips(&self, loaded: &Loaded) -> splatkit::Result<Vec<scene::Clip>> {
+        self.clip.clips(&loaded.scene, &loaded.subject.bounds)
     }
 
     /// Returns a warning if the flags of light or of optics change nothing.

@@ -26,7 +26,7 @@ use splatkit::{
     math::Camera,
     picture::{Picture, PictureFormat},
     reference,
-    scene::Settings,
+    scene::{Clip, Settings},
     session::Origin,
 };
 #[cfg(feature = "window")]
@@ -163,6 +163,8 @@ pub struct Finish {
     #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "for the window"))]
     pub background: Option<[f32; 3]>,
     overlay: Option<Overlay>,
+    /// The clips of the picture, which also cut edges.
+    clips: Vec<Clip>,
 }
 
 impl Finish {
@@ -177,7 +179,8 @@ impl Finish {
         let view = camera.view([picture.width, picture.height])?;
         // A line is a pixel wide, and wider in large pictures.
         let width = (f64::from(picture.height) / 720.0).max(1.0);
-        loaded.items.edges().iter().for_each(|edges| picture.draw_edges(edges, &view, width));
+        let edges = loaded.items.edges(&self.clips);
+        edges.iter().for_each(|edges| picture.draw_edges(edges, &view, width));
         Ok(picture)
     }
 
@@ -375,7 +378,8 @@ impl Render {
     pub fn finish(&self, loaded: &Loaded) -> Result<Finish, Failure> {
         let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
         let overlay = self.overlay.open(&loaded.captions, self.background.0)?;
-        Ok(Finish { factor, background: self.background.0, overlay })
+        let clips = self.engine.clips(loaded)?;
+        Ok(Finish { factor, background: self.background.0, overlay, clips })
     }
 
     /// The same, if other transfer functions show the fields of these items.

@@ -15,7 +15,7 @@ use splatkit::{
     math::Camera,
     memory,
     scene::{Scene, Settings},
-    session::{Captions, Data, Framing, Items, Name, Subject, Surfaces},
+    session::{Captions, CellStyle, Data, Framing, Items, Name, Subject, Surfaces},
 };
 #[cfg(feature = "window")]
 use splatkit::{scene::Item, session::Legend, volume::TransferFunction};
@@ -102,6 +102,7 @@ impl SceneFlags {
             read.extend(opened.files());
             match &input {
                 Data::Mesh(_) => is_scaled = true,
+                Data::Cells(_) => is_scaled |= showing.cell_style()? == CellStyle::Solid,
                 Data::Hierarchy(_) => unscaled = Some(path),
                 _ => {}
             }
@@ -111,6 +112,8 @@ impl SceneFlags {
             showing.is_named = self.load.scalar().is_some();
             showing.values_by =
                 showing.values_by.or_else(|| optics.map(|flag| format!("--{flag}")));
+            // Light that is not emitted and absorbed shows the field inside.
+            showing.cells = showing.cells.or(optics.map(|_| CellStyle::Volume));
             items.add(&Name::of_file(path), input, &showing, &|stage| progress.stage(stage))?;
         }
         let captions = items.captions();

@@ -11,7 +11,9 @@ use clap::Args;
 use splatkit::{
     input::Limits,
     math::Kernel,
-    session::{Appearance, Coloring, Showing, Surface, SurfaceColor, SurfaceValue, Transfer},
+    session::{
+        Appearance, CellStyle, Coloring, Showing, Surface, SurfaceColor, SurfaceValue, Transfer,
+    },
     volume::TransferFunction,
 };
 use std::path::{Path, PathBuf};
@@ -66,9 +68,14 @@ pub struct ShowFlags {
     /// [default: 60]
     #[arg(long, value_name = "DEGREES", value_parser = parse::crease)]
     crease: Option<f32>,
-    /// Meshes: draw the edges of the triangles as thin dark lines.
+    /// Draw the edges of the triangles of meshes, or of cells, as thin dark lines.
     #[arg(long)]
     edges: bool,
+    /// Draw cells as an opaque body that shows the field inside where clips cut it (solid), or as
+    /// a field, by a transfer function (volume) [default: solid; volume with --transfer, --iso,
+    /// --mip and --x-ray]
+    #[arg(long, value_name = "STYLE", value_parser = CellStyle::NAMES)]
+    cells: Option<String>,
     /// Meshes and point clouds: let this share of the light be absorbed where a ray meets a
     /// surface once, above 0 to 1. FILE=OPACITY is for one input, and the flag can be given
     /// several times [default: 1]
@@ -285,6 +292,11 @@ impl Show<'_> {
         }
     }
 
+    /// Returns how cells are drawn, if it is given. The flag has no other values.
+    fn cells(&self) -> Option<CellStyle> {
+        self.flags.cells.as_deref().and_then(|name| CellStyle::named(name).ok())
+    }
+
     /// Returns how an input is shown.
     pub fn showing(&self, path: &Path) -> Showing {
         Showing {
@@ -295,6 +307,7 @@ impl Show<'_> {
             crease: self.flags.crease,
             opacity: self.opacities.of(path).copied(),
             draws_edges: self.flags.edges,
+            cells: self.cells(),
             values_by: self.shows_values(path).map(str::to_owned),
             ..Showing::default()
         }

@@ -330,7 +330,8 @@ impl Work {
         let deadline = self.load.limits().deadline();
         let coloring = self.look.coloring()?;
         let attribute = coloring.attribute().or(self.load.scalar());
-        match self.load.reading().open_colored(path, attribute)?.read()? {
+        let input = self.load.reading().open_colored(path, attribute)?.read()?;
+        match input.with_surface_of_bare_cells()? {
             Data::Mesh(mut mesh) => {
                 let frame = Frame::of(mesh.about.stance, || Ok(mesh.guess_stance()))?;
                 let up = self.own.up.map(DVec3::from_array).and_then(DVec3::try_normalize);

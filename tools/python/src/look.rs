@@ -8,7 +8,8 @@ use splatkit::{
     color::ColorMap,
     math::Kernel,
     session::{
-        self, Appearance, Coloring, Showing, SurfaceColor, SurfaceValue, Transfer, shown_of,
+        self, Appearance, CellStyle, Coloring, Showing, SurfaceColor, SurfaceValue, Transfer,
+        shown_of,
     },
     volume::TransferFunction,
 };
@@ -34,6 +35,8 @@ pub struct Look {
     opacity: Option<f32>,
     radius_scale: Option<f32>,
     crease: Option<f32>,
+    /// How cells are drawn: solid or volume.
+    cells: Option<String>,
 }
 
 /// An isosurface. Without a colour, it has the transfer function's.
@@ -123,6 +126,7 @@ impl Look {
             radius_scale: self.radius_scale,
             crease: self.crease,
             opacity: self.opacity,
+            cells: self.cells.as_deref().map(CellStyle::named).transpose()?,
             values_by: self.shows_values().map(str::to_owned),
             ..Showing::default()
         })

@@ -217,7 +217,7 @@ impl Convert {
         let most = self.most_memory();
         let reading = self.load.reading(Some(most));
         let opened = reading.open_colored(path, self.attribute())?;
-        let input = opened.read()?;
+        let input = opened.read()?.with_surface_of_bare_cells()?;
         self.check_unneeded(&opened.files())?;
         let read_ms = milliseconds(start);
         let start = Instant::now();
