@@ -6,7 +6,7 @@ use super::{
     sides::{self, Side},
     split::{Between, Divisions},
 };
-use crate::{parallel::prelude::*, surface::Mesh};
+use crate::{math::weld::first_of_equals, parallel::prelude::*, surface::Mesh};
 use glam::{DVec3, DVec4};
 use std::collections::HashMap;
 
@@ -224,8 +224,10 @@ impl Made<'_> {
     }
 }
 
-/// The nodes of sides.
+/// The nodes of sides. Of nodes at one place, the first stands for all: pieces of a file may have
+/// points of their own.
 struct Sides {
+    first: Vec<u32>,
     nodes: Vec<Vec<u32>>,
     /// The sides that have each node.
     of_nodes: HashMap<u32, Vec<u32>>,
@@ -234,6 +236,7 @@ struct Sides {
 impl Sides {
     fn new(made: &Made, open: &[Side]) -> Self {
         let cells = made.cells;
+        let first = first_of_equals(&cells.points);
         let nodes_of = |side: &Side| {
             let (cell, number) = (side.cell as usize, side.number as usize);
             let mut found = Vec::new();
@@ -253,6 +256,7 @@ impl Sides {
                     }
                 }),
             }
+            found.iter_mut().for_each(|node| *node = first[*node as usize]);
             found.sort_unstable();
             found.dedup();
             found
@@ -262,17 +266,98 @@ impl Sides {
         for (side, nodes) in (0..).zip(&nodes) {
             nodes.iter().for_each(|node| of_nodes.entry(*node).or_default().push(side));
         }
-        Self { nodes, of_nodes }
+        Self { first, nodes, of_nodes }
     }
 
     /// Returns whether all corners of a polygon are nodes of one side.
     fn hold(&self, polygon: &[u32]) -> bool {
-        let first = polygon.first().and_then(|corner| self.of_nodes.get(corner));
-        first.is_some_and(|sides| {
+        let own: Vec<u32> = polygon.iter().map(|corner| self.first[*corner as usize]).collect();
+        let sides = own.first().and_then(|corner| self.of_nodes.get(corner));
+        sides.is_some_and(|sides| {
             sides.iter().any(|side| {
                 let nodes = &self.nodes[*side as usize];
-                polygon.iter().all(|corner| nodes.binary_search(corner).is_ok())
+                own.iter().all(|corner| nodes.binary_search(corner).is_ok())
             })
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    fn cube() -> Cells {
+        let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+        let points: Vec<Vec3> = (0..8).map(corner).collect();
+        let values = points.iter().map(|p| p.element_sum()).collect();
+        let mut cells = Cells { points, values, ..Cells::default() };
+        cells.push(CellKind::Voxel, 0..8);
+        cells
+    }
+
+    /// Six times the volume inside.
+    fn volume(mesh: &Mesh) -> f32 {
+        let one = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|corner| mesh.positions[corner as usize]);
+            a.dot(b.cross(c))
+        };
+        mesh.triangles.iter().map(one).sum()
+    }
+
+    #[test]
+    fn sides_face_outward_whatever_the_order_of_nodes() {
+        for nodes in [[0, 1, 3, 2, 4, 5, 7, 6], [4, 5, 7, 6, 0, 1, 3, 2]] {
+            let mut cells = Cells { kinds: vec![], offsets: vec![0], nodes: vec![], ..cube() };
+            cells.push(CellKind::Hexahedron, nodes);
+            let boundary = Boundary::of(&cells);
+            assert!((volume(&boundary.mesh) - 6.0).abs() < 1e-6);
+            assert_eq!((boundary.mesh.triangles.len(), boundary.edges.len()), (12, 12));
+            assert!(boundary.mesh.is_solid());
+        }
+    }
+
+    #[test]
+    fn faces_on_a_side_are_left_out() {
+        let mut cells = cube();
+        // Another point at the place of the first, and one away.
+        cells.points.extend([Vec3::ZERO, Vec3::new(0.0, 0.0, 2.0)]);
+        cells.values.extend([9.0, 9.0]);
+        cells.faces.push([0, 1, 3, 2]);
+        cells.faces.push([8, 1, 3]);
+        cells.faces.push([4, 5, 9]);
+        cells.validate().unwrap();
+        let boundary = Boundary::of(&cells);
+        assert_eq!((boundary.mesh.triangles.len(), boundary.mesh.positions.len()), (13, 9));
+        assert_eq!(boundary.edges.len(), 14);
+        // With values of cells, the face has its own.
+        let of_cells = Cells { place: Place::Cells, values: vec![1.0], ..cells };
+        let faces = super::super::Faces { values: vec![5.0, 6.0, 7.0], ..of_cells.faces.clone() };
+        let boundary = Boundary::of(&Cells { faces, ..of_cells });
+        assert_eq!(boundary.of_triangles.len(), 13);
+        assert_eq!((boundary.of_triangles[11], boundary.of_triangles[12]), (1.0, 7.0));
+    }
+
+    #[test]
+    fn curved_sides_are_divided_and_holes_open_sides() {
+        let cells = Cells::tube(CellKind::QuadraticHexahedron, 1).unwrap();
+        let boundary = Boundary::of(&cells);
+        let straight = Boundary::of(&Cells::tube(CellKind::Hexahedron, 1).unwrap());
+        assert!(boundary.mesh.triangles.len() >= 4 * straight.mesh.triangles.len());
+        assert!(boundary.mesh.is_solid() && straight.mesh.is_solid());
+        // The inner and the outer wall, round to a thousandth.
+        let radius = |edge: &[u32; 2]| {
+            let [a, b] = edge.map(|end| boundary.mesh.positions[end as usize]);
+            (0.5 * (a + b)).truncate().length()
+        };
+        let wall = |own: f32| !(0.47..=0.98).contains(&own);
+        let off = boundary.edges.iter().map(radius).filter(|own| wall(*own));
+        assert!(off.map(|own| (own - 0.45).abs().min((own - 1.0).abs())).all(|off| off < 5e-3));
+        let mut holed = Cells::tube(CellKind::Hexahedron, 1).unwrap();
+        let node = holed.nodes_of(5)[0] as usize;
+        holed.values[node] = f32::NAN;
+        let holed = Boundary::of(&holed);
+        assert!(holed.mesh.values.iter().all(|value| !value.is_nan()));
+        assert_ne!(holed.mesh.triangles.len(), straight.mesh.triangles.len());
     }
 }

@@ -293,11 +293,8 @@ fn cells_are_drawn_as_a_solid_or_as_a_field() {
         let items = items_of(&cells, &showing, Surfaces::Facets).unwrap();
         assert!(matches!(items.scene(true).unwrap().items[0], Item::Cells(..)));
     }
-    let both = Showing {
-        appearance: by_surface,
-        cells: Some(CellStyle::Solid),
-        ..Showing::default()
-    };
+    let both =
+        Showing { appearance: by_surface, cells: Some(CellStyle::Solid), ..Showing::default() };
     assert!(both.validate().is_err() && CellStyle::named("haze").is_err());
     // Cells of one value, and without any.
     for values in [vec![3.0; cells.points.len()], Vec::new()] {
