@@ -10,6 +10,7 @@ use crate::{
     color::ColorScale,
     facet::{Facet, FacetSet},
     math::{Bounds, Clip},
+    memory,
     parallel::prelude::*,
     splat::{NO_NORMAL, decode_normal},
     surface::{self, Bands, Mesh, Paint, SurfelOptions},
@@ -41,15 +42,12 @@ pub struct SolidOptions {
     pub has_edges: bool,
 }
 
-/// Facets of a solid at most.
-pub(super) const MOST_FACETS: usize = 1 << 23;
-
 impl SolidOptions {
     /// Returns the defaults for this tint. Creases from 45° on look sharp.
     pub fn new(tint: Tint) -> Self {
         let surface = SurfelOptions {
             crease_angle_degrees: 45.0,
-            most_facets: MOST_FACETS,
+            most_facets: usize::MAX,
             ..SurfelOptions::default()
         };
         Self { tint, surface, has_edges: false }
@@ -146,6 +144,7 @@ fn tinted(cells: &Cells, tint: Tint) -> Result<(Boundary, Option<Bands>)> {
     if matches!(tint, Tint::Values(_)) && cells.values.is_empty() {
         return Err(Error::Argument("the cells have no values to be coloured by".into()));
     }
+    memory::room("finding the boundary of cells", 32 * cells.len() as u64)?;
     let mut boundary = Boundary::of(cells);
     let mesh = &mut boundary.mesh;
     if mesh.triangles.is_empty() {
