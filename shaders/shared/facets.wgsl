@@ -137,7 +137,8 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
         let distance = dot(z, weights) / pixels[r].cosine;
         var counts = share > LEAST_SHARE_ADDED;
         if CLIPS + HOLES > 0u {
-            counts = counts && is_kept(r, distance);
+            // Facets that were cut before end at the clips.
+            counts = counts && (abs(last.w) < 1.0 || is_kept(r, distance));
         }
         var tint = vec4(1.0);
         // The share that is seen.

@@ -141,7 +141,7 @@ struct Source {
     // First batch of this chunk in the frame's list of batches.
     first_run: u32,
     // RADIANCE, ISOTROPIC, ENDS, NODES, COARSE, FACETS, CULLED, MIXED, TRAINED_FLAG,
-    // BODY_CENTRED_FLAG, RECTILINEAR_FLAG; the number of the field from bit FIELD_SHIFT on.
+    // BODY_CENTRED_FLAG, RECTILINEAR_FLAG, CUT; the number of the field from bit FIELD_SHIFT on.
     flags: u32,
 }
 
@@ -160,6 +160,8 @@ const MIXED: u32 = 128u;
 const TRAINED_FLAG: u32 = 256u;
 const BODY_CENTRED_FLAG: u32 = 512u;
 const RECTILINEAR_FLAG: u32 = 1024u;
+// Facets end at the clips already.
+const CUT: u32 = 2048u;
 const FIELD_SHIFT: u32 = 16u;
 
 // Returns the number of words of a splat's record.

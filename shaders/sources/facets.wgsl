@@ -77,8 +77,12 @@ fn facet_record(index: u32) -> array<vec4<f32>, 4> {
     }
     // On a set that winds in any way, all facets count as fronts.
     let is_front = away_of(a, b, c) < 0.0 || (source.flags & MIXED) != 0u;
-    // 1, or 1 more than the facet's number among those that show images, counted from 1.
-    let number = f32(select(1u, 1u + source.lattice.x + index, source.lattice.x > 0u));
+    // 1, or 1 more than the facet's number among those that show images, counted from 1; a half if
+    // the facet ends at the clips already.
+    var number = f32(select(1u, 1u + source.lattice.x + index, source.lattice.x > 0u));
+    if (source.flags & CUT) != 0u {
+        number = 0.5;
+    }
     return array<vec4<f32>, 4>(
         vec4(a, normals[0]),
         vec4(b, normals[1]),

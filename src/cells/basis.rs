@@ -76,7 +76,8 @@ const WEDGE: &[[usize; 2]] =
 const PYRAMID: &[[usize; 2]] = &[[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]];
 
 impl Form {
-    fn corners(self) -> &'static [At] {
+    /// Returns the places of the corners.
+    pub(super) fn corners(self) -> &'static [At] {
         const SQUARE: [At; 8] = [
             [0.0, 0.0, 0.0],
             [1.0, 0.0, 0.0],

@@ -5,6 +5,7 @@ use super::{
     CellKind,
     basis::{At, Basis, Form},
 };
+use glam::DVec3;
 use std::collections::BTreeSet;
 
 /// A part of a divided cell, by the numbers of its points.
@@ -22,9 +23,12 @@ pub(super) struct Division {
     pub blocks: Vec<Block>,
     /// Pairs of points between which the blocks are linear, and the weights in the middle.
     pub middles: Vec<([usize; 2], Vec<f64>)>,
+    /// The faces of blocks on each face of the cell ([`Form::sides`]).
+    pub sides: Vec<Vec<Vec<usize>>>,
 }
 
-/// The faces of a hexahedron, a wedge and a pyramid.
+/// The faces of the forms, counter-clockwise from outside.
+const TETRAHEDRON: &[&[usize]] = &[&[0, 1, 3], &[1, 2, 3], &[2, 0, 3], &[0, 2, 1]];
 const HEXAHEDRON: &[&[usize]] =
     &[&[0, 4, 7, 3], &[1, 2, 6, 5], &[0, 1, 5, 4], &[3, 7, 6, 2], &[0, 3, 2, 1], &[4, 5, 6, 7]];
 const WEDGE: &[&[usize]] = &[&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]];
@@ -46,6 +50,25 @@ pub(super) fn faces_of(kind: CellKind) -> Option<Vec<Vec<usize>>> {
         CellKind::HexagonalPrism => prism(6),
         _ => return None,
     })
+}
+
+impl Form {
+    /// Returns the corners of each face, counter-clockwise from outside.
+    pub fn sides(self) -> &'static [&'static [usize]] {
+        match self {
+            Self::Tetrahedron => TETRAHEDRON,
+            Self::Hexahedron => HEXAHEDRON,
+            Self::Wedge => WEDGE,
+            Self::Pyramid => PYRAMID,
+        }
+    }
+
+    /// Returns whether a place lies in the plane of a face.
+    fn is_on(self, side: &[usize], place: At) -> bool {
+        let corner = |at: usize| DVec3::from_array(self.corners()[side[at]]);
+        let normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+        normal.dot(DVec3::from_array(place) - corner(0)).abs() < 1e-9
+    }
 }
 
 impl Division {
@@ -72,11 +95,30 @@ impl Division {
         };
         let middles = pairs.into_iter().map(|pair| (pair, basis.weights(middle(pair)))).collect();
         let points = places.iter().map(|place| basis.weights(at(*place))).collect();
-        Self { points, blocks, middles }
+        let is_on = |side: &[usize], face: &Vec<usize>| {
+            face.iter().all(|corner| form.is_on(side, at(places[*corner])))
+        };
+        let on_side = |side: &&[usize]| {
+            let faces = blocks.iter().flat_map(Block::faces);
+            faces.filter(|face| is_on(side, face)).collect()
+        };
+        let sides = form.sides().iter().map(on_side).collect();
+        Self { points, blocks, middles, sides }
     }
 }
 
 impl Block {
+    /// Returns the corners of the faces.
+    fn faces(&self) -> Vec<Vec<usize>> {
+        match self {
+            Self::Tetrahedron(corners) => TETRAHEDRON
+                .iter()
+                .map(|face| face.iter().map(|at| corners[*at]).collect())
+                .collect(),
+            Self::Solid(faces) => faces.clone(),
+        }
+    }
+
     fn corners(&self) -> Vec<usize> {
         match self {
             Self::Tetrahedron(corners) => corners.to_vec(),

@@ -1,15 +1,22 @@
 //! Cells: tetrahedra, hexahedra and their kin with a field inside, as solvers write them.
 
 mod basis;
+mod boundary;
+mod cut;
 mod division;
+mod faces;
 mod kind;
 mod phantom;
+mod sides;
+mod solid;
 mod split;
 #[cfg(test)]
 mod tests;
 mod tetrahedra;
 
+pub use faces::Faces;
 pub use kind::CellKind;
+pub use solid::{Solid, SolidOptions, Tint};
 pub use split::CellOptions;
 pub use tetrahedra::Tetrahedra;
 
@@ -46,7 +53,8 @@ pub struct Cells {
     pub origin: DVec3,
     /// The points that cells refer to, relative to `origin`.
     pub points: Vec<Vec3>,
-    /// One value for each point or each cell, by `place`.
+    /// One value for each point or each cell, by `place`; empty if there are none. Without values,
+    /// cells are drawn as a solid of one colour.
     pub values: Vec<f32>,
     /// Where the values sit.
     pub place: Place,
@@ -57,6 +65,8 @@ pub struct Cells {
     pub offsets: Vec<usize>,
     /// The points of all cells, cell after cell, in VTK's order.
     pub nodes: Vec<u32>,
+    /// Surfaces beside the cells.
+    pub faces: Faces,
     /// What the file says beyond the values.
     pub about: About,
 }
@@ -81,6 +91,7 @@ impl Default for Cells {
             kinds: Vec::new(),
             offsets: vec![0],
             nodes: Vec::new(),
+            faces: Faces::default(),
             about: About::default(),
         }
     }
@@ -160,7 +171,8 @@ impl Cells {
             let node = self.points_of(cell).find(is_out).unwrap_or_default();
             return Err(format!("cell {cell} refers to point {node} of {points}"));
         }
-        Ok(())
+        let is_valued = self.place == Place::Cells && !self.values.is_empty();
+        self.faces.check(points, is_valued)
     }
 
     /// Checks the lengths of the lists, and the offsets.
@@ -178,7 +190,7 @@ impl Cells {
             Place::Points => (points, "points"),
             Place::Cells => (count, "cells"),
         };
-        if self.values.len() != wanted {
+        if self.values.len() != wanted && !self.values.is_empty() {
             return Err(format!("there are {} values for {wanted} {of}", self.values.len()));
         }
         let ends = [self.offsets.first(), self.offsets.last()];
@@ -199,7 +211,7 @@ impl Cells {
         Ok(())
     }
 
-    /// Returns the smallest and largest value; `[∞, −∞]` if all are holes.
+    /// Returns the smallest and largest value; `[∞, −∞]` if there are none, or only holes.
     pub fn range(&self) -> [f64; 2] {
         let none = || [f32::INFINITY, f32::NEG_INFINITY];
         let ends = self
@@ -208,7 +220,8 @@ impl Cells {
             .filter(|value| !value.is_nan())
             .fold(none, |[low, high], &value| [low.min(value), high.max(value)])
             .reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-        ends.map(f64::from)
+        let of_faces = self.faces.values.iter().filter(|value| !value.is_nan());
+        of_faces.fold(ends, |[low, high], value| [low.min(*value), high.max(*value)]).map(f64::from)
     }
 
     /// Returns the smallest and largest world coordinates of the cells' nodes.
@@ -222,6 +235,7 @@ impl Cells {
             .into_par_iter()
             .fold(none, |ends, cell| self.points_of(cell).fold(ends, add))
             .reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        let ends = self.faces.corners.iter().copied().fold(ends, add);
         ends.map(|end| self.origin + end.as_dvec3())
     }
 
@@ -251,7 +265,7 @@ impl Cells {
     /// takes the mean of the values of its cells.
     #[must_use]
     pub fn with_values_of_points(self) -> Self {
-        if self.place == Place::Points {
+        if self.place == Place::Points || self.values.is_empty() {
             return self;
         }
         let mut sums = vec![(0.0, 0u32); self.points.len()];
@@ -264,7 +278,8 @@ impl Cells {
         }
         // A point of no cell with a value has none.
         let values = sums.into_iter().map(|(sum, count)| (sum / f64::from(count)) as f32).collect();
-        Self { values, place: Place::Points, ..self }
+        let faces = Faces { values: Vec::new(), ..self.faces };
+        Self { values, place: Place::Points, faces, ..self }
     }
 
     /// Derives a transfer function from the values. Colours span all but the outermost hundredths

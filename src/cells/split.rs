@@ -7,7 +7,7 @@ use super::{
     kind::faces,
     tetrahedra::Builder,
 };
-use crate::{Result, parallel::prelude::*};
+use crate::{Error, Result, parallel::prelude::*};
 use glam::DVec4;
 use std::collections::HashMap;
 
@@ -40,25 +40,43 @@ impl Cells {
     /// Left out are cells with a hole at a node, and tetrahedra without a volume.
     ///
     /// # Errors
-    /// Those of [`validate`](Self::validate), and [`Error::Argument`](crate::Error::Argument) if
+    /// Those of [`validate`](Self::validate), and [`Error::Argument`] if there are no values, or if
     /// nothing is left.
     pub fn tetrahedra(&self, options: &CellOptions) -> Result<Tetrahedra> {
+        if self.values.is_empty() {
+            return Err(Error::Argument("the cells have no values".into()));
+        }
+        self.divided(options)?.0.finish(true)
+    }
+
+    /// Returns the tetrahedra, to be completed, and the number of those before each cell.
+    pub(super) fn divided(&self, options: &CellOptions) -> Result<(Builder, Vec<u32>)> {
         self.validate()?;
         let divisions = Divisions::new(self);
         let shown: Vec<bool> =
             (0..self.len()).into_par_iter().map(|cell| self.is_shown(cell)).collect();
         let level = self.level(&divisions, &shown, options);
-        let mut made = Made { cells: self, points: HashMap::new(), builder: Builder::new(self) };
-        for cell in (0..self.len()).filter(|cell| shown[*cell]) {
-            let own = divisions.of(self, cell);
-            made.add(cell, own.get(level).or(own.last()));
+        let mut made =
+            Made { cells: self, between: Between::default(), builder: Builder::new(self) };
+        let mut starts = Vec::with_capacity(self.len());
+        for (cell, is_shown) in shown.into_iter().enumerate() {
+            starts.push(made.builder.len() as u32);
+            if is_shown {
+                let own = divisions.of(self, cell);
+                made.add(cell, own.get(level).or(own.last()));
+            }
         }
-        made.builder.finish()
+        Ok((made.builder, starts))
     }
 
     /// Returns the level to which the shown cells are divided, if they have as many. All have the
     /// same, so that the faces between curved cells fit.
-    fn level(&self, divisions: &Divisions, shown: &[bool], options: &CellOptions) -> usize {
+    pub(super) fn level(
+        &self,
+        divisions: &Divisions,
+        shown: &[bool],
+        options: &CellOptions,
+    ) -> usize {
         let [low, high] = self.range();
         let (shape, field) = (options.tolerance, options.tolerance * (high - low));
         let cells = || (0..self.len()).into_par_iter().filter(|cell| shown[*cell]);
@@ -81,8 +99,9 @@ impl Cells {
     }
 
     /// Whether a cell has values at all of its nodes.
-    fn is_shown(&self, cell: usize) -> bool {
+    pub(super) fn is_shown(&self, cell: usize) -> bool {
         match self.place {
+            _ if self.values.is_empty() => true,
             Place::Points => self.points_of(cell).all(|node| !self.values[node as usize].is_nan()),
             Place::Cells => !self.values[cell].is_nan(),
         }
@@ -105,21 +124,21 @@ impl Cells {
         })
     }
 
-    /// Returns a node's place and value. Values of cells count as 0.
-    fn node(&self, node: u32) -> DVec4 {
+    /// Returns a node's place and value. Values of cells count as 0, and so does a missing field.
+    pub(super) fn node(&self, node: u32) -> DVec4 {
         let value = match self.place {
-            Place::Points => f64::from(self.values[node as usize]),
-            Place::Cells => 0.0,
+            Place::Points if !self.values.is_empty() => f64::from(self.values[node as usize]),
+            _ => 0.0,
         };
         self.points[node as usize].as_dvec3().extend(value)
     }
 }
 
 /// The divisions of all kinds of cells of a mesh, by kind and number of nodes, at each level.
-struct Divisions(HashMap<(CellKind, usize), Vec<Division>>);
+pub(super) struct Divisions(HashMap<(CellKind, usize), Vec<Division>>);
 
 impl Divisions {
-    fn new(cells: &Cells) -> Self {
+    pub fn new(cells: &Cells) -> Self {
         let mut found: HashMap<_, Vec<Division>> = HashMap::new();
         for (cell, kind) in cells.kinds.iter().enumerate() {
             let nodes = cells.nodes_of(cell).len();
@@ -137,7 +156,7 @@ impl Divisions {
     }
 
     /// Returns the divisions of a cell, the coarsest first; none for prisms and polyhedra.
-    fn of(&self, cells: &Cells, cell: usize) -> &[Division] {
+    pub fn of(&self, cells: &Cells, cell: usize) -> &[Division] {
         let key = (cells.kinds[cell], cells.nodes_of(cell).len());
         self.0.get(&key).map_or(&[], Vec::as_slice)
     }
@@ -146,20 +165,49 @@ impl Divisions {
 /// Tetrahedra that are being made.
 struct Made<'a> {
     cells: &'a Cells,
-    /// The points that are no nodes, by the weights of the nodes that make them.
-    points: HashMap<u128, u32>,
+    between: Between,
     builder: Builder,
 }
 
 /// A smaller weight is one of rounding.
 const LEAST_WEIGHT: f64 = 1e-9;
 
+/// The points of divided cells that are no nodes, by the weights of the nodes that make them.
+#[derive(Default)]
+pub(super) struct Between(HashMap<u128, u32>);
+
+impl Between {
+    /// Returns the number of the point with these weights of a cell's nodes. `add` adds one that
+    /// was not met before, with its place and value, and returns its number.
+    pub fn number(
+        &mut self,
+        cells: &Cells,
+        nodes: &[u32],
+        weights: &[f64],
+        add: impl FnOnce(DVec4) -> u32,
+    ) -> u32 {
+        let parts = nodes.iter().zip(weights).filter(|(_, weight)| weight.abs() > LEAST_WEIGHT);
+        // Weights add up to 1. Between the nodes, polynomials of a high order may exceed 1.
+        let mut found = parts.clone();
+        if let (Some((node, _)), None) = (found.next(), found.next()) {
+            return *node;
+        }
+        // A point of a face has weights of the nodes of this face only, in all of its cells. The
+        // sum does not depend on their order.
+        let key = parts.clone().fold(0u128, |sum, (node, weight)| {
+            sum.wrapping_add(mixed(*node, (weight * 65536.0).round() as i64))
+        });
+        let at = || parts.map(|(node, weight)| *weight * cells.node(*node)).sum();
+        *self.0.entry(key).or_insert_with(|| add(at()))
+    }
+}
+
 impl Made<'_> {
     fn add(&mut self, cell: usize, division: Option<&Division>) {
         let nodes = self.cells.nodes_of(cell);
         let value = match self.cells.place {
             Place::Points => 0.0,
-            Place::Cells => self.cells.values[cell],
+            Place::Cells => self.cells.values.get(cell).copied().unwrap_or_default(),
         };
         let Some(division) = division else {
             return match faces_of(self.cells.kinds[cell]) {
@@ -181,24 +229,8 @@ impl Made<'_> {
 
     /// Returns the number of the point with these weights of the nodes.
     fn point(&mut self, nodes: &[u32], weights: &[f64]) -> u32 {
-        let parts = nodes.iter().zip(weights).filter(|(_, weight)| weight.abs() > LEAST_WEIGHT);
-        // Weights add up to 1. Between the nodes, polynomials of a high order may exceed 1.
-        let mut found = parts.clone();
-        if let (Some((node, _)), None) = (found.next(), found.next()) {
-            return *node;
-        }
-        // A point of a face has weights of the nodes of this face only, in all of its cells. The
-        // sum does not depend on their order.
-        let key = parts.clone().fold(0u128, |sum, (node, weight)| {
-            sum.wrapping_add(mixed(*node, (weight * 65536.0).round() as i64))
-        });
-        if let Some(point) = self.points.get(&key) {
-            return *point;
-        }
-        let at: DVec4 = parts.map(|(node, weight)| *weight * self.cells.node(*node)).sum();
-        let point = self.builder.point(at.truncate().as_vec3(), at.w as f32);
-        self.points.insert(key, point);
-        point
+        let add = |at: DVec4| self.builder.point(at.truncate().as_vec3(), at.w as f32);
+        self.between.number(self.cells, nodes, weights, add)
     }
 
     /// Adds a convex solid: the cone from its point with the least number over the faces that do

@@ -81,6 +81,8 @@ impl Builder {
     /// Begins with the points of cells, and their values if there is one a point.
     pub fn new(cells: &Cells) -> Self {
         let values = match cells.place {
+            // Without a field, it is 0 everywhere.
+            Place::Points if cells.values.is_empty() => vec![0.0; cells.points.len()],
             Place::Points => cells.values.clone(),
             Place::Cells => Vec::new(),
         };
@@ -97,6 +99,11 @@ impl Builder {
                 spacing: 0.0,
             },
         }
+    }
+
+    /// Number of tetrahedra so far.
+    pub fn len(&self) -> usize {
+        self.made.len()
     }
 
     /// Adds a point and returns its number.
@@ -124,11 +131,11 @@ impl Builder {
         }
     }
 
-    /// Completes the tetrahedra.
+    /// Completes the tetrahedra. Without `has_gradients`, they have none, and cannot be lit.
     ///
     /// # Errors
     /// [`Error::Argument`] if there are none, or more points than 32 bits can count.
-    pub fn finish(self) -> Result<Tetrahedra> {
+    pub fn finish(self, has_gradients: bool) -> Result<Tetrahedra> {
         let mut made = self.made;
         if made.is_empty() {
             return Err(Error::Argument(
@@ -143,7 +150,7 @@ impl Builder {
             )));
         }
         made.measure();
-        if made.place == Place::Points {
+        if made.place == Place::Points && has_gradients {
             made.gradients = made.gradients_of_points();
         }
         Ok(made)

@@ -24,6 +24,8 @@ use std::sync::Arc;
 const FARTHEST: f32 = 60.0;
 /// Smaller shares of a pixel are not added.
 const LEAST_SHARE: f32 = 1e-6;
+/// `extent2` of the record of a facet that ends at the clips already.
+const CUT: f32 = 1.0;
 
 /// Facets of a set in a view.
 pub struct FacetProjector<'a> {
@@ -70,7 +72,7 @@ impl<'a> FacetProjector<'a> {
             center: a.to_array(),
             strength: if is_front { 1.0 } else { -1.0 },
             whitening: [b.x, b.y, b.z, c.x, c.y, c.z],
-            extent2: 0.0,
+            extent2: if self.set.whole.is_some() { CUT } else { 0.0 },
             kind: Kind::Facet,
             payload: [
                 normals[0],
@@ -163,6 +165,8 @@ struct Shown<'a> {
     normals: [Vec3; 3],
     colors: [[f32; 3]; 3],
     is_front: bool,
+    /// Whether the facet ends at the clips already.
+    is_cut: bool,
     /// Factor that makes the area in the picture positive.
     turn: f32,
 }
@@ -253,6 +257,7 @@ impl<'a> Shown<'a> {
             normals: [a, b, c].map(|bits| decode_normal(bits.to_bits()).unwrap_or(Vec3::ZERO)),
             colors: [d, e, f].map(unpack),
             is_front: record.strength > 0.0,
+            is_cut: record.extent2 > 0.0,
             turn,
         }
     }
@@ -371,7 +376,7 @@ impl<S: Simd> OpenTile<'_, S> {
         let of =
             |parts: [f32; 3]| weights[0] * parts[0] + weights[1] * parts[1] + weights[2] * parts[2];
         let distance = of(facet.corners.map(|corner| corner.z)) / rays.cosine;
-        if plan.has_clips() {
+        if plan.has_clips() && !facet.is_cut {
             covers &= is_kept(plan, rays, distance);
         }
         let mut color = three!(I => of(facet.colors.map(|color| color[I])));

@@ -14,6 +14,7 @@ use super::{
 use crate::{
     Error, Result,
     bricks::{BLOCK, BLOCKS, Choice, SIDE},
+    cells::Solid,
     facet::FacetSet,
     gaussians::{Eye, Gaussians},
     hierarchy::{Cut, Levels},
@@ -41,6 +42,11 @@ pub enum Prepared {
         drawn: Arc<SplatSet>,
     },
     Facets(Arc<FacetSet>),
+    /// A solid, and what the clips of the last picture left of it.
+    Solid {
+        solid: Arc<Solid>,
+        drawn: Arc<FacetSet>,
+    },
     /// Trained Gaussians, and the splats that the eye of the last view saw.
     Gaussians {
         set: Arc<Gaussians>,
@@ -67,6 +73,9 @@ impl Prepared {
                 Self::Set { levels: Levels::new(set).map(Box::new), drawn: set.clone() }
             }
             Item::Facets(set) => Self::Facets(set.clone()),
+            Item::Solid(solid) => {
+                Self::Solid { solid: solid.clone(), drawn: solid.boundary().clone() }
+            }
             Item::Gaussians(set) => Self::Gaussians { set: set.clone(), seen: None },
             Item::Hierarchy(hierarchy) => Self::Hierarchy(Box::new(PageCache::new(hierarchy))),
             Item::Volume(volume, kernel, _) => Self::Volume {
@@ -94,7 +103,7 @@ impl Prepared {
     /// Returns the bytes of memory held for drawing, besides the scene's own.
     pub fn bytes(&self) -> u64 {
         match self {
-            Self::Set { .. } | Self::Facets(_) | Self::Cells => 0,
+            Self::Set { .. } | Self::Facets(_) | Self::Solid { .. } | Self::Cells => 0,
             Self::Gaussians { seen, .. } => {
                 seen.as_ref().map_or(0, |(_, seen)| size_of_val(&seen.splats[..]) as u64)
             }
@@ -144,12 +153,10 @@ impl Prepared {
                     records.extend(batch.iter().filter_map(own));
                 }))
             }
-            Self::Facets(set) => {
-                let projector = FacetProjector::new(plan, set, settings);
-                Ok(batches(&set.facets, spare, |first, batch, records| {
-                    let numbers = first..first + batch.len();
-                    records.extend(numbers.filter_map(|number| projector.record(number)));
-                }))
+            Self::Facets(set) => Ok(facets(plan, set, settings, spare)),
+            Self::Solid { solid, drawn } => {
+                *drawn = solid.facets(&settings.clips);
+                Ok(facets(plan, drawn, settings, spare))
             }
             Self::Hierarchy(pages) => {
                 pages.update(view, settings, *cut_pixels)?;
@@ -186,6 +193,20 @@ fn radiance(plan: &Plan, set: &SplatSet, spare: &mut Spare) -> Vec<Vec<Record>> 
             batch.iter().map(|splat| (splat, 1.0)),
             records,
         ));
+    })
+}
+
+/// Returns the records of facets.
+fn facets(
+    plan: &Plan,
+    set: &Arc<FacetSet>,
+    settings: &Settings,
+    spare: &mut Spare,
+) -> Vec<Vec<Record>> {
+    let projector = FacetProjector::new(plan, set, settings);
+    batches(&set.facets, spare, |first, batch, records| {
+        let numbers = first..first + batch.len();
+        records.extend(numbers.filter_map(|number| projector.record(number)));
     })
 }
 

@@ -191,6 +191,7 @@ impl CpuRenderer {
                 Prepared::Bricks(bricks) => stats.brick_bytes += bricks.bytes(),
                 Prepared::Set { .. }
                 | Prepared::Facets(_)
+                | Prepared::Solid { .. }
                 | Prepared::Gaussians { .. }
                 | Prepared::Volume { .. }
                 | Prepared::Cells => {}

@@ -93,6 +93,14 @@ pub struct Plan<'a> {
     pub region: Option<[Vec3; 2]>,
 }
 
+/// Returns the facets of an item that show images.
+fn set_with_images(item: &Item) -> Option<Arc<FacetSet>> {
+    match item {
+        Item::Facets(set) if !set.shown.is_empty() => Some(set.clone()),
+        _ => None,
+    }
+}
+
 impl<'a> Plan<'a> {
     /// Returns the plan of one field of a scene, by the number of its item and with its choice of
     /// bricks; or of a scene without fields.
@@ -138,17 +146,17 @@ impl<'a> Plan<'a> {
         };
         // Only emission and absorption is lit.
         let emits = settings.optics == Optics::EmissionAbsorption;
+        let is_lit = emits && settings.surface_shade.is_some();
         for item in &scene.items {
-            if let Item::Facets(set) = item
-                && !set.shown.is_empty()
-            {
-                plan.with_images.push(set.clone());
-            }
             match item {
-                Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
-                    plan.has_facets |= matches!(item, Item::Facets(_));
-                    plan.has_radiance |= !matches!(item, Item::Facets(_));
-                    plan.lit_surfaces |= emits && settings.surface_shade.is_some();
+                Item::Facets(_) | Item::Solid(_) => {
+                    plan.has_facets = true;
+                    plan.lit_surfaces |= is_lit;
+                    plan.with_images.extend(set_with_images(item));
+                }
+                Item::Radiance(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {
+                    plan.has_radiance = true;
+                    plan.lit_surfaces |= is_lit;
                 }
                 Item::Scalar(..) | Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {}
             }

@@ -106,6 +106,9 @@ pub struct FacetSet {
     pub images: Vec<Arc<Image>>,
     /// What each facet shows of them; empty if none shows anything.
     pub shown: Vec<Shown>,
+    /// The box around the whole, in world coordinates, if the facets are what clips left of it.
+    /// They end at the clips exactly, and no clip is applied to them again.
+    pub whole: Option<Bounds>,
 }
 
 impl FacetSet {
@@ -115,8 +118,12 @@ impl FacetSet {
         Some((self.images.get(shown.image as usize)?, shown.places))
     }
 
-    /// Returns the box around all facets, in world coordinates.
+    /// Returns the box around all facets, in world coordinates: also around those that clips
+    /// removed, so that a picture's sheets do not depend on its clips.
     pub fn bounds(&self) -> Bounds {
+        if let Some(whole) = self.whole {
+            return whole;
+        }
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let grow = |all: (Vec3, Vec3), facet: &Facet| {
             facet

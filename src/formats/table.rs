@@ -501,16 +501,16 @@ const VTK: Format = Format {
 };
 
 const VTK_CELLS: [Holding; 4] = [
-    some(Content::Cells, "that fill space, with values"),
-    some(Content::Mesh, "cells that are surfaces; the boundary of cells without values"),
+    some(Content::Cells, "that fill space"),
+    some(Content::Mesh, "cells that are surfaces"),
     some(Content::PointCloud, "without cells"),
     some(Content::Samples, "without cells, if a scalar is named"),
 ];
 
 const VTK_ANY: [Holding; 5] = [
     some(Content::Volume, "image data, rectilinear grids"),
-    some(Content::Cells, "that fill space, with values"),
-    some(Content::Mesh, "polygons; the boundary of cells without values"),
+    some(Content::Cells, "that fill space"),
+    some(Content::Mesh, "polygons"),
     some(Content::PointCloud, "without cells"),
     some(Content::Samples, "without cells, if a scalar is named"),
 ];

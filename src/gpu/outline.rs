@@ -61,6 +61,7 @@ impl Request<'_> {
         let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
         prepared.update_levels(gpu, view, pixels)?;
         passes.recolor.update(gpu, prepared, view)?;
+        prepared.update_solids(gpu, settings)?;
         prepared.update_facets(view, settings);
         prepared.update_forests(gpu, view, settings, cut_pixels)?;
         let choice = self.bring_bricks(gpu, passes, prepared)?;

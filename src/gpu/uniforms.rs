@@ -119,6 +119,7 @@ const CULLED: u32 = 64;
 const MIXED: u32 = 128;
 const TRAINED: u32 = 256;
 const BODY_CENTRED: u32 = 512;
+const CUT: u32 = 2048;
 const RECTILINEAR: u32 = 1024;
 
 /// The number of the field lies in the upper half of `Source::flags`.
@@ -254,8 +255,9 @@ impl Source {
     pub fn of_facets(view: &View, set: &FacetSet, is_culled: bool) -> Self {
         let culled = if is_culled { CULLED } else { 0 };
         let mixed = if set.sides == Sides::Mixed { MIXED } else { 0 };
+        let cut = if set.whole.is_some() { CUT } else { 0 };
         let source = Self::new(&source::Source::of_radiance(view, set.origin, 1.0));
-        Self { flags: FACETS | culled | mixed, ..source }
+        Self { flags: FACETS | culled | mixed | cut, ..source }
     }
 
     /// Returns the source of nodes of a hierarchy.

@@ -83,7 +83,11 @@ impl Histogram {
                 let values = &cells.values;
                 Some(Self::of_values(values.len(), range, |at| f64::from(values[at])))
             }
-            Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => None,
+            Item::Radiance(_)
+            | Item::Facets(_)
+            | Item::Solid(_)
+            | Item::Gaussians(_)
+            | Item::Hierarchy(_) => None,
         }
     }
 

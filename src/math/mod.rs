@@ -2,6 +2,7 @@
 //! points in space.
 
 mod camera;
+mod clip;
 pub(crate) mod cosine;
 mod eigen;
 mod fit;
@@ -13,6 +14,7 @@ mod sheets;
 pub(crate) mod weld;
 
 pub use camera::{Bounds, Camera, Projection, View};
+pub use clip::{Clip, ClipShape};
 pub(crate) use eigen::eigen;
 pub use kernel::{Kernel, Profile, Tensor};
 pub use path::{CameraPath, Keyframe};

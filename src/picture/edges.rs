@@ -66,6 +66,12 @@ impl Edges {
         Self { origin: mesh.origin, positions: mesh.positions.clone(), pairs, sides }
     }
 
+    /// Returns edges by their ends, relative to an origin in the world.
+    pub fn of_lines(origin: DVec3, lines: Vec<[Vec3; 2]>) -> Self {
+        let pairs = (0..lines.len() as u32).map(|line| [2 * line, 2 * line + 1]).collect();
+        Self { origin, positions: lines.as_flattened().to_vec(), pairs, sides: Vec::new() }
+    }
+
     /// Returns the number of edges.
     pub fn len(&self) -> usize {
         self.pairs.len()

@@ -114,6 +114,7 @@ impl Field {
             Item::Cells(..)
             | Item::Radiance(_)
             | Item::Facets(_)
+            | Item::Solid(_)
             | Item::Gaussians(_)
             | Item::Hierarchy(_) => {}
         }

@@ -23,6 +23,8 @@ pub(super) struct Facet<'a> {
     normals: [DVec3; 3],
     colors: [DVec3; 3],
     is_front: bool,
+    /// Whether the facet ends at the clips already.
+    is_cut: bool,
     /// The area of the triangle of the directions to the corners, or its sign: negative if the
     /// front is seen.
     turn: f64,
@@ -92,6 +94,7 @@ impl<'a> Facet<'a> {
                 DVec3::new(red, green, blue)
             }),
             is_front: turn < 0.0 || set.sides == Sides::Mixed,
+            is_cut: set.whole.is_some(),
             turn: if turn < 0.0 { -1.0 } else { 1.0 },
             rows,
         })
@@ -219,7 +222,8 @@ impl Frame<'_> {
             let distance = of(facet.corners).z / ray.direction.z;
             let sheet = self.planes.partition_point(|&plane| plane <= distance);
             let within = 1..self.planes.len();
-            if share <= 0.0 || !within.contains(&sheet) || !clip::contains(&allowed, distance) {
+            let is_kept = facet.is_cut || clip::contains(&allowed, distance);
+            if share <= 0.0 || !within.contains(&sheet) || !is_kept {
                 continue;
             }
             let front = self.planes[sheet - 1];

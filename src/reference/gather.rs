@@ -57,9 +57,10 @@ fn add_item<'a>(
             let own = |splat| from_splat(set, splat, None, view);
             kernels.extend(set.splats.iter().filter_map(own));
         }
-        // Facets are no kernels. A hierarchy's cut and Gaussians have become sets by now, and
-        // bricks a volume.
+        // Facets are no kernels. A hierarchy's cut, Gaussians and solids have become sets by now,
+        // and bricks a volume.
         Item::Facets(_)
+        | Item::Solid(_)
         | Item::Gaussians(_)
         | Item::Hierarchy(_)
         | Item::Bricks(..)

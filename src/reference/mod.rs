@@ -270,8 +270,8 @@ fn without_bricks(scene: &Scene) -> Result<Scene> {
     Ok(Scene { items: scene.items.iter().map(whole).collect::<Result<_>>()? })
 }
 
-/// Returns the scene with hierarchies replaced by the splats of their cuts, and Gaussians by those
-/// that are seen.
+/// Returns the scene with hierarchies replaced by the splats of their cuts, Gaussians by those that
+/// are seen, and solids by the facets that clips leave of them.
 fn with_cuts(scene: &Scene, view: &View, settings: &Settings) -> Result<Scene> {
     let flat = |item: &Item| match item {
         Item::Hierarchy(hierarchy) => {
@@ -281,6 +281,7 @@ fn with_cuts(scene: &Scene, view: &View, settings: &Settings) -> Result<Scene> {
             Ok(Item::Radiance(cut.into()))
         }
         Item::Gaussians(set) => Ok(Item::Radiance(set.seen_from(Eye::of(view)).into())),
+        Item::Solid(solid) => Ok(Item::Facets(solid.facets(&settings.clips))),
         other => Ok(other.clone()),
     };
     Ok(Scene { items: scene.items.iter().map(flat).collect::<Result<_>>()? })

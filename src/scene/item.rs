@@ -4,7 +4,7 @@ use super::{Settings, numbers};
 use crate::{
     Result,
     bricks::Bricks,
-    cells::Tetrahedra,
+    cells::{Solid, Tetrahedra},
     facet::FacetSet,
     gaussians::Gaussians,
     hierarchy::Hierarchy,
@@ -37,6 +37,8 @@ pub enum Item {
     Bricks(Arc<Bricks>, Kernel, TransferFunction),
     /// Tetrahedra with a linear field inside, shown by a transfer function.
     Cells(Arc<Tetrahedra>, TransferFunction),
+    /// Cells as a solid body: facets of their boundary, and of the faces where clips cut them.
+    Solid(Arc<Solid>),
 }
 
 impl Item {
@@ -58,7 +60,11 @@ impl Item {
             | Self::Volume(_, _, transfer)
             | Self::Bricks(_, _, transfer)
             | Self::Cells(_, transfer) => Some(transfer),
-            Self::Radiance(_) | Self::Facets(_) | Self::Gaussians(_) | Self::Hierarchy(_) => None,
+            Self::Radiance(_)
+            | Self::Facets(_)
+            | Self::Solid(_)
+            | Self::Gaussians(_)
+            | Self::Hierarchy(_) => None,
         }
     }
 
@@ -69,7 +75,11 @@ impl Item {
             | Self::Volume(_, _, transfer)
             | Self::Bricks(_, _, transfer)
             | Self::Cells(_, transfer) => Some(transfer),
-            Self::Radiance(_) | Self::Facets(_) | Self::Gaussians(_) | Self::Hierarchy(_) => None,
+            Self::Radiance(_)
+            | Self::Facets(_)
+            | Self::Solid(_)
+            | Self::Gaussians(_)
+            | Self::Hierarchy(_) => None,
         }
     }
 
@@ -88,6 +98,7 @@ impl Item {
             Self::Volume(_, kernel, _) | Self::Bricks(_, kernel, _) => Some(kernel),
             Self::Radiance(_)
             | Self::Facets(_)
+            | Self::Solid(_)
             | Self::Gaussians(_)
             | Self::Hierarchy(_)
             | Self::Scalar(..)
@@ -102,6 +113,7 @@ impl Item {
             Self::Bricks(bricks, ..) => Some(&bricks.header().lattice),
             Self::Radiance(_)
             | Self::Facets(_)
+            | Self::Solid(_)
             | Self::Gaussians(_)
             | Self::Hierarchy(_)
             | Self::Scalar(..)
@@ -123,7 +135,11 @@ impl Item {
             Self::Volume(volume, ..) => Some(volume.range),
             Self::Bricks(bricks, ..) => Some(bricks.header().range),
             Self::Cells(cells, _) => Some(cells.range()),
-            Self::Radiance(_) | Self::Facets(_) | Self::Gaussians(_) | Self::Hierarchy(_) => None,
+            Self::Radiance(_)
+            | Self::Facets(_)
+            | Self::Solid(_)
+            | Self::Gaussians(_)
+            | Self::Hierarchy(_) => None,
         }
     }
 
@@ -152,6 +168,7 @@ impl Item {
         match self {
             Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
             Self::Facets(set) => set.bounds(),
+            Self::Solid(solid) => solid.bounds(),
             Self::Gaussians(set) => set.bounds(),
             Self::Hierarchy(hierarchy) => hierarchy.bounds(),
             Self::Cells(cells, _) => cells.bounds(),

@@ -9,16 +9,15 @@ mod sheets;
 mod specks;
 mod validate;
 
+pub use crate::math::{Clip, ClipShape};
 pub use item::Item;
-pub use settings::{
-    Classification, Clip, ClipShape, Evaluate, Gradient, Mode, Optics, Order, Region, Settings,
-};
+pub use settings::{Classification, Evaluate, Gradient, Mode, Optics, Order, Region, Settings};
 pub(crate) use sheets::MOST_GATHERED;
 
 use crate::{
     Error, Result,
     bricks::Bricks,
-    cells::Tetrahedra,
+    cells::{Solid, Tetrahedra},
     facet::FacetSet,
     gaussians::Gaussians,
     hierarchy::Hierarchy,
@@ -112,6 +111,13 @@ impl Scene {
         transfer: TransferFunction,
     ) -> Self {
         self.items.push(Item::Cells(tetrahedra.into(), transfer));
+        self
+    }
+
+    /// Adds cells as a solid body.
+    #[must_use]
+    pub fn with_solid(mut self, solid: impl Into<Arc<Solid>>) -> Self {
+        self.items.push(Item::Solid(solid.into()));
         self
     }
 

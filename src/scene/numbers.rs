@@ -57,6 +57,7 @@ pub(super) fn check_item(item: &Item) -> Result<()> {
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(Error::Argument)?,
         Item::Facets(set) => check_facets(set).map_err(Error::Argument)?,
+        Item::Solid(solid) => check_facets(solid.boundary()).map_err(Error::Argument)?,
         Item::Gaussians(set) => set.validate().map_err(Error::Argument)?,
         Item::Volume(volume, ..) => volume.validate().map_err(Error::Argument)?,
         // Tetrahedra are checked as they are made.

@@ -1,6 +1,6 @@
 //! Points that span what a picture shows of a scene, for cameras that are fitted to it.
 
-use super::{Clip, ClipShape, Item, Scene, specks::take_specks};
+use super::{Clip, Item, Scene, specks::take_specks};
 use crate::{
     Result,
     bricks::{Bricks, Level},
@@ -8,10 +8,7 @@ use crate::{
     facet::FacetSet,
     gaussians::{Eye, Gaussians},
     hierarchy::{Hierarchy, file::Page, needed::coarsest},
-    math::{
-        Bounds,
-        hull::{Kind, outermost, without_strays},
-    },
+    math::hull::{Kind, outermost, without_strays},
     parallel::prelude::*,
     splat::{Splat, SplatSet, TRAINED_OPACITIES},
     volume::{Lattice, TransferFunction, Volume, steps::Steps},
@@ -36,17 +33,6 @@ const FAINT: f64 = 0.02;
 
 /// The optical depth of a block of samples that is opaque.
 const OPAQUE: f64 = 3.0;
-
-impl Clip {
-    /// Returns whether the clip keeps a point.
-    pub fn keeps(&self, point: DVec3) -> bool {
-        let inside = match self.shape {
-            ClipShape::HalfSpace { normal, offset } => normal.dot(point) <= offset,
-            ClipShape::Box(Bounds { min, max }) => (point.cmpge(min) & point.cmple(max)).all(),
-        };
-        inside == self.inside
-    }
-}
 
 impl Scene {
     /// Returns points, in world coordinates, that span what a picture shows of the scene: of
@@ -74,6 +60,8 @@ impl Scene {
                 Item::Radiance(set) => of_splats(set, |_| true, clips, spread),
                 Item::Scalar(set, transfer) => of_samples(set, transfer, clips, spread),
                 Item::Facets(set) => of_facets(set, clips, number),
+                // Its facets end at the clips.
+                Item::Solid(solid) => of_facets(&solid.facets(clips), &[], number),
                 Item::Gaussians(set) => of_gaussians(set, clips, spread),
                 Item::Hierarchy(hierarchy) => {
                     of_splats(&coarse(hierarchy)?, |_| true, clips, spread)
@@ -506,7 +494,7 @@ impl<'a> Rows<'a> {
 mod tests {
     use super::*;
     use crate::{
-        math::Kernel,
+        math::{Bounds, ClipShape, Kernel},
         surface::{Mesh, SurfelOptions},
         volume::{Isosurface, Samples},
     };

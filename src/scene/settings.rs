@@ -3,10 +3,9 @@
 use crate::{
     Stop,
     hierarchy::Detail,
-    math::{Bounds, View},
+    math::{Bounds, Clip, View},
     volume::{Shade, TransferFunction},
 };
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// The layers that are composited.
@@ -66,29 +65,6 @@ pub enum Optics {
     /// The light that the field absorbs, in white: opacity only, without colour and lighting.
     #[serde(rename = "x-ray")]
     XRay,
-}
-
-/// A shape that cuts the scene.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Clip {
-    /// The shape that bounds the part.
-    pub shape: ClipShape,
-    /// Whether to keep what is inside the shape (`true`) or outside it (`false`).
-    pub inside: bool,
-}
-
-/// The shape of a [`Clip`], in world coordinates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ClipShape {
-    /// The points x with normal·x ≤ offset are inside.
-    HalfSpace {
-        /// The direction out of the half-space, in world coordinates; it need not have unit length.
-        normal: DVec3,
-        /// The distance of its face from the world's origin, times the length of `normal`.
-        offset: f64,
-    },
-    /// A box along the world's axes.
-    Box(Bounds),
 }
 
 /// The part of a picture that one of several machines draws. At each pixel it consists of the

@@ -4,6 +4,7 @@ use super::{Item, Mode, Scene, Settings};
 use crate::{
     bricks::Choice,
     cells::Place,
+    facet::FacetSet,
     gaussians::EXTENT,
     math::{Bounds, Sheets, Tensor, View, hull::percentiles},
     splat::{FOOTPRINT_BLUR, STEP_BACK, TRAINED_BLUR},
@@ -39,7 +40,7 @@ impl Scene {
         let reaches = self.items.iter().map(|item| match item {
             Item::Radiance(set) => f64::from(set.extent) + STEP_BACK,
             Item::Scalar(set, _) => f64::from(set.extent),
-            Item::Facets(_) => FACET_REACH,
+            Item::Facets(_) | Item::Solid(_) => FACET_REACH,
             Item::Gaussians(_) => f64::from(EXTENT) * TRAINED_BLUR / FOOTPRINT_BLUR,
             Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent) + STEP_BACK,
             Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => 0.0,
@@ -60,16 +61,18 @@ impl Scene {
                 .then(|| Bounds { min: origin + low.as_dvec3(), max: origin + high.as_dvec3() })
         };
         let step = |count: usize| count.div_ceil(LOOKS).max(1);
+        let of_facets = |set: &FacetSet| {
+            let some = set.facets.iter().step_by(step(set.facets.len()));
+            usual(some.map(|facet| facet.corners[0].into()).collect(), set.origin)
+        };
         let of_item = |item: &Item| {
             let found = match item {
                 Item::Radiance(set) if !set.splats.is_empty() => {
                     let some = set.splats.iter().step_by(step(set.splats.len()));
                     usual(some.map(|splat| splat.center.into()).collect(), set.origin)
                 }
-                Item::Facets(set) if !set.facets.is_empty() => {
-                    let some = set.facets.iter().step_by(step(set.facets.len()));
-                    usual(some.map(|facet| facet.corners[0].into()).collect(), set.origin)
-                }
+                Item::Facets(set) if !set.facets.is_empty() => of_facets(set),
+                Item::Solid(solid) => of_facets(solid.boundary()),
                 Item::Gaussians(set) if !set.is_empty() => {
                     let some = set.centers.iter().step_by(step(set.len()));
                     usual(some.copied().collect(), set.origin)
@@ -174,6 +177,7 @@ impl Scene {
                 Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => {}
                 Item::Radiance(_)
                 | Item::Facets(_)
+                | Item::Solid(_)
                 | Item::Gaussians(_)
                 | Item::Hierarchy(_)
                 | Item::Scalar(..) => {

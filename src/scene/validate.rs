@@ -42,6 +42,7 @@ impl Scene {
                 Item::Radiance(set) => (set, Payload::Radiance),
                 Item::Scalar(set, _) => (set, Payload::Scalar),
                 Item::Facets(_)
+                | Item::Solid(_)
                 | Item::Gaussians(_)
                 | Item::Hierarchy(_)
                 | Item::Volume(..)
@@ -141,7 +142,7 @@ fn check_item(item: &Item, settings: &Settings) -> Result<()> {
         {
             wrong("a maximum intensity picture takes a volume or samples alone, without surfaces")
         }
-        Item::Facets(_)
+        Item::Facets(_) | Item::Solid(_)
             if settings.mode != Mode::Sheets || settings.optics != Optics::EmissionAbsorption =>
         {
             wrong(
@@ -149,7 +150,11 @@ fn check_item(item: &Item, settings: &Settings) -> Result<()> {
                  draw the surfels of the mesh instead",
             )
         }
-        Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => Ok(()),
+        Item::Radiance(_)
+        | Item::Facets(_)
+        | Item::Solid(_)
+        | Item::Gaussians(_)
+        | Item::Hierarchy(_) => Ok(()),
         Item::Scalar(_, transfer) => check_classified(transfer, settings),
         Item::Cells(cells, transfer) => check_cells(cells, transfer, settings),
         Item::Volume(volume, kernel, transfer) => {

@@ -1,8 +1,16 @@
 //! What an input holds, of any kind.
 
 use crate::{
-    bricks::Bricks, cells::Cells, formats::Kind, gaussians::Gaussians, hierarchy::Hierarchy,
-    math::Bounds, scattered::Points, surface::Mesh, volume::Volume,
+    Result,
+    bricks::Bricks,
+    cells::{Cells, Tint},
+    formats::Kind,
+    gaussians::Gaussians,
+    hierarchy::Hierarchy,
+    math::Bounds,
+    scattered::Points,
+    surface::Mesh,
+    volume::Volume,
 };
 use std::sync::Arc;
 
@@ -35,6 +43,23 @@ impl Data {
             Self::Gaussians(_) => Kind::Gaussians,
             Self::Hierarchy(_) => Kind::Hierarchy,
             Self::Bricks(_) => Kind::Bricks,
+        }
+    }
+
+    /// Returns the boundary as a mesh for cells without values, which say no more; everything else
+    /// as it is.
+    ///
+    /// # Errors
+    /// Those of [`Cells::surface`].
+    pub fn with_surface_of_bare_cells(self) -> Result<Self> {
+        match self {
+            Self::Cells(cells) if cells.values.is_empty() => {
+                let mut mesh = cells.surface(Tint::Plain([1.0; 3]))?;
+                mesh.colors.clear();
+                mesh.about = cells.about;
+                Ok(Self::Mesh(mesh))
+            }
+            other => Ok(other),
         }
     }
 

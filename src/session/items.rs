@@ -1,18 +1,21 @@
 //! The items of a scene, made from inputs.
 
-use super::{Data, Framing, Legend, Name, Showing, Subject, Surfaces};
+use super::{
+    CellStyle, Data, Framing, Legend, Name, Showing, Subject, Surfaces,
+    solid::{ShownSolid, field_of},
+};
 use crate::{
     Deadline, Error, Result,
     about::{About, Frame, Labels, Stance},
     bricks::Bricks,
-    cells::{CellOptions, Cells},
+    cells::{Cells, Solid},
     facet::FacetSet,
     gaussians::Gaussians,
     hierarchy::Hierarchy,
     math::{Bounds, Camera},
     picture::{Edges, Picture},
     scattered::Points,
-    scene::{Item, Scene},
+    scene::{Clip, Item, Scene},
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
@@ -32,7 +35,7 @@ pub struct Items {
     surfaces: Surfaces,
     entries: Vec<Entry>,
     legends: Vec<(usize, Legend)>,
-    edges: Vec<Edges>,
+    edges: Vec<Arc<Edges>>,
     /// The unit of lengths; empty if no input says it.
     length: String,
 }
@@ -68,10 +71,12 @@ pub struct Mark {
     length: String,
 }
 
-/// An item, or a mesh, which is drawn as facets in the usual pictures and as surfels in others.
+/// An item; a mesh, which is drawn as facets in the usual pictures and as surfels in others; or
+/// cells, which are drawn as a solid in the usual pictures and as a field in others.
 enum Entry {
     Ready(Item),
     Mesh(Box<Faceted>),
+    Solid(Box<ShownSolid>),
 }
 
 struct Faceted {
@@ -157,20 +162,26 @@ impl Items {
         self.contents.iter().map(|content| content.count).sum()
     }
 
-    #[cfg(test)]
-    pub(super) fn edge_count(&self) -> usize {
-        self.edges.len()
+    /// Returns the edges of meshes and cells that are drawn over a picture with these clips.
+    pub(super) fn edges(&self, clips: &[Clip]) -> Vec<Arc<Edges>> {
+        let of_solid = |entry: &Entry| match entry {
+            Entry::Solid(own) => own.edges(clips),
+            Entry::Ready(_) | Entry::Mesh(_) => None,
+        };
+        let of_solids = self.entries.iter().filter_map(of_solid);
+        self.edges.iter().cloned().chain(of_solids).collect()
     }
 
-    /// Draws the edges of meshes over a finished picture, where they are asked for.
+    /// Draws the edges of meshes and cells over a finished picture with these clips, where they are
+    /// asked for.
     ///
     /// # Errors
     /// Those of [`Camera::view`].
-    pub fn draw_edges(&self, picture: &mut Picture, camera: &Camera) -> Result<()> {
+    pub fn draw_edges(&self, picture: &mut Picture, camera: &Camera, clips: &[Clip]) -> Result<()> {
         let view = camera.view([picture.width, picture.height])?;
         // A line is a pixel wide, and wider in large pictures.
         let width = (f64::from(picture.height) / 720.0).max(1.0);
-        self.edges.iter().for_each(|edges| picture.draw_edges(edges, &view, width));
+        self.edges(clips).iter().for_each(|edges| picture.draw_edges(edges, &view, width));
         Ok(())
     }
 
@@ -194,7 +205,7 @@ impl Items {
     pub fn fields(&self) -> impl Iterator<Item = (usize, &Item)> {
         self.entries.iter().enumerate().filter_map(|(number, entry)| match entry {
             Entry::Ready(item) => item.transfer().map(|_| (number, item)),
-            Entry::Mesh(_) => None,
+            Entry::Mesh(_) | Entry::Solid(_) => None,
         })
     }
 
@@ -231,6 +242,8 @@ impl Items {
                 Entry::Ready(item) => item.clone(),
                 Entry::Mesh(own) if facets => Item::Facets(own.facets.clone()),
                 Entry::Mesh(own) => Item::Radiance(own.surfels()?),
+                Entry::Solid(own) if facets => Item::Solid(own.solid.clone()),
+                Entry::Solid(own) => own.field()?,
             });
         }
         Ok(scene)
@@ -279,7 +292,7 @@ impl Adding<'_> {
         self.unit(&mesh.about);
         self.does("Making splats of");
         if showing.draws_edges && !mesh.triangles.is_empty() {
-            self.items.edges.push(Edges::of(&mesh));
+            self.items.edges.push(Edges::of(&mesh).into());
         }
         let options = showing.surfel_options(self.items.surfaces);
         let kind = if mesh.triangles.is_empty() { "points" } else { "mesh" };
@@ -396,21 +409,58 @@ impl Adding<'_> {
         Ok(())
     }
 
-    fn add_cells(&mut self, mut cells: Cells) -> Result<()> {
+    fn add_cells(&mut self, cells: Cells) -> Result<()> {
+        match self.showing.cell_style()? {
+            CellStyle::Solid => self.add_solid(cells),
+            CellStyle::Volume => self.add_cell_field(&cells),
+        }
+    }
+
+    /// Adds cells as a field.
+    fn add_cell_field(&mut self, cells: &Cells) -> Result<()> {
         let Self { name, showing, .. } = *self;
-        let transfer = showing.appearance.of_cells(&name.text, &cells)?;
+        if cells.values.is_empty() {
+            let hint = "--cells solid (in Python, cells) draws their boundary";
+            return Err(name.unfit("content", "the cells have no values", hint));
+        }
+        let transfer = showing.appearance.of_cells(&name.text, cells)?;
         let About { name: title, unit, frame, stance, .. } = &cells.about;
         self.values(&transfer, cells.range(), Legend::title(title, unit), None);
         self.unit(&cells.about);
         self.stand(*frame, *stance);
         self.does("Dividing the cells of");
-        if !transfer.isosurfaces.is_empty() {
-            cells = cells.with_values_of_points();
+        let item = field_of(cells, transfer).map_err(|error| name.fault(error))?;
+        let bounds = item.bounds();
+        self.push("cells", cells.len(), bounds, item);
+        Ok(())
+    }
+
+    /// Adds cells as a solid, or as the surfels of their boundary for pictures that show no facets.
+    fn add_solid(&mut self, cells: Cells) -> Result<()> {
+        let Self { name, showing, .. } = *self;
+        self.stand(cells.about.frame, cells.about.stance);
+        let up = self.items.subject.stance.up;
+        let (tint, legend) = showing.coloring().tint(name, &cells, up)?;
+        self.items.legends.extend(legend.map(|legend| (self.items.entries.len(), legend)));
+        self.unit(&cells.about);
+        self.does("Finding the boundary of");
+        let fault = |error| name.fault(error);
+        let (count, [min, max]) = (cells.len() + cells.faces.len(), cells.bounds());
+        let bounds = Bounds { min, max };
+        let is_clear = showing.opacity.is_some_and(|opacity| opacity < 1.0);
+        if is_clear || self.items.surfaces == Surfaces::Surfels {
+            let surfels = showing.surfel_options(Surfaces::Surfels);
+            let mesh = cells.surface(tint).map_err(fault)?;
+            if showing.draws_edges {
+                self.items.edges.push(Edges::of(&mesh).into());
+            }
+            let splats = mesh.surfels(&surfels).map_err(fault)?;
+            self.push("cells", count, bounds, Item::Radiance(splats.into()));
+            return Ok(());
         }
-        let tetrahedra = cells.tetrahedra(&CellOptions::default());
-        let tetrahedra = tetrahedra.map_err(|error| name.fault(error))?;
-        let bounds = tetrahedra.bounds();
-        self.push("cells", cells.len(), bounds, Item::Cells(tetrahedra.into(), transfer));
+        let solid = Solid::new(cells, &showing.solid_options(tint)).map_err(fault)?;
+        let own = ShownSolid::new(name, solid, showing);
+        self.push("cells", count, bounds, Entry::Solid(Box::new(own)));
         Ok(())
     }
 

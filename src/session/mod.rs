@@ -31,6 +31,7 @@ mod name;
 mod oddities;
 mod reading;
 mod showing;
+mod solid;
 mod subject;
 
 #[cfg(test)]
@@ -50,5 +51,5 @@ pub use items::{Captions, Content, Items, Mark};
 pub use legend::Legend;
 pub use name::Name;
 pub use reading::{Opened, Reading};
-pub use showing::{Showing, Surfaces};
+pub use showing::{CellStyle, Showing, Surfaces};
 pub use subject::{Origin, Subject};

@@ -180,7 +180,11 @@ impl Opened<'_> {
                 Data::Volume(formats::read_volume(source, &options)?)
             }
             (Kind::Samples, Some(source)) => Data::Samples(formats::read_samples(source, options)?),
-            (Kind::Cells, Some(source)) => Data::Cells(formats::read_cells(source, options)?),
+            (Kind::Cells, Some(source)) => {
+                let mut options = options.clone();
+                options.scalar = self.attribute.map(str::to_owned).or(options.scalar);
+                Data::Cells(formats::read_cells(source, &options)?)
+            }
             (Kind::Gaussians, Some(source)) => Data::Gaussians(formats::read_gaussians(source)?),
         };
         data.warn_of_holes(&self.path.display().to_string());

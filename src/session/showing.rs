@@ -1,7 +1,14 @@
 //! How an input is shown.
 
 use super::{Appearance, Coloring};
-use crate::{Deadline, Result, math::Kernel, scattered::SampleOptions, surface::SurfelOptions};
+use crate::{
+    Deadline, Error, Result,
+    cells::{SolidOptions, Tint},
+    math::Kernel,
+    scattered::SampleOptions,
+    surface::SurfelOptions,
+};
+use serde::{Deserialize, Serialize};
 
 /// How one input is shown. What is not given follows from its data.
 #[derive(Debug, Clone, Default)]
@@ -22,6 +29,8 @@ pub struct Showing {
     pub opacity: Option<f32>,
     /// Whether the edges of triangles are drawn.
     pub draws_edges: bool,
+    /// How cells are drawn; by default as a solid, unless another option shows the field inside.
+    pub cells: Option<CellStyle>,
     /// Whether the user named the values that were read.
     pub is_named: bool,
     /// An option that shows values, if one is given: of a volume that has colours, it shows the
@@ -29,6 +38,37 @@ pub struct Showing {
     pub values_by: Option<String>,
     /// By when the splats must be made.
     pub deadline: Deadline,
+}
+
+/// How cells are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub enum CellStyle {
+    /// As an opaque body: their boundary, and the field inside where clips cut it.
+    Solid,
+    /// As a field, by a transfer function.
+    Volume,
+}
+
+impl CellStyle {
+    /// The names that [`named`](Self::named) accepts.
+    pub const NAMES: [&str; 2] = ["solid", "volume"];
+
+    /// Returns the style of a name.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for another name.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "solid" => Ok(Self::Solid),
+            "volume" => Ok(Self::Volume),
+            _ => {
+                let names = Self::NAMES.join(" or ");
+                Err(Error::Argument(format!("cells are drawn as {names}, not as “{name}”")))
+            }
+        }
+    }
 }
 
 /// What meshes become.
@@ -49,12 +89,50 @@ impl Showing {
         &self.appearance.coloring
     }
 
+    /// Returns how cells are drawn.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a solid with options that only a field has.
+    pub fn cell_style(&self) -> Result<CellStyle> {
+        let Appearance { transfer, opacity_unit, isosurfaces, gradient, .. } = &self.appearance;
+        let of_field = [
+            ("a transfer function", transfer.is_some()),
+            ("a unit of opacities", opacity_unit.is_some()),
+            ("isosurfaces", !isosurfaces.is_empty()),
+            ("an opacity by gradients", !gradient.is_empty()),
+        ];
+        let asked = of_field.into_iter().find(|(_, is_given)| *is_given);
+        match (self.cells, asked) {
+            (Some(CellStyle::Solid), Some((what, _))) => Err(Error::Argument(format!(
+                "cells that are drawn as a solid have no use for {what}: leave it out, or draw \
+                 them as a volume"
+            ))),
+            (Some(style), _) => Ok(style),
+            (None, Some(_)) => Ok(CellStyle::Volume),
+            (None, None) => Ok(CellStyle::Solid),
+        }
+    }
+
+    /// Returns how cells become a solid that `tint` colours.
+    pub(super) fn solid_options(&self, tint: Tint) -> SolidOptions {
+        let mut options = SolidOptions::new(tint);
+        options.has_edges = self.draws_edges;
+        let surface = &mut options.surface;
+        surface.deadline = self.deadline;
+        if let Some(crease) = self.crease {
+            surface.crease_angle_degrees = crease.max(0.01);
+        }
+        options
+    }
+
     /// Checks what does not depend on an input.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for values outside of their ranges.
+    /// [`Error::Argument`] for values outside of their ranges, and for options that contradict each
+    /// other.
     pub fn validate(&self) -> Result<()> {
         self.samples.validate()?;
+        self.cell_style()?;
         self.surfel_options(Surfaces::Both).validate()
     }
 

@@ -11,12 +11,14 @@ use crate::{
 };
 use crate::{
     about::{Frame, Stance},
+    cells::{CellKind, Cells},
     math::Bounds,
-    scene::Item,
+    scene::{Clip, ClipShape, Item},
     surface::Mesh,
     volume::{Lattice, Samples, Volume},
 };
 use glam::{DMat3, DVec3, Vec3};
+use std::sync::Arc;
 
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 const TABLE: &str = "x,y,z,value\n0,0,0,1\n1,0,0,2\n0,1,0,3\n0,0,1,nan\n";
@@ -254,6 +256,56 @@ fn each_input_becomes_an_item_with_its_legend() {
     assert!(matches!(surfels.items[1], Item::Radiance(_)));
 }
 
+/// Cells are a solid, and a field where an option shows one.
+#[test]
+fn cells_are_drawn_as_a_solid_or_as_a_field() {
+    let mut cells = Cells::tube(CellKind::Hexahedron, 1).unwrap();
+    let items_of = |cells: &Cells, showing: &Showing, surfaces: Surfaces| {
+        let mut items = Items::new(surfaces);
+        let name = Name::of_file("a.vtu".as_ref());
+        items.add(&name, Data::Cells(cells.clone()), showing, &|_| ()).map(|()| items)
+    };
+    let showing = Showing { draws_edges: true, ..Showing::default() };
+    let items = items_of(&cells, &showing, Surfaces::Both).unwrap();
+    let [usual, other] = [true, false].map(|facets| items.scene(facets).unwrap());
+    assert!(matches!(usual.items[0], Item::Solid(_)) && usual.fields().is_empty());
+    assert!(matches!(other.items[0], Item::Cells(..)));
+    assert_eq!(items.captions().legends[0].1.title, "density");
+    let clip = ClipShape::HalfSpace { normal: DVec3::Z, offset: 0.1 };
+    let clips = [Clip { shape: clip, inside: true }];
+    let [all, left] = [&[][..], &clips].map(|clips| items.edges(clips)[0].len());
+    assert!(left > 0 && left < all, "{left} {all}");
+    assert!(Arc::ptr_eq(&items.edges(&clips)[0], &items.edges(&clips)[0]));
+    // Surfels, for pictures without facets.
+    let items = items_of(&cells, &showing, Surfaces::Surfels).unwrap();
+    assert!(matches!(items.scene(false).unwrap().items[0], Item::Radiance(_)));
+    // What shows a field asks for one.
+    let surface = Surface { value: SurfaceValue::Share(0.5), color: None, opacity: 1.0 };
+    let by_surface = Appearance { isosurfaces: vec![surface], ..Appearance::default() };
+    let by_function =
+        Appearance { transfer: Some(Transfer::Named("generic".into())), ..Appearance::default() };
+    for (appearance, style) in [
+        (by_surface.clone(), None),
+        (by_function, None),
+        (Appearance::default(), Some(CellStyle::Volume)),
+    ] {
+        let showing = Showing { appearance, cells: style, ..Showing::default() };
+        let items = items_of(&cells, &showing, Surfaces::Facets).unwrap();
+        assert!(matches!(items.scene(true).unwrap().items[0], Item::Cells(..)));
+    }
+    let both =
+        Showing { appearance: by_surface, cells: Some(CellStyle::Solid), ..Showing::default() };
+    assert!(both.validate().is_err() && CellStyle::named("haze").is_err());
+    // Cells of one value, and without any.
+    for values in [vec![3.0; cells.points.len()], Vec::new()] {
+        cells.values = values;
+        let items = items_of(&cells, &Showing::default(), Surfaces::Facets).unwrap();
+        assert!(matches!(items.scene(true).unwrap().items[0], Item::Solid(_)));
+        let field = Showing { cells: Some(CellStyle::Volume), ..Showing::default() };
+        assert!(items_of(&cells, &field, Surfaces::Facets).is_err());
+    }
+}
+
 #[test]
 fn an_input_that_cannot_be_shown_changes_nothing() {
     let mut items = Items::new(Surfaces::Facets);
@@ -266,13 +318,13 @@ fn an_input_that_cannot_be_shown_changes_nothing() {
     turned.about.frame = Frame::Patient;
     assert!(items.add(&name, Data::Mesh(turned), &showing, &|_| ()).is_err());
     assert_eq!(items.captions(), Captions::default());
-    assert_eq!((items.count(), items.edge_count(), items.contents.len()), (0, 0, 0));
+    assert_eq!((items.count(), items.edges(&[]).len(), items.contents.len()), (0, 0, 0));
     assert_eq!(items.subject.origin, Origin::Default);
     // Later, it is as if it had never been tried.
     let plain = Showing { draws_edges: true, ..Showing::default() };
     items.add(&name, Data::Mesh(triangle()), &plain, &|_| ()).unwrap();
     let count = items.count();
-    assert_eq!((count > 0, items.edge_count()), (true, 1));
+    assert_eq!((count > 0, items.edges(&[]).len()), (true, 1));
     let mark = items.mark();
     items.add(&name, Data::Volume(cube(0.0)), &plain, &|_| ()).unwrap();
     items.restore(mark);

@@ -3,6 +3,7 @@
 use super::{
     Mesh, SurfelOptions,
     adjacency::{Connected, is_split},
+    bands::{Bands, Corner},
     paint::{corner_tint, of_normal, pack, texture_of},
     refine::{Cutting, Origin, Refined, refine},
     smooth::corner_normals,
@@ -31,6 +32,45 @@ enum Normals<'a> {
     Interpolated(Origin<'a>),
 }
 
+/// The values that colour facets.
+struct Banded<'a> {
+    bands: &'a Bands,
+    /// The value of each triangle; empty if values are those of vertices.
+    of_triangles: Vec<f32>,
+}
+
+impl<'a> Banded<'a> {
+    /// Takes the values of triangles, some of which are parts of these sources.
+    fn new((bands, values): (&'a Bands, &[f32]), sources: Option<&[u32]>) -> Self {
+        let of_triangles = match sources {
+            Some(sources) if !values.is_empty() => {
+                sources.iter().map(|source| values[*source as usize]).collect()
+            }
+            _ => values.to_vec(),
+        };
+        Self { bands, of_triangles }
+    }
+
+    /// Returns the values at the corners of a triangle.
+    fn values(&self, mesh: &Mesh, number: usize) -> [f32; 3] {
+        match self.of_triangles.get(number) {
+            Some(value) => [*value; 3],
+            None => mesh.triangles[number].map(|vertex| mesh.values[vertex as usize]),
+        }
+    }
+
+    /// Adds the parts of a facet in the colours of the values at its corners.
+    fn add(&self, facet: &Facet, values: [f32; 3], add: &mut impl FnMut(Facet)) {
+        let normals = facet.decoded_normals();
+        let corner = |at: usize| Corner {
+            place: facet.corners[at].into(),
+            normal: normals[at],
+            value: values[at],
+        };
+        self.bands.add(&[corner(0), corner(1), corner(2)], add);
+    }
+}
+
 impl Mesh {
     /// Makes facets of the triangles, which have their outlines exactly. Returns `None` for what
     /// surfels draw better: a point cloud, a mesh of more than
@@ -47,6 +87,25 @@ impl Mesh {
     /// As [`surfels`](Self::surfels), except
     /// [`Error::NothingToDraw`](crate::Error::NothingToDraw): a mesh without area gives no facets.
     pub fn facets(&self, options: &SurfelOptions) -> Result<Option<FacetSet>> {
+        self.facets_by(options, None)
+    }
+
+    /// Returns the length, in world units, from which on the edges of facets are cut.
+    pub(crate) fn longest_facet(&self, options: &SurfelOptions) -> f32 {
+        let Some(bounds) = self.local_bounds() else { return f32::INFINITY };
+        largest_edge(bounds, self.area(), options) * LONGER
+    }
+
+    /// Like [`facets`](Self::facets). With `bands`, facets have the colours of the mesh's values,
+    /// or of the values of its triangles, if there are any.
+    ///
+    /// # Errors
+    /// Those of [`facets`](Self::facets).
+    pub(crate) fn facets_by(
+        &self,
+        options: &SurfelOptions,
+        bands: Option<(&Bands, &[f32])>,
+    ) -> Result<Option<FacetSet>> {
         let _span = tracing::info_span!("facets").entered();
         self.check(options)?;
         let count = self.triangles.len();
@@ -62,6 +121,7 @@ impl Mesh {
         let Refined { mesh, sources } =
             refine(self, cutting, options.most_triangles, options.deadline)?;
         let crease = options.crease_angle_degrees;
+        let banded = bands.map(|bands| Banded::new(bands, sources.as_deref()));
         let normals = match sources {
             Some(sources) => {
                 Normals::Interpolated(Origin::new(self, sources, crease, options.deadline)?)
@@ -72,15 +132,27 @@ impl Mesh {
         let is_turned = sides == Sides::Closed && self.is_inside_out();
         let traits = [is_turned, options.color_by_normal];
         memory::room(WORK, (size_of::<Facet>() * mesh.triangles.len()) as u64)?;
-        let facet = |number| Some((number, facet(&mesh, number, &normals, traits)?));
+        let facets = |number: usize| {
+            let own = facet(&mesh, number, &normals, traits);
+            let mut made = Vec::with_capacity(1);
+            let mut add = |facet| made.push((number, facet));
+            match (&banded, own) {
+                (Some(banded), Some(own)) => {
+                    let values = banded.values(&mesh, number);
+                    banded.add(&own, order(is_turned).map(|at| values[at]), &mut add);
+                }
+                (_, own) => own.into_iter().for_each(add),
+            }
+            made
+        };
         let (numbers, facets): (Vec<usize>, Vec<Facet>) =
-            (0..mesh.triangles.len()).into_par_iter().filter_map(facet).unzip();
+            (0..mesh.triangles.len()).into_par_iter().flat_map_iter(facets).unzip();
         options.deadline.check(WORK)?;
         let (images, shown) = match options.color_by_normal {
             true => Default::default(),
             false => images(&mesh, &numbers, is_turned),
         };
-        let set = FacetSet { origin: self.origin, facets, sides, images, shown };
+        let set = FacetSet { origin: self.origin, facets, sides, images, shown, whole: None };
         Ok((!set.facets.is_empty()).then_some(set))
     }
 

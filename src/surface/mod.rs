@@ -1,6 +1,7 @@
 //! Surfaces: meshes and point clouds, and the elliptic surfels that draw them.
 
 mod adjacency;
+mod bands;
 mod cloud;
 mod disc;
 mod eight;
@@ -24,6 +25,7 @@ mod survey;
 mod upright;
 
 pub use crate::facet::Texture;
+pub(crate) use bands::{Bands, Corner};
 pub use mesh::{Material, Mesh, Sensor};
 pub(crate) use orient::Known;
 pub(crate) use paint::color_at;

@@ -9,7 +9,8 @@ use glam::{DMat3, DVec3};
 use splatkit::{
     Error, Result,
     bricks::Bricks,
-    cells::{CellKind, CellOptions, Cells},
+    cells::{CellKind, CellOptions, Cells, Solid, SolidOptions, Tint},
+    color::{ColorMap, ColorScale},
     cpu::CpuRenderer,
     gpu::Renderer,
     hierarchy::{BuildOptions, Hierarchy, Tree},
@@ -183,6 +184,12 @@ fn cells() -> Result<Scene> {
     Ok(Scene::new().with_cells(cells.tetrahedra(&CellOptions::default())?, transfer()))
 }
 
+fn solid() -> Result<Scene> {
+    let cells = Cells::tube(CellKind::Hexahedron, 1)?;
+    let scale = ColorScale { range: cells.range(), ..ColorScale::new(ColorMap::VIRIDIS) };
+    Ok(Scene::new().with_solid(Solid::new(cells, &SolidOptions::new(Tint::Values(scale)))?))
+}
+
 fn surfels() -> Result<SplatSet> {
     Mesh::sphere(2).surfels(&SurfelOptions::default())
 }
@@ -223,6 +230,7 @@ fn rows_of_items() -> Vec<Row> {
         ),
         row("scattered samples", samples(Scene::new())),
         row("cells", cells()),
+        row("cells as a solid", solid()),
         row("surfels", surface()),
         row("a hierarchy", hierarchy().map(|own| Scene::new().with_hierarchy(own))),
         row("surfels and a volume", surfels().and_then(|own| Ok(usual()?.with_splats(own)))),

@@ -1,11 +1,13 @@
 //! Scenes of facets: closed, open, seen from within, clipped, and beside other items.
 
 use super::{Case, ORIGIN, PERSPECTIVE, SLANT, camera, methods, mixed_scene, settings};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use splatkit::{
+    cells::{CellKind, Cells, Solid, SolidOptions, Tint},
+    color::{ColorMap, ColorScale},
     facet::{FacetSet, Sides},
-    math::Projection,
-    scene::{Scene, Settings},
+    math::{Bounds, Projection},
+    scene::{Clip, ClipShape, Scene, Settings},
     surface::{Material, Mesh, SurfelOptions, Texture},
 };
 use std::sync::Arc;
@@ -100,6 +102,41 @@ pub fn textured() -> Case {
     case("textured", Scene::new().with_facets(set), PERSPECTIVE)
 }
 
-pub fn all() -> [Case; 5] {
-    [gear(), folded_sheet(), inside_a_box(), clipped_gear(), facets_in_a_volume()]
+/// Cells as a solid: the boundary in the colours of the values.
+pub fn solid() -> Case {
+    let mut cells = Cells::tube(CellKind::QuadraticHexahedron, 1).expect("a tube");
+    cells.origin = ORIGIN;
+    let scale = ColorScale { range: cells.range(), ..ColorScale::new(ColorMap::VIRIDIS) };
+    let solid = Solid::new(cells, &SolidOptions::new(Tint::Values(scale))).expect("a solid");
+    case("solid", Scene::new().with_solid(solid), PERSPECTIVE)
+}
+
+/// Cut by a plane, a box, and another box that is cut out: the field inside is seen.
+pub fn cut_solid() -> Case {
+    let half = ClipShape::HalfSpace {
+        normal: DVec3::new(0.2, -0.1, 1.0),
+        offset: 0.4 + DVec3::new(0.2, -0.1, 1.0).dot(ORIGIN),
+    };
+    let cuboid = |min: [f64; 3], max: [f64; 3]| {
+        let [min, max] = [min, max].map(|end| ORIGIN + DVec3::from_array(end));
+        ClipShape::Box(Bounds { min, max })
+    };
+    let clips = vec![
+        Clip { shape: half, inside: true },
+        Clip { shape: cuboid([-0.9, -0.95, -0.7], [0.97, 0.9, 0.9]), inside: true },
+        Clip { shape: cuboid([0.2, -0.1, -0.1], [2.0, 2.0, 2.0]), inside: false },
+    ];
+    Case { name: "cut_solid", settings: Settings { clips, ..settings() }, ..solid() }
+}
+
+pub fn all() -> [Case; 7] {
+    [
+        gear(),
+        folded_sheet(),
+        inside_a_box(),
+        clipped_gear(),
+        facets_in_a_volume(),
+        solid(),
+        cut_solid(),
+    ]
 }

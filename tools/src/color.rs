@@ -123,8 +123,9 @@ fn check_given(
 ) -> Result<(), Failure> {
     if has_color && !has_mesh {
         return Err(Failure::Usage(
-            "--color colours meshes and point clouds, but there are none; volumes and samples \
-             take --colormap, and hierarchies keep the colours that they were converted with"
+            "--color colours meshes, point clouds and the boundary of cells, but there are none; \
+             volumes and samples take --colormap, and hierarchies keep the colours that they were \
+             converted with"
                 .into(),
         ));
     }

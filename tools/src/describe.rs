@@ -70,7 +70,11 @@ fn field(item: &Item) -> Option<Value> {
             Some(field)
         }
         Item::Scalar(_, transfer) | Item::Cells(_, transfer) => Some(shown(transfer)),
-        Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => None,
+        Item::Radiance(_)
+        | Item::Facets(_)
+        | Item::Solid(_)
+        | Item::Gaussians(_)
+        | Item::Hierarchy(_) => None,
     }
 }
 

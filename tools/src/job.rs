@@ -14,8 +14,8 @@ use splatkit::{
     formats::Kind,
     math::Camera,
     picture::Picture,
-    scene::{Scene, Settings},
-    session::{self, Description, Framing, TransferEntry},
+    scene::{Clip, Scene, Settings},
+    session::{self, Description, Framing, LoadedInput, TransferEntry},
 };
 #[cfg(feature = "window")]
 use splatkit::{
@@ -74,6 +74,8 @@ pub struct Finish {
     #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "for the window"))]
     pub background: Option<[f32; 3]>,
     overlay: Option<Overlay>,
+    /// The clips of the picture, which also cut edges.
+    clips: Vec<Clip>,
 }
 
 impl Finish {
@@ -85,7 +87,7 @@ impl Finish {
         loaded: &Loaded,
     ) -> splatkit::Result<Picture> {
         let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
-        loaded.items.draw_edges(&mut picture, camera)?;
+        loaded.items.draw_edges(&mut picture, camera, &self.clips)?;
         Ok(picture)
     }
 
@@ -206,7 +208,8 @@ impl Job {
     /// Refuses what has no effect on the loaded inputs, or warns of it.
     fn check_effect(&self, loaded: &Loaded, progress: &Progress) -> Result<(), Failure> {
         let inputs = &loaded.inputs;
-        let is_scaled = inputs.iter().any(|input| input.kind == Kind::Mesh);
+        let is_surface = |input: &&LoadedInput| input.kind == Kind::Mesh || input.is_solid;
+        let is_scaled = inputs.iter().find(is_surface).is_some();
         let unscaled = inputs.iter().rfind(|input| input.kind == Kind::Hierarchy);
         let has_legends = !loaded.captions.legends.is_empty();
         color::check_effect(&self.scene, is_scaled, has_legends)?;
@@ -267,7 +270,8 @@ impl Job {
         let picture = &self.scene.picture;
         let (factor, background) = (picture.factor(&loaded.scene), picture.background());
         let overlay = Overlay::open(&self.scene.overlay, &loaded.captions, background)?;
-        Ok(Finish { factor, background, overlay })
+        let clips = picture.clips_of(&loaded.scene, &loaded.subject)?;
+        Ok(Finish { factor, background, overlay, clips })
     }
 
     /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,

@@ -7,9 +7,12 @@ use crate::{
     own::{Own, Shared},
     parse,
 };
-use clap::Args;
+use clap::{
+    Args,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 use splatkit::{
-    session::{Description, IsosurfaceEntry, TransferEntry},
+    session::{CellStyle, Description, IsosurfaceEntry, TransferEntry},
     volume::TransferFunction,
 };
 use std::path::PathBuf;
@@ -64,9 +67,14 @@ pub struct ShowFlags {
     /// [default: 60]
     #[arg(long, value_name = "DEGREES", value_parser = parse::crease)]
     crease: Option<f32>,
-    /// Meshes: draw the edges of the triangles as thin dark lines.
+    /// Draw the edges of the triangles of meshes, or of cells, as thin dark lines.
     #[arg(long)]
     edges: bool,
+    /// Draw cells as an opaque body that shows the field inside where clips cut it (solid), or as
+    /// a field, by a transfer function (volume) [default: solid; volume with --transfer, --iso,
+    /// --mip and --x-ray]
+    #[arg(long, value_name = "STYLE", value_parser = cells())]
+    cells: Option<CellStyle>,
     /// Meshes and point clouds: let this share of the light be absorbed where a ray meets a
     /// surface once, above 0 to 1. FILE=OPACITY is for one input, and the flag can be given
     /// several times [default: 1]
@@ -113,6 +121,7 @@ impl ShowFlags {
         Shared::set(scene, |appearance| &mut appearance.gradient_opacity, factors);
         Shared::set(scene, |appearance| &mut appearance.radius_scale, self.radius_scale);
         Shared::set(scene, |appearance| &mut appearance.crease, self.crease);
+        Shared::set(scene, |appearance| &mut appearance.cells, self.cells);
         scene.appearance.edges |= self.edges;
         self.color.apply(scene);
         self.kernel.apply(scene);
@@ -126,6 +135,12 @@ fn transfer(text: &str) -> Result<Own<String>, String> {
         true => Ok(Own::of_all(text.to_owned())),
         false => Own::parse(text, |text| Ok(text.to_owned())),
     }
+}
+
+/// Parses how cells are drawn.
+fn cells() -> impl TypedValueParser<Value = CellStyle> {
+    PossibleValuesParser::new(CellStyle::NAMES)
+        .map(|name| CellStyle::named(&name).expect("a name of the list"))
 }
 
 /// Parses a range of values.

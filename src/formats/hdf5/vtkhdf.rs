@@ -354,13 +354,12 @@ impl<'a> DataSet<'a> {
             return Err(self.source.error(format!("point {point}"), message));
         }
         let kinds = self.indices("Types")?;
-        let Some(chosen) = self.chosen(options, true)? else {
-            return Err(self.source.error(ROOT, "contains no values that can be drawn"));
-        };
-        let candidate = &self.arrays[chosen.array].1;
-        let of_cells = candidate.place == Place::Cells;
+        let chosen = self.chosen(options, true)?;
+        let candidate = chosen.map(|chosen| &self.arrays[chosen.array].1);
+        let of_cells = candidate.is_some_and(|candidate| candidate.place == Place::Cells);
         let count = if of_cells { kinds.len() } else { points.len() };
-        let own = self.values(chosen, count, options)?;
+        let own = chosen.map(|chosen| self.values(chosen, count, options)).transpose()?;
+        let own = own.unwrap_or_default();
         let place = if of_cells { CellPlace::Cells } else { CellPlace::Points };
         let mut cells = Cells { origin, points, place, ..Cells::default() };
         let (mut values, mut skipped) = (Vec::new(), 0usize);
@@ -368,6 +367,12 @@ impl<'a> DataSet<'a> {
         let total = cells.points.len();
         self.each_cell("", total, |cell, nodes| {
             match kinds.get(cell).and_then(|&kind| CellKind::of_vtk(kind)) {
+                None if matches!(kinds.get(cell), Some(5 | 7 | 9)) => {
+                    cells.faces.push(nodes.iter().copied());
+                    if of_cells {
+                        cells.faces.values.push(own[cell]);
+                    }
+                }
                 Some(CellKind::Polyhedron) | None => skipped += 1,
                 Some(kind) => {
                     cells.push(kind, nodes.iter().copied());
@@ -380,11 +385,16 @@ impl<'a> DataSet<'a> {
         })?;
         if skipped > 0 {
             let file = self.source.path.display();
-            tracing::warn!("{file}: {skipped} cells that are flat or polyhedra are left out");
+            tracing::warn!(
+                "{file}: {skipped} cells that are neither solids, triangles, quadrilaterals nor polygons, or that are \
+                 polyhedra, are left out"
+            );
         }
         cells.values = if of_cells { values } else { own };
         cells.about.holes = cells.values.iter().filter(|value| value.is_nan()).count() as u64;
-        cells.about.name = chosen.part.caption(&candidate.name, candidate.components);
+        if let (Some(chosen), Some(candidate)) = (chosen, candidate) {
+            cells.about.name = chosen.part.caption(&candidate.name, candidate.components);
+        }
         cells.check().map_err(|message| self.source.error("cells", message))?;
         Ok(cells)
     }

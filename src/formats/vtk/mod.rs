@@ -29,8 +29,8 @@ use survey::{Drawn, Survey, Wanted};
 
 /// Returns the kind of data that a file holds:
 /// - A single lattice (image data, a rectilinear grid) is a volume.
-/// - Cells that fill space are cells if they have values, else a mesh: their boundary.
-/// - Cells that are surfaces are a mesh.
+/// - Cells that fill space are cells, with or without values.
+/// - Cells that are surfaces, without others, are a mesh.
 /// - Points without either are a point cloud, or samples if a scalar is named.
 ///
 /// # Errors
@@ -39,8 +39,8 @@ pub fn kind(source: &Source, options: &ReadOptions) -> Result<Kind> {
     let (drawn, _) = Survey::of(source, options)?.drawn(source, options)?;
     Ok(match drawn {
         Drawn::Volume => Kind::Volume,
-        Drawn::Cells => Kind::Cells,
-        Drawn::Boundary | Drawn::Surface | Drawn::Cloud => Kind::Mesh,
+        Drawn::Cells | Drawn::Boundary => Kind::Cells,
+        Drawn::Surface | Drawn::Cloud => Kind::Mesh,
         Drawn::Samples => Kind::Samples,
     })
 }
@@ -106,22 +106,26 @@ pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// Reads the cells of a file that fill space, with their values. The array is chosen as by
-/// [`read_volume`]. Cells of several data sets are joined; lattices become hexahedra.
+/// Reads the cells of a file that fill space, with their values if there are any, and the surfaces
+/// beside them. The array is chosen as by [`read_volume`]. Cells of several data sets are joined;
+/// lattices become hexahedra.
 ///
 /// # Errors
-/// As [`read_volume`], also for cells that refer to missing points and if there are no values.
+/// As [`read_volume`], also for cells that refer to missing points.
 pub fn read_cells(source: &Source, options: &ReadOptions) -> Result<Cells> {
     let survey = Survey::of(source, options)?;
     let (drawn, wanted) = survey.drawn(source, options)?;
-    let Some(wanted) = wanted.filter(|_| drawn == Drawn::Cells) else {
-        return Err(other(source, drawn, "a set of cells with values"));
-    };
+    if !matches!(drawn, Drawn::Cells | Drawn::Boundary) {
+        return Err(other(source, drawn, "a set of cells"));
+    }
     survey.warn(source, options, drawn);
-    let mut grid = Grid::read(source, options, Some(&wanted))?;
-    grid.weld(source, wanted.array.place == Place::Cells)?;
-    let mut cells = solid::cells(source, &grid, &wanted, options)?;
-    cells.about.name = caption(&wanted);
+    let mut grid = Grid::read(source, options, wanted.as_ref())?;
+    let of_points = wanted.as_ref().is_some_and(|wanted| wanted.array.place == Place::Points);
+    grid.weld(source, !of_points)?;
+    let mut cells = solid::cells(source, &grid, wanted.as_ref(), options)?;
+    if let Some(wanted) = wanted {
+        cells.about.name = caption(&wanted);
+    }
     Ok(cells)
 }
 

@@ -8,9 +8,9 @@ use super::{
             holes::all_missing,
         },
     },
-    grid::{Grid, POLYHEDRON},
-    surface::centre,
-    survey::Wanted,
+    grid::Grid,
+    surface::{centre, cut},
+    survey::{Wanted, dimension},
 };
 use crate::{
     Result,
@@ -24,57 +24,51 @@ use crate::{
 /// kernel of lattices.
 const REACH: f64 = 1.4;
 
-/// Returns the cells of a grid that fill space. Points that they do not need are left out.
+/// Returns the cells of a grid that fill space, and its surfaces. Points that they do not need are
+/// left out. Without `wanted`, there are no values.
 pub fn cells(
     source: &Source,
     grid: &Grid,
-    wanted: &Wanted,
+    wanted: Option<&Wanted>,
     options: &ReadOptions,
 ) -> Result<Cells> {
-    let of_cells = wanted.array.place == Place::Cells;
+    let of_cells = wanted.is_some_and(|wanted| wanted.array.place == Place::Cells);
     source.room::<[u32; 2]>("the corners of the cells", grid.corners.len())?;
     source.room::<(usize, CellKind, f32)>("the cells", grid.types.len())?;
     source.room::<(u32, u32, f32)>("the points", grid.points.len())?;
     let mut cells = Cells::default();
-    // The number of each point among those that are used, and their numbers in the grid.
-    let mut numbers = vec![u32::MAX; grid.points.len()];
-    let mut used: Vec<u32> = Vec::new();
-    let mut number = |point: u32| {
-        let own = &mut numbers[point as usize];
-        if *own == u32::MAX {
-            *own = used.len() as u32;
-            used.push(point);
-        }
-        *own
-    };
+    let mut used = Used { numbers: vec![u32::MAX; grid.points.len()], points: Vec::new() };
     let mut unplaced = 0;
     for cell in 0..grid.types.len() {
-        let Some(kind) = CellKind::of_vtk(grid.types[cell].into()) else { continue };
+        let kind = CellKind::of_vtk(grid.types[cell].into());
+        if kind.is_none() && dimension(grid.types[cell]) != Some(2) {
+            continue;
+        }
         if !grid.points_of(cell).all(|point| grid.points[point as usize].is_finite()) {
             unplaced += 1;
             continue;
         }
-        let corners = grid.corners_of(cell);
-        if grid.types[cell] == POLYHEDRON {
-            let faces = super::grid::faces(corners).flat_map(|face| {
-                let points: Vec<u32> = face.iter().map(|&point| number(point)).collect();
-                std::iter::once(face.len() as u32).chain(points)
-            });
-            let stream: Vec<u32> = corners.first().copied().into_iter().chain(faces).collect();
-            cells.push(kind, stream);
-        } else {
-            cells.push(kind, corners.iter().map(|&point| number(point)).collect::<Vec<u32>>());
+        match kind {
+            Some(kind) => add_cell(grid, cell, kind, (&mut cells, &mut used)),
+            None => cut(source, grid, cell, &mut |corners| {
+                cells.faces.push(corners.iter().map(|&point| used.number(point)));
+                Ok(())
+            })?,
         }
         if of_cells {
-            cells.values.push(grid.values[cell] as f32);
+            let value = grid.values[cell] as f32;
+            cells.values.resize(cells.kinds.len(), value);
+            cells.faces.values.resize(cells.faces.len(), value);
         }
     }
     check_unplaced(source, unplaced, cells.kinds.len())?;
-    if !of_cells {
+    let used = used.points;
+    if wanted.is_some() && !of_cells {
         cells.values = used.iter().map(|&point| grid.values[point as usize] as f32).collect();
     }
-    let holes = cells.values.iter().filter(|value| value.is_nan()).count();
-    if holes == cells.values.len() {
+    let values = || cells.values.iter().chain(&cells.faces.values);
+    let holes = values().filter(|value| value.is_nan()).count();
+    if wanted.is_some() && holes == values().count() {
         return Err(source.error("samples", all_missing(holes, options.missing)));
     }
     let position = |row: usize| grid.points[used[row] as usize];
@@ -84,6 +78,40 @@ pub fn cells(
     cells.about.holes = holes as u64;
     cells.validate().map_err(|error| source.error("Cells", error.to_string()))?;
     Ok(cells)
+}
+
+/// The points that cells use.
+struct Used {
+    /// The number of each point of the grid among those that are used.
+    numbers: Vec<u32>,
+    /// The points that are used, by their numbers in the grid.
+    points: Vec<u32>,
+}
+
+impl Used {
+    fn number(&mut self, point: u32) -> u32 {
+        let own = &mut self.numbers[point as usize];
+        if *own == u32::MAX {
+            *own = self.points.len() as u32;
+            self.points.push(point);
+        }
+        *own
+    }
+}
+
+/// Adds a cell that fills space.
+fn add_cell(grid: &Grid, cell: usize, kind: CellKind, (cells, used): (&mut Cells, &mut Used)) {
+    let corners = grid.corners_of(cell);
+    if kind != CellKind::Polyhedron {
+        cells.push(kind, corners.iter().map(|&point| used.number(point)).collect::<Vec<u32>>());
+        return;
+    }
+    let faces = super::grid::faces(corners).flat_map(|face| {
+        let points: Vec<u32> = face.iter().map(|&point| used.number(point)).collect();
+        std::iter::once(face.len() as u32).chain(points)
+    });
+    let stream: Vec<u32> = corners.first().copied().into_iter().chain(faces).collect();
+    cells.push(kind, stream);
 }
 
 /// Says how many cells are left out because a corner is not at finite coordinates.

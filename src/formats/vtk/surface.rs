@@ -34,7 +34,8 @@ pub fn mesh(source: &Source, grid: &Grid, wanted: Option<&Wanted>) -> Result<Mes
     give(source, grid, wanted, triangles.into_inner())
 }
 
-/// Returns the boundary of the cells that fill space: the faces that only one cell has.
+/// Returns the boundary of the cells that fill space, the faces that only one cell has, and the
+/// surfaces beside them.
 pub fn boundary(source: &Source, grid: &Grid) -> Result<Mesh> {
     let mut sides: Growing<([u32; 4], u32, u32)> = Growing::new(source, "the faces of the cells");
     let mut lists: Growing<u32> = Growing::new(source, "the corners of the faces");
@@ -57,6 +58,11 @@ pub fn boundary(source: &Source, grid: &Grid) -> Result<Mesh> {
             let corners = &lists[start as usize..][..count as usize];
             polygon::triangles(corners, position, |triangle| triangles.push((triangle, 0)))?;
         }
+    }
+    for cell in (0..grid.types.len()).filter(|&cell| dimension(grid.types[cell]) == Some(2)) {
+        cut(source, grid, cell, &mut |corners| {
+            polygon::triangles(corners, position, |triangle| triangles.push((triangle, 0)))
+        })?;
     }
     give(source, grid, None, triangles.into_inner())
 }
@@ -159,7 +165,7 @@ fn give(
 
 /// Passes the polygons of a cell that is a surface to `add`. Those of higher order are cut along
 /// their nodes.
-fn cut(
+pub fn cut(
     source: &Source,
     grid: &Grid,
     cell: usize,

@@ -43,7 +43,7 @@ pub enum Drawn {
     Volume,
     /// Cells with a field inside.
     Cells,
-    /// The boundary of cells without values.
+    /// Cells without values; as a mesh, their boundary.
     Boundary,
     Surface,
     Cloud,
@@ -209,7 +209,7 @@ impl Survey {
                 left.push(format!("{count} {}", if count == 1 { one } else { many }));
             }
         };
-        add(self.faces * u64::from(is_solid), "face", "faces");
+        add(self.faces * u64::from(drawn == Drawn::Volume), "face", "faces");
         add(self.lines, "line", "lines");
         add(self.unknown, "cell of an unknown type", "cells of unknown types");
         let grids = self.lattices.len() as u64;

@@ -61,7 +61,10 @@ fn unstructured_grids() {
     let of_cells = array("type='Int32' Name='c'", "10 -20");
     let both = grid(&format!("{vector}{of_points}"), &of_cells);
     let cells = with(&both, None, read_cells).unwrap();
-    assert_eq!((cells.kinds, cells.values), (vec![CellKind::Tetrahedron], vec![1., 2., 3., 4.]));
+    let values: Vec<f32> = (1..=8).map(|value| value as f32).collect();
+    assert_eq!((cells.kinds, cells.values), (vec![CellKind::Tetrahedron], values));
+    // The square lies beside the cells.
+    assert_eq!((cells.faces.corners, cells.faces.ends), (vec![4, 5, 6, 7], vec![4]));
     let points = with(&both, None, read_samples).unwrap();
     assert_eq!(
         (points.len(), points.positions[6], points.values[6]),
@@ -71,6 +74,7 @@ fn unstructured_grids() {
     for (text, scalar) in [(&both, Some("c")), (&whole, None)] {
         let cells = with(text, scalar, read_cells).unwrap();
         assert_eq!((cells.place, cells.values), (cells::Place::Cells, vec![10.0]));
+        assert_eq!(cells.faces.values, [-20.0]);
         let points = with(text, scalar, read_samples).unwrap();
         assert_eq!(points.positions, [Vec3::splat(0.5), Vec3::new(6.0, 1.0, 0.0)]);
         assert_eq!(points.values, [10.0, -20.0]);
@@ -102,8 +106,10 @@ fn unstructured_grids() {
     let lie = whole.replace("NumberOfPoints='8'", "NumberOfPoints='99999999999'");
     assert!(matches!(with(&lie, None, read_cells), Err(Error::Limit { .. })));
     // Without values, the boundary is drawn.
-    assert_eq!(with(&grid("", ""), None, kind).unwrap(), Kind::Mesh);
-    assert_eq!(with(&grid("", ""), None, read_mesh).unwrap().triangles.len(), 4);
+    assert_eq!(with(&grid("", ""), None, kind).unwrap(), Kind::Cells);
+    assert_eq!(with(&grid("", ""), None, read_mesh).unwrap().triangles.len(), 6);
+    let bare = with(&grid("", ""), None, read_cells).unwrap();
+    assert_eq!((bare.len(), bare.faces.len(), bare.values.len()), (1, 1, 0));
 }
 
 /// Polyhedra as VTK writes them until 9.3, and since.

@@ -5,6 +5,7 @@ use super::chunk::{Chunk, Origin, SPAN_BYTES, runs_of, spans};
 use crate::{
     Error, Result,
     bricks::Choice,
+    cells::Solid,
     facet::{Facet, FacetSet, Sides},
     gaussians::{Eye, Gaussians},
     gpu::{
@@ -59,6 +60,14 @@ struct LevelledSet {
     set: Option<Arc<SplatSet>>,
 }
 
+/// A solid, of which the GPU holds what the clips of the last picture left.
+#[derive(Debug)]
+struct ShownSolid {
+    item: usize,
+    solid: Arc<Solid>,
+    drawn: Option<Arc<FacetSet>>,
+}
+
 /// Trained Gaussians, which are uploaded for the first picture.
 #[derive(Debug)]
 pub struct SeenSet {
@@ -76,6 +85,8 @@ pub struct PreparedScene {
     pub(crate) chunks: Vec<Chunk>,
     /// The sets that pictures may show in levels of detail.
     levels: Vec<LevelledSet>,
+    /// The solids.
+    solids: Vec<ShownSolid>,
     /// The trained Gaussians.
     pub(crate) seen: Vec<SeenSet>,
     /// The hierarchies, in the scene's order.
@@ -125,6 +136,7 @@ impl PreparedScene {
             scene: scene.clone(),
             chunks: Vec::new(),
             levels: Vec::new(),
+            solids: Vec::new(),
             seen: Vec::new(),
             page_caches: Vec::new(),
             brick_cache: None,
@@ -158,6 +170,11 @@ impl PreparedScene {
                     prepared.seen.push(SeenSet { item: number, set: set.clone(), eye: None });
                 }
                 Item::Facets(set) => prepared.add_facets(gpu, set, number),
+                // Their facets are uploaded as the clips of the first picture leave them.
+                Item::Solid(solid) => {
+                    let own = ShownSolid { item: number, solid: solid.clone(), drawn: None };
+                    prepared.solids.push(own);
+                }
                 Item::Hierarchy(hierarchy) => {
                     prepared.page_caches.push(PageCache::new(gpu, hierarchy, number));
                 }
@@ -369,10 +386,7 @@ impl PreparedScene {
         if own.set.as_ref().is_some_and(|shown| Arc::ptr_eq(shown, &set)) {
             return Ok(());
         }
-        let is_old = |chunk: &Chunk| chunk.item == own.item;
-        self.bytes -=
-            self.chunks.iter().filter(|chunk| is_old(chunk)).map(Chunk::bytes).sum::<u64>();
-        self.chunks.retain(|chunk| !is_old(chunk));
+        self.remove_chunks(own.item);
         own.set = None;
         gpu.check_memory(self.bytes + splat_bytes(&set))?;
         self.add_splats(gpu, &in_space_order(&set), own.item);
@@ -416,6 +430,36 @@ impl PreparedScene {
             let origin = Origin::Facets { set: set.clone(), is_culled: false, shown };
             self.add_chunk(gpu, item, origin, bytemuck::cast_slice(facets), facets.len() as u32);
         }
+    }
+
+    /// Uploads the facets that the clips of a picture leave of solids, if the clips have changed.
+    pub(crate) fn update_solids(&mut self, gpu: &Gpu, settings: &Settings) -> Result<()> {
+        let mut has_changed = false;
+        for number in 0..self.solids.len() {
+            let ShownSolid { item, solid, drawn } = &mut self.solids[number];
+            let (item, set) = (*item, solid.facets(&settings.clips));
+            if drawn.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &set)) {
+                continue;
+            }
+            *drawn = None;
+            self.remove_chunks(item);
+            gpu.check_memory(self.bytes + facet_bytes(&set))?;
+            self.add_facets(gpu, &set, item);
+            self.solids[number].drawn = Some(set);
+            has_changed = true;
+        }
+        if has_changed {
+            self.number_runs();
+        }
+        Ok(())
+    }
+
+    /// Frees the chunks of an item.
+    fn remove_chunks(&mut self, item: usize) {
+        let is_old = |chunk: &Chunk| chunk.item == item;
+        let old = self.chunks.iter().filter(|chunk| is_old(chunk));
+        self.bytes -= old.map(Chunk::bytes).sum::<u64>();
+        self.chunks.retain(|chunk| !is_old(chunk));
     }
 
     /// Decides for each set of facets whether a view leaves out backs.
@@ -630,9 +674,15 @@ fn bytes_of(item: &Item) -> u64 {
                 volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
             volume.drawn_lattice().len() as u64 * (sample + 2)
         }
-        Item::Facets(set) => set.facets.len() as u64 * (size_of::<Facet>() as u64 + SPAN_BYTES),
+        Item::Facets(set) => facet_bytes(set),
+        Item::Solid(solid) => facet_bytes(solid.boundary()),
         Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => 0,
     }
+}
+
+/// Returns the bytes of facets on the GPU, and of their spans.
+fn facet_bytes(set: &FacetSet) -> u64 {
+    set.facets.len() as u64 * (size_of::<Facet>() as u64 + SPAN_BYTES)
 }
 
 /// Returns the bytes of a set's splats on the GPU, and of their spans.

@@ -34,7 +34,7 @@ pub fn variant(request: &Request<'_>) -> Variant {
     let mut variant = without_items(request);
     for item in &scene.items {
         match item {
-            Item::Facets(_) => {
+            Item::Facets(_) | Item::Solid(_) => {
                 variant.facets = true;
                 variant.images = request.images;
                 variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();

@@ -145,7 +145,7 @@ impl<W: Watch> Work<'_, W> {
         let deadline = self.own.reading.limits().deadline();
         let reading = self.own.reading(Some(most));
         let opened = reading.open_colored(path, self.own.attribute())?;
-        let data = opened.read()?;
+        let data = opened.read()?.with_surface_of_bare_cells()?;
         self.watch.has_read(&opened.files())?;
         let read_ms = milliseconds(start);
         let start = Instant::now();

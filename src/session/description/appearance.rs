@@ -7,7 +7,8 @@ use crate::{
     input::Limits,
     math::Kernel,
     session::{
-        Appearance, Coloring, Showing, Surface, SurfaceColor, SurfaceValue, Transfer as Chosen,
+        Appearance, CellStyle, Coloring, Showing, Surface, SurfaceColor, SurfaceValue,
+        Transfer as Chosen,
     },
     volume::TransferFunction,
 };
@@ -71,9 +72,13 @@ pub struct AppearanceEntry {
     /// The angle between triangles, in degrees, from which on a crease looks sharp.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crease: Option<f32>,
-    /// Whether the edges of triangles are drawn.
+    /// Whether the edges of triangles and of cells are drawn.
     #[serde(skip_serializing_if = "is_false")]
     pub edges: bool,
+    /// How cells are drawn; by default as a solid, unless something else here shows the field
+    /// inside.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cells: Option<CellStyle>,
 }
 
 /// A transfer function.
@@ -146,7 +151,7 @@ impl AppearanceEntry {
         }
         own_or_shared!(
             transfer, range, opacity_unit, isosurfaces, gradient_opacity, colormap, nan_color,
-            kernel, sigma, extent, color, opacity, radius_scale, crease;
+            kernel, sigma, extent, color, opacity, radius_scale, crease, cells;
             log_colors, sharp, edges
         )
     }
@@ -247,6 +252,7 @@ impl AppearanceEntry {
             crease: self.crease,
             opacity: self.opacity,
             draws_edges: self.edges,
+            cells: self.cells,
             values_by: self.shows_values().map(str::to_owned),
             ..Showing::default()
         })

@@ -7,7 +7,7 @@ use crate::{
     math::Camera,
     memory,
     scene::{Scene, Settings},
-    session::{Captions, Data, Framing, Items, Name, Subject, Surfaces},
+    session::{Captions, CellStyle, Data, Framing, Items, Name, Showing, Subject, Surfaces},
 };
 use std::path::PathBuf;
 
@@ -37,14 +37,17 @@ pub struct LoadedInput {
     pub kind: Kind,
     /// Whether it is a point cloud: of the kind of meshes, without triangles.
     pub is_cloud: bool,
+    /// Whether it is of cells that are drawn as a solid.
+    pub is_solid: bool,
     /// Whether the description gave its layout, because the file has no format of its own.
     pub is_raw: bool,
 }
 
 impl LoadedInput {
-    fn new(file: PathBuf, data: &Data, is_raw: bool) -> Self {
+    fn new(file: PathBuf, data: &Data, is_raw: bool, showing: &Showing) -> Result<Self> {
         let is_cloud = matches!(data, Data::Mesh(mesh) if mesh.triangles.is_empty());
-        Self { file, kind: data.kind(), is_cloud, is_raw }
+        let is_solid = matches!(data, Data::Cells(_)) && showing.cell_style()? == CellStyle::Solid;
+        Ok(Self { file, kind: data.kind(), is_cloud, is_solid, is_raw })
     }
 }
 
@@ -111,7 +114,7 @@ impl Description {
         let reading = self.reading_of(input).reading_within(memory::most());
         let opened = reading.open_colored(path, showing.coloring().attribute())?;
         let data = opened.read()?;
-        let loaded = LoadedInput::new(path.clone(), &data, opened.is_raw());
+        let loaded = LoadedInput::new(path.clone(), &data, opened.is_raw(), &showing)?;
         let files = opened.files();
         items.add(&Name::of_file(path), data, &showing, does)?;
         Ok((loaded, files))

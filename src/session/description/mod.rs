@@ -25,7 +25,7 @@ pub use load::{Loaded, LoadedInput};
 pub use picture::{Composite, PictureEntry, Samples};
 pub use reading::{LimitsEntry, ReadingEntry};
 
-use super::{Framing, Showing};
+use super::{CellStyle, Framing, Showing};
 use crate::{Error, Result, input::Limits};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -190,6 +190,8 @@ impl Description {
         // Of values alone: colours have no largest one.
         if self.picture.optics.is_some_and(|optics| optics != Default::default()) {
             showing.values_by = showing.values_by.or_else(|| Some("optics".into()));
+            // They show the field inside cells.
+            showing.cells = showing.cells.or(Some(CellStyle::Volume));
         }
         Ok(showing)
     }

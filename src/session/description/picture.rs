@@ -4,7 +4,7 @@ use super::{Background, ClipEntry, appearance::Wrong};
 use crate::{
     Error, Result,
     hierarchy::Detail,
-    scene::{Classification, Evaluate, Gradient, Item, Mode, Optics, Order, Scene, Settings},
+    scene::{Classification, Clip, Evaluate, Gradient, Item, Mode, Optics, Order, Scene, Settings},
     session::Subject,
 };
 use serde::{Deserialize, Serialize};
@@ -243,7 +243,7 @@ impl PictureEntry {
     /// Returns the settings of the picture of a scene, before it is averaged down.
     ///
     /// # Errors
-    /// Those of [`Scene::validate_settings`]; [`Error::NothingToDraw`](crate::Error::NothingToDraw)
+    /// Those of [`Scene::validate_settings`]; [`Error::NothingToDraw`]
     /// for a clip that leaves nothing of the scene.
     pub fn settings(&self, scene: &Scene, subject: &Subject) -> Result<Settings> {
         let factor = self.factor(scene);
@@ -269,10 +269,18 @@ impl PictureEntry {
         };
         settings.cull_backfaces = self.cull_backfaces;
         settings.page_memory = self.memory.unwrap_or(settings.page_memory);
-        // Footprints reach beyond the samples, so something may be left there.
-        settings.clips = ClipEntry::all(&self.clips, &subject.bounds, &scene.bounds())?;
+        settings.clips = self.clips_of(scene, subject)?;
         scene.validate_settings(&settings)?;
         Ok(settings)
+    }
+
+    /// Returns the clips of the picture of a scene.
+    ///
+    /// # Errors
+    /// [`Error::NothingToDraw`] for a clip that leaves nothing of the scene.
+    pub fn clips_of(&self, scene: &Scene, subject: &Subject) -> Result<Vec<Clip>> {
+        // Footprints reach beyond the samples, so something may be left there.
+        ClipEntry::all(&self.clips, &subject.bounds, &scene.bounds())
     }
 
     fn light(&self, scene: &Scene, settings: &mut Settings) {

@@ -25,7 +25,7 @@ pub struct CellArrays<'py> {
     #[pyo3(item)]
     nodes: Bound<'py, PyAny>,
     #[pyo3(item)]
-    values: Bound<'py, PyAny>,
+    values: Option<Bound<'py, PyAny>>,
     /// Whether the values are those of cells.
     #[pyo3(item)]
     of_cells: bool,
@@ -36,23 +36,49 @@ impl CellArrays<'_> {
     pub fn cells(&self, mut about: About, missing: Option<f64>) -> Result<Cells, Error> {
         let (origin, points) = positions(&self.positions)?;
         let kinds = numbers::<u8>(&self.kinds)?;
-        let kinds: Vec<CellKind> =
-            kinds.iter().map(|number| kind(*number)).collect::<Result<_, _>>()?;
-        let offsets = numbers::<i64>(&self.offsets)?;
-        let offsets = offsets.into_iter().map(|own| usize::try_from(own).unwrap_or(usize::MAX));
-        let mut values = numbers::<f32>(&self.values)?;
+        let values = self.values.as_ref().map(numbers::<f32>).transpose()?;
+        let has_values = values.is_some();
+        let mut values = values.unwrap_or_default();
         let is_hole = |value: f32| !value.is_finite() || missing.is_some_and(|m| value == m as f32);
         for value in values.iter_mut().filter(|value| is_hole(**value)) {
             *value = f32::NAN;
             about.holes += 1;
         }
         let place = if self.of_cells { Place::Cells } else { Place::Points };
+        let mut cells = Cells { origin, points, place, about, ..Cells::default() };
+        let of_cells = self.of_cells && has_values;
+        let offsets = numbers::<i64>(&self.offsets)?;
         let nodes = numbers::<u32>(&self.nodes)?;
-        let offsets = offsets.collect();
-        let cells = Cells { origin, points, values, place, kinds, offsets, nodes, about };
+        for (cell, number) in kinds.iter().enumerate() {
+            let nodes = nodes_of(&offsets, &nodes, cell)?;
+            let value = values.get(cell).copied().filter(|_| of_cells);
+            match (*number, nodes) {
+                // Triangles, polygons and quadrilaterals; the corners of pixels are in rows.
+                (5 | 7 | 9, corners) => cells.faces.push(corners.iter().copied()),
+                (8, &[a, b, c, d]) => cells.faces.push([a, b, d, c]),
+                _ => {
+                    cells.push(kind(*number)?, nodes.iter().copied());
+                    cells.values.extend(value);
+                    continue;
+                }
+            }
+            cells.faces.values.extend(value);
+        }
+        if !of_cells {
+            cells.values = values;
+        }
         cells.validate()?;
         Ok(cells)
     }
+}
+
+/// Returns the nodes of a cell.
+fn nodes_of<'a>(offsets: &[i64], nodes: &'a [u32], cell: usize) -> Result<&'a [u32], Error> {
+    let ends = offsets.get(cell..cell + 2).and_then(|ends| {
+        let [from, to] = [ends[0], ends[1]].map(|end| usize::try_from(end).ok());
+        nodes.get(from?..to?)
+    });
+    ends.ok_or_else(|| wrong(format!("the offsets of cell {cell} do not fit the nodes")))
 }
 
 fn kind(number: u8) -> Result<CellKind, Error> {

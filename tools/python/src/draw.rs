@@ -278,7 +278,7 @@ impl Stage {
             if factor > 1 {
                 picture = picture.reduced(factor)?;
             }
-            locked(&self.items).items.draw_edges(&mut picture, &camera)?;
+            locked(&self.items).items.draw_edges(&mut picture, &camera, &settings.clips)?;
         }
         Ok(Drawn { picture, stats, camera })
     }

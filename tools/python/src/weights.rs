@@ -34,6 +34,11 @@ fn of_item(item: &Item) -> Result<Vec<[f64; 4]>> {
             let place = |at: usize| Vec3::from(set.facets[at].corners[0]).as_dvec3() + set.origin;
             sampled(set.facets.len(), place)
         }
+        Item::Solid(solid) => {
+            let set = solid.boundary();
+            let place = |at: usize| Vec3::from(set.facets[at].corners[0]).as_dvec3() + set.origin;
+            sampled(set.facets.len(), place)
+        }
         Item::Gaussians(set) => {
             sampled(set.centers.len(), |at| set.centers[at].as_dvec3() + set.origin)
         }

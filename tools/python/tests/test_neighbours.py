@@ -263,7 +263,7 @@ def test_grids_of_cells(data, tmp_path):
         Scene().add_volume(grid)
     with pytest.raises(TypeError, match=r"add_mesh\(\) takes a mesh"):
         Scene().add_mesh(grid)
-    with pytest.raises(TypeError, match="needs points, cells and values"):
+    with pytest.raises(TypeError, match="needs points and cells"):
         Scene().add_cells(points)
     with pytest.raises(ArgumentError, match="refers to point"):
         Scene().add_cells(points, rows[:, 1:] + 60, heat)

@@ -30,6 +30,45 @@ fn too_little_memory_for_pages_is_told() {
     assert!(told("--memory 200KiB") && !told(""));
 }
 
+/// Cells are solid bodies in the colours of their values, and a clip shows the field inside.
+#[test]
+fn cells_are_solid() {
+    let folder = Folder::new();
+    folder.run("generate hexahedra --parts 2 -o a.vtu").ok();
+    folder.put("one.vtk", ONE_VALUE);
+    let pixels = |flags: &str| -> Vec<[u8; 4]> {
+        let run = format!("render {flags} --raw -o - --background none --engine cpu {SMALL}");
+        let bytes = folder.run(&run).ok().stdout;
+        bytes.chunks_exact(4).map(|pixel| [pixel[0], pixel[1], pixel[2], pixel[3]]).collect()
+    };
+    let opaque = |pixels: &[[u8; 4]]| pixels.iter().filter(|pixel| pixel[3] == 255).count();
+    let whole = pixels("a.vtu");
+    assert!(opaque(&whole) > 600, "{}", opaque(&whole));
+    for field in ["--cells volume", "--transfer generic", "--x-ray", "--mip"] {
+        assert!(opaque(&pixels(&format!("a.vtu {field}"))) < 200, "{field}");
+    }
+    // The camera is fitted to what is left.
+    let cut = pixels("a.vtu --clip z<40% --view +Z");
+    assert!(opaque(&cut) > 600 && cut != whole);
+    let dark = |pixels: &[[u8; 4]]| -> u64 {
+        pixels.iter().map(|[r, g, b, _]| u64::from(*r) + u64::from(*g) + u64::from(*b)).sum()
+    };
+    assert!(dark(&pixels("a.vtu --edges")) < dark(&whole) * 97 / 100);
+    let red = pixels("a.vtu --color red --crease 0");
+    assert!(red.iter().all(|[r, g, b, a]| *a < 255 || r > g && r > b));
+    // A cell of one value is drawn, too.
+    assert!(opaque(&pixels("one.vtk")) > 600);
+    folder.run("render one.vtk -o one.png --cells volume").fails(3, &["all values of one.vtk"]);
+    let both = "render a.vtu -o a.png --cells solid --iso 50";
+    folder.run(both).fails(2, &["a solid have no use for isosurfaces"]);
+}
+
+/// A cube of one value.
+const ONE_VALUE: &str = "# vtk DataFile Version 3.0\none\nASCII\nDATASET UNSTRUCTURED_GRID\n\
+    POINTS 8 float\n0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1\n\
+    CELLS 1 9\n8 0 1 2 3 4 5 6 7\nCELL_TYPES 1\n12\n\
+    POINT_DATA 8\nSCALARS t float\nLOOKUP_TABLE default\n3 3 3 3 3 3 3 3\n";
+
 #[test]
 fn every_format_gives_a_picture() {
     let folder = folder();

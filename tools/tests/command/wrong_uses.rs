@@ -133,7 +133,7 @@ const USES: &[(&str, &str, i32, &str)] = &[
         "a flag of meshes for a volume",
         "render a.nrrd -o out.png --crease 30",
         0,
-        "warning: --crease has no effect: it is for meshes, but a.nrrd is a volume",
+        "warning: --crease has no effect: it is for meshes and cells, but a.nrrd is a volume",
     ),
     (
         "edges of a hierarchy",

@@ -77,6 +77,22 @@ class SurfaceLook(TypedDict, total=False):
     edges: bool
 
 
+class CellLook(FieldLook, total=False):
+    """How cells are shown."""
+
+    #: solid: an opaque body, with the field inside where clips cut it; volume: the field, by a
+    #: transfer function. Default: solid, unless another option is one of fields.
+    cells: str
+    #: values, height, normal, or a colour. Default: values.
+    color: Color
+    #: The colour of what has no value.
+    nan_color: Color
+    #: The share of the light that the boundary absorbs, above 0, up to 1.
+    opacity: float
+    #: Split normals where two sides meet at more than this angle, in degrees. Default: 45.
+    crease: float
+
+
 class VolumeLook(FieldLook, KernelLook):
     """How a volume is shown."""
 
@@ -119,10 +135,14 @@ class Reading(TypedDict, total=False):
 class FileOptions(VolumeLook, SurfaceLook, Reading):
     """How a file is read and shown."""
 
+    #: Cells: solid or volume (`CellLook`).
+    cells: str
+
 
 FIELD = frozenset(FieldLook.__annotations__)
 VOLUME = frozenset(VolumeLook.__annotations__)
 SURFACE = frozenset(SurfaceLook.__annotations__)
+CELLS = frozenset(CellLook.__annotations__)
 READING = frozenset(Reading.__annotations__)
 
 
@@ -205,7 +225,7 @@ def direction(value: str | Vector | None) -> list[float] | None:
 
 def look(options: Mapping[str, Any]) -> str:
     """Returns how an item looks, as JSON."""
-    given = {name: options[name] for name in options if name in VOLUME | SURFACE}
+    given = {name: options[name] for name in options if name in VOLUME | SURFACE | CELLS}
     transfer = given.get("transfer")
     if transfer is not None:
         given["transfer"] = TransferFunction.of(transfer)

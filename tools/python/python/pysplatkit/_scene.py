@@ -14,7 +14,7 @@ import numpy as np
 from . import _arrays, _neighbours, _options, _pysplatkit
 from ._camera import Camera, Clip
 from ._errors import ArgumentError, DataWarning, KindError
-from ._options import Color, FieldLook, FileOptions, SurfaceLook, Vector, VolumeLook
+from ._options import CellLook, Color, FieldLook, FileOptions, SurfaceLook, Vector, VolumeLook
 from ._picture import Picture
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Scene:
         `docs/python.md` lists the options, and the objects that are known.
         """
         if isinstance(source, (str, os.PathLike)):
-            known = _options.VOLUME | _options.SURFACE | _options.READING
+            known = _options.VOLUME | _options.SURFACE | _options.CELLS | _options.READING
             given = _options.checked(options, known, "add")
             path = os.fspath(source)
             reading, look = _options.reading(given), _options.look(given)
@@ -295,43 +295,46 @@ class Scene:
         missing: float | None = None,
         up: str | Vector | None = None,
         name: str = "cells",
-        **look: Unpack[FieldLook],
+        **look: Unpack[CellLook],
     ) -> Scene:
-        """Adds cells that fill space, such as those of a solver, with the field inside.
+        """Adds cells that fill space, such as those of a solver, with the field inside. Triangles
+        (VTK's type 5), polygons (7) and quadrilaterals (8, 9) are drawn with their boundary.
 
         Args:
             points: Positions x, y, z, (n, 3), or a grid of PyVista or VTK, which has the rest.
             cells: Rows of the points of cells of one kind, in VTK's order, or the list of the
                 number of points and the points of each cell.
             values: One number for each point, or for each cell. Cells with a value that is not
-                finite, or at a point with one, are left out.
+                finite, or at a point with one, are left out. None draws one colour.
             kinds: VTK's number of the type of all cells, or of each. Default: by the length of
                 rows: 4 tetrahedra, 5 pyramids, 6 wedges, 8 hexahedra.
             scalar: The name of the array of a grid.
         """
-        given = _options.checked(look, _options.FIELD, "add_cells")
+        given = _options.checked(look, _options.CELLS, "add_cells")
         own = _neighbours.of_kind(_neighbours.Cells, points, scalar, "add_cells")
         if own is None:
-            if cells is None or values is None:
-                raise KindError("add_cells() needs points, cells and values, or a grid")
+            if cells is None:
+                raise KindError("add_cells() needs points and cells, or a grid")
             arrays = _arrays.cells(cells, kinds)
         else:
             points = own.positions
             arrays = _arrays.raw_cells(own.kinds, own.offsets, own.nodes)
         is_told = own is not None and values is None
         positions = _arrays.positions(points, "points")
-        column = _arrays.column(own.values if is_told else values, "values")
-        count = len(arrays["kinds"])
-        of_cells = own.of_cells if is_told else len(column) == count != len(positions)
-        if len(column) != (count if of_cells else len(positions)):
-            raise ArgumentError(
-                f"there are {len(column)} values for {len(positions)} points and {count} cells"
-            )
+        numbers = own.values if is_told else values
+        column = None if numbers is None else _arrays.column(numbers, "values")
+        count, of_cells = len(arrays["kinds"]), False
+        if column is not None:
+            of_cells = own.of_cells if is_told else len(column) == count != len(positions)
+            if len(column) != (count if of_cells else len(positions)):
+                raise ArgumentError(
+                    f"there are {len(column)} values for {len(positions)} points and {count} cells"
+                )
         points, arrays["nodes"] = _arrays.used(arrays["nodes"], len(positions))
         given_arrays = {
             **arrays,
             "positions": positions[points],
-            "values": column if of_cells else column[points],
+            "values": column if of_cells or column is None else column[points],
             "of_cells": of_cells,
         }
         told = {"name": name, "missing": missing, "up": _options.direction(up)}

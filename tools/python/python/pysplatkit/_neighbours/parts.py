@@ -89,14 +89,15 @@ class Surface(Parts):
 
 @dataclass
 class Cells(Parts):
-    """Cells that fill space. Kinds have VTK's numbers."""
+    """Cells that fill space, and surfaces beside them. Kinds have VTK's numbers."""
 
     ARTICLE = "a set of cells"
     positions: Array
     kinds: Array
     offsets: Array
     nodes: Array
-    values: Array
+    #: None without a field.
+    values: Array | None
     #: Whether the values are those of cells, not of points.
     of_cells: bool
 

@@ -111,14 +111,19 @@ def _unstructured(source: Any, scalar: str | None) -> Parts:
     is_solid = np.isin(kinds, _SOLID)
     if not is_solid.any():
         return _flat(source, scalar, kinds, offsets, nodes)
-    values, of_cells = _values(source, scalar)
-    numbers = _scalars(values)
-    if not is_solid.all():
+    has_arrays = any(
+        data.GetNumberOfArrays() for data in (source.GetPointData(), source.GetCellData())
+    )
+    values, of_cells = _values(source, scalar) if has_arrays or scalar else (None, False)
+    numbers = None if values is None else _scalars(values)
+    # Solids, and the surfaces beside them.
+    is_kept = is_solid | np.isin(kinds, (5, _POLYGON, _PIXEL, 9))
+    if not is_kept.all():
         counts = np.diff(offsets)
-        nodes = nodes[np.repeat(is_solid, counts)]
-        offsets = np.concatenate([[0], np.cumsum(counts[is_solid])])
-        kinds = kinds[is_solid]
-        numbers = numbers[is_solid] if of_cells else numbers
+        nodes = nodes[np.repeat(is_kept, counts)]
+        offsets = np.concatenate([[0], np.cumsum(counts[is_kept])])
+        kinds = kinds[is_kept]
+        numbers = numbers[is_kept] if of_cells and numbers is not None else numbers
     return Cells(_positions(source), kinds, offsets, nodes, numbers, of_cells)
 
 
