@@ -78,6 +78,8 @@ pub struct Plan<'a> {
     pub has_radiance: bool,
     /// The scene has facets.
     pub has_facets: bool,
+    /// Some facets are rods.
+    pub has_rods: bool,
     /// The sets of facets that show images.
     pub with_images: Vec<Arc<FacetSet>>,
     pub lit_surfaces: bool,
@@ -124,6 +126,7 @@ impl<'a> Plan<'a> {
             isosurfaces: 0,
             has_radiance: false,
             has_facets: false,
+            has_rods: false,
             with_images: Vec::new(),
             lit_surfaces: false,
             has_trained: scene.items.iter().any(Item::is_trained),
@@ -135,10 +138,9 @@ impl<'a> Plan<'a> {
         // Only emission and absorption is lit.
         let emits = settings.optics == Optics::EmissionAbsorption;
         for item in &scene.items {
-            if let Item::Facets(set) = item
-                && !set.shown.is_empty()
-            {
-                plan.with_images.push(set.clone());
+            if let Item::Facets(set) = item {
+                plan.has_rods |= set.rods.is_some();
+                plan.with_images.extend((!set.shown.is_empty()).then(|| set.clone()));
             }
             match item {
                 Item::Radiance(_) | Item::Facets(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {

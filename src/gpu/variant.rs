@@ -36,8 +36,9 @@ pub fn variant(request: &Request<'_>) -> Variant {
     let mut variant = without_items(request);
     for item in &scene.items {
         match item {
-            Item::Facets(_) => {
+            Item::Facets(set) => {
                 variant.facets = true;
+                variant.rods |= set.rods.is_some();
                 variant.images = request.images;
                 variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
             }
@@ -108,6 +109,7 @@ fn without_items(request: &Request<'_>) -> Variant {
         trained: false,
         facets: false,
         images: false,
+        rods: false,
         isotropic: false,
         general: false,
         table_kernel: false,

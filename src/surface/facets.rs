@@ -80,7 +80,7 @@ impl Mesh {
             true => Default::default(),
             false => images(&mesh, &numbers, is_turned),
         };
-        let set = FacetSet { origin: self.origin, facets, sides, images, shown };
+        let set = FacetSet { origin: self.origin, facets, sides, images, shown, rods: None };
         Ok((!set.facets.is_empty()).then_some(set))
     }
 

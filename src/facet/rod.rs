@@ -1,0 +1,156 @@
+//! Rods: segments with a radius and round ends, drawn as balls, discs and tubes.
+
+use super::{Facet, FacetSet, Sides};
+use crate::{
+    parallel::prelude::*,
+    splat::{NO_NORMAL, decode_normal, encode_normal},
+};
+use glam::{DVec3, Vec3};
+
+/// A segment with a radius and round ends. With both ends at one place it is a ball.
+///
+/// A rod is stored as a [`Facet`]: its outline is exact at any distance, and rods meet where their
+/// surfaces do. The radius may be one of the world, one of the picture, or the larger of both.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rod {
+    /// The ends of the segment in world units, relative to the set's origin.
+    pub ends: [Vec3; 2],
+    /// The radius at each end, in world units.
+    pub radii: [f32; 2],
+    /// The least radius in the picture, in pixels: a rod that would be thinner is drawn this wide.
+    pub pixels: f32,
+    /// The colours at the ends: red, green and blue.
+    pub colors: [[u8; 3]; 2],
+    /// How the rod is lit.
+    pub relief: Relief,
+}
+
+/// How a rod looks from the eye.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Relief {
+    /// As a body: lit by the normal of its surface, which has its own depth.
+    #[default]
+    Round,
+    /// As a flat band or disc that faces the eye: lit by one unit normal, or not at all.
+    Flat(Option<Vec3>),
+}
+
+/// The last normal of a facet that is a rod. No unit vector is encoded like this, and as a float it
+/// is a usual one, which no device changes. rods.wgsl has the same number.
+pub(crate) const ROD: u32 = 0x4000_8000;
+
+/// The largest least radius of a rod, in pixels.
+pub const WIDEST_PIXELS: f32 = 1000.0;
+
+impl Rod {
+    /// Returns a ball.
+    pub fn ball(center: Vec3, radius: f32, color: [u8; 3]) -> Self {
+        Self {
+            ends: [center; 2],
+            radii: [radius; 2],
+            pixels: 0.0,
+            colors: [color; 2],
+            relief: Relief::Round,
+        }
+    }
+}
+
+impl From<Rod> for Facet {
+    fn from(rod: Rod) -> Self {
+        let Rod { ends: [a, b], radii: [first, last], pixels, colors, relief } = rod;
+        let (normal, is_round) = match relief {
+            Relief::Round => (NO_NORMAL, true),
+            Relief::Flat(normal) => (normal.map_or(NO_NORMAL, encode_normal), false),
+        };
+        let [from, to] =
+            colors.map(|[red, green, blue]| u32::from_le_bytes([red, green, blue, 255]));
+        Self {
+            corners: [a.to_array(), b.to_array(), [first, last, pixels]],
+            normals: [normal, u32::from(is_round), ROD],
+            colors: [from, to, to],
+        }
+    }
+}
+
+impl Facet {
+    /// Whether the facet is a rod instead of a triangle.
+    pub fn is_rod(&self) -> bool {
+        self.normals[2] == ROD
+    }
+
+    /// Returns the rod that is stored in the facet; `None` for a triangle.
+    pub fn rod(&self) -> Option<Rod> {
+        if !self.is_rod() {
+            return None;
+        }
+        let [a, b, [first, last, pixels]] = self.corners;
+        let [normal, is_round, _] = self.normals;
+        let color = |packed: u32| {
+            let [red, green, blue, _] = packed.to_le_bytes();
+            [red, green, blue]
+        };
+        Some(Rod {
+            ends: [a.into(), b.into()],
+            radii: [first, last],
+            pixels,
+            colors: [color(self.colors[0]), color(self.colors[1])],
+            relief: match is_round {
+                0 => Relief::Flat(decode_normal(normal)),
+                _ => Relief::Round,
+            },
+        })
+    }
+
+    /// Returns the box around the facet, without the least radius in pixels of a rod.
+    pub(crate) fn around(&self) -> [Vec3; 2] {
+        let [a, b, c] = self.corners.map(Vec3::from);
+        if self.is_rod() {
+            let [first, last] = [c.x, c.y].map(Vec3::splat);
+            return [(a - first).min(b - last), (a + first).max(b + last)];
+        }
+        [a.min(b).min(c), a.max(b).max(c)]
+    }
+}
+
+impl FacetSet {
+    /// Makes a set of facets, of which some are rods, around an origin.
+    pub fn of_rods(origin: DVec3, facets: Vec<Facet>) -> Self {
+        let pixels = |facet: &Facet| if facet.is_rod() { facet.corners[2][2] } else { -1.0 };
+        let most = facets.par_iter().map(pixels).reduce(|| -1.0, f32::max);
+        let rods = (most >= 0.0).then_some(most);
+        Self { origin, facets, sides: Sides::Mixed, rods, ..Self::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_facet_gives_back_its_rod() {
+        let normal = decode_normal(encode_normal(Vec3::new(0.0, 0.6, 0.8)));
+        for relief in [Relief::Round, Relief::Flat(None), Relief::Flat(normal)] {
+            let rod = Rod {
+                ends: [Vec3::X, Vec3::new(1.0, 2.0, 3.0)],
+                radii: [0.5, 0.25],
+                pixels: 1.5,
+                colors: [[1, 2, 3], [255, 0, 7]],
+                relief,
+            };
+            let facet = Facet::from(rod);
+            assert_eq!(facet.rod(), Some(rod));
+            assert_eq!(facet.around(), [Vec3::new(0.5, -0.5, -0.5), Vec3::new(1.5, 2.25, 3.25)]);
+        }
+        let triangle = Facet::new([Vec3::ZERO, Vec3::X, Vec3::Y], [Vec3::Z; 3], [[0; 3]; 3]);
+        assert_eq!(triangle.rod(), None);
+    }
+
+    #[test]
+    fn no_normal_reads_as_a_rod() {
+        for i in 0..100_000u32 {
+            let at = |scale: f32| (i as f32 * scale).sin();
+            assert_ne!(encode_normal(Vec3::new(at(0.7), at(1.3), at(2.9))), ROD);
+        }
+        assert!(f32::from_bits(ROD).is_normal() && NO_NORMAL != ROD);
+    }
+}
