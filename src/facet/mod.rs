@@ -6,7 +6,8 @@ mod rod;
 mod texture;
 
 pub use image::Image;
-pub use rod::{Relief, Rod, WIDEST_PIXELS};
+pub(crate) use rod::REACH;
+pub use rod::{Relief, Rod, Size};
 pub(crate) use texture::Mean;
 pub use texture::Texture;
 

@@ -2,10 +2,13 @@
 
 use super::{Facet, FacetSet, Sides};
 use crate::{
+    Error, Result,
     parallel::prelude::*,
     splat::{NO_NORMAL, decode_normal, encode_normal},
 };
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// A segment with a radius and round ends. With both ends at one place it is a ball.
 ///
@@ -39,8 +42,62 @@ pub enum Relief {
 /// is a usual one, which no device changes. rods.wgsl has the same number.
 pub(crate) const ROD: u32 = 0x4000_8000;
 
-/// The largest least radius of a rod, in pixels.
-pub const WIDEST_PIXELS: f32 = 1000.0;
+/// How many standard deviations of a splat its opaque part reaches.
+pub(crate) const REACH: f32 = 2.4;
+
+/// A diameter or width, of the world or of the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// In world units.
+    World(f32),
+    /// In pixels, however near the eye is.
+    Pixels(f32),
+}
+
+impl Size {
+    /// The most pixels.
+    pub const MOST_PIXELS: f32 = 1000.0;
+
+    /// The size of a pixel, as a part of the diagonal of what is drawn, where sizes must be those of
+    /// the world: in hierarchies, and where only splats are drawn.
+    pub(crate) const PIXEL: f32 = 1e-3;
+
+    /// Checks that the size is a positive number that pictures can show.
+    ///
+    /// # Errors
+    /// [`Error::Argument`], which calls the size by this name.
+    pub fn validate(self, name: &str) -> Result<()> {
+        let (size, most, unit) = match self {
+            Self::World(size) => (size, 1e18, ""),
+            Self::Pixels(size) => (size, Self::MOST_PIXELS, " pixels"),
+        };
+        if size > 0.0 && size <= most {
+            return Ok(());
+        }
+        Err(Error::Argument(format!(
+            "{name} is {size}{unit}; a number above 0, at most {most}, is needed"
+        )))
+    }
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    /// Reads `0.02`, a size of the world, or `3px`.
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let text = text.trim();
+        let number = |text: &str| text.trim().parse::<f32>().ok();
+        let size = match text.strip_suffix("px") {
+            Some(pixels) => number(pixels).map(Self::Pixels),
+            None => number(text).map(Self::World),
+        };
+        let form = "a size is a number of world units, such as 0.02, or of pixels, such as 3px";
+        let size = size.ok_or(form)?;
+        size.validate("the size").map_err(|error| error.to_string())?;
+        Ok(size)
+    }
+}
 
 impl Rod {
     /// Returns a ball.

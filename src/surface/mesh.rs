@@ -55,6 +55,9 @@ pub struct Mesh {
     /// One value of each vertex, to colour it by; empty if the file has none, or none was asked
     /// for. NaN where a vertex has no value. `about` has the name and the unit.
     pub values: Vec<f32>,
+    /// The radius of each point of a cloud, in world units; empty if none was asked for. Points have
+    /// the usual radius where this is not finite.
+    pub radii: Vec<f32>,
     /// How `values` colour the mesh instead of its own colours; `None` if they do not
     /// ([`paint`](Self::paint)).
     pub scale: Option<ColorScale>,
@@ -65,8 +68,17 @@ pub struct Mesh {
 impl Mesh {
     /// Bytes of the arrays. Textures are shared and do not count.
     pub(crate) fn bytes(&self) -> u64 {
-        let Self { positions, normals, colors, uvs, triangles, triangle_materials, values, .. } =
-            self;
+        let Self {
+            positions,
+            normals,
+            colors,
+            uvs,
+            triangles,
+            triangle_materials,
+            values,
+            radii,
+            ..
+        } = self;
         let arrays = [
             size_of_val(&positions[..]),
             size_of_val(&normals[..]),
@@ -75,6 +87,7 @@ impl Mesh {
             size_of_val(&triangles[..]),
             size_of_val(&triangle_materials[..]),
             size_of_val(&values[..]),
+            size_of_val(&radii[..]),
         ];
         arrays.iter().map(|&bytes| bytes as u64).sum()
     }

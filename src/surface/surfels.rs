@@ -11,7 +11,7 @@
 use super::{
     Mesh,
     adjacency::{Connected, is_split},
-    cloud,
+    cloud::{self, Parts},
     fan::{Made, Maker, Sums},
     fan_rules::{LEAST_RATIO_SQUARED, LEAST_SQUARE},
     refine::{Origin, budget, count_of_refined, is_fine, refine},
@@ -20,6 +20,7 @@ use super::{
 use crate::{
     Deadline, Error, Result,
     deadline::Clock,
+    facet::{FacetSet, Size},
     memory,
     parallel::prelude::*,
     splat::{Payload, Splat, SplatSet},
@@ -27,6 +28,21 @@ use crate::{
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::{borrow::Cow, ops::RangeInclusive};
+
+/// How the points of a cloud are drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PointStyle {
+    /// Points on surfaces are surfels; others, and all whose size is given, are balls.
+    Auto,
+    /// Discs in the plane of a point's neighbours, which overlap to a surface.
+    #[default]
+    Surfels,
+    /// Balls.
+    Spheres,
+    /// Flat discs that face the eye: lit by the file's normals, or not at all.
+    Dots,
+}
 
 /// How surfels are made from a mesh or point cloud.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,6 +68,15 @@ pub struct SurfelOptions {
     /// exactly. In pictures of usual sizes, the triangles of a larger mesh are no larger than
     /// pixels. 0 draws surfels always.
     pub most_facets: usize,
+    /// How the points of a cloud are drawn.
+    #[serde(default)]
+    pub points: PointStyle,
+    /// The diameter of points that are balls or discs; by their distances if `None`.
+    #[serde(default)]
+    pub point_size: Option<Size>,
+    /// The width of lines; [`LINE_WIDTH`](Self::LINE_WIDTH) if `None`.
+    #[serde(default)]
+    pub line_width: Option<Size>,
     /// When the surfels must be ready.
     #[serde(skip)]
     pub deadline: Deadline,
@@ -60,6 +85,8 @@ pub struct SurfelOptions {
 impl SurfelOptions {
     /// Factors on radii whose squares fit in 32 bits.
     pub const RADIUS_SCALES: RangeInclusive<f32> = 1e-6..=1e6;
+    /// The usual width of lines.
+    pub const LINE_WIDTH: Size = Size::Pixels(3.0);
     /// Fractions of the diagonal down to which edges can be cut. At smaller ones the fourth power
     /// does not fit in 32 bits. From 1 on, no edge is cut.
     pub const SPACINGS: RangeInclusive<f32> = 1e-9..=f32::MAX;
@@ -94,6 +121,9 @@ impl SurfelOptions {
                 )));
             }
         }
+        for (name, size) in [("point_size", self.point_size), ("line_width", self.line_width)] {
+            size.map_or(Ok(()), |size| size.validate(name))?;
+        }
         Ok(())
     }
 
@@ -113,6 +143,9 @@ impl Default for SurfelOptions {
             most_triangles: 1 << 23,
             color_by_normal: false,
             most_facets: 1 << 20,
+            points: PointStyle::Surfels,
+            point_size: None,
+            line_width: None,
             deadline: Deadline::NEVER,
         }
     }
@@ -161,13 +194,36 @@ impl Mesh {
         if splats.is_empty() {
             return Err(self.nothing());
         }
-        Ok(SplatSet {
+        Ok(self.set_of(splats))
+    }
+
+    /// Returns a point cloud as [`points`](SurfelOptions::points) says: the surfels of the points on
+    /// surfaces, and the other points as [rods](crate::facet::Rod), which are balls or discs. Where
+    /// some point is not opaque, all are surfels. Lengths are in world units, and centres are
+    /// relative to the mesh's origin. The order depends on the input only.
+    ///
+    /// # Errors
+    /// As [`surfels`](Self::surfels).
+    pub fn points(&self, options: &SurfelOptions) -> Result<(Option<SplatSet>, Option<FacetSet>)> {
+        let _span = tracing::info_span!("points").entered();
+        self.check(options)?;
+        let Parts { surfels, dots } = cloud::parts(self, options)?;
+        if surfels.is_empty() && dots.is_empty() {
+            return Err(self.nothing());
+        }
+        let surfels = (!surfels.is_empty()).then(|| self.set_of(surfels));
+        let dots = (!dots.is_empty()).then(|| FacetSet::of_rods(self.origin, dots));
+        Ok((surfels, dots))
+    }
+
+    fn set_of(&self, splats: Vec<Splat>) -> SplatSet {
+        SplatSet {
             origin: self.origin,
             payload: Payload::Radiance,
             splats,
             extent: EXTENT,
             overlap: 1.0,
-        })
+        }
     }
 
     /// Returns the smallest and the largest world coordinates of what is drawn: the corners of all
@@ -286,6 +342,7 @@ impl Mesh {
             ("colors", self.colors.len(), count),
             ("uvs", self.uvs.len(), count),
             ("values", self.values.len(), count),
+            ("radii", self.radii.len(), count),
             ("triangle_materials", self.triangle_materials.len(), self.triangles.len()),
         ] {
             if length != 0 && length != wanted {
