@@ -4,7 +4,7 @@ use super::{Facet, FacetSet, Sides};
 use crate::{
     Error, Result,
     parallel::prelude::*,
-    splat::{NO_NORMAL, decode_normal, encode_normal},
+    splat::{NO_NORMAL, Payload, Splat, SplatSet, decode_normal, encode_normal},
 };
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -177,6 +177,74 @@ impl FacetSet {
         let rods = (most >= 0.0).then_some(most);
         Self { origin, facets, sides: Sides::Mixed, rods, ..Self::default() }
     }
+}
+
+/// The pieces of a rod that splats stand for are this many radii long, unless there were more than
+/// [`MOST_PIECES`] of them.
+const PIECE: f32 = 2.0;
+const MOST_PIECES: f32 = 256.0;
+/// The optical depth of an opaque splat.
+const OPAQUE: f32 = 14.0;
+
+impl FacetSet {
+    /// Returns splats that stand for the rods of the set, for methods that draw no facets. A pixel
+    /// is a thousandth of the set's diagonal. The splats are not lit.
+    pub fn rod_splats(&self) -> SplatSet {
+        let pixel = self.bounds().diagonal() as f32 * Size::PIXEL;
+        let rods = self.facets.par_iter().filter_map(Facet::rod);
+        SplatSet {
+            origin: self.origin,
+            payload: Payload::Radiance,
+            splats: rods.flat_map_iter(|rod| rod.splats(pixel)).collect(),
+            extent: 3.0,
+            overlap: 1.0,
+        }
+    }
+}
+
+impl Rod {
+    /// Returns splats that stand for the rod where a pixel has this size.
+    pub(crate) fn splats(&self, pixel: f32) -> impl Iterator<Item = Splat> + use<> {
+        let Self { ends: [a, b], radii, colors: [from, to], .. } = *self;
+        let [first, last] = radii.map(|radius| radius.max(self.pixels * pixel));
+        let length = a.distance(b);
+        let way = (b - a).normalize_or_zero();
+        let thickest = first.max(last).max(f32::MIN_POSITIVE);
+        let count = (length / (PIECE * thickest)).ceil().clamp(1.0, MOST_PIECES);
+        let mix = move |part: f32| {
+            [0, 1, 2].map(move |i: usize| {
+                let [from, to] = [from[i], to[i]].map(f32::from);
+                (from + part * (to - from)).round() as u8
+            })
+        };
+        (0..count as usize).map(move |piece| {
+            let part = (piece as f32 + 0.5) / count;
+            let width = (first + part * (last - first)).max(f32::MIN_POSITIVE) / REACH;
+            // Half a piece is one standard deviation: neighbours add up to an even strength.
+            let along = way * (0.5 * length / count).max(0.0);
+            let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * f64::from(width));
+            let [red, green, blue] = mix(part);
+            Splat {
+                center: a.lerp(b, part).to_array(),
+                strength: OPAQUE,
+                factor: lower([axes[0], axes[1], axes[2], along.as_dvec3()]),
+                color: u32::from_le_bytes([red, green, blue, 255]),
+                normal: NO_NORMAL,
+            }
+        })
+    }
+}
+
+/// Returns the lower triangular factor of the sum of the squares of these vectors (Cholesky), row by
+/// row.
+fn lower<const N: usize>(columns: [DVec3; N]) -> [f32; 6] {
+    let sum = |i: usize, j: usize| columns.iter().map(|c| c[i] * c[j]).sum::<f64>();
+    let b00 = sum(0, 0).sqrt();
+    let (b10, b20) = (sum(1, 0) / b00, sum(2, 0) / b00);
+    let b11 = (sum(1, 1) - b10 * b10).max(sum(1, 1) * 1e-14).sqrt();
+    let b21 = (sum(2, 1) - b20 * b10) / b11;
+    let b22 = (sum(2, 2) - b20 * b20 - b21 * b21).max(sum(2, 2) * 1e-14).sqrt();
+    [b00, b10, b11, b20, b21, b22].map(|value| value as f32)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod ellipse;
 mod facets;
 mod fan;
 mod fan_rules;
+mod lines;
 mod machined;
 mod mesh;
 mod opacity;

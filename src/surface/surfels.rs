@@ -27,7 +27,7 @@ use crate::{
 };
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
-use std::{borrow::Cow, ops::RangeInclusive};
+use std::{borrow::Cow, ops::RangeInclusive, str::FromStr};
 
 /// How the points of a cloud are drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,6 +42,20 @@ pub enum PointStyle {
     Spheres,
     /// Flat discs that face the eye: lit by the file's normals, or not at all.
     Dots,
+}
+
+impl FromStr for PointStyle {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        Ok(match text {
+            "auto" => Self::Auto,
+            "surfels" => Self::Surfels,
+            "spheres" => Self::Spheres,
+            "dots" => Self::Dots,
+            _ => return Err("points are auto, surfels, spheres or dots".into()),
+        })
+    }
 }
 
 /// How surfels are made from a mesh or point cloud.
@@ -161,8 +175,8 @@ const WORK: &str = "making surfels";
 const CHUNK: usize = 1 << 12;
 
 impl Mesh {
-    /// Makes surfels that cover the triangles without holes, or, without triangles, stand for the
-    /// points. Lengths are in world units and centres are relative to the mesh's origin. The order
+    /// Makes surfels that cover the triangles without holes, stand for lines, or, without either, for
+    /// the points. Lengths are in world units and centres are relative to the mesh's origin. The order
     /// depends on the input only.
     ///
     /// Colours are vertex colour × material × texture. A surfel has the file's normal at its vertex
@@ -186,11 +200,14 @@ impl Mesh {
     pub fn surfels(&self, options: &SurfelOptions) -> Result<SplatSet> {
         let _span = tracing::info_span!("surfels").entered();
         self.check(options)?;
-        let splats = if self.triangles.is_empty() {
-            cloud::surfels(self, options)?
-        } else {
-            of_triangles(self, options)?
+        let mut splats = match (self.triangles.is_empty(), self.lines.is_empty()) {
+            (true, true) => cloud::surfels(self, options)?,
+            (true, false) => Vec::new(),
+            (false, _) => of_triangles(self, options)?,
         };
+        if let Some(lines) = self.line_rods(options)? {
+            splats.extend(lines.rod_splats().splats);
+        }
         if splats.is_empty() {
             return Err(self.nothing());
         }
@@ -238,7 +255,7 @@ impl Mesh {
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let with = |(low, high): (Vec3, Vec3), place: &Vec3| (low.min(*place), high.max(*place));
         let union = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
-        let (low, high) = if self.triangles.is_empty() {
+        let (low, high) = if self.triangles.is_empty() || !self.lines.is_empty() {
             self.positions.par_iter().fold(none, with).reduce(none, union)
         } else {
             let places =
@@ -298,6 +315,11 @@ impl Mesh {
         if !self.triangles.par_iter().all(|t| t.iter().all(|&index| (index as usize) < count)) {
             return Err(Error::Argument(format!(
                 "a triangle refers beyond the mesh's {count} vertices"
+            )));
+        }
+        if !self.lines.par_iter().all(|line| line.iter().all(|&index| (index as usize) < count)) {
+            return Err(Error::Argument(format!(
+                "a line refers beyond the mesh's {count} vertices"
             )));
         }
         if !self.triangle_materials.par_iter().all(|&index| (index as usize) < self.materials.len())

@@ -98,7 +98,8 @@ impl SceneFlags {
             progress.stage(format!("Reading {}", path.display()));
             let mut showing = show.showing(path);
             let opened = reading.open_colored(path, showing.coloring().attribute())?;
-            let input = opened.read()?;
+            let mut input = opened.read()?;
+            reading.give_radii(path, &mut input, showing.point_radius.as_deref())?;
             read.extend(opened.files());
             match &input {
                 Data::Mesh(_) => is_scaled = true,

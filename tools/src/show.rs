@@ -9,9 +9,11 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
+    facet::Size,
     input::Limits,
     math::Kernel,
     session::{Appearance, Coloring, Showing, Surface, SurfaceColor, SurfaceValue, Transfer},
+    surface::PointStyle,
     volume::TransferFunction,
 };
 use std::path::{Path, PathBuf};
@@ -61,6 +63,20 @@ pub struct ShowFlags {
     /// they were converted with.
     #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
     pub radius_scale: Option<f32>,
+    /// Draw points as surfels, spheres or dots. auto draws points on surfaces as surfels, which overlap
+    /// to a closed surface, and others as spheres [default: auto]
+    #[arg(long, value_name = "STYLE", value_parser = parse::points)]
+    points: Option<PointStyle>,
+    /// Draw points as spheres or dots of this diameter: in pixels, as 3px, or in world units, as 0.02
+    /// [default: by the distances between points, at least 2px]
+    #[arg(long, value_name = "SIZE")]
+    point_size: Option<Size>,
+    /// Draw points as spheres or dots with the radii that this array or column holds, in world units.
+    #[arg(long, value_name = "ARRAY")]
+    point_radius: Option<String>,
+    /// Draw lines as tubes of this width: in pixels, as 3px, or in world units, as 0.1 [default: 3px]
+    #[arg(long, value_name = "WIDTH")]
+    line_width: Option<Size>,
     /// Meshes: split the normals where two triangles meet at more than this angle, so that the
     /// crease looks sharp. 0 draws flat facets; from 60 on, creases are split at 60 degrees
     /// [default: 60]
@@ -293,6 +309,10 @@ impl Show<'_> {
             is_sharp: self.sharp,
             radius_scale: self.flags.radius_scale,
             crease: self.flags.crease,
+            points: self.flags.points.unwrap_or(PointStyle::Auto),
+            point_size: self.flags.point_size,
+            point_radius: self.flags.point_radius.clone(),
+            line_width: self.flags.line_width,
             opacity: self.opacities.of(path).copied(),
             draws_edges: self.flags.edges,
             values_by: self.shows_values(path).map(str::to_owned),

@@ -24,7 +24,7 @@ use splatkit::{
     memory,
     session::{Data, Name, warn_of_holes},
     splat::SplatSet,
-    surface::SurfelOptions,
+    surface::{PointStyle, SurfelOptions},
     volume,
 };
 use std::{
@@ -240,7 +240,13 @@ impl Work {
     fn surfel_options(&self, deadline: Deadline) -> SurfelOptions {
         let radius_scale = self.own.radius_scale();
         let color_by_normal = self.look.coloring().is_ok_and(|own| own.by_normal());
-        SurfelOptions { radius_scale, color_by_normal, deadline, ..SurfelOptions::default() }
+        SurfelOptions {
+            radius_scale,
+            color_by_normal,
+            points: PointStyle::Auto,
+            deadline,
+            ..SurfelOptions::default()
+        }
     }
 
     fn build_options(&self, closed: bool, points: u64) -> Result<BuildOptions, Error> {

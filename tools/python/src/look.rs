@@ -6,10 +6,12 @@ use serde_json::Value;
 use splatkit::{
     Error,
     color::ColorMap,
+    facet::Size,
     math::Kernel,
     session::{
         self, Appearance, Coloring, Showing, SurfaceColor, SurfaceValue, Transfer, shown_of,
     },
+    surface::PointStyle,
     volume::TransferFunction,
 };
 
@@ -34,6 +36,29 @@ pub struct Look {
     opacity: Option<f32>,
     radius_scale: Option<f32>,
     crease: Option<f32>,
+    points: Option<String>,
+    point_size: Option<SizeChoice>,
+    pub point_radius: Option<String>,
+    line_width: Option<SizeChoice>,
+}
+
+/// A size in world units, or in pixels as `3px`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged)]
+enum SizeChoice {
+    World(f32),
+    Text(String),
+}
+
+impl SizeChoice {
+    fn size(&self) -> Result<Size, Error> {
+        let size = match self {
+            Self::World(size) => Size::World(*size),
+            Self::Text(text) => text.parse().map_err(|message: String| wrong(message))?,
+        };
+        size.validate("a size")?;
+        Ok(size)
+    }
 }
 
 /// An isosurface. Without a colour, it has the transfer function's.
@@ -122,6 +147,13 @@ impl Look {
             is_sharp: self.sharp,
             radius_scale: self.radius_scale,
             crease: self.crease,
+            points: match &self.points {
+                Some(text) => text.parse().map_err(|message: String| wrong(message))?,
+                None => PointStyle::Auto,
+            },
+            point_size: self.point_size.as_ref().map(SizeChoice::size).transpose()?,
+            point_radius: self.point_radius.clone(),
+            line_width: self.line_width.as_ref().map(SizeChoice::size).transpose()?,
             opacity: self.opacity,
             values_by: self.shows_values().map(str::to_owned),
             ..Showing::default()

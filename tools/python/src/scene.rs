@@ -342,7 +342,8 @@ impl Scene {
             let deadline = load.limits().deadline();
             let showing = load.complete(look.showing()?, deadline);
             let attribute = showing.coloring().attribute();
-            let input = load.reading().open_colored(&path, attribute)?.read()?;
+            let mut input = load.reading().open_colored(&path, attribute)?.read()?;
+            load.reading().give_radii(&path, &mut input, showing.point_radius.as_deref())?;
             stage.add(Added { name: Name::of_file(&path), input, showing }, &own)
         })
     }

@@ -20,7 +20,7 @@ use splatkit::{
     },
     session::{Data, Name},
     splat::SplatSet,
-    surface::SurfelOptions,
+    surface::{PointStyle, SurfelOptions},
 };
 use std::{
     path::{Path, PathBuf},
@@ -398,7 +398,12 @@ impl SurfaceFlags {
     }
 
     pub(super) fn surfel_options(&self, deadline: Deadline) -> SurfelOptions {
-        SurfelOptions { radius_scale: self.radius_scale(), deadline, ..SurfelOptions::default() }
+        SurfelOptions {
+            radius_scale: self.radius_scale(),
+            points: PointStyle::Auto,
+            deadline,
+            ..SurfelOptions::default()
+        }
     }
 
     fn build_options(&self, gathered: &Gathered, deadline: Deadline) -> BuildOptions {

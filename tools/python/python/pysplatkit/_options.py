@@ -73,6 +73,15 @@ class SurfaceLook(TypedDict, total=False):
     radius_scale: float
     #: Split normals where two triangles meet at more than this angle, in degrees. Default: 60.
     crease: float
+    #: auto, surfels, spheres or dots. Default: auto, which draws points on surfaces as surfels, and
+    #: others as spheres.
+    points: str
+    #: The diameter of spheres and dots: a number of world units, or pixels, as "3px".
+    point_size: float | str
+    #: The attribute of the file that holds the radii of points, in world units.
+    point_radius: str
+    #: The width of lines: a number of world units, or pixels, as "3px". Default: "3px".
+    line_width: float | str
 
 
 class VolumeLook(FieldLook, KernelLook):
