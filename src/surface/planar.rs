@@ -139,3 +139,94 @@ pub(super) fn scatter<I: Iterator<Item = DVec3>>(offsets: impl Fn() -> I) -> DMa
     }
     scatter
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Mesh, PointStyle, SurfelOptions};
+    use glam::{Vec2, Vec3};
+
+    /// Numbers from 0 to 1, evenly spread by chance.
+    fn random() -> impl FnMut() -> f32 {
+        let mut state = 7u32;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        }
+    }
+
+    /// About normally distributed numbers.
+    fn normal(random: &mut impl FnMut() -> f32) -> f32 {
+        ((0..12).map(|_| random()).sum::<f32>() - 6.0).clamp(-3.0, 3.0)
+    }
+
+    /// Returns the share of the points that are balls.
+    fn off(positions: Vec<Vec3>) -> f64 {
+        let mesh = Mesh { positions, ..Mesh::default() };
+        let options = SurfelOptions { points: PointStyle::Auto, ..SurfelOptions::default() };
+        let (surfels, dots) = mesh.points(&options).unwrap();
+        let dots = dots.map_or(0, |dots| dots.facets.len());
+        assert_eq!(surfels.map_or(0, |set| set.splats.len()) + dots, mesh.positions.len());
+        dots as f64 / mesh.positions.len() as f64
+    }
+
+    /// A sphere whose points lie beside it by chance, in mean distances between points.
+    fn noisy_sphere(count: usize, noise: f32) -> Vec<Vec3> {
+        let mut random = random();
+        let spacing = (12.57 / count as f32).sqrt();
+        let mut place = || {
+            let place = Vec3::from([0, 1, 2].map(|_| normal(&mut random))).normalize_or(Vec3::X);
+            place * (1.0 + noise * spacing * normal(&mut random))
+        };
+        (0..count).map(|_| place()).collect()
+    }
+
+    /// A scan with noise stays a closed surface.
+    #[test]
+    fn surfaces_have_no_balls() {
+        for (count, noise) in
+            [(300, 0.0), (2000, 0.0), (5000, 0.3), (20_000, 0.5), (20_000, 1.0), (40_000, 2.0)]
+        {
+            assert_eq!(off(noisy_sphere(count, noise)), 0.0, "{count} {noise}");
+        }
+        let mut random = random();
+        // A cube, with its edges and corners, and lines of a scanner: dense along, sparse across.
+        let cube = (0..8000).map(|i| {
+            let mut place = [random(), random(), random()];
+            place[i % 3] = (i / 3 % 2) as f32;
+            Vec3::from(place)
+        });
+        assert_eq!(off(cube.collect()), 0.0);
+        let lines = (0..40_000).map(|i| {
+            let place = Vec2::new((i % 1000) as f32, 12.0 * (i / 1000) as f32);
+            place.extend((place.x * 0.01).sin() * 20.0)
+        });
+        assert_eq!(off(lines.collect()), 0.0);
+    }
+
+    #[test]
+    fn what_fills_space_and_curves_are_balls() {
+        let mut random = random();
+        let in_box: Vec<Vec3> =
+            (0..3000).map(|_| Vec3::new(random(), random(), random())).collect();
+        assert_eq!(off(in_box.clone()), 1.0);
+        let mut at = Vec3::ZERO;
+        let walk = (0..2000).map(|_| {
+            at += Vec3::from([0, 1, 2].map(|_| normal(&mut random)));
+            at
+        });
+        assert!(off(walk.collect()) > 0.9);
+        let helix = (0..2000).map(|i| {
+            let turn = i as f32 * 0.02;
+            Vec3::new(turn.cos(), turn.sin(), turn * 0.1)
+        });
+        assert!(off(helix.collect()) > 0.9);
+        let lattice =
+            (0..512).map(|i| Vec3::new((i % 8) as f32, (i / 8 % 8) as f32, (i / 64) as f32));
+        assert_eq!(off(lattice.collect()), 1.0);
+        // A surface with a crowd beside it: each as alone.
+        let crowd = in_box.iter().map(|place| *place + Vec3::X * 2.0);
+        let both: Vec<Vec3> = noisy_sphere(3000, 0.2).into_iter().chain(crowd).collect();
+        let share = off(both);
+        assert!((0.47..0.52).contains(&share), "{share}");
+    }
+}

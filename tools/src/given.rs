@@ -30,6 +30,9 @@ pub const CELLS: Kinds = 1 << 7;
 /// Trained 3D Gaussians.
 pub const GAUSSIANS: Kinds = 1 << 8;
 
+/// Lines, alone or beside triangles.
+pub const LINES: Kinds = 1 << 9;
+
 /// Any input.
 pub const ALL: Kinds = Kinds::MAX;
 
@@ -60,6 +63,10 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("sharp", LATTICE),
     ("radius-scale", MESH | CLOUD),
     ("opacity", MESH | CLOUD),
+    ("points", CLOUD),
+    ("point-size", CLOUD),
+    ("point-radius", CLOUD),
+    ("line-width", LINES),
     ("crease", MESH),
     ("edges", MESH),
     ("gradient", FIELD),
@@ -82,13 +89,14 @@ const READ_BY: &[(&str, &[&str])] = &[
 ];
 
 /// The names of kinds, for messages.
-const NAMES: [(Kinds, &str, &str); 9] = [
+const NAMES: [(Kinds, &str, &str); 10] = [
     (MESH, "meshes", "a mesh"),
     (CLOUD, "point clouds", "a point cloud"),
     (HIERARCHY, "hierarchies", "a hierarchy"),
     (VOLUME, "volumes", "a volume"),
     (BRICKS, "volumes in bricks", "a volume in bricks"),
     (SAMPLES, "scattered samples", "a set of samples"),
+    (LINES, "lines", "a set of lines"),
     (CELLS, "cells", "a set of cells"),
     (GAUSSIANS, "trained Gaussians", "a set of trained Gaussians"),
     (RAW, "raw volumes", "a raw volume"),
@@ -199,6 +207,7 @@ impl Given {
 /// Returns what an input is. `is_raw`: the flags give its layout.
 pub fn kinds_of(input: &Data, is_raw: bool) -> Kinds {
     match input {
+        Data::Mesh(mesh) if !mesh.lines.is_empty() => MESH | LINES,
         Data::Mesh(mesh) if mesh.triangles.is_empty() => CLOUD,
         Data::Mesh(_) => MESH,
         Data::Volume(_) if is_raw => VOLUME | RAW,
