@@ -6,6 +6,8 @@ const ROD: u32 = 0x40008000u;
 // Rays whose squared sine to a rod is smaller run along the rod.
 const LEAST_SINE_SQUARED: f32 = 1e-10;
 const HALF_PI: f32 = 1.5707963;
+// How far rods reach beyond a joint where they have an outline, in pixels.
+const OVERLAP: f32 = 0.25;
 
 fn add_rod(entry: u32, front: u32, first_pixel: vec2<i32>) {
     let index = first_word(entry);
@@ -17,8 +19,11 @@ fn add_rod(entry: u32, front: u32, first_pixel: vec2<i32>) {
     let length2 = dot(along, along);
     let radii = vec2(first.w, second.w);
     let least_pixels = third.x;
+    // The normal of a flat rod, or the direction of the rod before a round one.
     let normal = normal_or_none(bitcast<u32>(third.y));
-    let is_round = third.z > 0.0;
+    let is_round = third.z > 0.5;
+    // Another rod begins at the end.
+    let is_joined = third.z > 1.5;
     let color_from = unpack4x8unorm(bitcast<u32>(last.x)).xyz;
     let color_to = unpack4x8unorm(bitcast<u32>(last.y)).xyz;
     let continued = (entry & ENTRY_CONTINUED) != 0u;
@@ -52,6 +57,15 @@ fn add_rod(entry: u32, front: u32, first_pixel: vec2<i32>) {
         var distance = before;
         var part = nearest;
         var own_normal = normal;
+        if is_round && share < 1.0 {
+            // On the outline of round ends at joints, the outline is that of the other rod.
+            let slack = pixel * OVERLAP;
+            let is_beyond = is_joined && -dot(to + across, across) > slack * sqrt(across2);
+            let is_before = dot(to, across) > 0.0 && dot(to, normal) > slack;
+            if is_beyond || is_before {
+                continue;
+            }
+        }
         if is_round {
             // The middle of what the pixel sees of the rod across: nearer than the outline.
             let middle = 0.5 * (min(away + 0.5 * pixel, radius) + max(away - 0.5 * pixel, -radius));

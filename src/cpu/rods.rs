@@ -10,7 +10,7 @@ use super::{
     vector::{Lanes, dot, three},
 };
 use crate::{
-    facet::Facet,
+    facet::{Facet, OVERLAP},
     splat::{decode_normal, encode_normal},
 };
 use fearless_simd::{Simd, prelude::*};
@@ -32,7 +32,7 @@ pub fn record(plan: &Plan, facet: &Facet, turn: Mat3, origin: Vec3) -> Option<Re
     let radii = [(a, first), (b, last)].map(|(end, radius)| radius.max(pixels * pixel(end)));
     let covered = covered_pixels(plan, outline([a, b], radii, plan))?;
     let sheets = sheets(plan, [a, b], radii)?;
-    let [normal, is_round, _] = facet.normals;
+    let [normal, form, _] = facet.normals;
     let normal = decode_normal(normal).map_or(normal, |own| encode_normal(turn * own));
     let [from, to, _] = facet.colors.map(f32::from_bits);
     Some(Record {
@@ -41,7 +41,7 @@ pub fn record(plan: &Plan, facet: &Facet, turn: Mat3, origin: Vec3) -> Option<Re
         whitening: [b.x, b.y, b.z, first, last, pixels],
         extent2: 0.0,
         kind: Kind::Rod,
-        payload: [f32::from_bits(normal), is_round as f32, 0.0, from, to, 0.0, 0.0, 0.0],
+        payload: [f32::from_bits(normal), form as f32, 0.0, from, to, 0.0, 0.0, 0.0],
         pixels: covered,
         sheets,
         field: plan.number,
@@ -116,7 +116,10 @@ struct Shown {
     radii: [f32; 2],
     pixels: f32,
     is_round: bool,
-    /// The normal of a flat rod; zero if there is none.
+    /// Another rod begins at the end.
+    is_joined: bool,
+    /// The normal of a flat rod, or the direction of the rod before a round one; zero if there is
+    /// none.
     normal: Vec3,
     colors: [[f32; 3]; 2],
 }
@@ -134,7 +137,7 @@ impl Shown {
     fn new(record: &Record) -> Self {
         let [x, y, z, first, last, pixels] = record.whitening;
         let start = Vec3::from(record.center);
-        let [normal, is_round, _, from, to, ..] = record.payload;
+        let [normal, form, _, from, to, ..] = record.payload;
         let unpack = |bits: f32| {
             let [red, green, blue, _] = bits.to_bits().to_le_bytes();
             [red, green, blue].map(|part| f32::from(part) * (1.0 / 255.0))
@@ -144,7 +147,8 @@ impl Shown {
             along: Vec3::new(x, y, z) - start,
             radii: [first, last],
             pixels,
-            is_round: is_round > 0.0,
+            is_round: form > 0.5,
+            is_joined: form > 1.5,
             normal: decode_normal(normal.to_bits()).unwrap_or(Vec3::ZERO),
             colors: [from, to].map(unpack),
         }
@@ -188,6 +192,7 @@ impl Shown {
             let normal = three!(I => Lanes::splat(simd, self.normal[I]));
             return Met { share, distance: before, part: nearest, normal };
         }
+        let share = self.outlined(simd, share, to, across, pixel);
         // The middle of what the pixel sees of the rod across: nearer than the outline.
         let half = pixel * 0.5;
         let middle = ((away + half).min(radius) + (away - half).max(none - radius)) * 0.5;
@@ -211,6 +216,41 @@ impl Shown {
         let distance = to_depth + depth * part - height;
         let normal = three!(I => none - off[I] - way[I] * height);
         Met { share, distance, part, normal }
+    }
+}
+
+impl Shown {
+    /// Returns the shares without those on the outline of round ends at joints, where the outline is
+    /// that of the other rod. `to` is the way to the start and `across` the way from there to the
+    /// end, both across the rays.
+    #[inline(always)]
+    fn outlined<S: Simd>(
+        &self,
+        simd: S,
+        share: Lanes<S>,
+        to: [Lanes<S>; 3],
+        across: [Lanes<S>; 3],
+        pixel: Lanes<S>,
+    ) -> Lanes<S> {
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let slack = pixel * OVERLAP as f32;
+        let mut outlined = share;
+        if self.is_joined {
+            let behind = three!(I => to[I] + across[I]);
+            let beyond = none - dot(behind, across);
+            let is_beyond = beyond.simd_gt(slack * dot(across, across).sqrt());
+            outlined = is_beyond.select(none, outlined);
+        }
+        if self.normal != Vec3::ZERO {
+            let before: [Lanes<S>; 3] = three!(I => Lanes::splat(simd, self.normal[I]));
+            let part = dot(to, before);
+            let is_before = dot(to, across).simd_gt(none);
+            // `to` lies across the ray, so that its product with a vector is that with the part of
+            // the vector across the ray.
+            let is_own = part.simd_gt(slack);
+            outlined = (is_before & is_own).select(none, outlined);
+        }
+        share.simd_lt(one).select(outlined, share)
     }
 }
 

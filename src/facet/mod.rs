@@ -6,7 +6,7 @@ mod rod;
 mod texture;
 
 pub use image::Image;
-pub(crate) use rod::REACH;
+pub(crate) use rod::{OVERLAP, REACH};
 pub use rod::{Relief, Rod, Size};
 pub(crate) use texture::Mean;
 pub use texture::Texture;

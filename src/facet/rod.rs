@@ -26,6 +26,10 @@ pub struct Rod {
     pub colors: [[u8; 3]; 2],
     /// How the rod is lit.
     pub relief: Relief,
+    /// The unit direction of the rod that ends where this one starts, if there is one, and whether
+    /// another starts where this one ends. At such joints only one of both has an outline, where
+    /// their round ends would overlap. Flat rods have none.
+    pub joints: (Option<Vec3>, bool),
 }
 
 /// How a rod looks from the eye.
@@ -41,6 +45,16 @@ pub enum Relief {
 /// The last normal of a facet that is a rod. No unit vector is encoded like this, and as a float it
 /// is a usual one, which no device changes. rods.wgsl has the same number.
 pub(crate) const ROD: u32 = 0x4000_8000;
+
+/// The second normal of a facet that is a rod: a flat one, a round one, and a round one that another
+/// rod continues. rods.wgsl and src/cpu/rods.rs read them as numbers.
+const FLAT: u32 = 0;
+const ROUND: u32 = 1;
+const JOINED: u32 = 2;
+
+/// How far rods reach beyond a joint where they have an outline, in pixels, so that no gap opens by
+/// rounding. rods.wgsl has the same number.
+pub(crate) const OVERLAP: f64 = 0.25;
 
 /// How many standard deviations of a splat its opaque part reaches.
 pub(crate) const REACH: f32 = 2.4;
@@ -108,22 +122,24 @@ impl Rod {
             pixels: 0.0,
             colors: [color; 2],
             relief: Relief::Round,
+            joints: (None, false),
         }
     }
 }
 
 impl From<Rod> for Facet {
     fn from(rod: Rod) -> Self {
-        let Rod { ends: [a, b], radii: [first, last], pixels, colors, relief } = rod;
-        let (normal, is_round) = match relief {
-            Relief::Round => (NO_NORMAL, true),
-            Relief::Flat(normal) => (normal.map_or(NO_NORMAL, encode_normal), false),
+        let Rod { ends: [a, b], radii: [first, last], pixels, colors, relief, joints } = rod;
+        let encoded = |own: Option<Vec3>| own.map_or(NO_NORMAL, encode_normal);
+        let (normal, form) = match relief {
+            Relief::Flat(normal) => (encoded(normal), FLAT),
+            Relief::Round => (encoded(joints.0), if joints.1 { JOINED } else { ROUND }),
         };
         let [from, to] =
             colors.map(|[red, green, blue]| u32::from_le_bytes([red, green, blue, 255]));
         Self {
             corners: [a.to_array(), b.to_array(), [first, last, pixels]],
-            normals: [normal, u32::from(is_round), ROD],
+            normals: [normal, form, ROD],
             colors: [from, to, to],
         }
     }
@@ -141,7 +157,7 @@ impl Facet {
             return None;
         }
         let [a, b, [first, last, pixels]] = self.corners;
-        let [normal, is_round, _] = self.normals;
+        let [normal, form, _] = self.normals;
         let color = |packed: u32| {
             let [red, green, blue, _] = packed.to_le_bytes();
             [red, green, blue]
@@ -151,9 +167,10 @@ impl Facet {
             radii: [first, last],
             pixels,
             colors: [color(self.colors[0]), color(self.colors[1])],
-            relief: match is_round {
-                0 => Relief::Flat(decode_normal(normal)),
-                _ => Relief::Round,
+            relief: if form == FLAT { Relief::Flat(decode_normal(normal)) } else { Relief::Round },
+            joints: match form {
+                FLAT => (None, false),
+                _ => (decode_normal(normal), form == JOINED),
             },
         })
     }
@@ -261,6 +278,7 @@ mod tests {
                 pixels: 1.5,
                 colors: [[1, 2, 3], [255, 0, 7]],
                 relief,
+                joints: if relief == Relief::Round { (normal, true) } else { (None, false) },
             };
             let facet = Facet::from(rod);
             assert_eq!(facet.rod(), Some(rod));

@@ -160,7 +160,11 @@
 //! and −r … r; where it then enters the rod are the distance, the normal and the place between
 //! both colours. Flat rods have the distance of t, and their own normal or none. Of the rods in a
 //! sheet, the largest share counts as that of backs, because neighbours of a line overlap; S is at
-//! least the sum of all shares that are seen.
+//! least the sum of all shares that are seen. At a joint of two rods, pixels that neither fills
+//! belong to one of them, whatever their sheets: a rod with a next one does not count where the ray
+//! passes its end by more than a quarter of a pixel, and one with a rod before not where the ray
+//! passes in front of its start, unless that is within a quarter of a pixel of what lies beyond the
+//! end of that rod.
 //!
 //! **Several fields** ([`Scene::fields`]). Each field is classified and lit by itself, as above,
 //! with its own samples, kernel and transfer function, and has its own box. It does not see the

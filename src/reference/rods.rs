@@ -2,7 +2,7 @@
 
 use super::{facets::Place, ray::Ray};
 use crate::{
-    facet::{Relief, Rod},
+    facet::{OVERLAP, Relief, Rod},
     math::View,
 };
 use glam::DVec3;
@@ -17,6 +17,8 @@ pub(super) struct Body {
     is_round: bool,
     /// The normal of a flat rod; zero if there is none.
     normal: DVec3,
+    /// The direction of the rod before; zero if there is none. Whether another rod follows.
+    joints: (DVec3, bool),
 }
 
 impl Body {
@@ -32,6 +34,10 @@ impl Body {
             colors: rod.colors.map(|color| DVec3::from(color.map(f64::from)) / 255.0),
             is_round,
             normal: normal.map_or(DVec3::ZERO, |normal| view.rotation * normal.as_dvec3()),
+            joints: (
+                rod.joints.0.map_or(DVec3::ZERO, |before| view.rotation * before.as_dvec3()),
+                rod.joints.1,
+            ),
         }
     }
 
@@ -93,6 +99,13 @@ impl Body {
                 color: color(part),
                 normal: self.normal,
             });
+        }
+        // On the outline of round ends at joints, the outline is that of the other rod.
+        let slack = OVERLAP * pixel;
+        let is_beyond = self.joints.1 && -(from + side).dot(side) > slack * side.length();
+        let is_before = from.dot(side) > 0.0 && from.dot(self.joints.0) > slack;
+        if share < 1.0 && (is_beyond || is_before) {
+            return None;
         }
         // The middle of what the pixel sees of the rod across.
         let half = 0.5 * pixel;

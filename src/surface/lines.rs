@@ -55,20 +55,34 @@ impl Mesh {
             longest *= 2.0;
         }
         memory::room(WORK, (size_of::<Facet>() * count(longest)) as u64)?;
-        let rods = self.lines.par_iter().flat_map_iter(|line| {
-            let parts = parts(longest, *line);
-            self.cut_line(*line, parts, options)
+        let way = |[a, b]: [u32; 2]| (place(b) - place(a)).normalize_or_zero();
+        let rods = (0..self.lines.len()).into_par_iter().flat_map_iter(|number| {
+            let line = self.lines[number];
+            // Neighbours in the list are neighbours of a line if they share a vertex.
+            let neighbour = |other: Option<usize>| {
+                let other = *self.lines.get(other?)?;
+                Some((other, way(other))).filter(|(_, way)| *way != Vec3::ZERO)
+            };
+            let before = neighbour(number.checked_sub(1)).filter(|([_, end], _)| *end == line[0]);
+            let after = neighbour(Some(number + 1)).filter(|([start, _], _)| *start == line[1]);
+            let (own, parts) = (way(line), parts(longest, line));
+            let is_whole = own != Vec3::ZERO;
+            let before = before.filter(|_| is_whole).map(|(_, way)| way);
+            let joints = (before, is_whole && after.is_some());
+            self.cut_line(line, (own, parts), joints, options)
         });
         let rods: Vec<Facet> = rods.collect();
         options.deadline.check(WORK)?;
         Ok(Some(FacetSet::of_rods(self.origin, rods)))
     }
 
-    /// Returns the rods of a segment, cut into parts.
+    /// Returns the rods of a segment in a direction, cut into parts. `joints` are those of the whole
+    /// segment ([`Rod::joints`]).
     fn cut_line(
         &self,
         [a, b]: [u32; 2],
-        parts: usize,
+        (way, parts): (Vec3, usize),
+        joints: (Option<Vec3>, bool),
         options: &SurfelOptions,
     ) -> impl Iterator<Item = Facet> {
         let (radius, pixels) = match options.line_width.unwrap_or(SurfelOptions::LINE_WIDTH) {
@@ -94,6 +108,10 @@ impl Mesh {
                 pixels,
                 colors: [from, to],
                 relief: Relief::Round,
+                joints: (
+                    if part == 0 { joints.0 } else { Some(way) },
+                    part + 1 < parts || joints.1,
+                ),
             };
             rod.into()
         })

@@ -113,6 +113,7 @@ fn rods() -> Vec<Rod> {
         pixels: 0.0,
         colors: [color(i), color(i + 1)],
         relief: Relief::Round,
+        joints: ((i > 0).then(|| (place(i) - place(i.max(1) - 1)).normalize()), i < 39),
     });
     let thin = (0..12).map(|i| Rod {
         ends: [place(3 * i) * 0.6, Vec3::new(0.1, -0.2, 0.9 - 0.1 * i as f32)],
@@ -120,6 +121,7 @@ fn rods() -> Vec<Rod> {
         pixels: 0.2 + 0.3 * i as f32,
         colors: [color(i); 2],
         relief: if i % 3 == 0 { Relief::Flat(None) } else { Relief::Round },
+        joints: (None, false),
     });
     let balls = (0..30).map(|i| {
         let radius = if i % 4 == 0 { 0.004 } else { 0.12 };
