@@ -9,10 +9,15 @@ const NEARER: f32 = 4.0;
 const FARTHEST: f32 = 60.0;
 // Smaller shares of a pixel are not added.
 const LEAST_SHARE_ADDED: f32 = 1e-6;
+// The sides of a facet.
+const FRONT_SIDE: u32 = 0u;
+const BACK_SIDE: u32 = 1u;
+const ROD_SIDE: u32 = 2u;
 
 // Sums of the facets in the four open sheets.
 struct Cover {
-    // The shares of the pixel that fronts and backs fill.
+    // The shares of the pixel that fronts and backs fill. Rods count as backs, and of several the
+    // largest.
     front: vec4<f32>,
     back: vec4<f32>,
     // The shares of what is seen of their images.
@@ -65,6 +70,10 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
     let first = records[index];
     let second = records[index + 1u];
     let third = records[index + 2u];
+    if HAS_RODS && bitcast<u32>(third.w) == ROD {
+        add_rod(entry, front, first_pixel);
+        return;
+    }
     let last = records[index + 3u];
     let a = first.xyz;
     let b = second.xyz;
@@ -164,40 +173,66 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
             if SURFACE_SHADED && any(normals[0] != vec3(0.0)) {
                 color = lit(color, normals * weights, direction_of(r), frame.surface_shade);
             }
-            let is_inside = vec4(distance) < behind;
-            let is_past = vec4(distance) >= ahead;
-            var lanes = select(vec4(0.0), vec4(share), is_inside & is_past);
-            lanes.x = select(select(0.0, share, is_inside.x), 0.0, continued);
-            var start = ahead.x;
-            start = select(start, ahead.y, is_past.y);
-            start = select(start, ahead.z, is_past.z);
-            start = select(start, ahead.w, is_past.w);
-            var size = 1.0;
-            if PERSPECTIVE {
-                size = max(start, 1e-30);
-            }
-            let afar = clamp((distance - start) * (NEARER * frame.scale / size), 0.0, FARTHEST);
-            // Of the shares, what is seen.
-            let own = lanes * select(1.0, tint.w, HAS_IMAGES);
-            let near = own * exp(-afar);
-            if last.w > 0.0 {
-                covers[r].front += lanes;
-            } else {
-                covers[r].back += lanes;
-            }
-            if HAS_IMAGES {
-                covers[r].seen += own;
-            }
-            covers[r].red += own * color.x;
-            covers[r].green += own * color.y;
-            covers[r].blue += own * color.z;
-            covers[r].weight += near;
-            covers[r].distance += near * distance;
-            covers[r].near_red += near * color.x;
-            covers[r].near_green += near * color.y;
-            covers[r].near_blue += near * color.z;
+            let side = select(BACK_SIDE, FRONT_SIDE, last.w > 0.0);
+            add_cover(r, front, continued, side, share, seen, distance, color);
         }
     }
+}
+
+// Adds what a facet or rod covers of a pixel to the open sheets. `seen` is the part of the share
+// that is seen, if the facet shows an image.
+fn add_cover(
+    r: u32,
+    front: u32,
+    continued: bool,
+    side: u32,
+    share: f32,
+    seen: f32,
+    distance: f32,
+    color: vec3<f32>,
+) {
+    let ahead = vec4(
+        planes[front],
+        planes[front + 1u],
+        planes[front + 2u],
+        planes[front + 3u],
+    );
+    let behind = vec4(ahead.yzw, planes[front + 4u]);
+    let is_inside = vec4(distance) < behind;
+    let is_past = vec4(distance) >= ahead;
+    var lanes = select(vec4(0.0), vec4(1.0), is_inside & is_past);
+    lanes.x = select(select(0.0, 1.0, is_inside.x), 0.0, continued);
+    var start = ahead.x;
+    start = select(start, ahead.y, is_past.y);
+    start = select(start, ahead.z, is_past.z);
+    start = select(start, ahead.w, is_past.w);
+    var size = 1.0;
+    if PERSPECTIVE {
+        size = max(start, 1e-30);
+    }
+    let afar = clamp((distance - start) * (NEARER * frame.scale / size), 0.0, FARTHEST);
+    // Of the share, what is seen.
+    let own = lanes * seen;
+    let near = own * exp(-afar);
+    if HAS_RODS && side == ROD_SIDE {
+        // Where rods meet, they fill the same part of a pixel.
+        covers[r].back = max(covers[r].back, lanes * share);
+    } else if side == FRONT_SIDE {
+        covers[r].front += lanes * share;
+    } else {
+        covers[r].back += lanes * share;
+    }
+    if HAS_IMAGES || HAS_RODS {
+        covers[r].seen += own;
+    }
+    covers[r].red += own * color.x;
+    covers[r].green += own * color.y;
+    covers[r].blue += own * color.z;
+    covers[r].weight += near;
+    covers[r].distance += near * distance;
+    covers[r].near_red += near * color.x;
+    covers[r].near_green += near * color.y;
+    covers[r].near_blue += near * color.z;
 }
 
 // Composites the facets of the front lane's sheet, behind the rest of the sheet, and shifts the
@@ -206,7 +241,7 @@ fn cover(r: u32, sheet: u32) {
     let own = covers[r];
     covers[r].front = shift(own.front);
     covers[r].back = shift(own.back);
-    if HAS_IMAGES {
+    if HAS_IMAGES || HAS_RODS {
         covers[r].seen = shift(own.seen);
     }
     covers[r].red = shift(own.red);
@@ -217,20 +252,24 @@ fn cover(r: u32, sheet: u32) {
     covers[r].near_red = shift(own.near_red);
     covers[r].near_green = shift(own.near_green);
     covers[r].near_blue = shift(own.near_blue);
-    let all = own.front.x + own.back.x;
+    var all = own.front.x + own.back.x;
     if !(all > 0.0) || sheet < stage.first_sheet || sheet >= stage.end_sheet {
         return;
     }
     let weight = max(own.weight.x, 1e-37);
+    let seen = select(all, max(own.seen.x, 1e-37), HAS_IMAGES || HAS_RODS);
+    if HAS_RODS {
+        // Of rods, `back` has the largest share only.
+        all = max(all, seen);
+    }
     let hidden = clamp(all - 1.0, 0.0, 1.0);
-    let seen = select(all, max(own.seen.x, 1e-37), HAS_IMAGES);
     let mean = vec3(own.red.x, own.green.x, own.blue.x) / seen;
     let nearest = vec3(own.near_red.x, own.near_green.x, own.near_blue.x) / weight;
     let color = clamp(mix(mean, nearest, hidden * hidden), vec3(0.0), vec3(1.0));
     let before = pixels[r].transmittance;
     // At a fold, both sides fill the same part of a pixel.
     let filled = min(max(own.front.x, own.back.x), 1.0);
-    let opacity = select(1.0, min(seen / filled, 1.0), HAS_IMAGES);
+    let opacity = select(1.0, min(seen / filled, 1.0), HAS_IMAGES || HAS_RODS);
     let whole = opacity * opacity;
     let share = min(filled * mix(before, 1.0, whole * whole), before) * opacity;
     let left = before - share;

@@ -33,9 +33,53 @@ fn away_of(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> f32 {
     return select(across.z, dot(across, a), frame.perspective != 0u);
 }
 
+// The last normal of a facet that is a rod (src/facet/rod.rs).
+const ROD_NORMAL: u32 = 0x40008000u;
+
+fn is_rod(index: u32) -> bool {
+    return facets[index].normals[2] == ROD_NORMAL;
+}
+
+// Returns the radii at the ends of a rod, and the least radius in pixels.
+fn radii_of(index: u32) -> vec3<f32> {
+    return vec3(facets[index].corners[6], facets[index].corners[7], facets[index].corners[8]);
+}
+
+// Returns an ellipsoid around a rod, widened by a pixel.
+fn around_rod(index: u32) -> Candidate {
+    let a = corner_of(index, 0u);
+    let b = corner_of(index, 1u);
+    let radii = radii_of(index);
+    var splat: Candidate;
+    splat.center = 0.5 * (a + b);
+    splat.extent = 1.0;
+    splat.normal = NO_NORMAL;
+    let f = 0.5 * (b - a);
+    let half = length(f);
+    var pixel = 1.0 / frame.scale;
+    if frame.perspective != 0u {
+        pixel *= length(splat.center) + half;
+    }
+    let radius = max(max(radii.x, radii.y), radii.z * pixel) + pixel;
+    // Reaches x along and y across add up to at most √((1 + e)·x² + (1 + 1/e)·y²), for any e.
+    let e = max(radius / max(half, 1e-30), 0.5);
+    let along = 1.0 + e;
+    let across = radius * radius * (1.0 + 1.0 / e);
+    splat.covariance.xx = along * f.x * f.x + across;
+    splat.covariance.xy = along * f.x * f.y;
+    splat.covariance.xz = along * f.x * f.z;
+    splat.covariance.yy = along * f.y * f.y + across;
+    splat.covariance.yz = along * f.y * f.z;
+    splat.covariance.zz = along * f.z * f.z + across;
+    return splat;
+}
+
 // Returns a flat ellipsoid around a facet: the ellipse through its corners with the same centroid
 // (Steiner), widened by a pixel.
 fn candidate(index: u32) -> Candidate {
+    if is_rod(index) {
+        return around_rod(index);
+    }
     let a = corner_of(index, 0u);
     let b = corner_of(index, 1u);
     let c = corner_of(index, 2u);
@@ -63,12 +107,30 @@ fn candidate(index: u32) -> Candidate {
 }
 
 // Returns the four vectors of a facet's record, which add_facet reads: the corners with their
-// normals, then the colours and the side.
+// normals, then the colours and the side. Of a rod they are the ends with the radii there, then the
+// least radius, the normal and whether the rod is round, then the colours (add_rod).
 fn facet_record(index: u32) -> array<vec4<f32>, 4> {
     let a = corner_of(index, 0u);
     let b = corner_of(index, 1u);
     let c = corner_of(index, 2u);
     let to_view = mat3x3<f32>(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz);
+    if is_rod(index) {
+        let radii = radii_of(index);
+        let own = facets[index].normals[0];
+        let turned = encode_normal(to_view * decode_normal(own));
+        let normal = bitcast<f32>(select(turned, NO_NORMAL, own == NO_NORMAL));
+        return array<vec4<f32>, 4>(
+            vec4(a, radii.x),
+            vec4(b, radii.y),
+            vec4(radii.z, normal, f32(facets[index].normals[1]), bitcast<f32>(ROD_NORMAL)),
+            vec4(
+                bitcast<f32>(facets[index].colors[0]),
+                bitcast<f32>(facets[index].colors[1]),
+                0.0,
+                1.0,
+            ),
+        );
+    }
     var normals: array<f32, 3>;
     for (var i = 0u; i < 3u; i++) {
         let own = facets[index].normals[i];

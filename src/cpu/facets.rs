@@ -5,6 +5,7 @@ use super::{
     close::Packet,
     footprint::{Kind, Record},
     plan::Plan,
+    rods,
     scatter::{OpenTile, Window, is_kept},
     sums::{Sums, WINDOW},
     vector::{Lanes, exp, three},
@@ -23,9 +24,31 @@ use std::sync::Arc;
 /// measured, counts as this far.
 const FARTHEST: f32 = 60.0;
 /// Smaller shares of a pixel are not added.
-const LEAST_SHARE: f32 = 1e-6;
+pub const LEAST_SHARE: f32 = 1e-6;
 /// `extent2` of the record of a facet that ends at the clips already.
 const CUT: f32 = 1.0;
+
+/// The side of a facet that is seen.
+#[derive(Clone, Copy)]
+pub enum Side {
+    Front,
+    Back,
+    /// The facet is a rod.
+    Rod,
+}
+
+/// What a facet covers of eight pixels.
+pub struct Covered<S: Simd> {
+    pub share: Lanes<S>,
+    /// The part of the share that is seen, if the facet shows an image.
+    pub seen: Lanes<S>,
+    pub distance: Lanes<S>,
+    /// Lit.
+    pub color: [Lanes<S>; 3],
+    /// Pixels of which the facet covers a part.
+    pub covers: mask32x8<S>,
+    pub side: Side,
+}
 
 /// Facets of a set in a view.
 pub struct FacetProjector<'a> {
@@ -52,6 +75,9 @@ impl<'a> FacetProjector<'a> {
     pub fn record(&self, number: usize) -> Option<Record> {
         let (plan, facet) = (self.plan, &self.set.facets[number]);
         let Source { to_view, origin, .. } = self.source;
+        if facet.is_rod() {
+            return rods::record(plan, facet, to_view, origin);
+        }
         let corners = facet.corners.map(|corner| to_view * Vec3::from(corner) + origin);
         let [a, b, c] = corners;
         let across = (b - a).cross(c - a);
@@ -401,6 +427,22 @@ impl<S: Simd> OpenTile<'_, S> {
                 color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
             }
         }
+        let side = if facet.is_front { Side::Front } else { Side::Back };
+        let own = Covered { share, seen: seen_share, distance, color, covers, side };
+        Self::add_covered(simd, plan, &own, window, packet, sums);
+    }
+
+    /// Adds what a facet or rod covers in a window of sheets.
+    #[inline(always)]
+    pub fn add_covered(
+        simd: S,
+        plan: &Plan,
+        covered: &Covered<S>,
+        window: Window,
+        packet: &Packet<S>,
+        sums: &mut Sums<S>,
+    ) {
+        let Covered { share, seen, distance, color, covers, side } = *covered;
         let none = Lanes::splat(simd, 0.0);
         for own in usize::from(window.is_continued)..WINDOW {
             let [front, back] = [0, 1].map(|next| plan.planes[window.front + own + next]);
@@ -411,7 +453,7 @@ impl<S: Simd> OpenTile<'_, S> {
             if !inside.any_true() {
                 continue;
             }
-            let [share, seen] = [share, seen_share].map(|own| inside.select(own, none));
+            let [share, seen] = [share, seen].map(|own| inside.select(own, none));
             let pixel = if plan.view.perspective { front.max(1e-30) } else { 1.0 };
             let per_pixel = NEARER as f32 * plan.frame.scale / pixel;
             let behind =
@@ -420,7 +462,12 @@ impl<S: Simd> OpenTile<'_, S> {
             let slot = (window.front + own) % WINDOW;
             sums.has_facets[slot] |= packet.bit();
             let sums = &mut sums.facets[slot][packet.number];
-            sums.shares[usize::from(!facet.is_front)] += share;
+            match side {
+                Side::Front => sums.shares[0] += share,
+                Side::Back => sums.shares[1] += share,
+                // Where rods meet, they fill the same part of a pixel.
+                Side::Rod => sums.shares[1] = sums.shares[1].max(share),
+            }
             sums.seen += seen;
             sums.weight += weight;
             sums.distance = weight.mul_add(distance, sums.distance);

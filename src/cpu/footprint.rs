@@ -48,6 +48,10 @@ pub enum Kind {
     /// 1 for a front and −1 for a back. Payload: the normals and the colours at the corners, as
     /// bits.
     Facet,
+    /// A rod. The centre is its first end; `whitening` has the other one, both radii and the least
+    /// radius in pixels. Payload: the normal as bits, whether the rod is round, 0, and the colours
+    /// at the ends as bits.
+    Rod,
 }
 
 /// The data of a splat that tiles need.
@@ -226,7 +230,7 @@ fn facing_weight(plan: &Plan, normal: Vec3, center: Vec3) -> f32 {
 
 /// Bounds x/z over an ellipsoid in front of the eye, by the tangents to its silhouette; exact in
 /// perspective.
-fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> [f32; 2] {
+pub fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> [f32; 2] {
     let p = x / z;
     let (a, b, c) = (xx / z / z, xz / z / z, zz / z / z);
     let denominator = 1.0 / (1.0 - c);
@@ -237,7 +241,7 @@ fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> [f32; 2] {
 }
 
 /// Bounds x/z over the part of a box beyond the nearest visible z.
-fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> [f32; 2] {
+pub fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> [f32; 2] {
     let (low, high) = (x - reach, x + reach);
     [low / if low < 0.0 { z_low } else { z_high }, high / if high < 0.0 { z_high } else { z_low }]
 }

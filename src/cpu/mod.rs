@@ -21,7 +21,7 @@
 //! | `march` | draws the sheets of a tile in order |
 //! | `rays` | the rays of eight pixels |
 //! | `scatter`, `sums` | adds splats to the open sheets |
-//! | `facets` | the same for splats whose footprint is a triangle |
+//! | `facets`, `rods` | the same for splats whose footprint is a triangle, and for rods |
 //! | `gather`, `field` | the field of a lattice at a place, and its gradient |
 //! | `blend` | the same by sums over samples, for other kernels and lattices |
 //! | `radial`, `bells`, `rectilinear` | the weights of these sums |
@@ -51,6 +51,7 @@ mod project;
 mod radial;
 mod rays;
 mod rectilinear;
+mod rods;
 mod scatter;
 mod skip;
 mod spare;

@@ -80,6 +80,8 @@ pub struct Plan<'a> {
     pub has_radiance: bool,
     /// The scene has facets.
     pub has_facets: bool,
+    /// Some facets are rods.
+    pub has_rods: bool,
     /// The sets of facets that show images.
     pub with_images: Vec<Arc<FacetSet>>,
     pub lit_surfaces: bool,
@@ -136,6 +138,7 @@ impl<'a> Plan<'a> {
             isosurfaces: 0,
             has_radiance: false,
             has_facets: false,
+            has_rods: false,
             with_images: Vec::new(),
             lit_surfaces: false,
             has_trained: scene.items.iter().any(Item::is_trained),
@@ -152,6 +155,7 @@ impl<'a> Plan<'a> {
                 Item::Facets(_) | Item::Solid(_) => {
                     plan.has_facets = true;
                     plan.lit_surfaces |= is_lit;
+                    plan.has_rods |= matches!(item, Item::Facets(set) if set.rods.is_some());
                     plan.with_images.extend(set_with_images(item));
                 }
                 Item::Radiance(_) | Item::Gaussians(_) | Item::Hierarchy(_) => {

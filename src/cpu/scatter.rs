@@ -451,11 +451,14 @@ impl<S: Simd> OpenTile<'_, S> {
         let inside = |pixel: [i32; 2]| [0, 1].map(|axis| pixel[axis] - self.corner[axis]);
         let from = inside(first).map(|at| at.max(0) as usize);
         let to = inside(last).map(|at| at.min(TILE as i32 - 1) as usize);
-        if record.kind == Kind::Facet {
+        if matches!(record.kind, Kind::Facet | Kind::Rod) {
             let rows = from[1] / HIGH..=to[1] / HIGH;
             let columns = from[0] / WIDE..=to[0] / WIDE;
             let packets = rows.flat_map(|row| columns.clone().map(move |column| row * 2 + column));
-            self.add_facet(simd, plan, record, window, packets);
+            match record.kind {
+                Kind::Rod => self.add_rod(simd, plan, record, window, packets),
+                _ => self.add_facet(simd, plan, record, window, packets),
+            }
             return;
         }
         let splat = Projected::new(plan, record, window);

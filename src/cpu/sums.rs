@@ -42,7 +42,8 @@ pub struct FaceSums<S: Simd> {
 /// Sums of the facets in a sheet at eight pixels.
 #[derive(Clone, Copy)]
 pub struct FacetSums<S: Simd> {
-    /// The shares of the pixels that fronts and backs fill.
+    /// The shares of the pixels that fronts and backs fill. Rods count as backs, and of several the
+    /// largest.
     pub shares: [Lanes<S>; 2],
     /// The shares of what is seen of their images.
     pub seen: Lanes<S>,
@@ -92,8 +93,9 @@ pub struct Sums<S: Simd> {
     /// Empty in a scene without facets.
     pub facets: Vec<[FacetSums<S>; PACKETS]>,
     pub has_facets: [u8; WINDOW],
-    /// Facets show images, of which parts may not be seen.
-    has_images: bool,
+    /// Facets show images, of which parts may not be seen, or are rods, which may fill the same part
+    /// of a pixel.
+    has_seen: bool,
     none: Lanes<S>,
 }
 
@@ -135,7 +137,7 @@ impl<S: Simd> Sums<S> {
             radiance: [[[none; 8]; PACKETS]; WINDOW],
             has_radiance: [0; WINDOW],
             facets: if plan.has_facets { vec![no_facets; WINDOW] } else { Vec::new() },
-            has_images: !plan.with_images.is_empty(),
+            has_seen: !plan.with_images.is_empty() || plan.has_rods,
             has_facets: [0; WINDOW],
             none,
         }
@@ -196,8 +198,9 @@ impl<S: Simd> Sums<S> {
         let [front, back] = sums.shares;
         let one = Lanes::splat(simd, 1.0);
         let inverse = one / sums.weight.max(Lanes::splat(simd, 1e-37));
-        let all = front + back;
-        let seen = if self.has_images { sums.seen } else { all };
+        let mut all = front + back;
+        let seen = if self.has_seen { sums.seen } else { all };
+        all = all.max(seen);
         let least = Lanes::splat(simd, 1e-37);
         let per_share = one / seen.max(least);
         // What is more than the whole pixel lies behind something.
@@ -209,7 +212,7 @@ impl<S: Simd> Sums<S> {
         });
         // At a fold, both sides fill the same part of a pixel.
         let share = front.max(back).min(one);
-        let opacity = if self.has_images { (seen / share.max(least)).min(one) } else { one };
+        let opacity = if self.has_seen { (seen / share.max(least)).min(one) } else { one };
         Some(Cover { share, opacity, distance: sums.distance * inverse, color })
     }
 

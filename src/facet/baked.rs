@@ -29,7 +29,13 @@ impl FacetSet {
             self.cut(number, parts)
         };
         let facets = numbers().flat_map_iter(cut).collect();
-        Cow::Owned(Self { origin: self.origin, facets, sides: self.sides, ..Self::default() })
+        Cow::Owned(Self {
+            origin: self.origin,
+            facets,
+            sides: self.sides,
+            rods: self.rods,
+            ..Self::default()
+        })
     }
 
     /// Returns in how many parts each side of a facet is cut.

@@ -1,10 +1,13 @@
-//! Splats with a polygonal footprint: triangles whose outline is exact at any distance.
+//! Splats whose outline is exact at any distance: triangles, and [rods](Rod) with round ends.
 
 mod baked;
 mod image;
+mod rod;
 mod texture;
 
 pub use image::Image;
+pub(crate) use rod::{OVERLAP, REACH};
+pub use rod::{Relief, Rod, Size};
 pub(crate) use texture::Mean;
 pub use texture::Texture;
 
@@ -23,6 +26,8 @@ use std::sync::Arc;
 ///
 /// A pixel is covered by the share of its area that the triangle fills. The shares of neighbouring
 /// facets add up, so that no edge between them shows, and outlines are smooth.
+///
+/// A facet may also store a [`Rod`]; the corners and normals then have other meanings.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Facet {
@@ -93,7 +98,7 @@ pub enum Sides {
     Mixed,
 }
 
-/// Facets around a common origin.
+/// Facets around a common origin: triangles, rods, or both.
 #[derive(Debug, Clone, Default)]
 pub struct FacetSet {
     /// World position that the corners are relative to.
@@ -109,6 +114,8 @@ pub struct FacetSet {
     /// The box around the whole, in world coordinates, if the facets are what clips left of it.
     /// They end at the clips exactly, and no clip is applied to them again.
     pub whole: Option<Bounds>,
+    /// The largest [`Rod::pixels`] of the facets that are rods; `None` if all are triangles.
+    pub rods: Option<f32>,
 }
 
 impl FacetSet {
@@ -126,10 +133,8 @@ impl FacetSet {
         }
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let grow = |all: (Vec3, Vec3), facet: &Facet| {
-            facet
-                .corners
-                .iter()
-                .fold(all, |(low, high), &corner| (low.min(corner.into()), high.max(corner.into())))
+            let [low, high] = facet.around();
+            (all.0.min(low), all.1.max(high))
         };
         let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
         let (low, high) = self.facets.par_iter().fold(|| none, grow).reduce(|| none, both);

@@ -54,8 +54,8 @@ struct Opened<'a> {
     binary: Option<&'a [u8]>,
 }
 
-/// Reads a glTF or GLB file: the triangles of the default scene in its world frame, or its points
-/// if it has no triangles. Reads vertex colours, base colours and textures, with opacities as the
+/// Reads a glTF or GLB file: the triangles, lines and points of the default scene in its world
+/// frame. Reads vertex colours, base colours and textures, with opacities as the
 /// alpha modes require, and instances (`EXT_mesh_gpu_instancing`). Materials may be unlit. What is
 /// not drawn, such as skins and animations, is named in a warning.
 ///
@@ -81,6 +81,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
         has_gaussians: false,
         positions: Vec::new(),
         mesh: Mesh::default(),
+        loose: Vec::new(),
         material_of: HashMap::new(),
         pictures: HashMap::new(),
         idle: BTreeSet::new(),
@@ -181,6 +182,8 @@ struct Builder<'a> {
     has_gaussians: bool,
     positions: Vec<DVec3>,
     mesh: Mesh,
+    /// The vertices of points.
+    loose: Vec<Range<u32>>,
     /// Index in the mesh's materials, by index in the file (`None`: the default material).
     material_of: HashMap<Option<usize>, u32>,
     /// Decoded images, by image and alpha mode.
@@ -282,10 +285,6 @@ impl Builder<'_> {
         let Checked::Valid(mode) = primitive.mode else {
             return Err(self.source.error(place, "has an unknown mode"));
         };
-        if matches!(mode, Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
-            tracing::warn!("{}: {place}: lines are not drawn", self.source.path.display());
-            return Ok(());
-        }
         let Some(position) = attribute(primitive, Semantic::Positions) else { return Ok(()) };
         let draco = "KHR_draco_mesh_compression";
         let extensions = primitive.extensions.as_ref();
@@ -304,9 +303,62 @@ impl Builder<'_> {
         self.add_normals(&part)?;
         self.add_colors(&part, &base)?;
         self.add_uvs(&part, &base)?;
-        if mode != Mode::Points {
-            self.add_triangles(&part, mode, &base)?;
+        match mode {
+            Mode::Points => {
+                self.tint(&part, &base);
+                self.loose.push(part.vertices.start as u32..part.vertices.end as u32);
+            }
+            Mode::Lines | Mode::LineLoop | Mode::LineStrip => {
+                self.tint(&part, &base);
+                self.add_lines(&part, mode)?;
+            }
+            _ => self.add_triangles(&part, mode, &base)?,
         }
+        Ok(())
+    }
+
+    /// Gives the vertices of points and lines the colour of their material, if they have none.
+    fn tint(&mut self, part: &Part, base: &Base) {
+        let Range { start, end } = part.vertices;
+        let material = self
+            .root
+            .materials
+            .get(part.primitive.material.map_or(usize::MAX, |index| index.value()));
+        let Some(color) = material.map(|own| own.pbr_metallic_roughness.base_color_factor.0) else {
+            return;
+        };
+        let [red, green, blue, alpha] = displayed(color);
+        let own = [red, green, blue].map(|part| (part * 255.0).round() as u8);
+        let opacity = base.alpha.apply((alpha * 255.0).round() as u8);
+        if self.mesh.colors.len() >= end {
+            for color in &mut self.mesh.colors[start..end] {
+                for (part, own) in color.iter_mut().zip(own) {
+                    *part = (u16::from(*part) * u16::from(own) / 255) as u8;
+                }
+            }
+            return;
+        }
+        self.mesh.colors.resize(start, [255; 4]);
+        self.mesh.colors.resize(end, [own[0], own[1], own[2], opacity]);
+    }
+
+    /// Adds the segments of a primitive's lines.
+    fn add_lines(&mut self, part: &Part, mode: Mode) -> Result<()> {
+        let (start, count) = (part.vertices.start as u32, part.vertices.len());
+        let corners = match part.primitive.indices {
+            Some(index) => self.buffers.indices(index.value(), part.place, count)?,
+            None => (0..count as u32).collect(),
+        };
+        let lines = &mut self.mesh.lines;
+        let mut add = |a: u32, b: u32| lines.push([a + start, b + start]);
+        match mode {
+            Mode::Lines => corners.as_chunks().0.iter().for_each(|&[a, b]| add(a, b)),
+            _ => corners.windows(2).for_each(|ends| add(ends[0], ends[1])),
+        }
+        if let (Mode::LineLoop, &[first, _, .., last]) = (mode, &corners[..]) {
+            add(last, first);
+        }
+        self.source.check_points("the number of lines", self.mesh.lines.len() as u64)?;
         Ok(())
     }
 
@@ -442,6 +494,11 @@ impl Builder<'_> {
         }
         if !self.mesh.uvs.is_empty() {
             self.mesh.uvs.resize(count, Vec2::ZERO);
+        }
+        // Beside triangles and lines, points are balls: lines without a length.
+        if !self.mesh.triangles.is_empty() || !self.mesh.lines.is_empty() {
+            let points = std::mem::take(&mut self.loose).into_iter().flatten();
+            self.mesh.lines.extend(points.map(|point| [point; 2]));
         }
         self.mesh.about.stance = Some(Stance::Y_UP);
         unplaced::leave_out(self.source, &mut self.mesh)?;

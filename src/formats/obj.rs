@@ -5,6 +5,7 @@
 //! and no end mark. So a file that is cut at the end of a line, or within its last number, reads as
 //! a smaller one.
 
+mod line;
 mod material;
 mod survey;
 #[cfg(test)]
@@ -23,7 +24,7 @@ use survey::Survey;
 /// Reads an OBJ file. Polygons, including concave ones, are cut into triangles, with vertex
 /// colours, normals and materials. Texture coordinates are kept if a material has a picture. A
 /// vertex is split if its corners differ in normal or texture coordinates. A file with vertices
-/// only is a point cloud. Lines and points are skipped.
+/// only is a point cloud. Lines (`l`) are lines; points (`p`) are skipped.
 ///
 /// # Errors
 /// [`Error::Input`] for malformed numbers; for texture coordinates in pictures that are not finite;
@@ -39,6 +40,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     if survey.faces == 0 {
         return read_cloud(source, &text, &survey);
     }
+    let lines = line::Lines::read(source, &text, &survey)?;
     let (models, materials, shifts) = statements(source, &text, &survey)?;
     let has_materials = !materials.is_empty();
     let textured: Vec<bool> = materials.iter().map(|material| material.texture.is_some()).collect();
@@ -70,6 +72,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
         };
         return Err(source.error("file", message));
     }
+    mesh.lines = corners.add_lines(lines);
     let positions = &corners.positions;
     (mesh.origin, mesh.positions) =
         positions::settle_some(source, positions.len(), |i| positions[i])?;
@@ -150,6 +153,25 @@ struct Corners {
 }
 
 impl Corners {
+    /// Adds the vertices of lines. Returns the ends of their segments.
+    fn add_lines(&mut self, lines: line::Lines) -> Vec<[u32; 2]> {
+        let first = self.positions.len() as u32;
+        let all = self.positions.len() + lines.vertices.len();
+        let has_colors = !self.colors.is_empty();
+        self.positions.extend(lines.places);
+        if has_colors {
+            self.colors.extend(lines.colors);
+            self.colors.resize(all, [1.0; 3]);
+        }
+        if !self.normals.is_empty() {
+            self.normals.resize(all, Vec3::ZERO);
+        }
+        if !self.uvs.is_empty() {
+            self.uvs.resize(all, Vec2::ZERO);
+        }
+        lines.ends.into_iter().map(|ends| ends.map(|end| end + first)).collect()
+    }
+
     /// Adds a model. `with_uv`: its texture coordinates matter; `any_uv`: those of any model do.
     fn add(
         &mut self,
@@ -285,8 +307,20 @@ fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
         let hint = "end the last line with a line break if these are points that are whole";
         return Err(source.error(place, message).hint(hint));
     }
+    let has_colors = colors.len() == points.len();
+    if survey.lines > 0 {
+        let lines = line::Lines::read(source, text, survey)?;
+        let used = |at: usize| lines.vertices[at] as usize;
+        let placed = lines.vertices.iter().map(|&vertex| points[vertex as usize]).collect();
+        colors = if has_colors {
+            (0..lines.vertices.len()).map(|at| colors[used(at)]).collect()
+        } else {
+            colors
+        };
+        (points, mesh.lines) = (placed, lines.ends);
+    }
     (mesh.origin, mesh.positions) = positions::settle_some(source, points.len(), |i| points[i])?;
-    if colors.len() == points.len() {
+    if has_colors {
         mesh.colors = to_bytes(&colors);
     }
     unplaced::leave_out(source, &mut mesh)?;

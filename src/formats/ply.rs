@@ -49,7 +49,7 @@ const CHUNK: usize = 1 << 14;
 /// types, they are bytes if the largest value of the file shows it. The property of the vertices
 /// that [`ReadOptions::scalar`] names becomes the mesh's values. Of trained Gaussians, the centres
 /// are read as points. Vertices that are not at finite coordinates are left out, with the faces
-/// that use them.
+/// that use them. Edges (`element edge`) are lines.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed header, a file that ends before its last
@@ -60,7 +60,7 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     gaussians::refuse_compressed(source, &header)?;
     let vertices = header.elements.iter().find(|element| element.name == "vertex");
     let mut mesh = Mesh::default();
-    let mut faces = Vec::new();
+    let (mut faces, mut edges) = (Vec::new(), None);
     let mut at = header.payload;
     for element in &header.elements {
         let is_face = matches!(element.name.as_str(), "face" | "tristrips");
@@ -81,6 +81,9 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
             warn_of_face_colors(source, element);
             // Faces are read last, because their vertices may come after them.
             faces.push((element, rows));
+        } else if element.name == "edge" {
+            source.check_points("the count of element “edge”", element.count as u64)?;
+            edges = Some((element, rows));
         }
     }
     let mut all = Faces::default();
@@ -92,6 +95,9 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     if mesh.positions.is_empty() {
         return Err(source.error("header", "has no element “vertex” with at least one row"));
     }
+    if let Some((element, rows)) = edges {
+        mesh.lines = read_edges(source, element, &rows, mesh.positions.len())?;
+    }
     let of_corners = all.have_uvs();
     all.give(source, &mut mesh)?;
     if let Some(element) = vertices {
@@ -100,6 +106,36 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     give_textures(source, header.textures, of_corners, &mut mesh)?;
     unplaced::leave_out(source, &mut mesh)?;
     Ok(mesh)
+}
+
+/// Reads the lines of an element “edge”, by the vertices at their ends.
+fn read_edges(
+    source: &Source,
+    element: &Element,
+    rows: &Rows,
+    vertices: usize,
+) -> Result<Vec<[u32; 2]>> {
+    let is_number = |&column: &usize| element.columns[column].width().is_some();
+    let columns = [["vertex1", "v1"], ["vertex2", "v2"]]
+        .map(|names| element.column(&names).filter(is_number));
+    if columns.contains(&None) || element.count == 0 {
+        return Ok(Vec::new());
+    }
+    let table = Table::read(source, element, rows, &columns)?;
+    source.room::<[u32; 2]>("the lines", element.count)?;
+    let ends = (0..element.count).map(|row| {
+        let end = |role: usize| {
+            let vertex = table.value(row, role);
+            let is_one = vertex >= 0.0 && vertex < vertices as f64 && vertex.fract() == 0.0;
+            is_one.then_some(vertex as u32).ok_or_else(|| {
+                let message =
+                    format!("refers to vertex {vertex}, but there are {vertices} vertices");
+                source.error(format!("edge {row}"), message)
+            })
+        };
+        Ok([end(0)?, end(1)?])
+    });
+    ends.collect()
 }
 
 /// Gives the mesh the pictures that the header names. `of_corners`: faces have texture coordinates

@@ -502,7 +502,7 @@ const VTK: Format = Format {
 
 const VTK_CELLS: [Holding; 4] = [
     some(Content::Cells, "that fill space"),
-    some(Content::Mesh, "cells that are surfaces"),
+    some(Content::Mesh, "cells that are surfaces or lines"),
     some(Content::PointCloud, "without cells"),
     some(Content::Samples, "without cells, if a scalar is named"),
 ];
@@ -510,7 +510,7 @@ const VTK_CELLS: [Holding; 4] = [
 const VTK_ANY: [Holding; 5] = [
     some(Content::Volume, "image data, rectilinear grids"),
     some(Content::Cells, "that fill space"),
-    some(Content::Mesh, "polygons"),
+    some(Content::Mesh, "polygons and lines"),
     some(Content::PointCloud, "without cells"),
     some(Content::Samples, "without cells, if a scalar is named"),
 ];

@@ -1,6 +1,7 @@
-//! Facets: the part of a pixel that each fills, and what they add to its sheets.
+//! Facets: the part of a pixel that each fills, and what they add to its sheets. Rods are facets
+//! whose part and place is found in `rods`.
 
-use super::{Frame, clip, ray::Ray, shade};
+use super::{Frame, clip, ray::Ray, rods::Body, shade};
 use crate::{
     facet::{FacetSet, Image, NEARER, Sides},
     math::View,
@@ -16,7 +17,22 @@ const FARTHEST: f64 = 60.0;
 const RAYS: usize = 16;
 
 /// A facet in view space.
-pub(super) struct Facet<'a> {
+pub(super) enum Facet<'a> {
+    Triangle(Triangle<'a>),
+    Rod { body: Body, rows: [f64; 2] },
+}
+
+/// Where the ray of a pixel meets a facet, and the share of the pixel that the facet fills.
+pub(super) struct Place {
+    pub share: f64,
+    pub distance: f64,
+    pub color: DVec3,
+    /// Of any length; zero for a colour that is not lit.
+    pub normal: DVec3,
+}
+
+/// A triangle in view space.
+pub(super) struct Triangle<'a> {
     /// The image that it shows, and the corners' places there.
     image: Option<(&'a Image, [Vec2; 3])>,
     corners: [DVec3; 3],
@@ -35,7 +51,7 @@ pub(super) struct Facet<'a> {
 /// The facets of one sheet of one pixel.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Cover {
-    /// The shares that fronts and backs fill.
+    /// The shares that fronts and backs fill. Rods count as backs, and of several the largest.
     shares: [f64; 2],
     /// The shares of what is seen of their images.
     seen: f64,
@@ -52,7 +68,7 @@ impl Cover {
     /// distance and colour; `None` without facets.
     pub fn mean(&self) -> Option<([f64; 2], f64, DVec3)> {
         let [front, back] = self.shares;
-        let all = front + back;
+        let all = (front + back).max(self.seen);
         let hidden = (all - 1.0).clamp(0.0, 1.0);
         let color = (self.color / self.seen).lerp(self.nearest / self.weight, hidden * hidden);
         let share = front.max(back).min(1.0);
@@ -67,13 +83,30 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, settings: &Settings) -> 
     for item in &scene.items {
         let Item::Facets(set) = item else { continue };
         let is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
-        let seen = (0..set.facets.len()).filter_map(|number| Facet::new(number, set, view));
-        facets.extend(seen.filter(|facet| facet.turn < 0.0 || !is_culled));
+        for number in 0..set.facets.len() {
+            if let Some(rod) = set.facets[number].rod() {
+                let body = Body::new(&rod, set.origin, view);
+                let rows = body.rows(view);
+                facets.push(Facet::Rod { body, rows });
+                continue;
+            }
+            let triangle = Triangle::new(number, set, view);
+            let seen = triangle.filter(|own| own.turn < 0.0 || !is_culled);
+            facets.extend(seen.map(Facet::Triangle));
+        }
     }
     facets
 }
 
-impl<'a> Facet<'a> {
+impl Facet<'_> {
+    /// Whether the facet may fill a part of a pixel of a row.
+    pub fn meets_row(&self, row: i64) -> bool {
+        let (Self::Triangle(Triangle { rows, .. }) | Self::Rod { rows, .. }) = self;
+        rows[0] <= row as f64 + 1.0 && rows[1] >= row as f64
+    }
+}
+
+impl<'a> Triangle<'a> {
     fn new(number: usize, set: &'a FacetSet, view: &View) -> Option<Self> {
         let facet = &set.facets[number];
         let corners = facet
@@ -100,9 +133,17 @@ impl<'a> Facet<'a> {
         })
     }
 
-    /// Whether the facet may fill a part of a pixel of a row.
-    pub fn meets_row(&self, row: i64) -> bool {
-        self.rows[0] <= row as f64 + 1.0 && self.rows[1] >= row as f64
+    /// Returns where the ray of a pixel meets the triangle's plane, and the share that the triangle
+    /// fills.
+    fn at(&self, ray: &Ray, [column, row]: [i64; 2], view: &View) -> Option<Place> {
+        let share = share(&polygon(view, self.corners)?, column, row);
+        let weights = self.weights(ray, view);
+        let of = |parts: [DVec3; 3]| {
+            parts.iter().zip(weights).map(|(part, weight)| *part * weight).sum::<DVec3>()
+        };
+        let distance = of(self.corners).z / ray.direction.z;
+        let normal = if self.normals == [DVec3::ZERO; 3] { DVec3::ZERO } else { of(self.normals) };
+        Some(Place { share, distance, color: of(self.colors), normal })
     }
 
     /// Returns the mean colour of the image over a facet's part of a pixel, and the share that is
@@ -213,16 +254,15 @@ impl Frame<'_> {
         let ray = self.ray(column, row);
         let allowed = clip::allowed(&ray, view, &self.clips);
         for facet in facets {
-            let Some(polygon) = polygon(view, facet.corners) else { continue };
-            let share = share(&polygon, column, row);
-            let weights = facet.weights(&ray, view);
-            let of = |parts: [DVec3; 3]| {
-                parts.iter().zip(weights).map(|(part, weight)| *part * weight).sum::<DVec3>()
+            let place = match facet {
+                Facet::Triangle(own) => own.at(&ray, [column, row], view),
+                Facet::Rod { body, .. } => body.at(&ray, view),
             };
-            let distance = of(facet.corners).z / ray.direction.z;
+            let Some(Place { share, distance, color, normal }) = place else { continue };
             let sheet = self.planes.partition_point(|&plane| plane <= distance);
             let within = 1..self.planes.len();
-            let is_kept = facet.is_cut || clip::contains(&allowed, distance);
+            let is_cut = matches!(facet, Facet::Triangle(own) if own.is_cut);
+            let is_kept = is_cut || clip::contains(&allowed, distance);
             if share <= 0.0 || !within.contains(&sheet) || !is_kept {
                 continue;
             }
@@ -230,13 +270,16 @@ impl Frame<'_> {
             let pixel = if view.perspective { front } else { 1.0 } / view.scale;
             let behind = (NEARER * (distance - front) / pixel).clamp(0.0, FARTHEST);
             let pixel = DVec2::new(column as f64, row as f64) + 0.5;
-            let (tint, seen) = facet.tint(|at| Ray::new(view, pixel + at), view);
-            let (color, seen) = (of(facet.colors) * tint, share * seen);
+            let (tint, seen) = match facet {
+                Facet::Triangle(own) => own.tint(|at| Ray::new(view, pixel + at), view),
+                Facet::Rod { .. } => (DVec3::ONE, 1.0),
+            };
+            let (color, seen) = (color * tint, share * seen);
             let weight = seen * (-behind).exp();
             let color = match &self.shade {
                 // Facets without normals keep their colours.
-                Some(shade) if facet.normals != [DVec3::ZERO; 3] => {
-                    shade::lit(color, of(facet.normals), ray.direction, shade)
+                Some(shade) if normal != DVec3::ZERO => {
+                    shade::lit(color, normal, ray.direction, shade)
                 }
                 _ => color,
             };
@@ -244,7 +287,10 @@ impl Frame<'_> {
             if seen <= 0.0 {
                 continue;
             }
-            cover.shares[usize::from(!facet.is_front)] += share;
+            match facet {
+                Facet::Triangle(own) => cover.shares[usize::from(!own.is_front)] += share,
+                Facet::Rod { .. } => cover.shares[1] = cover.shares[1].max(share),
+            }
             cover.seen += seen;
             cover.weight += weight;
             cover.distance += weight * distance;

@@ -145,6 +145,9 @@ fn of_gaussians(
 
 /// Returns the outermost corners of facets.
 fn of_facets(set: &FacetSet, clips: &[Clip], item: usize) -> Vec<DVec3> {
+    if set.rods.is_some() {
+        return of_rods(set, clips, item);
+    }
     let world = |point: Vec3| set.origin + point.as_dvec3();
     let kept = |point: &Vec3| clips.iter().all(|clip| clip.keeps(world(*point)));
     let corners = set.facets.iter().flat_map(|facet| facet.corners.map(Vec3::from));
@@ -153,6 +156,34 @@ fn of_facets(set: &FacetSet, clips: &[Clip], item: usize) -> Vec<DVec3> {
     let Some([low, high]) = near else { return Vec::new() };
     corners.retain(|corner| corner.cmpge(low).all() && corner.cmple(high).all());
     outermost(&corners).into_iter().map(|index| world(corners[index as usize])).collect()
+}
+
+/// Returns the outermost ends of rods, with their radii, and corners of the triangles beside them.
+fn of_rods(set: &FacetSet, clips: &[Clip], item: usize) -> Vec<DVec3> {
+    let world = |point: Vec3| set.origin + point.as_dvec3();
+    let places = set.facets.iter().flat_map(|facet| {
+        let [a, b, c] = facet.corners.map(Vec3::from);
+        // The second end of a ball is that of the first.
+        let count = if !facet.is_rod() { 3 } else { 1 + usize::from(a != b) };
+        let radius = if facet.is_rod() { c.x.max(c.y) } else { 0.0 };
+        [a, b, c].into_iter().take(count).map(move |place| (place, radius))
+    });
+    let kept = |point: Vec3| clips.iter().all(|clip| clip.keeps(world(point)));
+    let (mut places, mut radii): (Vec<Vec3>, Vec<f32>) =
+        places.filter(|(place, _)| kept(*place)).unzip();
+    let near = near(&places, Kind::Measured, item, set.origin);
+    let Some([low, high]) = near else { return Vec::new() };
+    let is_near = |place: Vec3| place.cmpge(low).all() && place.cmple(high).all();
+    let mut each = places.iter().map(|place| is_near(*place));
+    radii.retain(|_| each.next().unwrap_or(false));
+    places.retain(|place| is_near(*place));
+    let reach = |index: u32| {
+        let (place, radius) = (places[index as usize], radii[index as usize]);
+        [Vec3::X, Vec3::Y, Vec3::Z]
+            .into_iter()
+            .flat_map(move |axis| [place - radius * axis, place + radius * axis])
+    };
+    outermost(&places).into_iter().flat_map(reach).map(world).collect()
 }
 
 /// Returns the outermost samples that a transfer function shows.

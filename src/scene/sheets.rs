@@ -40,7 +40,9 @@ impl Scene {
         let reaches = self.items.iter().map(|item| match item {
             Item::Radiance(set) => f64::from(set.extent) + STEP_BACK,
             Item::Scalar(set, _) => f64::from(set.extent),
-            Item::Facets(_) | Item::Solid(_) => FACET_REACH,
+            // A rod also has a radius in pixels.
+            Item::Facets(set) => FACET_REACH + f64::from(set.rods.unwrap_or(0.0)) / FOOTPRINT_BLUR,
+            Item::Solid(_) => FACET_REACH,
             Item::Gaussians(_) => f64::from(EXTENT) * TRAINED_BLUR / FOOTPRINT_BLUR,
             Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent) + STEP_BACK,
             Item::Volume(..) | Item::Bricks(..) | Item::Cells(..) => 0.0,

@@ -114,8 +114,12 @@ fn present<const N: usize>(attributes: [(&str, bool); N]) -> Value {
 
 fn of_mesh(mesh: &Mesh) -> Map<String, Value> {
     let mut facts = Map::new();
-    facts.insert("kind".into(), json!(if mesh.triangles.is_empty() { "cloud" } else { "mesh" }));
+    let is_cloud = mesh.triangles.is_empty() && mesh.lines.is_empty();
+    facts.insert("kind".into(), json!(if is_cloud { "cloud" } else { "mesh" }));
     facts.insert("triangles".into(), json!(mesh.triangles.len()));
+    if !mesh.lines.is_empty() {
+        facts.insert("lines".into(), json!(mesh.lines.len()));
+    }
     let attributes = present([
         ("position", true),
         ("normal", !mesh.normals.is_empty()),

@@ -25,7 +25,8 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-/// What a scene is made of, in the order in which it was added: each input becomes one item.
+/// What a scene is made of, in the order in which it was added. An input becomes one item, or
+/// several: the lines of a mesh, and points on no surface, have an item of their own.
 #[derive(Default)]
 pub struct Items {
     /// Where the scene is, and how it stands.
@@ -43,7 +44,8 @@ pub struct Items {
 /// An input in short.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Content {
-    /// `mesh`, `points`, `volume`, `samples`, `cells`, `gaussians`, `hierarchy` or `bricks`.
+    /// `mesh`, `points`, `lines`, `volume`, `samples`, `cells`, `gaussians`, `hierarchy` or
+    /// `bricks`.
     pub kind: &'static str,
     /// What the input is called.
     pub name: Name,
@@ -77,6 +79,11 @@ enum Entry {
     Ready(Item),
     Mesh(Box<Faceted>),
     Solid(Box<ShownSolid>),
+    /// Rods, which are splats in pictures that show no facets.
+    Rods {
+        facets: Arc<FacetSet>,
+        splats: OnceLock<Arc<SplatSet>>,
+    },
 }
 
 struct Faceted {
@@ -166,7 +173,7 @@ impl Items {
     pub(super) fn edges(&self, clips: &[Clip]) -> Vec<Arc<Edges>> {
         let of_solid = |entry: &Entry| match entry {
             Entry::Solid(own) => own.edges(clips),
-            Entry::Ready(_) | Entry::Mesh(_) => None,
+            Entry::Ready(_) | Entry::Mesh(_) | Entry::Rods { .. } => None,
         };
         let of_solids = self.entries.iter().filter_map(of_solid);
         self.edges.iter().cloned().chain(of_solids).collect()
@@ -205,7 +212,7 @@ impl Items {
     pub fn fields(&self) -> impl Iterator<Item = (usize, &Item)> {
         self.entries.iter().enumerate().filter_map(|(number, entry)| match entry {
             Entry::Ready(item) => item.transfer().map(|_| (number, item)),
-            Entry::Mesh(_) | Entry::Solid(_) => None,
+            Entry::Mesh(_) | Entry::Solid(_) | Entry::Rods { .. } => None,
         })
     }
 
@@ -244,6 +251,10 @@ impl Items {
                 Entry::Mesh(own) => Item::Radiance(own.surfels()?),
                 Entry::Solid(own) if facets => Item::Solid(own.solid.clone()),
                 Entry::Solid(own) => own.field()?,
+                Entry::Rods { facets: own, .. } if facets => Item::Facets(own.clone()),
+                Entry::Rods { facets, splats } => {
+                    Item::Radiance(splats.get_or_init(|| facets.rod_splats().into()).clone())
+                }
             });
         }
         Ok(scene)
@@ -295,9 +306,18 @@ impl Adding<'_> {
             self.items.edges.push(Edges::of(&mesh).into());
         }
         let options = showing.surfel_options(self.items.surfaces);
-        let kind = if mesh.triangles.is_empty() { "points" } else { "mesh" };
         let bounds = mesh.bounds().map(|[min, max]| Bounds { min, max });
         let fault = |error| name.fault(error);
+        if let Some(lines) = mesh.line_rods(&options).map_err(fault)? {
+            self.push_rods("lines", lines, bounds);
+        }
+        if mesh.triangles.is_empty() {
+            if mesh.lines.is_empty() {
+                return self.add_points(&mesh, &options, bounds);
+            }
+            return Ok(());
+        }
+        let kind = "mesh";
         if let Some(facets) = mesh.facets(&options).map_err(fault)? {
             let (count, own) = (facets.facets.len(), facets.bounds());
             let facets = Arc::new(facets);
@@ -315,6 +335,34 @@ impl Adding<'_> {
             self.push(kind, count, bounds.unwrap_or(own), Item::Radiance(splats.into()));
         }
         Ok(())
+    }
+
+    /// Adds a point cloud: surfels where points lie on a surface, and rods for the others.
+    fn add_points(
+        &mut self,
+        mesh: &Mesh,
+        options: &SurfelOptions,
+        bounds: Option<Bounds>,
+    ) -> Result<()> {
+        let (surfels, dots) = mesh.points(options).map_err(|error| self.name.fault(error))?;
+        if let Some(surfels) = surfels {
+            let (count, own) = (surfels.splats.len(), surfels.bounds());
+            self.push("points", count, bounds.unwrap_or(own), Item::Radiance(surfels.into()));
+        }
+        if let Some(dots) = dots {
+            self.push_rods("points", dots, bounds);
+        }
+        Ok(())
+    }
+
+    fn push_rods(&mut self, kind: &'static str, rods: FacetSet, bounds: Option<Bounds>) {
+        let (count, own) = (rods.facets.len(), rods.bounds());
+        let entry = match self.items.surfaces {
+            Surfaces::Surfels => Entry::Ready(Item::Radiance(rods.rod_splats().into())),
+            Surfaces::Facets => Entry::Ready(Item::Facets(rods.into())),
+            Surfaces::Both => Entry::Rods { facets: rods.into(), splats: OnceLock::new() },
+        };
+        self.push(kind, count, bounds.unwrap_or(own), entry);
     }
 
     fn add_gaussians(&mut self, mut set: Gaussians) {

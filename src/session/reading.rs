@@ -92,6 +92,27 @@ impl Reading {
         }
     }
 
+    /// Gives a point cloud that was read from a file the radii that an attribute of the file holds,
+    /// if one is named. Other data stays as it is.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open) and of reading; [`Error::Input`] for an attribute that points
+    /// do not have.
+    pub fn give_radii(&self, path: &Path, data: &mut Data, attribute: Option<&str>) -> Result<()> {
+        let (Some(attribute), Data::Mesh(mesh)) = (attribute, data) else { return Ok(()) };
+        let values = match self.open_colored(path, Some(attribute))?.read()? {
+            Data::Mesh(own) => own.values,
+            _ => Vec::new(),
+        };
+        if values.len() != mesh.positions.len() {
+            let message = format!("“{attribute}” is no attribute of points");
+            return Err(Error::input(path, "attributes", message)
+                .hint("`splatkit info` lists the attributes"));
+        }
+        mesh.radii = values;
+        Ok(())
+    }
+
     /// Returns the kind of an input, even if it is damaged, or larger than memory. An object on a
     /// server is not fetched if its name or its first bytes decide.
     ///

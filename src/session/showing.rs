@@ -4,14 +4,15 @@ use super::{Appearance, Coloring};
 use crate::{
     Deadline, Error, Result,
     cells::{SolidOptions, Tint},
+    facet::Size,
     math::Kernel,
     scattered::SampleOptions,
-    surface::SurfelOptions,
+    surface::{PointStyle, SurfelOptions},
 };
 use serde::{Deserialize, Serialize};
 
 /// How one input is shown. What is not given follows from its data.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Showing {
     /// How values are shown, and how surfaces are coloured.
     pub appearance: Appearance,
@@ -27,6 +28,14 @@ pub struct Showing {
     pub crease: Option<f32>,
     /// The share of the light that a surface absorbs, above 0 to 1.
     pub opacity: Option<f32>,
+    /// How points are drawn.
+    pub points: PointStyle,
+    /// The diameter of points that are drawn as balls or discs.
+    pub point_size: Option<Size>,
+    /// The array that holds the radii of points ([`Reading::give_radii`](super::Reading::give_radii)).
+    pub point_radius: Option<String>,
+    /// The width of lines.
+    pub line_width: Option<Size>,
     /// Whether the edges of triangles are drawn.
     pub draws_edges: bool,
     /// How cells are drawn; by default as a solid, unless another option shows the field inside.
@@ -38,6 +47,29 @@ pub struct Showing {
     pub values_by: Option<String>,
     /// By when the splats must be made.
     pub deadline: Deadline,
+}
+
+impl Default for Showing {
+    fn default() -> Self {
+        Self {
+            appearance: Appearance::default(),
+            kernel: Kernel::default(),
+            is_sharp: false,
+            samples: SampleOptions::default(),
+            radius_scale: None,
+            crease: None,
+            opacity: None,
+            points: PointStyle::Auto,
+            point_size: None,
+            point_radius: None,
+            line_width: None,
+            draws_edges: false,
+            cells: None,
+            is_named: false,
+            values_by: None,
+            deadline: Deadline::default(),
+        }
+    }
 }
 
 /// How cells are drawn.
@@ -139,6 +171,8 @@ impl Showing {
     /// Returns how a mesh or point cloud becomes surfels or facets.
     pub fn surfel_options(&self, surfaces: Surfaces) -> SurfelOptions {
         let mut options = SurfelOptions { deadline: self.deadline, ..SurfelOptions::default() };
+        (options.points, options.point_size) = (self.points, self.point_size);
+        options.line_width = self.line_width;
         options.radius_scale *= self.radius_scale.unwrap_or(1.0);
         options.color_by_normal = self.coloring().by_normal();
         // Triangles of one plane still join.

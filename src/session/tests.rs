@@ -14,7 +14,7 @@ use crate::{
     cells::{CellKind, Cells},
     math::Bounds,
     scene::{Clip, ClipShape, Item},
-    surface::Mesh,
+    surface::{Mesh, PointStyle},
     volume::{Lattice, Samples, Volume},
 };
 use glam::{DMat3, DVec3, Vec3};
@@ -330,4 +330,53 @@ fn an_input_that_cannot_be_shown_changes_nothing() {
     items.restore(mark);
     assert_eq!((items.count(), items.captions().legends.len()), (count, 0));
     assert!(items.set_transfer(0, Default::default()).is_err());
+}
+
+/// Points in a ball, in an order without a pattern.
+fn ball(count: usize) -> Vec<Vec3> {
+    let part = |i: usize, factor: f64| ((i as f64 * factor).fract() * 2.0 - 1.0) as f32;
+    let place = |i: usize| {
+        Vec3::new(part(i, 0.819_172_513), part(i, 0.671_043_607), part(i, 0.549_700_478))
+    };
+    (0..).map(place).filter(|place| place.length() < 1.0).take(count).collect()
+}
+
+/// Points that fill space are balls, those on a surface surfels, and a file with both has both;
+/// lines are tubes beside the triangles.
+#[test]
+fn points_and_lines_have_items_of_their_own() {
+    let sphere = Mesh::sphere(4).positions;
+    let apart: Vec<Vec3> = ball(2000).iter().map(|p| *p * 0.7 + Vec3::X * 3.0).collect();
+    let cloud = |positions: Vec<Vec3>| Mesh { positions, ..Mesh::default() };
+    let edges = Mesh { lines: vec![[0, 1], [1, 2]], ..triangle() };
+    let only = Mesh { triangles: Vec::new(), ..edges.clone() };
+    let cases = [
+        ("a surface", cloud(sphere.clone()), PointStyle::Auto, &["points"][..], &[false][..]),
+        ("a ball", cloud(ball(2000)), PointStyle::Auto, &["points"], &[true]),
+        (
+            "both",
+            cloud([sphere.clone(), apart].concat()),
+            PointStyle::Auto,
+            &["points"; 2],
+            &[false, true],
+        ),
+        ("surfels", cloud(ball(2000)), PointStyle::Surfels, &["points"], &[false]),
+        ("spheres", cloud(sphere), PointStyle::Spheres, &["points"], &[true]),
+        ("few", cloud(ball(5)), PointStyle::Auto, &["points"], &[true]),
+        ("edges", edges, PointStyle::Auto, &["lines", "mesh"], &[true, true]),
+        ("lines", only, PointStyle::Auto, &["lines"], &[true]),
+    ];
+    for (name, mesh, points, kinds, facets) in cases {
+        let mut items = Items::new(Surfaces::Both);
+        let showing = Showing { points, ..Showing::default() };
+        items.add(&Name::of_file("a.ply".as_ref()), Data::Mesh(mesh), &showing, &|_| ()).unwrap();
+        let found: Vec<&str> = items.contents.iter().map(|content| content.kind).collect();
+        assert_eq!(found, kinds, "{name}");
+        let [with, without] = [true, false].map(|facets| items.scene(facets).unwrap());
+        let is_facets = |item: &Item| matches!(item, Item::Facets(_));
+        assert_eq!(with.items.iter().map(is_facets).collect::<Vec<_>>(), facets, "{name}");
+        assert!(without.items.iter().all(|item| matches!(item, Item::Radiance(_))), "{name}");
+        with.validate().unwrap();
+        without.validate().unwrap();
+    }
 }

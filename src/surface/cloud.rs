@@ -1,22 +1,24 @@
 //! Surfels of a point cloud: the plane and the spacing of each point come from its nearest
-//! neighbours.
+//! neighbours. Points on no surface are rods: balls or discs.
 
 use super::{
-    Mesh, SurfelOptions,
+    Mesh, PointStyle, SurfelOptions,
     ellipse::{Tensor, factor, lower},
     opacity::{Absorbed, share_of},
     orient::{Known, orient},
     paint::{of_normal, pack, point_color},
+    planar::{is_flat_of_few, off_surface, scatter},
 };
 use crate::{
-    Deadline, Result,
+    Result,
     deadline::Clock,
+    facet::{Facet, REACH, Relief, Rod, Size},
     math::{eigen, neighbours::Neighbours},
     memory,
     parallel::prelude::*,
     splat::{NO_NORMAL, Splat, encode_normal},
 };
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 
 /// Neighbours that a point's plane and spacing are computed from.
@@ -39,10 +41,17 @@ const LARGEST: f32 = 16.0;
 const WORK: &str = "finding the neighbours of points";
 /// Bytes of temporary memory per point: the tree, its neighbourhood, the edges of the graph that
 /// orients normals, and its surfel.
-const OF_POINT: u64 = 330;
+const OF_POINT: u64 = 340;
+
+/// The radius of a ball, as a part of the usual distance of points on no surface from their nearest
+/// neighbours: they nearly touch.
+const BALL: f32 = 0.45;
+/// The least radius of points of automatic size, and of those whose size is one of the world, in
+/// pixels.
+const LEAST_PIXELS: [f32; 2] = [1.0, 0.5];
 
 /// The neighbours of a point; filled up with the point itself if there are fewer.
-type Nearest = [u32; COUNT];
+pub(super) type Nearest = [u32; COUNT];
 
 /// The neighbourhood of a point.
 #[derive(Default)]
@@ -59,6 +68,19 @@ struct Surroundings {
     stretch: f32,
     /// Points at the place of this one, which counts too.
     crowd: u8,
+    /// Distance to the nearest neighbour.
+    first: f32,
+    /// The neighbours lie on a plane.
+    is_flat: bool,
+}
+
+/// What a cloud is drawn as.
+#[derive(Default)]
+pub(super) struct Parts {
+    /// The surfels of the points on surfaces.
+    pub surfels: Vec<Splat>,
+    /// The other points, which are rods.
+    pub dots: Vec<Facet>,
 }
 
 /// Makes surfels in the order of the points. Of points that coincide, only the first produces one.
@@ -66,8 +88,32 @@ struct Surroundings {
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
 pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>> {
-    let judged = Judged::new(mesh, Known::default(), options.deadline)?;
+    let judged = Judged::new(mesh, Known::default(), options)?;
     Ok(judged.places.par_iter().map(|&place| judged.surfel(place as usize, options)).collect())
+}
+
+/// Makes the surfels of the points on surfaces and the rods of the others, as the options say, each
+/// in the order of the points. Where some point is not opaque, all are surfels: rods are opaque.
+///
+/// # Errors
+/// Those of [`surfels`].
+pub(super) fn parts(mesh: &Mesh, options: &SurfelOptions) -> Result<Parts> {
+    let judged = Judged::new(mesh, Known::default(), options)?;
+    let wants = |place: u32| judged.dots.off[place as usize];
+    let is_opaque = |&place: &u32| {
+        let color = point_color(mesh, judged.kept[place as usize] as usize);
+        options.absorbed(color[3], || 1.0).alpha == 1.0
+    };
+    let (dots, others): (Vec<u32>, Vec<u32>) =
+        match judged.places.par_iter().all(|place| !wants(*place) || is_opaque(place)) {
+            true => judged.places.iter().partition(|&&place| wants(place)),
+            false => (Vec::new(), judged.places.clone()),
+        };
+    options.deadline.check(WORK)?;
+    Ok(Parts {
+        surfels: others.par_iter().map(|&at| judged.surfel(at as usize, options)).collect(),
+        dots: dots.par_iter().map(|&at| judged.rod(at as usize, options).into()).collect(),
+    })
 }
 
 /// Makes the surfels of the wanted points, and returns them with their indices. `known` refers to
@@ -78,7 +124,7 @@ pub(super) fn some_surfels(
     known: Known,
     is_wanted: impl Fn(usize) -> bool + Sync,
 ) -> Result<Vec<(u32, Splat)>> {
-    let judged = Judged::new(mesh, known, options.deadline)?;
+    let judged = Judged::new(mesh, known, options)?;
     let wanted = judged.places.par_iter().map(|&place| place as usize);
     let wanted = wanted.filter(|&place| is_wanted(judged.kept[place] as usize));
     Ok(wanted.map(|place| (judged.kept[place], judged.surfel(place, options))).collect())
@@ -98,10 +144,22 @@ struct Judged<'a> {
     lone: Vec<bool>,
     normals: Vec<Vec3>,
     free: Vec<bool>,
+    dots: Dots,
+}
+
+/// The points that are drawn as rods, because they lie on no surface.
+struct Dots {
+    /// Whether each point is one.
+    off: Vec<bool>,
+    /// The usual distance from the nearest neighbour around each; empty if no point is a rod.
+    gaps: Vec<f32>,
+    /// The size of a pixel where pixels have none: that of a picture of the whole cloud.
+    pixel: f32,
 }
 
 impl<'a> Judged<'a> {
-    fn new(mesh: &'a Mesh, mut known: Known, deadline: Deadline) -> Result<Self> {
+    fn new(mesh: &'a Mesh, mut known: Known, options: &SurfelOptions) -> Result<Self> {
+        let deadline = options.deadline;
         memory::room(WORK, OF_POINT.saturating_mul(mesh.positions.len() as u64))?;
         let first = Neighbours::first_of_equals(&mesh.positions);
         let kept: Vec<u32> = (0..)
@@ -155,11 +213,62 @@ impl<'a> Judged<'a> {
             orient(&points, &spacing, &nearest, &free, &known, &mut normals);
         }
         deadline.check(WORK)?;
-        Ok(Self { mesh, places, kept, points, around, spacing, lone, normals, free })
+        let dots = Dots::new(mesh, (&points, &nearest, &around), &kept, &spacing, options)?;
+        Ok(Self { mesh, places, kept, points, around, spacing, lone, normals, free, dots })
+    }
+
+    /// Makes the rod of the point at a rank in the order: a ball, or a disc that faces the eye.
+    fn rod(&self, at: usize, options: &SurfelOptions) -> Rod {
+        let index = self.kept[at] as usize;
+        let [radius, pixels] = self.radius(at, options);
+        let given = self.mesh.given_normal(index);
+        let [red, green, blue, _] = match (options.color_by_normal, given) {
+            (true, Some(normal)) => pack(of_normal(encode_normal(normal))).to_le_bytes(),
+            _ => pack(point_color(self.mesh, index)).to_le_bytes(),
+        };
+        let ball = Rod::ball(self.points[at], radius, [red, green, blue]);
+        let is_flat = options.points == PointStyle::Dots;
+        let relief = if is_flat { Relief::Flat(given) } else { Relief::Round };
+        Rod { pixels, relief, ..ball }
+    }
+
+    /// Makes the splat that stands for a point's rod where only splats are drawn.
+    fn round_splat(&self, at: usize, options: &SurfelOptions) -> Splat {
+        let [mut radius, pixels] = self.radius(at, options);
+        if radius == 0.0 {
+            radius = pixels * self.dots.pixel;
+        }
+        let mut color = point_color(self.mesh, self.kept[at] as usize);
+        let Absorbed { strength, alpha } = options.absorbed(color[3], || 1.0);
+        color[3] = alpha;
+        let width = f64::from((radius / REACH).max(f32::MIN_POSITIVE));
+        Splat {
+            center: self.points[at].to_array(),
+            strength,
+            factor: lower([DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * width)),
+            color: pack(color),
+            normal: NO_NORMAL,
+        }
+    }
+
+    /// Returns the radius of a point's rod in world units, and the least one in pixels.
+    fn radius(&self, at: usize, options: &SurfelOptions) -> [f32; 2] {
+        let [automatic, least] = LEAST_PIXELS;
+        let own = self.mesh.radii.get(self.kept[at] as usize);
+        let [radius, pixels] = match (own.filter(|own| own.is_finite()), options.point_size) {
+            (Some(radius), _) => [radius.max(0.0), least],
+            (None, Some(Size::World(size))) => [0.5 * size, least],
+            (None, Some(Size::Pixels(size))) => [0.0, 0.5 * size],
+            (None, None) => [BALL * self.dots.gaps[at], automatic],
+        };
+        [radius * options.radius_scale, pixels * options.radius_scale.min(1.0)]
     }
 
     /// Makes the surfel of the point at a rank in the order.
     fn surfel(&self, at: usize, options: &SurfelOptions) -> Splat {
+        if self.dots.off[at] {
+            return self.round_splat(at, options);
+        }
         // Points with spacings near the smallest float still have a width.
         let width =
             f64::from((self.spacing[at] * SPREAD * options.radius_scale).max(f32::MIN_POSITIVE));
@@ -185,6 +294,45 @@ impl<'a> Judged<'a> {
             normal: packed,
         }
     }
+}
+
+impl Dots {
+    fn new(
+        mesh: &Mesh,
+        (points, nearest, around): (&[Vec3], &[Nearest], &[Surroundings]),
+        kept: &[u32],
+        spacing: &[f32],
+        options: &SurfelOptions,
+    ) -> Result<Self> {
+        let is_sized = options.point_size.is_some() || !mesh.radii.is_empty();
+        let off = match options.points {
+            PointStyle::Surfels => vec![false; points.len()],
+            PointStyle::Auto if !is_sized => {
+                let is_flat: Vec<bool> = around.par_iter().map(|around| around.is_flat).collect();
+                let has_normal = |at: usize| mesh.given_normal(kept[at] as usize).is_some();
+                off_surface(points, nearest, &is_flat, has_normal, options.deadline, WORK)?
+            }
+            PointStyle::Auto | PointStyle::Spheres | PointStyle::Dots => vec![true; points.len()],
+        };
+        let count = off.par_iter().filter(|off| **off).count();
+        if count > 0 && options.points == PointStyle::Auto {
+            tracing::info!(count, "points lie on no surface; they are drawn as balls");
+        }
+        let gaps = if count > 0 { gaps(around, nearest, spacing) } else { Vec::new() };
+        let diagonal = mesh.local_bounds().map_or(0.0, |[low, high]| low.distance(high));
+        Ok(Self { off, gaps, pixel: diagonal * Size::PIXEL })
+    }
+}
+
+/// Returns the usual distance from the nearest neighbour around each point.
+fn gaps(around: &[Surroundings], nearest: &[Nearest], spacing: &[f32]) -> Vec<f32> {
+    let gap = |(at, nearest): (usize, &Nearest)| {
+        let mut others = nearest.map(|index| around[index as usize].first);
+        let usual = *others.select_nth_unstable_by(COUNT / 2, f32::total_cmp).1;
+        // Points that coincide have no distance.
+        if usual > 0.0 { usual.min(spacing[at]) } else { 0.5 * spacing[at] }
+    };
+    nearest.par_iter().enumerate().map(gap).collect()
 }
 
 /// Returns the spacing around each point, and which points are isolated. An isolated point takes
@@ -296,13 +444,8 @@ fn surroundings(
     let found = tree.of(index, COUNT * crowd);
     let center = points[index as usize];
     let offsets = || found.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
-    let mean = offsets().sum::<DVec3>() / (found.len() + 1) as f64;
-    let mut scatter = DMat3::ZERO;
-    for offset in offsets().chain([DVec3::ZERO]) {
-        let d = offset - mean;
-        scatter += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
-    }
-    let ([large, middle, _], axes) = eigen(scatter);
+    let (values, axes) = eigen(scatter(offsets));
+    let [large, middle, _] = values;
     let is_plane = middle > large * 1e-4;
     let mut nearest = [places[index as usize]; COUNT];
     let last = found.last().map_or(0.0, |&(distance, _)| distance);
@@ -316,6 +459,8 @@ fn surroundings(
         distance,
         area: area(&found, distance, crowd),
         crowd: same as u8 + 1,
+        first: found.get(crowd - 1).map_or(0.0, |&(distance, _)| distance),
+        is_flat: is_flat_of_few(values),
         normal: if is_plane { axes[2].as_vec3() } else { Vec3::ZERO },
         long: axes[0].as_vec3(),
         stretch: if is_plane { (large / middle).sqrt().min(2.0) as f32 } else { 1.0 },

@@ -152,7 +152,8 @@ impl Mesh {
             true => Default::default(),
             false => images(&mesh, &numbers, is_turned),
         };
-        let set = FacetSet { origin: self.origin, facets, sides, images, shown, whole: None };
+        let (whole, rods) = (None, None);
+        let set = FacetSet { origin: self.origin, facets, sides, images, shown, whole, rods };
         Ok((!set.facets.is_empty()).then_some(set))
     }
 

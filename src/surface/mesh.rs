@@ -9,7 +9,7 @@ use crate::{
 use glam::{DMat3, DVec3, Vec2, Vec3};
 use std::{ops::Range, sync::Arc};
 
-/// A triangle mesh, or a point cloud if it has no triangles.
+/// A triangle mesh, lines, or a point cloud if it has neither triangles nor lines.
 ///
 /// Positions are in the file's own unit, relative to `origin`, so that geo-referenced doubles keep
 /// their precision in 32 bits. Optional attributes are either empty or as long as `positions`.
@@ -45,6 +45,10 @@ pub struct Mesh {
     pub uvs: Vec<Vec2>,
     /// Vertex indices, counter-clockwise from outside. Polygons are already split into triangles.
     pub triangles: Vec<[u32; 3]>,
+    /// The segments of lines, as vertex indices. Lines are drawn as tubes
+    /// ([`line_rods`](Self::line_rods)); a mesh without triangles, but with lines, is no point
+    /// cloud.
+    pub lines: Vec<[u32; 2]>,
     /// The material of each triangle, an index into `materials`; empty if there are none.
     pub triangle_materials: Vec<u32>,
     /// The materials that `triangle_materials` refers to.
@@ -55,6 +59,9 @@ pub struct Mesh {
     /// One value of each vertex, to colour it by; empty if the file has none, or none was asked
     /// for. NaN where a vertex has no value. `about` has the name and the unit.
     pub values: Vec<f32>,
+    /// The radius of each point of a cloud, in world units; empty if none was asked for. Points have
+    /// the usual radius where this is not finite.
+    pub radii: Vec<f32>,
     /// How `values` colour the mesh instead of its own colours; `None` if they do not
     /// ([`paint`](Self::paint)).
     pub scale: Option<ColorScale>,
@@ -75,6 +82,8 @@ impl Mesh {
             size_of_val(&triangles[..]),
             size_of_val(&triangle_materials[..]),
             size_of_val(&values[..]),
+            size_of_val(&self.radii[..]),
+            size_of_val(&self.lines[..]),
         ];
         arrays.iter().map(|&bytes| bytes as u64).sum()
     }

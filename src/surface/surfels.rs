@@ -11,7 +11,7 @@
 use super::{
     Mesh,
     adjacency::{Connected, is_split},
-    cloud,
+    cloud::{self, Parts},
     fan::{Made, Maker, Sums},
     fan_rules::{LEAST_RATIO_SQUARED, LEAST_SQUARE},
     refine::{Origin, budget, count_of_refined, is_fine, refine},
@@ -20,13 +20,44 @@ use super::{
 use crate::{
     Deadline, Error, Result,
     deadline::Clock,
+    facet::{FacetSet, Size},
     memory,
     parallel::prelude::*,
     splat::{Payload, Splat, SplatSet},
 };
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
-use std::{borrow::Cow, ops::RangeInclusive};
+use std::{borrow::Cow, ops::RangeInclusive, str::FromStr};
+
+/// How the points of a cloud are drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub enum PointStyle {
+    /// Points on surfaces are surfels; others, and all whose size is given, are balls.
+    Auto,
+    /// Discs in the plane of a point's neighbours, which overlap to a surface.
+    #[default]
+    Surfels,
+    /// Balls.
+    Spheres,
+    /// Flat discs that face the eye: lit by the file's normals, or not at all.
+    Dots,
+}
+
+impl FromStr for PointStyle {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        Ok(match text {
+            "auto" => Self::Auto,
+            "surfels" => Self::Surfels,
+            "spheres" => Self::Spheres,
+            "dots" => Self::Dots,
+            _ => return Err("points are auto, surfels, spheres or dots".into()),
+        })
+    }
+}
 
 /// How surfels are made from a mesh or point cloud.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,6 +83,15 @@ pub struct SurfelOptions {
     /// exactly. In pictures of usual sizes, the triangles of a larger mesh are no larger than
     /// pixels. 0 draws surfels always.
     pub most_facets: usize,
+    /// How the points of a cloud are drawn.
+    #[serde(default)]
+    pub points: PointStyle,
+    /// The diameter of points that are balls or discs; by their distances if `None`.
+    #[serde(default)]
+    pub point_size: Option<Size>,
+    /// The width of lines; [`LINE_WIDTH`](Self::LINE_WIDTH) if `None`.
+    #[serde(default)]
+    pub line_width: Option<Size>,
     /// When the surfels must be ready.
     #[serde(skip)]
     pub deadline: Deadline,
@@ -60,6 +100,8 @@ pub struct SurfelOptions {
 impl SurfelOptions {
     /// Factors on radii whose squares fit in 32 bits.
     pub const RADIUS_SCALES: RangeInclusive<f32> = 1e-6..=1e6;
+    /// The usual width of lines.
+    pub const LINE_WIDTH: Size = Size::Pixels(3.0);
     /// Fractions of the diagonal down to which edges can be cut. At smaller ones the fourth power
     /// does not fit in 32 bits. From 1 on, no edge is cut.
     pub const SPACINGS: RangeInclusive<f32> = 1e-9..=f32::MAX;
@@ -94,6 +136,9 @@ impl SurfelOptions {
                 )));
             }
         }
+        for (name, size) in [("point_size", self.point_size), ("line_width", self.line_width)] {
+            size.map_or(Ok(()), |size| size.validate(name))?;
+        }
         Ok(())
     }
 
@@ -113,6 +158,9 @@ impl Default for SurfelOptions {
             most_triangles: 1 << 23,
             color_by_normal: false,
             most_facets: 1 << 20,
+            points: PointStyle::Surfels,
+            point_size: None,
+            line_width: None,
             deadline: Deadline::NEVER,
         }
     }
@@ -128,8 +176,8 @@ const WORK: &str = "making surfels";
 const CHUNK: usize = 1 << 12;
 
 impl Mesh {
-    /// Makes surfels that cover the triangles without holes, or, without triangles, stand for the
-    /// points. Lengths are in world units and centres are relative to the mesh's origin. The order
+    /// Makes surfels that cover the triangles without holes, stand for lines, or, without either, for
+    /// the points. Lengths are in world units and centres are relative to the mesh's origin. The order
     /// depends on the input only.
     ///
     /// Colours are vertex colour × material × texture. A surfel has the file's normal at its vertex
@@ -153,21 +201,47 @@ impl Mesh {
     pub fn surfels(&self, options: &SurfelOptions) -> Result<SplatSet> {
         let _span = tracing::info_span!("surfels").entered();
         self.check(options)?;
-        let splats = if self.triangles.is_empty() {
-            cloud::surfels(self, options)?
-        } else {
-            of_triangles(self, options)?
+        let mut splats = match (self.triangles.is_empty(), self.lines.is_empty()) {
+            (true, true) => cloud::surfels(self, options)?,
+            (true, false) => Vec::new(),
+            (false, _) => of_triangles(self, options)?,
         };
+        if let Some(lines) = self.line_rods(options)? {
+            splats.extend(lines.rod_splats().splats);
+        }
         if splats.is_empty() {
             return Err(self.nothing());
         }
-        Ok(SplatSet {
+        Ok(self.set_of(splats))
+    }
+
+    /// Returns a point cloud as [`points`](SurfelOptions::points) says: the surfels of the points on
+    /// surfaces, and the other points as [rods](crate::facet::Rod), which are balls or discs. Where
+    /// some point is not opaque, all are surfels. Lengths are in world units, and centres are
+    /// relative to the mesh's origin. The order depends on the input only.
+    ///
+    /// # Errors
+    /// As [`surfels`](Self::surfels).
+    pub fn points(&self, options: &SurfelOptions) -> Result<(Option<SplatSet>, Option<FacetSet>)> {
+        let _span = tracing::info_span!("points").entered();
+        self.check(options)?;
+        let Parts { surfels, dots } = cloud::parts(self, options)?;
+        if surfels.is_empty() && dots.is_empty() {
+            return Err(self.nothing());
+        }
+        let surfels = (!surfels.is_empty()).then(|| self.set_of(surfels));
+        let dots = (!dots.is_empty()).then(|| FacetSet::of_rods(self.origin, dots));
+        Ok((surfels, dots))
+    }
+
+    fn set_of(&self, splats: Vec<Splat>) -> SplatSet {
+        SplatSet {
             origin: self.origin,
             payload: Payload::Radiance,
             splats,
             extent: EXTENT,
             overlap: 1.0,
-        })
+        }
     }
 
     /// Returns the smallest and the largest world coordinates of what is drawn: the corners of all
@@ -182,7 +256,7 @@ impl Mesh {
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let with = |(low, high): (Vec3, Vec3), place: &Vec3| (low.min(*place), high.max(*place));
         let union = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
-        let (low, high) = if self.triangles.is_empty() {
+        let (low, high) = if self.triangles.is_empty() || !self.lines.is_empty() {
             self.positions.par_iter().fold(none, with).reduce(none, union)
         } else {
             let places =
@@ -244,6 +318,11 @@ impl Mesh {
                 "a triangle refers beyond the mesh's {count} vertices"
             )));
         }
+        if !self.lines.par_iter().all(|line| line.iter().all(|&index| (index as usize) < count)) {
+            return Err(Error::Argument(format!(
+                "a line refers beyond the mesh's {count} vertices"
+            )));
+        }
         if !self.triangle_materials.par_iter().all(|&index| (index as usize) < self.materials.len())
         {
             return Err(Error::Argument(
@@ -286,6 +365,7 @@ impl Mesh {
             ("colors", self.colors.len(), count),
             ("uvs", self.uvs.len(), count),
             ("values", self.values.len(), count),
+            ("radii", self.radii.len(), count),
             ("triangle_materials", self.triangle_materials.len(), self.triangles.len()),
         ] {
             if length != 0 && length != wanted {

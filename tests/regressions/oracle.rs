@@ -125,6 +125,10 @@ fn sound_mesh(mesh: &Mesh) {
         mesh.triangles.iter().flatten().all(|&index| (index as usize) < count),
         "an index is out of range"
     );
+    assert!(
+        mesh.lines.iter().flatten().all(|&index| (index as usize) < count),
+        "an end of a line is out of range"
+    );
     assert!(mesh.triangle_materials.iter().all(|&index| (index as usize) < mesh.materials.len()));
     assert!(
         mesh.sensors.iter().all(|sensor| sensor.position.is_finite() && sensor.points.end <= count)

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use splatkit::{
     cells::{CellKind, Cells, Solid, SolidOptions, Tint},
     color::{ColorMap, ColorScale},
-    facet::{FacetSet, Sides},
+    facet::{Facet, FacetSet, Relief, Rod, Sides},
     math::{Bounds, Projection},
     scene::{Clip, ClipShape, Scene, Settings},
     surface::{Material, Mesh, SurfelOptions, Texture},
@@ -129,7 +129,77 @@ pub fn cut_solid() -> Case {
     Case { name: "cut_solid", settings: Settings { clips, ..settings() }, ..solid() }
 }
 
-pub fn all() -> [Case; 7] {
+/// Tubes with bends, balls that meet, and discs, some of them thinner than a pixel.
+fn rods() -> Vec<Rod> {
+    let place = |i: usize| {
+        let turn = i as f32 * 0.31;
+        Vec3::new(0.8 * turn.cos(), 0.8 * turn.sin(), 0.04 * i as f32 - 0.8)
+    };
+    let color = |i: usize| [(40 + 5 * i) as u8, (250 - 5 * i) as u8, (80 + (97 * i) % 160) as u8];
+    let tube = (0..40).map(|i| Rod {
+        ends: [place(i), place(i + 1)],
+        radii: [0.03 + 0.001 * i as f32, 0.031 + 0.001 * i as f32],
+        pixels: 0.0,
+        colors: [color(i), color(i + 1)],
+        relief: Relief::Round,
+        joints: ((i > 0).then(|| (place(i) - place(i.max(1) - 1)).normalize()), i < 39),
+    });
+    let thin = (0..12).map(|i| Rod {
+        ends: [place(3 * i) * 0.6, Vec3::new(0.1, -0.2, 0.9 - 0.1 * i as f32)],
+        radii: [0.0; 2],
+        pixels: 0.2 + 0.3 * i as f32,
+        colors: [color(i); 2],
+        relief: if i % 3 == 0 { Relief::Flat(None) } else { Relief::Round },
+        joints: (None, false),
+    });
+    let balls = (0..30).map(|i| {
+        let radius = if i % 4 == 0 { 0.004 } else { 0.12 };
+        let flat = Relief::Flat((i % 2 == 0).then_some(Vec3::new(0.6, 0.0, 0.8)));
+        Rod {
+            relief: if i % 5 == 0 { flat } else { Relief::Round },
+            ..Rod::ball(place(7 * i) * Vec3::new(0.5, 0.5, 0.2), radius, color(i))
+        }
+    });
+    tube.chain(thin).chain(balls).collect()
+}
+
+fn set_of(rods: Vec<Rod>) -> FacetSet {
+    FacetSet::of_rods(ORIGIN, rods.into_iter().map(Facet::from).collect())
+}
+
+pub fn tubes_and_balls() -> Case {
+    case("tubes_and_balls", Scene::new().with_facets(set_of(rods())), PERSPECTIVE)
+}
+
+/// The same with parallel rays, clipped.
+pub fn clipped_tubes_and_balls() -> Case {
+    let clips = methods::clipped_surface_in_a_volume().settings.clips;
+    let parallel = Projection::Orthographic { height: 1.6 };
+    let case = case("clipped_tubes_and_balls", Scene::new().with_facets(set_of(rods())), parallel);
+    Case { settings: Settings { clips, ..settings() }, ..case }
+}
+
+/// The eye among rods, of which some pass it.
+pub fn inside_rods() -> Case {
+    let mut case = case(
+        "inside_rods",
+        Scene::new().with_facets(set_of(rods())),
+        Projection::Perspective { view_angle: 80.0 },
+    );
+    case.camera.position = ORIGIN + glam::DVec3::new(0.3, -0.2, 0.1);
+    case.camera.focal_point = ORIGIN + glam::DVec3::new(-1.0, 0.5, 0.2);
+    case
+}
+
+/// Rods, triangles, surfels and a volume in the same sheets.
+pub fn rods_among_others() -> Case {
+    let triangles = facets(Mesh::slivers(24), Sides::Closed).facets;
+    let all = triangles.into_iter().chain(set_of(rods()).facets).collect();
+    let scene = mixed_scene().with_facets(FacetSet::of_rods(ORIGIN, all));
+    case("rods_among_others", scene, PERSPECTIVE)
+}
+
+pub fn all() -> [Case; 11] {
     [
         gear(),
         folded_sheet(),
@@ -138,5 +208,9 @@ pub fn all() -> [Case; 7] {
         facets_in_a_volume(),
         solid(),
         cut_solid(),
+        tubes_and_balls(),
+        clipped_tubes_and_balls(),
+        inside_rods(),
+        rods_among_others(),
     ]
 }

@@ -33,6 +33,9 @@ pub const CELLS: Kinds = 1 << 7;
 /// Trained 3D Gaussians.
 pub const GAUSSIANS: Kinds = 1 << 8;
 
+/// Lines, alone or beside triangles.
+pub const LINES: Kinds = 1 << 9;
+
 /// Any input.
 pub const ALL: Kinds = Kinds::MAX;
 
@@ -63,6 +66,10 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("sharp", LATTICE),
     ("radius-scale", MESH | CLOUD),
     ("opacity", MESH | CLOUD | CELLS),
+    ("points", CLOUD),
+    ("point-size", CLOUD),
+    ("point-radius", CLOUD),
+    ("line-width", LINES),
     ("crease", MESH | CELLS),
     ("edges", MESH | CELLS),
     ("cells", CELLS),
@@ -86,13 +93,14 @@ const READ_BY: &[(&str, &[&str])] = &[
 ];
 
 /// The names of kinds, for messages.
-const NAMES: [(Kinds, &str, &str); 9] = [
+const NAMES: [(Kinds, &str, &str); 10] = [
     (MESH, "meshes", "a mesh"),
     (CLOUD, "point clouds", "a point cloud"),
     (HIERARCHY, "hierarchies", "a hierarchy"),
     (VOLUME, "volumes", "a volume"),
     (BRICKS, "volumes in bricks", "a volume in bricks"),
     (SAMPLES, "scattered samples", "a set of samples"),
+    (LINES, "lines", "a set of lines"),
     (CELLS, "cells", "a set of cells"),
     (GAUSSIANS, "trained Gaussians", "a set of trained Gaussians"),
     (RAW, "raw volumes", "a raw volume"),
@@ -225,6 +233,7 @@ impl Given {
 /// Returns what a loaded input is.
 pub fn kinds_of_input(input: &LoadedInput) -> Kinds {
     match (input.kind, input.is_cloud) {
+        (Kind::Mesh, _) if input.has_lines => MESH | LINES,
         (Kind::Mesh, true) => CLOUD,
         (Kind::Mesh, false) => MESH,
         (Kind::Volume, _) if input.is_raw => VOLUME | RAW,
@@ -240,6 +249,7 @@ pub fn kinds_of_input(input: &LoadedInput) -> Kinds {
 /// Returns what an input is. `is_raw`: the flags give its layout.
 pub fn kinds_of(input: &Data, is_raw: bool) -> Kinds {
     match input {
+        Data::Mesh(mesh) if !mesh.lines.is_empty() => MESH | LINES,
         Data::Mesh(mesh) if mesh.triangles.is_empty() => CLOUD,
         Data::Mesh(_) => MESH,
         Data::Volume(_) if is_raw => VOLUME | RAW,

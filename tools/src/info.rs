@@ -21,6 +21,7 @@ const ORDER: &[&str] = &[
     "kind",
     "count",
     "triangles",
+    "lines",
     "points",
     "cells",
     "dims",

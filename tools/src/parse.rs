@@ -5,7 +5,7 @@ use glam::DVec3;
 use splatkit::{
     formats::{Endian, SampleType},
     input::address,
-    surface::SurfelOptions,
+    surface::{PointStyle, SurfelOptions},
 };
 use std::{path::PathBuf, str::FromStr};
 
@@ -113,6 +113,11 @@ pub fn radius_scale(text: &str) -> Result<f32, String> {
     fits.ok_or_else(|| {
         format!("a number from {:e} to {:e} is needed", scales.start(), scales.end())
     })
+}
+
+/// How points are drawn.
+pub fn points(text: &str) -> Result<PointStyle, String> {
+    text.parse()
 }
 
 /// Degrees from 0 to 180.

@@ -171,6 +171,7 @@ mod tests {
             "--x-ray --cut 3.5 --engine cpu",
             "--budget 1000 --engine gpu",
             "--frame-time 16.5",
+            "--cells volume --points dots --point-size 3px --point-radius r --line-width 0.25",
             "--clip x<50% --cut-out box:0,0,0%:1,2,50% --clip plane:1,0,0,2.5",
             "--view iso --azimuth -20 --elevation 5 --zoom 1.5 --orthographic --up +Z",
             "--camera-position 1,2,3 --focal-point 0,0,0.5 --view-up 0,1,0 --view-angle 50",

@@ -324,7 +324,14 @@ fn strips_fans_and_points() {
     assert_eq!(load_json(&with(6)).expect("loads").triangles, [[0, 1, 2], [0, 2, 0]]);
     let cloud = load_json(&with(0)).expect("loads");
     assert_eq!((cloud.positions.len(), cloud.triangles.len()), (4, 0));
-    assert!(load_json(&with(1)).expect_err("lines only").to_string().contains("no meshes"));
+    for (mode, lines) in [
+        (1, &[[0, 1], [2, 0]][..]),
+        (2, &[[0, 1], [1, 2], [2, 0], [0, 0]]),
+        (3, &[[0, 1], [1, 2], [2, 0]]),
+    ] {
+        let mesh = load_json(&with(mode)).expect("loads");
+        assert_eq!((mesh.lines, mesh.triangles.len()), (lines.to_vec(), 0), "mode {mode}");
+    }
 }
 
 #[test]

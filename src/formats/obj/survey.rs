@@ -28,6 +28,9 @@ const CORNER: u64 = 384;
 pub(super) struct Survey {
     vertices: u64,
     pub faces: u64,
+    /// Statements of lines (`l`), and the words after them.
+    pub lines: u64,
+    ends: u64,
     /// Number of corners of all faces.
     corners: u64,
     /// Number of texture coordinates and normals.
@@ -64,6 +67,10 @@ impl Survey {
                 Some("f") => scan
                     .face(number, words)
                     .map_err(|message| source.error(format!("line {number}"), message))?,
+                Some("l") => {
+                    scan.survey.lines += 1;
+                    scan.survey.ends += words.count() as u64;
+                }
                 _ => {}
             }
         }
@@ -89,7 +96,8 @@ impl Survey {
         let bytes = VERTEX * survey.vertices
             + OTHER * survey.others
             + FACE * survey.faces
-            + CORNER * survey.corners;
+            + CORNER * survey.corners
+            + OTHER * survey.ends;
         source.spend("the size of the mesh in bytes", bytes)?;
         Ok(survey)
     }

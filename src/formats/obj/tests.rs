@@ -24,13 +24,45 @@ fn polygons_negative_indices_and_line_ends() {
         SQUARE.trim_end().to_owned(),
     ] {
         let mesh = load(&text).expect(&text);
-        assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]);
+        assert_eq!(mesh.positions[..4], [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
     }
     assert_eq!(
         load([b"# caf\xe9\n", SQUARE.as_bytes()].concat()).expect("Latin-1").triangles.len(),
         2
     );
+}
+
+#[test]
+fn lines_are_lines() {
+    let places = |mesh: &Mesh| -> Vec<[Vec3; 2]> {
+        let place = |end: u32| mesh.positions[end as usize] + mesh.origin.as_vec3();
+        mesh.lines.iter().map(|ends| ends.map(place)).collect()
+    };
+    let [a, b, c, d] = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
+    let wanted = [[a, b], [b, c], [d, a]];
+    // Beside faces, with normals that split vertices, and alone: then the fifth vertex is left out.
+    let lines = "l 1/1 2/1 3/1\nl -1 1\n";
+    let corners = SQUARE.split("f ").next().unwrap();
+    for text in [
+        format!("{SQUARE}{lines}"),
+        format!("{corners}vn 0 0 1\nf 1//1 2//1 3//1 4//1\n{lines}"),
+        format!("{corners}{lines}v 9 9 9\n"),
+    ] {
+        let mesh = load(&text).expect(&text);
+        assert_eq!(places(&mesh), wanted, "{text}");
+        let alone = text.contains("9 9 9");
+        assert_eq!(mesh.triangles.len(), if alone { 0 } else { 2 });
+        assert!(!alone || mesh.positions.len() == 4);
+    }
+    let colored = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nl 2 1\n";
+    assert_eq!(load(colored).unwrap().colors, [[0, 255, 0, 255], [255, 0, 0, 255]]);
+    for (line, message) in
+        [("l 1 9", "vertex 9, which does not exist"), ("l 1 x", "“x”"), ("l -9 1", "“-9”")]
+    {
+        let error = load(format!("{SQUARE}{line}\n")).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
 }
 
 #[test]

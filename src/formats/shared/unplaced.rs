@@ -48,6 +48,10 @@ pub(crate) fn remove(source: &Source, mesh: &mut Mesh) -> Result<usize> {
     for vertex in mesh.triangles.iter_mut().flatten() {
         *vertex = before[*vertex as usize];
     }
+    mesh.lines.retain(|line| line.iter().all(|&vertex| is_kept(vertex as usize)));
+    for vertex in mesh.lines.iter_mut().flatten() {
+        *vertex = before[*vertex as usize];
+    }
     for sensor in &mut mesh.sensors {
         let [start, end] =
             [sensor.points.start, sensor.points.end].map(|at| before[at.min(count)] as usize);

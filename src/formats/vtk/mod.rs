@@ -30,7 +30,7 @@ use survey::{Drawn, Survey, Wanted};
 /// Returns the kind of data that a file holds:
 /// - A single lattice (image data, a rectilinear grid) is a volume.
 /// - Cells that fill space are cells, with or without values.
-/// - Cells that are surfaces, without others, are a mesh.
+/// - Cells that are surfaces or lines, without others, are a mesh.
 /// - Points without either are a point cloud, or samples if a scalar is named.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
     }
 }
 
-/// Reads the surfaces of a file, the boundary of its cells if they have no values, or its points.
+/// Reads the surfaces and lines of a file, the boundary of its cells if they have no values, or its points.
 /// The array is chosen as by [`read_volume`], and becomes the mesh's values; an array of bytes with
 /// three or four components becomes its colours. Each face has one value if the array is one of the
 /// cells.

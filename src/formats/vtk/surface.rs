@@ -19,19 +19,40 @@ use std::collections::HashMap;
 /// Highest order of Lagrange and Bézier cells.
 const MOST_ORDER: usize = 64;
 
-/// Returns the faces of a grid as a mesh. Vertices between cells of different values or colours
-/// become several vertices. Points without faces are left out.
+/// Triangles and segments of lines, each with the number of its cell.
+type Owned = (Vec<([u32; 3], u32)>, Vec<([u32; 2], u32)>);
+
+/// Returns the faces and lines of a grid as a mesh. Vertices between cells of different values or
+/// colours become several vertices. Points without faces or lines are left out.
 pub fn mesh(source: &Source, grid: &Grid, wanted: Option<&Wanted>) -> Result<Mesh> {
     let mut triangles = Growing::new(source, "the triangles");
+    let mut lines = Growing::new(source, "the lines");
     let position = |point: u32| grid.points[point as usize];
-    for cell in (0..grid.types.len()).filter(|&cell| dimension(grid.types[cell]) == Some(2)) {
-        cut(source, grid, cell, &mut |corners| {
-            polygon::triangles(corners, position, |triangle| {
-                triangles.push((triangle, cell as u32))
-            })
-        })?;
+    for cell in 0..grid.types.len() {
+        match dimension(grid.types[cell]) {
+            Some(1) => {
+                let nodes = nodes_in_order(grid.types[cell], grid.corners_of(cell));
+                nodes
+                    .windows(2)
+                    .try_for_each(|ends| lines.push(([ends[0], ends[1]], cell as u32)))?;
+            }
+            Some(2) => cut(source, grid, cell, &mut |corners| {
+                polygon::triangles(corners, position, |triangle| {
+                    triangles.push((triangle, cell as u32))
+                })
+            })?,
+            _ => {}
+        }
     }
-    give(source, grid, wanted, triangles.into_inner())
+    give(source, grid, wanted, (triangles.into_inner(), lines.into_inner()))
+}
+
+/// Returns the nodes of a line from one end to the other. Those of higher order have both ends first.
+fn nodes_in_order(kind: u8, corners: &[u32]) -> Vec<u32> {
+    match (kind, corners) {
+        (21 | 35 | 68 | 75, [first, last, middle @ ..]) => [&[*first], middle, &[*last]].concat(),
+        _ => corners.to_vec(),
+    }
 }
 
 /// Returns the boundary of the cells that fill space, the faces that only one cell has, and the
@@ -64,7 +85,7 @@ pub fn boundary(source: &Source, grid: &Grid) -> Result<Mesh> {
             polygon::triangles(corners, position, |triangle| triangles.push((triangle, 0)))
         })?;
     }
-    give(source, grid, None, triangles.into_inner())
+    give(source, grid, None, (triangles.into_inner(), Vec::new()))
 }
 
 /// Returns the points of a grid as a cloud. Values of cells are given to their points.
@@ -100,14 +121,15 @@ pub fn cloud(source: &Source, grid: &Grid, wanted: Option<&Wanted>) -> Result<Me
     Ok(mesh)
 }
 
-/// Makes a mesh of triangles over the points of a grid, each with the number of its cell.
+/// Makes a mesh of triangles and lines over the points of a grid, each with the number of its cell.
 fn give(
     source: &Source,
     grid: &Grid,
     wanted: Option<&Wanted>,
-    triangles: Vec<([u32; 3], u32)>,
+    (triangles, segments): Owned,
 ) -> Result<Mesh> {
     source.check_points("the number of triangles", triangles.len() as u64)?;
+    source.check_points("the number of lines", segments.len() as u64)?;
     let of_cells = wanted.is_some_and(|wanted| wanted.array.place == Place::Cells);
     // What tells the vertices at a point apart.
     let key = |cell: u32| match (grid.values.get(cell as usize), grid.colors.get(cell as usize)) {
@@ -118,24 +140,28 @@ fn give(
     };
     source.room::<[u32; 2]>("the vertices", grid.points.len())?;
     source.room::<[u32; 3]>("the triangles", triangles.len())?;
+    source.room::<[u32; 2]>("the lines", segments.len())?;
     // The first vertex at each point with its key, and the others.
     let mut firsts: Vec<Option<(u32, u32)>> = vec![None; grid.points.len()];
     let mut others: HashMap<(u32, u32), u32> = HashMap::new();
     // The point and the cell of each vertex.
     let mut vertices: Growing<(u32, u32)> = Growing::new(source, "the vertices");
-    let mut out = Vec::with_capacity(triangles.len());
-    for (corners, cell) in triangles {
-        let key = key(cell);
-        let mut triangle = [0; 3];
-        for (vertex, point) in triangle.iter_mut().zip(corners) {
-            let next = vertices.len() as u32;
-            let (own, first) = *firsts[point as usize].get_or_insert((key, next));
-            *vertex = if own == key { first } else { *others.entry((point, key)).or_insert(next) };
-            if *vertex == next {
-                vertices.push((point, cell))?;
-            }
+    let mut vertex = |point: u32, cell: u32| {
+        let (key, next) = (key(cell), vertices.len() as u32);
+        let (own, first) = *firsts[point as usize].get_or_insert((key, next));
+        let vertex = if own == key { first } else { *others.entry((point, key)).or_insert(next) };
+        if vertex == next {
+            vertices.push((point, cell))?;
         }
-        out.push(triangle);
+        Ok(vertex)
+    };
+    let mut out = Vec::with_capacity(triangles.len());
+    for ([a, b, c], cell) in triangles {
+        out.push([vertex(a, cell)?, vertex(b, cell)?, vertex(c, cell)?]);
+    }
+    let mut lines = Vec::with_capacity(segments.len());
+    for ([a, b], cell) in segments {
+        lines.push([vertex(a, cell)?, vertex(b, cell)?]);
     }
     source.check_points("the number of vertices", vertices.len() as u64)?;
     let vertices = vertices.into_inner();
@@ -157,6 +183,7 @@ fn give(
             .map(|vertex| grid.values[index(vertex)] as f32)
             .collect(),
         triangles: out,
+        lines,
         ..Mesh::default()
     };
     unplaced::leave_out(source, &mut mesh)?;

@@ -45,6 +45,7 @@ pub enum Drawn {
     Cells,
     /// Cells without values; as a mesh, their boundary.
     Boundary,
+    /// Faces and lines.
     Surface,
     Cloud,
     Samples,
@@ -154,7 +155,7 @@ impl Survey {
             Drawn::Volume
         } else if is_solid {
             if wanted.is_some() { Drawn::Cells } else { Drawn::Boundary }
-        } else if self.faces > 0 {
+        } else if self.faces > 0 || self.lines > 0 {
             Drawn::Surface
         } else if self.points == 0 {
             return Err(source.error("file", "contains no points"));
@@ -210,7 +211,7 @@ impl Survey {
             }
         };
         add(self.faces * u64::from(drawn == Drawn::Volume), "face", "faces");
-        add(self.lines, "line", "lines");
+        add(self.lines * u64::from(is_solid), "line", "lines");
         add(self.unknown, "cell of an unknown type", "cells of unknown types");
         let grids = self.lattices.len() as u64;
         add(grids * u64::from(!is_solid), "grid", "grids");

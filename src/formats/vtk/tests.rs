@@ -270,6 +270,35 @@ fn surfaces_of_higher_order() {
     }
 }
 
+/// Lines from one end to the other, also of higher order, with values of their cells or points.
+#[test]
+fn lines_are_lines() {
+    for (kind, nodes, wanted) in [
+        (3, 2, &[[0, 1]][..]),
+        (4, 4, &[[0, 1], [1, 2], [2, 3]]),
+        (21, 3, &[[0, 2], [2, 1]]),
+        (35, 4, &[[0, 2], [2, 3], [3, 1]]),
+        (68, 5, &[[0, 2], [2, 3], [3, 4], [4, 1]]),
+    ] {
+        let points: Vec<String> = (0..nodes).map(|i| format!("{i} {} 0", i * i)).collect();
+        let corners: Vec<String> = (0..nodes).map(|i| i.to_string()).collect();
+        let piece = format!(
+            "<Piece NumberOfPoints='{nodes}' NumberOfCells='1'><Points>{0}</Points><CellData>{4}\
+             </CellData><Cells>{1}{2}{3}</Cells></Piece>",
+            array(XYZ, &points.join(" ")),
+            array("type='Int64' Name='connectivity'", &corners.join(" ")),
+            array("type='Int64' Name='offsets'", &nodes.to_string()),
+            array("type='UInt8' Name='types'", &kind.to_string()),
+            array("type='Float32' Name='heat'", "7.5"),
+        );
+        let mesh = with(&file("UnstructuredGrid", "", &piece), None, read_mesh).unwrap();
+        let place = |end: u32| (mesh.positions[end as usize] + mesh.origin.as_vec3()).x as u32;
+        let lines: Vec<[u32; 2]> = mesh.lines.iter().map(|ends| ends.map(place)).collect();
+        assert_eq!(lines, wanted, "type {kind}");
+        assert_eq!((mesh.triangles.len(), mesh.values), (0, vec![7.5; nodes]));
+    }
+}
+
 fn lattice(kind: &str, whole: &str, piece: &str) -> String {
     file(
         kind,

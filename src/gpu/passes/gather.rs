@@ -34,6 +34,7 @@ impl Gather {
             radiance: false,
             trained: false,
             facets: false,
+            rods: false,
             images: false,
             surface_shaded: false,
             staged: false,

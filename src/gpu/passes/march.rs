@@ -38,6 +38,7 @@ impl March {
             if variant.staged { shaders::STAGED } else { shaders::NO_STAGED },
             shaders::SHEET,
             if variant.facets { shaders::FACETS } else { shaders::NO_FACETS },
+            if variant.rods { shaders::RODS } else { shaders::NO_RODS },
             if variant.images { shaders::IMAGES } else { shaders::NO_IMAGES },
             shaders::PICTURE,
             shaders::PROGRESS,

@@ -35,6 +35,9 @@ pub fn variant(request: &Request<'_>) -> Variant {
     for item in &scene.items {
         match item {
             Item::Facets(_) | Item::Solid(_) => {
+                if let Item::Facets(set) = item {
+                    variant.rods |= set.rods.is_some();
+                }
                 variant.facets = true;
                 variant.images = request.images;
                 variant.surface_shaded |= is_lit(settings) && settings.surface_shade.is_some();
@@ -106,6 +109,7 @@ fn without_items(request: &Request<'_>) -> Variant {
         trained: false,
         facets: false,
         images: false,
+        rods: false,
         isotropic: false,
         general: false,
         table_kernel: false,

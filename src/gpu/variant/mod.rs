@@ -53,6 +53,8 @@ pub struct Variant {
     pub facets: bool,
     /// Facets show images.
     pub images: bool,
+    /// Facets are rods.
+    pub rods: bool,
     /// Lattice samples are drawn with sections that do not depend on the pixel.
     pub isotropic: bool,
     /// Samples are drawn with sections that depend on the pixel.
@@ -160,7 +162,7 @@ impl Variant {
     }
 
     /// The constants that are true or false.
-    fn flags(&self) -> [(&'static str, bool); 39] {
+    fn flags(&self) -> [(&'static str, bool); 40] {
         let radiance = self.radiance || self.classified;
         [
             ("PERSPECTIVE", self.perspective),
@@ -183,6 +185,7 @@ impl Variant {
             ("GENERAL_RECORDS", radiance || self.facets || self.general),
             ("HAS_FACETS", self.facets),
             ("HAS_IMAGES", self.images),
+            ("HAS_RODS", self.rods),
             ("TABLE_KERNEL", self.table_kernel),
             ("BEYOND", self.beyond),
             ("VOLUME_SHADED", self.volume_shaded),

@@ -21,7 +21,7 @@ use super::{Coloring, Data, Reading};
 use crate::{
     Deadline, Error, Result,
     hierarchy::{BuildOptions, Preset, external, external::Plan, file::WriteOptions},
-    surface::SurfelOptions,
+    surface::{PointStyle, SurfelOptions},
     volume::{Lattice, Scalar},
 };
 use glam::DVec3;
@@ -362,6 +362,7 @@ impl Conversion {
         SurfelOptions {
             radius_scale: self.radius_scale,
             color_by_normal: self.coloring.by_normal(),
+            points: PointStyle::Auto,
             deadline,
             ..SurfelOptions::default()
         }

@@ -4,12 +4,14 @@ use super::{ColorEntry, kernel_file};
 use crate::{
     Error, Result,
     color::ColorMap,
+    facet::Size,
     input::Limits,
     math::Kernel,
     session::{
         Appearance, CellStyle, Coloring, Showing, Surface, SurfaceColor, SurfaceValue,
         Transfer as Chosen,
     },
+    surface::{PointStyle, SurfelOptions},
     volume::TransferFunction,
 };
 use serde::{Deserialize, Serialize};
@@ -69,6 +71,18 @@ pub struct AppearanceEntry {
     /// A factor on the radii of surfels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_scale: Option<f32>,
+    /// How points are drawn; by default points on surfaces are surfels, and others spheres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points: Option<PointStyle>,
+    /// The diameter of spheres and dots: a number in world units, or a text such as `3px`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_size: Option<Size>,
+    /// The array that holds the radii of points, in world units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_radius: Option<String>,
+    /// The width of lines: a number in world units, or a text such as `3px`, which is the default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_width: Option<Size>,
     /// The angle between triangles, in degrees, from which on a crease looks sharp.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crease: Option<f32>,
@@ -151,7 +165,7 @@ impl AppearanceEntry {
         }
         own_or_shared!(
             transfer, range, opacity_unit, isosurfaces, gradient_opacity, colormap, nan_color,
-            kernel, sigma, extent, color, opacity, radius_scale, crease, cells;
+            kernel, sigma, extent, color, opacity, radius_scale, points, point_size, point_radius, line_width, crease, cells;
             log_colors, sharp, edges
         )
     }
@@ -204,7 +218,7 @@ impl AppearanceEntry {
         let whole =
             TransferFunction { opacity: vec![(0.0, 1.0)], gradient, ..TransferFunction::default() };
         whole.validate().map_err(|error| ("gradient_opacity", error.to_string()))?;
-        let scales = crate::surface::SurfelOptions::RADIUS_SCALES;
+        let scales = SurfelOptions::RADIUS_SCALES;
         if self.radius_scale.is_some_and(|scale| !scales.contains(&scale)) {
             let message = format!("must be from {:e} to {:e}", scales.start(), scales.end());
             return Err(("radius_scale", message));
@@ -251,6 +265,10 @@ impl AppearanceEntry {
             radius_scale: self.radius_scale,
             crease: self.crease,
             opacity: self.opacity,
+            points: self.points.unwrap_or(PointStyle::Auto),
+            point_size: self.point_size,
+            point_radius: self.point_radius.clone(),
+            line_width: self.line_width,
             draws_edges: self.edges,
             cells: self.cells,
             values_by: self.shows_values().map(str::to_owned),

@@ -96,10 +96,13 @@ fn check_texts(scene: &Description) -> std::result::Result<(), (String, String)>
     texts.extend(of_reading("reading".into(), &scene.reading));
     let attribute = |color: &Option<SurfaceColor>| color.as_ref().map(ToString::to_string);
     texts.push(("appearance.color".into(), attribute(&scene.appearance.color)));
+    texts.push(("appearance.point_radius".into(), scene.appearance.point_radius.clone()));
     for (number, input) in scene.inputs.iter().enumerate() {
         texts.extend(of_reading(format!("inputs[{number}].reading"), &input.reading));
         let place = format!("inputs[{number}].appearance.color");
         texts.push((place, attribute(&input.appearance.color)));
+        let place = format!("inputs[{number}].appearance.point_radius");
+        texts.push((place, input.appearance.point_radius.clone()));
     }
     let long = texts.into_iter().find_map(|(place, text)| {
         Some((place, text.map(|text| text.len()).filter(|bytes| *bytes > MOST_TEXT)?))

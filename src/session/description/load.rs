@@ -37,6 +37,8 @@ pub struct LoadedInput {
     pub kind: Kind,
     /// Whether it is a point cloud: of the kind of meshes, without triangles.
     pub is_cloud: bool,
+    /// Whether it has lines, alone or beside triangles.
+    pub has_lines: bool,
     /// Whether it is of cells that are drawn as a solid.
     pub is_solid: bool,
     /// Whether the description gave its layout, because the file has no format of its own.
@@ -45,9 +47,10 @@ pub struct LoadedInput {
 
 impl LoadedInput {
     fn new(file: PathBuf, data: &Data, is_raw: bool, showing: &Showing) -> Result<Self> {
-        let is_cloud = matches!(data, Data::Mesh(mesh) if mesh.triangles.is_empty());
+        let has_lines = matches!(data, Data::Mesh(mesh) if !mesh.lines.is_empty());
+        let is_cloud = !has_lines && matches!(data, Data::Mesh(mesh) if mesh.triangles.is_empty());
         let is_solid = matches!(data, Data::Cells(_)) && showing.cell_style()? == CellStyle::Solid;
-        Ok(Self { file, kind: data.kind(), is_cloud, is_solid, is_raw })
+        Ok(Self { file, kind: data.kind(), is_cloud, has_lines, is_solid, is_raw })
     }
 }
 
@@ -90,7 +93,10 @@ impl Description {
         let Some((number, Error::Transfer(what))) = Items::unfit(scene) else {
             return items.at_fault(scene, error);
         };
-        let Some(input) = self.visible().nth(number) else { return error };
+        // An input may have become several items.
+        let name = &items.contents[number].name.text;
+        let is_own = |input: &&InputEntry| input.file.display().to_string() == *name;
+        let Some(input) = self.visible().find(is_own) else { return error };
         let own = self.appearance_of(input);
         let is_changed = own.range.is_some() || own.opacity_unit.is_some();
         let message = format!("{what}; the values are those of {}", input.file.display());
@@ -113,7 +119,8 @@ impl Description {
         let showing = self.showing(input)?;
         let reading = self.reading_of(input).reading_within(memory::most());
         let opened = reading.open_colored(path, showing.coloring().attribute())?;
-        let data = opened.read()?;
+        let mut data = opened.read()?;
+        reading.give_radii(path, &mut data, showing.point_radius.as_deref())?;
         let loaded = LoadedInput::new(path.clone(), &data, opened.is_raw(), &showing)?;
         let files = opened.files();
         items.add(&Name::of_file(path), data, &showing, does)?;

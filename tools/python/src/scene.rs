@@ -349,7 +349,8 @@ impl Scene {
             let deadline = load.limits().deadline();
             let showing = load.complete(look.showing(&load.limits())?, deadline)?;
             let attribute = showing.coloring().attribute();
-            let input = load.reading().open_colored(&path, attribute)?.read()?;
+            let mut input = load.reading().open_colored(&path, attribute)?.read()?;
+            load.reading().give_radii(&path, &mut input, showing.point_radius.as_deref())?;
             stage.add(Added { name: Name::of_file(&path), input, showing }, &own)
         })
     }
@@ -370,7 +371,8 @@ impl Scene {
                 let showing = scene.showing(input)?;
                 let reading = scene.reading_of(input).reading();
                 let attribute = showing.coloring().attribute();
-                let data = reading.open_colored(&input.file, attribute)?.read()?;
+                let mut data = reading.open_colored(&input.file, attribute)?.read()?;
+                reading.give_radii(&input.file, &mut data, showing.point_radius.as_deref())?;
                 stage
                     .add(Added { name: Name::of_file(&input.file), input: data, showing }, &own)?;
             }

@@ -622,8 +622,9 @@ impl Window {
         self.loaded_by = Some(self.document.loaded_by());
         let size = stage.loaded.subject.bounds.diagonal();
         let own_transfers = stage.transfers();
-        let visible = self.document.scene().inputs.iter().filter(|input| input.visible);
-        let inputs = visible.map(|input| input.file.clone()).collect();
+        // An input may have become several items.
+        let names = stage.loaded.items.contents.iter().map(|content| &content.name.text);
+        let inputs = names.map(PathBuf::from).collect();
         let field = own_transfers.first().map_or(0, |(item, _)| *item);
         self.panels.scene_changed(&stage);
         self.shown = Some(Shown {

@@ -75,6 +75,15 @@ class SurfaceLook(TypedDict, total=False):
     crease: float
     #: Draw the edges of triangles as thin dark lines.
     edges: bool
+    #: auto, surfels, spheres or dots. Default: auto, which draws points on surfaces as surfels, and
+    #: others as spheres.
+    points: str
+    #: The diameter of spheres and dots: a number of world units, or pixels, as "3px".
+    point_size: float | str
+    #: The attribute of the file that holds the radii of points, in world units.
+    point_radius: str
+    #: The width of lines: a number of world units, or pixels, as "3px". Default: "3px".
+    line_width: float | str
 
 
 class CellLook(FieldLook, total=False):
