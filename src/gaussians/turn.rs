@@ -78,7 +78,12 @@ impl Gaussians {
         let Some(own) = self.about.stance.replace(wanted).filter(|own| *own != wanted) else {
             return;
         };
-        let rotation = own.turn_to(wanted);
+        self.turn(own.turn_to(wanted));
+    }
+
+    /// Turns the world about its origin: the Gaussians, and the colours that they show in each
+    /// direction.
+    pub(crate) fn turn(&mut self, rotation: DMat3) {
         let (quat, colors) = (DQuat::from_mat3(&rotation), turn(self.degree, rotation));
         self.origin = rotation * self.origin;
         self.centers.par_iter_mut().for_each(|center| {

@@ -43,7 +43,8 @@ pub use data::{Data, warn_of_holes};
 pub use description::{
     AppearanceEntry, Axis, Background, CameraEntry, ClipEntry, ClipSide, ColorEntry, Composite,
     Description, Engine, InputEntry, IsosurfaceEntry, KernelEntry, LimitsEntry, Loaded,
-    LoadedInput, OverlayEntry, PictureEntry, Place, ReadingEntry, Samples, TransferEntry,
+    LoadedInput, OverlayEntry, PictureEntry, Place, ReadingEntry, Rotation, Samples, TransferEntry,
+    TransformEntry,
 };
 pub use facts::Facts;
 pub use framing::{Framing, Side};

@@ -33,9 +33,12 @@ pub fn words_of(scene: &Description) -> Result<Vec<String>, String> {
             ("range", own.range.take().map(|[low, high]| format!("{low},{high}"))),
             ("iso", own.isosurfaces.take().map(|own| surfaces(&own))),
         ];
-        if own != Default::default() || input.reading != Default::default() {
+        let is_plain = own == Default::default()
+            && input.reading == Default::default()
+            && input.transform == Default::default();
+        if !is_plain {
             return Err(format!(
-                "{file} is read or shown in a way of its own that no flag says; save the scene, \
+                "{file} is read, moved or shown in a way of its own that no flag says; save the scene, \
                  which splatkit render draws"
             ));
         }

@@ -119,8 +119,7 @@ impl Description {
         let showing = self.showing(input)?;
         let reading = self.reading_of(input).reading_within(memory::most());
         let opened = reading.open_colored(path, showing.coloring().attribute())?;
-        let mut data = opened.read()?;
-        reading.give_radii(path, &mut data, showing.point_radius.as_deref())?;
+        let data = self.read_input(input, &opened, &showing)?;
         let loaded = LoadedInput::new(path.clone(), &data, opened.is_raw(), &showing)?;
         let files = opened.files();
         items.add(&Name::of_file(path), data, &showing, does)?;

@@ -16,6 +16,7 @@ mod picture;
 mod reading;
 #[cfg(test)]
 mod tests;
+mod transform;
 
 pub use appearance::{AppearanceEntry, IsosurfaceEntry, KernelEntry, TransferEntry};
 pub use camera::CameraEntry;
@@ -24,8 +25,9 @@ pub use color::{Background, ColorEntry};
 pub use load::{Loaded, LoadedInput};
 pub use picture::{Composite, PictureEntry, Samples};
 pub use reading::{LimitsEntry, ReadingEntry};
+pub use transform::{Rotation, TransformEntry};
 
-use super::{CellStyle, Framing, Showing};
+use super::{CellStyle, Data, Framing, Opened, Showing};
 use crate::{Error, Result, input::Limits};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -75,6 +77,9 @@ pub struct InputEntry {
     /// How it is read. Limits are those of the whole scene.
     #[serde(default, skip_serializing_if = "is_default")]
     pub reading: ReadingEntry,
+    /// Where it is moved to.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub transform: TransformEntry,
     /// How it is shown.
     #[serde(default, skip_serializing_if = "is_default")]
     pub appearance: AppearanceEntry,
@@ -133,8 +138,8 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 impl InputEntry {
     /// A visible input with nothing else set.
     pub fn new(file: PathBuf) -> Self {
-        let (reading, appearance) = Default::default();
-        Self { file, visible: true, reading, appearance }
+        let (reading, transform, appearance) = Default::default();
+        Self { file, visible: true, reading, transform, appearance }
     }
 }
 
@@ -196,6 +201,25 @@ impl Description {
         Ok(showing)
     }
 
+    /// Reads the data of an input that was opened, with all that the input says of it: radii of
+    /// points that `showing` names, and where it is moved to.
+    ///
+    /// # Errors
+    /// Those of [`Opened::read`] and [`Reading::give_radii`](super::Reading::give_radii);
+    /// [`Error::Input`] for a file that cannot be moved.
+    pub fn read_input(
+        &self,
+        input: &InputEntry,
+        opened: &Opened<'_>,
+        showing: &Showing,
+    ) -> Result<Data> {
+        let mut data = opened.read()?;
+        let reading = self.reading_of(input).reading();
+        reading.give_radii(&input.file, &mut data, showing.point_radius.as_deref())?;
+        input.transform.apply(&input.file, &mut data)?;
+        Ok(data)
+    }
+
     /// Returns how the camera looks at the scene.
     ///
     /// # Errors
@@ -223,6 +247,7 @@ impl Description {
                 (format!("inputs[{number}].{part}.{field}"), message)
             };
             input.reading.check().map_err(|wrong| place("reading", wrong))?;
+            input.transform.check().map_err(|wrong| place("transform", wrong))?;
             self.appearance_of(input).check().map_err(|wrong| match self.appearance.check() {
                 Err((field, message)) => (format!("appearance.{field}"), message),
                 Ok(()) => place("appearance", wrong),

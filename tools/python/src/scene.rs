@@ -371,8 +371,8 @@ impl Scene {
                 let showing = scene.showing(input)?;
                 let reading = scene.reading_of(input).reading();
                 let attribute = showing.coloring().attribute();
-                let mut data = reading.open_colored(&input.file, attribute)?.read()?;
-                reading.give_radii(&input.file, &mut data, showing.point_radius.as_deref())?;
+                let opened = reading.open_colored(&input.file, attribute)?;
+                let data = scene.read_input(input, &opened, &showing)?;
                 stage
                     .add(Added { name: Name::of_file(&input.file), input: data, showing }, &own)?;
             }
