@@ -181,7 +181,9 @@ impl Opened<'_> {
             }
             (Kind::Samples, Some(source)) => Data::Samples(formats::read_samples(source, options)?),
             (Kind::Cells, Some(source)) => Data::Cells(formats::read_cells(source, options)?),
-            (Kind::Gaussians, Some(source)) => Data::Gaussians(formats::read_gaussians(source)?),
+            (Kind::Gaussians, Some(source)) => {
+                Data::Gaussians(formats::read_gaussians(source, options)?)
+            }
         };
         data.warn_of_holes(&self.path.display().to_string());
         Ok(data)
