@@ -139,7 +139,7 @@ pub struct Layer<S: Simd> {
     pub filling: Lanes<S>,
     pub direction: [Lanes<S>; 3],
     /// The gradients in view space at the front, in the middle and at the back, in entries per
-    /// thickness of a sheet; `None` where only those of the faces are known, and only across.
+    /// thickness of a sheet. `None` where only those of the faces are known, and only across.
     pub sections: Option<Sections<S>>,
 }
 
