@@ -37,8 +37,8 @@ impl Splat {
     /// right slopes, a linear field is reproduced exactly (Franke & Nielson 1980).
     ///
     /// The weight is a 16-bit float. The components of the slope are integers of 13 bits with a
-    /// common exponent of 9 bits (as colours of Ward 1991), so that slopes of any unit keep 12 bits
-    /// of their largest component.
+    /// common exponent of 9 bits (as colours of Ward 1991). So slopes of any unit keep 12 bits of
+    /// their largest component.
     pub fn sample(center: Vec3, value: f32, factor: [f32; 6], weight: f32, slope: Vec3) -> Self {
         let (parts, exponent) = encode_slope(slope);
         let [x, y, z] = parts.map(|part| part as u32 & SLOPE_MASK);

@@ -14,8 +14,8 @@
 //
 // An invocation has ROWS pixels, one below the other, which share the loads of an entry. On a GPU
 // the whole tile shares them instead (STAGED): each of its 64 invocations loads one of the next 64
-// entries into workgroup memory, so that the tile waits for memory once for all of them (as the
-// tiles of Kerbl et al. 2023 do).
+// entries into workgroup memory. So the tile waits for memory once for all of them (as the tiles of
+// Kerbl et al. 2023 do).
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;

@@ -1,5 +1,5 @@
 // Mark: finds the sheets of each tile in which a gathered lattice may be visible. An invocation
-// looks at eight sheets of one tile: what the tile sees of a sheet lies in a box of samples, and if
+// looks at eight sheets of one tile. What the tile sees of a sheet lies in a box of samples. If
 // something may be visible in any block of that box, the sheet is marked. Four invocations find a
 // word.
 

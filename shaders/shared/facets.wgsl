@@ -4,7 +4,7 @@
 // Vectors of a pixel that saved.wgsl saves.
 const FACET_VECTORS: u32 = 11u;
 // Of surfaces behind each other in one sheet, each counts less by e to the power of minus this for
-// every pixel that another is nearer; no more than by this power in all.
+// every pixel that another is nearer. In all, it counts less by this power at most.
 const NEARER: f32 = 4.0;
 const FARTHEST: f32 = 60.0;
 // Smaller shares of a pixel are not added.

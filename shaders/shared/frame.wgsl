@@ -55,8 +55,8 @@ struct Field {
     high: vec4<f32>,
     // Ambient, diffuse, specular, power.
     shade: vec4<f32>,
-    // The magnitude of a field's gradient up to which its direction does not count, and one over
-    // the magnitudes from there to where it counts in full; in entries of the table per thickness.
+    // The magnitude of a field's gradient up to which its direction does not count. One over the
+    // magnitudes from there to where it counts in full. Both in entries of the table per thickness.
     certain: vec4<f32>,
     // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared
     // extent in standard deviations; the minimum sum of kernels for which a value exists.
@@ -212,8 +212,8 @@ const RUN: u32 = 16u;
 const ONE_SPLAT: u32 = 0x10000u;
 
 // An entry: sheet within its group (7 bits), window after the splat's first (1), isotropic record
-// (1), isotropic record of the coarser level, or general record of a facet (1), place of the record
-// in units of RECORD_UNIT words (22).
+// (1). Then isotropic record of the coarser level, or general record of a facet (1), and place of
+// the record in units of RECORD_UNIT words (22).
 const ENTRY_SHEET_SHIFT: u32 = 25u;
 const ENTRY_CONTINUED: u32 = 0x1000000u;
 const ENTRY_ISOTROPIC: u32 = 0x800000u;

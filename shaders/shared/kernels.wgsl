@@ -187,7 +187,7 @@ fn add_isotropic(f: u32, at: u32, count: u32, front: u32, first_pixel: vec2<i32>
     }
 }
 
-// Returns the facing weight. Within a sheet, splats that face the eye hide those that face away: if
+// Returns the facing weight. Within a sheet, splats that face the eye hide those that face away. If
 // an object is thinner than a sheet, its far side must not mix into the colour and light of its
 // near side. Far sides keep a small weight, so that they have a colour when alone.
 fn facing_weight(normal: vec3<f32>, center: vec3<f32>) -> f32 {
@@ -283,7 +283,7 @@ fn payload_of(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
 }
 
 // Adds any ellipsoid, with centre c and whitening M. Along a pixel's ray direction b: β = M·b; v =
-// M·c × β, which is zero at the projected centre and grows linearly from there; ρ² = |v|²/|β|²; the
+// M·c × β, which is zero at the projected centre and grows linearly from there. ρ² = |v|²/|β|²; the
 // closest approach is where |β|²·z = L, at v × β / |β|² in whitened space. All of these are exact
 // in perspective. They are computed from vectors, not from expanded polynomials, which cancel
 // beside the eye. See docs/engine.md.

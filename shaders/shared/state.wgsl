@@ -33,7 +33,7 @@ const HELD: u32 = 15u;
 const STATE_WORDS: u32 = 28u;
 
 // Indirect dispatches of a pass, as offsets in `arguments`: over the bins for clear and scan, over
-// the bins for order, over the tiles with entries for march, over them once more if some are
+// the bins for order, over the tiles with entries for march. Then over these once more if some are
 // unfinished, and over all tiles.
 const SCAN_ARGUMENTS: u32 = 0u;
 const ORDER_ARGUMENTS: u32 = 4u;

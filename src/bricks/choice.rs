@@ -38,7 +38,7 @@ pub struct Wish {
     pub region: Option<Bounds>,
 }
 
-/// How far the sheets that a region cuts reach beyond it, in samples of a level: sheets are at most
+/// How far the sheets that a region cuts reach beyond it, in samples of a level. Sheets are at most
 /// 4/3 samples of the next level thick, and differences of pixels need one sample more.
 const BEYOND: f64 = 4.0;
 

@@ -137,9 +137,9 @@ impl Cells {
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument), which names the first cell or point that is
-    /// wrong. Causes are no cells, lists of different lengths, more than 2³² points, nodes that do
-    /// not fit the kind of their cell, nodes without a point, and numbers that are not finite
-    /// (except values that are holes).
+    /// wrong. Causes are no cells, lists of different lengths, and more than 2³² points. Others are
+    /// nodes that do not fit the kind of their cell, nodes without a point, and numbers that are
+    /// not finite (except values that are holes).
     pub fn validate(&self) -> crate::Result<()> {
         self.check().map_err(crate::Error::Argument)
     }

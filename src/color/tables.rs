@@ -68,10 +68,10 @@ pub(super) const TWILIGHT: [u32; 52] = [
     0xcda78e, 0xd0b39e, 0xd4beaf, 0xd9c8c0, 0xddd0cf, 0xe0d7da, 0xe2d9e2,
 ];
 
-/// Colours of the classes of airborne scans, in the order of the LAS specification 1.4 R15: never
-/// classified, unclassified, ground, low, medium and high vegetation, building, low noise,
-/// reserved, water, rail, road, reserved, wire guard, wire conductor, tower, connector, bridge,
-/// high noise.
+/// Colours of the classes of airborne scans, in the order of the LAS specification 1.4 R15. Never
+/// classified, unclassified, ground, low, medium and high vegetation, building, low noise and
+/// reserved come first. Then come water, rail, road, reserved, wire guard, wire conductor, tower,
+/// connector, bridge and high noise.
 pub(super) const CLASSES: [u32; 19] = [
     0x808080, 0xb8b8b8, 0xa0703c, 0xb4d878, 0x5cb040, 0x1e7a32, 0xe05038, 0xff40c0, 0xd0c8b0,
     0x3878d8, 0x705898, 0x505860, 0x98d0d0, 0xf0d030, 0xf0a020, 0xb060d0, 0xd090e0, 0xc0a080,

@@ -1,6 +1,6 @@
-//! Code that the files of hierarchies (`.splk`) and of volumes in bricks (`.splv`) share: numbers
-//! as bytes, the directory in pages, pages that wait until their places are known, and the findings
-//! of a check.
+//! Code that the files of hierarchies (`.splk`) and of volumes in bricks (`.splv`) share. It has
+//! numbers as bytes, the directory in pages, pages that wait until their places are known, and the
+//! findings of a check.
 
 mod bytes;
 pub(crate) mod directory;

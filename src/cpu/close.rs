@@ -139,7 +139,7 @@ pub struct Layer<S: Simd> {
     pub filling: Lanes<S>,
     pub direction: [Lanes<S>; 3],
     /// The gradients in view space at the front, in the middle and at the back, in entries per
-    /// thickness of a sheet; `None` where only those of the faces are known, and only across.
+    /// thickness of a sheet. `None` where only those of the faces are known, and only across.
     pub sections: Option<Sections<S>>,
 }
 
@@ -218,7 +218,7 @@ impl Visible {
         }
         let Values { last, place, .. } = plan.field.values;
         let mut shows: Vec<bool> =
-            plan.tables.entries[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
+            plan.tables.colors[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
         for surface in &plan.field.isosurfaces[..plan.isosurfaces] {
             let at = (surface.value + place).clamp(0.0, last) as usize;
             let end = (at + 2).min(shows.len());
@@ -267,7 +267,7 @@ impl Plan<'_> {
         let inverse = Lanes::splat(simd, 1.0) / (high - low);
         let (first, last) = (low.max(none).min(all), high.max(none).min(all));
         let [first_at, last_at]: [[f32; 8]; 2] = [first.into(), last.into()];
-        let integrals = &self.tables.entries[self.tables.starts.integrals..];
+        let integrals = &self.tables.integrals;
         let within = columns(
             simd,
             each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
@@ -293,8 +293,8 @@ impl Plan<'_> {
             simd,
             each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
                 let low = places[L] as usize;
-                let from: f32x4<S> = self.tables.entries[low].simd_into(simd);
-                let to: f32x4<S> = self.tables.entries[low + 1].simd_into(simd);
+                let from: f32x4<S> = self.tables.colors[low].simd_into(simd);
+                let to: f32x4<S> = self.tables.colors[low + 1].simd_into(simd);
                 (to - from).mul_add(f32x4::splat(simd, places[L].fract()), from)
             }),
         );
@@ -316,12 +316,12 @@ impl Plan<'_> {
     #[inline(always)]
     fn gradient_factor<S: Simd>(&self, simd: S, magnitude: Lanes<S>) -> Lanes<S> {
         let Factors { first, per_magnitude } = self.field.gradients.factors;
-        let factors = &self.tables.entries[self.tables.starts.factors..self.tables.starts.radii];
+        let factors = &self.tables.factors;
         let last = Lanes::splat(simd, (factors.len() - 2) as f32);
         let at: [f32; 8] =
             ((magnitude - first) * per_magnitude).max(Lanes::splat(simd, 0.0)).min(last).into();
         let factor = |at: f32| {
-            let [low, high] = [factors[at as usize][0], factors[at as usize + 1][0]];
+            let [low, high] = [factors[at as usize], factors[at as usize + 1]];
             low + (high - low) * at.fract()
         };
         at.map(factor).simd_into(simd)

@@ -210,7 +210,7 @@ fn classify(plan: &Plan, value: f32) -> [f32; 4] {
     let Values { last: end, place, .. } = plan.field.values;
     let at = (value + place).clamp(0.0, end);
     let (low, part) = (at as usize, at.fract());
-    let (a, b) = (plan.tables.entries[low], plan.tables.entries[low + 1]);
+    let (a, b) = (plan.tables.colors[low], plan.tables.colors[low + 1]);
     std::array::from_fn(|channel| a[channel] + (b[channel] - a[channel]) * part)
 }
 

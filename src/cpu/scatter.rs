@@ -543,13 +543,12 @@ pub fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask
 fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
     let FieldKernel { extent: length, per_extent: per_length, .. } = plan.field.kernel;
     let last = (RADII - 1) as f32;
-    let start = plan.tables.starts.radii;
     let radii: [f32; 8] = radius.into();
     let mut found = [[0.0f32; 8]; 2];
     for (lane, radius) in radii.into_iter().enumerate() {
         if radius <= length {
             let at = (radius * per_length * last).min(last);
-            let [a, b, c, d] = plan.tables.entries[start + at as usize];
+            let [a, b, c, d] = plan.tables.radii[at as usize];
             let part = at.fract();
             (found[0][lane], found[1][lane]) = (a + (c - a) * part, b + (d - b) * part);
         }
@@ -563,12 +562,11 @@ fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
 fn kernel_integral<S: Simd>(simd: S, plan: &Plan, rho: Lanes<S>, t: Lanes<S>) -> Lanes<S> {
     let per_length = plan.field.kernel.per_extent;
     let cells = SECTIONS as f32;
-    let start = plan.tables.starts.sections;
     let ([rhos, ts], mut found): ([[f32; 8]; 2], _) = ([rho.into(), t.into()], [0.0f32; 8]);
     for lane in 0..8 {
         let place = |value: f32| (value * per_length * cells).min(cells - 1e-3);
         let (x, y) = (place(rhos[lane]), place(ts[lane].abs()));
-        let [a, b, c, d] = plan.tables.entries[start + x as usize * SECTIONS + y as usize];
+        let [a, b, c, d] = plan.tables.sections[x as usize * SECTIONS + y as usize];
         let (low, high) = (a + (b - a) * y.fract(), c + (d - c) * y.fract());
         found[lane] =
             (low + (high - low) * x.fract()).copysign(if ts[lane] >= 0.0 { 1.0 } else { -1.0 });

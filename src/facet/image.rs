@@ -53,8 +53,8 @@ impl Image {
     /// `across` and `down`. Channels are in 0 … 1: red, green, blue, and the share that is seen.
     ///
     /// The parallelogram is divided into parts of about one texel of a level, at least three along
-    /// its shorter side, and each is interpolated between four texels: a pixel seen at a slant has
-    /// many parts in a row (after Heckbert 1989).
+    /// its shorter side. Each is interpolated between four texels. A pixel seen at a slant has many
+    /// parts in a row (after Heckbert 1989).
     pub fn mean(&self, uv: Vec2, across: Vec2, down: Vec2) -> [f32; 4] {
         let size = Vec2::new(self.finest.width as f32, self.finest.height as f32);
         let [wide, high] = [across, down].map(|side| (side * size).length());

@@ -35,7 +35,7 @@ pub struct Format {
     pub(super) volume: Option<VolumeReader>,
     pub(super) samples: Option<SamplesReader>,
     pub(super) cells: Option<fn(&Source, &ReadOptions) -> Result<Cells>>,
-    pub(super) gaussians: Option<fn(&Source) -> Result<Gaussians>>,
+    pub(super) gaussians: Option<fn(&Source, &ReadOptions) -> Result<Gaussians>>,
     pub(super) pieces: InPieces,
     pub(super) arrays: Option<ListArrays>,
     pub(super) series: Option<ListSeries>,

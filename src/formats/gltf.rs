@@ -33,9 +33,9 @@ use std::{
     sync::Arc,
 };
 
-/// Extensions that a file may require, by prefix: those that are read (among them
-/// `KHR_materials_pbrSpecularGlossiness`), those that only change the look of a material in ways
-/// that splats do not show, and those of Gaussians, which are checked at each primitive.
+/// Extensions that a file may require, by prefix. These are those that are read (among them
+/// `KHR_materials_pbrSpecularGlossiness`), and those that only change the look of a material in
+/// ways that splats do not show. Those of Gaussians are checked at each primitive.
 const KNOWN: [&str; 7] = [
     "KHR_mesh_quantization",
     "EXT_mesh_gpu_instancing",
@@ -61,9 +61,9 @@ struct Opened<'a> {
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for malformed JSON, indices and ranges outside their
-/// target, cyclic nodes, references outside the file's folder, positions that are not finite, and
-/// required extensions that are not supported (among them Draco and meshopt compression);
-/// [`Error::Limit`](crate::Error::Limit) for counts over the limits.
+/// target, cyclic nodes, and references outside the file's folder. Also for positions that are not
+/// finite, and for required extensions that are not supported (among them Draco and meshopt
+/// compression). [`Error::Limit`](crate::Error::Limit) for counts over the limits.
 pub fn read(source: &Source) -> Result<Mesh> {
     let Opened { root, text, binary } = open(source)?;
     let marks = if root.extensions_used.iter().any(|name| name == gaussians::NAME) {

@@ -80,9 +80,9 @@ pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
 /// volume is read, or the one that [`ReadOptions::time`] names.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for a malformed file, for a name that it does not contain,
-/// with those that it does, for data sets that are no numbers, and for a filter that is not known,
-/// with its number; [`Error::Limit`](crate::Error::Limit) for a data set over the limits.
+/// [`Error::Input`](crate::Error::Input) for a malformed file, and for data sets that are no
+/// numbers. Also for an unknown name, with those that the file contains, and for an unknown filter,
+/// with its number. [`Error::Limit`](crate::Error::Limit) for a data set over the limits.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let file = File::open(source)?;
     if options.dataset.is_none()

@@ -220,8 +220,12 @@ pub(super) fn cells_of(table: &[Format], source: &Source, options: &ReadOptions)
 /// # Errors
 /// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file that is in no
 /// format of Gaussians.
-pub fn load_gaussians(path: impl AsRef<Path>, limits: &Limits) -> Result<Gaussians> {
-    read_gaussians(&Source::open(path.as_ref(), limits)?)
+pub fn load_gaussians(
+    path: impl AsRef<Path>,
+    limits: &Limits,
+    options: &ReadOptions,
+) -> Result<Gaussians> {
+    read_gaussians(&Source::open(path.as_ref(), limits)?, options)
 }
 
 /// As [`load_gaussians`], but reads from an open source, which may be in memory
@@ -229,17 +233,21 @@ pub fn load_gaussians(path: impl AsRef<Path>, limits: &Limits) -> Result<Gaussia
 ///
 /// # Errors
 /// Those of [`load_gaussians`], except those of opening the file.
-pub fn read_gaussians(source: &Source) -> Result<Gaussians> {
+pub fn read_gaussians(source: &Source, options: &ReadOptions) -> Result<Gaussians> {
     let _span = tracing::info_span!("load_gaussians", file = %source.path.display()).entered();
-    source.unless_changed(gaussians_of(FORMATS, source))
+    source.unless_changed(gaussians_of(FORMATS, source, options))
 }
 
 /// As [`read_gaussians`], in the formats of a table, but does not check whether the file changed
 /// meanwhile.
-pub(super) fn gaussians_of(table: &[Format], source: &Source) -> Result<Gaussians> {
+pub(super) fn gaussians_of(
+    table: &[Format],
+    source: &Source,
+    options: &ReadOptions,
+) -> Result<Gaussians> {
     let may = |format: &Format| format.gaussians.is_some();
     match find(table, source, may)?.and_then(|format| format.gaussians) {
-        Some(read) => read(source),
+        Some(read) => read(source, options),
         None => {
             let named = named(source);
             let message = format!("“.{named}” is not a format of trained Gaussians");

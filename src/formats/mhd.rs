@@ -37,8 +37,8 @@ const DATA: &str = "ElementDataFile";
 /// anatomical orientation, the volume is turned from DICOM's frame, which ITK uses, into the
 /// patient's ([`Frame::Patient`](crate::about::Frame)).
 ///
-/// Samples may have several channels ([`ReadOptions::scalar`]): without a choice, three or four of
-/// unsigned bytes are a colour, of which the brightness is read, and others a vector, of which the
+/// Samples may have several channels ([`ReadOptions::scalar`]). Without a choice, three or four of
+/// unsigned bytes are a colour, of which the brightness is read. Others are a vector, of which the
 /// length is read. `ElementDataFile` is `LOCAL`, one file, a list of files or a pattern of names
 /// (`slice%03d.raw 1 90 1`), in the header's folder or below. One file may be compressed by zlib.
 ///

@@ -1,8 +1,8 @@
 //! Readers and writers of files, one module per format. [`FORMATS`] is the table of all formats.
 //!
 //! [`load_mesh`], [`load_volume`], [`load_samples`], [`load_cells`] and [`load_gaussians`] look at
-//! the name and the first bytes, and return a mesh (or point cloud), a volume, scattered samples,
-//! cells or trained Gaussians; [`Kind`] says which of them a file needs. [`read_mesh`],
+//! the name and the first bytes. They return a mesh (or point cloud), a volume, scattered samples,
+//! cells or trained Gaussians. [`Kind`] says which of them a file needs. [`read_mesh`],
 //! [`read_volume`], [`read_samples`], [`read_cells`] and [`read_gaussians`] do the same with bytes
 //! in memory ([`Source::from_bytes`]). All of them read through a [`Source`], within its
 //! [`Limits`](crate::input::Limits).

@@ -58,7 +58,7 @@ pub(super) fn is_nifti(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed header, a type that is not read (bits,
-/// 128-bit floats), a time that the file does not have, and samples that are cut off;
+/// 128-bit floats), a time that the file does not have, and samples that are cut off.
 /// [`Error::Limit`](crate::Error::Limit) for sizes over the limits.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     if !has_extension(source.path, "img") {

@@ -39,7 +39,7 @@ pub fn kind(source: &Source) -> Result<Kind> {
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a file that is not such an array, for another size
-/// than the header claims, and for numbers that are not finite, with the row;
+/// than the header claims, and for numbers that are not finite, with the row.
 /// [`Error::Limit`](crate::Error::Limit) for more rows than the limits allow points.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Points> {
     let header = Header::of(source)?;

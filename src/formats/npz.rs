@@ -61,10 +61,10 @@ pub fn kind(source: &Source, options: &ReadOptions) -> Result<Kind> {
 /// one. Which of its axes is x is the same as for NPY files ([`npy::read_volume`]).
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for a file that is not an archive of arrays, for a name
-/// that it does not contain, with those that it does, for an array that is no volume, and for
-/// arrays of which none is surely what is meant; [`Error::Limit`](crate::Error::Limit) for an array
-/// over the limits.
+/// [`Error::Input`](crate::Error::Input) for a file that is not an archive of arrays, and for an
+/// array that is no volume. Also for an unknown name, with those that the file contains, and if it
+/// is not clear which array is meant. [`Error::Limit`](crate::Error::Limit) for an array over the
+/// limits.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let mut archive = open(source)?;
     let entries = entries(source, &mut archive)?;

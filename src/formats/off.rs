@@ -28,9 +28,9 @@ struct Header {
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) with the line for text that does not follow the format,
-/// for fewer vertices or faces than are counted, corners that do not exist, positions that are not
-/// finite and space of other than three axes; [`Error::Limit`](crate::Error::Limit) for more
-/// vertices or faces than the limits allow.
+/// and for fewer vertices or faces than are counted. Also for corners that do not exist, positions
+/// that are not finite and space of other than three axes. [`Error::Limit`](crate::Error::Limit)
+/// for more vertices or faces than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     let (header, start) = header(source.bytes()).unwrap_or_default();
     if header.is_of_more_axes {

@@ -28,7 +28,7 @@ const POINT: u64 = 8 + 24 + 12 + 4;
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed header, another size than it claims, data
-/// that cannot be unpacked, and lines of text that do not match the header;
+/// that cannot be unpacked, and lines of text that do not match the header.
 /// [`Error::Limit`](crate::Error::Limit) for more points or bytes than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     read_named(source, None)

@@ -103,7 +103,7 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     if let Some(element) = vertices {
         mesh.about.attributes = samples::attributes(element);
     }
-    give_textures(source, header.textures, of_corners, &mut mesh)?;
+    give_textures(source, &header.textures, of_corners, &mut mesh)?;
     unplaced::leave_out(source, &mut mesh)?;
     Ok(mesh)
 }
@@ -142,7 +142,7 @@ fn read_edges(
 /// for their corners, and the number of their picture.
 fn give_textures(
     source: &Source,
-    textures: Vec<String>,
+    textures: &[String],
     of_corners: bool,
     mesh: &mut Mesh,
 ) -> Result<()> {
@@ -170,9 +170,14 @@ fn give_textures(
             textures.len()
         );
     }
-    for name in textures.into_iter().take(shown) {
-        let texture = texture::read_reference(source, "comment TextureFile", &name)?;
-        mesh.materials.push(Material { name, color: [1.0; 4], texture, unlit: false });
+    for name in textures.iter().take(shown) {
+        let texture = texture::read_reference(source, "comment TextureFile", name)?;
+        mesh.materials.push(Material {
+            name: name.clone(),
+            color: [1.0; 4],
+            texture,
+            unlit: false,
+        });
     }
     if !of_corners {
         source.room::<u32>("the materials of the triangles", mesh.triangles.len())?;

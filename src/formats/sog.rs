@@ -69,8 +69,8 @@ fn head_has(bytes: &[u8], word: &str) -> bool {
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a file that is no archive with a `meta.json`, for a
-/// `meta.json` that is malformed or of another version, for planes that are missing, outside the
-/// folder, not lossless or too small, and for streamed scenes;
+/// `meta.json` that is malformed or of another version, and for streamed scenes. Also for planes
+/// that are missing, outside the folder, not lossless or too small.
 /// [`Error::Limit`](crate::Error::Limit) for counts and pictures over the limits.
 pub fn read(source: &Source) -> Result<Gaussians> {
     let is_index = source.path.file_name().is_some_and(|name| name == "lod-meta.json");

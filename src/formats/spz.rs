@@ -97,7 +97,7 @@ pub fn is_spz(bytes: &[u8]) -> bool {
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a version or a degree of the harmonics that cannot be
 /// read, for contents that do not match the header, and for version 4 in a build without the
-/// feature `files`; [`Error::Limit`](crate::Error::Limit) for more Gaussians or bytes than the
+/// feature `files`. [`Error::Limit`](crate::Error::Limit) for more Gaussians or bytes than the
 /// limits allow.
 pub fn read(source: &Source) -> Result<Gaussians> {
     let bytes = source.bytes();

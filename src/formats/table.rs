@@ -73,7 +73,7 @@ pub static FORMATS: &[Format] = &[
         #[cfg(feature = "ply")]
         samples: Some(ply::read_samples),
         #[cfg(feature = "ply")]
-        gaussians: Some(ply::read_gaussians),
+        gaussians: Some(|source, _| ply::read_gaussians(source)),
         #[cfg(feature = "ply")]
         pieces: InPieces::Points {
             of: "binary files",
@@ -88,7 +88,7 @@ pub static FORMATS: &[Format] = &[
         holds: &[all(Content::Gaussians)],
         written: Some("splat"),
         kind: Which::Always(Kind::Gaussians),
-        gaussians: Some(splat::read),
+        gaussians: Some(|source, _| splat::read(source)),
         ..Format::ROW
     },
     Format {
@@ -98,7 +98,7 @@ pub static FORMATS: &[Format] = &[
         written: Some("spz"),
         magic: Magic::Rule(spz::is_spz),
         kind: Which::Always(Kind::Gaussians),
-        gaussians: Some(spz::read),
+        gaussians: Some(|source, _| spz::read(source)),
         ..Format::ROW
     },
     Format {
@@ -111,7 +111,7 @@ pub static FORMATS: &[Format] = &[
         magic: Magic::Rule(|bytes| sog::is_sog(bytes) || sog::is_meta(bytes)),
         kind: Which::Always(Kind::Gaussians),
         #[cfg(feature = "sog")]
-        gaussians: Some(sog::read),
+        gaussians: Some(|source, _| sog::read(source)),
         ..Format::ROW
     },
     Format {
@@ -147,7 +147,7 @@ pub static FORMATS: &[Format] = &[
         #[cfg(feature = "gltf")]
         mesh: Some(|source, _| gltf::read(source)),
         #[cfg(feature = "gltf")]
-        gaussians: Some(gltf::read_gaussians),
+        gaussians: Some(|source, _| gltf::read_gaussians(source)),
         ..Format::ROW
     },
     Format {

@@ -23,11 +23,12 @@ use meaning::Meaning;
 use pages::{Layout, Pages, Read};
 use std::{borrow::Cow, path::PathBuf};
 
-/// Reads the pages of a file as the slices of a volume, in their order; of a folder, its TIFF files
-/// of one page each, in the order of the numbers in their names (`s9.tif` before `s10.tif`). Rows
-/// run along x, columns along y and pages along z. Pages are strips or tiles of 1 to 64 bits,
-/// uncompressed or compressed by LZW, deflate, PackBits or JPEG. BigTIFF files are read too, and
-/// ImageJ's files of one directory for all slices. Previews of lower resolution are skipped.
+/// Reads the pages of a file as the slices of a volume, in their order. Of a folder, the slices are
+/// its TIFF files of one page each, in the order of the numbers in their names (`s9.tif` before
+/// `s10.tif`). Rows run along x, columns along y and pages along z. Pages are strips or tiles of 1
+/// to 64 bits, uncompressed or compressed by LZW, deflate, PackBits or JPEG. BigTIFF files are read
+/// too, and ImageJ's files of one directory for all slices. Previews of lower resolution are
+/// skipped.
 ///
 /// ImageJ's and OME's descriptions give the order of slices, channels and times, the distance
 /// between samples and its unit. [`ReadOptions::scalar`] chooses a channel (`channel:1`), and

@@ -46,7 +46,7 @@ const INTENSITY: &[&str] = &["intensity", "i", "grey", "gray", "reflectance"];
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) with the line, for fewer than three columns, lines with
-/// another number of columns, words that are not numbers, and fewer points than the file counts;
+/// another number of columns, words that are not numbers, and fewer points than the file counts.
 /// [`Error::Limit`](crate::Error::Limit) for more lines than the limits allow points.
 pub fn read(source: &Source) -> Result<Mesh> {
     read_named(source, None)

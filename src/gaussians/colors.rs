@@ -40,8 +40,8 @@ impl Colors {
         Self { degree, values: Values::Exact(harmonics) }
     }
 
-    /// Keeps constant terms in steps of 1/2048, and the others in 8 bits: in 1/127 of the largest
-    /// one of their degree, but in steps of at most 1/64, so that they end at ±1.98.
+    /// Keeps constant terms in steps of 1/2048, and the others in 8 bits. Their step is 1/127 of
+    /// the largest one of their degree, but at most 1/64, so that they end at ±1.98.
     pub fn coded(degree: u32, harmonics: &[[f32; 3]]) -> Self {
         let count = terms(degree);
         let mut most = [0f32; 3];

@@ -1,6 +1,6 @@
-//! Real spherical harmonics of degree 0 to 3, as trainers of Gaussian scenes use them: the order of
-//! the terms is −m … m in each degree, and the signs are those of the Condon–Shortley phase
-//! (Sloan 2013, Kerbl et al. 2023).
+//! Real spherical harmonics of degree 0 to 3, as trainers of Gaussian scenes use them. The order of
+//! the terms is −m … m in each degree, and the signs are those of the Condon–Shortley phase (Sloan
+//! 2013, Kerbl et al. 2023).
 
 use glam::Vec3;
 

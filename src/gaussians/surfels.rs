@@ -16,8 +16,8 @@ impl Gaussians {
     /// extent of their footprints.
     ///
     /// # Errors
-    /// [`Error::Argument`] for splats that are not surfels: samples of a volume have no colours,
-    /// and those of a trained scene have only those of one view; [`Error::Memory`] if the Gaussians
+    /// [`Error::Argument`] for splats that are not surfels. Samples of a volume have no colours,
+    /// and those of a trained scene have only those of one view. [`Error::Memory`] if the Gaussians
     /// do not fit in memory.
     pub fn from_splats(set: &SplatSet) -> Result<Self> {
         let refused = match set.payload {

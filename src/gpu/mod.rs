@@ -1,7 +1,7 @@
 //! The GPU engine: draws a scene, sheet by sheet, on wgpu.
 //!
-//! A frame runs through these passes. Each has a Rust file in `passes` and a shader of the same name
-//! in shaders/passes/:
+//! A frame runs through these passes. Each has a Rust file in `passes` and a shader of the same
+//! name in shaders/passes/:
 //!
 //! | pass | purpose |
 //! |---|---|

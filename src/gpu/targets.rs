@@ -386,9 +386,9 @@ pub fn gathered_word(tiles: u32) -> u64 {
     2 * u64::from(tiles) + SLOTS / 32 + 3
 }
 
-/// Returns the bytes of the counts by sheet and band (census.wgsl) for a number of sheets: 6 counts
-/// for each of 16 bands and for all bands together, also for the sheet before the first and the one
-/// behind the last.
+/// Returns the bytes of the counts by sheet and band (census.wgsl) for a number of sheets. There
+/// are 6 counts for each of 16 bands and for all bands together, also for the sheet before the
+/// first and the one behind the last.
 pub fn census_bytes(sheets: usize) -> u64 {
     (sheets as u64 + 2) * 17 * 6 * 4
 }

@@ -9,7 +9,7 @@ use crate::{
         field::{self, Field, FieldKernel, Gradients},
         frame::{self, Convex, Light},
         source,
-        tables::{Factors, Starts, Values},
+        tables::{Factors, Values},
     },
     scene::{Scene, Settings},
     splat::SplatSet,
@@ -177,14 +177,14 @@ impl Frame {
 }
 
 impl FrameField {
-    /// Packs a field, whose tables begin at entry `start`.
-    pub fn new(field: &Field, starts: Starts, start: u32) -> Self {
+    /// Packs a field, whose tables begin at these entries: the transfer function, its integrals,
+    /// the gradient's factors, and the kernel.
+    pub fn new(field: &Field, table_starts: [u32; 4]) -> Self {
         let [axis_x, axis_y, axis_z] = field.axes.map(|axis| wide_with(axis, 0.0));
         let kernel = field.kernel;
         let Values { zero, per_value, last, place } = field.values;
         let Gradients { factors: Factors { first, per_magnitude }, length, pixels } =
             field.gradients;
-        let Starts { integrals, factors, radii, .. } = starts;
         let [finer, coarser] = field.levels;
         let FieldKernel { deviation, per_deviation, radius2, .. } = kernel;
         // Unused isosurfaces have a value that no ray reaches.
@@ -209,7 +209,7 @@ impl FrameField {
             isotropic: [deviation, per_deviation, radius2, field.least_sum],
             transfer: [zero, per_value, last, place],
             gradients: [first, per_magnitude, length, pixels],
-            table_starts: [0, integrals, factors, radii].map(|part| start + part as u32),
+            table_starts,
             before: field.beyond[0],
             behind: field.beyond[1],
             kernel: [kernel.extent, kernel.per_extent, kernel.per_overlap, field.unit],

@@ -117,7 +117,7 @@ pub(crate) fn settle(
 /// over all.
 ///
 /// If nine tenths of these lie together in a box a hundredth as large as the whole along each axis,
-/// or smaller, that box decides: one point far away must not take the precision of the others.
+/// or smaller, that box decides. One point far away must not take the precision of the others.
 pub(crate) fn origin(source: &Source, [low, high]: [DVec3; 2], looks: &[DVec3]) -> Result<DVec3> {
     let around = |[low, high]: [DVec3; 2]| {
         let center = low * 0.5 + high * 0.5;

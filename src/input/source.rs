@@ -4,6 +4,7 @@
 use super::{Limits, address::is_remote, budget::Budget, copy, mapping::Mapping, remote::Remote};
 use crate::{Error, Result, error::LimitKind, memory};
 use std::{
+    any::Any,
     borrow::Cow,
     fs::File,
     io::Read,
@@ -39,6 +40,8 @@ pub struct Source<'a> {
     content: Content<'a>,
     /// Text of the file that a reader borrows from, as a copy.
     text: OnceLock<String>,
+    /// What a reader has parsed, for readers that look at the same part later.
+    parsed: OnceLock<Arc<dyn Any + Send + Sync>>,
     /// Shared by all files of a model.
     budget: Arc<Budget>,
 }
@@ -66,7 +69,11 @@ impl<'a> Source<'a> {
         // A file in pieces has the time limit for each batch of them.
         remote.ready();
         let content = Content::Remote(remote);
-        Ok(Self { path, limits, content, text: OnceLock::new(), budget })
+        Ok(Self::of(path, limits, content, budget))
+    }
+
+    fn of(path: &'a Path, limits: &'a Limits, content: Content<'a>, budget: Arc<Budget>) -> Self {
+        Self { path, limits, content, text: OnceLock::new(), parsed: OnceLock::new(), budget }
     }
 
     /// Opens a file that belongs to this one: it refers to it, by a path from
@@ -80,13 +87,12 @@ impl<'a> Source<'a> {
 
     fn open_within(path: &'a Path, limits: &'a Limits, budget: Arc<Budget>) -> Result<Self> {
         let content = Content::Mapped(map_within(path, limits, &budget)?);
-        Ok(Self { path, limits, content, text: OnceLock::new(), budget })
+        Ok(Self::of(path, limits, content, budget))
     }
 
     /// Creates the source of a folder with these files.
     pub(super) fn of_folder(path: &'a Path, limits: &'a Limits, files: Vec<PathBuf>) -> Self {
-        let (content, budget) = (Content::Listed(files), Arc::new(Budget::new()));
-        Self { path, limits, content, text: OnceLock::new(), budget }
+        Self::of(path, limits, Content::Listed(files), Arc::new(Budget::new()))
     }
 
     /// Creates the source of another file that is mapped already. Both share one budget.
@@ -94,8 +100,7 @@ impl<'a> Source<'a> {
     where
         'a: 'b,
     {
-        let (content, budget) = (Content::Mapped(mapping), self.budget.clone());
-        Source { path, limits: self.limits, content, text: OnceLock::new(), budget }
+        Source::of(path, self.limits, Content::Mapped(mapping), self.budget.clone())
     }
 
     /// Returns the files of a folder, ordered by their paths; `None` for a file or bytes in memory.
@@ -109,6 +114,22 @@ impl<'a> Source<'a> {
     /// Maps a file as [`open`](Self::open) does, for callers that read from it later.
     pub(crate) fn map(path: &Path, limits: &Limits) -> Result<Mapping> {
         map_within(path, limits, &Budget::new())
+    }
+
+    /// Returns what `parse` makes of the file. It is parsed once: whoever asks for the same type
+    /// later gets the same.
+    pub(crate) fn parsed<T: Any + Send + Sync>(
+        &self,
+        parse: impl FnOnce(&Self) -> Result<T>,
+    ) -> Result<Arc<T>> {
+        let before = self.parsed.get().and_then(|parsed| parsed.clone().downcast().ok());
+        if let Some(parsed) = before {
+            return Ok(parsed);
+        }
+        let made = Arc::new(parse(self)?);
+        // Of several types, the first is kept.
+        self.parsed.set(made.clone()).ok();
+        Ok(made)
     }
 
     /// Returns the files opened so far: this one, and those it refers to that a reader has opened.
@@ -126,13 +147,7 @@ impl<'a> Source<'a> {
     pub fn from_bytes(name: &'a Path, bytes: &'a [u8], limits: &'a Limits) -> Result<Self> {
         let budget = Arc::new(Budget::new());
         budget.spend(limits, name, "the file's size in bytes", bytes.len() as u64)?;
-        Ok(Self {
-            path: name,
-            limits,
-            content: Content::Held(bytes),
-            text: OnceLock::new(),
-            budget,
-        })
+        Ok(Self::of(name, limits, Content::Held(bytes), budget))
     }
 
     /// Returns whether this source holds bytes from the caller or from a server, which have no

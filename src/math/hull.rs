@@ -143,8 +143,8 @@ const LOOKS: usize = 1 << 16;
 const FEWEST: usize = 100;
 
 /// Returns the corners of a box that contains nearly all points. Left out are up to a thousandth on
-/// each side that lies farther out than half of the side of the box around the others, and more of
-/// them only if they lie much farther away ([`Kind::strays`], [`BACKGROUND`]).
+/// each side that lies farther out than half of the side of the box around the others. More are
+/// left out only if they lie much farther away ([`Kind::strays`], [`BACKGROUND`]).
 pub(crate) fn without_strays(points: &[Vec3], kind: Kind) -> Option<[Vec3; 2]> {
     if points.is_empty() {
         return None;

@@ -2,8 +2,8 @@
 //!
 //! kiddo splits along x, y and z in turn, to a depth fixed by the number of points. Across an
 //! axis-parallel plane or line of points a split does nothing, so the points would end up in large
-//! leaves. With kiddo 6.3, a million points on a plane take 3 to 4 times as long, and 200 000 on a
-//! line 80 times as long, as with a tree that chooses its axes. The tree is therefore built over
+//! leaves. With kiddo 6.3, a million points on a plane take 3 to 4 times as long as with a tree
+//! that chooses its axes. 200 000 on a line take 80 times as long. The tree is therefore built over
 //! points rotated so that no axis is special. The rotation is in integers, which keeps equal
 //! distances equal.
 

@@ -7,7 +7,7 @@
 //!   three times the slower of the two moves around the keyframe. A camera that rests between two
 //!   equal keyframes does not sway.
 //! - The logarithms of the distance, and of the size of the view, have the tangents of Fritsch and
-//!   Butland (1984), which do not overshoot: no camera on the way is nearer than its keyframes.
+//!   Butland (1984), which do not overshoot. No camera on the way is nearer than its keyframes.
 //! - Directions follow the cubic of unit quaternions by Kim, Kim and Shin (1995). Its tangents are
 //!   those of the focal point, for angular velocities. Each move turns the shorter way.
 //!

@@ -140,8 +140,8 @@ impl Field {
         let (to_entries, length) = (per_value * sheets.step, sheets.step);
         // If the factors are constant or change in one step, their number per magnitude may exceed
         // 32 bits.
-        let per_magnitude = (tables.factors.per_magnitude / to_entries).min(1e30);
-        let factors = Factors { first: tables.factors.first * to_entries, per_magnitude };
+        let per_magnitude = (tables.lookup.per_magnitude / to_entries).min(1e30);
+        let factors = Factors { first: tables.lookup.first * to_entries, per_magnitude };
         self.gradients = Gradients {
             factors: factors.narrow(),
             length: length as f32,

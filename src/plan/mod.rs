@@ -1,5 +1,5 @@
-//! The plan of a frame, which both engines share: the numbers of its view, of its fields and of
-//! their tables, the weights and visible parts of a lattice, and the pace of resting and moving
+//! The plan of a frame, which both engines share. It has the numbers of the view, of its fields and
+//! of their tables, the weights and visible parts of a lattice, and the pace of resting and moving
 //! views. The CPU engine reads the numbers by name, and the GPU engine packs them for its shaders.
 
 pub(crate) mod field;

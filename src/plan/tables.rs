@@ -1,5 +1,6 @@
-//! The tables that march looks values up in (shaders/shared/tables.wgsl): the transfer function,
-//! its integral, the gradient's factor, the kernel and its sections. All lie in one buffer.
+//! The tables in which values are looked up: the transfer function, its integral, the gradient's
+//! factor, the kernel and its sections. On the GPU all lie in one buffer
+//! (shaders/shared/tables.wgsl).
 
 use crate::{
     math::{Kernel, Profile},
@@ -48,26 +49,23 @@ pub fn constants() -> String {
 /// The tables of a picture, and the numbers by which values are looked up in them.
 #[derive(Debug, Default)]
 pub struct Tables {
-    pub entries: Vec<[f32; 4]>,
-    pub starts: Starts,
+    /// The transfer function: colour and extinction of an entry, and the last entry again.
+    pub colors: Vec<[f32; 4]>,
+    /// The running integrals of extinction times colour, and of extinction, in entries.
+    pub integrals: Vec<[f32; 4]>,
+    /// The gradient's factors.
+    pub factors: Vec<f32>,
+    /// Value and −h′(r)/r of the kernel at each radius, beside those at the next. Empty, as the
+    /// sections are, for kernels with a closed form.
+    pub radii: Vec<[f32; 4]>,
+    /// The kernel's sections: the four corners of each cell.
+    pub sections: Vec<[f32; 4]>,
     pub values: Values<f64>,
     /// Magnitudes are values per world length.
-    pub factors: Factors<f64>,
+    pub lookup: Factors<f64>,
     /// Extinction times colour, and extinction, of all values before the first entry and of all
     /// behind the last one.
     pub beyond: [[f32; 4]; 2],
-}
-
-/// Where the parts behind the transfer function start.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Starts {
-    pub integrals: usize,
-    /// The gradient's factors.
-    pub factors: usize,
-    /// The kernel along its radius.
-    pub radii: usize,
-    /// The kernel's sections.
-    pub sections: usize,
 }
 
 /// How a value becomes a place among the entries of the transfer function.
@@ -133,27 +131,22 @@ impl Tables {
         kernel: Option<&Kernel>,
     ) -> Self {
         let last = (count - 1) as f64;
-        let mut entries = transfer.table([low, high], count);
+        let mut colors = transfer.table([low, high], count);
         // The last entry again, for interpolation at the upper end.
-        entries.push(entries[count - 1]);
-        let mut starts = Starts { integrals: entries.len(), ..Starts::default() };
-        entries.extend(integrals(transfer, [low, high], count));
-        starts.factors = entries.len();
-        let factors = factors(transfer, &mut entries);
-        starts.radii = entries.len();
+        colors.push(colors[count - 1]);
+        let (factors, lookup) = factors(transfer);
         let is_radial_table =
             |kernel: &&Kernel| !matches!(kernel.profile, Profile::Gaussian(_) | Profile::Tensor(_));
-        if let Some(kernel) = kernel.filter(is_radial_table) {
-            entries.extend(radial(kernel));
-            starts.sections = entries.len();
-            entries.extend(sections(kernel));
-        }
+        let kernel = kernel.filter(is_radial_table);
         let (zero, per_value) = (zero(range), last / (high - low));
         Self {
-            entries,
-            starts,
-            values: Values { zero, per_value, last, place: (zero - low) * per_value },
+            colors,
+            integrals: integrals(transfer, [low, high], count),
             factors,
+            radii: kernel.map_or_else(Vec::new, radial),
+            sections: kernel.map_or_else(Vec::new, sections),
+            values: Values { zero, per_value, last, place: (zero - low) * per_value },
+            lookup,
             beyond: [low, high].map(|value| shown(transfer, value).map(|v| v as f32)),
         }
     }
@@ -262,9 +255,9 @@ fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2], count: usize) -
     all
 }
 
-/// Adds the gradient's factors at the magnitudes between which they change. Returns how they are
+/// Returns the gradient's factors at the magnitudes between which they change, and how they are
 /// looked up.
-fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> Factors<f64> {
+fn factors(transfer: &TransferFunction) -> (Vec<f32>, Factors<f64>) {
     let changing = transfer.gradient.windows(2).filter(|pair| pair[0].1 != pair[1].1);
     let [first, last] = changing.fold([f64::INFINITY, 0.0], |[low, high], pair| {
         [f64::min(low, pair[0].0), f64::max(high, pair[1].0)]
@@ -277,8 +270,8 @@ fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> Factors<
     let step = width / (GRADIENTS - 2) as f64;
     let start = first - 0.5 * step;
     let factor = |i: usize| transfer.gradient_factor(start + step * i.min(GRADIENTS - 1) as f64);
-    entries.extend((0..=GRADIENTS).map(|i| [factor(i) as f32, 0.0, 0.0, 0.0]));
-    Factors { first: start, per_magnitude: 1.0 / step }
+    let factors = (0..=GRADIENTS).map(|i| factor(i) as f32).collect();
+    (factors, Factors { first: start, per_magnitude: 1.0 / step })
 }
 
 /// Returns value and −h′(r)/r at each radius, beside those at the next.
@@ -344,18 +337,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_parts_start_where_the_shader_looks() {
+    fn tables_have_the_entries_that_are_looked_up() {
         let transfer = TransferFunction {
             gradient: vec![(0.0, 0.0), (2.0, 1.0)],
             ..TransferFunction::default()
         };
         let tables = Tables::new(&transfer, [0.0, 1.0], Some(&Kernel::b_spline(2.0).unwrap()));
-        let Starts { integrals, factors, radii, sections } = tables.starts;
-        assert_eq!(tables.entries.len(), sections + SECTIONS * SECTIONS);
-        assert_eq!(tables.entries[integrals], [0.0; 4]);
-        assert_eq!(tables.entries[radii][0], 1.0);
-        let factor = tables.entries[factors + GRADIENTS / 2][0];
+        assert_eq!(tables.colors.len(), tables.integrals.len());
+        assert_eq!(tables.sections.len(), SECTIONS * SECTIONS);
+        assert_eq!(tables.integrals[0], [0.0; 4]);
+        assert_eq!(tables.radii[0][0], 1.0);
+        let factor = tables.factors[GRADIENTS / 2];
         assert!((factor - 0.5).abs() < 0.01, "{factor}");
+        let smooth = Tables::new(&transfer, [0.0, 1.0], Some(&Kernel::default()));
+        assert!(smooth.radii.is_empty() && smooth.sections.is_empty());
     }
 
     #[test]
@@ -365,7 +360,7 @@ mod tests {
         let tables = Tables::new(&transfer, [0.0, 1.0], None);
         let Values { zero, per_value, last, place } = tables.values;
         let low = zero - place / per_value;
-        let whole = f64::from(tables.entries[tables.starts.integrals + VALUES - 1][3]) / per_value;
+        let whole = f64::from(tables.integrals[VALUES - 1][3]) / per_value;
         let expected = (low + last / per_value - 0.5) * transfer.extinction(0.9);
         assert!((whole / expected - 1.0).abs() < 1e-3, "{whole} {expected}");
     }
@@ -422,7 +417,7 @@ mod tests {
                 ..TransferFunction::default()
             };
             let tables = Tables::new(&transfer, [0.0, 255.0], None);
-            let entries = [tables.entries[0][3], tables.entries[VALUES - 1][3]];
+            let entries = [tables.colors[0][3], tables.colors[VALUES - 1][3]];
             let beyond = tables.beyond.map(|shown| shown[3]);
             assert_eq!(
                 entries,

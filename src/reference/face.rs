@@ -63,9 +63,9 @@ impl Face {
     }
 }
 
-/// Returns the slope at the middle one of three neighbours, any of which may lack a value: the
-/// difference across both neighbours, the one-sided difference if there is only one, or 0 without
-/// neighbours.
+/// Returns the slope at the middle one of three neighbours, any of which may lack a value. This is
+/// the difference across both neighbours, the one-sided difference if there is only one, or 0
+/// without neighbours.
 fn slope([before, here, after]: [Option<f64>; 3]) -> f64 {
     match (before, here, after) {
         (Some(before), _, Some(after)) => 0.5 * (after - before),

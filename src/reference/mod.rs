@@ -18,17 +18,21 @@
 //!   covariance Σ = B·Bᵀ is widened by (0.35 pixel)² in every direction, so that the splat cannot
 //!   fall between the pixels' rays. (The weight w of a scattered sample is divided by the factor by
 //!   which this increases the sample's volume.) A pixel's size is |c|/f at the centre's distance in
-//!   perspective, with f the focal length in pixels. In orthographic views it is one over the
-//!   number of pixels per world unit. Opaque surfaces must not grow through this widening. So a
-//!   splat of radiance with a normal n steps back along n, to c − 2.4·(σ′ − σ)·n. Here σ and σ′ are
-//!   the splat's standard deviations along n before and after widening.
+//!   perspective. f is the focal length in pixels.
+//!
+//!   In orthographic views it is one over the number of pixels per world unit. Opaque surfaces must
+//!   not grow through this widening. So a splat of radiance with a normal n steps back along n, to
+//!   c − 2.4·(σ′ − σ)·n. Here σ and σ′ are the splat's standard deviations along n before and after
+//!   widening.
 //! - A trained Gaussian ([`Gaussians`](crate::gaussians::Gaussians)) is a splat without a normal,
 //!   with the colour of its harmonics in the direction from the eye to its centre. It is widened by
 //!   (√0.3 pixel)² across the view's axis and by a hundredth of that along it. Its pixel has the
-//!   size z/f, with z the centre's distance along that axis. It covers the share α = min(0.99,
-//!   o·exp(−ρ²/2)) of a ray that passes it at ρ, with o its opacity. If α < 1/255 it covers
-//!   nothing. Its optical depth on the ray is −ln(1 − α), spread like its line integral. Its colour
-//!   may exceed 1. (Kerbl et al. 2023 draw whole Gaussians; [`trained`] draws by their formulas.)
+//!   size z/f, with z the centre's distance along that axis.
+//!
+//!   It covers the share α = min(0.99, o·exp(−ρ²/2)) of a ray that passes it at ρ, with o its
+//!   opacity. If α < 1/255 it covers nothing. Its optical depth on the ray is −ln(1 − α), spread
+//!   like its line integral. Its colour may exceed 1. (Kerbl et al. 2023 draw whole Gaussians;
+//!   [`trained`] draws by their formulas.)
 //! - A sample of a lattice has the profile of its volume's kernel, and B = A·U·u. A holds the steps
 //!   of the lattice, U is the sample's unit in steps, u the kernel's unit. Lattice samples are not
 //!   widened. Their lattice is `drawn_lattice` and their values are `drawn_value`: the volume's
@@ -41,10 +45,12 @@
 //! **Samples** carry the value f + g·(x − c) and have a weight w. On Cartesian and body-centred
 //! lattices w = 1 and g = 0. On rectilinear lattices w = 1, and g is the gradient by finite
 //! differences of the neighbouring samples. Along each axis, with the distances d± to the two
-//! neighbours, it is ((f₊ − f)·d₋/d₊ + (f − f₋)·d₊/d₋)/(d₋ + d₊). It is one-sided at the border,
-//! and 0 along an axis with a single sample. Scattered samples have their own w and slope. The
-//! slope is g in kernel space, as it is before splats are widened (Franke & Nielson 1980: nodal
-//! functions blended by weights). For a flat sample the slope has no meaning in space, so g = 0.
+//! neighbours, it is ((f₊ − f)·d₋/d₊ + (f − f₋)·d₊/d₋)/(d₋ + d₊).
+//!
+//! It is one-sided at the border, and 0 along an axis with a single sample. Scattered samples have
+//! their own w and slope. The slope is g in kernel space, as it is before splats are widened
+//! (Franke & Nielson 1980: nodal functions blended by weights). For a flat sample the slope has no
+//! meaning in space, so g = 0.
 //!
 //! **Tensor products** ([`Tensor`](crate::math::Tensor)). On Cartesian lattices the field may
 //! instead be f(x) = Σ t(p₁ − i)·t(p₂ − j)·t(p₃ − k)·f_ijk. Here p is the place of x in steps of
@@ -56,10 +62,11 @@
 //! **Label maps** ([`Volume::with_labels`](crate::volume::Volume::with_labels)). A sheet has the
 //! label of the sample that is nearest to the middle of what the ray keeps of it. The label is
 //! classified as it is. Light follows the gradient of the label's mask Σ w·m/Σ w, with w =
-//! exp(−d²/2σ²), σ = 0.7 steps, over the four nearest samples along each axis. At a sample of the
-//! label, m is the share of its label around it: the same mean of 1 at samples with that label and
-//! 0 at others, with σ = 1.2, over two samples to each side. At another sample, m is 1 minus the
-//! share of its own label. Samples outside the lattice have no weight.
+//! exp(−d²/2σ²), σ = 0.7 steps, over the four nearest samples along each axis.
+//!
+//! At a sample of the label, m is the share of its label around it. That is the same mean of 1 at
+//! samples with that label and 0 at others, with σ = 1.2, over two samples to each side. At another
+//! sample, m is 1 minus the share of its own label. Samples outside the lattice have no weight.
 //!
 //! # Sheets ([`Mode::Sheets`])
 //! Kernels are cut at the faces, as in Mueller & Crawfis (1998). The field is classified after
@@ -69,48 +76,54 @@
 //! mean is f̄ = V/W. If W ≤ 10⁻⁴ of the sheet's thickness, the sheet has no mean and holds no
 //! field. (For kernels of both signs the limit is 3/10 of their integral.) At a face P = Σ w·h and
 //! Q = Σ w·(f + g·(x − c))·h. The value there is Q/P; there is none if P ≤ 10⁻⁴ (3/10 of the
-//! integral likewise). A face without a value takes f̄. The gradient at a face is that of Q/P in
-//! space, (∇Q − (Q/P)·∇P)/P. Its derivation ignores the rims of the footprints. With central
-//! differences, its components across the picture are instead half the difference of the face's
-//! values in the neighbouring pixels. They are one-sided if one neighbour has no value, and 0 if
-//! neither has one. A face without a value has no gradient. For a tensor product f̄ = ∫f ds over
-//! the sheet's thickness, and the faces have f and ∇f.
+//! integral likewise).
+//!
+//! A face without a value takes f̄. The gradient at a face is that of Q/P in space, (∇Q −
+//! (Q/P)·∇P)/P. Its derivation ignores the rims of the footprints. With central differences, its
+//! components across the picture are instead half the difference of the face's values in the
+//! neighbouring pixels. They are one-sided if one neighbour has no value, and 0 if neither has one.
+//! A face without a value has no gradient. For a tensor product f̄ = ∫f ds over the sheet's
+//! thickness, and the faces have f and ∇f.
 //!
 //! **Values.** u runs from 0 at the front face to 1 at the back face. With
 //! [`Classification::PreIntegrated`], f(u) is the parabola with the values of the faces and the
 //! mean f̄. With [`Classification::Post`], f(u) = f̄. The gradient g(u) of a lattice's field is the
 //! parabola through the gradients at the faces and in the middle of the sheet (at u = ½, defined as
-//! at a face). There are four exceptions: fields without a lattice, central differences, sheets
-//! thicker than 2.2 of the smallest sample spacings, and `Evaluate::Scatter`, because splats are
-//! added to sheets and faces only. For these, and where one of the three gradients is missing, g(u)
-//! across the ray is linear between the gradients of the faces. (If one face has none, g(u) is that
-//! of the other; if neither has one, it is 0.) Along the ray, it is then the derivative of the
-//! values' parabola.
+//! at a face).
+//!
+//! There are four exceptions: fields without a lattice, central differences, sheets thicker than
+//! 2.2 of the smallest sample spacings, and `Evaluate::Scatter`, because splats are added to sheets
+//! and faces only. For these, and where one of the three gradients is missing, g(u) across the ray
+//! is linear between the gradients of the faces. (If one face has none, g(u) is that of the other;
+//! if neither has one, it is 0.) Along the ray, it is then the derivative of the values' parabola.
 //!
 //! **Cells.** A field of tetrahedra is linear inside each, between the values of its corners. Those
 //! with a visible value count (all in a maximum intensity picture). A ray crosses a tetrahedron
 //! where no barycentric coordinate is negative. In a sheet, L is the sum of the lengths of these
 //! crossings and V the sum of their integrals; f̄ = V/L. If L ≤ 10⁻⁴ of the sheet's thickness, the
-//! sheet holds no field. The faces of the sheet then are the first place where a crossing begins
-//! and the last where one ends, with the values and gradients there, and extinction is multiplied
-//! by min(1, L/distance between them). A gradient is linear between those of the corners, and is
-//! taken whole: not only across the ray. If each tetrahedron has one value, it adds the optical
-//! depth κ·ℓ of its crossing, unlit, to the sheet; optical depths add, colours mix in proportion.
+//! sheet holds no field.
+//!
+//! The faces of the sheet then are the first place where a crossing begins and the last where one
+//! ends, with the values and gradients there. Extinction is multiplied by min(1, L/distance between
+//! them). A gradient is linear between those of the corners, and is taken whole: not only across
+//! the ray. If each tetrahedron has one value, it adds the optical depth κ·ℓ of its crossing,
+//! unlit, to the sheet; optical depths add, colours mix in proportion.
 //!
 //! **Parts.** The field exists where the sheet lies inside the box of the samples and inside what
 //! the clips leave. The box is that of the volume's lattice, not of the drawn one. An axis on which
 //! all samples lie at one place extends half a kernel unit to either side; scattered samples have
 //! no box. Each remaining piece is divided into three equal parts. (It stays one part if f(u) = f̄
-//! and there are no isosurfaces.) Consider a part from f(u_a) = a to f(u_b) = b, of length ℓ. All
-//! values between a and b count alike in it (Engel et al. 2001): the extinction is κ̄ = ∫κ df/(b −
-//! a) and the colour ∫κ·c df/∫κ df. If a = b, and in Post with f̄, extinction and colour are those
-//! of the value. κ̄ is multiplied by the gradient factor of |g| in the part's middle (Levoy 1988),
-//! and for scattered samples by min(1, W/thickness). Then α = 1 − exp(−κ̄·ℓ).
+//! and there are no isosurfaces.) Consider a part from f(u_a) = a to f(u_b) = b, of length ℓ.
+//!
+//! All values between a and b count alike in it (Engel et al. 2001): the extinction is κ̄ = ∫κ
+//! df/(b − a) and the colour ∫κ·c df/∫κ df. If a = b, and in Post with f̄, extinction and colour
+//! are those of the value. κ̄ is multiplied by the gradient factor of |g| in the part's middle
+//! (Levoy 1988), and for scattered samples by min(1, W/thickness). Then α = 1 − exp(−κ̄·ℓ).
 //!
 //! **Isosurfaces.** A part crosses each surface of value v with (a < v) ≠ (b < v) at its share (v −
 //! a)/(b − a). Surfaces are crossed nearest first, equal ones in the order of the list. (a and b
-//! are the values of the parabola in Post too.) The part's optical depth is split at the surfaces:
-//! the shares before, between and behind them count there, all with the part's colour. A surface
+//! are the values of the parabola in Post too.) The part's optical depth is split at the surfaces.
+//! The shares before, between and behind them count there, all with the part's colour. A surface
 //! blocks the share of the light that its opacity gives.
 //!
 //! **In a sheet,** front to back from t = 1: a part adds t·α·(lit colour) to S, a surface adds
@@ -122,33 +135,39 @@
 //! share is the sheet's share of the Gaussian along the ray (Zwicker et al. 2001 take the whole
 //! kernel). If the opacity is below 1, τ is also multiplied by A/A′: the area of the splat, seen
 //! from the eye along c, before and after it is widened. So it absorbs as much light in all. In a
-//! sheet the optical depths add. Colours and normals are averaged, weighted by optical depth and by
-//! how much the splats face the eye: 0.5 − 4·n·ĉ, clamped to 1/255 … 1. The average is lit once if
-//! some splat has a normal. In a scene with trained Gaussians, which are not lit, the lit colour
-//! counts by min(1, 2·|n̄|), with n̄ the average normal. Sheets with an optical depth below 10⁻⁵
-//! have no radiance. Splats whose closest approach s* is clipped away do not count.
+//! sheet the optical depths add.
+//!
+//! Colours and normals are averaged, weighted by optical depth and by how much the splats face the
+//! eye: 0.5 − 4·n·ĉ, clamped to 1/255 … 1. The average is lit once if some splat has a normal. In a
+//! scene with trained Gaussians, which are not lit, the lit colour counts by min(1, 2·|n̄|), with
+//! n̄ the average normal. Sheets with an optical depth below 10⁻⁵ have no radiance. Splats whose
+//! closest approach s* is clipped away do not count.
 //!
 //! **Facets** are triangles. A facet fills a share of a pixel: the area of the pixel's square
 //! inside the triangle's perspective image. At a pixel it has the place, the normal and the colour
 //! of its corners' mean. Their weights are the barycentric coordinates at which the pixel's ray
 //! meets the facet's plane. Negative ones are set to 0, and the rest is scaled to add up to 1. The
 //! facet's distance s is that of this place, z/b̂_z, and the facet belongs to the sheet that
-//! contains s. In a sheet the shares of fronts add up, and those of backs; the larger sum counts,
-//! and 1 at most. (If the set is [`Mixed`](crate::facet::Sides), all count as fronts. If it is
-//! closed, its backs may be left out as those of hierarchies.) Each facet is lit by itself. The
-//! sheet's colour is the mean weighted by shares, mixed with the mean weighted by
-//! share·exp(−min(60, 4·p)), in which the nearest counts most. Here p is the distance from the
-//! sheet's front face in pixels; a pixel's size is planes\[k\]/f (orthographic: as for splats).
+//! contains s.
+//!
+//! In a sheet the shares of fronts add up, and those of backs; the larger sum counts, and 1 at
+//! most. (If the set is [`Mixed`](crate::facet::Sides), all count as fronts. If it is closed, its
+//! backs may be left out as those of hierarchies.) Each facet is lit by itself. The sheet's colour
+//! is the mean weighted by shares, mixed with the mean weighted by share·exp(−min(60, 4·p)), in
+//! which the nearest counts most. Here p is the distance from the sheet's front face in pixels; a
+//! pixel's size is planes\[k\]/f (orthographic: as for splats).
+//!
 //! With S the sum of all shares, the second mean counts by x² with x = S − 1, clamped to 0 … 1. So
 //! facets side by side mix by their shares, and a surface that fills a part x of the pixel in front
 //! of another shows by x. A facet whose place is clipped away does not count. Behind the rest of
 //! its sheet, a share a adds x·c to C, and x to A, with x = o·min(1 − A, a·(1 − A + A·o⁴)) and o
-//! the opacity, 1 without images. So what fills the rest of a pixel in another sheet leaves no gap
-//! if it is opaque, and takes its share of the light that is left if it is clear. A facet that
-//! shows an image has the mean colour of the image over its part of the pixel, times its own, and
-//! the image's mean opacity there; where that is 0 it does not count. Colours are then weighted by
-//! share·opacity, and o is the sum of share·opacity over a, 1 at most. Other modes and optics draw
-//! no facets.
+//! the opacity, 1 without images.
+//!
+//! So what fills the rest of a pixel in another sheet leaves no gap if it is opaque, and takes its
+//! share of the light that is left if it is clear. A facet that shows an image has the mean colour
+//! of the image over its part of the pixel, times its own, and the image's mean opacity there.
+//! Where that is 0 it does not count. Colours are then weighted by share·opacity, and o is the sum
+//! of share·opacity over a, 1 at most. Other modes and optics draw no facets.
 //!
 //! **Rods** ([`Rod`](crate::facet::Rod)) are facets of another shape: the points within a radius r
 //! of a segment. With t the place of the segment nearest to a pixel's ray, r is that of the ends,
@@ -179,9 +198,10 @@
 //! **Light** is that of Blinn and Phong with the light at the eye, on both sides; colours are
 //! clamped to 1. If the gradient is 0, the ambient and diffuse parts count in full. A field's
 //! gradient g counts with the certainty c = (|g| − g₀)/(g₁ − g₀), clamped to 0 … 1 (`certain` of
-//! [`Shade`], in value per world length): the diffuse part is multiplied by 1 − c·(1 − cos), the
-//! highlight by c. So what is flat, or as noisy as a flat region, is drawn as if it faced the eye.
-//! Normals of radiance are certain.
+//! [`Shade`], in value per world length).
+//!
+//! The diffuse part is multiplied by 1 − c·(1 − cos), the highlight by c. So what is flat, or as
+//! noisy as a flat region, is drawn as if it faced the eye. Normals of radiance are certain.
 //!
 //! # Other ways
 //! **Optics.** The above is emission and absorption (Max 1995). [`Optics::XRay`] uses the same
@@ -193,11 +213,13 @@
 //! below; of one field only) are radiance (Westover 1989). They have the colour c(f) and, over a
 //! part of the ray, the optical depth κ(f)·w/o·∫h ds. Here o is the average sum of the kernels. On
 //! a lattice, o is ∫h over kernel space (body-centred: times 2^(−3/2)/½, unit over cell). Scattered
-//! sets store their own. Slopes do not count. If the field is lit, a sample has a normal, against
-//! the gradient g that is defined as on a rectilinear lattice. (On body-centred lattices g uses the
-//! next samples of the same cubic lattice; scattered samples have their own slope.) A sample with g
-//! = 0 has no normal. One shade lights the whole picture: the field's. There is no box. Kernels
-//! with negative lobes can take light back within a sheet; colours are clamped to 0 … 1.
+//! sets store their own. Slopes do not count.
+//!
+//! If the field is lit, a sample has a normal, against the gradient g that is defined as on a
+//! rectilinear lattice. (On body-centred lattices g uses the next samples of the same cubic
+//! lattice; scattered samples have their own slope.) A sample with g = 0 has no normal. One shade
+//! lights the whole picture: the field's. There is no box. Kernels with negative lobes can take
+//! light back within a sheet; colours are clamped to 0 … 1.
 //!
 //! **[`Mode::AxisSheets`]** (Westover 1990). n is a unit vector perpendicular to two of the
 //! lattice's axes (the world's axes without a lattice). Of the three such vectors it is the one

@@ -34,10 +34,11 @@ struct Footprint {
     color: DVec3,
 }
 
-/// Draws a trained scene by the formulas of Kerbl et al. (2023), pixel by pixel: footprints of the
-/// projection's linear part at each centre, widened by 0.3 in the variances, composited in the
-/// order of the centres' depths along the view's axis. A Gaussian covers α = min(0.99, o·G) of a
-/// pixel, and nothing where α < 1/255. A ray ends before less than 10⁻⁴ of its light would be left.
+/// Draws a trained scene by the formulas of Kerbl et al. (2023), pixel by pixel. Footprints are
+/// those of the projection's linear part at each centre, widened by 0.3 in the variances. They are
+/// composited in the order of the centres' depths along the view's axis. A Gaussian covers α =
+/// min(0.99, o·G) of a pixel, and nothing where α < 1/255. A ray ends before less than 10⁻⁴ of its
+/// light would be left.
 ///
 /// Unlike the trainer's rasteriser, all pixels of a footprint count, not only those in the tiles
 /// that the square of three standard deviations meets.

@@ -32,8 +32,8 @@ use glam::{DMat3, DVec2, DVec3};
 ///
 /// # Errors
 /// Those of [`render`](super::render). [`Error::Argument`] for a scene that is not a single volume
-/// on a Cartesian or body-centred lattice, for other optics, for a step that is not a positive
-/// length, and for a step so short that a ray would take more than 2²⁰ of them.
+/// on a Cartesian or body-centred lattice, and for other optics. Also for a step that is not a
+/// positive length, or so short that a ray would take more than 2²⁰ of them.
 pub fn integrate(
     scene: &Scene,
     camera: &Camera,

@@ -35,18 +35,20 @@ const FAINT: f64 = 0.02;
 const OPAQUE: f64 = 3.0;
 
 impl Scene {
-    /// Returns points, in world coordinates, that span what a picture shows of the scene: of
-    /// splats, the outermost ones and their reach; of volumes and cells, the outermost samples that
-    /// the transfer function shows. [`Camera::fit_points`](crate::math::Camera::fit_points) makes
-    /// them fill a picture.
+    /// Returns points, in world coordinates, that span what a picture shows of the scene. Of
+    /// splats, these are the outermost ones and their reach; of volumes and cells, the outermost
+    /// samples that the transfer function shows.
+    /// [`Camera::fit_points`](crate::math::Camera::fit_points) makes them fill a picture.
     ///
-    /// A few splats far away from all others are left out, with a warning that counts them: on each
-    /// side up to a thousandth beyond half the size of the rest, a hundredth beyond 4 diagonals, a
-    /// twentieth beyond 20 diagonals; of trained scenes the background too, a fifth beyond 1.5
-    /// diagonals if it lies all around. So are specks of a volume apart from the rest, up to a
-    /// thousandth of what is seen. The time is linear
-    /// in the number of splats and samples; of large hierarchies and bricks only coarse levels are
-    /// read. If an item shows nothing, or the clips remove it, the corners of its box stand for it.
+    /// A few splats far away from all others are left out, with a warning that counts them. These
+    /// are on each side up to a thousandth beyond half the size of the rest, a hundredth beyond 4
+    /// diagonals, and a twentieth beyond 20 diagonals. Of trained scenes the background too, a
+    /// fifth beyond 1.5 diagonals if it lies all around.
+    ///
+    /// So are specks of a volume apart from the rest, up to a thousandth of what is seen. The time
+    /// is linear in the number of splats and samples; of large hierarchies and bricks only coarse
+    /// levels are read. If an item shows nothing, or the clips remove it, the corners of its box
+    /// stand for it.
     ///
     /// # Errors
     /// Those of reading pages and bricks.

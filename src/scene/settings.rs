@@ -69,7 +69,7 @@ pub enum Optics {
 
 /// The part of a picture that one of several machines draws. At each pixel it consists of the
 /// sheets whose middle lies in a box. The parts of boxes that fill space, composited in the order
-/// of their distances from the eye, are the picture of the whole scene: sheets, levels and culling
+/// of their distances from the eye, are the picture of the whole scene. Sheets, levels and culling
 /// are those of the whole, and only what a region needs is read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Region {

@@ -51,8 +51,8 @@ impl Scene {
     }
 
     /// Returns a hundred times the diagonal of the box around nine tenths of the splats, and of
-    /// everything else: the size of the scene, if few splats far away make it larger than that. The
-    /// parts that lie together must not be nearer than the first sheet.
+    /// everything else. This is the size of the scene, if few splats far away make it larger than
+    /// that. The parts that lie together must not be nearer than the first sheet.
     fn usual_size(&self) -> f64 {
         const LOOKS: usize = 1 << 12;
         const FEWEST: usize = 20;

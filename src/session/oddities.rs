@@ -14,7 +14,7 @@ use std::path::Path;
 
 impl Data {
     /// Returns the oddities of a mesh, of a point cloud and of trained Gaussians, and of any data
-    /// whether it is out of sight of the usual camera; other readers report what is wrong.
+    /// whether it is out of sight of the usual camera. Other readers report what is wrong.
     /// Hierarchies and bricks have checks of their own:
     /// [`hierarchy::file::check`](crate::hierarchy::file::check) and
     /// [`bricks::check`](crate::bricks::check).

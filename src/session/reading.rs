@@ -206,7 +206,9 @@ impl Opened<'_> {
                 options.scalar = self.attribute.map(str::to_owned).or(options.scalar);
                 Data::Cells(formats::read_cells(source, &options)?)
             }
-            (Kind::Gaussians, Some(source)) => Data::Gaussians(formats::read_gaussians(source)?),
+            (Kind::Gaussians, Some(source)) => {
+                Data::Gaussians(formats::read_gaussians(source, options)?)
+            }
         };
         data.warn_of_holes(&self.path.display().to_string());
         Ok(data)

@@ -2,9 +2,10 @@
 //!
 //! People see a thing the right way up if it rests as it would on a table. Fu, Cohen-Or, Dror and
 //! Sheffer (2008, “Upright orientation of man-made objects”) therefore compare the poses in which a
-//! shape is stable, by the size of its base, by how far it may be tilted, by symmetry and by how
-//! much of it is seen. This module does the same for the six directions of the coordinate axes,
-//! because files are nearly always drawn or scanned along one of them. A pose is judged by
+//! shape is stable. They do so by the size of its base, by how far it may be tilted, by symmetry
+//! and by how much of it is seen. This module does the same for the six directions of the
+//! coordinate axes, because files are nearly always drawn or scanned along one of them. A pose is
+//! judged by
 //!
 //! - its **base**: the convex hull of the lowest samples, as a share of the shadow from above;
 //! - its **balance**: by how many degrees it may be tilted until the centre of mass leaves the
@@ -256,8 +257,8 @@ impl Shape {
     }
 
     /// Returns the share of the samples that a viewer sees from above, or from two of sixteen
-    /// places around: eight above the thing, eight a little below its middle, who do not see
-    /// through the ground. Samples on the ground count as seen.
+    /// places around. These are eight above the thing, eight a little below its middle, who do not
+    /// see through the ground. Samples on the ground count as seen.
     fn openness(&self, axis: usize, sign: f64) -> f64 {
         let [u, v] = across(axis);
         let mut views = vec![(sign * DVec3::AXES[axis], 0.0)];

@@ -272,8 +272,8 @@ fn mapped(samples: &Samples, change: impl Fn(i32) -> i32 + Sync) -> Vec<i32> {
 pub const OWN_DEVIATION: f64 = 1.2;
 pub const OWN_REACH: usize = 2;
 
-/// Returns, for each sample of a label map, the share of its own label around it, 255 for all: the
-/// mean of the label's mask under a Gaussian over the samples within [`OWN_REACH`] steps.
+/// Returns, for each sample of a label map, the share of its own label around it, 255 for all. This
+/// is the mean of the label's mask under a Gaussian over the samples within [`OWN_REACH`] steps.
 pub fn own_shares(volume: &Volume) -> Vec<u8> {
     each_type!(volume.samples, values => shares_of(volume.lattice.dims, values))
 }

@@ -1,10 +1,10 @@
 //! The coefficients of a cubic B-spline that passes through the samples of a Cartesian lattice.
 //!
 //! The weights of the spline at the samples are ⅙, ⅔ and ⅙ along each axis. The inverse of that
-//! filter is one forward and one backward recursion, both with the pole √3 − 2 (Unser, Aldroubi &
-//! Eden, "Fast B-spline transforms for continuous image representation and interpolation", 1991;
-//! Thévenaz, Blu & Unser, "Interpolation revisited", 2000). The samples continue mirrored at the
-//! outermost ones, and so do the coefficients.
+//! filter is one forward and one backward recursion, both with the pole √3 − 2. See Unser, Aldroubi
+//! & Eden, "Fast B-spline transforms for continuous image representation and interpolation", 1991.
+//! See also Thévenaz, Blu & Unser, "Interpolation revisited", 2000. The samples continue mirrored
+//! at the outermost ones, and so do the coefficients.
 
 use super::{Samples, each_type};
 use crate::{math::cosine::mirrored, parallel::prelude::*};

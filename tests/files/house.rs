@@ -56,12 +56,12 @@ const COLUMNS: usize = 100;
 /// A module, by the names from the crate's root on.
 type Module = Vec<String>;
 
-fn root() -> &'static Path {
+pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
 /// Lists the files below a folder, without what is built or fetched.
-fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+pub fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry")) {
         let (path, name) = (entry.path(), entry.file_name());
         let left_out = ["target", "out", "corpus", "artifacts", "coverage", "regressions"];

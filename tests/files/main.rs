@@ -1,6 +1,7 @@
 //! Files: what is read from them and written to them. Also the files of the project itself: its
 //! modules, and the tables of its documentation.
 
+mod comments;
 mod external;
 mod frames;
 mod house;

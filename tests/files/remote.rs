@@ -57,8 +57,8 @@ fn keep() -> MutexGuard<'static, ()> {
     own
 }
 
-/// A LAZ file of 80,000 points along a bumpy strip, in chunks of 4,000 from one end to the other,
-/// with so many random bytes a point that a chunk has about 400 KiB.
+/// A LAZ file of 80,000 points along a bumpy strip, in chunks of 4,000 from one end to the other.
+/// It has so many random bytes a point that a chunk has about 400 KiB.
 fn strip() -> Vec<u8> {
     const MORE: usize = 100;
     let items = laz::LazItemRecordBuilder::default_for_point_format_id(0, MORE as u16).unwrap();

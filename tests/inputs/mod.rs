@@ -84,7 +84,7 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
             format!("cells {}", formats::load_cells(path, limits, &ReadOptions::default())?.len())
         }
         Some(Kind::Gaussians) => {
-            let set = formats::load_gaussians(path, limits)?;
+            let set = formats::load_gaussians(path, limits, &ReadOptions::default())?;
             format!("Gaussians {} of degree {}", set.len(), set.degree)
         }
         Some(Kind::Hierarchy) => {

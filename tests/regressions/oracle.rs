@@ -592,7 +592,9 @@ pub fn any(bytes: &[u8]) {
                     .iter()
                     .for_each(sound_cells);
             }
-            Some(Kind::Gaussians) => gaussians("input", bytes, formats::read_gaussians),
+            Some(Kind::Gaussians) => gaussians("input", bytes, |source| {
+                formats::read_gaussians(source, &ReadOptions::default())
+            }),
             Some(Kind::Hierarchy) => splk(bytes),
             Some(Kind::Bricks) => splv(bytes),
             None => drop(read("input", bytes, |source| Ok(formats::advice(source)))),

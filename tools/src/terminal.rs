@@ -26,9 +26,9 @@ const MOST: usize = 2000;
 /// Characters shown from the end of such a text, where the command's own words mostly stand.
 const END: usize = 500;
 
-/// Whether a terminal may obey a character instead of showing it: control characters (C0, DEL, C1),
-/// characters that change the direction of the text after them, and characters that end a line or a
-/// paragraph.
+/// Whether a terminal may obey a character instead of showing it. These are control characters (C0,
+/// DEL, C1), characters that change the direction of the text after them, and characters that end a
+/// line or a paragraph.
 fn is_unsafe(letter: char) -> bool {
     letter.is_control()
         || matches!(

@@ -43,7 +43,7 @@ pub fn holds_gaussians(source: &Source) -> Result<bool> {
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed header, for missing properties, for a
-/// number of `f_rest_…` that no degree from 0 to 3 has, and for a file that ends early;
+/// number of `f_rest_…` that no degree from 0 to 3 has, and for a file that ends early.
 /// [`Error::Limit`](crate::Error::Limit) for more Gaussians than the limits allow.
 pub fn read_gaussians(source: &Source) -> Result<Gaussians> {
     let header = header::read(source)?;

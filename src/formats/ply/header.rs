@@ -13,6 +13,7 @@ use ply_rs::{
     parser::Parser,
     ply::{DefaultElement, Encoding, PropertyType, ScalarType},
 };
+use std::sync::Arc;
 
 /// Headers of real files have far fewer bytes and columns than this.
 const LONGEST: usize = 1 << 20;
@@ -86,8 +87,12 @@ pub(super) fn width(scalar: &ScalarType) -> usize {
     }
 }
 
-/// Reads the header of a file.
-pub(super) fn read(source: &Source) -> Result<Header> {
+/// Returns the header of a file, which is parsed once.
+pub(super) fn read(source: &Source) -> Result<Arc<Header>> {
+    source.parsed(parse)
+}
+
+fn parse(source: &Source) -> Result<Header> {
     let bytes = source.bytes();
     let mut clean = Clean::default();
     let mut at = 0;

@@ -16,6 +16,19 @@ fn load_within(bytes: impl AsRef<[u8]>, limits: &Limits) -> Result<Mesh> {
     read(&Source::open(&path, limits)?, &ReadOptions::default())
 }
 
+#[test]
+fn the_header_is_parsed_once() {
+    let text = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float \
+                 y\nproperty float z\nend_header\n1 2 3\n";
+    let limits = Limits::default();
+    let source = Source::from_bytes(Path::new("a.ply"), text, &limits).unwrap();
+    let first = header::read(&source).unwrap();
+    let kind = crate::formats::Kind::of_source(&source, &ReadOptions::default()).unwrap();
+    assert_eq!(kind, Some(crate::formats::Kind::Mesh));
+    assert_eq!(read(&source, &ReadOptions::default()).unwrap().positions.len(), 1);
+    assert!(std::sync::Arc::ptr_eq(&first, &header::read(&source).unwrap()));
+}
+
 const POINTS: [[f64; 3]; 4] =
     [[0.0, 0.0, 0.0], [1.0, 0.0, 0.5], [1.0, 1.0, 0.25], [0.0, 1.0, -2.0]];
 

@@ -28,8 +28,9 @@ struct Own {
     transfer: TransferFunction,
     range: [f64; 2],
     diagonal: f64,
+    /// The numbers of the tables, without entries.
     tables: Tables,
-    start: u32,
+    starts: [u32; 4],
 }
 
 impl FieldTables {
@@ -52,10 +53,9 @@ impl FieldTables {
         let made = fields().filter_map(|(number, item)| {
             let (transfer, range) = (item.transfer()?, item.value_range()?);
             let mut tables = Tables::of(item, transfer, range);
-            let start = entries.len() as u32;
-            entries.append(&mut tables.entries);
+            let starts = pack(&mut tables, &mut entries);
             let (transfer, diagonal) = (transfer.clone(), item.field_diagonal());
-            Some(Own { item: number, transfer, range, diagonal, tables, start })
+            Some(Own { item: number, transfer, range, diagonal, tables, starts })
         });
         let fields = made.collect();
         if entries.is_empty() {
@@ -91,7 +91,23 @@ impl FieldTables {
     /// Packs the fields of a view, with the places of their tables.
     pub fn pack(&self, fields: &[Field], frame: &mut Frame) {
         for ((slot, field), own) in frame.fields.iter_mut().zip(fields).zip(&self.fields) {
-            *slot = FrameField::new(field, own.tables.starts, own.start);
+            *slot = FrameField::new(field, own.starts);
         }
     }
+}
+
+/// Moves tables behind the entries of others. Returns where their parts start: the transfer
+/// function, its integrals, the gradient's factors, and the kernel with its sections.
+fn pack(tables: &mut Tables, entries: &mut Vec<[f32; 4]>) -> [u32; 4] {
+    let factors = std::mem::take(&mut tables.factors);
+    let factors = factors.into_iter().map(|factor| [factor, 0.0, 0.0, 0.0]).collect();
+    let parts = [&mut tables.colors, &mut tables.integrals, &mut tables.radii].map(std::mem::take);
+    let [colors, integrals, radii] = parts;
+    let starts = [colors, integrals, factors, radii].map(|mut part: Vec<[f32; 4]>| {
+        let start = entries.len() as u32;
+        entries.append(&mut part);
+        start
+    });
+    entries.append(&mut tables.sections);
+    starts
 }

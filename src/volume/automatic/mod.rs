@@ -1,10 +1,10 @@
 //! The transfer function that is made for a field from what the field is like.
 //!
 //! Values of a field are those of materials, where their surroundings are even, or of boundaries
-//! between two materials, where the gradient is large (Kindlmann & Durkin 1998, "Semi-automatic
-//! generation of transfer functions for direct volume rendering"). [`survey`] measures both, and
-//! the noise (Immerkær 1996). [`materials`] finds the background, along the edges of the box, and
-//! the materials before it. [`recipe`] shows them. If the file says what measured the values,
+//! between two materials, where the gradient is large. See Kindlmann & Durkin 1998, "Semi-automatic
+//! generation of transfer functions for direct volume rendering". [`survey`] measures both, and the
+//! noise (Immerkær 1996). [`materials`] finds the background, along the edges of the box, and the
+//! materials before it. [`recipe`] shows them. If the file says what measured the values,
 //! [`modality`] has a recipe of its own.
 
 mod colours;

@@ -96,9 +96,9 @@ impl MarkedPrimitive {
     }
 }
 
-/// Returns an upper bound on the bytes that the marks take: for each object a primitive, for each
-/// name and each item of a list an entry of a map, and the text of all names. All include the spare
-/// capacity of lists.
+/// Returns an upper bound on the bytes that the marks take. An object counts as a primitive, each
+/// name and each item of a list as an entry of a map. The text of all names is added. All include
+/// the spare capacity of lists.
 fn tree_bytes(text: &[u8]) -> u64 {
     const ENTRY: u64 = 128;
     let count = |letter: u8| text.iter().filter(|&&b| b == letter).count() as u64;

@@ -83,8 +83,8 @@ pub(super) fn read(source: &Source, header: &Header) -> Result<Gaussians> {
 }
 
 /// Returns the scales of a Gaussian that a filter widens, and the factor on its opacity that keeps
-/// what it absorbs: the low-pass filter that Mip-Splatting trains with and stores beside the scales
-/// (Yu et al. 2024, equation 9). Axes without an extent count for neither.
+/// what it absorbs. The filter is the low-pass that Mip-Splatting trains with and stores beside the
+/// scales (Yu et al. 2024, equation 9). Axes without an extent count for neither.
 fn filtered(scale: Vec3, filter: f32) -> (Vec3, f32) {
     let wide = (scale * scale + Vec3::splat(filter * filter)).map(f32::sqrt);
     let share = |axis: usize| if scale[axis] > 0.0 { scale[axis] / wide[axis] } else { 1.0 };

@@ -6,7 +6,7 @@ use image_webp::{ColorType, WebPEncoder};
 use serde_json::{Value, json};
 use splatkit::{
     compare::compare_files,
-    formats,
+    formats::{self, ReadOptions},
     gaussians::{Gaussians, harmonics::terms},
     input::Limits,
 };
@@ -210,7 +210,8 @@ pub fn write(set: &Gaussians, extension: &str, path: &Path) {
 
 /// Reads a scene.
 pub fn load(folder: &Folder, name: &str) -> Gaussians {
-    formats::load_gaussians(folder.path(name), &Limits::default()).expect(name)
+    let (limits, options) = (Limits::default(), ReadOptions::default());
+    formats::load_gaussians(folder.path(name), &limits, &options).expect(name)
 }
 
 /// Returns how alike two pictures are, in dB.
