@@ -739,7 +739,7 @@ fn trained_gaussians_are_told() {
         .fails(2, &["gaussians.ply holds no volume", "trained Gaussians"]);
     folder
         .run("render gaussians.ply -o a.png --color red")
-        .fails(2, &["--color colours meshes and point clouds, but there are none"]);
+        .fails(2, &["--color colours meshes, point clouds and the boundary of cells"]);
     folder.put("a.ksplat", [0; 4096]);
     folder
         .run("render a.ksplat -o a.png")

@@ -139,7 +139,7 @@ const USES: &[(&str, &str, i32, &str)] = &[
         "edges of a hierarchy",
         "render a.splk -o out.png --edges",
         0,
-        "warning: --edges has no effect: it is for meshes, but a.splk is a hierarchy",
+        "warning: --edges has no effect: it is for meshes and cells, but a.splk is a hierarchy",
     ),
     (
         "a layout of a file that has its own",
