@@ -23,6 +23,7 @@ const ORDER: &[&str] = &[
     "triangles",
     "points",
     "cells",
+    "faces",
     "dims",
     "spacing",
     "type",
