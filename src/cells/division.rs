@@ -23,7 +23,7 @@ pub(super) struct Division {
     pub blocks: Vec<Block>,
     /// Pairs of points between which the blocks are linear, and the weights in the middle.
     pub middles: Vec<([usize; 2], Vec<f64>)>,
-    /// The faces of blocks on each face of the cell ([`Form::sides`]).
+    /// The faces of blocks on each face of the cell ([`Form::sides`]), as seen from outside.
     pub sides: Vec<Vec<Vec<usize>>>,
 }
 
@@ -63,11 +63,10 @@ impl Form {
         }
     }
 
-    /// Returns whether a place lies in the plane of a face.
-    fn is_on(self, side: &[usize], place: At) -> bool {
+    /// Returns a place in the plane of a face, and the direction out of the form there.
+    fn plane(self, side: &[usize]) -> [DVec3; 2] {
         let corner = |at: usize| DVec3::from_array(self.corners()[side[at]]);
-        let normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
-        normal.dot(DVec3::from_array(place) - corner(0)).abs() < 1e-9
+        [corner(0), (corner(1) - corner(0)).cross(corner(2) - corner(0))]
     }
 }
 
@@ -95,12 +94,20 @@ impl Division {
         };
         let middles = pairs.into_iter().map(|pair| (pair, basis.weights(middle(pair)))).collect();
         let points = places.iter().map(|place| basis.weights(at(*place))).collect();
-        let is_on = |side: &[usize], face: &Vec<usize>| {
-            face.iter().all(|corner| form.is_on(side, at(places[*corner])))
-        };
         let on_side = |side: &&[usize]| {
+            let [start, out] = form.plane(side);
+            let place = |corner: usize| DVec3::from_array(at(places[corner]));
+            let is_on = |corner: &usize| out.dot(place(*corner) - start).abs() < 1e-9;
             let faces = blocks.iter().flat_map(Block::faces);
-            faces.filter(|face| is_on(side, face)).collect()
+            let found = faces.filter(|face| face.iter().all(is_on)).map(|mut face| {
+                let [a, b, c] = [0, 1, 2].map(|corner| place(face[corner]));
+                // Tetrahedra have their corners in any order.
+                if (b - a).cross(c - a).dot(out) < 0.0 {
+                    face.reverse();
+                }
+                face
+            });
+            found.collect()
         };
         let sides = form.sides().iter().map(on_side).collect();
         Self { points, blocks, middles, sides }

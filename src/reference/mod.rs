@@ -381,7 +381,7 @@ struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// `flat` is the scene with its hierarchies cut.
+    /// `flat` is the scene with its hierarchies and solids cut.
     fn new(scene: &'a Scene, flat: &'a Scene, view: View, settings: &Settings) -> Self {
         let sheets = scene.sheets(&view, settings);
         let is_dark = settings.optics == Optics::XRay;
@@ -403,7 +403,7 @@ impl<'a> Frame<'a> {
             planes: sheets.planes,
             near: nearest(scene, &view, settings),
             kernels: gather::radiance(flat, &view, before_shade),
-            facets: facets::gather(scene, &view, settings),
+            facets: facets::gather(flat, &view, settings),
             fields,
             lattice: flat.items.iter().find_map(Item::lattice),
             // Normals are as certain as their splats.

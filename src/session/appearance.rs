@@ -92,7 +92,9 @@ impl Appearance {
     /// Those of [`of_volume`](Self::of_volume).
     pub fn of_cells(&self, name: &str, cells: &Cells) -> Result<TransferFunction> {
         let values = Values::new(name, cells.range(), cells.bounds());
-        self.transfer(&values, || cells.automatic_transfer())
+        // A surface without light has no shape; a haze with light has no colours.
+        let shade = (!self.isosurfaces.is_empty()).then(Shade::default);
+        self.transfer(&values, || TransferFunction { shade, ..cells.automatic_transfer() })
     }
 
     /// Returns the transfer function of a volume in bricks. The automatic one is that of a level

@@ -260,8 +260,15 @@ fn of_cells(cells: &Cells) -> Map<String, Value> {
     facts.insert("kind".into(), json!("cells"));
     facts.insert("points".into(), json!(cells.points.len()));
     facts.insert("cells".into(), Value::Object(kinds.collect()));
-    facts.insert("range".into(), json!(cells.range()));
-    facts.insert("attributes".into(), json!(["position", format!("value of {place}")]));
+    if !cells.faces.is_empty() {
+        facts.insert("faces".into(), json!(cells.faces.len()));
+    }
+    let mut attributes = vec!["position".to_owned()];
+    if !cells.values.is_empty() {
+        facts.insert("range".into(), json!(cells.range()));
+        attributes.push(format!("value of {place}"));
+    }
+    facts.insert("attributes".into(), json!(attributes));
     stand(&mut facts, cells.about.stance);
     facts.insert("bounds".into(), bounds(Some(cells.bounds())));
     facts

@@ -24,6 +24,7 @@ const ORDER: &[&str] = &[
     "lines",
     "points",
     "cells",
+    "faces",
     "dims",
     "spacing",
     "type",
