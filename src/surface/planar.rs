@@ -18,7 +18,8 @@ use glam::{DMat3, DVec3, Vec3};
 const MORE: usize = 32;
 /// Of so many points one is looked at, level by level.
 const STRIDES: [usize; 3] = [1, 8, 64];
-/// A neighbourhood may hold one in so many points of a cloud: a larger one shows the shape of the whole.
+/// A neighbourhood may hold one in so many points of a cloud: a larger one shows the shape of the
+/// whole.
 const MOST_OF_CLOUD: usize = 128;
 /// Largest ratio of the smallest eigenvalue to the middle one on a surface, for few neighbours and
 /// for more. Of points that fill space by chance, 1 in 100 is below that.
