@@ -3,7 +3,7 @@
 
 use super::{
     close::Packet,
-    facets::{Covered, LEAST_SHARE, Side},
+    covered::{Covered, LEAST_SHARE, Side},
     footprint::{Kind, Record, box_bounds, tangent_bounds},
     plan::Plan,
     scatter::{OpenTile, Window, is_kept},

@@ -1,12 +1,21 @@
 //! Rods: the share of a pixel that each fills, and where the pixel's ray meets it.
 
-use super::{facets::Place, ray::Ray};
+use super::ray::Ray;
 use crate::{
     facet::{OVERLAP, Relief, Rod},
     math::View,
 };
 use glam::DVec3;
 use std::f64::consts::FRAC_PI_2;
+
+/// Where the ray of a pixel meets a facet, and the share of the pixel that the facet fills.
+pub(super) struct Place {
+    pub share: f64,
+    pub distance: f64,
+    pub color: DVec3,
+    /// Of any length; zero for a colour that is not lit.
+    pub normal: DVec3,
+}
 
 /// A rod in view space.
 pub(super) struct Body {

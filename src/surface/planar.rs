@@ -5,7 +5,6 @@
 //! are undecided are judged by more neighbours: 32 nearest, then the 32 nearest among every 8th and
 //! every 64th point. The neighbours vote, so that edges and strays do not become islands.
 
-use super::cloud::Nearest;
 use crate::{
     Deadline, Result,
     deadline::Clock,
@@ -13,6 +12,12 @@ use crate::{
     parallel::prelude::*,
 };
 use glam::{DMat3, DVec3, Vec3};
+
+/// Neighbours that a point's plane and spacing are computed from.
+pub(super) const COUNT: usize = 10;
+
+/// The neighbours of a point; filled up with the point itself if there are fewer.
+pub(super) type Nearest = [u32; COUNT];
 
 /// Neighbours that undecided points are judged by.
 const MORE: usize = 32;
