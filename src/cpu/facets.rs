@@ -3,15 +3,16 @@
 
 use super::{
     close::Packet,
+    covered::{Covered, LEAST_SHARE, Side},
     footprint::{Kind, Record},
     plan::Plan,
     rods,
     scatter::{OpenTile, Window, is_kept},
     sums::{Sums, WINDOW},
-    vector::{Lanes, exp, three},
+    vector::{Lanes, three},
 };
 use crate::{
-    facet::{FacetSet, Image, NEARER, Sides},
+    facet::{FacetSet, Image, Sides},
     plan::source::Source,
     scene::Settings,
     splat::{NO_NORMAL, decode_normal, encode_normal},
@@ -20,35 +21,8 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
 
-/// A facet further behind the front of its sheet than this, over the length by which nearness is
-/// measured, counts as this far.
-const FARTHEST: f32 = 60.0;
-/// Smaller shares of a pixel are not added.
-pub const LEAST_SHARE: f32 = 1e-6;
 /// `extent2` of the record of a facet that ends at the clips already.
 const CUT: f32 = 1.0;
-
-/// The side of a facet that is seen.
-#[derive(Clone, Copy)]
-pub enum Side {
-    Front,
-    Back,
-    /// The facet is a rod.
-    Rod,
-}
-
-/// What a facet covers of eight pixels.
-pub struct Covered<S: Simd> {
-    pub share: Lanes<S>,
-    /// The part of the share that is seen, if the facet shows an image.
-    pub seen: Lanes<S>,
-    pub distance: Lanes<S>,
-    /// Lit.
-    pub color: [Lanes<S>; 3],
-    /// Pixels of which the facet covers a part.
-    pub covers: mask32x8<S>,
-    pub side: Side,
-}
 
 /// Facets of a set in a view.
 pub struct FacetProjector<'a> {
@@ -430,50 +404,6 @@ impl<S: Simd> OpenTile<'_, S> {
         let side = if facet.is_front { Side::Front } else { Side::Back };
         let own = Covered { share, seen: seen_share, distance, color, covers, side };
         Self::add_covered(simd, plan, &own, window, packet, sums);
-    }
-
-    /// Adds what a facet or rod covers in a window of sheets.
-    #[inline(always)]
-    pub fn add_covered(
-        simd: S,
-        plan: &Plan,
-        covered: &Covered<S>,
-        window: Window,
-        packet: &Packet<S>,
-        sums: &mut Sums<S>,
-    ) {
-        let Covered { share, seen, distance, color, covers, side } = *covered;
-        let none = Lanes::splat(simd, 0.0);
-        for own in usize::from(window.is_continued)..WINDOW {
-            let [front, back] = [0, 1].map(|next| plan.planes[window.front + own + next]);
-            let mut inside: mask32x8<S> = distance.simd_lt(back) & covers;
-            if own > 0 {
-                inside &= distance.simd_ge(front);
-            }
-            if !inside.any_true() {
-                continue;
-            }
-            let [share, seen] = [share, seen].map(|own| inside.select(own, none));
-            let pixel = if plan.view.perspective { front.max(1e-30) } else { 1.0 };
-            let per_pixel = NEARER as f32 * plan.frame.scale / pixel;
-            let behind =
-                ((distance - front) * per_pixel).max(none).min(Lanes::splat(simd, FARTHEST));
-            let weight = seen * exp(simd, none - behind);
-            let slot = (window.front + own) % WINDOW;
-            sums.has_facets[slot] |= packet.bit();
-            let sums = &mut sums.facets[slot][packet.number];
-            match side {
-                Side::Front => sums.shares[0] += share,
-                Side::Back => sums.shares[1] += share,
-                // Where rods meet, they fill the same part of a pixel.
-                Side::Rod => sums.shares[1] = sums.shares[1].max(share),
-            }
-            sums.seen += seen;
-            sums.weight += weight;
-            sums.distance = weight.mul_add(distance, sums.distance);
-            sums.color = three!(I => seen.mul_add(color[I], sums.color[I]));
-            sums.nearest = three!(I => weight.mul_add(color[I], sums.nearest[I]));
-        }
     }
 
     /// Adds a facet's window to all packets that it meets.

@@ -1,8 +1,9 @@
-//! Rods: the pixels and sheets that they cover, and where rays meet them (shaders/shared/rods.wgsl).
+//! Rods: the pixels and sheets that they cover, and where rays meet them
+//! (shaders/shared/rods.wgsl).
 
 use super::{
     close::Packet,
-    facets::{Covered, LEAST_SHARE, Side},
+    covered::{Covered, LEAST_SHARE, Side},
     footprint::{Kind, Record, box_bounds, tangent_bounds},
     plan::Plan,
     scatter::{OpenTile, Window, is_kept},
@@ -220,9 +221,9 @@ impl Shown {
 }
 
 impl Shown {
-    /// Returns the shares without those on the outline of round ends at joints, where the outline is
-    /// that of the other rod. `to` is the way to the start and `across` the way from there to the
-    /// end, both across the rays.
+    /// Returns the shares without those on the outline of round ends at joints, where the outline
+    /// is that of the other rod. `to` is the way to the start and `across` the way from there to
+    /// the end, both across the rays.
     #[inline(always)]
     fn outlined<S: Simd>(
         &self,

@@ -93,8 +93,8 @@ pub struct Sums<S: Simd> {
     /// Empty in a scene without facets.
     pub facets: Vec<[FacetSums<S>; PACKETS]>,
     pub has_facets: [u8; WINDOW],
-    /// Facets show images, of which parts may not be seen, or are rods, which may fill the same part
-    /// of a pixel.
+    /// Facets show images, of which parts may not be seen, or are rods, which may fill the same
+    /// part of a pixel.
     has_seen: bool,
     none: Lanes<S>,
 }

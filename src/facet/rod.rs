@@ -46,8 +46,8 @@ pub enum Relief {
 /// is a usual one, which no device changes. rods.wgsl has the same number.
 pub(crate) const ROD: u32 = 0x4000_8000;
 
-/// The second normal of a facet that is a rod: a flat one, a round one, and a round one that another
-/// rod continues. rods.wgsl and src/cpu/rods.rs read them as numbers.
+/// The second normal of a facet that is a rod: a flat one, a round one, and a round one that
+/// another rod continues. rods.wgsl and src/cpu/rods.rs read them as numbers.
 const FLAT: u32 = 0;
 const ROUND: u32 = 1;
 const JOINED: u32 = 2;
@@ -108,8 +108,8 @@ impl Size {
     /// The most pixels.
     pub const MOST_PIXELS: f32 = 1000.0;
 
-    /// The size of a pixel, as a part of the diagonal of what is drawn, where sizes must be those of
-    /// the world: in hierarchies, and where only splats are drawn.
+    /// The size of a pixel, as a part of the diagonal of what is drawn, where sizes must be those
+    /// of the world: in hierarchies, and where only splats are drawn.
     pub(crate) const PIXEL: f32 = 1e-3;
 
     /// Checks that the size is a positive number that pictures can show.
@@ -287,8 +287,8 @@ impl Rod {
     }
 }
 
-/// Returns the lower triangular factor of the sum of the squares of these vectors (Cholesky), row by
-/// row.
+/// Returns the lower triangular factor of the sum of the squares of these vectors (Cholesky), row
+/// by row.
 fn lower<const N: usize>(columns: [DVec3; N]) -> [f32; 6] {
     let sum = |i: usize, j: usize| columns.iter().map(|c| c[i] * c[j]).sum::<f64>();
     let b00 = sum(0, 0).sqrt();

@@ -1,7 +1,12 @@
 //! Facets: the part of a pixel that each fills, and what they add to its sheets. Rods are facets
 //! whose part and place is found in `rods`.
 
-use super::{Frame, clip, ray::Ray, rods::Body, shade};
+use super::{
+    Frame, clip,
+    ray::Ray,
+    rods::{Body, Place},
+    shade,
+};
 use crate::{
     facet::{FacetSet, Image, NEARER, Sides},
     math::View,
@@ -20,15 +25,6 @@ const RAYS: usize = 16;
 pub(super) enum Facet<'a> {
     Triangle(Triangle<'a>),
     Rod { body: Body, rows: [f64; 2] },
-}
-
-/// Where the ray of a pixel meets a facet, and the share of the pixel that the facet fills.
-pub(super) struct Place {
-    pub share: f64,
-    pub distance: f64,
-    pub color: DVec3,
-    /// Of any length; zero for a colour that is not lit.
-    pub normal: DVec3,
 }
 
 /// A triangle in view space.

@@ -73,11 +73,12 @@ pub struct Mark {
     length: String,
 }
 
-/// An item; a mesh, which is drawn as facets in the usual pictures and as surfels in others; or
-/// cells, which are drawn as a solid in the usual pictures and as a field in others.
+/// What an input has become. Some entries are one item in the usual pictures and another in others.
 enum Entry {
     Ready(Item),
+    /// Facets, or surfels.
     Mesh(Box<Faceted>),
+    /// Cells as a solid, or as a field.
     Solid(Box<ShownSolid>),
     /// Rods, which are splats in pictures that show no facets.
     Rods {

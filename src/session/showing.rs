@@ -32,7 +32,8 @@ pub struct Showing {
     pub points: PointStyle,
     /// The diameter of points that are drawn as balls or discs.
     pub point_size: Option<Size>,
-    /// The array that holds the radii of points ([`Reading::give_radii`](super::Reading::give_radii)).
+    /// The array that holds the radii of points
+    /// ([`Reading::give_radii`](super::Reading::give_radii)).
     pub point_radius: Option<String>,
     /// The width of lines.
     pub line_width: Option<Size>,

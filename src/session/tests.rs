@@ -353,16 +353,10 @@ fn points_and_lines_have_items_of_their_own() {
     let cases = [
         ("a surface", cloud(sphere.clone()), PointStyle::Auto, &["points"][..], &[false][..]),
         ("a ball", cloud(ball(2000)), PointStyle::Auto, &["points"], &[true]),
-        (
-            "both",
-            cloud([sphere.clone(), apart].concat()),
-            PointStyle::Auto,
-            &["points"; 2],
-            &[false, true],
-        ),
+        ("both", cloud([sphere.clone(), apart].concat()), PointStyle::Auto, &["points"], &[false]),
         ("surfels", cloud(ball(2000)), PointStyle::Surfels, &["points"], &[false]),
         ("spheres", cloud(sphere), PointStyle::Spheres, &["points"], &[true]),
-        ("few", cloud(ball(5)), PointStyle::Auto, &["points"], &[true]),
+        ("few", cloud(ball(5)), PointStyle::Auto, &["points"], &[false]),
         ("edges", edges, PointStyle::Auto, &["lines", "mesh"], &[true, true]),
         ("lines", only, PointStyle::Auto, &["lines"], &[true]),
     ];

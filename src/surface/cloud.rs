@@ -7,7 +7,7 @@ use super::{
     opacity::{Absorbed, share_of},
     orient::{Known, orient},
     paint::{of_normal, pack, point_color},
-    planar::{is_flat_of_few, off_surface, scatter},
+    planar::{COUNT, Nearest, is_flat_of_few, off_surface, scatter},
 };
 use crate::{
     Result,
@@ -21,8 +21,6 @@ use crate::{
 use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 
-/// Neighbours that a point's plane and spacing are computed from.
-const COUNT: usize = 10;
 /// Standard deviation of a surfel, in units of the median distance to the neighbours. On a square
 /// grid of points that is 1.2 spacings, and 0.39 would be enough; the rest is for irregular point
 /// clouds.
@@ -49,9 +47,6 @@ const BALL: f32 = 0.45;
 /// The least radius of points of automatic size, and of those whose size is one of the world, in
 /// pixels.
 const LEAST_PIXELS: [f32; 2] = [1.0, 0.5];
-
-/// The neighbours of a point; filled up with the point itself if there are fewer.
-pub(super) type Nearest = [u32; COUNT];
 
 /// The neighbourhood of a point.
 #[derive(Default)]

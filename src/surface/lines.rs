@@ -12,8 +12,8 @@ use crate::{
 };
 use glam::Vec3;
 
-/// Longer segments are cut, in diagonals of the mesh: the tiles and sheets that a long rod meets are
-/// more than those that it fills.
+/// Longer segments are cut, in diagonals of the mesh: the tiles and sheets that a long rod meets
+/// are more than those that it fills.
 const LONGEST: f32 = 1.0 / 40.0;
 
 /// Most rods that cutting adds, unless as many as the segments are more.
@@ -76,8 +76,8 @@ impl Mesh {
         Ok(Some(FacetSet::of_rods(self.origin, rods)))
     }
 
-    /// Returns the rods of a segment in a direction, cut into parts. `joints` are those of the whole
-    /// segment ([`Rod::joints`]).
+    /// Returns the rods of a segment in a direction, cut into parts. `joints` are those of the
+    /// whole segment ([`Rod::joints`]).
     fn cut_line(
         &self,
         [a, b]: [u32; 2],

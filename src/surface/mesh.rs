@@ -59,8 +59,8 @@ pub struct Mesh {
     /// One value of each vertex, to colour it by; empty if the file has none, or none was asked
     /// for. NaN where a vertex has no value. `about` has the name and the unit.
     pub values: Vec<f32>,
-    /// The radius of each point of a cloud, in world units; empty if none was asked for. Points have
-    /// the usual radius where this is not finite.
+    /// The radius of each point of a cloud, in world units; empty if none was asked for. Points
+    /// have the usual radius where this is not finite.
     pub radii: Vec<f32>,
     /// How `values` colour the mesh instead of its own colours; `None` if they do not
     /// ([`paint`](Self::paint)).

@@ -176,9 +176,9 @@ const WORK: &str = "making surfels";
 const CHUNK: usize = 1 << 12;
 
 impl Mesh {
-    /// Makes surfels that cover the triangles without holes, stand for lines, or, without either, for
-    /// the points. Lengths are in world units and centres are relative to the mesh's origin. The order
-    /// depends on the input only.
+    /// Makes surfels that cover the triangles without holes, stand for lines, or, without either,
+    /// for the points. Lengths are in world units and centres are relative to the mesh's origin.
+    /// The order depends on the input only.
     ///
     /// Colours are vertex colour × material × texture. A surfel has the file's normal at its vertex
     /// if there is one. Otherwise it has the angle-weighted normal of the triangles that are smooth
@@ -215,9 +215,9 @@ impl Mesh {
         Ok(self.set_of(splats))
     }
 
-    /// Returns a point cloud as [`points`](SurfelOptions::points) says: the surfels of the points on
-    /// surfaces, and the other points as [rods](crate::facet::Rod), which are balls or discs. Where
-    /// some point is not opaque, all are surfels. Lengths are in world units, and centres are
+    /// Returns a point cloud as [`points`](SurfelOptions::points) says: the surfels of the points
+    /// on surfaces, and the other points as [rods](crate::facet::Rod), which are balls or discs.
+    /// Where some point is not opaque, all are surfels. Lengths are in world units, and centres are
     /// relative to the mesh's origin. The order depends on the input only.
     ///
     /// # Errors

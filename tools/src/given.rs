@@ -138,7 +138,10 @@ impl Given {
     /// Returns these flags and those that a scene stands for.
     pub fn with(&self, scene: &Description) -> Self {
         let mut all = self.0.clone();
-        let scene = serde_json::json!(scene);
+        // A path that is no text has no JSON.
+        let mut named = scene.clone();
+        named.inputs.iter_mut().for_each(|input| input.file = "input".into());
+        let Ok(scene) = serde_json::to_value(named) else { return self.clone() };
         let inputs = scene["inputs"].as_array().into_iter().flatten();
         for part in inputs.chain([&scene]) {
             let parts = ["reading", "appearance", "framing", "picture", "overlay"];

@@ -113,7 +113,8 @@ pub fn open(
     if scene.visible().next().is_none() {
         return Err(Error::input(path, "inputs", "none of them is visible").into());
     }
-    let fields = serde_json::json!(scene);
+    // What a scene file states is text.
+    let fields = serde_json::to_value(&scene).unwrap_or_default();
     let stated = Stated { path: path.clone(), fields, given: given.clone() };
     Ok((scene, Some(stated)))
 }

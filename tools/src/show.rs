@@ -64,18 +64,20 @@ pub struct ShowFlags {
     /// they were converted with.
     #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
     radius_scale: Option<f32>,
-    /// Draw points as surfels, spheres or dots. auto draws points on surfaces as surfels, which overlap
-    /// to a closed surface, and others as spheres [default: auto]
+    /// Draw points as surfels, spheres or dots. auto draws points on surfaces as surfels, which
+    /// overlap to a closed surface, and others as spheres [default: auto]
     #[arg(long, value_name = "STYLE", value_parser = parse::points)]
     points: Option<PointStyle>,
-    /// Draw points as spheres or dots of this diameter: in pixels, as 3px, or in world units, as 0.02
-    /// [default: by the distances between points, at least 2px]
+    /// Draw points as spheres or dots of this diameter: in pixels, as 3px, or in world units, as
+    /// 0.02 [default: by the distances between points, at least 2px]
     #[arg(long, value_name = "SIZE")]
     point_size: Option<Size>,
-    /// Draw points as spheres or dots with the radii that this array or column holds, in world units.
+    /// Draw points as spheres or dots with the radii that this array or column holds, in world
+    /// units.
     #[arg(long, value_name = "ARRAY")]
     point_radius: Option<String>,
-    /// Draw lines as tubes of this width: in pixels, as 3px, or in world units, as 0.1 [default: 3px]
+    /// Draw lines as tubes of this width: in pixels, as 3px, or in world units, as 0.1 [default:
+    /// 3px]
     #[arg(long, value_name = "WIDTH")]
     line_width: Option<Size>,
     /// Meshes: split the normals where two triangles meet at more than this angle, so that the

@@ -9,8 +9,9 @@ use std::path::Path;
 /// sets.
 pub fn words_of(scene: &Description) -> Result<Vec<String>, String> {
     let mut words = Vec::new();
+    let json = serde_json::to_value(scene).map_err(|error| error.to_string())?;
     for part in ["framing", "picture", "overlay", "reading", "appearance"] {
-        of_part(&mut words, &serde_json::json!(scene)[part], part)?;
+        of_part(&mut words, &json[part], part)?;
     }
     if let Some(camera) = &scene.camera {
         words.push(format!("--camera={}", serde_json::json!(camera)));
@@ -38,8 +39,8 @@ pub fn words_of(scene: &Description) -> Result<Vec<String>, String> {
             && input.transform == Default::default();
         if !is_plain {
             return Err(format!(
-                "{file} is read, moved or shown in a way of its own that no flag says; save the scene, \
-                 which splatkit render draws"
+                "{file} is read, moved or shown in a way of its own that no flag says; save the \
+                 scene, which splatkit render draws"
             ));
         }
         let file_of = |path: &Path| {
@@ -180,7 +181,8 @@ mod tests {
             "--camera-position 1,2,3 --focal-point 0,0,0.5 --view-up 0,1,0 --view-angle 50",
             r#"--camera {"position":[1,2,3],"focal_point":[0,0,0],"view_up":[0,0,1],"height":2}"#,
             "--scalar heat --dims 4x5x6 --type u8 --spacing 1,1,2.5 --endian big --header 12",
-            "--time 3 --series 2 --dataset a/b --missing -999 --radius 0.4 --neighbours 9 --no-slopes",
+            "--time 3 --series 2 --dataset a/b --missing -999",
+            "--radius 0.4 --neighbours 9 --no-slopes",
         ] {
             let words: Vec<String> = ["a.nrrd", "b.ply"]
                 .into_iter()

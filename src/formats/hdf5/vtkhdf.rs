@@ -386,7 +386,8 @@ impl<'a> DataSet<'a> {
         if skipped > 0 {
             let file = self.source.path.display();
             tracing::warn!(
-                "{file}: {skipped} cells that are neither solids, triangles, quadrilaterals nor polygons, or that are \
+                "{file}: {skipped} cells that are neither solids, triangles, quadrilaterals nor \
+                 polygons, or that are \
                  polyhedra, are left out"
             );
         }

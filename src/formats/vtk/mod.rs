@@ -72,10 +72,10 @@ pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
     }
 }
 
-/// Reads the surfaces and lines of a file, the boundary of its cells if they have no values, or its points.
-/// The array is chosen as by [`read_volume`], and becomes the mesh's values; an array of bytes with
-/// three or four components becomes its colours. Each face has one value if the array is one of the
-/// cells.
+/// Reads the surfaces and lines of a file, the boundary of its cells if they have no values, or its
+/// points. The array is chosen as by [`read_volume`], and becomes the mesh's values; an array of
+/// bytes with three or four components becomes its colours. Each face has one value if the array is
+/// one of the cells.
 ///
 /// # Errors
 /// As [`read_volume`], also for cells that refer to missing points.

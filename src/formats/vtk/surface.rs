@@ -47,7 +47,8 @@ pub fn mesh(source: &Source, grid: &Grid, wanted: Option<&Wanted>) -> Result<Mes
     give(source, grid, wanted, (triangles.into_inner(), lines.into_inner()))
 }
 
-/// Returns the nodes of a line from one end to the other. Those of higher order have both ends first.
+/// Returns the nodes of a line from one end to the other. Those of higher order have both ends
+/// first.
 fn nodes_in_order(kind: u8, corners: &[u32]) -> Vec<u32> {
     match (kind, corners) {
         (21 | 35 | 68 | 75, [first, last, middle @ ..]) => [&[*first], middle, &[*last]].concat(),

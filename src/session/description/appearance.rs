@@ -165,7 +165,8 @@ impl AppearanceEntry {
         }
         own_or_shared!(
             transfer, range, opacity_unit, isosurfaces, gradient_opacity, colormap, nan_color,
-            kernel, sigma, extent, color, opacity, radius_scale, points, point_size, point_radius, line_width, crease, cells;
+            kernel, sigma, extent, color, opacity, radius_scale, points, point_size, point_radius,
+            line_width, crease, cells;
             log_colors, sharp, edges
         )
     }
@@ -294,7 +295,8 @@ impl AppearanceEntry {
     /// Those of [`Kernel::named`], of [`Kernel::table`] and of reading its file.
     pub fn kernel(&self, limits: &Limits) -> Result<Kernel> {
         let needs_extent = |what: &str| {
-            let message = format!("{what} needs an extent: the distance of its last value");
+            let message =
+                format!("{what} needs an extent (--extent), the distance of its last value");
             Error::Argument(message)
         };
         match &self.kernel {

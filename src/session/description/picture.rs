@@ -184,8 +184,8 @@ impl PictureEntry {
             return Err(("size", "a picture needs a width and a height above 0".into()));
         }
         if self.back_to_front && self.mode != Some(Composite::Splats) {
-            let message = "needs the mode splats (--mode splats): it sets the order of single \
-                           splats";
+            let message =
+                "needs the mode splats (--mode splats): it sets the order of single splats";
             return Err(("back_to_front", message.into()));
         }
         let lengths = [("sheet_thickness", self.sheet_thickness), ("frame_time", self.frame_time)];

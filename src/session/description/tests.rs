@@ -87,7 +87,8 @@ fn what_is_wrong_is_named() {
     assert!(wrong("\"view_angle\": 30.0", "\"angle\": 30.0").1.contains("angle"));
     assert!(wrong("\"plane\"", "\"plan\"").0.contains("picture.clips[0]"));
     assert!(place("0.125", "7.5").contains("transfer"), "an opacity above 1");
-    assert_eq!(place("\"opacity\": 0.5", "\"opacity\": 1.5"), "appearance.isosurfaces");
+    let isosurface = place("\"percent\": 50.0", "\"percent\": 150.0");
+    assert_eq!(isosurface, "appearance.isosurfaces");
     assert_eq!(place("\"viridis_r\"", "\"virids\""), "appearance.colormap");
     assert_eq!(place("\"white\"", "\"whitish\""), "picture.background");
     assert_eq!(place("\"x-ray\"", "\"xray\""), "picture.optics");

@@ -159,7 +159,7 @@ const WRONG: &[(&str, i32, &str)] = &[
     (
         "a.nrrd --kernel cone.csv",
         2,
-        "cone.csv: a kernel from a file needs --extent, the distance of its last value",
+        "cone.csv: a kernel from a file needs an extent (--extent), the distance of its last value",
     ),
     ("a.nrrd --kernel none.csv --extent 2", 3, "none.csv: cannot open"),
     ("a.nrrd --kernel words.csv --extent 2", 3, "words.csv: line 2: “one half” is not a number"),
@@ -257,13 +257,13 @@ const WRONG: &[(&str, i32, &str)] = &[
         "a.nrrd --clip x<9 --clip x<9 --clip x<9 --clip x<9 --clip x<9 --cut-out x<1 \
          --cut-out x<1 --cut-out x<1 --cut-out x<1",
         2,
-        "--clip and --cut-out give 9 shapes; at most 8 are allowed",
+        "--clip: 9 shapes are given; at most 8 are allowed",
     ),
     // Options that cannot be combined.
     (
         "a.nrrd --back-to-front",
         2,
-        "--back-to-front needs --mode splats: it sets the order of single splats",
+        "--back-to-front: needs the mode splats (--mode splats): it sets the order",
     ),
     ("a.nrrd --mip --x-ray", 2, "the argument '--mip' cannot be used with '--x-ray'"),
     (

@@ -138,8 +138,9 @@ fn each_volume_has_its_own_function() {
     // A scene file says the same.
     folder.put(
         "s.json",
-        r#"{"splatkit_scene": 1, "size": [64, 48], "transfer": "mri",
-            "inputs": [{"file": "a.nrrd"}, {"file": "b.nrrd", "transfer": "generic"}]}"#,
+        r#"{"splatkit_scene": 2, "picture": {"size": [64, 48]}, "appearance": {"transfer": "mri"},
+            "inputs": [{"file": "a.nrrd"},
+                       {"file": "b.nrrd", "appearance": {"transfer": "generic"}}]}"#,
     );
     folder.run("render s.json -o s.png").ok();
     assert!(std::fs::read(folder.path("s.png")).unwrap() == one.0);
