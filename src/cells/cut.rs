@@ -214,8 +214,8 @@ fn without<const N: usize>(polygon: Polygon<N>, hole: &[Half]) -> Vec<Polygon<N>
     parts
 }
 
-/// Returns the parts of a polygon inside and outside a half-space. What only touches it from outside
-/// is not inside.
+/// Returns the parts of a polygon inside and outside a half-space. What only touches it from
+/// outside is not inside.
 pub(super) fn split<const N: usize>(polygon: Polygon<N>, half: &Half) -> [Option<Polygon<N>>; 2] {
     let beyond: Vec<f64> = polygon.iter().map(|corner| half.beyond(corner.place)).collect();
     if beyond.iter().all(|beyond| *beyond <= 0.0) {

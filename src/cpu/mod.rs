@@ -21,7 +21,7 @@
 //! | `march` | draws the sheets of a tile in order |
 //! | `rays` | the rays of eight pixels |
 //! | `scatter`, `sums` | adds splats to the open sheets |
-//! | `facets`, `rods`, `covered` | the same for splats whose footprint is a triangle, and for rods |
+//! | `facets`, `rods`, `covered` | the same for splats that are triangles, and for rods |
 //! | `gather`, `field` | the field of a lattice at a place, and its gradient |
 //! | `blend` | the same by sums over samples, for other kernels and lattices |
 //! | `radial`, `bells`, `rectilinear` | the weights of these sums |

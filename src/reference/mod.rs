@@ -170,21 +170,21 @@
 //! of share·opacity over a, 1 at most. Other modes and optics draw no facets.
 //!
 //! **Rods** ([`Rod`](crate::facet::Rod)) are facets of another shape: the points within a radius r
-//! of a segment. Let t be the place of the segment nearest to a pixel's ray. The radius r is that of
-//! the ends, interpolated, or the least radius in pixels where that is larger. The distance of the
-//! ray from t is d, in pixels, as r is. A pixel's size is the depth of t over f.
+//! of a segment. Let t be the place of the segment nearest to a pixel's ray. The radius r is that
+//! of the ends, interpolated, or the least radius in pixels where that is larger. The distance of
+//! the ray from t is d, in pixels, as r is. A pixel's size is the depth of t over f.
 //!
 //! The rod fills the share (s(r − d) + s(r + d) − 1)·min(1, π/2·r + l) of the pixel. There, s(x) is
-//! x + ½ clamped to 0 … 1, and l the segment's length across the ray. That is a straight edge at the
-//! outline, and the area of what is smaller than a pixel.
+//! x + ½ clamped to 0 … 1, and l the segment's length across the ray. That is a straight edge at
+//! the outline, and the area of what is smaller than a pixel.
 //!
 //! The ray is moved from d to the middle of d − ½ … d + ½ and −r … r. Where it then enters the rod
 //! are the distance, the normal and the place between both colours. Flat rods have the distance of
 //! t, and their own normal or none. Of the rods in a sheet, the largest share counts as that of
 //! backs, because neighbours of a line overlap. S is at least the sum of all shares that are seen.
 //!
-//! At a joint of two rods, pixels that neither fills belong to one of them, whatever their sheets. A
-//! rod with a next one does not count where the ray passes its end by more than a quarter of a
+//! At a joint of two rods, pixels that neither fills belong to one of them, whatever their sheets.
+//! A rod with a next one does not count where the ray passes its end by more than a quarter of a
 //! pixel. One with a rod before does not count where the ray passes in front of its start, unless
 //! that is within a quarter of a pixel of what lies beyond the end of that rod.
 //!

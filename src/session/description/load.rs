@@ -87,8 +87,8 @@ impl Description {
         Ok(Loaded { scene, subject, items, captions, inputs, files })
     }
 
-    /// Returns the error for a scene that cannot be drawn. If an item cannot be drawn by itself, its
-    /// file is at fault, or what says how it is shown.
+    /// Returns the error for a scene that cannot be drawn. If an item cannot be drawn by itself,
+    /// its file is at fault, or what says how it is shown.
     fn at_fault(&self, items: &Items, scene: &Scene, error: Error) -> Error {
         let Some((number, Error::Transfer(what))) = Items::unfit(scene) else {
             return items.at_fault(scene, error);
