@@ -185,8 +185,8 @@
 //!
 //! At a joint of two rods, pixels that neither fills belong to one of them, whatever their sheets.
 //! A rod with a next one does not count where the ray passes its end by more than a quarter of a
-//! pixel. One with a rod before does not count where the ray passes in front of its start, unless
-//! that is within a quarter of a pixel of what lies beyond the end of that rod.
+//! pixel. One with a rod before does not count where the ray passes in front of its start. Within a
+//! quarter of a pixel of what lies beyond the end of that rod it counts nevertheless.
 //!
 //! **Several fields** ([`Scene::fields`]). Each field is classified and lit by itself, as above,
 //! with its own samples, kernel and transfer function, and has its own box. It does not see the

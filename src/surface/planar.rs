@@ -34,7 +34,7 @@ const FLAT_OF_MORE: f64 = 0.35;
 const LINE: f64 = 0.05;
 /// Clouds of fewer points show too little to decide: they count as surfaces.
 const FEWEST: usize = 50;
-/// If the points on surfaces are a smaller part of the cloud, none counts, else all: noise may make
+/// If the points on surfaces are a smaller part of the cloud, none counts, else all. Noise may make
 /// a third of a scan look like points in space, and it must stay closed.
 const LEAST_SURFACE: f64 = 0.35;
 /// Rounds in which points between others on a surface join them.

@@ -141,7 +141,7 @@ mod tests {
     ];
 
     /// Flags that have the names of others with a heading, but are a task's own.
-    const OWN: &[(&str, &str)] = &[("generate", "dims type parts"), ("demo", "gpu")];
+    const OWN: &[(&str, &str)] = &[("generate", "dims type parts points"), ("demo", "gpu")];
 
     fn tasks() -> Vec<Command> {
         let mut command = crate::command();

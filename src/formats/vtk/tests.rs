@@ -523,7 +523,7 @@ fn parallel_files_and_collections() {
     let pieces = "<Piece Source='u0.vtu'/><Piece Source='u1.vtu'/>";
     let path = folder.write("a.pvtu", file("PUnstructuredGrid", "GhostLevel='1'", pieces));
     let cells = read_with(&path, |source| read_cells(source, &none)).unwrap();
-    assert_eq!((cells.len(), cells.points.len()), (2, 4));
+    assert_eq!((cells.len(), cells.points.len()), (2, 8));
     // A collection of blocks within blocks.
     let blocks = "<Block index='0'><DataSet index='0' name='grid' file='a.pvtu'/></Block>\
                   <Block index='1'><Block index='0'><DataSet index='0' file='p0.vti'/></Block>\

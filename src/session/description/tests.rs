@@ -90,7 +90,7 @@ fn what_is_wrong_is_named() {
     let isosurface = place("\"percent\": 50.0", "\"percent\": 150.0");
     assert_eq!(isosurface, "appearance.isosurfaces");
     assert_eq!(place("\"viridis_r\"", "\"virids\""), "appearance.colormap");
-    assert_eq!(place("\"white\"", "\"whitish\""), "picture.background");
+    assert_eq!(place("\"#ffffff\"", "\"whitish\""), "picture.background");
     assert_eq!(place("\"x-ray\"", "\"xray\""), "picture.optics");
     assert_eq!(place("\"cut\": 3.5", "\"cut\": -3.5"), "picture.cut");
     assert_eq!(place("\"mode\": \"splats\"", "\"mode\": \"sheets\""), "picture.back_to_front");

@@ -160,8 +160,10 @@ fn unstructured_grids_of_both_versions() {
             let message = samples(&content, Some("none")).unwrap_err().to_string();
             assert!(message.contains("no array “none”"), "{message}");
             let solid = with(&content, None, read_cells).unwrap();
-            assert_eq!((&solid.kinds, solid.points.len()), (&vec![CellKind::Tetrahedron], 4));
-            assert_eq!((solid.values, solid.about.name), (vec![1.0, 2.0, 3.0, 4.0], "p".into()));
+            assert_eq!((&solid.kinds, solid.points.len()), (&vec![CellKind::Tetrahedron], 8));
+            // The square lies beside the cells.
+            let values: Vec<f32> = (1..=8).map(|value| value as f32).collect();
+            assert_eq!((solid.values, solid.about.name), (values, "p".into()));
             assert_eq!(with(&content, Some("c"), kind).unwrap(), Kind::Cells);
             let solid = with(&content, Some("cell:c"), read_cells).unwrap();
             assert_eq!((solid.place, solid.values), (cells::Place::Cells, vec![10.0]));
