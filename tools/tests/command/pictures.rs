@@ -48,7 +48,7 @@ fn cells_are_solid() {
         assert!(opaque(&pixels(&format!("a.vtu {field}"))) < 200, "{field}");
     }
     // The camera is fitted to what is left.
-    let cut = pixels("a.vtu --clip z<40% --view +Z");
+    let cut = pixels("a.vtu --clip z<40% --view top");
     assert!(opaque(&cut) > 600 && cut != whole);
     let dark = |pixels: &[[u8; 4]]| -> u64 {
         pixels.iter().map(|[r, g, b, _]| u64::from(*r) + u64::from(*g) + u64::from(*b)).sum()
