@@ -253,7 +253,17 @@ SCENES = [
     (["tree.splk"], {"picture": {"cut": 8, "background": "none"}}),
     (["bricks.splv"], {"picture": {"sheet_thickness": 1.5}}),
     (["trained.spz"], {"framing": {"distance": 9, "up": [0, 0, 1]}}),
-    (["bytes.npy", "colors.ply"], {"camera": {"position": [60, -40, 30], "focal_point": [7, 7, 7], "view_up": [0, 0, 1], "view_angle": 30}}),
+    (
+        ["bytes.npy", "colors.ply"],
+        {
+            "camera": {
+                "position": [60, -40, 30],
+                "focal_point": [7, 7, 7],
+                "view_up": [0, 0, 1],
+                "view_angle": 30,
+            }
+        },
+    ),
 ]
 
 

@@ -89,9 +89,6 @@ class SurfaceLook(TypedDict, total=False):
 class CellLook(FieldLook, total=False):
     """How cells are shown."""
 
-    #: solid: an opaque body, with the field inside where clips cut it; volume: the field, by a
-    #: transfer function. Default: solid, unless another option is one of fields.
-    cells: str
     #: values, height, normal, or a colour. Default: values.
     color: Color
     #: The colour of what has no value.
@@ -144,14 +141,16 @@ class Reading(TypedDict, total=False):
 class FileOptions(VolumeLook, SurfaceLook, Reading):
     """How a file is read and shown."""
 
-    #: Cells: solid or volume (`CellLook`).
+    #: Cells: solid, an opaque body with the field inside where clips cut it, or volume, the field
+    #: by a transfer function. Default: solid, unless another option is one of fields.
     cells: str
 
 
 FIELD = frozenset(FieldLook.__annotations__)
 VOLUME = frozenset(VolumeLook.__annotations__)
 SURFACE = frozenset(SurfaceLook.__annotations__)
-CELLS = frozenset(CellLook.__annotations__)
+#: `cells` is called `style` where cells are an argument.
+CELLS = frozenset(CellLook.__annotations__) | {"cells"}
 READING = frozenset(Reading.__annotations__)
 
 

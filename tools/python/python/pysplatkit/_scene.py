@@ -50,7 +50,9 @@ class Scene:
         scene._described = json.loads(scene._own.add_scene(os.fspath(path), trusted))
         scene._files = None
         if scene._described["overlay"]:
-            message = f"{os.fspath(path)}: the texts over the picture are drawn by the command alone"
+            message = (
+                f"{os.fspath(path)}: the texts over the picture are drawn by the command alone"
+            )
             warnings.warn(message, DataWarning, stacklevel=2)
         return scene
 
@@ -97,7 +99,10 @@ class Scene:
         own = _neighbours.found(source, options.get("scalar"))
         if own is not None:
             options.pop("scalar", None)
-            return getattr(self, own.method)(own, **options)  # type: ignore[no-any-return]
+            arguments: dict[str, Any] = dict(options)
+            if own.method == "add_cells" and "cells" in arguments:
+                arguments["style"] = arguments.pop("cells")
+            return getattr(self, own.method)(own, **arguments)  # type: ignore[no-any-return]
         if isinstance(source, Mapping):
             return self._add_arguments(source, options)
         shape = np.shape(source)
@@ -295,6 +300,7 @@ class Scene:
         missing: float | None = None,
         up: str | Vector | None = None,
         name: str = "cells",
+        style: str | None = None,
         **look: Unpack[CellLook],
     ) -> Scene:
         """Adds cells that fill space, such as those of a solver, with the field inside. Triangles
@@ -309,8 +315,13 @@ class Scene:
             kinds: VTK's number of the type of all cells, or of each. Default: by the length of
                 rows: 4 tetrahedra, 5 pyramids, 6 wedges, 8 hexahedra.
             scalar: The name of the array of a grid.
+            style: solid, an opaque body with the field inside where clips cut it, or volume, the
+                field by a transfer function. Default: solid, unless another option is one of
+                fields.
         """
-        given = _options.checked(look, _options.CELLS, "add_cells")
+        given = _options.checked(look, _options.CELLS - {"cells"}, "add_cells")
+        if style is not None:
+            given["cells"] = style
         own = _neighbours.of_kind(_neighbours.Cells, points, scalar, "add_cells")
         if own is None:
             if cells is None:
