@@ -25,7 +25,8 @@ use std::path::PathBuf;
 /// Returns red, green and blue of a colour as in CSS.
 #[pyfunction]
 fn color(py: Python<'_>, text: &str) -> PyResult<[f32; 3]> {
-    splatkit::color::parse(text).map_err(|message| raise(py, &errors::wrong(message)))
+    let wrong = |message| errors::wrong(format!("“{text}” is no colour: {message}"));
+    splatkit::color::parse(text).map_err(|message| raise(py, &wrong(message)))
 }
 
 /// Returns a transfer function by name, as JSON.
