@@ -66,7 +66,6 @@ mod view;
 #[cfg(not(feature = "window"))]
 #[path = "view_absent.rs"]
 mod view;
-mod words;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use given::Given;

@@ -1,7 +1,7 @@
 //! `splatkit view` in a build without the feature `window`: an error that says how to get one.
 
-use crate::{failure::Failure, progress::Progress};
-use clap::{ArgMatches, Args};
+use crate::{failure::Failure, given::Given, progress::Progress};
+use clap::Args;
 use std::ffi::OsString;
 
 /// Takes whatever a window would take.
@@ -12,7 +12,7 @@ pub struct View {
 }
 
 impl View {
-    pub fn run(self, _: &ArgMatches, _: &Progress) -> Result<(), Failure> {
+    pub fn run(self, _: &Given, _: &Progress) -> Result<(), Failure> {
         tracing::debug!(arguments = ?self.arguments, "no window");
         Err(Failure::Usage(
             "this program was built without “window”; with it: cargo build --release -p \

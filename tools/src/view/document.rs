@@ -5,7 +5,7 @@ use crate::{
     failure::Failure,
     given::Given,
     job::Job,
-    words::{quoted, words_of},
+    view::words::{quoted, words_of},
 };
 use splatkit::{
     scene::Clip,

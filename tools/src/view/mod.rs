@@ -18,6 +18,7 @@ mod slices;
 #[cfg(test)]
 mod tests;
 mod window;
+mod words;
 
 use crate::{failure::Failure, given::Given, progress::Progress, render::Render};
 use clap::Args;

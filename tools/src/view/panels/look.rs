@@ -1,6 +1,10 @@
 //! How the scene looks: background, light, texts, and flags with values.
 
-use crate::{parse, show::surface, view::window::Window, words::surfaces};
+use crate::{
+    parse,
+    show::surface,
+    view::{window::Window, words::surfaces},
+};
 use eframe::egui::{self, Grid, Ui};
 use splatkit::{
     about::direction_name,
