@@ -3,6 +3,7 @@
 use super::{Facet, FacetSet, Sides};
 use crate::{
     Error, Result,
+    math::lower,
     parallel::prelude::*,
     splat::{NO_NORMAL, Payload, Splat, SplatSet, decode_normal, encode_normal},
 };
@@ -285,18 +286,6 @@ impl Rod {
             }
         })
     }
-}
-
-/// Returns the lower triangular factor of the sum of the squares of these vectors (Cholesky), row
-/// by row.
-fn lower<const N: usize>(columns: [DVec3; N]) -> [f32; 6] {
-    let sum = |i: usize, j: usize| columns.iter().map(|c| c[i] * c[j]).sum::<f64>();
-    let b00 = sum(0, 0).sqrt();
-    let (b10, b20) = (sum(1, 0) / b00, sum(2, 0) / b00);
-    let b11 = (sum(1, 1) - b10 * b10).max(sum(1, 1) * 1e-14).sqrt();
-    let b21 = (sum(2, 1) - b20 * b10) / b11;
-    let b22 = (sum(2, 2) - b20 * b20 - b21 * b21).max(sum(2, 2) * 1e-14).sqrt();
-    [b00, b10, b11, b20, b21, b22].map(|value| value as f32)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::{
     Mesh, PointStyle, SurfelOptions,
-    ellipse::{Tensor, factor, lower},
+    ellipse::{Tensor, factor},
     opacity::{Absorbed, share_of},
     orient::{Known, orient},
     paint::{of_normal, pack, point_color},
@@ -13,7 +13,7 @@ use crate::{
     Result,
     deadline::Clock,
     facet::{Facet, REACH, Relief, Rod, Size},
-    math::{eigen, neighbours::Neighbours},
+    math::{eigen, lower, neighbours::Neighbours},
     memory,
     parallel::prelude::*,
     splat::{NO_NORMAL, Splat, encode_normal},

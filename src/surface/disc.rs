@@ -1,7 +1,7 @@
 //! The ellipse of a surfel: fitted to a piece of surface, then widened until it covers what it has
 //! to.
 
-use super::ellipse::lower;
+use crate::math::lower;
 use glam::{Vec2, Vec3};
 
 /// The moments of triangles that share a corner, in a tangent plane with its origin there.

@@ -1,5 +1,6 @@
 //! The ellipses of a point cloud's surfels: symmetric 2×2 tensors, and covariances in space.
 
+use crate::math::lower;
 use glam::{DVec2, DVec3};
 
 /// The thickness of a surfel, as a multiple of its smaller tangent standard deviation.
@@ -32,17 +33,6 @@ pub(super) fn factor(tensor: Tensor, x: DVec3, y: DVec3, normal: DVec3) -> [f32;
     let small = small.max(large * 1e-6);
     let (a, b) = (x * axis.x + y * axis.y, y * axis.x - x * axis.y);
     lower([a * large.sqrt(), b * small.sqrt(), normal * (THICKNESS * small.sqrt())])
-}
-
-/// Returns the lower triangular factor of R·Rᵀ, where R has these columns (Cholesky).
-pub(super) fn lower(columns: [DVec3; 3]) -> [f32; 6] {
-    let sum = |i: usize, j: usize| columns.iter().map(|c| c[i] * c[j]).sum::<f64>();
-    let b00 = sum(0, 0).sqrt();
-    let (b10, b20) = (sum(1, 0) / b00, sum(2, 0) / b00);
-    let b11 = (sum(1, 1) - b10 * b10).max(sum(1, 1) * 1e-14).sqrt();
-    let b21 = (sum(2, 1) - b20 * b10) / b11;
-    let b22 = (sum(2, 2) - b20 * b20 - b21 * b21).max(sum(2, 2) * 1e-14).sqrt();
-    [b00, b10, b11, b20, b21, b22].map(|value| value as f32)
 }
 
 #[cfg(test)]
