@@ -136,5 +136,7 @@ pub use wgpu;
 pub use deadline::Deadline;
 pub use error::{Error, Result};
 pub use plan::FrameStats;
+#[cfg(feature = "gpu")]
+pub use renderer::Frame;
 pub use renderer::{Device, Renderer};
 pub use stop::Stop;

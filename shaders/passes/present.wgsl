@@ -21,13 +21,17 @@ struct Present {
     far: f32,
     // Whether pixels have depths.
     has_depth: u32,
+    // Whether depths are distances along the rays; otherwise they are view-space z.
+    are_distances: u32,
+    // A depth buffer holds shift + factor / z in perspective, otherwise shift + factor · z.
+    depth_shift: f32,
+    depth_factor: f32,
 }
 
 @group(0) @binding(0) var<uniform> present: Present;
 // The state of the frame, or the progress of gather.
 @group(0) @binding(1) var<storage, read> words: array<u32>;
 @group(0) @binding(2) var<storage, read> colors: array<vec4<f32>>;
-// Distances along the rays.
 @group(0) @binding(3) var<storage, read> depths: array<f32>;
 
 const NONE: u32 = 0xffffffffu;
@@ -64,7 +68,7 @@ fn depth_of(index: u32, pixel: vec2<f32>) -> f32 {
     if present.has_depth == 0u || colors[index].a < 0.5 {
         return present.far;
     }
-    if present.perspective == 0u {
+    if present.perspective == 0u || present.are_distances == 0u {
         return depths[index];
     }
     let slope = (pixel - present.center) / present.scale;
@@ -99,4 +103,24 @@ fn color_and_depth(@builtin(position) position: vec4<f32>) -> Pixel {
     }
     let index = index_of(position);
     return Pixel(color_of(index), depth_of(index, pixel_of(position)));
+}
+
+struct BufferPixel {
+    @location(0) color: vec4<f32>,
+    @builtin(frag_depth) depth: f32,
+}
+
+@fragment
+fn color_and_depth_buffer(@builtin(position) position: vec4<f32>) -> BufferPixel {
+    if !is_finished() {
+        discard;
+    }
+    let index = index_of(position);
+    let z = depth_of(index, pixel_of(position));
+    if present.has_depth == 0u || colors[index].a < 0.5 {
+        return BufferPixel(color_of(index), present.far);
+    }
+    let along = select(z, 1.0 / z, present.perspective != 0u);
+    let depth = present.depth_shift + present.depth_factor * along;
+    return BufferPixel(color_of(index), clamp(depth, 0.0, 1.0));
 }

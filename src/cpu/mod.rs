@@ -64,7 +64,7 @@ use crate::{
     Error, Result,
     bricks::Choice,
     hierarchy::Detail,
-    math::{Camera, View},
+    math::{View, Viewpoint},
     parallel::prelude::*,
     picture::Picture,
     plan::{FrameStats, TILE, gathering, pace::Pace, tables::Values},
@@ -157,12 +157,12 @@ impl CpuRenderer {
     /// for scenes that are read while they are drawn.
     pub fn render(
         &mut self,
-        camera: &Camera,
+        viewpoint: &impl Viewpoint,
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
         let start = Instant::now();
         self.scene.validate_settings(settings)?;
-        let view = camera.view(settings.size)?;
+        let view = viewpoint.view(settings.size)?;
         let bounds = self.scene.bounds();
         view.validate_for(&bounds)?;
         let mut clock = Clock { last: start, steps: Vec::new() };

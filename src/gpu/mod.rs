@@ -34,6 +34,7 @@
 //! | `scene` | the data of a scene on the GPU |
 //! | `targets`, `budget` | the buffers of a frame, and the capacity of a depth pass |
 //! | `output` | where a host application gets the picture |
+//! | `upload` | pictures of the CPU engine, for a host application |
 //! | `frame` | the order of the passes |
 //! | `outline` | the plan of a frame: detail, bricks, sheets, strips |
 //! | `pending` | a picture that is being drawn, batch by batch |
@@ -55,11 +56,13 @@ mod renderer;
 mod scene;
 mod targets;
 mod uniforms;
+mod upload;
 mod variant;
 
 pub use budget::Budget;
 pub use device::{AdapterChoice, Gpu};
-pub use output::Output;
+pub use output::{Depth, Output};
 pub use pending::PendingFrame;
 pub use renderer::{Progress, Renderer};
 pub use scene::PreparedScene;
+pub(crate) use upload::Upload;

@@ -11,7 +11,7 @@ use crate::{
         output::Output,
         passes::{
             cut::{finest_within, tally_bytes},
-            present::{Presenter, Strip},
+            present::{Pixels, Presenter, Strip},
         },
         pipeline::{commands::Commands, state::State},
         scene::{PreparedScene, chunk::Origin},
@@ -366,7 +366,8 @@ impl PendingFrame {
             && is_last
         {
             let optics = self.settings.optics;
-            let strip = Strip { view: &rows.view, first_row: rows.first, targets, optics };
+            let pixels = Pixels::of(targets);
+            let strip = Strip { view: &rows.view, first_row: rows.first, pixels, optics };
             presenter.encode(gpu, encoder, output, &strip);
         }
         let part = match self.stage {

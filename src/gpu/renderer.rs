@@ -13,7 +13,7 @@ use crate::{
         scene::PreparedScene,
     },
     hierarchy::Detail,
-    math::Camera,
+    math::{View, Viewpoint},
     picture::Picture,
     plan::{FrameStats, pace::Pace},
     scene::{Scene, Settings},
@@ -117,13 +117,13 @@ impl Renderer {
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         prepared: &mut PreparedScene,
-        camera: &Camera,
+        viewpoint: &impl Viewpoint,
         settings: &Settings,
         output: impl Into<Output>,
     ) -> Result<PendingFrame> {
-        let output = output.into();
-        output.check(settings.size)?;
-        let mut frame = self.begin(prepared, camera, settings, Sink::Output(output))?;
+        let (output, view) = (output.into(), viewpoint.view(settings.size)?);
+        output.check(&view)?;
+        let mut frame = self.begin(prepared, &view, settings, Sink::Output(output))?;
         self.encode_next(encoder, prepared, &mut frame)?;
         Ok(frame)
     }
@@ -173,10 +173,10 @@ impl Renderer {
     pub async fn render_async(
         &mut self,
         prepared: &mut PreparedScene,
-        camera: &Camera,
+        viewpoint: &impl Viewpoint,
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
-        let mut frame = self.begin(prepared, camera, settings, empty_picture(settings))?;
+        let mut frame = self.begin(prepared, viewpoint, settings, empty_picture(settings))?;
         loop {
             let mut encoder = self.encoder();
             self.encode_next(&mut encoder, prepared, &mut frame)?;
@@ -194,7 +194,7 @@ impl Renderer {
     fn begin(
         &mut self,
         prepared: &mut PreparedScene,
-        camera: &Camera,
+        viewpoint: &impl Viewpoint,
         settings: &Settings,
         sink: Sink,
     ) -> Result<PendingFrame> {
@@ -204,7 +204,7 @@ impl Renderer {
                 let what = "the GPU engine does not draw regions yet; the CPU engine does";
                 return Err(Error::Argument(what.into()));
             }
-            let view = camera.view(settings.size)?;
+            let view: View = viewpoint.view(settings.size)?;
             let detail = match settings.detail {
                 Detail::Milliseconds(_) => Detail::Pixels(renderer.pace.next(&view)),
                 detail => detail,
@@ -287,10 +287,10 @@ impl Renderer {
     pub fn render(
         &mut self,
         prepared: &mut PreparedScene,
-        camera: &Camera,
+        viewpoint: &impl Viewpoint,
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
-        let mut frame = self.begin(prepared, camera, settings, empty_picture(settings))?;
+        let mut frame = self.begin(prepared, viewpoint, settings, empty_picture(settings))?;
         self.complete(prepared, &mut frame, None)?;
         Ok(finished(frame))
     }
@@ -302,10 +302,10 @@ impl Renderer {
     pub fn draw(
         &mut self,
         prepared: &mut PreparedScene,
-        camera: &Camera,
+        viewpoint: &impl Viewpoint,
         settings: &Settings,
     ) -> Result<FrameStats> {
-        let mut frame = self.begin(prepared, camera, settings, Sink::Nowhere)?;
+        let mut frame = self.begin(prepared, viewpoint, settings, Sink::Nowhere)?;
         self.complete(prepared, &mut frame, None)?;
         Ok(frame.finish().1)
     }
@@ -318,10 +318,10 @@ impl Renderer {
     pub fn profile(
         &mut self,
         prepared: &mut PreparedScene,
-        camera: &Camera,
+        viewpoint: &impl Viewpoint,
         settings: &Settings,
     ) -> Result<FrameStats> {
-        let mut frame = self.begin(prepared, camera, settings, Sink::Nowhere)?.singly();
+        let mut frame = self.begin(prepared, viewpoint, settings, Sink::Nowhere)?.singly();
         let mut times = Times::new();
         self.complete(prepared, &mut frame, Some(&mut times))?;
         Ok(FrameStats { steps: times, ..frame.finish().1 })

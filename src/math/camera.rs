@@ -287,6 +287,33 @@ pub struct View {
     pub size: [u32; 2],
 }
 
+/// What a picture is taken from: a [`Camera`], or a [`View`] that a host has made of its matrices.
+pub trait Viewpoint {
+    /// Resolves the viewpoint for a picture of `size` pixels (width, height).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a camera without a picture, and for a view of another size.
+    fn view(&self, size: [u32; 2]) -> Result<View>;
+}
+
+impl Viewpoint for Camera {
+    fn view(&self, size: [u32; 2]) -> Result<View> {
+        Self::view(self, size)
+    }
+}
+
+impl Viewpoint for View {
+    fn view(&self, size: [u32; 2]) -> Result<View> {
+        if self.size == size {
+            return Ok(self.clone());
+        }
+        Err(Error::Argument(format!(
+            "the view is that of a picture of {}x{} pixels, the settings ask for {}x{}",
+            self.size[0], self.size[1], size[0], size[1]
+        )))
+    }
+}
+
 /// The largest distance from the camera, and the most pixels for a length of 1. Its inverse is the
 /// fewest. The squares fit in 32 bits.
 const FARTHEST: f64 = 1e18;

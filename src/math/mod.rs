@@ -9,12 +9,13 @@ mod factor;
 mod fit;
 pub(crate) mod hull;
 mod kernel;
+mod matrices;
 pub(crate) mod neighbours;
 mod path;
 mod sheets;
 pub(crate) mod weld;
 
-pub use camera::{Bounds, Camera, Projection, View};
+pub use camera::{Bounds, Camera, Projection, View, Viewpoint};
 pub use clip::{Clip, ClipShape};
 pub(crate) use eigen::eigen;
 pub(crate) use factor::lower;

@@ -1,58 +1,40 @@
 //! One renderer for both engines, the GPU engine and the CPU engine.
 
-#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-use crate::gpu::{self, Budget, Gpu, PreparedScene};
+mod device;
+#[cfg(feature = "gpu")]
+mod host;
+mod worker;
+
+#[cfg(feature = "gpu")]
+use crate::gpu::{self, PreparedScene, Upload};
 use crate::{
     Error, Result,
     cpu::CpuRenderer,
-    math::Camera,
+    math::Viewpoint,
     picture::Picture,
     plan::FrameStats,
     scene::{Scene, Settings},
     volume::TransferFunction,
 };
+pub use device::Device;
+#[cfg(feature = "gpu")]
+pub use host::Frame;
+use std::future::poll_fn;
+use worker::Worker;
 
-/// The device that draws.
-#[derive(Debug, Clone)]
-pub enum Device {
-    /// The GPU engine on wgpu, with the capacity of its passes. Needs the feature `gpu`. In a
-    /// browser, where nothing may block, see
-    /// [`gpu::Renderer::render_async`](crate::gpu::Renderer::render_async).
-    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-    Gpu(Gpu, Budget),
-    /// The CPU engine. It needs no driver.
-    Cpu,
-}
-
-impl Device {
-    /// Returns the fastest hardware adapter, or the CPU if there is none. The CPU engine is faster
-    /// than a GPU driver that runs on the processor. `WGPU_ADAPTER_NAME` can name another adapter
-    /// ([`Gpu::hardware`](crate::gpu::Gpu::hardware)). Without the feature `gpu`, this is the CPU.
-    pub fn automatic() -> Self {
-        #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-        if let Some(gpu) = Gpu::hardware() {
-            return Self::Gpu(gpu, Budget::default());
-        }
-        Self::Cpu
-    }
-
-    /// Returns the adapter's name, or “CPU”.
-    pub fn name(&self) -> &str {
-        match self {
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Self::Gpu(gpu, _) => &gpu.info.name,
-            Self::Cpu => "CPU",
-        }
-    }
-}
-
-/// Draws one scene on one device. The camera, the settings and the transfer function may change
+/// Draws one scene on one device. The viewpoint, the settings and the transfer functions may change
 /// from picture to picture.
+///
+/// | method | waits | the picture is |
+/// |---|---|---|
+/// | [`render`](Self::render) | yes | returned |
+/// | [`render_async`](Self::render_async) | no, it is awaited | returned |
+/// | [`encode`](Self::encode), [`poll`](Self::poll) | no | written to textures or buffers of a host application |
+/// | [`draw`](Self::draw), [`profile`](Self::profile) | yes | left on the device |
 ///
 /// The CPU engine draws everywhere; [`Device::automatic`] takes a GPU if there is one:
 ///
 /// ```
-/// use glam::DVec3;
 /// use splatkit::{
 ///     Device, Renderer,
 ///     math::Camera,
@@ -63,7 +45,7 @@ impl Device {
 /// let ball = Mesh::sphere(3).surfels(&SurfelOptions::default())?;
 /// let scene = Scene::new().with_splats(ball);
 /// let mut renderer = Renderer::new(&Device::Cpu, &scene)?;
-/// let camera = Camera::framing(&scene.bounds(), DVec3::NEG_Z, DVec3::Y, 1.0);
+/// let camera = Camera::fit(&scene, [32, 32])?;
 /// let (picture, stats) = renderer.render(&camera, &Settings::new([32, 32]))?;
 /// // Red, green, blue and opacity of the pixel in the middle.
 /// assert!(picture.color[16 * 32 + 16][3] > 0.99 && stats.splats > 0);
@@ -74,28 +56,39 @@ pub struct Renderer {
     scene: Scene,
     device: Device,
     drawer: Drawer,
+    /// The number of the CPU engine's last frame for a host; 0 if it is abandoned.
+    frame: u64,
+    /// What uploads the CPU engine's frames.
+    #[cfg(feature = "gpu")]
+    upload: Option<Upload>,
 }
 
 #[derive(Debug)]
 enum Drawer {
-    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    #[cfg(feature = "gpu")]
     Gpu(Box<gpu::Renderer>, Box<PreparedScene>),
-    Cpu(Box<CpuRenderer>),
+    Cpu(Worker),
 }
 
 impl Drawer {
     fn new(device: &Device, scene: &Scene) -> Result<Self> {
-        Ok(match device {
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Device::Gpu(gpu, budget) => {
-                let renderer = gpu::Renderer::with_budget(gpu, *budget);
-                let prepared = renderer.prepare(scene)?;
-                gpu.wait()?;
-                Self::Gpu(Box::new(renderer), Box::new(prepared))
-            }
-            Device::Cpu => Self::Cpu(Box::new(CpuRenderer::new(scene)?)),
-        })
+        #[cfg(feature = "gpu")]
+        if let Device::Gpu(gpu, budget) = device {
+            let renderer = gpu::Renderer::with_budget(gpu, *budget);
+            let prepared = renderer.prepare(scene)?;
+            #[cfg(not(target_arch = "wasm32"))]
+            gpu.wait()?;
+            return Ok(Self::Gpu(Box::new(renderer), Box::new(prepared)));
+        }
+        let _ = device;
+        Ok(Self::Cpu(Worker::new(CpuRenderer::new(scene)?)))
     }
+}
+
+/// Returned where a browser's GPU would have to be waited for.
+#[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+fn cannot_wait<T>() -> Result<T> {
+    Err(Error::Argument("a browser cannot wait for the GPU; use render_async or encode".into()))
 }
 
 impl Renderer {
@@ -109,6 +102,9 @@ impl Renderer {
             scene: scene.clone(),
             device: device.clone(),
             drawer: Drawer::new(device, scene)?,
+            frame: 0,
+            #[cfg(feature = "gpu")]
+            upload: host::upload(device),
         })
     }
 
@@ -121,17 +117,18 @@ impl Renderer {
     ///
     /// # Errors
     /// Those of [`gpu::Renderer::render`](crate::gpu::Renderer::render) and
-    /// [`CpuRenderer::render`].
+    /// [`CpuRenderer::render`]. [`Error::Argument`] on a GPU in a browser, which cannot be waited
+    /// for.
     pub fn render(
         &mut self,
-        camera: &Camera,
+        viewpoint: &impl Viewpoint,
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
-        match self.render_once(camera, settings) {
+        match self.render_once(viewpoint, settings) {
             Err(Error::DeviceLost(reason)) => {
                 tracing::warn!("{reason}; reopening the device and drawing the picture again");
                 self.reopen()?;
-                self.render_once(camera, settings)
+                self.render_once(viewpoint, settings)
             }
             done => done,
         }
@@ -139,13 +136,41 @@ impl Renderer {
 
     fn render_once(
         &mut self,
-        camera: &Camera,
+        viewpoint: &impl Viewpoint,
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
+        self.frame = 0;
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Drawer::Gpu(renderer, prepared) => renderer.render(prepared, camera, settings),
-            Drawer::Cpu(renderer) => renderer.render(camera, settings),
+            Drawer::Gpu(renderer, prepared) => renderer.render(prepared, viewpoint, settings),
+            #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+            Drawer::Gpu(..) => cannot_wait(),
+            Drawer::Cpu(worker) => worker.engine().render(viewpoint, settings),
+        }
+    }
+
+    /// Draws a picture without blocking. The CPU engine draws in a thread, except in a browser.
+    /// Elsewhere than in a browser, someone must poll a GPU's device meanwhile
+    /// ([`wgpu::Device::poll`]).
+    ///
+    /// # Errors
+    /// Those of [`render`](Self::render). A lost device is not reopened: [`Error::DeviceLost`].
+    pub async fn render_async(
+        &mut self,
+        viewpoint: &impl Viewpoint,
+        settings: &Settings,
+    ) -> Result<(Picture, FrameStats)> {
+        let view = viewpoint.view(settings.size)?;
+        self.frame = 0;
+        match &mut self.drawer {
+            #[cfg(feature = "gpu")]
+            Drawer::Gpu(renderer, prepared) => {
+                renderer.render_async(prepared, &view, settings).await
+            }
+            Drawer::Cpu(worker) => {
+                worker.begin(view, settings);
+                poll_fn(|context| worker.poll(Some(context.waker()))).await
+            }
         }
     }
 
@@ -154,11 +179,11 @@ impl Renderer {
     ///
     /// # Errors
     /// Those of [`render`](Self::render). A lost device is not reopened: [`Error::DeviceLost`].
-    pub fn draw(&mut self, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
+    pub fn draw(&mut self, viewpoint: &impl Viewpoint, settings: &Settings) -> Result<FrameStats> {
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Drawer::Gpu(renderer, prepared) => renderer.draw(prepared, camera, settings),
-            Drawer::Cpu(renderer) => Ok(renderer.render(camera, settings)?.1),
+            Drawer::Gpu(renderer, prepared) => renderer.draw(prepared, viewpoint, settings),
+            _ => Ok(self.render_once(viewpoint, settings)?.1),
         }
     }
 
@@ -166,11 +191,15 @@ impl Renderer {
     ///
     /// # Errors
     /// Those of [`draw`](Self::draw).
-    pub fn profile(&mut self, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
+    pub fn profile(
+        &mut self,
+        viewpoint: &impl Viewpoint,
+        settings: &Settings,
+    ) -> Result<FrameStats> {
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Drawer::Gpu(renderer, prepared) => renderer.profile(prepared, camera, settings),
-            Drawer::Cpu(renderer) => Ok(renderer.render(camera, settings)?.1),
+            Drawer::Gpu(renderer, prepared) => renderer.profile(prepared, viewpoint, settings),
+            _ => Ok(self.render_once(viewpoint, settings)?.1),
         }
     }
 
@@ -183,9 +212,9 @@ impl Renderer {
     pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
         self.scene = self.scene.shown_by(item, transfer)?;
         match &mut self.drawer {
-            #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+            #[cfg(feature = "gpu")]
             Drawer::Gpu(_, prepared) => prepared.set_transfer(item, transfer),
-            Drawer::Cpu(renderer) => renderer.set_transfer(item, transfer),
+            Drawer::Cpu(worker) => worker.engine().set_transfer(item, transfer),
         }
     }
 
