@@ -110,8 +110,8 @@ impl Frames {
     /// the coordinates of the others may mean other places.
     pub fn add(&mut self, name: &str, frame: Frame) -> Option<String> {
         let (had_patient, had_other) = (self.first[0].is_some(), self.first[1].is_some());
-        let own = usize::from(frame != Frame::Patient);
-        self.first[own].get_or_insert_with(|| name.to_owned());
+        let slot = usize::from(frame != Frame::Patient);
+        self.first[slot].get_or_insert_with(|| name.to_owned());
         let [Some(patient), Some(other)] = &self.first else { return None };
         (!(had_patient && had_other)).then(|| {
             format!(
@@ -203,7 +203,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_patient_and_something_else_are_told_of_once() {
+    fn a_patient_and_something_else_are_reported_once() {
         let mut frames = Frames::default();
         assert_eq!(frames.add("ct.nii", Frame::Patient), None);
         assert_eq!(frames.add("mask.dcm", Frame::Patient), None);

@@ -36,7 +36,7 @@ pub struct Outline {
 pub struct FieldOutline {
     pub choice: Option<Choice>,
     /// The ranges of values that are visible.
-    pub shown: [u16; 256],
+    pub visible_ranges: [u16; 256],
     /// Whether the field is gathered.
     pub gathers: bool,
 }

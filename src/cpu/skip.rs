@@ -17,15 +17,15 @@ impl Shown {
         let coarse = bricks::BLOCK.ilog2();
         let blocks = size.dims.map(|n| n.div_ceil(bricks::BLOCK).div_ceil(BLOCK));
         let mut words = vec![[0; 2]; blocks.iter().product()];
-        for &(_, brick) in choice.bricks.iter().filter(|(own, _)| *own == level) {
+        for &(_, brick) in choice.bricks.iter().filter(|(brick_level, _)| *brick_level == level) {
             let Some(slot) = cache.slot(level, brick) else { continue };
             let first = size.place(brick).map(|at| at * BLOCKS);
             for (number, [low, high]) in cache.blocks(slot).iter().enumerate() {
                 if u16::from(*high) < choice.shown[usize::from(*low)] {
                     continue;
                 }
-                let own = [number % BLOCKS, number / BLOCKS % BLOCKS, number / (BLOCKS * BLOCKS)];
-                let cell = [0, 1, 2].map(|axis| first[axis] + own[axis]);
+                let block = [number % BLOCKS, number / BLOCKS % BLOCKS, number / (BLOCKS * BLOCKS)];
+                let cell = [0, 1, 2].map(|axis| first[axis] + block[axis]);
                 let [x, y, z] = cell.map(|at| at / BLOCK);
                 // Blocks entirely outside the border show nothing.
                 let Some(words) = words.get_mut((z * blocks[1] + y) * blocks[0] + x) else {

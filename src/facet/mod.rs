@@ -47,11 +47,11 @@ impl Facet {
     /// Makes a facet. Normals without a length become that of the triangle.
     pub fn new(corners: [Vec3; 3], normals: [Vec3; 3], colors: [[u8; 3]; 3]) -> Self {
         let [a, b, c] = corners;
-        let own = (b - a).cross(c - a).normalize_or(Vec3::Z);
+        let face_normal = (b - a).cross(c - a).normalize_or(Vec3::Z);
         Self {
             corners: corners.map(|corner| corner.to_array()),
             normals: normals.map(|normal| match encode_normal(normal) {
-                NO_NORMAL => encode_normal(own),
+                NO_NORMAL => encode_normal(face_normal),
                 normal => normal,
             }),
             colors: colors.map(|[red, green, blue]| u32::from_le_bytes([red, green, blue, 255])),
@@ -121,8 +121,8 @@ pub struct FacetSet {
 impl FacetSet {
     /// Returns the image that a facet shows, and the places of its corners there.
     pub(crate) fn image_of(&self, facet: usize) -> Option<(&Image, [Vec2; 3])> {
-        let shown = self.shown.get(facet)?;
-        Some((self.images.get(shown.image as usize)?, shown.places))
+        let mapping = self.shown.get(facet)?;
+        Some((self.images.get(mapping.image as usize)?, mapping.places))
     }
 
     /// Returns the box around all facets, in world coordinates: also around those that clips

@@ -40,12 +40,12 @@ impl StreamPoint {
         f32::from_le_bytes(self.color)
     }
 
-    pub fn new(found: &Found, origin: DVec3) -> Self {
+    pub fn new(point: &Found, origin: DVec3) -> Self {
         Self {
-            index: found.row as u32,
-            position: (found.position - origin).as_vec3().to_array(),
-            normal: found.normal.to_array(),
-            color: found.color,
+            index: point.row as u32,
+            position: (point.position - origin).as_vec3().to_array(),
+            normal: point.normal.to_array(),
+            color: point.color,
         }
     }
 }

@@ -246,8 +246,8 @@ struct Fields<'a> {
 
 impl Fields<'_> {
     fn at<const N: usize>(&self, at: usize) -> Result<[u8; N], String> {
-        let found = self.bytes.get(at..).and_then(|rest| rest.first_chunk()).copied();
-        found.ok_or_else(|| {
+        let bytes = self.bytes.get(at..).and_then(|rest| rest.first_chunk()).copied();
+        bytes.ok_or_else(|| {
             format!(
                 "{} extends to byte {}, but only {} bytes are \
                      present",

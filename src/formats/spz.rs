@@ -205,9 +205,9 @@ fn in_streams(source: &Source) -> Result<Packed> {
     }
     // Attributes without bytes have no stream.
     let wanted = sizes.iter().filter(|&&size| size > 0).count();
-    let found = usize::from(head[HEADER - 1]);
-    if found != wanted {
-        let message = format!("counts {found} streams, but {wanted} are expected");
+    let streams = usize::from(head[HEADER - 1]);
+    if streams != wanted {
+        let message = format!("counts {streams} streams, but {wanted} are expected");
         return Err(source.error("header", message));
     }
     let table_at = number(head, HEADER).map_or(0, |at| at as usize);

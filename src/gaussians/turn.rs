@@ -75,10 +75,11 @@ impl Turn {
 impl Gaussians {
     /// Turns a scene of a known stance in the world, so that it has another one.
     pub fn stand(&mut self, wanted: Stance) {
-        let Some(own) = self.about.stance.replace(wanted).filter(|own| *own != wanted) else {
+        let Some(stance) = self.about.stance.replace(wanted).filter(|stance| *stance != wanted)
+        else {
             return;
         };
-        self.turn(own.turn_to(wanted));
+        self.turn(stance.turn_to(wanted));
     }
 
     /// Turns the world about its origin: the Gaussians, and the colours that they show in each
@@ -89,11 +90,11 @@ impl Gaussians {
         self.centers.par_iter_mut().for_each(|center| {
             *center = (rotation * center.as_dvec3()).as_vec3();
         });
-        self.rotations.par_iter_mut().for_each(|own| {
-            *own = (quat * own.as_dquat()).normalize().as_quat();
+        self.rotations.par_iter_mut().for_each(|quaternion| {
+            *quaternion = (quat * quaternion.as_dquat()).normalize().as_quat();
         });
         let terms = terms(self.degree);
-        self.harmonics.par_chunks_mut(terms).for_each(|own| colors.apply(own));
+        self.harmonics.par_chunks_mut(terms).for_each(|harmonics| colors.apply(harmonics));
     }
 }
 
@@ -236,9 +237,9 @@ mod tests {
                     // Directions that the matrix was not made from.
                     let direction = (direction + DVec3::new(0.3, -0.2, 0.1)).normalize();
                     let wanted = color(degree, &before, direction.as_vec3());
-                    let found = color(degree, &after, (rotation * direction).as_vec3());
-                    for (found, wanted) in found.iter().zip(wanted) {
-                        assert!((found - wanted).abs() < 2e-6, "degree {degree}, {rotation}");
+                    let turned = color(degree, &after, (rotation * direction).as_vec3());
+                    for (actual, wanted) in turned.iter().zip(wanted) {
+                        assert!((actual - wanted).abs() < 2e-6, "degree {degree}, {rotation}");
                     }
                 }
             }
@@ -251,8 +252,8 @@ mod tests {
         let mut colors = [[0.0; 3]; 4];
         colors[3] = [1.0, 2.0, 3.0];
         turn(1, DMat3::from_rotation_z(PI / 2.0)).apply(&mut colors);
-        for (found, wanted) in colors[1].iter().zip([1.0, 2.0, 3.0]) {
-            assert!((found - wanted).abs() < 1e-6, "{colors:?}");
+        for (actual, wanted) in colors[1].iter().zip([1.0, 2.0, 3.0]) {
+            assert!((actual - wanted).abs() < 1e-6, "{colors:?}");
         }
         assert!(colors[2..].as_flattened().iter().all(|v| v.abs() < 1e-6), "{colors:?}");
         // A point reflection changes the sign of the odd degrees.
@@ -284,8 +285,8 @@ mod tests {
     fn terms_are_those_of_the_colours() {
         for (direction, _) in directions() {
             let wanted = harmonics::basis(3, direction.as_vec3());
-            for (found, wanted) in basis(direction).iter().zip(wanted) {
-                assert!((found - f64::from(wanted)).abs() < 1e-6, "{direction}");
+            for (actual, wanted) in basis(direction).iter().zip(wanted) {
+                assert!((actual - f64::from(wanted)).abs() < 1e-6, "{direction}");
             }
         }
     }
@@ -303,9 +304,9 @@ mod tests {
         }
         let mut constant = [[constant_of(0.25), constant_of(0.5), constant_of(1.0)]];
         map_colors(&mut constant, |color| color.map(f32::sqrt));
-        let found = color(0, &constant, glam::Vec3::X);
-        for (found, wanted) in found.iter().zip([0.5, 0.5f32.sqrt(), 1.0]) {
-            assert!((found - wanted).abs() < 1e-6, "{found} is not {wanted}");
+        let mapped = color(0, &constant, glam::Vec3::X);
+        for (actual, wanted) in mapped.iter().zip([0.5, 0.5f32.sqrt(), 1.0]) {
+            assert!((actual - wanted).abs() < 1e-6, "{actual} is not {wanted}");
         }
     }
 }

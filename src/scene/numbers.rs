@@ -99,12 +99,12 @@ fn check_facets(set: &FacetSet) -> Result<(), String> {
         ));
     }
     if !set.shown.is_empty() && set.shown.len() != set.facets.len() {
-        let [facets, shown] = [set.facets.len(), set.shown.len()];
-        return Err(format!("{shown} facets show images, but there are {facets} facets"));
+        let [facets, textured] = [set.facets.len(), set.shown.len()];
+        return Err(format!("{textured} facets show images, but there are {facets} facets"));
     }
     let exists = |image: u32| image == Shown::PLAIN || (image as usize) < set.images.len();
-    let is_sound = |own: &Shown| exists(own.image) && own.places.iter().all(|at| at.is_finite());
-    match set.shown.par_iter().position_first(|own| !is_sound(own)) {
+    let is_sound = |part: &Shown| exists(part.image) && part.places.iter().all(|at| at.is_finite());
+    match set.shown.par_iter().position_first(|part| !is_sound(part)) {
         Some(index) => Err(format!("facet {index} shows no part of an image that there is")),
         None => Ok(()),
     }

@@ -204,8 +204,8 @@ pub fn shown_of(transfer: &TransferFunction, [low, high]: [f64; 2]) -> [f64; 2] 
     let first = transfer.opacity.first().map_or(low, |point| point.0);
     let from = if from.is_finite() { from } else { first.min(high) };
     let to = if to.is_finite() { to } else { last_color };
-    let shown = [from.max(low), to.min(high)];
-    if shown[0] < shown[1] { shown } else { [low, high] }
+    let clipped = [from.max(low), to.min(high)];
+    if clipped[0] < clipped[1] { clipped } else { [low, high] }
 }
 
 /// Refuses a logarithmic scale over values that have no logarithm.

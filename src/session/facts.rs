@@ -251,7 +251,7 @@ fn of_samples(points: &Points) -> Map<String, Value> {
 }
 
 fn of_cells(cells: &Cells) -> Map<String, Value> {
-    let count = |kind: CellKind| cells.kinds.iter().filter(|own| **own == kind).count();
+    let count = |kind: CellKind| cells.kinds.iter().filter(|other| **other == kind).count();
     let kinds = CellKind::ALL.into_iter().map(|kind| (kind, count(kind)));
     let kinds = kinds.filter(|(_, count)| *count > 0);
     let kinds = kinds.map(|(kind, count)| (kind.name().to_owned(), json!(count)));
@@ -305,6 +305,6 @@ fn bounds(bounds: Option<[DVec3; 2]>) -> Value {
     bounds.map_or(Value::Null, |[min, max]| json!({ "min": min.to_array(), "max": max.to_array() }))
 }
 
-fn bounds_of(own: Bounds) -> Value {
-    bounds(Some([own.min, own.max]))
+fn bounds_of(Bounds { min, max }: Bounds) -> Value {
+    bounds(Some([min, max]))
 }

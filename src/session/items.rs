@@ -173,7 +173,7 @@ impl Items {
     /// Returns the edges of meshes and cells that are drawn over a picture with these clips.
     pub(super) fn edges(&self, clips: &[Clip]) -> Vec<Arc<Edges>> {
         let of_solid = |entry: &Entry| match entry {
-            Entry::Solid(own) => own.edges(clips),
+            Entry::Solid(solid) => solid.edges(clips),
             Entry::Ready(_) | Entry::Mesh(_) | Entry::Rods { .. } => None,
         };
         let of_solids = self.entries.iter().filter_map(of_solid);
@@ -228,10 +228,10 @@ impl Items {
         };
         let mut changed = item.clone();
         match &mut changed {
-            Item::Scalar(_, own)
-            | Item::Volume(_, _, own)
-            | Item::Bricks(_, _, own)
-            | Item::Cells(_, own) => *own = new,
+            Item::Scalar(_, transfer)
+            | Item::Volume(_, _, transfer)
+            | Item::Bricks(_, _, transfer)
+            | Item::Cells(_, transfer) => *transfer = new,
             _ => return Err(Error::Argument(format!("item {number} of the scene has no field"))),
         }
         changed.validate()?;
@@ -248,11 +248,11 @@ impl Items {
         for entry in &self.entries {
             scene.items.push(match entry {
                 Entry::Ready(item) => item.clone(),
-                Entry::Mesh(own) if facets => Item::Facets(own.facets.clone()),
-                Entry::Mesh(own) => Item::Radiance(own.surfels()?),
-                Entry::Solid(own) if facets => Item::Solid(own.solid.clone()),
-                Entry::Solid(own) => own.field()?,
-                Entry::Rods { facets: own, .. } if facets => Item::Facets(own.clone()),
+                Entry::Mesh(mesh) if facets => Item::Facets(mesh.facets.clone()),
+                Entry::Mesh(mesh) => Item::Radiance(mesh.surfels()?),
+                Entry::Solid(solid) if facets => Item::Solid(solid.solid.clone()),
+                Entry::Solid(solid) => solid.field()?,
+                Entry::Rods { facets: rods, .. } if facets => Item::Facets(rods.clone()),
                 Entry::Rods { facets, splats } => {
                     Item::Radiance(splats.get_or_init(|| facets.rod_splats().into()).clone())
                 }
@@ -269,8 +269,8 @@ impl Items {
     /// Returns the error for a scene that cannot be drawn: that of the file whose item cannot be
     /// drawn by itself, if there is one.
     pub fn at_fault(&self, scene: &Scene, error: Error) -> Error {
-        match Self::unfit(scene).map(|(item, own)| (&self.contents[item].name, own)) {
-            Some((name, own)) if name.is_file => name.fault(own),
+        match Self::unfit(scene).map(|(item, fault)| (&self.contents[item].name, fault)) {
+            Some((name, fault)) if name.is_file => name.fault(fault),
             _ => error,
         }
     }
@@ -320,7 +320,7 @@ impl Adding<'_> {
         }
         let kind = "mesh";
         if let Some(facets) = mesh.facets(&options).map_err(fault)? {
-            let (count, own) = (facets.facets.len(), facets.bounds());
+            let (count, facet_bounds) = (facets.facets.len(), facets.bounds());
             let facets = Arc::new(facets);
             let entry = if self.items.surfaces == Surfaces::Both {
                 let options = SurfelOptions { deadline: Deadline::NEVER, ..options };
@@ -329,11 +329,11 @@ impl Adding<'_> {
             } else {
                 Entry::Ready(Item::Facets(facets))
             };
-            self.push(kind, count, bounds.unwrap_or(own), entry);
+            self.push(kind, count, bounds.unwrap_or(facet_bounds), entry);
         } else {
             let splats = mesh.surfels(&options).map_err(fault)?;
-            let (count, own) = (splats.splats.len(), splats.bounds());
-            self.push(kind, count, bounds.unwrap_or(own), Item::Radiance(splats.into()));
+            let (count, splat_bounds) = (splats.splats.len(), splats.bounds());
+            self.push(kind, count, bounds.unwrap_or(splat_bounds), Item::Radiance(splats.into()));
         }
         Ok(())
     }
@@ -347,8 +347,13 @@ impl Adding<'_> {
     ) -> Result<()> {
         let (surfels, dots) = mesh.points(options).map_err(|error| self.name.fault(error))?;
         if let Some(surfels) = surfels {
-            let (count, own) = (surfels.splats.len(), surfels.bounds());
-            self.push("points", count, bounds.unwrap_or(own), Item::Radiance(surfels.into()));
+            let (count, splat_bounds) = (surfels.splats.len(), surfels.bounds());
+            self.push(
+                "points",
+                count,
+                bounds.unwrap_or(splat_bounds),
+                Item::Radiance(surfels.into()),
+            );
         }
         if let Some(dots) = dots {
             self.push_rods("points", dots, bounds);
@@ -357,13 +362,13 @@ impl Adding<'_> {
     }
 
     fn push_rods(&mut self, kind: &'static str, rods: FacetSet, bounds: Option<Bounds>) {
-        let (count, own) = (rods.facets.len(), rods.bounds());
+        let (count, rod_bounds) = (rods.facets.len(), rods.bounds());
         let entry = match self.items.surfaces {
             Surfaces::Surfels => Entry::Ready(Item::Radiance(rods.rod_splats().into())),
             Surfaces::Facets => Entry::Ready(Item::Facets(rods.into())),
             Surfaces::Both => Entry::Rods { facets: rods.into(), splats: OnceLock::new() },
         };
-        self.push(kind, count, bounds.unwrap_or(own), entry);
+        self.push(kind, count, bounds.unwrap_or(rod_bounds), entry);
     }
 
     fn add_gaussians(&mut self, mut set: Gaussians) {
@@ -508,8 +513,8 @@ impl Adding<'_> {
             return Ok(());
         }
         let solid = Solid::new(cells, &showing.solid_options(tint)).map_err(fault)?;
-        let own = ShownSolid::new(name, solid, showing);
-        self.push("cells", count, bounds, Entry::Solid(Box::new(own)));
+        let solid = ShownSolid::new(name, solid, showing);
+        self.push("cells", count, bounds, Entry::Solid(Box::new(solid)));
         Ok(())
     }
 
@@ -546,7 +551,7 @@ impl Adding<'_> {
     /// Takes the frame and the stance of a field, or the convention for fields.
     fn stand(&mut self, frame: Frame, stance: Option<Stance>) {
         self.frame(frame);
-        warn(self.items.subject.stand_as_told(&self.name.text, stance, Stance::SURVEY));
+        warn(self.items.subject.stand_as_stated(&self.name.text, stance, Stance::SURVEY));
     }
 
     fn does(&self, what: &str) {

@@ -89,22 +89,22 @@ impl Subject {
     /// Takes the stance of an input that is not turned.
     pub fn stand(&mut self, name: &str, stance: Stance, origin: Origin) -> Option<String> {
         self.consider(stance, origin).then(|| {
-            let [own, scene] = [stance.up, self.stance.up].map(direction_name);
+            let [up, scene] = [stance.up, self.stance.up].map(direction_name);
             format!(
-                "{name} says that {own} is up, but the scene stands with {scene} up, as an input \
+                "{name} says that {up} is up, but the scene stands with {scene} up, as an input \
                  before says; --up (in Python, up) sets another"
             )
         })
     }
 
     /// Takes what a file says of its stance, or the convention for its kind.
-    pub fn stand_as_told(
+    pub fn stand_as_stated(
         &mut self,
         name: &str,
-        told: Option<Stance>,
+        stated: Option<Stance>,
         usual: Stance,
     ) -> Option<String> {
-        match told {
+        match stated {
             Some(stance) => self.stand(name, stance, Origin::File),
             None => self.stand(name, usual, Origin::Convention),
         }
@@ -117,7 +117,7 @@ impl Subject {
             Some(stance) => self.turn(name, stance, |wanted| mesh.stand(wanted)),
             // A guess would not count.
             None if self.origin >= Origin::Guess => None,
-            None => mesh.guess_stance().and_then(|own| self.stand(name, own, Origin::Guess)),
+            None => mesh.guess_stance().and_then(|guess| self.stand(name, guess, Origin::Guess)),
         }
     }
 
@@ -142,12 +142,12 @@ impl Subject {
     }
 
     /// Takes a stance that a file states. If the scene stands otherwise, `turn` turns the input.
-    fn turn(&mut self, name: &str, own: Stance, turn: impl FnOnce(Stance)) -> Option<String> {
-        self.consider(own, Origin::File).then(|| {
+    fn turn(&mut self, name: &str, stance: Stance, turn: impl FnOnce(Stance)) -> Option<String> {
+        self.consider(stance, Origin::File).then(|| {
             turn(self.stance);
-            let [own, scene] = [own.up, self.stance.up].map(direction_name);
+            let [up, scene] = [stance.up, self.stance.up].map(direction_name);
             format!(
-                "{name} is turned: it stands with {own} up, and the input before with {scene} up"
+                "{name} is turned: it stands with {up} up, and the input before with {scene} up"
             )
         })
     }

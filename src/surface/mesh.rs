@@ -90,19 +90,19 @@ impl Mesh {
 
     /// Turns a mesh of a known stance in the world, so that it has another one.
     pub fn stand(&mut self, wanted: Stance) {
-        if let Some(own) = self.about.stance.replace(wanted) {
-            self.turn(own.turn_to(wanted));
+        if let Some(previous) = self.about.stance.replace(wanted) {
+            self.turn(previous.turn_to(wanted));
         }
     }
 
     /// Turns the world about its origin. If the matrix mirrors, triangles turn over, so that their
     /// outsides stay outside.
     pub(crate) fn turn(&mut self, turn: DMat3) {
-        let own = turn.as_mat3();
+        let matrix = turn.as_mat3();
         self.origin = turn * self.origin + DVec3::ZERO;
-        self.positions.par_iter_mut().for_each(|position| *position = own * *position);
-        self.normals.par_iter_mut().for_each(|normal| *normal = own * *normal);
-        self.sensors.iter_mut().for_each(|sensor| sensor.position = own * sensor.position);
+        self.positions.par_iter_mut().for_each(|position| *position = matrix * *position);
+        self.normals.par_iter_mut().for_each(|normal| *normal = matrix * *normal);
+        self.sensors.iter_mut().for_each(|sensor| sensor.position = matrix * sensor.position);
         if turn.determinant() < 0.0 {
             self.triangles.par_iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
         }

@@ -126,17 +126,18 @@ mod tests {
     }
 
     /// Returns the places of all numbers in JSON.
-    fn numbers(value: &Value, at: &str, found: &mut Vec<String>) {
+    fn numbers(value: &Value, at: &str, places: &mut Vec<String>) {
         match value {
-            Value::Number(_) => found.push(at.to_owned()),
+            Value::Number(_) => places.push(at.to_owned()),
             Value::Array(all) => {
                 // The first and the last of long lists stand for the others.
                 let ends = [0, all.len().saturating_sub(1)];
                 let all = all.iter().enumerate().filter(|(number, _)| ends.contains(number));
-                all.for_each(|(number, own)| numbers(own, &format!("{at}/{number}"), found));
+                all.for_each(|(number, value)| numbers(value, &format!("{at}/{number}"), places));
             }
             Value::Object(all) => {
-                all.iter().for_each(|(name, own)| numbers(own, &format!("{at}/{name}"), found));
+                all.iter()
+                    .for_each(|(name, value)| numbers(value, &format!("{at}/{name}"), places));
             }
             _ => {}
         }

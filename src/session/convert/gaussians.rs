@@ -87,7 +87,7 @@ impl<W: Watch> Work<'_, W> {
 
     /// Returns whether all inputs hold trained Gaussians, also in hierarchies.
     pub fn are_gaussians(&self) -> Result<bool, W::Error> {
-        let reading = self.own.reading(crate::memory::most());
+        let reading = self.conversion.reading(crate::memory::most());
         for path in self.files {
             let is_one = match reading.kind(path)? {
                 Kind::Gaussians => true,
@@ -132,7 +132,10 @@ impl<W: Watch> Work<'_, W> {
     fn tree_options(&self, set: &Gaussians, points: u64) -> (BuildOptions, WriteOptions) {
         let frame =
             Frame { stance: set.about.stance, is_guessed: false, unit: set.about.length.clone() };
-        (self.own.build_options(false, points), self.own.write_options(self.files, &frame))
+        (
+            self.conversion.build_options(false, points),
+            self.conversion.write_options(self.files, &frame),
+        )
     }
 
     /// Reads all inputs as Gaussians, with colours of the degree that is kept.
@@ -150,7 +153,7 @@ impl<W: Watch> Work<'_, W> {
             }
         }
         let mut all = gathered.ok_or_else(|| wrong("there is nothing to convert"))?;
-        if let Some(degree) = self.own.degree {
+        if let Some(degree) = self.conversion.degree {
             all.set.set_degree(degree.min(all.set.degree));
         }
         Ok(all)
@@ -159,7 +162,7 @@ impl<W: Watch> Work<'_, W> {
     /// Returns the Gaussians of an input, or its splats as Gaussians.
     fn gaussians_of(&self, path: &Path) -> Result<AllGaussians, W::Error> {
         let start = Instant::now();
-        let reading = self.own.reading(crate::memory::most());
+        let reading = self.conversion.reading(crate::memory::most());
         let kind = reading.kind(path)?;
         let trained = match kind {
             Kind::Gaussians => Some(self.trained(path)?),
@@ -175,7 +178,7 @@ impl<W: Watch> Work<'_, W> {
         if kind == Kind::Hierarchy {
             self.watch.has_read(slice::from_ref(&path.to_owned()))?;
         }
-        let scale = self.own.radius_scale;
+        let scale = self.conversion.radius_scale;
         set.scales.iter_mut().for_each(|radii| *radii *= scale);
         let points = set.len() as u64;
         Ok(AllGaussians { set, points, read_ms: milliseconds(start) })
@@ -185,7 +188,7 @@ impl<W: Watch> Work<'_, W> {
     fn trained(&self, path: &Path) -> Result<Gaussians, W::Error> {
         self.watch.stage(&format!("Reading {}", path.display()));
         self.watch.has_colored(false, false)?;
-        let most = self.own.memory.or_else(crate::memory::most);
+        let most = self.conversion.memory.or_else(crate::memory::most);
         let Data::Gaussians(mut set) = self.data(path, most)? else {
             return Err(Error::input(path, "file", "holds no Gaussians").into());
         };

@@ -64,7 +64,7 @@ impl<W: Watch> Work<'_, W> {
             return self.gaussian_hierarchy();
         }
         let need = self.need();
-        if need.bytes > self.own.most_memory() || self.own.in_regions {
+        if need.bytes > self.conversion.most_memory() || self.conversion.in_regions {
             return self.in_regions(need);
         }
         let gathered = self.gather()?;
@@ -73,8 +73,8 @@ impl<W: Watch> Work<'_, W> {
         let watch =
             |done: u64, _: u64| self.watch.progress("Building the hierarchy", done, splats as u64);
         watch(0, 0);
-        let build = self.own.build_options(gathered.closed, gathered.points);
-        let write = self.own.write_options(self.files, &gathered.frame);
+        let build = self.conversion.build_options(gathered.closed, gathered.points);
+        let write = self.conversion.write_options(self.files, &gathered.frame);
         let built = hierarchy::build_file(&gathered.set, self.output, &build, &write, Some(&watch));
         built.map_err(|error| self.at_fault(error))?;
         Ok(Converted::Hierarchy(gathered.built(milliseconds(start))))
@@ -85,7 +85,7 @@ impl<W: Watch> Work<'_, W> {
             return self.expect_gaussian_hierarchy();
         }
         let need = self.need();
-        if need.bytes > self.own.most_memory() || self.own.in_regions {
+        if need.bytes > self.conversion.most_memory() || self.conversion.in_regions {
             return self.expect_regions(need);
         }
         self.extrapolated(&self.gather()?, need.bytes)
@@ -103,8 +103,8 @@ impl<W: Watch> Work<'_, W> {
         let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
         let splats_of_part = splats[first..first + count].to_vec();
         let part = SplatSet { origin, payload, splats: splats_of_part, extent, overlap };
-        let build = self.own.build_options(gathered.closed, gathered.points);
-        let write = self.own.write_options(self.files, &gathered.frame);
+        let build = self.conversion.build_options(gathered.closed, gathered.points);
+        let write = self.conversion.write_options(self.files, &gathered.frame);
         let start = Instant::now();
         let tree = hierarchy::Tree::build(&part, &build, None);
         let tree = tree.map_err(|error| self.at_fault(error))?;
@@ -116,9 +116,9 @@ impl<W: Watch> Work<'_, W> {
 
     /// Returns the memory for converting all inputs as a whole.
     pub fn need(&self) -> memory::Need {
-        let limits = self.own.reading.limits();
-        let options = self.own.surfel_options(limits.deadline());
-        memory::need(self.files, limits, &options, self.own.most_memory())
+        let limits = self.conversion.reading.limits();
+        let options = self.conversion.surfel_options(limits.deadline());
+        memory::need(self.files, limits, &options, self.conversion.most_memory())
     }
 
     /// Reads all inputs and makes splats of them, relative to the first input's origin.
@@ -140,18 +140,18 @@ impl<W: Watch> Work<'_, W> {
     pub fn splats_of(&self, path: &Path, taken: u64) -> Result<Gathered, W::Error> {
         self.watch.stage(&format!("Reading {}", path.display()));
         let start = Instant::now();
-        let most = self.own.most_memory();
+        let most = self.conversion.most_memory();
         // One deadline covers reading the input and making its splats.
-        let deadline = self.own.reading.limits().deadline();
-        let reading = self.own.reading(Some(most));
-        let opened = reading.open_colored(path, self.own.attribute())?;
+        let deadline = self.conversion.reading.limits().deadline();
+        let reading = self.conversion.reading(Some(most));
+        let opened = reading.open_colored(path, self.conversion.attribute())?;
         let data = opened.read()?.with_surface_of_bare_cells()?;
         self.watch.has_read(&opened.files())?;
         let read_ms = milliseconds(start);
         let start = Instant::now();
         let mut gathered = match data {
             Data::Mesh(mesh) => {
-                let options = self.own.surfel_options(deadline);
+                let options = self.conversion.surfel_options(deadline);
                 let (mesh, frame) = self.painted(path, mesh)?;
                 self.watch.stage(&format!("Making splats of {} points", mesh.positions.len()));
                 let need = memory_of_mesh(&mesh, &options, most.saturating_sub(taken));
@@ -167,7 +167,7 @@ impl<W: Watch> Work<'_, W> {
                 let header = hierarchy.header();
                 memory::check(path, memory_of_splats(header.leaves as usize), taken, most)?;
                 let mut set = hierarchy.leaves()?;
-                let scale = self.own.radius_scale;
+                let scale = self.conversion.radius_scale;
                 let larger = |factor: [f32; 6]| factor.map(|entry| entry * scale);
                 set.splats.iter_mut().for_each(|splat| splat.factor = larger(splat.factor));
                 let unit = header.unit.clone();
@@ -194,9 +194,9 @@ impl<W: Watch> Work<'_, W> {
     /// Returns a mesh or point cloud in its colours, and how it stands.
     fn painted(&self, path: &Path, mut mesh: Mesh) -> Result<(Mesh, Frame), W::Error> {
         let frame = Frame::of(mesh.about.stance, || Ok(mesh.guess_stance()))?;
-        let named = self.own.reading.options.scalar.is_some();
-        let up = frame.up(self.own.up);
-        let legend = self.own.coloring.paint(&Name::of_file(path), &mut mesh, up, named)?;
+        let named = self.conversion.reading.options.scalar.is_some();
+        let up = frame.up(self.conversion.up);
+        let legend = self.conversion.coloring.paint(&Name::of_file(path), &mut mesh, up, named)?;
         self.watch.has_colored(true, legend.is_some())?;
         Ok((mesh, frame))
     }

@@ -152,10 +152,10 @@ fn things_stand_as_people_know_them() {
             // than most shapes have.
             let is_usual = up == DVec3::Y || up == DVec3::Z;
             let may_be =
-                |found: DVec3| found == up || !is_usual && [DVec3::Y, DVec3::Z].contains(&found);
-            let found = mesh.guess_stance().expect("a stance").up;
-            if !may_be(found) {
-                wrong.push(format!("{name} with {up} up: {found}"));
+                |guess: DVec3| guess == up || !is_usual && [DVec3::Y, DVec3::Z].contains(&guess);
+            let guess = mesh.guess_stance().expect("a stance").up;
+            if !may_be(guess) {
+                wrong.push(format!("{name} with {up} up: {guess}"));
             }
             if *name == "bowl" && up.min_element() < 0.0 {
                 // Its points alone hide its inside too little to count against the habit.
@@ -164,9 +164,9 @@ fn things_stand_as_people_know_them() {
             // Points without triangles stand as the surface does.
             mesh.positions = mesh.spread();
             mesh.triangles.clear();
-            let found = mesh.guess_stance().expect("a stance").up;
-            if !may_be(found) {
-                wrong.push(format!("points of a {name} with {up} up: {found}"));
+            let guess = mesh.guess_stance().expect("a stance").up;
+            if !may_be(guess) {
+                wrong.push(format!("points of a {name} with {up} up: {guess}"));
             }
         }
     }
@@ -176,8 +176,8 @@ fn things_stand_as_people_know_them() {
 #[test]
 fn a_plate_lies() {
     for (up, turn) in turns() {
-        let found = rotated(&gear(), turn).guess_stance().expect("a stance").up;
-        assert!(found.dot(up).abs() > 0.999, "{up}: {found}");
+        let guess = rotated(&gear(), turn).guess_stance().expect("a stance").up;
+        assert!(guess.dot(up).abs() > 0.999, "{up}: {guess}");
     }
 }
 

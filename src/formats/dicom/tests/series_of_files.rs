@@ -238,13 +238,13 @@ fn a_series_is_chosen() {
     let limits = Limits::default();
     let source = Source::open_any(folder.as_ref(), &limits).unwrap();
     let listed = crate::formats::series(&source, &ReadOptions::default()).unwrap();
-    let told: Vec<_> = listed
+    let summary: Vec<_> = listed
         .iter()
         .map(|one| (one.number, &*one.description, one.pictures, one.is_drawn))
         .collect();
     let expected =
         [(2, "Scout", 1, false), (4, "Chest thin", 3, true), (7, "Chest thick", 2, false)];
-    assert_eq!(told, expected.map(|(n, words, count, is)| (Some(n), words, count, is)));
+    assert_eq!(summary, expected.map(|(n, words, count, is)| (Some(n), words, count, is)));
     assert!(crate::formats::load_volume(&folder, &limits, &ReadOptions::default()).is_ok());
     let none = Folder::new();
     none.write("a.txt", "text");

@@ -125,17 +125,17 @@ fn linear(value: f32) -> f32 {
 
 /// Returns the attributes in their order in the file.
 fn columns(degree: u32) -> Vec<Column> {
-    let own = |name: &str, values| Column { name: format!("{NAME}:{name}"), values };
+    let column = |name: &str, values| Column { name: format!("{NAME}:{name}"), values };
     let mut columns = vec![
         Column { name: "POSITION".into(), values: Values::Center },
-        own("ROTATION", Values::Rotation),
-        own("SCALE", Values::Scale),
-        own("OPACITY", Values::Opacity),
+        column("ROTATION", Values::Rotation),
+        column("SCALE", Values::Scale),
+        column("OPACITY", Values::Opacity),
     ];
     for l in 0..=degree {
         let first = l as usize * l as usize;
         columns.extend((0..=2 * l as usize).map(|coefficient| {
-            own(&format!("SH_DEGREE_{l}_COEF_{coefficient}"), Values::Term(first + coefficient))
+            column(&format!("SH_DEGREE_{l}_COEF_{coefficient}"), Values::Term(first + coefficient))
         }));
     }
     columns.push(Column { name: "COLOR_0".into(), values: Values::Color });

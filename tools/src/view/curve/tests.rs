@@ -84,8 +84,8 @@ fn drag(harness: &mut Harness<'_, State>, from: Pos2, to: Pos2) {
     harness.run();
 }
 
-fn near(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() < tolerance, "{found} is not {expected}");
+fn near(value: f64, expected: f64, tolerance: f64) {
+    assert!((value - expected).abs() < tolerance, "{value} is not {expected}");
 }
 
 #[test]
