@@ -22,7 +22,7 @@ pub struct Choice {
     pub lambda: f64,
     /// Which ranges of values show something, as from
     /// [`first_visible`](crate::volume::reach::first_visible).
-    pub shown: [u16; 256],
+    pub first_visible: [u16; 256],
 }
 
 /// How fine a picture should be, and how much of it is drawn.
@@ -88,7 +88,7 @@ pub fn choice(
     }
     drawn.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
     let bricks = drawn.into_iter().map(|(_, level, brick)| (level, brick)).collect();
-    Choice { levels, bricks, lambda, shown: *first_visible }
+    Choice { levels, bricks, lambda, first_visible: *first_visible }
 }
 
 /// λ before any budget.

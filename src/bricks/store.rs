@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::{Frame, Stance},
+    about::{Frame, Orientation},
     container::directory::{Directory, Fault, Kind, Shape},
     error::LimitKind,
     input::{self, Bytes, Limits},
@@ -42,8 +42,8 @@ pub struct Header {
 
 impl Header {
     /// Returns how the subject stands, if that is known.
-    pub fn stance(&self) -> Option<Stance> {
-        (self.frame == Frame::Patient).then_some(Stance::RAS)
+    pub fn orientation(&self) -> Option<Orientation> {
+        (self.frame == Frame::Patient).then_some(Orientation::RAS)
     }
 
     /// Checks that a volume with this header can be cut into bricks, in memory or in a file. The

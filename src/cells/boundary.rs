@@ -263,7 +263,7 @@ impl Sides {
             side_nodes.iter_mut().for_each(|node| *node = first[*node as usize]);
             side_nodes.sort_unstable();
             side_nodes.dedup();
-            on_side
+            side_nodes
         };
         let nodes: Vec<Vec<u32>> = open.par_iter().map(nodes_of).collect();
         let mut of_nodes: HashMap<u32, Vec<u32>> = HashMap::new();

@@ -124,7 +124,7 @@ enum Shape<'a> {
     /// Four weights an axis, each given by its coefficients of 1, t, t² and t³.
     Cubic([[f32; 4]; 4]),
     /// The nearest sample, with the Gaussian that smooths the mask of its label, and the shares of
-    /// each sample's own label around it ([`own_shares`](crate::volume::own_shares)).
+    /// each sample's own label around it ([`label_shares`](crate::volume::label_shares)).
     Labels(Bell, &'a [u8]),
 }
 

@@ -18,12 +18,12 @@ use crate::{
     math::{Bounds, Kernel, Sheets, View},
     plan::{
         gathering,
-        shown::{self, Shown},
+        visible::{self, VisibleBlocks},
         weighting::{Weighting, deviation, weighting},
     },
     scene::{Item, Optics, Scene, Settings},
     volume::{
-        Lattice, Volume, own_shares,
+        Lattice, Volume, label_shares,
         reach::{EVERYTHING, first_visible},
     },
 };
@@ -43,9 +43,9 @@ pub struct FieldState {
     shares: Option<Vec<u8>>,
     /// The visible samples of a gathered lattice, and the transfer function's visibility table for
     /// which they were found.
-    visible_samples: Option<([u16; 256], Shown)>,
+    visible_samples: Option<([u16; 256], VisibleBlocks)>,
     /// The levels of a gathered volume in bricks, for the bricks of the last picture.
-    levels: Option<(Choice, Vec<(Grid, Shown)>)>,
+    levels: Option<(Choice, Vec<(Grid, VisibleBlocks)>)>,
 }
 
 impl FieldState {
@@ -131,22 +131,25 @@ impl FieldState {
                     self.blend = Some(Blend::new(volume, kernel, taps));
                 }
                 if volume.is_label_map() {
-                    self.shares.get_or_insert_with(|| own_shares(volume));
+                    self.shares.get_or_insert_with(|| label_shares(volume));
                 }
                 let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
                     Some(blend) => blend.ranges(volume, kernel),
-                    None => shown::field_ranges(volume, kernel),
+                    None => visible::field_ranges(volume, kernel),
                 });
                 let dims = self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
                 self.visible_samples.take_if(|(held, _)| *held != first);
                 self.visible_samples
-                    .get_or_insert_with(|| (first, Shown::new(dims, ranges, &first)));
+                    .get_or_insert_with(|| (first, VisibleBlocks::new(dims, ranges, &first)));
             }
             (Item::Bricks(..), Prepared::Bricks(cache), Some(choice))
                 if self.levels.as_ref().is_none_or(|(held, _)| held != choice) =>
             {
                 let level = |(level, _): &(usize, f64)| {
-                    (Grid::new(cache, choice, *level), Shown::of_bricks(cache, choice, *level))
+                    (
+                        Grid::new(cache, choice, *level),
+                        VisibleBlocks::of_bricks(cache, choice, *level),
+                    )
                 };
                 self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
             }
@@ -253,24 +256,26 @@ impl FieldState {
     ) -> Option<Vec<gather::Level<'a>>> {
         let (choice, grids) = self.levels.as_ref()?;
         let fine = &bricks.header().lattice;
-        let level =
-            |((level, share), (grid, visible_samples)): (&(usize, f64), &'a (Grid, Shown))| {
-                let (lattice, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
-                let to_level = lattice.axes.inverse();
-                let scale = (to_level * fine.axes).to_cols_array_2d();
-                let shift = (to_level * (fine.origin - lattice.origin)).as_vec3().to_array();
-                let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
-                gather::Level {
-                    field: Typed::of_bricks(cache.samples(), dims, grid, weighting, zero),
-                    dims,
-                    grid: Some(grid),
-                    visible_samples,
-                    share: *share as f32,
-                    scale,
-                    shift,
-                    cells: [scale, shift],
-                }
-            };
+        let level = |((level, share), (grid, visible_samples)): (
+            &(usize, f64),
+            &'a (Grid, VisibleBlocks),
+        )| {
+            let (lattice, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
+            let to_level = lattice.axes.inverse();
+            let scale = (to_level * fine.axes).to_cols_array_2d();
+            let shift = (to_level * (fine.origin - lattice.origin)).as_vec3().to_array();
+            let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
+            gather::Level {
+                field: Typed::of_bricks(cache.samples(), dims, grid, weighting, zero),
+                dims,
+                grid: Some(grid),
+                visible_samples,
+                share: *share as f32,
+                scale,
+                shift,
+                cells: [scale, shift],
+            }
+        };
         Some(choice.levels.iter().zip(grids).map(level).collect())
     }
 

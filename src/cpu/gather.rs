@@ -13,7 +13,7 @@ use super::{
     skip::is_marked,
     vector::{Lanes, dot, each, three},
 };
-use crate::{math::Kernel, plan::shown::Shown, scene::Optics, volume::Volume};
+use crate::{math::Kernel, plan::visible::VisibleBlocks, scene::Optics, volume::Volume};
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// If the slopes at a sheet's ends differ by fewer entries of the table per sheet, a cubic between
@@ -54,7 +54,7 @@ pub struct Level<'a> {
     pub dims: [usize; 3],
     /// The slots of its bricks; `None` for a volume in memory.
     pub grid: Option<&'a Grid>,
-    pub visible_samples: &'a Shown,
+    pub visible_samples: &'a VisibleBlocks,
     /// The level's share in the picture.
     pub share: f32,
     /// Steps of the level per step of the lattice along each axis, and the place of the lattice's

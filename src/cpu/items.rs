@@ -390,7 +390,7 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
                     let block = within.map(|at| at / BLOCK);
                     let [low, high] = blocks[(block[2] * BLOCKS + block[1]) * BLOCKS + block[0]];
                     let is_inside = (0..3).all(|axis| first[axis] + within[axis] < dims[axis]);
-                    if u16::from(high) < choice.shown[usize::from(low)] || !is_inside {
+                    if u16::from(high) < choice.first_visible[usize::from(low)] || !is_inside {
                         continue;
                     }
                     let steps = Vec3::from_array(std::array::from_fn(|axis| {

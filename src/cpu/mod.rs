@@ -143,7 +143,7 @@ impl CpuRenderer {
     /// [`Error::Argument`] if the item has no field; [`Error::Transfer`] for a transfer function
     /// that [`CpuRenderer::new`] would refuse. The scene then keeps the old one.
     pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
-        self.scene = self.scene.shown_by(item, transfer)?;
+        self.scene = self.scene.with_transfer(item, transfer)?;
         for field in &mut self.fields {
             field.item = self.scene.items[field.number].clone();
         }

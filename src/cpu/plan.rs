@@ -98,7 +98,7 @@ pub struct Plan<'a> {
 /// Returns the facets of an item that show images.
 fn set_with_images(item: &Item) -> Option<Arc<FacetSet>> {
     match item {
-        Item::Facets(set) if !set.shown.is_empty() => Some(set.clone()),
+        Item::Facets(set) if !set.texture_coordinates.is_empty() => Some(set.clone()),
         _ => None,
     }
 }

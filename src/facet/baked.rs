@@ -18,7 +18,7 @@ impl FacetSet {
     /// Returns the facets with the images in their corners' colours: those that show an image are
     /// cut to about its texels, or larger parts if there would be millions.
     pub(crate) fn baked(&self) -> Cow<'_, Self> {
-        if self.shown.is_empty() {
+        if self.texture_coordinates.is_empty() {
             return Cow::Borrowed(self);
         }
         let numbers = || (0..self.facets.len()).into_par_iter();
@@ -126,7 +126,7 @@ fn piece(corners: [&Corner; 3], facet: &Facet) -> Option<Facet> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::facet::{Shown, Texture};
+    use crate::facet::{Texture, TextureCoordinates};
     use std::sync::Arc;
 
     #[test]
@@ -141,13 +141,15 @@ mod tests {
         let set = FacetSet {
             facets: vec![facet, plain],
             images: vec![Arc::new(image)],
-            shown: [0, Shown::PLAIN].map(|image| Shown { image, places }).to_vec(),
+            texture_coordinates: [0, TextureCoordinates::PLAIN]
+                .map(|image| TextureCoordinates { image, places })
+                .to_vec(),
             ..FacetSet::default()
         };
         let baked = set.baked();
         let parts = (16.0 * 2f32.sqrt() / 1.5).ceil() as usize;
         assert_eq!(baked.facets.len(), parts * parts + 1);
-        assert!(baked.facets.contains(&plain) && baked.shown.is_empty());
+        assert!(baked.facets.contains(&plain) && baked.texture_coordinates.is_empty());
         let area = |facet: &Facet| {
             let [a, b, c] = facet.corners.map(Vec3::from);
             (b - a).cross(c - a).z

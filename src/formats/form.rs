@@ -1,9 +1,9 @@
 //! What a format offers if the points of its files are read in pieces.
 
-use super::shared::found::Found;
+use super::shared::raw_point::RawPoint;
 use crate::{
     Result,
-    about::{About, Stance},
+    about::{About, Orientation},
     input::Source,
     parallel::{self, prelude::*},
 };
@@ -40,7 +40,7 @@ impl StreamPoint {
         f32::from_le_bytes(self.color)
     }
 
-    pub fn new(point: &Found, origin: DVec3) -> Self {
+    pub fn new(point: &RawPoint, origin: DVec3) -> Self {
         Self {
             index: point.row as u32,
             position: (point.position - origin).as_vec3().to_array(),
@@ -67,7 +67,7 @@ pub(super) trait Form: Send + Sync {
     }
 
     /// Returns how the points stand, if the file or the format's convention says so.
-    fn stance(&self) -> Option<Stance>;
+    fn orientation(&self) -> Option<Orientation>;
 
     fn has_normals(&self) -> bool;
 
@@ -101,7 +101,7 @@ pub(super) trait Form: Send + Sync {
     fn triangles(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)>;
 
     /// Returns a vertex of a mesh; `None` for a point cloud.
-    fn vertex(&self, source: &Source, index: usize) -> Option<Found>;
+    fn vertex(&self, source: &Source, index: usize) -> Option<RawPoint>;
 
     /// Returns the position of a vertex of a mesh; `None` for a point cloud.
     fn position(&self, source: &Source, index: usize) -> Option<DVec3>;

@@ -18,7 +18,7 @@ pub use gaussians::{holds_gaussians, read_gaussians, write_gaussians};
 use super::shared::unplaced;
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     input::{Source, copy, positions},
     surface::{Mesh, Texture},
 };
@@ -502,7 +502,7 @@ impl Builder<'_> {
             let points = std::mem::take(&mut self.loose).into_iter().flatten();
             self.mesh.lines.extend(points.map(|point| [point; 2]));
         }
-        self.mesh.about.stance = Some(Stance::Y_UP);
+        self.mesh.about.orientation = Some(Orientation::Y_UP);
         unplaced::leave_out(self.source, &mut self.mesh)?;
         Ok(self.mesh)
     }

@@ -17,7 +17,7 @@ mod time;
 pub(super) use pieces::Pieces;
 
 use super::shared::cloud::{Cloud, colors_of_16_bits, greys};
-use crate::{Result, about::Stance, input::Source, parallel::prelude::*, surface::Mesh};
+use crate::{Result, about::Orientation, input::Source, parallel::prelude::*, surface::Mesh};
 use attribute::Attribute;
 use glam::DVec3;
 use std::ops::Range;
@@ -66,7 +66,7 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     cloud.about.attributes = attribute::names(&header, &extras);
     cloud.about.crs = describe::crs(source, &header);
     cloud.about.layout = describe::layout(&header);
-    cloud.about.stance = Some(Stance::SURVEY);
+    cloud.about.orientation = Some(Orientation::SURVEY);
     cloud.into_mesh(source)
 }
 

@@ -419,7 +419,7 @@ fn is_word(value: &str, word: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::about::Stance;
+    use crate::about::Orientation;
     use crate::input::testing::*;
     use flate2::{Compression, write::ZlibEncoder};
     use std::io::Write;
@@ -520,7 +520,7 @@ mod tests {
         assert_eq!(axes.y_axis, DVec3::new(3.0, 0.0, 0.0));
         assert_eq!(axes.z_axis, DVec3::new(0.0, 0.0, 4.0));
         assert_eq!(volume.lattice.origin, DVec3::new(-1.0, -2.0, 3.0));
-        assert_eq!(volume.about.stance, Some(Stance::RAS));
+        assert_eq!(volume.about.orientation, Some(Orientation::RAS));
         assert_eq!(volume.about.modality, Some(Modality::Ct));
         // Without directions, the letters are those of the sides that the axes come from.
         let turned = mha("AnatomicalOrientation = PIR\n", "1 1 1", "MET_UCHAR", &[1]);
@@ -530,7 +530,7 @@ mod tests {
         assert_eq!(turned.lattice.axes.z_axis, DVec3::NEG_X);
         let plain = mha("AnatomicalOrientation = ???\n", "1 1 1", "MET_UCHAR", &[1]);
         let plain = load(&plain, &ReadOptions::default()).unwrap();
-        assert_eq!((plain.lattice.spacing(), plain.about.stance), (DVec3::ONE, None));
+        assert_eq!((plain.lattice.spacing(), plain.about.orientation), (DVec3::ONE, None));
     }
 
     #[test]

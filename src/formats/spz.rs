@@ -112,7 +112,7 @@ pub fn read(source: &Source) -> Result<Gaussians> {
     let mut set = settle(source, header.count, header.degree, |index, colors| {
         Ok(decode::gaussian(&header, &attributes, index, colors))
     })?;
-    set.about.stance = system.and_then(|system| extensions::stance(source, system));
+    set.about.orientation = system.and_then(|system| extensions::orientation(source, system));
     Ok(set)
 }
 

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     color::{ColorScale, Spread},
     input::{Limits, Source, positions},
     surface::{Mesh, Paint, Values},
@@ -150,23 +150,23 @@ impl<'a> Stream<'a> {
     }
 
     /// Returns how its points stand, if the file or its format's convention says so.
-    pub fn stance(&self) -> Option<Stance> {
-        self.form.stance()
+    pub fn orientation(&self) -> Option<Orientation> {
+        self.form.orientation()
     }
 
-    /// Guesses how its points stand ([`Mesh::guess_stance`]), from pieces spread over the file.
+    /// Guesses how its points stand ([`Mesh::guess_orientation`]), from pieces spread over the file.
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) for damaged pieces.
-    pub fn guess_stance(&self) -> Result<Option<Stance>> {
+    pub fn guess_orientation(&self) -> Result<Option<Orientation>> {
         let Some((_, positions)) = self.some_positions(PIECES)? else { return Ok(None) };
-        Ok(Mesh { positions, ..Mesh::default() }.guess_stance())
+        Ok(Mesh { positions, ..Mesh::default() }.guess_orientation())
     }
 
     /// Returns the world positions of some points of pieces spread over the file.
     fn sample(&self, pieces: usize) -> Result<Vec<DVec3>> {
         let Some((origin, positions)) = self.some_positions(pieces)? else { return Ok(Vec::new()) };
-        let step = positions.len().div_ceil(positions::LOOKS).max(1);
+        let step = positions.len().div_ceil(positions::MOST_SAMPLED).max(1);
         Ok(positions.iter().step_by(step).map(|place| origin + place.as_dvec3()).collect())
     }
 

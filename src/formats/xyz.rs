@@ -9,7 +9,7 @@ use super::shared::{
 };
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     input::{
         Source,
         text::{Text, Want, first_words},
@@ -85,7 +85,7 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     source.spend("the size of the points in bytes", POINT * text.len() as u64)?;
     let positions = table.triples(layout.position).collect();
     let mut cloud = Cloud { positions, ..Cloud::default() };
-    cloud.about.stance = Some(Stance::SURVEY);
+    cloud.about.orientation = Some(Orientation::SURVEY);
     if let Some(columns) = layout.normal {
         cloud.normals = table.triples(columns).map(|normal| normal.as_vec3()).collect();
     }

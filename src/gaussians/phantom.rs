@@ -4,7 +4,7 @@ use super::{
     Gaussians,
     harmonics::{MOST_TERMS, basis, constant_of, terms},
 };
-use crate::{about::Stance, parallel::prelude::*};
+use crate::{about::Orientation, parallel::prelude::*};
 use glam::{Quat, Vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -46,7 +46,7 @@ pub fn phantom(count: usize) -> Gaussians {
         .collect();
     set.opacities = made.iter().map(|gaussian| gaussian.opacity).collect();
     set.harmonics = made.par_iter().flat_map_iter(colors).collect();
-    set.about.stance = Some(Stance::Y_DOWN);
+    set.about.orientation = Some(Orientation::Y_DOWN);
     set
 }
 

@@ -5,7 +5,7 @@
 //! weights give these integrals exactly.
 
 use super::{Gaussians, MOST_DEGREE, harmonics::terms};
-use crate::{about::Stance, parallel::prelude::*};
+use crate::{about::Orientation, parallel::prelude::*};
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::PI;
 
@@ -73,13 +73,14 @@ impl Turn {
 }
 
 impl Gaussians {
-    /// Turns a scene of a known stance in the world, so that it has another one.
-    pub fn stand(&mut self, wanted: Stance) {
-        let Some(stance) = self.about.stance.replace(wanted).filter(|stance| *stance != wanted)
+    /// Turns a scene of a known orientation in the world, so that it has another one.
+    pub fn stand(&mut self, wanted: Orientation) {
+        let Some(orientation) =
+            self.about.orientation.replace(wanted).filter(|orientation| *orientation != wanted)
         else {
             return;
         };
-        self.turn(stance.turn_to(wanted));
+        self.turn(orientation.turn_to(wanted));
     }
 
     /// Turns the world about its origin: the Gaussians, and the colours that they show in each
@@ -190,10 +191,10 @@ mod tests {
             harmonics: vec![[0.0; 3], [0.1; 3], [0.2; 3], [0.3; 3]],
             ..Gaussians::default()
         };
-        set.about.stance = Some(Stance::Y_UP);
+        set.about.orientation = Some(Orientation::Y_UP);
         let before = set.clone();
-        set.stand(Stance::Y_DOWN);
-        assert_eq!(set.about.stance, Some(Stance::Y_DOWN));
+        set.stand(Orientation::Y_DOWN);
+        assert_eq!(set.about.orientation, Some(Orientation::Y_DOWN));
         assert_eq!(set.origin, DVec3::new(10.0, -20.0, -30.0));
         assert!((set.centers[0] - Vec3::new(1.0, -2.0, -3.0)).length() < 1e-6);
         let seen = |set: &Gaussians, from: Vec3| {
@@ -202,12 +203,12 @@ mod tests {
         let [old, new] =
             [seen(&before, Vec3::new(1.0, 2.0, -3.0)), seen(&set, Vec3::new(1.0, -2.0, 3.0))];
         assert!(old.iter().zip(new).all(|(a, b)| (a - b).abs() < 1e-5), "{old:?} {new:?}");
-        set.stand(Stance::Y_UP);
+        set.stand(Orientation::Y_UP);
         assert!((set.axes(0) - before.axes(0)).to_cols_array().iter().all(|v| v.abs() < 1e-6));
-        // Without a stance there is nothing to turn from.
-        set.about.stance = None;
+        // Without a orientation there is nothing to turn from.
+        set.about.orientation = None;
         let centers = set.centers.clone();
-        set.stand(Stance::Y_DOWN);
+        set.stand(Orientation::Y_DOWN);
         assert_eq!(set.centers, centers);
     }
     use crate::gaussians::harmonics::{self, color, constant_of};

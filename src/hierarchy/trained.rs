@@ -123,7 +123,7 @@ impl Hierarchy {
         let set = Gaussians::from_splats(&self.leaves()?)?;
         let header = self.header();
         let mut about = set.about.clone();
-        (about.stance, about.length) = (header.stance, header.unit.clone());
+        (about.orientation, about.length) = (header.orientation, header.unit.clone());
         Ok(Some(Gaussians { degree, harmonics: pages.concat(), about, ..set }))
     }
 }

@@ -42,7 +42,7 @@ pub(crate) fn settle_some(
             format!("none of the {count} points has coordinates that are finite numbers"),
         ));
     }
-    let step = count.div_ceil(LOOKS);
+    let step = count.div_ceil(MOST_SAMPLED);
     let sampled = (0..count).step_by(step).map(&position);
     let sampled: Vec<DVec3> = sampled.filter(|position| position.is_finite()).collect();
     let origin = origin(source, [low, high], &sampled)?;
@@ -107,7 +107,7 @@ pub(crate) fn settle(
             .reduce(|| (start, start), both);
         (low, high) = both((low, high), bounds);
     }
-    let step = count.div_ceil(LOOKS);
+    let step = count.div_ceil(MOST_SAMPLED);
     let sampled: Vec<DVec3> = (0..count).step_by(step).map(&position).collect();
     let origin = origin(source, [low, high], &sampled)?;
     Ok((origin, collected(source, count, |row| (position(row) - origin).as_vec3())?))
@@ -150,7 +150,7 @@ fn half([low, high]: [DVec3; 2]) -> f64 {
 }
 
 /// Positions that are looked at for an origin, and how few say nothing about the others.
-pub(crate) const LOOKS: usize = 1 << 14;
+pub(crate) const MOST_SAMPLED: usize = 1 << 14;
 const FEWEST: usize = 20;
 
 /// Returns the box between the 5th and the 95th percentile along each axis.

@@ -153,7 +153,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Argument`] if the scene has no such field; [`Error::Transfer`] if
     /// [`validate`](Self::validate) would refuse the function.
-    pub(crate) fn shown_by(&self, number: usize, transfer: &TransferFunction) -> Result<Self> {
+    pub(crate) fn with_transfer(&self, number: usize, transfer: &TransferFunction) -> Result<Self> {
         let mut scene = self.clone();
         let Some(item) = scene.items.get_mut(number) else {
             return Err(Error::Argument(format!("the scene has no item {number}")));

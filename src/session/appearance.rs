@@ -150,7 +150,7 @@ impl Appearance {
 
     /// Returns the error for a transfer function that shows none of the values.
     fn invisible(&self, transfer: &TransferFunction, name: &str, [low, high]: [f64; 2]) -> Error {
-        let text = match transfer.shown_range() {
+        let text = match transfer.visible_range() {
             Some([from, to]) if from == to => format!("shows only the value {from}"),
             Some([from, to]) => format!("shows values between {from} and {to}"),
             None => "shows no value".to_owned(),

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     Deadline, Error, Result,
-    about::{About, Frame, Labels, Stance},
+    about::{About, Frame, Labels, Orientation},
     bricks::Bricks,
     cells::{Cells, Solid},
     facet::FacetSet,
@@ -298,7 +298,7 @@ impl Adding<'_> {
         self.frame(mesh.about.frame);
         self.does("Finding the way up of");
         warn(self.items.subject.stand_mesh(&name.text, &mut mesh));
-        let up = self.items.subject.stance.up;
+        let up = self.items.subject.orientation.up;
         let legend = showing.coloring().paint(name, &mut mesh, up, showing.is_named)?;
         self.items.legends.extend(legend.map(|legend| (self.items.entries.len(), legend)));
         self.unit(&mesh.about);
@@ -397,7 +397,7 @@ impl Adding<'_> {
         let header = bricks.header();
         self.values(&transfer, header.range, Legend::title("", ""), None);
         self.length(&header.unit);
-        self.stand(header.frame, header.stance());
+        self.stand(header.frame, header.orientation());
         let (count, bounds) = (bricks.level(0).dims.iter().product(), bricks.bounds());
         let item = Item::Bricks(bricks.clone(), showing.kernel.clone(), transfer);
         self.push("bricks", count, bounds, item);
@@ -416,10 +416,10 @@ impl Adding<'_> {
             }
         }
         let transfer = showing.appearance.of_volume(&name.text, &volume)?;
-        let About { name: title, unit, labels, frame, stance, .. } = &volume.about;
+        let About { name: title, unit, labels, frame, orientation, .. } = &volume.about;
         self.values(&transfer, volume.range, Legend::title(title, unit), labels.as_ref());
         self.unit(&volume.about);
-        self.stand(*frame, *stance);
+        self.stand(*frame, *orientation);
         let [min, max] = volume.bounds();
         let kernel = showing.kernel.clone();
         if showing.is_sharp {
@@ -438,7 +438,7 @@ impl Adding<'_> {
         let splats = volume.colored_splats().map_err(|error| self.name.fault(error))?;
         let splats = splats.expect("the volume has colours");
         self.unit(&volume.about);
-        self.stand(volume.about.frame, volume.about.stance);
+        self.stand(volume.about.frame, volume.about.orientation);
         let [min, max] = volume.bounds();
         self.push("volume", volume.len(), Bounds { min, max }, Item::Radiance(splats.into()));
         Ok(())
@@ -447,7 +447,7 @@ impl Adding<'_> {
     fn add_samples(&mut self, points: &Points) -> Result<()> {
         let Self { name, showing, .. } = *self;
         let transfer = showing.appearance.of_samples(&name.text, points)?;
-        let About { name: title, unit, frame, stance, .. } = &points.about;
+        let About { name: title, unit, frame, orientation, .. } = &points.about;
         self.values(&transfer, points.range(), Legend::title(title, unit), None);
         self.unit(&points.about);
         self.does("Making splats of");
@@ -456,7 +456,7 @@ impl Adding<'_> {
         // Options are the caller's, whatever holds the samples.
         options.validate()?;
         let splats = points.to_splats(&options).map_err(|error| name.fault(error))?;
-        self.stand(*frame, *stance);
+        self.stand(*frame, *orientation);
         let [min, max] = points.bounds();
         let bounds = Bounds { min, max }.union(splats.bounds());
         self.push("samples", points.len(), bounds, Item::Scalar(splats.into(), transfer));
@@ -478,10 +478,10 @@ impl Adding<'_> {
             return Err(name.unfit("content", "the cells have no values", hint));
         }
         let transfer = showing.appearance.of_cells(&name.text, cells)?;
-        let About { name: title, unit, frame, stance, .. } = &cells.about;
+        let About { name: title, unit, frame, orientation, .. } = &cells.about;
         self.values(&transfer, cells.range(), Legend::title(title, unit), None);
         self.unit(&cells.about);
-        self.stand(*frame, *stance);
+        self.stand(*frame, *orientation);
         self.does("Dividing the cells of");
         let item = field_of(cells, transfer).map_err(|error| name.fault(error))?;
         let bounds = item.bounds();
@@ -492,8 +492,8 @@ impl Adding<'_> {
     /// Adds cells as a solid, or as the surfels of their boundary for pictures that show no facets.
     fn add_solid(&mut self, cells: Cells) -> Result<()> {
         let Self { name, showing, .. } = *self;
-        self.stand(cells.about.frame, cells.about.stance);
-        let up = self.items.subject.stance.up;
+        self.stand(cells.about.frame, cells.about.orientation);
+        let up = self.items.subject.orientation.up;
         let (tint, legend) = showing.coloring().tint(name, &cells, up)?;
         self.items.legends.extend(legend.map(|legend| (self.items.entries.len(), legend)));
         self.unit(&cells.about);
@@ -548,10 +548,14 @@ impl Adding<'_> {
         warn(self.items.subject.frame(&self.name.text, frame));
     }
 
-    /// Takes the frame and the stance of a field, or the convention for fields.
-    fn stand(&mut self, frame: Frame, stance: Option<Stance>) {
+    /// Takes the frame and the orientation of a field, or the convention for fields.
+    fn stand(&mut self, frame: Frame, orientation: Option<Orientation>) {
         self.frame(frame);
-        warn(self.items.subject.stand_as_stated(&self.name.text, stance, Stance::SURVEY));
+        warn(self.items.subject.orient_as_stated(
+            &self.name.text,
+            orientation,
+            Orientation::SURVEY,
+        ));
     }
 
     fn does(&self, what: &str) {

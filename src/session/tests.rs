@@ -10,7 +10,7 @@ use crate::{
     },
 };
 use crate::{
-    about::{Frame, Stance},
+    about::{Frame, Orientation},
     cells::{CellKind, Cells},
     math::Bounds,
     scene::{Clip, ClipShape, Item},
@@ -120,19 +120,23 @@ fn oddities_are_found() {
 #[test]
 fn the_first_statement_decides() {
     let mut subject = Subject::default();
-    assert_eq!(subject.stand_as_stated("a.raw", None, Stance::SURVEY), None);
-    assert_eq!((subject.stance, subject.origin), (Stance::SURVEY, Origin::Convention));
-    assert_eq!(subject.stand_as_stated("b.glb", Some(Stance::Y_UP), Stance::SURVEY), None);
-    assert_eq!((subject.stance, subject.origin), (Stance::Y_UP, Origin::File));
-    let warning = subject.stand_as_stated("c.las", Some(Stance::SURVEY), Stance::SURVEY).unwrap();
+    assert_eq!(subject.orient_as_stated("a.raw", None, Orientation::SURVEY), None);
+    assert_eq!((subject.orientation, subject.origin), (Orientation::SURVEY, Origin::Convention));
+    assert_eq!(
+        subject.orient_as_stated("b.glb", Some(Orientation::Y_UP), Orientation::SURVEY),
+        None
+    );
+    assert_eq!((subject.orientation, subject.origin), (Orientation::Y_UP, Origin::File));
+    let warning =
+        subject.orient_as_stated("c.las", Some(Orientation::SURVEY), Orientation::SURVEY).unwrap();
     assert!(
         warning.starts_with("c.las says that +Z is up, but the scene stands with +Y up"),
         "{warning}"
     );
-    assert_eq!(subject.stance, Stance::Y_UP);
+    assert_eq!(subject.orientation, Orientation::Y_UP);
     let mut mesh = crate::surface::Mesh::default();
     mesh.positions.push(glam::Vec3::Z);
-    mesh.about.stance = Some(Stance::SURVEY);
+    mesh.about.orientation = Some(Orientation::SURVEY);
     let warning = subject.stand_mesh("d.ply", &mut mesh).unwrap();
     assert!(warning.starts_with("d.ply is turned: it stands with +Z up"), "{warning}");
     assert!(mesh.positions[0].distance(glam::Vec3::Y) < 1e-6);
@@ -317,7 +321,7 @@ fn an_input_that_cannot_be_shown_changes_nothing() {
     let showing = Showing { appearance, draws_edges: true, ..Showing::default() };
     let name = Name::of_file("a.ply".as_ref());
     let mut turned = triangle();
-    turned.about.stance = Some(Stance::RAS);
+    turned.about.orientation = Some(Orientation::RAS);
     turned.about.frame = Frame::Patient;
     assert!(items.add(&name, Data::Mesh(turned), &showing, &|_| ()).is_err());
     assert_eq!(items.captions(), Captions::default());

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     Result,
-    facet::{Facet, FacetSet, Image, Shown, Sides},
+    facet::{Facet, FacetSet, Image, Sides, TextureCoordinates},
     memory,
     parallel::prelude::*,
     splat::encode_normal,
@@ -153,8 +153,15 @@ impl Mesh {
             false => images(&mesh, &numbers, is_turned),
         };
         let (whole, rods) = (None, None);
-        let set =
-            FacetSet { origin: self.origin, facets, sides, images, shown: mappings, whole, rods };
+        let set = FacetSet {
+            origin: self.origin,
+            facets,
+            sides,
+            images,
+            texture_coordinates: mappings,
+            whole,
+            rods,
+        };
         Ok((!set.facets.is_empty()).then_some(set))
     }
 
@@ -229,21 +236,25 @@ fn order(is_turned: bool) -> [usize; 3] {
 }
 
 /// Returns the images of a mesh, and what the facets of these triangles show of them.
-fn images(mesh: &Mesh, triangles: &[usize], is_turned: bool) -> (Vec<Arc<Image>>, Vec<Shown>) {
+fn images(
+    mesh: &Mesh,
+    triangles: &[usize],
+    is_turned: bool,
+) -> (Vec<Arc<Image>>, Vec<TextureCoordinates>) {
     let textured = |triangle: &usize| texture_of(mesh, *triangle);
     if mesh.uvs.is_empty() || !triangles.iter().any(|triangle| textured(triangle).is_some()) {
         return Default::default();
     }
     let (mut images, mut numbers) = (Vec::new(), HashMap::new());
     let mappings = triangles.iter().map(|triangle| {
-        let image = textured(triangle).map_or(Shown::PLAIN, |texture| {
+        let image = textured(triangle).map_or(TextureCoordinates::PLAIN, |texture| {
             *numbers.entry(Arc::as_ptr(texture)).or_insert_with(|| {
                 images.push(Arc::new(Image::new(texture)));
                 images.len() as u32 - 1
             })
         });
         let vertices = order(is_turned).map(|corner| mesh.triangles[*triangle][corner]);
-        Shown { image, places: vertices.map(|vertex| mesh.uvs[vertex as usize]) }
+        TextureCoordinates { image, places: vertices.map(|vertex| mesh.uvs[vertex as usize]) }
     });
     let mappings = mappings.collect();
     (images, mappings)

@@ -1,7 +1,7 @@
 //! The content of a mesh or point cloud file, whatever its format.
 
 use crate::{
-    about::{About, Stance},
+    about::{About, Orientation},
     color::ColorScale,
     facet::Texture,
     parallel::prelude::*,
@@ -88,9 +88,9 @@ impl Mesh {
         arrays.iter().map(|&bytes| bytes as u64).sum()
     }
 
-    /// Turns a mesh of a known stance in the world, so that it has another one.
-    pub fn stand(&mut self, wanted: Stance) {
-        if let Some(previous) = self.about.stance.replace(wanted) {
+    /// Turns a mesh of a known orientation in the world, so that it has another one.
+    pub fn stand(&mut self, wanted: Orientation) {
+        if let Some(previous) = self.about.orientation.replace(wanted) {
             self.turn(previous.turn_to(wanted));
         }
     }

@@ -1,6 +1,6 @@
 //! Label maps: volumes whose values name things. A place has the label of the nearest sample, so
 //! nothing is mixed, and no label lies between two others. Light follows the shares of labels
-//! around samples ([`own_shares`]), which change smoothly where the labels change in steps.
+//! around samples ([`label_shares`]), which change smoothly where the labels change in steps.
 
 use super::{Arrangement, Isosurface, Samples, Shade, TransferFunction, Volume, each_type};
 use crate::{
@@ -274,7 +274,7 @@ pub const OWN_REACH: usize = 2;
 
 /// Returns, for each sample of a label map, the share of its own label around it, 255 for all. This
 /// is the mean of the label's mask under a Gaussian over the samples within [`OWN_REACH`] steps.
-pub fn own_shares(volume: &Volume) -> Vec<u8> {
+pub fn label_shares(volume: &Volume) -> Vec<u8> {
     each_type!(volume.samples, values => shares_of(volume.lattice.dims, values))
 }
 
@@ -558,7 +558,7 @@ mod tests {
     #[test]
     fn own_shares_fall_towards_borders() {
         let volume = volume(|at| if at.x < 0.0 { 1.0 } else { 2.0 }).with_labels(Vec::new());
-        let shares = own_shares(&volume);
+        let shares = label_shares(&volume);
         let at = |x: usize| shares[(SIDE / 2 * SIDE + SIDE / 2) * SIDE + x];
         assert_eq!((at(0), at(SIDE - 1)), (255, 255));
         assert!(at(SIDE / 2) == at(SIDE / 2 - 1) && at(SIDE / 2) < 190 && at(SIDE / 2) > 127);

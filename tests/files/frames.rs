@@ -6,7 +6,7 @@ use crate::{
     testing::folder::Folder,
 };
 use splatkit::{
-    about::{Frame, Stance},
+    about::{Frame, Orientation},
     bricks,
     formats::{ReadOptions, load_mesh, load_volume, nrrd},
     glam::DVec3,
@@ -163,7 +163,7 @@ fn a_body_lies_at_the_same_place_in_all_formats() {
         let volume = load(&path);
         let name = path.display();
         assert_eq!(volume.about.frame, Frame::Patient, "{name}");
-        assert_eq!(volume.about.stance, Some(Stance::RAS), "{name}");
+        assert_eq!(volume.about.orientation, Some(Orientation::RAS), "{name}");
         for ((sample, place), (value, expected)) in body(&volume).into_iter().zip(&expected) {
             assert_eq!(sample, *value, "{name}");
             assert!(

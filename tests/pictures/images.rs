@@ -125,8 +125,8 @@ fn textured_triangles_stay_whole() {
     let plain = Mesh { materials: Vec::new(), triangle_materials: Vec::new(), ..mesh.clone() };
     let (set, plain) = (facets(&mesh), facets(&plain));
     assert_eq!(set.facets.len(), plain.facets.len());
-    assert_eq!((set.shown.len(), set.images.len()), (set.facets.len(), 1));
-    assert!(plain.shown.is_empty() && plain.images.is_empty());
+    assert_eq!((set.texture_coordinates.len(), set.images.len()), (set.facets.len(), 1));
+    assert!(plain.texture_coordinates.is_empty() && plain.images.is_empty());
     let levels: u64 = set.images.iter().map(|image| image.bytes()).sum();
     assert!(levels < 4 * 200 * 300 / 2, "{levels}");
 }
@@ -140,7 +140,10 @@ fn images_are_checked() {
         change(&mut set);
         Scene::new().with_facets(set).validate().expect_err("an error").to_string()
     };
-    assert!(refused(|set| set.shown[3].image = 1).contains("facet 3 shows no part"));
-    assert!(refused(|set| set.shown[0].places[1].x = f32::NAN).contains("facet 0 shows no part"));
-    assert!(refused(|set| set.shown.truncate(1)).contains("facets show images"));
+    assert!(refused(|set| set.texture_coordinates[3].image = 1).contains("facet 3 shows no part"));
+    assert!(
+        refused(|set| set.texture_coordinates[0].places[1].x = f32::NAN)
+            .contains("facet 0 shows no part")
+    );
+    assert!(refused(|set| set.texture_coordinates.truncate(1)).contains("facets show images"));
 }

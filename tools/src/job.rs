@@ -362,7 +362,7 @@ impl Job {
 
     /// Returns the scene's way up.
     pub fn up(&self, loaded: &Loaded) -> splatkit::Result<glam::DVec3> {
-        Ok(self.framing()?.stance(&loaded.subject).0.up)
+        Ok(self.framing()?.orientation(&loaded.subject).0.up)
     }
 }
 

@@ -6,7 +6,7 @@ mod series_of_files;
 
 use super::*;
 use crate::{
-    about::{Modality, Stance},
+    about::{Modality, Orientation},
     error::LimitKind,
     input::{
         Limits,
@@ -57,8 +57,8 @@ fn a_slice_in_every_coding() {
         assert_eq!((about.modality, about.window), (Some(Modality::Ct), Some([-160.0, 240.0])));
         assert_eq!((&*about.unit, &*about.length), ("HU", "mm"));
         // One slice is seen as on film.
-        let stance = Stance { up: DVec3::Y, front: DVec3::NEG_Z };
-        assert_eq!(about.stance, Some(stance));
+        let orientation = Orientation { up: DVec3::Y, front: DVec3::NEG_Z };
+        assert_eq!(about.orientation, Some(orientation));
         assert!(is_dicom(&made.file()), "“{syntax}”");
         // Without the preamble, and without the header.
         assert_eq!(values(&read_bytes(&made.file()[128 + 4..]).unwrap()), values(&volume));
@@ -561,7 +561,7 @@ fn groups_of_functions_place_frames() {
             let volume = read_with(&path, |source| read(source, &options)).unwrap();
             assert_eq!(values(&volume), expected, "“{syntax}”");
             assert_eq!(volume.lattice.spacing(), DVec3::new(3.0, 2.0, 5.0));
-            assert_eq!(volume.about.stance, Some(Stance::RAS));
+            assert_eq!(volume.about.orientation, Some(Orientation::RAS));
         }
     }
 }

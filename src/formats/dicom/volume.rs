@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     formats::{
         ReadOptions,
         shared::{anatomy::Anatomy, colors, holes, rescale::rescaled, several},
@@ -221,12 +221,12 @@ fn describe(volume: &mut Volume, head: &Head, stack: &Stack) {
         // One slice is seen from its front, as on film.
         if stack.slices.len() == 1 {
             let front = -x.cross(y).normalize_or(y.any_orthonormal_vector());
-            about.stance = Some(Stance { up: -y, front });
+            about.orientation = Some(Orientation { up: -y, front });
         }
         Anatomy::LPS.place(volume);
     } else if stack.slices.len() == 1 {
         let [x, y] = [glam::DVec3::X, glam::DVec3::Y];
-        about.stance = Some(Stance { up: -y, front: -x.cross(y) });
+        about.orientation = Some(Orientation { up: -y, front: -x.cross(y) });
     }
 }
 

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     formats::shared::trained::{Trained, settle},
     gaussians::{Gaussians, MOST_DEGREE, harmonics, turn::map_colors},
     input::Source,
@@ -64,7 +64,7 @@ pub fn read_gaussians(source: &Source) -> Result<Gaussians> {
     let degree = scene.clouds.iter().map(Cloud::degree).max().unwrap_or_default();
     let mut set =
         settle(source, scene.count, degree, |index, colors| Ok(scene.one(index, colors)))?;
-    set.about.stance = Some(Stance::Y_UP);
+    set.about.orientation = Some(Orientation::Y_UP);
     Ok(set)
 }
 

@@ -6,14 +6,14 @@ use super::{
         shared::{
             brightness::Brightness,
             cloud::{color_of_16_bits, grey},
-            found::Found,
+            raw_point::RawPoint,
         },
     },
     Header, Point, packed, plain_bytes,
 };
 use crate::{
     Error, Result,
-    about::{About, Stance},
+    about::{About, Orientation},
     input::{Source, positions},
     parallel::prelude::*,
 };
@@ -125,8 +125,8 @@ impl Form for Pieces {
         [self.firsts.len(), 0]
     }
 
-    fn stance(&self) -> Option<Stance> {
-        Some(Stance::SURVEY)
+    fn orientation(&self) -> Option<Orientation> {
+        Some(Orientation::SURVEY)
     }
 
     fn bytes(&self, piece: usize) -> Range<usize> {
@@ -203,7 +203,7 @@ impl Form for Pieces {
 
     fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>> {
         let settled = |(row, point): (usize, Point)| {
-            let placed = Found {
+            let placed = RawPoint {
                 row,
                 position: self.header.position(&point),
                 normal: Vec3::ZERO,
@@ -223,7 +223,7 @@ impl Form for Pieces {
         Ok((0, Vec::new()))
     }
 
-    fn vertex(&self, _: &Source, _: usize) -> Option<Found> {
+    fn vertex(&self, _: &Source, _: usize) -> Option<RawPoint> {
         None
     }
 

@@ -155,7 +155,7 @@ fn every_type_in_both_versions_and_orders() {
             let volume = of(&bytes);
             assert_eq!(volume.lattice.dims, [3, 1, 2]);
             assert_eq!(values(&volume), [1.0, 2.0, 3.0, 4.0, 5.0, 100.0], "{name}");
-            assert!(volume.about.stance.is_none() && volume.about.length.is_empty());
+            assert!(volume.about.orientation.is_none() && volume.about.length.is_empty());
             assert!(is_nifti(&bytes) && is_nifti(&gzip(&bytes)));
         }
         let mut made = Made::new(second, big, 32, &[2, 1, 1]);
@@ -179,7 +179,7 @@ fn the_matrix_places_samples_then_the_rotation_then_the_steps() {
         (1..=3).for_each(|axis| made.step(axis, [0.5, 2.0, 4.0][axis - 1]));
         let lattice = |made: &Made| {
             let volume = of(&made.clone().values(SampleType::U8, "1 2 3 4 5 6 7 8"));
-            (volume.lattice.clone(), volume.about.stance.is_some())
+            (volume.lattice.clone(), volume.about.orientation.is_some())
         };
         let steps = DMat3::from_diagonal(DVec3::new(0.5, 2.0, 4.0));
         let expected = Lattice::cartesian([2; 3], DVec3::ZERO, steps);
@@ -326,7 +326,7 @@ fn pairs_are_found_from_either_file() {
     let volume =
         read_with(&folder.path("d.hdr"), |source| read(source, &ReadOptions::default())).unwrap();
     assert_eq!((values(&volume), volume.lattice.axes.z_axis.z), (vec![1.0, 2.0], 7.0));
-    assert!(volume.about.stance.is_none());
+    assert!(volume.about.orientation.is_none());
 }
 
 #[test]

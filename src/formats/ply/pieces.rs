@@ -4,7 +4,7 @@
 use super::{
     super::{
         form::{Coloring, Counts, Form, StreamPoint, in_order},
-        shared::{found::Found, unplaced},
+        shared::{raw_point::RawPoint, unplaced},
     },
     Brightest, COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale,
     column_named, gaussians,
@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     Result,
-    about::{About, Stance},
+    about::{About, Orientation},
     input::{Source, positions},
 };
 use glam::{DVec3, Vec3};
@@ -141,9 +141,9 @@ impl Pieces {
     }
 
     /// Returns a vertex, converted as by the reader of whole files.
-    fn vertex(&self, source: &Source, row: usize) -> Found {
+    fn vertex(&self, source: &Source, row: usize) -> RawPoint {
         let value = |role: usize| self.value(source, row, role);
-        let mut vertex = Found {
+        let mut vertex = RawPoint {
             row,
             position: self.position(source, row),
             normal: Vec3::ZERO,
@@ -213,7 +213,7 @@ impl Form for Pieces {
         [self.points(), self.triangles()].map(|count| count.div_ceil(ROWS))
     }
 
-    fn stance(&self) -> Option<Stance> {
+    fn orientation(&self) -> Option<Orientation> {
         None
     }
 
@@ -308,7 +308,7 @@ impl Form for Pieces {
         self.triangle_piece(source, piece)
     }
 
-    fn vertex(&self, source: &Source, index: usize) -> Option<Found> {
+    fn vertex(&self, source: &Source, index: usize) -> Option<RawPoint> {
         Some(self.vertex(source, index))
     }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::{Error, about::Stance, input::testing::*};
+use crate::{Error, about::Orientation, input::testing::*};
 use flate2::{Compression, write::GzEncoder};
 use glam::{DVec3, Quat, Vec3};
 use std::io::Write;
@@ -96,7 +96,7 @@ fn check(set: &Gaussians, version: u32, degree: u8) {
     for (at, actual) in others.iter().enumerate() {
         assert_eq!(*actual, (at as f32 - 28.0) / 128.0, "{case}");
     }
-    assert_eq!(set.about.stance, None);
+    assert_eq!(set.about.orientation, None);
 }
 
 #[test]
@@ -184,11 +184,11 @@ fn extensions_say_what_is_up() {
         let head = header(3, 1, 0, 12, EXTENDED);
         let bytes = [head, attributes(3, 0).concat(), extensions(system)].concat();
         let set = load("a.spz", &gzip(&bytes)).unwrap();
-        assert_eq!(set.about.stance, up.map(Stance::with_up), "{system}");
+        assert_eq!(set.about.orientation, up.map(Orientation::with_up), "{system}");
         #[cfg(feature = "files")]
         {
             let set = load("a.spz", &streams(0, &extensions(system))).unwrap();
-            assert_eq!(set.about.stance, up.map(Stance::with_up), "{system}");
+            assert_eq!(set.about.orientation, up.map(Orientation::with_up), "{system}");
         }
     }
     // Records that are cut off.

@@ -81,7 +81,7 @@ impl SelectBricks {
             let Origin::Bricks { slab, level, .. } = &mut chunk.origin else { continue };
             let drawn = choice.levels.get(slab.part).map(|(level, _)| *level);
             *level = drawn.unwrap_or(0);
-            let count = brick_cache.count(slab, drawn, &choice.shown);
+            let count = brick_cache.count(slab, drawn, &choice.first_visible);
             samples += u64::from(count);
             runs += u64::from(runs_of(count));
             brick_cache.describe(gpu, slab, drawn);
@@ -95,7 +95,7 @@ impl SelectBricks {
             return Ok(Listed::TooMany { runs, most });
         }
         gpu.check_memory(prepared.bytes - before + list_bytes(samples))?;
-        self.update(gpu, &mut slabs, &choice.shown);
+        self.update(gpu, &mut slabs, &choice.first_visible);
         prepared.bytes -= before;
         for chunk in &mut prepared.chunks {
             let Origin::Bricks { slab, .. } = &chunk.origin else { continue };

@@ -316,7 +316,7 @@ impl Drawn {
         Self {
             bricks,
             levels: choice.levels.iter().map(|(level, _)| *level).collect(),
-            first_visible: choice.shown,
+            first_visible: choice.first_visible,
         }
     }
 }

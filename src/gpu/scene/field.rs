@@ -14,12 +14,12 @@ use crate::{
     plan::{
         field,
         gathering::unsuited_kernel,
-        shown::{BLOCK, Shown, field_ranges},
         tables::Values,
+        visible::{BLOCK, VisibleBlocks, field_ranges},
         weighting::{MASK_DEVIATION, deviation},
     },
     scene::{Item, Scene, Settings},
-    volume::{Arrangement, Scalar, Volume, own_shares},
+    volume::{Arrangement, Scalar, Volume, label_shares},
 };
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
@@ -229,7 +229,7 @@ pub struct Field {
     /// The layout of the samples (`SAMPLE_KIND` in field_lattice.wgsl).
     pub kind: u32,
     /// Where the field may be visible, and the table of visible ranges that this holds for.
-    visible: Option<([u16; 256], Shown)>,
+    visible: Option<([u16; 256], VisibleBlocks)>,
     /// `visibility` of field_lattice.wgsl.
     buffer: wgpu::Buffer,
     /// Whether the buffer contains the samples' bits.
@@ -268,7 +268,7 @@ impl Field {
         let mut textures = vec![texture(gpu, dims, (kind, volume.samples.bytes()))];
         let mut sigma = deviation(kernel).unwrap_or(1.0);
         if volume.is_label_map() {
-            textures.push(texture(gpu, dims, (SHARES, &own_shares(volume))));
+            textures.push(texture(gpu, dims, (SHARES, &label_shares(volume))));
             sigma = MASK_DEVIATION;
         }
         let view_of_all = wgpu::TextureViewDescriptor::default();
@@ -298,7 +298,7 @@ impl Field {
     pub fn show(&mut self, first: &[u16; 256]) {
         if self.visible.as_ref().is_none_or(|(table, _)| table != first) {
             self.visible =
-                Some((*first, Shown::new(self.volume.lattice.dims, &self.ranges, first)));
+                Some((*first, VisibleBlocks::new(self.volume.lattice.dims, &self.ranges, first)));
             self.has_bits = false;
         }
     }

@@ -1,7 +1,7 @@
 //! The images that facets show, on the GPU (shaders/shared/images.wgsl).
 
 use crate::{
-    facet::{FacetSet, Image, Shown},
+    facet::{FacetSet, Image, TextureCoordinates},
     gpu::device::Gpu,
     scene::{Item, Scene},
 };
@@ -37,7 +37,7 @@ impl Images {
             firsts.insert(item, first);
             let images: Vec<[u32; 4]> =
                 set.images.iter().map(|image| add(image, &mut texels)).collect();
-            facets.extend(set.shown.iter().flat_map(|facet| words(facet, &images)));
+            facets.extend(set.texture_coordinates.iter().flat_map(|facet| words(facet, &images)));
         }
         if facets.is_empty() {
             return None;
@@ -56,8 +56,9 @@ impl Images {
 
     /// Returns the bytes that the images of a scene take.
     pub fn bytes_of(scene: &Scene) -> u64 {
-        let of_set =
-            |set: &Arc<FacetSet>| 4 * texels_of(set) + (16 * SHOWN_WORDS * set.shown.len()) as u64;
+        let of_set = |set: &Arc<FacetSet>| {
+            4 * texels_of(set) + (16 * SHOWN_WORDS * set.texture_coordinates.len()) as u64
+        };
         sets(scene).map(|(_, set)| of_set(set)).sum()
     }
 }
@@ -65,7 +66,7 @@ impl Images {
 /// Returns the sets of facets that show images, with the numbers of their items.
 fn sets(scene: &Scene) -> impl Iterator<Item = (usize, &Arc<FacetSet>)> {
     scene.items.iter().enumerate().filter_map(|(number, item)| match item {
-        Item::Facets(set) if !set.shown.is_empty() => Some((number, set)),
+        Item::Facets(set) if !set.texture_coordinates.is_empty() => Some((number, set)),
         _ => None,
     })
 }
@@ -97,7 +98,7 @@ fn add(image: &Image, texels: &mut Vec<[u8; 4]>) -> [u32; 4] {
 }
 
 /// Returns what a facet shows, as the shader reads it.
-fn words(facet: &Shown, images: &[[u32; 4]]) -> [[u32; 4]; SHOWN_WORDS] {
+fn words(facet: &TextureCoordinates, images: &[[u32; 4]]) -> [[u32; 4]; SHOWN_WORDS] {
     let [a, b, c] = facet.places.map(|place| place.to_array().map(f32::to_bits));
     let image = images.get(facet.image as usize).copied().unwrap_or_default();
     [[a[0], a[1], b[0], b[1]], [c[0], c[1], 0, 0], image]

@@ -219,7 +219,7 @@ impl PreparedScene {
     /// [`Renderer::prepare`](crate::gpu::Renderer::prepare) would refuse the function. The scene
     /// then keeps its old one.
     pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
-        self.scene = self.scene.shown_by(item, transfer)?;
+        self.scene = self.scene.with_transfer(item, transfer)?;
         Ok(())
     }
 

@@ -5,7 +5,7 @@ use crate::{
     Result,
     formats::{Counts, Stream},
     math::weld::first_of_equals,
-    surface::{Joining, PiecesClosing, Sides, Told},
+    surface::{Evidence, Joining, PiecesClosing, Sides},
 };
 use glam::Vec3;
 
@@ -63,7 +63,7 @@ pub fn is_solid(
     let mut sides = Sides::new(parts.count());
     stream.triangles(
         |first, triangles| {
-            let mut evidence = Told::default();
+            let mut evidence = Evidence::default();
             for (number, triangle) in (first..).zip(triangles) {
                 let corners = triangle.map(|vertex| stream.vertex(vertex));
                 let is_opaque = corners.iter().all(|corner| stream.is_opaque(corner));

@@ -193,7 +193,7 @@ impl Hierarchy {
             source_points: tree.source_points,
             leaves: tree.leaf_count(),
             nodes: tree.blocks.iter().map(|block| block.nodes.len() as u64).sum(),
-            stance: None,
+            orientation: None,
             is_guessed: false,
             unit: String::new(),
             source: String::new(),

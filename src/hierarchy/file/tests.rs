@@ -2,7 +2,7 @@
 
 use super::{entry::Listing, page::Frame, *};
 use crate::{
-    about::Stance,
+    about::Orientation,
     container::directory::Shape,
     hierarchy::{
         Block, Detail, Node, Tree,
@@ -19,7 +19,7 @@ use std::path::Path;
 fn options(lossless: bool) -> WriteOptions {
     WriteOptions {
         lossless,
-        stance: Some(Stance::RAS),
+        orientation: Some(Orientation::RAS),
         is_guessed: true,
         unit: "m".into(),
         source: "scan.ply".into(),
@@ -82,8 +82,8 @@ fn lossless_keeps_every_bit() {
         same(&hierarchy.read_tree().unwrap(), &tree);
         let header = hierarchy.header();
         assert_eq!(
-            (header.leaves, header.stance, header.unit.as_str()),
-            (tree.leaf_count(), Some(Stance::RAS), "m")
+            (header.leaves, header.orientation, header.unit.as_str()),
+            (tree.leaf_count(), Some(Orientation::RAS), "m")
         );
         assert_eq!((header.lossless, header.source.as_str()), (true, "scan.ply"));
     }

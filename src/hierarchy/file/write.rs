@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::Stance,
+    about::Orientation,
     gaussians::Colors,
     hierarchy::{
         Block, MOST_CHILDREN, Node, Tree,
@@ -39,8 +39,8 @@ pub struct WriteOptions {
     /// Store every bit, at about eight times the size.
     pub lossless: bool,
     /// How the source stands; `None` if unknown.
-    pub stance: Option<Stance>,
-    /// Whether the stance was guessed from the shape.
+    pub orientation: Option<Orientation>,
+    /// Whether the orientation was guessed from the shape.
     pub is_guessed: bool,
     /// The name of the world's unit.
     pub unit: String,
@@ -321,7 +321,7 @@ impl Writer {
             source_points: whole.source_points,
             leaves: self.contents.leaves,
             nodes: self.drafts.nodes + joint_nodes,
-            stance: self.options.stance,
+            orientation: self.options.orientation,
             is_guessed: self.options.is_guessed,
             unit: self.options.unit.clone(),
             source: self.options.source.clone(),

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::Stance,
+    about::Orientation,
     formats::{self, Kind},
     gaussians::{Gaussians, harmonics},
     hierarchy::{self, BuildOptions, Hierarchy, file::WriteOptions},
@@ -80,7 +80,7 @@ impl<W: Watch> Work<'_, W> {
         let mut all = self.gather_gaussians()?;
         if is_trained && target != Target::Glb {
             // Viewers expect the frame of trainers in these files.
-            all.set.stand(Stance::Y_DOWN);
+            all.set.stand(Orientation::Y_DOWN);
         }
         Ok(all)
     }
@@ -130,8 +130,11 @@ impl<W: Watch> Work<'_, W> {
     }
 
     fn tree_options(&self, set: &Gaussians, points: u64) -> (BuildOptions, WriteOptions) {
-        let frame =
-            Frame { stance: set.about.stance, is_guessed: false, unit: set.about.length.clone() };
+        let frame = Frame {
+            orientation: set.about.orientation,
+            is_guessed: false,
+            unit: set.about.length.clone(),
+        };
         (
             self.conversion.build_options(false, points),
             self.conversion.write_options(self.files, &frame),
@@ -172,7 +175,7 @@ impl<W: Watch> Work<'_, W> {
         let Some(mut set) = trained else {
             let Gathered { set, points, frame, .. } = self.splats_of(path, 0)?;
             let mut set = Gaussians::from_splats(&set).map_err(|error| in_file(path, error))?;
-            set.about.stance = frame.stance;
+            set.about.orientation = frame.orientation;
             return Ok(AllGaussians { set, points, read_ms: milliseconds(start) });
         };
         if kind == Kind::Hierarchy {
@@ -193,7 +196,7 @@ impl<W: Watch> Work<'_, W> {
             return Err(Error::input(path, "file", "holds no Gaussians").into());
         };
         // Files of trainers do not say what is up: it is −y.
-        set.about.stance = set.about.stance.or(Some(Stance::Y_DOWN));
+        set.about.orientation = set.about.orientation.or(Some(Orientation::Y_DOWN));
         Ok(set)
     }
 }

@@ -381,10 +381,10 @@ impl Conversion {
     /// Returns the options for writing a hierarchy. The `frame` counts unless the caller overrides
     /// it.
     fn write_options(&self, files: &[PathBuf], frame: &Frame) -> WriteOptions {
-        let up = self.up.map(crate::about::Stance::with_up);
+        let up = self.up.map(crate::about::Orientation::with_up);
         WriteOptions {
             lossless: self.lossless,
-            stance: up.or(frame.stance),
+            orientation: up.or(frame.orientation),
             is_guessed: up.is_none() && frame.is_guessed,
             unit: self.unit.clone().unwrap_or_else(|| frame.unit.clone()),
             source: files.iter().filter_map(|path| name_of(path)).collect::<Vec<_>>().join(", "),

@@ -65,7 +65,7 @@ impl<W: Watch> Work<'_, W> {
         let first = self.files.first().map(|file| Stream::open(file, limits));
         let first = first.transpose()?.flatten();
         let frame = match &first {
-            Some(first) => Frame::of(first.stance(), || first.guess_stance())?,
+            Some(first) => Frame::of(first.orientation(), || first.guess_orientation())?,
             None => Frame::default(),
         };
         let is_cloud = first.is_some_and(|file| file.counts().triangles == 0);

@@ -3,7 +3,7 @@
 use super::{Built, Converted, Expected, Watch, Work, memory, milliseconds, wrong};
 use crate::{
     Error, Result,
-    about::Stance,
+    about::Orientation,
     hierarchy::{
         self,
         external::{memory_of_mesh, memory_of_splats},
@@ -33,28 +33,32 @@ pub struct Gathered {
 /// Facts about an input's coordinates, for viewers.
 #[derive(Default)]
 pub struct Frame {
-    pub stance: Option<Stance>,
-    /// Whether the stance was guessed from the shape.
+    pub orientation: Option<Orientation>,
+    /// Whether the orientation was guessed from the shape.
     pub is_guessed: bool,
     pub unit: String,
 }
 
 impl Frame {
-    /// Takes what a file says of its stance, or a guess.
+    /// Takes what a file says of its orientation, or a guess.
     pub fn of(
-        stated: Option<Stance>,
-        guess: impl FnOnce() -> Result<Option<Stance>>,
+        stated: Option<Orientation>,
+        guess: impl FnOnce() -> Result<Option<Orientation>>,
     ) -> Result<Self> {
-        let stance = match stated {
-            Some(stance) => Some(stance),
+        let orientation = match stated {
+            Some(orientation) => Some(orientation),
             None => guess()?,
         };
-        Ok(Self { stance, is_guessed: stated.is_none() && stance.is_some(), unit: String::new() })
+        Ok(Self {
+            orientation,
+            is_guessed: stated.is_none() && orientation.is_some(),
+            unit: String::new(),
+        })
     }
 
     /// Returns the direction in which heights are measured: that to be recorded, or the input's.
     pub fn up(&self, recorded: Option<DVec3>) -> DVec3 {
-        recorded.unwrap_or(self.stance.map_or(DVec3::Y, |stance| stance.up))
+        recorded.unwrap_or(self.orientation.map_or(DVec3::Y, |orientation| orientation.up))
     }
 }
 
@@ -171,7 +175,8 @@ impl<W: Watch> Work<'_, W> {
                 let larger = |factor: [f32; 6]| factor.map(|entry| entry * scale);
                 set.splats.iter_mut().for_each(|splat| splat.factor = larger(splat.factor));
                 let unit = header.unit.clone();
-                let frame = Frame { stance: header.stance, is_guessed: header.is_guessed, unit };
+                let frame =
+                    Frame { orientation: header.orientation, is_guessed: header.is_guessed, unit };
                 let (closed, points) = (header.closed, header.source_points);
                 Gathered { set, closed, frame, points, read_ms, splats_ms: 0.0 }
             }
@@ -193,7 +198,7 @@ impl<W: Watch> Work<'_, W> {
 
     /// Returns a mesh or point cloud in its colours, and how it stands.
     fn painted(&self, path: &Path, mut mesh: Mesh) -> Result<(Mesh, Frame), W::Error> {
-        let frame = Frame::of(mesh.about.stance, || Ok(mesh.guess_stance()))?;
+        let frame = Frame::of(mesh.about.orientation, || Ok(mesh.guess_orientation()))?;
         let named = self.conversion.reading.options.scalar.is_some();
         let up = frame.up(self.conversion.up);
         let legend = self.conversion.coloring.paint(&Name::of_file(path), &mut mesh, up, named)?;
@@ -214,9 +219,9 @@ impl Gathered {
         self.set.splats.append(&mut set.splats);
         // A statement counts more than a guess before it.
         let frame = other.frame;
-        let states = frame.stance.is_some() && !frame.is_guessed;
-        if self.frame.stance.is_none() || (self.frame.is_guessed && states) {
-            (self.frame.stance, self.frame.is_guessed) = (frame.stance, frame.is_guessed);
+        let states = frame.orientation.is_some() && !frame.is_guessed;
+        if self.frame.orientation.is_none() || (self.frame.is_guessed && states) {
+            (self.frame.orientation, self.frame.is_guessed) = (frame.orientation, frame.is_guessed);
         }
         self.closed &= other.closed;
         self.points += other.points;

@@ -2,7 +2,7 @@
 
 use crate::{
     Error, Result,
-    about::{About, Stance},
+    about::{About, Orientation},
     parallel::prelude::*,
     session::Data,
 };
@@ -151,9 +151,11 @@ impl Similarity {
     }
 
     fn stand(&self, about: &mut About) {
-        let turned =
-            |Stance { up, front }| Stance { up: self.rotation * up, front: self.rotation * front };
-        about.stance = about.stance.map(turned);
+        let turned = |Orientation { up, front }| Orientation {
+            up: self.rotation * up,
+            front: self.rotation * front,
+        };
+        about.orientation = about.orientation.map(turned);
     }
 }
 

@@ -164,9 +164,9 @@ impl Stage {
     }
 
     /// Returns the way up, and the diagonal of the box around the scene in world units.
-    pub fn stance(&self) -> (DVec3, f64) {
+    pub fn orientation(&self) -> (DVec3, f64) {
         let subject = &locked(&self.items).items.subject;
-        (subject.stance.up, subject.bounds.diagonal())
+        (subject.orientation.up, subject.bounds.diagonal())
     }
 
     /// Returns the fields of the scene.

@@ -46,7 +46,7 @@ impl Hierarchy {
             "degree": header.degree,
             "has_color": header.has_color,
             "has_normals": header.has_normals,
-            "up": header.stance.map(|stance| stance.up.to_array()),
+            "up": header.orientation.map(|orientation| orientation.up.to_array()),
             "is_guessed": header.is_guessed,
             "unit": header.unit,
             "source": header.source,

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 use splatkit::{
     Deadline, Error, Stop,
-    about::{About, Frame, Label, Modality, Stance},
+    about::{About, Frame, Label, Modality, Orientation},
     formats,
     gaussians::{Gaussians, harmonics},
     glam::{DMat3, DVec3, Quat, Vec3},
@@ -105,17 +105,17 @@ impl ArrayFacts {
                 )));
             }
         };
-        about.stance = match self.frame.as_deref() {
-            Some("lps" | "ras") => Some(Stance::RAS),
+        about.orientation = match self.frame.as_deref() {
+            Some("lps" | "ras") => Some(Orientation::RAS),
             _ => None,
         };
-        if about.stance.is_some() {
+        if about.orientation.is_some() {
             about.frame = Frame::Patient;
         }
         if let Some(up) = self.up {
             let up = DVec3::from_array(up).try_normalize();
             let up = up.ok_or_else(|| wrong("up is a direction with a length above 0"))?;
-            about.stance = Some(Stance::with_up(up));
+            about.orientation = Some(Orientation::with_up(up));
         }
         Ok(about)
     }

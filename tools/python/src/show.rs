@@ -104,7 +104,7 @@ fn moved(scene: &Scene, text: &str, size: [u32; 2], gesture: &str) -> Result<Str
         let depth = point.map(|point| view.to_view(DVec3::from_array(point)).z);
         depth.filter(|depth| *depth > 0.0)
     };
-    let (up, diagonal) = scene.stage().stance();
+    let (up, diagonal) = scene.stage().orientation();
     let up = axis_of(&camera, up);
     let mut orbit = Orbit::new(camera, up, diagonal);
     match options(gesture)? {

@@ -65,7 +65,7 @@ fn a_hierarchy_of_a_hierarchy_keeps_what_is_told_of_it() {
     folder.run("convert a.splk -o b.splk --radius-scale 2 --lossless").ok();
     let open = |name: &str| Hierarchy::open(folder.path(name), &Limits::default()).unwrap();
     let (a, b) = (open("a.splk"), open("b.splk"));
-    assert_eq!((b.header().stance, b.header().unit.as_str()), (a.header().stance, "mm"));
+    assert_eq!((b.header().orientation, b.header().unit.as_str()), (a.header().orientation, "mm"));
     let widths = |hierarchy: &Hierarchy| {
         let mut widths: Vec<f32> =
             hierarchy.leaves().unwrap().splats.iter().map(|splat| splat.factor[0]).collect();

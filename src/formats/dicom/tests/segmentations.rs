@@ -82,7 +82,7 @@ fn frames_of_segments_are_one_label_map() {
     };
     near(lung, [0.502; 3]);
     near(node, [1.0, 0.0, 0.0]);
-    assert_eq!(volume.about.stance, Some(Stance::RAS));
+    assert_eq!(volume.about.orientation, Some(Orientation::RAS));
 }
 
 #[test]

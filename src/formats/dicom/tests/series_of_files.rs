@@ -51,7 +51,7 @@ fn slices_are_ordered_by_their_positions() {
     assert_eq!(volume.lattice.axes.z_axis, DVec3::new(0.0, 0.0, 2.5));
     // The patient's x leads to the right and y to the front.
     assert_eq!(volume.lattice.origin, DVec3::new(-1.0, -2.0, 2.5));
-    assert_eq!(volume.about.stance, Some(Stance::RAS));
+    assert_eq!(volume.about.orientation, Some(Orientation::RAS));
     // Rounded positions are even all the same.
     let volume = stack(&[at(0.0), at(0.63), at(1.25), at(1.88), at(2.5)]);
     assert_eq!(volume.lattice.arrangement, Arrangement::Cartesian);

@@ -104,7 +104,7 @@ fn numbers_are_those_of_the_file() {
         assert_eq!(set.harmonics_of(0)[term], values[..3]);
         assert_eq!(set.harmonics_of(1)[term], values[3..]);
     }
-    assert_eq!((set.about.stance, set.broken.all()), (Some(Stance::Y_UP), 0));
+    assert_eq!((set.about.orientation, set.broken.all()), (Some(Orientation::Y_UP), 0));
     set.validate().expect("valid");
 }
 

@@ -15,7 +15,7 @@ pub const BLOCK: usize = 4;
 /// samples, a bit for each sample. For a level in bricks, a bit stands for a block of samples with
 /// a known range.
 #[derive(Debug)]
-pub struct Shown {
+pub struct VisibleBlocks {
     /// Samples along each axis.
     pub dims: [usize; 3],
     /// Bits stand for cells of 2 to the power of this many samples along each axis.
@@ -61,7 +61,7 @@ pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
     ranges
 }
 
-impl Shown {
+impl VisibleBlocks {
     /// `dims` is the number of samples along each axis, `ranges` the extremes around each sample.
     /// For each minimum, `first` is the smallest maximum with which something is visible.
     pub fn new(dims: [usize; 3], ranges: &[[u8; 2]], first: &[u16; 256]) -> Self {
@@ -214,7 +214,7 @@ mod tests {
         let (dims, odd) = ([5, 3, 6], |sample: usize| sample * sample % 7 == 2);
         let ranges: Vec<[u8; 2]> =
             (0..90).map(|sample| [0, if odd(sample) { 200 } else { 10 }]).collect();
-        let visible = Shown::new(dims, &ranges, &[100; 256]);
+        let visible = VisibleBlocks::new(dims, &ranges, &[100; 256]);
         assert_eq!(visible.blocks, [2, 1, 2]);
         for (sample, _) in ranges.iter().enumerate() {
             let at = [sample % 5, sample / 5 % 3, sample / 15];
