@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[non_exhaustive]
 pub struct About {
     /// How the subject stands in the world; `None` if the file does not say.
-    pub stance: Option<Stance>,
+    pub orientation: Option<Orientation>,
     /// What the axes of the world mean.
     pub frame: Frame,
     /// What measured the values.
@@ -110,8 +110,8 @@ impl Frames {
     /// the coordinates of the others may mean other places.
     pub fn add(&mut self, name: &str, frame: Frame) -> Option<String> {
         let (had_patient, had_other) = (self.first[0].is_some(), self.first[1].is_some());
-        let own = usize::from(frame != Frame::Patient);
-        self.first[own].get_or_insert_with(|| name.to_owned());
+        let slot = usize::from(frame != Frame::Patient);
+        self.first[slot].get_or_insert_with(|| name.to_owned());
         let [Some(patient), Some(other)] = &self.first else { return None };
         (!(had_patient && had_other)).then(|| {
             format!(
@@ -129,7 +129,7 @@ impl Frames {
 
 /// How a subject stands in the world. Both directions have unit length and are perpendicular.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Stance {
+pub struct Orientation {
     /// The direction that is up.
     pub up: DVec3,
     /// The direction that the subject faces. The first camera looks against it.
@@ -152,7 +152,7 @@ pub enum Modality {
     Microscopy,
 }
 
-impl Stance {
+impl Orientation {
     /// The frame of a patient (RAS): x to the right, y to the front, z to the head.
     pub const RAS: Self = Self { up: DVec3::Z, front: DVec3::Y };
 
@@ -165,14 +165,19 @@ impl Stance {
     /// The frame of a camera, which trainers of Gaussian scenes keep: y down, seen along +z.
     pub const Y_DOWN: Self = Self { up: DVec3::NEG_Y, front: DVec3::NEG_Z };
 
-    /// Returns the rotation that turns a subject of this stance to another one.
+    /// Returns the rotation that turns a subject of this orientation to another one.
     pub(crate) fn turn_to(self, wanted: Self) -> DMat3 {
-        let axes =
-            |stance: Self| DMat3::from_cols(stance.up.cross(stance.front), stance.up, stance.front);
+        let axes = |orientation: Self| {
+            DMat3::from_cols(
+                orientation.up.cross(orientation.front),
+                orientation.up,
+                orientation.front,
+            )
+        };
         axes(wanted) * axes(self).transpose()
     }
 
-    /// Returns the stance with this direction up, and the front that is usual for it: −Y if Z or −Z
+    /// Returns the orientation with this direction up, and the front that is usual for it: −Y if Z or −Z
     /// is nearest to the direction, otherwise +Z; made perpendicular to it.
     ///
     /// # Panics
@@ -203,7 +208,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_patient_and_something_else_are_told_of_once() {
+    fn a_patient_and_something_else_are_reported_once() {
         let mut frames = Frames::default();
         assert_eq!(frames.add("ct.nii", Frame::Patient), None);
         assert_eq!(frames.add("mask.dcm", Frame::Patient), None);
@@ -215,7 +220,7 @@ mod tests {
 
     #[test]
     fn turns_lead_from_one_stance_to_another() {
-        let turn = Stance::Y_UP.turn_to(Stance::SURVEY);
+        let turn = Orientation::Y_UP.turn_to(Orientation::SURVEY);
         assert_eq!(turn * DVec3::Y, DVec3::Z);
         assert_eq!(turn * DVec3::Z, DVec3::NEG_Y);
         assert_eq!(turn * DVec3::X, DVec3::X);
@@ -223,14 +228,14 @@ mod tests {
 
     #[test]
     fn every_direction_has_a_front() {
-        assert_eq!(Stance::with_up(2.0 * DVec3::Z), Stance::SURVEY);
-        assert_eq!(Stance::with_up(DVec3::Y), Stance::Y_UP);
-        assert_eq!(Stance::with_up(DVec3::X).front, DVec3::Z);
-        assert_eq!(Stance::with_up(DVec3::NEG_Z).front, DVec3::NEG_Y);
+        assert_eq!(Orientation::with_up(2.0 * DVec3::Z), Orientation::SURVEY);
+        assert_eq!(Orientation::with_up(DVec3::Y), Orientation::Y_UP);
+        assert_eq!(Orientation::with_up(DVec3::X).front, DVec3::Z);
+        assert_eq!(Orientation::with_up(DVec3::NEG_Z).front, DVec3::NEG_Y);
         for up in [DVec3::ONE, DVec3::new(-0.2, 0.9, 0.8), DVec3::new(0.1, 0.7, 0.7)] {
-            let stance = Stance::with_up(up);
-            assert!(stance.front.dot(stance.up).abs() < 1e-12, "{stance:?}");
-            assert!((stance.front.length() - 1.0).abs() < 1e-12, "{stance:?}");
+            let orientation = Orientation::with_up(up);
+            assert!(orientation.front.dot(orientation.up).abs() < 1e-12, "{orientation:?}");
+            assert!((orientation.front.length() - 1.0).abs() < 1e-12, "{orientation:?}");
         }
     }
 }

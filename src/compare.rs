@@ -37,11 +37,11 @@ pub struct Comparison {
 /// [`Error::Argument`] if a picture's length does not match the size, or if the size has no pixels.
 pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
     let bytes = 4 * u128::from(size[0]) * u128::from(size[1]);
-    for (name, found) in [("first", a.len()), ("second", b.len())] {
-        if found as u128 != bytes {
+    for (name, length) in [("first", a.len()), ("second", b.len())] {
+        if length as u128 != bytes {
             let [width, height] = size;
             return Err(Error::Argument(format!(
-                "the {name} picture has {found} bytes, but {width}x{height} pixels need {bytes}"
+                "the {name} picture has {length} bytes, but {width}x{height} pixels need {bytes}"
             )));
         }
     }
@@ -137,11 +137,11 @@ fn structural_similarity(pixel: impl Fn(usize) -> [f64; 2], [width, height]: [us
     // The last rows, as many as the window is high. Each contains the averages along x of both
     // values, their squares and their product.
     let mut rows: VecDeque<Vec<[f64; 5]>> = VecDeque::with_capacity(down.len());
-    let mut own = Vec::with_capacity(width);
+    let mut terms = Vec::with_capacity(width);
     let mut sum = 0.0;
     for y in 0..height {
-        own.clear();
-        own.extend((0..width).map(|x| {
+        terms.clear();
+        terms.extend((0..width).map(|x| {
             let [a, b] = pixel(y * width + x);
             [a, b, a * a, b * b, a * b]
         }));
@@ -151,7 +151,7 @@ fn structural_similarity(pixel: impl Fn(usize) -> [f64; 2], [width, height]: [us
             Vec::new()
         };
         row.clear();
-        row.extend((0..columns).map(|x| average(&across, own[x..].iter())));
+        row.extend((0..columns).map(|x| average(&across, terms[x..].iter())));
         rows.push_back(row);
         if rows.len() < down.len() {
             continue;
@@ -198,28 +198,31 @@ mod tests {
         pixels.flat_map(|v| [v, v, v, 255]).collect()
     }
 
-    fn close(found: f64, expected: f64) {
-        assert!((found - expected).abs() < 1e-9, "{found} is not {expected}");
+    fn close(value: f64, expected: f64) {
+        assert!((value - expected).abs() < 1e-9, "{value} is not {expected}");
     }
 
     #[test]
     fn the_same_picture_is_the_same() {
         let a = texture([20, 15], |x, y| (x * 31 + y * 17) as u8);
-        let found = compare(&a, &a, [20, 15]).unwrap();
-        assert_eq!((found.psnr, found.max_difference, found.different_pixels), (None, 0.0, 0));
-        close(found.ssim, 1.0);
+        let comparison = compare(&a, &a, [20, 15]).unwrap();
+        assert_eq!(
+            (comparison.psnr, comparison.max_difference, comparison.different_pixels),
+            (None, 0.0, 0)
+        );
+        close(comparison.ssim, 1.0);
     }
 
     #[test]
     fn constant_pictures_by_hand() {
         let [a, b] = [100u8, 110].map(|v| texture([16, 16], |_, _| v));
-        let found = compare(&a, &b, [16, 16]).unwrap();
-        close(found.psnr.unwrap(), 20.0 * 25.5_f64.log10());
-        close(found.max_difference, 10.0 / 255.0);
-        assert_eq!(found.different_pixels, 256);
+        let comparison = compare(&a, &b, [16, 16]).unwrap();
+        close(comparison.psnr.unwrap(), 20.0 * 25.5_f64.log10());
+        close(comparison.max_difference, 10.0 / 255.0);
+        assert_eq!(comparison.different_pixels, 256);
         // Without variance, SSIM is its first factor.
         let (a, b) = (100.0 / 255.0, 110.0 / 255.0);
-        close(found.ssim, (2.0 * a * b + 1e-4) / (a * a + b * b + 1e-4));
+        close(comparison.ssim, (2.0 * a * b + 1e-4) / (a * a + b * b + 1e-4));
     }
 
     #[test]
@@ -227,11 +230,11 @@ mod tests {
         let a = texture([4, 5], |_, _| 50);
         let mut b = a.clone();
         b[4 * 7 + 1] = 101;
-        let found = compare(&a, &b, [4, 5]).unwrap();
-        assert_eq!(found.different_pixels, 1);
-        close(found.max_difference, 0.2);
+        let comparison = compare(&a, &b, [4, 5]).unwrap();
+        assert_eq!(comparison.different_pixels, 1);
+        close(comparison.max_difference, 0.2);
         // 0.2² in one of 60 channels: opacity does not count, because all pixels are opaque.
-        close(found.psnr.unwrap(), 10.0 * (60.0 / 0.04_f64).log10());
+        close(comparison.psnr.unwrap(), 10.0 * (60.0 / 0.04_f64).log10());
     }
 
     #[test]
@@ -243,10 +246,10 @@ mod tests {
         let b = texture(size, |x, y| {
             ((x * x * 7 + y * 29 + x * y * 3) % 251 / 2 + (x * 5 + y * 3) % 60) as u8
         });
-        let found = compare(&a, &b, [24, 17]).unwrap();
-        close(found.ssim, 0.745_384_820_6);
-        close(found.psnr.unwrap(), 14.008_331_670_7);
-        assert!(found.ssim < 0.999);
+        let comparison = compare(&a, &b, [24, 17]).unwrap();
+        close(comparison.ssim, 0.745_384_820_6);
+        close(comparison.psnr.unwrap(), 14.008_331_670_7);
+        assert!(comparison.ssim < 0.999);
     }
 
     #[test]
@@ -265,9 +268,9 @@ mod tests {
             color: vec![[v, 0.0, 0.0, 1.0]; 3],
             depth: vec![1.0; 3],
         };
-        let found = compare_pictures(&picture(0.25), &picture(0.25 + 0.001)).unwrap();
-        assert_eq!(found.different_pixels, 0);
-        assert!((found.psnr.unwrap() - (60.0 + 10.0 * 3.0_f64.log10())).abs() < 1e-3);
+        let comparison = compare_pictures(&picture(0.25), &picture(0.25 + 0.001)).unwrap();
+        assert_eq!(comparison.different_pixels, 0);
+        assert!((comparison.psnr.unwrap() - (60.0 + 10.0 * 3.0_f64.log10())).abs() < 1e-3);
         let broken = compare_pictures(&picture(0.25), &picture(f32::NAN)).unwrap();
         assert_eq!((broken.psnr, broken.max_difference), (Some(f64::NEG_INFINITY), f64::INFINITY));
     }
@@ -307,10 +310,10 @@ mod tests {
         // Limits for one picture, and for both: a pixel counts as 16 bytes while it is decoded.
         let of_one = std::fs::metadata(&png).unwrap().len() + 16 * 64 * 48;
         for (bytes, fits) in [(of_one - 1, false), (2 * of_one - 1, false), (2 * of_one, true)] {
-            let found = compare_files(&png, &png, &Limits { bytes, ..limits.clone() });
+            let result = compare_files(&png, &png, &Limits { bytes, ..limits.clone() });
             assert!(
-                if fits { found.is_ok() } else { matches!(found, Err(Error::Limit { .. })) },
-                "{bytes}: {found:?}"
+                if fits { result.is_ok() } else { matches!(result, Err(Error::Limit { .. })) },
+                "{bytes}: {result:?}"
             );
         }
     }

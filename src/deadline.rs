@@ -31,7 +31,7 @@ impl Deadline {
     #[must_use]
     pub fn or_earlier(self, other: Self) -> Self {
         match (self.end, other.end) {
-            (Some(own), Some(end)) if end < own => other,
+            (Some(end), Some(other_end)) if other_end < end => other,
             (None, Some(_)) => other,
             _ => self,
         }

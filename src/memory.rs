@@ -93,9 +93,12 @@ fn groups() -> Vec<PathBuf> {
             }
             _ => continue,
         };
-        let own = Path::new(root).join(group.trim_start_matches('/'));
+        let directory = Path::new(root).join(group.trim_start_matches('/'));
         files.extend(
-            own.ancestors().take_while(|path| path.starts_with(root)).map(|path| path.join(name)),
+            directory
+                .ancestors()
+                .take_while(|path| path.starts_with(root))
+                .map(|path| path.join(name)),
         );
     }
     files
@@ -109,8 +112,8 @@ mod tests {
     fn the_machine_tells_its_memory() {
         // No machine that builds this has less memory than the lower bound, or more than the upper
         // one.
-        let found = most().expect("an amount");
-        assert!((1 << 28..1 << 50).contains(&found), "{found}");
+        let bytes = most().expect("an amount");
+        assert!((1 << 28..1 << 50).contains(&bytes), "{bytes}");
         assert!(check("that", 1 << 20).is_ok());
         let message = check("this", u64::MAX).unwrap_err();
         assert!(

@@ -50,13 +50,13 @@ impl Picture {
         self.check("depths", self.depth.len())
     }
 
-    fn check(&self, what: &str, found: usize) -> Result<()> {
+    fn check(&self, what: &str, count: usize) -> Result<()> {
         let Self { width, height, .. } = self;
-        if found as u64 == u64::from(*width) * u64::from(*height) {
+        if count as u64 == u64::from(*width) * u64::from(*height) {
             return Ok(());
         }
         Err(Error::Argument(format!(
-            "a picture of {width}x{height} pixels cannot have {found} {what}"
+            "a picture of {width}x{height} pixels cannot have {count} {what}"
         )))
     }
 

@@ -288,11 +288,11 @@ mod tests {
             for stretch in [1.0, 1.3, 1.999_9] {
                 let slope = direction * (2f64.powi(power) * stretch).min(3e38) as f32;
                 let sample = Splat::sample(Vec3::ZERO, 1.0, [1.0; 6], 0.37, slope);
-                let (weight, found) = sample.weight_and_slope();
+                let (weight, decoded) = sample.weight_and_slope();
                 assert!((weight - 0.37).abs() < 2e-4, "{weight}");
-                let error = (found.as_dvec3() - slope.as_dvec3()).abs().max_element();
+                let error = (decoded.as_dvec3() - slope.as_dvec3()).abs().max_element();
                 let largest = f64::from(slope.abs().max_element());
-                assert!(error <= 2.5e-4 * largest, "{slope} {found}");
+                assert!(error <= 2.5e-4 * largest, "{slope} {decoded}");
             }
         }
         for (slope, expected) in [
@@ -313,8 +313,8 @@ mod tests {
             let [packed, rest] = encode_trained_color(color);
             assert!([packed, rest].map(f32::from_bits).iter().all(|v| v.is_normal()));
             let splat = Splat { color: packed, normal: rest, ..Splat::zeroed() };
-            for (found, wanted) in decode_trained_color(&splat).iter().zip(color) {
-                assert!((found - wanted).abs() <= 0.51 * TRAINED_COLOR, "{found} {wanted}");
+            for (decoded, wanted) in decode_trained_color(&splat).iter().zip(color) {
+                assert!((decoded - wanted).abs() <= 0.51 * TRAINED_COLOR, "{decoded} {wanted}");
             }
         }
         let [packed, rest] = encode_trained_color([-1.0, 100.0, f32::NAN]);

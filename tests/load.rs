@@ -62,8 +62,8 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
     let splk = folder.join("a.splk");
     let tree = Tree::build(&surfels, &BuildOptions::default(), None).unwrap();
     hierarchy::file::write(&tree, &splk, &hierarchy::file::WriteOptions::default()).unwrap();
-    let found = hierarchy::file::check(&splk, &limits);
-    assert!(found.findings.is_empty(), "{:?}", found.findings);
+    let report = hierarchy::file::check(&splk, &limits);
+    assert!(report.findings.is_empty(), "{:?}", report.findings);
     let read = Hierarchy::open(&splk, &limits).unwrap();
 
     let splv = folder.join("a.splv");
@@ -85,7 +85,7 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
     .unwrap();
     let scattered = points.to_splats(&SampleOptions::default()).unwrap();
     let range = points.range();
-    let shown = TransferFunction {
+    let points_transfer = TransferFunction {
         color: vec![(range[0], [0.1, 0.3, 0.9]), (range[1], [0.9, 0.7, 0.1])],
         opacity: vec![(range[0], 0.0), (range[1], 0.5)],
         unit: 0.1,
@@ -96,7 +96,7 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
         ("bricks", Scene::new().with_bricks(cut, Kernel::default(), transfer.clone())),
         ("surfels", Scene::new().with_splats(surfels.clone())),
         ("hierarchy", Scene::new().with_hierarchy(read)),
-        ("scattered", Scene::new().with_samples(scattered, shown)),
+        ("scattered", Scene::new().with_samples(scattered, points_transfer)),
         (
             "mixed",
             Scene::new().with_volume(volume, Kernel::default(), transfer).with_splats(surfels),
@@ -168,17 +168,18 @@ fn nothing_grows() {
                 }
             }
         }
-        let own = on_the_gpu(&gpu);
+        let usage = on_the_gpu(&gpu);
         // Everything that the round created is freed.
-        assert_eq!(*buffers.get_or_insert(own), own, "round {round}: buffers and bytes on the GPU");
+        let first = *buffers.get_or_insert(usage);
+        assert_eq!(first, usage, "round {round}: buffers and bytes on the GPU");
         assert_eq!(folder.names().len(), 2, "files are replaced, and nothing else is left");
         held.push(resident());
         if end.is_some() && number % 50 == 0 {
-            let [mib, gpu_mib] = [resident() >> 20, own.1 >> 20];
+            let [mib, gpu_mib] = [resident() >> 20, usage.1 >> 20];
             println!(
                 "{:7.0} s, round {number}: {mib} MiB, {} buffers of {gpu_mib} MiB",
                 start.elapsed().as_secs_f64(),
-                own.0
+                usage.0
             );
         }
     }

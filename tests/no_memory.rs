@@ -158,9 +158,9 @@ fn walk(name: &str, content: Vec<u8>, mut bound: impl FnMut(usize), first: usize
     loop {
         std::fs::remove_file(&output).ok();
         bound(bytes);
-        let found = convert(&input, &output);
+        let result = convert(&input, &output);
         bound(usize::MAX);
-        match found {
+        match result {
             Ok(splats) => {
                 assert_eq!(splats, whole, "{name}: {bytes} bytes");
                 return refused;

@@ -45,7 +45,7 @@ pub struct Compositor {
     /// splatkit's picture that is being drawn, with its camera.
     frame: Option<(PendingFrame, Camera)>,
     /// The camera of the picture in the textures.
-    shown: Option<Camera>,
+    drawn_camera: Option<Camera>,
     size: [u32; 2],
     textures: Textures,
     layout: wgpu::BindGroupLayout,
@@ -84,7 +84,7 @@ impl Compositor {
             renderer,
             prepared,
             frame: None,
-            shown: None,
+            drawn_camera: None,
             size,
             textures: textures(&gpu.device, size),
             layout,
@@ -99,7 +99,7 @@ impl Compositor {
     pub fn resize(&mut self, size: [u32; 2]) {
         self.size = size;
         self.textures = textures(&self.gpu.device, size);
-        (self.frame, self.shown) = (None, None);
+        (self.frame, self.drawn_camera) = (None, None);
     }
 
     /// Draws what there is: splatkit's last finished picture, and the triangles as its camera sees
@@ -107,11 +107,11 @@ impl Compositor {
     pub fn draw(&mut self, camera: &Camera, to: &wgpu::TextureView) -> splatkit::Result<bool> {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         self.advance(camera, &mut encoder)?;
-        if let Some(shown) = &self.shown {
-            self.composite(&shown.view(self.size)?, to, &mut encoder);
+        if let Some(drawn_camera) = &self.drawn_camera {
+            self.composite(&drawn_camera.view(self.size)?, to, &mut encoder);
         }
         self.gpu.queue.submit([encoder.finish()]);
-        Ok(self.shown.as_ref() == Some(camera))
+        Ok(self.drawn_camera.as_ref() == Some(camera))
     }
 
     /// Encodes the next part of splatkit's picture, if it is time for it. Nothing here waits.
@@ -120,8 +120,8 @@ impl Compositor {
         camera: &Camera,
         encoder: &mut wgpu::CommandEncoder,
     ) -> splatkit::Result<()> {
-        let Some((frame, own)) = &mut self.frame else {
-            if self.shown.as_ref() != Some(camera) {
+        let Some((frame, frame_camera)) = &mut self.frame else {
+            if self.drawn_camera.as_ref() != Some(camera) {
                 let output = Output::Textures {
                     color: self.textures.colors.clone(),
                     format: self.textures.colors.texture().format(),
@@ -136,7 +136,7 @@ impl Compositor {
         };
         match self.renderer.poll(&mut self.prepared, frame)? {
             Progress::Done(_) => {
-                self.shown = Some(own.clone());
+                self.drawn_camera = Some(frame_camera.clone());
                 self.frame = None;
             }
             Progress::NextBatch => {

@@ -42,8 +42,8 @@ pub fn prepare() {
 
 /// Runs a target. A panic that the target does not catch aborts the process, so that libFuzzer
 /// keeps the input.
-pub fn run(look: oracle::Look, bytes: &[u8]) {
-    if catch_unwind(AssertUnwindSafe(|| look(bytes))).is_err() {
+pub fn run(target: oracle::Target, bytes: &[u8]) {
+    if catch_unwind(AssertUnwindSafe(|| target(bytes))).is_err() {
         eprintln!("{}", LAST.lock().unwrap_or_else(PoisonError::into_inner));
         std::process::abort();
     }

@@ -8,7 +8,7 @@
 // more than invocations.
 @group(1) @binding(1) var<storage, read_write> counts: array<u32>;
 // The nodes that each invocation found; each has as many places as it visits nodes.
-@group(1) @binding(2) var<storage, read_write> found_nodes: array<u32>;
+@group(1) @binding(2) var<storage, read_write> cut_nodes: array<u32>;
 // The drawn nodes: number in the chunk, share in the upper ten bits. The element behind the last
 // possible one is their number.
 @group(1) @binding(3) var<storage, read_write> selected: array<u32>;
@@ -42,15 +42,15 @@ fn count(
         && refinement(pixels(parents.center, parents.radius + room, parents.size)) == 0u {
         end = 0u;
     }
-    var found = 0u;
+    var listed = 0u;
     for (var i = run.x + id % SHARERS; i < end; i += SHARERS) {
-        let own = share(i);
-        if own > 0u {
-            found_nodes[id * OWN_NODES + found] = i | (own << SHARE_SHIFT);
-            found++;
+        let node_share = share(i);
+        if node_share > 0u {
+            cut_nodes[id * OWN_NODES + listed] = i | (node_share << SHARE_SHIFT);
+            listed++;
         }
     }
-    counts[id] = found;
+    counts[id] = listed;
     if id + 1u == 64u * workgroups.x {
         counts[id + 1u] = 0u;
     }
@@ -63,12 +63,12 @@ fn write(
 ) {
     let id = invocation.x;
     let at = counts[id];
-    let found = counts[id + 1u] - at;
-    for (var i = 0u; i < found; i++) {
-        selected[at + i] = found_nodes[id * OWN_NODES + i];
+    let listed = counts[id + 1u] - at;
+    for (var i = 0u; i < listed; i++) {
+        selected[at + i] = cut_nodes[id * OWN_NODES + i];
     }
     if id + 1u == 64u * workgroups.x {
-        let all = at + found;
+        let all = at + listed;
         selected[source.count] = all;
         arguments[0] = (all + 64u * RUN - 1u) / (64u * RUN);
         arguments[1] = 1u;

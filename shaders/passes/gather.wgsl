@@ -6,7 +6,7 @@
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
 @group(0) @binding(2) var<uniform> stage: Pass;
-@group(0) @binding(3) var<storage, read> shown: array<u32>;
+@group(0) @binding(3) var<storage, read> visibility: array<u32>;
 @group(0) @binding(4) var<storage, read_write> progress: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> depths: array<f32>;
 // Binding 6: the tables of tables.wgsl.

@@ -33,8 +33,8 @@ fn count(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    for (var own = group.x; own < large[0]; own += groups.x) {
-        let walk = walk_of(boxes[large[1u + own]], stage);
+    for (var number = group.x; number < large[0]; number += groups.x) {
+        let walk = walk_of(boxes[large[1u + number]], stage);
         for (var i = lane; i < bin_count(walk); i += 256u) {
             atomicAdd(&bins[nth_bin(walk, i)], 1u);
         }
@@ -47,8 +47,8 @@ fn fill(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    for (var own = group.x; own < large[0]; own += groups.x) {
-        let at = large[1u + own];
+    for (var number = group.x; number < large[0]; number += groups.x) {
+        let at = large[1u + number];
         let box = boxes[at];
         let walk = walk_of(box, stage);
         let tiles = bin_count(walk) / walk.windows;

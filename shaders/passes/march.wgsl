@@ -38,7 +38,7 @@ var<workgroup> neighbours: array<array<f32, 64>, FIELDS>;
 var<private> slopes: array<array<vec2<f32>, FIELDS>, ROWS>;
 // Whether an invocation of the tile stopped, and the tile's slot.
 var<workgroup> any_stopped: atomic<u32>;
-var<workgroup> own_slot: u32;
+var<workgroup> tile_slot: u32;
 
 @compute @workgroup_size(8, LANE_ROWS)
 fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
@@ -196,20 +196,20 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         workgroupBarrier();
         if atomicLoad(&any_stopped) > 0u {
             if all(lane.xy == vec2(0u)) {
-                own_slot = resumed - 1u;
+                tile_slot = resumed - 1u;
                 if resumed == 0u {
-                    own_slot = claim_slot();
+                    tile_slot = claim_slot();
                 }
-                atomicStore(&progress[tile], own_slot + 1u);
+                atomicStore(&progress[tile], tile_slot + 1u);
                 atomicStore(&progress[progress_word(UNFINISHED)], 1u);
-                atomicAdd(&progress[progress_word(STOPS)], select(1u, 0u, own_slot == NO_SLOT));
+                atomicAdd(&progress[progress_word(STOPS)], select(1u, 0u, tile_slot == NO_SLOT));
             }
             workgroupBarrier();
-            if own_slot == NO_SLOT {
+            if tile_slot == NO_SLOT {
                 // The tile starts again, from the pixels stored in the picture.
                 return;
             }
-            save(own_slot, lane.xy, vec4(at, bin, front, open));
+            save(tile_slot, lane.xy, vec4(at, bin, front, open));
         } else if resumed > 0u && all(lane.xy == vec2(0u)) {
             free_slot(resumed - 1u);
         }
@@ -224,9 +224,9 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         end_field(tile);
     }
     for (var r = 0u; r < ROWS; r++) {
-        let own = vec2<i32>(lane.xy) + vec2(0, i32(lane.y * (ROWS - 1u) + r));
+        let place = vec2<i32>(lane.xy) + vec2(0, i32(lane.y * (ROWS - 1u) + r));
         let pixel = first_pixel + vec2(0, i32(r));
-        if all(own >= vec2(APRON)) && all(own < vec2(8 - APRON))
+        if all(place >= vec2(APRON)) && all(place < vec2(8 - APRON))
             && all(pixel < vec2<i32>(frame.size)) {
             store_pixel(r, u32(pixel.y) * frame.size.x + u32(pixel.x));
         }
@@ -335,15 +335,15 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
 }
 
 fn close_field(r: u32, f: u32, sheet: u32, mixture: ptr<function, Mixture>) {
-    var own: Sheet;
-    resolve_field(r, f, sheet, &own);
+    var field: Sheet;
+    resolve_field(r, f, sheet, &field);
     if CENTRAL {
-        own.back.slope = slope_on_plane(r, f, slopes[r][f], planes[sheet + 1u]);
+        field.back.slope = slope_on_plane(r, f, slopes[r][f], planes[sheet + 1u]);
     }
     if SUMS {
-        pixels[r].fields[f].front = own.back;
+        pixels[r].fields[f].front = field.back;
     }
-    mix_field(r, f, sheet, own, mixture);
+    mix_field(r, f, sheet, field, mixture);
 }
 
 // Finds the slopes on the plane behind the sheet being closed, from the values of the tile's
@@ -374,7 +374,7 @@ fn find_slopes(lane: vec2<u32>) {
 // neighbour has no value.
 fn difference(lane: vec2<u32>, r: u32, f: u32) -> vec2<f32> {
     let y = lane.y * ROWS + r;
-    let own = neighbours[f][y * 8u + lane.x];
+    let middle = neighbours[f][y * 8u + lane.x];
     let before = vec2(
         neighbours[f][y * 8u + max(lane.x, 1u) - 1u],
         neighbours[f][(max(y, 1u) - 1u) * 8u + lane.x],
@@ -386,7 +386,7 @@ fn difference(lane: vec2<u32>, r: u32, f: u32) -> vec2<f32> {
     let has_before = before > vec2(NO_VALUE);
     let has_after = after > vec2(NO_VALUE);
     let span = vec2<f32>(vec2<u32>(has_before) + vec2<u32>(has_after));
-    return (select(vec2(own), after, has_after) - select(vec2(own), before, has_before))
+    return (select(vec2(middle), after, has_after) - select(vec2(middle), before, has_before))
         / max(span, vec2(1.0));
 }
 

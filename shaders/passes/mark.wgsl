@@ -6,7 +6,7 @@
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
 // See field_lattice.wgsl.
-@group(0) @binding(2) var<storage, read_write> shown: array<u32>;
+@group(0) @binding(2) var<storage, read_write> visibility: array<u32>;
 @group(0) @binding(3) var<storage, read_write> progress: array<atomic<u32>>;
 
 // Rounding of places, in steps of the lattice.
@@ -86,7 +86,7 @@ fn may_show(beam: Beam, near: f32, far: f32) -> bool {
         for (var y = first.y; y <= last.y; y++) {
             for (var x = first.x; x <= last.x; x++) {
                 let block = 2u * ((z * blocks.y + y) * blocks.x + x);
-                if (shown[block] | shown[block + 1u]) != 0u {
+                if (visibility[block] | visibility[block + 1u]) != 0u {
                     return true;
                 }
             }
@@ -102,7 +102,7 @@ fn mark(
     @builtin(global_invocation_id) id: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let words = frame.fields[0].shown.z;
+    let words = frame.fields[0].visibility.z;
     let number = number_of(id) / 4u;
     let first = (number % words) * 32u + 8u * (lane % 4u);
     var bits = 0u;
@@ -122,7 +122,7 @@ fn mark(
     }
     let word = bits | (parts[lane + 1u] << 8u) | (parts[lane + 2u] << 16u)
         | (parts[lane + 3u] << 24u);
-    shown[frame.fields[0].shown.y + number] = word;
+    visibility[frame.fields[0].visibility.y + number] = word;
     if word != 0u {
         atomicAdd(&progress[marked_word()], countOneBits(word));
     }

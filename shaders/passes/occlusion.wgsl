@@ -9,13 +9,16 @@
 // A tile is opaque if march would not read another entry for any of its pixels. Only tiles that the
 // pass has drawn in may have become opaque.
 @compute @workgroup_size(64)
-fn look(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+fn find_opaque(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+) {
     let number = id.x + id.y * groups.x * 64u;
     if number >= progress[progress_word(LISTED)] {
         return;
     }
-    let own = progress[listed_tile(number)];
-    let tile = vec2(own % frame.tiles.x, own / frame.tiles.x);
+    let index = progress[listed_tile(number)];
+    let tile = vec2(index % frame.tiles.x, index / frame.tiles.x);
     let first = tile * u32(TILE_STEP);
     let end = min(first + u32(TILE_STEP), frame.size);
     var least = 1.0;

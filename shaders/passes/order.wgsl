@@ -92,13 +92,13 @@ fn order(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     }
     loop {
         for (var i = start + gap; i < end; i++) {
-            let own = entries[i];
+            let entry = entries[i];
             var at = i;
-            while at >= start + gap && goes_before(own, entries[at - gap]) {
+            while at >= start + gap && goes_before(entry, entries[at - gap]) {
                 entries[at] = entries[at - gap];
                 at -= gap;
             }
-            entries[at] = own;
+            entries[at] = entry;
         }
         if gap == 1u {
             break;

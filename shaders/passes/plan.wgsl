@@ -74,12 +74,12 @@ fn accumulate(@builtin(local_invocation_index) band: u32) {
 
 // Replaces counts by the sums before them. Returns the sums including them.
 fn replace(at: u32, before: vec3<u32>) -> vec3<u32> {
-    let own = vec3(census[at], census[at + 1u], census[at + 2u]);
+    let counts = vec3(census[at], census[at + 1u], census[at + 2u]);
     census[at] = before.x;
     census[at + 1u] = before.y;
     census[at + 2u] = before.z;
-    let entries = before.x + own.x;
-    return vec3(entries, before.y + own.y + u32(entries < own.x), before.z + own.z);
+    let entries = before.x + counts.x;
+    return vec3(entries, before.y + counts.y + u32(entries < counts.x), before.z + counts.z);
 }
 
 // Returns the entries and record words of the batches that meet a band in the sheets first … end-1.

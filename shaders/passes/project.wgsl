@@ -74,9 +74,9 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     if number >= drawn[active_count(source.first_run)] {
         return;
     }
-    let own = active_run(source.first_run, number);
-    let run = drawn[own];
-    var mask = drawn[own + 1u];
+    let place = active_run(source.first_run, number);
+    let run = drawn[place];
+    var mask = drawn[place + 1u];
     var at = runs[run];
     let start = (run - source.first_run) * RUN;
     let words = record_words(source.flags);

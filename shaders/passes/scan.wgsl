@@ -35,17 +35,17 @@ fn spine(@builtin(local_invocation_index) lane: u32) {
     if lane == 0u {
         var before = 0u;
         for (var i = 0u; i < 256u; i++) {
-            let own = lane_sums[i];
+            let lane_sum = lane_sums[i];
             lane_sums[i] = before;
-            before += own;
+            before += lane_sum;
         }
     }
     workgroupBarrier();
     var before = lane_sums[lane];
     for (var i = lane * share; i < min((lane + 1u) * share, count); i++) {
-        let own = segments[i];
+        let segment_sum = segments[i];
         segments[i] = before;
-        before += own;
+        before += segment_sum;
     }
 }
 
@@ -57,8 +57,8 @@ fn spread(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var before = segments[id.x];
     for (var i = start; i < min(start + SEGMENT, size.x); i++) {
-        let own = numbers[i];
+        let value = numbers[i];
         numbers[i] = before;
-        before += own;
+        before += value;
     }
 }

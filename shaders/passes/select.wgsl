@@ -55,15 +55,15 @@ fn count(@builtin(global_invocation_id) id: vec3<u32>) {
     if block.first.z >= block.end.z {
         return;
     }
-    var found = 0u;
+    var visible = 0u;
     for (var z = block.first.z; z < block.end.z; z++) {
         for (var y = block.first.y; y < block.end.y; y++) {
             for (var x = block.first.x; x < block.end.x; x++) {
-                found += u32(is_visible(index_of(vec3(x, y, z))));
+                visible += u32(is_visible(index_of(vec3(x, y, z))));
             }
         }
     }
-    blocks[number] = found;
+    blocks[number] = visible;
 }
 
 @compute @workgroup_size(64)

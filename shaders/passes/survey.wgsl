@@ -22,11 +22,11 @@ fn survey(@builtin(global_invocation_id) id: vec3<u32>) {
     if number >= run_count.x {
         return;
     }
-    let own = needs[number];
-    if own.y == 0u {
+    let packed = needs[number];
+    if packed.y == 0u {
         return;
     }
-    let need = vec2(own.x, own.y & (ONE_SPLAT - 1u));
+    let need = vec2(packed.x, packed.y & (ONE_SPLAT - 1u));
     let span = run_spans[number];
     let first = sheet_of_corner(span.x);
     let last = sheet_of_corner(span.y);

@@ -212,8 +212,8 @@ fn add_cover(
     }
     let afar = clamp((distance - start) * (NEARER * frame.scale / size), 0.0, FARTHEST);
     // Of the share, what is seen.
-    let own = lanes * seen;
-    let near = own * exp(-afar);
+    let visible = lanes * seen;
+    let near = visible * exp(-afar);
     if HAS_RODS && side == ROD_SIDE {
         // Where rods meet, they fill the same part of a pixel.
         covers[r].back = max(covers[r].back, lanes * share);
@@ -223,11 +223,11 @@ fn add_cover(
         covers[r].back += lanes * share;
     }
     if HAS_IMAGES || HAS_RODS {
-        covers[r].seen += own;
+        covers[r].seen += visible;
     }
-    covers[r].red += own * color.x;
-    covers[r].green += own * color.y;
-    covers[r].blue += own * color.z;
+    covers[r].red += visible * color.x;
+    covers[r].green += visible * color.y;
+    covers[r].blue += visible * color.z;
     covers[r].weight += near;
     covers[r].distance += near * distance;
     covers[r].near_red += near * color.x;
@@ -238,61 +238,61 @@ fn add_cover(
 // Composites the facets of the front lane's sheet, behind the rest of the sheet, and shifts the
 // lane out.
 fn cover(r: u32, sheet: u32) {
-    let own = covers[r];
-    covers[r].front = shift(own.front);
-    covers[r].back = shift(own.back);
+    let sums = covers[r];
+    covers[r].front = shift(sums.front);
+    covers[r].back = shift(sums.back);
     if HAS_IMAGES || HAS_RODS {
-        covers[r].seen = shift(own.seen);
+        covers[r].seen = shift(sums.seen);
     }
-    covers[r].red = shift(own.red);
-    covers[r].green = shift(own.green);
-    covers[r].blue = shift(own.blue);
-    covers[r].weight = shift(own.weight);
-    covers[r].distance = shift(own.distance);
-    covers[r].near_red = shift(own.near_red);
-    covers[r].near_green = shift(own.near_green);
-    covers[r].near_blue = shift(own.near_blue);
-    var all = own.front.x + own.back.x;
+    covers[r].red = shift(sums.red);
+    covers[r].green = shift(sums.green);
+    covers[r].blue = shift(sums.blue);
+    covers[r].weight = shift(sums.weight);
+    covers[r].distance = shift(sums.distance);
+    covers[r].near_red = shift(sums.near_red);
+    covers[r].near_green = shift(sums.near_green);
+    covers[r].near_blue = shift(sums.near_blue);
+    var all = sums.front.x + sums.back.x;
     if !(all > 0.0) || sheet < stage.first_sheet || sheet >= stage.end_sheet {
         return;
     }
-    let weight = max(own.weight.x, 1e-37);
-    let seen = select(all, max(own.seen.x, 1e-37), HAS_IMAGES || HAS_RODS);
+    let weight = max(sums.weight.x, 1e-37);
+    let seen = select(all, max(sums.seen.x, 1e-37), HAS_IMAGES || HAS_RODS);
     if HAS_RODS {
         // Of rods, `back` has the largest share only.
         all = max(all, seen);
     }
     let hidden = clamp(all - 1.0, 0.0, 1.0);
-    let mean = vec3(own.red.x, own.green.x, own.blue.x) / seen;
-    let nearest = vec3(own.near_red.x, own.near_green.x, own.near_blue.x) / weight;
+    let mean = vec3(sums.red.x, sums.green.x, sums.blue.x) / seen;
+    let nearest = vec3(sums.near_red.x, sums.near_green.x, sums.near_blue.x) / weight;
     let color = clamp(mix(mean, nearest, hidden * hidden), vec3(0.0), vec3(1.0));
     let before = pixels[r].transmittance;
     // At a fold, both sides fill the same part of a pixel.
-    let filled = min(max(own.front.x, own.back.x), 1.0);
+    let filled = min(max(sums.front.x, sums.back.x), 1.0);
     let opacity = select(1.0, min(seen / filled, 1.0), HAS_IMAGES || HAS_RODS);
     let whole = opacity * opacity;
     let share = min(filled * mix(before, 1.0, whole * whole), before) * opacity;
     let left = before - share;
     pixels[r].color += share * color;
     if before > 0.5 && left <= 0.5 {
-        pixels[r].hit = own.distance.x / weight;
+        pixels[r].hit = sums.distance.x / weight;
     }
     pixels[r].transmittance = left;
 }
 
 fn save_facets(r: u32, at: u32) {
-    let own = covers[r];
-    colors[at] = own.front;
-    colors[at + 1u] = own.back;
-    colors[at + 2u] = own.red;
-    colors[at + 3u] = own.green;
-    colors[at + 4u] = own.blue;
-    colors[at + 5u] = own.weight;
-    colors[at + 6u] = own.distance;
-    colors[at + 7u] = own.near_red;
-    colors[at + 8u] = own.near_green;
-    colors[at + 9u] = own.near_blue;
-    colors[at + 10u] = own.seen;
+    let sums = covers[r];
+    colors[at] = sums.front;
+    colors[at + 1u] = sums.back;
+    colors[at + 2u] = sums.red;
+    colors[at + 3u] = sums.green;
+    colors[at + 4u] = sums.blue;
+    colors[at + 5u] = sums.weight;
+    colors[at + 6u] = sums.distance;
+    colors[at + 7u] = sums.near_red;
+    colors[at + 8u] = sums.near_green;
+    colors[at + 9u] = sums.near_blue;
+    colors[at + 10u] = sums.seen;
 }
 
 fn restore_facets(r: u32, at: u32) {

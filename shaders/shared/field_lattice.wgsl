@@ -3,7 +3,7 @@
 // axes, so four weights an axis replace the 64 kernels in reach. The gradient follows from the
 // first moments: ∂E[f]/∂p = (E[n·f] − E[n]·E[f])/σ², with n the sample's index along the axis.
 //
-// The shader that includes this file declares `shown`. It has a bit for each sample: whether
+// The shader that includes this file declares `visibility`. It has a bit for each sample: whether
 // something may be visible at the places nearest to that sample. The bits of each block of 4³
 // samples are two words. Behind them it has, for each entry of the transfer function's table, the
 // number of visible entries before it. Then follow, for each tile, the sheets in which something
@@ -224,9 +224,9 @@ const STRAIGHT: f32 = 64.0;
 // Returns the mean of a sheet: that of the cubic with the values and slopes along the ray of both
 // faces (Hermite). With the value in the middle it is exact to the fifth degree (Simpson's rule
 // with slopes).
-fn mean_of(r: u32, sheet: u32, own: ptr<function, Sheet>) -> f32 {
-    let front = (*own).front;
-    let back = (*own).back;
+fn mean_of(r: u32, sheet: u32, field: ptr<function, Sheet>) -> f32 {
+    let front = (*field).front;
+    let back = (*field).back;
     let thickness = planes[sheet + 1u] - planes[sheet];
     let sum = front.value + back.value;
     let bend = (front.along - back.along) * thickness;
@@ -235,14 +235,14 @@ fn mean_of(r: u32, sheet: u32, own: ptr<function, Sheet>) -> f32 {
     let turn = abs(back.slope - front.slope);
     let bent = max(max(abs(bend), abs(skew)), max(turn.x, turn.y)) > STRAIGHT;
     if POST || (GRADIENTS && bent) {
-        (*own).inside = field_at(r, 0.5 * (planes[sheet] + planes[sheet + 1u]));
-        return (sum * 7.0 + (*own).inside.value * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
+        (*field).inside = field_at(r, 0.5 * (planes[sheet] + planes[sheet + 1u]));
+        return (sum * 7.0 + (*field).inside.value * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
     }
     let along = (back.value - front.value) / thickness;
-    (*own).front.along = along + 0.5 * bend / thickness;
-    (*own).back.along = along - 0.5 * bend / thickness;
-    (*own).inside.along = along;
-    (*own).inside.slope = 0.5 * (front.slope + back.slope);
+    (*field).front.along = along + 0.5 * bend / thickness;
+    (*field).back.along = along - 0.5 * bend / thickness;
+    (*field).inside.along = along;
+    (*field).inside.slope = 0.5 * (front.slope + back.slope);
     return 0.5 * sum + bend * (1.0 / 12.0);
 }
 
@@ -253,7 +253,7 @@ fn sample_shows(place: vec3<f32>) -> bool {
     let block = at >> vec3(2u);
     let word = 2u * ((block.z * blocks.y + block.y) * blocks.x + block.x) + ((at.z >> 1u) & 1u);
     let bit = ((at.z & 1u) << 4u) | ((at.y & 3u) << 2u) | (at.x & 3u);
-    return ((shown[word] >> bit) & 1u) != 0u;
+    return ((visibility[word] >> bit) & 1u) != 0u;
 }
 
 // Whether something may be visible at a pixel in a sheet: around its front, its middle and its
@@ -290,8 +290,8 @@ fn range_shows(sheet: u32) -> bool {
         vec2(0.0),
         vec2(frame.fields[0].transfer.z),
     );
-    let before = frame.fields[0].shown.x;
-    return shown[before + u32(ends.y) + 1u] > shown[before + u32(ends.x)];
+    let before = frame.fields[0].visibility.x;
+    return visibility[before + u32(ends.y) + 1u] > visibility[before + u32(ends.x)];
 }
 
 // Returns the next sheet from `sheet` on in which something may be visible in a tile, or `end` if
@@ -300,39 +300,39 @@ fn next_marked(tile: u32, sheet: u32, end: u32) -> u32 {
     if sheet >= end {
         return end;
     }
-    let marks = frame.fields[0].shown.y + tile * frame.fields[0].shown.z;
+    let marks = frame.fields[0].visibility.y + tile * frame.fields[0].visibility.z;
     var word = sheet >> 5u;
-    var bits = shown[marks + word] & (0xffffffffu << (sheet & 31u));
+    var bits = visibility[marks + word] & (0xffffffffu << (sheet & 31u));
     loop {
         if bits != 0u || (word + 1u) * 32u >= end {
             break;
         }
         word++;
-        bits = shown[marks + word];
+        bits = visibility[marks + word];
     }
     return select(end, min(word * 32u + firstTrailingBit(bits), end), bits != 0u);
 }
 
 // Resolves the field of the sheet between the two planes that were evaluated last. The shader that
 // includes this file defines shows_field, which says whether the field is wanted there.
-fn resolve_field(r: u32, f: u32, sheet: u32, own: ptr<function, Sheet>) {
-    (*own).has_value = shows_field(r, sheet);
-    (*own).filling = 1.0;
+fn resolve_field(r: u32, f: u32, sheet: u32, field: ptr<function, Sheet>) {
+    (*field).has_value = shows_field(r, sheet);
+    (*field).filling = 1.0;
     if LABELS {
-        resolve_label(r, sheet, own);
+        resolve_label(r, sheet, field);
         return;
     }
-    (*own).front = pixels[r].fields[0].front;
-    (*own).back = pixels[r].fields[0].behind;
-    (*own).value = mean_of(r, sheet, own);
+    (*field).front = pixels[r].fields[0].front;
+    (*field).back = pixels[r].fields[0].behind;
+    (*field).value = mean_of(r, sheet, field);
 }
 
 // Adds a sheet that contains only the field to the picture.
 fn composite_field(r: u32, sheet: u32) {
-    var own: Sheet;
-    resolve_field(r, 0u, sheet, &own);
+    var field: Sheet;
+    resolve_field(r, 0u, sheet, &field);
     var mixture: Mixture;
     mixture.hit = NO_HIT;
-    mix_field(r, 0u, sheet, own, &mixture);
+    mix_field(r, 0u, sheet, field, &mixture);
     composite(r, sheet, mixture);
 }

@@ -13,9 +13,9 @@ fn resolve_face(r: u32, f: u32, sheet: u32) -> Face {
     face.has_value = weight > frame.fields[f].isotropic.w;
     face.value = pixels[r].fields[f].face_value.x * inverse;
     if GRADIENTS && !CENTRAL {
-        let own = pixels[r].fields[f];
-        let slope = face.value * vec2(own.weight_x.x, own.weight_y.x)
-            - vec2(own.value_x.x, own.value_y.x);
+        let sums = pixels[r].fields[f];
+        let slope = face.value * vec2(sums.weight_x.x, sums.weight_y.x)
+            - vec2(sums.value_x.x, sums.value_y.x);
         face.slope = slope_on_plane(r, f, slope * inverse, planes[sheet + 1u]);
         pixels[r].fields[f].weight_x = shift_faces(pixels[r].fields[f].weight_x);
         pixels[r].fields[f].weight_y = shift_faces(pixels[r].fields[f].weight_y);
@@ -27,16 +27,16 @@ fn resolve_face(r: u32, f: u32, sheet: u32) -> Face {
     return face;
 }
 
-fn resolve_field(r: u32, f: u32, sheet: u32, own: ptr<function, Sheet>) {
+fn resolve_field(r: u32, f: u32, sheet: u32, field: ptr<function, Sheet>) {
     let thickness = planes[sheet + 1u] - planes[sheet];
     let weight = pixels[r].fields[f].weight.x;
-    (*own).has_value = weight > frame.fields[f].isotropic.w * thickness;
-    (*own).value = pixels[r].fields[f].value.x / max(weight, 1e-37);
+    (*field).has_value = weight > frame.fields[f].isotropic.w * thickness;
+    (*field).value = pixels[r].fields[f].value.x / max(weight, 1e-37);
     // A lattice fills its box.
     let is_full = LATTICE && (!SAMPLES || frame.fields[f].low.w > 0.0);
-    (*own).filling = select(min(weight / thickness, 1.0), 1.0, is_full);
-    (*own).front = pixels[r].fields[f].front;
-    (*own).back = resolve_face(r, f, sheet);
+    (*field).filling = select(min(weight / thickness, 1.0), 1.0, is_full);
+    (*field).front = pixels[r].fields[f].front;
+    (*field).back = resolve_face(r, f, sheet);
     pixels[r].fields[f].weight = shift(pixels[r].fields[f].weight);
     pixels[r].fields[f].value = shift(pixels[r].fields[f].value);
 }

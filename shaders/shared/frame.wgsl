@@ -80,12 +80,12 @@ struct Field {
     // Volumes in bricks: the shares of the finer and of the coarser level.
     levels: vec4<f32>,
     // A gathered lattice: samples along x, y and z; one over the kernel's variance in squared
-    // steps, its weights one and two steps from its centre. The starts of the parts of `shown`:
-    // visibility of the transfer function's entries, the tiles' sheets; and the number of words of
-    // a tile's sheets.
+    // steps, its weights one and two steps from its centre. The starts of the parts of the
+    // buffer `visibility`: the transfer function's entries, the tiles' sheets; and the number of
+    // words of a tile's sheets.
     lattice: vec4<u32>,
     taps: vec4<f32>,
-    shown: vec4<u32>,
+    visibility: vec4<u32>,
     // By ascending value.
     isosurfaces: array<Isosurface, 8>,
 }

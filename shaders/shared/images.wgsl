@@ -5,7 +5,7 @@
 @group(0) @binding(11) var image_texels: texture_2d<u32>;
 // What each facet shows, in three words of four: the places of its corners as 32-bit floats; the
 // first texel of the image, its width and height, and how many coarser levels follow.
-@group(0) @binding(12) var facets_shown: texture_2d<u32>;
+@group(0) @binding(12) var facet_images: texture_2d<u32>;
 
 // Most means along the longer side of a pixel's part of an image.
 const MOST_ALONG: f32 = 32.0;
@@ -16,21 +16,21 @@ var<private> image_iterations: u32;
 // Returns what the images of an entry cost, in entries of six iterations, against a driver's limit.
 // The driver counts together what eight lanes do, and each may see other facets.
 fn image_entries() -> u32 {
-    let own = image_iterations;
+    let iterations = image_iterations;
     image_iterations = 0u;
-    return own * 8u / 6u;
+    return iterations * 8u / 6u;
 }
 
-fn shown_word(at: u32) -> vec4<u32> {
-    let width = textureDimensions(facets_shown).x;
-    return textureLoad(facets_shown, vec2(at % width, at / width), 0);
+fn facet_word(at: u32) -> vec4<u32> {
+    let width = textureDimensions(facet_images).x;
+    return textureLoad(facet_images, vec2(at % width, at / width), 0);
 }
 
 // Returns a texel: its colour times its opacity, and its opacity.
 fn image_texel(at: u32) -> vec4<f32> {
     let width = textureDimensions(image_texels).x;
-    let own = unpack4x8unorm(textureLoad(image_texels, vec2(at % width, at / width), 0).x);
-    return vec4(own.xyz * own.w, own.w);
+    let texel = unpack4x8unorm(textureLoad(image_texels, vec2(at % width, at / width), 0).x);
+    return vec4(texel.xyz * texel.w, texel.w);
 }
 
 // Returns the colour of a level at a place, interpolated between four texels.
@@ -59,9 +59,9 @@ fn facet_tint(
     right: vec3<f32>,
     down: vec3<f32>,
 ) -> vec4<f32> {
-    let places = bitcast<vec4<f32>>(shown_word(3u * number));
-    let more = shown_word(3u * number + 1u);
-    let image = shown_word(3u * number + 2u);
+    let places = bitcast<vec4<f32>>(facet_word(3u * number));
+    let more = facet_word(3u * number + 1u);
+    let image = facet_word(3u * number + 2u);
     var size = image.yz;
     if size.x == 0u {
         return vec4(1.0);

@@ -70,16 +70,16 @@ struct Added {
     value_y: vec3<f32>,
 }
 
-fn add_to_field(r: u32, f: u32, own: Added) {
-    pixels[r].fields[f].weight += own.weight;
-    pixels[r].fields[f].value += own.value;
-    pixels[r].fields[f].face_weight += own.face_weight;
-    pixels[r].fields[f].face_value += own.face_value;
+fn add_to_field(r: u32, f: u32, added: Added) {
+    pixels[r].fields[f].weight += added.weight;
+    pixels[r].fields[f].value += added.value;
+    pixels[r].fields[f].face_weight += added.face_weight;
+    pixels[r].fields[f].face_value += added.face_value;
     if GRADIENTS && !CENTRAL {
-        pixels[r].fields[f].weight_x += own.weight_x;
-        pixels[r].fields[f].weight_y += own.weight_y;
-        pixels[r].fields[f].value_x += own.value_x;
-        pixels[r].fields[f].value_y += own.value_y;
+        pixels[r].fields[f].weight_x += added.weight_x;
+        pixels[r].fields[f].weight_y += added.weight_y;
+        pixels[r].fields[f].value_x += added.value_x;
+        pixels[r].fields[f].value_y += added.value_y;
     }
 }
 
@@ -162,25 +162,25 @@ fn add_isotropic(f: u32, at: u32, count: u32, front: u32, first_pixel: vec2<i32>
         let cosine2 = pixels[r].cosine * pixels[r].cosine;
         var sum: Added;
         for (var i = 0u; i < TOGETHER; i++) {
-            let own = samples[i];
-            let d = vec2<f32>(first_pixel + vec2(0, i32(r))) + 0.5 - own.at;
+            let sample = samples[i];
+            let d = vec2<f32>(first_pixel + vec2(0, i32(r))) + 0.5 - sample.at;
             let turned = vec2(
-                own.form.x * d.x + own.form.y * d.y,
-                own.form.y * d.x + own.form.z * d.y,
+                sample.form.x * d.x + sample.form.y * d.y,
+                sample.form.y * d.x + sample.form.z * d.y,
             );
             let rho2 = dot(d, turned) * cosine2;
-            let e = select(0.0, exp(-0.5 * rho2), rho2 <= own.extent2);
-            let v = e * own.value;
-            sum.weight += own.along * e;
-            sum.value += own.along * v;
-            sum.face_weight += own.on_plane * e;
-            sum.face_value += own.on_plane * v;
+            let e = select(0.0, exp(-0.5 * rho2), rho2 <= sample.extent2);
+            let v = e * sample.value;
+            sum.weight += sample.along * e;
+            sum.value += sample.along * v;
+            sum.face_weight += sample.on_plane * e;
+            sum.face_value += sample.on_plane * v;
             if GRADIENTS && !CENTRAL {
                 let slope = turned * cosine2;
-                sum.weight_x += own.on_plane * (e * slope.x);
-                sum.weight_y += own.on_plane * (e * slope.y);
-                sum.value_x += own.on_plane * (v * slope.x);
-                sum.value_y += own.on_plane * (v * slope.y);
+                sum.weight_x += sample.on_plane * (e * slope.x);
+                sum.weight_y += sample.on_plane * (e * slope.y);
+                sum.value_x += sample.on_plane * (v * slope.x);
+                sum.value_y += sample.on_plane * (v * slope.y);
             }
         }
         add_to_field(r, f, sum);
@@ -266,9 +266,9 @@ fn payload_of(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
         }
     }
     if CLASSIFIED && !splat.is_radiance {
-        let shown = classify(0u, a.w);
-        splat.color = shown.xyz;
-        splat.strength = shown.w * d.w * frame.fields[0].kernel.z;
+        let classified = classify(0u, a.w);
+        splat.color = classified.xyz;
+        splat.strength = classified.w * d.w * frame.fields[0].kernel.z;
     }
     if RADIANCE_PAYLOAD && any(splat.normal != vec3(0.0)) {
         splat.facing = facing_weight(splat.normal, a.xyz);
@@ -424,18 +424,18 @@ fn add_loaded(f: u32, splat: Loaded, first_pixel: vec2<i32>) {
             steep *= splat.weight;
             let nearest = cross(v, beta) * (inverse * inverse);
             let unit = beta * inverse;
-            var own: Added;
-            own.weight = section;
-            own.value = section * splat.strength;
+            var added: Added;
+            added.weight = section;
+            added.value = section * splat.strength;
             if SLOPES {
                 let slope_along = dot(splat.slope, unit);
                 value += dot(splat.slope, nearest) + t * slope_along;
                 let g = on_plane;
                 let carried = vec4(-g.x, g.x - g.y, g.y - g.z, g.z) * slope_along;
-                own.value += section * dot(splat.slope, nearest) + carried * length_of;
+                added.value += section * dot(splat.slope, nearest) + carried * length_of;
             }
-            own.face_weight = on_plane;
-            own.face_value = on_plane * value;
+            added.face_weight = on_plane;
+            added.face_value = on_plane * value;
             if GRADIENTS && !CENTRAL {
                 // The change of x′ on a plane per pixel to the right and down.
                 var across = array<vec3<f32>, 2>(m0, m1);
@@ -448,16 +448,16 @@ fn add_loaded(f: u32, splat: Loaded, first_pixel: vec2<i32>) {
                 }
                 let x = size * (dot(nearest, across[0]) + t * dot(unit, across[0]));
                 let y = size * (dot(nearest, across[1]) + t * dot(unit, across[1]));
-                own.weight_x = steep * x;
-                own.weight_y = steep * y;
-                own.value_x = steep * x * value;
-                own.value_y = steep * y * value;
+                added.weight_x = steep * x;
+                added.weight_y = steep * y;
+                added.value_x = steep * x * value;
+                added.value_y = steep * y * value;
                 if SLOPES {
-                    own.value_x -= on_plane * size * dot(splat.slope, across[0]);
-                    own.value_y -= on_plane * size * dot(splat.slope, across[1]);
+                    added.value_x -= on_plane * size * dot(splat.slope, across[0]);
+                    added.value_y -= on_plane * size * dot(splat.slope, across[1]);
                 }
             }
-            add_to_field(r, f, own);
+            add_to_field(r, f, added);
         }
     }
 }

@@ -23,8 +23,8 @@ fn shares_at(first: i32, y: i32, z: i32) -> vec4<f32> {
 
 // Returns four samples of the mask of a label, as row_at has it.
 fn mask_at(taps: Taps, label: f32, y: i32, z: i32) -> vec4<f32> {
-    let own = shares_at(taps.first.x, y, z);
-    return select(255.0 - own, own, row_at(taps, y, z) == vec4(label));
+    let share = shares_at(taps.first.x, y, z);
+    return select(255.0 - share, share, row_at(taps, y, z) == vec4(label));
 }
 
 // Returns the change of a label's mask per step along each axis. In loops, because Mesa's software
@@ -54,7 +54,7 @@ fn label_at(taps: Taps, place: vec3<f32>) -> f32 {
 }
 
 // Resolves a sheet: the label in the middle of the part of the ray that counts.
-fn resolve_label(r: u32, sheet: u32, own: ptr<function, Sheet>) {
+fn resolve_label(r: u32, sheet: u32, field: ptr<function, Sheet>) {
     let begin = max(planes[sheet], pixels[r].fields[0].inside.x);
     let end = min(planes[sheet + 1u], pixels[r].fields[0].inside.y);
     let distance = 0.5 * (begin + end);
@@ -64,11 +64,11 @@ fn resolve_label(r: u32, sheet: u32, own: ptr<function, Sheet>) {
     face.has_value = true;
     face.value = counted_mean(label);
     // What is not seen needs no light.
-    if GRADIENTS && (*own).has_value && classify(0u, face.value).w > 0.0 {
+    if GRADIENTS && (*field).has_value && classify(0u, face.value).w > 0.0 {
         add_gradient(r, mask_slopes(taps, label), &face);
     }
-    (*own).front = face;
-    (*own).inside = face;
-    (*own).back = face;
-    (*own).value = face.value;
+    (*field).front = face;
+    (*field).inside = face;
+    (*field).back = face;
+    (*field).value = face.value;
 }

@@ -1,16 +1,16 @@
 // March with a gathered lattice: its field is evaluated in each sheet that march closes, and in the
 // sheets between.
 
-@group(0) @binding(10) var<storage, read> shown: array<u32>;
+@group(0) @binding(10) var<storage, read> visibility: array<u32>;
 
 // The field of the sheets before this one is drawn already.
 var<private> next_field: u32;
 // The plane of pixels[r].fields[0].behind, and the current tile.
 var<private> held_plane: u32;
-var<private> own_tile: u32;
+var<private> current_tile: u32;
 
 fn begin_field(tile: u32) {
-    own_tile = tile;
+    current_tile = tile;
     held_plane = 0u;
     next_field = max(atomicLoad(&progress[next_of(tile)]), 1u);
 }
@@ -21,7 +21,7 @@ fn end_field(tile: u32) {
 }
 
 // Evaluates the field on the planes of a sheet.
-fn look_at(sheet: u32) {
+fn evaluate_sheet(sheet: u32) {
     var plane = select(sheet, sheet + 1u, held_plane == sheet);
     loop {
         for (var r = 0u; r < ROWS; r++) {
@@ -39,17 +39,17 @@ fn look_at(sheet: u32) {
 // Draws the visible sheets of the field before `end`. Returns their number.
 fn pass_field_before(end: u32) -> u32 {
     var count = 0u;
-    var sheet = next_marked(own_tile, next_field, end);
+    var sheet = next_marked(current_tile, next_field, end);
     loop {
         if sheet >= end {
             break;
         }
-        look_at(sheet);
+        evaluate_sheet(sheet);
         for (var r = 0u; r < ROWS; r++) {
             composite_field(r, sheet);
         }
         count++;
-        sheet = next_marked(own_tile, sheet + 1u, end);
+        sheet = next_marked(current_tile, sheet + 1u, end);
     }
     next_field = max(next_field, end);
     return count;
@@ -61,8 +61,8 @@ fn open_field(sheet: u32) -> u32 {
         return 0u;
     }
     let count = pass_field_before(sheet);
-    if next_marked(own_tile, sheet, sheet + 1u) == sheet {
-        look_at(sheet);
+    if next_marked(current_tile, sheet, sheet + 1u) == sheet {
+        evaluate_sheet(sheet);
     }
     next_field = sheet + 1u;
     return count;

@@ -121,14 +121,14 @@ fn share(index: u32) -> u32 {
     if above == 0u {
         return 0u;
     }
-    var own = 0u;
+    var refined = 0u;
     if has_children(node) {
-        own = refinement(pixels(node.center, node.radius, node.size));
+        refined = refinement(pixels(node.center, node.radius, node.size));
     }
-    if above <= own || is_hidden(index, node) {
+    if above <= refined || is_hidden(index, node) {
         return 0u;
     }
-    return above - own;
+    return above - refined;
 }
 
 // Returns the nodes of a batch of the participating slots: the first, and the one behind the last.

@@ -22,9 +22,10 @@ fn store_pixel(r: u32, index: u32) {
         if hit == NO_VALUE {
             hit = STORED_NONE;
         } else {
-            let shown = classify(0u, hit);
+            let classified = classify(0u, hit);
             // The opacity of a unit of length, as in the transfer function.
-            color = vec4(shown.xyz, 1.0) * (1.0 - exp(-shown.w * frame.fields[0].kernel.w));
+            color = vec4(classified.xyz, 1.0)
+                * (1.0 - exp(-classified.w * frame.fields[0].kernel.w));
             hit = select(hit, STORED_ZERO, hit == 0.0);
         }
     } else if AXIS_SHEETS && hit != depths[index] {

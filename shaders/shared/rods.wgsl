@@ -56,7 +56,7 @@ fn add_rod(entry: u32, front: u32, first_pixel: vec2<i32>) {
         }
         var distance = before;
         var part = nearest;
-        var own_normal = normal;
+        var surface_normal = normal;
         if is_round && share < 1.0 {
             // On the outline of round ends at joints, the outline is that of the other rod.
             let slack = pixel * OVERLAP;
@@ -86,15 +86,15 @@ fn add_rod(entry: u32, front: u32, first_pixel: vec2<i32>) {
             let off = to + across * part;
             let height = sqrt(max(radius * radius - dot(off, off), 0.0));
             distance = to_depth + depth * part - height;
-            own_normal = -off - way * height;
+            surface_normal = -off - way * height;
         }
         if CLIPS + HOLES > 0u {
             counts = is_kept(r, distance);
         }
         if counts {
             var color = mix(color_from, color_to, part);
-            if SURFACE_SHADED && any(own_normal != vec3(0.0)) {
-                color = lit(color, own_normal, way, frame.surface_shade);
+            if SURFACE_SHADED && any(surface_normal != vec3(0.0)) {
+                color = lit(color, surface_normal, way, frame.surface_shade);
             }
             add_cover(r, front, continued, ROD_SIDE, share, share, distance, color);
         }

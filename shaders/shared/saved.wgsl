@@ -85,19 +85,19 @@ fn restore(slot: u32, lane: vec2<u32>) -> vec4<u32> {
 }
 
 fn save_field(r: u32, f: u32, at: u32) {
-    let own = pixels[r].fields[f];
-    let front = own.front;
+    let field = pixels[r].fields[f];
+    let front = field.front;
     if SUMS {
-        colors[at] = own.weight;
-        colors[at + 1u] = own.value;
-        colors[at + 2u] = vec4(own.face_weight, front.value);
-        colors[at + 3u] = vec4(own.face_value, select(0.0, 1.0, front.has_value));
+        colors[at] = field.weight;
+        colors[at + 1u] = field.value;
+        colors[at + 2u] = vec4(field.face_weight, front.value);
+        colors[at + 3u] = vec4(field.face_value, select(0.0, 1.0, front.has_value));
     }
     if SUMS && GRADIENTS {
-        colors[at + 4u] = vec4(own.weight_x, front.slope.x);
-        colors[at + 5u] = vec4(own.weight_y, front.slope.y);
-        colors[at + 6u] = vec4(own.value_x, 0.0);
-        colors[at + 7u] = vec4(own.value_y, 0.0);
+        colors[at + 4u] = vec4(field.weight_x, front.slope.x);
+        colors[at + 5u] = vec4(field.weight_y, front.slope.y);
+        colors[at + 6u] = vec4(field.value_x, 0.0);
+        colors[at + 7u] = vec4(field.value_y, 0.0);
     }
 }
 

@@ -51,8 +51,8 @@ fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f3
 
 // The same for the gradient of the field.
 fn lit_field(r: u32, f: u32, color: vec3<f32>, gradient: vec3<f32>) -> vec3<f32> {
-    let own = frame.fields[f].shade;
-    return lit_from(color, gradient, direction_of(r), own, frame.fields[f].certain.xy);
+    let shade = frame.fields[f].shade;
+    return lit_from(color, gradient, direction_of(r), shade, frame.fields[f].certain.xy);
 }
 
 // The same for a part of a sheet, in its mean light: gradients change more within a part than
@@ -130,10 +130,10 @@ fn resolve_radiance(r: u32, sheet: u32) -> Mixture {
             let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
             // Splats without a normal keep their colours.
             if dot(normal, normal) > 0.0 {
-                let shown = lit(color, normal, direction_of(r), frame.surface_shade);
+                let lit_color = lit(color, normal, direction_of(r), frame.surface_shade);
                 // The share of what is lit: Gaussians are not.
                 let share = LIT_BY * length(normal) / max(pixels[r].facing.x, 1e-12);
-                color = mix(color, shown, select(1.0, min(share, 1.0), TRAINED));
+                color = mix(color, lit_color, select(1.0, min(share, 1.0), TRAINED));
             }
             pixels[r].normal_x = shift(pixels[r].normal_x);
             pixels[r].normal_y = shift(pixels[r].normal_y);
@@ -206,7 +206,7 @@ fn pass_piece(
     r: u32,
     f: u32,
     sheet: u32,
-    own: Sheet,
+    field: Sheet,
     begin: f32,
     end: f32,
     medium: ptr<function, Medium>,
@@ -224,22 +224,22 @@ fn pass_piece(
         if MAXIMUM {
             (*medium).peak = max((*medium).peak, max(value, next));
         } else {
-            var shown: vec4<f32>;
+            var classified: vec4<f32>;
             if POST {
-                shown = classify(f, own.value);
-                shown = vec4(shown.xyz * shown.w, shown.w);
+                classified = classify(f, field.value);
+                classified = vec4(classified.xyz * classified.w, classified.w);
             } else {
-                shown = classify_between(f, value, next);
+                classified = classify_between(f, value, next);
             }
             var normal: vec3<f32>;
             if GRADIENT_OPACITY {
                 normal = gradient_at(r, f, *medium, 0.5 * (place + next_place));
-                shown *= gradient_factor(f, length(normal));
+                classified *= gradient_factor(f, length(normal));
             }
             // Differences of integrals: rounding remainders, where nothing is visible, must stay a
             // colour.
-            let depth = max(shown.w, 0.0) * step * own.filling;
-            var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
+            let depth = max(classified.w, 0.0) * step * field.filling;
+            var color = clamp(classified.xyz / max(classified.w, 1e-20), vec3(0.0), vec3(1.0));
             if VOLUME_SHADED {
                 color = lit_piece(r, f, *medium, color, place, next_place);
             }
@@ -317,28 +317,28 @@ fn pass_surface(
 }
 
 // Returns a field's medium of a sheet, inside the box of the samples and what the clips leave.
-fn pass_field(r: u32, f: u32, sheet: u32, own: Sheet) -> Medium {
+fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet) -> Medium {
     var medium: Medium;
     medium.through = 1.0;
     medium.peak = NO_VALUE;
     medium.hit = NO_HIT;
-    let front = select(own.value, own.front.value, own.front.has_value);
-    let back = select(own.value, own.back.value, own.back.has_value);
-    medium.curve = vec3(front, 1.5 * own.value - 0.25 * (front + back), back);
+    let front = select(field.value, field.front.value, field.front.has_value);
+    let back = select(field.value, field.back.value, field.back.has_value);
+    medium.curve = vec3(front, 1.5 * field.value - 0.25 * (front + back), back);
     medium.thickness = planes[sheet + 1u] - planes[sheet];
-    if GRADIENTS && (own.front.has_value || own.back.has_value) {
-        medium.front = select(own.back.slope, own.front.slope, own.front.has_value);
-        medium.back = select(own.front.slope, own.back.slope, own.back.has_value);
+    if GRADIENTS && (field.front.has_value || field.back.has_value) {
+        medium.front = select(field.back.slope, field.front.slope, field.front.has_value);
+        medium.back = select(field.front.slope, field.back.slope, field.back.has_value);
         if GATHER {
-            medium.inside = own.inside.slope;
-            medium.along = vec3(own.front.along, own.inside.along, own.back.along);
+            medium.inside = field.inside.slope;
+            medium.along = vec3(field.front.along, field.inside.along, field.back.along);
         }
     }
     var begin = max(planes[sheet], pixels[r].fields[f].inside.x);
     let last = min(planes[sheet + 1u], pixels[r].fields[f].inside.y);
     if HOLES == 0u {
         if begin < last {
-            pass_piece(r, f, sheet, own, begin, last, &medium);
+            pass_piece(r, f, sheet, field, begin, last, &medium);
         }
         return medium;
     }
@@ -354,7 +354,7 @@ fn pass_field(r: u32, f: u32, sheet: u32, own: Sheet) -> Medium {
             end = select(end, min(end, hole.x), hole.x > begin && hole.x < hole.y);
         }
         if begin < end {
-            pass_piece(r, f, sheet, own, begin, end, &medium);
+            pass_piece(r, f, sheet, field, begin, end, &medium);
         }
         begin = max(begin, end);
     }
@@ -362,12 +362,12 @@ fn pass_field(r: u32, f: u32, sheet: u32, own: Sheet) -> Medium {
 }
 
 // Adds a field's medium of a sheet to the mixture.
-fn mix_field(r: u32, f: u32, sheet: u32, own: Sheet, mixture: ptr<function, Mixture>) {
+fn mix_field(r: u32, f: u32, sheet: u32, field: Sheet, mixture: ptr<function, Mixture>) {
     // A gathered field may remain from sheets before the pass.
-    if !own.has_value || !(GATHER || is_in_pass(sheet)) {
+    if !field.has_value || !(GATHER || is_in_pass(sheet)) {
         return;
     }
-    var medium = pass_field(r, f, sheet, own);
+    var medium = pass_field(r, f, sheet, field);
     if MAXIMUM {
         pixels[r].hit = max(pixels[r].hit, medium.peak);
         return;

@@ -48,12 +48,12 @@ fn thinned(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, center: vec3<f32>, blur2: f
 
 // Returns a splat in view space, widened.
 fn splat_at(index: u32) -> Candidate {
-    let own = splats[index];
-    let b = own.factor_a;
-    let d = own.factor_b;
+    let packed = splats[index];
+    let b = packed.factor_a;
+    let d = packed.factor_b;
     let to_view = mat3x3<f32>(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz);
     var splat: Candidate;
-    splat.center = to_view * own.center + source.origin.xyz;
+    splat.center = to_view * packed.center + source.origin.xyz;
     // Columns of B, rotated into view space; B = (b00 0 0, b10 b11 0, b20 b21 b22) row by row.
     let c0 = to_view * vec3(b.x, b.y, b.w);
     let c1 = to_view * vec3(0.0, b.z, d.x);
@@ -73,9 +73,9 @@ fn splat_at(index: u32) -> Candidate {
     splat.covariance.yz = c0.y * c0.z + c1.y * c1.z + c2.y * c2.z;
     splat.covariance.zz = c0.z * c0.z + c1.z * c1.z + c2.z * c2.z + along * along;
     splat.extent = source.extent;
-    splat.strength = own.strength;
-    splat.color = own.color;
-    splat.normal = own.normal;
+    splat.strength = packed.strength;
+    splat.color = packed.color;
+    splat.normal = packed.normal;
     if SAMPLES && (source.flags & RADIANCE) == 0u {
         // The slope is in the splat's own whitened space; B⁻ᵀ maps it to the set's space.
         let weight = unpack2x16float(splat.color).x;

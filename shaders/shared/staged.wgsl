@@ -94,35 +94,35 @@ fn staged_vector(place: u32, vector: u32) -> vec4<f32> {
     return staged[vector * STAGED_ENTRIES + place - staged_first];
 }
 
-fn stage_round(lane: u32, own: Round) {
-    stage_vector(lane, 0u, vec4(own.at, own.value, own.extent2));
-    stage_vector(lane, 1u, vec4(own.form, 0.0));
-    stage_vector(lane, 2u, own.along);
-    stage_vector(lane, 3u, vec4(own.on_plane, 0.0));
+fn stage_round(lane: u32, sample: Round) {
+    stage_vector(lane, 0u, vec4(sample.at, sample.value, sample.extent2));
+    stage_vector(lane, 1u, vec4(sample.form, 0.0));
+    stage_vector(lane, 2u, sample.along);
+    stage_vector(lane, 3u, vec4(sample.on_plane, 0.0));
 }
 
 fn staged_round(place: u32) -> Round {
     let first = staged_vector(place, 0u);
-    var own: Round;
-    own.at = first.xy;
-    own.value = first.z;
-    own.extent2 = first.w;
-    own.form = staged_vector(place, 1u).xyz;
-    own.along = staged_vector(place, 2u);
-    own.on_plane = staged_vector(place, 3u).xyz;
-    return own;
+    var sample: Round;
+    sample.at = first.xy;
+    sample.value = first.z;
+    sample.extent2 = first.w;
+    sample.form = staged_vector(place, 1u).xyz;
+    sample.along = staged_vector(place, 2u);
+    sample.on_plane = staged_vector(place, 3u).xyz;
+    return sample;
 }
 
-fn stage_general(lane: u32, own: Loaded) {
-    stage_vector(lane, 0u, vec4(own.at, own.extent2, select(-1.0, 1.0, own.is_radiance)));
-    stage_vector(lane, 1u, vec4(own.v0, own.m0.x));
-    stage_vector(lane, 2u, vec4(own.v1, own.m0.y));
-    stage_vector(lane, 3u, vec4(own.m0.z, own.m1.yz, own.m2.z));
-    stage_vector(lane, 4u, vec4(own.whitened, own.base));
-    stage_vector(lane, 5u, vec4(own.near, own.distance));
-    stage_vector(lane, 6u, vec4(own.color, own.strength));
-    stage_vector(lane, 7u, vec4(own.normal, own.facing));
-    stage_vector(lane, 8u, vec4(own.slope, own.weight));
+fn stage_general(lane: u32, splat: Loaded) {
+    stage_vector(lane, 0u, vec4(splat.at, splat.extent2, select(-1.0, 1.0, splat.is_radiance)));
+    stage_vector(lane, 1u, vec4(splat.v0, splat.m0.x));
+    stage_vector(lane, 2u, vec4(splat.v1, splat.m0.y));
+    stage_vector(lane, 3u, vec4(splat.m0.z, splat.m1.yz, splat.m2.z));
+    stage_vector(lane, 4u, vec4(splat.whitened, splat.base));
+    stage_vector(lane, 5u, vec4(splat.near, splat.distance));
+    stage_vector(lane, 6u, vec4(splat.color, splat.strength));
+    stage_vector(lane, 7u, vec4(splat.normal, splat.facing));
+    stage_vector(lane, 8u, vec4(splat.slope, splat.weight));
 }
 
 fn staged_general(place: u32) -> Loaded {
@@ -135,24 +135,24 @@ fn staged_general(place: u32) -> Loaded {
     let color = staged_vector(place, 6u);
     let normal = staged_vector(place, 7u);
     let slope = staged_vector(place, 8u);
-    var own: Loaded;
-    own.at = at.xy;
-    own.extent2 = at.z;
-    own.is_radiance = RADIANCE_PAYLOAD && (!(SUMS || CLASSIFIED) || at.w > 0.0);
-    own.v0 = right.xyz;
-    own.v1 = down.xyz;
-    own.m0 = vec3(right.w, down.w, ray.x);
-    own.m1 = vec3(0.0, ray.yz);
-    own.m2 = vec3(0.0, 0.0, ray.w);
-    own.whitened = middle.xyz;
-    own.base = middle.w;
-    own.near = near.xyz;
-    own.distance = near.w;
-    own.color = color.xyz;
-    own.strength = color.w;
-    own.normal = normal.xyz;
-    own.facing = normal.w;
-    own.slope = slope.xyz;
-    own.weight = slope.w;
-    return own;
+    var splat: Loaded;
+    splat.at = at.xy;
+    splat.extent2 = at.z;
+    splat.is_radiance = RADIANCE_PAYLOAD && (!(SUMS || CLASSIFIED) || at.w > 0.0);
+    splat.v0 = right.xyz;
+    splat.v1 = down.xyz;
+    splat.m0 = vec3(right.w, down.w, ray.x);
+    splat.m1 = vec3(0.0, ray.yz);
+    splat.m2 = vec3(0.0, 0.0, ray.w);
+    splat.whitened = middle.xyz;
+    splat.base = middle.w;
+    splat.near = near.xyz;
+    splat.distance = near.w;
+    splat.color = color.xyz;
+    splat.strength = color.w;
+    splat.normal = normal.xyz;
+    splat.facing = normal.w;
+    splat.slope = slope.xyz;
+    splat.weight = slope.w;
+    return splat;
 }

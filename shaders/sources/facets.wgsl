@@ -18,12 +18,12 @@ fn candidate_count() -> u32 {
 // Returns a corner in view space.
 fn corner_of(index: u32, corner: u32) -> vec3<f32> {
     let at = 3u * corner;
-    let own = vec3(
+    let place = vec3(
         facets[index].corners[at],
         facets[index].corners[at + 1u],
         facets[index].corners[at + 2u],
     );
-    return source.axis_x.xyz * own.x + source.axis_y.xyz * own.y + source.axis_z.xyz * own.z
+    return source.axis_x.xyz * place.x + source.axis_y.xyz * place.y + source.axis_z.xyz * place.z
         + source.origin.xyz;
 }
 
@@ -116,9 +116,9 @@ fn facet_record(index: u32) -> array<vec4<f32>, 4> {
     let to_view = mat3x3<f32>(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz);
     if is_rod(index) {
         let radii = radii_of(index);
-        let own = facets[index].normals[0];
-        let turned = encode_normal(to_view * decode_normal(own));
-        let normal = bitcast<f32>(select(turned, NO_NORMAL, own == NO_NORMAL));
+        let packed = facets[index].normals[0];
+        let turned = encode_normal(to_view * decode_normal(packed));
+        let normal = bitcast<f32>(select(turned, NO_NORMAL, packed == NO_NORMAL));
         return array<vec4<f32>, 4>(
             vec4(a, radii.x),
             vec4(b, radii.y),
@@ -133,9 +133,9 @@ fn facet_record(index: u32) -> array<vec4<f32>, 4> {
     }
     var normals: array<f32, 3>;
     for (var i = 0u; i < 3u; i++) {
-        let own = facets[index].normals[i];
-        let turned = encode_normal(to_view * decode_normal(own));
-        normals[i] = bitcast<f32>(select(turned, NO_NORMAL, own == NO_NORMAL));
+        let packed = facets[index].normals[i];
+        let turned = encode_normal(to_view * decode_normal(packed));
+        normals[i] = bitcast<f32>(select(turned, NO_NORMAL, packed == NO_NORMAL));
     }
     // On a set that winds in any way, all facets count as fronts.
     let is_front = away_of(a, b, c) < 0.0 || (source.flags & MIXED) != 0u;

@@ -12,9 +12,9 @@ fn candidate_count() -> u32 {
 }
 
 fn candidate(order: u32) -> Candidate {
-    let own = selected[order];
-    var splat = splat_at(own & 0x3fffffu);
-    let share = f32(own >> 22u) / 1023.0;
+    let packed = selected[order];
+    var splat = splat_at(packed & 0x3fffffu);
+    let share = f32(packed >> 22u) / 1023.0;
     if TRAINED && splat.strength < 0.0 {
         // Of a trained Gaussian, too, the share is that of its optical depth.
         splat.strength = exp(share * log(1.0 + splat.strength)) - 1.0;

@@ -22,7 +22,7 @@ pub struct Choice {
     pub lambda: f64,
     /// Which ranges of values show something, as from
     /// [`first_visible`](crate::volume::reach::first_visible).
-    pub shown: [u16; 256],
+    pub first_visible: [u16; 256],
 }
 
 /// How fine a picture should be, and how much of it is drawn.
@@ -47,8 +47,8 @@ const STEPS: f64 = 16.0;
 
 /// Chooses the levels whose step between samples covers [`Wish::pixels`] pixels where the volume is
 /// nearest to the eye. Of these levels it chooses the bricks that are in the picture and hold
-/// values that show according to `shown` ([`Choice::shown`]). `extent` is the kernel's, in samples
-/// of the drawn level. Of a region, it chooses the bricks that the region needs.
+/// values that show according to `first_visible` ([`Choice::shown`]). `extent` is the kernel's, in
+/// samples of the drawn level. Of a region, it chooses the bricks that the region needs.
 ///
 /// The level is a real number λ = log₂(`pixels` / p), at least [`Wish::least`] and at most the
 /// coarsest level. Here p is the size in pixels of the longest step of level 0 at the point of the
@@ -59,7 +59,7 @@ pub fn choice(
     bricks: &Bricks,
     view: &View,
     extent: f64,
-    shown: &[u16; 256],
+    first_visible: &[u16; 256],
     wish: &Wish,
 ) -> Choice {
     let &Wish { pixels, most, least, region } = wish;
@@ -72,7 +72,7 @@ pub fn choice(
         let mut count = 0;
         for &(level, _) in &levels {
             count += known[level]
-                .get_or_insert_with(|| visible(bricks, level, view, extent, shown, region))
+                .get_or_insert_with(|| visible(bricks, level, view, extent, first_visible, region))
                 .len();
         }
         if count <= most || lambda >= coarsest {
@@ -80,15 +80,15 @@ pub fn choice(
         }
         lambda = ((lambda * STEPS).floor() + 1.0).min(coarsest * STEPS) / STEPS;
     };
-    let mut found: Vec<(f64, usize, u32)> = Vec::new();
+    let mut drawn: Vec<(f64, usize, u32)> = Vec::new();
     for &(level, _) in &levels {
-        found.extend(
+        drawn.extend(
             known[level].iter().flatten().map(|&(distance, brick)| (distance, level, brick)),
         );
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
-    let bricks = found.into_iter().map(|(_, level, brick)| (level, brick)).collect();
-    Choice { levels, bricks, lambda, shown: *shown }
+    drawn.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
+    let bricks = drawn.into_iter().map(|(_, level, brick)| (level, brick)).collect();
+    Choice { levels, bricks, lambda, first_visible: *first_visible }
 }
 
 /// λ before any budget.
@@ -111,13 +111,13 @@ fn visible(
     number: usize,
     view: &View,
     extent: f64,
-    shown: &[u16; 256],
+    first_visible: &[u16; 256],
     region: Option<Bounds>,
 ) -> Vec<(f64, u32)> {
     let level = bricks.level(number);
     let lattice = bricks.lattice(number);
     let sides = view.sides(1.0);
-    let shows = |[low, high]: [u8; 2]| u16::from(high) >= shown[usize::from(low)];
+    let shows = |[low, high]: [u8; 2]| u16::from(high) >= first_visible[usize::from(low)];
     // The samples that bricks from the first to the last one along each axis reach, if they may be
     // in the picture.
     let in_picture = |[first, last]: [[usize; 3]; 2]| {
@@ -139,14 +139,14 @@ fn visible(
         }
         Some([low, high])
     };
-    let look = |(brick, range): (u32, [u8; 2])| {
+    let visible_brick = |(brick, range): (u32, [u8; 2])| {
         let place = level.place(brick);
         let [low, high] = shows(range).then(|| in_picture([place; 2])).flatten()?;
         let center = view.to_view(lattice.position(0.5 * (low + high)));
         Some((if view.perspective { center.length() } else { center.z }, brick))
     };
-    let found = bricks.ranges_within(number, |group| in_picture(group).is_some());
-    found.into_par_iter().filter_map(look).collect()
+    let candidates = bricks.ranges_within(number, |group| in_picture(group).is_some());
+    candidates.into_par_iter().filter_map(visible_brick).collect()
 }
 
 /// Returns the corners of a box of samples in the world.
@@ -157,8 +157,9 @@ fn corners(lattice: &Lattice, [min, max]: [DVec3; 2]) -> [DVec3; 8] {
 /// Whether a box of samples may meet a box of the world: the world's boxes around both overlap.
 fn meets(bounds: &Bounds, lattice: &Lattice, samples: [DVec3; 2]) -> bool {
     let point = |at: DVec3| Bounds { min: at, max: at };
-    let own = corners(lattice, samples).map(point).into_iter().fold(Bounds::EMPTY, Bounds::union);
-    (own.min.cmple(bounds.max) & own.max.cmpge(bounds.min)).all()
+    let around =
+        corners(lattice, samples).map(point).into_iter().fold(Bounds::EMPTY, Bounds::union);
+    (around.min.cmple(bounds.max) & around.max.cmpge(bounds.min)).all()
 }
 
 #[cfg(test)]
@@ -220,10 +221,16 @@ mod tests {
         view: &View,
         extent: f64,
         pixels: f64,
-        shown: &[u16; 256],
+        first_visible: &[u16; 256],
         most: usize,
     ) -> Choice {
-        choice_for(bricks, view, extent, shown, &Wish { pixels, most, least: 0.0, region: None })
+        choice_for(
+            bricks,
+            view,
+            extent,
+            first_visible,
+            &Wish { pixels, most, least: 0.0, region: None },
+        )
     }
 
     #[test]
@@ -264,8 +271,8 @@ mod tests {
             (4.0 * scale, 1.0),
             (6.0 * scale, 3f64.log2()),
         ] {
-            let found = choice(&bricks, &at(distance), 2.0, 1.0, &shows, MANY).lambda;
-            assert!((found - lambda).abs() < 1e-9, "{distance}: {found}");
+            let chosen = choice(&bricks, &at(distance), 2.0, 1.0, &shows, MANY).lambda;
+            assert!((chosen - lambda).abs() < 1e-9, "{distance}: {chosen}");
         }
     }
 
@@ -274,7 +281,7 @@ mod tests {
         let bricks = ramp();
         let share = |height: f64, level: usize| {
             let choice = choice(&bricks, &flat(height), 2.0, 1.0, &over(-5.0), MANY);
-            choice.levels.iter().find(|(found, _)| *found == level).map_or(0.0, |found| found.1)
+            choice.levels.iter().find(|(number, _)| *number == level).map_or(0.0, |level| level.1)
         };
         for step in 0..400 {
             let [before, after] = [step, step + 1].map(|step| 500.0 * 1.01f64.powi(step));
@@ -288,9 +295,9 @@ mod tests {
     fn bricks_are_those_in_the_picture_that_show() {
         let bricks = ramp();
         // Values over 150 are at x of 75 and more; kernels and ranges reach 3 further.
-        let shown = choice(&bricks, &flat(400.0), 2.0, 1.0, &over(150.0), MANY);
+        let bright = choice(&bricks, &flat(400.0), 2.0, 1.0, &over(150.0), MANY);
         let columns: Vec<usize> =
-            shown.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick)[0]).collect();
+            bright.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick)[0]).collect();
         assert!(columns.len() == 32 && columns.iter().all(|x| *x >= 2), "{columns:?}");
         assert_eq!(choice(&bricks, &flat(400.0), 2.0, 1.0, &EVERYTHING, MANY).bricks.len(), 64);
         assert!(choice(&bricks, &flat(400.0), 2.0, 1.0, &over(250.0), MANY).bricks.is_empty());
@@ -314,8 +321,8 @@ mod tests {
     #[test]
     fn near_bricks_come_first() {
         let bricks = ramp();
-        let found = choice(&bricks, &at(3.0 * at(1.0).scale), 2.0, 1.0, &over(-5.0), MANY);
-        assert_eq!((found.levels.len(), found.bricks.len()), (2, 72));
+        let chosen = choice(&bricks, &at(3.0 * at(1.0).scale), 2.0, 1.0, &over(-5.0), MANY);
+        assert_eq!((chosen.levels.len(), chosen.bricks.len()), (2, 72));
         let distance = |&(level, brick): &(usize, u32)| {
             let size = bricks.level(level);
             let place: [f64; 3] = size.place(brick).map(|at| (at * SIDE) as f64);
@@ -328,7 +335,7 @@ mod tests {
                 -3.0 * at(1.0).scale,
             ))
         };
-        let distances: Vec<f64> = found.bricks.iter().map(distance).collect();
+        let distances: Vec<f64> = chosen.bricks.iter().map(distance).collect();
         assert!(distances.is_sorted_by(|a, b| *a <= b + 1e-9));
     }
 
@@ -336,9 +343,9 @@ mod tests {
     fn budgets_are_kept() {
         let bricks = ramp();
         let lambda = |most| {
-            let found = choice(&bricks, &flat(400.0), 2.0, 1.0, &over(-5.0), most);
-            assert!(found.bricks.len() <= most.max(1));
-            found.lambda
+            let chosen = choice(&bricks, &flat(400.0), 2.0, 1.0, &over(-5.0), most);
+            assert!(chosen.bricks.len() <= most.max(1));
+            chosen.lambda
         };
         assert_eq!(
             [72, 64, 63, 9, 8, 7, 1, 0].map(lambda),
@@ -356,12 +363,12 @@ mod tests {
             choice_for(&bricks, &flat(400.0), 2.0, &EVERYTHING, &wish)
         };
         let columns = |from: f64, to: f64| {
-            let found = at([from, to], 0.0);
-            let own = found.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick)[0]);
-            let mut own: Vec<usize> = own.collect();
-            own.sort_unstable();
-            own.dedup();
-            own
+            let chosen = at([from, to], 0.0);
+            let places = chosen.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick)[0]);
+            let mut places: Vec<usize> = places.collect();
+            places.sort_unstable();
+            places.dedup();
+            places
         };
         // Brick 1 has the samples 32 to 63, at x of 64 to 126; it is needed 6 samples beyond.
         assert_eq!(columns(-1e3, 40.0), [0]);

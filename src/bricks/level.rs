@@ -106,7 +106,7 @@ fn are_countable(dims: [usize; 3]) -> bool {
     let bricks = levels(dims)
         .into_iter()
         .map(|level| level.brick_dims.iter().try_fold(1usize, |all, n| all.checked_mul(*n)));
-    let count = bricks.into_iter().try_fold(0usize, |all, own| all.checked_add(own?));
+    let count = bricks.into_iter().try_fold(0usize, |all, bricks| all.checked_add(bricks?));
     count.is_some_and(|count| u32::try_from(count).is_ok())
 }
 
@@ -148,14 +148,14 @@ mod tests {
             assert!((0..).zip(&ranks).all(|(brick, rank)| level.brick(*rank) == brick), "{dims:?}");
             let mut next = 0;
             for [first, last] in level.groups() {
-                let own = (0..level.bricks() as u32).filter(|brick| {
+                let members = (0..level.bricks() as u32).filter(|brick| {
                     let at = level.place(*brick);
                     (0..3).all(|axis| (first[axis]..=last[axis]).contains(&at[axis]))
                 });
-                let mut own: Vec<u32> = own.map(|brick| level.rank(brick)).collect();
-                own.sort_unstable();
-                assert!(own.iter().copied().eq(next..next + own.len() as u32), "{dims:?}");
-                next += own.len() as u32;
+                let mut members: Vec<u32> = members.map(|brick| level.rank(brick)).collect();
+                members.sort_unstable();
+                assert!(members.iter().copied().eq(next..next + members.len() as u32), "{dims:?}");
+                next += members.len() as u32;
             }
             ranks.sort_unstable();
             assert!(ranks.into_iter().eq(0..level.bricks() as u32));

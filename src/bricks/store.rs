@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::{Frame, Stance},
+    about::{Frame, Orientation},
     container::directory::{Directory, Fault, Kind, Shape},
     error::LimitKind,
     input::{self, Bytes, Limits},
@@ -42,8 +42,8 @@ pub struct Header {
 
 impl Header {
     /// Returns how the subject stands, if that is known.
-    pub fn stance(&self) -> Option<Stance> {
-        (self.frame == Frame::Patient).then_some(Stance::RAS)
+    pub fn orientation(&self) -> Option<Orientation> {
+        (self.frame == Frame::Patient).then_some(Orientation::RAS)
     }
 
     /// Checks that a volume with this header can be cut into bricks, in memory or in a file. The
@@ -133,9 +133,9 @@ impl Bricks {
         let steps = Steps::new(scalar, volume.range);
         let numbers = Numbers::new(levels);
         let entry = |number| {
-            let (own, brick) = numbers.brick(number);
-            let level = numbers.levels[own];
-            let slices = in_memory(&volume, &coarse, own, level);
+            let (index, brick) = numbers.brick(number);
+            let level = numbers.levels[index];
+            let slices = in_memory(&volume, &coarse, index, level);
             Entry::in_memory(slices.range(level.place(brick), &steps))
         };
         let entries: Vec<Entry> = (0..numbers.count).into_par_iter().map(entry).collect();
@@ -247,7 +247,7 @@ impl Bricks {
         self.directory.prepare(self.bytes(), groups.iter().flat_map(ends)).ok();
         let of_group = |group: &[[usize; 3]; 2]| {
             let [first, last] = ends(group);
-            let mut own = Vec::with_capacity((last - first) as usize + 1);
+            let mut ranges = Vec::with_capacity((last - first) as usize + 1);
             let mut number = first;
             while number <= last {
                 let run = self.directory.run(self.bytes(), number).ok();
@@ -256,11 +256,11 @@ impl Bricks {
                     let range = run.as_ref().map_or([0, 255], |(first, entries)| {
                         entries[(number - first) as usize].range
                     });
-                    own.push((numbers.brick(number).1, range));
+                    ranges.push((numbers.brick(number).1, range));
                 }
                 number = end;
             }
-            own
+            ranges
         };
         groups.par_iter().flat_map_iter(of_group).collect()
     }
@@ -305,7 +305,7 @@ impl Bricks {
 
     /// Returns the error for a fault of the directory.
     pub(super) fn fault(&self, fault: Fault) -> Error {
-        let error = told(&self.path, fault);
+        let error = error_of(&self.path, fault);
         match self.bytes() {
             Some(file) => file.why(&self.path, error),
             None => error,
@@ -448,13 +448,13 @@ fn begin(path: &Path, file: &Bytes, limits: &Limits) -> Result<(Header, Director
     };
     let (head, place) = (file.beginning(start)?, (stored.length(), kind.end));
     let directory =
-        Directory::open(kind, count, place, &head).map_err(|fault| told(path, fault))?;
+        Directory::open(kind, count, place, &head).map_err(|fault| error_of(path, fault))?;
     limits.check(LimitKind::Bytes, path, "the size of the file in bytes", present)?;
     Ok((stored.header, directory))
 }
 
 /// The error for a fault of the directory.
-fn told(path: &Path, fault: Fault) -> Error {
+fn error_of(path: &Path, fault: Fault) -> Error {
     match fault {
         Fault::Incomplete(place) => incomplete(path, place),
         Fault::Damaged(place, message) => damaged(path, place, message),

@@ -131,8 +131,8 @@ fn a_directory_of_several_pages_is_read_in_parts() {
     let name = format!("directory page 1 of level 0 (byte {place})");
     assert!(error.contains(&name), "{error}");
     let path = folder.write("a.splv", &broken);
-    let found = check(path, &Limits::default(), None).findings;
-    assert!(found.iter().any(|f| f.code == "directory" && f.place == name), "{found:?}");
+    let findings = check(path, &Limits::default(), None).findings;
+    assert!(findings.iter().any(|f| f.code == "directory" && f.place == name), "{findings:?}");
 }
 
 #[test]
@@ -175,10 +175,10 @@ fn ranges_are_those_of_brute_force() {
         let scale = 255.0 / (highest - lowest);
         for (number, level) in bricks.levels().iter().enumerate() {
             let all = every(&bricks, number);
-            for (brick, found) in all.iter().enumerate() {
+            for (brick, content) in all.iter().enumerate() {
                 let place = level.place(brick as u32);
                 let mut whole = EMPTY;
-                for (index, &block) in found.blocks.iter().enumerate() {
+                for (index, &block) in content.blocks.iter().enumerate() {
                     let block_at =
                         [index % BLOCKS, index / BLOCKS % BLOCKS, index / BLOCKS / BLOCKS];
                     let start: [usize; 3] =
@@ -209,7 +209,7 @@ fn ranges_are_those_of_brute_force() {
                     );
                     whole = [whole[0].min(block[0]), whole[1].max(block[1])];
                 }
-                assert_eq!((bricks.ranges(number)[brick], found.range()), (whole, whole));
+                assert_eq!((bricks.ranges(number)[brick], content.range()), (whole, whole));
             }
         }
     }
@@ -321,15 +321,15 @@ fn other_lattices_and_other_bricks_are_refused() {
 fn refusal(bytes: &[u8]) -> Option<String> {
     let bricks = match open(bytes) {
         Ok(bricks) => bricks,
-        Err(error) => return Some(told(error)),
+        Err(error) => return Some(text_of(error)),
     };
     let all = bricks.levels().iter().enumerate();
     let all = all
         .flat_map(|(number, level)| (0..level.bricks() as u32).map(move |brick| (number, brick)));
-    all.filter_map(|(level, brick)| bricks.read(level, brick).err()).map(told).next()
+    all.filter_map(|(level, brick)| bricks.read(level, brick).err()).map(text_of).next()
 }
 
-fn told(error: Error) -> String {
+fn text_of(error: Error) -> String {
     match error {
         Error::Input { file, place, message, hint } => {
             assert_eq!(file, Path::new("test.splv"));

@@ -336,11 +336,11 @@ fn inverse(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         rows.swap(column, pivot);
         let scale = 1.0 / rows[column][column];
         rows[column].iter_mut().for_each(|entry| *entry *= scale);
-        let own = rows[column].clone();
+        let pivot_row = rows[column].clone();
         for (index, row) in rows.iter_mut().enumerate() {
             let factor = row[column];
             if index != column && factor != 0.0 {
-                row.iter_mut().zip(&own).for_each(|(entry, own)| *entry -= factor * own);
+                row.iter_mut().zip(&pivot_row).for_each(|(entry, value)| *entry -= factor * value);
             }
         }
     }
@@ -362,15 +362,15 @@ fn triangle_steps(order: usize, grown: usize) -> Vec<[usize; 3]> {
     if order == 0 {
         return vec![[grown; 3]];
     }
-    let mut found = corners.to_vec();
+    let mut nodes = corners.to_vec();
     for [a, b] in [[0, 1], [1, 2], [2, 0]] {
-        found.extend(between(corners[a], corners[b], order));
+        nodes.extend(between(corners[a], corners[b], order));
     }
-    found.iter_mut().for_each(|steps| *steps = steps.map(|step| step + grown));
+    nodes.iter_mut().for_each(|steps| *steps = steps.map(|step| step + grown));
     if order >= 3 {
-        found.extend(triangle_steps(order - 3, grown + 1));
+        nodes.extend(triangle_steps(order - 3, grown + 1));
     }
-    found
+    nodes
 }
 
 /// Returns the nodes inside a triangle of an order.
@@ -384,21 +384,22 @@ fn tetrahedron_steps(order: usize) -> Vec<[usize; 4]> {
         return vec![[0; 4]];
     }
     let corner = |at: usize| std::array::from_fn(|axis| if axis == at { order } else { 0 });
-    let mut found: Vec<[usize; 4]> = (0..4).map(corner).collect();
+    let mut nodes: Vec<[usize; 4]> = (0..4).map(corner).collect();
     for [a, b] in TETRAHEDRON {
-        found.extend(between(corner(*a), corner(*b), order));
+        nodes.extend(between(corner(*a), corner(*b), order));
     }
     for face in [[0, 1, 3], [2, 3, 1], [0, 3, 2], [0, 2, 1]] {
-        found.extend(inner_triangle(order).into_iter().map(|steps| {
-            let mut own = [0; 4];
-            face.iter().zip(steps).for_each(|(corner, step)| own[*corner] = step);
-            own
+        nodes.extend(inner_triangle(order).into_iter().map(|steps| {
+            let mut node = [0; 4];
+            face.iter().zip(steps).for_each(|(corner, step)| node[*corner] = step);
+            node
         }));
     }
     if order >= 4 {
-        found.extend(tetrahedron_steps(order - 4).into_iter().map(|own| own.map(|step| step + 1)));
+        nodes
+            .extend(tetrahedron_steps(order - 4).into_iter().map(|node| node.map(|step| step + 1)));
     }
-    found
+    nodes
 }
 
 /// Returns the steps of the nodes of a hexahedron along its axes.
@@ -407,53 +408,53 @@ fn hexahedron_steps(order: usize) -> Vec<[usize; 4]> {
         let [x, y, z] = Form::Hexahedron.corners()[at].map(|end| end as usize * order);
         [x, y, z, 0]
     };
-    let mut found: Vec<[usize; 4]> = (0..8).map(corner).collect();
+    let mut nodes: Vec<[usize; 4]> = (0..8).map(corner).collect();
     // All edges run along an axis.
     for [a, b] in CUBE {
         let (a, b) = (corner(*a), corner(*b));
-        found.extend(between(a.min(b), a.max(b), order));
+        nodes.extend(between(a.min(b), a.max(b), order));
     }
     let inner = || 1..order;
     for [fixed, first, second] in [[0, 1, 2], [1, 0, 2], [2, 0, 1]] {
         for side in [0, order] {
             for b in inner() {
-                found.extend(inner().map(|a| {
-                    let mut own = [0; 4];
-                    (own[fixed], own[first], own[second]) = (side, a, b);
-                    own
+                nodes.extend(inner().map(|a| {
+                    let mut node = [0; 4];
+                    (node[fixed], node[first], node[second]) = (side, a, b);
+                    node
                 }));
             }
         }
     }
     for z in inner() {
         for y in inner() {
-            found.extend(inner().map(|x| [x, y, z, 0]));
+            nodes.extend(inner().map(|x| [x, y, z, 0]));
         }
     }
-    found
+    nodes
 }
 
 /// Returns the steps of the nodes of a wedge: away from the corners of its triangle, and along its
 /// axis.
 fn wedge_steps(order: usize) -> Vec<[usize; 4]> {
     let corner = |at: usize| {
-        let mut own = [0; 4];
-        (own[at % 3], own[3]) = (order, at / 3 * order);
-        own
+        let mut node = [0; 4];
+        (node[at % 3], node[3]) = (order, at / 3 * order);
+        node
     };
-    let mut found: Vec<[usize; 4]> = (0..6).map(corner).collect();
+    let mut nodes: Vec<[usize; 4]> = (0..6).map(corner).collect();
     for [a, b] in WEDGE {
-        found.extend(between(corner(*a), corner(*b), order));
+        nodes.extend(between(corner(*a), corner(*b), order));
     }
     let triangle = inner_triangle(order);
     let at = |layer: usize| triangle.iter().map(move |&[a, b, c]| [a, b, c, layer]);
-    found.extend([0, order].into_iter().flat_map(at));
+    nodes.extend([0, order].into_iter().flat_map(at));
     for [a, b] in [[0, 1], [1, 2], [2, 0]] {
         let side = between(corner(a), corner(b), order);
-        found.extend(
+        nodes.extend(
             (1..order).flat_map(|layer| side.iter().map(move |&[a, b, c, _]| [a, b, c, layer])),
         );
     }
-    found.extend((1..order).flat_map(at));
-    found
+    nodes.extend((1..order).flat_map(at));
+    nodes
 }

@@ -38,10 +38,10 @@ impl Boundary {
     /// Returns the boundary of cells that are usable. Cells with a hole at a node are left out.
     pub fn of(cells: &Cells) -> Self {
         let divisions = Divisions::new(cells);
-        let shown: Vec<bool> =
+        let visible: Vec<bool> =
             (0..cells.len()).into_par_iter().map(|cell| cells.is_shown(cell)).collect();
-        let level = cells.level(&divisions, &shown, &CellOptions::default());
-        let open = sides::open(cells, |cell| shown[cell]);
+        let level = cells.level(&divisions, &visible, &CellOptions::default());
+        let open = sides::open(cells, |cell| visible[cell]);
         let mut made = Made {
             cells,
             divisions,
@@ -99,13 +99,13 @@ impl Made<'_> {
         let is_straight = divisions.len() <= 1;
         let division = divisions.get(*level).or(divisions.last());
         let Some(division) = division.filter(|_| !is_straight) else {
-            let mut found = Vec::new();
-            sides::each(cells, cell, &mut |own, corners| {
-                if own as usize == number {
-                    found = vec![corners.to_vec()];
+            let mut polygons = Vec::new();
+            sides::each(cells, cell, &mut |index, corners| {
+                if index as usize == number {
+                    polygons = vec![corners.to_vec()];
                 }
             });
-            return found;
+            return polygons;
         };
         let nodes = cells.nodes_of(cell);
         let mut point = |at: &usize| {
@@ -196,12 +196,12 @@ impl Made<'_> {
         let mut numbers = vec![u32::MAX; self.cells.points.len() + self.more.len()];
         let mut used = Vec::new();
         for corner in self.triangles.as_flattened_mut() {
-            let own = &mut numbers[*corner as usize];
-            if *own == u32::MAX {
-                *own = used.len() as u32;
+            let number = &mut numbers[*corner as usize];
+            if *number == u32::MAX {
+                *number = used.len() as u32;
                 used.push(*corner);
             }
-            *corner = *own;
+            *corner = *number;
         }
         let mut edges = self.edges.clone();
         for edge in &mut edges {
@@ -239,7 +239,7 @@ impl Sides {
         let first = first_of_equals(&cells.points);
         let nodes_of = |side: &Side| {
             let (cell, number) = (side.cell as usize, side.number as usize);
-            let mut found = Vec::new();
+            let mut side_nodes = Vec::new();
             let divisions = made.divisions.of(cells, cell);
             match divisions.get(1) {
                 // Those that have a weight somewhere on the side.
@@ -247,19 +247,23 @@ impl Sides {
                     let nodes = cells.nodes_of(cell);
                     for at in division.sides[number].iter().flatten() {
                         let weights = nodes.iter().zip(&division.points[*at]);
-                        found.extend(weights.filter(|own| own.1.abs() > 1e-9).map(|own| *own.0));
+                        side_nodes.extend(
+                            weights
+                                .filter(|(_, weight)| weight.abs() > 1e-9)
+                                .map(|(node, _)| *node),
+                        );
                     }
                 }
-                _ => sides::each(cells, cell, &mut |own, corners| {
-                    if own as usize == number {
-                        found.extend(corners);
+                _ => sides::each(cells, cell, &mut |index, corners| {
+                    if index as usize == number {
+                        side_nodes.extend(corners);
                     }
                 }),
             }
-            found.iter_mut().for_each(|node| *node = first[*node as usize]);
-            found.sort_unstable();
-            found.dedup();
-            found
+            side_nodes.iter_mut().for_each(|node| *node = first[*node as usize]);
+            side_nodes.sort_unstable();
+            side_nodes.dedup();
+            side_nodes
         };
         let nodes: Vec<Vec<u32>> = open.par_iter().map(nodes_of).collect();
         let mut of_nodes: HashMap<u32, Vec<u32>> = HashMap::new();
@@ -271,12 +275,12 @@ impl Sides {
 
     /// Returns whether all corners of a polygon are nodes of one side.
     fn hold(&self, polygon: &[u32]) -> bool {
-        let own: Vec<u32> = polygon.iter().map(|corner| self.first[*corner as usize]).collect();
-        let sides = own.first().and_then(|corner| self.of_nodes.get(corner));
+        let corners: Vec<u32> = polygon.iter().map(|corner| self.first[*corner as usize]).collect();
+        let sides = corners.first().and_then(|corner| self.of_nodes.get(corner));
         sides.is_some_and(|sides| {
             sides.iter().any(|side| {
                 let nodes = &self.nodes[*side as usize];
-                own.iter().all(|corner| nodes.binary_search(corner).is_ok())
+                corners.iter().all(|corner| nodes.binary_search(corner).is_ok())
             })
         })
     }
@@ -350,9 +354,12 @@ mod tests {
             let [a, b] = edge.map(|end| boundary.mesh.positions[end as usize]);
             (0.5 * (a + b)).truncate().length()
         };
-        let wall = |own: f32| !(0.47..=0.98).contains(&own);
-        let off = boundary.edges.iter().map(radius).filter(|own| wall(*own));
-        assert!(off.map(|own| (own - 0.45).abs().min((own - 1.0).abs())).all(|off| off < 5e-3));
+        let wall = |distance: f32| !(0.47..=0.98).contains(&distance);
+        let off = boundary.edges.iter().map(radius).filter(|distance| wall(*distance));
+        assert!(
+            off.map(|distance| (distance - 0.45).abs().min((distance - 1.0).abs()))
+                .all(|off| off < 5e-3)
+        );
         let mut holed = Cells::tube(CellKind::Hexahedron, 1).unwrap();
         let node = holed.nodes_of(5)[0] as usize;
         holed.values[node] = f32::NAN;

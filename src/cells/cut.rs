@@ -88,10 +88,10 @@ impl Kept {
                     kept.halves.push(if clip.inside { half } else { half.turned() });
                 }
                 ClipShape::Box(Bounds { min, max }) => {
-                    let own = Bounds { min: min - origin, max: max - origin };
+                    let bounds = Bounds { min: min - origin, max: max - origin };
                     match clip.inside {
-                        true => kept.halves.extend(Half::around(own)),
-                        false => kept.holes.push(Half::around(own)),
+                        true => kept.halves.extend(Half::around(bounds)),
+                        false => kept.holes.push(Half::around(bounds)),
                     }
                 }
             }
@@ -108,27 +108,27 @@ impl Kept {
 
     /// Returns the planes in which what is kept ends.
     pub fn sections(&self) -> Vec<Section> {
-        let others = |halves: &[Half], own: usize| -> Vec<Half> {
-            let rest = halves.iter().enumerate().filter(|(at, _)| *at != own);
+        let others = |halves: &[Half], skipped: usize| -> Vec<Half> {
+            let rest = halves.iter().enumerate().filter(|(at, _)| *at != skipped);
             rest.map(|(_, half)| *half).collect()
         };
-        let mut found: Vec<Section> = (0..self.halves.len())
-            .map(|own| {
-                let halves = others(&self.halves, own);
+        let mut sections: Vec<Section> = (0..self.halves.len())
+            .map(|at| {
+                let halves = others(&self.halves, at);
                 let within = Self { halves, holes: self.holes.clone() };
-                Section { plane: self.halves[own], within }
+                Section { plane: self.halves[at], within }
             })
             .collect();
         for (number, hole) in self.holes.iter().enumerate() {
             let mut holes = self.holes.clone();
             holes.remove(number);
-            for own in 0..hole.len() {
-                let halves = [self.halves.clone(), others(hole, own)].concat();
+            for at in 0..hole.len() {
+                let halves = [self.halves.clone(), others(hole, at)].concat();
                 let within = Self { halves, holes: holes.clone() };
-                found.push(Section { plane: hole[own].turned(), within });
+                sections.push(Section { plane: hole[at].turned(), within });
             }
         }
-        found
+        sections
     }
 
     /// Returns whether places in a box are all kept (`Some(true)`), all removed (`Some(false)`), or
@@ -346,15 +346,15 @@ mod tests {
             (DVec3::X, -1.0, None),
         ] {
             let plane = Half { normal, offset };
-            let found = section(corners, &plane);
-            assert_eq!(found.as_ref().map(Vec::len), count, "{normal} {offset}");
-            let Some(found) = found else { continue };
-            for corner in &found {
+            let polygon = section(corners, &plane);
+            assert_eq!(polygon.as_ref().map(Vec::len), count, "{normal} {offset}");
+            let Some(polygon) = polygon else { continue };
+            for corner in &polygon {
                 assert!(plane.beyond(corner.place).abs() < 1e-12);
                 let [x, y, z] = corner.place.to_array();
                 assert!((corner.numbers[0] - x - 2.0 * y - 4.0 * z).abs() < 1e-12);
             }
-            let [a, b, c] = [0, 1, 2].map(|at| found[at].place);
+            let [a, b, c] = [0, 1, 2].map(|at| polygon[at].place);
             assert!((b - a).cross(c - a).dot(normal) > 0.0);
         }
     }

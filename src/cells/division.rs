@@ -99,7 +99,7 @@ impl Division {
             let place = |corner: usize| DVec3::from_array(at(places[corner]));
             let is_on = |corner: &usize| out.dot(place(*corner) - start).abs() < 1e-9;
             let faces = blocks.iter().flat_map(Block::faces);
-            let found = faces.filter(|face| face.iter().all(is_on)).map(|mut face| {
+            let faces = faces.filter(|face| face.iter().all(is_on)).map(|mut face| {
                 let [a, b, c] = [0, 1, 2].map(|corner| place(face[corner]));
                 // Tetrahedra have their corners in any order.
                 if (b - a).cross(c - a).dot(out) < 0.0 {
@@ -107,7 +107,7 @@ impl Division {
                 }
                 face
             });
-            found.collect()
+            faces.collect()
         };
         let sides = form.sides().iter().map(on_side).collect();
         Self { points, blocks, middles, sides }
@@ -153,7 +153,7 @@ impl Places {
 
     fn number(&self, place: [usize; 3]) -> usize {
         let order = |[x, y, z]: [usize; 3]| [z, y, x];
-        self.0.partition_point(|own| order(*own) < order(place))
+        self.0.partition_point(|point| order(*point) < order(place))
     }
 
     fn solid(&self, faces: &[&[usize]], corners: &[[usize; 3]]) -> Block {

@@ -46,8 +46,8 @@ impl Faces {
         }
         let wanted = if is_valued { self.len() } else { 0 };
         if self.values.len() != wanted {
-            let found = self.values.len();
-            return Err(format!("the faces have {found} values, but {wanted} are expected"));
+            let count = self.values.len();
+            return Err(format!("the faces have {count} values, but {wanted} are expected"));
         }
         match self.values.iter().find(|value| value.is_infinite()) {
             Some(value) => Err(format!("the value of a face is {value}")),

@@ -164,17 +164,17 @@ impl CellKind {
 
     /// Checks the nodes of a cell: their number, and the faces of a polyhedron.
     pub(super) fn check(self, nodes: &[u32]) -> Result<(), String> {
-        let (name, found) = (self.name(), nodes.len());
+        let (name, count) = (self.name(), nodes.len());
         match self {
             Self::Polyhedron => faces(nodes).try_for_each(|face| face.map(drop)),
             _ => match self.nodes() {
-                Some(expected) if expected == found => Ok(()),
+                Some(expected) if expected == count => Ok(()),
                 Some(expected) => {
-                    Err(format!("is a {name} with {found} nodes, but has {expected}"))
+                    Err(format!("is a {name} with {count} nodes, but has {expected}"))
                 }
-                None if self.order(found).is_some() => Ok(()),
+                None if self.order(count).is_some() => Ok(()),
                 None => Err(format!(
-                    "is a {name} with {found} nodes, which no order from 1 to {MOST_ORDER} has"
+                    "is a {name} with {count} nodes, which no order from 1 to {MOST_ORDER} has"
                 )),
             },
         }

@@ -128,9 +128,9 @@ impl Cells {
         let nodes = self.nodes_of(cell);
         let is_stream = self.kinds[cell] == CellKind::Polyhedron;
         let stream = if is_stream { nodes } else { &[] };
-        let own = if is_stream { &[] } else { nodes };
+        let nodes = if is_stream { &[] } else { nodes };
         let faces = kind::faces(stream).filter_map(Result::ok).flatten();
-        own.iter().chain(faces).copied()
+        nodes.iter().chain(faces).copied()
     }
 
     /// Checks that the cells are usable.

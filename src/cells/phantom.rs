@@ -89,8 +89,8 @@ impl Grid {
             }
             CellKind::QuadraticTetrahedron => {
                 for tetrahedron in TETRAHEDRA {
-                    let own = tetrahedron.map(|at| corners[at]);
-                    self.push(kind, with_middles(&own, TETRAHEDRON));
+                    let nodes = tetrahedron.map(|at| corners[at]);
+                    self.push(kind, with_middles(&nodes, TETRAHEDRON));
                 }
             }
             other => {

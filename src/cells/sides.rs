@@ -67,16 +67,16 @@ pub(super) fn each(cells: &Cells, cell: usize, visit: &mut impl FnMut(u32, &[u32
 pub(super) fn open(cells: &Cells, is_shown: impl Fn(usize) -> bool + Sync) -> Vec<Side> {
     let starts: Vec<usize> = (0..cells.len()).step_by(TOGETHER).collect();
     let of_some = |start: &usize| {
-        let mut found = Vec::new();
+        let mut entries = Vec::new();
         for cell in (*start..(start + TOGETHER).min(cells.len())).filter(|cell| is_shown(*cell)) {
             each(cells, cell, &mut |number, corners| {
                 if let Some(key) = key(corners) {
-                    found.push(Entry { key, side: Side { cell: cell as u32, number } });
+                    entries.push(Entry { key, side: Side { cell: cell as u32, number } });
                 }
             });
         }
-        found.sort_unstable();
-        single(&found)
+        entries.sort_unstable();
+        single(&entries)
     };
     let parts: Vec<Vec<Entry>> = starts.par_iter().map(of_some).collect();
     let mut left = parts.concat();

@@ -227,8 +227,8 @@ impl Solid {
             return self.boundary.clone();
         }
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((own, facets)) = &*last
-            && own == clips
+        if let Some((last_clips, facets)) = &*last
+            && last_clips == clips
         {
             return facets.clone();
         }
@@ -266,8 +266,8 @@ impl Solid {
             all.flat_map(|ends| kept.lines(ends.map(|end| end.as_dvec3()))).map(single).collect();
         let Some(inside) = self.inside() else { return lines };
         for Section { plane, within } in kept.sections() {
-            let own = inside.lines(&plane);
-            lines.extend(own.into_iter().flat_map(|ends| within.lines(ends)).map(single));
+            let cuts = inside.lines(&plane);
+            lines.extend(cuts.into_iter().flat_map(|ends| within.lines(ends)).map(single));
         }
         lines
     }
@@ -335,9 +335,9 @@ impl Solid {
         };
         match &self.bands {
             Some(bands) => {
-                let corner = |own: &Corner<1>| {
-                    let place = own.place.as_vec3();
-                    surface::Corner { place, normal, value: value(own) }
+                let corner = |corner: &Corner<1>| {
+                    let place = corner.place.as_vec3();
+                    surface::Corner { place, normal, value: value(corner) }
                 };
                 let corners: Vec<surface::Corner> = part.iter().map(corner).collect();
                 bands.add(&corners, &mut |facet| facets.push(facet));
@@ -469,7 +469,7 @@ impl Inside {
         let beyond = corners.map(|corner| plane.beyond(corner.place));
         let mut lines = Vec::new();
         for face in [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]] {
-            let mut found = Vec::new();
+            let mut crossings = Vec::new();
             for [a, b] in [[0, 1], [0, 2], [1, 2]].map(|edge| edge.map(|at: usize| face[at])) {
                 if (beyond[a] <= 0.0) == (beyond[b] <= 0.0) {
                     continue;
@@ -480,11 +480,11 @@ impl Inside {
                 let on_plane = [a, b].into_iter().find(|at| beyond[*at] == 0.0);
                 // The numbers of a tetrahedron's corners ascend.
                 let name = on_plane.map_or([names[a], names[b]], |at| [names[at]; 2]);
-                found.push((name, crossing.place));
+                crossings.push((name, crossing.place));
             }
-            found.sort_by_key(|end| end.0);
-            found.dedup_by_key(|end| end.0);
-            if let [(from, start), (to, end)] = found[..] {
+            crossings.sort_by_key(|end| end.0);
+            crossings.dedup_by_key(|end| end.0);
+            if let [(from, start), (to, end)] = crossings[..] {
                 let (face, names) = (face.map(|at| names[at]), [from, to]);
                 lines.push(Line { face, cell, names, ends: [start, end] });
             }
@@ -529,8 +529,8 @@ mod tests {
         ] {
             let solid = solid(Cells::tube(kind, 2).unwrap());
             let whole = volume(&solid.facets(&[]));
-            let own = volume_of(solid.cells());
-            assert!((whole / own - 1.0).abs() < 1e-5, "{kind:?}: {whole} {own}");
+            let expected = volume_of(solid.cells());
+            assert!((whole / expected - 1.0).abs() < 1e-5, "{kind:?}: {whole} {expected}");
             let plane = half(DVec3::new(1.0, 2.0, 3.0), 0.2);
             let other = Clip { inside: false, ..plane };
             let bounds = Bounds { min: DVec3::splat(-0.4), max: DVec3::new(0.6, 2.0, 0.5) };
@@ -572,8 +572,8 @@ mod tests {
             for (corner, color) in facet.corners.iter().zip(facet.colors) {
                 let wanted = scale.color((corner[0] + corner[1]).into());
                 let [red, green, blue, _] = color.to_le_bytes();
-                for (own, wanted) in [red, green, blue].into_iter().zip(wanted) {
-                    assert!((f32::from(own) - 255.0 * wanted).abs() < 2.0);
+                for (actual, wanted) in [red, green, blue].into_iter().zip(wanted) {
+                    assert!((f32::from(actual) - 255.0 * wanted).abs() < 2.0);
                 }
             }
         }

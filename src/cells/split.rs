@@ -53,33 +53,33 @@ impl Cells {
     pub(super) fn divided(&self, options: &CellOptions) -> Result<(Builder, Vec<u32>)> {
         self.validate()?;
         let divisions = Divisions::new(self);
-        let shown: Vec<bool> =
+        let visible: Vec<bool> =
             (0..self.len()).into_par_iter().map(|cell| self.is_shown(cell)).collect();
-        let level = self.level(&divisions, &shown, options);
+        let level = self.level(&divisions, &visible, options);
         let mut made =
             Made { cells: self, between: Between::default(), builder: Builder::new(self) };
         let mut starts = Vec::with_capacity(self.len());
-        for (cell, is_shown) in shown.into_iter().enumerate() {
+        for (cell, is_shown) in visible.into_iter().enumerate() {
             starts.push(made.builder.len() as u32);
             if is_shown {
-                let own = divisions.of(self, cell);
-                made.add(cell, own.get(level).or(own.last()));
+                let levels = divisions.of(self, cell);
+                made.add(cell, levels.get(level).or(levels.last()));
             }
         }
         Ok((made.builder, starts))
     }
 
-    /// Returns the level to which the shown cells are divided, if they have as many. All have the
-    /// same, so that the faces between curved cells fit.
+    /// Returns the level to which the visible cells are divided. All have the same, so that the
+    /// faces between curved cells fit. A cell with fewer levels takes its last one.
     pub(super) fn level(
         &self,
         divisions: &Divisions,
-        shown: &[bool],
+        visible: &[bool],
         options: &CellOptions,
     ) -> usize {
         let [low, high] = self.range();
         let (shape, field) = (options.tolerance, options.tolerance * (high - low));
-        let cells = || (0..self.len()).into_par_iter().filter(|cell| shown[*cell]);
+        let cells = || (0..self.len()).into_par_iter().filter(|cell| visible[*cell]);
         let wanted = |cell: usize| {
             // The finest level is taken as it is.
             let coarser = divisions.of(self, cell).split_last().map_or(&[][..], |(_, rest)| rest);
@@ -139,11 +139,11 @@ pub(super) struct Divisions(HashMap<(CellKind, usize), Vec<Division>>);
 
 impl Divisions {
     pub fn new(cells: &Cells) -> Self {
-        let mut found: HashMap<_, Vec<Division>> = HashMap::new();
+        let mut divisions: HashMap<_, Vec<Division>> = HashMap::new();
         for (cell, kind) in cells.kinds.iter().enumerate() {
             let nodes = cells.nodes_of(cell).len();
             let Some(form) = kind.form() else { continue };
-            found.entry((*kind, nodes)).or_insert_with(|| {
+            divisions.entry((*kind, nodes)).or_insert_with(|| {
                 let Some(basis) = Basis::of(*kind, nodes) else { return Vec::new() };
                 // Cells with straight edges are divided once: their faces then fit each other.
                 let is_straight = nodes <= 8 && kind.order(nodes).is_none();
@@ -152,7 +152,7 @@ impl Divisions {
                 parts.map(|parts| Division::new(form, &basis, *parts)).collect()
             });
         }
-        Self(found)
+        Self(divisions)
     }
 
     /// Returns the divisions of a cell, the coarsest first; none for prisms and polyhedra.
@@ -188,8 +188,8 @@ impl Between {
     ) -> u32 {
         let parts = nodes.iter().zip(weights).filter(|(_, weight)| weight.abs() > LEAST_WEIGHT);
         // Weights add up to 1. Between the nodes, polynomials of a high order may exceed 1.
-        let mut found = parts.clone();
-        if let (Some((node, _)), None) = (found.next(), found.next()) {
+        let mut weighted = parts.clone();
+        if let (Some((node, _)), None) = (weighted.next(), weighted.next()) {
             return *node;
         }
         // A point of a face has weights of the nodes of this face only, in all of its cells. The

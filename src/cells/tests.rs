@@ -53,25 +53,28 @@ fn kinds_have_the_numbers_of_vtk() {
 
 #[test]
 fn what_is_wrong_is_named() {
-    let told = |change: &dyn Fn(&mut Cells), expected: &str| {
+    let refuses = |change: &dyn Fn(&mut Cells), expected: &str| {
         let mut cells = cube();
         change(&mut cells);
         let message = cells.validate().unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");
     };
-    told(&|cells| *cells = Cells::default(), "there are no cells");
-    told(&|cells| cells.values.truncate(3), "there are 3 values for 8 points");
-    told(&|cells| cells.place = Place::Cells, "there are 8 values for 1 cells");
-    told(&|cells| cells.offsets = vec![0, 9], "2 ascending numbers from 0 to 8");
-    told(&|cells| cells.offsets = vec![0], "2 ascending numbers from 0 to 8");
-    told(&|cells| cells.points[2].y = f32::NAN, "of point 2 is not finite");
-    told(&|cells| cells.values[3] = f32::INFINITY, "the value of point 3 is inf");
-    told(&|cells| cells.nodes[5] = 8, "cell 0 refers to point 8 of 8");
-    told(&|cells| cells.kinds[0] = CellKind::Wedge, "is a wedge with 8 nodes, but has 6");
-    told(&|cells| cells.push(CellKind::LagrangeWedge, 0..7), "cell 1 is a Lagrange wedge with 7");
-    told(&|cells| cells.origin.x = f64::NAN, "the origin");
+    refuses(&|cells| *cells = Cells::default(), "there are no cells");
+    refuses(&|cells| cells.values.truncate(3), "there are 3 values for 8 points");
+    refuses(&|cells| cells.place = Place::Cells, "there are 8 values for 1 cells");
+    refuses(&|cells| cells.offsets = vec![0, 9], "2 ascending numbers from 0 to 8");
+    refuses(&|cells| cells.offsets = vec![0], "2 ascending numbers from 0 to 8");
+    refuses(&|cells| cells.points[2].y = f32::NAN, "of point 2 is not finite");
+    refuses(&|cells| cells.values[3] = f32::INFINITY, "the value of point 3 is inf");
+    refuses(&|cells| cells.nodes[5] = 8, "cell 0 refers to point 8 of 8");
+    refuses(&|cells| cells.kinds[0] = CellKind::Wedge, "is a wedge with 8 nodes, but has 6");
+    refuses(
+        &|cells| cells.push(CellKind::LagrangeWedge, 0..7),
+        "cell 1 is a Lagrange wedge with 7",
+    );
+    refuses(&|cells| cells.origin.x = f64::NAN, "the origin");
     let stream = |stream: &[u32], expected: &str| {
-        told(&|cells| cells.push(CellKind::Polyhedron, stream.to_vec()), expected);
+        refuses(&|cells| cells.push(CellKind::Polyhedron, stream.to_vec()), expected);
     };
     stream(&[], "fewer than 4");
     stream(&[3], "fewer than 4");

@@ -94,7 +94,7 @@ static MAPS: LazyLock<[(&str, Points); 13]> = LazyLock::new(|| {
 });
 
 /// Values of which percentiles are taken: of more, every second, third, … one.
-const LOOKS: usize = 1 << 20;
+const MOST_SAMPLED: usize = 1 << 20;
 
 impl ColorMap {
     /// The names that [`named`](Self::named) accepts. Each may end with `_r`, which reverses it.
@@ -123,8 +123,8 @@ impl ColorMap {
             Some(plain) => (plain, true),
             None => (lower.as_str(), false),
         };
-        let found = Self::NAMES.into_iter().find(|known| *known == plain);
-        found.map(|name| Self { name, is_reversed }).ok_or_else(|| {
+        let matching = Self::NAMES.into_iter().find(|known| *known == plain);
+        matching.map(|name| Self { name, is_reversed }).ok_or_else(|| {
             Error::Argument(format!(
                 "there is no colour map “{name}”; there are {}, and each reversed, such as \
                  viridis_r",
@@ -162,8 +162,8 @@ impl ColorMap {
     }
 
     fn table(self) -> &'static Points {
-        let found = MAPS.iter().find(|(name, _)| *name == self.name);
-        &found.unwrap_or(&MAPS[0]).1
+        let entry = MAPS.iter().find(|(name, _)| *name == self.name);
+        &entry.unwrap_or(&MAPS[0]).1
     }
 }
 
@@ -245,7 +245,7 @@ impl Spread {
         let counts = |value: &f32| value.is_finite() && (*value > 0.0 || !is_positive);
         let step = match self {
             Self::Full => 1,
-            Self::Percentiles => values.len().div_ceil(LOOKS).max(1),
+            Self::Percentiles => values.len().div_ceil(MOST_SAMPLED).max(1),
         };
         let each = values.par_iter().step_by(step).copied().filter(counts);
         let [low, high] = match self {
@@ -255,9 +255,9 @@ impl Spread {
                 each.fold(none, |all, value| both(all, [value; 2])).reduce(none, both)
             }
             Self::Percentiles => {
-                let mut found: Vec<f32> = each.collect();
-                let last = found.len().checked_sub(1)?;
-                let mut at = |rank| *found.select_nth_unstable_by(rank, f32::total_cmp).1;
+                let mut sampled: Vec<f32> = each.collect();
+                let last = sampled.len().checked_sub(1)?;
+                let mut at = |rank| *sampled.select_nth_unstable_by(rank, f32::total_cmp).1;
                 [at(last / 100), at(last - last / 100)]
             }
         };

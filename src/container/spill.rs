@@ -104,8 +104,8 @@ impl Spilled {
         match self {
             Self::Memory(all) => {
                 let start = offset as usize;
-                let found = all.get(start..start + bytes.len());
-                bytes.copy_from_slice(found.ok_or(io::ErrorKind::UnexpectedEof)?);
+                let source = all.get(start..start + bytes.len());
+                bytes.copy_from_slice(source.ok_or(io::ErrorKind::UnexpectedEof)?);
                 Ok(())
             }
             Self::Disk { others, file, start } => match offset.checked_sub(*start) {

@@ -69,9 +69,9 @@ fn products<S: Simd>(
         for (y, moment_y) in y.iter().zip(&moments[1]) {
             let Some(row) = rows.next() else { break };
             let (mut sum, mut sum_x) = (none, none);
-            for ((x, moment_x), own) in x.iter().zip(&moments[0]).zip(row) {
-                sum = x.mul_add(*own, sum);
-                sum_x = moment_x.mul_add(*own, sum_x);
+            for ((x, moment_x), sample) in x.iter().zip(&moments[0]).zip(row) {
+                sum = x.mul_add(*sample, sum);
+                sum_x = moment_x.mul_add(*sample, sum_x);
             }
             slice = y.mul_add(sum, slice);
             slice_x = y.mul_add(sum_x, slice_x);
@@ -110,23 +110,23 @@ fn cut<S: Simd>(
             let aside = away_y.mul_add(*away_y, *away_z * *away_z);
             let along = away_y.mul_add(way[1], *away_z * way[2]);
             let both = *y * *z;
-            let (mut sum, mut sum_own) = (none, none);
-            for ((x, away_x), own) in x.iter().zip(away[0]).zip(row) {
+            let (mut sum, mut weighted_sum) = (none, none);
+            for ((x, away_x), sample) in x.iter().zip(away[0]).zip(row) {
                 let along = away_x.mul_add(way[0], along);
                 let beside = away_x.mul_add(*away_x, aside) - along * along;
                 let h = beside.simd_le(squared).select(both * *x, none);
-                let h_own = h * *own;
+                let weighted = h * *sample;
                 sum += h;
-                sum_own += h_own;
+                weighted_sum += weighted;
                 weight_slopes[0] = h.mul_add(*away_x, weight_slopes[0]);
-                value_slopes[0] = h_own.mul_add(*away_x, value_slopes[0]);
+                value_slopes[0] = weighted.mul_add(*away_x, value_slopes[0]);
             }
             weight += sum;
-            value += sum_own;
+            value += weighted_sum;
             weight_slopes[1] = sum.mul_add(*away_y, weight_slopes[1]);
-            value_slopes[1] = sum_own.mul_add(*away_y, value_slopes[1]);
+            value_slopes[1] = weighted_sum.mul_add(*away_y, value_slopes[1]);
             weight_slopes[2] = sum.mul_add(*away_z, weight_slopes[2]);
-            value_slopes[2] = sum_own.mul_add(*away_z, value_slopes[2]);
+            value_slopes[2] = weighted_sum.mul_add(*away_z, value_slopes[2]);
         }
     }
     Sums { weight, value, weight_slopes, value_slopes }

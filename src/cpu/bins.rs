@@ -172,8 +172,8 @@ impl<'a> Bins<'a> {
         let is_single = plan.single().is_some();
         self.groups.par_iter_mut().for_each(|group| {
             let batches = group.batches.clone().zip(&self.records[group.batches.clone()]);
-            let numbers = batches.flat_map(|(batch, own)| {
-                (0..own.len()).map(move |place| batch << BATCH_BITS | place)
+            let numbers = batches.flat_map(|(batch, records)| {
+                (0..records.len()).map(move |place| batch << BATCH_BITS | place)
             });
             for (span, number) in group.spans.iter().zip(numbers) {
                 let [first, last] = span.blocks();
@@ -220,8 +220,8 @@ impl Span {
 impl Lists<'_> {
     /// Returns the lists of a block's tiles, with the splats in drawing order.
     pub fn of_tiles(&self, column: usize, row: usize, columns: usize) -> TileLists {
-        let own = row * columns + column - self.first;
-        let entries = &self.entries[self.starts[own]..self.starts[own + 1]];
+        let block = row * columns + column - self.first;
+        let entries = &self.entries[self.starts[block]..self.starts[block + 1]];
         let entries = if self.plan.single().is_some() {
             self.by_order(entries, [column, row])
         } else {
@@ -255,12 +255,12 @@ fn by_sheet(entries: &[AtomicU64]) -> Vec<Entry> {
     let mut ends = Vec::new();
     let mut least = u16::MAX;
     for entry in entries {
-        let own = sheet(entry.load(Relaxed));
-        least = least.min(own);
-        if usize::from(own) >= ends.len() {
-            ends.resize(usize::from(own) + 1, 0u32);
+        let first_sheet = sheet(entry.load(Relaxed));
+        least = least.min(first_sheet);
+        if usize::from(first_sheet) >= ends.len() {
+            ends.resize(usize::from(first_sheet) + 1, 0u32);
         }
-        ends[usize::from(own)] += 1;
+        ends[usize::from(first_sheet)] += 1;
     }
     let mut sum = 0;
     for end in ends.iter_mut().skip(least.into()) {

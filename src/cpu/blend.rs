@@ -168,7 +168,7 @@ impl<'a> Blended<'a> {
                             .max(Lanes::splat(simd, -beyond))
                             .min(Lanes::splat(simd, beyond))
                     });
-                    let own = match &self.blend.form {
+                    let sums = match &self.blend.form {
                         Form::Rectilinear(axes) => {
                             let taps = three!(I => axes.along::<S, N>(simd, I, place[I]));
                             let around = Around {
@@ -193,9 +193,9 @@ impl<'a> Blended<'a> {
                         }
                     };
                     all = Some(all.map_or(
-                        own,
+                        sums,
                         #[inline(always)]
-                        |all| all.plus(&own),
+                        |all| all.plus(&sums),
                     ));
                 }
                 all.unwrap_or(Sums {
@@ -227,8 +227,8 @@ impl<'a> Blended<'a> {
         });
         let away = three!(I => {
             let mut away = [Lanes::splat(simd, FAR); N];
-            for (tap, own) in away.iter_mut().enumerate().take(part.dims[I]) {
-                *own = (place[I] - starts[I] - tap as f32) * self.blend.per_step;
+            for (tap, distance) in away.iter_mut().enumerate().take(part.dims[I]) {
+                *distance = (place[I] - starts[I] - tap as f32) * self.blend.per_step;
             }
             away
         });
@@ -252,23 +252,23 @@ impl<'a> Blended<'a> {
         simd.vectorize(
             #[inline(always)]
             || match self.samples {
-                Source::Coefficients(own) => {
-                    part.load::<S, f32, N, WIDE, ALL>(simd, own, zero, around, values);
+                Source::Coefficients(coefficients) => {
+                    part.load::<S, f32, N, WIDE, ALL>(simd, coefficients, zero, around, values);
                 }
-                Source::Samples(SampleSlice::F32(own)) => {
-                    part.load::<S, f32, N, WIDE, ALL>(simd, own, zero, around, values);
+                Source::Samples(SampleSlice::F32(samples)) => {
+                    part.load::<S, f32, N, WIDE, ALL>(simd, samples, zero, around, values);
                 }
-                Source::Samples(SampleSlice::U8(own)) => {
-                    part.load::<S, u8, N, WIDE, ALL>(simd, own, zero, around, values);
+                Source::Samples(SampleSlice::U8(samples)) => {
+                    part.load::<S, u8, N, WIDE, ALL>(simd, samples, zero, around, values);
                 }
-                Source::Samples(SampleSlice::U16(own)) => {
-                    part.load::<S, u16, N, WIDE, ALL>(simd, own, zero, around, values);
+                Source::Samples(SampleSlice::U16(samples)) => {
+                    part.load::<S, u16, N, WIDE, ALL>(simd, samples, zero, around, values);
                 }
-                Source::Samples(SampleSlice::I16(own)) => {
-                    part.load::<S, i16, N, WIDE, ALL>(simd, own, zero, around, values);
+                Source::Samples(SampleSlice::I16(samples)) => {
+                    part.load::<S, i16, N, WIDE, ALL>(simd, samples, zero, around, values);
                 }
-                Source::Samples(SampleSlice::I32(own)) => {
-                    part.load::<S, i32, N, WIDE, ALL>(simd, own, zero, around, values);
+                Source::Samples(SampleSlice::I32(samples)) => {
+                    part.load::<S, i32, N, WIDE, ALL>(simd, samples, zero, around, values);
                 }
             },
         );
@@ -496,11 +496,11 @@ impl Part {
             // Sample by sample.
             for (at, value) in values.iter_mut().enumerate() {
                 let tap = [at % N, at / N % N, at / (N * N)];
-                let own = each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
+                let lanes = each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
                     let [x, y, z] = three!(I => (first[I][L] as usize + tap[I]).min(dims[I] - 1));
                     samples[z * slice + y * row + x].value() - zero
                 });
-                *value = own.simd_into(simd);
+                *value = lanes.simd_into(simd);
             }
             return;
         }
@@ -532,11 +532,12 @@ impl Part {
                 if at < WIDE {
                     loaded[at..].copy_from_slice(&T::two(simd, &window, [at, j, k]));
                 }
-                let own = &mut values[(k * N + j) * N..][..N];
+                let row_values = &mut values[(k * N + j) * N..][..N];
                 for tap in 0..N {
-                    own[tap] = loaded[tap] - zero;
+                    row_values[tap] = loaded[tap] - zero;
                     if any_moved {
-                        own[tap] = is_moved.select(loaded[(tap + 1) % WIDE] - zero, own[tap]);
+                        row_values[tap] =
+                            is_moved.select(loaded[(tap + 1) % WIDE] - zero, row_values[tap]);
                     }
                 }
             }
@@ -596,7 +597,7 @@ mod tests {
         let table =
             Kernel::table((0..=64).map(|at| (1.0 - f64::from(at) / 64.0).powi(2)).collect(), 1.8)
                 .unwrap();
-        let mut found = Vec::new();
+        let mut cases = Vec::new();
         for (kind, kernel) in [
             Kernel::b_spline(2.0).unwrap(),
             Kernel::b_spline(1.3).unwrap(),
@@ -611,8 +612,8 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            found.push((volume(cartesian([13, 12, 14]), kind), kernel.clone()));
-            found.push((volume(cartesian([14, 1, 5]), kind + 1), kernel));
+            cases.push((volume(cartesian([13, 12, 14]), kind), kernel.clone()));
+            cases.push((volume(cartesian([14, 1, 5]), kind + 1), kernel));
         }
         for (kind, kernel) in [
             gaussian(0.6, 2.0),
@@ -624,23 +625,23 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            found.push((volume(body_centred([9, 8, 17]), kind), kernel.clone()));
-            found.push((volume(body_centred([3, 9, 6]), kind + 1), kernel.clone()));
-            found.push((volume(body_centred([7, 2, 1]), kind + 2), kernel));
+            cases.push((volume(body_centred([9, 8, 17]), kind), kernel.clone()));
+            cases.push((volume(body_centred([3, 9, 6]), kind + 1), kernel.clone()));
+            cases.push((volume(body_centred([7, 2, 1]), kind + 2), kernel));
         }
         for (kind, steps) in
             [&[1.0][..], &[0.5, 0.7, 1.0, 1.4, 2.0, 1.2], &[1.0, 3.0], &[0.3, 0.3, 0.3, 0.9]]
                 .into_iter()
                 .enumerate()
         {
-            found.push((volume(rectilinear([12, 13, 11], steps), kind), gaussian(0.6, 2.0)));
-            found.push((volume(rectilinear([1, 3, 12], steps), kind + 1), gaussian(0.6, 2.0)));
+            cases.push((volume(rectilinear([12, 13, 11], steps), kind), gaussian(0.6, 2.0)));
+            cases.push((volume(rectilinear([1, 3, 12], steps), kind + 1), gaussian(0.6, 2.0)));
         }
         let kernel = gaussian(0.7, 3.0);
         let sharp = |lattice: Lattice| volume(lattice, 4).sharpened(&kernel).unwrap();
-        found.push((sharp(cartesian([8, 9, 7])), kernel.clone()));
-        found.push((sharp(body_centred([6, 5, 9])), kernel.clone()));
-        found
+        cases.push((sharp(cartesian([8, 9, 7])), kernel.clone()));
+        cases.push((sharp(body_centred([6, 5, 9])), kernel.clone()));
+        cases
     }
 
     /// Returns h and h′(r)/r.
@@ -661,10 +662,10 @@ mod tests {
         DVec3::from_array([0, 1, 2].map(|axis| {
             let here = lattice.steps(index)[axis];
             let beside = |other: usize| {
-                let mut own = index;
-                own[axis] = other;
+                let mut neighbour = index;
+                neighbour[axis] = other;
                 let sample = at + other * stride[axis] - index[axis] * stride[axis];
-                (volume.value(sample) - volume.value(at), lattice.steps(own)[axis] - here)
+                (volume.value(sample) - volume.value(at), lattice.steps(neighbour)[axis] - here)
             };
             let before =
                 index[axis].checked_sub(1).map(beside).map(|(rise, away)| (rise / away, -away));
@@ -696,19 +697,19 @@ mod tests {
                 continue;
             }
             let slope = if is_sloped { slope_at(volume, at) } else { DVec3::ZERO };
-            let own = volume.drawn_value(at) + slope.dot(away);
+            let sample = volume.drawn_value(at) + slope.dot(away);
             let h_slope = s * away / (unit * unit);
             weight += h;
-            value += h * own;
+            value += h * sample;
             weight_slopes += h_slope;
-            value_slopes += h_slope * own + h * slope;
+            value_slopes += h_slope * sample + h * slope;
         }
         let value = value / weight;
         let slopes = (value_slopes - value * weight_slopes) / weight;
         [weight, value, slopes.x, slopes.y, slopes.z]
     }
 
-    fn found(typed: &Typed, places: [[f32; 8]; 3], way: [f32; 3]) -> [[f32; 8]; 5] {
+    fn evaluate(typed: &Typed, places: [[f32; 8]; 3], way: [f32; 3]) -> [[f32; 8]; 5] {
         #[inline(always)]
         fn at<S: Simd>(
             simd: S,
@@ -754,12 +755,12 @@ mod tests {
                 let typed = Typed::blended(&volume, &blend, zero);
                 for round in 0..20 {
                     let places = places(lattice, round, if round < 15 { 0.0 } else { 0.7 });
-                    let found =
-                        found(&typed, places, way.as_vec3().to_array().map(|along| 3.0 * along));
+                    let results =
+                        evaluate(&typed, places, way.as_vec3().to_array().map(|along| 3.0 * along));
                     for lane in 0..8 {
-                        let place = DVec3::from_array(places.map(|own| f64::from(own[lane])));
+                        let place = DVec3::from_array(places.map(|lanes| f64::from(lanes[lane])));
                         let expected = truth(&volume, &kernel, place, way);
-                        let [weight, own @ ..] = found.map(|own| f64::from(own[lane]));
+                        let [weight, actual @ ..] = results.map(|lanes| f64::from(lanes[lane]));
                         let least = kernel.least_sum();
                         let near = if is_cut { 0.01 + 0.05 * expected[0] } else { 1e-4 };
                         assert!(
@@ -770,9 +771,9 @@ mod tests {
                             continue;
                         }
                         compared += 1;
-                        error += (own[0] + zero - expected[1]).powi(2);
+                        error += (actual[0] + zero - expected[1]).powi(2);
                         slope_error +=
-                            (1..4).map(|i| (own[i] - expected[i + 1]).powi(2)).sum::<f64>();
+                            (1..4).map(|i| (actual[i] - expected[i + 1]).powi(2)).sum::<f64>();
                     }
                 }
             }
@@ -817,7 +818,7 @@ mod tests {
                 let places = places(&volume.lattice, round, 0.0);
                 let drawn =
                     [0, 1, 2].map(|axis| places[axis].map(|place| place + before[axis] as f32));
-                let [weight, value, ..] = found(&typed, drawn, [1.0, 2.0, -0.5]);
+                let [weight, value, ..] = evaluate(&typed, drawn, [1.0, 2.0, -0.5]);
                 for lane in (0..8).filter(|lane| weight[*lane] > 0.0) {
                     let cell = [0, 1, 2].map(|axis| {
                         let at = places[axis][lane] * scale[axis] + shift[axis];
@@ -840,17 +841,21 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_gathered_is_told() {
-        let told = |lattice: Lattice, kernel: Kernel, what: &str| {
+    fn what_is_not_gathered_is_refused() {
+        let check = |lattice: Lattice, kernel: Kernel, what: &str| {
             let message = Way::of(&volume(lattice, 0), &kernel).unwrap_err();
             assert!(message.contains(what), "{message}");
         };
-        told(cartesian([4; 3]), Kernel::hann(4.2).unwrap(), "too many");
-        told(cartesian([4; 3]), Kernel::gaussian(2.0, 9.0).unwrap(), "too many");
-        told(cartesian([4; 3]), Kernel::b_spline(1.1).unwrap(), "narrower");
-        told(body_centred([4; 3]), Kernel::gaussian(0.29, 2.0).unwrap(), "narrower");
-        told(rectilinear([4; 3], &[1.0]), Kernel::gaussian(0.6, 1.5).unwrap(), "still have weight");
-        told(
+        check(cartesian([4; 3]), Kernel::hann(4.2).unwrap(), "too many");
+        check(cartesian([4; 3]), Kernel::gaussian(2.0, 9.0).unwrap(), "too many");
+        check(cartesian([4; 3]), Kernel::b_spline(1.1).unwrap(), "narrower");
+        check(body_centred([4; 3]), Kernel::gaussian(0.29, 2.0).unwrap(), "narrower");
+        check(
+            rectilinear([4; 3], &[1.0]),
+            Kernel::gaussian(0.6, 1.5).unwrap(),
+            "still have weight",
+        );
+        check(
             rectilinear([40; 3], &[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 20.0]),
             Kernel::default(),
             "far more samples",

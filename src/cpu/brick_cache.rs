@@ -149,10 +149,10 @@ impl BrickCache {
         touched.sort_unstable();
         touched.dedup();
         for (level, brick) in touched {
-            let Some(own) = self.slot(level, brick) else { continue };
+            let Some(slot) = self.slot(level, brick) else { continue };
             for step in around().filter(|step| *step != [0; 3]) {
                 let from = self.neighbour(level, brick, step).map(|(_, slot)| slot);
-                each_type!(mut self.samples, samples => copy_beside(samples, own, from, step));
+                each_type!(mut self.samples, samples => copy_beside(samples, slot, from, step));
             }
         }
     }
@@ -189,17 +189,17 @@ fn place_of([x, y, z]: [isize; 3]) -> usize {
 fn fill<T: AnyBitPattern>(slot: &mut [T], bytes: &[u8]) {
     for (row, bytes) in bytes.chunks_exact(SIDE * size_of::<T>()).enumerate() {
         let start = place_of([0, (row % SIDE) as isize, (row / SIDE) as isize]);
-        for (own, bytes) in
+        for (sample, bytes) in
             slot[start..start + SIDE].iter_mut().zip(bytes.chunks_exact(size_of::<T>()))
         {
-            *own = bytemuck::pod_read_unaligned(bytes);
+            *sample = bytemuck::pod_read_unaligned(bytes);
         }
     }
 }
 
 /// Fills the extra samples on one side of a brick from its neighbour there, or else from its own
 /// border.
-fn copy_beside<T: Copy>(samples: &mut [T], own: usize, from: Option<usize>, step: [isize; 3]) {
+fn copy_beside<T: Copy>(samples: &mut [T], slot: usize, from: Option<usize>, step: [isize; 3]) {
     let side = SIDE as isize;
     let along = |axis: usize| match step[axis] {
         -1 => -(BESIDE as isize)..0,
@@ -208,13 +208,13 @@ fn copy_beside<T: Copy>(samples: &mut [T], own: usize, from: Option<usize>, step
     };
     // The source of a sample beside the brick.
     let source = |at: [isize; 3]| match from {
-        Some(slot) => slot * SLOT + place_of([0, 1, 2].map(|axis| at[axis] - side * step[axis])),
-        None => own * SLOT + place_of(at.map(|at| at.clamp(0, side - 1))),
+        Some(from) => from * SLOT + place_of([0, 1, 2].map(|axis| at[axis] - side * step[axis])),
+        None => slot * SLOT + place_of(at.map(|at| at.clamp(0, side - 1))),
     };
     for z in along(2) {
         for y in along(1) {
             for x in along(0) {
-                samples[own * SLOT + place_of([x, y, z])] = samples[source([x, y, z])];
+                samples[slot * SLOT + place_of([x, y, z])] = samples[source([x, y, z])];
             }
         }
     }
@@ -236,7 +236,7 @@ impl Grid {
 
     pub fn new(cache: &BrickCache, choice: &Choice, level: usize) -> Self {
         let mut slots = vec![Self::ABSENT; cache.bricks.level(level).bricks()];
-        for &(_, brick) in choice.bricks.iter().filter(|(own, _)| *own == level) {
+        for &(_, brick) in choice.bricks.iter().filter(|(brick_level, _)| *brick_level == level) {
             if let Some(slot) = cache.slot(level, brick) {
                 slots[brick as usize] = slot as u32;
             }

@@ -90,9 +90,10 @@ impl<'a> CellField<'a> {
         let turn = plan.view.rotation * (per_value * f64::from(plan.field.gradients.length));
         let turn: Mat3 = turn.as_mat3();
         let needs = plan.has_gradients() && of_points;
-        let own = if needs { &tetrahedra.gradients[..] } else { &[] };
-        let gradients = own.par_iter().map(|gradient| (turn * *gradient).to_array()).collect();
-        let mut found = Self {
+        let gradients = if needs { &tetrahedra.gradients[..] } else { &[] };
+        let gradients =
+            gradients.par_iter().map(|gradient| (turn * *gradient).to_array()).collect();
+        let mut field = Self {
             tetrahedra,
             points,
             gradients,
@@ -105,19 +106,19 @@ impl<'a> CellField<'a> {
             let numbers = batch * BATCH..((batch + 1) * BATCH).min(tetrahedra.len());
             let shows = |number: &usize| {
                 let [low, high] = if of_points {
-                    found.range(*number)
+                    field.range(*number)
                 } else {
                     [entry(tetrahedra.values[*number]); 2]
                 };
                 plan.optics == Optics::Maximum || visible.may_show_between(plan, low, high)
             };
-            numbers.filter(shows).filter_map(|number| found.shot(plan, number)).collect()
+            numbers.filter(shows).filter_map(|number| field.shot(plan, number)).collect()
         };
         let batches: Vec<Vec<Shot>> =
             (0..tetrahedra.len().div_ceil(BATCH)).into_par_iter().map(batch).collect();
-        found.order(plan, &batches);
-        found.list(plan);
-        found
+        field.order(plan, &batches);
+        field.list(plan);
+        field
     }
 
     /// The number of tetrahedra in the picture.
@@ -224,7 +225,7 @@ impl<'a> CellField<'a> {
         const SIDE: i32 = (BLOCK * TILE) as i32;
         let [column, row] = corner.map(|first| (first / SIDE) as usize);
         let block = row * self.blocks + column;
-        let own = self.starts[block] as usize..self.starts[block + 1] as usize;
+        let range = self.starts[block] as usize..self.starts[block + 1] as usize;
         let meets = |number: &u32| {
             let pixels = self.shots[*number as usize].pixels;
             [0, 1].into_iter().all(|axis| {
@@ -232,7 +233,7 @@ impl<'a> CellField<'a> {
                 first < corner[axis] + TILE as i32 && last >= corner[axis]
             })
         };
-        self.listed[own].iter().copied().filter(meets).collect()
+        self.listed[range].iter().copied().filter(meets).collect()
     }
 
     /// Returns the linear functions of a tetrahedron; `None` if it is flat in 32 bits.
@@ -274,11 +275,11 @@ impl<'a> CellField<'a> {
                 let [x, y, z] = factor.to_array();
                 [x, y, z, 0.25 - factor.dot(middle)]
             });
-            let own = corners.map(|corner| self.gradients[corner as usize]);
+            let corner_gradients = corners.map(|corner| self.gradients[corner as usize]);
             for (axis, gradient) in gradient.iter_mut().enumerate() {
-                for (own, factors) in own.iter().zip(&coordinates) {
+                for (corner_gradient, factors) in corner_gradients.iter().zip(&coordinates) {
                     for (sum, factor) in gradient.iter_mut().zip(factors) {
-                        *sum += own[axis] * factor;
+                        *sum += corner_gradient[axis] * factor;
                     }
                 }
             }
@@ -351,14 +352,14 @@ pub struct CellTile<'a, S: Simd> {
 impl<'a, S: Simd> CellTile<'a, S> {
     /// Returns the tetrahedra of the tile with a first pixel; `None` if it has none.
     pub fn new(simd: S, field: &'a CellField<'a>, corner: [i32; 2]) -> Option<Self> {
-        let own = field.of_tile(corner);
-        if own.is_empty() {
+        let shots = field.of_tile(corner);
+        if shots.is_empty() {
             return None;
         }
         Some(Self {
             field,
             corner,
-            ahead: own.into_iter(),
+            ahead: shots.into_iter(),
             continued: Vec::new(),
             sums: Box::new([[Sum::new(simd); PACKETS]; OPEN]),
             has_sums: [0; OPEN],
@@ -401,14 +402,14 @@ impl<'a, S: Simd> CellTile<'a, S> {
         let shots = &self.field.shots;
         self.continued.retain(|(shot, next)| usize::from(shots[*shot as usize].sheets[1]) >= *next);
         while let Some(shot) = self.ahead.as_slice().first().copied() {
-            let own = self.field.shots[shot as usize];
-            if usize::from(own.sheets[0]) > sheet {
+            let sheets = self.field.shots[shot as usize].sheets;
+            if usize::from(sheets[0]) > sheet {
                 break;
             }
             self.ahead.next();
             self.add_shot(simd, plan, shot, sheet, packets);
             added += 1;
-            if usize::from(own.sheets[1]) >= sheet + OPEN {
+            if usize::from(sheets[1]) >= sheet + OPEN {
                 self.continued.push((shot, sheet + OPEN));
             }
         }

@@ -304,12 +304,12 @@ impl Plan<'_> {
     /// Returns the same for a value that is the same everywhere around.
     #[inline(always)]
     pub fn of_value<S: Simd>(&self, simd: S, value: Lanes<S>) -> [Lanes<S>; 4] {
-        let mut shown = self.one(simd, value);
+        let mut emission = self.one(simd, value);
         if self.has_gradient_opacity {
             let factor = self.gradient_factor(simd, Lanes::splat(simd, 0.0));
-            shown = four!(I => shown[I] * factor);
+            emission = four!(I => emission[I] * factor);
         }
-        shown
+        emission
     }
 
     /// Returns the factor on the extinction for a gradient's magnitude.
@@ -511,9 +511,9 @@ impl Plan<'_> {
                 let is_ahead = from.simd_gt(begin) & from.simd_lt(*to);
                 end = is_ahead.select(end.min(*from), end);
             }
-            let own = mask & begin.simd_lt(end);
-            if own.any_true() {
-                self.pass_between(simd, layer, [begin, end], own, &mut medium);
+            let mask = mask & begin.simd_lt(end);
+            if mask.any_true() {
+                self.pass_between(simd, layer, [begin, end], mask, &mut medium);
             }
             begin = begin.max(end);
         }
@@ -593,7 +593,7 @@ impl Plan<'_> {
         medium: &mut Medium<S>,
     ) {
         let none = Lanes::splat(simd, 0.0);
-        let Some((color, depth)) = self.shown_in(simd, layer, piece) else { return };
+        let Some((color, depth)) = self.color_and_depth(simd, layer, piece) else { return };
         let ([place, next_place], [value, next]) = (piece.places, piece.values);
         let mut done = none;
         for number in 0..self.isosurfaces {
@@ -636,7 +636,7 @@ impl Plan<'_> {
     /// Returns the colour and the optical depth that the transfer function shows in a piece, or
     /// `None` if the piece has no visible value and the transfer function no isosurface.
     #[inline(always)]
-    fn shown_in<S: Simd>(
+    fn color_and_depth<S: Simd>(
         &self,
         simd: S,
         layer: &Layer<S>,
@@ -644,7 +644,7 @@ impl Plan<'_> {
     ) -> Option<([Lanes<S>; 3], Lanes<S>)> {
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let ([place, next_place], [value, next]) = (piece.places, piece.values);
-        let mut shown = if self.is_integrated {
+        let mut emission = if self.is_integrated {
             self.between(simd, value, next)
         } else {
             self.one(simd, layer.mean())
@@ -655,14 +655,14 @@ impl Plan<'_> {
         }
         if self.has_gradient_opacity {
             let factor = self.gradient_factor(simd, dot(normal, normal).sqrt());
-            shown = four!(I => shown[I] * factor);
+            emission = four!(I => emission[I] * factor);
         }
-        let depth = piece.mask.select(shown[3].max(none) * piece.length * layer.filling, none);
+        let depth = piece.mask.select(emission[3].max(none) * piece.length * layer.filling, none);
         if !(depth.simd_gt(0.0).any_true() || self.isosurfaces > 0) {
             return None;
         }
-        let inverse = one / shown[3].max(Lanes::splat(simd, 1e-20));
-        let mut color = three!(I => (shown[I] * inverse).max(none).min(one));
+        let inverse = one / emission[3].max(Lanes::splat(simd, 1e-20));
+        let mut color = three!(I => (emission[I] * inverse).max(none).min(one));
         if self.is_lit {
             color = self.lit_piece(simd, color, layer, piece.places);
         }
@@ -738,16 +738,16 @@ impl<S: Simd> Medium<S> {
     #[inline(always)]
     fn mixed_with(&self, simd: S, [red, green, blue, depth]: [Lanes<S>; 4]) -> [Lanes<S>; 4] {
         let one = Lanes::splat(simd, 1.0);
-        let own = self.depth.min(Lanes::splat(simd, MOST_DEPTH));
+        let tau = self.depth.min(Lanes::splat(simd, MOST_DEPTH));
         // Converts opacity to optical depth: τ / (1 − e^−τ). For small τ that ratio would lose its
         // digits.
-        let ratio = own.simd_lt(1e-2).select(own * 0.5 + 1.0, own / (one - exp(simd, -own)));
+        let ratio = tau.simd_lt(1e-2).select(tau * 0.5 + 1.0, tau / (one - exp(simd, -tau)));
         let [red, green, blue] = [
             ratio.mul_add(self.color[0], red),
             ratio.mul_add(self.color[1], green),
             ratio.mul_add(self.color[2], blue),
         ];
-        [red, green, blue, depth + own]
+        [red, green, blue, depth + tau]
     }
 
     #[inline(always)]

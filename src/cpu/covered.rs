@@ -51,22 +51,22 @@ impl<S: Simd> OpenTile<'_, S> {
     ) {
         let Covered { share, seen, distance, color, covers, side } = *covered;
         let none = Lanes::splat(simd, 0.0);
-        for own in usize::from(window.is_continued)..WINDOW {
-            let [front, back] = [0, 1].map(|next| plan.planes[window.front + own + next]);
+        for offset in usize::from(window.is_continued)..WINDOW {
+            let [front, back] = [0, 1].map(|next| plan.planes[window.front + offset + next]);
             let mut inside: mask32x8<S> = distance.simd_lt(back) & covers;
-            if own > 0 {
+            if offset > 0 {
                 inside &= distance.simd_ge(front);
             }
             if !inside.any_true() {
                 continue;
             }
-            let [share, seen] = [share, seen].map(|own| inside.select(own, none));
+            let [share, seen] = [share, seen].map(|value| inside.select(value, none));
             let pixel = if plan.view.perspective { front.max(1e-30) } else { 1.0 };
             let per_pixel = NEARER as f32 * plan.frame.scale / pixel;
             let behind =
                 ((distance - front) * per_pixel).max(none).min(Lanes::splat(simd, FARTHEST));
             let weight = seen * exp(simd, none - behind);
-            let slot = (window.front + own) % WINDOW;
+            let slot = (window.front + offset) % WINDOW;
             sums.has_facets[slot] |= packet.bit();
             let sums = &mut sums.facets[slot][packet.number];
             match side {

@@ -39,7 +39,7 @@ impl<'a> FacetProjector<'a> {
         let view = plan.view;
         let is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
         let source = Source::of_radiance(view, set.origin, 0.0);
-        let place = plan.with_images.iter().position(|own| Arc::ptr_eq(own, set));
+        let place = plan.with_images.iter().position(|other| Arc::ptr_eq(other, set));
         let images = place.map_or(0, |place| place as u32 + 1);
         Self { plan, set, images, source, is_culled }
     }
@@ -154,7 +154,7 @@ fn sheets(plan: &Plan, corners: [Vec3; 3]) -> Option<[u16; 2]> {
 }
 
 /// A facet on its way to the pixels of a tile.
-struct Shown<'a> {
+struct DrawnFacet<'a> {
     /// The image that it shows, and where.
     image: Option<Mapped<'a>>,
     corners: [Vec3; 3],
@@ -195,8 +195,8 @@ impl Mapped<'_> {
         let [x, y] = &packet.rays.pixel;
         let mut seen = [[0.0f32; 8]; 4];
         for lane in (0..8).filter(|lane| wanted[*lane] > 0.0) {
-            let own = self.at(x[lane], y[lane]);
-            seen.iter_mut().zip(own).for_each(|(seen, own)| seen[lane] = own);
+            let color = self.at(x[lane], y[lane]);
+            seen.iter_mut().zip(color).for_each(|(seen, channel)| seen[lane] = channel);
         }
         let [red, green, blue, alpha] = seen;
         [red.simd_into(simd), green.simd_into(simd), blue.simd_into(simd), alpha.simd_into(simd)]
@@ -205,9 +205,9 @@ impl Mapped<'_> {
     /// Returns the colour of a pixel, by the place of its centre, and the share that is seen.
     fn at(&self, x: f32, y: f32) -> [f32; 4] {
         let [start, right, down] = self.weights;
-        let own: [f32; 3] = std::array::from_fn(|i| start[i] + x * right[i] + y * down[i]);
+        let weights: [f32; 3] = std::array::from_fn(|i| start[i] + x * right[i] + y * down[i]);
         // Beside the facet, its nearest place counts.
-        let inside = own.map(|weight| weight.max(0.0));
+        let inside = weights.map(|weight| weight.max(0.0));
         let sum = |values: [f32; 3]| values[0] + values[1] + values[2];
         let of = |values: [f32; 3]| {
             self.places[0] * values[0] + self.places[1] * values[1] + self.places[2] * values[2]
@@ -222,7 +222,7 @@ impl Mapped<'_> {
     }
 }
 
-impl<'a> Shown<'a> {
+impl<'a> DrawnFacet<'a> {
     #[inline(always)]
     fn new(plan: &'a Plan, record: &Record) -> Self {
         let [bx, by, bz, cx, cy, cz] = record.whitening;
@@ -246,7 +246,8 @@ impl<'a> Shown<'a> {
         let set = (images.to_bits() as usize).checked_sub(1).map(|set| &plan.with_images[set]);
         let image = set.and_then(|set| set.image_of(number.to_bits() as usize));
         let image = image.map(|(image, places)| {
-            let weights = linear_weights(plan, corners).map(|part| part.map(|own| own * turn));
+            let weights =
+                linear_weights(plan, corners).map(|part| part.map(|weight| weight * turn));
             Mapped { image, weights, places }
         });
         Self {
@@ -320,7 +321,7 @@ fn linear_weights(plan: &Plan, corners: [Vec3; 3]) -> [[f32; 3]; 3] {
     });
     let of = |part: fn(Vec3) -> f32| edges.map(part);
     let (right, down) = (of(|edge| edge.x), of(|edge| edge.y));
-    let [right, down] = [right, down].map(|part| part.map(|own| own / frame.scale));
+    let [right, down] = [right, down].map(|part| part.map(|weight| weight / frame.scale));
     let start = std::array::from_fn(|i| {
         edges[i].z - frame.center[0] * right[i] - frame.center[1] * down[i]
     });
@@ -360,7 +361,7 @@ impl<S: Simd> OpenTile<'_, S> {
     fn add_facet_to(
         simd: S,
         plan: &Plan,
-        facet: &Shown,
+        facet: &DrawnFacet,
         window: Window,
         packet: &Packet<S>,
         sums: &mut Sums<S>,
@@ -402,8 +403,8 @@ impl<S: Simd> OpenTile<'_, S> {
             }
         }
         let side = if facet.is_front { Side::Front } else { Side::Back };
-        let own = Covered { share, seen: seen_share, distance, color, covers, side };
-        Self::add_covered(simd, plan, &own, window, packet, sums);
+        let covered = Covered { share, seen: seen_share, distance, color, covers, side };
+        Self::add_covered(simd, plan, &covered, window, packet, sums);
     }
 
     /// Adds a facet's window to all packets that it meets.
@@ -416,7 +417,7 @@ impl<S: Simd> OpenTile<'_, S> {
         window: Window,
         packets: impl Iterator<Item = usize>,
     ) {
-        let facet = Shown::new(plan, record);
+        let facet = DrawnFacet::new(plan, record);
         for number in packets {
             let packet = &self.packets[number];
             if !packet.is_done || plan.central {

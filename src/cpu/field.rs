@@ -124,7 +124,7 @@ enum Shape<'a> {
     /// Four weights an axis, each given by its coefficients of 1, t, t² and t³.
     Cubic([[f32; 4]; 4]),
     /// The nearest sample, with the Gaussian that smooths the mask of its label, and the shares of
-    /// each sample's own label around it ([`own_shares`](crate::volume::own_shares)).
+    /// each sample's own label around it ([`label_shares`](crate::volume::label_shares)).
     Labels(Bell, &'a [u8]),
 }
 
@@ -297,14 +297,14 @@ impl<T: Sample> Field<'_, T> {
             Memory::Slots(grid) => (grid.places(first), SLOT_SIDE, SLOT_SIDE * SLOT_SIDE),
             Memory::Rows if nx * ny * nz <= i32::MAX as usize => {
                 let [x, y, z] = first;
-                let own: [i32; 8] = ((z * ny as i32 + y) * nx as i32 + x).into();
-                (each!([0, 1, 2, 3, 4, 5, 6, 7], I => own[I] as usize), nx, nx * ny)
+                let indices: [i32; 8] = ((z * ny as i32 + y) * nx as i32 + x).into();
+                (each!([0, 1, 2, 3, 4, 5, 6, 7], I => indices[I] as usize), nx, nx * ny)
             }
             Memory::Rows => {
                 let [x, y, z]: [[i32; 8]; 3] = three!(I => first[I].into());
-                let own = each!([0, 1, 2, 3, 4, 5, 6, 7], I => (z[I] as usize * ny
+                let indices = each!([0, 1, 2, 3, 4, 5, 6, 7], I => (z[I] as usize * ny
                     + y[I] as usize) * nx + x[I] as usize);
-                (own, nx, nx * ny)
+                (indices, nx, nx * ny)
             }
         };
         Window::new(samples, places, row, slice)
@@ -344,17 +344,17 @@ impl<T: Sample> Field<'_, T> {
         let mut taps = [[[0; 4]; 8]; 3];
         for axis in 0..3 {
             let last = Lanes::splat(simd, self.dims[axis] as f32 - 1.0);
-            let mut own = weights[axis].weights;
+            let mut kept = weights[axis].weights;
             for tap in 0..4 {
                 let index = first[axis] + (tap as f32 - 1.0);
                 let inside = index.max(none).min(last);
-                own[tap] = inside.simd_eq(index).select(own[tap], none);
+                kept[tap] = inside.simd_eq(index).select(kept[tap], none);
                 let indices: [f32; 8] = inside.into();
-                for (own, index) in taps[axis].iter_mut().zip(indices) {
-                    own[tap] = index as usize;
+                for (lane_taps, index) in taps[axis].iter_mut().zip(indices) {
+                    lane_taps[tap] = index as usize;
                 }
             }
-            weights[axis] = normalised(simd, own);
+            weights[axis] = normalised(simd, kept);
         }
         (weights, self.border(samples, taps))
     }
@@ -394,13 +394,13 @@ impl<T: Sample> Field<'_, T> {
 #[inline(always)]
 fn moved<S: Simd>(simd: S, weights: [Lanes<S>; 4], by: Lanes<S>) -> Weights<S> {
     let none = Lanes::splat(simd, 0.0);
-    let mut found = [none; 4];
-    for (to, own) in found.iter_mut().enumerate() {
+    let mut shifted = [none; 4];
+    for (to, target) in shifted.iter_mut().enumerate() {
         for (from, weight) in weights.iter().enumerate() {
-            *own = by.simd_eq(from as f32 - to as f32).select(*weight, *own);
+            *target = by.simd_eq(from as f32 - to as f32).select(*weight, *target);
         }
     }
-    normalised(simd, found)
+    normalised(simd, shifted)
 }
 
 /// Scales weights so that they add up to 1.
@@ -528,8 +528,8 @@ impl<T: Sample> Field<'_, T> {
             for tap in 0..4 {
                 let index = (first + (tap as f32 - 1.0)).abs();
                 let index: [f32; 8] = ((index - last).abs() * -1.0 + last).max(none).into();
-                for (own, index) in indices[I].iter_mut().zip(index) {
-                    own[tap] = index as usize;
+                for (lane_indices, index) in indices[I].iter_mut().zip(index) {
+                    lane_indices[tap] = index as usize;
                 }
             }
             Taps::new(simd, factors, place - first)
@@ -699,14 +699,14 @@ impl<T> Field<'_, T> {
 impl<S: Simd, T: Sample> Rows<S> for Border<'_, T> {
     #[inline(always)]
     fn four(&self, simd: S, row: usize, slice: usize) -> [Lanes<S>; 4] {
-        let mut found = [[0.0f32; 8]; 4];
+        let mut values = [[0.0f32; 8]; 4];
         for lane in 0..8 {
             let start = self.taps[2][lane][slice] * self.slice + self.taps[1][lane][row] * self.row;
-            for (own, x) in found.iter_mut().zip(self.taps[0][lane]) {
-                own[lane] = self.samples[self.starts[lane] + start + x].value();
+            for (lanes, x) in values.iter_mut().zip(self.taps[0][lane]) {
+                lanes[lane] = self.samples[self.starts[lane] + start + x].value();
             }
         }
-        four!(I => found[I].simd_into(simd))
+        four!(I => values[I].simd_into(simd))
     }
 }
 
@@ -742,7 +742,7 @@ mod tests {
         sums
     }
 
-    fn found(
+    fn evaluate(
         volume: &Volume,
         weighting: Weighting,
         places: [[f32; 8]; 3],
@@ -796,7 +796,7 @@ mod tests {
                     let places =
                         [0, 1, 2].map(|axis| std::array::from_fn(|lane| place(axis, lane)));
                     for zero in [0.0, 100.0] {
-                        let found = found(&volume, Weighting::Tensor(tensor), places, zero);
+                        let results = evaluate(&volume, Weighting::Tensor(tensor), places, zero);
                         for lane in 0..8 {
                             let place = places.map(|lanes| f64::from(lanes[lane]));
                             let mut expected = truth(&volume, tensor, place);
@@ -806,11 +806,11 @@ mod tests {
                             let is_kink = tensor == Tensor::Linear
                                 && place.iter().any(|at| at.fract() == 0.0);
                             let compared = if is_kink { 1 } else { 4 };
-                            for (found, expected) in found.iter().zip(expected).take(compared) {
-                                let found = f64::from(found[lane]);
+                            for (lanes, expected) in results.iter().zip(expected).take(compared) {
+                                let value = f64::from(lanes[lane]);
                                 assert!(
-                                    (found - expected).abs() < 2e-3,
-                                    "{tensor:?} {dims:?} {place:?}: {found} {expected}"
+                                    (value - expected).abs() < 2e-3,
+                                    "{tensor:?} {dims:?} {place:?}: {value} {expected}"
                                 );
                             }
                         }
@@ -827,8 +827,9 @@ mod tests {
         let at = |place: [f64; 3]| {
             let (mut sum, mut weights) = (0.0, 0.0);
             for index in 0..dims.iter().product() {
-                let own = [index % dims[0], index / dims[0] % dims[1], index / (dims[0] * dims[1])];
-                let away = [0, 1, 2].map(|axis| place[axis] - own[axis] as f64);
+                let sample =
+                    [index % dims[0], index / dims[0] % dims[1], index / (dims[0] * dims[1])];
+                let away = [0, 1, 2].map(|axis| place[axis] - sample[axis] as f64);
                 let weight =
                     (-0.5 * away.iter().map(|d| d * d).sum::<f64>() / (sigma * sigma)).exp();
                 (sum, weights) = (sum + weight * volume.value(index), weights + weight);
@@ -836,8 +837,9 @@ mod tests {
             sum / weights
         };
         let slope = |axis: usize| {
-            let beside =
-                |by: f64| [0, 1, 2].map(|own| place[own] + if own == axis { by } else { 0.0 });
+            let beside = |by: f64| {
+                [0, 1, 2].map(|other| place[other] + if other == axis { by } else { 0.0 })
+            };
             (at(beside(1e-4)) - at(beside(-1e-4))) / 2e-4
         };
         [at(place), slope(0), slope(1), slope(2)]
@@ -849,9 +851,9 @@ mod tests {
         let bytes: Vec<u8> = (0..336).map(|at: usize| (at * at * 31 % 251) as u8).collect();
         let kinds = [
             Samples::U8(bytes.clone()),
-            Samples::U16(bytes.iter().map(|own| u16::from(*own)).collect()),
-            Samples::I16(bytes.iter().map(|own| i16::from(*own)).collect()),
-            Samples::F32(bytes.iter().map(|own| f32::from(*own)).collect()),
+            Samples::U16(bytes.iter().map(|byte| u16::from(*byte)).collect()),
+            Samples::I16(bytes.iter().map(|byte| i16::from(*byte)).collect()),
+            Samples::F32(bytes.iter().map(|byte| f32::from(*byte)).collect()),
         ];
         for samples in kinds {
             let volume = Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples).unwrap();
@@ -861,14 +863,14 @@ mod tests {
                     (part * (dims[axis] as f64 + 2.0) - 1.5) as f32
                 };
                 let places = [0, 1, 2].map(|axis| std::array::from_fn(|lane| place(axis, lane)));
-                let found = found(&volume, Weighting::Gaussian(0.5), places, 0.0);
+                let results = evaluate(&volume, Weighting::Gaussian(0.5), places, 0.0);
                 for lane in 0..8 {
                     let place = places.map(|lanes| f64::from(lanes[lane]));
-                    for (found, expected) in found.iter().zip(mean(&volume, 0.5, place)) {
+                    for (lanes, expected) in results.iter().zip(mean(&volume, 0.5, place)) {
                         // Relative to 251. The errors come from omitted weights, and for integers
                         // from rounded weights.
-                        let found = f64::from(found[lane]);
-                        assert!((found - expected).abs() < 2.0, "{place:?}: {found} {expected}");
+                        let value = f64::from(lanes[lane]);
+                        assert!((value - expected).abs() < 2.0, "{place:?}: {value} {expected}");
                     }
                 }
             }

@@ -18,12 +18,12 @@ use crate::{
     math::{Bounds, Kernel, Sheets, View},
     plan::{
         gathering,
-        shown::{self, Shown},
+        visible::{self, VisibleBlocks},
         weighting::{Weighting, deviation, weighting},
     },
     scene::{Item, Optics, Scene, Settings},
     volume::{
-        Lattice, Volume, own_shares,
+        Lattice, Volume, label_shares,
         reach::{EVERYTHING, first_visible},
     },
 };
@@ -43,9 +43,9 @@ pub struct FieldState {
     shares: Option<Vec<u8>>,
     /// The visible samples of a gathered lattice, and the transfer function's visibility table for
     /// which they were found.
-    shown: Option<([u16; 256], Shown)>,
+    visible_samples: Option<([u16; 256], VisibleBlocks)>,
     /// The levels of a gathered volume in bricks, for the bricks of the last picture.
-    levels: Option<(Choice, Vec<(Grid, Shown)>)>,
+    levels: Option<(Choice, Vec<(Grid, VisibleBlocks)>)>,
 }
 
 impl FieldState {
@@ -57,7 +57,7 @@ impl FieldState {
             ranges: None,
             blend: None,
             shares: None,
-            shown: None,
+            visible_samples: None,
             levels: None,
         };
         scene.fields().into_iter().map(field).collect()
@@ -65,9 +65,9 @@ impl FieldState {
 
     /// Returns the bytes of memory held for drawing.
     pub fn bytes(&self) -> u64 {
-        let shown = self.shown.as_ref().map_or(0, |(_, shown)| shown.bytes());
+        let samples = self.visible_samples.as_ref().map_or(0, |(_, samples)| samples.bytes());
         let ranges = self.ranges.as_ref().map_or(0, |ranges| size_of_val(ranges.as_slice()) as u64);
-        shown + ranges + self.shares.as_ref().map_or(0, |shares| shares.len() as u64)
+        samples + ranges + self.shares.as_ref().map_or(0, |shares| shares.len() as u64)
     }
 
     /// Returns the bricks that a view of the scene needs, if the field is a volume in bricks.
@@ -95,14 +95,14 @@ impl FieldState {
         sheets: &Sheets,
         choice: Option<Choice>,
     ) -> Result<FieldOutline> {
-        let mut shown = EVERYTHING;
+        let mut visible_ranges = EVERYTHING;
         if let Item::Volume(volume, _, transfer) = &self.item
             && !self.item.mixes_afar(settings, sheets, choice.as_ref())
         {
-            shown = first_visible(transfer, volume.range);
+            visible_ranges = first_visible(transfer, volume.range);
         }
         let gathers = self.gathers(settings, sheets, choice.as_ref())?;
-        Ok(FieldOutline { choice, shown, gathers })
+        Ok(FieldOutline { choice, visible_ranges, gathers })
     }
 
     /// Whether the field is gathered.
@@ -131,21 +131,25 @@ impl FieldState {
                     self.blend = Some(Blend::new(volume, kernel, taps));
                 }
                 if volume.is_label_map() {
-                    self.shares.get_or_insert_with(|| own_shares(volume));
+                    self.shares.get_or_insert_with(|| label_shares(volume));
                 }
                 let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
                     Some(blend) => blend.ranges(volume, kernel),
-                    None => shown::field_ranges(volume, kernel),
+                    None => visible::field_ranges(volume, kernel),
                 });
                 let dims = self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
-                self.shown.take_if(|(own, _)| *own != first);
-                self.shown.get_or_insert_with(|| (first, Shown::new(dims, ranges, &first)));
+                self.visible_samples.take_if(|(held, _)| *held != first);
+                self.visible_samples
+                    .get_or_insert_with(|| (first, VisibleBlocks::new(dims, ranges, &first)));
             }
             (Item::Bricks(..), Prepared::Bricks(cache), Some(choice))
-                if self.levels.as_ref().is_none_or(|(own, _)| own != choice) =>
+                if self.levels.as_ref().is_none_or(|(held, _)| held != choice) =>
             {
                 let level = |(level, _): &(usize, f64)| {
-                    (Grid::new(cache, choice, *level), Shown::of_bricks(cache, choice, *level))
+                    (
+                        Grid::new(cache, choice, *level),
+                        VisibleBlocks::of_bricks(cache, choice, *level),
+                    )
                 };
                 self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
             }
@@ -199,14 +203,14 @@ impl FieldState {
             f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis])
         });
         let steps = steps.fold(0.0, f64::max) * sheets.step;
-        let looks =
+        let lookups =
             if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
         let parts = gathering::parts(slice::from_ref(&self.item), sheets, outline.choice.as_ref());
         let deviation = self.item.kernel().and_then(deviation);
         let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
         let (is_blended, zero) = (self.blend.is_some(), zero as f32);
         let is_label_map = self.item.is_label_map();
-        Some(Gather { plan, levels, parts, ends, looks, is_blended, is_label_map, visible, zero })
+        Some(Gather { plan, levels, parts, ends, lookups, is_blended, is_label_map, visible, zero })
     }
 
     /// Returns a volume in memory as the only level. Values are relative to `zero`.
@@ -216,7 +220,7 @@ impl FieldState {
         kernel: &Kernel,
         zero: f64,
     ) -> Option<gather::Level<'a>> {
-        let (_, shown) = self.shown.as_ref()?;
+        let (_, visible_samples) = self.visible_samples.as_ref()?;
         let field = match (&self.blend, Way::of(volume, kernel)) {
             (Some(blend), _) => Typed::blended(volume, blend, zero),
             (None, Ok(Way::Plain(Weighting::Labels))) => {
@@ -234,7 +238,7 @@ impl FieldState {
             field,
             dims: drawn.dims,
             grid: None,
-            shown,
+            visible_samples,
             share: 1.0,
             scale: [1.0; 3],
             shift,
@@ -250,26 +254,29 @@ impl FieldState {
         weighting: Weighting,
         zero: f64,
     ) -> Option<Vec<gather::Level<'a>>> {
-        let (choice, found) = self.levels.as_ref()?;
+        let (choice, grids) = self.levels.as_ref()?;
         let fine = &bricks.header().lattice;
-        let level = |((level, share), (grid, shown)): (&(usize, f64), &'a (Grid, Shown))| {
-            let (own, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
-            let to_own = own.axes.inverse();
-            let scale = (to_own * fine.axes).to_cols_array_2d();
-            let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
+        let level = |((level, share), (grid, visible_samples)): (
+            &(usize, f64),
+            &'a (Grid, VisibleBlocks),
+        )| {
+            let (lattice, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
+            let to_level = lattice.axes.inverse();
+            let scale = (to_level * fine.axes).to_cols_array_2d();
+            let shift = (to_level * (fine.origin - lattice.origin)).as_vec3().to_array();
             let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
             gather::Level {
                 field: Typed::of_bricks(cache.samples(), dims, grid, weighting, zero),
                 dims,
                 grid: Some(grid),
-                shown,
+                visible_samples,
                 share: *share as f32,
                 scale,
                 shift,
                 cells: [scale, shift],
             }
         };
-        Some(choice.levels.iter().zip(found).map(level).collect())
+        Some(choice.levels.iter().zip(grids).map(level).collect())
     }
 
     /// Returns the lattices of the gathered levels.
@@ -295,12 +302,12 @@ impl FieldState {
     ) -> Vec<Vec<u64>> {
         let mut marks: Vec<Vec<u64>> = Vec::new();
         for (level, lattice) in gather.levels.iter().zip(self.lattices(outline)) {
-            let own = level.shown.sheets_of_tiles(&lattice, plan.view, sheets);
+            let level_marks = level.visible_samples.sheets_of_tiles(&lattice, plan.view, sheets);
             if marks.is_empty() {
-                marks = own;
+                marks = level_marks;
                 continue;
             }
-            for (tile, other) in marks.iter_mut().zip(own) {
+            for (tile, other) in marks.iter_mut().zip(level_marks) {
                 tile.iter_mut().zip(other).for_each(|(a, b)| *a |= b);
             }
         }

@@ -13,7 +13,7 @@ use super::{
     skip::is_marked,
     vector::{Lanes, dot, each, three},
 };
-use crate::{math::Kernel, plan::shown::Shown, scene::Optics, volume::Volume};
+use crate::{math::Kernel, plan::visible::VisibleBlocks, scene::Optics, volume::Volume};
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// If the slopes at a sheet's ends differ by fewer entries of the table per sheet, a cubic between
@@ -37,7 +37,7 @@ pub struct Gather<'a> {
     pub ends: Option<f32>,
     /// Number of parts of a sheet at whose ends visibility is looked up. It is 0 if sheets are no
     /// thicker than the lattice's steps: then a whole sheet lies within half a step of its middle.
-    pub looks: usize,
+    pub lookups: usize,
     /// There may be places without a field, and places where the kernels' sum is larger than
     /// elsewhere.
     pub is_blended: bool,
@@ -54,7 +54,7 @@ pub struct Level<'a> {
     pub dims: [usize; 3],
     /// The slots of its bricks; `None` for a volume in memory.
     pub grid: Option<&'a Grid>,
-    pub shown: &'a Shown,
+    pub visible_samples: &'a VisibleBlocks,
     /// The level's share in the picture.
     pub share: f32,
     /// Steps of the level per step of the lattice along each axis, and the place of the lattice's
@@ -284,7 +284,7 @@ impl Gather<'_> {
         let face = Face { value, across: [none; 3] };
         let of_sheet = [start, stop - start].map(
             #[inline(always)]
-            |own| Lanes::splat(simd, own),
+            |distance| Lanes::splat(simd, distance),
         );
         let mut layer = Layer::new(simd, rays.direction, [face; 2], value, of_sheet, [begin, end]);
         if self.plan.has_gradients() {
@@ -428,23 +428,23 @@ impl Gather<'_> {
                 continue;
             }
             let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
-            let found;
-            if self.looks == 0 {
-                found = self.shows(simd, rays.place(0.5 * (start + stop)));
+            let bits;
+            if self.lookups == 0 {
+                bits = self.shows(simd, rays.place(0.5 * (start + stop)));
             } else {
                 let mut some = behind.unwrap_or_else(
                     #[inline(always)]
                     || self.shows(simd, rays.place(start)),
                 );
-                for look in 1..self.looks {
-                    let part = look as f32 / self.looks as f32;
+                for number in 1..self.lookups {
+                    let part = number as f32 / self.lookups as f32;
                     some |= self.shows(simd, rays.place(start + (stop - start) * part));
                 }
                 let next = self.shows(simd, rays.place(stop));
                 behind = Some(next);
-                found = some | next;
+                bits = some | next;
             }
-            *shows = found as u8;
+            *shows = bits as u8;
         }
     }
 
@@ -454,7 +454,7 @@ impl Gather<'_> {
     fn shows<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> u64 {
         let mut shows = 0;
         for level in &self.levels {
-            shows |= level.shown.at(simd, level.cell(place));
+            shows |= level.visible_samples.at(simd, level.cell(place));
         }
         shows
     }
@@ -499,10 +499,10 @@ impl Gather<'_> {
                 continue;
             }
             let share = is_held.select(Lanes::splat(simd, level.share), none);
-            let Point { value: own, slopes: own_slopes, .. } = level.at(simd, place, way);
+            let Point { value: level_value, slopes: level_slopes, .. } = level.at(simd, place, way);
             all += share;
-            value = share.mul_add(own, value);
-            slopes = three!(I => (share * level.scale[I]).mul_add(own_slopes[I], slopes[I]));
+            value = share.mul_add(level_value, value);
+            slopes = three!(I => (share * level.scale[I]).mul_add(level_slopes[I], slopes[I]));
         }
         let inverse = Lanes::splat(simd, 1.0) / all.max(Lanes::splat(simd, f32::MIN_POSITIVE));
         let value = all.simd_gt(0.0).select(value * inverse, hidden);

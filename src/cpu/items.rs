@@ -129,7 +129,7 @@ impl Prepared {
         let view = plan.view;
         let cut_pixels = &outline.cut_pixels;
         let choice = field.and_then(|field| field.choice.as_ref());
-        let shown = field.map_or(&EVERYTHING, |field| &field.shown);
+        let visible = field.map_or(&EVERYTHING, |field| &field.visible_ranges);
         match self {
             Self::Set { drawn, .. } if drawn.payload == Payload::Radiance => {
                 Ok(radiance(plan, drawn, spare))
@@ -148,9 +148,10 @@ impl Prepared {
             }
             Self::Set { drawn, .. } => {
                 let source = Source::of_splats(view, drawn);
-                let own = |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
+                let to_record =
+                    |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
                 Ok(batches(&drawn.splats, spare, |_, batch, records| {
-                    records.extend(batch.iter().filter_map(own));
+                    records.extend(batch.iter().filter_map(to_record));
                 }))
             }
             Self::Facets(set) => Ok(facets(plan, set, settings, spare)),
@@ -164,15 +165,17 @@ impl Prepared {
             }
             Self::Volume { volume, kernel, ranges, listed } => {
                 let ranges = ranges.get_or_insert_with(|| volume.drawn_ranges(kernel).into_owned());
-                if listed.as_ref().is_none_or(|(own, _)| **own != *shown) {
-                    *listed =
-                        Some((Box::new(*shown), list(volume.drawn_lattice().dims, ranges, shown)));
+                if listed.as_ref().is_none_or(|(held, _)| **held != *visible) {
+                    *listed = Some((
+                        Box::new(*visible),
+                        list(volume.drawn_lattice().dims, ranges, visible),
+                    ));
                 }
                 let Some((_, list)) = listed else { return Ok(Vec::new()) };
                 let lattice = LatticeSource::new(plan, volume, kernel);
-                let own = |index: &u32| lattice.record(plan, *index as usize);
+                let to_record = |index: &u32| lattice.record(plan, *index as usize);
                 Ok(batches(list, spare, |_, batch, records| {
-                    records.extend(batch.iter().filter_map(own));
+                    records.extend(batch.iter().filter_map(to_record));
                 }))
             }
             Self::Cells => Ok(Vec::new()),
@@ -226,8 +229,8 @@ fn batches<T: Sync>(
 }
 
 /// Returns the visible samples, block by block.
-fn list(dims: [usize; 3], ranges: &[[u8; 2]], shown: &[u16; 256]) -> Vec<u32> {
-    let shows = |[low, high]: [u8; 2]| u16::from(high) >= shown[usize::from(low)];
+fn list(dims: [usize; 3], ranges: &[[u8; 2]], visible: &[u16; 256]) -> Vec<u32> {
+    let shows = |[low, high]: [u8; 2]| u16::from(high) >= visible[usize::from(low)];
     let layer = |layer: usize| {
         let mut list = Vec::new();
         let along = |block: usize, axis: usize| {
@@ -238,9 +241,9 @@ fn list(dims: [usize; 3], ranges: &[[u8; 2]], shown: &[u16; 256]) -> Vec<u32> {
                 for z in along(layer, 2) {
                     for y in along(row, 1) {
                         let start = (z * dims[1] + y) * dims[0];
-                        let own = along(column, 0).map(|x| start + x);
+                        let indices = along(column, 0).map(|x| start + x);
                         list.extend(
-                            own.filter(|index| shows(ranges[*index])).map(|index| index as u32),
+                            indices.filter(|index| shows(ranges[*index])).map(|index| index as u32),
                         );
                     }
                 }
@@ -292,8 +295,8 @@ impl<'a> LatticeSource<'a> {
                     (coordinates[axis][index[axis]] - coordinates[axis][0]) as f32
                 }));
                 let unit = self.lattice.unit(index).as_vec3() * self.source.unit;
-                let own = self.source.to_view * Mat3::from_diagonal(unit);
-                covariance = own * own.transpose();
+                let axes = self.source.to_view * Mat3::from_diagonal(unit);
+                covariance = axes * axes.transpose();
             }
         }
         let value = self.value(plan, number);
@@ -370,7 +373,7 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
     let place_in_slot =
         |[x, y, z]: [usize; 3]| ((z + BESIDE) * SLOT_SIDE + y + BESIDE) * SLOT_SIDE + x + BESIDE;
     let batch = |&(level, brick, quarter): &(usize, u32, usize)| {
-        let Some(part) = choice.levels.iter().position(|(own, _)| *own == level) else {
+        let Some(part) = choice.levels.iter().position(|(other, _)| *other == level) else {
             return Vec::new();
         };
         let Some(slot) = cache.slot(level, brick) else { return Vec::new() };
@@ -387,7 +390,7 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
                     let block = within.map(|at| at / BLOCK);
                     let [low, high] = blocks[(block[2] * BLOCKS + block[1]) * BLOCKS + block[0]];
                     let is_inside = (0..3).all(|axis| first[axis] + within[axis] < dims[axis]);
-                    if u16::from(high) < choice.shown[usize::from(low)] || !is_inside {
+                    if u16::from(high) < choice.first_visible[usize::from(low)] || !is_inside {
                         continue;
                     }
                     let steps = Vec3::from_array(std::array::from_fn(|axis| {

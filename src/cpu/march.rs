@@ -107,9 +107,9 @@ impl DrawnField<'_> {
                     .values
                     .as_ref()
                     .map(|values| values.each_ref().map(|on| differences(simd, on, number)));
-                let found = sums.resolve(simd, plan, packet, sheet, slopes)?;
+                let resolved = sums.resolve(simd, plan, packet, sheet, slopes)?;
                 let is_maximum = plan.optics == Optics::Maximum;
-                (is_maximum || self.visible.may_show(simd, plan, &found.0)).then_some(found)
+                (is_maximum || self.visible.may_show(simd, plan, &resolved.0)).then_some(resolved)
             }
             Means::Nothing => None,
         }
@@ -149,8 +149,8 @@ impl March<'_> {
         for field in &self.fields {
             let marks = field.marks.get(number).map_or(&[][..], Vec::as_slice);
             let mut cells = None;
-            if let Means::Cells(own) = &field.means {
-                cells = CellTile::new(simd, own, corner);
+            if let Means::Cells(cell_field) = &field.means {
+                cells = CellTile::new(simd, cell_field, corner);
             }
             is_empty &= cells.is_none() && marks.iter().all(|word| *word == 0);
             fields.push(OpenField { sums: None, values: None, cells });
@@ -240,15 +240,16 @@ impl March<'_> {
             if open == 0 {
                 let entry = ahead.entries.first();
                 let mut next = entry.map_or(usize::MAX, |entry| usize::from(entry.sheet));
-                for (own, seen) in tile.fields.iter().zip(seen.iter()) {
+                for (open_field, seen) in tile.fields.iter().zip(seen.iter()) {
                     next = next.min(next_mark(seen.marks, sheet));
-                    next = own.cells.as_ref().map_or(next, |cells| next.min(cells.next(sheet)));
+                    next =
+                        open_field.cells.as_ref().map_or(next, |cells| next.min(cells.next(sheet)));
                 }
                 let Some(first) = next.checked_add(1) else { return };
                 sheet = first - 1;
             }
-            for (field, own) in self.fields.iter().zip(&mut tile.fields) {
-                if let Some(cells) = &mut own.cells {
+            for (field, open_field) in self.fields.iter().zip(&mut tile.fields) {
+                if let Some(cells) = &mut open_field.cells {
                     *drawn += cells.add(simd, field.plan, sheet, &tile.packets);
                 }
             }
@@ -265,11 +266,11 @@ impl March<'_> {
                 }
             }
             tile.sums.clear(sheet);
-            for own in &mut tile.fields {
-                if let Some(sums) = &mut own.sums {
+            for open_field in &mut tile.fields {
+                if let Some(sums) = &mut open_field.sums {
                     sums.clear(sheet);
                 }
-                if let Some(cells) = &mut own.cells {
+                if let Some(cells) = &mut open_field.cells {
                     cells.clear(simd, sheet);
                 }
             }
@@ -304,9 +305,9 @@ impl March<'_> {
         }
         // This sheet's slot is next used by the sheet four further on, which reuses the memory.
         continued.clear();
-        let own = &mut ahead.continued[sheet % WINDOW];
-        if own.is_empty() {
-            *own = continued;
+        let slot = &mut ahead.continued[sheet % WINDOW];
+        if slot.is_empty() {
+            *slot = continued;
         }
         added
     }
@@ -320,8 +321,8 @@ impl March<'_> {
         seen: &mut [Seen<'_, S>],
     ) {
         let plan = &self.plans[0];
-        for (field, own) in self.fields.iter().zip(&mut tile.fields) {
-            own.find_values(simd, field.plan, sheet);
+        for (field, open) in self.fields.iter().zip(&mut tile.fields) {
+            open.find_values(simd, field.plan, sheet);
         }
         let OpenTile { packets, sums, fields, .. } = tile;
         for packet in packets {
@@ -334,18 +335,18 @@ impl March<'_> {
                 continue;
             }
             let mut radiance = sums.take_radiance(simd, plan, packet, sheet);
-            for (field, own) in self.fields.iter().zip(fields.iter()) {
-                let Some(cells) = &own.cells else { continue };
-                let Some(own) = cells.radiance(simd, field.plan, packet, sheet) else { continue };
+            for (field, open) in self.fields.iter().zip(fields.iter()) {
+                let Some(cells) = &open.cells else { continue };
+                let Some(part) = cells.radiance(simd, field.plan, packet, sheet) else { continue };
                 radiance = match radiance {
-                    Some(all) => Some(four!(I => all[I] + own[I])),
-                    None => Some(own),
+                    Some(all) => Some(four!(I => all[I] + part[I])),
+                    None => Some(part),
                 };
             }
             let mut media = Media::new(simd, radiance);
-            for ((field, own), seen) in self.fields.iter().zip(fields.iter_mut()).zip(&mut *seen) {
-                let found = field.layer(simd, packet, sheet, own, seen);
-                if let Some((layer, mask)) = &found {
+            for ((field, open), seen) in self.fields.iter().zip(fields.iter_mut()).zip(&mut *seen) {
+                let field_layer = field.layer(simd, packet, sheet, open, seen);
+                if let Some((layer, mask)) = &field_layer {
                     field.plan.add_field(simd, (layer, *mask), packet, &mut media);
                 }
             }
@@ -390,9 +391,9 @@ impl March<'_> {
             }
             let hit: [f32; 8] = hit.into();
             for lane in 0..8 {
-                let own = &mut tile
+                let pixel = &mut tile
                     [(number / 2 * HIGH + lane / WIDE) * TILE + number % 2 * WIDE + lane % WIDE];
-                *own = ([red[lane], green[lane], blue[lane], 1.0 - through[lane]], hit[lane]);
+                *pixel = ([red[lane], green[lane], blue[lane], 1.0 - through[lane]], hit[lane]);
             }
         }
         tile
@@ -401,19 +402,19 @@ impl March<'_> {
 
 /// Returns the record with a number that [`super::bins`] assigned.
 fn record_of(records: &[Vec<Record>], number: u32) -> &Record {
-    let (batch, own) = super::bins::place_of(number);
-    &records[batch][own]
+    let (batch, place) = super::bins::place_of(number);
+    &records[batch][place]
 }
 
 /// Returns the first marked sheet at or after `sheet`.
 fn next_mark(marks: &[u64], sheet: usize) -> usize {
     let bit = sheet.max(1) - 1;
     let mut word = bit / 64;
-    let mut rest = marks.get(word).map_or(0, |own| own & u64::MAX << (bit % 64));
+    let mut rest = marks.get(word).map_or(0, |bits| bits & u64::MAX << (bit % 64));
     while rest == 0 {
         word += 1;
         match marks.get(word) {
-            Some(own) => rest = *own,
+            Some(bits) => rest = *bits,
             None => return usize::MAX,
         }
     }

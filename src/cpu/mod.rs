@@ -143,7 +143,7 @@ impl CpuRenderer {
     /// [`Error::Argument`] if the item has no field; [`Error::Transfer`] for a transfer function
     /// that [`CpuRenderer::new`] would refuse. The scene then keeps the old one.
     pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
-        self.scene = self.scene.shown_by(item, transfer)?;
+        self.scene = self.scene.with_transfer(item, transfer)?;
         for field in &mut self.fields {
             field.item = self.scene.items[field.number].clone();
         }
@@ -206,11 +206,11 @@ impl CpuRenderer {
     /// Returns a plan for each field, or the only plan of a scene without one.
     fn plans<'a>(&self, view: &'a View, settings: &Settings, outline: &Outline) -> Vec<Plan<'a>> {
         let sheets = &outline.sheets;
-        let own = |(field, own): (&FieldState, &FieldOutline)| {
-            let choice = own.choice.as_ref();
+        let plan = |(field, field_outline): (&FieldState, &FieldOutline)| {
+            let choice = field_outline.choice.as_ref();
             Plan::new(&self.scene, Some((field.number, choice)), view, sheets, settings)
         };
-        let mut plans: Vec<_> = self.fields.iter().zip(&outline.fields).map(own).collect();
+        let mut plans: Vec<_> = self.fields.iter().zip(&outline.fields).map(plan).collect();
         if plans.is_empty() {
             plans.push(Plan::new(&self.scene, None, view, sheets, settings));
         }
@@ -229,15 +229,21 @@ impl CpuRenderer {
         let mut spare = std::mem::take(&mut self.spare);
         for (number, prepared) in self.prepared.iter_mut().enumerate() {
             let field = self.fields.iter().position(|field| field.number == number);
-            let own = field.map(|field| &outline.fields[field]);
+            let field_outline = field.map(|field| &outline.fields[field]);
             if let (Prepared::Bricks(cache), Some(choice)) =
-                (&mut *prepared, own.and_then(|own| own.choice.as_ref()))
+                (&mut *prepared, field_outline.and_then(|outline| outline.choice.as_ref()))
             {
                 cache.update(choice, most_bricks(&cache.bricks, settings))?;
             }
-            if !own.is_some_and(|own| own.gathers) {
+            if !field_outline.is_some_and(|outline| outline.gathers) {
                 let plan = &plans[field.unwrap_or(0)];
-                records.extend(prepared.records(plan, settings, outline, own, &mut spare)?);
+                records.extend(prepared.records(
+                    plan,
+                    settings,
+                    outline,
+                    field_outline,
+                    &mut spare,
+                )?);
             }
         }
         items::check_count(&records)?;
@@ -283,9 +289,9 @@ impl CpuRenderer {
         let choices: Vec<Option<Choice>> = self.fields.iter().map(choice).collect();
         let in_bricks: Vec<Choice> = choices.iter().flatten().cloned().collect();
         let sheets = self.scene.sheets_of(view, settings, &in_bricks, &bounds);
-        let own = self.fields.iter().zip(choices);
-        let own = own.map(|(field, choice)| field.outline(settings, &sheets, choice));
-        let fields = own.collect::<Result<Vec<_>>>()?;
+        let fields = self.fields.iter().zip(choices);
+        let fields = fields.map(|(field, choice)| field.outline(settings, &sheets, choice));
+        let fields = fields.collect::<Result<Vec<_>>>()?;
         if fields.is_empty() && settings.evaluate == Evaluate::Gather {
             return Err(gathering::not_gathered("a scene without a volume on a lattice"));
         }
@@ -294,9 +300,10 @@ impl CpuRenderer {
     }
 
     fn prepare_gather(&mut self, plans: &[Plan], outline: &Outline) {
-        for ((field, plan), own) in self.fields.iter_mut().zip(plans).zip(&outline.fields) {
-            if own.gathers {
-                field.prepare_gather(plan, own, &self.prepared[field.number]);
+        for ((field, plan), field_outline) in self.fields.iter_mut().zip(plans).zip(&outline.fields)
+        {
+            if field_outline.gathers {
+                field.prepare_gather(plan, field_outline, &self.prepared[field.number]);
             }
         }
     }
@@ -309,8 +316,8 @@ impl CpuRenderer {
         visible: &'a [Visible],
     ) -> Vec<DrawnField<'a>> {
         let all = self.fields.iter().zip(plans).zip(&outline.fields).zip(visible);
-        all.map(|(((field, plan), own), visible)| {
-            field.drawn(plan, &outline.sheets, own, &self.prepared[field.number], visible)
+        all.map(|(((field, plan), field_outline), visible)| {
+            field.drawn(plan, &outline.sheets, field_outline, &self.prepared[field.number], visible)
         })
         .collect()
     }
@@ -385,9 +392,9 @@ fn draw_block(
     drawn: &AtomicU64,
 ) -> Vec<Tile> {
     let tiles = march.plans[0].tiles();
-    let mut found = vec![EMPTY; BLOCK * BLOCK];
+    let mut block = vec![EMPTY; BLOCK * BLOCK];
     let mut count = 0;
-    for (number, tile) in found.iter_mut().enumerate() {
+    for (number, tile) in block.iter_mut().enumerate() {
         let at = [column * BLOCK + number % BLOCK, row * BLOCK + number / BLOCK];
         if at[0] < tiles[0] && at[1] < tiles[1] {
             let entries = entries.of(number);
@@ -395,7 +402,7 @@ fn draw_block(
         }
     }
     drawn.fetch_add(count, Relaxed);
-    found
+    block
 }
 
 /// Writes the pixels of a row of blocks.
@@ -411,17 +418,17 @@ fn write_band(
     for (y, (color, depth)) in color.chunks_mut(width).zip(depth.chunks_mut(width)).enumerate() {
         let parts = color.chunks_mut(step).zip(depth.chunks_mut(step));
         for (tile, (color, depth)) in parts.enumerate() {
-            let own = &blocks[tile / BLOCK][y / step * BLOCK + tile % BLOCK]
+            let pixels = &blocks[tile / BLOCK][y / step * BLOCK + tile % BLOCK]
                 [(y % step + apron) * TILE + apron..];
-            for ((color, depth), (own, hit)) in color.iter_mut().zip(depth).zip(own) {
+            for ((color, depth), (rgba, hit)) in color.iter_mut().zip(depth).zip(pixels) {
                 if plan.optics == Optics::Maximum {
                     *color = transfer
                         .map_or([0.0; 4], |transfer| of_largest(*hit, transfer, plan.field.values));
                     *depth = f32::INFINITY;
                     continue;
                 }
-                *color = *own;
-                *depth = if own[3] >= 0.5 { *hit } else { f32::INFINITY };
+                *color = *rgba;
+                *depth = if rgba[3] >= 0.5 { *hit } else { f32::INFINITY };
             }
         }
     }

@@ -89,7 +89,7 @@ impl Nodes {
         let or_root = |parent: &u32| if (*parent as usize) < count { *parent } else { root };
         let parent: Vec<u32> = page.parent.iter().map(or_root).collect();
         let ends = |run: &[u32]| {
-            run.iter().fold([u32::MAX, 0], |[low, high], own| [low.min(*own), high.max(*own)])
+            run.iter().fold([u32::MAX, 0], |[low, high], index| [low.min(*index), high.max(*index)])
         };
         Self {
             splats: page.nodes.iter().map(|node| node.splat).collect(),
@@ -140,7 +140,7 @@ impl Nodes {
         for first in (0..root).step_by(8) {
             self.parents.refinement(simd, cut, first).store_slice(&mut above[first..first + 8]);
         }
-        let mut found = Vec::new();
+        let mut drawn = Vec::new();
         let mut last_child = (NO_PAGE, false);
         for (run, [low, high]) in self.runs.iter().enumerate() {
             if above[*low as usize..=*high as usize].iter().all(|above| *above == 0.0) {
@@ -149,7 +149,7 @@ impl Nodes {
             let end = ((run + 1) * RUN).min(self.splats.len());
             for first in (run * RUN..end).step_by(8) {
                 let count = (end - first).min(8);
-                let (mut above_own, mut gives_way) = ([0.0f32; 8], [0.0f32; 8]);
+                let (mut parent_shares, mut gives_way) = ([0.0f32; 8], [0.0f32; 8]);
                 let nodes = self.parent[first..first + count]
                     .iter()
                     .zip(&self.child_pages[first..first + count]);
@@ -157,46 +157,46 @@ impl Nodes {
                     if *child != last_child.0 {
                         last_child = (*child, *child != NO_PAGE && is_active(*child));
                     }
-                    above_own[lane] = above[*parent as usize];
+                    parent_shares[lane] = above[*parent as usize];
                     gives_way[lane] = f32::from(u8::from(last_child.1));
                 }
-                let above_own: Lanes<S> = above_own.simd_into(simd);
-                if !above_own.simd_gt(0.0).any_true() {
+                let parent_shares: Lanes<S> = parent_shares.simd_into(simd);
+                if !parent_shares.simd_gt(0.0).any_true() {
                     continue;
                 }
                 let gives_way: Lanes<S> = gives_way.simd_into(simd);
-                let shares = above_own - self.spheres.refinement(simd, cut, first) * gives_way;
+                let shares = parent_shares - self.spheres.refinement(simd, cut, first) * gives_way;
                 let mut bits = shares.simd_gt(0.0).to_bitmask();
                 let shares: [f32; 8] = shares.into();
                 while bits != 0 {
                     let lane = bits.trailing_zeros() as usize & 7;
                     bits &= bits - 1;
-                    found.push(((first + lane) as u32, shares[lane]));
+                    drawn.push(((first + lane) as u32, shares[lane]));
                 }
             }
         }
-        self.keep_seen(simd, cut, &mut found);
-        found
+        self.keep_seen(simd, cut, &mut drawn);
+        drawn
     }
 
     /// Removes invisible nodes.
     #[inline(always)]
-    fn keep_seen<S: Simd>(&self, simd: S, cut: &Cut, found: &mut Vec<Drawn>) {
+    fn keep_seen<S: Simd>(&self, simd: S, cut: &Cut, drawn: &mut Vec<Drawn>) {
         let mut kept = 0;
-        for first in (0..found.len()).step_by(8) {
-            let count = (found.len() - first).min(8);
+        for first in (0..drawn.len()).step_by(8) {
+            let count = (drawn.len() - first).min(8);
             let mut nodes = [0; 8];
-            for (node, own) in nodes.iter_mut().zip(&found[first..first + count]) {
-                *node = own.0 as usize;
+            for (node, entry) in nodes.iter_mut().zip(&drawn[first..first + count]) {
+                *node = entry.0 as usize;
             }
             let mut seen = !self.are_hidden(simd, cut, nodes).to_bitmask() & ((1 << count) - 1);
             while seen != 0 {
-                found[kept] = found[first + seen.trailing_zeros() as usize];
+                drawn[kept] = drawn[first + seen.trailing_zeros() as usize];
                 seen &= seen - 1;
                 kept += 1;
             }
         }
-        found.truncate(kept);
+        drawn.truncate(kept);
     }
 
     /// Returns which of eight nodes' splats are invisible, because they lie beside the picture or

@@ -76,25 +76,25 @@ impl PageCache {
     pub fn update(&mut self, view: &View, settings: &Settings, pixels: f64) -> Result<()> {
         self.frame += 1;
         let cut = self.cut(view, settings, pixels);
-        let mut found = needed(&self.hierarchy, &cut)?;
+        let mut wanted = needed(&self.hierarchy, &cut)?;
         let degree = self.hierarchy.header().degree;
         let mut room = settings.page_memory;
         let (mut most, mut absent, mut more) = (0, Vec::new(), 0);
-        for own in &found {
-            let bytes = Nodes::bytes_of(own.nodes as usize, degree);
+        for entry in &wanted {
+            let bytes = Nodes::bytes_of(entry.nodes as usize, degree);
             if bytes > room && most > 0 {
                 break;
             }
             room = room.saturating_sub(bytes);
             most += 1;
-            if !self.held.contains_key(&own.page) {
-                absent.push(own.page);
+            if !self.held.contains_key(&entry.page) {
+                absent.push(entry.page);
                 more += bytes;
             }
         }
-        self.missing = found.len() - most;
-        found.truncate(most);
-        let mut needed: Vec<u32> = found.into_iter().map(|own| own.page).collect();
+        self.missing = wanted.len() - most;
+        wanted.truncate(most);
+        let mut needed: Vec<u32> = wanted.into_iter().map(|entry| entry.page).collect();
         needed.sort_unstable();
         self.make_room(&needed, more, settings.page_memory);
         for batch in absent.chunks(BATCH) {
@@ -153,7 +153,7 @@ impl PageCache {
             let Some(Held { nodes, .. }) = self.held.get(page) else { return };
             let drawn: Vec<Drawn> = lanes!(level, simd => self.drawn_of(simd, &cut, nodes));
             if nodes.colors.is_some() {
-                let seen = |own: &Drawn| nodes.seen(*own, eye, header.origin);
+                let seen = |node: &Drawn| nodes.seen(*node, eye, header.origin);
                 let seen: Vec<Splat> = drawn.iter().map(seen).collect();
                 let whole = seen.iter().map(|splat| (splat, 1.0));
                 lanes!(level, simd => projector.add(simd, whole, records));

@@ -36,7 +36,7 @@ pub struct Outline {
 pub struct FieldOutline {
     pub choice: Option<Choice>,
     /// The ranges of values that are visible.
-    pub shown: [u16; 256],
+    pub visible_ranges: [u16; 256],
     /// Whether the field is gathered.
     pub gathers: bool,
 }
@@ -98,7 +98,7 @@ pub struct Plan<'a> {
 /// Returns the facets of an item that show images.
 fn set_with_images(item: &Item) -> Option<Arc<FacetSet>> {
     match item {
-        Item::Facets(set) if !set.shown.is_empty() => Some(set.clone()),
+        Item::Facets(set) if !set.texture_coordinates.is_empty() => Some(set.clone()),
         _ => None,
     }
 }

@@ -187,14 +187,14 @@ impl<'a> Projector<'a> {
         let normal = three!(I => has_normal.select(normal[I], none));
         let mut thinned = one;
         let is_translucent =
-            !self.is_trained() && eight.color.iter().any(|&own| own as u32 >> 24 < 255);
+            !self.is_trained() && eight.color.iter().any(|&color| color as u32 >> 24 < 255);
         if is_translucent {
             thinned = self.thinned(simd, eight, center, columns, blur2);
         }
         // Opaque splats must not grow through widening, so they step back.
         let along = three!(I => dot(columns[I], normal));
-        let own2 = dot(along, along);
-        let back = ((own2 + blur2).sqrt() - own2.sqrt()) * STEP_BACK as f32;
+        let variance = dot(along, along);
+        let back = ((variance + blur2).sqrt() - variance.sqrt()) * STEP_BACK as f32;
         let center = three!(I => center[I] - normal[I] * back);
         Widened { center, covariance, normal, has_normal, thinned }
     }
@@ -390,17 +390,17 @@ impl<'a> Projector<'a> {
         let [distances, estimates]: [[f32; 8]; 2] = [distance.into(), estimate.into()];
         let mut sheets = [0; 8];
         for ((sheet, estimate), distance) in sheets.iter_mut().zip(estimates).zip(distances) {
-            let mut own = (estimate as usize).min(plan.sheets);
+            let mut number = (estimate as usize).min(plan.sheets);
             // The closed form may be off by one or two where rounding meets a plane. The list
             // decides.
             for _ in 0..2 {
-                if distance < plan.planes[own] {
-                    own -= 1;
-                } else if distance >= plan.planes[own + 1] && own < plan.sheets {
-                    own += 1;
+                if distance < plan.planes[number] {
+                    number -= 1;
+                } else if distance >= plan.planes[number + 1] && number < plan.sheets {
+                    number += 1;
                 }
             }
-            *sheet = own as u16;
+            *sheet = number as u16;
         }
         sheets
     }

@@ -88,25 +88,25 @@ impl Radial {
         let squared = extent * extent;
         // A separate function for each form.
         match self {
-            Self::Spline(own) => simd.vectorize(
+            Self::Spline(form) => simd.vectorize(
                 #[inline(always)]
-                || sums(simd, own, away, values, squared),
+                || sums(simd, form, away, values, squared),
             ),
-            Self::Low(own) => simd.vectorize(
+            Self::Low(form) => simd.vectorize(
                 #[inline(always)]
-                || sums(simd, own, away, values, squared),
+                || sums(simd, form, away, values, squared),
             ),
-            Self::Middle(own) => simd.vectorize(
+            Self::Middle(form) => simd.vectorize(
                 #[inline(always)]
-                || sums(simd, own, away, values, squared),
+                || sums(simd, form, away, values, squared),
             ),
-            Self::High(own) => simd.vectorize(
+            Self::High(form) => simd.vectorize(
                 #[inline(always)]
-                || sums(simd, own, away, values, squared),
+                || sums(simd, form, away, values, squared),
             ),
-            Self::Table(own) => simd.vectorize(
+            Self::Table(form) => simd.vectorize(
                 #[inline(always)]
-                || sums(simd, own, away, values, squared),
+                || sums(simd, form, away, values, squared),
             ),
         }
     }
@@ -133,15 +133,15 @@ fn sums<S: Simd>(
                 continue;
             }
             let (mut slope, mut value_slope) = (none, none);
-            for (x, own) in x.iter().zip(row) {
+            for (x, sample) in x.iter().zip(row) {
                 let [h, s] = kernel.weigh(simd, x.mul_add(*x, aside));
-                let s_own = s * *own;
+                let s_sample = s * *sample;
                 weight += h;
-                value = h.mul_add(*own, value);
+                value = h.mul_add(*sample, value);
                 slope += s;
-                value_slope += s_own;
+                value_slope += s_sample;
                 weight_slopes[0] = s.mul_add(*x, weight_slopes[0]);
-                value_slopes[0] = s_own.mul_add(*x, value_slopes[0]);
+                value_slopes[0] = s_sample.mul_add(*x, value_slopes[0]);
             }
             weight_slopes[1] = slope.mul_add(*y, weight_slopes[1]);
             value_slopes[1] = value_slope.mul_add(*y, value_slopes[1]);
@@ -186,8 +186,8 @@ impl<const N: usize> Even<N> {
         let values: Vec<f64> =
             (0..NODES).map(|node| kernel.value(radius(angle(node).cos()))).collect();
         let mut factors = [0.0; N];
-        let (mut before, mut own) = ([0.0; N], [0.0; N]);
-        own[0] = 1.0;
+        let (mut before, mut current) = ([0.0; N], [0.0; N]);
+        current[0] = 1.0;
         for degree in 0..N {
             let sum: f64 = values
                 .iter()
@@ -195,20 +195,20 @@ impl<const N: usize> Even<N> {
                 .map(|(node, v)| v * (degree as f64 * angle(node)).cos())
                 .sum();
             let share = sum * if degree == 0 { 1.0 } else { 2.0 } / NODES as f64;
-            factors.iter_mut().zip(own).for_each(|(factor, own)| *factor += share * own);
+            factors.iter_mut().zip(current).for_each(|(factor, part)| *factor += share * part);
             let mut next = [0.0; N];
             for power in 0..N - 1 {
-                next[power + 1] = own[power] * if degree == 0 { 1.0 } else { 2.0 };
+                next[power + 1] = current[power] * if degree == 0 { 1.0 } else { 2.0 };
             }
             next.iter_mut().zip(before).for_each(|(next, before)| *next -= before);
-            (before, own) = (own, next);
+            (before, current) = (current, next);
         }
         let largest = kernel.value(0.0).abs();
         let at = |v: f64| {
             factors
                 .iter()
                 .rev()
-                .fold([0.0, 0.0], |[sum, slope], own| [sum * v + own, slope * v + sum])
+                .fold([0.0, 0.0], |[sum, slope], factor| [sum * v + factor, slope * v + sum])
         };
         let is_near = (0..=1000).all(|step| {
             let v = f64::from(step) / 500.0 - 1.0;
@@ -260,8 +260,8 @@ impl Weigh for Table {
         let at = (squared.sqrt() * self.per_step).min(end);
         let low = at.floor();
         let places: [i32; 8] = i32x8::truncate_from(low).into();
-        let own = each!([0, 1, 2, 3, 4, 5, 6, 7], L => self.pairs[places[L] as usize]);
-        let [value, rise] = pairs(simd, own);
+        let entries = each!([0, 1, 2, 3, 4, 5, 6, 7], L => self.pairs[places[L] as usize]);
+        let [value, rise] = pairs(simd, entries);
         let per_squared = self.per_step * self.per_step;
         [(at - low).mul_add(rise, value), rise / at.max(Lanes::splat(simd, 1e-6)) * per_squared]
     }
@@ -294,11 +294,11 @@ mod tests {
                 let radii: [f64; 8] = std::array::from_fn(radius);
                 let squared = radii.map(|r| (r * r) as f32);
                 let [values, slopes] = match &radial {
-                    Radial::Spline(own) => dispatch!(level, simd => at(simd, own, squared)),
-                    Radial::Low(own) => dispatch!(level, simd => at(simd, own, squared)),
-                    Radial::Middle(own) => dispatch!(level, simd => at(simd, own, squared)),
-                    Radial::High(own) => dispatch!(level, simd => at(simd, own, squared)),
-                    Radial::Table(own) => dispatch!(level, simd => at(simd, own, squared)),
+                    Radial::Spline(form) => dispatch!(level, simd => at(simd, form, squared)),
+                    Radial::Low(form) => dispatch!(level, simd => at(simd, form, squared)),
+                    Radial::Middle(form) => dispatch!(level, simd => at(simd, form, squared)),
+                    Radial::High(form) => dispatch!(level, simd => at(simd, form, squared)),
+                    Radial::Table(form) => dispatch!(level, simd => at(simd, form, squared)),
                 };
                 for ((r, value), slope) in radii.into_iter().zip(values).zip(slopes) {
                     let expected = kernel.value(r);

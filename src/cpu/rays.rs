@@ -149,8 +149,8 @@ fn part_in_box<S: Simd>(
     let (mut enter, mut leave) = (Lanes::splat(simd, BEFORE), Lanes::splat(simd, BEHIND));
     for axis in 0..3 {
         // A ray along a face would divide 0 by 0.
-        let own = direction[axis];
-        let safe = own.abs().simd_lt(1e-20).select(Lanes::splat(simd, 1e-20), own);
+        let along = direction[axis];
+        let safe = along.abs().simd_lt(1e-20).select(Lanes::splat(simd, 1e-20), along);
         let a = (low[axis] - origin[axis]) / safe;
         let b = (high[axis] - origin[axis]) / safe;
         (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));

@@ -81,18 +81,18 @@ fn reached(places: &[f64], kernel: &Kernel) -> Vec<[u32; 2]> {
     let reach = reach(kernel) / sigma;
     let last = places.len() - 1;
     let cells = last.max(1);
-    let mut found: Vec<[u32; 2]> =
+    let mut ranges: Vec<[u32; 2]> =
         (0..cells).map(|cell| [cell as u32, (cell + 1).min(last) as u32]).collect();
     for (at, (place, deviation)) in places.iter().zip(deviations(places, kernel)).enumerate() {
-        let own = [place - reach * deviation, place + reach * deviation];
-        let first = places.partition_point(|place| *place <= own[0]).saturating_sub(1);
-        let end = places.partition_point(|place| *place < own[1]).min(cells);
-        for [low, high] in &mut found[first.min(cells - 1)..end] {
+        let ends = [place - reach * deviation, place + reach * deviation];
+        let first = places.partition_point(|place| *place <= ends[0]).saturating_sub(1);
+        let end = places.partition_point(|place| *place < ends[1]).min(cells);
+        for [low, high] in &mut ranges[first.min(cells - 1)..end] {
             *low = (*low).min(at as u32);
             *high = (*high).max(at as u32);
         }
     }
-    found.iter().map(|[low, high]| [low.saturating_sub(1), (high + 1).min(last as u32)]).collect()
+    ranges.iter().map(|[low, high]| [low.saturating_sub(1), (high + 1).min(last as u32)]).collect()
 }
 
 /// Returns the minimum distance of neighbours along an axis, and the distance of its ends.
@@ -145,12 +145,12 @@ impl Axes {
         let mut ranges = neighbourhood_ranges(volume, [0; 3]);
         let mut dims = volume.lattice.dims;
         // From samples to cells, one axis after another.
-        for (axis, own) in self.0.iter().enumerate() {
-            let reached = own.reached_of_cells();
-            let inner: usize = dims[..axis].iter().product();
+        for (number, axis) in self.0.iter().enumerate() {
+            let reached = axis.reached_of_cells();
+            let inner: usize = dims[..number].iter().product();
             let from = ranges;
-            ranges = Vec::with_capacity(from.len() / dims[axis] * own.cells);
-            for slab in from.chunks(inner * dims[axis]) {
+            ranges = Vec::with_capacity(from.len() / dims[number] * axis.cells);
+            for slab in from.chunks(inner * dims[number]) {
                 for [first, last] in &reached {
                     for at in 0..inner {
                         let along = (*first..=*last).map(|sample| slab[sample * inner + at]);
@@ -160,7 +160,7 @@ impl Axes {
                     }
                 }
             }
-            dims[axis] = own.cells;
+            dims[number] = axis.cells;
         }
         let lebesgue = 1.0 + self.0.iter().map(Axis::added).sum::<f64>();
         let overshoot = Overshoot { lebesgue, tails: Vec::new() };
@@ -196,11 +196,11 @@ impl Axes {
                     continue;
                 }
                 let (mut a, mut b, mut a_x, mut b_x) = (none, none, none, none);
-                for (tap, own) in row.iter().enumerate() {
-                    a = both[tap].mul_add(*own, a);
-                    b = x.weights[tap].mul_add(*own, b);
-                    a_x = both_slopes[tap].mul_add(*own, a_x);
-                    b_x = x.weight_slopes[tap].mul_add(*own, b_x);
+                for (tap, sample) in row.iter().enumerate() {
+                    a = both[tap].mul_add(*sample, a);
+                    b = x.weights[tap].mul_add(*sample, b);
+                    a_x = both_slopes[tap].mul_add(*sample, a_x);
+                    b_x = x.weight_slopes[tap].mul_add(*sample, b_x);
                 }
                 let (weight, added) = (y.weights[j], y.added[j]);
                 sum = weight.mul_add(a, added.mul_add(b, sum));
@@ -236,8 +236,8 @@ impl Axes {
 #[inline(always)]
 fn total<S: Simd>(simd: S, all: &[Lanes<S>]) -> Lanes<S> {
     let mut sum = Lanes::splat(simd, 0.0);
-    for own in all {
-        sum += *own;
+    for value in all {
+        sum += *value;
     }
     sum
 }
@@ -246,7 +246,7 @@ impl Axis {
     fn new(places: &[f64], kernel: &Kernel, taps: usize) -> Self {
         let count = places.len();
         let last = count - 1;
-        let own = |at: usize, deviation: f64| {
+        let sample = |at: usize, deviation: f64| {
             let before = (at > 0).then(|| places[at] - places[at - 1]);
             let after = (at < last).then(|| places[at + 1] - places[at]);
             let shares = match (before, after) {
@@ -262,7 +262,7 @@ impl Axis {
         };
         let deviations = deviations(places, kernel);
         let mut samples: Vec<_> =
-            deviations.iter().enumerate().map(|(at, deviation)| own(at, *deviation)).collect();
+            deviations.iter().enumerate().map(|(at, deviation)| sample(at, *deviation)).collect();
         // Windows may extend beyond smaller lattices.
         samples
             .resize(count.max(taps), [FAR * (samples[last][0] + 1.0), samples[last][1], 0.0, 0.0]);
@@ -306,8 +306,8 @@ impl Axis {
             let places = [cell as f64 - 0.5, cell as f64 + 1.5].map(|at| at * self.width);
             // A bin maps to the cell in which it begins; a place may lie in the next cell.
             let [first, last] = [of(places[0]), (of(places[1]) + 1).min(end)];
-            let own = self.reached[first..=last].iter();
-            own.fold([usize::MAX, 0], |[a, b], [low, high]| {
+            let ranges = self.reached[first..=last].iter();
+            ranges.fold([usize::MAX, 0], |[a, b], [low, high]| {
                 [a.min(*low as usize), b.max(*high as usize)]
             })
         };
@@ -335,7 +335,7 @@ impl Axis {
                     added[tap + 1] += moment * (before - after);
                     added[tap + 2] += moment * after;
                 }
-                most = most.max(added.iter().map(|own| own.abs()).sum::<f64>() / all);
+                most = most.max(added.iter().map(|weight| weight.abs()).sum::<f64>() / all);
             }
         }
         most
@@ -356,7 +356,7 @@ impl Axis {
             let cell = if next > cell && places[L] >= self.samples[next][0] { next } else { cell };
             self.starts[cell] as usize
         });
-        let mut own = Along {
+        let mut along = Along {
             start: each!([0, 1, 2, 3, 4, 5, 6, 7], L => starts[L] as f32).simd_into(simd),
             counted: 0,
             weights: [none; N],
@@ -369,10 +369,10 @@ impl Axis {
             let [at, inverse, mut before, mut after] = columns(simd, rows);
             // Samples at the ends of the window have negligible weight, or no neighbour.
             if tap == 0 {
-                (before, after) = (none, own.start.simd_gt(0.0).select(none, after));
+                (before, after) = (none, along.start.simd_gt(0.0).select(none, after));
             }
             if tap + 1 == N {
-                let is_cut = own.start.simd_lt(self.count as f32 - N as f32);
+                let is_cut = along.start.simd_lt(self.count as f32 - N as f32);
                 (before, after) = (is_cut.select(none, before), none);
             }
             let away = place - at;
@@ -381,29 +381,29 @@ impl Axis {
             if !weight.simd_gt(LEAST_COUNTED).any_true() {
                 continue;
             }
-            own.counted |= 1 << tap;
+            along.counted |= 1 << tap;
             // Slopes use the neighbours, so the weights that they add end where the weights end.
             let has_weight = weight.simd_gt(LEAST_WEIGHT as f32);
             if has_weight.any_true() {
-                own.counted |= (2 << tap) | ((1 << tap) >> 1);
+                along.counted |= (2 << tap) | ((1 << tap) >> 1);
             }
             (before, after) = (has_weight.select(before, none), has_weight.select(after, none));
             let slope = -(weight * scaled * inverse);
             let moment = weight * away;
             let moment_slope = slope.mul_add(away, weight);
-            own.weights[tap] = weight;
-            own.weight_slopes[tap] = slope;
+            along.weights[tap] = weight;
+            along.weight_slopes[tap] = slope;
             if tap > 0 {
-                own.added[tap - 1] -= moment * before;
-                own.added_slopes[tap - 1] -= moment_slope * before;
+                along.added[tap - 1] -= moment * before;
+                along.added_slopes[tap - 1] -= moment_slope * before;
             }
-            own.added[tap] += moment * (before - after);
-            own.added_slopes[tap] += moment_slope * (before - after);
+            along.added[tap] += moment * (before - after);
+            along.added_slopes[tap] += moment_slope * (before - after);
             if tap + 1 < N {
-                own.added[tap + 1] += moment * after;
-                own.added_slopes[tap + 1] += moment_slope * after;
+                along.added[tap + 1] += moment * after;
+                along.added_slopes[tap + 1] += moment_slope * after;
             }
         }
-        own
+        along
     }
 }

@@ -34,7 +34,7 @@ pub fn record(plan: &Plan, facet: &Facet, turn: Mat3, origin: Vec3) -> Option<Re
     let covered = covered_pixels(plan, outline([a, b], radii, plan))?;
     let sheets = sheets(plan, [a, b], radii)?;
     let [normal, form, _] = facet.normals;
-    let normal = decode_normal(normal).map_or(normal, |own| encode_normal(turn * own));
+    let normal = decode_normal(normal).map_or(normal, |direction| encode_normal(turn * direction));
     let [from, to, _] = facet.colors.map(f32::from_bits);
     Some(Record {
         center: a.to_array(),
@@ -110,7 +110,7 @@ fn sheets(plan: &Plan, [a, b]: [Vec3; 2], radii: [f32; 2]) -> Option<[u16; 2]> {
 }
 
 /// A rod on its way to the pixels of a tile.
-struct Shown {
+struct DrawnRod {
     /// An end, and the way from there to the other one.
     start: Vec3,
     along: Vec3,
@@ -134,7 +134,7 @@ struct Met<S: Simd> {
     normal: [Lanes<S>; 3],
 }
 
-impl Shown {
+impl DrawnRod {
     fn new(record: &Record) -> Self {
         let [x, y, z, first, last, pixels] = record.whitening;
         let start = Vec3::from(record.center);
@@ -220,7 +220,7 @@ impl Shown {
     }
 }
 
-impl Shown {
+impl DrawnRod {
     /// Returns the shares without those on the outline of round ends at joints, where the outline
     /// is that of the other rod. `to` is the way to the start and `across` the way from there to
     /// the end, both across the rays.
@@ -248,8 +248,8 @@ impl Shown {
             let is_before = dot(to, across).simd_gt(none);
             // `to` lies across the ray, so that its product with a vector is that with the part of
             // the vector across the ray.
-            let is_own = part.simd_gt(slack);
-            outlined = (is_before & is_own).select(none, outlined);
+            let is_beside_other = part.simd_gt(slack);
+            outlined = (is_before & is_beside_other).select(none, outlined);
         }
         share.simd_lt(one).select(outlined, share)
     }
@@ -261,7 +261,7 @@ impl<S: Simd> OpenTile<'_, S> {
     fn add_rod_to(
         simd: S,
         plan: &Plan,
-        rod: &Shown,
+        rod: &DrawnRod,
         window: Window,
         packet: &Packet<S>,
         sums: &mut Sums<S>,
@@ -280,8 +280,8 @@ impl<S: Simd> OpenTile<'_, S> {
         if plan.lit_surfaces && (rod.is_round || rod.normal != Vec3::ZERO) {
             color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
         }
-        let own = Covered { share, seen: share, distance, color, covers, side: Side::Rod };
-        Self::add_covered(simd, plan, &own, window, packet, sums);
+        let covered = Covered { share, seen: share, distance, color, covers, side: Side::Rod };
+        Self::add_covered(simd, plan, &covered, window, packet, sums);
     }
 
     /// Adds a rod's window to all packets that it meets.
@@ -294,7 +294,7 @@ impl<S: Simd> OpenTile<'_, S> {
         window: Window,
         packets: impl Iterator<Item = usize>,
     ) {
-        let rod = Shown::new(record);
+        let rod = DrawnRod::new(record);
         for number in packets {
             let packet = &self.packets[number];
             if !packet.is_done || plan.central {

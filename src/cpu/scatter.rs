@@ -253,14 +253,14 @@ impl<'a> Projected<'a> {
             return;
         }
         let [_, payload @ ..] = record.payload;
-        for (own, section) in sections.iter().enumerate().take(self.count + 1) {
+        for (offset, section) in sections.iter().enumerate().take(self.count + 1) {
             let depth = strength * *section;
             let adds = depth.abs().simd_gt(LEAST_ADDED);
             if !adds.any_true() {
                 continue;
             }
             let depth = adds.select(depth, none);
-            let slot = (self.window.front + own) % WINDOW;
+            let slot = (self.window.front + offset) % WINDOW;
             sums.has_radiance[slot] |= packet.bit();
             // The first part of the payload is 1.
             let [whole, parts @ ..] = &mut sums.radiance[slot][packet.number];
@@ -298,20 +298,20 @@ impl<'a> Projected<'a> {
         // The kernel on the planes in front of and behind a sheet: the slope's contribution to the
         // sheet.
         let mut before = none;
-        for (own, section) in sections.iter().enumerate().take(self.count + 1) {
-            let slot = (front + own) % WINDOW;
+        for (offset, section) in sections.iter().enumerate().take(self.count + 1) {
+            let slot = (front + offset) % WINDOW;
             sums.has_field[slot] |= packet.bit();
             let weight = section_kernel * *section;
             let field = &mut sums.field[slot][packet.number];
             field.weight += weight;
             field.value = weight.mul_add(line.value, field.value);
-            if own == self.count {
+            if offset == self.count {
                 if plan.has_slopes {
                     field.value += before * line.slope * length_of;
                 }
                 break;
             }
-            let t = along.t[own];
+            let t = along.t[offset];
             let (on_plane, steep) = if plan.table_kernel {
                 let [on_plane, steep] = kernel_at(simd, plan, (along.rho2 + t * t).sqrt());
                 (on_plane * kernel, steep * kernel)
@@ -324,11 +324,11 @@ impl<'a> Projected<'a> {
             }
             before = on_plane;
             let here = t.mul_add(line.slope, line.value);
-            let face = &mut sums.faces[(front + own + 1) % WINDOW][packet.number];
+            let face = &mut sums.faces[(front + offset + 1) % WINDOW][packet.number];
             face.weight += on_plane;
             face.value = on_plane.mul_add(here, face.value);
             let Some(across) = &across else { continue };
-            let plane = plan.planes[front + 1 + own];
+            let plane = plan.planes[front + 1 + offset];
             let size = if plan.view.perspective { rays.cosine * plane } else { one };
             for (axis, change) in across.iter().enumerate() {
                 let moved = size * (change.nearest + t * change.unit);
@@ -544,16 +544,16 @@ fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
     let FieldKernel { extent: length, per_extent: per_length, .. } = plan.field.kernel;
     let last = (RADII - 1) as f32;
     let radii: [f32; 8] = radius.into();
-    let mut found = [[0.0f32; 8]; 2];
+    let mut values = [[0.0f32; 8]; 2];
     for (lane, radius) in radii.into_iter().enumerate() {
         if radius <= length {
             let at = (radius * per_length * last).min(last);
             let [a, b, c, d] = plan.tables.radii[at as usize];
             let part = at.fract();
-            (found[0][lane], found[1][lane]) = (a + (c - a) * part, b + (d - b) * part);
+            (values[0][lane], values[1][lane]) = (a + (c - a) * part, b + (d - b) * part);
         }
     }
-    [found[0].simd_into(simd), found[1].simd_into(simd)]
+    [values[0].simd_into(simd), values[1].simd_into(simd)]
 }
 
 /// Returns the kernel's integral along lines at distances `rho` from its centre, from the closest
@@ -562,14 +562,14 @@ fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
 fn kernel_integral<S: Simd>(simd: S, plan: &Plan, rho: Lanes<S>, t: Lanes<S>) -> Lanes<S> {
     let per_length = plan.field.kernel.per_extent;
     let cells = SECTIONS as f32;
-    let ([rhos, ts], mut found): ([[f32; 8]; 2], _) = ([rho.into(), t.into()], [0.0f32; 8]);
+    let ([rhos, ts], mut integrals): ([[f32; 8]; 2], _) = ([rho.into(), t.into()], [0.0f32; 8]);
     for lane in 0..8 {
         let place = |value: f32| (value * per_length * cells).min(cells - 1e-3);
         let (x, y) = (place(rhos[lane]), place(ts[lane].abs()));
         let [a, b, c, d] = plan.tables.sections[x as usize * SECTIONS + y as usize];
         let (low, high) = (a + (b - a) * y.fract(), c + (d - c) * y.fract());
-        found[lane] =
+        integrals[lane] =
             (low + (high - low) * x.fract()).copysign(if ts[lane] >= 0.0 { 1.0 } else { -1.0 });
     }
-    found.simd_into(simd)
+    integrals.simd_into(simd)
 }

@@ -6,26 +6,26 @@ use super::{
 };
 use crate::{
     bricks::{self, BLOCKS, Choice},
-    plan::shown::{BLOCK, Shown, bit_of},
+    plan::visible::{BLOCK, VisibleBlocks, bit_of},
 };
 use fearless_simd::{Simd, i32x8, prelude::*, u32x8};
 
-impl Shown {
+impl VisibleBlocks {
     /// Returns the visible blocks of a level of a volume in bricks, of those that a picture shows.
     pub fn of_bricks(cache: &BrickCache, choice: &Choice, level: usize) -> Self {
         let size = cache.bricks.level(level);
         let coarse = bricks::BLOCK.ilog2();
         let blocks = size.dims.map(|n| n.div_ceil(bricks::BLOCK).div_ceil(BLOCK));
         let mut words = vec![[0; 2]; blocks.iter().product()];
-        for &(_, brick) in choice.bricks.iter().filter(|(own, _)| *own == level) {
+        for &(_, brick) in choice.bricks.iter().filter(|(brick_level, _)| *brick_level == level) {
             let Some(slot) = cache.slot(level, brick) else { continue };
             let first = size.place(brick).map(|at| at * BLOCKS);
             for (number, [low, high]) in cache.blocks(slot).iter().enumerate() {
-                if u16::from(*high) < choice.shown[usize::from(*low)] {
+                if u16::from(*high) < choice.first_visible[usize::from(*low)] {
                     continue;
                 }
-                let own = [number % BLOCKS, number / BLOCKS % BLOCKS, number / (BLOCKS * BLOCKS)];
-                let cell = [0, 1, 2].map(|axis| first[axis] + own[axis]);
+                let block = [number % BLOCKS, number / BLOCKS % BLOCKS, number / (BLOCKS * BLOCKS)];
+                let cell = [0, 1, 2].map(|axis| first[axis] + block[axis]);
                 let [x, y, z] = cell.map(|at| at / BLOCK);
                 // Blocks entirely outside the border show nothing.
                 let Some(words) = words.get_mut((z * blocks[1] + y) * blocks[0] + x) else {
@@ -59,7 +59,7 @@ impl Shown {
 }
 
 /// Returns whether `sheet`, counted from 1, is marked in the words of a tile
-/// ([`Shown::sheets_of_tiles`]).
+/// ([`VisibleBlocks::sheets_of_tiles`]).
 pub fn is_marked(marks: &[u64], sheet: usize) -> bool {
     let bit = sheet - 1;
     marks.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 != 0)

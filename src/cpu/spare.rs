@@ -8,13 +8,13 @@ pub type Spare = Vec<Vec<Record>>;
 
 /// Takes memory for a number of batches of records.
 pub fn spare_for(spare: &mut Spare, batches: usize) -> Vec<Vec<Record>> {
-    let mut own = spare.split_off(spare.len().saturating_sub(batches));
-    for records in &mut own {
+    let mut taken = spare.split_off(spare.len().saturating_sub(batches));
+    for records in &mut taken {
         if records.capacity() / 4 > records.len() {
             records.shrink_to(2 * records.len());
         }
         records.clear();
     }
-    own.resize_with(batches, Vec::new);
-    own
+    taken.resize_with(batches, Vec::new);
+    taken
 }

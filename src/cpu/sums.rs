@@ -222,9 +222,9 @@ impl<S: Simd> Sums<S> {
         let slot = sheet % WINDOW;
         if self.has_radiance[slot] != 0 {
             // Not taken yet: the sheet is not drawn, or a packet is done.
-            for (packet, own) in self.radiance[slot].iter_mut().enumerate() {
+            for (packet, sums) in self.radiance[slot].iter_mut().enumerate() {
                 if self.has_radiance[slot] & (1 << packet) != 0 {
-                    *own = [self.none; 8];
+                    *sums = [self.none; 8];
                 }
             }
             self.has_radiance[slot] = 0;
@@ -271,11 +271,12 @@ impl<S: Simd> ScalarSums<S> {
         }
         let [start, stop] = [plan.planes[sheet], plan.planes[sheet + 1]];
         let thickness = stop - start;
-        let own = &self.field[slot][packet.number];
-        let has_value = own.weight.simd_gt(plan.field.least_sum * thickness);
-        let value = own.value / own.weight.max(Lanes::splat(simd, 1e-37));
+        let sums = &self.field[slot][packet.number];
+        let has_value = sums.weight.simd_gt(plan.field.least_sum * thickness);
+        let value = sums.value / sums.weight.max(Lanes::splat(simd, 1e-37));
         let one = Lanes::splat(simd, 1.0);
-        let filling = if plan.on_lattice { one } else { (own.weight * (1.0 / thickness)).min(one) };
+        let filling =
+            if plan.on_lattice { one } else { (sums.weight * (1.0 / thickness)).min(one) };
         let front = self.face(simd, plan, packet, sheet, slopes.map(|[front, _]| front));
         let back = self.face(simd, plan, packet, sheet + 1, slopes.map(|[_, back]| back));
         let either = |a: &Resolved<S>, b: &Resolved<S>| {
@@ -312,14 +313,14 @@ impl<S: Simd> ScalarSums<S> {
         plane: usize,
         differences: Option<[Lanes<S>; 2]>,
     ) -> Resolved<S> {
-        let own = &self.faces[plane % WINDOW][packet.number];
-        let has_value = own.weight.simd_gt(plan.field.least_sum);
-        let inverse = Lanes::splat(simd, 1.0) / own.weight.max(Lanes::splat(simd, 1e-37));
-        let value = own.value * inverse;
+        let sums = &self.faces[plane % WINDOW][packet.number];
+        let has_value = sums.weight.simd_gt(plan.field.least_sum);
+        let inverse = Lanes::splat(simd, 1.0) / sums.weight.max(Lanes::splat(simd, 1e-37));
+        let value = sums.value * inverse;
         let mut across = [self.none; 3];
         if plan.has_gradients() {
             let of =
-                |axis: usize| (value * own.weight_slope[axis] - own.value_slope[axis]) * inverse;
+                |axis: usize| (value * sums.weight_slope[axis] - sums.value_slope[axis]) * inverse;
             let slopes = differences.unwrap_or([of(0), of(1)]);
             across = across_of(simd, plan, &packet.rays, slopes, plan.planes[plane]);
         }
@@ -331,9 +332,9 @@ impl<S: Simd> ScalarSums<S> {
     #[inline(always)]
     pub fn values_on(&self, simd: S, plan: &Plan, plane: usize) -> [[f32; TILE]; TILE] {
         let mut values = [[f32::NAN; TILE]; TILE];
-        for (packet, own) in self.faces[plane % WINDOW].iter().enumerate() {
-            let has_value = own.weight.simd_gt(plan.field.least_sum);
-            let value = own.value / own.weight.max(Lanes::splat(simd, 1e-37));
+        for (packet, sums) in self.faces[plane % WINDOW].iter().enumerate() {
+            let has_value = sums.weight.simd_gt(plan.field.least_sum);
+            let value = sums.value / sums.weight.max(Lanes::splat(simd, 1e-37));
             let value: [f32; 8] = has_value.select(value, Lanes::splat(simd, f32::NAN)).into();
             for (lane, value) in value.into_iter().enumerate() {
                 values[packet / 2 * 2 + lane / 4][packet % 2 * 4 + lane % 4] = value;
@@ -389,7 +390,7 @@ pub fn differences<S: Simd>(simd: S, values: &[[f32; TILE]; TILE], packet: usize
     let mut slopes = [[0.0f32; 8]; 2];
     for lane in 0..8 {
         let (row, column) = (packet / 2 * 2 + lane / 4, packet % 2 * 4 + lane % 4);
-        let own = values[row][column];
+        let center = values[row][column];
         let last = TILE - 1;
         let pairs = [
             [values[row][column.max(1) - 1], values[row][(column + 1).min(last)]],
@@ -397,8 +398,8 @@ pub fn differences<S: Simd>(simd: S, values: &[[f32; TILE]; TILE], packet: usize
         ];
         for (slopes, [before, after]) in slopes.iter_mut().zip(pairs) {
             let span = f32::from(u8::from(!before.is_nan()) + u8::from(!after.is_nan()));
-            let or_own = |value: f32| if value.is_nan() { own } else { value };
-            slopes[lane] = (or_own(after) - or_own(before)) / span.max(1.0);
+            let or_center = |value: f32| if value.is_nan() { center } else { value };
+            slopes[lane] = (or_center(after) - or_center(before)) / span.max(1.0);
         }
     }
     let [x, y] = slopes;

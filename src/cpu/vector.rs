@@ -168,14 +168,14 @@ mod tests {
         let numbers: Vec<f32> = (0..8000).map(|i| (i as f32 - 4000.0) * 0.01).collect();
         for eight in numbers.chunks_exact(8) {
             let x: [f32; 8] = std::array::from_fn(|i| eight[i]);
-            let found: [f32; 8] =
+            let powers: [f32; 8] =
                 dispatch!(Level::new(), simd => exp2(simd, x.simd_into(simd)).into());
-            for (x, found) in x.iter().zip(found) {
+            for (x, power) in x.iter().zip(powers) {
                 let truth = f64::from(*x).exp2();
-                assert!((f64::from(found) / truth - 1.0).abs() < 4e-7, "2^{x}: {found}");
+                assert!((f64::from(power) / truth - 1.0).abs() < 4e-7, "2^{x}: {power}");
             }
             let back: [f32; 8] =
-                dispatch!(Level::new(), simd => log2(simd, found.simd_into(simd)).into());
+                dispatch!(Level::new(), simd => log2(simd, powers.simd_into(simd)).into());
             for (x, back) in x.iter().zip(back) {
                 assert!((x - back).abs() < 2e-5, "{x} {back}");
             }

@@ -140,8 +140,8 @@ impl<S: Simd> Pairs<S> {
         weights.moment = Lanes::float_from(moments[0] + moments[2] + moments[3]) * (1.0 / PARTS);
         let pair = each!([0, 1], I => [values, moments][I]);
         let [value, moment] = each!([0, 1], I => {
-            let own = pair[I];
-            each!([0, 2], K => ((own[order[K]] & 0xffff) | (own[order[K + 1]] << 16))
+            let parts = pair[I];
+            each!([0, 2], K => ((parts[order[K]] & 0xffff) | (parts[order[K + 1]] << 16))
                 .bitcast::<i16x16<S>>())
         });
         Self { value, moment }
@@ -321,8 +321,8 @@ impl Sample for i32 {
         columns(
             simd,
             each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
-                let own: [i32; 4] = window.row(L, first);
-                four!(I => own[I] as f32)
+                let row: [i32; 4] = window.row(L, first);
+                four!(I => row[I] as f32)
             }),
         )
     }
@@ -336,8 +336,8 @@ impl Sample for i32 {
         pairs(
             simd,
             each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
-                let own: [i32; 2] = window.row(L, first);
-                [own[0] as f32, own[1] as f32]
+                let row: [i32; 2] = window.row(L, first);
+                [row[0] as f32, row[1] as f32]
             }),
         )
     }
@@ -391,7 +391,7 @@ pub fn columns<S: Simd>(simd: S, rows: [[f32; 4]; 8]) -> [Lanes<S>; 4] {
 #[inline(always)]
 pub fn pairs<S: Simd>(simd: S, pairs: [[f32; 2]; 8]) -> [Lanes<S>; 2] {
     each!([0, 1], I => {
-        let own: [f32; 8] = each!([0, 1, 2, 3, 4, 5, 6, 7], L => pairs[L][I]);
-        own.simd_into(simd)
+        let lanes: [f32; 8] = each!([0, 1, 2, 3, 4, 5, 6, 7], L => pairs[L][I]);
+        lanes.simd_into(simd)
     })
 }

@@ -37,7 +37,7 @@ impl AtomicFile {
     /// file or is a dangling link.
     pub fn create(wanted: &Path) -> Result<Self> {
         let fail = |e| Error::output(wanted, e);
-        if wanted.metadata().is_ok_and(|found| !found.is_file()) {
+        if wanted.metadata().is_ok_and(|metadata| !metadata.is_file()) {
             return Err(fail(io::Error::new(
                 io::ErrorKind::InvalidInput,
                 "something of this name exists that is not a regular file",

@@ -64,7 +64,7 @@ impl Part {
         // The full name may leave no room for the suffix.
         let name: String =
             wanted.file_name().unwrap_or_default().to_string_lossy().chars().take(50).collect();
-        let permissions = wanted.metadata().ok().map(|found| found.permissions());
+        let permissions = wanted.metadata().ok().map(|metadata| metadata.permissions());
         let mut live = live();
         step(Step::Create)?;
         for try_number in 0..MOST {
@@ -159,7 +159,7 @@ fn create_new(path: &Path, permissions: Option<&Permissions>) -> io::Result<File
 
 /// Removes a temporary file that no living process holds.
 fn remove_stale(path: &Path) {
-    if path.symlink_metadata().is_ok_and(|found| found.is_file())
+    if path.symlink_metadata().is_ok_and(|metadata| metadata.is_file())
         && let Ok(file) = File::open(path)
         && file.try_lock().is_ok()
     {

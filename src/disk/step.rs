@@ -81,9 +81,9 @@ pub(crate) mod faults {
         run: impl FnOnce() -> T,
     ) -> T {
         RACE.set(Some(Box::new(other)));
-        let found = run();
+        let result = run();
         RACE.set(None);
-        found
+        result
     }
 
     pub(in crate::disk) fn step(step: Step) -> io::Result<()> {
@@ -105,7 +105,7 @@ pub(crate) mod faults {
     /// Calls `run` with a fault, and also returns the steps that it reached.
     pub(crate) fn with<T>(at: Option<(usize, Fault)>, run: impl FnOnce() -> T) -> (T, Vec<Step>) {
         PLAN.set(Plan { at, done: Vec::new() });
-        let found = run();
-        (found, PLAN.take().done)
+        let result = run();
+        (result, PLAN.take().done)
     }
 }

@@ -53,39 +53,42 @@ fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
                 None => std::fs::remove_file(&path).unwrap_or_default(),
                 Some(old) => std::fs::write(&path, old).unwrap(),
             }
-            let told = format!("{name}: {fault:?}, {step:?}, step {at} of {}", steps.len());
+            let case = format!("{name}: {fault:?}, {step:?}, step {at} of {}", steps.len());
             let (done, _) = faults::with(Some((at, fault)), || writer(&path));
-            let found = std::fs::read(&path).ok();
+            let content = std::fs::read(&path).ok();
             if fault == Fault::Full {
                 match done {
                     // Nothing is lost if the folder could not be synced.
                     Ok(()) => {
-                        assert!(step == Step::SyncFolder && found.as_ref() == Some(&new), "{told}");
+                        assert!(
+                            step == Step::SyncFolder && content.as_ref() == Some(&new),
+                            "{case}"
+                        );
                     }
                     Err(error) => {
-                        assert_eq!(found.as_deref(), old, "{told}");
-                        assert!(error.to_string().contains(name), "{told}: {error}");
+                        assert_eq!(content.as_deref(), old, "{case}");
+                        assert!(error.to_string().contains(name), "{case}: {error}");
                         assert!(
                             matches!(error, Error::Output { .. }) || step == Step::Read,
-                            "{told}: {error}"
+                            "{case}: {error}"
                         );
                     }
                 }
-                assert!(names(&folder).iter().all(|n| n == name), "{told}: {:?}", names(&folder));
+                assert!(names(&folder).iter().all(|n| n == name), "{case}: {:?}", names(&folder));
                 continue;
             }
-            assert!(found.as_deref() == old || found.as_ref() == Some(&new), "{told}");
+            assert!(content.as_deref() == old || content.as_ref() == Some(&new), "{case}");
             for left in names(&folder).iter().filter(|left| *left != name) {
                 assert!(
                     left.starts_with(&format!(".{name}.")) && left.ends_with(".splatkit-part"),
-                    "{told}: {left}"
+                    "{case}: {left}"
                 );
                 let bytes = std::fs::read(folder.path(left)).unwrap();
-                assert!(bytes == new || !is_read(name, bytes), "{told}");
+                assert!(bytes == new || !is_read(name, bytes), "{case}");
             }
             writer(&path).unwrap();
-            assert!(std::fs::read(&path).unwrap() == new, "{told}");
-            assert_eq!(names(&folder), [name], "{told}");
+            assert!(std::fs::read(&path).unwrap() == new, "{case}");
+            assert_eq!(names(&folder), [name], "{case}");
         }
     }
     println!("{name}: stopped {} times", 2 * steps.len());
@@ -384,8 +387,8 @@ fn writers_at_once_leave_a_whole_file() {
             scope.spawn(move || (0..50).for_each(|_| write(path, &vec![writer; 5000]).unwrap()));
         }
         for _ in 0..200 {
-            if let Ok(found) = std::fs::read(&path) {
-                assert!(found.len() == 5000 && found.iter().all(|&byte| byte == found[0]));
+            if let Ok(bytes) = std::fs::read(&path) {
+                assert!(bytes.len() == 5000 && bytes.iter().all(|&byte| byte == bytes[0]));
             }
         }
     });

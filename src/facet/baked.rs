@@ -18,7 +18,7 @@ impl FacetSet {
     /// Returns the facets with the images in their corners' colours: those that show an image are
     /// cut to about its texels, or larger parts if there would be millions.
     pub(crate) fn baked(&self) -> Cow<'_, Self> {
-        if self.shown.is_empty() {
+        if self.texture_coordinates.is_empty() {
             return Cow::Borrowed(self);
         }
         let numbers = || (0..self.facets.len()).into_par_iter();
@@ -92,12 +92,12 @@ impl Corner {
         let uv = (0..3).map(|i| places[i] * weights[i]).sum();
         let [across, down] = [1, 2].map(|i| (places[i] - places[0]) / parts);
         let mut color = image.mean(uv, across, down);
-        let own = facet.colors.map(|color| {
+        let corner_colors = facet.colors.map(|color| {
             let [red, green, blue, _] = color.to_le_bytes().map(|part| f32::from(part) / 255.0);
             Vec3::new(red, green, blue)
         });
-        let own = of(own).to_array();
-        color.iter_mut().zip(own).for_each(|(part, own)| *part *= own);
+        let tint = of(corner_colors).to_array();
+        color.iter_mut().zip(tint).for_each(|(part, factor)| *part *= factor);
         Self {
             place: of(facet.corners.map(Vec3::from)),
             normal: of(facet.decoded_normals()),
@@ -114,19 +114,19 @@ fn piece(corners: [&Corner; 3], facet: &Facet) -> Option<Facet> {
     }
     let byte = |part: f32| (part.clamp(0.0, 1.0) * 255.0).round() as u8;
     let color = |corner: &Corner| [0, 1, 2].map(|i| byte(corner.color[i]));
-    let own = Facet::new(
+    let piece = Facet::new(
         corners.map(|corner| corner.place),
         corners.map(|corner| corner.normal),
         corners.map(color),
     );
     let is_unlit = facet.decoded_normals() == [Vec3::ZERO; 3];
-    Some(if is_unlit { own.unlit() } else { own })
+    Some(if is_unlit { piece.unlit() } else { piece })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::facet::{Shown, Texture};
+    use crate::facet::{Texture, TextureCoordinates};
     use std::sync::Arc;
 
     #[test]
@@ -141,19 +141,21 @@ mod tests {
         let set = FacetSet {
             facets: vec![facet, plain],
             images: vec![Arc::new(image)],
-            shown: [0, Shown::PLAIN].map(|image| Shown { image, places }).to_vec(),
+            texture_coordinates: [0, TextureCoordinates::PLAIN]
+                .map(|image| TextureCoordinates { image, places })
+                .to_vec(),
             ..FacetSet::default()
         };
         let baked = set.baked();
         let parts = (16.0 * 2f32.sqrt() / 1.5).ceil() as usize;
         assert_eq!(baked.facets.len(), parts * parts + 1);
-        assert!(baked.facets.contains(&plain) && baked.shown.is_empty());
+        assert!(baked.facets.contains(&plain) && baked.texture_coordinates.is_empty());
         let area = |facet: &Facet| {
             let [a, b, c] = facet.corners.map(Vec3::from);
             (b - a).cross(c - a).z
         };
-        let own: f32 = baked.facets.iter().filter(|facet| **facet != plain).map(area).sum();
-        assert!((own - 1.0).abs() < 1e-4, "{own}");
+        let total: f32 = baked.facets.iter().filter(|facet| **facet != plain).map(area).sum();
+        assert!((total - 1.0).abs() < 1e-4, "{total}");
         let near = baked.facets.iter().find(|facet| {
             let [x, y, _] = facet.corners[0];
             (x - 0.5).abs() < 0.05 && (y - 0.25).abs() < 0.05

@@ -63,11 +63,11 @@ impl Image {
         let level = (least / 3.0).max(most / MOST_ALONG).log2().floor();
         let level = if level > 0.0 { (level as usize).min(self.coarser.len()) } else { 0 };
         let texel = (1u32 << level.min(31)) as f32;
-        let own = if level == 0 { &*self.finest } else { &self.coarser[level - 1] };
+        let texture = if level == 0 { &*self.finest } else { &self.coarser[level - 1] };
         let parts = |side: f32| (side / texel).ceil().clamp(1.0, MOST_ALONG) as u32;
         let (columns, rows) = (parts(wide), parts(high));
         if (columns, rows) == (1, 1) {
-            return own.sample(uv);
+            return texture.sample(uv);
         }
         let (mut sum, mut seen) = ([0.0f32; 3], 0.0);
         let (right, below) = (across / columns as f32, down / rows as f32);
@@ -75,7 +75,7 @@ impl Image {
         for row in 0..rows {
             for column in 0..columns {
                 let [r, g, b, alpha] =
-                    own.sample(first + row as f32 * below + column as f32 * right);
+                    texture.sample(first + row as f32 * below + column as f32 * right);
                 seen += alpha;
                 sum[0] += r * alpha;
                 sum[1] += g * alpha;
@@ -148,12 +148,13 @@ mod tests {
 
     #[test]
     fn levels_keep_the_mean() {
-        let own = image(37, 20, |x, y| [(x * 6) as u8, (y * 12) as u8, 7, 255]);
-        let sizes: Vec<[u32; 2]> = own.coarser.iter().map(|own| [own.width, own.height]).collect();
+        let picture = image(37, 20, |x, y| [(x * 6) as u8, (y * 12) as u8, 7, 255]);
+        let sizes: Vec<[u32; 2]> =
+            picture.coarser.iter().map(|level| [level.width, level.height]).collect();
         assert_eq!(sizes, [[19, 10], [10, 5], [5, 3], [3, 2], [2, 1], [1, 1]]);
-        let last = own.coarser.last().unwrap().texels[0];
-        for (found, wanted) in last.into_iter().zip([108.0, 114.0, 7.0, 255.0]) {
-            assert!((f64::from(found) - wanted).abs() <= 2.0, "{last:?}");
+        let last = picture.coarser.last().unwrap().texels[0];
+        for (actual, wanted) in last.into_iter().zip([108.0, 114.0, 7.0, 255.0]) {
+            assert!((f64::from(actual) - wanted).abs() <= 2.0, "{last:?}");
         }
     }
 
@@ -162,7 +163,7 @@ mod tests {
     #[test]
     fn means_are_those_of_many_samples() {
         let wave = |at: u32, by: u32| 128.0 + 100.0 * (at as f32 / by as f32).sin();
-        let own = image(256, 128, |x, y| {
+        let picture = image(256, 128, |x, y| {
             let hidden = (x / 9 + y / 7) % 3 == 0;
             let tint = if hidden { [255; 3] } else { [wave(x, 5) as u8, wave(y, 3) as u8, 40] };
             [tint[0], tint[1], tint[2], if hidden { 0 } else { 255 }]
@@ -174,30 +175,30 @@ mod tests {
             let long = 0.002 + 0.2 * part(41) * part(53);
             let (across, down) =
                 (Vec2::new(long, 0.3 * long * part(7)), Vec2::new(0.0, 0.02 * part(11)));
-            let found = own.mean(uv, across, down);
+            let mean = picture.mean(uv, across, down);
             let (mut sum, mut seen) = ([0.0; 3], 0.0);
             for i in 0..64 * 64 {
                 let place = Vec2::new((i % 64) as f32 + 0.5, (i / 64) as f32 + 0.5) / 64.0 - 0.5;
-                let [r, g, b, a] = own.finest.sample(uv + across * place.x + down * place.y);
+                let [r, g, b, a] = picture.finest.sample(uv + across * place.x + down * place.y);
                 seen += a / 4096.0;
                 for (sum, part) in sum.iter_mut().zip([r, g, b]) {
                     *sum += part * a / 4096.0;
                 }
             }
             // What is seen: colours times their shares.
-            let error = (0..3).map(|i| (found[i] * found[3] - sum[i]).abs()).fold(0.0, f32::max);
-            worst = worst.max(error).max((found[3] - seen).abs());
+            let error = (0..3).map(|i| (mean[i] * mean[3] - sum[i]).abs()).fold(0.0, f32::max);
+            worst = worst.max(error).max((mean[3] - seen).abs());
         }
         assert!(worst < 0.12, "{worst}");
     }
 
     #[test]
     fn odd_coordinates_give_colours() {
-        let own = image(4, 4, |x, _| [(60 * x) as u8, 0, 0, 255]);
+        let picture = image(4, 4, |x, _| [(60 * x) as u8, 0, 0, 255]);
         let one = Vec2::ONE;
         for uv in [f32::NAN, f32::INFINITY, 1e30, -1e-30] {
             for side in [0.0, 1e-30, 1e30, f32::NAN, f32::INFINITY] {
-                let color = own.mean(one * uv, one * side, Vec2::new(-side, side));
+                let color = picture.mean(one * uv, one * side, Vec2::new(-side, side));
                 assert!(
                     color.iter().all(|part| (0.0..=1.0).contains(part)),
                     "{uv} {side} {color:?}"

@@ -47,11 +47,11 @@ impl Facet {
     /// Makes a facet. Normals without a length become that of the triangle.
     pub fn new(corners: [Vec3; 3], normals: [Vec3; 3], colors: [[u8; 3]; 3]) -> Self {
         let [a, b, c] = corners;
-        let own = (b - a).cross(c - a).normalize_or(Vec3::Z);
+        let face_normal = (b - a).cross(c - a).normalize_or(Vec3::Z);
         Self {
             corners: corners.map(|corner| corner.to_array()),
             normals: normals.map(|normal| match encode_normal(normal) {
-                NO_NORMAL => encode_normal(own),
+                NO_NORMAL => encode_normal(face_normal),
                 normal => normal,
             }),
             colors: colors.map(|[red, green, blue]| u32::from_le_bytes([red, green, blue, 255])),
@@ -72,7 +72,7 @@ impl Facet {
 /// What a facet shows of an image. The image's colours are multiplied with those of the corners,
 /// and a pixel is covered less where less of the image is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shown {
+pub struct TextureCoordinates {
     /// The number of the image; [`PLAIN`](Self::PLAIN) if the facet shows none.
     pub image: u32,
     /// The places of the corners in the image; (0, 0) is its top left corner, (1, 1) the bottom
@@ -80,7 +80,7 @@ pub struct Shown {
     pub places: [Vec2; 3],
 }
 
-impl Shown {
+impl TextureCoordinates {
     /// Stands for no image.
     pub const PLAIN: u32 = u32::MAX;
 }
@@ -110,7 +110,7 @@ pub struct FacetSet {
     /// The images that facets show.
     pub images: Vec<Arc<Image>>,
     /// What each facet shows of them; empty if none shows anything.
-    pub shown: Vec<Shown>,
+    pub texture_coordinates: Vec<TextureCoordinates>,
     /// The box around the whole, in world coordinates, if the facets are what clips left of it.
     /// They end at the clips exactly, and no clip is applied to them again.
     pub whole: Option<Bounds>,
@@ -121,8 +121,8 @@ pub struct FacetSet {
 impl FacetSet {
     /// Returns the image that a facet shows, and the places of its corners there.
     pub(crate) fn image_of(&self, facet: usize) -> Option<(&Image, [Vec2; 3])> {
-        let shown = self.shown.get(facet)?;
-        Some((self.images.get(shown.image as usize)?, shown.places))
+        let mapping = self.texture_coordinates.get(facet)?;
+        Some((self.images.get(mapping.image as usize)?, mapping.places))
     }
 
     /// Returns the box around all facets, in world coordinates: also around those that clips

@@ -166,7 +166,7 @@ impl Rod {
 impl From<Rod> for Facet {
     fn from(rod: Rod) -> Self {
         let Rod { ends: [a, b], radii: [first, last], pixels, colors, relief, joints } = rod;
-        let encoded = |own: Option<Vec3>| own.map_or(NO_NORMAL, encode_normal);
+        let encoded = |normal: Option<Vec3>| normal.map_or(NO_NORMAL, encode_normal);
         let (normal, form) = match relief {
             Relief::Flat(normal) => (encoded(normal), FLAT),
             Relief::Round => (encoded(joints.0), if joints.1 { JOINED } else { ROUND }),

@@ -113,10 +113,10 @@ mod tests {
         let clear = [0.0; 4];
         for (width, height, count) in [(0, 0, 0), (0, 3, 3), (3, 0, 3), (u32::MAX, u32::MAX, 1)] {
             let texture = Texture { width, height, texels: vec![[255; 4]; count] };
-            let found = [0.0, 0.9].map(|at| texture.sample(Vec2::splat(at)));
+            let colors = [0.0, 0.9].map(|at| texture.sample(Vec2::splat(at)));
             assert!(
-                found.iter().all(|color| color.iter().all(|part| (0.0..=1.0).contains(part))),
-                "{found:?}"
+                colors.iter().all(|color| color.iter().all(|part| (0.0..=1.0).contains(part))),
+                "{colors:?}"
             );
         }
         let short = Texture { width: 2, height: 2, texels: vec![[255; 4]; 1] };

@@ -51,10 +51,10 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
         let head = Head::read(source)?;
         return volume::read(source, vec![head], options);
     };
-    let found = Found::look(source, &paths)?;
-    let chosen = found.choose(source, options)?;
-    found.tell(source, options, chosen);
-    let series = found.series.into_iter().nth(chosen).map(|series| series.heads);
+    let list = SeriesList::scan(source, &paths)?;
+    let chosen = list.choose(source, options)?;
+    list.tell(source, options, chosen);
+    let series = list.series.into_iter().nth(chosen).map(|series| series.heads);
     volume::read(source, series.unwrap_or_default(), options)
 }
 
@@ -64,9 +64,9 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
 /// Those of [`read`], but for those of pixels.
 pub(super) fn series(source: &Source, options: &ReadOptions) -> Result<Vec<Series>> {
     let Some(paths) = listed(source)? else { return Ok(Vec::new()) };
-    let found = Found::look(source, &paths)?;
-    let chosen = found.choose(source, options).ok();
-    let described = found.series.iter().enumerate();
+    let list = SeriesList::scan(source, &paths)?;
+    let chosen = list.choose(source, options).ok();
+    let described = list.series.iter().enumerate();
     Ok(described.map(|(at, series)| series.describe(chosen == Some(at))).collect())
 }
 
@@ -81,7 +81,7 @@ pub(super) fn is_folder(source: &Source) -> Result<bool> {
 }
 
 /// Returns a text of the file for a message: at most 60 characters.
-fn shown(text: &str) -> String {
+fn excerpt(text: &str) -> String {
     text.chars().take(60).collect()
 }
 
@@ -132,7 +132,7 @@ fn referenced(source: &Source, parts: &[&str]) -> Result<PathBuf> {
 }
 
 /// The series that were found in files.
-struct Found {
+struct SeriesList {
     series: Vec<Group>,
     /// What was passed over, as sentences.
     words: Vec<String>,
@@ -145,10 +145,10 @@ struct Group {
     obstacle: Option<String>,
 }
 
-impl Found {
+impl SeriesList {
     /// Looks at files. Those that are not DICOM, or hold no pictures, are passed over. Copies of a
     /// file are left out.
-    fn look(source: &Source, paths: &[PathBuf]) -> Result<Self> {
+    fn scan(source: &Source, paths: &[PathBuf]) -> Result<Self> {
         let (mut series, mut seen): (Vec<Group>, _) = (Vec::new(), HashSet::new());
         let (mut first, mut damaged, mut copies) = (None, 0, 0);
         for path in paths {
@@ -202,9 +202,9 @@ impl Found {
         self.words.iter().for_each(|word| tracing::warn!("{path}: {word}"));
         let count = self.series.len();
         if count > 1 && options.series.is_none() {
-            let name = self.series[chosen].heads[0].series.told();
-            let told = "has the most pictures and is read; see --series";
-            tracing::warn!("{path}: of {count} series, {name} {told}");
+            let name = self.series[chosen].heads[0].series.title();
+            let reason = "has the most pictures and is read; see --series";
+            tracing::warn!("{path}: of {count} series, {name} {reason}");
         }
     }
 
@@ -218,15 +218,15 @@ impl Found {
             names().filter(|(_, name)| fits(name)).map(|(at, _)| at).collect()
         };
         let lower = wanted.to_lowercase();
-        let by_number = by(&|name| name.number.is_some_and(|own| Ok(own) == wanted.parse()));
+        let by_number = by(&|name| name.number.is_some_and(|number| Ok(number) == wanted.parse()));
         let by_identifier = by(&|name| name.identifier == wanted);
         let by_words = by(&|name| name.description.to_lowercase().contains(&lower));
-        let found = [by_number, by_identifier, by_words].into_iter().find(|all| !all.is_empty());
-        let list = names().map(|(_, name)| name.told()).collect::<Vec<_>>().join("; ");
-        match found.as_deref() {
+        let matches = [by_number, by_identifier, by_words].into_iter().find(|all| !all.is_empty());
+        let list = names().map(|(_, name)| name.title()).collect::<Vec<_>>().join("; ");
+        match matches.as_deref() {
             Some(&[one]) => Ok(one),
             Some(several) => {
-                let wanted = shown(wanted);
+                let wanted = excerpt(wanted);
                 let message = format!("{} series fit “{wanted}”", several.len());
                 let several: Vec<&str> = several
                     .iter()
@@ -236,7 +236,7 @@ impl Found {
                 Err(source.error("series", message).hint(hint))
             }
             None => {
-                let message = format!("no series fits “{}”", shown(wanted));
+                let message = format!("no series fits “{}”", excerpt(wanted));
                 Err(source.error("series", message).hint(format!("there are: {list}")))
             }
         }
@@ -275,11 +275,11 @@ impl Group {
 
 impl head::SeriesName {
     /// Returns a text that names the series.
-    fn told(&self) -> String {
+    fn title(&self) -> String {
         let number = self.number.map_or("no number".into(), |number| format!("number {number}"));
         match self.description.as_str() {
             "" => number,
-            description => format!("{number} “{}”", shown(description)),
+            description => format!("{number} “{}”", excerpt(description)),
         }
     }
 }

@@ -12,7 +12,7 @@ use super::shared::{
 };
 use crate::{
     Result,
-    about::{About, Stance},
+    about::{About, Orientation},
     input::{Source, growing::Growing, isolate::isolated},
     surface::Mesh,
 };
@@ -168,7 +168,7 @@ impl<'a> Points<'a> {
             colors,
             sensors: self.sensors,
             values: if has_values { self.intensities.into_inner() } else { Vec::new() },
-            about: About { stance: Some(Stance::SURVEY), ..about },
+            about: About { orientation: Some(Orientation::SURVEY), ..about },
             ..Cloud::default()
         })
     }

@@ -72,9 +72,9 @@ pub fn advice(source: &Source) -> Option<Advice> {
     }
     let bytes = &source.bytes()[..source.bytes().len().min(LOOKED_AT)];
     // The name first: scenes and tables of some programs are archives.
-    let found = by_extension(source.path).or_else(|| by_magic(bytes));
-    let found = found.map(|foreign| Advice::of(foreign, source.path));
-    found.or_else(|| gzip(source)).or_else(|| layout::raw(source))
+    let foreign = by_extension(source.path).or_else(|| by_magic(bytes));
+    let advice = foreign.map(|foreign| Advice::of(foreign, source.path));
+    advice.or_else(|| gzip(source)).or_else(|| layout::raw(source))
 }
 
 /// Returns the error for a mesh of a solver, by the name of the file; `None` for other names. Its
@@ -143,15 +143,15 @@ fn gzip(source: &Source) -> Option<Advice> {
     let name = source.path.file_stem().unwrap_or_default();
     let inside = Path::new(name);
     let known = super::Format::of_path(inside).map(|format| format.name);
-    let foreign = by_extension(inside).or_else(|| by_magic(&head)).map(|found| found.what);
-    let shown = inside.display();
+    let foreign = by_extension(inside).or_else(|| by_magic(&head)).map(|row| row.what);
+    let unpacked = inside.display();
     let what = match known.or(foreign) {
         Some(inner) => format!("packed by gzip, with a file of {inner} inside"),
         None => "packed by gzip".into(),
     };
     let hint = format!(
-        "unpack it with gunzip -k {}, and name {shown}; raw samples may stay packed, with --dims \
-         and --type",
+        "unpack it with gunzip -k {}, and name {unpacked}; raw samples may stay packed, with \
+         --dims and --type",
         source.path.display()
     );
     Some(Advice { what, hint })
@@ -182,15 +182,15 @@ mod tests {
             assert!(!foreign.hint.ends_with('.'), "{}", foreign.what);
             for extension in &foreign.extensions {
                 assert!(names.insert(extension), "{extension} stands in two rows");
-                let found = asked(&format!("a.{extension}"), b"?");
-                let found = found.unwrap();
-                assert_eq!(found.what, foreign.what, "{extension}");
-                assert!(!found.hint.is_empty(), "{extension}");
+                let advice = asked(&format!("a.{extension}"), b"?");
+                let advice = advice.unwrap();
+                assert_eq!(advice.what, foreign.what, "{extension}");
+                assert!(!advice.hint.is_empty(), "{extension}");
             }
             for magic in &foreign.magic {
                 let bytes = [magic, &[0u8; 32][..]].concat();
-                let found = asked("a.unknown", &bytes).map(|advice| advice.what);
-                assert_eq!(found.as_deref(), Some(foreign.what), "{magic:?}");
+                let what = asked("a.unknown", &bytes).map(|advice| advice.what);
+                assert_eq!(what.as_deref(), Some(foreign.what), "{magic:?}");
             }
         }
         assert_eq!(asked("a.unknown", b"BM is no bitmap"), None);

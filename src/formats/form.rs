@@ -1,9 +1,9 @@
 //! What a format offers if the points of its files are read in pieces.
 
-use super::shared::found::Found;
+use super::shared::raw_point::RawPoint;
 use crate::{
     Result,
-    about::{About, Stance},
+    about::{About, Orientation},
     input::Source,
     parallel::{self, prelude::*},
 };
@@ -40,12 +40,12 @@ impl StreamPoint {
         f32::from_le_bytes(self.color)
     }
 
-    pub fn new(found: &Found, origin: DVec3) -> Self {
+    pub fn new(point: &RawPoint, origin: DVec3) -> Self {
         Self {
-            index: found.row as u32,
-            position: (found.position - origin).as_vec3().to_array(),
-            normal: found.normal.to_array(),
-            color: found.color,
+            index: point.row as u32,
+            position: (point.position - origin).as_vec3().to_array(),
+            normal: point.normal.to_array(),
+            color: point.color,
         }
     }
 }
@@ -67,7 +67,7 @@ pub(super) trait Form: Send + Sync {
     }
 
     /// Returns how the points stand, if the file or the format's convention says so.
-    fn stance(&self) -> Option<Stance>;
+    fn orientation(&self) -> Option<Orientation>;
 
     fn has_normals(&self) -> bool;
 
@@ -101,7 +101,7 @@ pub(super) trait Form: Send + Sync {
     fn triangles(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)>;
 
     /// Returns a vertex of a mesh; `None` for a point cloud.
-    fn vertex(&self, source: &Source, index: usize) -> Option<Found>;
+    fn vertex(&self, source: &Source, index: usize) -> Option<RawPoint>;
 
     /// Returns the position of a vertex of a mesh; `None` for a point cloud.
     fn position(&self, source: &Source, index: usize) -> Option<DVec3>;

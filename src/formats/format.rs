@@ -188,12 +188,12 @@ impl Format {
     /// (`nii.gz`). A name that is nothing but an extension has none.
     fn is_for(&self, path: &Path) -> bool {
         let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase());
-        let ends = |name: &str, own: &str| {
-            name.strip_suffix(own)
+        let ends = |name: &str, extension: &str| {
+            name.strip_suffix(extension)
                 .and_then(|rest| rest.strip_suffix('.'))
                 .is_some_and(|rest| !rest.is_empty())
         };
-        name.is_some_and(|name| self.extensions.iter().any(|own| ends(&name, own)))
+        name.is_some_and(|name| self.extensions.iter().any(|extension| ends(&name, extension)))
     }
 }
 
@@ -311,8 +311,8 @@ pub(super) fn find<'a>(
     if source.folder().is_some() {
         return by_folder(table, source, may);
     }
-    let found = by_extension(table, source.path, may);
-    unless_left_out(found.or_else(|| by_magic(table, source.bytes(), may)), source)
+    let format = by_extension(table, source.path, may);
+    unless_left_out(format.or_else(|| by_magic(table, source.bytes(), may)), source)
 }
 
 /// As [`find`], for a volume. If the extension names none and the caller gives a layout, the file
@@ -331,10 +331,10 @@ pub(super) fn find_volume<'a>(
         return by_folder(table, source, may);
     }
     let needs_layout = |format: &&Format| matches!(format.volume, Some(VolumeReader::Described(_)));
-    let found = by_extension(table, source.path, may)
+    let format = by_extension(table, source.path, may)
         .or_else(|| table.iter().find(needs_layout).filter(|_| is_described))
         .or_else(|| by_magic(table, source.bytes(), may));
-    unless_left_out(found, source)
+    unless_left_out(format, source)
 }
 
 /// Returns the format that the files of a folder have together, among those that `may` be read.
@@ -351,9 +351,9 @@ fn by_folder<'a>(
     Ok(None)
 }
 
-/// Returns what was found, unless this build leaves it out.
-fn unless_left_out<'a>(found: Option<&'a Format>, source: &Source) -> Result<Option<&'a Format>> {
-    let Some(format) = found.filter(|format| format.is_left_out()) else { return Ok(found) };
+/// Returns the chosen format, unless this build leaves it out.
+fn unless_left_out<'a>(choice: Option<&'a Format>, source: &Source) -> Result<Option<&'a Format>> {
+    let Some(format) = choice.filter(|format| format.is_left_out()) else { return Ok(choice) };
     let (name, feature) = (format.name, format.feature.unwrap_or_default());
     let message = format!("is a file of {name}, but this program was built without “{feature}”");
     let hint = format!("build it with the feature “{feature}” of the crate splatkit");
@@ -458,16 +458,16 @@ mod tests {
         let table = [FORMATS, &[row]].concat();
         assert!(row.is_left_out() && !TOY.is_left_out());
         for (name, bytes) in [("a.toy", "1 2 3"), ("a.dat", "toys")] {
-            let told = |error: Error| {
+            let check = |error: Error| {
                 let message = error.to_string();
                 assert!(message.contains("a file of toy, but"), "{message}");
                 assert!(message.contains("without “toys”"), "{message}");
             };
             with(name, bytes.as_bytes(), |source| {
-                told(mesh_of(&table, source, &ReadOptions::default()).unwrap_err());
-                told(volume_of(&table, source, &ReadOptions::default()).unwrap_err());
-                told(samples_of(&table, source, &ReadOptions::default()).unwrap_err());
-                told(Kind::find(&table, source, &ReadOptions::default()).unwrap_err());
+                check(mesh_of(&table, source, &ReadOptions::default()).unwrap_err());
+                check(volume_of(&table, source, &ReadOptions::default()).unwrap_err());
+                check(samples_of(&table, source, &ReadOptions::default()).unwrap_err());
+                check(Kind::find(&table, source, &ReadOptions::default()).unwrap_err());
             });
         }
     }
@@ -485,7 +485,10 @@ mod tests {
                 assert!(names.insert(extension), "{extension} is the extension of two formats");
                 assert_eq!(extension.to_ascii_lowercase(), *extension);
             }
-            assert!(format.written.is_none_or(|own| format.extensions.contains(&own)), "{name}");
+            assert!(
+                format.written.is_none_or(|written| format.extensions.contains(&written)),
+                "{name}"
+            );
             let holds = |kind| format.holds.iter().any(|holding| holding.content.kind() == kind);
             assert_eq!(format.mesh.is_some(), holds(Kind::Mesh), "{name}");
             assert_eq!(format.volume.is_some(), holds(Kind::Volume), "{name}");
@@ -525,11 +528,11 @@ mod tests {
             // A comment of a header is no sign of another format.
             ("NRRD0004\n# from <VTKFile type='PolyData'>", "NRRD"),
         ] {
-            let found = by_magic(FORMATS, bytes.as_bytes(), |_| true);
-            assert_eq!(found.map(|format| format.name), Some(name), "{bytes}");
+            let format = by_magic(FORMATS, bytes.as_bytes(), |_| true);
+            assert_eq!(format.map(|format| format.name), Some(name), "{bytes}");
         }
-        let found = by_magic(FORMATS, b"\x93NUMPY\x01\0", |_| true);
-        assert_eq!(found.map(|format| format.name), Some("NPY"));
+        let format = by_magic(FORMATS, b"\x93NUMPY\x01\0", |_| true);
+        assert_eq!(format.map(|format| format.name), Some("NPY"));
         for bytes in ["", "hello", "solid", "<?xml?><svg>", "RectilinearGrid"] {
             assert!(by_magic(FORMATS, bytes.as_bytes(), |_| true).is_none(), "{bytes}");
         }
@@ -540,17 +543,17 @@ mod tests {
 
     #[test]
     fn what_no_reader_reads_is_told() {
-        let told = |error: Error| error.to_string();
+        let text = |error: Error| error.to_string();
         let message = with("a.vti", b"", |source| {
-            told(mesh_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
+            text(mesh_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
         });
         assert!(message.contains("“.vti” is not a mesh format that can be read"), "{message}");
         let message = with("a.OBJ", b"", |source| {
-            told(samples_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
+            text(samples_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
         });
         assert!(message.contains("“.obj” is not a format of scattered samples"), "{message}");
         let message = with("a.raw", b"", |source| {
-            told(volume_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
+            text(volume_of(FORMATS, source, &ReadOptions::default()).unwrap_err())
         });
         assert!(message.contains("VTI, "), "{message}");
         assert!(message.contains(" NRRD, "), "{message}");

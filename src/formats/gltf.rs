@@ -18,7 +18,7 @@ pub use gaussians::{holds_gaussians, read_gaussians, write_gaussians};
 use super::shared::unplaced;
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     input::{Source, copy, positions},
     surface::{Mesh, Texture},
 };
@@ -157,12 +157,12 @@ impl Part<'_> {
     }
 
     /// Returns an error if an attribute has another number of values than there are vertices.
-    fn check(&self, source: &Source, what: &str, found: usize) -> Result<()> {
+    fn check(&self, source: &Source, what: &str, number: usize) -> Result<()> {
         let count = self.vertices.len();
-        if found == count {
+        if number == count {
             return Ok(());
         }
-        Err(source.error(self.place, format!("has {count} positions but {found} {what}")))
+        Err(source.error(self.place, format!("has {count} positions but {number} {what}")))
     }
 }
 
@@ -219,8 +219,8 @@ impl Builder<'_> {
             .enumerate()
             .map(|(index, mesh)| {
                 let primitives = mesh.primitives.iter().enumerate();
-                let own = primitives.filter(|(at, _)| !self.marks.are_gaussians(index, *at));
-                own.map(|(_, primitive)| of_primitive(primitive)).fold([0; 3], add)
+                let primitives = primitives.filter(|(at, _)| !self.marks.are_gaussians(index, *at));
+                primitives.map(|(_, primitive)| of_primitive(primitive)).fold([0; 3], add)
             })
             .collect();
         let all = meshes.iter().filter_map(|(_, mesh)| sizes.get(*mesh)).copied().fold([0; 3], add);
@@ -243,7 +243,7 @@ impl Builder<'_> {
         ];
         let parts = parts.into_iter().filter(|(is_there, _)| *is_there);
         self.idle.extend(parts.map(|(_, name)| name.to_owned()));
-        let look = |name: &&String| {
+        let is_idle = |name: &&String| {
             name.starts_with("KHR_materials_")
                 && !matches!(
                     name.as_str(),
@@ -254,7 +254,7 @@ impl Builder<'_> {
                         | "KHR_materials_specular"
                 )
         };
-        self.idle.extend(root.extensions_used.iter().filter(look).cloned());
+        self.idle.extend(root.extensions_used.iter().filter(is_idle).cloned());
     }
 
     fn add_mesh(&mut self, transform: DMat4, index: usize) -> Result<()> {
@@ -288,7 +288,7 @@ impl Builder<'_> {
         let Some(position) = attribute(primitive, Semantic::Positions) else { return Ok(()) };
         let draco = "KHR_draco_mesh_compression";
         let extensions = primitive.extensions.as_ref();
-        let is_packed = extensions.is_some_and(|own| own.others.contains_key(draco));
+        let is_packed = extensions.is_some_and(|extensions| extensions.others.contains_key(draco));
         let has_data =
             |accessor: &json::Accessor| accessor.buffer_view.is_some() || accessor.sparse.is_some();
         if is_packed && !self.root.accessors.get(position).is_some_and(has_data) {
@@ -324,22 +324,24 @@ impl Builder<'_> {
             .root
             .materials
             .get(part.primitive.material.map_or(usize::MAX, |index| index.value()));
-        let Some(color) = material.map(|own| own.pbr_metallic_roughness.base_color_factor.0) else {
+        let Some(color) =
+            material.map(|material| material.pbr_metallic_roughness.base_color_factor.0)
+        else {
             return;
         };
         let [red, green, blue, alpha] = displayed(color);
-        let own = [red, green, blue].map(|part| (part * 255.0).round() as u8);
+        let tint = [red, green, blue].map(|part| (part * 255.0).round() as u8);
         let opacity = base.alpha.apply((alpha * 255.0).round() as u8);
         if self.mesh.colors.len() >= end {
             for color in &mut self.mesh.colors[start..end] {
-                for (part, own) in color.iter_mut().zip(own) {
-                    *part = (u16::from(*part) * u16::from(own) / 255) as u8;
+                for (part, factor) in color.iter_mut().zip(tint) {
+                    *part = (u16::from(*part) * u16::from(factor) / 255) as u8;
                 }
             }
             return;
         }
         self.mesh.colors.resize(start, [255; 4]);
-        self.mesh.colors.resize(end, [own[0], own[1], own[2], opacity]);
+        self.mesh.colors.resize(end, [tint[0], tint[1], tint[2], opacity]);
     }
 
     /// Adds the segments of a primitive's lines.
@@ -500,7 +502,7 @@ impl Builder<'_> {
             let points = std::mem::take(&mut self.loose).into_iter().flatten();
             self.mesh.lines.extend(points.map(|point| [point; 2]));
         }
-        self.mesh.about.stance = Some(Stance::Y_UP);
+        self.mesh.about.orientation = Some(Orientation::Y_UP);
         unplaced::leave_out(self.source, &mut self.mesh)?;
         Ok(self.mesh)
     }

@@ -17,7 +17,7 @@ use super::{
 use crate::{Result, cells::Cells, input::Source, surface::Mesh, volume::Volume};
 use attributes::Attributes;
 use coordinates::Coordinates;
-use file::{File, Found};
+use file::{File, StoredSet};
 use hdf5_pure::{Datatype, DatatypeByteOrder};
 use vtkhdf::DataSet;
 
@@ -93,9 +93,9 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
             _ => Err(vtkhdf::other_kind(source)),
         };
     }
-    let found = file.data_sets()?;
-    let chosen = chosen(source, &found, options)?;
-    let coordinates = Coordinates::of(source, &found, chosen);
+    let sets = file.data_sets()?;
+    let chosen = chosen(source, &sets, options)?;
+    let coordinates = Coordinates::of(source, &sets, chosen);
     let mut shaped = shaped(source, chosen)?;
     let counted = shaped.counted_axes();
     if let (Some(names), [first, ..]) = (&mut shaped.outer, &counted[..]) {
@@ -124,42 +124,46 @@ pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
     {
         return data.list(options);
     }
-    let found = file.data_sets()?;
-    let drawn = chosen(source, &found, options).ok().map(|chosen| chosen.path.clone());
-    let array = |found: &Found| Array {
-        name: found.path.clone(),
+    let sets = file.data_sets()?;
+    let drawn = chosen(source, &sets, options).ok().map(|chosen| chosen.path.clone());
+    let array = |set: &StoredSet| Array {
+        name: set.path.clone(),
         place: Place::Points,
-        kind: described(found),
+        kind: described(set),
         components: 1,
         range: None,
-        is_drawn: drawn.as_ref() == Some(&found.path),
+        is_drawn: drawn.as_ref() == Some(&set.path),
     };
-    Ok(found.iter().map(array).collect())
+    Ok(sets.iter().map(array).collect())
 }
 
 /// Returns the type and the shape of a data set.
-fn described(found: &Found) -> String {
-    let shape: Vec<String> = found.shape.iter().map(ToString::to_string).collect();
-    let kind = number_type(&found.datatype)
-        .map_or_else(|| found.datatype.to_string(), |(element, ..)| element.name());
+fn described(set: &StoredSet) -> String {
+    let shape: Vec<String> = set.shape.iter().map(ToString::to_string).collect();
+    let kind = number_type(&set.datatype)
+        .map_or_else(|| set.datatype.to_string(), |(element, ..)| element.name());
     format!("{} ({})", kind.chars().take(40).collect::<String>(), shape.join(", "))
 }
 
 /// Returns the data set to draw.
-fn chosen<'a>(source: &Source, found: &'a [Found], options: &ReadOptions) -> Result<&'a Found> {
-    let list = || listing(found.iter().map(|set| format!("“{}”, {}", set.path, described(set))));
+fn chosen<'a>(
+    source: &Source,
+    sets: &'a [StoredSet],
+    options: &ReadOptions,
+) -> Result<&'a StoredSet> {
+    let list = || listing(sets.iter().map(|set| format!("“{}”, {}", set.path, described(set))));
     if let Some(name) = &options.dataset {
         let name = name.trim_matches('/');
-        return found.iter().find(|set| set.path == name).ok_or_else(|| {
+        return sets.iter().find(|set| set.path == name).ok_or_else(|| {
             source
                 .error("file", format!("has no data set “{name}”; it has {}", list()))
                 .hint("name one of these with --dataset")
         });
     }
-    let is_volume = |set: &&Found| shaped(source, set).is_ok_and(|shaped| shaped.is_volume());
-    let samples = |set: &&Found| set.shape.iter().fold(1u64, |all, &n| all.saturating_mul(n));
+    let is_volume = |set: &&StoredSet| shaped(source, set).is_ok_and(|shaped| shaped.is_volume());
+    let samples = |set: &&StoredSet| set.shape.iter().fold(1u64, |all, &n| all.saturating_mul(n));
     // Of several that are as large, the first.
-    let volumes = found.iter().filter(is_volume).rev();
+    let volumes = sets.iter().filter(is_volume).rev();
     volumes.max_by_key(samples).ok_or_else(|| {
         source
             .error("file", format!("has no numbers of three dimensions; it has {}", list()))
@@ -168,16 +172,16 @@ fn chosen<'a>(source: &Source, found: &'a [Found], options: &ReadOptions) -> Res
 }
 
 /// Returns what is known of the dimensions of a data set.
-fn shaped(source: &Source, found: &Found) -> Result<Shaped> {
-    let place = format!("data set “{}”", found.path);
-    let (element, endian, inner) = number_type(&found.datatype).ok_or_else(|| {
-        let shown: String = found.datatype.to_string().chars().take(80).collect();
-        source.error(&place, format!("holds values of the type {shown}, which are not numbers"))
+fn shaped(source: &Source, set: &StoredSet) -> Result<Shaped> {
+    let place = format!("data set “{}”", set.path);
+    let (element, endian, inner) = number_type(&set.datatype).ok_or_else(|| {
+        let kind: String = set.datatype.to_string().chars().take(80).collect();
+        source.error(&place, format!("holds values of the type {kind}, which are not numbers"))
     })?;
-    let sizes = found.shape.iter().copied().chain(inner).collect();
+    let sizes = set.shape.iter().copied().chain(inner).collect();
     // The dimensions of NetCDF have names, and those before space are mostly times.
-    let outer = found.has_scales.then(|| "times".to_owned());
-    Ok(Shaped { element, endian, sizes, shown: described(found), place, outer })
+    let outer = set.has_scales.then(|| "times".to_owned());
+    Ok(Shaped { element, endian, sizes, shape_text: described(set), place, outer })
 }
 
 /// Returns the type of numbers, their byte order, and the dimensions that each value has itself.
@@ -218,8 +222,8 @@ fn number_type(datatype: &Datatype) -> Option<(Element, Endian, Vec<u64>)> {
         Datatype::Enumeration { base_type, .. } => number_type(base_type),
         Datatype::Array { base_type, dimensions } => {
             let (element, endian, inner) = number_type(base_type)?;
-            let own = dimensions.iter().map(|&size| u64::from(size));
-            Some((element, endian, own.chain(inner).collect()))
+            let outer = dimensions.iter().map(|&size| u64::from(size));
+            Some((element, endian, outer.chain(inner).collect()))
         }
         Datatype::Compound { size, members } => complex(*size, members),
         _ => None,

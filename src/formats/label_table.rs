@@ -47,8 +47,8 @@ pub fn read_labels(path: impl AsRef<Path>, limits: &Limits) -> Result<Vec<Label>
             None => of_snap(line).or_else(|| of_surfer(line)),
         };
         table.push(label.ok_or_else(|| {
-            let shown: String = line.chars().take(60).collect();
-            source.error(format!("line {number}"), format!("“{shown}” is not a label")).hint(
+            let text: String = line.chars().take(60).collect();
+            source.error(format!("line {number}"), format!("“{text}” is not a label")).hint(
                 "a line holds a number, a name, and red, green and blue in 0 … 255, as \
                      FreeSurfer and ITK-SNAP write it, or columns below a header with index, name \
                      and color",
@@ -61,8 +61,8 @@ pub fn read_labels(path: impl AsRef<Path>, limits: &Limits) -> Result<Vec<Label>
 /// Returns a colour of numbers in 0 … 255.
 fn color(channels: [&str; 3]) -> Option<[f64; 3]> {
     let mut color = [0.0; 3];
-    for (own, text) in color.iter_mut().zip(channels) {
-        *own = f64::from(text.trim().parse::<u8>().ok()?) / 255.0;
+    for (channel, text) in color.iter_mut().zip(channels) {
+        *channel = f64::from(text.trim().parse::<u8>().ok()?) / 255.0;
     }
     Some(color)
 }
@@ -73,12 +73,12 @@ fn of_snap(line: &str) -> Option<Label> {
     let words: Vec<&str> = numbers.split_ascii_whitespace().collect();
     let [value, red, green, blue, opacity, ..] = words[..] else { return None };
     let opacity: f64 = opacity.parse().ok()?;
-    let is_shown = words.get(5).is_none_or(|word| *word != "0");
+    let is_visible = words.get(5).is_none_or(|word| *word != "0");
     Some(Label {
         value: value.parse().ok()?,
         name: rest.split('"').next().unwrap_or_default().to_owned(),
         color: Some(color([red, green, blue])?),
-        opacity: Some(if is_shown { opacity.clamp(0.0, 1.0) } else { 0.0 }),
+        opacity: Some(if is_visible { opacity.clamp(0.0, 1.0) } else { 0.0 }),
     })
 }
 
@@ -192,9 +192,9 @@ mod tests {
             ]
         );
         let columns = "\u{feff}index\tname\tcolor\n4\tVentricle\t#0a0B0c\n5\tNone\tn/a\n";
-        let found = read(columns).unwrap();
-        assert_eq!(found[0], label(4, "Ventricle", [10, 11, 12], None));
-        assert_eq!(found[1].color, None);
+        let labels = read(columns).unwrap();
+        assert_eq!(labels[0], label(4, "Ventricle", [10, 11, 12], None));
+        assert_eq!(labels[1].color, None);
         assert_eq!(read("label;r;g;b\n-2;1;2;3").unwrap(), [label(-2, "", [1, 2, 3], None)]);
         let error = read("1 skin 200 100 50 0\nbone 1 2 3").unwrap_err().to_string();
         assert!(error.contains("line 2") && error.contains("bone"), "{error}");

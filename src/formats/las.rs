@@ -17,7 +17,7 @@ mod time;
 pub(super) use pieces::Pieces;
 
 use super::shared::cloud::{Cloud, colors_of_16_bits, greys};
-use crate::{Result, about::Stance, input::Source, parallel::prelude::*, surface::Mesh};
+use crate::{Result, about::Orientation, input::Source, parallel::prelude::*, surface::Mesh};
 use attribute::Attribute;
 use glam::DVec3;
 use std::ops::Range;
@@ -66,7 +66,7 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     cloud.about.attributes = attribute::names(&header, &extras);
     cloud.about.crs = describe::crs(source, &header);
     cloud.about.layout = describe::layout(&header);
-    cloud.about.stance = Some(Stance::SURVEY);
+    cloud.about.orientation = Some(Orientation::SURVEY);
     cloud.into_mesh(source)
 }
 
@@ -246,8 +246,8 @@ struct Fields<'a> {
 
 impl Fields<'_> {
     fn at<const N: usize>(&self, at: usize) -> Result<[u8; N], String> {
-        let found = self.bytes.get(at..).and_then(|rest| rest.first_chunk()).copied();
-        found.ok_or_else(|| {
+        let bytes = self.bytes.get(at..).and_then(|rest| rest.first_chunk()).copied();
+        bytes.ok_or_else(|| {
             format!(
                 "{} extends to byte {}, but only {} bytes are \
                      present",

@@ -36,7 +36,9 @@ pub fn load_mesh(path: impl AsRef<Path>, limits: &Limits, options: &ReadOptions)
 pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
     let _span = tracing::info_span!("load_mesh", file = %source.path.display()).entered();
     let mut mesh = source.unless_changed(mesh_of(FORMATS, source, options))?;
-    if let Some(anatomy) = anatomy::stated(source.bytes()).filter(|_| mesh.about.stance.is_none()) {
+    if let Some(anatomy) =
+        anatomy::stated(source.bytes()).filter(|_| mesh.about.orientation.is_none())
+    {
         anatomy.place_mesh(&mut mesh);
     }
     Ok(mesh)

@@ -92,7 +92,7 @@ pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
 /// Returns whether the first bytes are of a header.
 pub fn is_header(bytes: &[u8]) -> bool {
     let start = &bytes[..bytes.len().min(256)];
-    let has = |word: &[u8]| start.windows(word.len()).any(|found| found == word);
+    let has = |word: &[u8]| start.windows(word.len()).any(|window| window == word);
     let is_first = |word: &[u8]| start.trim_ascii_start().starts_with(word);
     (is_first(b"ObjectType") || is_first(b"NDims") || is_first(b"Comment")) && has(b"NDims")
 }
@@ -181,8 +181,8 @@ impl<'a> Header<'a> {
         let numbers: Option<Vec<T>> = words.map(|word| word.parse().ok()).collect();
         let numbers = numbers.filter(|numbers| numbers.len() == count);
         numbers.map(Some).ok_or_else(|| {
-            let shown: String = text.chars().take(80).collect();
-            self.source.error(names[0], format!("“{shown}” is not a list of {count} numbers"))
+            let excerpt: String = text.chars().take(80).collect();
+            self.source.error(names[0], format!("“{excerpt}” is not a list of {count} numbers"))
         })
     }
 
@@ -244,8 +244,8 @@ impl<'a> Header<'a> {
             "MET_FLOAT" => SampleType::F32,
             "MET_DOUBLE" => SampleType::F64,
             _ => {
-                let shown: String = name.chars().take(80).collect();
-                let message = format!("“{shown}” is not a type of numbers, such as MET_SHORT");
+                let excerpt: String = name.chars().take(80).collect();
+                let message = format!("“{excerpt}” is not a type of numbers, such as MET_SHORT");
                 return Err(self.source.error("ElementType", message));
             }
         })
@@ -254,8 +254,8 @@ impl<'a> Header<'a> {
     fn lattice(&self, dims: [usize; 3]) -> Result<Lattice> {
         let axes = self.axes()?;
         let spacing = self.numbers::<f64>(&["ElementSpacing"], axes)?;
-        let spacing =
-            spacing.map_or_else(|| self.numbers(&["ElementSize"], axes), |own| Ok(Some(own)));
+        let spacing = spacing
+            .map_or_else(|| self.numbers(&["ElementSize"], axes), |spacing| Ok(Some(spacing)));
         let spacing = spacing?.unwrap_or_else(|| vec![1.0; axes]);
         let directions = self.numbers::<f64>(&DIRECTIONS, axes * axes)?;
         let offset = self.numbers::<f64>(&["Offset", "Position", "Origin"], axes)?;
@@ -419,7 +419,7 @@ fn is_word(value: &str, word: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::about::Stance;
+    use crate::about::Orientation;
     use crate::input::testing::*;
     use flate2::{Compression, write::ZlibEncoder};
     use std::io::Write;
@@ -520,7 +520,7 @@ mod tests {
         assert_eq!(axes.y_axis, DVec3::new(3.0, 0.0, 0.0));
         assert_eq!(axes.z_axis, DVec3::new(0.0, 0.0, 4.0));
         assert_eq!(volume.lattice.origin, DVec3::new(-1.0, -2.0, 3.0));
-        assert_eq!(volume.about.stance, Some(Stance::RAS));
+        assert_eq!(volume.about.orientation, Some(Orientation::RAS));
         assert_eq!(volume.about.modality, Some(Modality::Ct));
         // Without directions, the letters are those of the sides that the axes come from.
         let turned = mha("AnatomicalOrientation = PIR\n", "1 1 1", "MET_UCHAR", &[1]);
@@ -530,7 +530,7 @@ mod tests {
         assert_eq!(turned.lattice.axes.z_axis, DVec3::NEG_X);
         let plain = mha("AnatomicalOrientation = ???\n", "1 1 1", "MET_UCHAR", &[1]);
         let plain = load(&plain, &ReadOptions::default()).unwrap();
-        assert_eq!((plain.lattice.spacing(), plain.about.stance), (DVec3::ONE, None));
+        assert_eq!((plain.lattice.spacing(), plain.about.orientation), (DVec3::ONE, None));
     }
 
     #[test]

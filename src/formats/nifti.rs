@@ -72,9 +72,9 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     }
     match (partner(source, "hdr"), &options.raw) {
         (Ok(path), _) => {
-            let own = source.open_beside(&path)?;
-            let header = Header::read(&own, &first_bytes(&own)?)?;
-            own.unless_changed(volume(&own, source, &header, options))
+            let beside = source.open_beside(&path)?;
+            let header = Header::read(&beside, &first_bytes(&beside)?)?;
+            beside.unless_changed(volume(&beside, source, &header, options))
         }
         // Many programs call raw samples an image.
         (Err(_), Some(layout)) => raw::read(source, layout, options),
@@ -98,9 +98,9 @@ fn partner(source: &Source, extension: &str) -> Result<PathBuf> {
     let stem = stem.rsplit_once('.').map_or(stem, |(stem, _)| stem);
     let upper = extension.to_ascii_uppercase();
     let names = [extension, &format!("{extension}.gz"), &upper, &format!("{upper}.GZ")];
-    let mut found = names.map(|extension| source.neighbour("pair", &format!("{stem}.{extension}")));
-    let there = found.iter().position(Result::is_ok).unwrap_or(0);
-    std::mem::replace(&mut found[there], Ok(PathBuf::new()))
+    let mut paths = names.map(|extension| source.neighbour("pair", &format!("{stem}.{extension}")));
+    let there = paths.iter().position(Result::is_ok).unwrap_or(0);
+    std::mem::replace(&mut paths[there], Ok(PathBuf::new()))
 }
 
 /// Returns the first bytes of a file, unpacked.
@@ -161,16 +161,21 @@ const LABELS: i64 = 1002;
 
 /// Reads the volume that the options choose. The header is from one source, the samples from
 /// another, or from the same.
-fn volume(own: &Source, image: &Source, header: &Header, options: &ReadOptions) -> Result<Volume> {
-    let (kind, form) = form(own, header)?;
+fn volume(
+    header_file: &Source,
+    image: &Source,
+    header: &Header,
+    options: &ReadOptions,
+) -> Result<Volume> {
+    let (kind, form) = form(header_file, header)?;
     let [nx, ny, nz, times, components, more @ ..] = header.dims;
     let claimed = [nx, ny, nz].map(|n| usize::try_from(n).unwrap_or(usize::MAX));
     let (lattice, is_stated) = place::lattice(header, claimed);
-    lattice.check().map_err(|message| own.error("header", message))?;
+    lattice.check().map_err(|message| header_file.error("header", message))?;
     if more != [1, 1] {
         let message =
             format!("the file has {} axes, of which the first five are read", header.axes);
-        tracing::warn!("{}: header: {message}", own.path.display());
+        tracing::warn!("{}: header: {message}", header_file.path.display());
     }
     let numbers = match form {
         Form::Scalar => 1,
@@ -179,14 +184,14 @@ fn volume(own: &Source, image: &Source, header: &Header, options: &ReadOptions) 
     };
     let wide = kind.bytes_of(claimed).and_then(|bytes| bytes.checked_mul(numbers as u64));
     let size = image.check_bytes("the size of the samples in bytes", wide.unwrap_or(u64::MAX))?;
-    let time = several::time(own, "header, dim[4]", times, options)? as u64;
-    let components_read = wanted(own, header, options)?;
+    let time = several::time(header_file, "header, dim[4]", times, options)? as u64;
+    let components_read = wanted(header_file, header, options)?;
     let mut parts = Vec::new();
     let mut colors: Option<Arc<[[u8; 4]]>> = None;
     for component in components_read {
         let number = u64::from(component) * times + time;
         let is_last = number + 1 == times.saturating_mul(components);
-        let at = start(own, header)?.saturating_add(number.saturating_mul(size as u64));
+        let at = start(header_file, header)?.saturating_add(number.saturating_mul(size as u64));
         let bytes = bytes(image, at, size, is_last)?;
         if let (Form::Color(channels), None) = (form, &options.scalar) {
             image.spend("the size of the colours in bytes", 4 * bytes.len() as u64)?;
@@ -198,9 +203,9 @@ fn volume(own: &Source, image: &Source, header: &Header, options: &ReadOptions) 
     let samples = match <[Samples; 1]>::try_from(parts) {
         Ok([one]) => one,
         Err(several) if is_color && several.len() >= 3 => {
-            let own = colors::of_channels(image, &several)?;
-            let brightness = colors::brightness(&own);
-            colors = Some(own);
+            let pixels = colors::of_channels(image, &several)?;
+            let brightness = colors::brightness(&pixels);
+            colors = Some(pixels);
             brightness
         }
         Err(several) => length(image, &several)?,
@@ -220,8 +225,8 @@ fn describe(volume: &mut Volume, header: &Header, is_stated: bool) {
     }
     let about = &mut volume.about;
     about.name.clone_from(&header.name);
-    let [low, high] = header.shown;
-    about.window = (low < high && low.is_finite() && high.is_finite()).then_some(header.shown);
+    let [low, high] = header.window;
+    about.window = (low < high && low.is_finite() && high.is_finite()).then_some(header.window);
     if place::millimetres(header).is_some() {
         about.length = "mm".into();
     }

@@ -112,7 +112,7 @@ fn unpacked(
 ) -> Result<Vec<u8>> {
     let size = source.check_bytes("the size of an array in bytes", entry.size)?;
     isolated(source, &entry.shaped.place, || {
-        let file = archive.by_index(entry.index).map_err(|error| told(source, &error))?;
+        let file = archive.by_index(entry.index).map_err(|error| archive_error(source, &error))?;
         source.unpack(&entry.shaped.place, file, size)
     })
 }
@@ -130,7 +130,7 @@ pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
         Err(_) => Vec::new(),
     };
     let array = |(at, entry): (usize, Entry)| Array {
-        kind: format!("{} {}", entry.header.element.name(), entry.shaped.shown),
+        kind: format!("{} {}", entry.header.element.name(), entry.shaped.shape_text),
         name: entry.name,
         place: Place::Points,
         components: 1,
@@ -140,13 +140,13 @@ pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
     Ok(entries.into_iter().enumerate().map(array).collect())
 }
 
-fn told(source: &Source, error: &zip::result::ZipError) -> crate::Error {
+fn archive_error(source: &Source, error: &zip::result::ZipError) -> crate::Error {
     source.error("archive", format!("is not a ZIP archive that can be read: {error}"))
 }
 
 fn open<'a>(source: &'a Source) -> Result<ZipArchive<Cursor<&'a [u8]>>> {
     isolated(source, "archive", || {
-        ZipArchive::new(Cursor::new(source.bytes())).map_err(|error| told(source, &error))
+        ZipArchive::new(Cursor::new(source.bytes())).map_err(|error| archive_error(source, &error))
     })
 }
 
@@ -160,8 +160,8 @@ fn entries(source: &Source, archive: &mut ZipArchive<Cursor<&[u8]>>) -> Result<V
     for index in 0..archive.len() {
         source.check_time()?;
         let (name, size, head) = isolated(source, &format!("file {index}"), || {
-            let file = archive.by_index(index).map_err(|error| told(source, &error))?;
-            let name = file.name().map_err(|error| told(source, &error))?.into_owned();
+            let file = archive.by_index(index).map_err(|error| archive_error(source, &error))?;
+            let name = file.name().map_err(|error| archive_error(source, &error))?.into_owned();
             let (size, mut head) = (file.size(), Vec::new());
             file.take(LONGEST).read_to_end(&mut head).map_err(|error| {
                 source.error(format!("array “{name}”"), format!("cannot be unpacked: {error}"))
@@ -200,7 +200,7 @@ impl Entry {
 fn drawn(source: &Source, entries: &[Entry], options: &ReadOptions) -> Result<Drawn> {
     let list = || {
         let entry = |entry: &Entry| {
-            format!("“{}”, {} {}", entry.name, entry.header.element.name(), entry.shaped.shown)
+            format!("“{}”, {} {}", entry.name, entry.header.element.name(), entry.shaped.shape_text)
         };
         listing(entries.iter().map(entry))
     };

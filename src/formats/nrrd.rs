@@ -137,8 +137,8 @@ pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
             let path = source.neighbour("data file", name)?;
             let size = sample_type.bytes_of(lattice.dims).unwrap_or(u64::MAX);
             // Too few bytes are an error when they are read.
-            if let Ok(found) = path.metadata() {
-                refuse_more(&path, found.len(), size)?;
+            if let Ok(metadata) = path.metadata() {
+                refuse_more(&path, metadata.len(), size)?;
             }
             (path, 0)
         }
@@ -232,7 +232,7 @@ impl<'a> Header<'a> {
     fn add_key(&mut self, key: &str, value: &str, line: usize) -> Result<()> {
         let is_read = key == "lattice" || key.starts_with("axis positions ");
         if self.keys.insert(key.to_owned(), value.to_owned()).is_some() && is_read {
-            let message = format!("the key “{}” is given twice; give it once", shown(key));
+            let message = format!("the key “{}” is given twice; give it once", excerpt(key));
             return Err(self.source.error(format!("line {line}"), message));
         }
         Ok(())
@@ -256,7 +256,7 @@ impl<'a> Header<'a> {
         if let Some(before) = lines.insert(spelling, line) {
             let message = format!(
                 "the field “{}” is given twice, in line {before} too; give it once",
-                shown(&name)
+                excerpt(&name)
             );
             return Err(self.source.error(format!("line {line}"), message));
         }
@@ -298,8 +298,9 @@ impl<'a> Header<'a> {
     ) -> Result<[T; N]> {
         let words = text.split_ascii_whitespace().take(N + 1);
         let numbers: Option<Vec<T>> = words.map(|word| word.parse().ok()).collect();
-        let wrong =
-            |_| self.source.error(name, format!("“{}” is not a list of {N} numbers", shown(text)));
+        let wrong = |_| {
+            self.source.error(name, format!("“{}” is not a list of {N} numbers", excerpt(text)))
+        };
         numbers.unwrap_or_default().try_into().map_err(wrong)
     }
 
@@ -413,7 +414,7 @@ impl<'a> Header<'a> {
 
     /// Returns vectors written as (x,y,z), exactly `N`.
     fn vectors<const N: usize>(&self, name: &str, text: &str) -> Result<[DVec3; N]> {
-        let wrong = || self.source.error(name, format!("“{}” is not {N} × (x,y,z)", shown(text)));
+        let wrong = || self.source.error(name, format!("“{}” is not {N} × (x,y,z)", excerpt(text)));
         let vector = |part: &str| {
             let numbers: Option<Vec<f64>> = part
                 .trim()
@@ -460,7 +461,7 @@ impl<'a> Header<'a> {
             _ => {
                 return Err(self
                     .source
-                    .error("type", format!("“{}” is not a scalar type", shown(&name))));
+                    .error("type", format!("“{}” is not a scalar type", excerpt(&name))));
             }
         })
     }
@@ -575,15 +576,15 @@ impl<'a> Header<'a> {
             refuse_more(file.path, there as u64, size as u64)?;
         }
         let start = skip.or_else(|| data.len().checked_sub(size));
-        let found = start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
-        found.ok_or_else(|| {
+        let samples = start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
+        samples.ok_or_else(|| {
             file.error("data", format!("there are {there} bytes where {size} were expected"))
         })
     }
 }
 
 /// Returns the first 80 characters of a text, for an error.
-fn shown(text: &str) -> String {
+fn excerpt(text: &str) -> String {
     if text.chars().nth(80).is_none() {
         text.to_owned()
     } else {
@@ -708,9 +709,9 @@ mod tests {
                 [1.0; 3],
             ),
         ] {
-            let found = lattice(fields).unwrap();
+            let placed = lattice(fields).unwrap();
             assert_eq!(
-                (found.origin, found.spacing()),
+                (placed.origin, placed.spacing()),
                 (origin.into(), spacing.into()),
                 "{fields}"
             );
@@ -959,7 +960,7 @@ mod tests {
                 "NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 1 1\nencoding: raw\n{fields}\n"
             );
             let path = folder.write("volume.nhdr", text);
-            (read_with(&path, read), read_with(&path, plain).map(|found| found.is_some()))
+            (read_with(&path, read), read_with(&path, plain).map(|plain| plain.is_some()))
         };
         let (whole, plain) = detached("data file: a.raw");
         for error in [whole.err(), plain.err()] {

@@ -65,9 +65,9 @@ fn header(bytes: &[u8]) -> Option<(Header, usize)> {
         rest = rest[end..].trim_ascii_start();
     }
     let mut take = |word: &[u8]| {
-        let found = rest.strip_prefix(word);
-        rest = found.unwrap_or(rest);
-        found.is_some()
+        let tail = rest.strip_prefix(word);
+        rest = tail.unwrap_or(rest);
+        tail.is_some()
     };
     header.has_uvs = take(b"ST");
     header.has_colors = take(b"C");
@@ -174,13 +174,13 @@ impl<'a> Parts<'a> {
         if self.has_face_colors && colors.is_empty() {
             // Each corner has a vertex of its own, with the colour of its face.
             source.room::<(DVec3, Vec3, [u8; 4])>("the corners", 3 * triangles.len())?;
-            let own = colors_of_faces(&self.of_triangles);
+            let face_colors = colors_of_faces(&self.of_triangles);
             let corners = || triangles.iter().flatten().map(|&corner| corner as usize);
             if !normals.is_empty() {
                 normals = corners().map(|corner| normals[corner]).collect();
             }
             places = corners().map(|corner| places[corner]).collect();
-            colors = own.into_iter().flat_map(|color| [color; 3]).collect();
+            colors = face_colors.into_iter().flat_map(|color| [color; 3]).collect();
             let next = |triangle: u32| [0, 1, 2].map(|corner| 3 * triangle + corner);
             triangles = (0..triangles.len() as u32).map(next).collect();
         }
@@ -283,7 +283,7 @@ impl<'a> Text<'a> {
             self.need("vertex", vertex, vertices)?;
             parts.vertex(header, &self.numbers, |message| self.wrong(message))?;
         }
-        let mut own = Vec::new();
+        let mut indices = Vec::new();
         for face in 0..faces {
             self.need("face", face, faces)?;
             let [count, rest @ ..] = &self.numbers[..] else { continue };
@@ -294,8 +294,8 @@ impl<'a> Text<'a> {
                 return Err(self.wrong(message));
             };
             let vertices = parts.positions.len();
-            corners(list, vertices, &mut own).map_err(|message| self.wrong(message))?;
-            parts.face(&own, color)?;
+            corners(list, vertices, &mut indices).map_err(|message| self.wrong(message))?;
+            parts.face(&indices, color)?;
         }
         Ok(parts)
     }
@@ -340,7 +340,7 @@ impl<'a> Binary<'a> {
             + 3 * usize::from(header.has_normals)
             + 4 * usize::from(header.has_colors)
             + 2 * usize::from(header.has_uvs);
-        let (mut numbers, mut own) = (Vec::new(), Vec::new());
+        let (mut numbers, mut indices) = (Vec::new(), Vec::new());
         for vertex in 0..vertices {
             self.floats(width, &mut numbers)?;
             let wrong = |message| self.source.error(format!("vertex {vertex}"), message);
@@ -357,10 +357,10 @@ impl<'a> Binary<'a> {
             for _ in 0..size {
                 numbers.push(i32::from_be_bytes(self.word()?).into());
             }
-            corners(&numbers, parts.positions.len(), &mut own).map_err(wrong)?;
+            corners(&numbers, parts.positions.len(), &mut indices).map_err(wrong)?;
             let size = self.count("numbers of a colour")?.min(4) as usize;
             self.floats(size, &mut numbers)?;
-            parts.face(&own, &numbers)?;
+            parts.face(&indices, &numbers)?;
         }
         Ok(parts)
     }

@@ -80,8 +80,9 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
         about: About {
             attributes: {
                 let known = [position, normal.unwrap_or(position)].concat();
-                let known =
-                    |field: &Field| known.iter().chain(&color).any(|own| std::ptr::eq(*own, field));
+                let known = |field: &Field| {
+                    known.iter().chain(&color).any(|other| std::ptr::eq(*other, field))
+                };
                 let free = header.fields.iter().filter(|field| !known(field) && field.name != "_");
                 free.map(|field| field.name.clone()).collect()
             },
@@ -109,13 +110,13 @@ impl<'a> Rows<'a> {
             "the size of the points in bytes",
             (count as u64).saturating_mul(stride as u64),
         )?;
-        let sizes = |found: usize, wanted: usize| -> Result<()> {
-            if found >= wanted {
+        let sizes = |available: usize, wanted: usize| -> Result<()> {
+            if available >= wanted {
                 return Ok(());
             }
             Err(source.error(
                 "data",
-                format!("{found} bytes follow the header where {wanted} were expected"),
+                format!("{available} bytes follow the header where {wanted} were expected"),
             ))
         };
         match header.data {
@@ -152,31 +153,31 @@ impl<'a> Rows<'a> {
     fn of_text(source: &Source, header: &Header, data: &[u8], count: usize) -> Result<Self> {
         let width = header.fields.iter().map(|field| field.count).sum::<usize>();
         let mut numbers = Growing::new(source, "the numbers");
-        let mut found = 0;
+        let mut points = 0;
         for (number, line) in (header.lines + 1..).zip(lines_of(data)) {
             let before = numbers.len();
             for word in line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()) {
                 let value: f64 = copy::float(word).ok_or_else(|| {
-                    let shown = copy::excerpt(word);
-                    source.error(format!("line {number}"), format!("“{shown}” is not a number"))
+                    let excerpt = copy::excerpt(word);
+                    source.error(format!("line {number}"), format!("“{excerpt}” is not a number"))
                 })?;
                 numbers.push(value)?;
             }
             match numbers.len() - before {
                 0 => continue,
-                words if words == width => found += 1,
+                words if words == width => points += 1,
                 words => {
                     let message = format!("has {words} numbers where the fields need {width}");
                     return Err(source.error(format!("line {number}"), message));
                 }
             }
-            if found == count {
+            if points == count {
                 break;
             }
         }
-        if found < count {
+        if points < count {
             return Err(
-                source.error("data", format!("has {found} points, but the header claims {count}"))
+                source.error("data", format!("has {points} points, but the header claims {count}"))
             );
         }
         Ok(Self::Text { numbers: numbers.into_inner(), width })

@@ -162,15 +162,15 @@ fn give_textures(
         return Err(super::uv_error(source, format!("vertex {vertex}"), mesh.uvs[vertex]));
     }
     // Texture coordinates of vertices refer to the first picture.
-    let shown = if of_corners { textures.len() } else { 1 };
-    if textures.len() > shown {
+    let used = if of_corners { textures.len() } else { 1 };
+    if textures.len() > used {
         tracing::warn!(
             "{}: names {} pictures, of which vertices can have coordinates in the first only",
             source.path.display(),
             textures.len()
         );
     }
-    for name in textures.iter().take(shown) {
+    for name in textures.iter().take(used) {
         let texture = texture::read_reference(source, "comment TextureFile", name)?;
         mesh.materials.push(Material {
             name: name.clone(),

@@ -126,14 +126,14 @@ fn guess(size: u64, layout: &RawLayout) -> String {
             );
         }
     }
-    let found = rest / sample_type.bytes() as u64;
-    let whole = found > 0 && rest.is_multiple_of(sample_type.bytes() as u64);
+    let available = rest / sample_type.bytes() as u64;
+    let whole = available > 0 && rest.is_multiple_of(sample_type.bytes() as u64);
     let slice = (*nx as u64).saturating_mul(*ny as u64);
-    let side = (found as f64).cbrt().round() as u64;
-    if whole && found.is_multiple_of(slice) {
-        return format!("the size fits {nx} × {ny} × {}", found / slice);
+    let side = (available as f64).cbrt().round() as u64;
+    if whole && available.is_multiple_of(slice) {
+        return format!("the size fits {nx} × {ny} × {}", available / slice);
     }
-    if whole && side.checked_pow(3) == Some(found) {
+    if whole && side.checked_pow(3) == Some(available) {
         return format!("the size fits {side} × {side} × {side}");
     }
     let samples = count.saturating_mul(sample_type.bytes() as u64);

@@ -218,8 +218,8 @@ impl Palette {
         let centroids = plane(0, Need::Rows(entries.div_ceil(ENTRIES_IN_ROW)))?;
         let labels = plane(1, Need::Texels(count))?;
         let width = |degree: u32| ENTRIES_IN_ROW * (terms(degree) - 1);
-        let found = (1..=MOST_DEGREE).find(|&degree| width(degree) == centroids.width);
-        let degree = found.ok_or_else(|| {
+        let degree = (1..=MOST_DEGREE).find(|&degree| width(degree) == centroids.width);
+        let degree = degree.ok_or_else(|| {
             let wanted = [1, 2, 3].map(width);
             let message = format!("is {} pixels wide, not one of {wanted:?}", centroids.width);
             source.error("shN.files[0]", message)

@@ -126,8 +126,8 @@ mod tests {
         assert!(set.rotations[0].dot(turn) > 0.999_999, "{}", set.rotations[0]);
         // The constant terms of the colours 1, 0 and 0.2.
         let wanted = [1.772_453_9f32, -1.772_453_9, -1.063_472_3];
-        for (found, wanted) in set.harmonics[0].iter().zip(wanted) {
-            assert!((found - wanted).abs() < 1e-5, "{found} {wanted}");
+        for (actual, wanted) in set.harmonics[0].iter().zip(wanted) {
+            assert!((actual - wanted).abs() < 1e-5, "{actual} {wanted}");
         }
     }
 
@@ -178,16 +178,16 @@ mod tests {
         };
         let path = folder.path("a.splat");
         write(&set, &path).unwrap();
-        let found = read_with(&path, read).unwrap();
-        assert_eq!((found.len(), found.degree, &found.scales), (2, 0, &set.scales));
+        let loaded = read_with(&path, read).unwrap();
+        assert_eq!((loaded.len(), loaded.degree, &loaded.scales), (2, 0, &set.scales));
         let half = 0.5 / 255.0 / CONSTANT + 1e-5;
         let wanted = [set.harmonics[0], [0.5 / CONSTANT, -0.5 / CONSTANT, 0.0]];
         for (index, wanted) in wanted.iter().enumerate() {
             let place = |set: &Gaussians| set.origin + set.centers[index].as_dvec3();
-            assert_eq!(place(&found), place(&set));
-            assert!((found.opacities[index] - set.opacities[index]).abs() < 0.002);
-            assert!(found.rotations[index].dot(set.rotations[index]).abs() > 0.999_9);
-            let color = found.harmonics_of(index)[0];
+            assert_eq!(place(&loaded), place(&set));
+            assert!((loaded.opacities[index] - set.opacities[index]).abs() < 0.002);
+            assert!(loaded.rotations[index].dot(set.rotations[index]).abs() > 0.999_9);
+            let color = loaded.harmonics_of(index)[0];
             let near = color.iter().zip(wanted).all(|(a, b)| (a - b).abs() < half);
             assert!(near, "{color:?} {wanted:?}");
         }

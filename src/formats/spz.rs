@@ -112,7 +112,7 @@ pub fn read(source: &Source) -> Result<Gaussians> {
     let mut set = settle(source, header.count, header.degree, |index, colors| {
         Ok(decode::gaussian(&header, &attributes, index, colors))
     })?;
-    set.about.stance = system.and_then(|system| extensions::stance(source, system));
+    set.about.orientation = system.and_then(|system| extensions::orientation(source, system));
     Ok(set)
 }
 
@@ -205,9 +205,9 @@ fn in_streams(source: &Source) -> Result<Packed> {
     }
     // Attributes without bytes have no stream.
     let wanted = sizes.iter().filter(|&&size| size > 0).count();
-    let found = usize::from(head[HEADER - 1]);
-    if found != wanted {
-        let message = format!("counts {found} streams, but {wanted} are expected");
+    let streams = usize::from(head[HEADER - 1]);
+    if streams != wanted {
+        let message = format!("counts {streams} streams, but {wanted} are expected");
         return Err(source.error("header", message));
     }
     let table_at = number(head, HEADER).map_or(0, |at| at as usize);

@@ -342,9 +342,9 @@ mod tests {
             binary(u32::MAX, &FACETS),
             [binary(2, &FACETS), vec![7; 3000]].concat(),
         ] {
-            let shown = copy::lossy(&content);
-            let mesh = load(content).unwrap_or_else(|error| panic!("{shown}: {error}"));
-            assert_eq!(mesh.triangles.len(), 2, "{shown}");
+            let text = copy::lossy(&content);
+            let mesh = load(content).unwrap_or_else(|error| panic!("{text}: {error}"));
+            assert_eq!(mesh.triangles.len(), 2, "{text}");
         }
     }
 

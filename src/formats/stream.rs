@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     color::{ColorScale, Spread},
     input::{Limits, Source, positions},
     surface::{Mesh, Paint, Values},
@@ -22,7 +22,7 @@ use std::path::Path;
 const PIECES: usize = 64;
 
 /// Values of which percentiles are taken: of more, every second, third, … one.
-const LOOKS: u64 = 1 << 20;
+const MOST_SAMPLED: u64 = 1 << 20;
 
 /// What the first pass over a file finds. Another stream of the same file, with the same paint, can
 /// take it instead of making that pass.
@@ -150,23 +150,23 @@ impl<'a> Stream<'a> {
     }
 
     /// Returns how its points stand, if the file or its format's convention says so.
-    pub fn stance(&self) -> Option<Stance> {
-        self.form.stance()
+    pub fn orientation(&self) -> Option<Orientation> {
+        self.form.orientation()
     }
 
-    /// Guesses how its points stand ([`Mesh::guess_stance`]), from pieces spread over the file.
+    /// Guesses how its points stand ([`Mesh::guess_orientation`]), from pieces spread over the file.
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) for damaged pieces.
-    pub fn guess_stance(&self) -> Result<Option<Stance>> {
+    pub fn guess_orientation(&self) -> Result<Option<Orientation>> {
         let Some((_, positions)) = self.some_positions(PIECES)? else { return Ok(None) };
-        Ok(Mesh { positions, ..Mesh::default() }.guess_stance())
+        Ok(Mesh { positions, ..Mesh::default() }.guess_orientation())
     }
 
     /// Returns the world positions of some points of pieces spread over the file.
-    fn looks(&self, pieces: usize) -> Result<Vec<DVec3>> {
+    fn sample(&self, pieces: usize) -> Result<Vec<DVec3>> {
         let Some((origin, positions)) = self.some_positions(pieces)? else { return Ok(Vec::new()) };
-        let step = positions.len().div_ceil(positions::LOOKS).max(1);
+        let step = positions.len().div_ceil(positions::MOST_SAMPLED).max(1);
         Ok(positions.iter().step_by(step).map(|place| origin + place.as_dvec3()).collect())
     }
 
@@ -217,11 +217,11 @@ impl<'a> Stream<'a> {
         let (points, [low, high]) = self.source.unless_changed(surveyed)?;
         self.points = points;
         // A few points that lie close together, at the beginning, make it worth looking at more.
-        let mut looks = self.looks(1)?;
-        if positions::are_crowded(&looks, [low, high]) {
-            looks = self.looks(PIECES)?;
+        let mut sampled = self.sample(1)?;
+        if positions::are_crowded(&sampled, [low, high]) {
+            sampled = self.sample(PIECES)?;
         }
-        self.origin = positions::origin(&self.source, [low, high], &looks)?;
+        self.origin = positions::origin(&self.source, [low, high], &sampled)?;
         self.bounds = [(low - self.origin).as_vec3(), (high - self.origin).as_vec3()];
         self.settle_scale()
     }
@@ -231,27 +231,28 @@ impl<'a> Stream<'a> {
         let Some(Paint::Values { mut scale, spread: Some(spread), .. }) = self.paint else {
             return Ok(());
         };
-        let step = self.points.div_ceil(LOOKS).max(1) as usize;
-        let mut looks = Vec::new();
+        let step = self.points.div_ceil(MOST_SAMPLED).max(1) as usize;
+        let mut sampled = Vec::new();
         let of_piece = |points: &[StreamPoint]| {
             let some = points.iter().filter(|point| (point.index as usize).is_multiple_of(step));
-            let found: Vec<f32> = some.map(StreamPoint::value).collect();
+            let chosen: Vec<f32> = some.map(StreamPoint::value).collect();
             let all: Vec<f32> = points.iter().map(StreamPoint::value).collect();
-            (found, Spread::Full.range(&all, scale.is_log))
+            (chosen, Spread::Full.range(&all, scale.is_log))
         };
         let mut ends: Option<[f64; 2]> = None;
-        self.points(of_piece, |(found, of_piece)| {
-            looks.extend(found);
+        self.points(of_piece, |(chosen, of_piece)| {
+            sampled.extend(chosen);
             ends = match (ends, of_piece) {
                 (Some([a, b]), Some([c, d])) => Some([f64::min(a, c), f64::max(b, d)]),
                 (one, other) => one.or(other),
             };
             Ok(())
         })?;
-        let range = if spread == Spread::Full { ends } else { spread.range(&looks, scale.is_log) };
+        let range =
+            if spread == Spread::Full { ends } else { spread.range(&sampled, scale.is_log) };
         scale.range = range.ok_or_else(|| no_values(&self.source))?;
-        if let Some(Paint::Values { scale: own, spread, .. }) = &mut self.paint {
-            (*own, *spread) = (scale, None);
+        if let Some(Paint::Values { scale: stored, spread, .. }) = &mut self.paint {
+            (*stored, *spread) = (scale, None);
         }
         Ok(())
     }
@@ -273,11 +274,11 @@ impl<'a> Stream<'a> {
     }
 
     /// Takes what the first pass over the same file has found.
-    pub(crate) fn resume(&mut self, found: &Settled) {
-        (self.points, self.origin, self.bounds) = (found.points, found.origin, found.bounds);
-        self.form.resume(found.coloring, found.points);
+    pub(crate) fn resume(&mut self, settled: &Settled) {
+        (self.points, self.origin, self.bounds) = (settled.points, settled.origin, settled.bounds);
+        self.form.resume(settled.coloring, settled.points);
         if let (Some(Paint::Values { scale, spread, .. }), Some(range)) =
-            (&mut self.paint, found.range)
+            (&mut self.paint, settled.range)
         {
             (scale.range, *spread) = (range, None);
         }
@@ -391,9 +392,9 @@ impl<'a> Stream<'a> {
 
     /// Returns a vertex of a mesh.
     pub(crate) fn vertex(&self, index: u32) -> StreamPoint {
-        let found = self.form.vertex(&self.source, index as usize);
-        let mut point =
-            found.map_or_else(StreamPoint::zeroed, |found| StreamPoint::new(&found, self.origin));
+        let vertex = self.form.vertex(&self.source, index as usize);
+        let mut point = vertex
+            .map_or_else(StreamPoint::zeroed, |vertex| StreamPoint::new(&vertex, self.origin));
         self.paint(&mut point);
         point
     }

@@ -521,5 +521,5 @@ fn is_vtk_xml(bytes: &[u8]) -> bool {
 
 /// Returns whether a word is among the first 1024 bytes.
 fn has_word(bytes: &[u8], word: &[u8]) -> bool {
-    bytes[..bytes.len().min(1024)].windows(word.len()).any(|found| found == word)
+    bytes[..bytes.len().min(1024)].windows(word.len()).any(|part| part == word)
 }

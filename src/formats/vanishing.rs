@@ -23,8 +23,8 @@ fn cut(path: &Path, length: u64) {
     File::options().write(true).open(path).unwrap().set_len(length).unwrap();
 }
 
-fn is_told<T>(name: &str, found: Result<T>) {
-    let Err(error) = found else { panic!("{name}: was read") };
+fn assert_changed<T>(name: &str, result: Result<T>) {
+    let Err(error) = result else { panic!("{name}: was read") };
     assert!(matches!(error, Error::Input { .. }), "{name}: {error}");
     assert!(error.to_string().contains("changed while it was read"), "{name}: {error}");
 }
@@ -40,7 +40,7 @@ fn cut_when_open<T>(name: &str, bytes: impl AsRef<[u8]>, read: impl Fn(&Source) 
         let path = folder.write(name, bytes);
         let source = Source::open(&path, &limits).unwrap();
         cut(&path, bytes.len() as u64 * parts / 100);
-        is_told(name, source.unless_changed(read(&source)));
+        assert_changed(name, source.unless_changed(read(&source)));
     }
 }
 
@@ -130,8 +130,8 @@ fn volumes_and_samples() {
     let stream = VolumeStream::open(&path, &Limits::default(), Some(&layout)).unwrap().unwrap();
     assert!(stream.slices(0..3).is_ok());
     cut(&path, 10_000);
-    is_told("slices", stream.slices(20..23));
-    is_told("range", stream.range(None));
+    assert_changed("slices", stream.slices(20..23));
+    assert_changed("range", stream.range(None));
 }
 
 #[test]
@@ -144,11 +144,11 @@ fn streams() {
         let mut stream = Stream::open(&path, &limits).unwrap().unwrap();
         stream.settle(&|_| ()).unwrap();
         cut(&path, length);
-        is_told("points", stream.points(<[_]>::len, |_| Ok(())));
-        is_told("triangles", stream.triangles(|_, found| found.len(), |_| Ok(())));
+        assert_changed("points", stream.points(<[_]>::len, |_| Ok(())));
+        assert_changed("triangles", stream.triangles(|_, triangles| triangles.len(), |_| Ok(())));
         stream.position(1599);
         stream.vertex(1599);
-        is_told("settle", stream.settle(&|_| ()));
+        assert_changed("settle", stream.settle(&|_| ()));
     }
 }
 
@@ -161,14 +161,14 @@ fn hierarchies_and_bricks() {
     let pages = hierarchy.page_count();
     assert!(hierarchy.read_page(pages - 1).is_ok() && pages > 1);
     cut(&path, 100);
-    is_told("page", hierarchy.read_page(pages - 1));
-    is_told("tree", hierarchy.read_tree());
+    assert_changed("page", hierarchy.read_page(pages - 1));
+    assert_changed("tree", hierarchy.read_tree());
     let path = folder.path("a.splv");
     let volume = Phantom::named("ball").unwrap().sample([60, 60, 60]).unwrap();
     bricks::write(&volume, &path, &bricks::WriteOptions::default(), None).unwrap();
     let bricks = Bricks::open(&path, &Limits::default()).unwrap();
     assert!(bricks.read(0, 7).is_ok());
     cut(&path, 100);
-    is_told("brick", bricks.read(0, 7));
-    is_told("level", bricks.volume(0));
+    assert_changed("brick", bricks.read(0, 7));
+    assert_changed("level", bricks.volume(0));
 }

@@ -155,9 +155,9 @@ impl VolumeStream {
         for first in (0..count).step_by(PIECE) {
             tell(watch, first as u64, count as u64);
             let z = first..(first + PIECE).min(count);
-            let (count, found) = holes::measure(&self.slices(z)?, self.missing);
+            let (count, extremes) = holes::measure(&self.slices(z)?, self.missing);
             holes += count;
-            if let Some([low, high]) = found {
+            if let Some([low, high]) = extremes {
                 range = [range[0].min(low), range[1].max(high)];
             }
         }

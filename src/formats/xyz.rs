@@ -9,7 +9,7 @@ use super::shared::{
 };
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     input::{
         Source,
         text::{Text, Want, first_words},
@@ -77,7 +77,7 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     let numbers = text
         .numbers(source, |column| if is_wanted(column) { Want::Values } else { Want::Nothing })?;
     let table = Table { numbers, width: text.width, rows: text.len() };
-    let layout = named.unwrap_or_else(|| Layout::found(source, &table));
+    let layout = named.unwrap_or_else(|| Layout::guess(source, &table));
     let value = match (chosen, scalar) {
         (None, Some(name)) => Some(layout.column(source, &text, name)?),
         (chosen, _) => chosen,
@@ -85,7 +85,7 @@ pub fn read_named(source: &Source, scalar: Option<&str>) -> Result<Mesh> {
     source.spend("the size of the points in bytes", POINT * text.len() as u64)?;
     let positions = table.triples(layout.position).collect();
     let mut cloud = Cloud { positions, ..Cloud::default() };
-    cloud.about.stance = Some(Stance::SURVEY);
+    cloud.about.orientation = Some(Orientation::SURVEY);
     if let Some(columns) = layout.normal {
         cloud.normals = table.triples(columns).map(|normal| normal.as_vec3()).collect();
     }
@@ -166,7 +166,7 @@ impl Table {
     /// Returns the mean difference between two columns.
     fn difference(&self, a: usize, b: usize) -> f64 {
         let one = |row: usize| (self.value(row, a) - self.value(row, b)).abs();
-        (0..self.rows).map(one).filter(|found| found.is_finite()).sum::<f64>()
+        (0..self.rows).map(one).filter(|difference| difference.is_finite()).sum::<f64>()
     }
 
     /// Returns the colours in three columns. The largest number of nearly all decides their scale.
@@ -227,22 +227,22 @@ impl Layout {
         })
     }
 
-    /// Finds the meaning of columns without names by their values. After the position, three
+    /// Guesses the meaning of columns without names from their values. After the position, three
     /// columns of unit length are a normal, and three of bytes the colour. If there are none, other
     /// columns at the usual places may be: fractions, and numbers of 16 bits.
-    fn found(source: &Source, table: &Table) -> Self {
+    fn guess(source: &Source, table: &Table) -> Self {
         let width = table.width;
         let triple = |first: usize| [first, first + 1, first + 2];
         let all = || (3..).map(triple).take_while(|columns| columns[2] < width);
-        let mut found = Self { position: [0, 1, 2], ..Self::default() };
-        found.normal = all().find(|columns| table.is_surely_normal(*columns));
+        let mut layout = Self { position: [0, 1, 2], ..Self::default() };
+        layout.normal = all().find(|columns| table.is_surely_normal(*columns));
         let is_free = |taken: Option<[usize; 3]>, columns: &[usize; 3]| {
             taken.is_none_or(|taken| !columns.iter().any(|column| taken.contains(column)))
         };
         let bytes: Vec<[usize; 3]> = all()
-            .filter(|columns| is_free(found.normal, columns) && table.are_bytes(*columns))
+            .filter(|columns| is_free(layout.normal, columns) && table.are_bytes(*columns))
             .collect();
-        found.color = brightest(source, table, &bytes);
+        layout.color = brightest(source, table, &bytes);
         let usual: &[usize] = match width {
             6 | 8 => &[3],
             7 => &[4],
@@ -251,17 +251,17 @@ impl Layout {
             _ => &[],
         };
         for columns in usual.iter().map(|&first| triple(first)) {
-            if !is_free(found.normal, &columns) || !is_free(found.color, &columns) {
+            if !is_free(layout.normal, &columns) || !is_free(layout.color, &columns) {
                 continue;
             }
-            if found.normal.is_none() && table.is_normal(columns) {
-                found.normal = Some(columns);
-            } else if found.color.is_none() && table.may_be_colors(columns) {
-                found.color = Some(columns);
+            if layout.normal.is_none() && table.is_normal(columns) {
+                layout.normal = Some(columns);
+            } else if layout.color.is_none() && table.may_be_colors(columns) {
+                layout.color = Some(columns);
             }
         }
-        found.intensity = (width > 3 && !found.uses(3)).then_some(3);
-        found
+        layout.intensity = (width > 3 && !layout.uses(3)).then_some(3);
+        layout
     }
 
     /// Returns the name of a column: its own, or a number from 1.
@@ -476,14 +476,14 @@ mod tests {
             ("1 2 3\n4 5 6", "intensity", None),
         ] {
             let path = folder.write("a.xyz", text);
-            let found = read_with(&path, |source| read_named(source, Some(name)));
-            match (found, wanted) {
+            let result = read_with(&path, |source| read_named(source, Some(name)));
+            match (result, wanted) {
                 (Ok(mesh), Some(wanted)) => assert_eq!(mesh.values, wanted, "{text}"),
                 (Err(error), None) => {
                     let message = error.to_string();
                     assert!(message.contains("line 1: has no attribute"), "{message}");
                 }
-                (found, _) => panic!("{text}: {:?}", found.map(|mesh| mesh.values)),
+                (result, _) => panic!("{text}: {:?}", result.map(|mesh| mesh.values)),
             }
         }
     }

@@ -45,8 +45,8 @@ impl Colors {
     pub fn coded(degree: u32, harmonics: &[[f32; 3]]) -> Self {
         let count = terms(degree);
         let mut most = [0f32; 3];
-        for own in harmonics.chunks_exact(count) {
-            for (term, parts) in own.iter().enumerate().skip(1) {
+        for coefficients in harmonics.chunks_exact(count) {
+            for (term, parts) in coefficients.iter().enumerate().skip(1) {
                 let most = &mut most[degree_of_term(term) - 1];
                 *most = parts.iter().fold(*most, |most, part| most.max(part.abs()));
             }
@@ -57,9 +57,9 @@ impl Colors {
             let step = steps[degree_of_term(term) - 1].max(f32::MIN_POSITIVE);
             (part / step).round().clamp(-MOST_STEPS, MOST_STEPS) as i8
         };
-        let own = || harmonics.chunks_exact(count);
-        let constants = own().map(|terms| terms[0].map(constant)).collect();
-        let others = own().flat_map(|terms| {
+        let each = || harmonics.chunks_exact(count);
+        let constants = each().map(|terms| terms[0].map(constant)).collect();
+        let others = each().flat_map(|terms| {
             terms.iter().enumerate().skip(1).map(|(term, parts)| parts.map(|v| other(term, v)))
         });
         let others = others.collect();
@@ -91,20 +91,20 @@ impl Colors {
 
     /// Returns the harmonics of one Gaussian; the terms above the degree are 0.
     pub fn harmonics(&self, index: usize) -> [[f32; 3]; MOST_TERMS] {
-        let (count, mut found) = (terms(self.degree), [[0.0; 3]; MOST_TERMS]);
+        let (count, mut values) = (terms(self.degree), [[0.0; 3]; MOST_TERMS]);
         match &self.values {
             Values::Exact(harmonics) => {
-                found[..count].copy_from_slice(&harmonics[index * count..][..count]);
+                values[..count].copy_from_slice(&harmonics[index * count..][..count]);
             }
             Values::Coded { steps, constants, others } => {
-                found[0] = constants[index].map(|part| f32::from(part) * CONSTANT_STEP);
-                let own = &others[index * (count - 1)..][..count - 1];
-                for (term, (found, parts)) in (1..).zip(found[1..].iter_mut().zip(own)) {
-                    *found = parts.map(|part| f32::from(part) * steps[degree_of_term(term) - 1]);
+                values[0] = constants[index].map(|part| f32::from(part) * CONSTANT_STEP);
+                let coded = &others[index * (count - 1)..][..count - 1];
+                for (term, (value, parts)) in (1..).zip(values[1..].iter_mut().zip(coded)) {
+                    *value = parts.map(|part| f32::from(part) * steps[degree_of_term(term) - 1]);
                 }
             }
         }
-        found
+        values
     }
 
     /// Returns the colour of one Gaussian that is seen along a direction of unit length.
@@ -152,7 +152,9 @@ impl Colors {
         }
         let count = terms(degree);
         let of_part = |part: &Self| -> Vec<[f32; 3]> {
-            (0..part.len()).flat_map(|own| part.harmonics(own).into_iter().take(count)).collect()
+            (0..part.len())
+                .flat_map(|index| part.harmonics(index).into_iter().take(count))
+                .collect()
         };
         Self::exact(degree, parts.iter().flat_map(of_part).collect())
     }
@@ -164,15 +166,15 @@ impl Colors {
         let mut out = vec![u8::from(matches!(self.values, Values::Coded { .. }))];
         match &self.values {
             Values::Exact(harmonics) => {
-                let own = &harmonics[range.start * count..range.end * count];
-                planes(own.as_flattened(), 3 * count, f32::to_le_bytes, &mut out);
+                let part = &harmonics[range.start * count..range.end * count];
+                planes(part.as_flattened(), 3 * count, f32::to_le_bytes, &mut out);
             }
             Values::Coded { steps, constants, others } => {
                 out.extend(steps.map(f32::to_le_bytes).as_flattened());
-                let own = constants[range.clone()].as_flattened();
-                planes(own, 3, i16::to_le_bytes, &mut out);
-                let own = &others[range.start * (count - 1)..range.end * (count - 1)];
-                planes(own.as_flattened(), 3 * (count - 1), i8::to_le_bytes, &mut out);
+                let part = constants[range.clone()].as_flattened();
+                planes(part, 3, i16::to_le_bytes, &mut out);
+                let part = &others[range.start * (count - 1)..range.end * (count - 1)];
+                planes(part.as_flattened(), 3 * (count - 1), i8::to_le_bytes, &mut out);
             }
         }
         out
@@ -257,11 +259,11 @@ fn joined<T, const N: usize>(
     count: usize,
     value: impl Fn([u8; N]) -> T,
 ) -> Vec<T> {
-    let own = |at: usize| {
+    let one = |at: usize| {
         let (index, number) = (at / each, at % each);
         value(std::array::from_fn(|byte| bytes[(number * N + byte) * count + index]))
     };
-    (0..each * count).map(own).collect()
+    (0..each * count).map(one).collect()
 }
 
 #[cfg(test)]
@@ -281,13 +283,13 @@ mod tests {
             for colors in [Colors::exact(degree, given.clone()), Colors::coded(degree, &given)] {
                 assert_eq!((colors.len(), colors.degree()), (9, degree));
                 for (index, given) in given.chunks_exact(count).enumerate() {
-                    let found = colors.harmonics(index);
-                    for (found, given) in found[..count].iter().zip(given) {
-                        for (found, given) in found.iter().zip(given) {
-                            assert!((found - given).abs() < 0.004, "{found} {given}");
+                    let harmonics = colors.harmonics(index);
+                    for (term, given) in harmonics[..count].iter().zip(given) {
+                        for (actual, given) in term.iter().zip(given) {
+                            assert!((actual - given).abs() < 0.004, "{actual} {given}");
                         }
                     }
-                    assert!(found[count..].as_flattened().iter().all(|v| *v == 0.0));
+                    assert!(harmonics[count..].as_flattened().iter().all(|v| *v == 0.0));
                 }
                 let part = colors.chosen((3..8).rev());
                 assert_eq!(part.harmonics(0), colors.harmonics(7));

@@ -102,9 +102,9 @@ mod tests {
         }
         for (i, row) in products.iter().enumerate() {
             for (j, sum) in row.iter().enumerate() {
-                let found = sum * 4.0 * std::f64::consts::PI / count;
+                let product = sum * 4.0 * std::f64::consts::PI / count;
                 let wanted = f64::from(u8::from(i == j));
-                assert!((found - wanted).abs() < 1e-3, "terms {i} and {j}: {found}");
+                assert!((product - wanted).abs() < 1e-3, "terms {i} and {j}: {product}");
             }
         }
     }

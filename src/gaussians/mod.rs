@@ -184,19 +184,19 @@ impl Gaussians {
             ));
         }
         let count = self.len();
-        for (what, found, wanted) in [
+        for (what, given, wanted) in [
             ("scales", self.scales.len(), count),
             ("rotations", self.rotations.len(), count),
             ("opacities", self.opacities.len(), count),
             ("harmonics", self.harmonics.len(), count * harmonics::terms(self.degree)),
         ] {
-            if found != wanted {
-                return Err(format!("{count} Gaussians need {wanted} {what}, but have {found}"));
+            if given != wanted {
+                return Err(format!("{count} Gaussians need {wanted} {what}, but have {given}"));
             }
         }
         let bad = (0..count).into_par_iter().find_first(|&index| self.problem(index).is_some());
-        let told = |index| self.problem(index).map(|what| format!("Gaussian {index}: {what}"));
-        bad.and_then(told).map_or(Ok(()), Err)
+        let message = |index| self.problem(index).map(|what| format!("Gaussian {index}: {what}"));
+        bad.and_then(message).map_or(Ok(()), Err)
     }
 
     /// Returns what is wrong with the numbers of one Gaussian.

@@ -4,7 +4,7 @@ use super::{
     Gaussians,
     harmonics::{MOST_TERMS, basis, constant_of, terms},
 };
-use crate::{about::Stance, parallel::prelude::*};
+use crate::{about::Orientation, parallel::prelude::*};
 use glam::{Quat, Vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -38,13 +38,15 @@ pub fn phantom(count: usize) -> Gaussians {
     let made = [of_part(floor), of_part(ball), of_part(ring), of_part(needle)];
     let made: Vec<Made> = made.into_iter().flatten().collect();
     let mut set = Gaussians { degree: DEGREE, ..Gaussians::default() };
-    set.centers = made.iter().map(|own| own.center).collect();
-    set.scales = made.iter().map(|own| own.scale).collect();
-    set.rotations =
-        made.iter().map(|own| Quat::from_rotation_arc(Vec3::Z, own.normal).normalize()).collect();
-    set.opacities = made.iter().map(|own| own.opacity).collect();
+    set.centers = made.iter().map(|gaussian| gaussian.center).collect();
+    set.scales = made.iter().map(|gaussian| gaussian.scale).collect();
+    set.rotations = made
+        .iter()
+        .map(|gaussian| Quat::from_rotation_arc(Vec3::Z, gaussian.normal).normalize())
+        .collect();
+    set.opacities = made.iter().map(|gaussian| gaussian.opacity).collect();
     set.harmonics = made.par_iter().flat_map_iter(colors).collect();
-    set.about.stance = Some(Stance::Y_DOWN);
+    set.about.orientation = Some(Orientation::Y_DOWN);
     set
 }
 
@@ -122,21 +124,22 @@ fn needle(index: usize, count: usize) -> Made {
 
 /// Returns the harmonics of a Gaussian's colour: lit from one side, with a highlight that moves
 /// with the eye.
-fn colors(own: &Made) -> Vec<[f32; 3]> {
+fn colors(gaussian: &Made) -> Vec<[f32; 3]> {
     let light = LIGHT.normalize();
-    let lit = own.color * (0.45 + 0.55 * own.normal.dot(light).max(0.0));
+    let lit = gaussian.color * (0.45 + 0.55 * gaussian.normal.dot(light).max(0.0));
     let mut shine = [0.0; MOST_TERMS];
     for index in 0..DIRECTIONS {
         let seen = on_sphere(index, DIRECTIONS);
-        let reflected = seen - 2.0 * seen.dot(own.normal) * own.normal;
-        let value = own.shine * reflected.dot(light).max(0.0).powi(6);
+        let reflected = seen - 2.0 * seen.dot(gaussian.normal) * gaussian.normal;
+        let value = gaussian.shine * reflected.dot(light).max(0.0).powi(6);
         let share = value * 4.0 * PI / DIRECTIONS as f32;
         shine.iter_mut().zip(basis(DEGREE, seen)).for_each(|(sum, term)| *sum += share * term);
     }
-    let mut found: Vec<[f32; 3]> = shine[..terms(DEGREE)].iter().map(|term| [*term; 3]).collect();
+    let mut harmonics: Vec<[f32; 3]> =
+        shine[..terms(DEGREE)].iter().map(|term| [*term; 3]).collect();
     let constant = lit.to_array().map(constant_of);
-    found[0].iter_mut().zip(constant).for_each(|(sum, part)| *sum += part);
-    found
+    harmonics[0].iter_mut().zip(constant).for_each(|(sum, part)| *sum += part);
+    harmonics
 }
 
 #[cfg(test)]

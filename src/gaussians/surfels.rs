@@ -86,22 +86,25 @@ mod tests {
     #[test]
     fn gaussians_are_the_splats() {
         let set = Mesh::sphere(2).surfels(&Default::default()).unwrap();
-        let found = Gaussians::from_splats(&set).unwrap();
-        assert_eq!((found.len(), found.validate()), (set.splats.len(), Ok(())));
-        assert_eq!((found.origin, found.degree, found.broken.all()), (set.origin, 0, 0));
+        let gaussians = Gaussians::from_splats(&set).unwrap();
+        assert_eq!((gaussians.len(), gaussians.validate()), (set.splats.len(), Ok(())));
+        assert_eq!(
+            (gaussians.origin, gaussians.degree, gaussians.broken.all()),
+            (set.origin, 0, 0)
+        );
         for (index, splat) in set.splats.iter().enumerate() {
-            assert_eq!(found.centers[index].to_array(), splat.center);
+            assert_eq!(gaussians.centers[index].to_array(), splat.center);
             let depth = f64::from(splat.strength) * f64::from(splat.color >> 24) / 255.0;
-            let opacity = f64::from(found.opacities[index]);
+            let opacity = f64::from(gaussians.opacities[index]);
             assert!((opacity - (1.0 - (-depth).exp())).abs() < 1e-6);
-            let [red, ..] = harmonics::color(0, found.harmonics_of(index), Vec3::Z);
+            let [red, ..] = harmonics::color(0, gaussians.harmonics_of(index), Vec3::Z);
             assert!((red - (splat.color & 255) as f32 / 255.0).abs() < 1e-6);
             // R · diag(σ²) · Rᵀ is B · Bᵀ.
-            let axes = found.axes(index).as_dmat3();
+            let axes = gaussians.axes(index).as_dmat3();
             let wanted = factor(splat) * factor(splat).transpose();
             let miss = axes * axes.transpose() - wanted;
             let miss = miss.to_cols_array().iter().map(|v| v.abs()).fold(0.0, f64::max);
-            let largest = f64::from(found.scales[index].max_element());
+            let largest = f64::from(gaussians.scales[index].max_element());
             assert!(miss < 1e-5 * largest * largest, "{miss}");
         }
     }

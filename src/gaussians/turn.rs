@@ -5,7 +5,7 @@
 //! weights give these integrals exactly.
 
 use super::{Gaussians, MOST_DEGREE, harmonics::terms};
-use crate::{about::Stance, parallel::prelude::*};
+use crate::{about::Orientation, parallel::prelude::*};
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::PI;
 
@@ -73,12 +73,14 @@ impl Turn {
 }
 
 impl Gaussians {
-    /// Turns a scene of a known stance in the world, so that it has another one.
-    pub fn stand(&mut self, wanted: Stance) {
-        let Some(own) = self.about.stance.replace(wanted).filter(|own| *own != wanted) else {
+    /// Turns a scene of a known orientation in the world, so that it has another one.
+    pub fn stand(&mut self, wanted: Orientation) {
+        let Some(orientation) =
+            self.about.orientation.replace(wanted).filter(|orientation| *orientation != wanted)
+        else {
             return;
         };
-        self.turn(own.turn_to(wanted));
+        self.turn(orientation.turn_to(wanted));
     }
 
     /// Turns the world about its origin: the Gaussians, and the colours that they show in each
@@ -89,11 +91,11 @@ impl Gaussians {
         self.centers.par_iter_mut().for_each(|center| {
             *center = (rotation * center.as_dvec3()).as_vec3();
         });
-        self.rotations.par_iter_mut().for_each(|own| {
-            *own = (quat * own.as_dquat()).normalize().as_quat();
+        self.rotations.par_iter_mut().for_each(|quaternion| {
+            *quaternion = (quat * quaternion.as_dquat()).normalize().as_quat();
         });
         let terms = terms(self.degree);
-        self.harmonics.par_chunks_mut(terms).for_each(|own| colors.apply(own));
+        self.harmonics.par_chunks_mut(terms).for_each(|harmonics| colors.apply(harmonics));
     }
 }
 
@@ -189,10 +191,10 @@ mod tests {
             harmonics: vec![[0.0; 3], [0.1; 3], [0.2; 3], [0.3; 3]],
             ..Gaussians::default()
         };
-        set.about.stance = Some(Stance::Y_UP);
+        set.about.orientation = Some(Orientation::Y_UP);
         let before = set.clone();
-        set.stand(Stance::Y_DOWN);
-        assert_eq!(set.about.stance, Some(Stance::Y_DOWN));
+        set.stand(Orientation::Y_DOWN);
+        assert_eq!(set.about.orientation, Some(Orientation::Y_DOWN));
         assert_eq!(set.origin, DVec3::new(10.0, -20.0, -30.0));
         assert!((set.centers[0] - Vec3::new(1.0, -2.0, -3.0)).length() < 1e-6);
         let seen = |set: &Gaussians, from: Vec3| {
@@ -201,12 +203,12 @@ mod tests {
         let [old, new] =
             [seen(&before, Vec3::new(1.0, 2.0, -3.0)), seen(&set, Vec3::new(1.0, -2.0, 3.0))];
         assert!(old.iter().zip(new).all(|(a, b)| (a - b).abs() < 1e-5), "{old:?} {new:?}");
-        set.stand(Stance::Y_UP);
+        set.stand(Orientation::Y_UP);
         assert!((set.axes(0) - before.axes(0)).to_cols_array().iter().all(|v| v.abs() < 1e-6));
-        // Without a stance there is nothing to turn from.
-        set.about.stance = None;
+        // Without a orientation there is nothing to turn from.
+        set.about.orientation = None;
         let centers = set.centers.clone();
-        set.stand(Stance::Y_DOWN);
+        set.stand(Orientation::Y_DOWN);
         assert_eq!(set.centers, centers);
     }
     use crate::gaussians::harmonics::{self, color, constant_of};
@@ -236,9 +238,9 @@ mod tests {
                     // Directions that the matrix was not made from.
                     let direction = (direction + DVec3::new(0.3, -0.2, 0.1)).normalize();
                     let wanted = color(degree, &before, direction.as_vec3());
-                    let found = color(degree, &after, (rotation * direction).as_vec3());
-                    for (found, wanted) in found.iter().zip(wanted) {
-                        assert!((found - wanted).abs() < 2e-6, "degree {degree}, {rotation}");
+                    let turned = color(degree, &after, (rotation * direction).as_vec3());
+                    for (actual, wanted) in turned.iter().zip(wanted) {
+                        assert!((actual - wanted).abs() < 2e-6, "degree {degree}, {rotation}");
                     }
                 }
             }
@@ -251,8 +253,8 @@ mod tests {
         let mut colors = [[0.0; 3]; 4];
         colors[3] = [1.0, 2.0, 3.0];
         turn(1, DMat3::from_rotation_z(PI / 2.0)).apply(&mut colors);
-        for (found, wanted) in colors[1].iter().zip([1.0, 2.0, 3.0]) {
-            assert!((found - wanted).abs() < 1e-6, "{colors:?}");
+        for (actual, wanted) in colors[1].iter().zip([1.0, 2.0, 3.0]) {
+            assert!((actual - wanted).abs() < 1e-6, "{colors:?}");
         }
         assert!(colors[2..].as_flattened().iter().all(|v| v.abs() < 1e-6), "{colors:?}");
         // A point reflection changes the sign of the odd degrees.
@@ -284,8 +286,8 @@ mod tests {
     fn terms_are_those_of_the_colours() {
         for (direction, _) in directions() {
             let wanted = harmonics::basis(3, direction.as_vec3());
-            for (found, wanted) in basis(direction).iter().zip(wanted) {
-                assert!((found - f64::from(wanted)).abs() < 1e-6, "{direction}");
+            for (actual, wanted) in basis(direction).iter().zip(wanted) {
+                assert!((actual - f64::from(wanted)).abs() < 1e-6, "{direction}");
             }
         }
     }
@@ -303,9 +305,9 @@ mod tests {
         }
         let mut constant = [[constant_of(0.25), constant_of(0.5), constant_of(1.0)]];
         map_colors(&mut constant, |color| color.map(f32::sqrt));
-        let found = color(0, &constant, glam::Vec3::X);
-        for (found, wanted) in found.iter().zip([0.5, 0.5f32.sqrt(), 1.0]) {
-            assert!((found - wanted).abs() < 1e-6, "{found} is not {wanted}");
+        let mapped = color(0, &constant, glam::Vec3::X);
+        for (actual, wanted) in mapped.iter().zip([0.5, 0.5f32.sqrt(), 1.0]) {
+            assert!((actual - wanted).abs() < 1e-6, "{actual} is not {wanted}");
         }
     }
 }

@@ -133,10 +133,12 @@ impl<'a> Work<'a> {
         let Some(scatter) = &pipelines.scatter else { return steps };
         for chunk in &prepared.chunks {
             if let Origin::Nodes { slots, .. } = &chunk.origin {
-                let own = slots.chunk(&chunk.uniform, &chunk.data);
+                let nodes = slots.chunk(&chunk.uniform, &chunk.data);
                 steps.push((
                     "cut",
-                    Box::new(move |commands| passes.cut.encode(gpu, commands, &passes.scan, &own)),
+                    Box::new(move |commands| {
+                        passes.cut.encode(gpu, commands, &passes.scan, &nodes);
+                    }),
                 ));
             }
         }

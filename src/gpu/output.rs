@@ -134,7 +134,9 @@ impl Output {
             Self::Buffers { color, distance } => {
                 let pixels = u64::from(size[0]) * u64::from(size[1]);
                 check_buffer("colours", color, 16 * pixels)?;
-                distance.as_ref().map_or(Ok(()), |own| check_buffer("distances", own, 4 * pixels))
+                distance
+                    .as_ref()
+                    .map_or(Ok(()), |buffer| check_buffer("distances", buffer, 4 * pixels))
             }
         }
     }
@@ -145,16 +147,14 @@ fn wrong<T>(message: String) -> Result<T> {
 }
 
 fn check_texture(what: &str, texture: &wgpu::Texture, [width, height]: [u32; 2]) -> Result<()> {
-    let [own_width, own_height] = [texture.width(), texture.height()];
+    let [columns, rows] = [texture.width(), texture.height()];
     if !texture.usage().contains(TextureUsages::RENDER_ATTACHMENT) {
         return wrong(format!("the texture of the {what} lacks the usage RENDER_ATTACHMENT"));
     }
-    if own_width >= width && own_height >= height {
+    if columns >= width && rows >= height {
         return Ok(());
     }
-    wrong(format!(
-        "the texture of the {what} is {own_width}x{own_height}, the picture {width}x{height}"
-    ))
+    wrong(format!("the texture of the {what} is {columns}x{rows}, the picture {width}x{height}"))
 }
 
 fn check_buffer(what: &str, buffer: &wgpu::Buffer, bytes: u64) -> Result<()> {

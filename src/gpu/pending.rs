@@ -322,8 +322,8 @@ impl PendingFrame {
             if let Origin::Nodes { slots, .. } = &chunk.origin {
                 let source = chunk.source(&self.view, false, &prepared.page_caches);
                 gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
-                let own = slots.chunk(&chunk.uniform, &chunk.data);
-                engine.passes.cut.encode_tally(gpu, &mut commands, &own, &counters);
+                let nodes = slots.chunk(&chunk.uniform, &chunk.data);
+                engine.passes.cut.encode_tally(gpu, &mut commands, &nodes, &counters);
             }
         }
         Readback::encode(gpu, commands.encoder(), &[(&counters, 0, tally_bytes())])

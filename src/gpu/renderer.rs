@@ -160,7 +160,7 @@ impl Renderer {
     ) -> Result<Progress> {
         self.check(prepared, frame)?;
         self.guarded(prepared, |renderer, prepared| {
-            renderer.engine.gpu.look()?;
+            renderer.engine.gpu.poll()?;
             renderer.take(prepared, frame)
         })
     }
@@ -389,9 +389,9 @@ fn measure(gpu: &Gpu, steps: Vec<Step<'_>>, times: &mut Times) -> Result<()> {
         gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") })
     };
     let mut encoder = new();
-    let mut add = |label, own| match times.iter_mut().find(|(name, _)| *name == label) {
-        Some((_, sum)) => *sum += own,
-        None => times.push((label, own)),
+    let mut add = |label, time| match times.iter_mut().find(|(name, _)| *name == label) {
+        Some((_, sum)) => *sum += time,
+        None => times.push((label, time)),
     };
     if let Some(clock) = Timestamps::new(gpu, steps.len()) {
         clock.mark(&mut encoder, 0);
@@ -399,8 +399,8 @@ fn measure(gpu: &Gpu, steps: Vec<Step<'_>>, times: &mut Times) -> Result<()> {
             encode(&mut Commands::new(&mut encoder));
             clock.mark(&mut encoder, index);
         }
-        let own = clock.finish(gpu, encoder)?;
-        steps.iter().zip(own).for_each(|((label, _), own)| add(*label, own));
+        let durations = clock.finish(gpu, encoder)?;
+        steps.iter().zip(durations).for_each(|((label, _), time)| add(*label, time));
         return Ok(());
     }
     for (label, encode) in steps {

@@ -62,8 +62,8 @@ fn slot_bytes(fields: usize) -> u64 {
 /// Returns the maximum bytes of the slots for a scene with this number of fields. They lie behind
 /// the colours of a picture, in the same binding.
 pub fn most_slot_bytes(gpu: &Gpu, fields: usize) -> u64 {
-    let own = slot_bytes(fields);
-    SLOTS.min(gpu.binding_size() / 2 / own) * own
+    let bytes = slot_bytes(fields);
+    SLOTS.min(gpu.binding_size() / 2 / bytes) * bytes
 }
 
 /// The buffers of a frame: the data that passes write for later passes, and the picture.

@@ -70,7 +70,7 @@ pub struct FrameField {
     pub levels: [f32; 4],
     pub lattice: [u32; 4],
     pub taps: [f32; 4],
-    pub shown: [u32; 4],
+    pub visibility: [u32; 4],
     pub isosurfaces: [FrameIsosurface; TransferFunction::MAX_ISOSURFACES],
 }
 

@@ -269,7 +269,7 @@ fn colored_block_of(
 ) -> Block {
     let splat = |i: u32| &set.splats[part[i as usize] as usize];
     let measures = Measures::of(&set.splats, part);
-    let boxes: Vec<_> = (0..).zip(&measures).map(|(i, own)| own.box_of(splat(i))).collect();
+    let boxes: Vec<_> = (0..).zip(&measures).map(|(i, measure)| measure.box_of(splat(i))).collect();
     let leaf = |i: u32| measures[i as usize].leaf(splat(i), set.extent);
     let mass = |i: u32| measures[i as usize].mass(splat(i));
     let (mut block, sources) = cluster(&boxes, leaf, mass, preset);

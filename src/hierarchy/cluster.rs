@@ -92,7 +92,7 @@ pub(super) fn box_of(splat: &Splat) -> Aabb {
 /// They are placed in a row, spaced so that the members of each half, quarter and so on are nearer
 /// to each other than to the rest.
 fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
-    let mut keys: Vec<u64> = boxes.iter().map(|own| mixed(key(own))).collect();
+    let mut keys: Vec<u64> = boxes.iter().map(|aabb| mixed(key(aabb))).collect();
     // If few keys share their first bits, even fewer are equal.
     let mut counts = vec![0u8; 1 << BUCKET_BITS];
     let most = keys.iter().fold(0, |most: u8, key| {
@@ -109,17 +109,17 @@ fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
     {
         return Cow::Borrowed(boxes);
     }
-    let mut found: HashMap<[u32; 6], u64> = HashMap::new();
-    let set_apart = |own: &Aabb| {
-        let before = found.entry(key(own)).or_default();
+    let mut copies: HashMap<[u32; 6], u64> = HashMap::new();
+    let set_apart = |aabb: &Aabb| {
+        let before = copies.entry(key(aabb)).or_default();
         let place: u64 =
             (0..u64::BITS - before.leading_zeros()).map(|level| (*before >> level) << level).sum();
         *before += 1;
-        let width = (own.max.x - own.min.x) / 1024.0;
+        let width = (aabb.max.x - aabb.min.x) / 1024.0;
         // Far from the origin, the spacing of 32-bit numbers is wider than that.
-        let step = width.max(own.max.x.abs().max(own.min.x.abs()) * 2f32.powi(-22));
+        let step = width.max(aabb.max.x.abs().max(aabb.min.x.abs()) * 2f32.powi(-22));
         let shift = Vec3::X * (step * place as f32);
-        Aabb::new((Vec3::from(own.min) + shift).into(), (Vec3::from(own.max) + shift).into())
+        Aabb::new((Vec3::from(aabb.min) + shift).into(), (Vec3::from(aabb.max) + shift).into())
     };
     Cow::Owned(boxes.iter().map(set_apart).collect())
 }
@@ -130,8 +130,8 @@ const MOST_ALIKE: usize = 32;
 const BUCKET_BITS: u32 = 15;
 
 /// All bits of a box.
-fn key(own: &Aabb) -> [u32; 6] {
-    [own.min.x, own.min.y, own.min.z, own.max.x, own.max.y, own.max.z]
+fn key(aabb: &Aabb) -> [u32; 6] {
+    [aabb.min.x, aabb.min.y, aabb.min.z, aabb.max.x, aabb.max.y, aabb.max.z]
         .map(|value| (value + 0.0).to_bits())
 }
 
@@ -173,13 +173,13 @@ fn groups(pairs: &Bvh2) -> Vec<bool> {
         let halves = [first, first + 1];
         let mut counts = halves.map(|half| items[half]);
         leaves[index as usize] = leaves[first] + leaves[first + 1];
-        let own = grade(leaves[index as usize]);
+        let pair_grade = grade(leaves[index as usize]);
         let mut close = |side: usize, counts: &mut [u8; 2]| {
             closed[halves[side]] = true;
             counts[side] = 1;
         };
         for side in [0, 1] {
-            if counts[side] > 2 && grade(leaves[halves[side]]) < own {
+            if counts[side] > 2 && grade(leaves[halves[side]]) < pair_grade {
                 close(side, &mut counts);
             }
         }

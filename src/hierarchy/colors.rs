@@ -25,8 +25,8 @@ impl<'a> LeafColors<'a> {
 
     fn of(&self, splat: u32) -> Harmonics {
         let mut all = [[0.0; 3]; MOST_TERMS];
-        let own = self.set.harmonics_of(self.numbers[splat as usize] as usize);
-        all[..own.len()].copy_from_slice(own);
+        let harmonics = self.set.harmonics_of(self.numbers[splat as usize] as usize);
+        all[..harmonics.len()].copy_from_slice(harmonics);
         all
     }
 
@@ -56,22 +56,22 @@ fn colors_of(
     let mut all = vec![[0f32; 3]; nodes.len() * count];
     let mut masses = vec![0f32; nodes.len()];
     for (index, node) in nodes.iter().enumerate().rev() {
-        let mut own = [[0f32; 3]; MOST_TERMS];
+        let mut harmonics = [[0f32; 3]; MOST_TERMS];
         if node.is_leaf() {
             masses[index] = Mass::of(&node.splat).mass;
-            own = leaf(index);
+            harmonics = leaf(index);
         } else {
             let children = node.first_child as usize..(node.first_child + node.children) as usize;
             let total: f32 = masses[children.clone()].iter().sum();
             masses[index] = total;
             for child in children {
                 let share = masses[child] / total;
-                for (own, part) in own.iter_mut().zip(&all[child * count..][..count]) {
-                    own.iter_mut().zip(part).for_each(|(own, part)| *own += share * part);
+                for (term, part) in harmonics.iter_mut().zip(&all[child * count..][..count]) {
+                    term.iter_mut().zip(part).for_each(|(value, part)| *value += share * part);
                 }
             }
         }
-        all[index * count..][..count].copy_from_slice(&own[..count]);
+        all[index * count..][..count].copy_from_slice(&harmonics[..count]);
     }
     if is_exact { Colors::exact(degree, all) } else { Colors::coded(degree, &all) }
 }

@@ -161,8 +161,8 @@ impl Cut {
         if above == 0 {
             return 0;
         }
-        let own = if has_children { self.refinement(&CutSphere::of(node)) } else { 0 };
-        if above <= own || self.is_hidden(node) { 0 } else { above - own }
+        let refinement = if has_children { self.refinement(&CutSphere::of(node)) } else { 0 };
+        if above <= refinement || self.is_hidden(node) { 0 } else { above - refinement }
     }
 
     /// Returns whether nothing of a node's splat is visible: it is outside the picture, or faces
@@ -302,11 +302,11 @@ impl Tree {
     /// If the nodes of a block are not in order. [`cut`](Self::cut) returns an error for such
     /// trees, and [`validate`](super::validate()) a finding.
     pub fn selected(&self, cut: &Cut) -> Vec<(&Node, u32)> {
-        let own = self.blocks.par_iter().enumerate().map(|(index, block)| {
-            let own = self.selected_of(index, block, cut).into_iter();
-            own.map(|(node, share)| (&block.nodes[node as usize], share)).collect::<Vec<_>>()
+        let blocks = self.blocks.par_iter().enumerate().map(|(index, block)| {
+            let selected = self.selected_of(index, block, cut).into_iter();
+            selected.map(|(node, share)| (&block.nodes[node as usize], share)).collect::<Vec<_>>()
         });
-        own.collect::<Vec<_>>().concat()
+        blocks.collect::<Vec<_>>().concat()
     }
 
     /// The selected nodes of one block, by their numbers.

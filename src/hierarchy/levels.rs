@@ -102,8 +102,8 @@ impl Levels {
         };
         let edge = CELL / f64::from(cut.widths(&unit)).max(f64::from(f32::MIN_POSITIVE));
         let power = edge.log2().floor().clamp(-100.0, 100.0) as i32;
-        if let Fewer::Cells(own, set) = &self.fewer
-            && *own == power
+        if let Fewer::Cells(kept_power, set) = &self.fewer
+            && *kept_power == power
         {
             return set.clone();
         }

@@ -117,9 +117,9 @@ fn measures<S: Simd>(simd: S, factor: &[[f32; 8]; 6], normal: &[[f32; 8]; 2]) ->
     let is_round = p.simd_le(1e-6);
     let largest = is_round.select(mean + mean * p, mean + mean * 2.0 * p * series);
     let sigma = largest.max(none).sqrt();
-    let own = unpacked(simd, normal);
-    let thin = thin_axis(simd, b, own);
-    let cosine = (own[0] * thin[0] + own[1] * thin[1] + own[2] * thin[2]).abs();
+    let normal = unpacked(simd, normal);
+    let thin = thin_axis(simd, b, normal);
+    let cosine = (normal[0] * thin[0] + normal[1] * thin[1] + normal[2] * thin[2]).abs();
     let cone = cosine.simd_lt(ALIKE).select((cosine - 2e-6).max(none), one);
     [sigma.into(), area.into(), reach.into(), cone.into()]
 }

@@ -189,8 +189,8 @@ pub(crate) fn merge(children: &[Node], masses: &[Mass]) -> (Node, Mass) {
         normal += decode_normal(child.splat.normal).unwrap_or(Vec3::ZERO) * m.area;
     }
     let moments: Moments = std::array::from_fn(|i| within[i] + between[i]);
-    let shown: Moments = std::array::from_fn(|i| within[i] + SPREAD * between[i]);
-    let shown_area = area(&shown).max(f32::MIN_POSITIVE);
+    let drawn: Moments = std::array::from_fn(|i| within[i] + SPREAD * between[i]);
+    let drawn_area = area(&drawn).max(f32::MIN_POSITIVE);
     let alpha = (color[3] / 255.0).max(1.0 / 255.0);
     // What is not opaque keeps its mass: it is meant to let light pass.
     let opaque = if color[3] < 254.5 { 0.0 } else { (depth / OPAQUE).min(1.0) };
@@ -198,8 +198,8 @@ pub(crate) fn merge(children: &[Node], masses: &[Mass]) -> (Node, Mass) {
     let packed_normal = encode_normal(normal.normalize_or_zero());
     let splat = Splat {
         center: mean.to_array(),
-        strength: (total / shown_area / alpha * made_up).min(MOST_STRENGTH),
-        factor: factor(&shown),
+        strength: (total / drawn_area / alpha * made_up).min(MOST_STRENGTH),
+        factor: factor(&drawn),
         color: u32::from_le_bytes(color.map(|part| part.round() as u8)),
         normal: packed_normal,
     };
@@ -223,16 +223,16 @@ fn cone(axis: u32, children: &[Node]) -> f32 {
     let Some(axis) = decode_normal(axis) else { return -1.0 };
     let mut narrowest = 1.0f32;
     for child in children {
-        let Some(own) = decode_normal(child.splat.normal).filter(|_| child.cone > -1.0) else {
+        let Some(normal) = decode_normal(child.splat.normal).filter(|_| child.cone > -1.0) else {
             return -1.0;
         };
-        let (cos, sin) = (axis.dot(own), axis.cross(own).length());
-        let (own_cos, own_sin) = (child.cone, (1.0 - child.cone * child.cone).max(0.0).sqrt());
+        let (cos, sin) = (axis.dot(normal), axis.cross(normal).length());
+        let (cone_cos, cone_sin) = (child.cone, (1.0 - child.cone * child.cone).max(0.0).sqrt());
         // Two angles that add up to more than half a turn have no cone.
-        if sin * own_cos + cos * own_sin < 0.0 {
+        if sin * cone_cos + cos * cone_sin < 0.0 {
             return -1.0;
         }
-        narrowest = narrowest.min(cos * own_cos - sin * own_sin);
+        narrowest = narrowest.min(cos * cone_cos - sin * cone_sin);
     }
     // With a margin for rounding.
     (narrowest - 2e-6).max(-1.0)

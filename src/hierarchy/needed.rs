@@ -25,7 +25,7 @@ pub struct Needed {
 /// Those of [`Hierarchy::entry`].
 pub fn needed(hierarchy: &Hierarchy, cut: &Cut) -> Result<Vec<Needed>> {
     let around = |sphere: &CutSphere| cut.may_refine_below(sphere);
-    Ok(found(hierarchy, around, |sphere| cut.may_refine(sphere), u64::MAX)?.in_order())
+    Ok(search(hierarchy, around, |sphere| cut.may_refine(sphere), u64::MAX)?.in_order())
 }
 
 /// Returns the coarsest pages, `most` of them, coarse ones first.
@@ -36,10 +36,10 @@ pub fn coarsest(hierarchy: &Hierarchy, most: usize) -> Result<Vec<Needed>> {
     let mut size = (hierarchy.bounds().diagonal() as f32).min(f32::MAX);
     loop {
         let large = |sphere: &CutSphere| sphere.size >= size;
-        let mut found = found(hierarchy, large, large, u64::MAX)?.in_order();
-        if found.len() >= most || size == 0.0 {
-            found.truncate(most);
-            return Ok(found);
+        let mut pages = search(hierarchy, large, large, u64::MAX)?.in_order();
+        if pages.len() >= most || size == 0.0 {
+            pages.truncate(most);
+            return Ok(pages);
         }
         size = if size > f32::MIN_POSITIVE { size * 0.5 } else { 0.0 };
     }
@@ -53,8 +53,8 @@ pub fn finest_within(hierarchy: &Hierarchy, most: u64, cut: impl Fn(f64) -> Cut)
     let fits = |pixels: f64| {
         let cut = cut(pixels);
         let around = |sphere: &CutSphere| cut.may_refine_below(sphere);
-        let found = found(hierarchy, around, |sphere| cut.may_refine(sphere), most)?;
-        Ok(found.nodes <= most)
+        let pages = search(hierarchy, around, |sphere| cut.may_refine(sphere), most)?;
+        Ok(pages.nodes <= most)
     };
     if fits(0.0)? {
         return Ok(0.0);
@@ -67,15 +67,15 @@ pub fn finest_within(hierarchy: &Hierarchy, most: u64, cut: impl Fn(f64) -> Cut)
     Ok(coarse.exp2())
 }
 
-/// A page that was found, in brief.
+/// What is needed of the entry of a page.
 #[derive(Debug, Clone)]
-struct Found {
+struct Summary {
     nodes: u32,
     size: f32,
     parents: Range<u32>,
 }
 
-impl Found {
+impl Summary {
     fn of(entry: &PageEntry) -> Self {
         let parents = entry.parent_pages.clone();
         Self { nodes: entry.nodes, size: entry.largest_parent_size, parents }
@@ -85,7 +85,7 @@ impl Found {
 /// Pages with all pages above them.
 #[derive(Debug)]
 struct All {
-    pages: Vec<(u32, Found)>,
+    pages: Vec<(u32, Summary)>,
     /// Whether each page of the file is among them.
     holds: Vec<bool>,
     nodes: u64,
@@ -99,17 +99,17 @@ impl All {
     }
 
     /// Adds a page and the pages above it, which may be on other pages of the directory.
-    fn add(&mut self, hierarchy: &Hierarchy, page: u32, own: Found) -> Result<()> {
-        let mut rest = vec![(page, own)];
-        while let Some((page, own)) = rest.pop() {
+    fn add(&mut self, hierarchy: &Hierarchy, page: u32, summary: Summary) -> Result<()> {
+        let mut rest = vec![(page, summary)];
+        while let Some((page, summary)) = rest.pop() {
             if std::mem::replace(&mut self.holds[page as usize], true) {
                 continue;
             }
-            for above in own.parents.clone().filter(|above| !self.holds[*above as usize]) {
-                rest.push((above, Found::of(&hierarchy.entry(above)?)));
+            for above in summary.parents.clone().filter(|above| !self.holds[*above as usize]) {
+                rest.push((above, Summary::of(&hierarchy.entry(above)?)));
             }
-            self.nodes += u64::from(own.nodes);
-            self.pages.push((page, own));
+            self.nodes += u64::from(summary.nodes);
+            self.pages.push((page, summary));
         }
         Ok(())
     }
@@ -120,23 +120,23 @@ impl All {
         // Parents are on earlier pages.
         self.pages.sort_unstable_by_key(|(page, _)| *page);
         let mut sizes = vec![f32::INFINITY; self.holds.len()];
-        for (page, own) in &self.pages {
-            let above = own.parents.clone().map(|above| sizes[above as usize]);
-            sizes[*page as usize] = above.fold(own.size, f32::min);
+        for (page, summary) in &self.pages {
+            let above = summary.parents.clone().map(|above| sizes[above as usize]);
+            sizes[*page as usize] = above.fold(summary.size, f32::min);
         }
         let size = |page: u32| sizes[page as usize];
-        let order = |(a, _): &(u32, Found), (b, _): &(u32, Found)| {
+        let order = |(a, _): &(u32, Summary), (b, _): &(u32, Summary)| {
             size(*b).total_cmp(&size(*a)).then(a.cmp(b))
         };
         self.pages.sort_unstable_by(order);
-        let needed = |(page, own): (u32, Found)| Needed { page, nodes: own.nodes };
+        let needed = |(page, summary): (u32, Summary)| Needed { page, nodes: summary.nodes };
         self.pages.into_iter().map(needed).collect()
     }
 }
 
 /// Returns the pages whose bounds pass, if those around them do, with all pages above them. Stops
 /// when they have more than `most` nodes.
-fn found(
+fn search(
     hierarchy: &Hierarchy,
     around: impl Fn(&CutSphere) -> bool + Sync,
     wanted: impl Fn(&CutSphere) -> bool + Sync,
@@ -146,12 +146,12 @@ fn found(
     hierarchy.visit(around, |runs| {
         let of_run = |(first, entries): &(u32, std::sync::Arc<[PageEntry]>)| {
             let test = |(page, entry): &(u32, &PageEntry)| *page == 0 || wanted(&parents_of(entry));
-            let own = (*first..).zip(entries.iter()).filter(test);
-            own.map(|(page, entry)| (page, Found::of(entry))).collect::<Vec<_>>()
+            let passing = (*first..).zip(entries.iter()).filter(test);
+            passing.map(|(page, entry)| (page, Summary::of(entry))).collect::<Vec<_>>()
         };
-        let found: Vec<Vec<(u32, Found)>> = runs.par_iter().map(of_run).collect();
-        for (page, own) in found.into_iter().flatten() {
-            all.add(hierarchy, page, own)?;
+        let passing: Vec<Vec<(u32, Summary)>> = runs.par_iter().map(of_run).collect();
+        for (page, summary) in passing.into_iter().flatten() {
+            all.add(hierarchy, page, summary)?;
             if all.nodes > most {
                 return Ok(false);
             }
@@ -207,8 +207,8 @@ mod tests {
             let above = entry.parent_pages.clone().map(|above| sizes[above as usize]);
             sizes.push(above.fold(entry.largest_parent_size, f32::min));
         }
-        let own = |entry: &PageEntry| cut.may_refine(&parents_of(entry));
-        let mut needed: Vec<bool> = entries.iter().map(own).collect();
+        let is_needed = |entry: &PageEntry| cut.may_refine(&parents_of(entry));
+        let mut needed: Vec<bool> = entries.iter().map(is_needed).collect();
         needed[0] = true;
         for page in (0..entries.len()).rev() {
             if needed[page] {
@@ -243,10 +243,10 @@ mod tests {
             }
             let view = camera.view([100, 60]).unwrap();
             let cut = Cut::new(&view, origin, [0.0, 0.5, 2.0, 16.0][number % 4], false);
-            let found: Vec<u32> =
-                needed(&hierarchy, &cut).unwrap().iter().map(|own| own.page).collect();
-            assert_eq!(found, of_all(&hierarchy, &cut), "{number}");
-            (least, most) = (least.min(found.len()), most.max(found.len()));
+            let pages: Vec<u32> =
+                needed(&hierarchy, &cut).unwrap().iter().map(|needed| needed.page).collect();
+            assert_eq!(pages, of_all(&hierarchy, &cut), "{number}");
+            (least, most) = (least.min(pages.len()), most.max(pages.len()));
         }
         assert!(least < 20 && most > 600, "{least} to {most}");
         let coarse = coarsest(&hierarchy, 50).unwrap();
@@ -260,6 +260,6 @@ mod tests {
             ),
         );
         assert_eq!(all.len(), hierarchy.page_count() as usize);
-        assert!(coarse.iter().map(|own| own.page).eq(all[..50].iter().copied()));
+        assert!(coarse.iter().map(|needed| needed.page).eq(all[..50].iter().copied()));
     }
 }

@@ -120,7 +120,7 @@ impl Sphere {
             (within < 1.0).then(|| at(within))
         };
         // Rounding may accept a sphere that just does not fit, or reject one that does.
-        let quick = search(&fits).filter(|found| outer.holds(found));
+        let quick = search(&fits).filter(|sphere| outer.holds(sphere));
         quick.or_else(|| search(&|part| outer.holds(&at(part)))).unwrap_or(*outer)
     }
 }
@@ -165,14 +165,14 @@ pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
         }
         let outer = if index == 0 { outer } else { Sphere::of(&nodes[parents[index] as usize]) };
         let mut levels = LEVELS_BELOW;
-        let mut own = Sphere::of(&nodes[index]);
+        let mut sphere = Sphere::of(&nodes[index]);
         if heights[index] >= FITTED_HEIGHT {
             descendants(nodes, index, levels, &mut around);
-            own = Sphere::around(&around, MANY_ROUNDS);
-        } else if outer.holds(&own) {
+            sphere = Sphere::around(&around, MANY_ROUNDS);
+        } else if outer.holds(&sphere) {
             continue;
         }
-        if !outer.holds(&own) {
+        if !outer.holds(&sphere) {
             descendants(nodes, index, levels, &mut around);
             // While descendants reach beyond the outer sphere, go one level deeper. Leaves never
             // reach beyond it.
@@ -180,15 +180,15 @@ pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
                 levels += 1;
                 descendants(nodes, index, levels, &mut around);
             }
-            let moved = own.moved_inside(&outer, &around);
+            let moved = sphere.moved_inside(&outer, &around);
             let roomy = Sphere { radius: outer.radius * ROOM, ..outer };
-            own = match () {
-                () if index > 0 || moved.radius <= MOST_WIDER * own.radius => moved,
-                () if roomy.holds(&own) => own,
-                () => own.moved_inside(&roomy, &around),
+            sphere = match () {
+                () if index > 0 || moved.radius <= MOST_WIDER * sphere.radius => moved,
+                () if roomy.holds(&sphere) => sphere,
+                () => sphere.moved_inside(&roomy, &around),
             };
         }
-        own.give(&mut nodes[index]);
+        sphere.give(&mut nodes[index]);
     }
 }
 
@@ -198,18 +198,18 @@ pub(crate) fn children_of(node: &Node) -> std::ops::Range<usize> {
 
 /// Collects the spheres of descendants `levels` levels below a node's children, or of leaves that
 /// are less deep.
-fn descendants(nodes: &[Node], index: usize, levels: u32, found: &mut Vec<Sphere>) {
-    fn walk(nodes: &[Node], index: usize, levels: u32, found: &mut Vec<Sphere>) {
+fn descendants(nodes: &[Node], index: usize, levels: u32, spheres: &mut Vec<Sphere>) {
+    fn walk(nodes: &[Node], index: usize, levels: u32, spheres: &mut Vec<Sphere>) {
         for child in children_of(&nodes[index]) {
             if levels == 0 || nodes[child].is_leaf() {
-                found.push(Sphere::of(&nodes[child]));
+                spheres.push(Sphere::of(&nodes[child]));
             } else {
-                walk(nodes, child, levels - 1, found);
+                walk(nodes, child, levels - 1, spheres);
             }
         }
     }
-    found.clear();
-    walk(nodes, index, levels, found);
+    spheres.clear();
+    walk(nodes, index, levels, spheres);
 }
 
 /// Directions in which the farthest spheres are searched: the axes of a cube, and those through its
@@ -233,12 +233,12 @@ pub(super) const DIRECTIONS: [[f32; 3]; 13] = [
 /// Returns, for each direction and its opposite, the first of the splats that are farthest in it.
 fn extremes(splats: &[Splat]) -> Vec<usize> {
     let chunks: Vec<&[Splat]> = splats.chunks(CHUNK).collect();
-    let found: Vec<[Ends; DIRECTIONS.len()]> =
+    let chunk_ends: Vec<[Ends; DIRECTIONS.len()]> =
         chunks.par_iter().map(|chunk| dispatch!(Level::new(), simd => ends(simd, chunk))).collect();
     let mut out = Vec::with_capacity(2 * DIRECTIONS.len());
     for (number, direction) in DIRECTIONS.iter().enumerate() {
         for side in [0, 1] {
-            let of = |chunk: usize| found[chunk][number][side];
+            let of = |chunk: usize| chunk_ends[chunk][number][side];
             let mut farthest = 0;
             for chunk in 1..chunks.len() {
                 if of(chunk) > of(farthest) {
@@ -264,7 +264,7 @@ type Ends = [f32; 2];
 #[inline(always)]
 fn ends<S: Simd>(simd: S, splats: &[Splat]) -> [Ends; DIRECTIONS.len()] {
     let none = f32x8::splat(simd, f32::NEG_INFINITY);
-    let mut found = [[none; 2]; DIRECTIONS.len()];
+    let mut lanes = [[none; 2]; DIRECTIONS.len()];
     let mut places = [[0.0f32; 8]; 3];
     for eight in splats.chunks(8) {
         for lane in 0..8 {
@@ -276,14 +276,14 @@ fn ends<S: Simd>(simd: S, splats: &[Splat]) -> [Ends; DIRECTIONS.len()] {
         }
         let [x, y, z]: [f32x8<S>; 3] =
             [places[0].simd_into(simd), places[1].simd_into(simd), places[2].simd_into(simd)];
-        for (ends, direction) in found.iter_mut().zip(DIRECTIONS) {
+        for (ends, direction) in lanes.iter_mut().zip(DIRECTIONS) {
             let along = x * direction[0] + y * direction[1] + z * direction[2];
             *ends = [ends[0].max(along), ends[1].max(-along)];
         }
     }
     let mut out = [[f32::NEG_INFINITY; 2]; DIRECTIONS.len()];
-    for (out, found) in out.iter_mut().zip(found) {
-        let farthest: [[f32; 8]; 2] = [found[0].into(), found[1].into()];
+    for (out, lanes) in out.iter_mut().zip(lanes) {
+        let farthest: [[f32; 8]; 2] = [lanes[0].into(), lanes[1].into()];
         *out = [0, 1].map(|side| farthest[side].iter().copied().fold(f32::NEG_INFINITY, f32::max));
     }
     out
@@ -311,8 +311,8 @@ pub(crate) fn enclosing(splats: &[Splat], extent: f32) -> Sphere {
             let variances: f32 = splat.factor.iter().map(|entry| entry * entry).sum();
             let most = Vec3::from(splat.center).distance(center) + extent * variances.sqrt();
             (f64::from(most) > around.radius).then(|| {
-                let own = sphere(splat);
-                (own.center.distance(around.center) + own.radius, own)
+                let footprint = sphere(splat);
+                (footprint.center.distance(around.center) + footprint.radius, footprint)
             })
         };
         let farther = |a: (f64, Sphere), b: (f64, Sphere)| if b.0 > a.0 { b } else { a };

@@ -123,7 +123,7 @@ impl Hierarchy {
         let set = Gaussians::from_splats(&self.leaves()?)?;
         let header = self.header();
         let mut about = set.about.clone();
-        (about.stance, about.length) = (header.stance, header.unit.clone());
+        (about.orientation, about.length) = (header.orientation, header.unit.clone());
         Ok(Some(Gaussians { degree, harmonics: pages.concat(), about, ..set }))
     }
 }
@@ -180,13 +180,13 @@ mod tests {
         let mut wanted = set.seen_from(Eye::of(&view)).splats;
         wanted.retain(|splat| splat.strength < -0.01);
         let key = |splat: &Splat| splat.center.map(f32::to_bits);
-        let mut found = cut.splats;
+        let mut drawn = cut.splats;
         wanted.sort_by_key(key);
-        found.sort_by_key(key);
-        assert_eq!(found.len(), wanted.len());
-        for (found, wanted) in found.iter().zip(&wanted) {
-            assert_eq!((found.color, found.normal), (wanted.color, wanted.normal));
-            assert!((found.strength - wanted.strength).abs() < 1e-5);
+        drawn.sort_by_key(key);
+        assert_eq!(drawn.len(), wanted.len());
+        for (drawn, wanted) in drawn.iter().zip(&wanted) {
+            assert_eq!((drawn.color, drawn.normal), (wanted.color, wanted.normal));
+            assert!((drawn.strength - wanted.strength).abs() < 1e-5);
         }
     }
 
@@ -227,7 +227,7 @@ mod tests {
                 assert!((again.opacities[index] - 0.7).abs() < 0.02);
                 assert!((again.harmonics_of(index)[2][0] - 0.3).abs() < 0.01);
             }
-            // A cut file is told, wherever it ends.
+            // A truncated file is an error, wherever it ends.
             for end in (0..bytes.len()).step_by(997) {
                 let cut = bytes[..end].to_vec();
                 assert!(Hierarchy::from_bytes(cut, name, &Limits::default()).is_err());

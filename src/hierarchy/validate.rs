@@ -89,20 +89,22 @@ impl Footprints {
     }
 
     /// Checks the stated box. Does nothing if there were no leaves.
-    pub fn check_box(&self, origin: DVec3, told: &Bounds, place: &str, findings: &mut Findings) {
+    pub fn check_box(&self, origin: DVec3, stated: &Bounds, place: &str, findings: &mut Findings) {
         if !self.low.cmple(self.high).all() {
             return;
         }
-        let found =
+        let actual =
             Bounds { min: origin + self.low.as_dvec3(), max: origin + self.high.as_dvec3() };
         let most =
-            BOX * found.diagonal().max(told.diagonal()) + BOX_OF_WIDEST * f64::from(self.widest);
-        let off = (found.min - told.min).abs().max((found.max - told.max).abs()).max_element();
+            BOX * actual.diagonal().max(stated.diagonal()) + BOX_OF_WIDEST * f64::from(self.widest);
+        let off =
+            (actual.min - stated.min).abs().max((actual.max - stated.max).abs()).max_element();
         if off > most {
-            let [low, high, told_low, told_high] = [found.min, found.max, told.min, told.max];
+            let [low, high, stated_low, stated_high] =
+                [actual.min, actual.max, stated.min, stated.max];
             let message = format!(
-                "footprints lie between {low} and {high}, but the box stated is from {told_low} to \
-                 {told_high}"
+                "footprints lie between {low} and {high}, but the box stated is from {stated_low} \
+                 to {stated_high}"
             );
             findings.push(Finding::error("bounds", place, message));
         }
@@ -152,8 +154,8 @@ pub fn check_portals(
     findings: &mut Findings,
 ) {
     let mut portal = |message: String| findings.push(Finding::error("portal", "block 0", message));
-    if let Some(own) = own_portal {
-        portal(format!("it has the portal {own}; the block that joins others must have none"));
+    if let Some(number) = own_portal {
+        portal(format!("it has the portal {number}; the block that joins others must have none"));
     }
     if roots.is_empty() {
         return;

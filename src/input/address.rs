@@ -111,8 +111,8 @@ mod tests {
         let texts =
             ["https://q/get.splk?id=1", "https://q/get.splk?id=2", "https://q/get.splk?id=3"];
         let names = texts.map(address);
-        let told = ["https://q/get.splk", "https://2@q/get.splk", "https://3@q/get.splk"];
-        assert_eq!(names.each_ref().map(|name| name.to_str()), told.map(Some));
+        let expected = ["https://q/get.splk", "https://2@q/get.splk", "https://3@q/get.splk"];
+        assert_eq!(names.each_ref().map(|name| name.to_str()), expected.map(Some));
         for (text, name) in texts.into_iter().zip(&names) {
             assert_eq!((&address(text), &address(name)), (name, name));
             #[cfg(feature = "remote")]

@@ -79,14 +79,14 @@ impl Budget {
         }
         let limit = limits.until.seconds();
         let what = "the time for all inputs together in seconds".into();
-        let (kind, found) = (LimitKind::Seconds, limit.saturating_add(1));
-        Err(Error::Limit { file: file.to_owned(), what, kind, found, limit })
+        let (kind, seconds) = (LimitKind::Seconds, limit.saturating_add(1));
+        Err(Error::Limit { file: file.to_owned(), what, kind, found: seconds, limit })
     }
 
     /// Returns the time that is left for reading.
     pub fn left(&self, limits: &Limits) -> Duration {
-        let own = Duration::from_secs(limits.seconds).saturating_sub(self.taken());
-        limits.until.left().map_or(own, |left| left.min(own))
+        let remaining = Duration::from_secs(limits.seconds).saturating_sub(self.taken());
+        limits.until.left().map_or(remaining, |left| left.min(remaining))
     }
 
     fn taken(&self) -> Duration {

@@ -72,7 +72,7 @@ impl Bytes {
                 remote.forget(0..BEGINNING.min(remote.len()));
                 begin(self)
             }
-            (_, found) => found,
+            (_, result) => result,
         }
     }
 
@@ -118,7 +118,7 @@ impl Bytes {
                 }
                 Ok(again.map_err(|message| format!("{message}, also when it is fetched again")))
             }
-            (_, found) => Ok(found),
+            (_, result) => Ok(result),
         }
     }
 
@@ -154,6 +154,6 @@ pub fn size(path: impl AsRef<Path>) -> Result<u64> {
     if is_remote(path) {
         return Remote::size(path);
     }
-    let found = path.metadata().map_err(|error| Error::file(path, "read", error))?;
-    Ok(found.len())
+    let metadata = path.metadata().map_err(|error| Error::file(path, "read", error))?;
+    Ok(metadata.len())
 }

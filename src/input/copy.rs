@@ -69,10 +69,10 @@ pub(crate) fn float(word: &[u8]) -> Option<f64> {
             (b"1.#inf", f64::INFINITY),
         ];
         let rest = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word);
-        let found = WORDS.iter().find(|(start, _)| {
-            rest.get(..start.len()).is_some_and(|own| own.eq_ignore_ascii_case(start))
+        let entry = WORDS.iter().find(|(start, _)| {
+            rest.get(..start.len()).is_some_and(|head| head.eq_ignore_ascii_case(start))
         });
-        found.map(|(_, value)| *value)
+        entry.map(|(_, value)| *value)
     })
 }
 

@@ -59,9 +59,9 @@ pub(crate) fn isolated_in_time<T: Send + 'static>(
     decode: impl FnOnce() -> Result<T, String> + Send + 'static,
 ) -> Result<T> {
     source.check_time()?;
-    let told = |decoded: Result<T, String>| decoded.map_err(|text| source.error(place, text));
+    let located = |decoded: Result<T, String>| decoded.map_err(|text| source.error(place, text));
     if !long {
-        return isolated(source, place, || told(decode()));
+        return isolated(source, place, || located(decode()));
     }
     hush();
     let (sender, receiver) = mpsc::channel();
@@ -79,13 +79,13 @@ pub(crate) fn isolated_in_time<T: Send + 'static>(
         sender.send(decoded.unwrap_or_else(|panic| Err(text_of(&*panic)))).ok();
     });
     if started.is_err() {
-        return isolated(source, place, || told(take(&decode)()));
+        return isolated(source, place, || located(take(&decode)()));
     }
     loop {
         match receiver.recv_timeout(source.time_left()) {
-            Ok(decoded) => return told(decoded),
+            Ok(decoded) => return located(decoded),
             Err(RecvTimeoutError::Timeout) => source.check_time()?,
-            Err(RecvTimeoutError::Disconnected) => return told(Err(text_of(&()))),
+            Err(RecvTimeoutError::Disconnected) => return located(Err(text_of(&()))),
         }
     }
 }

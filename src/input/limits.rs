@@ -70,19 +70,19 @@ impl Limits {
         }
     }
 
-    /// Returns an error if `found` exceeds the limit of this kind. `what` names the quantity in the
+    /// Returns an error if `value` exceeds the limit of this kind. `what` names the quantity in the
     /// error.
     pub(crate) fn check(
         &self,
         kind: LimitKind,
         file: &Path,
         what: impl Into<String>,
-        found: u64,
+        value: u64,
     ) -> Result<()> {
         let limit = self.of(kind);
-        if found <= limit {
+        if value <= limit {
             return Ok(());
         }
-        Err(Error::Limit { file: file.to_owned(), what: what.into(), kind, found, limit })
+        Err(Error::Limit { file: file.to_owned(), what: what.into(), kind, found: value, limit })
     }
 }

@@ -12,8 +12,8 @@ impl Source<'_> {
     /// model that loads on one machine loads on every other.
     pub fn neighbour(&self, place: &str, reference: &str) -> Result<PathBuf> {
         let refuse = |reason: &str| {
-            let shown: String = reference.chars().take(80).collect();
-            self.error(place, format!("refers to “{shown}”, {reason}")).hint(
+            let excerpt: String = reference.chars().take(80).collect();
+            self.error(place, format!("refers to “{excerpt}”, {reason}")).hint(
                 "put the file beside the one that names it and refer to it by a relative path",
             )
         };
@@ -39,7 +39,7 @@ impl Source<'_> {
         if !real.starts_with(&home) {
             return Err(refuse("a link that leaves the file's own folder"));
         }
-        if self.path.canonicalize().is_ok_and(|own| own == real) {
+        if self.path.canonicalize().is_ok_and(|path| path == real) {
             return Err(refuse("the file itself"));
         }
         if !real.is_file() {

@@ -25,13 +25,13 @@ pub(crate) fn settle_some(
     let (mut low, mut high) = none;
     for rows in batches(count) {
         source.check_time()?;
-        let found = rows
+        let bounds = rows
             .into_par_iter()
             .map(&position)
             .filter(|position| position.is_finite())
             .map(|position| (position, position))
             .reduce(|| none, both);
-        (low, high) = both((low, high), found);
+        (low, high) = both((low, high), bounds);
     }
     if count == 0 {
         return Ok((DVec3::ZERO, Vec::new()));
@@ -42,10 +42,10 @@ pub(crate) fn settle_some(
             format!("none of the {count} points has coordinates that are finite numbers"),
         ));
     }
-    let step = count.div_ceil(LOOKS);
-    let looks = (0..count).step_by(step).map(&position);
-    let looks: Vec<DVec3> = looks.filter(|position| position.is_finite()).collect();
-    let origin = origin(source, [low, high], &looks)?;
+    let step = count.div_ceil(MOST_SAMPLED);
+    let sampled = (0..count).step_by(step).map(&position);
+    let sampled: Vec<DVec3> = sampled.filter(|position| position.is_finite()).collect();
+    let origin = origin(source, [low, high], &sampled)?;
     let relative = |row| match position(row) {
         position if position.is_finite() => (position - origin).as_vec3(),
         _ => Vec3::NAN,
@@ -101,15 +101,15 @@ pub(crate) fn settle(
         if let Some(row) = bad {
             return Err(not_finite(source, place(row), position(row)));
         }
-        let found = rows
+        let bounds = rows
             .into_par_iter()
             .map(|row| (position(row), position(row)))
             .reduce(|| (start, start), both);
-        (low, high) = both((low, high), found);
+        (low, high) = both((low, high), bounds);
     }
-    let step = count.div_ceil(LOOKS);
-    let looks: Vec<DVec3> = (0..count).step_by(step).map(&position).collect();
-    let origin = origin(source, [low, high], &looks)?;
+    let step = count.div_ceil(MOST_SAMPLED);
+    let sampled: Vec<DVec3> = (0..count).step_by(step).map(&position).collect();
+    let origin = origin(source, [low, high], &sampled)?;
     Ok((origin, collected(source, count, |row| (position(row) - origin).as_vec3())?))
 }
 
@@ -118,13 +118,13 @@ pub(crate) fn settle(
 ///
 /// If nine tenths of these lie together in a box a hundredth as large as the whole along each axis,
 /// or smaller, that box decides. One point far away must not take the precision of the others.
-pub(crate) fn origin(source: &Source, [low, high]: [DVec3; 2], looks: &[DVec3]) -> Result<DVec3> {
+pub(crate) fn origin(source: &Source, [low, high]: [DVec3; 2], sampled: &[DVec3]) -> Result<DVec3> {
     let around = |[low, high]: [DVec3; 2]| {
         let center = low * 0.5 + high * 0.5;
         let is_far = center.abs().max_element() > 16.0 * half([low, high]);
         if is_far { center.round() } else { DVec3::ZERO }
     };
-    let usual = usual(looks).filter(|_| are_crowded(looks, [low, high]));
+    let usual = usual(sampled).filter(|_| are_crowded(sampled, [low, high]));
     let origin = around(usual.unwrap_or([low, high]));
     if (low - origin).abs().max((high - origin).abs()).max_element() > LARGEST {
         return Err(source.error(
@@ -140,8 +140,8 @@ pub(crate) fn origin(source: &Source, [low, high]: [DVec3; 2], looks: &[DVec3]) 
 }
 
 /// Returns whether nine tenths of some positions lie in a box a hundredth as large as the whole.
-pub(crate) fn are_crowded(looks: &[DVec3], whole: [DVec3; 2]) -> bool {
-    usual(looks).is_some_and(|usual| 100.0 * half(usual) < half(whole))
+pub(crate) fn are_crowded(sampled: &[DVec3], whole: [DVec3; 2]) -> bool {
+    usual(sampled).is_some_and(|usual| 100.0 * half(usual) < half(whole))
 }
 
 /// Returns half of the longest side of a box.
@@ -150,20 +150,20 @@ fn half([low, high]: [DVec3; 2]) -> f64 {
 }
 
 /// Positions that are looked at for an origin, and how few say nothing about the others.
-pub(crate) const LOOKS: usize = 1 << 14;
+pub(crate) const MOST_SAMPLED: usize = 1 << 14;
 const FEWEST: usize = 20;
 
 /// Returns the box between the 5th and the 95th percentile along each axis.
-fn usual(looks: &[DVec3]) -> Option<[DVec3; 2]> {
-    if looks.len() < FEWEST {
+fn usual(sampled: &[DVec3]) -> Option<[DVec3; 2]> {
+    if sampled.len() < FEWEST {
         return None;
     }
-    let cut = looks.len() / 20;
+    let cut = sampled.len() / 20;
     let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
     for axis in 0..3 {
-        let mut along: Vec<f64> = looks.iter().map(|place| place[axis]).collect();
+        let mut along: Vec<f64> = sampled.iter().map(|place| place[axis]).collect();
         let mut at = |index: usize| *along.select_nth_unstable_by(index, f64::total_cmp).1;
-        (low[axis], high[axis]) = (at(cut), at(looks.len() - 1 - cut));
+        (low[axis], high[axis]) = (at(cut), at(sampled.len() - 1 - cut));
     }
     Some([low, high])
 }
@@ -200,8 +200,8 @@ mod tests {
             let (origin, places) = settled(Some(stray));
             assert!(origin.distance(at(0)) < 10.0, "{origin}");
             assert_eq!(places.len(), all.len());
-            let found = origin + places[7].as_dvec3();
-            assert!(found.distance(at(7)) < 1e-5, "{found}");
+            let position = origin + places[7].as_dvec3();
+            assert!(position.distance(at(7)) < 1e-5, "{position}");
             assert!((origin + places[stray].as_dvec3()).length() < 1.0);
         }
         // Two parts that are both substantial lie around the usual origin.

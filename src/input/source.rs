@@ -240,10 +240,10 @@ impl<'a> Source<'a> {
         Ok(self.text.get_or_init(|| text))
     }
 
-    /// Returns `found`, the result of reading, unless the file has changed meanwhile. Then it
+    /// Returns `result`, which reading gave, unless the file has changed meanwhile. Then it
     /// returns only the error that says so.
-    pub(crate) fn unless_changed<T>(&self, found: Result<T>) -> Result<T> {
-        self.intact().and(found)
+    pub(crate) fn unless_changed<T>(&self, result: Result<T>) -> Result<T> {
+        self.intact().and(result)
     }
 
     /// See [`Mapping::release`].
@@ -342,11 +342,11 @@ impl<'a> Source<'a> {
         )
     }
 
-    fn check(&self, kind: LimitKind, what: &str, found: u64) -> Result<usize> {
-        self.limits.check(kind, self.path, what, found)?;
+    fn check(&self, kind: LimitKind, what: &str, value: u64) -> Result<usize> {
+        self.limits.check(kind, self.path, what, value)?;
         // A 32-bit `usize` may be smaller than a limit.
-        usize::try_from(found)
-            .map_err(|_| self.error(what, format!("is {found}, more than this machine can count")))
+        usize::try_from(value)
+            .map_err(|_| self.error(what, format!("is {value}, more than this machine can count")))
     }
 
     /// Unpacks a stream whose unpacked size is known. A stream that ends early or holds more than
@@ -370,10 +370,12 @@ impl<'a> Source<'a> {
             }
         }
         if out.len() != expected {
-            let found =
+            let length =
                 if out.len() > expected { "too many".to_owned() } else { out.len().to_string() };
-            return Err(self
-                .error(place, format!("unpacks to {found} bytes where {expected} were expected")));
+            return Err(self.error(
+                place,
+                format!("unpacks to {length} bytes where {expected} were expected"),
+            ));
         }
         Ok(out)
     }
@@ -404,7 +406,7 @@ fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> 
     }
     // Opening a pipe would wait for its other end, and opening a device may start it. So check the
     // type before opening.
-    let look = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;
+    let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;
     let regular = |meta: &std::fs::Metadata| {
         if meta.is_file() {
             Ok(())
@@ -412,7 +414,7 @@ fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> 
             Err(Error::input(path, "path", "is not a regular file"))
         }
     };
-    regular(&look)?;
+    regular(&metadata)?;
     let file = File::open(path).map_err(|e| Error::file(path, "open", e))?;
     let meta = file.metadata().map_err(|e| Error::file(path, "read", e))?;
     regular(&meta)?;

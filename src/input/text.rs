@@ -273,9 +273,9 @@ fn parsed(
             f64::NAN
         }
         None => {
-            let shown = copy::excerpt(word);
-            let error = source.error(place(), format!("“{shown}” is not a number"));
-            let has_comma = shown.contains(',');
+            let excerpt = copy::excerpt(word);
+            let error = source.error(place(), format!("“{excerpt}” is not a number"));
+            let has_comma = excerpt.contains(',');
             let hint = "write numbers with a decimal point, not a comma";
             return Err(if has_comma { error.hint(hint) } else { error });
         }

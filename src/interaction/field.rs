@@ -57,9 +57,10 @@ impl<'a> Field<'a> {
     fn nearest_to(&self, steps: DVec3) -> Option<f64> {
         let dims = self.volume.lattice.dims;
         let mut index = [0; 3];
-        for (axis, own) in index.iter_mut().enumerate() {
+        for (axis, coordinate) in index.iter_mut().enumerate() {
             let nearest = (steps[axis] + 0.5).floor();
-            *own = (0.0..dims[axis] as f64).contains(&nearest).then_some(nearest as usize)?;
+            *coordinate =
+                (0.0..dims[axis] as f64).contains(&nearest).then_some(nearest as usize)?;
         }
         Some(self.volume.value(index[0] + dims[0] * (index[1] + dims[1] * index[2])))
     }
@@ -91,9 +92,9 @@ impl<'a> Field<'a> {
 pub fn check(volume: &Volume) -> Result<()> {
     volume.lattice.validate()?;
     let drawn = volume.coefficients.as_ref().map(|drawn| (drawn.values.len(), drawn.lattice.len()));
-    for (found, expected) in [(volume.len(), volume.lattice.len())].into_iter().chain(drawn) {
-        if found != expected {
-            let message = format!("{found} samples do not fill a lattice of {expected}");
+    for (count, expected) in [(volume.len(), volume.lattice.len())].into_iter().chain(drawn) {
+        if count != expected {
+            let message = format!("{count} samples do not fill a lattice of {expected}");
             return Err(Error::Argument(message));
         }
     }

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 use std::ops::Range;
 
 /// At most about so many samples are counted: of more, every second, third, … one along each axis.
-const LOOKS: usize = 1 << 24;
+const MOST_SAMPLES: usize = 1 << 24;
 /// Of so many samples the percentile of the gradient's magnitude is taken.
 const FEW: usize = 1 << 20;
 /// The share of the magnitudes that the joint histogram leaves out at its upper end.
@@ -98,13 +98,13 @@ impl Histogram {
     }
 
     fn of_values(count: usize, range: [f64; 2], value: impl Fn(usize) -> f64 + Sync) -> Self {
-        let step = count.div_ceil(LOOKS).max(1);
-        let looks = count.div_ceil(step);
+        let step = count.div_ceil(MOST_SAMPLES).max(1);
+        let samples = count.div_ceil(step);
         in_parts(
-            looks,
+            samples,
             || Self::empty(range, None),
-            |histogram, look| {
-                histogram.add(value(look * step));
+            |histogram, sample| {
+                histogram.add(value(sample * step));
             },
         )
     }
@@ -118,12 +118,12 @@ impl Histogram {
     fn of_lattice(lattice: &Lattice, range: [f64; 2], value: impl Fn(usize) -> f64 + Sync) -> Self {
         let slopes = Slopes::new(lattice, value);
         let magnitude = slopes.steepest();
-        let looks = Looks::new(lattice.dims, LOOKS);
-        let rows = looks.counts[1] * looks.counts[2];
+        let grid = Grid::new(lattice.dims, MOST_SAMPLES);
+        let rows = grid.counts[1] * grid.counts[2];
         let start = || Self::empty(range, Some(magnitude));
         in_parts(rows, start, |histogram, row| {
-            for number in 0..looks.counts[0] {
-                let index = looks.index(row * looks.counts[0] + number);
+            for number in 0..grid.counts[0] {
+                let index = grid.index(row * grid.counts[0] + number);
                 let value = slopes.value(index);
                 if let (Some(bin), Some(joint)) = (histogram.add(value), &mut histogram.joint) {
                     joint.add(bin, slopes.magnitude(index));
@@ -159,7 +159,7 @@ impl Histogram {
 
 /// Returns the finest level that can be read quickly as a whole, or the coarsest level.
 fn overview(bricks: &Bricks) -> usize {
-    let is_quick = |level: &Level| level.dims.iter().product::<usize>() <= LOOKS;
+    let is_quick = |level: &Level| level.dims.iter().product::<usize>() <= MOST_SAMPLES;
     bricks.levels().iter().position(is_quick).unwrap_or(bricks.levels().len() - 1)
 }
 
@@ -182,12 +182,12 @@ fn in_parts(
 }
 
 /// Samples that are evenly spread over a lattice, ends included.
-struct Looks {
+struct Grid {
     dims: [usize; 3],
     counts: [usize; 3],
 }
 
-impl Looks {
+impl Grid {
     fn new(dims: [usize; 3], most: usize) -> Self {
         // Both ends of an axis are looked at.
         let counts = |step: usize| dims.map(|n| n.div_ceil(step).max(n.min(2)));
@@ -252,12 +252,12 @@ impl<'a, F: Fn(usize) -> f64 + Sync> Slopes<'a, F> {
 
     /// Returns the magnitude that [`STEEPEST`] of the samples exceed.
     fn steepest(&self) -> f64 {
-        let looks = Looks::new(self.lattice.dims, FEW);
-        let all = (0..looks.len()).into_par_iter().map(|look| self.magnitude(looks.index(look)));
-        let mut found: Vec<f64> = all.filter(|magnitude| magnitude.is_finite()).collect();
-        let Some(last) = found.len().checked_sub(1) else { return 0.0 };
-        let rank = last - (STEEPEST * found.len() as f64) as usize;
-        *found.select_nth_unstable_by(rank, f64::total_cmp).1
+        let grid = Grid::new(self.lattice.dims, FEW);
+        let all = (0..grid.len()).into_par_iter().map(|number| self.magnitude(grid.index(number)));
+        let mut magnitudes: Vec<f64> = all.filter(|magnitude| magnitude.is_finite()).collect();
+        let Some(last) = magnitudes.len().checked_sub(1) else { return 0.0 };
+        let rank = last - (STEEPEST * magnitudes.len() as f64) as usize;
+        *magnitudes.select_nth_unstable_by(rank, f64::total_cmp).1
     }
 }
 
@@ -271,12 +271,12 @@ mod tests {
     };
     use std::sync::Arc;
 
-    fn shown() -> TransferFunction {
+    fn transfer() -> TransferFunction {
         TransferFunction { opacity: vec![(0.0, 0.5)], ..TransferFunction::default() }
     }
 
     fn of(volume: Volume) -> Histogram {
-        let item = Item::Volume(Arc::new(volume), Kernel::default(), shown());
+        let item = Item::Volume(Arc::new(volume), Kernel::default(), transfer());
         Histogram::of_item(&item).unwrap()
     }
 
@@ -297,8 +297,8 @@ mod tests {
         let histogram = of(Volume::new(lattice, Samples::U8(values)).unwrap());
         assert_eq!(histogram.range, [0.0, 255.0]);
         assert_eq!(histogram.counts.len(), Histogram::BINS);
-        let found = [0, 1, 2, 128, 255].map(|bin| histogram.counts[bin]);
-        assert_eq!((found, histogram.counts.iter().sum::<u64>()), ([3, 1, 1, 1, 2], 8));
+        let counts = [0, 1, 2, 128, 255].map(|bin| histogram.counts[bin]);
+        assert_eq!((counts, histogram.counts.iter().sum::<u64>()), ([3, 1, 1, 1, 2], 8));
         let phantom = Phantom::Specimen.sample_bytes([40, 30, 20]).unwrap();
         let expected = phantom.histogram(Histogram::BINS).unwrap();
         assert_eq!(of(phantom).counts, expected);
@@ -345,12 +345,12 @@ mod tests {
 
     #[test]
     fn large_volumes_are_looked_at_evenly() {
-        let looks = Looks::new([1000, 7, 900], 10_000);
-        assert!(looks.len() <= 10_000 && looks.len() > 2000, "{}", looks.len());
-        assert!(Looks::new([100_000, 100_000, 1], 10_000).len() <= 10_000);
-        assert_eq!(looks.index(0), [0; 3]);
-        assert_eq!(looks.index(looks.len() - 1), [999, 6, 899]);
-        let all = Looks::new([3, 4, 5], 10_000);
+        let grid = Grid::new([1000, 7, 900], 10_000);
+        assert!(grid.len() <= 10_000 && grid.len() > 2000, "{}", grid.len());
+        assert!(Grid::new([100_000, 100_000, 1], 10_000).len() <= 10_000);
+        assert_eq!(grid.index(0), [0; 3]);
+        assert_eq!(grid.index(grid.len() - 1), [999, 6, 899]);
+        let all = Grid::new([3, 4, 5], 10_000);
         let lattice = Lattice::with_spacing([3, 4, 5], DVec3::ONE);
         assert!((0..60).all(|at| all.index(at) == lattice.index(at)));
     }
@@ -359,7 +359,7 @@ mod tests {
     fn fields_without_a_lattice_have_no_joint_counts() {
         let volume = Phantom::Ball.sample_bytes([16; 3]).unwrap();
         let bricks = Bricks::from_volume(Arc::new(volume.clone())).unwrap();
-        let item = Item::Bricks(Arc::new(bricks), Kernel::default(), shown());
+        let item = Item::Bricks(Arc::new(bricks), Kernel::default(), transfer());
         let expected = of(volume.clone());
         assert_eq!(Histogram::of_item(&item), Some(expected.clone()));
         let splat = |at| {
@@ -374,7 +374,7 @@ mod tests {
             extent: 3.0,
             overlap: 1.0,
         };
-        let scene = Scene::new().with_samples(set, shown());
+        let scene = Scene::new().with_samples(set, transfer());
         let histogram = Histogram::of_item(&scene.items[0]).unwrap();
         assert_eq!((histogram.counts, histogram.joint), (expected.counts, None));
     }

@@ -71,30 +71,30 @@ pub struct Pace {
     factor: f64,
     /// The least factor for now, because a smaller one was too slow.
     least: f64,
-    /// What is shown of the current view.
-    shown: Option<Effort>,
+    /// The effort of the last frame of the current view.
+    last: Option<Effort>,
 }
 
 impl Pace {
     /// A pace that keeps moving frames within a time in milliseconds.
     pub fn new(wanted: f64) -> Self {
         // The first frame is coarse. If it was faster than wanted, the next ones are finer.
-        Self { wanted: wanted.max(1.0), factor: 16.0, least: 1.0, shown: None }
+        Self { wanted: wanted.max(1.0), factor: 16.0, least: 1.0, last: None }
     }
 
-    /// Something changed: what is shown is no longer the current view.
+    /// Something changed: the last frame no longer shows the current view.
     pub fn changed(&mut self) {
-        self.shown = None;
+        self.last = None;
     }
 
     /// Returns the effort of the next frame. `None`: the exact picture is shown.
     pub fn next(&self) -> Option<Effort> {
-        match self.shown {
+        match self.last {
             None => Some(Effort::faster(self.factor)),
             Some(Effort::EXACT) => None,
-            // Finer in every respect than what is shown.
-            Some(shown) => {
-                let pixel = shown.pixel / FINER;
+            // Finer in every respect than the last frame.
+            Some(last) => {
+                let pixel = last.pixel / FINER;
                 Some(if pixel < FINER.sqrt() {
                     Effort::EXACT
                 } else {
@@ -106,7 +106,7 @@ impl Pace {
 
     /// Records a frame of the current view, and the time it took in milliseconds.
     pub fn took(&mut self, effort: Effort, milliseconds: f64) {
-        if self.shown.is_none() {
+        if self.last.is_none() {
             let share = milliseconds / self.wanted;
             self.least = (self.least * FORGOTTEN).max(1.0);
             if share > TOO_SLOW {
@@ -119,7 +119,7 @@ impl Pace {
                 self.factor = (self.factor * change).clamp(self.least.min(most), most);
             }
         }
-        self.shown = Some(effort);
+        self.last = Some(effort);
     }
 }
 

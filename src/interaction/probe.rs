@@ -114,9 +114,9 @@ impl<'a> Probe<'a> {
     /// The picture may have fewer pixels than the view, as a coarse one that is shown meanwhile.
     pub fn picked(picture: &Picture, view: &View, pixel: DVec2) -> Option<DVec3> {
         let size = DVec2::from_array(view.size.map(f64::from));
-        let own = [picture.width, picture.height];
-        let place = pixel / size * DVec2::from_array(own.map(f64::from));
-        let inside = |axis: usize| place[axis] >= 0.0 && place[axis] < f64::from(own[axis]);
+        let dims = [picture.width, picture.height];
+        let place = pixel / size * DVec2::from_array(dims.map(f64::from));
+        let inside = |axis: usize| place[axis] >= 0.0 && place[axis] < f64::from(dims[axis]);
         if !(inside(0) && inside(1)) {
             return None;
         }

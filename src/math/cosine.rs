@@ -154,7 +154,7 @@ mod tests {
                             .sum::<f64>();
                     }
                 });
-                for (index, found) in filtered.into_iter().enumerate() {
+                for (index, value) in filtered.into_iter().enumerate() {
                     let place =
                         [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]];
                     let expected: f64 = (-2..=2isize)
@@ -165,7 +165,7 @@ mod tests {
                         })
                         .sum();
                     assert!(
-                        (found - expected).abs() < 1e-12,
+                        (value - expected).abs() < 1e-12,
                         "{dims:?}, axis {axis}, sample {index}"
                     );
                 }

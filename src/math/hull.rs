@@ -60,20 +60,21 @@ pub(crate) fn outermost(points: &[Vec3]) -> Vec<u32> {
         .filter(|ends| ends[0] < ends[1])
         .map(|ends| Cell::of(points, &order, ends[0]..ends[1]))
         .collect();
-    let mut found: Vec<u32> = (0..DIRECTIONS)
+    let mut indices: Vec<u32> = (0..DIRECTIONS)
         .into_par_iter()
         .filter_map(|number| farthest(points, &order, &cells, direction(number)))
         .collect();
-    found.sort_unstable();
-    found.dedup();
-    found
+    indices.sort_unstable();
+    indices.dedup();
+    indices
 }
 
 impl Cell {
     fn of(points: &[Vec3], order: &[u32], range: std::ops::Range<usize>) -> Self {
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        let own = order[range.clone()].iter().map(|&index| points[index as usize]);
-        let (low, high) = own.fold(none, |(low, high), point| (low.min(point), high.max(point)));
+        let members = order[range.clone()].iter().map(|&index| points[index as usize]);
+        let (low, high) =
+            members.fold(none, |(low, high), point| (low.min(point), high.max(point)));
         Self { center: 0.5 * (low + high), half: 0.5 * (high - low), points: range }
     }
 }
@@ -139,7 +140,7 @@ const BACKGROUND: [f64; 2] = [0.2, 1.5];
 const WIDENED: f32 = 10.0;
 
 /// Points that percentiles are taken of. Of fewer than the least, none is a stray by its share.
-const LOOKS: usize = 1 << 16;
+const SAMPLED: usize = 1 << 16;
 const FEWEST: usize = 100;
 
 /// Returns the corners of a box that contains nearly all points. Left out are up to a thousandth on
@@ -155,8 +156,8 @@ pub(crate) fn without_strays(points: &[Vec3], kind: Kind) -> Option<[Vec3; 2]> {
     if points.len() < FEWEST {
         return Some(kept);
     }
-    let step = points.len().div_ceil(LOOKS);
-    let looks: Vec<Vec3> = points.iter().step_by(step).copied().collect();
+    let step = points.len().div_ceil(SAMPLED);
+    let sampled: Vec<Vec3> = points.iter().step_by(step).copied().collect();
     let mut keep = |[low, high]: [Vec3; 2], diagonals: f32| {
         let slack = diagonals * low.distance(high);
         if slack > 0.0 {
@@ -164,12 +165,12 @@ pub(crate) fn without_strays(points: &[Vec3], kind: Kind) -> Option<[Vec3; 2]> {
         }
     };
     for &[share, diagonals] in kind.strays() {
-        keep(percentiles(&looks, share), diagonals as f32);
+        keep(percentiles(&sampled, share), diagonals as f32);
     }
     let [share, diagonals] = BACKGROUND;
     if kind == Kind::Trained {
-        let core = percentiles(&looks, share);
-        if is_surrounded(&looks, core, diagonals as f32) {
+        let core = percentiles(&sampled, share);
+        if is_surrounded(&sampled, core, diagonals as f32) {
             keep(core, diagonals as f32);
         }
     }
@@ -327,14 +328,14 @@ mod tests {
         let mut points: Vec<Vec3> =
             (0..5000).map(|_| Vec3::new(random(), 3.0 * random(), 0.2 * random())).collect();
         points.push(Vec3::NAN);
-        let found = outermost(&points);
-        assert!(found.len() > 20 && found.len() < DIRECTIONS, "{}", found.len());
+        let indices = outermost(&points);
+        assert!(indices.len() > 20 && indices.len() < DIRECTIONS, "{}", indices.len());
         for number in 0..DIRECTIONS {
             let along = |point: &Vec3| point.dot(direction(number));
             let most = |most: f32, along: f32| if along > most { along } else { most };
             let expected = points.iter().map(along).fold(f32::NEG_INFINITY, most);
-            let own = found.iter().map(|&index| along(&points[index as usize]));
-            assert_eq!(own.fold(f32::NEG_INFINITY, most), expected);
+            let distances = indices.iter().map(|&index| along(&points[index as usize]));
+            assert_eq!(distances.fold(f32::NEG_INFINITY, most), expected);
         }
         assert!(outermost(&[]).is_empty());
         assert_eq!(outermost(&[Vec3::ONE; 3]), [0]);

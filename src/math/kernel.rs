@@ -159,9 +159,9 @@ impl Kernel {
             Profile::Gaussian(sigma) => Self::gaussian(*sigma, self.extent),
             Profile::Table(values) => Self::table(values.to_vec(), self.extent),
             Profile::Tensor(tensor) if self.extent != tensor.extent() => {
-                let (name, own, found) = (tensor.name(), tensor.extent(), self.extent);
+                let (name, expected, extent) = (tensor.name(), tensor.extent(), self.extent);
                 Err(Error::Argument(format!(
-                    "the extent of the kernel {name} is {own} samples, found {found}"
+                    "the extent of the kernel {name} is {expected} samples, found {extent}"
                 )))
             }
             profile => Self::with_extent(profile.clone(), self.extent),
@@ -364,17 +364,18 @@ mod tests {
         for tensor in Tensor::ALL {
             for step in 0..=64 {
                 let t = f64::from(step) / 64.0;
-                let own = tensor.polynomials().map(|[a, b, c, d]| ((d * t + c) * t + b) * t + a);
+                let weights =
+                    tensor.polynomials().map(|[a, b, c, d]| ((d * t + c) * t + b) * t + a);
                 let by_value = [t + 1.0, t, t - 1.0, t - 2.0].map(|x| tensor.value(x));
                 assert!(
-                    (own.iter().sum::<f64>() - 1.0).abs() < 1e-15,
-                    "{tensor:?} at {t}: {own:?}"
+                    (weights.iter().sum::<f64>() - 1.0).abs() < 1e-15,
+                    "{tensor:?} at {t}: {weights:?}"
                 );
-                for (own, value) in own.iter().zip(by_value) {
-                    assert!((own - value).abs() < 1e-15, "{tensor:?} at {t}: {own} {value}");
+                for (weight, value) in weights.iter().zip(by_value) {
+                    assert!((weight - value).abs() < 1e-15, "{tensor:?} at {t}: {weight} {value}");
                 }
                 assert!(
-                    own.iter().map(|weight| weight.abs()).sum::<f64>().powi(3)
+                    weights.iter().map(|weight| weight.abs()).sum::<f64>().powi(3)
                         <= tensor.lebesgue() + 1e-12
                 );
             }
@@ -432,7 +433,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_kernels_are_told() {
+    fn impossible_kernels_are_refused() {
         let message = |kernel: Result<Kernel>| kernel.unwrap_err().to_string();
         assert!(message(Kernel::gaussian(0.0, 2.0)).contains("sigma above 0"));
         assert!(message(Kernel::gaussian(f64::NAN, 2.0)).contains("sigma above 0"));

@@ -55,8 +55,8 @@ impl<'a> Neighbours<'a> {
     pub fn distance(&self, at: Vec3) -> f64 {
         let at = turned(at);
         let query = self.tree.query(&at);
-        let found = query.nearest_n::<SquaredEuclidean<f64>>(NonZero::<usize>::MIN).execute();
-        found.iter().map(|found| found.distance.sqrt() / SCALE).fold(f64::INFINITY, f64::min)
+        let nearest = query.nearest_n::<SquaredEuclidean<f64>>(NonZero::<usize>::MIN).execute();
+        nearest.iter().map(|point| point.distance.sqrt() / SCALE).fold(f64::INFINITY, f64::min)
     }
 
     /// Returns distance and index of the `count` points nearest to point `index`, which is
@@ -64,9 +64,9 @@ impl<'a> Neighbours<'a> {
     pub fn of(&self, index: u32, count: usize) -> Vec<(f32, u32)> {
         let at = turned(self.points[index as usize]);
         let wanted = NonZero::<usize>::MIN.saturating_add(count);
-        let found = self.tree.query(&at).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
-        let others = found.iter().filter(|found| found.item != index).take(count);
-        others.map(|found| ((found.distance.sqrt() / SCALE) as f32, found.item)).collect()
+        let nearest = self.tree.query(&at).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
+        let others = nearest.iter().filter(|point| point.item != index).take(count);
+        others.map(|point| ((point.distance.sqrt() / SCALE) as f32, point.item)).collect()
     }
 }
 
@@ -87,18 +87,21 @@ mod tests {
                 points.iter().map(|p| p.as_dvec3().distance(points[index].as_dvec3())).collect();
             all.sort_by(f64::total_cmp);
             for count in [1, 4, 16, 64] {
-                let found = tree.of(index as u32, count);
-                assert_eq!(found.len(), count.min(points.len() - 1));
-                for (&(distance, neighbour), &expected) in found.iter().zip(&all[1..]) {
+                let neighbours = tree.of(index as u32, count);
+                assert_eq!(neighbours.len(), count.min(points.len() - 1));
+                for (&(distance, neighbour), &expected) in neighbours.iter().zip(&all[1..]) {
                     assert!(
                         (f64::from(distance) - expected).abs() <= 1e-6 * expected,
                         "{distance} for {expected}"
                     );
-                    let own = points[neighbour as usize].distance(points[index]);
-                    assert!((distance - own).abs() <= 1e-6 * own, "{distance} to a point at {own}");
+                    let exact = points[neighbour as usize].distance(points[index]);
+                    assert!(
+                        (distance - exact).abs() <= 1e-6 * exact,
+                        "{distance} to a point at {exact}"
+                    );
                 }
                 let mut indices: Vec<u32> =
-                    found.iter().map(|&(_, index)| index).chain([index as u32]).collect();
+                    neighbours.iter().map(|&(_, index)| index).chain([index as u32]).collect();
                 indices.sort_unstable();
                 assert!(indices.array_windows().all(|[a, b]| a < b), "{indices:?}");
             }
@@ -161,9 +164,9 @@ mod tests {
         let points = vec![Vec3::ONE; 5000];
         let tree = Neighbours::new(&points);
         for index in 0..5000 {
-            let found = tree.of(index, 8);
-            assert_eq!(found.len(), 8);
-            assert!(found.iter().all(|&(distance, other)| distance == 0.0 && other != index));
+            let neighbours = tree.of(index, 8);
+            assert_eq!(neighbours.len(), 8);
+            assert!(neighbours.iter().all(|&(distance, other)| distance == 0.0 && other != index));
         }
     }
 
@@ -173,12 +176,12 @@ mod tests {
         let ask = || {
             let tree = Neighbours::new(&points);
             let order = tree.order();
-            let found: Vec<_> = order.par_iter().map(|&index| tree.of(index, 10)).collect();
-            (order, found)
+            let neighbours: Vec<_> = order.par_iter().map(|&index| tree.of(index, 10)).collect();
+            (order, neighbours)
         };
-        let (mut order, found) = ask();
+        let (mut order, neighbours) = ask();
         let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        assert!(alone.install(ask) == (order.clone(), found));
+        assert!(alone.install(ask) == (order.clone(), neighbours));
         order.sort_unstable();
         assert!(order.iter().copied().eq(0..64_000));
     }

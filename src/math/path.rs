@@ -201,8 +201,8 @@ impl CameraPath {
     fn parse(text: &str) -> Result<Self, String> {
         let document: Document = serde_json::from_str(text).map_err(|e| e.to_string())?;
         if document.splatkit_path != VERSION {
-            let found = document.splatkit_path;
-            return Err(format!("the version is {found}, but only version {VERSION} is known"));
+            let version = document.splatkit_path;
+            return Err(format!("the version is {version}, but only version {VERSION} is known"));
         }
         let keyframe = |(number, TimedCamera { time, camera }): (usize, TimedCamera)| {
             let projection = match (camera.view_angle, camera.height) {
@@ -433,8 +433,8 @@ mod tests {
             let (time, camera) = (keyframe.time, &keyframe.camera);
             assert_eq!(path.at(time), *camera);
             for step in [-1e-7, 1e-7] {
-                let found = apart(&path.at(time + step), camera);
-                assert!(found < 1e-4, "{time} {step}: {found}");
+                let distance = apart(&path.at(time + step), camera);
+                assert!(distance < 1e-4, "{time} {step}: {distance}");
             }
             // The speed has no jump either.
             let speed =
@@ -445,8 +445,8 @@ mod tests {
         let steps = 4000;
         let camera = |step: u32| path.at(-1.0 + 3.25 * f64::from(step) / f64::from(steps));
         for step in 0..steps {
-            let found = apart(&camera(step), &camera(step + 1));
-            assert!(found < 0.2, "{step}: {found}");
+            let distance = apart(&camera(step), &camera(step + 1));
+            assert!(distance < 0.2, "{step}: {distance}");
         }
         assert_eq!(path.at(-9.0), path.keyframes()[0].camera);
         assert_eq!(path.at(f64::NAN), path.keyframes()[0].camera);

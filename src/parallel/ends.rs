@@ -177,13 +177,13 @@ pub trait ParallelIterator: Parallel {
     }
 
     fn any(self, is: impl Fn(Self::Item) -> bool + Sync) -> bool {
-        let found = AtomicBool::new(false);
+        let matched = AtomicBool::new(false);
         each_part(self, |divided, part| {
-            if !found.load(Relaxed) && Self::items(divided, part).any(&is) {
-                found.store(true, Relaxed);
+            if !matched.load(Relaxed) && Self::items(divided, part).any(&is) {
+                matched.store(true, Relaxed);
             }
         });
-        found.into_inner()
+        matched.into_inner()
     }
 
     fn all(self, is: impl Fn(Self::Item) -> bool + Sync) -> bool {
@@ -203,9 +203,9 @@ pub trait ParallelIterator: Parallel {
         let first = First::default();
         each_part(self, |divided, part| {
             if !first.is_before(part)
-                && let Some(found) = Self::items(divided, part).find_map(&of)
+                && let Some(result) = Self::items(divided, part).find_map(&of)
             {
-                first.put(part, found);
+                first.put(part, result);
             }
         });
         first.into_inner()
@@ -226,29 +226,29 @@ impl<T> Default for First<T> {
 }
 
 impl<T> First<T> {
-    fn found(&self) -> MutexGuard<'_, Option<(usize, T)>> {
+    fn lock(&self) -> MutexGuard<'_, Option<(usize, T)>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn is_none(&self) -> bool {
-        self.found().is_none()
+        self.lock().is_none()
     }
 
     /// Whether a part before this one has a result.
     fn is_before(&self, part: Part) -> bool {
-        self.found().as_ref().is_some_and(|(number, _)| *number < part.number)
+        self.lock().as_ref().is_some_and(|(number, _)| *number < part.number)
     }
 
     fn put(&self, part: Part, result: T) {
-        let mut found = self.found();
-        if found.as_ref().is_none_or(|(number, _)| part.number < *number) {
-            *found = Some((part.number, result));
+        let mut first = self.lock();
+        if first.as_ref().is_none_or(|(number, _)| part.number < *number) {
+            *first = Some((part.number, result));
         }
     }
 
     fn into_inner(self) -> Option<T> {
-        let found = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
-        found.map(|(_, result)| result)
+        let first = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
+        first.map(|(_, result)| result)
     }
 }
 

@@ -51,11 +51,11 @@ fn steps_are_those_of_iterators() {
         assert!(
             halves.iter().zip(&doubles).zip(&all).all(|((h, d), n)| *h == n / 2 && *d == n * 2)
         );
-        let own = all.par_iter().map_init(Vec::new, |own: &mut Vec<u32>, &n| {
-            own.push(n);
+        let mapped = all.par_iter().map_init(Vec::new, |scratch: &mut Vec<u32>, &n| {
+            scratch.push(n);
             n
         });
-        assert_eq!(own.collect::<Vec<_>>(), all);
+        assert_eq!(mapped.collect::<Vec<_>>(), all);
     }
 }
 

@@ -51,8 +51,8 @@ impl Edges {
             .map(|([a, b], at)| ([a.min(b), a.max(b)], at))
             .collect();
         all.par_sort_unstable();
-        let own = all.chunk_by(|a, b| a.0 == b.0);
-        let pairs = own.clone().map(|triangles| triangles[0].0).collect();
+        let groups = all.chunk_by(|a, b| a.0 == b.0);
+        let pairs = groups.clone().map(|triangles| triangles[0].0).collect();
         let normal = |at: u32| {
             let [a, b, c] = mesh.triangles[at as usize].map(|at| mesh.positions[at as usize]);
             (b - a).cross(c - a)
@@ -62,7 +62,7 @@ impl Edges {
             // Nothing is known of other edges.
             _ => [Vec3::NAN; 2],
         };
-        let sides = if mesh.is_solid() { own.map(sides).collect() } else { Vec::new() };
+        let sides = if mesh.is_solid() { groups.map(sides).collect() } else { Vec::new() };
         Self { origin: mesh.origin, positions: mesh.positions.clone(), pairs, sides }
     }
 
@@ -97,9 +97,10 @@ impl Picture {
     /// no lines.
     pub fn draw_edges(&mut self, edges: &Edges, view: &View, width: f64) {
         let surface = Surface { picture: self, view };
-        let shown = (0..edges.len()).into_par_iter().filter(|edge| edges.may_be_seen(*edge, view));
+        let visible =
+            (0..edges.len()).into_par_iter().filter(|edge| edges.may_be_seen(*edge, view));
         let lines: Vec<Line> =
-            shown.filter_map(|edge| edges.line(edges.pairs[edge], view)).collect();
+            visible.filter_map(|edge| edges.line(edges.pairs[edge], view)).collect();
         let mut shares = vec![0.0f32; self.color.len()];
         for line in &lines {
             surface.trace(line, width, &mut shares);
@@ -165,8 +166,8 @@ impl Line {
             last = last.min(leave / along);
         }
         let depth = |t: f64| self.depths[0] + t * (self.depths[1] - self.depths[0]);
-        let is_shown = first < last && a.is_finite() && b.is_finite();
-        is_shown.then(|| Self {
+        let is_visible = first < last && a.is_finite() && b.is_finite();
+        is_visible.then(|| Self {
             ends: [a.lerp(b, first), a.lerp(b, last)],
             depths: [depth(first), depth(last)],
         })
@@ -195,22 +196,22 @@ impl Surface<'_> {
     fn shows(&self, x: i64, y: i64, depth: f64) -> bool {
         let near = [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)]
             .map(|(across, down)| self.depth(x + across, y + down));
-        let own = near[0];
-        let own = if own.is_finite() {
-            own
+        let surface = near[0];
+        let surface = if surface.is_finite() {
+            surface
         } else {
             // The picture's samples at a silhouette may miss the surface.
             near.into_iter().filter(|depth| depth.is_finite()).fold(f64::NEG_INFINITY, f64::max)
         };
         let step = |a: f64, b: f64| {
-            let least = (a - own).abs().min((b - own).abs());
+            let least = (a - surface).abs().min((b - surface).abs());
             if least.is_finite() { least } else { 0.0 }
         };
         let slope = step(near[1], near[2]) + step(near[3], near[4]);
         // A steep step is the border between two surfaces.
         let pixel = if self.view.perspective { depth } else { 1.0 } / self.view.scale;
         let beside = BESIDE * pixel;
-        (depth - own).abs() <= beside + slope.min(beside)
+        (depth - surface).abs() <= beside + slope.min(beside)
     }
 
     /// Adds the shares of the pixels that a line covers.
@@ -297,7 +298,7 @@ mod tests {
         let (mesh, view, whole) = square();
         for depth in [2.0, 8.0] {
             let mut picture = whole.clone();
-            picture.depth.iter_mut().for_each(|own| *own = depth);
+            picture.depth.iter_mut().for_each(|stored| *stored = depth);
             picture.draw_edges(&Edges::of(&mesh), &view, 1.0);
             assert_eq!(picture.color, whole.color);
         }

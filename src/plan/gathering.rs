@@ -47,7 +47,8 @@ pub fn obstacle(
     (settings.gradient == Gradient::Central).then_some("gradients from neighbouring pixels")
 }
 
-/// Returns what of items is gathered, but never scattered (“the kernel linear”, “a label map”).
+/// Returns the first trait of items that only gathering can draw (“the kernel linear”, “a label
+/// map”).
 fn only_gathered(items: &[Item]) -> Option<String> {
     let tensor = items.iter().find_map(|item| item.kernel()?.as_tensor());
     let labels = || items.iter().any(Item::is_label_map).then(|| "a label map".to_owned());
@@ -57,8 +58,8 @@ fn only_gathered(items: &[Item]) -> Option<String> {
 /// Whether the field of a scene with these items is gathered. `obstacle` is why it can't be, if so.
 ///
 /// # Errors
-/// [`Error::Argument`] if the settings, or what of the scene is never scattered, ask for what
-/// can't be.
+/// [`Error::Argument`] if the settings ask for a method that can't draw the items, or if no method
+/// can.
 pub fn is_chosen(
     items: &[Item],
     settings: &Settings,
@@ -75,14 +76,14 @@ pub fn is_chosen(
     }
     match (obstacle(), only) {
         (Some(what), _) if settings.evaluate == Evaluate::Gather => Err(not_gathered(what)),
-        (Some(what), Some(own)) => {
-            Err(Error::Argument(format!("{own} is always gathered, and {what} can't be")))
+        (Some(what), Some(only)) => {
+            Err(Error::Argument(format!("{only} is always gathered, and {what} can't be")))
         }
         (obstacle, _) => Ok(obstacle.is_none()),
     }
 }
 
-/// Returns the error for what is to be gathered and cannot be.
+/// Returns the error for settings that ask for gathering where it is impossible.
 pub fn not_gathered(what: &str) -> Error {
     let message = format!("{what} can't be gathered; scatter instead, or leave it to the engine");
     Error::Argument(message)

@@ -6,10 +6,10 @@ pub(crate) mod field;
 pub(crate) mod frame;
 pub(crate) mod gathering;
 pub(crate) mod pace;
-pub(crate) mod shown;
 pub(crate) mod source;
 mod stats;
 pub(crate) mod tables;
+pub(crate) mod visible;
 pub(crate) mod weighting;
 
 pub use stats::FrameStats;

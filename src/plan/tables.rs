@@ -147,13 +147,13 @@ impl Tables {
             sections: kernel.map_or_else(Vec::new, sections),
             values: Values { zero, per_value, last, place: (zero - low) * per_value },
             lookup,
-            beyond: [low, high].map(|value| shown(transfer, value).map(|v| v as f32)),
+            beyond: [low, high].map(|value| emission(transfer, value).map(|v| v as f32)),
         }
     }
 }
 
 /// Returns extinction times colour, and extinction.
-fn shown(transfer: &TransferFunction, value: f64) -> [f64; 4] {
+fn emission(transfer: &TransferFunction, value: f64) -> [f64; 4] {
     let extinction = transfer.extinction(value);
     let [red, green, blue] = transfer.color(value);
     [red, green, blue, 1.0].map(|part| part * extinction)
@@ -218,18 +218,18 @@ fn changes(transfer: &TransferFunction) -> Vec<[f64; 2]> {
         .filter(|pair| pair[0].1 != pair[1].1)
         .map(|pair| [pair[0].0, pair[1].0]);
     // Colours count only where there is opacity.
-    let shown = transfer.opacity.windows(2).filter(|pair| pair[0].1 > 0.0 || pair[1].1 > 0.0);
+    let visible = transfer.opacity.windows(2).filter(|pair| pair[0].1 > 0.0 || pair[1].1 > 0.0);
     let ends = |points: &[(f64, f64)]| {
         [(points[0], f64::NEG_INFINITY), (points[points.len() - 1], f64::INFINITY)]
     };
     let beyond = ends(&transfer.opacity).into_iter().filter(|(point, _)| point.1 > 0.0);
-    let shown: Vec<[f64; 2]> = shown
+    let visible: Vec<[f64; 2]> = visible
         .map(|pair| [pair[0].0, pair[1].0])
         .chain(beyond.map(|((value, _), end)| [value.min(end), value.max(end)]))
         .collect();
     let color = transfer.color.windows(2).filter(|pair| pair[0].1 != pair[1].1).flat_map(|pair| {
-        let own = [pair[0].0, pair[1].0];
-        shown.iter().map(move |part| [own[0].max(part[0]), own[1].min(part[1])])
+        let span = [pair[0].0, pair[1].0];
+        visible.iter().map(move |part| [span[0].max(part[0]), span[1].min(part[1])])
     });
     opacity.chain(color.filter(|part| part[0] <= part[1])).collect()
 }
@@ -246,7 +246,7 @@ fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2], count: usize) -
         for j in 0..INSIDE {
             let at = (i as f64 + (j as f64 + 0.5) / INSIDE as f64).min(last);
             let value = low + (high - low) * at / last;
-            for (sum, part) in sum.iter_mut().zip(shown(transfer, value)) {
+            for (sum, part) in sum.iter_mut().zip(emission(transfer, value)) {
                 *sum += part / INSIDE as f64;
             }
         }
@@ -377,12 +377,12 @@ mod tests {
         };
         // A few hundred values of 16-bit data, and a function far wider than the data's values can
         // be.
-        let near = |found: [f64; 2], expected: [f64; 2]| {
+        let near = |ends: [f64; 2], expected: [f64; 2]| {
             let beside = (expected[1] - expected[0]) * 2.0 / 4095.0;
-            let is_near = found[0] < expected[0] && expected[1] < found[1];
+            let is_near = ends[0] < expected[0] && expected[1] < ends[1];
             assert!(
-                is_near && found[1] - found[0] < expected[1] - expected[0] + 2.01 * beside,
-                "{found:?}"
+                is_near && ends[1] - ends[0] < expected[1] - expected[0] + 2.01 * beside,
+                "{ends:?}"
             );
         };
         near(over(&[(100.0, 0.0), (400.0, 1.0)], [-32768.0, 32767.0]), [100.0, 400.0]);
@@ -418,7 +418,7 @@ mod tests {
             };
             let tables = Tables::new(&transfer, [0.0, 255.0], None);
             let entries = [tables.colors[0][3], tables.colors[VALUES - 1][3]];
-            let beyond = tables.beyond.map(|shown| shown[3]);
+            let beyond = tables.beyond.map(|emission| emission[3]);
             assert_eq!(
                 entries,
                 [0.0, 255.0].map(|value| transfer.extinction(value) as f32),

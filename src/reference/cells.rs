@@ -3,7 +3,7 @@
 use super::{
     Frame, clip,
     composite::{Added, Medium, Step},
-    field::{Field, Found, Layer},
+    field::{ClippedLayer, Field, Layer},
     ray::Ray,
 };
 use crate::{
@@ -162,13 +162,18 @@ impl Solids {
 
     /// Returns the field in each sheet of a ray of which the clips leave parts, with values at the
     /// points.
-    pub fn layers(&self, frame: &Frame, ray: &Ray, allowed: &[[f64; 2]]) -> Vec<Option<Found>> {
-        let own = |(k, parts): (usize, Vec<Part>)| {
+    pub fn layers(
+        &self,
+        frame: &Frame,
+        ray: &Ray,
+        allowed: &[[f64; 2]],
+    ) -> Vec<Option<ClippedLayer>> {
+        let clipped = |(k, parts): (usize, Vec<Part>)| {
             let [from, to] = frame.span(k);
             let layer = layer(&parts, to - from)?;
             Some((layer, clip::intersection(allowed, Some(layer.span))))
         };
-        self.parts_of_sheets(frame, ray).into_iter().enumerate().map(own).collect()
+        self.parts_of_sheets(frame, ray).into_iter().enumerate().map(clipped).collect()
     }
 
     /// Returns what tetrahedra that have one value each add to the sheets of a ray.
@@ -179,7 +184,7 @@ impl Solids {
         ray: &Ray,
         allowed: &[[f64; 2]],
     ) -> Vec<Option<Added>> {
-        let own = |(k, parts): (usize, Vec<Part>)| {
+        let added = |(k, parts): (usize, Vec<Part>)| {
             let mut medium = Medium::default();
             for part in parts {
                 let (extinction, color) = field.classifier.at(part.values[0]);
@@ -190,7 +195,7 @@ impl Solids {
             }
             Some((medium, vec![Step { depth: medium.depth, span: frame.span(k) }]))
         };
-        self.parts_of_sheets(frame, ray).into_iter().enumerate().map(own).collect()
+        self.parts_of_sheets(frame, ray).into_iter().enumerate().map(added).collect()
     }
 
     /// Returns the largest value on a ray of tetrahedra that have one value each.

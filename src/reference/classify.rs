@@ -83,17 +83,17 @@ mod tests {
         for (a, b, extinction, blue) in
             [(1.0, 2.5, 4.0 / 3.0, 0.0), (3.5, 1.5, 3.0, 1.0 / 3.0), (0.0, 5.0, 1.6, 0.5)]
         {
-            let (found, color) = classifier.between(a, b);
-            assert!((found - extinction).abs() < 1e-12, "{found}");
+            let (mean, color) = classifier.between(a, b);
+            assert!((mean - extinction).abs() < 1e-12, "{mean}");
             assert!((color - DVec3::new(1.0 - blue, 0.0, blue)).length() < 1e-12, "{color}");
         }
         assert_eq!(classifier.between(0.0, 1.0), (0.0, DVec3::ZERO));
         let (exact, _) = classifier.between(2.5, 2.5);
         assert!((exact - 4.0).abs() < 1e-12);
         // −∫ ln(1 − x) dx = (1 − x)·ln(1 − x) + x, up to the opacity that counts as full.
-        let (found, _) = classifier.between(5.0, 5.0 + OPAQUE);
+        let (mean, _) = classifier.between(5.0, 5.0 + OPAQUE);
         let expected = ((1.0 - OPAQUE) * (1.0 - OPAQUE).ln() + OPAQUE) / OPAQUE / 0.5;
-        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        assert!((mean - expected).abs() < 1e-9, "{mean} {expected}");
         let tiny = classifier.between(5.5, 5.5 + 1e-13).0;
         assert!((tiny - transfer.extinction(5.5)).abs() < 1e-9);
     }

@@ -87,7 +87,7 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, settings: &Settings) -> 
                 continue;
             }
             let triangle = Triangle::new(number, set, view);
-            let seen = triangle.filter(|own| own.turn < 0.0 || !is_culled);
+            let seen = triangle.filter(|triangle| triangle.turn < 0.0 || !is_culled);
             facets.extend(seen.map(Facet::Triangle));
         }
     }
@@ -156,8 +156,8 @@ impl<'a> Triangle<'a> {
             let at = DVec2::new((number % RAYS) as f64, (number / RAYS) as f64);
             let ray = ray((at + 0.5) / RAYS as f64 - 0.5);
             if self.edges(&ray, view).iter().all(|edge| *edge >= 0.0) {
-                let (color, own) = sample(self.weights(&ray, view));
-                (sum, seen, count) = (sum + color, seen + own, count + 1.0);
+                let (color, opacity) = sample(self.weights(&ray, view));
+                (sum, seen, count) = (sum + color, seen + opacity, count + 1.0);
             }
         }
         if count == 0.0 {
@@ -251,13 +251,13 @@ impl Frame<'_> {
         let allowed = clip::allowed(&ray, view, &self.clips);
         for facet in facets {
             let place = match facet {
-                Facet::Triangle(own) => own.at(&ray, [column, row], view),
+                Facet::Triangle(triangle) => triangle.at(&ray, [column, row], view),
                 Facet::Rod { body, .. } => body.at(&ray, view),
             };
             let Some(Place { share, distance, color, normal }) = place else { continue };
             let sheet = self.planes.partition_point(|&plane| plane <= distance);
             let within = 1..self.planes.len();
-            let is_cut = matches!(facet, Facet::Triangle(own) if own.is_cut);
+            let is_cut = matches!(facet, Facet::Triangle(triangle) if triangle.is_cut);
             let is_kept = is_cut || clip::contains(&allowed, distance);
             if share <= 0.0 || !within.contains(&sheet) || !is_kept {
                 continue;
@@ -267,7 +267,7 @@ impl Frame<'_> {
             let behind = (NEARER * (distance - front) / pixel).clamp(0.0, FARTHEST);
             let pixel = DVec2::new(column as f64, row as f64) + 0.5;
             let (tint, seen) = match facet {
-                Facet::Triangle(own) => own.tint(|at| Ray::new(view, pixel + at), view),
+                Facet::Triangle(triangle) => triangle.tint(|at| Ray::new(view, pixel + at), view),
                 Facet::Rod { .. } => (DVec3::ONE, 1.0),
             };
             let (color, seen) = (color * tint, share * seen);
@@ -284,7 +284,7 @@ impl Frame<'_> {
                 continue;
             }
             match facet {
-                Facet::Triangle(own) => cover.shares[usize::from(!own.is_front)] += share,
+                Facet::Triangle(triangle) => cover.shares[usize::from(!triangle.is_front)] += share,
                 Facet::Rod { .. } => cover.shares[1] = cover.shares[1].max(share),
             }
             cover.seen += seen;

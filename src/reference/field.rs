@@ -36,7 +36,7 @@ pub(super) struct Layer {
 }
 
 /// The field in a sheet, and the parts of the ray where it counts.
-pub(super) type Found = (Layer, Vec<[f64; 2]>);
+pub(super) type ClippedLayer = (Layer, Vec<[f64; 2]>);
 
 /// A part of a sheet: the places of its ends, and the values there.
 struct Part {

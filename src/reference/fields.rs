@@ -7,7 +7,7 @@ use super::{
     clip,
     composite::Added,
     face::Face,
-    field::{Field, Found, Layer},
+    field::{ClippedLayer, Field, Layer},
     gather,
     kernel::{Kernel, Load},
     labels::LabelMap,
@@ -157,7 +157,7 @@ impl<'a> Drawn<'a> {
     }
 
     /// Returns the field in each sheet of a ray.
-    fn layers(&self, frame: &Frame, on: &Through) -> Vec<Option<Found>> {
+    fn layers(&self, frame: &Frame, on: &Through) -> Vec<Option<ClippedLayer>> {
         if let Some(solids) = &self.solids {
             return solids.layers(frame, on.ray, on.allowed);
         }
@@ -204,12 +204,13 @@ impl<'a> Drawn<'a> {
 
     /// Returns what the field adds to each sheet of a ray.
     pub fn media(&self, frame: &Frame, on: &Through) -> Vec<Option<Added>> {
-        let shine = |(layer, pieces): Found| layer.shine(&self.field, on.ray.direction, &pieces);
+        let shine =
+            |(layer, pieces): ClippedLayer| layer.shine(&self.field, on.ray.direction, &pieces);
         let mut media: Vec<Option<Added>> = match &self.solids {
             Some(solids) if solids.place() == Place::Cells => {
                 solids.media(frame, &self.field, on.ray, on.allowed)
             }
-            _ => self.layers(frame, on).into_iter().map(|found| found.map(shine)).collect(),
+            _ => self.layers(frame, on).into_iter().map(|layer| layer.map(shine)).collect(),
         };
         if frame.optics == Optics::XRay {
             media.iter_mut().flatten().for_each(|(medium, _)| medium.color = DVec3::ONE);
@@ -225,7 +226,7 @@ impl<'a> Drawn<'a> {
             }
             _ => {
                 let layers = self.layers(frame, on).into_iter().flatten();
-                let largest = |(layer, pieces): Found| layer.largest(&self.field, &pieces);
+                let largest = |(layer, pieces): ClippedLayer| layer.largest(&self.field, &pieces);
                 layers.filter_map(largest).reduce(f64::max)
             }
         }

@@ -54,8 +54,8 @@ fn add_item<'a>(
 ) {
     match item {
         Item::Radiance(set) => {
-            let own = |splat| from_splat(set, splat, None, view);
-            kernels.extend(set.splats.iter().filter_map(own));
+            let to_kernel = |splat| from_splat(set, splat, None, view);
+            kernels.extend(set.splats.iter().filter_map(to_kernel));
         }
         // Facets are no kernels. A hierarchy's cut, Gaussians and solids have become sets by now,
         // and bricks a volume.
@@ -67,8 +67,8 @@ fn add_item<'a>(
         | Item::Cells(..) => {}
         Item::Scalar(set, transfer) => {
             let before = before.map(|before| (before, transfer));
-            let own = |splat| from_splat(set, splat, before, view);
-            kernels.extend(set.splats.iter().filter_map(own));
+            let to_kernel = |splat| from_splat(set, splat, before, view);
+            kernels.extend(set.splats.iter().filter_map(to_kernel));
         }
         // Tensor products are not radial functions: their field is evaluated point by point
         // (product.rs).
@@ -348,8 +348,8 @@ mod tests {
                 .collect();
             let volume = Volume::new(lattice, Samples::F32(values)).unwrap();
             for at in 0..volume.len() {
-                let found = slope(&volume.lattice, at, |at| volume.value(at));
-                assert!((found - gradient).length() < 1e-5, "{found} at {at}");
+                let computed = slope(&volume.lattice, at, |at| volume.value(at));
+                assert!((computed - gradient).length() < 1e-5, "{computed} at {at}");
             }
         }
         // The slope of a parabola is exact too, between unequal neighbours.
@@ -357,7 +357,7 @@ mod tests {
         let arrangement = Arrangement::Rectilinear(places);
         let lattice =
             Lattice { arrangement, ..Lattice::with_spacing([3, 1, 1], DVec3::splat(0.5)) };
-        let found = slope(&lattice, 1, |at| lattice.sample_position(at).x.powi(2));
-        assert!((found - DVec3::X).length() < 1e-12, "{found}");
+        let computed = slope(&lattice, 1, |at| lattice.sample_position(at).x.powi(2));
+        assert!((computed - DVec3::X).length() < 1e-12, "{computed}");
     }
 }

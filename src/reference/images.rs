@@ -80,11 +80,16 @@ impl Frame<'_> {
     }
 
     /// Returns the values beside a pixel's faces, if gradients are their differences.
-    fn around(&self, drawn: &Drawn, own: &FieldRow, [column, row]: [i64; 2]) -> Option<Around> {
-        let [above, below] = own.beside.as_ref()?;
+    fn around(
+        &self,
+        drawn: &Drawn,
+        field_row: &FieldRow,
+        [column, row]: [i64; 2],
+    ) -> Option<Around> {
+        let [above, below] = field_row.beside.as_ref()?;
         let neighbours = [
-            (column - 1, row, &own.kernels),
-            (column + 1, row, &own.kernels),
+            (column - 1, row, &field_row.kernels),
+            (column + 1, row, &field_row.kernels),
             (column, row - 1, above),
             (column, row + 1, below),
         ];
@@ -103,9 +108,9 @@ impl Frame<'_> {
         let allowed = clip::allowed(&ray, &self.view, &self.clips);
         let both = self.fields.iter().zip(&row.fields);
         let rays: Vec<Through> = both
-            .map(|(drawn, own)| {
-                let around = self.around(drawn, own, [column, row.number]);
-                Through { ray: &ray, kernels: &own.kernels, around, allowed: &allowed }
+            .map(|(drawn, field_row)| {
+                let around = self.around(drawn, field_row, [column, row.number]);
+                Through { ray: &ray, kernels: &field_row.kernels, around, allowed: &allowed }
             })
             .collect();
         let mut fields = self.fields.iter().zip(&rays);
@@ -134,14 +139,14 @@ impl Frame<'_> {
         let mut composite = Composite::EMPTY;
         for (k, light) in lights.iter().enumerate() {
             let surface = self.surface(light, ray);
-            let found = media.iter().filter_map(|sheets| sheets[k].as_ref());
-            let found: Vec<&Added> = found.filter(|(medium, _)| medium.depth > 0.0).collect();
-            match found[..] {
+            let present = media.iter().filter_map(|sheets| sheets[k].as_ref());
+            let present: Vec<&Added> = present.filter(|(medium, _)| medium.depth > 0.0).collect();
+            match present[..] {
                 [(medium, steps)] if surface.depth <= 0.0 => {
                     composite.pass_in_steps(*medium, steps);
                 }
                 _ => {
-                    let all = found.iter().fold(surface, |all, (medium, _)| all.with(*medium));
+                    let all = present.iter().fold(surface, |all, (medium, _)| all.with(*medium));
                     composite.pass(all, self.span(k));
                 }
             }

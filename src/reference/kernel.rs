@@ -197,9 +197,9 @@ mod tests {
                     |p: DVec3| profile.value((kernel.whitening * (p - kernel.center)).length());
                 let (largest, _) = crossing.at(crossing.closest);
                 for s in [crossing.closest - 0.01, crossing.closest, crossing.closest + 0.2] {
-                    let (found, gradient) = crossing.at(s);
+                    let (height, gradient) = crossing.at(s);
                     let p = ray.point(s);
-                    assert!((found - value(p)).abs() < 1e-12 && found <= largest);
+                    assert!((height - value(p)).abs() < 1e-12 && height <= largest);
                     let step = 1e-5;
                     for axis in DVec3::AXES {
                         let expected =
@@ -220,9 +220,10 @@ mod tests {
                     (expected[0], expected[1]) =
                         (expected[0] + h, expected[1] + (s - crossing.closest) * h);
                 }
-                let found = crossing.moments(part);
+                let moments = crossing.moments(part);
                 assert!(
-                    (found[0] - expected[0]).abs() < 1e-9 && (found[1] - expected[1]).abs() < 1e-9
+                    (moments[0] - expected[0]).abs() < 1e-9
+                        && (moments[1] - expected[1]).abs() < 1e-9
                 );
                 let [from, to] = crossing.span();
                 assert!(crossing.at(from - 1e-9).0 < 1e-15 && crossing.at(to + 1e-9).0 < 1e-15);

@@ -38,13 +38,13 @@ impl<'a> LabelMap<'a> {
                 (other, (-0.5 * (other.abs_diff(at) as f64 / OWN_DEVIATION).powi(2)).exp())
             })
         });
-        let own = self.value(at);
+        let label = self.value(at);
         let (mut sum, mut all) = (0.0, 0.0);
         for (k, wz) in around[2].clone() {
             for (j, wy) in around[1].clone() {
                 for (i, wx) in around[0].clone() {
                     all += wx * wy * wz;
-                    sum += if self.value([i, j, k]) == own { wx * wy * wz } else { 0.0 };
+                    sum += if self.value([i, j, k]) == label { wx * wy * wz } else { 0.0 };
                 }
             }
         }

@@ -61,11 +61,11 @@ pub fn trace(
             for i in 0..side * side {
                 let within =
                     (DVec2::new((i % side).into(), (i / side).into()) + 0.5) / f64::from(side);
-                let found =
+                let composite =
                     traced.follow(&Ray::new(&view, DVec2::new(column.into(), row.into()) + within));
-                sum.color += found.color;
-                sum.opacity += found.opacity;
-                sum.half = sum.half.min(found.half);
+                sum.color += composite.color;
+                sum.opacity += composite.opacity;
+                sum.half = sum.half.min(composite.half);
             }
             let share = 1.0 / f64::from(side * side);
             (sum.color, sum.opacity) = (sum.color * share, sum.opacity * share);
@@ -289,11 +289,11 @@ mod tests {
             let options = SurfelOptions { largest_spacing: 1.0 / 24.0, ..SurfelOptions::default() };
             let scene = Scene::new().with_splats(mesh.surfels(&options).unwrap());
             let truth = trace(&mesh, options.crease_angle_degrees, &camera, &settings, 4).unwrap();
-            let found = compare_pictures(&render(&scene, &camera, &settings).unwrap(), &truth)
+            let psnr = compare_pictures(&render(&scene, &camera, &settings).unwrap(), &truth)
                 .unwrap()
                 .psnr
                 .unwrap();
-            assert!(found > least, "{name}: {found} dB");
+            assert!(psnr > least, "{name}: {psnr} dB");
         }
     }
 
@@ -314,7 +314,7 @@ mod tests {
             trace(&Mesh::default(), 60.0, &camera, &settings, 1),
             Err(Error::NothingToDraw(_))
         ));
-        let told = |mesh: &Mesh, settings: &Settings, side: u32| match trace(
+        let refusal = |mesh: &Mesh, settings: &Settings, side: u32| match trace(
             mesh, 60.0, &camera, settings, side,
         ) {
             Err(Error::Argument(message)) => message,
@@ -322,18 +322,18 @@ mod tests {
         };
         let cube = Mesh::cube(1.0);
         for side in [0, 257, 65_536, u32::MAX] {
-            assert!(told(&cube, &settings, side).contains("rays"));
+            assert!(refusal(&cube, &settings, side).contains("rays"));
         }
         let beyond = Mesh { triangles: vec![[0, 1, 99]], ..cube.clone() };
-        assert!(told(&beyond, &settings, 1).contains("beyond the mesh's 8 vertices"));
+        assert!(refusal(&beyond, &settings, 1).contains("beyond the mesh's 8 vertices"));
         let materials = Mesh { triangle_materials: vec![3; 12], ..cube.clone() };
-        assert!(told(&materials, &settings, 1).contains("a material that is not there"));
+        assert!(refusal(&materials, &settings, 1).contains("a material that is not there"));
         let mut nowhere = cube.clone();
         nowhere.positions[0] = Vec3::NAN;
-        assert!(told(&nowhere, &settings, 1).contains("not finite"));
+        assert!(refusal(&nowhere, &settings, 1).contains("not finite"));
         let shade = Shade { ambient: f64::NAN, ..Shade::default() };
         let dark = Settings { surface_shade: Some(shade), ..settings.clone() };
-        assert!(told(&cube, &dark, 1).contains("light"));
+        assert!(refusal(&cube, &dark, 1).contains("light"));
         trace(&cube, 60.0, &camera, &settings, 2).unwrap();
     }
 }

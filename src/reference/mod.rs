@@ -393,8 +393,8 @@ impl<'a> Frame<'a> {
         let has_field = flat.items.iter().any(|item| item.transfer().is_some());
         let shade = flat.items.iter().find_map(|item| item.light(settings)).filter(|_| !is_dark);
         // Bricks have become volumes by now.
-        let own = |item| Drawn::new(item, &view, settings, &sheets);
-        let fields = flat.items.iter().filter(|_| !before).filter_map(own).collect();
+        let drawn = |item| Drawn::new(item, &view, settings, &sheets);
+        let fields = flat.items.iter().filter(|_| !before).filter_map(drawn).collect();
         let before_shade = before.then_some(Before { lit: shade.is_some() });
         Self {
             has_trained: scene.items.iter().any(Item::is_trained),

@@ -129,10 +129,10 @@ mod tests {
                     for at in 0..volume.len() {
                         // Not exactly at the sample, where rounding would choose the cell.
                         let place = view.to_view(volume.lattice.sample_position(at));
-                        let (found, _) = field.at(place + DVec3::splat(1e-9));
+                        let (value, _) = field.at(place + DVec3::splat(1e-9));
                         assert!(
-                            (found - volume.value(at)).abs() < 2e-6,
-                            "{tensor:?} at {at}: {found}"
+                            (value - volume.value(at)).abs() < 2e-6,
+                            "{tensor:?} at {at}: {value}"
                         );
                     }
                 });
@@ -178,10 +178,10 @@ mod tests {
                         part[0] + (part[1] - part[0]) * (f64::from(i) + 0.5) / f64::from(steps)
                     };
                     let sum: f64 = (0..steps).map(|i| field.at(ray.point(place(i))).0).sum();
-                    let found = field.mean(&ray, part).value(0.1, part[1] - part[0]).unwrap();
+                    let mean = field.mean(&ray, part).value(0.1, part[1] - part[0]).unwrap();
                     assert!(
-                        (found - sum / f64::from(steps)).abs() < 1e-6,
-                        "{tensor:?} {part:?}: {found}"
+                        (mean - sum / f64::from(steps)).abs() < 1e-6,
+                        "{tensor:?} {part:?}: {mean}"
                     );
                 }
             });

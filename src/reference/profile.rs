@@ -185,11 +185,11 @@ mod tests {
                         let h = profile.value(rho.hypot(t)) * (to - from) / f64::from(steps);
                         (expected[0], expected[1]) = (expected[0] + h, expected[1] + t * h);
                     }
-                    let found = profile.moments(rho, [from, to]);
+                    let moments = profile.moments(rho, [from, to]);
                     for i in 0..2 {
                         assert!(
-                            (found[i] - expected[i]).abs() < 2e-6,
-                            "{kernel:?} {rho}: {found:?} {expected:?}"
+                            (moments[i] - expected[i]).abs() < 2e-6,
+                            "{kernel:?} {rho}: {moments:?} {expected:?}"
                         );
                     }
                 }

@@ -103,15 +103,15 @@ pub(super) mod tests {
             let s = 4.0;
             let across = DVec2::from(ray.across(s).map(|step| gradient.dot(step)));
             let along = gradient.dot(ray.direction);
-            let found = ray.gradient(s, across, along).unwrap();
-            assert!((found - gradient).length() < 1e-9, "{found}");
+            let restored = ray.gradient(s, across, along).unwrap();
+            assert!((restored - gradient).length() < 1e-9, "{restored}");
             if view.perspective {
                 // The same, solved by hand: r = |b| = 1/b̂_z.
                 let b = ray.direction;
                 let k = view.scale / (b.z * s);
                 let (x, y) = (across[0] * k + along * b.x, across[1] * k + along * b.y);
                 let by_hand = DVec3::new(x, y, (along - x * b.x - y * b.y) / b.z);
-                assert!((found - by_hand).length() < 1e-9, "{by_hand}");
+                assert!((restored - by_hand).length() < 1e-9, "{by_hand}");
             }
         }
     }

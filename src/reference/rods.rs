@@ -194,9 +194,12 @@ mod tests {
                 };
                 let body = Body::new(&rod, DVec3::ZERO, &view);
                 let (mut all, mut truth) = (0.0, 0.0);
-                for (row, column) in (0..32).flat_map(|row| (0..32).map(move |own| (row, own))) {
+                for (row, column) in
+                    (0..32).flat_map(|row| (0..32).map(move |column| (row, column)))
+                {
                     let pixel = DVec2::new(f64::from(column), f64::from(row)) + 0.5;
-                    let own = body.at(&Ray::new(&view, pixel), &view).map_or(0.0, |own| own.share);
+                    let filled =
+                        body.at(&Ray::new(&view, pixel), &view).map_or(0.0, |place| place.share);
                     let rays = (0..256).map(|at| {
                         let at = DVec2::new(f64::from(at % 16), f64::from(at / 16));
                         Ray::new(&view, pixel - 0.5 + (at + 0.5) / 16.0)
@@ -205,8 +208,8 @@ mod tests {
                         enter(ray.origin, ray.direction, body.ends, f64::from(radius)).is_some()
                     });
                     let share = hits.count() as f64 / 256.0;
-                    assert!((own - share).abs() < 0.2, "{radius} {to}: {own} {share}");
-                    (all, truth) = (all + own, truth + share);
+                    assert!((filled - share).abs() < 0.2, "{radius} {to}: {filled} {share}");
+                    (all, truth) = (all + filled, truth + share);
                 }
                 // 256 rays meet a rod thinner than a quarter of a pixel too seldom to tell more.
                 let most = if radius < 0.02 { 0.08 } else { 0.06 };

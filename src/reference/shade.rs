@@ -47,8 +47,8 @@ mod tests {
         let shade = Shade { ambient: 0.1, diffuse: 0.5, specular: 0.2, power: 2.0, certain: None };
         let color = DVec3::new(1.0, 0.5, 0.0);
         let close = |normal: DVec3, expected: [f64; 3]| {
-            let found = lit(color, normal, DVec3::Z, &shade);
-            assert!((found - DVec3::from(expected)).length() < 1e-12, "{found}");
+            let lit_color = lit(color, normal, DVec3::Z, &shade);
+            assert!((lit_color - DVec3::from(expected)).length() < 1e-12, "{lit_color}");
         };
         close(DVec3::Z * 1e-30, [0.8, 0.5, 0.2]);
         close(DVec3::NEG_Z * 7.0, [0.8, 0.5, 0.2]);
@@ -73,8 +73,11 @@ mod tests {
             let (full, none) = (of(direction, &plain), of(DVec3::ZERO, &plain));
             for (length, share) in [(1.0, 0.0), (2.0, 0.0), (2.5, 0.25), (4.0, 1.0), (9.0, 1.0)] {
                 let expected = none + share * (full - none);
-                let found = of(direction * length, &shade);
-                assert!((found - expected).length() < 1e-12, "{length}: {found} {expected}");
+                let lit_color = of(direction * length, &shade);
+                assert!(
+                    (lit_color - expected).length() < 1e-12,
+                    "{length}: {lit_color} {expected}"
+                );
             }
         }
         // A step.

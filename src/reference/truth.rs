@@ -140,7 +140,7 @@ struct Points {
     sums: Vec<[f64; 2]>,
     /// Σ h′/r·x′ and Σ f·h′/r·x′.
     slopes: Vec<[DVec3; 2]>,
-    shown: Vec<bool>,
+    visible: Vec<bool>,
 }
 
 impl<'a> Pointwise<'a> {
@@ -193,9 +193,9 @@ impl<'a> Pointwise<'a> {
             let mut last = None;
             for first in (0..count).step_by(block) {
                 let (block, at) = (block.min(count - first), place(first));
-                let shown =
+                let is_visible =
                     |i: f64| self.visible.at((origin + (at + i * step) * direction) * self.unit);
-                points.reset(block, shown);
+                points.reset(block, is_visible);
                 let Some([start, end]) = points.ends() else {
                     last = None;
                     continue;
@@ -203,7 +203,7 @@ impl<'a> Pointwise<'a> {
                 last = last.filter(|_| start == 0);
                 self.sum(origin, direction, [at, step], [start, end], points);
                 for i in start..=end {
-                    let here = self.at(points, i).filter(|_| points.shown[i]);
+                    let here = self.at(points, i).filter(|_| points.visible[i]);
                     let s = place(first + i);
                     if let Some((value, gradient)) = here {
                         if let Some((before, _)) = last {
@@ -407,11 +407,11 @@ impl<'a> Pointwise<'a> {
 impl Points {
     /// Prepares the buffers for `count` points. The neighbours of visible points count as visible
     /// too, because isosurfaces lie between two points.
-    fn reset(&mut self, count: usize, shown: impl Fn(f64) -> bool) {
-        self.shown.clear();
-        let (mut before, mut here) = (shown(-1.0), shown(0.0));
-        self.shown.extend((0..count).map(|i| {
-            let after = shown(i as f64 + 1.0);
+    fn reset(&mut self, count: usize, is_visible: impl Fn(f64) -> bool) {
+        self.visible.clear();
+        let (mut before, mut here) = (is_visible(-1.0), is_visible(0.0));
+        self.visible.extend((0..count).map(|i| {
+            let after = is_visible(i as f64 + 1.0);
             let any = before || here || after;
             (before, here) = (here, after);
             any
@@ -425,8 +425,8 @@ impl Points {
     /// Returns the first and the last visible point.
     fn ends(&self) -> Option<[usize; 2]> {
         Some([
-            self.shown.iter().position(|shown| *shown)?,
-            self.shown.iter().rposition(|shown| *shown)?,
+            self.visible.iter().position(|visible| *visible)?,
+            self.visible.iter().rposition(|visible| *visible)?,
         ])
     }
 }

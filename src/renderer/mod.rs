@@ -210,7 +210,7 @@ impl Renderer {
     /// [`Error::Argument`] if the item has no field; [`Error::Transfer`] if [`new`](Self::new)
     /// would refuse the function. The scene then keeps its old one.
     pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
-        self.scene = self.scene.shown_by(item, transfer)?;
+        self.scene = self.scene.with_transfer(item, transfer)?;
         match &mut self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(_, prepared) => prepared.set_transfer(item, transfer),

@@ -39,21 +39,21 @@ pub(crate) fn merged(set: &SplatSet, edge: f64) -> SplatSet {
 
 /// Returns the sample that stands for those of a cell.
 fn one_of(set: &SplatSet, cell: &[(u64, u32)]) -> Splat {
-    let own = || cell.iter().map(|&(_, index)| &set.splats[index as usize]);
+    let members = || cell.iter().map(|&(_, index)| &set.splats[index as usize]);
     let first = &set.splats[cell[0].1 as usize];
     if cell.len() == 1 {
         return *first;
     }
     let origin = DVec3::from_array(first.center.map(f64::from));
     let (mut mass, mut place, mut value) = (0.0, DVec3::ZERO, 0.0);
-    for part in own().map(Part::of) {
+    for part in members().map(Part::of) {
         mass += part.mass;
         place += part.mass * (part.center - origin);
         value += part.mass * part.value;
     }
     let (middle, value) = (origin + place / mass, value / mass);
     let (mut covariance, mut rise) = (DMat3::ZERO, DVec3::ZERO);
-    for part in own().map(Part::of) {
+    for part in members().map(Part::of) {
         let d = part.center - middle;
         let share = part.mass / mass;
         covariance += share

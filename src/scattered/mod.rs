@@ -92,8 +92,8 @@ impl Points {
         let given = [("radii", self.radii.len()), ("covariances", self.covariances.len())];
         let mut lists = vec![("values", self.values.len())];
         lists.extend(given.iter().filter(|list| list.1 > 0));
-        if let Some((name, found)) = lists.into_iter().find(|list| list.1 != count) {
-            return Err(format!("there are {found} {name} for {count} positions"));
+        if let Some((name, length)) = lists.into_iter().find(|list| list.1 != count) {
+            return Err(format!("there are {length} {name} for {count} positions"));
         }
         if !self.origin.is_finite() {
             return Err(format!("the origin {} is not finite", self.origin));

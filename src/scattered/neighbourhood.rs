@@ -66,10 +66,10 @@ pub(super) fn places(
         let is_over = clock.is_over(at);
         if is_over { Place::default() } else { around.place(order[at], sums[order[at] as usize].1) }
     };
-    let found: Vec<Place> = (0..order.len()).into_par_iter().map(place).collect();
+    let in_order: Vec<Place> = (0..order.len()).into_par_iter().map(place).collect();
     clock.finish("finding the neighbours of samples")?;
-    let mut places = found.clone();
-    for (index, place) in order.into_iter().zip(found) {
+    let mut places = in_order.clone();
+    for (index, place) in order.into_iter().zip(in_order) {
         places[index as usize] = place;
     }
     Ok((places, place_of))
@@ -84,11 +84,11 @@ struct Surroundings<'a> {
 
 impl Surroundings<'_> {
     fn place(&self, index: u32, samples: u32) -> Place {
-        let (center, own) = (self.positions[index as usize], self.values[index as usize]);
+        let (center, value) = (self.positions[index as usize], self.values[index as usize]);
         let nearest =
             self.tree.of(index, self.neighbours).into_iter().map(|(distance, neighbour)| {
                 let offset = (self.positions[neighbour as usize] - center).as_dvec3();
-                (offset, self.values[neighbour as usize] - own, f64::from(distance))
+                (offset, self.values[neighbour as usize] - value, f64::from(distance))
             });
         let around: Vec<(DVec3, f64, f64)> = nearest.collect();
         let Some(&(.., farthest)) = around.last() else {
@@ -131,11 +131,11 @@ impl Fit {
     /// equally far.
     fn new(around: &[(DVec3, f64, f64)], farthest: f64) -> Self {
         let weight = |distance: f64| 1.0 - 0.64 * (distance / farthest).powi(2);
-        let own = (DVec3::ZERO, 0.0, 0.0);
+        let middle = (DVec3::ZERO, 0.0, 0.0);
         let all = || {
             around
                 .iter()
-                .chain([&own])
+                .chain([&middle])
                 .map(|&(offset, rise, distance)| (offset, rise, weight(distance)))
         };
         let (mut sum, mut mean, mut mean_rise) = (0.0, DVec3::ZERO, 0.0);

@@ -134,8 +134,8 @@ impl Points {
             [b, 0.0, b, 0.0, 0.0, b]
         };
         let radius = options.radius.or_else(|| {
-            let own = || self.radii.get(index).map(|&radius| f64::from(radius));
-            if self.covariances.is_empty() { own() } else { None }
+            let listed = || self.radii.get(index).map(|&radius| f64::from(radius));
+            if self.covariances.is_empty() { listed() } else { None }
         });
         let given = match radius {
             Some(radius) => Some(round(radius / options.deviations)),

@@ -250,7 +250,7 @@ fn covariances_become_factors() {
     let samples =
         Points { covariances: vec![terms; 2], ..points(vec![Vec3::ZERO, Vec3::X], |p| p.x) };
     let [b00, b10, b11, b20, b21, b22] = splats(&samples).splats[0].factor;
-    let found = [
+    let products = [
         b00 * b00,
         b00 * b10,
         b00 * b20,
@@ -258,7 +258,7 @@ fn covariances_become_factors() {
         b10 * b20 + b11 * b21,
         b20 * b20 + b21 * b21 + b22 * b22,
     ];
-    assert!(found.iter().zip(terms).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
+    assert!(products.iter().zip(terms).all(|(a, b)| (a - b).abs() < 1e-5), "{products:?}");
     // A radius in the options takes precedence.
     let round = samples
         .to_splats(&SampleOptions { radius: Some(1.0), ..SampleOptions::default() })
@@ -275,11 +275,11 @@ fn slopes_of_any_unit_are_no_trouble() {
     };
     let expected = places(&splats(&random(100, |p| p.x)));
     for unit in [1e-30, 1e-12, 1e8, 1e12, 1e30] {
-        let found = places(&splats(&random(100, |p| unit * p.x)));
-        for (found, expected) in found.iter().zip(&expected) {
+        let scaled = places(&splats(&random(100, |p| unit * p.x)));
+        for (actual, expected) in scaled.iter().zip(&expected) {
             assert!(
-                (found / f64::from(unit) - expected).abs() < 1e-3,
-                "{unit}: {found} {expected}"
+                (actual / f64::from(unit) - expected).abs() < 1e-3,
+                "{unit}: {actual} {expected}"
             );
         }
     }

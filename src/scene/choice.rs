@@ -24,7 +24,7 @@ impl Scene {
         most: usize,
         bounds: &Bounds,
     ) -> Option<Choice> {
-        let own = |item: &Item| match item {
+        let choice_of = |item: &Item| match item {
             Item::Bricks(bricks, kernel, transfer) => {
                 let room = settings.page_memory / bricks::slot_bytes(bricks);
                 let (pixels, room) = match detail {
@@ -44,8 +44,9 @@ impl Scene {
                     });
                 let least = settings.region.map_or(0.0, |region| region.level);
                 let wish = Wish { pixels: pixels / SAMPLE_WIDTH, most, least, region };
-                let choose =
-                    |shown: &[u16; 256]| bricks::choice(bricks, view, kernel.extent, shown, &wish);
+                let choose = |visible: &[u16; 256]| {
+                    bricks::choice(bricks, view, kernel.extent, visible, &wish)
+                };
                 // If kernels reach further than the ranges of blocks cover, the ranges cannot
                 // exclude bricks.
                 if kernel.extent > bricks::REACH as f64 {
@@ -61,6 +62,6 @@ impl Scene {
             }
             _ => None,
         };
-        self.items.iter().find_map(own)
+        self.items.iter().find_map(choice_of)
     }
 }

@@ -153,21 +153,21 @@ impl Scene {
     /// # Errors
     /// [`Error::Argument`] if the scene has no such field; [`Error::Transfer`] if
     /// [`validate`](Self::validate) would refuse the function.
-    pub(crate) fn shown_by(&self, number: usize, transfer: &TransferFunction) -> Result<Self> {
+    pub(crate) fn with_transfer(&self, number: usize, transfer: &TransferFunction) -> Result<Self> {
         let mut scene = self.clone();
         let Some(item) = scene.items.get_mut(number) else {
             return Err(Error::Argument(format!("the scene has no item {number}")));
         };
-        let Some(shown) = item.transfer_mut() else {
+        let Some(function) = item.transfer_mut() else {
             return Err(Error::Argument(format!(
                 "item {number} of the scene has colours of its own, and no transfer function"
             )));
         };
-        shown.clone_from(transfer);
-        if let Item::Volume(volume, _, shown) = item
+        function.clone_from(transfer);
+        if let Item::Volume(volume, _, function) = item
             && volume.is_label_map()
         {
-            *shown = transfer.over_labels(volume);
+            *function = transfer.over_labels(volume);
         }
         numbers::check_field(item).map_err(numbers::of_item(number))?;
         Ok(scene)
@@ -182,7 +182,8 @@ impl Scene {
 
     /// Returns the scene without its fields, except that of item `number`.
     pub(crate) fn with_one_field(&self, number: usize) -> Self {
-        let is_kept = |(own, item): &(usize, &Item)| *own == number || item.transfer().is_none();
+        let is_kept =
+            |(index, item): &(usize, &Item)| *index == number || item.transfer().is_none();
         let items = self.items.iter().enumerate().filter(is_kept);
         Self { items: items.map(|(_, item)| item.clone()).collect() }
     }

@@ -5,7 +5,7 @@
 use super::{Item, Settings};
 use crate::{
     Error, Result,
-    facet::{Facet, FacetSet, Shown},
+    facet::{Facet, FacetSet, TextureCoordinates},
     hierarchy::Detail,
     math::{Bounds, Kernel},
     parallel::prelude::*,
@@ -98,13 +98,16 @@ fn check_facets(set: &FacetSet) -> Result<(), String> {
             "facet {index}: the corners {corners:?} are not finite, or beyond 1e18"
         ));
     }
-    if !set.shown.is_empty() && set.shown.len() != set.facets.len() {
-        let [facets, shown] = [set.facets.len(), set.shown.len()];
-        return Err(format!("{shown} facets show images, but there are {facets} facets"));
+    if !set.texture_coordinates.is_empty() && set.texture_coordinates.len() != set.facets.len() {
+        let [facets, textured] = [set.facets.len(), set.texture_coordinates.len()];
+        return Err(format!("{textured} facets show images, but there are {facets} facets"));
     }
-    let exists = |image: u32| image == Shown::PLAIN || (image as usize) < set.images.len();
-    let is_sound = |own: &Shown| exists(own.image) && own.places.iter().all(|at| at.is_finite());
-    match set.shown.par_iter().position_first(|own| !is_sound(own)) {
+    let exists =
+        |image: u32| image == TextureCoordinates::PLAIN || (image as usize) < set.images.len();
+    let is_sound = |part: &TextureCoordinates| {
+        exists(part.image) && part.places.iter().all(|at| at.is_finite())
+    };
+    match set.texture_coordinates.par_iter().position_first(|part| !is_sound(part)) {
         Some(index) => Err(format!("facet {index} shows no part of an image that there is")),
         None => Ok(()),
     }

@@ -58,7 +58,7 @@ impl Scene {
         for (number, item) in self.items.iter().enumerate() {
             let kind = if item.is_trained() { Kind::Trained } else { Kind::Measured };
             let spread = |points: &[Vec3], origin| near(points, kind, number, origin);
-            let own = match item {
+            let outermost = match item {
                 Item::Radiance(set) => of_splats(set, |_| true, clips, spread),
                 Item::Scalar(set, transfer) => of_samples(set, transfer, clips, spread),
                 Item::Facets(set) => of_facets(set, clips, number),
@@ -74,7 +74,7 @@ impl Scene {
                     of_volume(&bricks.volume(overview(bricks))?, transfer, clips)
                 }
             };
-            points.extend(own);
+            points.extend(outermost);
         }
         if points.is_empty() {
             points.extend(self.items.iter().flat_map(|item| item.bounds().corners()));
@@ -118,8 +118,8 @@ fn of_splats(
 ) -> Vec<DVec3> {
     let world = |point: Vec3| set.origin + point.as_dvec3();
     let kept = |point: Vec3| clips.iter().all(|clip| clip.keeps(world(point)));
-    let shown = set.splats.iter().filter(|splat| shows(splat) && kept(Vec3::from(splat.center)));
-    let mut splats: Vec<&Splat> = shown.collect();
+    let visible = set.splats.iter().filter(|splat| shows(splat) && kept(Vec3::from(splat.center)));
+    let mut splats: Vec<&Splat> = visible.collect();
     let mut centers: Vec<Vec3> = splats.iter().map(|splat| Vec3::from(splat.center)).collect();
     let Some([low, high]) = near(&centers, set.origin) else { return Vec::new() };
     let is_near = |center: &Vec3| center.cmpge(low).all() && center.cmple(high).all();
@@ -221,7 +221,8 @@ fn coarse(hierarchy: &Hierarchy) -> Result<SplatSet> {
     if hierarchy.page_count() as usize <= MOST_PAGES {
         return hierarchy.leaves();
     }
-    let read: Vec<u32> = coarsest(hierarchy, MOST_PAGES)?.into_iter().map(|own| own.page).collect();
+    let read: Vec<u32> =
+        coarsest(hierarchy, MOST_PAGES)?.into_iter().map(|needed| needed.page).collect();
     let known: HashSet<u32> = read.iter().copied().collect();
     let of_page = |page: &Page| {
         let last = |at: &usize| !known.contains(&page.child_pages[*at]);
@@ -270,9 +271,9 @@ impl Sides {
 /// Returns the extinction of values from one to another: that of the first, unless the function is
 /// clear at both and shows something between.
 fn extinction_in(transfer: &TransferFunction, [from, to]: [f64; 2]) -> f64 {
-    let own = transfer.extinction(from);
-    if own > 0.0 || transfer.extinction(to) > 0.0 {
-        return own;
+    let first = transfer.extinction(from);
+    if first > 0.0 || transfer.extinction(to) > 0.0 {
+        return first;
     }
     let inside = transfer.opacity.iter().filter(|(value, _)| (from..to).contains(value));
     inside.map(|&(value, _)| transfer.extinction(value)).fold(0.0, f64::max)
@@ -342,8 +343,9 @@ impl<'a> Rows<'a> {
         let sides = rows.sides(transfer);
         for step in 0..256 {
             let inside = |&(surface, above): &(f64, bool)| (value(step) >= surface) == above;
-            let own = extinction_in(transfer, [value(step), value(step + 1)]) as f32;
-            rows.extinction[step] = if sides.0.iter().any(inside) { f32::INFINITY } else { own };
+            let extinction = extinction_in(transfer, [value(step), value(step + 1)]) as f32;
+            rows.extinction[step] =
+                if sides.0.iter().any(inside) { f32::INFINITY } else { extinction };
         }
         if volume.is_label_map() {
             let count = (high - low) as usize + 1;
@@ -368,8 +370,8 @@ impl<'a> Rows<'a> {
     /// Returns the numbers of blocks along the axes.
     fn block_dims(&self) -> [usize; 3] {
         let [nx, ny, nz] = self.volume.lattice.dims;
-        let looked_at = |count: usize| count.div_ceil(self.stride).div_ceil(BLOCK);
-        [nx.div_ceil(BLOCK), looked_at(ny), looked_at(nz)]
+        let blocks_along = |count: usize| count.div_ceil(self.stride).div_ceil(BLOCK);
+        [nx.div_ceil(BLOCK), blocks_along(ny), blocks_along(nz)]
     }
 
     /// Writes the extinctions of a row of samples, from sample number `first` on. `scratch` is as
@@ -378,14 +380,14 @@ impl<'a> Rows<'a> {
         if self.of_labels.is_empty() {
             let samples = self.volume.samples.bytes();
             self.steps.write(self.steps.from(samples, first), scratch);
-            for (own, [step, _]) in row.iter_mut().zip(scratch) {
-                *own = self.extinction[usize::from(*step)];
+            for (extinction, [step, _]) in row.iter_mut().zip(scratch) {
+                *extinction = self.extinction[usize::from(*step)];
             }
             return;
         }
-        for (at, own) in row.iter_mut().enumerate() {
+        for (at, extinction) in row.iter_mut().enumerate() {
             let label = self.volume.value(first + at) - self.volume.range[0];
-            *own = self.of_labels[label as usize];
+            *extinction = self.of_labels[label as usize];
         }
     }
 
@@ -435,8 +437,8 @@ impl<'a> Rows<'a> {
                 continue;
             }
             self.write((k * ny + j) * nx, &mut scratch, &mut row);
-            for (i, &own) in row.iter().enumerate() {
-                let is_seen = blocks[i / BLOCK] && own > 0.0;
+            for (i, &extinction) in row.iter().enumerate() {
+                let is_seen = blocks[i / BLOCK] && extinction > 0.0;
                 if is_seen && self.is_kept([i, j, k]) {
                     visit([i, j, k]);
                 }
@@ -553,7 +555,7 @@ mod tests {
         volume.unwrap()
     }
 
-    fn shown(transfer: TransferFunction, clips: &[Clip]) -> Bounds {
+    fn visible_bounds(transfer: TransferFunction, clips: &[Clip]) -> Bounds {
         ends(&Scene::new().with_volume(ball(), Kernel::default(), transfer).seen(clips).unwrap())
     }
 
@@ -563,10 +565,10 @@ mod tests {
             opacity: vec![(low, 0.0), (low + 1.0, 0.9)],
             ..TransferFunction::default()
         };
-        let all = shown(opaque(0.0), &[]);
+        let all = visible_bounds(opaque(0.0), &[]);
         assert!((all.min - DVec3::new(3.0, 4.0, 5.0)).abs().max_element() < 1.1, "{all:?}");
         assert!((all.max - DVec3::new(21.0, 22.0, 23.0)).abs().max_element() < 1.1, "{all:?}");
-        let inner = shown(opaque(100.0), &[]);
+        let inner = visible_bounds(opaque(100.0), &[]);
         assert!((inner.max - DVec3::new(16.0, 17.0, 18.0)).abs().max_element() < 1.1, "{inner:?}");
         let surface = Isosurface { value: 100.0, color: [1.0; 3], opacity: 1.0 };
         let only = TransferFunction {
@@ -574,13 +576,13 @@ mod tests {
             isosurfaces: vec![surface],
             ..TransferFunction::default()
         };
-        let surface = shown(only, &[]);
+        let surface = visible_bounds(only, &[]);
         assert!((surface.max - inner.max).abs().max_element() < 1.1, "{surface:?}");
         let shape = ClipShape::HalfSpace { normal: DVec3::X, offset: 12.0 };
-        let half = shown(opaque(0.0), &[Clip { shape, inside: true }]);
+        let half = visible_bounds(opaque(0.0), &[Clip { shape, inside: true }]);
         assert!((half.max.x - 12.5).abs() < 0.6 && half.max.y > 14.0, "{half:?}");
         // If nothing is seen, the box is.
-        assert!(shown(opaque(300.0), &[]).max.x > 31.0);
+        assert!(visible_bounds(opaque(300.0), &[]).max.x > 31.0);
     }
 
     #[test]

@@ -220,10 +220,10 @@ impl Settings {
     /// Returns the lighting of a volume that `transfer` shows. Gradients are certain from the
     /// magnitudes on that the settings give, else from the transfer function's own.
     pub fn shade_of(&self, transfer: &TransferFunction) -> Option<Shade> {
-        let own = transfer.shade.and_then(|shade| shade.certain);
+        let certain = transfer.shade.and_then(|shade| shade.certain);
         match self.volume_shade {
             None => transfer.shade,
-            Some(shade) => shade.map(|shade| Shade { certain: shade.certain.or(own), ..shade }),
+            Some(shade) => shade.map(|shade| Shade { certain: shade.certain.or(certain), ..shade }),
         }
     }
 

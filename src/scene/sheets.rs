@@ -54,7 +54,7 @@ impl Scene {
     /// everything else. This is the size of the scene, if few splats far away make it larger than
     /// that. The parts that lie together must not be nearer than the first sheet.
     fn usual_size(&self) -> f64 {
-        const LOOKS: usize = 1 << 12;
+        const MOST: usize = 1 << 12;
         const FEWEST: usize = 20;
         const SHARE: f64 = 0.05;
         let usual = |places: Vec<Vec3>, origin: DVec3| {
@@ -62,13 +62,13 @@ impl Scene {
             (places.len() >= FEWEST)
                 .then(|| Bounds { min: origin + low.as_dvec3(), max: origin + high.as_dvec3() })
         };
-        let step = |count: usize| count.div_ceil(LOOKS).max(1);
+        let step = |count: usize| count.div_ceil(MOST).max(1);
         let of_facets = |set: &FacetSet| {
             let some = set.facets.iter().step_by(step(set.facets.len()));
             usual(some.map(|facet| facet.corners[0].into()).collect(), set.origin)
         };
         let of_item = |item: &Item| {
-            let found = match item {
+            let bounds = match item {
                 Item::Radiance(set) if !set.splats.is_empty() => {
                     let some = set.splats.iter().step_by(step(set.splats.len()));
                     usual(some.map(|splat| splat.center.into()).collect(), set.origin)
@@ -81,7 +81,7 @@ impl Scene {
                 }
                 _ => None,
             };
-            found.unwrap_or_else(|| item.bounds())
+            bounds.unwrap_or_else(|| item.bounds())
         };
         let all = self.items.iter().map(of_item).fold(Bounds::EMPTY, Bounds::union);
         100.0 * all.diagonal()
@@ -101,8 +101,8 @@ impl Scene {
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
         let bounds = self.bounds();
         let choice = |number: usize| {
-            let own = self.with_one_field(number);
-            own.choice(view, settings, settings.detail, usize::MAX, &bounds)
+            let scene = self.with_one_field(number);
+            scene.choice(view, settings, settings.detail, usize::MAX, &bounds)
         };
         let choices: Vec<Choice> = self.fields().into_iter().filter_map(choice).collect();
         self.sheets_of(view, settings, &choices, &bounds)

@@ -27,13 +27,13 @@ pub(super) fn take_specks(seen: &mut [bool], dims: [usize; 3], weights: &[f32], 
 
 /// Returns the parts of the grid, each as the blocks that it consists of.
 fn parts(seen: &[bool], [nx, ny, nz]: [usize; 3]) -> Vec<Vec<usize>> {
-    let mut is_found: Vec<bool> = seen.iter().map(|is_seen| !is_seen).collect();
+    let mut is_visited: Vec<bool> = seen.iter().map(|is_seen| !is_seen).collect();
     let mut parts = Vec::new();
     for first in 0..seen.len() {
-        if is_found[first] {
+        if is_visited[first] {
             continue;
         }
-        is_found[first] = true;
+        is_visited[first] = true;
         let mut part = vec![first];
         let mut next = 0;
         while let Some(&at) = part.get(next) {
@@ -43,7 +43,7 @@ fn parts(seen: &[bool], [nx, ny, nz]: [usize; 3]) -> Vec<Vec<usize>> {
                 for j in around(y, ny) {
                     for i in around(x, nx) {
                         let other = i + nx * (j + ny * k);
-                        if !std::mem::replace(&mut is_found[other], true) {
+                        if !std::mem::replace(&mut is_visited[other], true) {
                             part.push(other);
                         }
                     }

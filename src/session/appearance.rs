@@ -150,7 +150,7 @@ impl Appearance {
 
     /// Returns the error for a transfer function that shows none of the values.
     fn invisible(&self, transfer: &TransferFunction, name: &str, [low, high]: [f64; 2]) -> Error {
-        let shown = match transfer.shown_range() {
+        let text = match transfer.visible_range() {
             Some([from, to]) if from == to => format!("shows only the value {from}"),
             Some([from, to]) => format!("shows values between {from} and {to}"),
             None => "shows no value".to_owned(),
@@ -159,7 +159,7 @@ impl Appearance {
             format!("spread over the range {}, {}, ", plain(low), plain(high))
         });
         Error::NothingToDraw(format!(
-            "{spread}the transfer function {shown}, but the values of {name} lie between {low} \
+            "{spread}the transfer function {text}, but the values of {name} lie between {low} \
              and {high}"
         ))
     }

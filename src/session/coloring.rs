@@ -180,7 +180,7 @@ impl Coloring {
     /// Those of [`check_log`].
     pub fn color_transfer(&self, transfer: &mut TransferFunction, values: [f64; 2]) -> Result<()> {
         let Some(map) = self.map else { return Ok(()) };
-        let range = self.range.unwrap_or_else(|| shown_of(transfer, values));
+        let range = self.range.unwrap_or_else(|| visible_range_of(transfer, values));
         let scale = self.scale(map, Some(range));
         check_log(&scale)?;
         // Logarithms are not linear between the points of a map.
@@ -197,15 +197,15 @@ impl Coloring {
 
 /// Returns the values that a transfer function distinguishes: those that it shows, up to the last
 /// value at which it changes.
-pub fn shown_of(transfer: &TransferFunction, [low, high]: [f64; 2]) -> [f64; 2] {
-    let [from, to] = transfer.shown_range().unwrap_or([low, high]);
+pub fn visible_range_of(transfer: &TransferFunction, [low, high]: [f64; 2]) -> [f64; 2] {
+    let [from, to] = transfer.visible_range().unwrap_or([low, high]);
     let last = transfer.opacity.iter().map(|point| point.0).fold(f64::NEG_INFINITY, f64::max);
     let last_color = transfer.color.iter().map(|point| point.0).fold(last, f64::max);
     let first = transfer.opacity.first().map_or(low, |point| point.0);
     let from = if from.is_finite() { from } else { first.min(high) };
     let to = if to.is_finite() { to } else { last_color };
-    let shown = [from.max(low), to.min(high)];
-    if shown[0] < shown[1] { shown } else { [low, high] }
+    let clipped = [from.max(low), to.min(high)];
+    if clipped[0] < clipped[1] { clipped } else { [low, high] }
 }
 
 /// Refuses a logarithmic scale over values that have no logarithm.

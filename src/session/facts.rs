@@ -3,7 +3,7 @@
 use super::{Data, Opened};
 use crate::{
     Result,
-    about::{About, Frame, Modality, Stance, direction_name},
+    about::{About, Frame, Modality, Orientation, direction_name},
     bricks::Bricks,
     cells::{CellKind, Cells, Place},
     formats::{Array, Series},
@@ -139,7 +139,7 @@ fn of_mesh(mesh: &Mesh) -> Map<String, Value> {
             facts.insert(name.into(), json!(text));
         }
     }
-    stand(&mut facts, mesh.about.stance);
+    stand(&mut facts, mesh.about.orientation);
     facts.insert("bounds".into(), bounds(mesh.bounds()));
     facts
 }
@@ -154,7 +154,7 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     let attributes =
         if volume.colors.is_some() { json!(["value", "color"]) } else { json!(["value"]) };
     facts.insert("attributes".into(), attributes);
-    stand(&mut facts, volume.about.stance);
+    stand(&mut facts, volume.about.orientation);
     say(&mut facts, &volume.about);
     if let Some(labels) = &volume.about.labels {
         facts.insert("labels".into(), json!(labels.listed()));
@@ -222,7 +222,10 @@ fn of_hierarchy(hierarchy: &Hierarchy) -> Map<String, Value> {
     if let Some(degree) = header.degree {
         facts.insert("degree".into(), json!(degree));
     }
-    facts.insert("up".into(), header.stance.map_or(Value::Null, |stance| up(&stance)));
+    facts.insert(
+        "up".into(),
+        header.orientation.map_or(Value::Null, |orientation| up(&orientation)),
+    );
     if header.is_guessed {
         facts.insert("up_from".into(), json!("guess"));
     }
@@ -245,13 +248,13 @@ fn of_samples(points: &Points) -> Map<String, Value> {
         ("covariance", !points.covariances.is_empty()),
     ]);
     facts.insert("attributes".into(), attributes);
-    stand(&mut facts, points.about.stance);
+    stand(&mut facts, points.about.orientation);
     facts.insert("bounds".into(), bounds(Some(points.bounds())));
     facts
 }
 
 fn of_cells(cells: &Cells) -> Map<String, Value> {
-    let count = |kind: CellKind| cells.kinds.iter().filter(|own| **own == kind).count();
+    let count = |kind: CellKind| cells.kinds.iter().filter(|other| **other == kind).count();
     let kinds = CellKind::ALL.into_iter().map(|kind| (kind, count(kind)));
     let kinds = kinds.filter(|(_, count)| *count > 0);
     let kinds = kinds.map(|(kind, count)| (kind.name().to_owned(), json!(count)));
@@ -269,7 +272,7 @@ fn of_cells(cells: &Cells) -> Map<String, Value> {
         attributes.push(format!("value of {place}"));
     }
     facts.insert("attributes".into(), json!(attributes));
-    stand(&mut facts, cells.about.stance);
+    stand(&mut facts, cells.about.orientation);
     facts.insert("bounds".into(), bounds(Some(cells.bounds())));
     facts
 }
@@ -284,27 +287,27 @@ fn of_gaussians(set: &Gaussians) -> Map<String, Value> {
     facts.insert("invisible".into(), json!(survey.invisible));
     facts.insert("broken".into(), json!(set.broken.all()));
     facts.insert("attributes".into(), json!(["position", "covariance", "opacity", "color"]));
-    stand(&mut facts, set.about.stance);
+    stand(&mut facts, set.about.orientation);
     facts.insert("bounds".into(), bounds_of(set.bounds()));
     facts
 }
 
 /// Adds the direction that is up, if the file says so.
-fn stand(facts: &mut Map<String, Value>, stance: Option<Stance>) {
-    if let Some(stance) = stance {
-        facts.insert("up".into(), up(&stance));
+fn stand(facts: &mut Map<String, Value>, orientation: Option<Orientation>) {
+    if let Some(orientation) = orientation {
+        facts.insert("up".into(), up(&orientation));
     }
 }
 
 /// Returns the direction that is up: X, Y, Z, -X, …
-fn up(stance: &Stance) -> Value {
-    json!(direction_name(stance.up).trim_start_matches('+'))
+fn up(orientation: &Orientation) -> Value {
+    json!(direction_name(orientation.up).trim_start_matches('+'))
 }
 
 fn bounds(bounds: Option<[DVec3; 2]>) -> Value {
     bounds.map_or(Value::Null, |[min, max]| json!({ "min": min.to_array(), "max": max.to_array() }))
 }
 
-fn bounds_of(own: Bounds) -> Value {
-    bounds(Some([own.min, own.max]))
+fn bounds_of(Bounds { min, max }: Bounds) -> Value {
+    bounds(Some([min, max]))
 }

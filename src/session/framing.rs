@@ -4,7 +4,7 @@
 use super::{Origin, Subject};
 use crate::{
     Error, Result,
-    about::Stance,
+    about::Orientation,
     math::{Bounds, Camera},
 };
 use glam::DVec3;
@@ -222,14 +222,14 @@ impl Framing {
     }
 
     /// Returns how the scene stands in the picture, and where that comes from.
-    pub fn stance(&self, subject: &Subject) -> (Stance, Origin) {
+    pub fn orientation(&self, subject: &Subject) -> (Orientation, Origin) {
         match self.up.and_then(DVec3::try_normalize) {
             // The front is kept if the axis is the subject's own.
-            Some(up) if up.dot(subject.stance.up) < 0.999_999 => {
-                (Stance::with_up(up), Origin::Flag)
+            Some(up) if up.dot(subject.orientation.up) < 0.999_999 => {
+                (Orientation::with_up(up), Origin::Flag)
             }
-            Some(_) => (subject.stance, Origin::Flag),
-            None => (subject.stance, subject.origin),
+            Some(_) => (subject.orientation, Origin::Flag),
+            None => (subject.orientation, subject.origin),
         }
     }
 
@@ -252,14 +252,15 @@ impl Framing {
             camera.azimuth(turn);
             return camera;
         }
-        let (stance, _) = self.stance(subject);
-        let view_up = self.view_up.unwrap_or(stance.up);
+        let (orientation, _) = self.orientation(subject);
+        let view_up = self.view_up.unwrap_or(orientation.up);
         let view_angle = self.view_angle.unwrap_or(Camera::DEFAULT_VIEW_ANGLE);
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let around = |all: Bounds, &point: &DVec3| all.union(Bounds { min: point, max: point });
         let seen = subject.seen.iter().fold(Bounds::EMPTY, around);
         let bounds = if subject.seen.is_empty() { subject.bounds } else { seen };
-        let mut camera = Camera::framing_with(&bounds, -stance.front, view_up, aspect, view_angle);
+        let mut camera =
+            Camera::framing_with(&bounds, -orientation.front, view_up, aspect, view_angle);
         if let Some(focal_point) = self.focal_point {
             camera.position += focal_point - camera.focal_point;
             camera.focal_point = focal_point;

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     Deadline, Error, Result,
-    about::{About, Frame, Labels, Stance},
+    about::{About, Frame, Labels, Orientation},
     bricks::Bricks,
     cells::{Cells, Solid},
     facet::FacetSet,
@@ -173,7 +173,7 @@ impl Items {
     /// Returns the edges of meshes and cells that are drawn over a picture with these clips.
     pub(super) fn edges(&self, clips: &[Clip]) -> Vec<Arc<Edges>> {
         let of_solid = |entry: &Entry| match entry {
-            Entry::Solid(own) => own.edges(clips),
+            Entry::Solid(solid) => solid.edges(clips),
             Entry::Ready(_) | Entry::Mesh(_) | Entry::Rods { .. } => None,
         };
         let of_solids = self.entries.iter().filter_map(of_solid);
@@ -228,10 +228,10 @@ impl Items {
         };
         let mut changed = item.clone();
         match &mut changed {
-            Item::Scalar(_, own)
-            | Item::Volume(_, _, own)
-            | Item::Bricks(_, _, own)
-            | Item::Cells(_, own) => *own = new,
+            Item::Scalar(_, transfer)
+            | Item::Volume(_, _, transfer)
+            | Item::Bricks(_, _, transfer)
+            | Item::Cells(_, transfer) => *transfer = new,
             _ => return Err(Error::Argument(format!("item {number} of the scene has no field"))),
         }
         changed.validate()?;
@@ -248,11 +248,11 @@ impl Items {
         for entry in &self.entries {
             scene.items.push(match entry {
                 Entry::Ready(item) => item.clone(),
-                Entry::Mesh(own) if facets => Item::Facets(own.facets.clone()),
-                Entry::Mesh(own) => Item::Radiance(own.surfels()?),
-                Entry::Solid(own) if facets => Item::Solid(own.solid.clone()),
-                Entry::Solid(own) => own.field()?,
-                Entry::Rods { facets: own, .. } if facets => Item::Facets(own.clone()),
+                Entry::Mesh(mesh) if facets => Item::Facets(mesh.facets.clone()),
+                Entry::Mesh(mesh) => Item::Radiance(mesh.surfels()?),
+                Entry::Solid(solid) if facets => Item::Solid(solid.solid.clone()),
+                Entry::Solid(solid) => solid.field()?,
+                Entry::Rods { facets: rods, .. } if facets => Item::Facets(rods.clone()),
                 Entry::Rods { facets, splats } => {
                     Item::Radiance(splats.get_or_init(|| facets.rod_splats().into()).clone())
                 }
@@ -269,8 +269,8 @@ impl Items {
     /// Returns the error for a scene that cannot be drawn: that of the file whose item cannot be
     /// drawn by itself, if there is one.
     pub fn at_fault(&self, scene: &Scene, error: Error) -> Error {
-        match Self::unfit(scene).map(|(item, own)| (&self.contents[item].name, own)) {
-            Some((name, own)) if name.is_file => name.fault(own),
+        match Self::unfit(scene).map(|(item, fault)| (&self.contents[item].name, fault)) {
+            Some((name, fault)) if name.is_file => name.fault(fault),
             _ => error,
         }
     }
@@ -298,7 +298,7 @@ impl Adding<'_> {
         self.frame(mesh.about.frame);
         self.does("Finding the way up of");
         warn(self.items.subject.stand_mesh(&name.text, &mut mesh));
-        let up = self.items.subject.stance.up;
+        let up = self.items.subject.orientation.up;
         let legend = showing.coloring().paint(name, &mut mesh, up, showing.is_named)?;
         self.items.legends.extend(legend.map(|legend| (self.items.entries.len(), legend)));
         self.unit(&mesh.about);
@@ -320,7 +320,7 @@ impl Adding<'_> {
         }
         let kind = "mesh";
         if let Some(facets) = mesh.facets(&options).map_err(fault)? {
-            let (count, own) = (facets.facets.len(), facets.bounds());
+            let (count, facet_bounds) = (facets.facets.len(), facets.bounds());
             let facets = Arc::new(facets);
             let entry = if self.items.surfaces == Surfaces::Both {
                 let options = SurfelOptions { deadline: Deadline::NEVER, ..options };
@@ -329,11 +329,11 @@ impl Adding<'_> {
             } else {
                 Entry::Ready(Item::Facets(facets))
             };
-            self.push(kind, count, bounds.unwrap_or(own), entry);
+            self.push(kind, count, bounds.unwrap_or(facet_bounds), entry);
         } else {
             let splats = mesh.surfels(&options).map_err(fault)?;
-            let (count, own) = (splats.splats.len(), splats.bounds());
-            self.push(kind, count, bounds.unwrap_or(own), Item::Radiance(splats.into()));
+            let (count, splat_bounds) = (splats.splats.len(), splats.bounds());
+            self.push(kind, count, bounds.unwrap_or(splat_bounds), Item::Radiance(splats.into()));
         }
         Ok(())
     }
@@ -347,8 +347,13 @@ impl Adding<'_> {
     ) -> Result<()> {
         let (surfels, dots) = mesh.points(options).map_err(|error| self.name.fault(error))?;
         if let Some(surfels) = surfels {
-            let (count, own) = (surfels.splats.len(), surfels.bounds());
-            self.push("points", count, bounds.unwrap_or(own), Item::Radiance(surfels.into()));
+            let (count, splat_bounds) = (surfels.splats.len(), surfels.bounds());
+            self.push(
+                "points",
+                count,
+                bounds.unwrap_or(splat_bounds),
+                Item::Radiance(surfels.into()),
+            );
         }
         if let Some(dots) = dots {
             self.push_rods("points", dots, bounds);
@@ -357,13 +362,13 @@ impl Adding<'_> {
     }
 
     fn push_rods(&mut self, kind: &'static str, rods: FacetSet, bounds: Option<Bounds>) {
-        let (count, own) = (rods.facets.len(), rods.bounds());
+        let (count, rod_bounds) = (rods.facets.len(), rods.bounds());
         let entry = match self.items.surfaces {
             Surfaces::Surfels => Entry::Ready(Item::Radiance(rods.rod_splats().into())),
             Surfaces::Facets => Entry::Ready(Item::Facets(rods.into())),
             Surfaces::Both => Entry::Rods { facets: rods.into(), splats: OnceLock::new() },
         };
-        self.push(kind, count, bounds.unwrap_or(own), entry);
+        self.push(kind, count, bounds.unwrap_or(rod_bounds), entry);
     }
 
     fn add_gaussians(&mut self, mut set: Gaussians) {
@@ -392,7 +397,7 @@ impl Adding<'_> {
         let header = bricks.header();
         self.values(&transfer, header.range, Legend::title("", ""), None);
         self.length(&header.unit);
-        self.stand(header.frame, header.stance());
+        self.stand(header.frame, header.orientation());
         let (count, bounds) = (bricks.level(0).dims.iter().product(), bricks.bounds());
         let item = Item::Bricks(bricks.clone(), showing.kernel.clone(), transfer);
         self.push("bricks", count, bounds, item);
@@ -411,10 +416,10 @@ impl Adding<'_> {
             }
         }
         let transfer = showing.appearance.of_volume(&name.text, &volume)?;
-        let About { name: title, unit, labels, frame, stance, .. } = &volume.about;
+        let About { name: title, unit, labels, frame, orientation, .. } = &volume.about;
         self.values(&transfer, volume.range, Legend::title(title, unit), labels.as_ref());
         self.unit(&volume.about);
-        self.stand(*frame, *stance);
+        self.stand(*frame, *orientation);
         let [min, max] = volume.bounds();
         let kernel = showing.kernel.clone();
         if showing.is_sharp {
@@ -433,7 +438,7 @@ impl Adding<'_> {
         let splats = volume.colored_splats().map_err(|error| self.name.fault(error))?;
         let splats = splats.expect("the volume has colours");
         self.unit(&volume.about);
-        self.stand(volume.about.frame, volume.about.stance);
+        self.stand(volume.about.frame, volume.about.orientation);
         let [min, max] = volume.bounds();
         self.push("volume", volume.len(), Bounds { min, max }, Item::Radiance(splats.into()));
         Ok(())
@@ -442,7 +447,7 @@ impl Adding<'_> {
     fn add_samples(&mut self, points: &Points) -> Result<()> {
         let Self { name, showing, .. } = *self;
         let transfer = showing.appearance.of_samples(&name.text, points)?;
-        let About { name: title, unit, frame, stance, .. } = &points.about;
+        let About { name: title, unit, frame, orientation, .. } = &points.about;
         self.values(&transfer, points.range(), Legend::title(title, unit), None);
         self.unit(&points.about);
         self.does("Making splats of");
@@ -451,7 +456,7 @@ impl Adding<'_> {
         // Options are the caller's, whatever holds the samples.
         options.validate()?;
         let splats = points.to_splats(&options).map_err(|error| name.fault(error))?;
-        self.stand(*frame, *stance);
+        self.stand(*frame, *orientation);
         let [min, max] = points.bounds();
         let bounds = Bounds { min, max }.union(splats.bounds());
         self.push("samples", points.len(), bounds, Item::Scalar(splats.into(), transfer));
@@ -473,10 +478,10 @@ impl Adding<'_> {
             return Err(name.unfit("content", "the cells have no values", hint));
         }
         let transfer = showing.appearance.of_cells(&name.text, cells)?;
-        let About { name: title, unit, frame, stance, .. } = &cells.about;
+        let About { name: title, unit, frame, orientation, .. } = &cells.about;
         self.values(&transfer, cells.range(), Legend::title(title, unit), None);
         self.unit(&cells.about);
-        self.stand(*frame, *stance);
+        self.stand(*frame, *orientation);
         self.does("Dividing the cells of");
         let item = field_of(cells, transfer).map_err(|error| name.fault(error))?;
         let bounds = item.bounds();
@@ -487,8 +492,8 @@ impl Adding<'_> {
     /// Adds cells as a solid, or as the surfels of their boundary for pictures that show no facets.
     fn add_solid(&mut self, cells: Cells) -> Result<()> {
         let Self { name, showing, .. } = *self;
-        self.stand(cells.about.frame, cells.about.stance);
-        let up = self.items.subject.stance.up;
+        self.stand(cells.about.frame, cells.about.orientation);
+        let up = self.items.subject.orientation.up;
         let (tint, legend) = showing.coloring().tint(name, &cells, up)?;
         self.items.legends.extend(legend.map(|legend| (self.items.entries.len(), legend)));
         self.unit(&cells.about);
@@ -508,8 +513,8 @@ impl Adding<'_> {
             return Ok(());
         }
         let solid = Solid::new(cells, &showing.solid_options(tint)).map_err(fault)?;
-        let own = ShownSolid::new(name, solid, showing);
-        self.push("cells", count, bounds, Entry::Solid(Box::new(own)));
+        let solid = ShownSolid::new(name, solid, showing);
+        self.push("cells", count, bounds, Entry::Solid(Box::new(solid)));
         Ok(())
     }
 
@@ -543,10 +548,14 @@ impl Adding<'_> {
         warn(self.items.subject.frame(&self.name.text, frame));
     }
 
-    /// Takes the frame and the stance of a field, or the convention for fields.
-    fn stand(&mut self, frame: Frame, stance: Option<Stance>) {
+    /// Takes the frame and the orientation of a field, or the convention for fields.
+    fn stand(&mut self, frame: Frame, orientation: Option<Orientation>) {
         self.frame(frame);
-        warn(self.items.subject.stand_as_told(&self.name.text, stance, Stance::SURVEY));
+        warn(self.items.subject.orient_as_stated(
+            &self.name.text,
+            orientation,
+            Orientation::SURVEY,
+        ));
     }
 
     fn does(&self, what: &str) {

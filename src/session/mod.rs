@@ -38,7 +38,7 @@ mod subject;
 mod tests;
 
 pub use appearance::{Appearance, Surface, SurfaceValue, Transfer};
-pub use coloring::{Coloring, SurfaceColor, check_log, shown_of};
+pub use coloring::{Coloring, SurfaceColor, check_log, visible_range_of};
 pub use data::{Data, warn_of_holes};
 pub use description::{
     AppearanceEntry, Axis, Background, CameraEntry, ClipEntry, ClipSide, ColorEntry, Composite,

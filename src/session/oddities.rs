@@ -48,22 +48,22 @@ fn of_bounds(bounds: Bounds) -> Option<Finding> {
 }
 
 /// Returns a warning if something was found.
-fn warning(code: &'static str, place: &str, found: Option<String>) -> Option<Finding> {
+fn warning(code: &'static str, place: &str, message: Option<String>) -> Option<Finding> {
     let (severity, place) = (Severity::Warning, place.to_owned());
-    found.map(|message| Finding { code, severity, place, message })
+    message.map(|message| Finding { code, severity, place, message })
 }
 
 /// Returns the oddities of trained Gaussians.
 fn in_gaussians(set: &Gaussians) -> Vec<Finding> {
     let (survey, all) = (set.survey(), set.len() as u64 + set.broken.all());
     let of = |count: u64, what: &str| (count > 0).then(|| format!("{count} of {all} {what}"));
-    let found = [
+    let oddities = [
         ("not-finite", of(set.broken.not_finite, "have numbers that are not finite; left out")),
         ("no-rotation", of(set.broken.without_rotation, "have a zero quaternion; left out")),
         ("invisible", of(survey.invisible, "cover less than 1/255 of any pixel")),
         ("needles", of(survey.needles, "are at least 25 times as long as they are wide")),
     ];
-    found.into_iter().filter_map(|(code, found)| warning(code, "Gaussians", found)).collect()
+    oddities.into_iter().filter_map(|(code, message)| warning(code, "Gaussians", message)).collect()
 }
 
 /// Returns findings on a mesh or point cloud: parts that draw nothing, or that are drawn
@@ -76,7 +76,7 @@ fn in_mesh(mesh: &Mesh, deadline: Deadline) -> Result<Vec<Finding>> {
     };
     let open = "the surface has borders; its back is visible through them";
     let open = (triangles > 0 && !mesh.is_closed()).then(|| open.to_owned());
-    let found = [
+    let oddities = [
         ("not-finite", "positions", of(survey.not_finite, points, "are not finite")),
         (
             "duplicates",
@@ -87,8 +87,9 @@ fn in_mesh(mesh: &Mesh, deadline: Deadline) -> Result<Vec<Finding>> {
         ("unused", "positions", of(survey.unused, points, "belong to no triangle")),
         ("open", "triangles", open),
     ];
-    let found = found.into_iter().filter_map(|(code, place, found)| warning(code, place, found));
-    let mut findings: Vec<Finding> = found.collect();
+    let warnings =
+        oddities.into_iter().filter_map(|(code, place, message)| warning(code, place, message));
+    let mut findings: Vec<Finding> = warnings.collect();
     match mesh.surfels(&SurfelOptions { deadline, ..SurfelOptions::default() }) {
         // These errors say nothing about the file.
         Err(error @ (Error::Timeout { .. } | Error::Memory { .. })) => return Err(error),

@@ -101,7 +101,7 @@ impl Reading {
     pub fn give_radii(&self, path: &Path, data: &mut Data, attribute: Option<&str>) -> Result<()> {
         let (Some(attribute), Data::Mesh(mesh)) = (attribute, data) else { return Ok(()) };
         let values = match self.open_colored(path, Some(attribute))?.read()? {
-            Data::Mesh(own) => own.values,
+            Data::Mesh(colored) => colored.values,
             _ => Vec::new(),
         };
         if values.len() != mesh.positions.len() {
@@ -216,9 +216,9 @@ impl Opened<'_> {
 
     /// Returns the files opened so far: its own, those it refers to, and a table of labels.
     pub fn files(&self) -> Vec<PathBuf> {
-        let own = self.source.as_ref().map_or_else(|| vec![self.path.to_owned()], Source::files);
+        let opened = self.source.as_ref().map_or_else(|| vec![self.path.to_owned()], Source::files);
         let table = self.reading.label_table.clone().filter(|_| self.kind == Kind::Volume);
-        own.into_iter().chain(table).collect()
+        opened.into_iter().chain(table).collect()
     }
 
     /// Returns the arrays of a file that holds several; none for the kinds that name none.

@@ -61,8 +61,8 @@ impl ShownSolid {
             return None;
         }
         let mut kept = self.edges.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((own, edges)) = &*kept
-            && own == clips
+        if let Some((kept_clips, edges)) = &*kept
+            && kept_clips == clips
         {
             return Some(edges.clone());
         }

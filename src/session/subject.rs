@@ -1,7 +1,7 @@
 //! A scene as its camera needs it: where it is, how it stands, and what of it is seen.
 
 use crate::{
-    about::{Frame, Frames, Stance, direction_name},
+    about::{Frame, Frames, Orientation, direction_name},
     gaussians::Gaussians,
     hierarchy::Hierarchy,
     math::Bounds,
@@ -9,7 +9,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Where a scene's stance comes from, from the least certain on.
+/// Where a scene's orientation comes from, from the least certain on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Origin {
     /// The default for shapes that rest no better one way than the other.
@@ -45,8 +45,8 @@ pub struct Subject {
     /// The box around samples and vertices, in world units; footprints reach further.
     pub bounds: Bounds,
     /// How the scene stands unless the user says how.
-    pub stance: Stance,
-    /// Where the stance comes from.
+    pub orientation: Orientation,
+    /// Where the orientation comes from.
     pub origin: Origin,
     /// Points that span what is seen; if there are none, the box is seen.
     pub seen: Vec<DVec3>,
@@ -62,8 +62,8 @@ impl Default for Subject {
 impl Subject {
     /// A subject whose box is seen, and which stands with this direction up.
     pub fn new(bounds: Bounds, up: DVec3) -> Self {
-        let (stance, seen) = (Stance::with_up(up), Vec::new());
-        Self { bounds, stance, origin: Origin::Default, seen, frames: Frames::default() }
+        let (orientation, seen) = (Orientation::with_up(up), Vec::new());
+        Self { bounds, orientation, origin: Origin::Default, seen, frames: Frames::default() }
     }
 
     /// Adds the box of an input.
@@ -86,78 +86,91 @@ impl Subject {
         self.frames.have_patient()
     }
 
-    /// Takes the stance of an input that is not turned.
-    pub fn stand(&mut self, name: &str, stance: Stance, origin: Origin) -> Option<String> {
-        self.consider(stance, origin).then(|| {
-            let [own, scene] = [stance.up, self.stance.up].map(direction_name);
+    /// Takes the orientation of an input that is not turned.
+    pub fn stand(
+        &mut self,
+        name: &str,
+        orientation: Orientation,
+        origin: Origin,
+    ) -> Option<String> {
+        self.consider(orientation, origin).then(|| {
+            let [up, scene] = [orientation.up, self.orientation.up].map(direction_name);
             format!(
-                "{name} says that {own} is up, but the scene stands with {scene} up, as an input \
+                "{name} says that {up} is up, but the scene stands with {scene} up, as an input \
                  before says; --up (in Python, up) sets another"
             )
         })
     }
 
-    /// Takes what a file says of its stance, or the convention for its kind.
-    pub fn stand_as_told(
+    /// Takes what a file says of its orientation, or the convention for its kind.
+    pub fn orient_as_stated(
         &mut self,
         name: &str,
-        told: Option<Stance>,
-        usual: Stance,
+        stated: Option<Orientation>,
+        usual: Orientation,
     ) -> Option<String> {
-        match told {
-            Some(stance) => self.stand(name, stance, Origin::File),
+        match stated {
+            Some(orientation) => self.stand(name, orientation, Origin::File),
             None => self.stand(name, usual, Origin::Convention),
         }
     }
 
-    /// Takes the stance of a mesh, or guesses it. A mesh that stands otherwise than an input before
+    /// Takes the orientation of a mesh, or guesses it. A mesh that stands otherwise than an input before
     /// is turned.
     pub fn stand_mesh(&mut self, name: &str, mesh: &mut Mesh) -> Option<String> {
-        match mesh.about.stance {
-            Some(stance) => self.turn(name, stance, |wanted| mesh.stand(wanted)),
+        match mesh.about.orientation {
+            Some(orientation) => self.turn(name, orientation, |wanted| mesh.stand(wanted)),
             // A guess would not count.
             None if self.origin >= Origin::Guess => None,
-            None => mesh.guess_stance().and_then(|own| self.stand(name, own, Origin::Guess)),
+            None => {
+                mesh.guess_orientation().and_then(|guess| self.stand(name, guess, Origin::Guess))
+            }
         }
     }
 
-    /// Takes the stance of trained Gaussians, or the convention of trainers. Gaussians that stand
+    /// Takes the orientation of trained Gaussians, or the convention of trainers. Gaussians that stand
     /// otherwise than an input before are turned.
     pub fn stand_gaussians(&mut self, name: &str, set: &mut Gaussians) -> Option<String> {
-        match set.about.stance {
-            Some(stance) => self.turn(name, stance, |wanted| set.stand(wanted)),
-            None => self.stand(name, Stance::Y_DOWN, Origin::Convention),
+        match set.about.orientation {
+            Some(orientation) => self.turn(name, orientation, |wanted| set.stand(wanted)),
+            None => self.stand(name, Orientation::Y_DOWN, Origin::Convention),
         }
     }
 
-    /// Takes the stance and the frame of a hierarchy.
+    /// Takes the orientation and the frame of a hierarchy.
     pub fn stand_hierarchy(&mut self, name: &str, hierarchy: &Hierarchy) -> Vec<String> {
         let header = hierarchy.header();
         let origin = if header.is_guessed { Origin::Guess } else { Origin::File };
-        let stance = header.stance.and_then(|stance| self.stand(name, stance, origin));
-        // No other frame has this stance.
-        let is_patient = header.stance == Some(Stance::RAS);
+        let orientation =
+            header.orientation.and_then(|orientation| self.stand(name, orientation, origin));
+        // No other frame has this orientation.
+        let is_patient = header.orientation == Some(Orientation::RAS);
         let frame = self.frame(name, if is_patient { Frame::Patient } else { Frame::Own });
-        stance.into_iter().chain(frame).collect()
+        orientation.into_iter().chain(frame).collect()
     }
 
-    /// Takes a stance that a file states. If the scene stands otherwise, `turn` turns the input.
-    fn turn(&mut self, name: &str, own: Stance, turn: impl FnOnce(Stance)) -> Option<String> {
-        self.consider(own, Origin::File).then(|| {
-            turn(self.stance);
-            let [own, scene] = [own.up, self.stance.up].map(direction_name);
+    /// Takes a orientation that a file states. If the scene stands otherwise, `turn` turns the input.
+    fn turn(
+        &mut self,
+        name: &str,
+        orientation: Orientation,
+        turn: impl FnOnce(Orientation),
+    ) -> Option<String> {
+        self.consider(orientation, Origin::File).then(|| {
+            turn(self.orientation);
+            let [up, scene] = [orientation.up, self.orientation.up].map(direction_name);
             format!(
-                "{name} is turned: it stands with {own} up, and the input before with {scene} up"
+                "{name} is turned: it stands with {up} up, and the input before with {scene} up"
             )
         })
     }
 
-    /// Takes a stance if it comes from a more certain origin than the one before. Returns whether
+    /// Takes a orientation if it comes from a more certain origin than the one before. Returns whether
     /// it contradicts that one, although both come from files.
-    fn consider(&mut self, stance: Stance, origin: Origin) -> bool {
+    fn consider(&mut self, orientation: Orientation, origin: Origin) -> bool {
         if origin > self.origin {
-            (self.stance, self.origin) = (stance, origin);
+            (self.orientation, self.origin) = (orientation, origin);
         }
-        origin == Origin::File && self.stance.up.dot(stance.up) < 0.999
+        origin == Origin::File && self.orientation.up.dot(orientation.up) < 0.999
     }
 }

@@ -10,7 +10,7 @@ use crate::{
     },
 };
 use crate::{
-    about::{Frame, Stance},
+    about::{Frame, Orientation},
     cells::{CellKind, Cells},
     math::Bounds,
     scene::{Clip, ClipShape, Item},
@@ -70,9 +70,12 @@ fn an_attribute_makes_no_samples() {
 fn missing_values_are_told() {
     let folder = Folder::new();
     let path = folder.write("a.csv", TABLE.as_bytes());
-    let (data, told) = warnings_of(|| Reading::default().open(&path).unwrap().read().unwrap());
+    let (data, warnings) = warnings_of(|| Reading::default().open(&path).unwrap().read().unwrap());
     assert_eq!(data.holes(), 1);
-    assert!(told.iter().any(|line| line.ends_with("1 of 4 values missing: left out")), "{told:?}");
+    assert!(
+        warnings.iter().any(|line| line.ends_with("1 of 4 values missing: left out")),
+        "{warnings:?}"
+    );
 }
 
 #[test]
@@ -117,21 +120,25 @@ fn oddities_are_found() {
 #[test]
 fn the_first_statement_decides() {
     let mut subject = Subject::default();
-    assert_eq!(subject.stand_as_told("a.raw", None, Stance::SURVEY), None);
-    assert_eq!((subject.stance, subject.origin), (Stance::SURVEY, Origin::Convention));
-    assert_eq!(subject.stand_as_told("b.glb", Some(Stance::Y_UP), Stance::SURVEY), None);
-    assert_eq!((subject.stance, subject.origin), (Stance::Y_UP, Origin::File));
-    let told = subject.stand_as_told("c.las", Some(Stance::SURVEY), Stance::SURVEY).unwrap();
-    assert!(
-        told.starts_with("c.las says that +Z is up, but the scene stands with +Y up"),
-        "{told}"
+    assert_eq!(subject.orient_as_stated("a.raw", None, Orientation::SURVEY), None);
+    assert_eq!((subject.orientation, subject.origin), (Orientation::SURVEY, Origin::Convention));
+    assert_eq!(
+        subject.orient_as_stated("b.glb", Some(Orientation::Y_UP), Orientation::SURVEY),
+        None
     );
-    assert_eq!(subject.stance, Stance::Y_UP);
+    assert_eq!((subject.orientation, subject.origin), (Orientation::Y_UP, Origin::File));
+    let warning =
+        subject.orient_as_stated("c.las", Some(Orientation::SURVEY), Orientation::SURVEY).unwrap();
+    assert!(
+        warning.starts_with("c.las says that +Z is up, but the scene stands with +Y up"),
+        "{warning}"
+    );
+    assert_eq!(subject.orientation, Orientation::Y_UP);
     let mut mesh = crate::surface::Mesh::default();
     mesh.positions.push(glam::Vec3::Z);
-    mesh.about.stance = Some(Stance::SURVEY);
-    let told = subject.stand_mesh("d.ply", &mut mesh).unwrap();
-    assert!(told.starts_with("d.ply is turned: it stands with +Z up"), "{told}");
+    mesh.about.orientation = Some(Orientation::SURVEY);
+    let warning = subject.stand_mesh("d.ply", &mut mesh).unwrap();
+    assert!(warning.starts_with("d.ply is turned: it stands with +Z up"), "{warning}");
     assert!(mesh.positions[0].distance(glam::Vec3::Y) < 1e-6);
     assert_eq!(subject.frame("d.ply", Frame::Own), None);
     assert!(subject.frame("e.nii", Frame::Patient).is_some() && subject.is_patient());
@@ -157,8 +164,8 @@ fn a_camera_looks_from_the_side_that_is_asked_for() {
     let turned = toward(Framing { up: Some(DVec3::Y), ..side(Side::Front) });
     assert!(turned.distance(DVec3::Z) < 1e-9, "{turned}");
     let names: Vec<_> = Side::ALL.map(Side::name).to_vec();
-    let told = serde_json::to_value(Side::ALL).unwrap();
-    assert_eq!(told, serde_json::json!(names));
+    let written = serde_json::to_value(Side::ALL).unwrap();
+    assert_eq!(written, serde_json::json!(names));
 }
 
 #[test]
@@ -202,12 +209,12 @@ fn a_surface_needs_the_values_that_colour_it() {
     let heat = Coloring { surface: Some(SurfaceColor::of(" heat", None)), ..Coloring::default() };
     assert_eq!(heat.attribute(), Some("heat"));
     let mut mesh = triangle();
-    let [file, own] = [true, false].map(|is_file| Name { text: "a.ply".into(), is_file });
+    let [file, caller] = [true, false].map(|is_file| Name { text: "a.ply".into(), is_file });
     let error = heat.paint(&file, &mut mesh, DVec3::Z, true).unwrap_err();
     assert!(
         matches!(&error, Error::Input { message, .. } if message.contains("“heat” is neither"))
     );
-    let error = heat.paint(&own, &mut mesh, DVec3::Z, true).unwrap_err();
+    let error = heat.paint(&caller, &mut mesh, DVec3::Z, true).unwrap_err();
     assert!(matches!(&error, Error::Argument(message) if message.contains("a.ply: “heat”")));
     assert_eq!(Coloring::default().paint(&file, &mut mesh, DVec3::Z, true).unwrap(), None);
     mesh.values = vec![1.0, 2.0, 4.0];
@@ -314,7 +321,7 @@ fn an_input_that_cannot_be_shown_changes_nothing() {
     let showing = Showing { appearance, draws_edges: true, ..Showing::default() };
     let name = Name::of_file("a.ply".as_ref());
     let mut turned = triangle();
-    turned.about.stance = Some(Stance::RAS);
+    turned.about.orientation = Some(Orientation::RAS);
     turned.about.frame = Frame::Patient;
     assert!(items.add(&name, Data::Mesh(turned), &showing, &|_| ()).is_err());
     assert_eq!(items.captions(), Captions::default());
@@ -364,8 +371,8 @@ fn points_and_lines_have_items_of_their_own() {
         let mut items = Items::new(Surfaces::Both);
         let showing = Showing { points, ..Showing::default() };
         items.add(&Name::of_file("a.ply".as_ref()), Data::Mesh(mesh), &showing, &|_| ()).unwrap();
-        let found: Vec<&str> = items.contents.iter().map(|content| content.kind).collect();
-        assert_eq!(found, kinds, "{name}");
+        let item_kinds: Vec<&str> = items.contents.iter().map(|content| content.kind).collect();
+        assert_eq!(item_kinds, kinds, "{name}");
         let [with, without] = [true, false].map(|facets| items.scene(facets).unwrap());
         let is_facets = |item: &Item| matches!(item, Item::Facets(_));
         assert_eq!(with.items.iter().map(is_facets).collect::<Vec<_>>(), facets, "{name}");

@@ -50,9 +50,9 @@ impl Part {
         for triangle in triangles {
             for &vertex in triangle {
                 // Smaller vertex numbers wrap around and become too large.
-                let own = vertex.wrapping_sub(first);
-                if own < count {
-                    starts[own as usize] += 1;
+                let offset = vertex.wrapping_sub(first);
+                if offset < count {
+                    starts[offset as usize] += 1;
                 }
             }
         }
@@ -66,9 +66,9 @@ impl Part {
         let mut corners = vec![0u32; end as usize];
         for (index, triangle) in triangles.iter().enumerate().rev() {
             for (corner, &vertex) in triangle.iter().enumerate().rev() {
-                let own = vertex.wrapping_sub(first);
-                if own < count {
-                    let slot = &mut starts[own as usize];
+                let offset = vertex.wrapping_sub(first);
+                if offset < count {
+                    let slot = &mut starts[offset as usize];
                     *slot -= 1;
                     corners[*slot as usize] = (index * 3 + corner) as u32;
                 }

@@ -127,9 +127,9 @@ mod tests {
     }
 
     fn facets(scale: ColorScale, count: usize, values: [f32; 3]) -> Vec<Facet> {
-        let mut found = Vec::new();
-        Bands::new(scale, count).add(&triangle(values), &mut |facet| found.push(facet));
-        found
+        let mut facets = Vec::new();
+        Bands::new(scale, count).add(&triangle(values), &mut |facet| facets.push(facet));
+        facets
     }
 
     fn area(facets: &[Facet]) -> f32 {
@@ -143,15 +143,15 @@ mod tests {
     #[test]
     fn colours_between_the_corners_are_those_of_the_values() {
         let scale = ColorScale::new(ColorMap::named("turbo").unwrap());
-        let found = facets(scale, 1, [0.0, 1.0, 0.0]);
-        assert!((area(&found) - 0.5).abs() < 1e-5, "{}", area(&found));
+        let facets = facets(scale, 1, [0.0, 1.0, 0.0]);
+        assert!((area(&facets) - 0.5).abs() < 1e-5, "{}", area(&facets));
         // Along the first edge, the value is x.
-        for facet in &found {
+        for facet in &facets {
             for (corner, color) in facet.corners.iter().zip(facet.colors) {
                 let [red, green, blue, _] = color.to_le_bytes();
                 let right = scale.color(corner[0].into()).map(|part| (part * 255.0).round() as i16);
-                let own = [red, green, blue].map(i16::from);
-                assert!((0..3).all(|c| (own[c] - right[c]).abs() <= 1), "{own:?} {right:?}");
+                let actual = [red, green, blue].map(i16::from);
+                assert!((0..3).all(|c| (actual[c] - right[c]).abs() <= 1), "{actual:?} {right:?}");
             }
             let [low, high] = [f32::min, f32::max]
                 .map(|end| facet.corners.iter().map(|at| at[0]).reduce(end).unwrap());

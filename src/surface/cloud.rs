@@ -195,8 +195,8 @@ impl<'a> Judged<'a> {
         let points: Vec<Vec3> = order.par_iter().map(|&point| points[point as usize]).collect();
         // Normals are dropped for points that coincide with an earlier one.
         known.normals.retain_mut(|(index, _)| {
-            let found = kept.binary_search(index).map(|point| *index = places[point]);
-            found.is_ok()
+            let renumbered = kept.binary_search(index).map(|point| *index = places[point]);
+            renumbered.is_ok()
         });
         let kept: Vec<u32> = order.into_par_iter().map(|point| kept[point as usize]).collect();
         let (spacing, lone) = spacings(&around, &nearest, known.spacing);
@@ -249,8 +249,9 @@ impl<'a> Judged<'a> {
     /// Returns the radius of a point's rod in world units, and the least one in pixels.
     fn radius(&self, at: usize, options: &SurfelOptions) -> [f32; 2] {
         let [automatic, least] = LEAST_PIXELS;
-        let own = self.mesh.radii.get(self.kept[at] as usize);
-        let [radius, pixels] = match (own.filter(|own| own.is_finite()), options.point_size) {
+        let given = self.mesh.radii.get(self.kept[at] as usize);
+        let [radius, pixels] = match (given.filter(|radius| radius.is_finite()), options.point_size)
+        {
             (Some(radius), _) => [radius.max(0.0), least],
             (None, Some(Size::World(size))) => [0.5 * size, least],
             (None, Some(Size::Pixels(size))) => [0.0, 0.5 * size],
@@ -352,11 +353,11 @@ fn spacings(
     around
         .par_iter()
         .zip(nearest)
-        .map(|(own, nearest)| {
+        .map(|(point, nearest)| {
             let mut others = nearest.map(|index| around[index as usize].distance);
             let usual = *others.select_nth_unstable_by(COUNT / 2, f32::total_cmp).1;
-            let lone = own.distance > usual * LONE;
-            let distance = if lone { usual } else { own.distance.min(usual * WIDER) };
+            let lone = point.distance > usual * LONE;
+            let distance = if lone { usual } else { point.distance.min(usual * WIDER) };
             (if distance > 0.0 { distance.min(typical * LARGEST) } else { typical }, lone)
         })
         .unzip()
@@ -436,25 +437,27 @@ fn surroundings(
     places: &[u32],
 ) -> (Nearest, Surroundings) {
     let crowd = crowd as usize;
-    let found = tree.of(index, COUNT * crowd);
+    let neighbours = tree.of(index, COUNT * crowd);
     let center = points[index as usize];
-    let offsets = || found.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
+    let offsets =
+        || neighbours.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
     let (values, axes) = eigen(scatter(offsets));
     let [large, middle, _] = values;
     let is_plane = middle > large * 1e-4;
     let mut nearest = [places[index as usize]; COUNT];
-    let last = found.last().map_or(0.0, |&(distance, _)| distance);
-    let same = found.iter().take_while(|&&(distance, _)| distance <= SAME_PLACE * last).count();
+    let last = neighbours.last().map_or(0.0, |&(distance, _)| distance);
+    let same =
+        neighbours.iter().take_while(|&&(distance, _)| distance <= SAME_PLACE * last).count();
     nearest
         .iter_mut()
-        .zip(found.iter().skip(crowd - 1).step_by(crowd))
+        .zip(neighbours.iter().skip(crowd - 1).step_by(crowd))
         .for_each(|(slot, &(_, index))| *slot = places[index as usize]);
-    let distance = found.get(found.len() / 2).map_or(0.0, |&(distance, _)| distance);
+    let distance = neighbours.get(neighbours.len() / 2).map_or(0.0, |&(distance, _)| distance);
     let around = Surroundings {
         distance,
-        area: area(&found, distance, crowd),
+        area: area(&neighbours, distance, crowd),
         crowd: same as u8 + 1,
-        first: found.get(crowd - 1).map_or(0.0, |&(distance, _)| distance),
+        first: neighbours.get(crowd - 1).map_or(0.0, |&(distance, _)| distance),
         is_flat: is_flat_of_few(values),
         normal: if is_plane { axes[2].as_vec3() } else { Vec3::ZERO },
         long: axes[0].as_vec3(),
@@ -469,8 +472,8 @@ const MEASURED: std::ops::Range<usize> = 4..8;
 /// Returns the area that a point stands for, in squares of a distance. If points lie on a surface
 /// by chance, the disc that reaches to the nth neighbour has n times the area of a point in the
 /// mean. On a grid the mean over a few neighbours is right within a few hundredths.
-fn area(found: &[(f32, u32)], unit: f32, crowd: usize) -> f32 {
-    let discs = (1..).zip(found).skip(MEASURED.start * crowd).take(MEASURED.len() * crowd);
+fn area(neighbours: &[(f32, u32)], unit: f32, crowd: usize) -> f32 {
+    let discs = (1..).zip(neighbours).skip(MEASURED.start * crowd).take(MEASURED.len() * crowd);
     let discs = discs.map(|(n, &(distance, _))| PI * (distance / unit).powi(2) / n as f32);
     let (count, sum) = discs.fold((0u32, 0.0), |(count, sum), disc| (count + 1, sum + disc));
     // Too few points to measure: as on a square grid.

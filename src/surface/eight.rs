@@ -51,7 +51,7 @@ pub(super) struct Common {
 
 /// The results for eight vertices.
 #[derive(Default)]
-pub(super) struct Found {
+pub(super) struct Results {
     /// Whether the vertex has exactly the surfel given here.
     pub is_made: [bool; 8],
     pub center: [Eight; 3],
@@ -74,7 +74,7 @@ struct Sums<S: Simd> {
     area: Lanes<S>,
     /// The sum of the normals times the areas, and times the angles at the vertex.
     cross: Triple<S>,
-    own: Triple<S>,
+    normal_sum: Triple<S>,
 }
 
 impl Fans {
@@ -107,17 +107,17 @@ impl Fans {
 
     /// Makes the surfels.
     #[inline(always)]
-    pub fn surfels<S: Simd>(&mut self, simd: S, common: &Common, found: &mut Found) {
+    pub fn surfels<S: Simd>(&mut self, simd: S, common: &Common, results: &mut Results) {
         let number = |value: f32| Lanes::splat(simd, value);
         let none = number(0.0);
         let here = load(simd, &self.here);
         let counts: Lanes<S> = self.counts.simd_into(simd);
         let per_unit = number(1.0 / common.unit);
-        let Sums { mut is_made, longest, area, cross, own } =
+        let Sums { mut is_made, longest, area, cross, normal_sum } =
             self.measure(simd, counts, per_unit, common.flat);
-        let recip = number(1.0) / dot(own, own).sqrt();
+        let recip = number(1.0) / dot(normal_sum, normal_sum).sqrt();
         is_made &= recip.simd_gt(0.0) & recip.simd_lt(f32::INFINITY);
-        let normal = scaled(own, recip);
+        let normal = scaled(normal_sum, recip);
         is_made &= dot(normal, normal).abs().simd_ge(ALIKE);
         let (x, y) = across(simd, normal);
         let height = self.lay(simd, [x, y, normal], per_unit);
@@ -136,18 +136,18 @@ impl Fans {
         let back = scaled(outward, thickness * STEP_BACK as f32);
         let offset = difference(sum(aside, scaled(normal, sag)), back);
         let unit = number(common.unit);
-        store(sum(here, scaled(offset, unit)), &mut found.center);
+        store(sum(here, scaled(offset, unit)), &mut results.center);
         let factor = ellipse.factor([x, y, normal], scale * unit, thickness * unit);
-        for (entry, place) in factor.iter().zip(&mut found.factor) {
+        for (entry, place) in factor.iter().zip(&mut results.factor) {
             is_made &= entry.abs().simd_lt(f32::INFINITY);
             *place = (*entry).into();
         }
         let [u, v] = octahedral(simd, outward);
-        found.normal = [u.into(), v.into()];
-        (found.longest, found.area) = (longest.into(), area.into());
-        store(cross, &mut found.cross);
+        results.normal = [u.into(), v.into()];
+        (results.longest, results.area) = (longest.into(), area.into());
+        store(cross, &mut results.cross);
         let made: Eight = is_made.select(number(1.0), none).into();
-        found.is_made = made.map(|made| made > 0.0);
+        results.is_made = made.map(|made| made > 0.0);
     }
 
     /// Sets the normals, areas and angles of all triangles, and returns their sums. Edges are
@@ -164,7 +164,7 @@ impl Fans {
         let none = number(0.0);
         let here = load(simd, &self.here);
         let mut is_made = counts.simd_gt(0.0);
-        let (mut longest, mut area, mut cross, mut own) = (none, none, [none; 3], [none; 3]);
+        let (mut longest, mut area, mut cross, mut normal_sum) = (none, none, [none; 3], [none; 3]);
         let mut first = [none; 3];
         for at in 0..self.most {
             let corner = &mut self.corners[at];
@@ -191,12 +191,12 @@ impl Fans {
             }
             area += own_area;
             cross = sum(cross, scaled(normal, own_area));
-            own = sum(own, scaled(normal, own_angle));
+            normal_sum = sum(normal_sum, scaled(normal, own_angle));
             store(normal, &mut corner.normal);
             corner.area = own_area.into();
             corner.angle = own_angle.into();
         }
-        Sums { is_made, longest, area, cross, own }
+        Sums { is_made, longest, area, cross, normal_sum }
     }
 
     /// Projects the edges onto the plane of the first two axes. Returns the sum of the heights over
@@ -213,15 +213,16 @@ impl Fans {
         for corner in &mut self.corners[..self.most] {
             let a = scaled(difference(load(simd, &corner.next), here), per_unit);
             let b = scaled(difference(load(simd, &corner.last), here), per_unit);
-            let own = load(simd, &corner.normal);
+            let corner_normal = load(simd, &corner.normal);
             let area: Lanes<S> = corner.area.simd_into(simd);
             let mut laid = [dot(a, x), dot(a, y), dot(b, x), dot(b, y)];
-            let slope = dot(normal, own);
+            let slope = dot(normal, corner_normal);
             let is_steep = slope.abs().simd_lt(STEEP) & area.simd_gt(0.0);
             if is_steep.any_true() {
                 let one = Lanes::splat(simd, 1.0);
                 let steepness = one.copysign(slope) * slope.abs().max(one * 0.5);
-                let (down_x, down_y) = (dot(own, x) / steepness, dot(own, y) / steepness);
+                let (down_x, down_y) =
+                    (dot(corner_normal, x) / steepness, dot(corner_normal, y) / steepness);
                 let (up_a, up_b) = (dot(normal, a), dot(normal, b));
                 laid[0] = is_steep.select(laid[0] - down_x * up_a, laid[0]);
                 laid[1] = is_steep.select(laid[1] - down_y * up_a, laid[1]);

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     Result,
-    facet::{Facet, FacetSet, Image, Shown, Sides},
+    facet::{Facet, FacetSet, Image, Sides, TextureCoordinates},
     memory,
     parallel::prelude::*,
     splat::encode_normal,
@@ -133,27 +133,35 @@ impl Mesh {
         let traits = [is_turned, options.color_by_normal];
         memory::room(WORK, (size_of::<Facet>() * mesh.triangles.len()) as u64)?;
         let facets = |number: usize| {
-            let own = facet(&mesh, number, &normals, traits);
+            let facet = facet(&mesh, number, &normals, traits);
             let mut made = Vec::with_capacity(1);
             let mut add = |facet| made.push((number, facet));
-            match (&banded, own) {
-                (Some(banded), Some(own)) => {
+            match (&banded, facet) {
+                (Some(banded), Some(facet)) => {
                     let values = banded.values(&mesh, number);
-                    banded.add(&own, order(is_turned).map(|at| values[at]), &mut add);
+                    banded.add(&facet, order(is_turned).map(|at| values[at]), &mut add);
                 }
-                (_, own) => own.into_iter().for_each(add),
+                (_, facet) => facet.into_iter().for_each(add),
             }
             made
         };
         let (numbers, facets): (Vec<usize>, Vec<Facet>) =
             (0..mesh.triangles.len()).into_par_iter().flat_map_iter(facets).unzip();
         options.deadline.check(WORK)?;
-        let (images, shown) = match options.color_by_normal {
+        let (images, mappings) = match options.color_by_normal {
             true => Default::default(),
             false => images(&mesh, &numbers, is_turned),
         };
         let (whole, rods) = (None, None);
-        let set = FacetSet { origin: self.origin, facets, sides, images, shown, whole, rods };
+        let set = FacetSet {
+            origin: self.origin,
+            facets,
+            sides,
+            images,
+            texture_coordinates: mappings,
+            whole,
+            rods,
+        };
         Ok((!set.facets.is_empty()).then_some(set))
     }
 
@@ -200,16 +208,16 @@ fn facet(
     if !has_area {
         return None;
     }
-    let own = match normals {
+    let normals = match normals {
         Normals::Own(normals) => normals[number],
         Normals::Interpolated(origin) => {
             [0, 1, 2].map(|corner| origin.normal(mesh, (3 * number + corner) as u32))
         }
     };
-    let own = own.map(|normal| normal.normalize_or_zero());
+    let normals = normals.map(|normal| normal.normalize_or_zero());
     let colors = [0, 1, 2].map(|corner| {
         if by_normal {
-            let outward = if is_turned { -own[corner] } else { own[corner] };
+            let outward = if is_turned { -normals[corner] } else { normals[corner] };
             let [red, green, blue, _] = pack(of_normal(encode_normal(outward))).to_le_bytes();
             return [red, green, blue];
         }
@@ -218,7 +226,7 @@ fn facet(
     });
     let order = order(is_turned);
     let facet =
-        Facet::new(order.map(|i| corners[i]), order.map(|i| own[i]), order.map(|i| colors[i]));
+        Facet::new(order.map(|i| corners[i]), order.map(|i| normals[i]), order.map(|i| colors[i]));
     Some(if mesh.is_unlit(number) { facet.unlit() } else { facet })
 }
 
@@ -228,22 +236,26 @@ fn order(is_turned: bool) -> [usize; 3] {
 }
 
 /// Returns the images of a mesh, and what the facets of these triangles show of them.
-fn images(mesh: &Mesh, triangles: &[usize], is_turned: bool) -> (Vec<Arc<Image>>, Vec<Shown>) {
+fn images(
+    mesh: &Mesh,
+    triangles: &[usize],
+    is_turned: bool,
+) -> (Vec<Arc<Image>>, Vec<TextureCoordinates>) {
     let textured = |triangle: &usize| texture_of(mesh, *triangle);
-    if mesh.uvs.is_empty() || !triangles.iter().any(|own| textured(own).is_some()) {
+    if mesh.uvs.is_empty() || !triangles.iter().any(|triangle| textured(triangle).is_some()) {
         return Default::default();
     }
     let (mut images, mut numbers) = (Vec::new(), HashMap::new());
-    let shown = triangles.iter().map(|triangle| {
-        let image = textured(triangle).map_or(Shown::PLAIN, |texture| {
+    let mappings = triangles.iter().map(|triangle| {
+        let image = textured(triangle).map_or(TextureCoordinates::PLAIN, |texture| {
             *numbers.entry(Arc::as_ptr(texture)).or_insert_with(|| {
                 images.push(Arc::new(Image::new(texture)));
                 images.len() as u32 - 1
             })
         });
         let vertices = order(is_turned).map(|corner| mesh.triangles[*triangle][corner]);
-        Shown { image, places: vertices.map(|vertex| mesh.uvs[vertex as usize]) }
+        TextureCoordinates { image, places: vertices.map(|vertex| mesh.uvs[vertex as usize]) }
     });
-    let shown = shown.collect();
-    (images, shown)
+    let mappings = mappings.collect();
+    (images, mappings)
 }

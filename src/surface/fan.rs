@@ -4,7 +4,7 @@ use super::{
     Mesh, SurfelOptions,
     adjacency::Connected,
     disc::{Ellipse, Moments},
-    eight::{Common, Fans, Found, MOST_CORNERS},
+    eight::{Common, Fans, MOST_CORNERS, Results},
     fan_rules::{
         ALIKE, CENTROID, CORNER, LEAST_RATIO_SQUARED, LEAST_SQUARE, MIDDLE, SAG, SPREAD, STEEP,
         THICKNESS, mixed,
@@ -75,7 +75,7 @@ pub(super) struct Made {
     /// Normals of the smooth groups.
     normals: Vec<Vec3>,
     /// Eight vertices, and their results.
-    fans: Box<(Fans, Found)>,
+    fans: Box<(Fans, Results)>,
 }
 
 impl Made {
@@ -118,9 +118,9 @@ impl Maker<'_> {
             } else {
                 let mut rest = &rows[..];
                 for &vertex in few {
-                    let (own, after) =
+                    let (triangles, after) =
                         rest.split_at(self.connected.adjacency.corners(vertex).len());
-                    self.vertex(vertex, own, made);
+                    self.vertex(vertex, triangles, made);
                     rest = after;
                 }
             }
@@ -140,24 +140,25 @@ impl Maker<'_> {
         let mut fans = std::mem::take(&mut made.fans);
         let mut rest = rows;
         for eight in vertices.chunks(8) {
-            let (fan, found) = &mut *fans;
+            let (fan, results) = &mut *fans;
             let all = rest;
             fan.clear();
             for (lane, &vertex) in eight.iter().enumerate() {
                 let corners = self.connected.adjacency.corners(vertex);
-                let (own, after) = rest.split_at(corners.len());
+                let (triangles, after) = rest.split_at(corners.len());
                 rest = after;
-                self.gather(fan, lane, vertex, corners, own);
+                self.gather(fan, lane, vertex, corners, triangles);
             }
-            fan.surfels(simd, &common, found);
+            fan.surfels(simd, &common, results);
             let mut rest = all;
             for (lane, &vertex) in eight.iter().enumerate() {
-                let (own, after) = rest.split_at(self.connected.adjacency.corners(vertex).len());
+                let (triangles, after) =
+                    rest.split_at(self.connected.adjacency.corners(vertex).len());
                 rest = after;
-                if found.is_made[lane] && self.is_opaque(vertex) {
-                    self.take(found, lane, vertex, made);
+                if results.is_made[lane] && self.is_opaque(vertex) {
+                    self.take(results, lane, vertex, made);
                 } else {
-                    self.vertex(vertex, own, made);
+                    self.vertex(vertex, triangles, made);
                 }
             }
         }
@@ -194,23 +195,24 @@ impl Maker<'_> {
 
     /// Adds the result for the vertex in a lane.
     #[inline(always)]
-    fn take(&self, found: &Found, lane: usize, vertex: usize, made: &mut Made) {
+    fn take(&self, results: &Results, lane: usize, vertex: usize, made: &mut Made) {
         let half = |part: f32| u32::from(part as i16 as u16);
-        made.longest = made.longest.max(found.longest[lane]);
-        let cross = Vec3::new(found.cross[0][lane], found.cross[1][lane], found.cross[2][lane]);
-        made.sums.add(self.mesh.positions[vertex], found.area[lane], cross);
-        let [f0, f1, f2, f3, f4, f5] = &found.factor;
-        let normal = half(found.normal[0][lane]) | half(found.normal[1][lane]) << 16;
+        made.longest = made.longest.max(results.longest[lane]);
+        let cross =
+            Vec3::new(results.cross[0][lane], results.cross[1][lane], results.cross[2][lane]);
+        made.sums.add(self.mesh.positions[vertex], results.area[lane], cross);
+        let [f0, f1, f2, f3, f4, f5] = &results.factor;
+        let normal = half(results.normal[0][lane]) | half(results.normal[1][lane]) << 16;
         made.splats.push(Splat {
-            center: [found.center[0][lane], found.center[1][lane], found.center[2][lane]],
+            center: [results.center[0][lane], results.center[1][lane], results.center[2][lane]],
             strength: self.options.optical_depth,
             factor: [f0[lane], f1[lane], f2[lane], f3[lane], f4[lane], f5[lane]],
             color: match self.options.color_by_normal {
                 true => pack(of_normal(normal)),
                 // Packed as in memory, red lowest.
                 false => {
-                    let own = self.mesh.vertex_color(vertex);
-                    own.map_or_else(|| pack(NEUTRAL), u32::from_le_bytes)
+                    let color = self.mesh.vertex_color(vertex);
+                    color.map_or_else(|| pack(NEUTRAL), u32::from_le_bytes)
                 }
             },
             normal,
@@ -298,11 +300,11 @@ impl Maker<'_> {
     /// differs from their mean.
     fn surfel(&self, vertex: usize, group: &mut [Around], shading: Option<Vec3>) -> Option<Splat> {
         let first = group.first()?.normal;
-        let own =
+        let mean =
             group.iter().map(|t| t.normal * t.angle).sum::<Vec3>().try_normalize().unwrap_or(first);
         let given = self.mesh.given_normal(vertex);
-        let shading = given.or_else(|| shading.and_then(Vec3::try_normalize)).unwrap_or(own);
-        let normal = if shading.dot(own).abs() >= ALIKE { shading } else { own };
+        let shading = given.or_else(|| shading.and_then(Vec3::try_normalize)).unwrap_or(mean);
+        let normal = if shading.dot(mean).abs() >= ALIKE { shading } else { mean };
         let (x, y) = normal.any_orthonormal_pair();
         let mut moments = Moments::default();
         let mut height = 0.0;
@@ -370,13 +372,13 @@ impl Maker<'_> {
             return of_normal(normal);
         }
         if self.plain {
-            let own = self.mesh.vertex_color(vertex);
-            return own.map_or(NEUTRAL, |own| own.map(|part| f32::from(part) / 255.0));
+            let color = self.mesh.vertex_color(vertex);
+            return color.map_or(NEUTRAL, |color| color.map(|part| f32::from(part) / 255.0));
         }
         let mut mean = Mean::default();
         for t in group {
-            let own = corner_color(self.mesh, t.at as usize / 3, t.at as usize % 3);
-            mean.add(own, t.area / area);
+            let color = corner_color(self.mesh, t.at as usize / 3, t.at as usize % 3);
+            mean.add(color, t.area / area);
         }
         mean.color()
     }

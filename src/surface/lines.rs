@@ -65,11 +65,11 @@ impl Mesh {
             };
             let before = neighbour(number.checked_sub(1)).filter(|([_, end], _)| *end == line[0]);
             let after = neighbour(Some(number + 1)).filter(|([start, _], _)| *start == line[1]);
-            let (own, parts) = (way(line), parts(longest, line));
-            let is_whole = own != Vec3::ZERO;
+            let (direction, parts) = (way(line), parts(longest, line));
+            let is_whole = direction != Vec3::ZERO;
             let before = before.filter(|_| is_whole).map(|(_, way)| way);
             let joints = (before, is_whole && after.is_some());
-            self.cut_line(line, (own, parts), joints, options)
+            self.cut_line(line, (direction, parts), joints, options)
         });
         let rods: Vec<Facet> = rods.collect();
         options.deadline.check(WORK)?;
@@ -91,7 +91,7 @@ impl Mesh {
         };
         let [from, to] = [a, b].map(|end| self.positions[end as usize]);
         let colors =
-            [a, b].map(|end| point_color(self, end as usize).map(|own| own.clamp(0.0, 1.0)));
+            [a, b].map(|end| point_color(self, end as usize).map(|part| part.clamp(0.0, 1.0)));
         let at = move |part: usize| {
             let share = part as f32 / parts as f32;
             let place: Vec3 = if part == parts { to } else { from + (to - from) * share };

@@ -1,7 +1,7 @@
 //! The content of a mesh or point cloud file, whatever its format.
 
 use crate::{
-    about::{About, Stance},
+    about::{About, Orientation},
     color::ColorScale,
     facet::Texture,
     parallel::prelude::*,
@@ -88,21 +88,21 @@ impl Mesh {
         arrays.iter().map(|&bytes| bytes as u64).sum()
     }
 
-    /// Turns a mesh of a known stance in the world, so that it has another one.
-    pub fn stand(&mut self, wanted: Stance) {
-        if let Some(own) = self.about.stance.replace(wanted) {
-            self.turn(own.turn_to(wanted));
+    /// Turns a mesh of a known orientation in the world, so that it has another one.
+    pub fn stand(&mut self, wanted: Orientation) {
+        if let Some(previous) = self.about.orientation.replace(wanted) {
+            self.turn(previous.turn_to(wanted));
         }
     }
 
     /// Turns the world about its origin. If the matrix mirrors, triangles turn over, so that their
     /// outsides stay outside.
     pub(crate) fn turn(&mut self, turn: DMat3) {
-        let own = turn.as_mat3();
+        let matrix = turn.as_mat3();
         self.origin = turn * self.origin + DVec3::ZERO;
-        self.positions.par_iter_mut().for_each(|position| *position = own * *position);
-        self.normals.par_iter_mut().for_each(|normal| *normal = own * *normal);
-        self.sensors.iter_mut().for_each(|sensor| sensor.position = own * sensor.position);
+        self.positions.par_iter_mut().for_each(|position| *position = matrix * *position);
+        self.normals.par_iter_mut().for_each(|normal| *normal = matrix * *normal);
+        self.sensors.iter_mut().for_each(|sensor| sensor.position = matrix * sensor.position);
         if turn.determinant() < 0.0 {
             self.triangles.par_iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
         }

@@ -35,7 +35,7 @@ pub use paint::{Paint, Values};
 pub(crate) use parts::Joining;
 pub(crate) use piece::{MeshPieces, PiecesClosing, Triangles, cloud_piece};
 pub(crate) use smooth::corner_normals;
-pub(crate) use solid::{Sides, Told};
+pub(crate) use solid::{Evidence, Sides};
 pub(crate) use surfels::EXTENT;
 pub use surfels::{PointStyle, SurfelOptions};
 pub use survey::Survey;

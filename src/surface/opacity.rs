@@ -58,14 +58,14 @@ mod tests {
         assert_eq!(of(1.0), Absorbed { strength: 14.0, alpha: 1.0 });
         assert_eq!(of(0.0).alpha, 0.0);
         for alpha in [0.001, 0.3, 0.5, 254.0 / 255.0] {
-            let found = of(alpha);
-            let depth = found.strength * found.alpha / 0.5;
-            assert!((1.0 - (-depth).exp() - alpha).abs() < 1e-4, "{alpha}: {found:?}");
-            assert!(found.alpha > 0.0 && found.alpha < 1.0);
+            let absorbed = of(alpha);
+            let depth = absorbed.strength * absorbed.alpha / 0.5;
+            assert!((1.0 - (-depth).exp() - alpha).abs() < 1e-4, "{alpha}: {absorbed:?}");
+            assert!(absorbed.alpha > 0.0 && absorbed.alpha < 1.0);
         }
         // The opacities of the file and of the options multiply.
         let half = SurfelOptions { optical_depth: 2f32.ln(), ..options };
-        let found = half.absorbed(0.5, || 1.0);
-        assert!((found.strength * found.alpha + 0.75f32.ln()).abs() < 1e-5, "{found:?}");
+        let absorbed = half.absorbed(0.5, || 1.0);
+        assert!((absorbed.strength * absorbed.alpha + 0.75f32.ln()).abs() < 1e-5, "{absorbed:?}");
     }
 }

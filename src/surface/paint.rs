@@ -151,9 +151,9 @@ pub(super) fn corner_tint(mesh: &Mesh, triangle: usize, corner: usize) -> [f32; 
     let material =
         mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
     let mut color = base_color(mesh, material);
-    if let Some(own) = mesh.vertex_color(vertex) {
-        let own = own.map(|part| f32::from(part) / 255.0);
-        color.iter_mut().zip(own).for_each(|(part, by)| *part *= by);
+    if let Some(tint) = mesh.vertex_color(vertex) {
+        let tint = tint.map(|part| f32::from(part) / 255.0);
+        color.iter_mut().zip(tint).for_each(|(part, by)| *part *= by);
     }
     color
 }

@@ -50,23 +50,23 @@ impl Joining {
     pub fn add(&self, first: u32, triangles: &[[u32; 3]], name: impl Fn(u32) -> u32) -> Vec<Open> {
         let mut open = Vec::new();
         let mut table = vec![Place::default(); 1 << PLACE_BITS];
-        let mut own: Vec<u32> = Vec::with_capacity(FEW);
+        let mut parents: Vec<u32> = Vec::with_capacity(FEW);
         for (few, first) in triangles.chunks(FEW).zip((first..).step_by(FEW)) {
             table.fill(Place::default());
-            own.clear();
-            own.extend(0..few.len() as u32);
+            parents.clear();
+            parents.extend(0..few.len() as u32);
             for (triangle, corners) in (0..).zip(few) {
                 let [a, b, c] = corners.map(&name);
                 for [from, to] in [[a, b], [b, c], [c, a]] {
                     if from != to {
                         let other = at_edge(&mut table, triangle, [from, to]);
-                        join(&mut own, other, triangle);
+                        join(&mut parents, other, triangle);
                     }
                 }
             }
             for triangle in 0..few.len() as u32 {
                 self.0.0[(first + triangle) as usize]
-                    .store(first + root(&mut own, triangle), Relaxed);
+                    .store(first + root(&mut parents, triangle), Relaxed);
             }
             // An edge with equally many triangles of both directions is closed here, whatever other
             // batches contain.

@@ -120,7 +120,7 @@ pub(crate) enum PiecesClosing {
 
 impl MeshPieces {
     /// Prepares a mesh with this many points and triangles and with these `bounds`, relative to its
-    /// origin. `look(length)` visits its triangles with edges longer than `length` to be cut.
+    /// origin. `visit(length)` visits its triangles with edges longer than `length` to be cut.
     /// Returns the result of the last visit as well. If cutting would give more than `room`
     /// triangles, `cut` of that result is an estimate above `room`.
     pub fn new(
@@ -129,11 +129,11 @@ impl MeshPieces {
         bounds: [Vec3; 2],
         options: &SurfelOptions,
         room: usize,
-        mut look: impl FnMut(f32) -> Result<Triangles>,
+        mut visit: impl FnMut(f32) -> Result<Triangles>,
     ) -> Result<(Self, Triangles)> {
         let budget = options.most_once_cut(triangles);
         let around_all = largest_edge(bounds, f64::INFINITY, options);
-        let first = look(around_all)?;
+        let first = visit(around_all)?;
         // Vertices that no triangle uses do not count towards the bounds, and the area may limit
         // the length.
         let unit = largest_edge(first.bounds.unwrap_or_default(), first.sums.area() / 3.0, options);
@@ -141,7 +141,7 @@ impl MeshPieces {
         let (length, seen) = affordable(
             unit,
             budget,
-            |length| first.take().map_or_else(|| look(length), Ok),
+            |length| first.take().map_or_else(|| visit(length), Ok),
             |seen| {
                 let whole = triangles.saturating_sub(seen.long.len()) as f64;
                 Expected { whole, cut: seen.expected - whole }
@@ -243,29 +243,29 @@ mod tests {
         mesh.positions.extend(scan.positions.iter().map(|place| *place * 0.02));
         let counts = [mesh.positions.len(), mesh.triangles.len()];
         let options = SurfelOptions { most_triangles: counts[1], ..SurfelOptions::default() };
-        let mut looks = 0;
-        let look = |length: f32| {
-            looks += 1;
+        let mut visits = 0;
+        let visit = |length: f32| {
+            visits += 1;
             Ok(seen(&mesh, length))
         };
-        let (pieces, told) = MeshPieces::new(
+        let (pieces, last) = MeshPieces::new(
             counts,
             [false; 2],
             [Vec3::splat(-1.0), Vec3::ONE],
             &options,
             usize::MAX,
-            look,
+            visit,
         )
         .unwrap();
         assert!(
-            pieces.whole.unit < 0.1 && told.cut > counts[1] / 20,
+            pieces.whole.unit < 0.1 && last.cut > counts[1] / 20,
             "{} and {}",
             pieces.whole.unit,
-            told.cut
+            last.cut
         );
-        assert!(looks < 8, "{looks} visits");
+        assert!(visits < 8, "{visits} visits");
         let fine = mesh.triangles_once_cut(&options, usize::MAX).unwrap();
-        assert_eq!(fine, counts[1] - told.long.len() + told.cut);
+        assert_eq!(fine, counts[1] - last.long.len() + last.cut);
     }
 
     /// Pieces are cut like the whole mesh, also with a budget, and never further than `room`
@@ -300,8 +300,8 @@ mod tests {
                         |length| Ok(seen(&mesh, length)),
                     )
                 };
-                let (pieces_of_all, told) = pieces(usize::MAX).unwrap();
-                let count = mesh.triangles.len() - told.long.len() + told.cut;
+                let (pieces_of_all, last) = pieces(usize::MAX).unwrap();
+                let count = mesh.triangles.len() - last.long.len() + last.cut;
                 let whole = count_of_refined(
                     &mesh,
                     pieces_of_all.whole.unit,
@@ -314,8 +314,8 @@ mod tests {
                     count <= options.most_once_cut(mesh.triangles.len()),
                     "{count} of {most_triangles}"
                 );
-                let (_, told) = pieces(count - 1).unwrap();
-                assert!(mesh.triangles.len() - told.long.len() + told.cut >= count);
+                let (_, last) = pieces(count - 1).unwrap();
+                assert!(mesh.triangles.len() - last.long.len() + last.cut >= count);
             }
         }
     }

@@ -117,14 +117,14 @@ fn flat_of_more(
     let flat: Vec<bool> = (0..some.len())
         .into_par_iter()
         .map(|at| {
-            let own = at * stride..((at + 1) * stride).min(points.len());
-            if clock.is_over(at) || is_decided[own].iter().all(|own| *own) {
+            let range = at * stride..((at + 1) * stride).min(points.len());
+            if clock.is_over(at) || is_decided[range].iter().all(|decided| *decided) {
                 return true;
             }
-            let found = tree.of(at as u32, MORE);
+            let neighbours = tree.of(at as u32, MORE);
             let center = some[at];
             let offsets =
-                || found.iter().map(|&(_, other)| (some[other as usize] - center).as_dvec3());
+                || neighbours.iter().map(|&(_, other)| (some[other as usize] - center).as_dvec3());
             is_flat(eigen(scatter(offsets)).0, FLAT_OF_MORE)
         })
         .collect();
@@ -135,7 +135,8 @@ fn flat_of_more(
 /// Returns the sum of the squares of places, and of the one that they are relative to, around their
 /// mean.
 pub(super) fn scatter<I: Iterator<Item = DVec3>>(offsets: impl Fn() -> I) -> DMat3 {
-    let (count, sum) = offsets().fold((1.0, DVec3::ZERO), |(n, sum), own| (n + 1.0, sum + own));
+    let (count, sum) =
+        offsets().fold((1.0, DVec3::ZERO), |(n, sum), offset| (n + 1.0, sum + offset));
     let mean = sum / count;
     let mut scatter = DMat3::ZERO;
     for offset in offsets().chain([DVec3::ZERO]) {

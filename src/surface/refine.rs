@@ -278,20 +278,20 @@ pub(super) fn count_once_cut(
 }
 
 /// Chooses the longest edge without texture for a budget of triangles that the input does not
-/// exceed: `length`, or longer, as [`refine`] chooses it. `look` visits the triangles for a length,
-/// and `expected` estimates how many there will be. `fits` cuts them and returns whether the exact
-/// number keeps to the budget.
+/// exceed: `length`, or longer, as [`refine`] chooses it. `visit` visits the triangles for a
+/// length, and `expected` estimates how many there will be. `fits` cuts them and returns whether
+/// the exact number keeps to the budget.
 pub(super) fn affordable<S, E>(
     length: f32,
     budget: usize,
-    mut look: impl FnMut(f32) -> std::result::Result<S, E>,
+    mut visit: impl FnMut(f32) -> std::result::Result<S, E>,
     expected: impl Fn(&S) -> Expected,
     mut fits: impl FnMut(&mut S, f32) -> std::result::Result<bool, E>,
 ) -> std::result::Result<(f32, S), E> {
     let (mut taken, mut failed) = (0, 0);
     loop {
         let length = length * coarser(taken).max(1.0);
-        let mut seen = look(length)?;
+        let mut seen = visit(length)?;
         let expected = expected(&seen);
         if expected.all() > budget as f64 {
             taken += expected.steps(budget);
@@ -867,10 +867,10 @@ mod tests {
         for (index, triangle) in fine.mesh.triangles.iter().enumerate() {
             for (corner, &vertex) in triangle.iter().enumerate() {
                 // Normals that change linearly over a triangle, like positions, stay the same.
-                let found = origin.normal(&fine.mesh, (3 * index + corner) as u32).normalize();
+                let normal = origin.normal(&fine.mesh, (3 * index + corner) as u32).normalize();
                 assert!(
-                    found.dot(fine.mesh.positions[vertex as usize].normalize()) > 0.9999,
-                    "{found}"
+                    normal.dot(fine.mesh.positions[vertex as usize].normalize()) > 0.9999,
+                    "{normal}"
                 );
             }
         }

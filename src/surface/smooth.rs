@@ -75,7 +75,7 @@ pub(crate) fn corner_normals(
     let adjacency = Connected::new(mesh, is_split(mesh))?.adjacency;
     memory::room(WORK, 48 * mesh.positions.len() as u64 + 120 * mesh.triangles.len() as u64)?;
     let clock = Clock::new(deadline);
-    let own: Vec<Vec<(u32, Vec3)>> = (0..mesh.positions.len())
+    let by_vertex: Vec<Vec<(u32, Vec3)>> = (0..mesh.positions.len())
         .into_par_iter()
         .map_init(
             || Groups::new(crease_angle_degrees),
@@ -100,7 +100,7 @@ pub(crate) fn corner_normals(
         .collect();
     clock.finish(WORK)?;
     let mut normals = vec![[Vec3::ZERO; 3]; mesh.triangles.len()];
-    for (at, normal) in own.into_iter().flatten() {
+    for (at, normal) in by_vertex.into_iter().flatten() {
         normals[at as usize / 3][at as usize % 3] = normal;
     }
     if !mesh.normals.is_empty() {

@@ -53,7 +53,7 @@ impl Part {
 
 /// The evidence of some triangles on their parts.
 #[derive(Debug, Default)]
-pub(crate) struct Told {
+pub(crate) struct Evidence {
     /// One entry for each sequence of consecutive triangles of the same part.
     runs: Vec<(u32, Part)>,
     is_translucent: bool,
@@ -61,7 +61,7 @@ pub(crate) struct Told {
     lacks_normals: bool,
 }
 
-impl Told {
+impl Evidence {
     /// Adds a triangle of a part. Normals of zero length count as missing.
     pub fn add(&mut self, part: u32, corners: [Vec3; 3], normals: [Vec3; 3], is_opaque: bool) {
         self.is_translucent |= !is_opaque;
@@ -97,10 +97,10 @@ impl Sides {
         Self { parts: vec![Part::default(); parts], is_translucent: false, lacks_normals: false }
     }
 
-    pub fn add(&mut self, told: Told) {
-        self.is_translucent |= told.is_translucent;
-        self.lacks_normals |= told.lacks_normals;
-        for (part, run) in told.runs {
+    pub fn add(&mut self, evidence: Evidence) {
+        self.is_translucent |= evidence.is_translucent;
+        self.lacks_normals |= evidence.lacks_normals;
+        for (part, run) in evidence.runs {
             let part = &mut self.parts[part as usize];
             *part = part.with(run);
         }
@@ -165,8 +165,8 @@ impl Mesh {
         });
         let open = open.collect();
         let parts = joining.parts(open);
-        let told = |(chunk, triangles): (usize, &[[u32; 3]])| {
-            let mut told = Told::default();
+        let gather = |(chunk, triangles): (usize, &[[u32; 3]])| {
+            let mut evidence = Evidence::default();
             for (number, triangle) in (chunk * CHUNK..).zip(triangles) {
                 let at = triangle.map(|vertex| vertex as usize);
                 let normals =
@@ -174,19 +174,19 @@ impl Mesh {
                 let is_opaque = at.iter().all(|&vertex| {
                     self.colors.get(vertex).map_or(OPAQUE, |color| color[3]) == OPAQUE
                 });
-                told.add(
+                evidence.add(
                     parts.of(number),
                     at.map(|vertex| self.positions[vertex]),
                     normals,
                     is_opaque,
                 );
             }
-            told
+            evidence
         };
         let mut sides = Sides::new(parts.count());
         for few in chunks.chunks(TOGETHER) {
-            let all: Vec<Told> = few.par_iter().copied().map(told).collect();
-            all.into_iter().for_each(|told| sides.add(told));
+            let all: Vec<Evidence> = few.par_iter().copied().map(gather).collect();
+            all.into_iter().for_each(|evidence| sides.add(evidence));
         }
         sides.are_solid()
     }

@@ -24,7 +24,7 @@
 
 use super::Mesh;
 use crate::{
-    about::Stance,
+    about::Orientation,
     math::{
         hull::{Kind, area, depth_inside, hull, without_strays},
         neighbours::Neighbours,
@@ -71,8 +71,8 @@ impl Mesh {
     /// vertices and triangles, and below 0.1 s for a million.
     ///
     /// Source: Fu, Cohen-Or, Dror & Sheffer (2008), with other measures of stability.
-    pub fn guess_stance(&self) -> Option<Stance> {
-        let _span = tracing::info_span!("stance").entered();
+    pub fn guess_orientation(&self) -> Option<Orientation> {
+        let _span = tracing::info_span!("orientation").entered();
         let samples = if self.triangles.is_empty() { self.thinned() } else { self.spread() };
         guess(samples)
     }
@@ -136,7 +136,7 @@ impl Mesh {
 }
 
 /// Guesses how evenly spread samples of a shape stand.
-fn guess(samples: Vec<Vec3>) -> Option<Stance> {
+fn guess(samples: Vec<Vec3>) -> Option<Orientation> {
     let shape = Shape::new(samples)?;
     let poses: Vec<(usize, f64)> =
         (0..3).flat_map(|axis| [1.0, -1.0].map(|sign| (axis, sign))).collect();
@@ -155,8 +155,8 @@ fn guess(samples: Vec<Vec3>) -> Option<Stance> {
         }
     }
     best.map(|(_, axis, sign)| {
-        let usual = Stance::with_up(sign * DVec3::AXES[axis]);
-        Stance { front: shape.front(axis, sign).unwrap_or(usual.front), ..usual }
+        let usual = Orientation::with_up(sign * DVec3::AXES[axis]);
+        Orientation { front: shape.front(axis, sign).unwrap_or(usual.front), ..usual }
     })
 }
 

@@ -123,9 +123,9 @@ impl Volume {
             });
             at.unwrap_or(0) as u8
         };
-        let found = [median(0), median(1), median(2), 255];
-        let alike = outside.iter().filter(|&&index| distance(&colors[index], &found) <= ALIKE);
-        if 2 * alike.count() > outside.len() { found } else { [0, 0, 0, 255] }
+        let color = [median(0), median(1), median(2), 255];
+        let alike = outside.iter().filter(|&&index| distance(&colors[index], &color) <= ALIKE);
+        if 2 * alike.count() > outside.len() { color } else { [0, 0, 0, 255] }
     }
 
     /// Returns the packed normal of a sample: the direction in which the opacity falls.

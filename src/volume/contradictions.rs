@@ -184,7 +184,7 @@ fn kernels_are_refused_where_they_come_in() {
 /// Bricks cannot be built by hand, but the other parts of a scene's item can be wrong.
 #[test]
 fn bricks_in_a_scene_are_looked_at() {
-    let told = |volume: Volume, kernel: Kernel, change: fn(&mut TransferFunction)| {
+    let validated = |volume: Volume, kernel: Kernel, change: fn(&mut TransferFunction)| {
         let mut transfer = TransferFunction::automatic(&good());
         change(&mut transfer);
         Scene::new()
@@ -196,24 +196,28 @@ fn bricks_in_a_scene_are_looked_at() {
         volume.lattice.origin.x = x;
         volume
     };
-    told(good(), Kernel::default(), |_| ()).unwrap();
-    told(far(1e6), Kernel::default(), |_| ()).unwrap();
-    refused("far", "beyond what 32-bit numbers hold", told(far(1e39), Kernel::default(), |_| ()));
+    validated(good(), Kernel::default(), |_| ()).unwrap();
+    validated(far(1e6), Kernel::default(), |_| ()).unwrap();
+    refused(
+        "far",
+        "beyond what 32-bit numbers hold",
+        validated(far(1e39), Kernel::default(), |_| ()),
+    );
     let wide = Kernel { extent: f64::INFINITY, ..Kernel::default() };
-    refused("kernel", "extent", told(good(), wide, |_| ()));
+    refused("kernel", "extent", validated(good(), wide, |_| ()));
     refused(
         "unit",
         "transfer function",
-        told(good(), Kernel::default(), |transfer| transfer.unit = f64::NAN),
+        validated(good(), Kernel::default(), |transfer| transfer.unit = f64::NAN),
     );
     refused(
         "opacity",
         "transfer function",
-        told(good(), Kernel::default(), |t| t.opacity[0].1 = f64::NAN),
+        validated(good(), Kernel::default(), |t| t.opacity[0].1 = f64::NAN),
     );
     let steep: fn(&mut TransferFunction) = |transfer| {
         transfer.color = vec![(0.0, [1.0; 3])];
         transfer.opacity = vec![(0.0, 0.0), (1e-9, 1.0)];
     };
-    refused("steep", "too close together", told(good(), Kernel::default(), steep));
+    refused("steep", "too close together", validated(good(), Kernel::default(), steep));
 }

@@ -1,6 +1,6 @@
 //! Label maps: volumes whose values name things. A place has the label of the nearest sample, so
 //! nothing is mixed, and no label lies between two others. Light follows the shares of labels
-//! around samples ([`own_shares`]), which change smoothly where the labels change in steps.
+//! around samples ([`label_shares`]), which change smoothly where the labels change in steps.
 
 use super::{Arrangement, Isosurface, Samples, Shade, TransferFunction, Volume, each_type};
 use crate::{
@@ -50,15 +50,15 @@ impl Volume {
         if self.lattice.arrangement != Arrangement::Cartesian || self.is_empty() {
             return self;
         }
-        let found: Vec<i32> = distinct(&self.samples).into_iter().collect();
-        let span = i64::from(found[found.len() - 1]) - i64::from(found[0]);
+        let values: Vec<i32> = distinct(&self.samples).into_iter().collect();
+        let span = i64::from(values[values.len() - 1]) - i64::from(values[0]);
         let (present, table) = if span < MOST_SPAN {
             if matches!(self.samples.as_slice(), super::SampleSlice::F32(_)) {
                 self.samples = Samples::I32(mapped(&self.samples, |value| value));
             }
-            (found, table)
+            (values, table)
         } else {
-            self.renumbered(&found, table)
+            self.renumbered(&values, table)
         };
         self.range = [f64::from(present[0]), f64::from(present[present.len() - 1])];
         let background = present.contains(&0).then_some(0);
@@ -67,8 +67,8 @@ impl Volume {
     }
 
     /// Numbers labels in their order, 0 staying 0. Returns the numbers and what is known of them.
-    fn renumbered(&mut self, found: &[i32], table: Vec<Label>) -> (Vec<i32>, Vec<Label>) {
-        let others: Vec<i32> = found.iter().copied().filter(|&value| value != 0).collect();
+    fn renumbered(&mut self, values: &[i32], table: Vec<Label>) -> (Vec<i32>, Vec<Label>) {
+        let others: Vec<i32> = values.iter().copied().filter(|&value| value != 0).collect();
         // With very many labels, some share a number, and so a colour.
         let most = MOST_SPAN as usize - 1;
         let number = |value: i32| match value {
@@ -84,7 +84,7 @@ impl Volume {
             Label { value: number(value), name, ..label }
         });
         let table = table.collect();
-        let numbers: BTreeSet<i32> = found.iter().map(|&value| number(value)).collect();
+        let numbers: BTreeSet<i32> = values.iter().map(|&value| number(value)).collect();
         (numbers.into_iter().collect(), table)
     }
 
@@ -96,14 +96,14 @@ impl Volume {
         if self.about.labels.is_some() || !self.looks_like_labels() {
             return self;
         }
-        let mut own = self.with_labels(Vec::new());
-        let corner = own.corner_value();
-        if let Some(labels) = &mut own.about.labels
+        let mut volume = self.with_labels(Vec::new());
+        let corner = volume.corner_value();
+        if let Some(labels) = &mut volume.about.labels
             && labels.background.is_none()
         {
             labels.background = corner.filter(|value| labels.present.contains(value));
         }
-        own
+        volume
     }
 
     /// Gives a label map what a table says about its labels. Another volume becomes a label map if
@@ -241,22 +241,22 @@ fn are_abrupt(ranks: &[[usize; 2]], common: usize, count: usize) -> bool {
 /// Returns the distinct values, rounded.
 fn distinct(samples: &Samples) -> BTreeSet<i32> {
     let chunks = 1 << 18;
-    let own = |found: Vec<BTreeSet<i32>>| found.into_iter().flatten().collect();
+    let merged = |sets: Vec<BTreeSet<i32>>| sets.into_iter().flatten().collect();
     each_type!(samples, values => {
         let of_chunk = |chunk: &[_]| {
-            let mut found = BTreeSet::new();
+            let mut set = BTreeSet::new();
             let mut before = None;
             for &value in chunk {
                 let value = f64::from(value).round() as i32;
                 // Labels are constant over regions.
                 if before != Some(value) {
-                    found.insert(value);
+                    set.insert(value);
                     before = Some(value);
                 }
             }
-            found
+            set
         };
-        own(values.par_chunks(chunks).map(of_chunk).collect())
+        merged(values.par_chunks(chunks).map(of_chunk).collect())
     })
 }
 
@@ -274,7 +274,7 @@ pub const OWN_REACH: usize = 2;
 
 /// Returns, for each sample of a label map, the share of its own label around it, 255 for all. This
 /// is the mean of the label's mask under a Gaussian over the samples within [`OWN_REACH`] steps.
-pub fn own_shares(volume: &Volume) -> Vec<u8> {
+pub fn label_shares(volume: &Volume) -> Vec<u8> {
     each_type!(volume.samples, values => shares_of(volume.lattice.dims, values))
 }
 
@@ -287,11 +287,11 @@ fn shares_of<T: PartialEq + Sync>([nx, ny, nz]: [usize; 3], values: &[T]) -> Vec
     shares.par_chunks_mut((nx * ny).max(1)).enumerate().for_each(|(k, slice)| {
         for (place, share) in slice.iter_mut().enumerate() {
             let (i, j) = (place % nx, place / nx);
-            let own = &values[(k * ny + j) * nx + i];
+            let label = &values[(k * ny + j) * nx + i];
             let (columns, rows, slices) = (around(i, nx), around(j, ny), around(k, nz));
             let row = |y: usize, z: usize| &values[(z * ny + y) * nx..][columns.clone()];
             // Most samples lie inside a region.
-            let is_own = |z: usize| rows.clone().all(|y| row(y, z).iter().all(|v| v == own));
+            let is_own = |z: usize| rows.clone().all(|y| row(y, z).iter().all(|v| v == label));
             if slices.clone().all(is_own) {
                 continue;
             }
@@ -303,7 +303,7 @@ fn shares_of<T: PartialEq + Sync>([nx, ny, nz]: [usize; 3], values: &[T]) -> Vec
                     for (x, value) in columns.clone().zip(row) {
                         let weight = beside * weights[x.abs_diff(i)];
                         all += weight;
-                        sum += if value == own { weight } else { 0.0 };
+                        sum += if value == label { weight } else { 0.0 };
                     }
                 }
             }
@@ -315,7 +315,7 @@ fn shares_of<T: PartialEq + Sync>([nx, ny, nz]: [usize; 3], values: &[T]) -> Vec
 
 /// What a label is drawn with.
 #[derive(Debug, Clone, Copy)]
-struct Shown {
+struct Style {
     value: i32,
     color: [f64; 3],
     opacity: f64,
@@ -328,7 +328,7 @@ impl TransferFunction {
     pub(super) fn of_labels(volume: &Volume, labels: &Labels) -> Self {
         let spacing = least_spacing(volume);
         let unit = if spacing > 0.0 { spacing } else { 1.0 };
-        let shown = labels.present.iter().map(|&value| {
+        let styles = labels.present.iter().map(|&value| {
             let known = labels.get(value);
             let color = known.and_then(|label| label.color).unwrap_or_else(|| color_of(value));
             let opacity = match known.and_then(|label| label.opacity) {
@@ -336,12 +336,12 @@ impl TransferFunction {
                 Some(opacity) => over(opacity, 1.0 / TRANSLUCENT),
                 None => solid(),
             };
-            Shown { value, color, opacity }
+            Style { value, color, opacity }
         });
-        let shown: Vec<Shown> = shown.collect();
+        let styles: Vec<Style> = styles.collect();
         let certain = CERTAIN.map(|magnitude| magnitude / unit);
         let shade = Shade { certain: Some(certain), ..Shade::default() };
-        Self { unit, shade: Some(shade), ..steps(&shown) }
+        Self { unit, shade: Some(shade), ..steps(&styles) }
     }
 
     /// Returns the function with a step for each label of a label map, so that each has what the
@@ -349,28 +349,28 @@ impl TransferFunction {
     pub(crate) fn over_labels(&self, volume: &Volume) -> Self {
         let Some(labels) = &volume.about.labels else { return self.clone() };
         let share = self.unit / (TRANSLUCENT * least_spacing(volume)).max(f64::MIN_POSITIVE);
-        let shown = labels.present.iter().map(|&value| {
-            let own = f64::from(value);
-            let is_met = |surface: &&Isosurface| (surface.value - own).abs() <= 0.5;
+        let styles = labels.present.iter().map(|&value| {
+            let number = f64::from(value);
+            let is_met = |surface: &&Isosurface| (surface.value - number).abs() <= 0.5;
             match self.isosurfaces.iter().rfind(is_met) {
-                Some(surface) if surface.opacity >= 1.0 => Shown {
+                Some(surface) if surface.opacity >= 1.0 => Style {
                     value,
                     color: surface.color,
                     opacity: over(solid(), TRANSLUCENT * share),
                 },
                 Some(surface) => {
-                    Shown { value, color: surface.color, opacity: over(surface.opacity, share) }
+                    Style { value, color: surface.color, opacity: over(surface.opacity, share) }
                 }
-                None => Shown { value, color: self.color(own), opacity: self.opacity(own) },
+                None => Style { value, color: self.color(number), opacity: self.opacity(number) },
             }
         });
-        let shown: Vec<Shown> = shown.collect();
+        let styles: Vec<Style> = styles.collect();
         let certain = CERTAIN.map(|magnitude| magnitude / least_spacing(volume));
         Self {
             unit: self.unit,
             shade: self.shade.map(|shade| Shade { certain: Some(certain), ..shade }),
             gradient: self.gradient.clone(),
-            ..steps(&shown)
+            ..steps(&styles)
         }
     }
 }
@@ -394,19 +394,22 @@ fn least_spacing(volume: &Volume) -> f64 {
 }
 
 /// Returns a function that is constant around each label, up to the middle between neighbours.
-fn steps(shown: &[Shown]) -> TransferFunction {
+fn steps(styles: &[Style]) -> TransferFunction {
     let (mut color, mut opacity) = (Vec::new(), Vec::new());
-    for (place, own) in shown.iter().enumerate() {
-        let (value, before, after) =
-            (f64::from(own.value), place.checked_sub(1).map(|at| &shown[at]), shown.get(place + 1));
+    for (place, style) in styles.iter().enumerate() {
+        let (value, before, after) = (
+            f64::from(style.value),
+            place.checked_sub(1).map(|at| &styles[at]),
+            styles.get(place + 1),
+        );
         let touches =
-            |other: Option<&Shown>| other.is_some_and(|o| o.value.abs_diff(own.value) == 1);
+            |other: Option<&Style>| other.is_some_and(|o| o.value.abs_diff(style.value) == 1);
         let [low, high] = [value - 0.5, value + 0.5];
-        color.extend([(low, own.color), (high, own.color)]);
+        color.extend([(low, style.color), (high, style.color)]);
         if !touches(before) {
             opacity.push((low, 0.0));
         }
-        opacity.extend([(low, own.opacity), (high, own.opacity)]);
+        opacity.extend([(low, style.opacity), (high, style.opacity)]);
         if !touches(after) {
             opacity.push((high, 0.0));
         }
@@ -440,11 +443,11 @@ mod tests {
         let centers = [[0.0, 0.0, 0.0], [0.6, 0.0, 0.5], [-0.6, 0.0, 0.5], [0.0, 0.7, 0.0]];
         volume(|at| {
             let mut value = 0.0;
-            for (own, (center, radius)) in
+            for (inside, (center, radius)) in
                 values.iter().zip(centers.iter().zip([0.6, 0.3, 0.3, 0.25]))
             {
                 if (at - DVec3::from(*center)).length() < radius {
-                    value = *own;
+                    value = *inside;
                 }
             }
             value
@@ -519,9 +522,9 @@ mod tests {
     #[test]
     fn a_table_makes_a_label_map_of_a_mask() {
         let mask = || volume(|at| if at.length() < 0.6 { 7.0 } else { 0.0 });
-        let own = |value| Label { value, name: "ear".into(), ..Label::default() };
-        assert!(present(&mask().with_label_table(&[own(8)])).is_none());
-        let named = mask().with_label_table(&[own(7)]);
+        let ear = |value| Label { value, name: "ear".into(), ..Label::default() };
+        assert!(present(&mask().with_label_table(&[ear(8)])).is_none());
+        let named = mask().with_label_table(&[ear(7)]);
         assert_eq!(named.about.labels.unwrap().name(7), "ear");
     }
 
@@ -536,8 +539,8 @@ mod tests {
         let transfer = TransferFunction::automatic(&volume);
         transfer.validate().unwrap();
         assert_eq!(transfer.color(2.0), [0.2, 0.4, 0.6]);
-        let shown = |value: f64| transfer.opacity(value) > 0.99;
-        assert!(shown(1.0) && shown(2.0) && shown(1000.0));
+        let is_solid = |value: f64| transfer.opacity(value) > 0.99;
+        assert!(is_solid(1.0) && is_solid(2.0) && is_solid(1000.0));
         assert!(transfer.opacity(0.0) == 0.0 && transfer.opacity(3.0) == 0.0);
         assert_eq!(transfer.opacity(500.0), 0.0);
         // The colour does not depend on the other labels of the file.
@@ -555,7 +558,7 @@ mod tests {
     #[test]
     fn own_shares_fall_towards_borders() {
         let volume = volume(|at| if at.x < 0.0 { 1.0 } else { 2.0 }).with_labels(Vec::new());
-        let shares = own_shares(&volume);
+        let shares = label_shares(&volume);
         let at = |x: usize| shares[(SIDE / 2 * SIDE + SIDE / 2) * SIDE + x];
         assert_eq!((at(0), at(SIDE - 1)), (255, 255));
         assert!(at(SIDE / 2) == at(SIDE / 2 - 1) && at(SIDE / 2) < 190 && at(SIDE / 2) > 127);

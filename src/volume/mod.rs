@@ -24,7 +24,7 @@ mod sharp;
 pub(crate) mod steps;
 mod transfer;
 
-pub(crate) use labels::{OWN_DEVIATION, OWN_REACH, own_shares};
+pub(crate) use labels::{OWN_DEVIATION, OWN_REACH, label_shares};
 pub use lattice::{Arrangement, Lattice};
 pub use reconstruct::Reconstruction;
 pub use resample::body_centred;

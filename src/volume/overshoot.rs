@@ -149,10 +149,10 @@ mod tests {
         // samples and never overshoots.
         let cone = Kernel::table(vec![1.0, 0.0], 1.0).unwrap();
         let grid = Grid::of(&Lattice::cartesian([4; 3], DVec3::ZERO, DMat3::IDENTITY)).unwrap();
-        let found = Overshoot::new(grid, &cone);
+        let overshoot = Overshoot::new(grid, &cone);
         assert!(
-            (found.lebesgue - MARGIN).abs() < 1e-9 && found.tails.last().unwrap().1 == 0.0,
-            "{found:?}"
+            (overshoot.lebesgue - MARGIN).abs() < 1e-9 && overshoot.tails.last().unwrap().1 == 0.0,
+            "{overshoot:?}"
         );
     }
 
@@ -167,23 +167,23 @@ mod tests {
 
     #[test]
     fn gaussians_ring_more_the_wider_they_are() {
-        let found = |sigma: f64, lattice: &Lattice| {
-            let found = Overshoot::new(
+        let lebesgue = |sigma: f64, lattice: &Lattice| {
+            let overshoot = Overshoot::new(
                 Grid::of(lattice).unwrap(),
                 &Kernel::gaussian(sigma, 4.0 * sigma).unwrap(),
             );
-            println!("σ {sigma}: {found:?}");
-            assert!(found.tails.windows(2).all(|pair| pair[0].1 >= pair[1].1));
-            found.lebesgue
+            println!("σ {sigma}: {overshoot:?}");
+            assert!(overshoot.tails.windows(2).all(|pair| pair[0].1 >= pair[1].1));
+            overshoot.lebesgue
         };
         let cartesian = Lattice::cartesian([4; 3], DVec3::ZERO, DMat3::IDENTITY);
         let body_centred = Lattice::body_centred([4; 3], DVec3::ZERO, DMat3::IDENTITY);
         for lattice in [&cartesian, &body_centred] {
             assert!(
-                found(0.5, lattice) < found(0.6, lattice)
-                    && found(0.6, lattice) < found(0.7, lattice)
+                lebesgue(0.5, lattice) < lebesgue(0.6, lattice)
+                    && lebesgue(0.6, lattice) < lebesgue(0.7, lattice)
             );
         }
-        assert!(found(0.6, &body_centred) < found(0.6, &cartesian));
+        assert!(lebesgue(0.6, &body_centred) < lebesgue(0.6, &cartesian));
     }
 }

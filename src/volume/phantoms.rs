@@ -232,9 +232,9 @@ mod tests {
         assert_eq!(Phantom::Constant(0.5).sample_bytes([2, 2, 2]).unwrap().range, [128.0, 128.0]);
         assert!(Phantom::Ball.sample([0, 2, 2]).is_err());
         for dims in [[1 << 20; 3], [1 << 21; 3], [usize::MAX, 1, 1]] {
-            let told = [Phantom::Ball.sample(dims), Phantom::Ball.sample_bytes(dims)]
+            let messages = [Phantom::Ball.sample(dims), Phantom::Ball.sample_bytes(dims)]
                 .map(|volume| volume.unwrap_err().to_string());
-            assert!(told.iter().all(|message| message.contains("memory")), "{told:?}");
+            assert!(messages.iter().all(|message| message.contains("memory")), "{messages:?}");
         }
         let lattice = Lattice::body_centred([usize::MAX, 1, 1], DVec3::ZERO, DMat3::IDENTITY);
         assert!(Phantom::Ball.sample_on(lattice).unwrap_err().to_string().contains("memory"));

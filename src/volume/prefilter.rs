@@ -21,8 +21,9 @@ const HORIZON: usize = 18;
 /// Returns the coefficients of samples on a lattice of `dims`, first axis fastest.
 pub fn cubic(samples: &Samples, dims: [usize; 3]) -> Vec<f32> {
     let [nx, ny, nz] = dims;
-    let mut values: Vec<f32> =
-        each_type!(samples, own => own.par_iter().map(|value| f64::from(*value) as f32).collect());
+    let mut values: Vec<f32> = each_type!(samples, values => {
+        values.par_iter().map(|value| f64::from(*value) as f32).collect()
+    });
     values.par_chunks_mut(nx * ny).for_each(|slice| {
         let mut rows = slice.chunks_exact_mut(LINES * nx);
         rows.by_ref().for_each(|rows| along_rows::<LINES>(rows, nx));
@@ -56,7 +57,7 @@ fn turn() -> f32 {
 /// several independent rows are interleaved.
 fn along_rows<const ROWS: usize>(values: &mut [f32], count: usize) {
     let mut rows: [&mut [f32]; ROWS] = std::array::from_fn(|_| Default::default());
-    rows.iter_mut().zip(values.chunks_exact_mut(count)).for_each(|(own, row)| *own = row);
+    rows.iter_mut().zip(values.chunks_exact_mut(count)).for_each(|(slot, row)| *slot = row);
     if count < 2 || rows.iter().any(|row| row.len() != count) {
         return;
     }
@@ -95,8 +96,8 @@ fn across_rows(rows: &mut [&mut [f32]]) {
     }
     rows[0].copy_from_slice(&first);
     for at in 1..count {
-        if let [.., before, own] = &mut rows[..=at] {
-            own.iter_mut()
+        if let [.., before, row] = &mut rows[..=at] {
+            row.iter_mut()
                 .zip(&**before)
                 .for_each(|(value, before)| *value = POLE * before + GAIN * *value);
         }
@@ -107,8 +108,8 @@ fn across_rows(rows: &mut [&mut [f32]]) {
             .for_each(|(value, before)| *value = turn() * (*value + POLE * before));
     }
     for at in (0..count - 1).rev() {
-        if let [own, after, ..] = &mut rows[at..] {
-            own.iter_mut()
+        if let [row, after, ..] = &mut rows[at..] {
+            row.iter_mut()
                 .zip(&**after)
                 .for_each(|(value, after)| *value = POLE * (after - *value));
         }
@@ -127,7 +128,7 @@ mod tests {
             let [nx, ny, nz] = dims;
             let value = |at: usize| ((at * at) as f32).sin() * 100.0 + 50.0;
             let samples = Samples::F32((0..nx * ny * nz).map(value).collect());
-            let found = cubic(&samples, dims);
+            let coefficients = cubic(&samples, dims);
             let mut most = 0f64;
             for at in 0..nx * ny * nz {
                 let place = [at % nx, at / nx % ny, at / nx / ny];
@@ -140,7 +141,7 @@ mod tests {
                         .product();
                     let [i, j, k] =
                         [0, 1, 2].map(|n| mirrored((place[n] + shift[n]) as isize - 1, dims[n]));
-                    sum += weight * f64::from(found[(k * ny + j) * nx + i]);
+                    sum += weight * f64::from(coefficients[(k * ny + j) * nx + i]);
                 }
                 most = most.max((sum - samples.value(at)).abs());
             }

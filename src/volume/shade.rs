@@ -94,9 +94,9 @@ mod tests {
             ..TransferFunction::default()
         };
         let shade = Shade::default();
-        let close = |found: [f64; 2], expected: [f64; 2]| {
-            let near = |i: usize| (found[i] / expected[i] - 1.0).abs() < 1e-12;
-            assert!(near(0) && near(1), "{found:?} {expected:?}");
+        let close = |actual: [f64; 2], expected: [f64; 2]| {
+            let near = |i: usize| (actual[i] / expected[i] - 1.0).abs() < 1e-12;
+            assert!(near(0) && near(1), "{actual:?} {expected:?}");
         };
         // The function changes from 20 to 120 where there are values.
         close(shade.certain_in(&transfer(1.0), [0.0, 120.0], 10.0), [0.2, 1.0]);
@@ -107,8 +107,8 @@ mod tests {
         close(shade.certain_in(&constant, [0.0, 50.0], 10.0), [0.1, 0.5]);
         assert_eq!(shade.certain_in(&constant, [5.0, 5.0], 10.0), [0.0; 2]);
         assert_eq!(shade.certain_in(&constant, [0.0, 5.0], 0.0), [0.0; 2]);
-        let own = Shade { certain: Some([3.0, 4.0]), ..shade };
-        assert_eq!(own.certain_in(&constant, [0.0, 50.0], 10.0), [3.0, 4.0]);
+        let fixed = Shade { certain: Some([3.0, 4.0]), ..shade };
+        assert_eq!(fixed.certain_in(&constant, [0.0, 50.0], 10.0), [3.0, 4.0]);
     }
 
     #[test]

@@ -115,9 +115,9 @@ mod tests {
     #[test]
     fn volumes_share_them_unless_values_are_missing() {
         let lattice = Lattice::with_spacing([2, 2, 1], DVec3::ONE);
-        let own = shared(vec![1.0, -2.5, 0.0, 7.0]);
-        let start = own.bytes().as_ptr();
-        let volume = Volume::with_missing(lattice.clone(), own, Some(9.0)).unwrap();
+        let samples = shared(vec![1.0, -2.5, 0.0, 7.0]);
+        let start = samples.bytes().as_ptr();
+        let volume = Volume::with_missing(lattice.clone(), samples, Some(9.0)).unwrap();
         assert_eq!(volume.samples.bytes().as_ptr(), start);
         assert_eq!((volume.range, volume.about.holes), ([-2.5, 7.0], 0));
         let holes = shared(vec![1.0, f32::NAN, 0.0, 9.0]);

@@ -291,7 +291,7 @@ impl TransferFunction {
     /// Returns the smallest interval that holds all values with opacity or an isosurface. An end is
     /// infinite if the function keeps its opacity beyond its points. `None` if the function shows
     /// nothing.
-    pub fn shown_range(&self) -> Option<[f64; 2]> {
+    pub fn visible_range(&self) -> Option<[f64; 2]> {
         let first = self.opacity.iter().position(|p| p.1 > 0.0);
         let last = self.opacity.iter().rposition(|p| p.1 > 0.0);
         let seen = first.zip(last).map(|(first, last)| {
@@ -434,7 +434,7 @@ mod tests {
             unit: 2.0,
             ..TransferFunction::default()
         };
-        assert_eq!(transfer.shown_range(), Some([20.0, f64::INFINITY]));
+        assert_eq!(transfer.visible_range(), Some([20.0, f64::INFINITY]));
         let stretched = transfer.clone().spread_over([-1.0, 1.0]);
         assert_eq!(stretched.color, [(-1.0, [0.0; 3]), (1.0, [1.0; 3])]);
         assert_eq!(stretched.opacity, [(0.0, 0.0), (1.0, 0.5)]);

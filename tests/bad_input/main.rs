@@ -64,10 +64,10 @@ fn every_cut_of_every_format_is_told() {
     let limits = Limits::default();
     for (name, bytes, may_load) in every_format(&folder) {
         let whole = folder.write(name, &bytes);
-        let told = load(&whole, &limits).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let summary = load(&whole, &limits).unwrap_or_else(|error| panic!("{name}: {error}"));
         for at in 0..bytes.len() {
             let path = folder.write(name, &bytes[..at]);
-            let context = format!("{name} ({told}) cut at {at} of {}", bytes.len());
+            let context = format!("{name} ({summary}) cut at {at} of {}", bytes.len());
             match load(&path, &limits) {
                 Err(error) => refused(&path, &error, &context),
                 Ok(less) => assert!(may_load(&bytes, at), "{context}: loads as {less}"),
@@ -90,10 +90,10 @@ fn every_cut_of_every_format_is_told() {
             match load(&folder.path(referring), &limits) {
                 Err(error) => refused(&folder.path(referring), &error, &context),
                 // The last bytes of a PNG hold nothing that decoding needs.
-                Ok(told) => {
+                Ok(summary) => {
                     assert!(
                         may_load || name == "a.png" && at + 16 >= bytes.len(),
-                        "{context}: loads as {told}"
+                        "{context}: loads as {summary}"
                     );
                 }
             }
@@ -159,12 +159,12 @@ fn each_bad_input_has_its_message() {
     let mut slowest = (0.0, "");
     for (name, bytes, expected) in cases() {
         folder.write(name, &bytes);
-        let mut found = String::new();
+        let mut outcome = String::new();
         let mut seconds = f64::INFINITY;
         // On a busy machine one attempt may be slow, but not all three.
         for _ in 0..3 {
             let begun = Instant::now();
-            found = folder.outcome(name, &limits);
+            outcome = folder.outcome(name, &limits);
             seconds = begun.elapsed().as_secs_f64().min(seconds);
             if seconds < MOST_SECONDS {
                 break;
@@ -173,8 +173,8 @@ fn each_bad_input_has_its_message() {
         if seconds > slowest.0 {
             slowest = (seconds, name);
         }
-        if found != expected {
-            wrong.push(format!("{name}\n  expected: {expected}\n  found:    {found}"));
+        if outcome != expected {
+            wrong.push(format!("{name}\n  expected: {expected}\n  found:    {outcome}"));
         }
         std::fs::remove_file(folder.path(name)).ok();
     }
@@ -327,11 +327,12 @@ fn equal_pages_are_read_within_limits() {
     let bytes = crafted::pages_of_one_node(56);
     let hierarchy =
         Hierarchy::from_bytes(bytes, Path::new("equal.splk"), &limits).expect("a directory");
-    let told = [
+    let errors = [
         hierarchy.read_tree().map(|_| ()).expect_err("too much").to_string(),
         hierarchy.leaves().map(|_| ()).expect_err("too much").to_string(),
     ];
-    assert!(told.iter().all(|told| told.contains("over the limit of 67108864")), "{told:?}");
+    let is_refused = |error: &String| error.contains("over the limit of 67108864");
+    assert!(errors.iter().all(is_refused), "{errors:?}");
     assert_eq!(hierarchy.read_page(0).expect("a page").nodes.len(), 4089);
 }
 

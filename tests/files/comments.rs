@@ -68,16 +68,16 @@ impl Comment {
 fn paragraphs(source: &str) -> Vec<Paragraph> {
     let (mut all, mut current) = (Vec::new(), Comment::default());
     for (number, line) in (1..).zip(source.lines().chain([""])) {
-        let found = comment(line);
-        if found.is_none_or(|(mark, _)| mark != current.mark) {
+        let comment = comment(line);
+        if comment.is_none_or(|(mark, _)| mark != current.mark) {
             let Comment { line: start, paragraphs, .. } = std::mem::take(&mut current);
             let is_help = ["#[arg(", "#[command(", "#[derive(Parser"]
                 .iter()
                 .any(|of| line.trim_start().starts_with(of));
-            let own = paragraphs.into_iter().map(|text| Paragraph { line: start, text });
-            all.extend(own.filter(|_| !is_help));
+            let ended = paragraphs.into_iter().map(|text| Paragraph { line: start, text });
+            all.extend(ended.filter(|_| !is_help));
         }
-        if let Some((mark, text)) = found {
+        if let Some((mark, text)) = comment {
             if current.mark.is_empty() {
                 (current.mark, current.line) = (mark, number);
             }
@@ -142,10 +142,13 @@ fn comments_are_short() {
 fn sentences_and_paragraphs_are_counted() {
     let source = "/// One two. Three\n/// `four five` (six).\n///\n/// - seven\n/// ```\n/// code\n\
                   /// ```\n/// eight\nfn f() {}\n/// Help\n#[arg(long)]\n// nine et al. ten\n";
-    let found = paragraphs(source);
-    let texts: Vec<&str> = found.iter().map(|own| own.text.as_str()).collect();
+    let paragraphs = paragraphs(source);
+    let texts: Vec<&str> = paragraphs.iter().map(|paragraph| paragraph.text.as_str()).collect();
     assert_eq!(texts, ["One two. Three `four five` (six).", "seven", "eight", "nine et al. ten"]);
-    assert_eq!(found.iter().map(|own| own.line).collect::<Vec<_>>(), [1, 1, 1, 12]);
+    assert_eq!(
+        paragraphs.iter().map(|paragraph| paragraph.line).collect::<Vec<_>>(),
+        [1, 1, 1, 12]
+    );
     assert_eq!(words(texts[0]), [2, 3, 0]);
     assert_eq!(words(texts[3]), [4]);
 }

@@ -582,8 +582,8 @@ fn parts_that_are_missing_or_damaged_are_named() {
     let refused = |index: u32, message: &str| {
         let error = plan.join(&out, None).unwrap_err();
         let splatkit::Error::Input { hint: Some(hint), .. } = &error else { panic!("{error}") };
-        let told = error.to_string();
-        assert!(told.contains(&format!("part {index} of 3: {message}")), "{told}");
+        let text = error.to_string();
+        assert!(text.contains(&format!("part {index} of 3: {message}")), "{text}");
         assert!(hint.contains(&plan.part_command(index)), "{hint}");
         assert!(!out.exists());
     };

@@ -6,7 +6,7 @@ use crate::{
     testing::folder::Folder,
 };
 use splatkit::{
-    about::{Frame, Stance},
+    about::{Frame, Orientation},
     bricks,
     formats::{ReadOptions, load_mesh, load_volume, nrrd},
     glam::DVec3,
@@ -163,10 +163,13 @@ fn a_body_lies_at_the_same_place_in_all_formats() {
         let volume = load(&path);
         let name = path.display();
         assert_eq!(volume.about.frame, Frame::Patient, "{name}");
-        assert_eq!(volume.about.stance, Some(Stance::RAS), "{name}");
-        for ((own, place), (value, expected)) in body(&volume).into_iter().zip(&expected) {
-            assert_eq!(own, *value, "{name}");
-            assert!(place.distance(*expected) < 1e-4, "{name}: {own} at {place}, not {expected}");
+        assert_eq!(volume.about.orientation, Some(Orientation::RAS), "{name}");
+        for ((sample, place), (value, expected)) in body(&volume).into_iter().zip(&expected) {
+            assert_eq!(sample, *value, "{name}");
+            assert!(
+                place.distance(*expected) < 1e-4,
+                "{name}: {sample} at {place}, not {expected}"
+            );
         }
         // What is written stays in the frame.
         let copy = folder.path("copy.nrrd");

@@ -61,7 +61,7 @@ pub fn root() -> &'static Path {
 }
 
 /// Lists the files below a folder, without what is built or fetched.
-pub fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+pub fn files(folder: &Path, paths: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry")) {
         let (path, name) = (entry.path(), entry.file_name());
         let left_out = ["target", "out", "corpus", "artifacts", "coverage", "regressions"];
@@ -70,9 +70,9 @@ pub fn files(folder: &Path, found: &mut Vec<PathBuf>) {
             continue;
         }
         if path.is_dir() {
-            files(&path, found);
+            files(&path, paths);
         } else {
-            found.push(path);
+            paths.push(path);
         }
     }
 }
@@ -213,8 +213,8 @@ fn imports() -> BTreeMap<Module, BTreeSet<Module>> {
     let edges = |(module, paths): (Module, BTreeSet<Module>)| {
         let imported = paths.iter().filter_map(of_path);
         // What a module above offers comes from one of the other modules.
-        let own = imported.filter(|other| !module.starts_with(other)).collect();
-        (module, own)
+        let others = imported.filter(|other| !module.starts_with(other)).collect();
+        (module, others)
     };
     read.into_iter().filter(|(module, _)| !is_test(module)).map(edges).collect()
 }
@@ -269,12 +269,12 @@ fn circle(
     way.push(module.clone());
     let imported = imports.get(module).into_iter().flatten();
     // A module above only lists those below it.
-    let found = imported
+    let cycle = imported
         .filter(|other| !other.starts_with(module))
         .find_map(|other| circle(other, imports, way, done));
     way.pop();
     done.insert(module.clone());
-    found
+    cycle
 }
 
 #[test]
@@ -282,8 +282,8 @@ fn no_modules_import_each_other() {
     let imports = imports();
     let mut done = BTreeSet::new();
     for module in imports.keys() {
-        let found = circle(module, &imports, &mut Vec::new(), &mut done);
-        let names = found.map(|found| found.iter().map(|m| m.join("::")).collect::<Vec<_>>());
+        let cycle = circle(module, &imports, &mut Vec::new(), &mut done);
+        let names = cycle.map(|cycle| cycle.iter().map(|m| m.join("::")).collect::<Vec<_>>());
         assert_eq!(names, None, "a circle of imports");
     }
 }
@@ -370,7 +370,8 @@ fn the_documents_count_unsafe_code() {
     };
     let has_code =
         |path: &&PathBuf| fs::read_to_string(path).is_ok_and(|text| text.lines().any(is_unsafe));
-    let found: BTreeSet<String> = all.iter().filter(is_source).filter(has_code).map(name).collect();
+    let unsafe_files: BTreeSet<String> =
+        all.iter().filter(is_source).filter(has_code).map(name).collect();
     for document in ["SECURITY.md", "docs/files.md"] {
         let text = fs::read_to_string(root().join(document)).expect("a document");
         let start = text.find("Unsafe code").expect("a section");
@@ -382,6 +383,6 @@ fn the_documents_count_unsafe_code() {
             .filter(|word| word.ends_with(".rs"))
             .map(str::to_owned)
             .collect();
-        assert_eq!(named, found, "{document}");
+        assert_eq!(named, unsafe_files, "{document}");
     }
 }

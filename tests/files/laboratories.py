@@ -69,8 +69,8 @@ def SimpleITK():
         for packed in [False, True]:
             file = f"{packed}-{name}"
             lib.WriteImage(image, file, packed)
-            told = place()
-            says(file, base, told["spacing"], told["origin"], at=told["at"])
+            header = place()
+            says(file, base, header["spacing"], header["origin"], at=header["at"])
     kinds = "UInt8 Int8 UInt16 Int32 UInt32 Int64 UInt64 Float32 Float64".split()
     for kind in kinds:
         array = byte // 2 if "8" in kind else unsigned if "U" in kind else base
@@ -111,13 +111,13 @@ def tifffile():
     planes = np.stack([byte, byte // 2, byte], 1)
     write("planes.tif", planes, byte // 2, dict(scalar="green"), photometric="rgb", planarconfig=2)
     write("times.tif", np.stack([unsigned, byte]).astype("u2"), byte, dict(time=1))
-    told = dict(imagej=True, resolution=(2, 4), photometric="minisblack")
+    common = dict(imagej=True, resolution=(2, 4), photometric="minisblack")
     near = dict(spacing=1.5, unit="um")
-    write("ij.tif", unsigned, spacing=[0.5, 0.25, 1.5], metadata=dict(near, axes="ZYX"), **told)
-    write("ij1.tif", unsigned, metadata=dict(axes="ZYX"), truncate=True, **told)
+    write("ij.tif", unsigned, spacing=[0.5, 0.25, 1.5], metadata=dict(near, axes="ZYX"), **common)
+    write("ij1.tif", unsigned, metadata=dict(axes="ZYX"), truncate=True, **common)
     stack = np.stack([unsigned, byte], 1)[None]
     stack = np.concatenate([stack, stack // 3]).astype("u2")
-    hyper = dict(metadata=dict(near, axes="TZCYX"), **told)
+    hyper = dict(metadata=dict(near, axes="TZCYX"), **common)
     write("hyper.tif", stack, stack[1, :, 1], dict(time=1, scalar="channel:1"), **hyper)
     lengths = {f"PhysicalSize{axis}": size for axis, size in zip("XYZ", (0.5, 0.25, 1500.0))}
     lengths["PhysicalSizeZUnit"] = "nm"

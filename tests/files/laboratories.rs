@@ -53,9 +53,9 @@ fn compare(folder: &Folder, line: &Value) {
     let expected = std::fs::read(folder.path(text(&line["expected"]).expect("a name")));
     let expected = expected.expect("the values");
     for (index, &value) in expected.as_chunks().0.iter().enumerate() {
-        let (found, value) = (volume.value(index), f64::from_le_bytes(value));
-        let near = (found - value).abs() <= 1e-6 * value.abs();
-        assert!(near, "{file} {how}: sample {index} is {found}, not {value}");
+        let (actual, value) = (volume.value(index), f64::from_le_bytes(value));
+        let near = (actual - value).abs() <= 1e-6 * value.abs();
+        assert!(near, "{file} {how}: sample {index} is {actual}, not {value}");
     }
     let near = |a: DVec3, b: Vec<f64>| (a - DVec3::from_slice(&b)).abs().max_element() < 1e-5;
     if let Some(spacing) = numbers(&line["spacing"]) {
@@ -65,8 +65,8 @@ fn compare(folder: &Folder, line: &Value) {
         assert!(near(volume.lattice.origin, origin), "{file}: {:?}", volume.lattice);
     }
     if let Some(at) = numbers(&how["at"]) {
-        let found = volume.lattice.position(DVec3::new(3.0, 1.0, 2.0));
-        assert!(near(found, at), "{file}: {:?}", volume.lattice);
+        let position = volume.lattice.position(DVec3::new(3.0, 1.0, 2.0));
+        assert!(near(position, at), "{file}: {:?}", volume.lattice);
     }
 }
 

@@ -30,7 +30,7 @@ fn table() -> String {
             Some("") => "yes",
             Some(of) => of,
         };
-        let written = format.written.map_or("no".into(), |own| format!("`.{own}`"));
+        let written = format.written.map_or("no".into(), |extension| format!("`.{extension}`"));
         let (name, holds) = (format.name, holds.join("; "));
         writeln!(text, "| {name} | {files} | {holds} | {pieces} | {written} |")
             .expect("writing to a string");
@@ -44,15 +44,15 @@ fn the_list_of_formats_is_current() {
     let text = fs::read_to_string(&page).expect("docs/formats.md").replace('\r', "");
     let (before, rest) = text.split_once(START).expect("the block's first line");
     let (inside, after) = rest.split_once(END).expect("the block's last line");
-    let found = table();
+    let table = table();
     if std::env::var_os("SPLATKIT_WRITE").is_some() {
-        fs::write(&page, format!("{before}{START}{found}{END}{after}")).expect("docs/formats.md");
+        fs::write(&page, format!("{before}{START}{table}{END}{after}")).expect("docs/formats.md");
         return;
     }
-    for (old, new) in inside.lines().zip(found.lines()) {
+    for (old, new) in inside.lines().zip(table.lines()) {
         assert_eq!(old, new, "docs/formats.md is out of date; SPLATKIT_WRITE=1 updates it");
     }
-    assert_eq!(inside, found, "docs/formats.md is out of date; SPLATKIT_WRITE=1 updates it");
+    assert_eq!(inside, table, "docs/formats.md is out of date; SPLATKIT_WRITE=1 updates it");
 }
 
 /// The features that are not of formats.

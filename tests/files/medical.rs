@@ -53,9 +53,9 @@ fn compare(volume: &Volume, line: &serde_json::Value) {
             "{name}: {sample}"
         );
         if let Some(place) = numbers(sample).get(4..7) {
-            let found = volume.lattice.sample_position(at);
+            let position = volume.lattice.sample_position(at);
             let expected = DVec3::from_slice(place);
-            assert!(found.distance(expected) < 1e-3, "{name}: {found}, {expected}");
+            assert!(position.distance(expected) < 1e-3, "{name}: {position}, {expected}");
         }
     }
 }

@@ -59,11 +59,11 @@ fn long(bytes: &[u8], at: usize) -> usize {
 fn pictures_are_those_of_the_tree_in_memory() {
     let file = open(many_pages(true));
     let tree = Hierarchy::from_tree(file.read_tree().expect("reads")).expect("a hierarchy");
-    let [mut own, mut other] = [file, tree].map(|hierarchy| {
+    let [mut paged, mut in_memory] = [file, tree].map(|hierarchy| {
         let scene = Scene::new().with_hierarchy(hierarchy);
         (Renderer::new(&Device::Cpu, &scene).expect("a renderer"), scene.bounds())
     });
-    let camera = Camera::framing(&own.1, DVec3::new(1.0, -2.0, 0.7), DVec3::Z, 1.0);
+    let camera = Camera::framing(&paged.1, DVec3::new(1.0, -2.0, 0.7), DVec3::Z, 1.0);
     let away = camera.position - camera.focal_point;
     for (part, detail) in [
         (1.0, Detail::Pixels(2.0)),
@@ -75,9 +75,9 @@ fn pictures_are_those_of_the_tree_in_memory() {
         let camera = Camera { position: camera.focal_point + away * part, ..camera };
         let settings = Settings { detail, ..Settings::new([80; 2]) };
         let draw = |renderer: &mut Renderer| renderer.render(&camera, &settings).expect("draws");
-        let (found, wanted) = (draw(&mut own.0), draw(&mut other.0));
-        assert!(found.0.color == wanted.0.color, "{part}, {detail:?}");
-        assert!(found.0.color.iter().any(|color| color[3] > 0.1), "{part}, {detail:?}");
+        let (actual, wanted) = (draw(&mut paged.0), draw(&mut in_memory.0));
+        assert!(actual.0.color == wanted.0.color, "{part}, {detail:?}");
+        assert!(actual.0.color.iter().any(|color| color[3] > 0.1), "{part}, {detail:?}");
     }
 }
 
@@ -101,12 +101,12 @@ fn summed(mut bytes: Vec<u8>) -> Vec<u8> {
     let sum = crc32fast::hash(&bytes[root(&bytes)..end]);
     bytes[end..end + 4].copy_from_slice(&sum.to_le_bytes());
     let hash = bytes.len() - 32;
-    let found = *blake3::hash(&bytes[..hash]).as_bytes();
-    bytes[hash..].copy_from_slice(&found);
+    let digest = *blake3::hash(&bytes[..hash]).as_bytes();
+    bytes[hash..].copy_from_slice(&digest);
     bytes
 }
 
-fn told(result: Result<(), Error>) -> String {
+fn message(result: Result<(), Error>) -> String {
     result.expect_err("damage").to_string()
 }
 
@@ -133,8 +133,8 @@ fn a_damaged_directory_page_is_named() {
     let settings = Settings { detail: Detail::Pixels(0.0), ..Settings::new([40; 2]) };
     let error = renderer.render(&camera, &settings).expect_err("damage").to_string();
     assert!(error.contains(&name), "{error}");
-    let found = check(&broken);
-    assert!(found.iter().any(|f| f.code == "directory" && f.place == name), "{found:?}");
+    let findings = check(&broken);
+    assert!(findings.iter().any(|f| f.code == "directory" && f.place == name), "{findings:?}");
 }
 
 #[test]
@@ -149,14 +149,14 @@ fn records_that_lie_are_found() {
     };
     // The root lists itself, with its own length and with that of a directory page.
     let itself = (root(&bytes) as u64).to_le_bytes();
-    let error = told(read_all(with(second, &itself)));
+    let error = message(read_all(with(second, &itself)));
     assert!(error.contains("it is not among the pages"), "{error}");
     // It lists the first directory page twice: the records there are of other pages.
     let first = bytes[second - OF_DIRECTORY..second].to_vec();
-    assert!(told(read_all(with(second, &first))).contains("directory page 1 of level 0"));
-    let error = told(read_all(with(second + 8, &7u32.to_le_bytes())));
+    assert!(message(read_all(with(second, &first))).contains("directory page 1 of level 0"));
+    let error = message(read_all(with(second + 8, &7u32.to_le_bytes())));
     assert!(error.contains("it has 7 bytes, not those of its records"), "{error}");
-    let error = told(read_all(with(second, &u64::MAX.to_le_bytes())));
+    let error = message(read_all(with(second, &u64::MAX.to_le_bytes())));
     assert!(
         error.contains("directory page 1 of level 0")
             && error.contains("it is not among the pages")
@@ -164,8 +164,8 @@ fn records_that_lie_are_found() {
     // Bounds that are too small would hide pages.
     let small = with(second + 28, &1e-9f32.to_le_bytes());
     assert!(read_all(small.clone()).is_ok());
-    let found = file::check(folder.write("small.splk", small), &Limits::default()).findings;
-    assert!(found.iter().any(|f| f.code == "directory"), "{found:?}");
-    let error = told(read_all(with(second + 28, &f32::NAN.to_le_bytes())));
+    let findings = file::check(folder.write("small.splk", small), &Limits::default()).findings;
+    assert!(findings.iter().any(|f| f.code == "directory"), "{findings:?}");
+    let error = message(read_all(with(second + 28, &f32::NAN.to_le_bytes())));
     assert!(error.contains("its bounds are not valid"), "{error}");
 }

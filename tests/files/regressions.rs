@@ -27,12 +27,12 @@ fn inputs(format: &str) -> Vec<PathBuf> {
 
 #[test]
 fn what_broke_once_holds() {
-    for (format, look) in oracle::FORMATS {
+    for (format, check) in oracle::FORMATS {
         for path in inputs(format) {
             let bytes = fs::read(&path).expect("a readable file");
             println!("{}", path.display());
             let start = Instant::now();
-            look(&bytes);
+            check(&bytes);
             assert!(start.elapsed() < MOST_TIME, "{} took {:?}", path.display(), start.elapsed());
         }
     }
@@ -41,9 +41,9 @@ fn what_broke_once_holds() {
 /// Empty inputs and inputs of one byte break no format.
 #[test]
 fn nothing_and_little() {
-    for (_, look) in oracle::FORMATS {
-        look(&[]);
-        (0..=255).for_each(|byte| look(&[byte]));
+    for (_, check) in oracle::FORMATS {
+        check(&[]);
+        (0..=255).for_each(|byte| check(&[byte]));
     }
 }
 

@@ -51,10 +51,10 @@ fn alone() -> MutexGuard<'static, ()> {
 /// Keeps what tests fetch in one temporary folder, for one test at a time.
 fn keep() -> MutexGuard<'static, ()> {
     static FOLDER: OnceLock<Folder> = OnceLock::new();
-    let own = alone();
+    let guard = alone();
     let folder = FOLDER.get_or_init(Folder::new);
     set_cache(Cache { folder: folder.path("cache"), bytes: 1 << 30 });
-    own
+    guard
 }
 
 /// A LAZ file of 80,000 points along a bumpy strip, in chunks of 4,000 from one end to the other.
@@ -117,10 +117,10 @@ fn clouds_are_converted_piece_by_piece() {
         convert(&[input], &limits, &out, &options, &write, None).unwrap();
         std::fs::read(out).unwrap()
     };
-    let own = converted(folder.path("a.laz"), "own.splk");
+    let local = converted(folder.path("a.laz"), "own.splk");
     forget();
     server.fail(|number, _| if number % 5 == 2 { Fault::Cut(1000) } else { Fault::None });
-    assert!(converted(server.address("a.laz").into(), "far.splk") == own);
+    assert!(converted(server.address("a.laz").into(), "far.splk") == local);
     server.fail(|_, _| Fault::None);
 
     forget();
@@ -137,7 +137,7 @@ fn clouds_are_converted_piece_by_piece() {
         assert!((1..size * 2 / 3).contains(&asked), "part {part}: {asked} of {size} bytes");
     }
     plan.join(&folder.path("joined.splk"), None).unwrap();
-    assert!(std::fs::read(folder.path("joined.splk")).unwrap() == own);
+    assert!(std::fs::read(folder.path("joined.splk")).unwrap() == local);
 
     // An object that changes makes the plan void.
     std::fs::remove_file(plan.part_path(0)).unwrap();
@@ -174,9 +174,9 @@ fn a_hierarchy_is_drawn_in_ranges() {
     // Now it is in memory and on disk.
     assert!(picture_of(open()).unwrap() == local);
     assert!(server.asked().is_empty());
-    let [own, remote] =
+    let [local, remote] =
         [Hierarchy::from_bytes(bytes, "a", &limits()), open()].map(|one| one.unwrap());
-    assert!(own.leaves().unwrap().splats == remote.leaves().unwrap().splats);
+    assert!(local.leaves().unwrap().splats == remote.leaves().unwrap().splats);
     assert!(file::check(server.address("a.splk"), &limits()).findings.is_empty());
 }
 
@@ -210,14 +210,14 @@ fn first_picture_of_many_pages() {
     println!("a file of {} bytes", bytes.len());
     let server = Server::of(bytes);
     let before = traffic();
-    let told = |what: &str, begun: Instant| {
+    let report = |what: &str, begun: Instant| {
         let (now, seconds) = (traffic(), begun.elapsed().as_secs_f64());
         let [requests, bytes] = [now.requests - before.requests, now.bytes - before.bytes];
         println!("{what}: {requests} requests, {bytes} bytes, {seconds:.3} s");
     };
     let begun = Instant::now();
     let hierarchy = Hierarchy::open(server.address("many.splk"), &limits()).unwrap();
-    told("open", begun);
+    report("open", begun);
     println!("{} pages", hierarchy.page_count());
     let scene = Scene::new().with_hierarchy(Arc::new(hierarchy));
     let camera = Camera::framing(&scene.bounds(), DVec3::X, DVec3::Z, 1.0);
@@ -225,7 +225,7 @@ fn first_picture_of_many_pages() {
     for pixels in [8.0, 1.0, 0.25] {
         let settings = Settings { detail: Detail::Pixels(pixels), ..Settings::new([32; 2]) };
         renderer.render(&camera, &settings).unwrap();
-        told(&format!("picture with a cut of {pixels} pixels"), begun);
+        report(&format!("picture with a cut of {pixels} pixels"), begun);
     }
 }
 
@@ -304,11 +304,12 @@ fn other_formats_are_fetched_as_a_whole() {
     let folder = Folder::new();
     formats::ply::write(&Mesh::sphere(4), folder.path("a.ply")).unwrap();
     let server = Server::of(std::fs::read(folder.path("a.ply")).unwrap());
-    let own = formats::load_mesh(folder.path("a.ply"), &limits(), &ReadOptions::default()).unwrap();
+    let mesh =
+        formats::load_mesh(folder.path("a.ply"), &limits(), &ReadOptions::default()).unwrap();
     let load = |name: &str, limits: &Limits| {
         formats::load_mesh(server.address(name), limits, &ReadOptions::default())
     };
-    assert_eq!(load("a.ply", &limits()).unwrap().positions, own.positions);
+    assert_eq!(load("a.ply", &limits()).unwrap().positions, mesh.positions);
     let few = Limits { bytes: 1000, ..limits() };
     assert!(matches!(load("a.ply", &few), Err(Error::Limit { .. })));
     server.fail(|_, _| Fault::Whole);

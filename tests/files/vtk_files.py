@@ -154,21 +154,21 @@ KINDS = {
 
 def facts(data, kind):
     """What a reader must find: counts, bounds, and the ranges of two arrays."""
-    found = {"kind": kind, "points": data.GetNumberOfPoints(), "cells": data.GetNumberOfCells()}
-    found["bounds"] = data.GetBounds()
-    found["t"] = data.GetPointData().GetArray("t").GetRange()
-    found["v"] = data.GetPointData().GetArray("v").GetRange(-1)
-    found["c"] = data.GetCellData().GetArray("c").GetRange()
+    expected = {"kind": kind, "points": data.GetNumberOfPoints(), "cells": data.GetNumberOfCells()}
+    expected["bounds"] = data.GetBounds()
+    expected["t"] = data.GetPointData().GetArray("t").GetRange()
+    expected["v"] = data.GetPointData().GetArray("v").GetRange(-1)
+    expected["c"] = data.GetCellData().GetArray("c").GetRange()
     if kind == "mesh":
-        found["area"] = area(data)
-    return found
+        expected["area"] = area(data)
+    return expected
 
 
-def report(name, found):
-    print(json.dumps({"file": name, **found}))
+def report(name, expected):
+    print(json.dumps({"file": name, **expected}))
 
 
-def xml(name, data, found, extension, writer):
+def xml(name, data, expected, extension, writer):
     modes = [
         (mode, packing, order)
         for mode in ("Ascii", "Binary", "Appended")
@@ -188,10 +188,10 @@ def xml(name, data, found, extension, writer):
         out.SetHeaderTypeToUInt32() if number % 3 else out.SetHeaderTypeToUInt64()
         out.SetBlockSize(1 << 10)
         out.Write()
-        report(file, found)
+        report(file, expected)
 
 
-def legacy(name, data, found):
+def legacy(name, data, expected):
     for number, (kind, version) in enumerate([(1, 42), (2, 42), (1, 51), (2, 51)]):
         file = "%s-%d.vtk" % (name, number)
         out = vtk.vtkDataSetWriter()
@@ -200,7 +200,7 @@ def legacy(name, data, found):
         out.SetFileType(kind)
         out.SetFileVersion(version)
         out.Write()
-        report(file, found)
+        report(file, expected)
 
 
 def parallel():
@@ -222,16 +222,16 @@ def parallel():
         out.Write()
         source.UpdatePiece(0, 1, 0)
         data = source.GetOutput()
-        found = {"kind": what, "points": data.GetNumberOfPoints()}
-        found["cells"] = data.GetNumberOfCells()
-        found["bounds"] = data.GetBounds()
-        found["RTData"] = data.GetPointData().GetArray("RTData").GetRange()
-        report(name, found)
+        expected = {"kind": what, "points": data.GetNumberOfPoints()}
+        expected["cells"] = data.GetNumberOfCells()
+        expected["bounds"] = data.GetBounds()
+        expected["RTData"] = data.GetPointData().GetArray("RTData").GetRange()
+        report(name, expected)
 
 
 for name, (make, kind, extension, writer) in KINDS.items():
     data = make()
-    found = facts(data, kind)
-    xml(name, data, found, extension, getattr(vtk, "vtkXML%sWriter" % writer))
-    legacy(name, data, found)
+    expected = facts(data, kind)
+    xml(name, data, expected, extension, getattr(vtk, "vtkXML%sWriter" % writer))
+    legacy(name, data, expected)
 parallel()

@@ -36,7 +36,7 @@ fn area(mesh: &Mesh) -> f64 {
 }
 
 /// What is read of a file, with an array: counts of points and cells, bounds, range, area.
-struct Found {
+struct Summary {
     points: usize,
     cells: Option<usize>,
     bounds: [DVec3; 2],
@@ -44,19 +44,19 @@ struct Found {
     area: Option<f64>,
 }
 
-fn read(path: &Path, kind: Kind, options: &ReadOptions) -> splatkit::Result<Found> {
+fn read(path: &Path, kind: Kind, options: &ReadOptions) -> splatkit::Result<Summary> {
     let limits = Limits::default();
     Ok(match kind {
         Kind::Volume => {
             let volume = formats::load_volume(path, &limits, options)?;
             let (points, bounds) = (volume.len(), volume.bounds());
-            Found { points, cells: None, bounds, range: volume.range, area: None }
+            Summary { points, cells: None, bounds, range: volume.range, area: None }
         }
         Kind::Cells => {
             let cells = formats::load_cells(path, &limits, options)?;
             let (points, count) = (cells.points.len(), Some(cells.len()));
             let (bounds, range) = (cells.bounds(), cells.range());
-            Found { points, cells: count, bounds, range, area: None }
+            Summary { points, cells: count, bounds, range, area: None }
         }
         _ => {
             let mesh = formats::load_mesh(path, &limits, options)?;
@@ -64,7 +64,7 @@ fn read(path: &Path, kind: Kind, options: &ReadOptions) -> splatkit::Result<Foun
                 [range[0].min(v.into()), range[1].max(v.into())]
             });
             let (bounds, size) = (mesh.bounds().expect("points"), Some(area(&mesh)));
-            Found { points: mesh.positions.len(), cells: None, bounds, range: ends, area: size }
+            Summary { points: mesh.positions.len(), cells: None, bounds, range: ends, area: size }
         }
     })
 }
@@ -91,31 +91,31 @@ fn check(folder: &Folder, facts: &Value, scalar: Option<&str>, key: &str) {
         _ => Kind::Mesh,
     };
     assert_eq!(kind, expected, "{what}");
-    let found = read(&path, kind, &options).unwrap_or_else(|error| panic!("{what}: {error}"));
+    let summary = read(&path, kind, &options).unwrap_or_else(|error| panic!("{what}: {error}"));
     let range = numbers(&facts[key]);
     assert!(
-        near(found.range[0], range[0], range[1]) && near(found.range[1], range[1], range[1]),
+        near(summary.range[0], range[0], range[1]) && near(summary.range[1], range[1], range[1]),
         "{what}: {:?} instead of {range:?}",
-        found.range
+        summary.range
     );
     let of_cells = key == "c";
-    if let (Kind::Cells, Some(cells)) = (kind, found.cells) {
+    if let (Kind::Cells, Some(cells)) = (kind, summary.cells) {
         assert_eq!(Some(cells as u64), facts["cells"].as_u64(), "{what}");
     }
     if kind == Kind::Volume {
         let count = if of_cells { &facts["cells"] } else { &facts["points"] };
-        assert_eq!(Some(found.points as u64), count.as_u64(), "{what}");
+        assert_eq!(Some(summary.points as u64), count.as_u64(), "{what}");
     }
     let bounds = numbers(&facts["bounds"]);
     for (axis, ends) in bounds.chunks(2).enumerate().filter(|_| !(of_cells && kind == Kind::Volume))
     {
         let size = ends[0].abs().max(ends[1].abs());
-        let own = [found.bounds[0][axis], found.bounds[1][axis]];
-        let fits = near(own[0], ends[0], size) && near(own[1], ends[1], size);
-        assert!(fits, "{what}: axis {axis}: {own:?} instead of {ends:?}");
+        let actual = [summary.bounds[0][axis], summary.bounds[1][axis]];
+        let fits = near(actual[0], ends[0], size) && near(actual[1], ends[1], size);
+        assert!(fits, "{what}: axis {axis}: {actual:?} instead of {ends:?}");
     }
-    if let (Some(own), Some(area)) = (found.area, facts["area"].as_f64()) {
-        assert!((own - area).abs() < 1e-4 * area, "{what}: area {own} instead of {area}");
+    if let (Some(actual), Some(area)) = (summary.area, facts["area"].as_f64()) {
+        assert!((actual - area).abs() < 1e-4 * area, "{what}: area {actual} instead of {area}");
     }
 }
 

@@ -76,9 +76,9 @@ pub fn long_splk() -> Vec<u8> {
     file::to_bytes(&tree, &options).expect("bytes")
 }
 
-/// The same hierarchy with its last two pages swapped. If `is_told`, lengths and checksums in the
-/// directory are swapped with them; otherwise the directory stays as it was.
-pub fn swapped(is_told: bool) -> Vec<u8> {
+/// The same hierarchy with its last two pages swapped. If `with_directory`, lengths and checksums
+/// in the directory are swapped with them; otherwise the directory stays as it was.
+pub fn swapped(with_directory: bool) -> Vec<u8> {
     let bytes = long_splk();
     let [entries, _] = pages(&bytes);
     let count = word(&bytes, 128);
@@ -92,7 +92,7 @@ pub fn swapped(is_told: bool) -> Vec<u8> {
     let mut out = bytes.clone();
     out[start..start + before.len() + behind.len()]
         .copy_from_slice(&[&behind[..], &before].concat());
-    if !is_told {
+    if !with_directory {
         return out;
     }
     // Swap the lengths with the pages. `summed` then sets checksums and offsets.
@@ -145,13 +145,13 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
     let mut begin = 0;
     for number in 0..count {
         let content = page(u8::from(number < full));
-        let own = if number == 0 { first_page } else { PAGE_NODES.min(nodes - begin) };
+        let size = if number == 0 { first_page } else { PAGE_NODES.min(nodes - begin) };
         let first_child = nodes.min(1 + 8 * begin);
         let child_page = if number < full { page_of(first_child) } else { u32::MAX };
         let parents = match number {
             0 => [0, 0],
             _ => {
-                let [first, last] = [begin - 1, begin + own - 2].map(|node| page_of(node / 8));
+                let [first, last] = [begin - 1, begin + size - 2].map(|node| page_of(node / 8));
                 [first, last - first + 1]
             }
         };
@@ -159,7 +159,7 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
         directory.extend(u64::from(number).to_le_bytes());
         let [parent, parents] = parents;
         directory.extend(
-            [content.len() as u32, 0, 0, begin, own, first_child, child_page, parent, parents]
+            [content.len() as u32, 0, 0, begin, size, first_child, child_page, parent, parents]
                 .iter()
                 .chain(&[u32::MAX])
                 .flat_map(|v| v.to_le_bytes()),
@@ -167,7 +167,7 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
         let around = if number == 0 { f32::INFINITY } else { 1.0 };
         directory.extend([0f32, 0.0, 0.0, around, around].iter().flat_map(|v| v.to_le_bytes()));
         contents.extend(content);
-        begin += own;
+        begin += size;
     }
     summed([&head[..], &[0; 4], &directory, &[0; 4], &contents, &[0; 32]].concat())
 }

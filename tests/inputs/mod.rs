@@ -25,7 +25,7 @@ impl Folder {
     /// folder.
     pub fn outcome(&self, name: &str, limits: &Limits) -> String {
         match load(&self.path(name), limits) {
-            Ok(told) => told,
+            Ok(summary) => summary,
             Err(error) => self.without_path(&error.to_string()),
         }
     }
@@ -57,8 +57,8 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
         return Ok(format!("transfer {} {}", transfer.color.len(), transfer.opacity.len()));
     }
     if extension == "png" {
-        let found = splatkit::compare::compare_files(path, path, limits)?;
-        return Ok(format!("compared, {} pixels differ", found.different_pixels));
+        let comparison = splatkit::compare::compare_files(path, path, limits)?;
+        return Ok(format!("compared, {} pixels differ", comparison.different_pixels));
     }
     let raw = ["raw", "gz"].contains(&extension).then_some(RAW);
     let kind =

@@ -113,9 +113,9 @@ fn the_finest_level_is_the_volume() {
                 let (expected, _) = draw(&mut renderer, &plain, &camera, &settings);
                 assert_shows_something(&expected);
                 for (origin, bricks) in [("memory", bricks_of(&volume)), ("file", file.clone())] {
-                    let (found, stats) = draw(&mut renderer, &scene(&bricks), &camera, &settings);
+                    let (picture, stats) = draw(&mut renderer, &scene(&bricks), &camera, &settings);
                     assert_eq!(stats.lambda, 0.0);
-                    let agreement = measured(&found, &expected);
+                    let agreement = measured(&picture, &expected);
                     println!(
                         "{name}, bytes: {bytes}, {origin}, occlusion: {occlusion}: {agreement:.1} \
                          dB"
@@ -146,8 +146,9 @@ fn thick_sheets_take_all_bricks() {
     for thickness in [1.0, 4.0, 1.0] {
         let settings = Settings { sheet_thickness: Some(thickness), ..settings(0.0) };
         let (expected, _) = draw(&mut renderer, &plain, camera, &settings);
-        let (found, stats) = renderer.render(&mut prepared, camera, &settings).expect("a picture");
-        let agreement = measured(&found, &expected);
+        let (picture, stats) =
+            renderer.render(&mut prepared, camera, &settings).expect("a picture");
+        let agreement = measured(&picture, &expected);
         assert!(agreement > 80.0, "{thickness}: {agreement:.1} dB");
         counts.push((stats.bricks, stats.splats));
     }
@@ -162,8 +163,8 @@ fn the_reference_draws_the_whole_volume() {
     let settings = Settings { size: [40, 40], ..settings(0.0) };
     let expected =
         reference::render(&scene(&bricks_of(&volume)), &camera, &settings).expect("a picture");
-    let (found, _) = draw(&mut renderer(), &scene(&bricks_of(&volume)), &camera, &settings);
-    let agreement = measured(&found, &expected);
+    let (picture, _) = draw(&mut renderer(), &scene(&bricks_of(&volume)), &camera, &settings);
+    let agreement = measured(&picture, &expected);
     assert!(agreement > 50.0, "{agreement:.1} dB");
 }
 
@@ -179,10 +180,10 @@ fn budgets_are_kept_by_coarser_levels() {
     let slot = 32 * 32 * 32 + 1024;
     for (count, lambda) in [(64, 0.0), (20, 1.0), (8, 1.0), (1, 2.0)] {
         let settings = Settings { page_memory: count * slot, ..settings(0.0) };
-        let (found, stats) = draw(&mut renderer, &scene, camera, &settings);
+        let (picture, stats) = draw(&mut renderer, &scene, camera, &settings);
         assert_eq!(stats.lambda, lambda, "{count}");
         assert!(stats.brick_bytes <= count * slot, "{count}: {}", stats.brick_bytes);
-        let agreement = measured(&found, &finest);
+        let agreement = measured(&picture, &finest);
         println!("{count} bricks: {agreement:.1} dB");
         assert!(agreement > 20.0, "{count}: {agreement:.1} dB");
     }
@@ -288,14 +289,14 @@ fn bricks_are_read_once() {
 fn what_bricks_cannot_do_is_told() {
     let bricks = bricks_of(&volume([9; 3], DVec3::ONE, true));
     let mut settings = settings(1.0);
-    let told = |scene: &Scene, settings: &Settings| {
+    let refused = |scene: &Scene, settings: &Settings| {
         scene.validate_settings(settings).unwrap_err().to_string()
     };
     let hann =
         Scene::new().with_bricks(bricks.clone(), Kernel::hann(2.0).expect("a kernel"), transfer());
-    assert!(told(&hann, &settings).contains("Gaussian"));
+    assert!(refused(&hann, &settings).contains("Gaussian"));
     settings.classification = Classification::Pre;
-    assert!(told(&scene(&bricks), &settings).contains("after interpolation"));
+    assert!(refused(&scene(&bricks), &settings).contains("after interpolation"));
     let more = |scene: Scene| scene.with_bricks(bricks.clone(), Kernel::default(), transfer());
     let most = more(more(more(scene(&bricks))));
     assert!(most.validate().is_ok());
@@ -322,13 +323,13 @@ fn processors_gather_bricks() {
                 renderer.render(&camera, settings).expect("a picture")
             };
             let finest = Settings { evaluate: Evaluate::Gather, ..settings(0.0) };
-            let ((whole, _), (found, stats)) = (drawn(&plain, &finest), drawn(&bricks, &finest));
+            let ((whole, _), (picture, stats)) = (drawn(&plain, &finest), drawn(&bricks, &finest));
             assert!(
                 whole.color.iter().any(|color| color[3] > 0.1),
                 "{name}, {dims:?}: an empty picture"
             );
             assert!(stats.gathered > 0 && stats.lambda == 0.0, "{stats:?}");
-            let agreement = measured(&found, &whole);
+            let agreement = measured(&picture, &whole);
             println!("{name}, {dims:?}: {agreement:.1} dB to the whole volume");
             assert!(agreement > 80.0, "{name}, {dims:?}: {agreement:.1} dB");
             let step = spacing.max_element() * camera.view([96, 96]).expect("a view").scale;
@@ -342,10 +343,10 @@ fn processors_gather_bricks() {
                     detail: Detail::Pixels(2.0 * lambda.exp2() * step / near),
                     ..finest.clone()
                 };
-                let (found, stats) = drawn(&bricks, &between);
+                let (picture, stats) = drawn(&bricks, &between);
                 let (scattered, _) =
                     drawn(&bricks, &Settings { evaluate: Evaluate::Scatter, ..between });
-                let agreement = measured(&found, &scattered);
+                let agreement = measured(&picture, &scattered);
                 println!(
                     "{name}, {dims:?}, level {:.2}: {agreement:.1} dB to scattering",
                     stats.lambda
@@ -390,17 +391,17 @@ fn processors_hold_few_bricks() {
     // Clip boxes from one end to the other, drawn by one renderer and each by a renderer of its
     // own.
     let part = |from: f64, to: f64| {
-        let mut own = settings.clone();
-        own.page_memory = 1 << 30;
+        let mut settings = settings.clone();
+        settings.page_memory = 1 << 30;
         let shape = ClipShape::Box(Bounds { min: DVec3::splat(from), max: DVec3::splat(to) });
-        own.clips = vec![Clip { shape, inside: true }];
-        own
+        settings.clips = vec![Clip { shape, inside: true }];
+        settings
     };
     for (from, to) in [(0.0, 40.0), (30.0, 70.0), (60.0, 110.0)] {
-        let own = part(from, to);
-        let (found, _) = renderer.render(&near, &own).expect("a picture");
+        let settings = part(from, to);
+        let (picture, _) = renderer.render(&near, &settings).expect("a picture");
         let (alone, _) =
-            CpuRenderer::new(&scene).expect("a scene").render(&near, &own).expect("a picture");
-        assert_eq!(found.color, alone.color);
+            CpuRenderer::new(&scene).expect("a scene").render(&near, &settings).expect("a picture");
+        assert_eq!(picture.color, alone.color);
     }
 }

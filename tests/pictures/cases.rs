@@ -80,12 +80,12 @@ impl Truth {
 fn disguised() -> &'static Gpu {
     static DISGUISED: OnceLock<Gpu> = OnceLock::new();
     DISGUISED.get_or_init(|| {
-        let own = gpu();
+        let shared = gpu();
         let info = wgpu::AdapterInfo {
             device_type: wgpu::DeviceType::DiscreteGpu,
-            ..wgpu::AdapterInfo::clone(&own.info)
+            ..wgpu::AdapterInfo::clone(&shared.info)
         };
-        Gpu::from_wgpu(own.device.clone(), own.queue.clone(), info)
+        Gpu::from_wgpu(shared.device.clone(), shared.queue.clone(), info)
     })
 }
 
@@ -93,13 +93,13 @@ fn by_gpu(gpu: &Gpu, case: &Case, evaluate: Evaluate) -> splatkit::Result<Pictur
     let mut renderer = Renderer::new(gpu);
     let mut prepared = renderer.prepare(&case.scene)?;
     let settings = Settings { evaluate, ..case.settings.clone() };
-    let (found, _) = renderer.render(&mut prepared, &case.camera, &settings)?;
+    let (picture, _) = renderer.render(&mut prepared, &case.camera, &settings)?;
     if gpu.is_software() {
-        return Ok(found);
+        return Ok(picture);
     }
     let (again, _) = renderer.render(&mut prepared, &case.camera, &settings)?;
-    assert_eq!(bits(&found), bits(&again), "{}", case.name);
-    Ok(found)
+    assert_eq!(bits(&picture), bits(&again), "{}", case.name);
+    Ok(picture)
 }
 
 fn bits(picture: &Picture) -> Vec<u32> {
@@ -113,36 +113,36 @@ fn check(case: &Case, least: f64, as_a_gpu: &[Evaluate]) {
     let truth = Truth::new(case);
     assert_shows_something(case, &truth.scattered);
     save(case, "reference", &truth.scattered);
-    let own = case.settings.evaluate;
+    let evaluate = case.settings.evaluate;
 
     let mut renderer = CpuRenderer::new(&case.scene).expect(case.name);
-    let found = renderer.render(&case.camera, &case.settings).expect(case.name).0;
-    save(case, "cpu", &found);
-    let agreement = measured(&found, truth.of(own));
+    let picture = renderer.render(&case.camera, &case.settings).expect(case.name).0;
+    save(case, "cpu", &picture);
+    let agreement = measured(&picture, truth.of(evaluate));
     assert_agrees(case, "by the CPU", agreement, least_of_gathered(case.name));
-    assert_most_depths_agree(case, &found, truth.of(own));
+    assert_most_depths_agree(case, &picture, truth.of(evaluate));
 
     if let Some(what) = case.scene.beyond_gpu() {
-        let error = by_gpu(gpu(), case, own).expect_err(case.name).to_string();
+        let error = by_gpu(gpu(), case, evaluate).expect_err(case.name).to_string();
         assert!(error.contains(&what), "{}: {error}", case.name);
         return;
     }
-    let found = by_gpu(gpu(), case, Evaluate::Scatter).expect(case.name);
-    save(case, "scattered", &found);
-    assert_agrees(case, "scattered", psnr(&found, &truth.scattered), least);
+    let picture = by_gpu(gpu(), case, Evaluate::Scatter).expect(case.name);
+    save(case, "scattered", &picture);
+    assert_agrees(case, "scattered", psnr(&picture, &truth.scattered), least);
     match by_gpu(gpu(), case, Evaluate::Gather) {
-        Ok(found) => {
+        Ok(picture) => {
             let least = least.min(least_of_gathered(case.name));
-            save(case, "gathered", &found);
-            assert_agrees(case, "gathered", psnr(&found, &truth.gathered), least);
-            assert_depths_agree(case, &found, &truth.gathered);
+            save(case, "gathered", &picture);
+            assert_agrees(case, "gathered", psnr(&picture, &truth.gathered), least);
+            assert_depths_agree(case, &picture, &truth.gathered);
         }
         Err(error) if error.to_string().contains("can't be gathered") => {}
         Err(error) => panic!("{}: {error}", case.name),
     }
     for &evaluate in as_a_gpu {
-        let found = by_gpu(disguised(), case, evaluate).expect(case.name);
-        let agreement = psnr(&found, truth.of(evaluate));
+        let picture = by_gpu(disguised(), case, evaluate).expect(case.name);
+        let agreement = psnr(&picture, truth.of(evaluate));
         assert_agrees(case, "as on a GPU", agreement, least_of_gathered(case.name));
     }
 }
@@ -163,34 +163,34 @@ fn save(case: &Case, way: &str, picture: &Picture) {
 /// The depths of both pictures where the reference is clearly opaque. Near an opacity of one half,
 /// a difference of 1e-4 in opacity moves the depth by any amount.
 fn depths<'a>(
-    found: &'a Picture,
+    picture: &'a Picture,
     expected: &'a Picture,
 ) -> impl Iterator<Item = (f32, f32)> + use<'a> {
-    let depths = found.depth.iter().zip(&expected.depth).zip(&expected.color);
+    let depths = picture.depth.iter().zip(&expected.depth).zip(&expected.color);
     let opaque = depths.filter(|((_, depth), color)| color[3] > 0.9 && depth.is_finite());
-    opaque.map(|((found, expected), _)| (*found, *expected))
+    opaque.map(|((depth, expected), _)| (*depth, *expected))
 }
 
 /// Asserts that all depths are off by less than 5 % of the scene.
-fn assert_depths_agree(case: &Case, found: &Picture, expected: &Picture) {
+fn assert_depths_agree(case: &Case, picture: &Picture, expected: &Picture) {
     let size = case.scene.bounds().diagonal() as f32;
-    for (found, expected) in depths(found, expected) {
+    for (depth, expected) in depths(picture, expected) {
         let name = case.name;
-        assert!((found - expected).abs() < 0.05 * size, "{name}: depth {found} for {expected}");
+        assert!((depth - expected).abs() < 0.05 * size, "{name}: depth {depth} for {expected}");
     }
 }
 
 /// Asserts that at most one depth in 50 is off by more than 5 % of the scene.
-fn assert_most_depths_agree(case: &Case, found: &Picture, expected: &Picture) {
+fn assert_most_depths_agree(case: &Case, picture: &Picture, expected: &Picture) {
     // Depths of whole kernels and thick sheets are not compared: the engines place them at the
     // centres of kernels, and spread them evenly within a sheet.
     if case.settings.mode != Mode::Sheets || case.settings.sheet_thickness.is_some() {
         return;
     }
     let size = case.scene.bounds().diagonal() as f32;
-    let is_far = |&(found, expected): &(f32, f32)| (found - expected).abs() > 0.05 * size;
-    let far = depths(found, expected).filter(is_far).count();
-    let all = depths(found, expected).count();
+    let is_far = |&(depth, expected): &(f32, f32)| (depth - expected).abs() > 0.05 * size;
+    let far = depths(picture, expected).filter(is_far).count();
+    let all = depths(picture, expected).count();
     assert!(far * 50 <= all, "{}: {far} of {all} depths", case.name);
 }
 

@@ -53,8 +53,8 @@ fn divided(cells: &Cells) -> Tetrahedra {
 /// The same cells, each with the mean of the values at its nodes.
 fn of_cells(cells: &Cells) -> Cells {
     let mean = |cell: usize| {
-        let own = cells.nodes_of(cell);
-        own.iter().map(|node| cells.values[*node as usize]).sum::<f32>() / own.len() as f32
+        let nodes = cells.nodes_of(cell);
+        nodes.iter().map(|node| cells.values[*node as usize]).sum::<f32>() / nodes.len() as f32
     };
     let values = (0..cells.len()).map(mean).collect();
     Cells { values, place: Place::Cells, ..cells.clone() }
@@ -103,25 +103,25 @@ impl Case {
 
     /// Asserts that the CPU engine draws what the reference draws.
     fn check(&self) {
-        let found = self.drawn();
+        let drawn = self.drawn();
         let truth = reference::render(&self.scene, &self.camera, &self.settings).expect(&self.name);
         if let Ok(folder) = std::env::var("SPLATKIT_PICTURES") {
-            for (picture, of) in [(&found, "cpu"), (&truth, "reference")] {
+            for (picture, of) in [(&drawn, "cpu"), (&truth, "reference")] {
                 let path = std::path::Path::new(&folder).join(format!("{}-{of}.png", self.name));
                 picture.save(path, None).expect("a folder to write to");
             }
         }
-        let psnr = measured(&found, &truth);
+        let psnr = measured(&drawn, &truth);
         println!("{}: {psnr:.1} dB", self.name);
         assert!(truth.color.iter().any(|pixel| pixel[3] > 0.3), "{}: an empty picture", self.name);
         assert!(psnr >= 50.0, "{}: {psnr:.1} dB", self.name);
         let size = self.scene.bounds().diagonal() as f32;
-        let depths = found.depth.iter().zip(&truth.depth).zip(&truth.color);
-        let far = depths.filter(|((found, truth), color)| {
-            color[3] > 0.9 && truth.is_finite() && (**found - **truth).abs() > 0.02 * size
+        let depths = drawn.depth.iter().zip(&truth.depth).zip(&truth.color);
+        let far = depths.filter(|((drawn, truth), color)| {
+            color[3] > 0.9 && truth.is_finite() && (**drawn - **truth).abs() > 0.02 * size
         });
         let far = far.count();
-        assert!(far * 100 <= found.depth.len(), "{}: {far} depths", self.name);
+        assert!(far * 100 <= drawn.depth.len(), "{}: {far} depths", self.name);
     }
 }
 
@@ -138,12 +138,12 @@ fn ways_to_draw() {
     let case = |name: &str, transfer: TransferFunction| Case::new(name, &tube, transfer);
     let orthographic = Projection::Orthographic { height: 2.6 };
     case("unlit", transfer()).check();
-    case("orthographic", lit()).with(|own| own.camera.projection = orthographic).check();
+    case("orthographic", lit()).with(|case| case.camera.projection = orthographic).check();
     case("surfaces", surfaces()).check();
-    case("maximum", transfer()).with(|own| own.settings.optics = Optics::Maximum).check();
-    case("x-ray", transfer()).with(|own| own.settings.optics = Optics::XRay).check();
+    case("maximum", transfer()).with(|case| case.settings.optics = Optics::Maximum).check();
+    case("x-ray", transfer()).with(|case| case.settings.optics = Optics::XRay).check();
     case("from inside", lit())
-        .with(|own| own.camera.position = own.camera.focal_point + DVec3::new(0.1, -0.7, 0.2))
+        .with(|case| case.camera.position = case.camera.focal_point + DVec3::new(0.1, -0.7, 0.2))
         .check();
     let gradient = TransferFunction { gradient: vec![(20.0, 0.1), (150.0, 1.0)], ..lit() };
     case("gradient opacity", gradient).check();
@@ -151,7 +151,7 @@ fn ways_to_draw() {
     let cube = Bounds { min: DVec3::new(-0.2, -1.1, -0.3), max: DVec3::new(1.1, 0.1, 0.5) };
     let clips = [(plane, true), (ClipShape::Box(cube), false)];
     let clips: Vec<Clip> = clips.map(|(shape, inside)| Clip { shape, inside }).to_vec();
-    case("clipped", lit()).with(|own| own.settings.clips.clone_from(&clips)).check();
+    case("clipped", lit()).with(|case| case.settings.clips.clone_from(&clips)).check();
     // One long tetrahedron beside many short ones.
     let mut long = tube.clone();
     let first = long.points.len() as u32;
@@ -167,16 +167,16 @@ fn values_of_cells() {
     let tube = of_cells(&Cells::tube(CellKind::Hexahedron, 2).expect("a tube"));
     Case::new("of cells", &tube, lit()).check();
     Case::new("of cells, maximum", &tube, transfer())
-        .with(|own| own.settings.optics = Optics::Maximum)
+        .with(|case| case.settings.optics = Optics::Maximum)
         .check();
     Case::new("of cells, x-ray", &tube, transfer())
-        .with(|own| own.settings.optics = Optics::XRay)
+        .with(|case| case.settings.optics = Optics::XRay)
         .check();
     let cube = Bounds { min: DVec3::new(-0.2, -1.1, -0.3), max: DVec3::new(1.1, 0.1, 0.5) };
     let other = Bounds { min: DVec3::new(0.3, -0.9, -0.9), max: DVec3::new(1.3, 0.3, 0.9) };
-    let clips = [cube, other].map(|own| Clip { shape: ClipShape::Box(own), inside: false });
+    let clips = [cube, other].map(|bounds| Clip { shape: ClipShape::Box(bounds), inside: false });
     Case::new("of cells, clipped", &tube, transfer())
-        .with(|own| own.settings.clips = clips.to_vec())
+        .with(|case| case.settings.clips = clips.to_vec())
         .check();
 }
 
@@ -218,8 +218,8 @@ fn volumes_are_filled() {
             projection: Projection::Orthographic { height: 0.05 },
         };
         let picture = case.drawn();
-        let worst = picture.color.iter().map(|own| {
-            let length = -(1.0 - f64::from(own[3])).ln() / 2f64.ln();
+        let worst = picture.color.iter().map(|pixel| {
+            let length = -(1.0 - f64::from(pixel[3])).ln() / 2f64.ln();
             (length - 0.55).abs()
         });
         let worst = worst.fold(0.0, f64::max);
@@ -258,7 +258,7 @@ fn a_linear_field_is_exact() {
         };
         let expected = 1.0 - (-0.5f64).exp();
         let picture = case.drawn();
-        let worst = picture.color.iter().map(|own| (f64::from(own[3]) - expected).abs());
+        let worst = picture.color.iter().map(|pixel| (f64::from(pixel[3]) - expected).abs());
         let worst = worst.fold(0.0, f64::max);
         println!("{kind:?}: {worst:e}");
         assert!(worst < 2e-4, "{kind:?}: {worst:e}");
@@ -285,7 +285,7 @@ fn there_are_no_cracks() {
                 view_up: DVec3::Z,
                 projection: projection.unwrap_or(Projection::Perspective { view_angle: 5.0 }),
             };
-            let least = case.drawn().color.iter().map(|own| own[3]).fold(1.0, f32::min);
+            let least = case.drawn().color.iter().map(|pixel| pixel[3]).fold(1.0, f32::min);
             assert!(least > 0.999, "{kind:?}: {least}");
         }
     }
@@ -327,14 +327,14 @@ fn values_of_cells_become_values_of_points() {
 fn what_cells_do_not_draw_is_told() {
     let tube = Cells::tube(CellKind::Wedge, 1).expect("a tube");
     let mut case = Case::new("central", &tube, lit());
-    let told = |case: &Case, expected: &str| {
+    let refused = |case: &Case, expected: &str| {
         let mut renderer = CpuRenderer::new(&case.scene).expect("a scene");
         let error = renderer.render(&case.camera, &case.settings).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     };
     case.settings.gradient = Gradient::Central;
-    told(&case, "the gradient of cells");
+    refused(&case, "the gradient of cells");
     let cells = Case::new("of cells", &of_cells(&tube), surfaces());
-    told(&cells, "isosurfaces need values at the points");
+    refused(&cells, "isosurfaces need values at the points");
     assert_eq!(cells.scene.beyond_gpu().as_deref(), Some("cells"));
 }

@@ -2,7 +2,7 @@
 //! triangles, traced with 16 rays a pixel. `SPLATKIT_EDGES=800x600` measures pictures of that size,
 //! and surfels too; `SPLATKIT_MESHES` names more meshes to measure, separated by colons.
 
-use crate::testing::outline::{Found, Truth, given_meshes};
+use crate::testing::outline::{Difference, Truth, given_meshes};
 use splatkit::{
     cpu::CpuRenderer,
     facet::Sides,
@@ -29,21 +29,21 @@ fn size() -> ([u32; 2], bool) {
 }
 
 /// Draws a scene and compares it; prints a row of the table.
-fn row(name: &str, nearer: f64, truth: &Truth, scene: &Scene, what: &str) -> Found {
+fn row(name: &str, nearer: f64, truth: &Truth, scene: &Scene, what: &str) -> Difference {
     let mut renderer = CpuRenderer::new(scene).expect(name);
     let start = Instant::now();
     let picture = renderer.render(&truth.camera, &truth.settings).expect(name).0;
     let seconds = start.elapsed().as_secs_f64();
-    let found = truth.compare(&picture);
+    let difference = truth.compare(&picture);
     println!(
         "| {name}, {what}, {nearer}× | {:.1} | {:.1} | {:+.3} | {} | {} | {seconds:.3} |",
-        found.inside,
-        found.whole,
-        100.0 * found.area,
-        found.outside,
-        found.holes
+        difference.inside,
+        difference.whole,
+        100.0 * difference.area,
+        difference.outside,
+        difference.holes
     );
-    found
+    difference
 }
 
 #[test]
@@ -67,12 +67,12 @@ fn parts_have_their_outlines() {
             let truth = Truth::new(&mesh, size, nearer);
             let set = mesh.facets(&options).expect(name).expect("a mesh of facets");
             let scene = Scene::new().with_facets(set);
-            let found = row(name, nearer, &truth, &scene, "facets");
-            assert_eq!(found.outside, 0, "{name}");
-            assert!(found.area.abs() < 3e-3, "{name}: {}", found.area);
+            let difference = row(name, nearer, &truth, &scene, "facets");
+            assert_eq!(difference.outside, 0, "{name}");
+            assert!(difference.area.abs() < 3e-3, "{name}: {}", difference.area);
             // At this size, several edges cross a pixel of the smallest pictures.
             let least = if size[0] >= 800 { 35.0 } else { 32.0 };
-            assert!(found.inside > least, "{name}: {} dB", found.inside);
+            assert!(difference.inside > least, "{name}: {} dB", difference.inside);
             if with_surfels {
                 let surfels = Scene::new().with_splats(mesh.surfels(&options).expect(name));
                 row(name, nearer, &truth, &surfels, "surfels");

@@ -233,10 +233,10 @@ fn a_small_device_draws_the_same_or_says_why_not() {
     for shift in 16..27 {
         match scattered(&small_device(1 << shift), &scene) {
             Ok(picture) => {
-                let found = difference(&picture, &truth);
+                let difference = difference(&picture, &truth);
                 assert!(
-                    found <= MOST_DIFFERENCE,
-                    "2^{shift} bytes per buffer: the picture differs by {found}"
+                    difference <= MOST_DIFFERENCE,
+                    "2^{shift} bytes per buffer: the picture differs by {difference}"
                 );
             }
             Err(Error::Driver(message)) => {
@@ -407,12 +407,17 @@ fn a_budget_counts_for_the_whole_picture() {
         let mut prepared = renderer.prepare(&scene).expect("fits");
         renderer.render(&mut prepared, &camera, &settings).expect("draws")
     });
-    let [(whole, own), (strips, others)] = &pictures;
+    let [(whole, whole_stats), (strips, strip_stats)] = &pictures;
     assert!(
-        own.cut_pixels > 0.0 && own.splats > 1500 && own.splats > others.splats,
-        "{own:?}\n{others:?}"
+        whole_stats.cut_pixels > 0.0
+            && whole_stats.splats > 1500
+            && whole_stats.splats > strip_stats.splats,
+        "{whole_stats:?}\n{strip_stats:?}"
     );
-    assert!((own.cut_pixels / others.cut_pixels - 1.0).abs() < 1e-9, "{own:?}\n{others:?}");
+    assert!(
+        (whole_stats.cut_pixels / strip_stats.cut_pixels - 1.0).abs() < 1e-9,
+        "{whole_stats:?}\n{strip_stats:?}"
+    );
     let difference = difference(whole, strips);
     assert!(difference < MOST_DIFFERENCE, "the picture differs by {difference}");
 }
@@ -440,12 +445,12 @@ fn memory_is_shared_evenly() {
         let (alone, later) = (pictures(&[&camera]), pictures(&[&nearer, &camera]));
         kinds.push(match (alone, later) {
             (Ok(alone), Ok(later)) => {
-                let ((alone, own), (later, _)) = (&alone[0], &later[1]);
+                let ((alone, stats), (later, _)) = (&alone[0], &later[1]);
                 assert!(
                     same(alone, later),
                     "{mebibytes} MiB: the picture depends on the view before"
                 );
-                Some((own.lambda, own.missing_pages))
+                Some((stats.lambda, stats.missing_pages))
             }
             (Err(_), Err(_)) => None,
             (alone, later) => panic!("{mebibytes} MiB: {:?} and {:?}", alone.err(), later.err()),

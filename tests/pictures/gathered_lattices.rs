@@ -180,11 +180,11 @@ fn borders_and_flat_lattices_agree_with_the_reference() {
 fn body_centred_lattices_agree_with_the_reference() {
     let kernels = kernels().into_iter().chain([("gaussian", Kernel::default())]);
     let named = |(name, kernel): (&'static str, Kernel)| {
-        let own = with_kernel(&methods::body_centred(), &kernel, false);
+        let case = with_kernel(&methods::body_centred(), &kernel, false);
         let random = [[8, 2, 6], [5, 6, 1]].map(|dims| {
             (format!("{name}, {dims:?}"), with_kernel(&random(body_centred(dims)), &kernel, false))
         });
-        [(name.to_string(), own)].into_iter().chain(random)
+        [(name.to_string(), case)].into_iter().chain(random)
     };
     agree(kernels.flat_map(named), least_of_borders);
 }

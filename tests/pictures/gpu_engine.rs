@@ -110,12 +110,12 @@ fn samples_of_all_types_and_few() {
     };
     let dims = volume.lattice.dims;
     let part = |dims: [usize; 3]| {
-        let own = |index: usize| {
+        let value_at = |index: usize| {
             let at = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]]
                 .map(|n| n + 6);
             values[(at[2] * volume.lattice.dims[1] + at[1]) * volume.lattice.dims[0] + at[0]]
         };
-        (0..dims.iter().product()).map(own).collect::<Vec<f32>>()
+        (0..dims.iter().product()).map(value_at).collect::<Vec<f32>>()
     };
     let volumes = [
         with(Samples::U8(values.iter().map(|v| *v as u8).collect()), dims),
@@ -157,9 +157,9 @@ fn pages_of_gaussians_follow_the_eye() {
     let mut draw = |camera| renderer.render(&mut prepared, camera, &settings).expect("a picture").0;
     draw(&camera);
     draw(&away);
-    let found = draw(&moved);
+    let picture = draw(&moved);
     let expected = reference::render(&scene, &moved, &settings).expect("a picture");
-    let agreement = psnr(&found, &expected);
+    let agreement = psnr(&picture, &expected);
     assert!(agreement > 50.0, "{agreement:.1} dB");
 }
 
@@ -244,12 +244,12 @@ fn tiles_that_stop_go_on() {
 #[test]
 fn fields_are_not_exchanged() {
     let case = by(Evaluate::Scatter, fields::two_volumes());
-    let found = drawn(&case, Budget::default());
+    let picture = drawn(&case, Budget::default());
     let truth = |items: Vec<Item>| {
         reference::render(&Scene { items }, &case.camera, &case.settings).expect(case.name)
     };
     let items = &case.scene.items;
-    let [Item::Volume(a, kernel_a, shown_a), Item::Volume(b, kernel_b, shown_b)] = &items[..]
+    let [Item::Volume(a, kernel_a, transfer_a), Item::Volume(b, kernel_b, transfer_b)] = &items[..]
     else {
         panic!("{} has two volumes", case.name)
     };
@@ -257,14 +257,14 @@ fn fields_are_not_exchanged() {
     let per_byte =
         |points: &[(f64, f64)], by: f64| points.iter().map(|(v, o)| (v * by, *o)).collect();
     let to_a = TransferFunction {
-        opacity: per_byte(&shown_b.opacity, 255.0),
-        color: shown_b.color.iter().map(|(v, c)| (v * 255.0, *c)).collect(),
-        ..shown_b.clone()
+        opacity: per_byte(&transfer_b.opacity, 255.0),
+        color: transfer_b.color.iter().map(|(v, c)| (v * 255.0, *c)).collect(),
+        ..transfer_b.clone()
     };
     let to_b = TransferFunction {
-        opacity: per_byte(&shown_a.opacity, 1.0 / 255.0),
-        color: shown_a.color.iter().map(|(v, c)| (v / 255.0, *c)).collect(),
-        ..shown_a.clone()
+        opacity: per_byte(&transfer_a.opacity, 1.0 / 255.0),
+        color: transfer_a.color.iter().map(|(v, c)| (v / 255.0, *c)).collect(),
+        ..transfer_a.clone()
     };
     let exchanged = vec![
         Item::Volume(a.clone(), kernel_a.clone(), to_a),
@@ -275,7 +275,7 @@ fn fields_are_not_exchanged() {
         ("the first alone", vec![items[0].clone()]),
         ("the second alone", vec![items[1].clone()]),
     ] {
-        let agreement = psnr(&found, &truth(items));
+        let agreement = psnr(&picture, &truth(items));
         println!("{what}: {agreement:.1} dB");
         assert!(agreement < 35.0, "{what}: {agreement:.1} dB");
     }
@@ -289,8 +289,8 @@ fn a_budget_too_small_for_a_single_sheet_is_an_error() {
     let mut renderer =
         Renderer::with_budget(gpu(), Budget { entries: 8, record_words: 8, ..Budget::default() });
     let mut prepared = renderer.prepare(&case.scene).expect(case.name);
-    let found = renderer.render(&mut prepared, &case.camera, &case.settings);
-    assert!(found.is_err_and(|e| e.to_string().contains("budget")));
+    let result = renderer.render(&mut prepared, &case.camera, &case.settings);
+    assert!(result.is_err_and(|e| e.to_string().contains("budget")));
 }
 
 #[test]
@@ -368,8 +368,13 @@ fn a_new_transfer_function_needs_no_new_upload() {
         let mut prepared = renderer.prepare(&case.scene).expect(case.name);
         renderer.render(&mut prepared, &case.camera, &settings).expect(case.name);
         prepared.set_transfer(0, &other).unwrap();
-        let (found, _) = renderer.render(&mut prepared, &case.camera, &settings).expect(case.name);
-        assert!(psnr(&found, &expected) > 50.0, "{evaluate:?}: {:.1} dB", psnr(&found, &expected));
+        let (picture, _) =
+            renderer.render(&mut prepared, &case.camera, &settings).expect(case.name);
+        assert!(
+            psnr(&picture, &expected) > 50.0,
+            "{evaluate:?}: {:.1} dB",
+            psnr(&picture, &expected)
+        );
     }
 }
 

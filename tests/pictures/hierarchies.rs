@@ -94,10 +94,13 @@ fn trees_of_any_size_are_alike() {
         let tree = build(&scaled, 1 << 20);
         let nodes = |tree: &Tree| tree.nodes().copied().collect::<Vec<_>>();
         assert_eq!(nodes(&tree).len(), nodes(&whole).len(), "{scale:e}");
-        for (own, other) in nodes(&tree).iter().zip(nodes(&whole)) {
+        for (node, other) in nodes(&tree).iter().zip(nodes(&whole)) {
             let near = |a: f32, b: f32| (a - b).abs() <= 1e-3 * b.abs();
-            assert!(near(own.splat.strength, other.splat.strength), "{scale:e}: {own:?} {other:?}");
-            assert!(near(own.size, other.size * scale), "{scale:e}: {own:?} {other:?}");
+            assert!(
+                near(node.splat.strength, other.splat.strength),
+                "{scale:e}: {node:?} {other:?}"
+            );
+            assert!(near(node.size, other.size * scale), "{scale:e}: {node:?} {other:?}");
         }
     }
 }
@@ -140,8 +143,8 @@ fn a_hierarchy_in_a_volume() {
                 ..camera
             };
             let truth = reference::render(&scene, &camera, &settings(1.0)).expect("draws");
-            let found = renderer.render(&mut prepared, &camera, &settings(1.0)).expect("draws").0;
-            let agreement = measured(&found, &truth);
+            let picture = renderer.render(&mut prepared, &camera, &settings(1.0)).expect("draws").0;
+            let agreement = measured(&picture, &truth);
             println!("{part}: {agreement:.1} dB");
             assert!(agreement > 50.0, "{part}: {agreement:.1} dB");
         }
@@ -170,11 +173,11 @@ fn a_page_that_cannot_be_read_takes_nothing_with_it() {
         assert!(error.contains("knot.splk: page"), "{error}");
     }
     let coarse = settings(16.0);
-    let found = renderer.render(&mut prepared, &camera, &coarse).expect("draws").0;
+    let picture = renderer.render(&mut prepared, &camera, &coarse).expect("draws").0;
     let mut fresh = renderer.prepare(&scene).expect("fits");
     let truth = renderer.render(&mut fresh, &camera, &coarse).expect("draws").0;
     assert!(truth.color.iter().any(|color| color[3] > 0.5));
-    assert!(measured(&found, &truth) > 90.0, "{:.1} dB", measured(&found, &truth));
+    assert!(measured(&picture, &truth) > 90.0, "{:.1} dB", measured(&picture, &truth));
 }
 
 fn bytes(splat: &splatkit::splat::Splat) -> [u8; 48] {
@@ -283,7 +286,7 @@ fn the_engine_draws_the_cut_that_the_oracle_finds() {
                         camera.make_orthographic();
                     }
                     let settings = settings(pixels);
-                    let (found, stats) =
+                    let (picture, stats) =
                         renderer.render(&mut prepared, &camera, &settings).expect("a picture");
                     let view = camera.view(settings.size).expect("a view");
                     let cut = tree.cut(&view, settings.detail, None).expect("a cut");
@@ -296,7 +299,7 @@ fn the_engine_draws_the_cut_that_the_oracle_finds() {
                     // approximately.
                     let (expected, _) =
                         renderer.render(&mut flat, &camera, &settings).expect("a picture");
-                    let agreement = measured(&found, &expected);
+                    let agreement = measured(&picture, &expected);
                     assert!(agreement > 40.0, "{part} {pixels}: {agreement:.1} dB");
                 }
             }
@@ -314,9 +317,9 @@ fn the_engine_matches_the_reference() {
     for pixels in [0.0, 2.0, 6.0] {
         let settings = Settings { detail: Detail::Pixels(pixels), ..Settings::new([64, 64]) };
         let camera = camera(&scene.bounds(), 0.9);
-        let (found, _) = renderer.render(&mut prepared, &camera, &settings).expect("a picture");
+        let (picture, _) = renderer.render(&mut prepared, &camera, &settings).expect("a picture");
         let expected = reference::render(&scene, &camera, &settings).expect("a picture");
-        let agreement = measured(&found, &expected);
+        let agreement = measured(&picture, &expected);
         println!("{pixels}: {agreement:.1} dB");
         assert!(agreement > 50.0, "{pixels}: {agreement:.1} dB");
     }
@@ -438,15 +441,15 @@ fn a_view_looks_the_same_however_it_was_reached() {
     for part in [0.1, 2.0, 0.9, 4.0, 0.3] {
         let camera = camera(&set.bounds(), part);
         let settings = Settings { page_memory: 20 * 4096 * 96, ..settings(2.0) };
-        let (found, _) = renderer.render(&mut wanderer, &camera, &settings).expect("a picture");
+        let (picture, _) = renderer.render(&mut wanderer, &camera, &settings).expect("a picture");
         let mut fresh =
             renderer.prepare(&Scene::new().with_hierarchy(hierarchy())).expect("prepared");
         let (expected, _) = renderer.render(&mut fresh, &camera, &settings).expect("a picture");
         // The order of the splats differs, and with it the rounding of their sums.
         assert!(
-            measured(&found, &expected) > 60.0,
+            measured(&picture, &expected) > 60.0,
             "{part}: {:.1} dB",
-            measured(&found, &expected)
+            measured(&picture, &expected)
         );
     }
 }
@@ -500,10 +503,10 @@ fn an_opened_surface_shows_its_back() {
         ("within", &within, vec![], false),
     ] {
         let settings = Settings { clips, ..settings(0.0) };
-        let [(expected, all), (found, drawn)] = prepared
+        let [(expected, all), (picture, drawn)] = prepared
             .each_mut()
             .map(|prepared| renderer.render(prepared, camera, &settings).expect("a picture"));
-        let agreement = measured(&found, &expected);
+        let agreement = measured(&picture, &expected);
         println!("{name}: {} of {} splats, {agreement:.1} dB", drawn.splats, all.splats);
         assert!(agreement > 40.0, "{name}: {agreement:.1} dB");
         assert_eq!(

@@ -36,8 +36,8 @@ fn with_volume(scene: Scene) -> Scene {
 fn hierarchy() -> Scene {
     let tree = Tree::build(&knot(), &BuildOptions::default(), None).expect("a tree");
     let bytes = file::to_bytes(&tree, &file::WriteOptions::default()).expect("the file");
-    let own = Hierarchy::from_bytes(bytes, "knot", &Limits::default()).expect("a hierarchy");
-    Scene::new().with_hierarchy(own)
+    let hierarchy = Hierarchy::from_bytes(bytes, "knot", &Limits::default()).expect("a hierarchy");
+    Scene::new().with_hierarchy(hierarchy)
 }
 
 fn camera(scene: &Scene) -> Camera {
@@ -88,7 +88,7 @@ fn bytes(
 /// Returns the texels of a texture, row by row.
 fn texels(gpu: &Gpu, view: &wgpu::TextureView, bytes_each: u32) -> Vec<u8> {
     let size = view.texture().size();
-    let (own, row) = (size.width * bytes_each, (size.width * bytes_each).next_multiple_of(256));
+    let (packed, row) = (size.width * bytes_each, (size.width * bytes_each).next_multiple_of(256));
     let rows = bytes(gpu, u64::from(row * size.height), |encoder, staging| {
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
@@ -101,7 +101,7 @@ fn texels(gpu: &Gpu, view: &wgpu::TextureView, bytes_each: u32) -> Vec<u8> {
             size,
         );
     });
-    rows.chunks(row as usize).flat_map(|row| row[..own as usize].to_vec()).collect()
+    rows.chunks(row as usize).flat_map(|row| row[..packed as usize].to_vec()).collect()
 }
 
 fn floats(bytes: &[u8]) -> Vec<f32> {
@@ -138,10 +138,10 @@ fn drawn(
     }
 }
 
-fn same_depths(found: &[f32], expected: &[f32]) {
-    for (at, (found, expected)) in found.iter().zip(expected).enumerate() {
-        let is_near = found == expected || (found - expected).abs() <= 1e-6 * expected.abs();
-        assert!(is_near, "depth of pixel {at}: {found}, not {expected}");
+fn same_depths(depths: &[f32], expected: &[f32]) {
+    for (at, (depth, expected)) in depths.iter().zip(expected).enumerate() {
+        let is_near = depth == expected || (depth - expected).abs() <= 1e-6 * expected.abs();
+        assert!(is_near, "depth of pixel {at}: {depth}, not {expected}");
     }
 }
 
@@ -168,8 +168,8 @@ fn check(name: &str, scene: &Scene, settings: &Settings, budget: Budget) -> u32 
     same_depths(&floats(&texels(gpu, &depth, 4)), &expected.depth);
 
     let pixels = u64::from(SIZE[0] * SIZE[1]);
-    let own = |bytes| buffer(gpu, bytes, wgpu::BufferUsages::COPY_SRC);
-    let (colors, distances) = (own(16 * pixels), own(4 * pixels));
+    let source = |bytes| buffer(gpu, bytes, wgpu::BufferUsages::COPY_SRC);
+    let (colors, distances) = (source(16 * pixels), source(4 * pixels));
     let output = Output::Buffers { color: colors.clone(), distance: Some(distances.clone()) };
     drawn(gpu, &mut renderer, &mut prepared, view, output).expect(name);
     let read = |from: &wgpu::Buffer| {
@@ -223,15 +223,16 @@ fn srgb_textures_display_the_same_colours() {
     let (camera, settings) = (camera(&scene), Settings::new(SIZE));
     let mut renderer = Renderer::new(gpu);
     let mut prepared = renderer.prepare(&scene).unwrap();
-    let mut shown = |format| {
+    let mut displayed = |format| {
         let view = texture(gpu, format, SIZE);
-        let own = (&camera, &settings);
-        drawn(gpu, &mut renderer, &mut prepared, own, (&view).into()).unwrap();
+        let setup = (&camera, &settings);
+        drawn(gpu, &mut renderer, &mut prepared, setup, (&view).into()).unwrap();
         texels(gpu, &view, 4)
     };
     // Both hold the bytes that are displayed. Where pixels are translucent, they differ: colours
     // are multiplied by opacity before they are encoded.
-    let [plain, srgb] = [TextureFormat::Rgba8Unorm, TextureFormat::Rgba8UnormSrgb].map(&mut shown);
+    let [plain, srgb] =
+        [TextureFormat::Rgba8Unorm, TextureFormat::Rgba8UnormSrgb].map(&mut displayed);
     let mut opaque = 0;
     for (plain, srgb) in plain.chunks_exact(4).zip(srgb.chunks_exact(4)) {
         // Where an opacity lies between two bytes, devices round by the format.
@@ -388,18 +389,18 @@ fn a_host_composites_its_triangles_by_depth() {
     let (picture, _): (Picture, _) = renderer.render(&mut prepared, &camera, &settings).unwrap();
     let triangles = triangles_alone(&corners, &camera);
     let (mut before, mut behind, mut edges) = (0, 0, 0);
-    for (at, own) in composite.chunks_exact(4).enumerate() {
+    for (at, pixel) in composite.chunks_exact(4).enumerate() {
         let depth = f64::from(picture.depth[at]);
-        let own_z = triangles[at].map(|(z, _)| z);
+        let triangle_z = triangles[at].map(|(z, _)| z);
         let expected = put_together(picture.color[at], depth, triangles[at]);
-        let differs = own
+        let differs = pixel
             .iter()
             .zip(&expected)
-            .any(|(&own, expected)| (f32::from(own) / 255.0 - expected).abs() > 1.01 / 255.0);
-        match own_z {
+            .any(|(&byte, expected)| (f32::from(byte) / 255.0 - expected).abs() > 1.01 / 255.0);
+        match triangle_z {
             // Rounding decides where the two cross.
             _ if differs => {
-                edges += usize::from(own_z.is_none_or(|z| (z / depth - 1.0).abs() > 1e-4));
+                edges += usize::from(triangle_z.is_none_or(|z| (z / depth - 1.0).abs() > 1e-4));
             }
             Some(z) if z < depth => before += usize::from(depth.is_finite()),
             Some(_) => behind += 1,

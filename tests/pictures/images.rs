@@ -87,15 +87,16 @@ fn textures_look_as_many_rays_see_them() {
         for (name, camera) in views() {
             let settings = Settings::new([72, 48]);
             let truth = reference::render(&scene, &camera, &settings).expect(name);
-            let own = cpu.render(&camera, &settings).expect(name).0;
-            let other = renderer.render(&mut prepared, &camera, &settings).expect(name).0;
-            let both = psnr(&own, &other);
-            let [own, other] = [own, other].map(|picture| psnr(&picture, &truth));
+            let by_cpu = cpu.render(&camera, &settings).expect(name).0;
+            let by_gpu = renderer.render(&mut prepared, &camera, &settings).expect(name).0;
+            let both = psnr(&by_cpu, &by_gpu);
+            let [by_cpu, by_gpu] = [by_cpu, by_gpu].map(|picture| psnr(&picture, &truth));
             println!(
-                "{name}, mask {is_mask}, {repeats}×: CPU {own:.1} dB, GPU {other:.1} dB, {both:.1}"
+                "{name}, mask {is_mask}, {repeats}×: CPU {by_cpu:.1} dB, GPU {by_gpu:.1} dB, \
+                 {both:.1}"
             );
-            assert!(own > 36.0, "{name}, mask {is_mask}, {repeats}×: {own:.1} dB");
-            assert!(other > 36.0, "{name}, mask {is_mask}, {repeats}×, GPU: {other:.1} dB");
+            assert!(by_cpu > 36.0, "{name}, mask {is_mask}, {repeats}×: {by_cpu:.1} dB");
+            assert!(by_gpu > 36.0, "{name}, mask {is_mask}, {repeats}×, GPU: {by_gpu:.1} dB");
             assert!(both > 60.0, "{name}, mask {is_mask}, {repeats}×: the engines {both:.1} dB");
         }
     }
@@ -108,13 +109,13 @@ fn tiles_that_load_together_show_images() {
     let budget = Budget { staged: Some(true), ..Budget::default() };
     let mut renderer = Renderer::with_budget(gpu(), budget);
     let mut prepared = renderer.prepare(&case.scene).expect("a scene");
-    let other = renderer.render(&mut prepared, &case.camera, &case.settings).expect("a picture").0;
+    let by_gpu = renderer.render(&mut prepared, &case.camera, &case.settings).expect("a picture").0;
     let mut cpu = CpuRenderer::new(&case.scene).expect("a scene");
-    let own = cpu.render(&case.camera, &case.settings).expect("a picture").0;
+    let by_cpu = cpu.render(&case.camera, &case.settings).expect("a picture").0;
     let truth = reference::render(&case.scene, &case.camera, &case.settings).expect("a picture");
-    let found = [psnr(&own, &truth), psnr(&other, &truth), psnr(&own, &other)];
-    println!("CPU, GPU, both: {found:.1?} dB");
-    assert!(found[0] > 37.0 && found[1] > 37.0 && found[2] > 60.0, "{found:?}");
+    let ratios = [psnr(&by_cpu, &truth), psnr(&by_gpu, &truth), psnr(&by_cpu, &by_gpu)];
+    println!("CPU, GPU, both: {ratios:.1?} dB");
+    assert!(ratios[0] > 37.0 && ratios[1] > 37.0 && ratios[2] > 60.0, "{ratios:?}");
 }
 
 /// The picture decides how much of a texture is seen: facets are cut for no texel.
@@ -124,8 +125,8 @@ fn textured_triangles_stay_whole() {
     let plain = Mesh { materials: Vec::new(), triangle_materials: Vec::new(), ..mesh.clone() };
     let (set, plain) = (facets(&mesh), facets(&plain));
     assert_eq!(set.facets.len(), plain.facets.len());
-    assert_eq!((set.shown.len(), set.images.len()), (set.facets.len(), 1));
-    assert!(plain.shown.is_empty() && plain.images.is_empty());
+    assert_eq!((set.texture_coordinates.len(), set.images.len()), (set.facets.len(), 1));
+    assert!(plain.texture_coordinates.is_empty() && plain.images.is_empty());
     let levels: u64 = set.images.iter().map(|image| image.bytes()).sum();
     assert!(levels < 4 * 200 * 300 / 2, "{levels}");
 }
@@ -139,7 +140,10 @@ fn images_are_checked() {
         change(&mut set);
         Scene::new().with_facets(set).validate().expect_err("an error").to_string()
     };
-    assert!(refused(|set| set.shown[3].image = 1).contains("facet 3 shows no part"));
-    assert!(refused(|set| set.shown[0].places[1].x = f32::NAN).contains("facet 0 shows no part"));
-    assert!(refused(|set| set.shown.truncate(1)).contains("facets show images"));
+    assert!(refused(|set| set.texture_coordinates[3].image = 1).contains("facet 3 shows no part"));
+    assert!(
+        refused(|set| set.texture_coordinates[0].places[1].x = f32::NAN)
+            .contains("facet 0 shows no part")
+    );
+    assert!(refused(|set| set.texture_coordinates.truncate(1)).contains("facets show images"));
 }

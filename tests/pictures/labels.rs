@@ -86,22 +86,22 @@ fn compare(name: &str, scene: &Scene, camera: &Camera, settings: &Settings) {
 }
 
 /// The labels whose colours a picture without light shows. Nothing else may be opaque in it.
-fn shown(picture: &Picture, transfer: &TransferFunction) -> Vec<u16> {
-    let mut found = Vec::new();
+fn visible_labels(picture: &Picture, transfer: &TransferFunction) -> Vec<u16> {
+    let mut labels = Vec::new();
     for &[red, green, blue, opacity] in picture.color.iter().filter(|pixel| pixel[3] > 0.95) {
         let color = [red, green, blue].map(|channel| f64::from(channel / opacity));
         let is_of = |label: &u16| {
-            let own = transfer.color(f64::from(*label));
-            own.iter().zip(color).all(|(own, found)| (own - found).abs() < 0.02)
+            let expected = transfer.color(f64::from(*label));
+            expected.iter().zip(color).all(|(expected, channel)| (expected - channel).abs() < 0.02)
         };
         let label = LABELS.into_iter().find(is_of);
         let label = label.unwrap_or_else(|| panic!("{color:?} is no label's colour"));
-        if !found.contains(&label) {
-            found.push(label);
+        if !labels.contains(&label) {
+            labels.push(label);
         }
     }
-    found.sort_unstable();
-    found
+    labels.sort_unstable();
+    labels
 }
 
 #[test]
@@ -130,9 +130,9 @@ fn each_label_is_seen_and_nothing_between() {
     let iso = TransferFunction { isosurfaces: vec![surface], ..TransferFunction::default() };
     for (_, device) in engines() {
         let picture = draw(&device, &scene(None), &camera, &settings);
-        assert_eq!(shown(&picture, &transfer), LABELS);
+        assert_eq!(visible_labels(&picture, &transfer), LABELS);
         let picture = draw(&device, &scene(Some(iso.clone())), &camera, &settings);
-        assert_eq!(shown(&picture, &transfer), [1003]);
+        assert_eq!(visible_labels(&picture, &transfer), [1003]);
     }
 }
 
@@ -182,7 +182,7 @@ fn label_maps_are_drawn_among_surfaces() {
     let few = labels();
     let value = |i: usize| {
         let label = few.value(i);
-        LABELS.iter().position(|own| f64::from(*own) == label).map_or(0, |at| at + 1)
+        LABELS.iter().position(|other| f64::from(*other) == label).map_or(0, |at| at + 1)
     };
     let values: Vec<usize> = (0..few.lattice.len()).map(value).collect();
     for samples in [

@@ -32,12 +32,12 @@ fn draw(name: &str, mesh: &Mesh, size: [u32; 2]) -> usize {
         let truth = Truth::new(mesh, size, nearer);
         let mut renderer = CpuRenderer::new(&scene).expect("a renderer");
         let picture = renderer.render(&truth.camera, &truth.settings).expect("a picture").0;
-        let found = truth.compare(&picture);
+        let difference = truth.compare(&picture);
         let (inside, below, least) = truth.opacity_inside(&picture, LEAST);
-        let area = 100.0 * found.area;
+        let area = 100.0 * difference.area;
         println!(
             "| {name}, {nearer}× | {inside} | {below} | {least:.3} | {area:+.3} | {} | {:.1} |",
-            found.outside, found.whole
+            difference.outside, difference.whole
         );
         all += below;
     }

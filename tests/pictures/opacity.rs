@@ -63,7 +63,7 @@ fn material(opacity: f32, texture: Option<Texture>) -> Material {
 
 /// The ways in which a file defines an opacity of a half.
 fn surfaces(count: u32) -> [(&'static str, Mesh, SurfelOptions); 6] {
-    let own = SurfelOptions::default;
+    let usual = SurfelOptions::default;
     let plain = square(count);
     let colors = vec![[200, 100, 50, 128]; plain.positions.len()];
     let vertices = Mesh { colors: colors.clone(), ..plain.clone() };
@@ -88,10 +88,10 @@ fn surfaces(count: u32) -> [(&'static str, Mesh, SurfelOptions); 6] {
         ..SurfelOptions::default()
     };
     [
-        ("vertices", vertices, own()),
-        ("cloud", cloud, own()),
-        ("material", of_material, own()),
-        ("texture", textured, own()),
+        ("vertices", vertices, usual()),
+        ("cloud", cloud, usual()),
+        ("material", of_material, usual()),
+        ("texture", textured, usual()),
         ("options", plain, thin(0.5)),
         ("options and vertices", both, thin(0.5f32.sqrt())),
     ]
@@ -122,8 +122,8 @@ fn drawn(case: &Case) -> [Picture; 3] {
     let mut renderer = Renderer::new(gpu());
     let mut prepared = renderer.prepare(scene).expect(name);
     let by_gpu = renderer.render(&mut prepared, camera, settings).expect(name).0;
-    for (engine, found) in [("cpu", &by_cpu), ("gpu", &by_gpu)] {
-        let ratio = psnr(found, &truth);
+    for (engine, picture) in [("cpu", &by_cpu), ("gpu", &by_gpu)] {
+        let ratio = psnr(picture, &truth);
         assert!(ratio > 50.0, "{name}, {engine}: {ratio} dB");
     }
     [truth, by_cpu, by_gpu]
@@ -145,8 +145,8 @@ fn opacities_hold_at_any_size_of_splat() {
             let settings = Settings { detail: Detail::Pixels(0.0), ..Settings::new([SIDE; 2]) };
             let case = Case { name, scene, camera: camera(count, pitch, is_oblique), settings };
             for picture in drawn(&case) {
-                let found = mean_opacity(&picture);
-                println!("{name}, {pitch} px: {found:.3}");
+                let mean = mean_opacity(&picture);
+                println!("{name}, {pitch} px: {mean:.3}");
                 // The area of a point is estimated from its neighbours: less exactly without a
                 // grid, and of a few points there is no mean.
                 let tolerance = match name {
@@ -154,8 +154,8 @@ fn opacities_hold_at_any_size_of_splat() {
                     "cloud" => 0.06,
                     _ => TOLERANCE,
                 };
-                let is_right = (found - OPACITY).abs() < tolerance;
-                assert!(is_right, "{name}, splats {pitch} pixels apart: {found}");
+                let is_right = (mean - OPACITY).abs() < tolerance;
+                assert!(is_right, "{name}, splats {pitch} pixels apart: {mean}");
             }
         }
     }
@@ -173,8 +173,8 @@ fn opacities_hold_at_any_level_of_a_hierarchy() {
         let settings = Settings { detail: Detail::Pixels(pixels), ..Settings::new([SIDE; 2]) };
         let case = Case { name, scene: scene.clone(), camera: camera(count, 0.1, false), settings };
         for picture in drawn(&case) {
-            let found = mean_opacity(&picture);
-            assert!((found - OPACITY).abs() < TOLERANCE, "cut at {pixels}: {found}");
+            let mean = mean_opacity(&picture);
+            assert!((mean - OPACITY).abs() < TOLERANCE, "cut at {pixels}: {mean}");
         }
     }
 }
@@ -211,7 +211,7 @@ fn masks_cut_holes_and_leave_no_fringe() {
     // The area of the disc, in squares of the picture's side. Opaque splats at its rim are widened,
     // by less than a pixel.
     let area = |radius: f64| std::f64::consts::PI * radius.powi(2);
-    let found = mean_opacity(&picture);
+    let mean = mean_opacity(&picture);
     let radius = 20.0 / 64.0;
-    assert!(area(radius) < found && found < area(radius + 1.0 / 48.0), "{found}");
+    assert!(area(radius) < mean && mean < area(radius + 1.0 / 48.0), "{mean}");
 }

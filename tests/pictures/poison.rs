@@ -97,11 +97,13 @@ fn with_volume(volume: Volume) -> Scene {
 
 /// Asserts that both renderers refuse with the same message, which contains all `words`.
 fn assert_refused(scene: &Scene, camera: &Camera, settings: &Settings, words: &[&str]) {
-    let found = drawn(scene, camera, settings).expect_err(&format!("{words:?}")).to_string();
+    let message = drawn(scene, camera, settings).expect_err(&format!("{words:?}")).to_string();
     let expected =
         reference::render(scene, camera, settings).expect_err(&format!("{words:?}")).to_string();
-    assert_eq!(found, expected);
-    words.iter().for_each(|word| assert!(found.contains(word), "“{found}” does not say “{word}”"));
+    assert_eq!(message, expected);
+    words
+        .iter()
+        .for_each(|word| assert!(message.contains(word), "“{message}” does not say “{word}”"));
 }
 
 /// What was drawn wrongly; a test reports all of it at its end.
@@ -110,10 +112,10 @@ struct Faults(Vec<String>);
 
 impl Faults {
     /// Records a fault unless both refuse, or the engine draws what the reference draws.
-    fn look(&mut self, what: &str, scene: &Scene, camera: &Camera, settings: &Settings) {
+    fn inspect(&mut self, what: &str, scene: &Scene, camera: &Camera, settings: &Settings) {
         let fault =
             match (drawn(scene, camera, settings), reference::render(scene, camera, settings)) {
-                (Ok(found), Ok(expected)) => difference(&found, &expected),
+                (Ok(picture), Ok(expected)) => difference(&picture, &expected),
                 (
                     Err(Error::Argument(_) | Error::Transfer(_) | Error::NothingToDraw(_)),
                     Err(_),
@@ -129,8 +131,8 @@ impl Faults {
     }
 }
 
-fn difference(found: &Picture, expected: &Picture) -> Option<String> {
-    for (name, picture) in [("reference", expected), ("engine", found)] {
+fn difference(actual: &Picture, expected: &Picture) -> Option<String> {
+    for (name, picture) in [("reference", expected), ("engine", actual)] {
         if let Some(odd) =
             picture.color.iter().find(|color| !color.iter().all(|v| (-1e-4..=1.0001).contains(v)))
         {
@@ -140,11 +142,11 @@ fn difference(found: &Picture, expected: &Picture) -> Option<String> {
             return Some(format!("a depth of the {name} is not a number"));
         }
     }
-    let agreement = psnr(found, expected);
-    let shown = |picture: &Picture| {
+    let agreement = psnr(actual, expected);
+    let mean_opacity = |picture: &Picture| {
         picture.color.iter().map(|color| color[3]).sum::<f32>() / picture.color.len() as f32
     };
-    let share = [found, expected].map(shown);
+    let share = [actual, expected].map(mean_opacity);
     (agreement < 40.0).then(|| {
         format!("the engine is at {agreement:.1} dB from the reference, opacities {share:?}")
     })
@@ -190,7 +192,7 @@ fn no_samples_beside_a_surface_are_nothing() {
     let none = SplatSet { splats: Vec::new(), ..samples() };
     let mut faults = Faults::default();
     let scene = Scene::new().with_splats(ball()).with_samples(none, transfer());
-    faults.look("no samples", &scene, &camera(), &settings());
+    faults.inspect("no samples", &scene, &camera(), &settings());
     faults.tell();
 }
 
@@ -261,14 +263,14 @@ fn odd_splats_are_drawn_or_refused() {
                     .expect("a number")
                     .1 = odd;
                 let what = format!("{:?} with number {number} {odd:e}", set.payload);
-                faults.look(&what, &scene_of(set), &camera(), &settings());
+                faults.inspect(&what, &scene_of(set), &camera(), &settings());
             }
         }
         for odd in ODD {
             let mut set = set.clone();
             set.splats[POISONED].factor = [odd, 0.0, odd, 0.0, 0.0, odd];
             let what = format!("{:?} of size {odd:e}", set.payload);
-            faults.look(&what, &scene_of(set), &camera(), &settings());
+            faults.inspect(&what, &scene_of(set), &camera(), &settings());
         }
     }
     faults.tell();
@@ -316,18 +318,23 @@ fn odd_volumes_are_drawn_or_refused() {
         let mut values: Vec<f32> = (0..125).map(|i| (i % 11) as f32 / 10.0).collect();
         values[62] = odd;
         let odd_volume = Volume::new(lattice(), Samples::F32(values)).expect("a volume");
-        faults.look(
+        faults.inspect(
             &format!("a sample of {odd:e}"),
             &with_volume(odd_volume),
             &camera(),
             &settings(),
         );
         let all = Volume::new(lattice(), Samples::F32(vec![odd; 125])).expect("a volume");
-        faults.look(&format!("all samples of {odd:e}"), &with_volume(all), &camera(), &settings());
+        faults.inspect(
+            &format!("all samples of {odd:e}"),
+            &with_volume(all),
+            &camera(),
+            &settings(),
+        );
         let wide =
             Lattice { axes: DMat3::from_diagonal(DVec3::new(0.5, 0.5, odd.into())), ..lattice() };
         if let Ok(wide) = Volume::new(wide, volume().samples) {
-            faults.look(
+            faults.inspect(
                 &format!("a spacing of {odd:e}"),
                 &with_volume(wide),
                 &camera(),
@@ -338,7 +345,7 @@ fn odd_volumes_are_drawn_or_refused() {
             lattice: Lattice { origin: DVec3::splat(odd.into()), ..lattice() },
             ..volume()
         };
-        faults.look(&format!("a lattice at {odd:e}"), &with_volume(far), &camera(), &settings());
+        faults.inspect(&format!("a lattice at {odd:e}"), &with_volume(far), &camera(), &settings());
     }
     faults.tell();
 }
@@ -388,7 +395,7 @@ fn scattered_samples_are_drawn_or_refused() {
             match points.to_splats(&SampleOptions::default()) {
                 Ok(set) => {
                     let what = format!("a sample with {what} {odd:e}");
-                    faults.look(&what, &scene_of(set), &camera(), &settings());
+                    faults.inspect(&what, &scene_of(set), &camera(), &settings());
                 }
                 Err(error) => {
                     assert!(
@@ -435,7 +442,7 @@ fn transfer_functions_are_named() {
             Kernel::default(),
             TransferFunction { unit, ..transfer() },
         );
-        faults.look(&format!("a unit of {unit:e}"), &scene, &camera(), &settings());
+        faults.inspect(&format!("a unit of {unit:e}"), &scene, &camera(), &settings());
     }
     for far in [1e30, 1e38, 1e300, f64::MAX] {
         let wide = TransferFunction {
@@ -444,7 +451,7 @@ fn transfer_functions_are_named() {
             ..transfer()
         };
         let scene = Scene::new().with_volume(volume(), Kernel::default(), wide);
-        faults.look(&format!("a transfer function to {far:e}"), &scene, &camera(), &settings());
+        faults.inspect(&format!("a transfer function to {far:e}"), &scene, &camera(), &settings());
     }
     faults.tell();
 }
@@ -480,7 +487,12 @@ fn cameras_are_refused_or_draw() {
                 ),
                 ("up", Camera { view_up: DVec3::Z * odd, ..camera() }),
             ] {
-                faults.look(&format!("a camera's {what} of {odd:e}"), &scene, &camera, &settings());
+                faults.inspect(
+                    &format!("a camera's {what} of {odd:e}"),
+                    &scene,
+                    &camera,
+                    &settings(),
+                );
             }
         }
     }

@@ -62,9 +62,9 @@ fn an_invisible_field_changes_nothing() {
         let (expected, true_picture) = (drawn(&alone), referenced(&alone));
         assert!(expected.color.iter().any(|pixel| pixel[3] > 0.5), "{}", case.name);
         for other in [before, behind] {
-            let found = drawn(&other);
-            assert_eq!(found.color, expected.color, "{}", case.name);
-            assert_eq!(found.depth, expected.depth, "{}", case.name);
+            let picture = drawn(&other);
+            assert_eq!(picture.color, expected.color, "{}", case.name);
+            assert_eq!(picture.depth, expected.depth, "{}", case.name);
             let difference = largest_difference(&referenced(&other), &true_picture);
             assert_eq!(difference, 0.0, "{}", case.name);
         }
@@ -121,13 +121,13 @@ fn each_field_has_its_own_transfer_function() {
     };
     let before = render(&mut renderer);
     renderer.set_transfer(1, &other).expect("the second field");
-    let found = render(&mut renderer);
+    let picture = render(&mut renderer);
     let mut items = case.scene.items.clone();
     if let Item::Volume(_, _, transfer) = &mut items[1] {
         transfer.clone_from(&other);
     }
-    assert_eq!(found.color, drawn(&of_items(&case, items)).color);
-    assert_ne!(found.color, before.color);
+    assert_eq!(picture.color, drawn(&of_items(&case, items)).color);
+    assert_ne!(picture.color, before.color);
     assert!(renderer.set_transfer(2, &other).is_err(), "there is no such item");
     let surfels = scenes::ellipsoids_in_perspective();
     let mut renderer = CpuRenderer::new(&surfels.scene).expect("a scene");

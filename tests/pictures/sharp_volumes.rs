@@ -66,8 +66,8 @@ fn sharp_volumes_pass_through_their_samples() {
             let field = Reconstruction::new(&volume, &kernel).unwrap();
             let range = (volume.range[1] - volume.range[0]).max(1.0);
             for sample in 0..volume.len() {
-                let found = field.value_at(volume.lattice.sample_position(sample)).unwrap();
-                let error = (found - volume.value(sample)).abs() / range;
+                let value = field.value_at(volume.lattice.sample_position(sample)).unwrap();
+                let error = (value - volume.value(sample)).abs() / range;
                 assert!(
                     error < 1e-4,
                     "{kernel:?} on {:?}: sample {sample} is off by {error:e}",
@@ -240,17 +240,17 @@ fn marschner_and_lobb() {
     ];
     for (samples, linear, most) in [(40, 2.92, 1.3), (64, 1.28, 0.1)] {
         let volume = signal(samples);
-        let found = error(in_cube, |place| trilinear(&volume, place));
-        println!("{samples}³ trilinear {found:.3}");
-        assert!((found / linear - 1.0).abs() < 0.03);
+        let deviation = error(in_cube, |place| trilinear(&volume, place));
+        println!("{samples}³ trilinear {deviation:.3}");
+        assert!((deviation / linear - 1.0).abs() < 0.03);
         for (name, kernel) in names.iter().zip(&kernels) {
             let kernel = kernel.as_ref().unwrap();
-            let found = sharp(volume.clone(), kernel, in_cube);
+            let deviation = sharp(volume.clone(), kernel, in_cube);
             println!(
-                "{samples}³ {name}: smooth {:.3}, sharp {found:.3}",
+                "{samples}³ {name}: smooth {:.3}, sharp {deviation:.3}",
                 reconstructed(&volume, kernel, in_cube)
             );
-            assert!(kernel.extent < 3.0 || found <= most);
+            assert!(kernel.extent < 3.0 || deviation <= most);
         }
     }
 }

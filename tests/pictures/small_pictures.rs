@@ -174,22 +174,22 @@ fn any_scenes() -> Vec<(&'static str, Scene)> {
     let tree = Tree::build(&hills(200), &BuildOptions::default(), None).expect("a tree");
     let hierarchy = || Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
     let volume = |side| Phantom::Specimen.sample_bytes([side; 3]).expect("samples");
-    let shown = |volume: &Volume| TransferFunction::automatic(volume);
+    let automatic = |volume: &Volume| TransferFunction::automatic(volume);
     let (small, large) = (volume(20), volume(60));
-    let (small_shown, large_shown) = (shown(&small), shown(&large));
+    let (small_transfer, large_transfer) = (automatic(&small), automatic(&large));
     let bricks = Bricks::from_volume(Arc::new(large.clone())).expect("bricks");
     vec![
         ("surface", Scene::new().with_splats(hills(120))),
         ("dense surface", Scene::new().with_splats(hills(500))),
         ("samples", samples(5_000)),
         ("dense samples", samples(150_000)),
-        ("volume", Scene::new().with_volume(large, Kernel::default(), large_shown.clone())),
-        ("bricks", Scene::new().with_bricks(bricks, Kernel::default(), large_shown)),
+        ("volume", Scene::new().with_volume(large, Kernel::default(), large_transfer.clone())),
+        ("bricks", Scene::new().with_bricks(bricks, Kernel::default(), large_transfer)),
         ("hierarchy", Scene::new().with_hierarchy(hierarchy())),
         (
             "mixed",
             Scene::new()
-                .with_volume(small, Kernel::default(), small_shown)
+                .with_volume(small, Kernel::default(), small_transfer)
                 .with_hierarchy(hierarchy())
                 .with_splats(hills(400)),
         ),
@@ -229,10 +229,10 @@ fn any_scene_draws_at_any_size() {
         camera.position = camera.focal_point + nearness * (camera.position - camera.focal_point);
         let pixels = [0.0, 0.5, 2.0, 2.0, 9.0][random.below(5) as usize];
         let settings = Settings { detail: Detail::Pixels(pixels), ..Settings::new(size) };
-        let own = Instant::now();
+        let begun = Instant::now();
         let number = random.below(2) as usize;
         let drawn = renderers[number].render(&mut prepared[which], &camera, &settings);
-        let took = own.elapsed();
+        let took = begun.elapsed();
         let what =
             format!("{name} at {size:?}, cut {pixels}, {camera:?}, picture {pictures}, {took:?}");
         let (picture, _) = drawn.unwrap_or_else(|error| panic!("{what}: {error}"));

@@ -74,10 +74,10 @@ fn drawn(case: &Case) -> splatkit::Result<Picture> {
 
 /// Agreement of the CPU engine with the reference, in dB.
 fn agreement(case: &Case) -> f64 {
-    let found = drawn(case).expect(case.name);
+    let picture = drawn(case).expect(case.name);
     let truth = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
     assert!(truth.color.iter().any(|pixel| pixel[3] > 0.3), "{}: an empty picture", case.name);
-    measured(&found, &truth)
+    measured(&picture, &truth)
 }
 
 fn agree(cases: impl Iterator<Item = Case>, least: impl Fn(&str, Tensor) -> f64) {
@@ -144,10 +144,10 @@ fn fields_pass_through_the_samples() {
             };
             let field = Reconstruction::new(volume, kernel).expect("a field");
             for at in 0..volume.len() {
-                let found = field.value_at(volume.lattice.sample_position(at)).expect("a value");
+                let value = field.value_at(volume.lattice.sample_position(at)).expect("a value");
                 assert!(
-                    (found - volume.value(at)).abs() < 1e-4,
-                    "{tensor:?} {dims:?} at {at}: {found}"
+                    (value - volume.value(at)).abs() < 1e-4,
+                    "{tensor:?} {dims:?} at {at}: {value}"
                 );
             }
         }

@@ -192,9 +192,10 @@ fn scattered_values_of_any_unit() {
     };
     let expected = pictures(USUAL);
     for (value, zero) in [(1e12, 0.0), (1e-12, 0.0), (1e25, 0.0), (1e-25, 0.0), (1.0, 1e5)] {
-        let found = pictures(Units { value, zero, ..USUAL });
-        for (engine, (expected, found)) in ["GPU", "CPU"].iter().zip(expected.iter().zip(&found)) {
-            let agreement = psnr(expected, found);
+        let others = pictures(Units { value, zero, ..USUAL });
+        for (engine, (expected, picture)) in ["GPU", "CPU"].iter().zip(expected.iter().zip(&others))
+        {
+            let agreement = psnr(expected, picture);
             println!("{engine}, values times {value:e}, from {zero:e} on: {agreement:.1} dB");
             assert!(agreement > 50.0, "{engine}, {value:e}, {zero:e}: {agreement:.1} dB");
         }
@@ -302,11 +303,11 @@ fn lengths_of_any_unit() {
         };
         let expected = pictures(USUAL);
         for length in [1e-14, 1e-9, 1e9, 1e15] {
-            let found = pictures(Units { length, ..USUAL });
-            for (what, (found, expected)) in
-                ["volume", "splats"].iter().zip(found.iter().zip(&expected))
+            let others = pictures(Units { length, ..USUAL });
+            for (what, (picture, expected)) in
+                ["volume", "splats"].iter().zip(others.iter().zip(&expected))
             {
-                let agreement = psnr(expected, found);
+                let agreement = psnr(expected, picture);
                 println!("{projection:?}, lengths times {length:e}, {what}: {agreement:.1} dB");
                 assert!(
                     agreement > 60.0,
@@ -347,9 +348,9 @@ fn a_scene_belongs_to_its_device() {
     let other = own_gpu();
     let mut prepared: PreparedScene =
         Renderer::new(&other).prepare(&USUAL.splats()).expect("a scene");
-    let found =
+    let result =
         Renderer::new(gpu()).render(&mut prepared, &USUAL.camera(PERSPECTIVE, false), &settings());
-    let message = found.expect_err("another device").to_string();
+    let message = result.expect_err("another device").to_string();
     assert!(message.contains("prepared on another device"), "{message}");
 }
 

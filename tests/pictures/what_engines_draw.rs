@@ -111,16 +111,20 @@ fn transfer() -> TransferFunction {
     }
 }
 
-fn shown(lattice: Lattice, kernel: Result<Kernel>, transfer: TransferFunction) -> Result<Scene> {
+fn volume_scene(
+    lattice: Lattice,
+    kernel: Result<Kernel>,
+    transfer: TransferFunction,
+) -> Result<Scene> {
     Ok(Scene::new().with_volume(bytes_on(lattice)?, kernel?, transfer))
 }
 
 fn on(lattice: Lattice) -> Result<Scene> {
-    shown(lattice, Ok(Kernel::default()), transfer())
+    volume_scene(lattice, Ok(Kernel::default()), transfer())
 }
 
 fn by(kernel: Result<Kernel>) -> Result<Scene> {
-    shown(cartesian(SIDE), kernel, transfer())
+    volume_scene(cartesian(SIDE), kernel, transfer())
 }
 
 fn sharp(lattice: Lattice, kernel: Result<Kernel>) -> Result<Scene> {
@@ -232,11 +236,14 @@ fn rows_of_items() -> Vec<Row> {
         row("cells", cells()),
         row("cells as a solid", solid()),
         row("surfels", surface()),
-        row("a hierarchy", hierarchy().map(|own| Scene::new().with_hierarchy(own))),
-        row("surfels and a volume", surfels().and_then(|own| Ok(usual()?.with_splats(own)))),
+        row("a hierarchy", hierarchy().map(|hierarchy| Scene::new().with_hierarchy(hierarchy))),
+        row(
+            "surfels and a volume",
+            surfels().and_then(|surfels| Ok(usual()?.with_splats(surfels))),
+        ),
         row(
             "a hierarchy and a volume",
-            hierarchy().and_then(|own| Ok(usual()?.with_hierarchy(own))),
+            hierarchy().and_then(|hierarchy| Ok(usual()?.with_hierarchy(hierarchy))),
         ),
         row(
             "surfels and a volume in bricks",
@@ -264,11 +271,11 @@ fn rows_of_kernels() -> Vec<Row> {
         row("kernel: cubic-b-spline", by(tensor(Tensor::CubicBSpline))),
         row(
             "b-spline on a rectilinear lattice",
-            shown(rectilinear(), Kernel::b_spline(2.0), transfer()),
+            volume_scene(rectilinear(), Kernel::b_spline(2.0), transfer()),
         ),
         row(
             "linear on a rectilinear lattice",
-            shown(rectilinear(), tensor(Tensor::Linear), transfer()),
+            volume_scene(rectilinear(), tensor(Tensor::Linear), transfer()),
         ),
         row("linear in bricks", bricks(Scene::new(), tensor(Tensor::Linear))),
         row("sharp: gaussian", sharp(cartesian(SIDE), gaussian())),
@@ -286,11 +293,11 @@ fn rows_of_transfers() -> Vec<Row> {
         ..transfer()
     };
     let gradient = || TransferFunction { gradient: vec![(0.0, 0.0), (300.0, 1.0)], ..transfer() };
-    let lit = |transfer| shown(cartesian(SIDE), Ok(Kernel::default()), transfer);
+    let lit = |transfer| volume_scene(cartesian(SIDE), Ok(Kernel::default()), transfer);
     vec![
         row("light", lit(light())),
         row("light by --gradient central", lit(light()))
-            .with(|own| own.gradient = Gradient::Central),
+            .with(|settings| settings.gradient = Gradient::Central),
         row("an isosurface", lit(isosurface())),
         row("opacity by the gradient", lit(gradient())),
     ]
@@ -313,19 +320,23 @@ fn rows_of_settings() -> Vec<Row> {
         row("a camera inside", usual()).from(|camera| camera.position *= 0.05),
         row("sheets of 2 samples", usual()).with(thick(2.0)),
         row("sheets of 4 samples", usual()).with(thick(4.0)),
-        row("--classify post", usual()).with(|own| own.classification = Classification::Post),
-        row("--classify pre", usual()).with(|own| own.classification = Classification::Pre),
-        row("--mode axis-sheets", usual()).with(|own| own.mode = Mode::AxisSheets),
-        row("--mode splats", usual()).with(|own| own.mode = Mode::Splats(Order::FrontToBack)),
+        row("--classify post", usual())
+            .with(|settings| settings.classification = Classification::Post),
+        row("--classify pre", usual())
+            .with(|settings| settings.classification = Classification::Pre),
+        row("--mode axis-sheets", usual()).with(|settings| settings.mode = Mode::AxisSheets),
+        row("--mode splats", usual())
+            .with(|settings| settings.mode = Mode::Splats(Order::FrontToBack)),
         row("--mode splats of surfels", surface())
-            .with(|own| own.mode = Mode::Splats(Order::BackToFront)),
+            .with(|settings| settings.mode = Mode::Splats(Order::BackToFront)),
         row("--classify pre by linear", by(Ok(Kernel::tensor(Tensor::Linear))))
-            .with(|own| own.classification = Classification::Pre),
-        row("--optics maximum", usual()).with(|own| own.optics = Optics::Maximum),
+            .with(|settings| settings.classification = Classification::Pre),
+        row("--optics maximum", usual()).with(|settings| settings.optics = Optics::Maximum),
         row("--optics maximum of scattered samples", samples(Scene::new()))
-            .with(|own| own.optics = Optics::Maximum),
-        row("--optics maximum of surfels", surface()).with(|own| own.optics = Optics::Maximum),
-        row("--optics x-ray", usual()).with(|own| own.optics = Optics::XRay),
+            .with(|settings| settings.optics = Optics::Maximum),
+        row("--optics maximum of surfels", surface())
+            .with(|settings| settings.optics = Optics::Maximum),
+        row("--optics x-ray", usual()).with(|settings| settings.optics = Optics::XRay),
     ]
 }
 
@@ -428,13 +439,13 @@ fn the_table_of_what_each_engine_draws_is_true() {
     let text = fs::read_to_string(&page).expect("docs/engine.md").replace('\r', "");
     let (before, rest) = text.split_once(START).expect("the block's first line");
     let (inside, after) = rest.split_once(END).expect("the block's last line");
-    let found = table();
+    let table = table();
     if std::env::var_os("SPLATKIT_WRITE").is_some() {
-        fs::write(&page, format!("{before}{START}{found}{END}{after}")).expect("docs/engine.md");
+        fs::write(&page, format!("{before}{START}{table}{END}{after}")).expect("docs/engine.md");
         return;
     }
-    for (old, new) in inside.lines().zip(found.lines()) {
+    for (old, new) in inside.lines().zip(table.lines()) {
         assert_eq!(old, new, "docs/engine.md is out of date; SPLATKIT_WRITE=1 updates it");
     }
-    assert_eq!(inside, found, "docs/engine.md is out of date; SPLATKIT_WRITE=1 updates it");
+    assert_eq!(inside, table, "docs/engine.md is out of date; SPLATKIT_WRITE=1 updates it");
 }

@@ -34,10 +34,10 @@ use splatkit::{
 use std::path::Path;
 
 /// Reads bytes as a file of one format and checks the result.
-pub type Look = fn(&[u8]);
+pub type Target = fn(&[u8]);
 
 /// All entry points, by name.
-pub const FORMATS: &[(&str, Look)] = &[
+pub const FORMATS: &[(&str, Target)] = &[
     ("ply", ply),
     ("splat", splat),
     ("spz", spz),

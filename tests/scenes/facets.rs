@@ -98,7 +98,7 @@ pub fn textured() -> Case {
         ..Mesh::default()
     };
     let set = mesh.facets(&SurfelOptions::default()).expect("facets").expect("a mesh of facets");
-    assert!(!set.shown.is_empty());
+    assert!(!set.texture_coordinates.is_empty());
     case("textured", Scene::new().with_facets(set), PERSPECTIVE)
 }
 

@@ -145,12 +145,12 @@ fn two_cubic() -> Scene {
     let mut moved = (**volume).clone();
     moved.lattice.origin += DVec3::new(0.25, -0.15, 0.1);
     let high = moved.range[1];
-    let shown = TransferFunction {
+    let transfer = TransferFunction {
         color: vec![(0.0, [0.2, 0.9, 0.4]), (high, [0.6, 0.2, 0.9])],
         gradient: vec![(0.0, 0.3), (1.5 * high, 1.0)],
         ..transfer.clone()
     };
-    let other = Item::Volume(Arc::new(moved), kernel.clone(), shown);
+    let other = Item::Volume(Arc::new(moved), kernel.clone(), transfer);
     scene.items.push(other);
     scene
 }

@@ -34,7 +34,7 @@ pub struct Truth {
 
 /// How a picture differs from the truth.
 #[derive(Debug, Clone, Copy)]
-pub struct Found {
+pub struct Difference {
     /// Signal to noise where the mesh fills whole pixels, and in the whole picture, in dB.
     pub inside: f64,
     pub whole: f64,
@@ -86,11 +86,11 @@ impl Truth {
         (opacities.len(), below, opacities.iter().copied().fold(1.0, f32::min))
     }
 
-    pub fn compare(&self, picture: &Picture) -> Found {
-        let (own, truth) = (&picture.color, &self.picture.color);
+    pub fn compare(&self, picture: &Picture) -> Difference {
+        let (drawn, truth) = (&picture.color, &self.picture.color);
         let [width, height] = self.settings.size.map(|side| side as usize);
         let error = |at: usize| -> f64 {
-            own[at].iter().zip(truth[at]).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>()
+            drawn[at].iter().zip(truth[at]).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>()
         };
         let psnr = |at: &dyn Fn(usize) -> bool| {
             let pixels: Vec<usize> = (0..truth.len()).filter(|&i| at(i)).collect();
@@ -107,12 +107,12 @@ impl Truth {
             })
             .all(|near| truth[near][3] == 0.0)
         };
-        Found {
+        Difference {
             inside: psnr(&|at| truth[at][3] >= 1.0),
             whole: psnr(&|_| true),
-            area: area(own) / area(truth) - 1.0,
-            outside: (0..truth.len()).filter(|&at| own[at][3] > DRAWN && is_beside(at)).count(),
-            holes: (0..truth.len()).filter(|&at| truth[at][3] >= 1.0 && own[at][3] < 0.9).count(),
+            area: area(drawn) / area(truth) - 1.0,
+            outside: (0..truth.len()).filter(|&at| drawn[at][3] > DRAWN && is_beside(at)).count(),
+            holes: (0..truth.len()).filter(|&at| truth[at][3] >= 1.0 && drawn[at][3] < 0.9).count(),
         }
     }
 }

@@ -90,7 +90,8 @@ impl Server {
             asked: Vec::new(),
         }));
         let (most, is_over) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicBool::new(false)));
-        let own = Self { port, state: state.clone(), most: most.clone(), is_over: is_over.clone() };
+        let server =
+            Self { port, state: state.clone(), most: most.clone(), is_over: is_over.clone() };
         std::thread::spawn(move || {
             let now = Arc::new(AtomicUsize::new(0));
             for connection in listener.incoming().flatten() {
@@ -101,7 +102,7 @@ impl Server {
                 std::thread::spawn(move || serve(connection, &state, &now, &most));
             }
         });
-        own
+        server
     }
 
     fn state(&self) -> std::sync::MutexGuard<'_, State> {

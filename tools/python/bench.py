@@ -46,9 +46,12 @@ def transfer():
 
 def spent():
     """Returns the time, and that of all processors for this process and its children."""
-    own = os.times()
+    times = os.times()
     return np.array(
-        [time.perf_counter(), own.user + own.system + own.children_user + own.children_system]
+        [
+            time.perf_counter(),
+            times.user + times.system + times.children_user + times.children_system,
+        ]
     )
 
 
@@ -67,8 +70,8 @@ def median(work, runs):
 def peak():
     """Returns the peak and the present memory of this process in bytes."""
     lines = Path("/proc/self/status").read_text().splitlines()
-    own = {line.split(":")[0]: line.split()[1] for line in lines if line.startswith("Vm")}
-    return 1024 * int(own["VmHWM"]), 1024 * int(own["VmRSS"])
+    fields = {line.split(":")[0]: line.split()[1] for line in lines if line.startswith("Vm")}
+    return 1024 * int(fields["VmHWM"]), 1024 * int(fields["VmRSS"])
 
 
 def of_memory(side, copy):
@@ -85,7 +88,7 @@ def of_memory(side, copy):
     scene.render(SIZE)
     drawn, _ = peak()
     parts = {"added": added, "drawn": drawn}
-    return {name: round((own - before) / array.nbytes, 3) for name, own in parts.items()}
+    return {name: round((value - before) / array.nbytes, 3) for name, value in parts.items()}
 
 
 def of_splatkit(side, runs):
@@ -108,16 +111,28 @@ def of_command(command, side, runs):
     with tempfile.TemporaryDirectory() as folder:
         file, picture = Path(folder) / "volume.npy", Path(folder) / "picture.png"
         np.save(file, volume(side))
-        own = Path(folder) / "transfer.json"
-        own.write_text(transfer().to_json())
-        words = [command, "render", file, "-o", picture, "--engine", "cpu", "--transfer", own]
+        transfer_file = Path(folder) / "transfer.json"
+        transfer_file.write_text(transfer().to_json())
+        words = [
+            command,
+            "render",
+            file,
+            "-o",
+            picture,
+            "--engine",
+            "cpu",
+            "--transfer",
+            transfer_file,
+        ]
         words += ["--size", "x".join(map(str, SIZE)), "--overwrite"]
 
         def run():
             subprocess.run(list(map(str, words)), check=True, capture_output=True)
 
         def call():
-            pysplatkit.render(file, transfer=own, size=SIZE).save(Path(folder) / "own.png")
+            pysplatkit.render(file, transfer=transfer_file, size=SIZE).save(
+                Path(folder) / "own.png"
+            )
 
         command_time, python_time = median(run, runs), median(call, runs)
         same = picture.read_bytes() == (Path(folder) / "own.png").read_bytes()
@@ -134,8 +149,8 @@ def of_pyvista(side, runs):
     plotter = pyvista.Plotter(off_screen=True, window_size=SIZE)
 
     def begin():
-        look = {"cmap": "inferno", "opacity": 255 * steps, "opacity_unit_distance": 4}
-        plotter.add_volume(grid, shade=True, **look)
+        options = {"cmap": "inferno", "opacity": 255 * steps, "opacity_unit_distance": 4}
+        plotter.add_volume(grid, shade=True, **options)
         plotter.camera_position = "iso"
         plotter.show(auto_close=False)
 
@@ -173,8 +188,8 @@ def main():
     if given.task:
         task, *arguments = json.loads(given.task)
         tasks = (of_memory, of_splatkit, of_command, of_pyvista)
-        own = {task.__name__: task for task in tasks}[task](*arguments)
-        print(json.dumps(own))
+        result = {task.__name__: task for task in tasks}[task](*arguments)
+        print(json.dumps(result))
         return
     print(
         f"{os.cpu_count()} processors, pictures of {SIZE[0]} × {SIZE[1]}, [seconds, processor seconds]"

@@ -50,12 +50,14 @@ def drawn(path: Path, ranks: int, memory: int, given: argparse.Namespace, precis
             start = time.perf_counter()
             picture = renderer.render(size, camera, background="white", cut=given.cut)
             times.append(time.perf_counter() - start)
-    told = picture.statistics
-    own = told["ranks"]
+    statistics = picture.statistics
+    per_rank = statistics["ranks"]
     print(f"\n{ranks} ranks, {memory} MiB for bricks each, {cpus} threads, {precision}")
-    print(f"  first picture {times[0]:.1f} s, second {times[1]:.1f} s; level {told['level']:.2f}")
-    print(f"  moved for a picture: {told['moved_bytes'] / MIB:.1f} MiB")
-    for number, rank in enumerate(own):
+    print(
+        f"  first picture {times[0]:.1f} s, second {times[1]:.1f} s; level {statistics['level']:.2f}"
+    )
+    print(f"  moved for a picture: {statistics['moved_bytes'] / MIB:.1f} MiB")
+    for number, rank in enumerate(per_rank):
         peak, before = rank["peak_memory"] / MIB, base[number] / MIB
         print(
             f"  rank {number}: {rank['bricks']} bricks, {rank['seconds']:.1f} s, peak "
@@ -89,10 +91,10 @@ def main() -> None:
         one = drawn(path, 1, 1 << 20, given, "float32")
         pictures = {"one": one}
         for precision in ("float32", "float16"):
-            own = drawn(path, given.ranks, given.memory, given, precision)
-            pictures[precision] = own
-            error = np.mean((own.color.astype(float) - one.color) ** 2)
-            most = np.abs(own.rgba.astype(int) - one.rgba).max()
+            picture = drawn(path, given.ranks, given.memory, given, precision)
+            pictures[precision] = picture
+            error = np.mean((picture.color.astype(float) - one.color) ** 2)
+            most = np.abs(picture.rgba.astype(int) - one.rgba).max()
             decibels = -10 * np.log10(max(error, 1e-15))
             print(f"  {decibels:.1f} dB to one process; at most {most} of 255 off")
     if given.save:

@@ -101,32 +101,32 @@ impl CameraFlags {
     /// Changes where the picture of a scene is taken from: by the flags that are given. Any of
     /// those that place the camera replaces the scene's own camera.
     pub fn apply(&self, scene: &mut Description) {
-        let own = self.framing();
-        let placing = Framing { zoom: None, up: None, ..own.clone() };
+        let framing = self.framing();
+        let placing = Framing { zoom: None, up: None, ..framing.clone() };
         if placing != Framing::default() {
             scene.camera = None;
         }
         scene.camera = self.camera.or(scene.camera);
         let mut before = std::mem::take(&mut scene.framing);
-        if own.camera_position.is_some() {
+        if framing.camera_position.is_some() {
             (before.view, before.distance) = (None, None);
         }
-        if own.view.is_some() || own.distance.is_some() {
+        if framing.view.is_some() || framing.distance.is_some() {
             before.camera_position = None;
         }
         scene.framing = Framing {
             camera: None,
-            view: own.view.or(before.view),
-            camera_position: own.camera_position.or(before.camera_position),
-            focal_point: own.focal_point.or(before.focal_point),
-            view_up: own.view_up.or(before.view_up),
-            view_angle: own.view_angle.or(before.view_angle),
-            distance: own.distance.or(before.distance),
-            azimuth: own.azimuth.or(before.azimuth),
-            elevation: own.elevation.or(before.elevation),
-            zoom: own.zoom.or(before.zoom),
-            orthographic: own.orthographic || before.orthographic,
-            up: own.up.or(before.up),
+            view: framing.view.or(before.view),
+            camera_position: framing.camera_position.or(before.camera_position),
+            focal_point: framing.focal_point.or(before.focal_point),
+            view_up: framing.view_up.or(before.view_up),
+            view_angle: framing.view_angle.or(before.view_angle),
+            distance: framing.distance.or(before.distance),
+            azimuth: framing.azimuth.or(before.azimuth),
+            elevation: framing.elevation.or(before.elevation),
+            zoom: framing.zoom.or(before.zoom),
+            orthographic: framing.orthographic || before.orthographic,
+            up: framing.up.or(before.up),
         };
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     failure::Failure,
-    own::{Own, Shared},
+    input_values::{InputValue, Shared},
     parse,
 };
 use clap::Args;
@@ -28,7 +28,7 @@ pub struct ColorFlags {
     /// several times [default: by the values if --scalar names them or if there are no colours,
     /// else file]
     #[arg(long, value_name = "[FILE=]NAME|COLOR", value_parser = surface)]
-    color: Vec<Own<SurfaceColor>>,
+    color: Vec<InputValue<SurfaceColor>>,
     /// Set the colour of what has no value.
     #[arg(long, value_name = "COLOR", value_parser = parse::color)]
     nan_color: Option<[f32; 3]>,
@@ -38,14 +38,14 @@ pub struct ColorFlags {
 }
 
 /// Parses what colours surfaces, of all inputs or of one.
-fn surface(text: &str) -> Result<Own<SurfaceColor>, String> {
-    Own::parse(text, str::parse)
+fn surface(text: &str) -> Result<InputValue<SurfaceColor>, String> {
+    InputValue::parse(text, str::parse)
 }
 
 impl ColorFlags {
     /// Returns the flags of one input.
     pub fn of(&self, path: &Path) -> Self {
-        let color = Own::of(&self.color, path).cloned().map(Own::of_all);
+        let color = InputValue::of(&self.color, path).cloned().map(InputValue::of_all);
         Self { color: color.into_iter().collect(), ..self.clone() }
     }
 
@@ -77,12 +77,12 @@ impl ColorFlags {
 
     /// Checks the names of inputs.
     pub fn check(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
-        Own::check(&self.color, "color", inputs)
+        InputValue::check(&self.color, "color", inputs)
     }
 
     /// Returns what colours the surfaces that have no colour of their own here.
     fn surface(&self) -> Option<&SurfaceColor> {
-        Own::shared(&self.color)
+        InputValue::shared(&self.color)
     }
 
     /// Returns the flags that colour values, and whether they are given.
@@ -106,11 +106,11 @@ impl ColorFlags {
 pub fn check_effect(scene: &Description, has_mesh: bool, has_values: bool) -> Result<(), Failure> {
     let all = || scene.visible().map(|input| &input.appearance).chain([&scene.appearance]);
     let of_values = [
-        ("--colormap", all().any(|own| own.colormap.is_some())),
-        ("--nan-color", all().any(|own| own.nan_color.is_some())),
-        ("--log-colors", all().any(|own| own.log_colors)),
+        ("--colormap", all().any(|appearance| appearance.colormap.is_some())),
+        ("--nan-color", all().any(|appearance| appearance.nan_color.is_some())),
+        ("--log-colors", all().any(|appearance| appearance.log_colors)),
     ];
-    let has_color = all().any(|own| own.color.is_some());
+    let has_color = all().any(|appearance| appearance.color.is_some());
     check_given(has_color, of_values, has_mesh, has_values)
 }
 
@@ -156,7 +156,7 @@ mod tests {
             ("#fff", SurfaceColor::Plain([1.0; 3])),
             ("Intensity", SurfaceColor::Attribute("Intensity".into())),
         ] {
-            assert_eq!(surface(text), Ok(Own::of_all(wanted)));
+            assert_eq!(surface(text), Ok(InputValue::of_all(wanted)));
         }
         assert!(surface(" ").is_err() && map("virids").is_err());
     }
@@ -181,8 +181,8 @@ mod tests {
         );
         log.coloring(Some([1.0, 100.0])).color_transfer(&mut transfer, [0.0, 255.0]).unwrap();
         let title = Legend::title("CT", "HU");
-        let own = log.coloring(None);
-        let legend = Legend::of_transfer(&own, &transfer, [0.0, 255.0], (title, None));
+        let coloring = log.coloring(None);
+        let legend = Legend::of_transfer(&coloring, &transfer, [0.0, 255.0], (title, None));
         assert_eq!((legend.scale.range, legend.title.as_str()), ([1.0, 100.0], "CT (HU)"));
     }
 }

@@ -23,29 +23,29 @@ pub struct Compare {
 
 impl Compare {
     pub fn run(self) -> Result<(), Failure> {
-        let found =
-            compare_files(&self.a, &self.b, &self.limits.limits()).map_err(
-                |error| match error {
-                    // The only argument that can be wrong here is the sizes: the pictures differ.
-                    Error::Argument(message) => Failure::Comparison(message),
-                    other => other.into(),
-                },
-            )?;
+        let comparison = compare_files(&self.a, &self.b, &self.limits.limits()).map_err(
+            |error| match error {
+                // The only argument that can be wrong here is the sizes: the pictures differ.
+                Error::Argument(message) => Failure::Comparison(message),
+                other => other.into(),
+            },
+        )?;
         if self.json {
             output::json(&serde_json::json!({
-                "psnr": found.psnr,
-                "ssim": found.ssim,
-                "max_difference": found.max_difference,
-                "different_pixels": found.different_pixels,
+                "psnr": comparison.psnr,
+                "ssim": comparison.ssim,
+                "max_difference": comparison.max_difference,
+                "different_pixels": comparison.different_pixels,
             }))?;
         } else {
-            let psnr = found.psnr.map_or("identical".to_owned(), |psnr| format!("{psnr:.2} dB"));
+            let psnr =
+                comparison.psnr.map_or("identical".to_owned(), |psnr| format!("{psnr:.2} dB"));
             output::line(format_args!("PSNR              {psnr}"))?;
-            output::line(format_args!("SSIM              {:.6}", found.ssim))?;
-            output::line(format_args!("largest difference {:.6}", found.max_difference))?;
-            output::line(format_args!("different pixels  {}", found.different_pixels))?;
+            output::line(format_args!("SSIM              {:.6}", comparison.ssim))?;
+            output::line(format_args!("largest difference {:.6}", comparison.max_difference))?;
+            output::line(format_args!("different pixels  {}", comparison.different_pixels))?;
         }
-        match (found.psnr, self.threshold) {
+        match (comparison.psnr, self.threshold) {
             (Some(psnr), Some(threshold)) if psnr < threshold => Err(Failure::Comparison(format!(
                 "the pictures' PSNR is {psnr:.2} dB, below {threshold} dB"
             ))),

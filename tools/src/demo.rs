@@ -128,10 +128,10 @@ impl Demo {
             source_points: Some(mesh.positions.len() as u64),
             ..BuildOptions::default()
         };
-        let stance = mesh.guess_stance();
+        let orientation = mesh.guess_orientation();
         let write = WriteOptions {
-            stance,
-            is_guessed: stance.is_some(),
+            orientation,
+            is_guessed: orientation.is_some(),
             source: MESH.into(),
             ..WriteOptions::default()
         };

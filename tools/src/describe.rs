@@ -59,17 +59,17 @@ pub fn settings(scene: &Scene, settings: &Settings) -> Value {
 fn field(item: &Item) -> Option<Value> {
     match item {
         Item::Volume(volume, shape, transfer) => {
-            let mut field = shown(transfer);
+            let mut field = transfer_json(transfer);
             field["kernel"] = kernel(shape);
             field["sharp"] = json!(volume.coefficients.is_some());
             Some(field)
         }
         Item::Bricks(_, shape, transfer) => {
-            let mut field = shown(transfer);
+            let mut field = transfer_json(transfer);
             field["kernel"] = kernel(shape);
             Some(field)
         }
-        Item::Scalar(_, transfer) | Item::Cells(_, transfer) => Some(shown(transfer)),
+        Item::Scalar(_, transfer) | Item::Cells(_, transfer) => Some(transfer_json(transfer)),
         Item::Radiance(_)
         | Item::Facets(_)
         | Item::Solid(_)
@@ -78,7 +78,7 @@ fn field(item: &Item) -> Option<Value> {
     }
 }
 
-fn shown(transfer: &TransferFunction) -> Value {
+fn transfer_json(transfer: &TransferFunction) -> Value {
     json!({
         "shade": transfer.shade.is_some(),
         "gradient_opacity": !transfer.gradient.is_empty(),

@@ -81,8 +81,8 @@ impl Failure {
         let hint = match self {
             Self::Library(Error::Input { hint, .. }) => hint.as_deref(),
             Self::Library(Error::Output { source, .. }) => room(source),
-            Self::Library(Error::Limit { file, kind, found, .. }) => {
-                return Some(limits::hint(file, *kind, *found).into());
+            Self::Library(Error::Limit { file, kind, found: amount, .. }) => {
+                return Some(limits::hint(file, *kind, *amount).into());
             }
             Self::Library(Error::Timeout { .. }) => Some("raise --limit-seconds"),
             Self::Library(Error::Memory { .. }) => Some(

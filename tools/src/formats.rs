@@ -45,7 +45,8 @@ fn text(format: &Format) -> String {
         Some("") => "read in pieces".into(),
         Some(of) => format!("{of} are read in pieces"),
     };
-    let written = format.written.map_or("not written".into(), |own| format!("written as .{own}"));
+    let written =
+        format.written.map_or("not written".into(), |extension| format!("written as .{extension}"));
     format!("{} {extensions}\n   {}\n   {pieces}, {written}", format.name, holds.join(", "))
 }
 

@@ -114,7 +114,7 @@ fn what(name: &str) -> Result<What, String> {
     if name == "gaussians" {
         return Ok(What::Gaussians);
     }
-    let tube = TUBE_NAMES.iter().position(|own| *own == name);
+    let tube = TUBE_NAMES.iter().position(|known| *known == name);
     if let Some(tube) = tube {
         return Ok(What::Tube(TUBES[tube]));
     }

@@ -125,14 +125,14 @@ const IDLE: &[(&str, &str, &str)] = &[
 impl Given {
     /// Takes the flags on the command line from what clap found there.
     pub fn of(matches: &ArgMatches) -> Self {
-        let own = matches.subcommand().map_or(matches, |(_, own)| own);
-        let is_given = |id: &&str| own.value_source(id) == Some(ValueSource::CommandLine);
+        let task = matches.subcommand().map_or(matches, |(_, task)| task);
+        let is_given = |id: &&str| task.value_source(id) == Some(ValueSource::CommandLine);
         // Names of fields have underscores; one differs from its flag.
         let name = |id: &str| match id {
             "sample_type" => "type".to_owned(),
             id => id.replace('_', "-"),
         };
-        Self(own.ids().map(clap::Id::as_str).filter(is_given).map(name).collect())
+        Self(task.ids().map(clap::Id::as_str).filter(is_given).map(name).collect())
     }
 
     /// Returns these flags and those that a scene stands for.
@@ -178,11 +178,11 @@ impl Given {
         let mut warnings: Vec<String> = needless
             .map(|(flag, needs)| {
                 let (path, kinds) = inputs[0];
-                let found = match inputs.len() {
+                let reason = match inputs.len() {
                     1 => format!("{} is {}", path.display(), one_of(kinds)),
                     _ => "no input is one".to_owned(),
                 };
-                format!("--{flag} has no effect: it is for {}, but {found}", plural_of(*needs))
+                format!("--{flag} has no effect: it is for {}, but {reason}", plural_of(*needs))
             })
             .collect();
         warnings.extend(self.unread(inputs));
@@ -291,15 +291,15 @@ mod tests {
     fn idle_flags_are_named() {
         let mesh = (Path::new("a.ply"), MESH);
         let volume = (Path::new("b.nrrd"), VOLUME);
-        let found = given(&["sigma", "size", "crease"]).idle(&[mesh]);
+        let warnings = given(&["sigma", "size", "crease"]).idle(&[mesh]);
         assert_eq!(
-            found,
+            warnings,
             ["--sigma has no effect: it is for volumes and volumes in bricks, but a.ply is a mesh"]
         );
         assert!(given(&["sigma", "crease"]).idle(&[mesh, volume]).is_empty());
-        let found = given(&["radius"]).idle(&[mesh, volume]);
+        let warnings = given(&["radius"]).idle(&[mesh, volume]);
         assert_eq!(
-            found,
+            warnings,
             ["--radius has no effect: it is for scattered samples, but no input is one"]
         );
         assert_eq!(given(&["dims", "type"]).idle(&[volume]).len(), 2);

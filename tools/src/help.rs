@@ -74,15 +74,15 @@ const DRAWN: &str = "output overwrite background samples json transfer range iso
 
 /// Returns the whole command line with short texts for `-h`.
 pub fn with_short_help(command: Command) -> Command {
-    command.mut_subcommands(|task| match TASKS.iter().find(|own| own.name == task.get_name()) {
-        Some(own) => own.shortened(task),
+    command.mut_subcommands(|task| match TASKS.iter().find(|entry| entry.name == task.get_name()) {
+        Some(entry) => entry.shortened(task),
         None => task,
     })
 }
 
 /// Whether a list of words has this one.
 fn has(words: &str, word: &str) -> bool {
-    words.split_whitespace().any(|own| own == word)
+    words.split_whitespace().any(|other| other == word)
 }
 
 impl Task {
@@ -155,13 +155,15 @@ mod tests {
         let mut wrong = Vec::new();
         for task in tasks() {
             let name = task.get_name();
-            let own = OWN.iter().find(|(task, _)| *task == name).map_or("", |(_, flags)| flags);
+            let own_flags =
+                OWN.iter().find(|(task, _)| *task == name).map_or("", |(_, flags)| flags);
             for flag in task.get_arguments() {
                 let (heading, long) = (flag.get_help_heading(), flag.get_long().unwrap_or(""));
-                let of = HEADINGS.iter().filter(|(_, flags)| has(flags, long) && !has(own, long));
+                let of =
+                    HEADINGS.iter().filter(|(_, flags)| has(flags, long) && !has(own_flags, long));
                 let mut headings = of.map(|(heading, _)| *heading).peekable();
                 let is_right = match heading {
-                    Some(heading) => headings.any(|own| own == heading),
+                    Some(heading) => headings.any(|other| other == heading),
                     None => headings.peek().is_none(),
                 };
                 if !is_right {
@@ -193,7 +195,7 @@ mod tests {
             assert!(few.len() <= MOST, "{name} -h lists {}: {few:?}", few.len());
             let flags = task.get_arguments().filter(|flag| !flag.is_hide_set());
             for flag in flags.filter_map(Arg::get_long) {
-                assert!(all.iter().any(|own| own == flag), "{name}: {flag} in {all:?}");
+                assert!(all.iter().any(|other| other == flag), "{name}: {flag} in {all:?}");
             }
             let is_long = all.len() > MOST;
             assert_eq!(short.contains("--help lists all flags."), is_long, "{name}: {short}");
@@ -203,12 +205,12 @@ mod tests {
 
     #[test]
     fn short_help_names_flags_that_exist() {
-        for own in TASKS {
+        for entry in TASKS {
             let command = crate::Command::command();
-            let Some(task) = command.find_subcommand(own.name) else { continue };
-            for flag in own.flags.split_whitespace() {
+            let Some(task) = command.find_subcommand(entry.name) else { continue };
+            for flag in entry.flags.split_whitespace() {
                 let is_it = |other: &Arg| other.get_long() == Some(flag);
-                assert!(task.get_arguments().any(is_it), "{} --{flag}", own.name);
+                assert!(task.get_arguments().any(is_it), "{} --{flag}", entry.name);
             }
         }
     }

@@ -183,17 +183,18 @@ impl Job {
     fn with_flags(&self, error: Error) -> Failure {
         match error {
             Error::Transfer(what) => {
-                let own = self.scene.visible().map(|input| self.scene.appearance_of(input));
-                let flags = own.map(|own| {
-                    let transfer = own.transfer.map(|transfer| match transfer {
+                let appearances = self.scene.visible().map(|input| self.scene.appearance_of(input));
+                let flags = appearances.map(|appearance| {
+                    let transfer = appearance.transfer.map(|transfer| match transfer {
                         TransferEntry::Name(name) => format!("--transfer {name}"),
                         TransferEntry::Whole(_) => "--transfer".to_owned(),
                     });
-                    let range = own
+                    let range = appearance
                         .range
                         .map(|[low, high]| format!("--range {},{}", plain(low), plain(high)));
-                    let unit =
-                        own.opacity_unit.map(|unit| format!("--opacity-unit {}", plain(unit)));
+                    let unit = appearance
+                        .opacity_unit
+                        .map(|unit| format!("--opacity-unit {}", plain(unit)));
                     [transfer, range, unit].into_iter().flatten().collect::<Vec<_>>().join(" ")
                 });
                 match flags.into_iter().find(|flags| !flags.is_empty()) {
@@ -343,9 +344,9 @@ impl Job {
         let mut captions = loaded.captions.clone();
         for (item, legend) in &mut captions.legends {
             let item = *item;
-            let own = transfers.iter().find(|(own, _)| *own == item);
+            let entry = transfers.iter().find(|(number, _)| *number == item);
             let values = loaded.scene.items[item].value_range();
-            let (Some((_, transfer)), Some(values)) = (own, values) else { continue };
+            let (Some((_, transfer)), Some(values)) = (entry, values) else { continue };
             let labels = match &loaded.scene.items[item] {
                 Item::Volume(volume, ..) => volume.about.labels.as_ref(),
                 _ => None,
@@ -361,7 +362,7 @@ impl Job {
 
     /// Returns the scene's way up.
     pub fn up(&self, loaded: &Loaded) -> splatkit::Result<glam::DVec3> {
-        Ok(self.framing()?.stance(&loaded.subject).0.up)
+        Ok(self.framing()?.orientation(&loaded.subject).0.up)
     }
 }
 

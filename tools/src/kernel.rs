@@ -1,6 +1,6 @@
 //! The flags of the kernel that reconstructs the field from the samples of a lattice.
 
-use crate::{own::Shared, parse};
+use crate::{input_values::Shared, parse};
 use clap::Args;
 use splatkit::session::{Description, KernelEntry};
 

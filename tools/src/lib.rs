@@ -31,6 +31,7 @@ mod given;
 mod gpus;
 mod help;
 mod info;
+mod input_values;
 mod interrupt;
 mod job;
 mod kernel;
@@ -43,7 +44,6 @@ mod motion;
 #[doc(hidden)]
 pub mod output;
 mod overlay;
-mod own;
 #[doc(hidden)]
 pub mod parse;
 #[doc(hidden)]
@@ -139,17 +139,17 @@ pub fn main() -> ExitCode {
         Ok(matches) => matches,
         Err(answer) => return tell(&answer),
     };
-    let (given, own) = match Command::from_arg_matches(&matches) {
-        Ok(own) => (Given::of(&matches), own),
+    let (given, parsed) = match Command::from_arg_matches(&matches) {
+        Ok(parsed) => (Given::of(&matches), parsed),
         Err(answer) => return tell(&answer),
     };
-    let progress = match own.start.start() {
+    let progress = match parsed.start.start() {
         Ok(progress) => progress,
         Err(failure) => return failure.report(),
     };
     #[cfg(feature = "remote")]
-    own.cache.apply();
-    let result = match own.task {
+    parsed.cache.apply();
+    let result = match parsed.task {
         Task::Render(task) => task.run(&given, &progress),
         Task::View(task) => task.run(&given, &progress),
         Task::Info(task) => task.run(&given, &progress),

@@ -52,16 +52,16 @@ impl LimitFlags {
 
 /// Returns what the user can do about an exceeded limit. No limit helps a file that claims more
 /// than its bytes can hold.
-pub fn hint(file: &Path, kind: LimitKind, found: u64) -> String {
+pub fn hint(file: &Path, kind: LimitKind, amount: u64) -> String {
     let flag = match kind {
         LimitKind::Points | LimitKind::Bytes => {
-            if let Some(bytes) = too_few_bytes(file, kind, found) {
+            if let Some(bytes) = too_few_bytes(file, kind, amount) {
                 return format!(
                     "the file has {bytes} bytes, which cannot hold that: it is cut or damaged; \
                      make it again"
                 );
             }
-            if found == u64::MAX {
+            if amount == u64::MAX {
                 return "no machine holds that much: the file is damaged; make it again".into();
             }
             if kind == LimitKind::Points { "points" } else { "bytes" }
@@ -72,22 +72,22 @@ pub fn hint(file: &Path, kind: LimitKind, found: u64) -> String {
     };
     if kind == LimitKind::Bytes {
         return format!(
-            "raise --limit-bytes to more than {found} if the file can be trusted and memory \
+            "raise --limit-bytes to more than {amount} if the file can be trusted and memory \
              suffices; for a conversion, also raise --memory"
         );
     }
-    format!("raise --limit-{flag} to {found} or more if the file can be trusted")
+    format!("raise --limit-{flag} to {amount} or more if the file can be trusted")
 }
 
 /// Returns the file's size if that is far too small for what the file claims.
-fn too_few_bytes(file: &Path, kind: LimitKind, found: u64) -> Option<u64> {
+fn too_few_bytes(file: &Path, kind: LimitKind, amount: u64) -> Option<u64> {
     // The data may be in other files.
     let refers = Format::of_path(file).is_some_and(|format| format.refers);
     // A packed point takes a fraction of a byte or more. A byte unpacks to at most a thousand
     // bytes, each of which may take several hundred bytes of memory.
     let most = if kind == LimitKind::Points { 64 } else { 1 << 20 };
     let bytes = input::size(file).ok()?;
-    (!refers && bytes.saturating_mul(most) < found).then_some(bytes)
+    (!refers && bytes.saturating_mul(most) < amount).then_some(bytes)
 }
 
 #[cfg(test)]
@@ -111,8 +111,8 @@ mod tests {
                 command.get_arguments().find(|flag| flag.get_long() == Some(name)).expect(name);
             let help = flag.get_help().expect("a text").to_string();
             assert!(help.ends_with(&format!("[default: {}]", default.of(kind))), "{help}");
-            let told = hint(Path::new("none"), kind, 7);
-            assert!(told.contains(&format!("--{name} ")), "{told}");
+            let text = hint(Path::new("none"), kind, 7);
+            assert!(text.contains(&format!("--{name} ")), "{text}");
             let matches = command.clone().get_matches_from(["test", &format!("--{name}=7")]);
             let limits = LimitFlags::from_arg_matches(&matches).expect("flags").limits();
             assert_eq!(limits.of(kind), 7);

@@ -138,12 +138,12 @@ impl LoadFlags {
 
     /// Changes how the inputs of a scene are read: by the flags that are given.
     pub fn apply(&self, scene: &mut Description) {
-        let own = self.entry();
+        let entry = self.entry();
         macro_rules! share {
             ($($field:ident),*) => {$(
-                if own.$field.is_some() {
+                if entry.$field.is_some() {
                     scene.inputs.iter_mut().for_each(|input| input.reading.$field = None);
-                    scene.reading.$field = own.$field;
+                    scene.reading.$field = entry.$field;
                 }
             )*};
         }
@@ -151,7 +151,7 @@ impl LoadFlags {
             scalar, dims, r#type, endian, header, time, series, dataset, spacing, missing, labels,
             radius, neighbours, slopes
         );
-        let LimitsEntry { points, bytes, depth, texels, seconds } = own.limits;
+        let LimitsEntry { points, bytes, depth, texels, seconds } = entry.limits;
         let limits = &mut scene.reading.limits;
         limits.points = points.or(limits.points);
         limits.bytes = bytes.or(limits.bytes);

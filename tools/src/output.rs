@@ -70,7 +70,7 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     if path.is_dir() {
         return refuse("is a folder", "give the name of a file");
     }
-    if path.metadata().is_ok_and(|found| !found.is_file()) {
+    if path.metadata().is_ok_and(|metadata| !metadata.is_file()) {
         return refuse("is not a regular file", "give the name of a file");
     }
     if !overwrite && path.symlink_metadata().is_ok() {

@@ -295,13 +295,13 @@ impl Render {
             progress.stage("Framing the scene");
             let framing = job.framing()?;
             loaded.find_seen(&framing, &settings)?;
-            let (stance, origin) = framing.stance(&loaded.subject);
+            let (orientation, origin) = framing.orientation(&loaded.subject);
             if origin == Origin::Guess {
                 progress.note(format_args!(
                     "up: {}, front: {}, guessed from the shape; --up sets another up, and the \
                      front that is usual for it",
-                    direction_name(stance.up),
-                    direction_name(stance.front)
+                    direction_name(orientation.up),
+                    direction_name(orientation.front)
                 ));
             }
         }
@@ -339,7 +339,7 @@ impl Run<'_> {
     fn facts(&self, drawn: &Drawn) -> Result<serde_json::Value, Failure> {
         let Run { ready: Ready { job, loaded, settings, .. }, film, frames, .. } = self;
         let Drawn { stats, camera, frame_ms, overlay } = drawn;
-        let (stance, origin) = job.framing()?.stance(&loaded.subject);
+        let (orientation, origin) = job.framing()?.orientation(&loaded.subject);
         Ok(serde_json::json!({
             "width": film.size[0],
             "height": film.size[1],
@@ -356,7 +356,7 @@ impl Run<'_> {
             "load_ms": loaded.load_ms,
             "camera": crate::camera::to_json(camera),
             "overlay": overlay,
-            "up": direction_name(stance.up),
+            "up": direction_name(orientation.up),
             "up_from": origin.name(),
             "settings": describe::settings(&loaded.scene, settings),
         }))

@@ -184,12 +184,12 @@ impl Stated {
             return format!("reading.limits.{limit}");
         }
         let inputs = self.fields["inputs"].as_array().map_or(&[][..], Vec::as_slice);
-        let own = inputs.iter().enumerate().find_map(|(number, input)| {
+        let place = inputs.iter().enumerate().find_map(|(number, input)| {
             let part = ["reading", "appearance"].into_iter();
             let part = part.into_iter().find(|part| input.get(part).is_some_and(has))?;
             Some(format!("inputs[{number}].{part}.{field}"))
         });
-        own.unwrap_or(field)
+        place.unwrap_or(field)
     }
 }
 
@@ -224,6 +224,6 @@ pub fn flag_of(place: &str) -> String {
     if place.contains(".limits.") {
         return format!("limit-{field}");
     }
-    let other = FLAGS.iter().find(|(own, _)| *own == field);
+    let other = FLAGS.iter().find(|(name, _)| *name == field);
     other.map_or_else(|| field.replace('_', "-"), |(_, flags)| flags[0].to_owned())
 }

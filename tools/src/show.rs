@@ -3,8 +3,8 @@
 use crate::{
     color::ColorFlags,
     failure::Failure,
+    input_values::{InputValue, Shared},
     kernel::KernelFlags,
-    own::{Own, Shared},
     parse,
 };
 use clap::{
@@ -28,7 +28,7 @@ pub struct ShowFlags {
     /// flag can be given several times [default: made for the values, as `splatkit transfer` writes
     /// it]
     #[arg(long, value_name = "[FILE=]NAME|FILE.json", value_parser = transfer)]
-    transfer: Vec<Own<String>>,
+    transfer: Vec<InputValue<String>>,
     /// Spread the transfer function over these values instead of its own, and the colour map of
     /// meshes and point clouds. FILE=LOW,HIGH is for one input, and the flag can be given several
     /// times [default of the map: all values of a mesh, the 1st to the 99th percentile of a point
@@ -39,7 +39,7 @@ pub struct ShowFlags {
         value_parser = range,
         allow_hyphen_values = true
     )]
-    range: Vec<Own<[f64; 2]>>,
+    range: Vec<InputValue<[f64; 2]>>,
     /// Set the length that the transfer function's opacities hold for, in world units [default:
     /// that of the JSON file, else a part of the data's diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
@@ -55,7 +55,7 @@ pub struct ShowFlags {
         value_parser = surfaces,
         allow_hyphen_values = true
     )]
-    iso: Vec<Own<Vec<IsosurfaceEntry>>>,
+    iso: Vec<InputValue<Vec<IsosurfaceEntry>>>,
     /// Multiply the opacity by factors of 0 to 1, given by the gradient's magnitude (value per
     /// world length) and linear in between.
     #[arg(long, value_name = "MAGNITUDE,FACTOR:…", value_parser = Factors::parse)]
@@ -97,7 +97,7 @@ pub struct ShowFlags {
     /// surface once, above 0 to 1. FILE=OPACITY is for one input, and the flag can be given
     /// several times [default: 1]
     #[arg(long, value_name = "[FILE=]OPACITY", value_parser = opacity)]
-    opacity: Vec<Own<f32>>,
+    opacity: Vec<InputValue<f32>>,
     #[command(flatten)]
     pub color: ColorFlags,
     #[command(flatten)]
@@ -119,14 +119,14 @@ impl ShowFlags {
     pub fn apply(&self, scene: &mut Description) -> Result<(), Failure> {
         let inputs: Vec<PathBuf> = scene.visible().map(|input| input.file.clone()).collect();
         self.color.check(&inputs)?;
-        Own::check(&self.transfer, "transfer", &inputs)?;
-        Own::check(&self.range, "range", &inputs)?;
-        Own::check_files(&self.iso, "iso", &inputs)?;
-        Own::check(&self.opacity, "opacity", &inputs)?;
-        let transfers: Vec<Own<TransferEntry>> = self
+        InputValue::check(&self.transfer, "transfer", &inputs)?;
+        InputValue::check(&self.range, "range", &inputs)?;
+        InputValue::check_files(&self.iso, "iso", &inputs)?;
+        InputValue::check(&self.opacity, "opacity", &inputs)?;
+        let transfers: Vec<InputValue<TransferEntry>> = self
             .transfer
             .iter()
-            .map(|own| own.try_map(|text| TransferEntry::parse(text)))
+            .map(|value| value.try_map(|text| TransferEntry::parse(text)))
             .collect::<Result<_, _>>()?;
         let keep = |_: &mut _, _| {};
         Shared::set_each(scene, |appearance| &mut appearance.transfer, &transfers, keep);
@@ -152,10 +152,10 @@ impl ShowFlags {
 }
 
 /// Parses how values are shown. A text of JSON has no `=`.
-fn transfer(text: &str) -> Result<Own<String>, String> {
+fn transfer(text: &str) -> Result<InputValue<String>, String> {
     match text.trim_start().starts_with('{') {
-        true => Ok(Own::of_all(text.to_owned())),
-        false => Own::parse(text, |text| Ok(text.to_owned())),
+        true => Ok(InputValue::of_all(text.to_owned())),
+        false => InputValue::parse(text, |text| Ok(text.to_owned())),
     }
 }
 
@@ -166,18 +166,18 @@ fn cells() -> impl TypedValueParser<Value = CellStyle> {
 }
 
 /// Parses a range of values.
-fn range(text: &str) -> Result<Own<[f64; 2]>, String> {
-    Own::parse(text, parse::range)
+fn range(text: &str) -> Result<InputValue<[f64; 2]>, String> {
+    InputValue::parse(text, parse::range)
 }
 
 /// Parses isosurfaces.
-fn surfaces(text: &str) -> Result<Own<Vec<IsosurfaceEntry>>, String> {
-    Own::parse(text, |text| text.split(',').map(surface).collect())
+fn surfaces(text: &str) -> Result<InputValue<Vec<IsosurfaceEntry>>, String> {
+    InputValue::parse(text, |text| text.split(',').map(surface).collect())
 }
 
 /// Parses an opacity.
-fn opacity(text: &str) -> Result<Own<f32>, String> {
-    Own::parse(text, |text| match parse::finite(text)? {
+fn opacity(text: &str) -> Result<InputValue<f32>, String> {
+    InputValue::parse(text, |text| match parse::finite(text)? {
         opacity if opacity > 0.0 && opacity <= 1.0 => Ok(opacity as f32),
         _ => Err("an opacity lies above 0, up to 1".into()),
     })
@@ -267,13 +267,14 @@ mod tests {
         let flags = parsed.map(|text| surfaces(text).unwrap());
         let mut scene = Description::new(["a=b.nrrd".into(), "c.nrrd".into()]);
         let join = |before: &mut Vec<IsosurfaceEntry>, more: Vec<_>| before.extend(more);
-        Shared::set_each(&mut scene, |own| &mut own.isosurfaces, &flags, join);
-        let found = [0, 1].map(|number| scene.appearance_of(&scene.inputs[number]).isosurfaces);
-        assert_eq!(found[0], Some(vec![of(7.0, None, 0.5), of(9.0, None, 1.0)]));
-        assert_eq!(found[1].as_ref().map(Vec::len), Some(2));
+        Shared::set_each(&mut scene, |appearance| &mut appearance.isosurfaces, &flags, join);
+        let isosurfaces =
+            [0, 1].map(|number| scene.appearance_of(&scene.inputs[number]).isosurfaces);
+        assert_eq!(isosurfaces[0], Some(vec![of(7.0, None, 0.5), of(9.0, None, 1.0)]));
+        assert_eq!(isosurfaces[1].as_ref().map(Vec::len), Some(2));
         assert!(surfaces("a.nrrd=x").is_err() && surfaces("1,").is_err());
         let whole = r#"{"color": [], "opacity": []}"#;
-        assert_eq!(transfer(whole), Ok(Own::of_all(whole.to_owned())));
+        assert_eq!(transfer(whole), Ok(InputValue::of_all(whole.to_owned())));
         assert!(transfer(&format!("a=b.nrrd={whole}")).is_ok());
     }
 

@@ -89,8 +89,8 @@ fn runtime_folder(temporary: &Path) -> Option<std::path::PathBuf> {
     let folder = temporary.join(format!("splatkit-{user}"));
     std::fs::DirBuilder::new().mode(0o700).create(&folder).ok();
     // Not of what a link leads to.
-    let found = folder.symlink_metadata().ok()?;
-    (found.is_dir() && found.uid() == user && found.mode() & 0o077 == 0).then_some(folder)
+    let metadata = folder.symlink_metadata().ok()?;
+    (metadata.is_dir() && metadata.uid() == user && metadata.mode() & 0o077 == 0).then_some(folder)
 }
 
 /// Prints what clap returns instead of a command: a help text, the version, or an error in the
@@ -120,13 +120,13 @@ impl StartFlags {
     /// Returns which events are logged: those of the library. Those of other crates name neither
     /// the file nor what to do, and an error says what they mean.
     fn events(&self) -> Targets {
-        let own = match (self.quiet, self.verbose) {
+        let level = match (self.quiet, self.verbose) {
             (true, _) => LevelFilter::OFF,
             (_, 0) => LevelFilter::WARN,
             (_, 1) => LevelFilter::INFO,
             (_, _) => LevelFilter::TRACE,
         };
-        Targets::new().with_target("splatkit", own)
+        Targets::new().with_target("splatkit", level)
     }
 }
 
@@ -187,8 +187,8 @@ mod tests {
         std::fs::remove_dir(&folder).expect("removed");
         let other = temporary.path().join("other");
         std::fs::create_dir(&other).expect("a folder");
-        let own = std::fs::Permissions::from_mode(0o700);
-        std::fs::set_permissions(&other, own).expect("permissions");
+        let permissions = std::fs::Permissions::from_mode(0o700);
+        std::fs::set_permissions(&other, permissions).expect("permissions");
         symlink(&other, &folder).expect("a link");
         assert_eq!(runtime_folder(temporary.path()), None);
         std::fs::remove_file(&folder).expect("removed");

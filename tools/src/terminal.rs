@@ -196,8 +196,8 @@ mod tests {
         assert!(matches!(safe(plain), Cow::Borrowed(text) if text == plain));
         assert_eq!(safe_lines("a\x1b\nb"), "a\\u{1b}\nb");
         for letter in (0..=0x10_ffff).filter_map(char::from_u32) {
-            let shown = safe(letter.encode_utf8(&mut [0; 4])).into_owned();
-            assert!(shown.chars().all(|letter| !is_unsafe(letter)), "{letter:?}: {shown:?}");
+            let text = safe(letter.encode_utf8(&mut [0; 4])).into_owned();
+            assert!(text.chars().all(|letter| !is_unsafe(letter)), "{letter:?}: {text:?}");
         }
     }
 
@@ -212,11 +212,12 @@ mod tests {
     #[test]
     fn long_texts_keep_their_ends() {
         let text = format!("begin{}end", "µ".repeat(5000));
-        let shown = safe(&text);
-        assert!(shown.starts_with("beginµ") && shown.ends_with("µend"), "{shown}");
+        let shortened = safe(&text);
+        assert!(shortened.starts_with("beginµ") && shortened.ends_with("µend"), "{shortened}");
         assert!(
-            shown.contains("(3008 characters left out)") && shown.chars().count() < MOST + 50,
-            "{shown}"
+            shortened.contains("(3008 characters left out)")
+                && shortened.chars().count() < MOST + 50,
+            "{shortened}"
         );
         let text = "µ".repeat(MOST);
         assert_eq!(safe(&text), text);

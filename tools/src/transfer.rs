@@ -76,14 +76,14 @@ impl Transfer {
     }
 
     /// Returns the transfer function that shows an input.
-    fn of(&self, own: &Appearance, input: &Data) -> Result<TransferFunction, Failure> {
+    fn of(&self, appearance: &Appearance, input: &Data) -> Result<TransferFunction, Failure> {
         let path = &self.input;
         let name = path.display().to_string();
         Ok(match input {
-            Data::Volume(volume) => own.of_volume(&name, volume)?,
-            Data::Samples(points) => own.of_samples(&name, points)?,
-            Data::Cells(cells) => own.of_cells(&name, cells)?,
-            Data::Bricks(bricks) => own.of_bricks(&name, bricks)?,
+            Data::Volume(volume) => appearance.of_volume(&name, volume)?,
+            Data::Samples(points) => appearance.of_samples(&name, points)?,
+            Data::Cells(cells) => appearance.of_cells(&name, cells)?,
+            Data::Bricks(bricks) => appearance.of_bricks(&name, bricks)?,
             Data::Mesh(_) | Data::Gaussians(_) | Data::Hierarchy(_) => {
                 let message = "has colours of its own, and no values for a transfer function";
                 let error = Error::input(path, "content", message);

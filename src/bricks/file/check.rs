@@ -109,10 +109,10 @@ fn contents(bricks: &Bricks, watch: Watch<'_>, findings: &mut Findings) -> Resul
             let odd = |at: usize| {
                 let brick = (layer * nx * ny + at) as u32;
                 let wanted = slices.brick([at % nx, at / nx, layer], &steps);
-                let told = |what| {
+                let finding = |what| {
                     Finding::error(what, format!("level {number}, brick {brick}"), meaning(what))
                 };
-                bricks.read(number, brick).map(|found| difference(&found, &wanted).map(told))
+                bricks.read(number, brick).map(|stored| difference(&stored, &wanted).map(finding))
             };
             let odd: Vec<Option<Finding>> =
                 (0..nx * ny).into_par_iter().map(odd).collect::<Result<_>>()?;
@@ -130,11 +130,11 @@ fn contents(bricks: &Bricks, watch: Watch<'_>, findings: &mut Findings) -> Resul
     Ok(())
 }
 
-fn difference(found: &Brick, wanted: &Brick) -> Option<&'static str> {
-    if found.samples != wanted.samples {
+fn difference(stored: &Brick, wanted: &Brick) -> Option<&'static str> {
+    if stored.samples != wanted.samples {
         return Some("samples");
     }
-    (found.blocks != wanted.blocks).then_some("blocks")
+    (stored.blocks != wanted.blocks).then_some("blocks")
 }
 
 fn meaning(code: &str) -> &'static str {

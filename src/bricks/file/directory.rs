@@ -157,7 +157,7 @@ impl Kind for Listing {
     }
 
     fn around(bounds: &[[u8; 2]]) -> [u8; 2] {
-        bounds.iter().fold(crate::bricks::EMPTY, |all, own| joined(all, *own))
+        bounds.iter().fold(crate::bricks::EMPTY, |all, range| joined(all, *range))
     }
 }
 

@@ -281,7 +281,7 @@ impl Entries {
 }
 
 impl Contents<Listing> for Entries {
-    fn look(&mut self, number: u32) -> io::Result<(u32, u8)> {
+    fn measure(&mut self, number: u32) -> io::Result<(u32, u8)> {
         let (level, entry) = self.entry(number)?;
         // There are at most 64 levels.
         Ok((entry.place.bytes, level as u8))

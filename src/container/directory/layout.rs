@@ -14,7 +14,7 @@ const CLASSES: usize = 256;
 pub(crate) trait Contents<K: Kind> {
     /// Returns the length in bytes of a page, and its class. The highest class is written first.
     /// Called once for each page, in order.
-    fn look(&mut self, page: u32) -> io::Result<(u32, u8)>;
+    fn measure(&mut self, page: u32) -> io::Result<(u32, u8)>;
 
     /// Appends the record of a page that begins at byte `offset`. Returns its bounds. Called once
     /// for each page, in order.
@@ -47,7 +47,7 @@ impl<K: Kind> Layout<K> {
         let mut classes = Vec::with_capacity(count as usize);
         let mut pages = vec![0u64; CLASSES];
         for page in 0..count {
-            let (bytes, class) = contents.look(page)?;
+            let (bytes, class) = contents.measure(page)?;
             pages[usize::from(class)] += u64::from(bytes);
             classes.push(class);
         }
@@ -56,11 +56,11 @@ impl<K: Kind> Layout<K> {
         for (level, sizes) in directory.iter_mut().enumerate() {
             let below = above.last().unwrap_or(&classes);
             let highest = below.chunks(RECORDS as usize).map(|part| part.iter().fold(0, highest));
-            let own: Vec<u8> = highest.collect();
-            for (number, class) in (0..).zip(&own) {
+            let maxima: Vec<u8> = highest.collect();
+            for (number, class) in (0..).zip(&maxima) {
                 sizes[usize::from(*class)] += shape.length::<K>(level, number) as u64;
             }
-            above.push(own);
+            above.push(maxima);
         }
         let mut at = start + shape.root_length::<K>() as u64;
         let mut place = |bytes: &mut u64| at += std::mem::replace(bytes, at);
@@ -122,13 +122,14 @@ impl<K: Kind> Layout<K> {
         for class in (0..CLASSES as u32).rev().filter(|class| has[*class as usize]) {
             let class = class as u8;
             for (level, classes) in self.above.iter().enumerate().rev() {
-                for (number, _) in classes.iter().enumerate().filter(|(_, own)| **own == class) {
+                for (number, _) in classes.iter().enumerate().filter(|(_, other)| **other == class)
+                {
                     bytes.resize(self.shape.length::<K>(level, number as u32), 0);
                     spilled.read(waiting.0[level][number], &mut bytes)?;
                     put(&bytes)?;
                 }
             }
-            for (page, _) in (0..).zip(&self.classes).filter(|(_, own)| **own == class) {
+            for (page, _) in (0..).zip(&self.classes).filter(|(_, other)| **other == class) {
                 let place = contents.waiting(page)?;
                 bytes.resize(place.bytes as usize, 0);
                 spilled.read(place.offset, &mut bytes)?;

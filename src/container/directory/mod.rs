@@ -234,11 +234,11 @@ impl<K: Kind> Directory<K> {
         }
         let pages: Vec<u32> = pages.collect();
         for level in (0..self.shape.root()).rev() {
-            let mut own: Vec<u32> = pages.iter().map(|page| self.above(*page, level)).collect();
-            own.sort_unstable();
-            own.dedup();
+            let mut numbers: Vec<u32> = pages.iter().map(|page| self.above(*page, level)).collect();
+            numbers.sort_unstable();
+            numbers.dedup();
             let place = |number: u32| Ok((number, self.place(file, level, number)?));
-            let places = own.into_iter().map(place).collect::<Result<Vec<_>, Fault>>()?;
+            let places = numbers.into_iter().map(place).collect::<Result<Vec<_>, Fault>>()?;
             let within = places.into_iter().filter(|(_, place)| self.is_within(*place));
             self.fetch(file, level, within)?;
         }
@@ -350,8 +350,8 @@ impl<K: Kind> Directory<K> {
             return Ok(root.clone());
         }
         let lock = || read.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = lock().get((level, number)) {
-            return Ok(found);
+        if let Some(page) = lock().get((level, number)) {
+            return Ok(page);
         }
         let stored = self.place(file, level, number)?;
         let place = || name(level, number, stored);
@@ -372,10 +372,10 @@ impl<K: Kind> Directory<K> {
             }
             listed(&self.kind, level, number, bytes)
         };
-        let found = file.decoded(stored.range(), decode)?;
-        let found = found.map_err(|message| Fault::Damaged(place(), message))?;
-        lock().put((level, number), found.clone());
-        Ok(found)
+        let page = file.decoded(stored.range(), decode)?;
+        let page = page.map_err(|message| Fault::Damaged(place(), message))?;
+        lock().put((level, number), page.clone());
+        Ok(page)
     }
 
     /// Returns whether the pages, and the directory pages other than the root, fill these bytes.

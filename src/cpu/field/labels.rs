@@ -79,7 +79,7 @@ impl<T: Sample> Field<'_, T> {
         let at = |lane: usize| {
             self.samples[(z[lane] as usize * ny + y[lane] as usize) * nx + x[lane] as usize].value()
         };
-        let found: [f32; 8] = std::array::from_fn(at);
-        found.simd_into(simd)
+        let values: [f32; 8] = std::array::from_fn(at);
+        values.simd_into(simd)
     }
 }

@@ -82,8 +82,8 @@ impl<'a> Bytes<'a> {
     }
 
     fn get<const N: usize>(&self, at: usize) -> Result<[u8; N]> {
-        let found = self.bytes.get(at..).and_then(|rest| rest.first_chunk());
-        found.copied().ok_or_else(|| self.cut(at))
+        let bytes = self.bytes.get(at..).and_then(|rest| rest.first_chunk());
+        bytes.copied().ok_or_else(|| self.cut(at))
     }
 
     fn short(&self, at: usize) -> Result<u16> {

@@ -94,7 +94,7 @@ impl<'a> File<'a> {
         let Packing::Other(name) = self.syntax.packing else { return Ok(self.syntax.packing) };
         let message = format!(
             "the pixels are packed by {name} (transfer syntax {}), which is not read",
-            super::shown(&self.identifier)
+            super::excerpt(&self.identifier)
         );
         let hint = match name {
             "JPEG XL" | "an unknown method" => {

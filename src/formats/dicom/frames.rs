@@ -93,8 +93,8 @@ pub fn frames(source: &Source, set: &Set, bytes: usize) -> Result<Vec<Frame>> {
 fn whole(set: &Set) -> Result<Frame> {
     let detector = set.item(tags::DETECTORS)?;
     let vector = |tag| {
-        let own = set.vector::<3>(tag);
-        own.or_else(|| detector.as_ref().and_then(|item| item.vector(tag))).map(DVec3::from)
+        let of_set = set.vector::<3>(tag);
+        of_set.or_else(|| detector.as_ref().and_then(|item| item.vector(tag))).map(DVec3::from)
     };
     let orientation = |set: &Set| directions(set.vector(tags::ORIENTATION)?);
     let positive = |tag| set.decimal(tag).map(f64::abs).filter(|&step| step > 0.0);
@@ -153,8 +153,8 @@ fn spacing(set: &Set) -> Result<Option<[f64; 2]>> {
         // The first is the step from row to row.
         pair.iter().all(|&step| step > 0.0).then_some([pair[1], pair[0]])
     };
-    if let Some(found) = pair(tags::PIXEL_SPACING).or_else(|| pair(tags::IMAGER_PIXEL_SPACING)) {
-        return Ok(Some(found));
+    if let Some(steps) = pair(tags::PIXEL_SPACING).or_else(|| pair(tags::IMAGER_PIXEL_SPACING)) {
+        return Ok(Some(steps));
     }
     if let Some(region) = set.item(tags::ULTRASOUND_REGIONS)? {
         const CENTIMETRES: u16 = 3;
@@ -181,8 +181,8 @@ fn add_group(frame: &mut Frame, group: &Set) -> Result<()> {
         frame.position = item.vector(tags::POSITION).map(DVec3::from).or(frame.position);
     }
     if let Some(item) = group.item(tags::PLANE_ORIENTATIONS)? {
-        let found = item.vector(tags::ORIENTATION).and_then(directions);
-        frame.directions = found.or(frame.directions);
+        let axes = item.vector(tags::ORIENTATION).and_then(directions);
+        frame.directions = axes.or(frame.directions);
     }
     if let Some(item) = group.item(tags::VALUE_TRANSFORMATIONS)? {
         frame.slope = slope(&item).unwrap_or(frame.slope);

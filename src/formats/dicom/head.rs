@@ -149,9 +149,9 @@ fn layout(file: &File, set: &Set) -> Result<Layout> {
     };
     let need = |tag, name: &str| match set.short(tag) {
         Some(number) if number > 0 => Ok(usize::from(number)),
-        found => {
-            let found = found.map_or("missing".into(), |number| number.to_string());
-            Err(source.error(name, format!("is {found}, but a number of pixels was expected")))
+        size => {
+            let size = size.map_or("missing".into(), |number| number.to_string());
+            Err(source.error(name, format!("is {size}, but a number of pixels was expected")))
         }
     };
     let channels = set.short(tags::SAMPLES_PER_PIXEL).unwrap_or(1);
@@ -188,8 +188,8 @@ fn whole_numbers(source: &Source, set: &Set) -> Result<Numbers> {
     let stored = set.short(tags::BITS_STORED).unwrap_or(allocated);
     let high = set.short(tags::HIGH_BIT).unwrap_or(stored.saturating_sub(1));
     if ![1, 8, 16, 32].contains(&allocated) {
-        let found = if allocated == 0 { "missing".into() } else { allocated.to_string() };
-        let message = format!("is {found}, but 1, 8, 16 or 32 was expected");
+        let bits = if allocated == 0 { "missing".into() } else { allocated.to_string() };
+        let message = format!("is {bits}, but 1, 8, 16 or 32 was expected");
         return Err(source.error("Bits Allocated", message));
     }
     if !(1..=allocated).contains(&stored) || high >= allocated || high + 1 < stored {
@@ -212,7 +212,7 @@ fn colors(source: &Source, set: &Set, channels: u16) -> Result<Colors> {
         ("YBR_FULL_422" | "YBR_PARTIAL_422", 3) => Colors::Halved,
         ("YBR_FULL", 3) => Colors::Luminance,
         _ => {
-            let name = super::shown(&name);
+            let name = super::excerpt(&name);
             let message = format!("“{name}” of {channels} numbers a pixel is not read");
             let hint = "grey values, palettes, RGB and YBR are read";
             return Err(source.error("Photometric Interpretation", message).hint(hint));
@@ -267,10 +267,11 @@ const OTHERS: &[(&str, &str)] = &[
 /// Returns what a file holds if its class says that it has no slices of a volume.
 fn no_slices(set: &Set) -> Option<Other> {
     let class = set.text(tags::CLASS).unwrap_or_default();
-    let own = class.strip_prefix("1.2.840.10008.5.1.4.1.1.")?;
-    let fits = |name: &str| if name.ends_with('.') { own.starts_with(name) } else { own == name };
+    let suffix = class.strip_prefix("1.2.840.10008.5.1.4.1.1.")?;
+    let fits =
+        |name: &str| if name.ends_with('.') { suffix.starts_with(name) } else { suffix == name };
     let &(_, what) = OTHERS.iter().find(|(name, _)| fits(name))?;
-    let is_slide = own == "77.1.6";
+    let is_slide = suffix == "77.1.6";
     let hint = match is_slide {
         true => {
             "one level of the slide can be written as a picture by OpenSlide or wsidicom; pictures \
@@ -286,7 +287,7 @@ fn without_pixels(source: &Source, set: &Set) -> crate::Error {
     let modality = set.text(tags::MODALITY).unwrap_or_default();
     let modality =
         if modality.is_empty() { String::new() } else { format!(" (modality {modality})") };
-    let message = format!("holds other data{}, not a picture", super::shown(&modality));
+    let message = format!("holds other data{}, not a picture", super::excerpt(&modality));
     source.error("data set", message).hint(OTHERS_HINT)
 }
 

@@ -54,12 +54,12 @@ pub fn read(source: &Source, heads: &[Head], options: &ReadOptions) -> Result<Vo
     let mut overlaps = 0;
     for (file, head) in heads.iter().enumerate() {
         let Some(segmentation) = &head.segmentation else { continue };
-        let own;
+        let beside;
         let opened = if head.path == source.path {
             source
         } else {
-            own = source.open_beside(&head.path)?;
-            &own
+            beside = source.open_beside(&head.path)?;
+            &beside
         };
         let data = File::open(opened)?;
         let decoder = Decoder::new(&data, head.layout)?;
@@ -74,13 +74,13 @@ pub fn read(source: &Source, heads: &[Head], options: &ReadOptions) -> Result<Vo
             let to = &mut labels[slice * size..][..size];
             for (i, label) in to.iter_mut().enumerate() {
                 let value = decoded.value(i);
-                let own = match segmentation.kind {
+                let segment = match segmentation.kind {
                     Kind::Labels => value as u16,
                     Kind::Mask(least) => place.segment * u16::from(value >= least),
                 };
-                if own != 0 {
-                    overlaps += u64::from(*label != 0 && *label != own);
-                    *label = own;
+                if segment != 0 {
+                    overlaps += u64::from(*label != 0 && *label != segment);
+                    *label = segment;
                 }
             }
         }
@@ -95,7 +95,7 @@ pub fn read(source: &Source, heads: &[Head], options: &ReadOptions) -> Result<Vo
     volume.about.length = "mm".into();
     Anatomy::LPS.place(&mut volume);
     let tables = heads.iter().filter_map(|head| head.segmentation.as_ref());
-    Ok(volume.with_labels(tables.flat_map(|own| own.table.clone()).collect()))
+    Ok(volume.with_labels(tables.flat_map(|segmentation| segmentation.table.clone()).collect()))
 }
 
 /// Returns where the frames lie. Those without positions follow each other within a segment.
@@ -122,10 +122,10 @@ fn slices(source: &Source, heads: &[Head], places: &[Place]) -> Result<Slices> {
     let first = &heads[0];
     let lowest = places.iter().min_by(|a, b| a.depth.total_cmp(&b.depth));
     let lowest = lowest.ok_or_else(|| source.error("segmentation", "has no frames"))?;
-    let own = [first.layout.columns, first.layout.rows];
+    let size = [first.layout.columns, first.layout.rows];
     let is_alike = |place: &Place| {
         let layout = heads[place.file].layout;
-        [layout.columns, layout.rows] == own && lowest.frame.is_parallel(place.frame)
+        [layout.columns, layout.rows] == size && lowest.frame.is_parallel(place.frame)
     };
     if let Some(other) = places.iter().find(|place| !is_alike(place)) {
         let name = name(&heads[other.file].path);
@@ -161,7 +161,7 @@ fn slices(source: &Source, heads: &[Head], places: &[Place]) -> Result<Slices> {
     let [dx, dy] = lowest.frame.spacing.unwrap_or([1.0; 2]);
     let [x, y] = lowest.frame.axes();
     let axes = DMat3::from_cols(x * dx, y * dy, lowest.frame.normal() * step);
-    let dims = [own[0], own[1], count as usize];
+    let dims = [size[0], size[1], count as usize];
     let lattice = Lattice::cartesian(dims, lowest.frame.position.unwrap_or(DVec3::ZERO), axes);
     lattice.check().map_err(|message| source.error("positions", message))?;
     Ok(Slices { lattice, first: depths[0], step })

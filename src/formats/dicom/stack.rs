@@ -74,11 +74,11 @@ fn main_slices(heads: &[Head], words: &mut Vec<String>) -> Vec<Slice> {
         for frame in &head.frames {
             let slice = Slice { file, frame: frame.clone() };
             let fits = |group: &&mut Vec<Slice>| {
-                let own = &heads[group[0].file];
+                let first = &heads[group[0].file];
                 let size = |head: &Head| (head.layout.columns, head.layout.rows);
-                size(own) == size(head)
-                    && own.layout.channels == head.layout.channels
-                    && own.nature.is_localizer == head.nature.is_localizer
+                size(first) == size(head)
+                    && first.layout.channels == head.layout.channels
+                    && first.nature.is_localizer == head.nature.is_localizer
                     && group[0].frame.is_parallel(&slice.frame)
             };
             match groups.iter_mut().find(fits) {

@@ -6,7 +6,7 @@ mod series_of_files;
 
 use super::*;
 use crate::{
-    about::{Modality, Stance},
+    about::{Modality, Orientation},
     error::LimitKind,
     input::{
         Limits,
@@ -26,7 +26,7 @@ fn read_bytes(bytes: &[u8]) -> Result<Volume> {
     read_with(&folder.write("a.dcm", bytes), |source| read(source, &ReadOptions::default()))
 }
 
-fn told(bytes: &[u8]) -> String {
+fn error_of(bytes: &[u8]) -> String {
     read_bytes(bytes).unwrap_err().to_string()
 }
 
@@ -57,8 +57,8 @@ fn a_slice_in_every_coding() {
         assert_eq!((about.modality, about.window), (Some(Modality::Ct), Some([-160.0, 240.0])));
         assert_eq!((&*about.unit, &*about.length), ("HU", "mm"));
         // One slice is seen as on film.
-        let stance = Stance { up: DVec3::Y, front: DVec3::NEG_Z };
-        assert_eq!(about.stance, Some(stance));
+        let orientation = Orientation { up: DVec3::Y, front: DVec3::NEG_Z };
+        assert_eq!(about.orientation, Some(orientation));
         assert!(is_dicom(&made.file()), "“{syntax}”");
         // Without the preamble, and without the header.
         assert_eq!(values(&read_bytes(&made.file()[128 + 4..]).unwrap()), values(&volume));
@@ -156,7 +156,7 @@ fn colours_are_luminances_and_inverted_values_turned() {
     pixels.bytes(tags::PIXEL_DATA, "OB", &[76, 76, 85, 255]);
     assert_eq!(colors(&mut pixels).unwrap()[1], [254, 0, 0, 255]);
     made.without(tags::PALETTE_RED + 1);
-    assert!(told(&made.file()).contains("palette: has fewer colours than its shape says"));
+    assert!(error_of(&made.file()).contains("palette: has fewer colours than its shape says"));
     for (bits, pixels) in [(8, vec![10u8, 30]), (16, vec![10, 0, 30, 0])] {
         let mut made = Made::slice(".1", 2, 1);
         made.bits(bits, bits, 0).text(tags::PHOTOMETRIC, "MONOCHROME1");
@@ -199,7 +199,7 @@ fn run_lengths() {
         let mut frame = frame.clone();
         frame[at] = byte;
         made.fragments(&[&[], &frame]);
-        assert!(told(&made.file()).contains(message), "{}", told(&made.file()));
+        assert!(error_of(&made.file()).contains(message), "{}", error_of(&made.file()));
     };
     change(0, 3, "pixel data, frame 0: cannot be unpacked: 3 segments where 2 were expected");
     change(64, 254, "segment 0 holds 3 of 4 bytes");
@@ -222,7 +222,7 @@ fn jpeg_ls() {
     assert_eq!(values(&read_made(&made)), expected);
     for end in 0..stream.len() - 2 {
         made.fragments(&[&[], &stream[..end]]);
-        assert!(told(&made.file()).contains("frame 0"), "{end}");
+        assert!(error_of(&made.file()).contains("frame 0"), "{end}");
     }
 }
 
@@ -312,115 +312,115 @@ fn tiles_take_memory() {
 fn what_is_not_read_is_told() {
     let mut made = Made::slice(".4.110", 2, 1);
     made.fragments(&[&[], &[1, 2]]);
-    let message = told(&made.file());
+    let message = error_of(&made.file());
     assert!(
         message.contains("packed by JPEG XL (transfer syntax 1.2.840.10008.1.2.4.110)"),
         "{message}"
     );
     let mut made = Made::slice(".4.70", 2, 1);
     made.fragments(&[&[], &[0xff, 0xd8, 0xff, 0xc3, 0, 11, 8, 0, 9, 0, 9, 1, 1, 1, 1]]);
-    assert!(told(&made.file()).contains("a picture of 9 × 9 pixels, not of 2 × 1"));
+    assert!(error_of(&made.file()).contains("a picture of 9 × 9 pixels, not of 2 × 1"));
     made.fragments(&[&[], &[0xff, 0xd8, 0xff, 0xc3, 0, 11, 8, 0, 1, 0, 2, 1, 1, 1, 1]]);
-    assert!(told(&made.file()).contains("frame 0: cannot be"), "{}", told(&made.file()));
+    assert!(error_of(&made.file()).contains("frame 0: cannot be"), "{}", error_of(&made.file()));
     let mut made = Made::slice(".4.90", 2, 1);
     made.fragments(&[&[], &[0xff, 0x4f, 1, 2]]);
-    assert!(told(&made.file()).contains("its header is damaged"));
-    assert!(told(b"no DICOM at all, but a file").contains("header: is not DICOM"));
+    assert!(error_of(&made.file()).contains("its header is damaged"));
+    assert!(error_of(b"no DICOM at all, but a file").contains("header: is not DICOM"));
 }
 
 /// The error of a file of two pixels, changed.
-fn told_of(change: impl FnOnce(&mut Made)) -> String {
+fn error_of_change(change: impl FnOnce(&mut Made)) -> String {
     let mut made = Made::slice(".1", 2, 1);
     made.shorts(tags::PIXEL_DATA, "OW", &[1, 2]);
     change(&mut made);
-    told(&made.file())
+    error_of(&made.file())
 }
 
 #[test]
 fn pixels_that_do_not_fit_are_told() {
-    for (found, message) in [
+    for (error, message) in [
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.without(tags::ROWS);
             }),
             "Rows: is missing, but a number of pixels",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.short(tags::COLUMNS, 0);
             }),
             "Columns: is 0, but a number",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.bits(12, 12, 0);
             }),
             "Bits Allocated: is 12, but 1, 8, 16 or 32",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.bits(16, 17, 0);
             }),
             "17 bits up to bit 16 do not lie in the 16",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.short(tags::ROWS, 2);
             }),
             "2 × 2 pixels needs 8 bytes, but the",
         ),
     ] {
-        assert!(found.contains(message), "{found} / {message}");
+        assert!(error.contains(message), "{error} / {message}");
     }
 }
 
 #[test]
 fn files_without_usable_pixels_are_told() {
-    for (found, message) in [
+    for (error, message) in [
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.text(tags::FRAMES, "9");
             }),
             "Number of Frames: is 9, but",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.text(tags::FRAMES, "0");
             }),
             "Number of Frames: is 0, but",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.text(tags::PHOTOMETRIC, "ARGB").short(tags::SAMPLES_PER_PIXEL, 4);
             }),
             "“ARGB” of 4 numbers a pixel is not read",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.without(tags::PIXEL_DATA);
             }),
             "holds other data",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.without(tags::PIXEL_DATA).text(tags::CLASS, "1.2.840.10008.5.1.4.1.1.481.3");
             }),
             "holds outlines of radiotherapy",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.text(tags::CLASS, "1.2.840.10008.5.1.4.1.1.77.1.6");
             }),
             "SOP class: holds tiles of a whole slide, not slices of a volume",
         ),
         (
-            told_of(|made| {
+            error_of_change(|made| {
                 made.without(tags::PIXEL_DATA).text(tags::CLASS, "1.2.840.10008.5.1.4.1.1.88.33");
             }),
             "holds a report",
         ),
     ] {
-        assert!(found.contains(message), "{found} / {message}");
+        assert!(error.contains(message), "{error} / {message}");
     }
 }
 
@@ -446,7 +446,7 @@ fn damaged_files_are_told() {
     let mut bytes = made.file();
     let end = bytes.len();
     bytes[end - 6..end - 2].copy_from_slice(&0xffff_fffe_u32.to_le_bytes());
-    assert!(told(&bytes).contains("4294967294 bytes were expected, but the file ends after 2"));
+    assert!(error_of(&bytes).contains("4294967294 bytes were expected, but the file ends after 2"));
     let mut bytes = Made::new(".1").file();
     let deep = [0x08, 0, 0x15, 0x11, b'S', b'Q', 0, 0, 255, 255, 255, 255];
     let item = [0xfe, 0xff, 0, 0xe0, 255, 255, 255, 255];
@@ -459,7 +459,7 @@ fn damaged_files_are_told() {
     let mut bytes = made.file();
     let at = bytes.len() - 14;
     bytes[at + 4] = 7;
-    assert!(told(&bytes).contains("has no type of values"), "{}", told(&bytes));
+    assert!(error_of(&bytes).contains("has no type of values"), "{}", error_of(&bytes));
     // A small stream that unpacks to much.
     let mut bomb = Made::slice(".1.99", 1, 1);
     bomb.bytes(tags::PIXEL_DATA, "OB", &vec![0; 8 << 20]);
@@ -561,7 +561,7 @@ fn groups_of_functions_place_frames() {
             let volume = read_with(&path, |source| read(source, &options)).unwrap();
             assert_eq!(values(&volume), expected, "“{syntax}”");
             assert_eq!(volume.lattice.spacing(), DVec3::new(3.0, 2.0, 5.0));
-            assert_eq!(volume.about.stance, Some(Stance::RAS));
+            assert_eq!(volume.about.orientation, Some(Orientation::RAS));
         }
     }
 }

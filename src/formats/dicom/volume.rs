@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     formats::{
         ReadOptions,
         shared::{anatomy::Anatomy, colors, holes, rescale::rescaled, several},
@@ -34,10 +34,10 @@ pub fn read(source: &Source, heads: Vec<Head>, options: &ReadOptions) -> Result<
     })?;
     let one = &stack.slices[0].frame;
     let is_even = stack.slices.iter().all(|slice| {
-        let own = heads[slice.file].layout;
+        let slice_layout = heads[slice.file].layout;
         (slice.frame.slope, slice.frame.intercept) == (one.slope, one.intercept)
-            && own.scalar() == layout.scalar()
-            && own.padding == layout.padding
+            && slice_layout.scalar() == layout.scalar()
+            && slice_layout.padding == layout.padding
     });
     let (mut samples, colors) = joined(source, &heads, &stack.slices, is_even)?;
     if is_even && (one.slope, one.intercept) != (1.0, 0.0) {
@@ -51,8 +51,8 @@ pub fn read(source: &Source, heads: Vec<Head>, options: &ReadOptions) -> Result<
     }
     let mut volume = holes::volume(source, lattice, samples, options)?;
     volume.about.holes += padded;
-    if let Some(own) = colors.filter(|_| options.scalar.is_none()) {
-        colors::attach(&mut volume, own.into());
+    if let Some(colors) = colors.filter(|_| options.scalar.is_none()) {
+        colors::attach(&mut volume, colors.into());
     }
     describe(&mut volume, first, &stack);
     if layout.colors == Colors::Inverted {
@@ -130,7 +130,7 @@ fn joined(
         let decoded: Vec<Result<Vec<(usize, Decoded)>>> =
             batch.par_iter().map(|job| frames(source, job, is_even)).collect();
         for decoded in decoded {
-            for (at, Decoded { samples, colors: own }) in decoded? {
+            for (at, Decoded { samples, colors: frame_colors }) in decoded? {
                 // Memory is taken once there is a frame, which has the bytes that it claims.
                 if out.is_none() {
                     source.spend("the size of the samples in bytes", bytes as u64)?;
@@ -140,8 +140,8 @@ fn joined(
                         colors = Some(vec![[0; 4]; size * slices.len()]);
                     }
                 }
-                if let (Some(colors), Some(own)) = (&mut colors, own) {
-                    colors[at * size..(at + 1) * size].copy_from_slice(&own);
+                if let (Some(colors), Some(frame_colors)) = (&mut colors, frame_colors) {
+                    colors[at * size..(at + 1) * size].copy_from_slice(&frame_colors);
                 }
                 let out = out.get_or_insert_with(|| zeros(scalar, size * slices.len()));
                 let (start, end) = (at * size, (at + 1) * size);
@@ -168,12 +168,12 @@ fn zeros(scalar: Scalar, count: usize) -> Samples {
 /// Decodes the frames of one file.
 fn frames(source: &Source, job: &Job, is_even: bool) -> Result<Vec<(usize, Decoded)>> {
     let path = job.head.path.as_path();
-    let own;
+    let beside;
     let opened = if path == source.path {
         source
     } else {
-        own = source.open_beside(path)?;
-        &own
+        beside = source.open_beside(path)?;
+        &beside
     };
     let file = File::open(opened)?;
     let decoder = Decoder::new(&file, job.head.layout)?;
@@ -182,7 +182,9 @@ fn frames(source: &Source, job: &Job, is_even: bool) -> Result<Vec<(usize, Decod
         opened.check_time()?;
         let mut decoded = decoder.frame(slice.frame.number)?;
         let count = decoded.samples.len();
-        if count != expected || decoded.colors.as_ref().is_some_and(|own| own.len() != expected) {
+        if count != expected
+            || decoded.colors.as_ref().is_some_and(|colors| colors.len() != expected)
+        {
             let message = format!("{count} pixels where {expected} were expected");
             return Err(opened.error("pixel data", message));
         }
@@ -219,12 +221,12 @@ fn describe(volume: &mut Volume, head: &Head, stack: &Stack) {
         // One slice is seen from its front, as on film.
         if stack.slices.len() == 1 {
             let front = -x.cross(y).normalize_or(y.any_orthonormal_vector());
-            about.stance = Some(Stance { up: -y, front });
+            about.orientation = Some(Orientation { up: -y, front });
         }
         Anatomy::LPS.place(volume);
     } else if stack.slices.len() == 1 {
         let [x, y] = [glam::DVec3::X, glam::DVec3::Y];
-        about.stance = Some(Stance { up: -y, front: -x.cross(y) });
+        about.orientation = Some(Orientation { up: -y, front: -x.cross(y) });
     }
 }
 

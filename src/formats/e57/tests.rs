@@ -252,16 +252,16 @@ fn values_that_wait_for_others_are_counted() {
     let limits = Limits::default();
     let source = Source::open(&path, &limits).unwrap();
     let scans = E57Reader::new(Cursor::new(source.bytes())).unwrap().pointclouds();
-    let told =
+    let check =
         |most: u64| streams::check(&source, &scans[0], 0, most).map_err(|error| error.to_string());
-    told(streams::MOST_WAITING).unwrap();
+    check(streams::MOST_WAITING).unwrap();
     // A packet has about 2,500 points. Each takes 24 bytes and one bit, and has a record of zero
     // bits.
-    let message = told(1000).unwrap_err();
+    let message = check(1000).unwrap_err();
     let words: Vec<&str> = message.split(' ').collect();
     let at = words.iter().position(|word| *word == "values").unwrap();
     let waiting: u64 = words[at - 1].parse().unwrap();
     assert!((5 * 1000..=5 * 2731 + 8).contains(&waiting), "{message}");
-    told(5 * 2731 + 8).unwrap();
+    check(5 * 2731 + 8).unwrap();
     assert_eq!(read(&source).unwrap().positions.len(), 5000);
 }

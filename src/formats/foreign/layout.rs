@@ -54,8 +54,8 @@ pub fn advice(source: &Source) -> Option<Advice> {
     let text = head(source);
     let field = |name: &str| {
         text.lines().find_map(|line| {
-            let (found, value) = line.split_once(':').or_else(|| line.split_once('='))?;
-            found.trim().eq_ignore_ascii_case(name).then(|| value.trim().to_owned())
+            let (key, value) = line.split_once(':').or_else(|| line.split_once('='))?;
+            key.trim().eq_ignore_ascii_case(name).then(|| value.trim().to_owned())
         })
     };
     let (file, sizes) = (field("ObjectFileName")?, field("Resolution")?);
@@ -93,7 +93,7 @@ pub fn raw(source: &Source) -> Option<Advice> {
     let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let is_raw = ["raw", "vol", "bin", "dat", "img", "data"]
         .iter()
-        .any(|own| extension.eq_ignore_ascii_case(own));
+        .any(|known| extension.eq_ignore_ascii_case(known));
     let size = source.bytes().len() as u64;
     let named = sizes_in(&name).map(|dims| (dims, type_in(&name)));
     let guess = match named {

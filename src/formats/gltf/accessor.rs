@@ -134,8 +134,8 @@ impl Buffers<'_> {
                     )));
                 }
                 let before = (count as u64).saturating_sub(1).checked_mul(stride as u64);
-                let own = if count == 0 { 0 } else { size as u64 };
-                let end = before.and_then(|before| before.checked_add(own)?.checked_add(offset));
+                let last = if count == 0 { 0 } else { size as u64 };
+                let end = before.and_then(|before| before.checked_add(last)?.checked_add(offset));
                 if end.is_none_or(|end| end > bytes.len() as u64) {
                     let message = format!(
                         "{count} elements from byte {offset} reach beyond the view's {}",

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     Result,
-    about::Stance,
+    about::Orientation,
     formats::shared::trained::{Trained, settle},
     gaussians::{Gaussians, MOST_DEGREE, harmonics, turn::map_colors},
     input::Source,
@@ -64,7 +64,7 @@ pub fn read_gaussians(source: &Source) -> Result<Gaussians> {
     let degree = scene.clouds.iter().map(Cloud::degree).max().unwrap_or_default();
     let mut set =
         settle(source, scene.count, degree, |index, colors| Ok(scene.one(index, colors)))?;
-    set.about.stance = Some(Stance::Y_UP);
+    set.about.orientation = Some(Orientation::Y_UP);
     Ok(set)
 }
 
@@ -284,14 +284,14 @@ impl Primitive<'_> {
         let mut highest = 0;
         for degree in 1..=MOST_DEGREE {
             let has = |coefficient: &u32| self.find(&term(degree, *coefficient)).is_some();
-            let found = (0..=2 * degree).filter(has).count() as u32;
-            if found == 0 {
+            let present = (0..=2 * degree).filter(has).count() as u32;
+            if present == 0 {
                 continue;
             }
-            if found != 2 * degree + 1 || highest + 1 != degree {
+            if present != 2 * degree + 1 || highest + 1 != degree {
                 let message = format!(
-                    "has {found} of {} harmonics of degree {degree}, and all of the degrees up to \
-                     {highest}; each degree needs all harmonics and all lower degrees",
+                    "has {present} of {} harmonics of degree {degree}, and all of the degrees up \
+                     to {highest}; each degree needs all harmonics and all lower degrees",
                     2 * degree + 1
                 );
                 return Err(self.source.error(self.place, message));
@@ -335,11 +335,11 @@ impl Primitive<'_> {
     /// Returns the accessor of an attribute that has this number of elements.
     fn counted(&self, name: &str, count: u64) -> Result<usize> {
         let accessor = self.needed(name)?;
-        let found = self.buffers.claimed(accessor);
-        if found == count {
+        let elements = self.buffers.claimed(accessor);
+        if elements == count {
             return Ok(accessor);
         }
-        let message = format!("has {count} positions, but {found} values of {name}");
+        let message = format!("has {count} positions, but {elements} values of {name}");
         Err(self.source.error(self.place, message))
     }
 

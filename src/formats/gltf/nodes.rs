@@ -36,8 +36,9 @@ pub(super) fn meshes(
         if let Some(mesh) = node.mesh {
             match instances(source, buffers, node, &place)? {
                 None => meshes.push((transform, mesh.value())),
-                Some(own) => {
-                    meshes.extend(own.into_iter().map(|own| (transform * own, mesh.value())));
+                Some(instances) => {
+                    let placed = instances.into_iter().map(|instance| transform * instance);
+                    meshes.extend(placed.map(|transform| (transform, mesh.value())));
                 }
             }
         }
@@ -99,7 +100,8 @@ fn instances(
     let Some(extension) = extension else { return Ok(None) };
     let place = format!("{place}, {NAME}");
     let accessor = |name: &str| {
-        let index = extension.get("attributes").and_then(|own| own.get(name))?.as_u64()?;
+        let index =
+            extension.get("attributes").and_then(|attributes| attributes.get(name))?.as_u64()?;
         usize::try_from(index).ok()
     };
     let three = |name: &str| -> Result<Option<Vec<[f32; 3]>>> {
@@ -115,7 +117,7 @@ fn instances(
         turns.as_ref().map(Vec::len),
     ];
     let Some(count) = counts.iter().flatten().max().copied() else { return Ok(None) };
-    if counts.iter().flatten().any(|own| *own != count) {
+    if counts.iter().flatten().any(|other| *other != count) {
         return Err(source.error(place, "has attributes of different counts"));
     }
     source.room::<(DMat4, usize)>("the instances", count)?;

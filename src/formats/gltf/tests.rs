@@ -166,15 +166,16 @@ fn opaque_materials_ignore_every_alpha() {
 
 #[test]
 fn masks_show_all_or_nothing() {
-    let check = |factor: f32, cutoff: Option<f32>, own: f32, texels: [u8; 4], vertices: [u8; 4]| {
-        let mut material = picture_material("MASK", factor);
-        if let Some(cutoff) = cutoff {
-            material["alphaCutoff"] = json!(cutoff);
-        }
-        let mesh = painted(&[material], [0, 159, 160, 255]);
-        let found = (mesh.materials[0].color[3], texel_alphas(&mesh, 0), vertex_alphas(&mesh));
-        assert_eq!(found, (own, texels.to_vec(), vertices.to_vec()), "{factor} {cutoff:?}");
-    };
+    let check =
+        |factor: f32, cutoff: Option<f32>, alpha: f32, texels: [u8; 4], vertices: [u8; 4]| {
+            let mut material = picture_material("MASK", factor);
+            if let Some(cutoff) = cutoff {
+                material["alphaCutoff"] = json!(cutoff);
+            }
+            let mesh = painted(&[material], [0, 159, 160, 255]);
+            let alphas = (mesh.materials[0].color[3], texel_alphas(&mesh, 0), vertex_alphas(&mesh));
+            assert_eq!(alphas, (alpha, texels.to_vec(), vertices.to_vec()), "{factor} {cutoff:?}");
+        };
     // The vertices have alphas of 255, 255, 128 and 0.
     check(0.8, None, 1.0, [0, 0, 255, 255], [255, 255, 0, 0]);
     check(1.0, None, 1.0, [0, 255, 255, 255], [255, 255, 255, 0]);

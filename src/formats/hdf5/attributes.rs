@@ -38,8 +38,8 @@ impl Attributes {
     pub fn of(all: &HashMap<String, AttrValue>) -> Self {
         let number = |name: &str| all.get(name).and_then(|value| numbers(value).first().copied());
         let text = |names: &[&str]| {
-            let found = names.iter().find_map(|&name| all.get(name)?.as_str());
-            found.unwrap_or_default().trim().chars().take(64).collect::<String>()
+            let value = names.iter().find_map(|&name| all.get(name)?.as_str());
+            value.unwrap_or_default().trim().chars().take(64).collect::<String>()
         };
         let spacing = SPACINGS.iter().find_map(|&(name, unit)| {
             let is_length = |&v: &f64| v.is_finite() && v > 0.0;

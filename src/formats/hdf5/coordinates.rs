@@ -7,7 +7,7 @@
 
 use super::{
     attributes::Attributes,
-    file::{File, Found},
+    file::{File, StoredSet},
     number_type,
 };
 use crate::{
@@ -35,7 +35,7 @@ enum Role {
 #[derive(Clone)]
 struct Scale<'a> {
     name: &'a str,
-    found: &'a Found,
+    set: &'a StoredSet,
     role: Option<Role>,
     unit: String,
     /// Whether its values grow downwards.
@@ -55,41 +55,41 @@ struct Places {
 
 impl<'a> Scale<'a> {
     /// Returns a data set as a scale; `None` if it is none.
-    fn of(found: &'a Found) -> Option<Self> {
+    fn of(set: &'a StoredSet) -> Option<Self> {
         let text = |name: &str| {
-            let value = found.attributes.get(name).and_then(|value| value.as_str());
+            let value = set.attributes.get(name).and_then(|value| value.as_str());
             value.unwrap_or_default().trim().to_owned()
         };
-        if text("CLASS") != "DIMENSION_SCALE" || found.shape.len() != 1 {
+        if text("CLASS") != "DIMENSION_SCALE" || set.shape.len() != 1 {
             return None;
         }
-        let name = found.path.rsplit('/').next().unwrap_or_default();
+        let name = set.path.rsplit('/').next().unwrap_or_default();
         let unit = text("units");
         let positive = text("positive").to_ascii_lowercase();
         let role = role(&text("axis"), &unit, &positive, &text("standard_name"), name);
         let is_pressure = matches!(plain_unit(&unit).as_str(), "Pa" | "hPa" | "mbar" | "dbar");
         let is_down = positive == "down" || is_pressure && positive != "up";
-        Some(Self { name, found, role, unit, is_down })
+        Some(Self { name, set, role, unit, is_down })
     }
 
     /// Whether it only gives a dimension a name.
     fn is_empty(&self) -> bool {
-        let name = self.found.attributes.get("NAME").and_then(|value| value.as_str());
+        let name = self.set.attributes.get("NAME").and_then(|value| value.as_str());
         name.is_some_and(|name| name.starts_with("This is a netCDF dimension but not"))
     }
 
     /// Reads its values; `None` if they do not place samples.
     fn places(&self, source: &Source, file: &File) -> Result<Option<Places>> {
-        let Some((element, endian, inner)) = number_type(&self.found.datatype) else {
+        let Some((element, endian, inner)) = number_type(&self.set.datatype) else {
             return Ok(None);
         };
         if self.is_empty() || !inner.is_empty() {
             return Ok(None);
         }
-        let size = self.found.shape[0].checked_mul(element.bytes() as u64);
-        let bytes = file.bytes(self.found, size)?;
+        let size = self.set.shape[0].checked_mul(element.bytes() as u64);
+        let bytes = file.bytes(self.set, size)?;
         source.room::<[f64; 3]>("the coordinates of a dimension", bytes.len() / element.bytes())?;
-        let [scale, offset] = Attributes::of(&self.found.attributes).scale;
+        let [scale, offset] = Attributes::of(&self.set.attributes).scale;
         let sign = if self.is_down { -1.0 } else { 1.0 };
         let values = element.doubles(&bytes, endian);
         let values: Vec<f64> = values.iter().map(|v| sign * (v * scale + offset)).collect();
@@ -163,16 +163,16 @@ fn plain_unit(unit: &str) -> String {
 impl<'a> Coordinates<'a> {
     /// Finds the scales of a data set among all data sets of its file: those of its group and of
     /// the groups around it.
-    pub fn of(source: &Source, all: &'a [Found], set: &Found) -> Self {
+    pub fn of(source: &Source, all: &'a [StoredSet], set: &StoredSet) -> Self {
         let mut scales: Vec<Option<Scale>> = vec![None; set.shape.len()];
         if !set.has_scales {
             return Self { scales };
         }
         let group = |path: &str| path.rsplit_once('/').map_or("", |(group, _)| group).to_owned();
-        let own = group(&set.path);
+        let parent = group(&set.path);
         let is_around = |scale: &Scale| {
-            let around = group(&scale.found.path);
-            around.is_empty() || own == around || own.starts_with(&format!("{around}/"))
+            let around = group(&scale.set.path);
+            around.is_empty() || parent == around || parent.starts_with(&format!("{around}/"))
         };
         let known: Vec<Scale> = all.iter().filter_map(Scale::of).filter(is_around).collect();
         let mut unclear = Vec::new();
@@ -183,10 +183,11 @@ impl<'a> Coordinates<'a> {
             if alike[0] != dimension {
                 continue;
             }
-            let fits: Vec<&Scale> = known.iter().filter(|own| own.found.shape[0] == size).collect();
-            match told_apart(fits, alike.len()) {
-                Ok(found) => alike.iter().zip(found).for_each(|(&at, own)| {
-                    scales[at] = Some(own.clone());
+            let fits: Vec<&Scale> =
+                known.iter().filter(|scale| scale.set.shape[0] == size).collect();
+            match ordered(fits, alike.len()) {
+                Ok(matches) => alike.iter().zip(matches).for_each(|(&at, scale)| {
+                    scales[at] = Some(scale.clone());
                 }),
                 Err(names) if size > 1 => unclear.extend(names),
                 Err(_) => {}
@@ -235,7 +236,7 @@ impl<'a> Coordinates<'a> {
         if places.iter().all(Option::is_none) {
             return Ok(());
         }
-        let units = places.each_ref().map(|own| own.as_ref().map_or("", |own| &own.unit));
+        let units = places.each_ref().map(|axis| axis.as_ref().map_or("", |axis| &axis.unit));
         let factors = factors(&places);
         if factors.iter().any(Option::is_none) && options.spacing.is_none() {
             let path = source.path.display();
@@ -257,7 +258,7 @@ impl<'a> Coordinates<'a> {
 
 /// Returns the scales of `count` dimensions of one length in their order, if they can be told
 /// apart; else the names of those that fit.
-fn told_apart<'s, 'a>(
+fn ordered<'s, 'a>(
     mut fits: Vec<&'s Scale<'a>>,
     count: usize,
 ) -> Result<Vec<&'s Scale<'a>>, Vec<String>> {
@@ -281,9 +282,9 @@ fn told_apart<'s, 'a>(
 /// Returns the factors that turn the coordinates of each axis into the unit of x; `None` for axes
 /// whose unit has no such factor.
 fn factors(places: &[Option<Places>; 3]) -> [Option<f64>; 3] {
-    let first = places.iter().flatten().next().map_or("", |own| own.unit.as_str());
-    places.each_ref().map(|own| match own {
-        Some(own) if own.unit != first => Some(meters(&own.unit)? / meters(first)?),
+    let first = places.iter().flatten().next().map_or("", |axis| axis.unit.as_str());
+    places.each_ref().map(|axis| match axis {
+        Some(axis) if axis.unit != first => Some(meters(&axis.unit)? / meters(first)?),
         _ => Some(1.0),
     })
 }
@@ -301,30 +302,30 @@ fn lattice(
         if length == 0.0 { 1.0 } else { length / steps }
     };
     let first = places.iter().flatten().next();
-    let common = first.map_or(1.0, |own| mean(&own.values).abs());
+    let common = first.map_or(1.0, |first| mean(&first.values).abs());
     let (mut origin, mut steps, mut signs) = (DVec3::ZERO, DVec3::ONE, DVec3::ONE);
     let mut all = [const { Vec::new() }; 3];
     let mut are_even = true;
     for axis in 0..3 {
         let count = dims[axis];
-        let Some(own) = &places[axis] else {
+        let Some(coordinates) = &places[axis] else {
             all[axis] = (0..count).map(|at| at as f64).collect();
             continue;
         };
-        let step = mean(&own.values);
+        let step = mean(&coordinates.values);
         let factor = factors[axis].unwrap_or(common / step.abs());
-        origin[axis] = factors[axis].map_or(0.0, |factor| factor * own.values[0]);
+        origin[axis] = factors[axis].map_or(0.0, |factor| factor * coordinates.values[0]);
         steps[axis] = factor * step;
         signs[axis] = step.signum();
         let away = |(at, value): (usize, &f64)| {
-            (value - own.values[0] - at as f64 * step).abs()
+            (value - coordinates.values[0] - at as f64 * step).abs()
                 > EVEN * step.abs() + 4.0 * f64::from(f32::EPSILON) * value.abs()
         };
-        let is_even = !own.values.iter().enumerate().any(away);
+        let is_even = !coordinates.values.iter().enumerate().any(away);
         are_even &= is_even;
         let place = |at: usize| match is_even {
             true => at as f64 * (factor * step).abs(),
-            false => factor * (own.values[at] - own.values[0]).abs(),
+            false => factor * (coordinates.values[at] - coordinates.values[0]).abs(),
         };
         all[axis] = (0..count).map(place).collect();
     }

@@ -40,7 +40,7 @@ pub struct File<'a> {
 }
 
 /// A data set of a file.
-pub struct Found {
+pub struct StoredSet {
     /// Its path, without the first slash.
     pub path: String,
     pub shape: Vec<u64>,
@@ -85,8 +85,8 @@ impl<T: Deref<Target = [u8]>> hdf5_pure::Source for Bytes<T> {
             available: self.bytes.len(),
         };
         let start = usize::try_from(offset).ok();
-        let found = start.and_then(|start| self.bytes.get(start..)?.get(..buffer.len()));
-        buffer.copy_from_slice(found.ok_or(end_of_file)?);
+        let bytes = start.and_then(|start| self.bytes.get(start..)?.get(..buffer.len()));
+        buffer.copy_from_slice(bytes.ok_or(end_of_file)?);
         Ok(())
     }
 
@@ -133,13 +133,13 @@ impl<'a> File<'a> {
     }
 
     /// Returns the data sets of all groups.
-    pub fn data_sets(&self) -> Result<Vec<Found>> {
+    pub fn data_sets(&self) -> Result<Vec<StoredSet>> {
         self.data_sets_of(self.root(), "")
     }
 
     /// Returns the data sets of a group and of those in it, with their paths below `path`.
-    pub fn data_sets_of(&self, group: Group, path: &str) -> Result<Vec<Found>> {
-        let mut found = Vec::new();
+    pub fn data_sets_of(&self, group: Group, path: &str) -> Result<Vec<StoredSet>> {
+        let mut list = Vec::new();
         let mut open = vec![(group, path.to_owned(), 0)];
         let mut count = 0;
         while let Some((group, path, depth)) = open.pop() {
@@ -162,8 +162,8 @@ impl<'a> File<'a> {
             for (name, data_set) in sets {
                 let path = below(&name);
                 self.source.spend("the size of the list of data sets in bytes", 1024)?;
-                match self.looked_at(&path, data_set) {
-                    Ok(set) => found.push(set),
+                match self.inspect(&path, data_set) {
+                    Ok(set) => list.push(set),
                     Err(error) => tracing::warn!("{error}; the data set is left out"),
                 }
             }
@@ -173,10 +173,10 @@ impl<'a> File<'a> {
                 open.extend(inner.map(|(name, group)| (group, below(&name), depth + 1)));
             }
         }
-        Ok(found)
+        Ok(list)
     }
 
-    fn looked_at(&self, path: &str, data_set: Dataset) -> Result<Found> {
+    fn inspect(&self, path: &str, data_set: Dataset) -> Result<StoredSet> {
         let place = format!("data set “{path}”");
         let (shape, datatype, attributes, has_scales) = self.ask(&place, || {
             let datatype = data_set.datatype()?;
@@ -186,7 +186,7 @@ impl<'a> File<'a> {
             let has_scales = kinds.contains_key("DIMENSION_LIST");
             Ok((data_set.shape()?, datatype, attributes, has_scales))
         })?;
-        Ok(Found { path: path.into(), shape, datatype, attributes, has_scales, data_set })
+        Ok(StoredSet { path: path.into(), shape, datatype, attributes, has_scales, data_set })
     }
 
     /// Returns a group; `None` if there is none of this path.
@@ -195,7 +195,7 @@ impl<'a> File<'a> {
         let mut group = self.root();
         for name in path.split('/') {
             let inner =
-                self.ask("groups", || Ok(group.iter_groups()?.find(|(own, _)| own == name)))?;
+                self.ask("groups", || Ok(group.iter_groups()?.find(|(member, _)| member == name)))?;
             match inner {
                 Some((_, inner)) => group = inner,
                 None => return Ok(None),
@@ -210,8 +210,8 @@ impl<'a> File<'a> {
     }
 
     /// Reads the `size` bytes of a data set, as they are stored.
-    pub fn bytes(&self, found: &Found, size: Option<u64>) -> Result<Vec<u8>> {
-        let place = format!("data set “{}”", found.path);
+    pub fn bytes(&self, set: &StoredSet, size: Option<u64>) -> Result<Vec<u8>> {
+        let place = format!("data set “{}”", set.path);
         let claim = size.unwrap_or(u64::MAX);
         let size = self.source.check_bytes("the size of a data set in bytes", claim)?;
         let there = self.source.bytes().len() as u64;
@@ -220,8 +220,8 @@ impl<'a> File<'a> {
             return Err(self.source.error(place, message));
         }
         self.source.spend("the size of a data set in bytes", size as u64)?;
-        self.check_chunks(found, &place)?;
-        let bytes = self.ask(&place, || found.data_set.read_raw())?;
+        self.check_chunks(set, &place)?;
+        let bytes = self.ask(&place, || set.data_set.read_raw())?;
         if bytes.len() != size {
             let message = format!("has {} bytes where {size} were expected", bytes.len());
             return Err(self.source.error(place, message));
@@ -231,20 +231,20 @@ impl<'a> File<'a> {
 
     /// Checks the chunks of a data set before the crate takes memory for them: their size, their
     /// number, and that each lies within the file.
-    fn check_chunks(&self, found: &Found, place: &str) -> Result<()> {
+    fn check_chunks(&self, set: &StoredSet, place: &str) -> Result<()> {
         let source = self.source;
-        let layout = self.ask(place, || found.data_set.layout())?;
+        let layout = self.ask(place, || set.data_set.layout())?;
         let Layout::Chunked { chunk_shape, .. } = layout else { return Ok(()) };
-        let element = self.ask(place, || found.data_set.element_size())?;
+        let element = self.ask(place, || set.data_set.element_size())?;
         let product = |sizes: &[u64]| sizes.iter().fold(1, |all: u64, &n| all.saturating_mul(n));
         // The filters of a chunk take turns with two copies of it.
         let bytes = product(&chunk_shape).saturating_mul(element).saturating_mul(2);
         source.lend("the size of a chunk in bytes", bytes)?;
         let along = |(&size, &chunk): (&u64, &u64)| size.div_ceil(chunk.max(1));
-        let counts: Vec<u64> = found.shape.iter().zip(&chunk_shape).map(along).collect();
+        let counts: Vec<u64> = set.shape.iter().zip(&chunk_shape).map(along).collect();
         let most = product(&counts);
         source.lend("the size of the list of chunks in bytes", most.saturating_mul(CHUNK))?;
-        let chunks = self.ask(place, || found.data_set.chunks())?;
+        let chunks = self.ask(place, || set.data_set.chunks())?;
         if chunks.len() as u64 > most {
             let message = format!("lists {} chunks, but has only {most}", chunks.len());
             return Err(source.error(place, message));
@@ -278,27 +278,28 @@ fn asked<T>(
     source.check_time()?;
     read.store(0, Relaxed);
     isolated(source, place, || {
-        work()?.map_err(|error| source.check_time().err().unwrap_or(told(source, place, &error)))
+        work()?
+            .map_err(|error| source.check_time().err().unwrap_or(reported(source, place, &error)))
     })
 }
 
 /// Returns the error of the crate with its place.
-fn told(source: &Source, place: &str, error: &hdf5_pure::Error) -> Error {
-    let found = source.error(place, format!("cannot be read: {error}"));
+fn reported(source: &Source, place: &str, error: &hdf5_pure::Error) -> Error {
+    let wrapped = source.error(place, format!("cannot be read: {error}"));
     match error {
-        hdf5_pure::Error::Format(FormatError::UnsupportedFilter(_)) => found.hint(
+        hdf5_pure::Error::Format(FormatError::UnsupportedFilter(_)) => wrapped.hint(
             "the data are packed by a filter that is not read here; pack them anew with \
              h5repack -f GZIP=4 IN.h5 OUT.h5",
         ),
         hdf5_pure::Error::Format(
             FormatError::UnsupportedExternalStorage | FormatError::UnsupportedVirtualLayout,
-        ) => found.hint("the data are in other files; copy them into one: h5copy or h5repack"),
-        hdf5_pure::Error::Format(FormatError::SignatureNotFound) => found,
-        hdf5_pure::Error::Format(_) => found.hint(
+        ) => wrapped.hint("the data are in other files; copy them into one: h5copy or h5repack"),
+        hdf5_pure::Error::Format(FormatError::SignatureNotFound) => wrapped,
+        hdf5_pure::Error::Format(_) => wrapped.hint(
             "if other programs read the file, write it again in an older form: h5py.File(OUT, \
              'w', libver='earliest')",
         ),
-        _ => found,
+        _ => wrapped,
     }
 }
 
@@ -350,8 +351,8 @@ mod tests {
             let limits = Limits { bytes: most, ..Limits::default() };
             let source = Source::from_bytes(Path::new("a.h5"), &bytes, &limits).unwrap();
             let file = File::open(&source).unwrap();
-            let found = file.data_sets().unwrap();
-            let read = file.bytes(&found[0], Some(1 << 20));
+            let sets = file.data_sets().unwrap();
+            let read = file.bytes(&sets[0], Some(1 << 20));
             assert_eq!(read.is_ok(), is_read, "{most}");
             if let Err(error) = read {
                 assert!(error.to_string().contains("the size of a chunk"), "{error}");
@@ -373,8 +374,8 @@ mod tests {
         bytes.pop();
         let error = open(&bytes).unwrap_err().to_string();
         let (end, there) = (bytes.len() + 1, bytes.len());
-        let told =
+        let message =
             format!("is cut off: its header says that it has {end} bytes, but it has {there}");
-        assert!(error.contains(&told), "{error}");
+        assert!(error.contains(&message), "{error}");
     }
 }

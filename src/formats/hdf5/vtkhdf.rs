@@ -3,7 +3,7 @@
 
 use super::{
     attributes::numbers,
-    file::{File, Found},
+    file::{File, StoredSet},
     number_type,
 };
 use crate::{
@@ -38,7 +38,7 @@ pub struct DataSet<'a> {
     file: &'a File<'a>,
     kind: String,
     attributes: HashMap<String, AttrValue>,
-    sets: Vec<Found>,
+    sets: Vec<StoredSet>,
     /// The arrays: their places in `sets`, and what to choose by.
     arrays: Vec<(usize, Candidate)>,
     /// Whether there are several times.
@@ -69,9 +69,9 @@ impl<'a> DataSet<'a> {
             "UnstructuredGrid" => Ok(Kind::Cells),
             "PolyData" => Ok(Kind::Mesh),
             other => {
-                let shown: String = other.chars().take(40).collect();
+                let kind: String = other.chars().take(40).collect();
                 let message = format!(
-                    "is “{shown}”, but ImageData, UnstructuredGrid or PolyData was expected"
+                    "is “{kind}”, but ImageData, UnstructuredGrid or PolyData was expected"
                 );
                 Err(self
                     .source
@@ -94,7 +94,7 @@ impl<'a> DataSet<'a> {
                 None => HashMap::new(),
             };
             let is_active = |word: &str, name: &str| {
-                active.get(word).and_then(AttrValue::as_str).is_some_and(|own| own == name)
+                active.get(word).and_then(AttrValue::as_str).is_some_and(|value| value == name)
             };
             for (index, set) in self.sets.iter().enumerate() {
                 let Some(name) = set.path.strip_prefix(&format!("{section}/")) else { continue };
@@ -110,7 +110,7 @@ impl<'a> DataSet<'a> {
                     Role::None
                 };
                 let element = number_type(&set.datatype);
-                let kind = element.as_ref().map_or("string".into(), |(own, ..)| own.name());
+                let kind = element.as_ref().map_or("string".into(), |(element, ..)| element.name());
                 let is_numeric = element.is_some();
                 let components = self.components(set);
                 let name = name.to_owned();
@@ -121,7 +121,7 @@ impl<'a> DataSet<'a> {
     }
 
     /// Returns the components of an array: its dimensions behind those of space and time.
-    fn components(&self, set: &Found) -> usize {
+    fn components(&self, set: &StoredSet) -> usize {
         let times = usize::from(self.has_steps && self.axes() == 3);
         let inner = set.shape.iter().skip(self.axes() + times);
         inner.fold(1usize, |all, &n| all.saturating_mul(usize::try_from(n).unwrap_or(usize::MAX)))
@@ -129,7 +129,8 @@ impl<'a> DataSet<'a> {
 
     /// Returns the array to draw; `None` if none is named and none is worth drawing.
     fn chosen(&self, options: &ReadOptions, is_needed: bool) -> Result<Option<Chosen>> {
-        let candidates: Vec<Candidate> = self.arrays.iter().map(|(_, own)| own.clone()).collect();
+        let candidates: Vec<Candidate> =
+            self.arrays.iter().map(|(_, candidate)| candidate.clone()).collect();
         let counts = |array: usize| {
             let set = &self.sets[self.arrays[array].0];
             let size = set.shape.iter().fold(8u64, |all, &n| all.saturating_mul(n));
@@ -163,7 +164,7 @@ impl<'a> DataSet<'a> {
     }
 
     /// Returns all numbers of an array.
-    fn numbers(&self, set: &Found) -> Result<Vec<f64>> {
+    fn numbers(&self, set: &StoredSet) -> Result<Vec<f64>> {
         let place = format!("data set “{ROOT}/{}”", set.path);
         let (element, endian, inner) = number_type(&set.datatype)
             .ok_or_else(|| self.source.error(&place, "holds no numbers"))?;
@@ -174,9 +175,9 @@ impl<'a> DataSet<'a> {
         Ok(element.doubles(&data, endian))
     }
 
-    fn set(&self, path: &str) -> Result<&Found> {
-        let found = self.sets.iter().find(|set| set.path == path);
-        found.ok_or_else(|| self.source.error(ROOT, format!("has no data set “{path}”")))
+    fn set(&self, path: &str) -> Result<&StoredSet> {
+        let set = self.sets.iter().find(|set| set.path == path);
+        set.ok_or_else(|| self.source.error(ROOT, format!("has no data set “{path}”")))
     }
 
     /// Returns the numbers of a data set as indices.
@@ -209,8 +210,8 @@ impl<'a> DataSet<'a> {
         let times = if self.has_steps { set.shape.first().copied().unwrap_or(0) } else { 1 };
         let time = several::time(self.source, &place, times, options)?;
         let space: Vec<u64> = lattice.dims.iter().rev().map(|&n| n as u64).collect();
-        let own = set.shape.iter().skip(usize::from(self.has_steps)).take(3);
-        if !own.eq(space.iter()) {
+        let shape = set.shape.iter().skip(usize::from(self.has_steps)).take(3);
+        if !shape.eq(space.iter()) {
             let message = format!("has the shape {:?}, but {space:?} was expected", set.shape);
             return Err(self.source.error(place, message));
         }
@@ -358,8 +359,8 @@ impl<'a> DataSet<'a> {
         let candidate = chosen.map(|chosen| &self.arrays[chosen.array].1);
         let of_cells = candidate.is_some_and(|candidate| candidate.place == Place::Cells);
         let count = if of_cells { kinds.len() } else { points.len() };
-        let own = chosen.map(|chosen| self.values(chosen, count, options)).transpose()?;
-        let own = own.unwrap_or_default();
+        let numbers = chosen.map(|chosen| self.values(chosen, count, options)).transpose()?;
+        let numbers = numbers.unwrap_or_default();
         let place = if of_cells { CellPlace::Cells } else { CellPlace::Points };
         let mut cells = Cells { origin, points, place, ..Cells::default() };
         let (mut values, mut skipped) = (Vec::new(), 0usize);
@@ -370,14 +371,14 @@ impl<'a> DataSet<'a> {
                 None if matches!(kinds.get(cell), Some(5 | 7 | 9)) => {
                     cells.faces.push(nodes.iter().copied());
                     if of_cells {
-                        cells.faces.values.push(own[cell]);
+                        cells.faces.values.push(numbers[cell]);
                     }
                 }
                 Some(CellKind::Polyhedron) | None => skipped += 1,
                 Some(kind) => {
                     cells.push(kind, nodes.iter().copied());
                     if of_cells {
-                        values.push(own[cell]);
+                        values.push(numbers[cell]);
                     }
                 }
             }
@@ -391,7 +392,7 @@ impl<'a> DataSet<'a> {
                  polyhedra, are left out"
             );
         }
-        cells.values = if of_cells { values } else { own };
+        cells.values = if of_cells { values } else { numbers };
         cells.about.holes = cells.values.iter().filter(|value| value.is_nan()).count() as u64;
         if let (Some(chosen), Some(candidate)) = (chosen, candidate) {
             cells.about.name = chosen.part.caption(&candidate.name, candidate.components);

@@ -19,12 +19,12 @@ pub fn layout(header: &Header) -> String {
 
 /// Returns the numbers in the extra bytes of a point, in their order.
 pub fn extras(source: &Source, header: &Header) -> Vec<Extra> {
-    let mut found = Vec::new();
+    let mut extras = Vec::new();
     let mut at = SIZES[usize::from(header.format)];
-    let Some(bytes) = record(source, header, "LASF_Spec", 4) else { return found };
-    for own in bytes.chunks_exact(DESCRIPTION) {
-        let (kind, options) = (own[2], own[3]);
-        let name = copy::lossy(&own[4..36]);
+    let Some(bytes) = record(source, header, "LASF_Spec", 4) else { return extras };
+    for description in bytes.chunks_exact(DESCRIPTION) {
+        let (kind, options) = (description[2], description[3]);
+        let name = copy::lossy(&description[4..36]);
         let name = name.split('\0').next().unwrap_or_default().trim();
         // Bytes of no type; `options` is their number.
         if kind == 0 {
@@ -38,26 +38,26 @@ pub fn extras(source: &Source, header: &Header) -> Vec<Extra> {
         }
         for part in 0..count {
             let double = |start: usize| {
-                let bytes = own[start + 8 * part..].first_chunk();
+                let bytes = description[start + 8 * part..].first_chunk();
                 bytes.map_or(0.0, |bytes| f64::from_le_bytes(*bytes))
             };
             let has = |bit: u8| options >> bit & 1 == 1;
-            found.push(Extra {
+            extras.push(Extra {
                 name: if count == 1 { name.to_owned() } else { format!("{name}[{part}]") },
                 at,
                 kind,
                 scale: if has(3) { double(112) } else { 1.0 },
                 offset: if has(4) { double(136) } else { 0.0 },
-                missing: own[40 + 8 * part..].first_chunk().copied().filter(|_| has(0)),
+                missing: description[40 + 8 * part..].first_chunk().copied().filter(|_| has(0)),
             });
             at += Extra::SIZES[usize::from(kind)];
         }
     }
-    found.retain(|extra| {
+    extras.retain(|extra| {
         let size = Extra::SIZES[usize::from(extra.kind)];
         !extra.name.is_empty() && extra.at + size <= header.size
     });
-    found
+    extras
 }
 
 /// Returns the coordinate reference system: its code or its name; empty if the file does not say.
@@ -109,11 +109,11 @@ pub fn record(source: &Source, header: &Header, user: &str, number: u16) -> Opti
     for _ in 0..count.min(MOST_RECORDS) {
         let id = u16::from_le_bytes(field.at(at + 18).ok()?);
         let length = usize::from(u16::from_le_bytes(field.at(at + 20).ok()?));
-        let own = bytes.get(at + 2..at + 18)?;
+        let owner = bytes.get(at + 2..at + 18)?;
         let data = bytes.get(at + 54..at + 54 + length)?;
         let is_wanted = id == number
-            && own.starts_with(user.as_bytes())
-            && own.get(user.len()).is_none_or(|&byte| byte == 0);
+            && owner.starts_with(user.as_bytes())
+            && owner.get(user.len()).is_none_or(|&byte| byte == 0);
         if is_wanted {
             return Some(data.to_vec());
         }

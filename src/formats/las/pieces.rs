@@ -6,14 +6,14 @@ use super::{
         shared::{
             brightness::Brightness,
             cloud::{color_of_16_bits, grey},
-            found::Found,
+            raw_point::RawPoint,
         },
     },
     Header, Point, packed, plain_bytes,
 };
 use crate::{
     Error, Result,
-    about::{About, Stance},
+    about::{About, Orientation},
     input::{Source, positions},
     parallel::prelude::*,
 };
@@ -98,7 +98,7 @@ impl Pieces {
         Ok((first..).zip(points))
     }
 
-    fn look(&self, source: &Source, piece: usize) -> Result<Seen> {
+    fn scan(&self, source: &Source, piece: usize) -> Result<Seen> {
         let mut seen = Seen::nothing();
         for (row, point) in self.piece(source, piece)? {
             let position = self.header.position(&point);
@@ -125,8 +125,8 @@ impl Form for Pieces {
         [self.firsts.len(), 0]
     }
 
-    fn stance(&self) -> Option<Stance> {
-        Some(Stance::SURVEY)
+    fn orientation(&self) -> Option<Orientation> {
+        Some(Orientation::SURVEY)
     }
 
     fn bytes(&self, piece: usize) -> Range<usize> {
@@ -166,8 +166,8 @@ impl Form for Pieces {
             |piece| self.bytes(piece),
             |pieces| {
                 source.restart_time();
-                let look = |&piece: &usize| self.look(source, piece);
-                let more: Vec<Seen> = pieces.par_iter().map(look).collect::<Result<_>>()?;
+                let scan = |&piece: &usize| self.scan(source, piece);
+                let more: Vec<Seen> = pieces.par_iter().map(scan).collect::<Result<_>>()?;
                 more.into_iter().for_each(|more| seen.join(more));
                 source.release();
                 watch(seen.points);
@@ -203,7 +203,7 @@ impl Form for Pieces {
 
     fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>> {
         let settled = |(row, point): (usize, Point)| {
-            let found = Found {
+            let placed = RawPoint {
                 row,
                 position: self.header.position(&point),
                 normal: Vec3::ZERO,
@@ -214,7 +214,7 @@ impl Form for Pieces {
                     Paint::Grey { low, high } => grey(f32::from(point.intensity), low, high),
                 },
             };
-            StreamPoint::new(&found, origin)
+            StreamPoint::new(&placed, origin)
         };
         Ok(self.piece(source, piece)?.map(settled).collect())
     }
@@ -223,7 +223,7 @@ impl Form for Pieces {
         Ok((0, Vec::new()))
     }
 
-    fn vertex(&self, _: &Source, _: usize) -> Option<Found> {
+    fn vertex(&self, _: &Source, _: usize) -> Option<RawPoint> {
         None
     }
 

@@ -298,13 +298,13 @@ fn attributes_are_read_by_name() {
 #[test]
 fn extra_bytes_are_attributes_by_name() {
     let description = |kind: u8, options: u8, name: &str| {
-        let mut own = vec![0; 192];
-        (own[2], own[3]) = (kind, options);
-        own[4..4 + name.len()].copy_from_slice(name.as_bytes());
-        own[40..48].copy_from_slice(&255u64.to_le_bytes());
-        own[112..120].copy_from_slice(&0.001f64.to_le_bytes());
-        own[136..144].copy_from_slice(&10.0f64.to_le_bytes());
-        own
+        let mut record = vec![0; 192];
+        (record[2], record[3]) = (kind, options);
+        record[4..4 + name.len()].copy_from_slice(name.as_bytes());
+        record[40..48].copy_from_slice(&255u64.to_le_bytes());
+        record[112..120].copy_from_slice(&0.001f64.to_le_bytes());
+        record[136..144].copy_from_slice(&10.0f64.to_le_bytes());
+        record
     };
     let vlr = |user: &str, id: u16, data: &[u8]| {
         let mut head = vec![0; 54];

@@ -65,8 +65,8 @@ impl Times {
         context: u32,
     ) -> Result<i32> {
         let difference = self.differences.decompress(decoder, near, context)?;
-        let own = &mut self.sequences[self.current];
-        own.time = own.time.wrapping_add(difference.into());
+        let sequence = &mut self.sequences[self.current];
+        sequence.time = sequence.time.wrapping_add(difference.into());
         Ok(difference)
     }
 
@@ -79,10 +79,10 @@ impl Times {
         context: u32,
     ) -> Result<()> {
         let difference = self.step(decoder, near, context)?;
-        let own = &mut self.sequences[self.current];
-        own.jumps += 1;
-        if own.jumps > 3 {
-            (own.difference, own.jumps) = (difference, 0);
+        let sequence = &mut self.sequences[self.current];
+        sequence.jumps += 1;
+        if sequence.jumps > 3 {
+            (sequence.difference, sequence.jumps) = (difference, 0);
         }
         Ok(())
     }
@@ -109,8 +109,8 @@ impl Times {
                     0 => return Ok(()),
                     1 => {
                         let difference = self.step(decoder, 0, 0)?;
-                        let own = &mut self.sequences[self.current];
-                        (own.difference, own.jumps) = (difference, 0);
+                        let sequence = &mut self.sequences[self.current];
+                        (sequence.difference, sequence.jumps) = (difference, 0);
                         return Ok(());
                     }
                     2 => return self.begin(decoder),
@@ -187,14 +187,14 @@ mod tests {
             (random >> 33) % below
         };
         let mut bases = [1i64 << 60, 1 << 50, (1 << 40) + 5, 77];
-        let mut own = 0;
+        let mut current = 0;
         let mut times = Vec::new();
         for _ in 0..60_000 {
             if next(20) == 0 {
-                own = next(4) as usize;
+                current = next(4) as usize;
             }
-            let unit = 1000 * (own as i64 + 1);
-            bases[own] += match next(12) {
+            let unit = 1000 * (current as i64 + 1);
+            bases[current] += match next(12) {
                 0 => 0,
                 1 => next(1 << 31) as i64,
                 2 => -(next(1 << 30) as i64),
@@ -203,7 +203,7 @@ mod tests {
                 5 => (next(1 << 30) as i64) << 20,
                 _ => unit,
             };
-            times.push(bases[own]);
+            times.push(bases[current]);
         }
         let mut items = LazItemRecordBuilder::default_for_point_format_id(1, 0).expect("a format");
         assert_eq!((items[1].size(), items[1].version()), (8, 2));

@@ -32,7 +32,7 @@ pub struct Header {
     pub slope: f64,
     pub intercept: f64,
     /// The lowest and the highest value to show.
-    pub shown: [f64; 2],
+    pub window: [f64; 2],
     /// The codes of the units of lengths and of times.
     pub units: i64,
     /// Whether the rotation (“qform”) places the samples.
@@ -52,7 +52,7 @@ pub struct Header {
 /// order.
 fn version(bytes: &[u8]) -> Option<(usize, Endian)> {
     let size: [u8; 4] = *bytes.first_chunk()?;
-    let of = |size: u32| SIZES.iter().position(|&own| own as u32 == size);
+    let of = |size: u32| SIZES.iter().position(|&known| known as u32 == size);
     of(u32::from_le_bytes(size))
         .map(|version| (version, Endian::Little))
         .or_else(|| of(u32::from_be_bytes(size)).map(|version| (version, Endian::Big)))
@@ -182,7 +182,7 @@ impl Fields<'_> {
             start: self.float(108),
             slope: if is_analyze { 0.0 } else { self.float(112) },
             intercept: if is_analyze { 0.0 } else { self.float(116) },
-            shown: if is_analyze { [0.0; 2] } else { [self.float(128), self.float(124)] },
+            window: if is_analyze { [0.0; 2] } else { [self.float(128), self.float(124)] },
             units: if is_analyze { 0 } else { self.bytes[123].into() },
             has_rotation: of_nifti(self.short(252)),
             has_matrix: of_nifti(self.short(254)),
@@ -207,7 +207,7 @@ impl Fields<'_> {
             start: self.long(168) as f64,
             slope: self.double(176),
             intercept: self.double(184),
-            shown: [self.double(200), self.double(192)],
+            window: [self.double(200), self.double(192)],
             units: self.int(500),
             has_rotation: self.int(344) > 0,
             has_matrix: self.int(348) > 0,

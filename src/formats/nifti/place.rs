@@ -14,9 +14,9 @@ pub fn lattice(header: &Header, dims: [usize; 3]) -> (Lattice, bool) {
         let step = header.steps[axis + 1].abs();
         if step > 0.0 && step.is_finite() { step } else { 1.0 }
     }));
-    let found = matrix(header, dims).or_else(|| rotation(header, steps));
-    let is_stated = found.is_some();
-    let (axes, origin) = found.unwrap_or((DMat3::from_diagonal(steps), DVec3::ZERO));
+    let placement = matrix(header, dims).or_else(|| rotation(header, steps));
+    let is_stated = placement.is_some();
+    let (axes, origin) = placement.unwrap_or((DMat3::from_diagonal(steps), DVec3::ZERO));
     let scale = millimetres(header).unwrap_or(1.0);
     (Lattice::cartesian(dims, origin * scale, axes * scale), is_stated)
 }

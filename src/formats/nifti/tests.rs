@@ -155,7 +155,7 @@ fn every_type_in_both_versions_and_orders() {
             let volume = of(&bytes);
             assert_eq!(volume.lattice.dims, [3, 1, 2]);
             assert_eq!(values(&volume), [1.0, 2.0, 3.0, 4.0, 5.0, 100.0], "{name}");
-            assert!(volume.about.stance.is_none() && volume.about.length.is_empty());
+            assert!(volume.about.orientation.is_none() && volume.about.length.is_empty());
             assert!(is_nifti(&bytes) && is_nifti(&gzip(&bytes)));
         }
         let mut made = Made::new(second, big, 32, &[2, 1, 1]);
@@ -179,7 +179,7 @@ fn the_matrix_places_samples_then_the_rotation_then_the_steps() {
         (1..=3).for_each(|axis| made.step(axis, [0.5, 2.0, 4.0][axis - 1]));
         let lattice = |made: &Made| {
             let volume = of(&made.clone().values(SampleType::U8, "1 2 3 4 5 6 7 8"));
-            (volume.lattice.clone(), volume.about.stance.is_some())
+            (volume.lattice.clone(), volume.about.orientation.is_some())
         };
         let steps = DMat3::from_diagonal(DVec3::new(0.5, 2.0, 4.0));
         let expected = Lattice::cartesian([2; 3], DVec3::ZERO, steps);
@@ -187,10 +187,10 @@ fn the_matrix_places_samples_then_the_rotation_then_the_steps() {
         // Half a turn about z leaves no first number of the quaternion; slices are mirrored.
         made.rotation([0.0, 0.0, 1.0], [10.0, -20.0, 30.0]);
         made.step(0, -1.0);
-        let (found, is_stated) = lattice(&made);
+        let (placed, is_stated) = lattice(&made);
         let axes = DMat3::from_diagonal(DVec3::new(-0.5, -2.0, -4.0));
-        assert!(found.axes.abs_diff_eq(axes, 1e-15) && is_stated);
-        assert_eq!(found.origin, DVec3::new(10.0, -20.0, 30.0));
+        assert!(placed.axes.abs_diff_eq(axes, 1e-15) && is_stated);
+        assert_eq!(placed.origin, DVec3::new(10.0, -20.0, 30.0));
         // A turn by 2·acos(a) about (1, 2, 2) / 3.
         made.rotation([0.2, 0.4, 0.4], [0.0; 3]);
         made.step(0, 1.0);
@@ -198,10 +198,10 @@ fn the_matrix_places_samples_then_the_rotation_then_the_steps() {
         assert!(lattice(&made).0.axes.abs_diff_eq(turn * steps, 1e-6));
         // The matrix comes first, and may be sheared.
         made.matrix([[0.0, -1.0, 0.5, 7.0], [2.0, 0.0, 0.25, 8.0], [0.0, 0.0, 3.0, 9.0]]);
-        let (found, _) = lattice(&made);
+        let (placed, _) = lattice(&made);
         let [x, y, z] = [[0.0, 2.0, 0.0], [-1.0, 0.0, 0.0], [0.5, 0.25, 3.0]];
-        assert_eq!(found.axes, DMat3::from_cols_array_2d(&[x, y, z]));
-        assert_eq!(found.origin, DVec3::new(7.0, 8.0, 9.0));
+        assert_eq!(placed.axes, DMat3::from_cols_array_2d(&[x, y, z]));
+        assert_eq!(placed.origin, DVec3::new(7.0, 8.0, 9.0));
         // Unless it spans nothing.
         made.matrix([[0.0; 4]; 3]);
         assert!(lattice(&made).0.axes.abs_diff_eq(turn * steps, 1e-6));
@@ -249,9 +249,9 @@ fn times_components_and_slices() {
             assert_eq!(values(&read(&ReadOptions::default()).unwrap()), [1.0, 2.0]);
             assert_eq!(values(&read(&at(2)).unwrap()), [5.0, 6.0]);
         }
-        let told = message(&bytes, &at(3));
+        let text = message(&bytes, &at(3));
         assert!(
-            told.contains("has 3 times, but number 3 was asked for; choose a time from 0 to 2")
+            text.contains("has 3 times, but number 3 was asked for; choose a time from 0 to 2")
         );
         let mut made = Made::new(second, big, 2, &[2, 1, 1, 1, 3]);
         let bytes = made.values(SampleType::U8, "1 2 2 3 2 6");
@@ -303,9 +303,9 @@ fn pairs_are_found_from_either_file() {
         }
     }
     let missing = folder.write("c.img", [1, 2, 3, 4]);
-    let told = |error: Error| error.to_string();
+    let text = |error: Error| error.to_string();
     let error = read_with(&missing, |source| read(source, &ReadOptions::default())).unwrap_err();
-    assert!(told(error).contains("c.img: pair: refers to “c.hdr”"));
+    assert!(text(error).contains("c.img: pair: refers to “c.hdr”"));
     let layout = crate::formats::RawLayout {
         dims: [2, 2, 1],
         sample_type: SampleType::U8,
@@ -326,7 +326,7 @@ fn pairs_are_found_from_either_file() {
     let volume =
         read_with(&folder.path("d.hdr"), |source| read(source, &ReadOptions::default())).unwrap();
     assert_eq!((values(&volume), volume.lattice.axes.z_axis.z), (vec![1.0, 2.0], 7.0));
-    assert!(volume.about.stance.is_none());
+    assert!(volume.about.orientation.is_none());
 }
 
 #[test]
@@ -346,7 +346,7 @@ fn broken_files_are_told() {
             message(&made.bytes, &none)
         };
         let datatype = if second { 12 } else { 70 };
-        for (told, found) in [
+        for (error, part) in [
             (with(&|made| made.count(0, 9)), "dim[0]: the number of axes is 9"),
             (with(&|made| made.count(0, -1)), "the number of axes is -1, but 1 to 7"),
             (with(&|made| made.count(2, 0)), "dim[2]: counts 0 samples"),
@@ -355,7 +355,7 @@ fn broken_files_are_told() {
             (with(&|made| made.short(datatype, 1536)), "1536 (128-bit floats) is not a type"),
             (with(&|made| made.short(datatype, 77)), "77 is not a type that can be read"),
         ] {
-            assert!(told.contains(found), "{told}");
+            assert!(error.contains(part), "{error}");
         }
     }
     let mut made = Made::new(true, false, 2, &[1 << 40, 1 << 40, 1]);

@@ -39,8 +39,8 @@ impl Header {
         let field =
             |name: &str| field(&text, name).ok_or_else(|| wrong(format!("has no “{name}”")));
         let (element, endian) = number_type(field("descr")?).ok_or_else(|| {
-            let found: String = field("descr").unwrap_or_default().chars().take(80).collect();
-            wrong(format!("has the type {found}, but numbers were expected, such as '<f4'"))
+            let descr: String = field("descr").unwrap_or_default().chars().take(80).collect();
+            wrong(format!("has the type {descr}, but numbers were expected, such as '<f4'"))
                 .hint("write one array of numbers: numpy.save(file, array.astype('float32'))")
         })?;
         let is_fortran = match field("fortran_order")? {
@@ -50,8 +50,8 @@ impl Header {
         };
         let shape = field("shape")?;
         let sizes = sizes(shape).filter(|sizes| sizes.len() <= MOST_AXES).ok_or_else(|| {
-            let shown: String = shape.chars().take(80).collect();
-            wrong(format!("has the shape {shown}, but a tuple of sizes was expected"))
+            let shape: String = shape.chars().take(80).collect();
+            wrong(format!("has the shape {shape}, but a tuple of sizes was expected"))
         })?;
         Ok(Self { element, endian, is_fortran, shape: sizes, start })
     }

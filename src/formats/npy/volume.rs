@@ -30,7 +30,7 @@ pub struct Shaped {
     /// Sizes of the axes, the slowest first.
     pub sizes: Vec<u64>,
     /// The shape as the file's own tools write it, for messages.
-    pub shown: String,
+    pub shape_text: String,
     /// The place in the file, for messages.
     pub place: String,
     /// What the volumes along an axis before the three of space are, as in “times”, if the file
@@ -88,7 +88,7 @@ pub fn shaped(header: &Header, place: &str) -> Shaped {
         element: header.element,
         endian: header.endian,
         sizes,
-        shown: header.shape_text(),
+        shape_text: header.shape_text(),
         place: place.into(),
         outer: None,
     }
@@ -219,7 +219,7 @@ impl Shaped {
 
     fn wrong(&self, source: &Source) -> crate::Error {
         let message =
-            format!("has the shape {}, but (z, y, x) was expected for a volume", self.shown);
+            format!("has the shape {}, but (z, y, x) was expected for a volume", self.shape_text);
         source.error(&self.place, message)
     }
 }

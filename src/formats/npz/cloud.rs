@@ -52,7 +52,7 @@ impl Columns {
     pub fn of(entries: &[Entry]) -> Option<Self> {
         let is_triple = |&at: &usize| matches!(entries[at].header.shape[..], [_, 3]);
         let triples: Vec<usize> = (0..entries.len()).filter(is_triple).collect();
-        let only = |found: Vec<usize>| <[usize; 1]>::try_from(found).ok().map(|[at]| at);
+        let only = |arrays: Vec<usize>| <[usize; 1]>::try_from(arrays).ok().map(|[at]| at);
         let named = triples.iter().copied().filter(|&at| is_named(&entries[at].name, POSITIONS));
         // Three rows are rather a matrix.
         let unnamed = triples.iter().copied().filter(|&at| {

@@ -1,6 +1,6 @@
 //! Which axes of a file are those of space, and what a fourth one is.
 
-use super::{Header, shown};
+use super::{Header, excerpt};
 use crate::{
     Result,
     formats::{
@@ -175,7 +175,7 @@ fn is_several(kind: &str) -> bool {
 fn flat(header: &Header, kind: &str) -> crate::Error {
     let message = format!(
         "one of the 3 axes holds values of the kind “{}”, but a volume has 3 axes of space",
-        shown(kind)
+        excerpt(kind)
     );
     header.source.error("kinds", message).hint("pictures are not drawn; name a volume")
 }

@@ -1,6 +1,6 @@
 //! The data files of a detached header: one, a list, or a pattern with a number.
 
-use super::shown;
+use super::excerpt;
 use crate::{
     Error, Result,
     input::{Source, copy},
@@ -32,7 +32,7 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
         Some(Ok(axes @ 1..=3)) => axes,
         Some(_) => {
             let message = "must end with 1, 2 or 3, the number of axes in a file";
-            return Err(wrong(source, format!("“{}” {message}", shown(field))));
+            return Err(wrong(source, format!("“{}” {message}", excerpt(field))));
         }
     };
     let wanted: usize = dims[axes..].iter().product();
@@ -64,7 +64,7 @@ fn listed<'a>(
     let mut words = field.split_ascii_whitespace().skip(1);
     let (axes, None) = (words.next(), words.next()) else {
         let message = "is not “LIST” followed by the number of axes in a file";
-        return Err(wrong(source, format!("“{}” {message}", shown(field))));
+        return Err(wrong(source, format!("“{}” {message}", excerpt(field))));
     };
     if rest.len() > super::LONGEST {
         let message = format!("the list of files is longer than {} bytes", super::LONGEST);
@@ -86,13 +86,13 @@ fn numbered<'a>(
 ) -> Result<(Vec<String>, Option<&'a str>)> {
     let count = pattern.count().ok_or_else(|| {
         let message = "names no files: its step does not lead from the first number to the last";
-        wrong(source, format!("“{}” {message}", shown(field)))
+        wrong(source, format!("“{}” {message}", excerpt(field)))
     })?;
     // Each file contains at least one sample.
     if count > dims.iter().product::<usize>() as u64 {
         return Err(wrong(
             source,
-            format!("“{}” counts {count} files, more than there are samples", shown(field)),
+            format!("“{}” counts {count} files, more than there are samples", excerpt(field)),
         ));
     }
     source.spend(

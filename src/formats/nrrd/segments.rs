@@ -20,14 +20,14 @@ pub fn table(keys: &HashMap<String, String>) -> Option<Vec<Label>> {
     }
     for (number, name, value) in places {
         // Older files have no values: segments are numbered from 1 on.
-        let own = segments.entry(number).or_insert_with(|| Label {
+        let label = segments.entry(number).or_insert_with(|| Label {
             value: number.saturating_add(1) as i32,
             ..Label::default()
         });
         match name {
-            "LabelValue" => own.value = value.trim().parse().unwrap_or(own.value),
-            "Name" => value.trim().clone_into(&mut own.name),
-            "Color" => own.color = color(value).or(own.color),
+            "LabelValue" => label.value = value.trim().parse().unwrap_or(label.value),
+            "Name" => value.trim().clone_into(&mut label.name),
+            "Color" => label.color = color(value).or(label.color),
             _ => {}
         }
     }

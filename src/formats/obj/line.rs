@@ -45,12 +45,12 @@ impl Lines {
                         let vertex = vertex(word, before)
                             .map_err(|message| source.error(format!("line {number}"), message))?;
                         let next = lines.vertices.len() as u32;
-                        let own = *numbers.entry(vertex).or_insert(next);
-                        if own == next {
+                        let index = *numbers.entry(vertex).or_insert(next);
+                        if index == next {
                             lines.vertices.push(vertex);
                         }
-                        lines.ends.extend(last.map(|last| [last, own]));
-                        last = Some(own);
+                        lines.ends.extend(last.map(|last| [last, index]));
+                        last = Some(index);
                     }
                 }
                 _ => {}

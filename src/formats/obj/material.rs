@@ -73,8 +73,8 @@ impl<'a, 'b> Library<'a, 'b> {
             match word {
                 "Kd" | "Ke" => match (color(rest), word) {
                     (None, _) => self.damaged(&file, number, line),
-                    (found, "Kd") => material.diffuse = found,
-                    (Some(found), _) if found.iter().any(|&part| part > 0.0) => self.idle(word),
+                    (color, "Kd") => material.diffuse = color,
+                    (Some(color), _) if color.iter().any(|&part| part > 0.0) => self.idle(word),
                     _ => {}
                 },
                 "d" | "Tr" => {
@@ -112,8 +112,8 @@ impl<'a, 'b> Library<'a, 'b> {
     /// Keeps a damaged line, which is left out.
     fn damaged(&mut self, file: &Source, number: usize, line: &str) {
         self.damaged.get_or_insert_with(|| {
-            let shown: String = line.chars().take(40).collect();
-            format!("{}: line {number}: “{shown}” is not valid", file.path.display())
+            let text: String = line.chars().take(40).collect();
+            format!("{}: line {number}: “{text}” is not valid", file.path.display())
         });
     }
 
@@ -134,7 +134,8 @@ impl<'a, 'b> Library<'a, 'b> {
         let place = format!("material “{}”", material.name);
         let color = material.diffuse_texture.as_deref().map(Reference::of);
         let mask = material.dissolve_texture.as_deref().map(Reference::of);
-        let shift = color.as_ref().or(mask.as_ref()).map_or(Shift::NONE, |own| own.shift);
+        let shift =
+            color.as_ref().or(mask.as_ref()).map_or(Shift::NONE, |reference| reference.shift);
         for reference in color.iter().chain(&mask) {
             reference.idle.iter().for_each(|option| self.idle(option));
         }
@@ -169,7 +170,8 @@ impl<'a, 'b> Library<'a, 'b> {
         place: &str,
         reference: Option<&Reference>,
     ) -> Result<Option<Arc<Texture>>> {
-        let Some(Reference { name, .. }) = reference.filter(|own| !own.name.is_empty()) else {
+        let Some(Reference { name, .. }) = reference.filter(|reference| !reference.name.is_empty())
+        else {
             return Ok(None);
         };
         if let Some(known) = self.pictures.get(name) {
@@ -257,7 +259,7 @@ struct Reference {
 
 impl Reference {
     fn of(statement: &str) -> Self {
-        let mut own = Self { name: String::new(), shift: Shift::NONE, idle: Vec::new() };
+        let mut reference = Self { name: String::new(), shift: Shift::NONE, idle: Vec::new() };
         let mut rest = statement.trim();
         while let Some(option) = rest.strip_prefix('-') {
             let (name, mut tail) = option.split_once(char::is_whitespace).unwrap_or((option, ""));
@@ -281,11 +283,11 @@ impl Reference {
                 values.push(value);
                 tail = after;
             }
-            own.apply(name, &values);
+            reference.apply(name, &values);
             rest = tail.trim();
         }
-        own.name = rest.trim_matches('"').to_owned();
-        own
+        reference.name = rest.trim_matches('"').to_owned();
+        reference
     }
 
     /// Applies an option. Missing numbers keep their default.

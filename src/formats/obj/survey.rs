@@ -174,9 +174,9 @@ impl Scan {
                 is_placed &= number.is_finite();
                 continue;
             }
-            let shown: String = word.chars().take(40).collect();
+            let text: String = word.chars().take(40).collect();
             return Err(source
-                .error(place, format!("“{shown}” is not a number"))
+                .error(place, format!("“{text}” is not a number"))
                 .hint("write numbers with a decimal point, not a comma"));
         }
         self.survey.unplaced += u64::from(!is_placed);

@@ -107,8 +107,10 @@ pub fn read(source: &Source) -> Result<Header> {
         // The name in versions up to 0.5.
         let name = if name == "COLUMNS" { "FIELDS" } else { name };
         let Some(entry) = ENTRIES.iter().position(|entry| *entry == name) else {
-            let shown: String = name.chars().take(40).collect();
-            return Err(source.error(place(), format!("“{shown}” is not an entry of a PCD header")));
+            let excerpt: String = name.chars().take(40).collect();
+            return Err(
+                source.error(place(), format!("“{excerpt}” is not an entry of a PCD header"))
+            );
         };
         words[entry] = parts.map(str::to_owned).collect();
         if entry == DATA {
@@ -195,8 +197,8 @@ impl Entries<'_> {
     fn fields(&self) -> Result<Vec<Field>> {
         let names = &self.words[FIELDS];
         for entry in [SIZE, TYPE, COUNT] {
-            let found = self.words[entry].len();
-            if found != names.len() && !(entry == COUNT && found == 0) {
+            let count = self.words[entry].len();
+            if count != names.len() && !(entry == COUNT && count == 0) {
                 let message = format!("does not fit the {} fields", names.len());
                 return Err(self.wrong(entry, &message));
             }

@@ -188,10 +188,10 @@ impl Table<'_> {
             self.source.spend("the size of a polygon in bytes", OF_CORNER * corners as u64)?;
         }
         // Faces without coordinates may occur among faces that have them.
-        let found = row.uvs.len();
-        if self.columns.uvs.is_some() && found != 0 && found != 2 * corners {
+        let numbers = row.uvs.len();
+        if self.columns.uvs.is_some() && numbers != 0 && numbers != 2 * corners {
             let message = format!(
-                "has {found} texture coordinates for {corners} corners, which need {}",
+                "has {numbers} texture coordinates for {corners} corners, which need {}",
                 2 * corners
             );
             return Err(self.wrong(index, message));
@@ -282,33 +282,33 @@ impl Faces {
     /// coordinates becomes several vertices.
     pub fn give(mut self, source: &Source, mesh: &mut Mesh) -> Result<()> {
         if self.have_uvs() {
-            let mut own: Vec<Option<Vec2>> = Vec::new();
+            let mut vertex_uvs: Vec<Option<Vec2>> = Vec::new();
             source.room::<(Option<Vec2>, Vec2)>("the texture coordinates", mesh.positions.len())?;
-            own.resize(mesh.positions.len(), None);
+            vertex_uvs.resize(mesh.positions.len(), None);
             let mut others: HashMap<(u32, [u32; 2]), u32> = HashMap::new();
             for (triangle, uvs) in self.triangles.iter_mut().zip(&self.uvs) {
                 for (index, &uv) in triangle.iter_mut().zip(uvs) {
-                    let known = *own[*index as usize].get_or_insert(uv);
+                    let known = *vertex_uvs[*index as usize].get_or_insert(uv);
                     let bits = uv.to_array().map(f32::to_bits);
                     if known.to_array().map(f32::to_bits) == bits {
                         continue;
                     }
-                    let count = own.len() as u32;
+                    let count = vertex_uvs.len() as u32;
                     let other = *others.entry((*index, bits)).or_insert(count);
                     if other == count {
                         source.spend("the size of the vertices at seams in bytes", 128)?;
-                        own.push(Some(uv));
+                        vertex_uvs.push(Some(uv));
                         copy(mesh, *index as usize);
                         source.check_points(
                             "the number of vertices including those at seams",
-                            own.len() as u64,
+                            vertex_uvs.len() as u64,
                         )?;
                     }
                     *index = other;
                 }
             }
             // In PLY, v = 0 is the bottom of the picture.
-            mesh.uvs = own
+            mesh.uvs = vertex_uvs
                 .iter()
                 .map(|uv| uv.unwrap_or_default())
                 .map(|uv| Vec2::new(uv.x, 1.0 - uv.y))

@@ -63,7 +63,7 @@ impl Element {
                 .iter()
                 .find_map(|name| self.columns.iter().position(|column| is(&column.name, name)))
         };
-        find(&|own, name| own == name).or_else(|| find(&str::eq_ignore_ascii_case))
+        find(&|column, name| column == name).or_else(|| find(&str::eq_ignore_ascii_case))
     }
 }
 
@@ -165,8 +165,8 @@ impl Clean {
             ["comment" | "obj_info", ..] => self.text.push_str("comment\n"),
             ["element", name, count] => {
                 if count.parse::<usize>().is_err() {
-                    let shown: String = count.chars().take(40).collect();
-                    return Err(format!("“{shown}” is not a row count"));
+                    let excerpt: String = count.chars().take(40).collect();
+                    return Err(format!("“{excerpt}” is not a row count"));
                 }
                 self.text.push_str(&format!("element e{} {count}\n", self.names.len()));
                 let known = KNOWN.iter().find(|known| known.eq_ignore_ascii_case(name));

@@ -4,7 +4,7 @@
 use super::{
     super::{
         form::{Coloring, Counts, Form, StreamPoint, in_order},
-        shared::{found::Found, unplaced},
+        shared::{raw_point::RawPoint, unplaced},
     },
     Brightest, COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale,
     column_named, gaussians,
@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     Result,
-    about::{About, Stance},
+    about::{About, Orientation},
     input::{Source, positions},
 };
 use glam::{DVec3, Vec3};
@@ -141,28 +141,28 @@ impl Pieces {
     }
 
     /// Returns a vertex, converted as by the reader of whole files.
-    fn vertex(&self, source: &Source, row: usize) -> Found {
+    fn vertex(&self, source: &Source, row: usize) -> RawPoint {
         let value = |role: usize| self.value(source, row, role);
-        let mut found = Found {
+        let mut vertex = RawPoint {
             row,
             position: self.position(source, row),
             normal: Vec3::ZERO,
             color: [255; 4],
         };
         if self.has_normals {
-            found.normal = positions::unit(Vec3::from_array(
+            vertex.normal = positions::unit(Vec3::from_array(
                 [0, 1, 2].map(|axis| value(NORMAL + axis) as f32),
             ));
         }
         if self.has_colors {
-            found.color = color(self.vertices.color_scale, |channel| value(COLOR + channel));
+            vertex.color = color(self.vertices.color_scale, |channel| value(COLOR + channel));
         }
         if let Some((offset, kind)) = &self.value {
             let Rows { at, stride, big, .. } = self.vertices.rows;
             let bytes = &source.bytes()[at + row * stride + offset..];
-            found.color = (number(bytes, kind, big) as f32).to_le_bytes();
+            vertex.color = (number(bytes, kind, big) as f32).to_le_bytes();
         }
-        found
+        vertex
     }
 
     /// Returns the triangles of a piece, and the index of the first one.
@@ -213,7 +213,7 @@ impl Form for Pieces {
         [self.points(), self.triangles()].map(|count| count.div_ceil(ROWS))
     }
 
-    fn stance(&self) -> Option<Stance> {
+    fn orientation(&self) -> Option<Orientation> {
         None
     }
 
@@ -308,7 +308,7 @@ impl Form for Pieces {
         self.triangle_piece(source, piece)
     }
 
-    fn vertex(&self, source: &Source, index: usize) -> Option<Found> {
+    fn vertex(&self, source: &Source, index: usize) -> Option<RawPoint> {
         Some(self.vertex(source, index))
     }
 
@@ -339,13 +339,13 @@ fn locate<'h>(source: &Source, header: &'h Header, big: bool) -> Result<Option<L
         let left = source.bytes().len() - at;
         if is_face && element.count > 0 {
             let rows = Rows { at, count: element.count.min(left / stride), stride, big };
-            let (None, Some(found)) = (&located.faces, Faces::find(element, rows)) else {
+            let (None, Some(faces)) = (&located.faces, Faces::find(element, rows)) else {
                 return Ok(None);
             };
-            if !found.are_triangles(source) {
+            if !faces.are_triangles(source) {
                 return Ok(None);
             }
-            located.faces = Some(found);
+            located.faces = Some(faces);
         }
         let size = element.count.checked_mul(stride).filter(|&size| size <= left);
         let Some(size) = size else { return Err(cut(source, element, left / stride)) };
@@ -387,14 +387,14 @@ impl Faces {
     /// Returns whether sampled faces across the whole file have three corners. After a face with
     /// another number, no row is at its expected offset.
     fn are_triangles(&self, source: &Source) -> bool {
-        const LOOKS: usize = 1 << 10;
+        const PROBES: usize = 1 << 10;
         let Rows { at, count, stride, big } = self.rows;
-        let looks = LOOKS.min(count);
-        let row = |look: usize| {
-            look as u128 * (count - 1) as u128 / looks.saturating_sub(1).max(1) as u128
+        let probes = PROBES.min(count);
+        let row = |probe: usize| {
+            probe as u128 * (count - 1) as u128 / probes.saturating_sub(1).max(1) as u128
         };
-        (0..looks).all(|look| {
-            let start = at + row(look) as usize * stride + self.length.0;
+        (0..probes).all(|probe| {
+            let start = at + row(probe) as usize * stride + self.length.0;
             number(&source.bytes()[start..], &self.length.1, big) == 3.0
         })
     }

@@ -99,9 +99,9 @@ impl<'a> Rows<'a> {
             for column in &element.columns {
                 next = end_of(rest, next, &column.kind, big).map_err(|problem| match problem {
                     Problem::Cut => cut(source, element, row),
-                    Problem::Length(found) => source.error(
+                    Problem::Length(length) => source.error(
                         format!("element “{}”, row {row}, byte {}", element.name, *at + next),
-                        format!("the list “{}” has the impossible length {found}", column.name),
+                        format!("the list “{}” has the impossible length {length}", column.name),
                     ),
                 })?;
             }

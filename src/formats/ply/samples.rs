@@ -72,8 +72,8 @@ pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
 /// meaning.
 pub(super) fn attributes(element: &Element) -> Vec<String> {
     let (candidates, _) = candidates(element);
-    let own = candidates.into_iter().filter(|candidate| candidate.role != Role::Geometry);
-    own.map(|candidate| candidate.name).collect()
+    let attributes = candidates.into_iter().filter(|candidate| candidate.role != Role::Geometry);
+    attributes.map(|candidate| candidate.name).collect()
 }
 
 /// Returns the property of the vertices that a caller names, and its values.
@@ -131,7 +131,7 @@ fn candidates(element: &Element) -> (Vec<Candidate>, Vec<usize>) {
                 && ROLES[group]
                     .iter()
                     .flat_map(|names| *names)
-                    .any(|own| own.eq_ignore_ascii_case(name))
+                    .any(|alias| alias.eq_ignore_ascii_case(name))
         });
         of_group || name == RADIUS || COVARIANCE.contains(&name)
     };

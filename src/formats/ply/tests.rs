@@ -340,8 +340,8 @@ fn large_coordinates_keep_their_precision() {
     let points = [[4_500_000.125, 5_600_000.25, 100.0], [4_500_001.375, 5_600_002.5, 101.0]];
     points.iter().flatten().for_each(|&v| put(&mut file, "double", v, false));
     let mesh = load(file).expect("loads");
-    for (own, point) in mesh.positions.iter().zip(points) {
-        assert_eq!(mesh.origin + own.as_dvec3(), DVec3::from_array(point));
+    for (position, point) in mesh.positions.iter().zip(points) {
+        assert_eq!(mesh.origin + position.as_dvec3(), DVec3::from_array(point));
     }
     assert_eq!(mesh.origin, mesh.origin.round());
 }

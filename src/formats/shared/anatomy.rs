@@ -2,7 +2,7 @@
 //! the head (RAS, as NIfTI has it).
 
 use crate::{
-    about::{About, Frame, Stance},
+    about::{About, Frame, Orientation},
     input::copy,
     surface::Mesh,
     volume::{Lattice, Volume},
@@ -72,12 +72,11 @@ impl Anatomy {
         self.describe(&mut mesh.about);
     }
 
-    /// Turns the stance that a reader has found, or sets that of a patient.
+    /// Turns the orientation that a reader has found, or sets that of a patient.
     fn describe(&self, about: &mut About) {
         about.frame = Frame::Patient;
-        about.stance = Some(about.stance.map_or(Stance::RAS, |stance| Stance {
-            up: self.turn * stance.up,
-            front: self.turn * stance.front,
+        about.orientation = Some(about.orientation.map_or(Orientation::RAS, |orientation| {
+            Orientation { up: self.turn * orientation.up, front: self.turn * orientation.front }
         }));
     }
 }

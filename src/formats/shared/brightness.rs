@@ -33,7 +33,7 @@ impl Brightness {
     /// Adds other colours of the same file.
     pub fn with(mut self, other: Self) -> Self {
         self.colors += other.colors;
-        self.above.iter_mut().zip(other.above).for_each(|(own, other)| *own += other);
+        self.above.iter_mut().zip(other.above).for_each(|(count, other)| *count += other);
         self.largest = self.largest.max(other.largest);
         self
     }

@@ -197,8 +197,8 @@ pub(crate) fn named(source: &Source, candidates: &[Candidate], wanted: &str) -> 
         _ => (None, wanted),
     };
     let whole = |array: usize| Chosen { array, part: candidates[array].whole() };
-    let found = find(candidates, None, wanted).or_else(|| find(candidates, place, name));
-    let chosen = match (found, name.rsplit_once(':')) {
+    let array = find(candidates, None, wanted).or_else(|| find(candidates, place, name));
+    let chosen = match (array, name.rsplit_once(':')) {
         (Some(array), _) => whole(array),
         (None, Some((name, part))) => {
             let array =
@@ -286,17 +286,18 @@ pub(crate) fn needed(
 
 fn find(candidates: &[Candidate], place: Option<Place>, name: &str) -> Option<usize> {
     let here = |candidate: &&Candidate| place.is_none_or(|place| candidate.place == place);
-    let exact = candidates.iter().position(|own| here(&own) && own.name == name);
+    let exact = candidates.iter().position(|candidate| here(&candidate) && candidate.name == name);
     exact.or_else(|| {
         // CloudCompare writes names with a word before them.
-        let like = |own: &Candidate| {
-            let plain = own.name.strip_prefix("scalar_").unwrap_or(&own.name);
-            here(&own) && (own.name.eq_ignore_ascii_case(name) || plain.eq_ignore_ascii_case(name))
+        let like = |candidate: &Candidate| {
+            let plain = candidate.name.strip_prefix("scalar_").unwrap_or(&candidate.name);
+            here(&candidate)
+                && (candidate.name.eq_ignore_ascii_case(name) || plain.eq_ignore_ascii_case(name))
         };
         let first = candidates.iter().position(like)?;
         let others = candidates[first + 1..]
             .iter()
-            .any(|own| like(own) && own.name != candidates[first].name);
+            .any(|candidate| like(candidate) && candidate.name != candidates[first].name);
         (!others).then_some(first)
     })
 }

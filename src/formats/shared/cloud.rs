@@ -147,7 +147,7 @@ mod tests {
         assert!(colors_of_16_bits(&[[0; 3]; 4]).is_empty());
         let mut colors = vec![[0, 128, 255]; 500];
         colors.push([9, 9, 40_000]);
-        let found = colors_of_16_bits(&colors);
-        assert_eq!((found[0], found[500]), ([0, 128, 255, 255], [9, 9, 255, 255]));
+        let converted = colors_of_16_bits(&colors);
+        assert_eq!((converted[0], converted[500]), ([0, 128, 255, 255], [9, 9, 255, 255]));
     }
 }

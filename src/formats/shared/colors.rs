@@ -36,10 +36,12 @@ pub(crate) fn attach(volume: &mut Volume, colors: Arc<[[u8; 4]]>) {
 pub(crate) fn of_channels(source: &Source, channels: &[Samples]) -> Result<Arc<[[u8; 4]]>> {
     let count = channels.iter().map(Samples::len).min().unwrap_or(0);
     source.spend("the size of the colours in bytes", 4 * count as u64)?;
-    let are_bytes = channels.iter().all(|own| matches!(own, Samples::U8(_)));
+    let are_bytes = channels.iter().all(|samples| matches!(samples, Samples::U8(_)));
     let largest = channels
         .iter()
-        .map(|own| (0..count).into_par_iter().map(|at| own.value(at)).reduce(|| 0.0, f64::max))
+        .map(|samples| {
+            (0..count).into_par_iter().map(|at| samples.value(at)).reduce(|| 0.0, f64::max)
+        })
         .fold(0.0, f64::max);
     let scale = match largest {
         _ if are_bytes => 1.0,
@@ -47,9 +49,11 @@ pub(crate) fn of_channels(source: &Source, channels: &[Samples]) -> Result<Arc<[
         _ if largest > 1.0 => 1.0,
         _ => 255.0,
     };
-    let byte = |own: &Samples, at: usize| (own.value(at) * scale).round() as u8;
+    let byte = |samples: &Samples, at: usize| (samples.value(at) * scale).round() as u8;
     let color = |at: usize| {
-        std::array::from_fn(|channel| channels.get(channel).map_or(255, |own| byte(own, at)))
+        std::array::from_fn(|channel| {
+            channels.get(channel).map_or(255, |samples| byte(samples, at))
+        })
     };
     Ok((0..count).into_par_iter().map(color).collect::<Vec<_>>().into())
 }

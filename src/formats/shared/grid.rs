@@ -297,8 +297,8 @@ fn rounded<T: Send>(values: Vec<f32>, turn: impl Fn(f32) -> T + Sync) -> Vec<T> 
 }
 
 /// Returns the error for a block that is cut off.
-pub fn too_few(source: &Source, found: usize, expected: usize) -> Error {
-    source.error("data", format!("there are {found} bytes where {expected} were expected"))
+pub fn too_few(source: &Source, bytes: usize, expected: usize) -> Error {
+    source.error("data", format!("there are {bytes} bytes where {expected} were expected"))
 }
 
 impl Component {
@@ -440,7 +440,7 @@ mod tests {
         let choose = |name: Option<&str>, count, colors| {
             with(|source| Component::chosen(source, &ReadOptions::scalar(name), count, colors))
         };
-        for (name, count, colors, found) in [
+        for (name, count, colors, expected) in [
             (None, 1, false, Component::One(0)),
             (None, 3, false, Component::Magnitude),
             (None, 3, true, Component::Color),
@@ -452,7 +452,7 @@ mod tests {
             (Some("2"), 3, true, Component::One(2)),
             (Some("blue"), 3, true, Component::One(2)),
         ] {
-            assert_eq!(choose(name, count, colors).unwrap(), found, "{name:?}");
+            assert_eq!(choose(name, count, colors).unwrap(), expected, "{name:?}");
         }
         let error = choose(Some("pressure"), 3, false).unwrap_err().to_string();
         assert!(error.contains("“pressure”; each sample has 3 components"), "{error}");

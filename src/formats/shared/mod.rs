@@ -7,7 +7,6 @@ pub(super) mod brightness;
 pub(super) mod choice;
 pub(super) mod cloud;
 pub(super) mod colors;
-pub(super) mod found;
 pub(super) mod gather;
 pub(super) mod grid;
 pub(super) mod holes;
@@ -16,6 +15,7 @@ pub(super) mod length;
 pub(super) mod luminance;
 pub(super) mod plain;
 pub(super) mod polygon;
+pub(super) mod raw_point;
 pub(super) mod rescale;
 pub(super) mod sample_type;
 pub(super) mod several;
@@ -31,12 +31,12 @@ const MOST_LISTED: usize = 20;
 /// Returns names as a list for messages: the first of them, and the number of the others.
 pub(super) fn listing(names: impl ExactSizeIterator<Item = String>) -> String {
     let count = names.len();
-    let shown: Vec<String> = names.take(MOST_LISTED).collect();
+    let listed: Vec<String> = names.take(MOST_LISTED).collect();
     match count {
         0 => "nothing that can be read".into(),
         _ if count > MOST_LISTED => {
-            format!("{} and {} more", shown.join("; "), count - MOST_LISTED)
+            format!("{} and {} more", listed.join("; "), count - MOST_LISTED)
         }
-        _ => shown.join("; "),
+        _ => listed.join("; "),
     }
 }

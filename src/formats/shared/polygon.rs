@@ -173,7 +173,7 @@ impl Ring {
             steps: 0,
             points,
         };
-        (0..count).for_each(|at| ring.look(at));
+        (0..count).for_each(|at| ring.update(at));
         ring
     }
 
@@ -248,12 +248,12 @@ impl Ring {
         let (before, after) = (self.before[at], self.after[at]);
         (self.after[before], self.before[after], self.start) = (after, before, after);
         (self.before[at], self.after[at], self.concave[at]) = (at, at, false);
-        self.look(before);
-        self.look(after);
+        self.update(before);
+        self.update(after);
     }
 
     /// Updates whether a corner is concave.
-    fn look(&mut self, at: usize) {
+    fn update(&mut self, at: usize) {
         let concave = self.turn(at) <= 0.0;
         if concave && !self.concave[at] {
             let [column, row] = self.square(self.points[at]);

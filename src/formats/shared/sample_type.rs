@@ -216,14 +216,17 @@ fn parse<const N: usize, T: std::str::FromStr>(
             return Err(format!("there are more than the {count} numbers expected"));
         }
         let number = word.parse().map_err(|_| {
-            let shown: String = word.chars().take(40).collect();
-            format!("number {i} is “{shown}”, which is not a valid {}", std::any::type_name::<T>())
+            let excerpt: String = word.chars().take(40).collect();
+            format!(
+                "number {i} is “{excerpt}”, which is not a valid {}",
+                std::any::type_name::<T>()
+            )
         })?;
         bytes.extend_from_slice(&write(number));
     }
-    let found = bytes.len() / N;
-    if found < count {
-        return Err(format!("there are {found} numbers where {count} were expected"));
+    let numbers = bytes.len() / N;
+    if numbers < count {
+        return Err(format!("there are {numbers} numbers where {count} were expected"));
     }
     Ok(bytes)
 }

@@ -34,8 +34,8 @@ pub(crate) fn check(source: &Source) -> Result<()> {
     }
     let first = &source.bytes()[..source.bytes().len().min(LOOKED_AT)];
     let begins = |word: &&str| {
-        let own = first.trim_ascii_start();
-        own.get(..word.len()).is_some_and(|own| own.eq_ignore_ascii_case(word.as_bytes()))
+        let text = first.trim_ascii_start();
+        text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes()))
     };
     match STAND_INS.iter().find(|(words, ..)| words.iter().any(begins)) {
         Some((_, what, hint)) => Err(source.error("file", format!("is {what}")).hint(*hint)),
@@ -51,17 +51,17 @@ mod tests {
 
     #[test]
     fn what_stands_in_is_told() {
-        let told = |text: &str| {
+        let message = |text: &str| {
             let limits = Limits::default();
             let source = Source::from_bytes(Path::new("a.ply"), text.as_bytes(), &limits).unwrap();
             check(&source).err().map(|error| error.to_string())
         };
         let lfs = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
-        assert!(told(lfs).unwrap().contains("Git LFS"));
-        assert!(told("/annex/objects/SHA256E-s1--4d7a.ply\n").unwrap().contains("git-annex"));
-        assert!(told("\n<!DOCTYPE HTML>\n<html>404").unwrap().contains("web page"));
+        assert!(message(lfs).unwrap().contains("Git LFS"));
+        assert!(message("/annex/objects/SHA256E-s1--4d7a.ply\n").unwrap().contains("git-annex"));
+        assert!(message("\n<!DOCTYPE HTML>\n<html>404").unwrap().contains("web page"));
         assert_eq!(
-            [told("ply\nformat ascii 1.0\n"), told(""), told("<?xml?>")],
+            [message("ply\nformat ascii 1.0\n"), message(""), message("<?xml?>")],
             [None, None, None]
         );
     }

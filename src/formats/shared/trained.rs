@@ -116,7 +116,7 @@ fn leave_out_broken(
     colors: &mut Vec<[f32; 3]>,
     terms: usize,
 ) -> Result<Broken> {
-    let count = |fault| faults.iter().filter(|own| **own == Some(fault)).count() as u64;
+    let count = |fault| faults.iter().filter(|other| **other == Some(fault)).count() as u64;
     let broken = Broken {
         not_finite: count(Fault::NotFinite),
         without_rotation: count(Fault::WithoutRotation),
@@ -137,8 +137,8 @@ fn leave_out_broken(
             source.path.display(),
             broken.all()
         );
-        let mut own = faults.iter();
-        all.retain(|_| own.next().is_some_and(Option::is_none));
+        let mut each_fault = faults.iter();
+        all.retain(|_| each_fault.next().is_some_and(Option::is_none));
         let mut each = faults.iter().flat_map(|fault| std::iter::repeat_n(fault, terms));
         colors.retain(|_| each.next().is_some_and(Option::is_none));
     }

@@ -67,7 +67,7 @@ pub fn open<'a>(source: &'a Source) -> Result<(String, Files<'a>)> {
         return Ok((source.small_text("a meta.json", MOST_META)?, Files::Folder));
     }
     let mut archive = isolated(source, "archive", || {
-        ZipArchive::new(Cursor::new(source.bytes())).map_err(|error| told(source, &error))
+        ZipArchive::new(Cursor::new(source.bytes())).map_err(|error| zip_error(source, &error))
     })?;
     if archive.index_for_name(META).is_none() {
         if archive.index_for_name("lod-meta.json").is_some() {
@@ -82,7 +82,7 @@ pub fn open<'a>(source: &'a Source) -> Result<(String, Files<'a>)> {
     Ok((text, Files::Archive(archive)))
 }
 
-fn told(source: &Source, error: &ZipError) -> crate::Error {
+fn zip_error(source: &Source, error: &ZipError) -> crate::Error {
     source.error("archive", format!("is not a ZIP archive that can be read: {error}"))
 }
 
@@ -96,10 +96,10 @@ fn entry(
 ) -> Result<Vec<u8>> {
     isolated(source, place, || {
         let Some(index) = archive.index_for_name(name) else {
-            let message = format!("refers to “{}”, which is not in the archive", shown(name));
+            let message = format!("refers to “{}”, which is not in the archive", excerpt(name));
             return Err(source.error(place, message));
         };
-        let file = archive.by_index(index).map_err(|error| told(source, &error))?;
+        let file = archive.by_index(index).map_err(|error| zip_error(source, &error))?;
         let size = source.check_bytes("the size of a file in bytes", file.size())?;
         if size > most {
             let message = format!("has {size} bytes, but may have at most {most}");
@@ -110,7 +110,7 @@ fn entry(
 }
 
 /// Returns the first characters of a name, for an error.
-fn shown(name: &str) -> String {
+fn excerpt(name: &str) -> String {
     name.chars().take(80).collect()
 }
 

@@ -120,10 +120,10 @@ fn message(folder: &Folder, meta: &Value, degree: u32) -> String {
     read_with(&folder_of(folder, meta, degree), read).unwrap_err().to_string()
 }
 
-fn near(found: &[f32], wanted: &[f32]) {
-    assert_eq!(found.len(), wanted.len());
+fn near(actual: &[f32], wanted: &[f32]) {
+    assert_eq!(actual.len(), wanted.len());
     let is_near = |(a, b): (&f32, &f32)| (a - b).abs() <= 2e-6 * b.abs().max(1.0);
-    assert!(found.iter().zip(wanted).all(is_near), "{found:?} is not {wanted:?}");
+    assert!(actual.iter().zip(wanted).all(is_near), "{actual:?} is not {wanted:?}");
 }
 
 /// Checks what both versions share.

@@ -2,7 +2,7 @@
 //! names the coordinate system is known.
 
 use super::number;
-use crate::{about::Stance, input::Source};
+use crate::{about::Orientation, input::Source};
 use glam::DVec3;
 
 /// The kind of `SPZ_ADOBE_coordinate_system`.
@@ -23,7 +23,7 @@ pub(super) fn system(mut records: &[u8]) -> Option<u32> {
 /// Returns which direction is up in a coordinate system. There are 16, from 1. Their names say
 /// where x, y and z point: from LDB (left, down, back) to RUF, then with z up or down from LFD to
 /// RBU.
-pub(super) fn stance(source: &Source, system: u32) -> Option<Stance> {
+pub(super) fn orientation(source: &Source, system: u32) -> Option<Orientation> {
     let system = system.checked_sub(1).filter(|&system| system < 16)?;
     // Bit 0 is “right”, bit 1 “up”, bit 2 the sign of the third; bit 3 exchanges y and z.
     if (system & 7).count_ones() % 2 == 1 {
@@ -33,5 +33,5 @@ pub(super) fn stance(source: &Source, system: u32) -> Option<Stance> {
         );
     }
     let axis = if system & 8 == 0 { DVec3::Y } else { DVec3::Z };
-    Some(Stance::with_up(if system & 2 == 0 { -axis } else { axis }))
+    Some(Orientation::with_up(if system & 2 == 0 { -axis } else { axis }))
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::{Error, about::Stance, input::testing::*};
+use crate::{Error, about::Orientation, input::testing::*};
 use flate2::{Compression, write::GzEncoder};
 use glam::{DVec3, Quat, Vec3};
 use std::io::Write;
@@ -74,29 +74,29 @@ fn load(name: &str, bytes: &[u8]) -> Result<Gaussians> {
 }
 
 fn check(set: &Gaussians, version: u32, degree: u8) {
-    let shown = format!("version {version}, degree {degree}");
-    assert_eq!((set.len(), set.degree, set.validate()), (1, u32::from(degree), Ok(())), "{shown}");
+    let case = format!("version {version}, degree {degree}");
+    assert_eq!((set.len(), set.degree, set.validate()), (1, u32::from(degree), Ok(())), "{case}");
     let center = set.origin + set.centers[0].as_dvec3();
-    assert_eq!(center, DVec3::new(1.5, -0.25, 0.0), "{shown}");
-    assert!(set.scales[0].distance(Vec3::new(1.0, 1f32.exp(), (-1f32).exp())) < 1e-6, "{shown}");
-    assert_eq!(set.opacities[0], 0.2, "{shown}");
+    assert_eq!(center, DVec3::new(1.5, -0.25, 0.0), "{case}");
+    assert!(set.scales[0].distance(Vec3::new(1.0, 1f32.exp(), (-1f32).exp())) < 1e-6, "{case}");
+    assert_eq!(set.opacities[0], 0.2, "{case}");
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let turn = if version < 3 {
         Quat::from_xyzw(0.6, -1.0 / 255.0, 1.0 / 255.0, 0.799_98)
     } else {
         Quat::from_xyzw(-half, 0.0, 0.0, half)
     };
-    let found = set.rotations[0];
-    assert!((found - turn).length() < 1e-4, "{shown}: {found}");
-    for (found, wanted) in set.harmonics[0].iter().zip([10.0f32 / 3.0, -10.0 / 3.0, -2.0]) {
-        assert!((found - wanted).abs() < 1e-5, "{shown}: {found}");
+    let rotation = set.rotations[0];
+    assert!((rotation - turn).length() < 1e-4, "{case}: {rotation}");
+    for (actual, wanted) in set.harmonics[0].iter().zip([10.0f32 / 3.0, -10.0 / 3.0, -2.0]) {
+        assert!((actual - wanted).abs() < 1e-5, "{case}: {actual}");
     }
     let others = set.harmonics[1..].as_flattened();
-    assert_eq!(others.len(), 3 * (terms(u32::from(degree)) - 1), "{shown}");
-    for (at, found) in others.iter().enumerate() {
-        assert_eq!(*found, (at as f32 - 28.0) / 128.0, "{shown}");
+    assert_eq!(others.len(), 3 * (terms(u32::from(degree)) - 1), "{case}");
+    for (at, actual) in others.iter().enumerate() {
+        assert_eq!(*actual, (at as f32 - 28.0) / 128.0, "{case}");
     }
-    assert_eq!(set.about.stance, None);
+    assert_eq!(set.about.orientation, None);
 }
 
 #[test]
@@ -184,11 +184,11 @@ fn extensions_say_what_is_up() {
         let head = header(3, 1, 0, 12, EXTENDED);
         let bytes = [head, attributes(3, 0).concat(), extensions(system)].concat();
         let set = load("a.spz", &gzip(&bytes)).unwrap();
-        assert_eq!(set.about.stance, up.map(Stance::with_up), "{system}");
+        assert_eq!(set.about.orientation, up.map(Orientation::with_up), "{system}");
         #[cfg(feature = "files")]
         {
             let set = load("a.spz", &streams(0, &extensions(system))).unwrap();
-            assert_eq!(set.about.stance, up.map(Stance::with_up), "{system}");
+            assert_eq!(set.about.orientation, up.map(Orientation::with_up), "{system}");
         }
     }
     // Records that are cut off.
@@ -251,18 +251,18 @@ fn a_written_set_is_read_again() {
         write(&set, &path).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         assert!(is_spz(&bytes) && bytes.starts_with(&GZIP));
-        let found = read_with(&path, read).unwrap();
-        assert_eq!((found.len(), found.degree, found.validate()), (64, degree, Ok(())));
+        let loaded = read_with(&path, read).unwrap();
+        assert_eq!((loaded.len(), loaded.degree, loaded.validate()), (64, degree, Ok(())));
         for i in 0..64 {
             let place = |set: &Gaussians| set.origin + set.centers[i].as_dvec3();
-            let miss = (place(&found) - place(&set)).abs().max_element();
+            let miss = (place(&loaded) - place(&set)).abs().max_element();
             assert!(miss <= 0.5001 / 4096.0, "{miss}");
-            let ratio = (found.scales[i] / set.scales[i]).to_array();
+            let ratio = (loaded.scales[i] / set.scales[i]).to_array();
             assert!(ratio.iter().all(|r| r.ln().abs() < 1.001 / 32.0), "{ratio:?}");
-            assert!((found.opacities[i] - set.opacities[i]).abs() < 0.501 / 255.0);
-            let dot = found.rotations[i].dot(set.rotations[i]).abs();
+            assert!((loaded.opacities[i] - set.opacities[i]).abs() < 0.501 / 255.0);
+            let dot = loaded.rotations[i].dot(set.rotations[i]).abs();
             assert!(dot > 0.999_99, "{dot}");
-            let terms = found.harmonics_of(i).iter().zip(set.harmonics_of(i)).enumerate();
+            let terms = loaded.harmonics_of(i).iter().zip(set.harmonics_of(i)).enumerate();
             for (term, (a, b)) in terms {
                 let half = if term == 0 { 0.501 / 255.0 / decode::COLOR } else { 0.501 / 128.0 };
                 // The largest byte is just below 1.
@@ -282,9 +282,9 @@ fn far_positions_have_fewer_fractional_bits() {
     for (far, step) in [(3000.0, 1.0 / 2048.0), (-8_388_607.0, 1.0)] {
         set.origin.z = far;
         write(&set, &path).unwrap();
-        let found = read_with(&path, read).unwrap();
-        let [found, wanted] = [&found, &set].map(|set| set.origin + set.centers[7].as_dvec3());
-        assert!((found - wanted).abs().max_element() <= 0.501 * step, "{found} {wanted}");
+        let loaded = read_with(&path, read).unwrap();
+        let [actual, wanted] = [&loaded, &set].map(|set| set.origin + set.centers[7].as_dvec3());
+        assert!((actual - wanted).abs().max_element() <= 0.501 * step, "{actual} {wanted}");
     }
     set.origin.z = 9e6;
     let refused = [write(&set, &path), write(&Gaussians::default(), &path)];

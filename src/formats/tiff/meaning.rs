@@ -100,16 +100,16 @@ impl Meaning {
             let unit = attribute(&format!("PhysicalSize{axis}Unit")).map(|text| unit(&text));
             Some((value, unit.unwrap_or_else(|| "µm".into()))).filter(|(v, _)| is_length(*v))
         });
-        if let [Some((x, own)), ..] = &lengths {
+        if let [Some((x, x_unit)), ..] = &lengths {
             let of = |length: &Option<(f64, String)>| match length {
-                Some((value, unit)) => match (meters(unit), meters(own)) {
-                    (Some(unit), Some(own)) => value * unit / own,
+                Some((value, unit)) => match (meters(unit), meters(x_unit)) {
+                    (Some(unit), Some(x_unit)) => value * unit / x_unit,
                     _ => *value,
                 },
                 None => *x,
             };
             self.spacing = [*x, of(&lengths[1]), of(&lengths[2])];
-            self.unit.clone_from(own);
+            self.unit.clone_from(x_unit);
         }
         self.is_microscopy = true;
         Some(self)

@@ -122,7 +122,7 @@ impl<'a> Pages<'a> {
         let mut decoder = isolated(source, "page 0", || {
             Decoder::new(Watched::new(source, Cursor::new(source.bytes())))
                 .map(|decoder| decoder.with_limits(limits))
-                .map_err(|error| told(source, 0, &error))
+                .map_err(|error| page_error(source, 0, &error))
         })?;
         let (description, resolution) = isolated(source, "page 0", || {
             let text = decoder.find_tag(Tag::ImageDescription).ok().flatten();
@@ -154,9 +154,9 @@ impl<'a> Pages<'a> {
                 Ok((kind.unwrap_or(0) & 1 == 1, decoder.more_images()))
             })?;
             if page == 0 || !is_preview {
-                let own = self.layout(page)?;
-                if own != layout {
-                    let error = self.source.error(format!("page {page}"), own.differs(&layout));
+                let other = self.layout(page)?;
+                if other != layout {
+                    let error = self.source.error(format!("page {page}"), other.differs(&layout));
                     return Err(error.hint("write the pages of one size to a file of their own"));
                 }
                 self.source.spend("the size of the list of pages in bytes", 64)?;
@@ -195,7 +195,7 @@ impl<'a> Pages<'a> {
     ) -> Result<T> {
         let (source, decoder) = (self.source, &mut self.decoder);
         isolated(source, &format!("page {page}"), || {
-            work(decoder).map_err(|error| told(source, page, &error))
+            work(decoder).map_err(|error| page_error(source, page, &error))
         })
     }
 
@@ -296,16 +296,16 @@ pub fn one(source: &Source) -> Result<Read> {
     Ok(Read { layout: layout.decoded(), data, meaning })
 }
 
-fn told(source: &Source, page: usize, error: &TiffError) -> Error {
+fn page_error(source: &Source, page: usize, error: &TiffError) -> Error {
     if let Err(error) = source.check_time() {
         return error;
     }
-    let found = source.error(format!("page {page}"), format!("cannot be read: {error}"));
+    let wrapped = source.error(format!("page {page}"), format!("cannot be read: {error}"));
     match error {
         TiffError::UnsupportedError(_) => {
-            found.hint("write it again without compression: tiffcp -c none IN.tif OUT.tif")
+            wrapped.hint("write it again without compression: tiffcp -c none IN.tif OUT.tif")
         }
-        _ => found,
+        _ => wrapped,
     }
 }
 

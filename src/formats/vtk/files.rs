@@ -27,23 +27,23 @@ pub struct DataSet<'a> {
     pub times: u64,
 }
 
-/// What looks at data sets; returns whether to go on.
-type Look<'l> = dyn FnMut(&DataSet<'_>) -> Result<bool> + 'l;
+/// A function that receives each data set. It returns whether to go on.
+type Visitor<'l> = dyn FnMut(&DataSet<'_>) -> Result<bool> + 'l;
 
-/// Passes the data sets of a file to `look`, until it returns false. Files that are referred to are
-/// open only meanwhile.
+/// Passes the data sets of a file to `visitor`, until it returns false. Files that are referred to
+/// are open only meanwhile.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a file in another format, one that is cut off, and
-/// references that lead out of the folder; those of `look`.
-pub fn visit(source: &Source, options: &ReadOptions, look: &mut Look<'_>) -> Result<()> {
-    let mut walk = Walk { options, look, wholes: 0, files: 0, times: 0 };
+/// references that lead out of the folder; those of `visitor`.
+pub fn visit(source: &Source, options: &ReadOptions, visitor: &mut Visitor<'_>) -> Result<()> {
+    let mut walk = Walk { options, visitor, wholes: 0, files: 0, times: 0 };
     walk.file(source, 0, None).map(drop)
 }
 
 struct Walk<'l, 'f> {
     options: &'l ReadOptions,
-    look: &'l mut Look<'f>,
+    visitor: &'l mut Visitor<'f>,
     /// Number of whole data sets so far.
     wholes: usize,
     /// Number of files so far.
@@ -110,14 +110,14 @@ impl Walk<'_, '_> {
         }
         let path = source.neighbour("reference", reference)?;
         let file = source.open_beside(&path)?;
-        let found = self.file(&file, depth + 1, whole);
-        file.unless_changed(found)
+        let result = self.file(&file, depth + 1, whole);
+        file.unless_changed(result)
     }
 
     fn show(&mut self, source: &Source, blocks: Vec<Block>, whole: Option<usize>) -> Result<bool> {
         let is_piece = whole.is_some();
         let whole = self.next(whole);
-        (self.look)(&DataSet { source, blocks, whole, is_piece, times: self.times })
+        (self.visitor)(&DataSet { source, blocks, whole, is_piece, times: self.times })
     }
 
     /// Returns the number of a data set: that of the whole it is a piece of, or the next one.
@@ -149,6 +149,9 @@ impl Walk<'_, '_> {
         let at = all[several::time(source, "Collection", count, &first)?];
         let is_wanted = |time: &Option<f64>| time.is_none_or(|time| time == at);
         let pairs = document.references.iter().zip(&times);
-        Ok(pairs.filter(|(_, time)| is_wanted(time)).map(|(own, _)| own.clone()).collect())
+        Ok(pairs
+            .filter(|(_, time)| is_wanted(time))
+            .map(|(reference, _)| reference.clone())
+            .collect())
     }
 }

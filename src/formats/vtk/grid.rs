@@ -67,8 +67,8 @@ impl Grid {
         let corners = self.corners_of(cell);
         let is_stream = self.types[cell] == POLYHEDRON;
         let faces = faces(if is_stream { corners } else { &[] });
-        let own = if is_stream { &[][..] } else { corners };
-        own.iter().chain(faces.flatten()).copied()
+        let listed = if is_stream { &[][..] } else { corners };
+        listed.iter().chain(faces.flatten()).copied()
     }
 
     /// The corners of a cell, or the stream of a polyhedron.
@@ -224,11 +224,11 @@ impl Grid {
                 );
                 return Err(source.error("Cells", message));
             }
-            let own = &corners[start..end as usize];
+            let listed = &corners[start..end as usize];
             start = end as usize;
             let kind = types.get(cell_number).or(types.first()).map_or(0, |&kind| kind as u8);
             let stream = if kind == POLYHEDRON { streams.next() } else { None };
-            let cell = Cell { kind, corners: stream.as_deref().unwrap_or(own) };
+            let cell = Cell { kind, corners: stream.as_deref().unwrap_or(listed) };
             if self.add_cell(source, cell, (block.point_count, marks, before + cell_number))? {
                 kept.push((before + cell_number) as u32);
             }
@@ -269,8 +269,9 @@ impl Grid {
         self.types.push(cell.kind);
         self.ends.push(self.corners.len());
         let last = self.types.len() - 1;
-        let own = |point: u32| point as usize - first;
-        let is_shown = cell.kind != EMPTY && marks.shows(number, self.points_of(last).map(own));
+        let in_block = |point: u32| point as usize - first;
+        let is_shown =
+            cell.kind != EMPTY && marks.shows(number, self.points_of(last).map(in_block));
         if !is_shown {
             self.types.pop();
             self.ends.pop();
@@ -467,9 +468,9 @@ fn streams(source: &Source, faces: &Faces, types: &[f64]) -> Result<Vec<Vec<f64>
             let stream = document.part(stream, largest(&ends))?.doubles(source)?;
             let mut start = 0.0;
             let of_cell = |cell: usize| {
-                let own = cut(&stream, start, ends[cell]);
+                let part = cut(&stream, start, ends[cell]);
                 start = ends[cell];
-                own
+                part
             };
             source.room::<f64>("the faces of the cells", stream.len())?;
             polyhedra().map(of_cell).collect()
@@ -483,9 +484,9 @@ fn streams(source: &Source, faces: &Faces, types: &[f64]) -> Result<Vec<Vec<f64>
             let mut streams = Vec::new();
             for cell in polyhedra() {
                 let start = if cell == 0 { 0.0 } else { cell_ends[cell - 1] };
-                let own = cut(&of_cells, start, cell_ends[cell])?;
-                let mut stream = vec![own.len() as f64];
-                for face in own {
+                let cell_faces = cut(&of_cells, start, cell_ends[cell])?;
+                let mut stream = vec![cell_faces.len() as f64];
+                for face in cell_faces {
                     let at = face as usize;
                     let end = *ends.get(at).filter(|_| face >= 0.0).ok_or_else(wrong)?;
                     let corners = cut(&points, if at == 0 { 0.0 } else { ends[at - 1] }, end)?;

@@ -168,9 +168,9 @@ impl<'a> DataSet<'a> {
             }
             ("FIELD", [_, arrays]) => {
                 for _ in 0..parser.count(place, arrays)? {
-                    let found = parser.field()?;
+                    let array = parser.field()?;
                     if let Some(at) = at {
-                        self.add_field(at, found);
+                        self.add_field(at, array);
                     }
                 }
                 Ok(())
@@ -202,15 +202,15 @@ impl<'a> DataSet<'a> {
                 Ok(())
             }
             _ => {
-                let shown: String = line.text.chars().take(40).collect();
-                Err(source.error(place, format!("“{shown}” is not a known keyword")))
+                let excerpt: String = line.text.chars().take(40).collect();
+                Err(source.error(place, format!("“{excerpt}” is not a known keyword")))
             }
         }
     }
 
     /// Adds an array of a field, if it has one tuple for each point or cell.
-    fn add_field(&mut self, at: Place, found: parser::FieldArray<'a>) {
-        let parser::FieldArray { name, components, tuples, kind, part } = found;
+    fn add_field(&mut self, at: Place, array: parser::FieldArray<'a>) {
+        let parser::FieldArray { name, components, tuples, kind, part } = array;
         if self.claims[usize::from(at == Place::Cells)] != Some(tuples) {
             return;
         }
@@ -230,10 +230,10 @@ impl<'a> DataSet<'a> {
             block.set_extent(source, self.extent)?;
         }
         if self.kind == Kind::Rectilinear {
-            let found = self.places.each_ref().map(|part| part.as_ref().map_or(0, Part::len));
+            let counts = self.places.each_ref().map(|part| part.as_ref().map_or(0, Part::len));
             let expected = self.extent.map(|[first, last]| (last - first) as usize + 1);
-            if found != expected {
-                let message = format!("there are {found:?} coordinates for {expected:?} points");
+            if counts != expected {
+                let message = format!("there are {counts:?} coordinates for {expected:?} points");
                 return Err(source.error("DIMENSIONS", message));
             }
             block.places = std::mem::take(&mut self.places)
@@ -243,12 +243,12 @@ impl<'a> DataSet<'a> {
                 .collect();
         }
         if !block.is_lattice() {
-            let found = self.points.as_ref().map_or(0, |part| part.len() / 3);
-            if self.kind == Kind::Structured && found != block.point_count {
-                let message = format!("there are {found} POINTS for {} points", block.point_count);
+            let points = self.points.as_ref().map_or(0, |part| part.len() / 3);
+            if self.kind == Kind::Structured && points != block.point_count {
+                let message = format!("there are {points} POINTS for {} points", block.point_count);
                 return Err(source.error("DIMENSIONS", message));
             }
-            block.point_count = found;
+            block.point_count = points;
             block.points = self.points.take().map(Numbers::Ready);
         }
         self.give_cells(source, &mut block)?;
@@ -277,8 +277,8 @@ impl<'a> DataSet<'a> {
                 (None, types) => types,
                 (Some((_, _, ends)), Some(types)) if types.len() == ends.len() => Some(types),
                 (Some((_, _, ends)), types) => {
-                    let found = types.as_ref().map_or(0, Part::len);
-                    let message = format!("there are {found} types for {} cells", ends.len());
+                    let count = types.as_ref().map_or(0, Part::len);
+                    let message = format!("there are {count} types for {} cells", ends.len());
                     return Err(source.error("CELL_TYPES", message));
                 }
             };

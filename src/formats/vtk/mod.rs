@@ -162,11 +162,11 @@ fn caption(wanted: &Wanted) -> String {
 
 /// Returns the error for a file that holds other data than those wanted.
 fn other(source: &Source, drawn: Drawn, wanted: &str) -> Error {
-    let found = match drawn {
+    let kind = match drawn {
         Drawn::Volume => "a volume",
         Drawn::Cells => "a set of cells",
         Drawn::Boundary | Drawn::Surface => "a surface",
         Drawn::Cloud | Drawn::Samples => "a set of points",
     };
-    source.error("data set", format!("is {found}, not {wanted}"))
+    source.error("data set", format!("is {kind}, not {wanted}"))
 }

@@ -96,9 +96,9 @@ fn grid<'b>(document: &'b Document, piece: &'b Piece<'b>, block: &mut Block<'b>)
     if block.kind == Kind::Rectilinear {
         let arrays = &piece.section("Coordinates").arrays;
         if arrays.len() != 3 {
-            let found = arrays.len();
+            let count = arrays.len();
             let message =
-                format!("contains {found} arrays, but one for each of 3 axes was expected");
+                format!("contains {count} arrays, but one for each of 3 axes was expected");
             return Err(source.error("Coordinates", message));
         }
         let counts = block.extent.map(|[first, last]| (last - first) as u64 + 1);
@@ -198,7 +198,7 @@ fn field<'b>(
         let kind = array.get("type").unwrap_or_default().to_ascii_lowercase();
         return Field::unread(name, place, kind, components);
     };
-    let is = |role: &str| section.attributes.get(role).is_some_and(|own| *own == name);
+    let is = |role: &str| section.attributes.get(role).is_some_and(|active| *active == name);
     let role = if is("Scalars") {
         Role::Scalars
     } else if is("Vectors") || is("Tensors") {

@@ -90,12 +90,12 @@ struct Used {
 
 impl Used {
     fn number(&mut self, point: u32) -> u32 {
-        let own = &mut self.numbers[point as usize];
-        if *own == u32::MAX {
-            *own = self.points.len() as u32;
+        let number = &mut self.numbers[point as usize];
+        if *number == u32::MAX {
+            *number = self.points.len() as u32;
             self.points.push(point);
         }
-        *own
+        *number
     }
 }
 

@@ -149,8 +149,9 @@ fn give(
     let mut vertices: Growing<(u32, u32)> = Growing::new(source, "the vertices");
     let mut vertex = |point: u32, cell: u32| {
         let (key, next) = (key(cell), vertices.len() as u32);
-        let (own, first) = *firsts[point as usize].get_or_insert((key, next));
-        let vertex = if own == key { first } else { *others.entry((point, key)).or_insert(next) };
+        let (first_key, first) = *firsts[point as usize].get_or_insert((key, next));
+        let vertex =
+            if first_key == key { first } else { *others.entry((point, key)).or_insert(next) };
         if vertex == next {
             vertices.push((point, cell))?;
         }

@@ -185,7 +185,7 @@ impl Survey {
             for (array, about) in arrays.iter_mut().zip(&self.candidates) {
                 for block in &set.blocks {
                     let field = block.field(about.place, &about.name);
-                    let field = field.filter(|own| own.about.components == about.components);
+                    let field = field.filter(|field| field.about.components == about.components);
                     if let Some(numbers) = field.and_then(|field| field.numbers.as_ref()) {
                         widen(array, numbers, options.missing)?;
                         set.source.check_time()?;
@@ -229,7 +229,7 @@ fn counts(source: &Source, options: &ReadOptions, array: &Candidate) -> Result<b
     visit(source, options, &mut |set| {
         for block in &set.blocks {
             let most = if *place == Place::Cells { block.cell_count } else { block.point_count };
-            let Some(numbers) = block.field(*place, name).and_then(|own| own.numbers.as_ref())
+            let Some(numbers) = block.field(*place, name).and_then(|field| field.numbers.as_ref())
             else {
                 continue;
             };
@@ -246,8 +246,9 @@ fn counts(source: &Source, options: &ReadOptions, array: &Candidate) -> Result<b
 
 /// Adds an array to a list, unless the list has one of its name, place and components.
 fn add_candidate(source: &Source, list: &mut Vec<Candidate>, about: &Candidate) -> Result<()> {
-    let key = |own: &Candidate| (own.place, own.components);
-    let is_known = |own: &Candidate| own.name == about.name && key(own) == key(about);
+    let key = |candidate: &Candidate| (candidate.place, candidate.components);
+    let is_known =
+        |candidate: &Candidate| candidate.name == about.name && key(candidate) == key(about);
     if !list.iter().any(is_known) {
         source.spend("the size of the names in bytes", 256)?;
         list.push(about.clone());
@@ -280,9 +281,9 @@ fn widen(array: &mut Array, numbers: &Numbers, missing: Option<f64>) -> Result<(
     const TUPLES: usize = 1 << 14;
     let components = array.components.max(1);
     let part = if components == 1 { Part::Whole } else { Part::Magnitude };
-    let found = numbers.part()?;
-    for bytes in found.bytes.chunks(TUPLES * components * found.kind.bytes()) {
-        let values = part.values(found.kind.doubles(bytes, found.endian), components);
+    let raw = numbers.part()?;
+    for bytes in raw.bytes.chunks(TUPLES * components * raw.kind.bytes()) {
+        let values = part.values(raw.kind.doubles(bytes, raw.endian), components);
         for value in values.into_iter().filter(|&value| !is_hole(value, missing)) {
             let [low, high] = array.range.unwrap_or([value, value]);
             array.range = Some([low.min(value), high.max(value)]);

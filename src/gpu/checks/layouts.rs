@@ -133,7 +133,7 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
     );
     let field = layout!(FrameField:
         axis_x, axis_y, axis_z, origin, low, high, shade, certain, isotropic, transfer, gradients,
-        table_starts, before, behind, kernel, levels, lattice, taps, shown, isosurfaces,
+        table_starts, before, behind, kernel, levels, lattice, taps, visibility, isosurfaces,
     );
     let source = layout!(Source:
         axis_x, axis_y, axis_z, origin, covariance_a, covariance_b, lattice, slices, extent, count,
@@ -210,9 +210,9 @@ fn name_of(module: &Module, kind: Handle<Type>) -> String {
 }
 
 /// Adds the structures that a type consists of.
-fn add_structures(module: &Module, kind: Handle<Type>, found: &mut BTreeMap<String, Layout>) {
+fn add_structures(module: &Module, kind: Handle<Type>, layouts: &mut BTreeMap<String, Layout>) {
     match &module.types[kind].inner {
-        TypeInner::Array { base, .. } => add_structures(module, *base, found),
+        TypeInner::Array { base, .. } => add_structures(module, *base, layouts),
         TypeInner::Struct { members, span } => {
             let field = |member: &naga::StructMember| {
                 let name = member.name.clone().expect("fields have names");
@@ -221,10 +221,10 @@ fn add_structures(module: &Module, kind: Handle<Type>, found: &mut BTreeMap<Stri
             let layout =
                 Layout { fields: members.iter().map(field).collect(), size: *span as usize };
             let name = name_of(module, kind);
-            let before = found.insert(name.clone(), layout.clone());
+            let before = layouts.insert(name.clone(), layout.clone());
             assert!(before.is_none_or(|before| before == layout), "two structures named {name}");
             for member in members {
-                add_structures(module, member.ty, found);
+                add_structures(module, member.ty, layouts);
             }
         }
         _ => {}
@@ -233,7 +233,7 @@ fn add_structures(module: &Module, kind: Handle<Type>, found: &mut BTreeMap<Stri
 
 /// Returns the structures in the buffers of all pipelines.
 fn structures() -> BTreeMap<String, Layout> {
-    let mut found = BTreeMap::new();
+    let mut layouts = BTreeMap::new();
     for recipe in
         recipes::shared().iter().chain(&usual().iter().flat_map(recipes::of).collect::<Vec<_>>())
     {
@@ -241,19 +241,19 @@ fn structures() -> BTreeMap<String, Layout> {
             recipes::parse(recipe).unwrap_or_else(|error| panic!("{}: {error}", recipe.label));
         for (_, global) in module.global_variables.iter() {
             if matches!(global.space, AddressSpace::Uniform | AddressSpace::Storage { .. }) {
-                add_structures(&module, global.ty, &mut found);
+                add_structures(&module, global.ty, &mut layouts);
             }
         }
     }
-    found
+    layouts
 }
 
 #[test]
 fn shared_structures_are_the_same_field_by_field() {
     let (mut shaders, rust) = (structures(), mirrors());
     for (name, expected) in &rust {
-        let found = shaders.remove(*name).unwrap_or_else(|| panic!("no shader binds {name}"));
-        assert_eq!(&found, expected, "{name}: WGSL on the left, Rust on the right");
+        let layout = shaders.remove(*name).unwrap_or_else(|| panic!("no shader binds {name}"));
+        assert_eq!(&layout, expected, "{name}: WGSL on the left, Rust on the right");
     }
     let pass = shaders["Pass"].size as u64;
     assert_eq!(pass, PASS_BYTES, "Pass");
@@ -286,7 +286,7 @@ fn the_words_of_the_state_are_its_fields() {
         expected.insert(name.into(), bytes as u32 / 4);
     }
     let module = naga::front::wgsl::parse_str(crate::gpu::pipeline::shaders::STATE).expect("WGSL");
-    let found: BTreeMap<String, u32> =
+    let constants: BTreeMap<String, u32> =
         recipes::integers(&module).map(|(name, value)| (name.to_owned(), value)).collect();
-    assert_eq!(found, expected, "WGSL on the left, Rust on the right");
+    assert_eq!(constants, expected, "WGSL on the left, Rust on the right");
 }

@@ -26,7 +26,7 @@ use std::{
 type Outcome = Result<(), String>;
 
 /// Returns an error with its causes.
-fn told(error: impl Error) -> String {
+fn with_causes(error: impl Error) -> String {
     let causes = std::iter::successors(error.source(), |&error| error.source());
     causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
@@ -65,7 +65,7 @@ fn check(recipe: &Recipe) -> Outcome {
     let entry = (stage_of(recipe, &module), recipe.entry);
     let (module, info) =
         process_overrides(&module, &info, Some(entry), &PipelineConstants::default())
-            .map_err(told)?;
+            .map_err(with_causes)?;
     write_spirv(recipe, &module, &info).map_err(|error| format!("SPIR-V: {error}"))?;
     write_msl(recipe, &module, &info).map_err(|error| format!("MSL: {error}"))?;
     write_hlsl(recipe, &module, &info).map_err(|error| format!("HLSL: {error}"))
@@ -129,7 +129,7 @@ fn write_spirv(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
         shader_stage: stage_of(recipe, module),
         entry_point: recipe.entry.to_owned(),
     };
-    spv::write_vec(module, info, &options, Some(&pipeline)).map(drop).map_err(told)
+    spv::write_vec(module, info, &options, Some(&pipeline)).map(drop).map_err(with_causes)
 }
 
 fn write_msl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
@@ -146,7 +146,7 @@ fn write_msl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
         .zip(bindings(recipe))
         .map(|(slot, (place, kind))| (place, target(slot, kind)))
         .collect();
-    let own = msl::EntryPointResources {
+    let entry_point = msl::EntryPointResources {
         sizes_buffer: Some(resources.len() as u8),
         resources,
         immediates_buffer: None,
@@ -154,7 +154,7 @@ fn write_msl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
     let options = msl::Options {
         // The oldest that wgpu's Metal backend has atomics and 32-bit textures in.
         lang_version: (2, 0),
-        per_entry_point_map: [(recipe.entry.to_owned(), own)].into(),
+        per_entry_point_map: [(recipe.entry.to_owned(), entry_point)].into(),
         fake_missing_bindings: false,
         zero_initialize_workgroup_memory: false,
         force_loop_bounding: false,
@@ -164,8 +164,8 @@ fn write_msl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
         entry_point: Some((stage_of(recipe, module), recipe.entry.to_owned())),
         ..msl::PipelineOptions::default()
     };
-    let (_, written) = msl::write_string(module, info, &options, &pipeline).map_err(told)?;
-    written.entry_point_names.into_iter().try_for_each(|name| name.map(drop).map_err(told))
+    let (_, written) = msl::write_string(module, info, &options, &pipeline).map_err(with_causes)?;
+    written.entry_point_names.into_iter().try_for_each(|name| name.map(drop).map_err(with_causes))
 }
 
 fn write_hlsl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
@@ -190,8 +190,8 @@ fn write_hlsl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
     let mut text = String::new();
     let written = hlsl::Writer::new(&mut text, &options, &pipeline)
         .write(module, info, None)
-        .map_err(told)?;
-    written.entry_point_names.into_iter().try_for_each(|name| name.map(drop).map_err(told))
+        .map_err(with_causes)?;
+    written.entry_point_names.into_iter().try_for_each(|name| name.map(drop).map_err(with_causes))
 }
 
 /// Pipelines that compile alike are checked once.
@@ -199,21 +199,21 @@ fn write_hlsl(recipe: &Recipe, module: &Module, info: &ModuleInfo) -> Outcome {
 fn every_pipeline_of_every_variant_compiles_for_every_backend() {
     let variants = &*variants::ALL;
     let shared = recipes::shared().into_iter().map(|recipe| (recipe, None));
-    let own = variants.iter().flat_map(|found| {
-        recipes::of(&found.1).into_iter().map(move |recipe| (recipe, Some(found)))
+    let specific = variants.iter().flat_map(|named| {
+        recipes::of(&named.1).into_iter().map(move |recipe| (recipe, Some(named)))
     });
     let mut essences = Essences::default();
     let mut distinct: HashMap<_, (Recipe, Option<&(&str, Variant)>)> = HashMap::new();
     let mut pipelines = 0;
-    for (recipe, found) in shared.chain(own) {
+    for (recipe, named) in shared.chain(specific) {
         pipelines += 1;
         let key = (essences.of(&recipe), recipe.entry, recipe.groups.clone());
-        distinct.entry(key).or_insert((recipe, found));
+        distinct.entry(key).or_insert((recipe, named));
     }
     println!("{} variants, {pipelines} pipelines, {} distinct", variants.len(), distinct.len());
-    let failure = |(recipe, found): &(Recipe, Option<&(&str, Variant)>)| {
+    let failure = |(recipe, named): &(Recipe, Option<&(&str, Variant)>)| {
         let error = check(recipe).err()?;
-        let variant = found.map_or("any variant".into(), |(scene, variant)| {
+        let variant = named.map_or("any variant".into(), |(scene, variant)| {
             format!("a variant of the scene {scene}, {variant:?}")
         });
         Some(format!("{} of {variant}:\n{error}\n", recipe.label))
@@ -262,9 +262,8 @@ fn every_entry_point_has_a_pipeline() {
             .collect();
         assert!(!entries.is_empty(), "{} has no entry point", path.display());
         for entry in entries {
-            let is_own =
-                |recipe: &Recipe| recipe.entry == entry && source_of(recipe).contains(&text);
-            assert!(recipes.iter().any(is_own), "{}: no pipeline of {entry}", path.display());
+            let fits = |recipe: &Recipe| recipe.entry == entry && source_of(recipe).contains(&text);
+            assert!(recipes.iter().any(fits), "{}: no pipeline of {entry}", path.display());
         }
     }
 }

@@ -63,8 +63,8 @@ pub fn parse(recipe: &Recipe) -> Result<Module, String> {
 
 /// Returns the kind of a pipeline's entry point.
 pub fn stage_of(recipe: &Recipe, module: &Module) -> ShaderStage {
-    let own = module.entry_points.iter().find(|point| point.name == recipe.entry);
-    own.map_or(ShaderStage::Compute, |point| point.stage)
+    let entry_point = module.entry_points.iter().find(|point| point.name == recipe.entry);
+    entry_point.map_or(ShaderStage::Compute, |point| point.stage)
 }
 
 /// Returns the constants of a module that are unsigned integers.

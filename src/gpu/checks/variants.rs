@@ -116,28 +116,28 @@ fn bricks(pixels: f64) -> Case {
 
 /// The settings of a case, and those that differ from them in one point.
 fn neighbours(case: &Case) -> Vec<Settings> {
-    let own = || case.settings.clone();
+    let base = || case.settings.clone();
     let shade =
         Some(Shade { ambient: 0.1, diffuse: 0.8, specular: 0.1, power: 8.0, certain: None });
     let mut all = vec![
-        own(),
-        Settings { optics: Optics::EmissionAbsorption, ..own() },
-        Settings { optics: Optics::Maximum, ..own() },
-        Settings { optics: Optics::XRay, ..own() },
-        Settings { gradient: Gradient::Analytic, ..own() },
-        Settings { gradient: Gradient::Central, ..own() },
-        Settings { occlusion: !case.settings.occlusion, ..own() },
-        Settings { volume_shade: Some(None), surface_shade: None, ..own() },
-        Settings { volume_shade: Some(shade), surface_shade: shade, ..own() },
-        Settings { clips: Vec::new(), ..own() },
-        Settings { clips: methods::clipped_volume().settings.clips, ..own() },
+        base(),
+        Settings { optics: Optics::EmissionAbsorption, ..base() },
+        Settings { optics: Optics::Maximum, ..base() },
+        Settings { optics: Optics::XRay, ..base() },
+        Settings { gradient: Gradient::Analytic, ..base() },
+        Settings { gradient: Gradient::Central, ..base() },
+        Settings { occlusion: !case.settings.occlusion, ..base() },
+        Settings { volume_shade: Some(None), surface_shade: None, ..base() },
+        Settings { volume_shade: Some(shade), surface_shade: shade, ..base() },
+        Settings { clips: Vec::new(), ..base() },
+        Settings { clips: methods::clipped_volume().settings.clips, ..base() },
     ];
     let classifications =
         [Classification::PreIntegrated, Classification::Post, Classification::Pre];
-    all.extend(classifications.map(|classification| Settings { classification, ..own() }));
+    all.extend(classifications.map(|classification| Settings { classification, ..base() }));
     let [front, back] = [Order::FrontToBack, Order::BackToFront].map(Mode::Splats);
     let modes = [Mode::Sheets, Mode::AxisSheets, front, back];
-    all.extend(modes.map(|mode| Settings { mode, ..own() }));
+    all.extend(modes.map(|mode| Settings { mode, ..base() }));
     all
 }
 
@@ -158,7 +158,7 @@ fn cameras(case: &Case) -> [Case; 3] {
 
 /// Adds the variants of a case in some settings: on a GPU and in software, gathered and scattered.
 /// `is_usual` says whether the settings are the case's own.
-fn add(case: &Case, settings: &Settings, is_usual: bool, found: &mut Found) {
+fn add(case: &Case, settings: &Settings, is_usual: bool, variants: &mut DistinctVariants) {
     if case.scene.validate_settings(settings).is_err() {
         return;
     }
@@ -169,8 +169,8 @@ fn add(case: &Case, settings: &Settings, is_usual: bool, found: &mut Found) {
     let mut kinds = vec![None];
     if let Ok(volume) = gathered_volume(&case.scene, settings, &sheets) {
         // Settings do not change how samples are read, so one of them is enough for all types.
-        let own = kind_of(volume.samples.scalar());
-        kinds.extend(if is_usual { 0..=FOUR } else { own..=own }.map(Some));
+        let kind = kind_of(volume.samples.scalar());
+        kinds.extend(if is_usual { 0..=FOUR } else { kind..=kind }.map(Some));
     }
     let stopping = Budget { tile_entries: Some(500), ..Budget::default() };
     for gathered in kinds {
@@ -178,9 +178,9 @@ fn add(case: &Case, settings: &Settings, is_usual: bool, found: &mut Found) {
             [(false, Budget::default()), (true, Budget::default()), (false, stopping)]
         {
             let (scene, view, choice) = (&case.scene, &view, choice.as_ref());
-            let shows = |item: &Item| matches!(item, Item::Facets(set) if !set.shown.is_empty());
+            let shows = |item: &Item| matches!(item, Item::Facets(set) if !set.texture_coordinates.is_empty());
             let images = scene.items.iter().any(shows);
-            found.add(
+            variants.add(
                 case.name,
                 variant(&Request {
                     scene,
@@ -199,12 +199,12 @@ fn add(case: &Case, settings: &Settings, is_usual: bool, found: &mut Found) {
 
 /// Variants, each with the scene that it was first found in.
 #[derive(Default)]
-struct Found {
+struct DistinctVariants {
     seen: HashSet<Variant>,
     list: Vec<(&'static str, Variant)>,
 }
 
-impl Found {
+impl DistinctVariants {
     fn add(&mut self, name: &'static str, variant: Variant) {
         if self.seen.insert(variant) {
             self.list.push((name, variant));
@@ -214,21 +214,21 @@ impl Found {
 
 /// The variants of all cases, in the settings around their own, each with a scene's name.
 pub static ALL: LazyLock<Vec<(&str, Variant)>> = LazyLock::new(|| {
-    let mut found = Found::default();
+    let mut variants = DistinctVariants::default();
     for case in cases() {
         for case in cameras(&case) {
             for (number, settings) in neighbours(&case).iter().enumerate() {
-                add(&case, settings, number == 0, &mut found);
+                add(&case, settings, number == 0, &mut variants);
             }
         }
     }
-    found.list
+    variants.list
 });
 
 /// Returns the variants of one scene with splats and a volume, gathered and scattered.
 pub fn usual() -> Vec<Variant> {
     let case = scenes::surface_in_a_volume();
-    let mut found = Found::default();
-    add(&case, &case.settings, true, &mut found);
-    found.list.into_iter().map(|(_, variant)| variant).collect()
+    let mut variants = DistinctVariants::default();
+    add(&case, &case.settings, true, &mut variants);
+    variants.list.into_iter().map(|(_, variant)| variant).collect()
 }

@@ -60,12 +60,13 @@ pub(crate) struct Condition {
 impl Condition {
     /// Registers the callbacks of a device that the engine has opened.
     pub fn listen(self: &Arc<Self>, device: &wgpu::Device) {
-        let own = self.clone();
-        device.set_device_lost_callback(move |_, reason| own.lose(reason));
-        let own = self.clone();
+        let condition = self.clone();
+        device.set_device_lost_callback(move |_, reason| condition.lose(reason));
+        let condition = self.clone();
         // Without a handler, wgpu ends the program if memory runs out.
-        device
-            .on_uncaptured_error(Arc::new(move |error: wgpu::Error| own.note(&error.to_string())));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            condition.note(&error.to_string());
+        }));
     }
 
     fn note(&self, complaint: &str) {
@@ -85,7 +86,7 @@ impl Gpu {
         let (done, complaint) = self.hear(work);
         if complaint.is_some() {
             // What is made on a lost device is invalid. Polling shows whether the device is lost.
-            self.look()?;
+            self.poll()?;
         }
         if complaint.is_some() || done.is_ok() {
             self.sound()?;
@@ -116,10 +117,10 @@ impl Gpu {
         let answers =
             scopes.into_iter().rev().map(|scope| self.answers.take(Box::pin(scope.pop())));
         let complaint = answers.reduce(Option::or).flatten();
-        (done, complaint.map(|complaint| self.told(complaint)))
+        (done, complaint.map(|complaint| self.driver_error(complaint)))
     }
 
-    fn told(&self, complaint: wgpu::Error) -> Error {
+    fn driver_error(&self, complaint: wgpu::Error) -> Error {
         self.pipeline_cache.forget();
         let (name, reason) = (&self.info.name, complaint.to_string());
         Error::Driver(match complaint {
@@ -129,7 +130,7 @@ impl Gpu {
     }
 
     /// Looks once, without waiting, whether submitted work is done.
-    pub(crate) fn look(&self) -> Result<()> {
+    pub(crate) fn poll(&self) -> Result<()> {
         // wgpu panics if a device was lost.
         if catch_unwind(AssertUnwindSafe(|| self.device.poll(wgpu::PollType::Poll))).is_err() {
             self.condition.lose("it disappeared");
@@ -179,6 +180,6 @@ impl Gpu {
         if let Some(stray) = lock(&self.condition.stray).take() {
             return Err(Error::Driver(stray));
         }
-        self.answers.late().map_or(Ok(()), |complaint| Err(self.told(complaint)))
+        self.answers.late().map_or(Ok(()), |complaint| Err(self.driver_error(complaint)))
     }
 }

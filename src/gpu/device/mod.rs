@@ -83,8 +83,8 @@ fn instance() -> wgpu::Instance {
     // wgpu turns its debug layers on in debug builds; environment variables override that.
     // The engine's own dispatches never exceed the limits (`rows_of` in frame.wgsl), so wgpu need
     // not look at their numbers of workgroups in a dispatch of its own before each.
-    let own = wgpu::InstanceFlags::default() - wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
-    descriptor.flags = own.with_env();
+    let flags = wgpu::InstanceFlags::default() - wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
+    descriptor.flags = flags.with_env();
     wgpu::Instance::new(descriptor)
 }
 
@@ -167,9 +167,9 @@ impl Gpu {
             }
             AdapterChoice::Name(name) => (by_name(name), format!("named “{name}”")),
             AdapterChoice::Software => {
-                let found =
+                let index =
                     adapters.iter().position(|a| a.get_info().device_type == wgpu::DeviceType::Cpu);
-                (found, format!("that runs in software; {NO_ADAPTER_HELP}"))
+                (index, format!("that runs in software; {NO_ADAPTER_HELP}"))
             }
         };
         let Some(index) = wanted.0 else {

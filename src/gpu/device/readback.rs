@@ -43,9 +43,9 @@ impl Readback {
             at += bytes;
         }
         let arrival = Arc::<Mutex<Arrival>>::default();
-        let own = arrival.clone();
+        let shared = arrival.clone();
         encoder.map_buffer_on_submit(&staging, wgpu::MapMode::Read, .., move |result| {
-            let mut arrival = lock(&own);
+            let mut arrival = lock(&shared);
             arrival.mapped = Some(result.is_ok());
             if let Some(waker) = arrival.waker.take() {
                 waker.wake();

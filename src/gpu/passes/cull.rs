@@ -42,11 +42,11 @@ impl Cull {
             shaders::ACTIVE,
             shaders::CULL,
         ];
-        let own: &[Binding] = &[Uniform, Uniform, Read, Read, Read, Write, Write, Write];
+        let bindings: &[Binding] = &[Uniform, Uniform, Read, Read, Read, Write, Write, Write];
         let chunk: &[Binding] = &[Uniform, Read];
         [
-            Recipe::new("cull", &sources, "cull", &[own, chunk]),
-            Recipe::new("cull: prepare", &sources, "prepare", &[own, chunk, &[Write]]),
+            Recipe::new("cull", &sources, "cull", &[bindings, chunk]),
+            Recipe::new("cull: prepare", &sources, "prepare", &[bindings, chunk, &[Write]]),
         ]
     }
 
@@ -78,14 +78,15 @@ impl Cull {
                 _ => &chunk.data,
             };
             let buffers = buffers.map(|b| b.as_entire_buffer_binding());
-            let own = [&chunk.uniform, numbers].map(|b| b.as_entire_buffer_binding());
-            let groups = [self.cull.bind(gpu, 0, &buffers), self.cull.bind(gpu, 1, &own)];
+            let chunk_buffers = [&chunk.uniform, numbers].map(|b| b.as_entire_buffer_binding());
+            let groups = [self.cull.bind(gpu, 0, &buffers), self.cull.bind(gpu, 1, &chunk_buffers)];
             let workgroups =
                 chunk.candidates.div_ceil(WORKGROUP_CANDIDATES).next_multiple_of(LANES);
             self.cull.dispatch(commands, &[&groups[0], &groups[1]], workgroups);
             let arguments =
                 self.prepare.bind(gpu, 2, &[chunk.active_arguments.as_entire_buffer_binding()]);
-            let groups = [self.prepare.bind(gpu, 0, &buffers), self.prepare.bind(gpu, 1, &own)];
+            let groups =
+                [self.prepare.bind(gpu, 0, &buffers), self.prepare.bind(gpu, 1, &chunk_buffers)];
             self.prepare.dispatch(commands, &[&groups[0], &groups[1], &arguments], 1);
         }
     }

@@ -29,7 +29,7 @@ impl Gather {
     pub fn recipe(variant: &Variant) -> Recipe {
         use Binding::{Read, Uniform, Write};
         // An invocation draws one pixel, and only the field.
-        let own = Variant {
+        let reduced = Variant {
             rows: 1,
             radiance: false,
             trained: false,
@@ -41,7 +41,7 @@ impl Gather {
             ..*variant
         };
         let sources = [
-            &own.constants(),
+            &reduced.constants(),
             shaders::FRAME,
             shaders::TABLES,
             shaders::PIXEL,
@@ -49,12 +49,12 @@ impl Gather {
             shaders::PICTURE,
             shaders::VALUE,
             shaders::FIELD_LATTICE,
-            own.label_shader(),
+            reduced.label_shader(),
             shaders::PROGRESS,
             shaders::GATHER,
         ];
         let bindings = [Uniform, Read, Uniform, Read, Write, Write, Read, Write];
-        Recipe::new("gather", &sources, "gather", &[&bindings, own.textures()])
+        Recipe::new("gather", &sources, "gather", &[&bindings, reduced.textures()])
     }
 
     pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
@@ -64,7 +64,7 @@ impl Gather {
                 &targets.frame,
                 &targets.planes,
                 window,
-                &gathered.shown,
+                &gathered.visibility,
                 &targets.progress,
                 &targets.depths,
                 &targets.tables,

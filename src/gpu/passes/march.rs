@@ -86,7 +86,7 @@ impl March {
         ];
         let mut textures = None;
         if let Some(gathered) = &targets.gathered {
-            buffers.push(gathered.shown.as_entire_buffer_binding());
+            buffers.push(gathered.visibility.as_entire_buffer_binding());
             textures = Some(self.0.bind_textures(gpu, 1, &gathered.textures));
         }
         let images = targets.images.as_ref().map_or(&[][..], |images| images);

@@ -32,7 +32,7 @@ impl Mark {
 
     pub fn encode(&self, gpu: &Gpu, commands: &mut Commands<'_>, targets: &Targets) {
         let Some(gathered) = &targets.gathered else { return };
-        let buffers = [&targets.frame, &targets.planes, &gathered.shown, &targets.progress];
+        let buffers = [&targets.frame, &targets.planes, &gathered.visibility, &targets.progress];
         let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
         self.0.dispatch(commands, &[&group], gathered.mark_words.div_ceil(WORDS));
     }

@@ -39,8 +39,8 @@ impl Measure {
                 shaders::BINS,
                 shaders::MEASURE,
             ];
-            let own = [Uniform, Read, Write, Write, Write];
-            Recipe::new(&format!("measure: {kind}"), &sources, "measure", &[&own, bindings])
+            let shared = [Uniform, Read, Write, Write, Write];
+            Recipe::new(&format!("measure: {kind}"), &sources, "measure", &[&shared, bindings])
         })
     }
 

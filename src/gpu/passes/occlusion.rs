@@ -16,15 +16,15 @@ use crate::gpu::{
 /// The pass.
 #[derive(Debug)]
 pub struct Occlusion {
-    look: Stage,
+    find_opaque: Stage,
     sum_rows: Stage,
     sum_columns: Stage,
 }
 
 impl Occlusion {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
-        let [look, sum_rows, sum_columns] = Stage::all(gpu, Self::recipes(variant));
-        Self { look, sum_rows, sum_columns }
+        let [find_opaque, sum_rows, sum_columns] = Stage::all(gpu, Self::recipes(variant));
+        Self { find_opaque, sum_rows, sum_columns }
     }
 
     pub fn recipes(variant: &Variant) -> [Recipe; 3] {
@@ -40,7 +40,7 @@ impl Occlusion {
             Recipe::new(label, &sources, entry, &[&[Uniform, Read, Read, Write]])
         };
         [
-            recipe("occlusion: look", "look"),
+            recipe("occlusion: opaque tiles", "find_opaque"),
             recipe("occlusion: rows", "sum_rows"),
             recipe("occlusion: columns", "sum_columns"),
         ]
@@ -51,8 +51,12 @@ impl Occlusion {
         let buffers = buffers.map(|b| b.as_entire_buffer_binding());
         // A workgroup checks 64 tiles, and march has a workgroup for each tile. So most workgroups
         // of this dispatch have nothing to do.
-        let group = self.look.bind(gpu, 0, &buffers);
-        self.look.dispatch_indirect(commands, &[&group], (&targets.arguments, MARCH_ARGUMENTS));
+        let group = self.find_opaque.bind(gpu, 0, &buffers);
+        self.find_opaque.dispatch_indirect(
+            commands,
+            &[&group],
+            (&targets.arguments, MARCH_ARGUMENTS),
+        );
         let [columns, rows] = targets.tiles;
         for (stage, count) in [(&self.sum_rows, rows), (&self.sum_columns, columns)] {
             stage.dispatch(commands, &[&stage.bind(gpu, 0, &buffers)], count.div_ceil(64));

@@ -33,9 +33,9 @@ impl Plan {
         let constants = variant.constants();
         let shared = [&constants, shaders::FRAME, shaders::SPANS, shaders::CENSUS];
         let plan = |label, entry| {
-            let own = [shaders::STATE, shaders::MAP, shaders::PROGRESS, shaders::PLAN];
+            let sources = [shaders::STATE, shaders::MAP, shaders::PROGRESS, shaders::PLAN];
             let bindings = [Uniform, Read, Uniform, Write, Write, Write, Write, Write, Read];
-            Recipe::new(label, &[shared.as_slice(), &own].concat(), entry, &[&bindings])
+            Recipe::new(label, &[shared.as_slice(), &sources].concat(), entry, &[&bindings])
         };
         let survey = [shared.as_slice(), &[shaders::SURVEY]].concat();
         [
@@ -66,14 +66,15 @@ impl Plan {
         let buffers = Self::buffers(targets);
         self.total.dispatch(commands, &[&self.total.bind(gpu, 0, &buffers)], 1);
         commands.clear(&targets.census);
-        let own = [
+        let survey_buffers = [
             &targets.frame,
             &targets.run_spans,
             &targets.needs,
             &targets.run_count,
             &targets.census,
         ];
-        let survey = self.survey.bind(gpu, 0, &own.map(|b| b.as_entire_buffer_binding()));
+        let survey =
+            self.survey.bind(gpu, 0, &survey_buffers.map(|b| b.as_entire_buffer_binding()));
         self.survey.dispatch(commands, &[&survey], targets.run_total.div_ceil(64));
         self.accumulate.dispatch(commands, &[&self.accumulate.bind(gpu, 0, &buffers)], 1);
     }

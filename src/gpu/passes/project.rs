@@ -38,8 +38,8 @@ impl Project {
                 shaders::ACTIVE,
                 shaders::PROJECT,
             ];
-            let own = [Uniform, Read, Read, Read, Write, Write];
-            Recipe::new(&format!("project: {kind}"), &sources, "project", &[&own, bindings])
+            let shared = [Uniform, Read, Read, Read, Write, Write];
+            Recipe::new(&format!("project: {kind}"), &sources, "project", &[&shared, bindings])
         })
     }
 

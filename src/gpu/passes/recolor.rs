@@ -69,7 +69,7 @@ impl Recolor {
         (harmonics, splats): (&Harmonics, &wgpu::Buffer),
         eye: Eye,
     ) {
-        harmonics.look_from(gpu, eye);
+        harmonics.set_eye(gpu, eye);
         let buffers = [&harmonics.eye, &harmonics.numbers, splats];
         let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
         self.0.dispatch(commands, &[&group], harmonics.blocks());

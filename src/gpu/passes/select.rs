@@ -69,16 +69,16 @@ impl Select {
             let (source, before) =
                 (chunk.source(view, false, &prepared.page_caches), chunk.list_bytes());
             let Origin::Lattice { volume, selection, .. } = &mut chunk.origin else { continue };
-            let shown = match prepared.scene.items[chunk.item].transfer() {
+            let first_visible = match prepared.scene.items[chunk.item].transfer() {
                 Some(transfer) if !all => first_visible(transfer, volume.range),
                 _ => EVERYTHING,
             };
-            if selection.is_for(&shown) {
+            if selection.is_for(&first_visible) {
                 continue;
             }
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
             let rest = prepared.bytes - before;
-            self.update(gpu, selection, &chunk.uniform, &shown, |count| {
+            self.update(gpu, selection, &chunk.uniform, &first_visible, |count| {
                 gpu.check_memory(rest + list_bytes(u64::from(count)))
             })?;
             chunk.candidates = selection.count;
@@ -90,21 +90,22 @@ impl Select {
     }
 
     /// Makes the list of a chunk, in a buffer of its size, unless `check` refuses the number of
-    /// samples. `uniform` is the chunk's source. `shown` contains the visible ranges
-    /// ([`first_visible`](crate::volume::reach::first_visible)).
+    /// samples. `uniform` is the chunk's source. `first_visible` is the result of
+    /// [`first_visible`](crate::volume::reach::first_visible).
     fn update(
         &self,
         gpu: &Gpu,
         selection: &mut Selection,
         uniform: &wgpu::Buffer,
-        shown: &[u16; 256],
+        first_visible: &[u16; 256],
         check: impl Fn(u32) -> Result<()>,
     ) -> Result<()> {
-        selection.count = selection.counts.shown(shown);
+        selection.count = selection.counts.visible(first_visible);
         check(selection.count)?;
         selection.selected =
             buffer(gpu, "selected", 4 * u64::from(selection.count), Usage::STORAGE);
-        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
+        let visible =
+            upload(gpu, "visible levels", bytemuck::cast_slice(&first_visible.map(u32::from)));
         let buffers =
             [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
         let bind = |stage: &Stage| {
@@ -117,7 +118,7 @@ impl Select {
             self.scan.encode(gpu, commands, &selection.blocks, blocks + 1);
             self.write.dispatch(commands, &[&bind(&self.write)], groups);
         });
-        selection.shown = Some(*shown);
+        selection.first_visible = Some(*first_visible);
         Ok(())
     }
 }

@@ -76,12 +76,12 @@ impl SelectBricks {
         most: u64,
     ) -> Result<Listed> {
         let Some(brick_cache) = &mut prepared.brick_cache else { return Ok(Listed::All) };
-        let (mut own, mut before, mut samples, mut runs) = (Vec::new(), 0, 0, 0);
+        let (mut slabs, mut before, mut samples, mut runs) = (Vec::new(), 0, 0, 0);
         for chunk in &mut prepared.chunks {
             let Origin::Bricks { slab, level, .. } = &mut chunk.origin else { continue };
             let drawn = choice.levels.get(slab.part).map(|(level, _)| *level);
             *level = drawn.unwrap_or(0);
-            let count = brick_cache.count(slab, drawn, &choice.shown);
+            let count = brick_cache.count(slab, drawn, &choice.first_visible);
             samples += u64::from(count);
             runs += u64::from(runs_of(count));
             brick_cache.describe(gpu, slab, drawn);
@@ -89,13 +89,13 @@ impl SelectBricks {
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
             before += chunk.list_bytes();
             let Origin::Bricks { slab, .. } = &mut chunk.origin else { continue };
-            own.push((slab.as_mut(), &chunk.uniform, count));
+            slabs.push((slab.as_mut(), &chunk.uniform, count));
         }
         if runs > most {
             return Ok(Listed::TooMany { runs, most });
         }
         gpu.check_memory(prepared.bytes - before + list_bytes(samples))?;
-        self.update(gpu, &mut own, &choice.shown);
+        self.update(gpu, &mut slabs, &choice.first_visible);
         prepared.bytes -= before;
         for chunk in &mut prepared.chunks {
             let Origin::Bricks { slab, .. } = &chunk.origin else { continue };
@@ -109,9 +109,15 @@ impl SelectBricks {
     }
 
     /// Makes the lists of all slabs, each with its uniform and its number of visible samples.
-    /// `shown` is that of `Choice`.
-    fn update(&self, gpu: &Gpu, slabs: &mut [(&mut Slab, &wgpu::Buffer, u32)], shown: &[u16; 256]) {
-        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
+    /// `first_visible` is `shown` of `Choice`.
+    fn update(
+        &self,
+        gpu: &Gpu,
+        slabs: &mut [(&mut Slab, &wgpu::Buffer, u32)],
+        first_visible: &[u16; 256],
+    ) {
+        let visible =
+            upload(gpu, "visible levels", bytemuck::cast_slice(&first_visible.map(u32::from)));
         // All slabs count in the same buffer, one after the other.
         let most = slabs.iter().map(|(slab, ..)| slab.blocks()).max().unwrap_or(0);
         let blocks = buffer(gpu, "select blocks", 4 * (u64::from(most) + 1), Usage::STORAGE);

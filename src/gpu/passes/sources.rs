@@ -100,7 +100,7 @@ impl Sources<Stage> {
         chunk: &Chunk,
         buffers: &[wgpu::BufferBinding<'_>],
     ) -> (&Stage, [wgpu::BindGroup; 2]) {
-        let (stage, own) = match &chunk.origin {
+        let (stage, chunk_buffers) = match &chunk.origin {
             Origin::Splats { .. } => (&self.splats, vec![&chunk.uniform, &chunk.data]),
             Origin::Facets { .. } => (&self.facets, vec![&chunk.uniform, &chunk.data]),
             Origin::Nodes { slots, .. } => {
@@ -113,7 +113,8 @@ impl Sources<Stage> {
                 (&self.bricks, vec![&chunk.uniform, &chunk.data, &slab.selected, &slab.slots])
             }
         };
-        let own: Vec<_> = own.into_iter().map(wgpu::Buffer::as_entire_buffer_binding).collect();
-        (stage, [stage.bind(gpu, 0, buffers), stage.bind(gpu, 1, &own)])
+        let chunk_buffers: Vec<_> =
+            chunk_buffers.into_iter().map(wgpu::Buffer::as_entire_buffer_binding).collect();
+        (stage, [stage.bind(gpu, 0, buffers), stage.bind(gpu, 1, &chunk_buffers)])
     }
 }

@@ -53,8 +53,11 @@ impl Stage {
         #[expect(unsafe_code, reason = "shaders without the checks that untrusted ones need")]
         let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
         let visibility = wgpu::ShaderStages::COMPUTE;
-        let layouts: Vec<_> =
-            recipe.groups.iter().map(|own| layout_of(device, label, own, visibility)).collect();
+        let layouts: Vec<_> = recipe
+            .groups
+            .iter()
+            .map(|bindings| layout_of(device, label, bindings, visibility))
+            .collect();
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(label),
             bind_group_layouts: &layouts.iter().map(Some).collect::<Vec<_>>(),
@@ -205,7 +208,7 @@ mod tests {
     fn a_device_compiles_each_recipe_once() {
         let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("an adapter");
         let pipelines =
-            |gpu: &Gpu| Stage::all(gpu, Scan::recipes()).map(|own| own.compiled.pipeline);
+            |gpu: &Gpu| Stage::all(gpu, Scan::recipes()).map(|stage| stage.compiled.pipeline);
         let first = pipelines(&gpu);
         assert_eq!(first, pipelines(&gpu.clone().with_memory(1)), "shared by the device's clones");
         assert!(first[0] != first[1] && first[1] != first[2], "entry points differ");

@@ -248,8 +248,8 @@ impl BrickCache {
                 let (data, ranges, first) = &self.chunks[chunk];
                 let at = slot - first;
                 gpu.queue.write_buffer(data, (at * bytes) as u64, &brick.samples);
-                let own = bytemuck::cast_slice(brick.blocks.as_slice());
-                gpu.queue.write_buffer(ranges, (at * 2 * BRICK_BLOCKS) as u64, own);
+                let blocks = bytemuck::cast_slice(brick.blocks.as_slice());
+                gpu.queue.write_buffer(ranges, (at * 2 * BRICK_BLOCKS) as u64, blocks);
                 self.ranges[slot] = *brick.blocks;
             }
             // Writes wait in staging memory until the next submission.
@@ -261,9 +261,9 @@ impl BrickCache {
     /// Returns the place of a slot's first sample in a level, if the slot contains a drawn brick of
     /// that level.
     fn place(&self, slot: usize, level: Option<usize>) -> Option<[usize; 3]> {
-        let ((own, brick), update) = self.slots[slot]?;
-        let is_drawn = Some(own) == level && update == self.update;
-        is_drawn.then(|| self.bricks.level(own).place(brick).map(|at| at * SIDE))
+        let ((slot_level, brick), update) = self.slots[slot]?;
+        let is_drawn = Some(slot_level) == level && update == self.update;
+        is_drawn.then(|| self.bricks.level(slot_level).place(brick).map(|at| at * SIDE))
     }
 
     /// Uploads which slots contain drawn bricks of a level, and where these lie.
@@ -277,14 +277,14 @@ impl BrickCache {
     }
 
     /// Returns the number of visible samples in the drawn bricks of a level, as
-    /// select_bricks.wgsl counts them. `shown` is that of `Choice`.
-    pub fn count(&self, slab: &Slab, level: Option<usize>, shown: &[u16; 256]) -> u32 {
+    /// select_bricks.wgsl counts them. `first_visible` is `shown` of `Choice`.
+    pub fn count(&self, slab: &Slab, level: Option<usize>, first_visible: &[u16; 256]) -> u32 {
         let visible = |slot| {
             let Some((at, level)) = self.place(slot, level).zip(level) else { return 0 };
             let dims = self.bricks.level(level).dims;
             let blocks = self.ranges[slot].iter().enumerate();
             blocks
-                .filter(|(_, [low, high])| u16::from(*high) >= shown[usize::from(*low)])
+                .filter(|(_, [low, high])| u16::from(*high) >= first_visible[usize::from(*low)])
                 .map(|(block, _)| {
                     let place = [block, block / BLOCKS, block / BLOCKS.pow(2)];
                     let samples = |axis: usize| {
@@ -306,7 +306,7 @@ impl BrickCache {
 struct Drawn {
     bricks: Vec<Key>,
     levels: Vec<usize>,
-    shown: [u16; 256],
+    first_visible: [u16; 256],
 }
 
 impl Drawn {
@@ -316,7 +316,7 @@ impl Drawn {
         Self {
             bricks,
             levels: choice.levels.iter().map(|(level, _)| *level).collect(),
-            shown: choice.shown,
+            first_visible: choice.first_visible,
         }
     }
 }

@@ -40,7 +40,7 @@ pub enum Origin {
         is_culled: bool,
         /// One more than the number of the chunk's first facet among those that show images; 0 if
         /// they show none.
-        shown: u32,
+        first_textured: u32,
     },
     /// Slots for pages of the hierarchy with this number.
     Nodes { page_cache: usize, slots: Box<Slots> },
@@ -107,8 +107,8 @@ impl Chunk {
                 Source::of_nodes(view, header)
             }
             Origin::Splats { set, .. } => Source::of_splats(view, set),
-            Origin::Facets { set, is_culled, shown } => {
-                let lattice = [*shown, 0, 0, 0];
+            Origin::Facets { set, is_culled, first_textured } => {
+                let lattice = [*first_textured, 0, 0, 0];
                 Source { lattice, ..Source::of_facets(view, set, *is_culled) }
             }
             Origin::Bricks { bricks, kernel, slab, level } => {

@@ -14,12 +14,12 @@ use crate::{
     plan::{
         field,
         gathering::unsuited_kernel,
-        shown::{BLOCK, Shown, field_ranges},
         tables::Values,
+        visible::{BLOCK, VisibleBlocks, field_ranges},
         weighting::{MASK_DEVIATION, deviation},
     },
     scene::{Item, Scene, Settings},
-    volume::{Arrangement, Scalar, Volume, own_shares},
+    volume::{Arrangement, Scalar, Volume, label_shares},
 };
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
@@ -96,7 +96,7 @@ fn beyond_limits(scene: &Scene, volume: &Volume, gpu: &Gpu) -> Option<&'static s
         return Some("a volume with more samples along an axis than the device's textures have");
     }
     // A bit for each sample, and the data of tiles and of the transfer function.
-    if shown_words(volume.lattice.dims) * 4 + TAIL_BYTES > gpu.binding_size() {
+    if bit_words(volume.lattice.dims) * 4 + TAIL_BYTES > gpu.binding_size() {
         return Some("a volume larger than the device's bindings allow");
     }
     if scene.items.len() > 1 && limits.max_storage_buffers_per_shader_stage < MOST_BUFFERS {
@@ -164,8 +164,8 @@ fn write_row(from: &[u8], kind: u32, to: &mut [u8]) {
         return;
     }
     for (index, word) in to.chunks_exact_mut(4).enumerate() {
-        let own = &from[index..(index + 4).min(from.len())];
-        word[..own.len()].copy_from_slice(own);
+        let samples = &from[index..(index + 4).min(from.len())];
+        word[..samples.len()].copy_from_slice(samples);
     }
 }
 
@@ -188,11 +188,11 @@ fn texture(gpu: &Gpu, dims: [usize; 3], (kind, bytes): (u32, &[u8])) -> wgpu::Te
     let row = bytes.len() / (rows * slices);
     let (to_row, to_slice) = (4 * words, 4 * words * rows);
     let each = (COPIED / to_slice).max(1);
-    for (first, own) in (0..depth).step_by(each).zip(bytes.chunks(row * rows * each)) {
-        let mut packed = vec![0u8; own.len() / row * to_row];
+    for (first, samples) in (0..depth).step_by(each).zip(bytes.chunks(row * rows * each)) {
+        let mut packed = vec![0u8; samples.len() / row * to_row];
         packed
             .par_chunks_mut(to_row)
-            .zip(own.par_chunks(row))
+            .zip(samples.par_chunks(row))
             .for_each(|(to, from)| write_row(from, kind, to));
         let layers = (packed.len() / to_slice) as u32;
         gpu.queue.write_texture(
@@ -229,8 +229,8 @@ pub struct Field {
     /// The layout of the samples (`SAMPLE_KIND` in field_lattice.wgsl).
     pub kind: u32,
     /// Where the field may be visible, and the table of visible ranges that this holds for.
-    shown: Option<([u16; 256], Shown)>,
-    /// `shown` of field_lattice.wgsl.
+    visible: Option<([u16; 256], VisibleBlocks)>,
+    /// `visibility` of field_lattice.wgsl.
     buffer: wgpu::Buffer,
     /// Whether the buffer contains the samples' bits.
     has_bits: bool,
@@ -246,7 +246,7 @@ pub struct Field {
 pub struct Gathered {
     /// The samples, and the shares of labels.
     pub textures: Vec<wgpu::TextureView>,
-    pub shown: wgpu::Buffer,
+    pub visibility: wgpu::Buffer,
     /// The sheets of each dispatch of gather (`Pass` in frame.wgsl).
     pub windows: Vec<wgpu::Buffer>,
     pub tiles: u32,
@@ -268,11 +268,11 @@ impl Field {
         let mut textures = vec![texture(gpu, dims, (kind, volume.samples.bytes()))];
         let mut sigma = deviation(kernel).unwrap_or(1.0);
         if volume.is_label_map() {
-            textures.push(texture(gpu, dims, (SHARES, &own_shares(volume))));
+            textures.push(texture(gpu, dims, (SHARES, &label_shares(volume))));
             sigma = MASK_DEVIATION;
         }
         let view_of_all = wgpu::TextureViewDescriptor::default();
-        let textures = textures.iter().map(|own| own.create_view(&view_of_all)).collect();
+        let textures = textures.iter().map(|texture| texture.create_view(&view_of_all)).collect();
         Self {
             kind,
             volume: volume.clone(),
@@ -280,7 +280,7 @@ impl Field {
             ranges: field_ranges(volume, kernel),
             textures,
             texture_bytes: texture_bytes(gpu, volume),
-            shown: None,
+            visible: None,
             buffer: buffer(gpu, "shown", 0, Usage::STORAGE),
             has_bits: false,
             visible_before: Vec::new(),
@@ -296,8 +296,9 @@ impl Field {
     /// Finds the samples around which the transfer function may show something. `first` is the
     /// result of [`first_visible`](crate::volume::reach::first_visible).
     pub fn show(&mut self, first: &[u16; 256]) {
-        if self.shown.as_ref().is_none_or(|(own, _)| own != first) {
-            self.shown = Some((*first, Shown::new(self.volume.lattice.dims, &self.ranges, first)));
+        if self.visible.as_ref().is_none_or(|(table, _)| table != first) {
+            self.visible =
+                Some((*first, VisibleBlocks::new(self.volume.lattice.dims, &self.ranges, first)));
             self.has_bits = false;
         }
     }
@@ -312,11 +313,11 @@ impl Field {
         (table, field): (&[[f32; 4]], &field::Field),
         packed: &mut FrameField,
     ) -> Option<Gathered> {
-        let (_, shown) = self.shown.as_ref()?;
+        let (_, visible) = self.visible.as_ref()?;
         // Shaders number sheets from 1.
         let words = (sheets.count() as u32 + 1).div_ceil(32);
         let visible_before = visible_before(variant, table, field);
-        let bits = shown_words(self.volume.lattice.dims) as u32;
+        let bits = bit_words(self.volume.lattice.dims) as u32;
         let marks = bits + visible_before.len() as u32;
         let bytes = 4 * (u64::from(marks) + u64::from(tiles) * u64::from(words));
         if self.buffer.size() < bytes {
@@ -325,7 +326,7 @@ impl Field {
             self.visible_before.clear();
         }
         if !std::mem::replace(&mut self.has_bits, true) {
-            gpu.queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&shown.words));
+            gpu.queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&visible.words));
         }
         if self.visible_before != visible_before {
             let at = 4 * u64::from(bits);
@@ -337,10 +338,10 @@ impl Field {
         let per_variance = 1.0 / (self.sigma * self.sigma);
         let weight = |steps: f64| (-0.5 * steps * steps * per_variance).exp() as f32;
         packed.taps = [per_variance as f32, weight(1.0), weight(2.0), 0.0];
-        packed.shown = [bits, marks, words, 0];
+        packed.visibility = [bits, marks, words, 0];
         Some(Gathered {
             textures: self.textures.clone(),
-            shown: self.buffer.clone(),
+            visibility: self.buffer.clone(),
             windows: self.windows(gpu, [sheets.count() as u32, variant.gathered_sheets(), tiles]),
             tiles,
             mark_words: tiles * words,
@@ -349,8 +350,8 @@ impl Field {
 
     /// Returns the sheets of each dispatch of gather.
     fn windows(&mut self, gpu: &Gpu, request: [u32; 3]) -> Vec<wgpu::Buffer> {
-        if let Some((own, windows)) = &self.windows
-            && *own == request
+        if let Some((cached, windows)) = &self.windows
+            && *cached == request
         {
             return windows.clone();
         }
@@ -368,7 +369,7 @@ impl Field {
 }
 
 /// Returns the words of the samples' bits: two for each block.
-fn shown_words(dims: [usize; 3]) -> u64 {
+fn bit_words(dims: [usize; 3]) -> u64 {
     2 * dims.iter().map(|n| n.div_ceil(BLOCK) as u64).product::<u64>()
 }
 

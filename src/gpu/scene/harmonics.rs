@@ -43,8 +43,8 @@ impl Harmonics {
         let mut numbers = vec![0f32; order.len().div_ceil(BLOCK) * BLOCK * each];
         let fill = |(block, order): (&mut [f32], &[u32])| {
             for (lane, &index) in order.iter().enumerate() {
-                let own = set.harmonics_of(index as usize).as_flattened();
-                for (number, value) in own.iter().enumerate() {
+                let coefficients = set.harmonics_of(index as usize).as_flattened();
+                for (number, value) in coefficients.iter().enumerate() {
                     block[number * BLOCK + lane] = *value;
                 }
             }
@@ -71,7 +71,7 @@ impl Harmonics {
     }
 
     /// Writes the eye that sees the colours.
-    pub fn look_from(&self, gpu: &Gpu, eye: Eye) {
+    pub fn set_eye(&self, gpu: &Gpu, eye: Eye) {
         let (at, w) = match eye {
             Eye::At(place) => (place - self.origin, 1.0),
             Eye::Along(direction) => (direction, 0.0),

@@ -1,7 +1,7 @@
 //! The images that facets show, on the GPU (shaders/shared/images.wgsl).
 
 use crate::{
-    facet::{FacetSet, Image, Shown},
+    facet::{FacetSet, Image, TextureCoordinates},
     gpu::device::Gpu,
     scene::{Item, Scene},
 };
@@ -28,25 +28,25 @@ impl Images {
     /// hold.
     pub fn of(gpu: &Gpu, scene: &Scene) -> Option<Self> {
         let mut firsts = HashMap::new();
-        let (mut texels, mut shown): (Vec<[u8; 4]>, Vec<[u32; 4]>) = (Vec::new(), Vec::new());
+        let (mut texels, mut facets): (Vec<[u8; 4]>, Vec<[u32; 4]>) = (Vec::new(), Vec::new());
         for (item, set) in sets(scene) {
             if texels.len() as u64 + texels_of(set) > u64::from(side(gpu)).pow(2) {
                 return None;
             }
-            let first = u32::try_from(shown.len() / SHOWN_WORDS).ok()?;
+            let first = u32::try_from(facets.len() / SHOWN_WORDS).ok()?;
             firsts.insert(item, first);
             let images: Vec<[u32; 4]> =
                 set.images.iter().map(|image| add(image, &mut texels)).collect();
-            shown.extend(set.shown.iter().flat_map(|own| words(own, &images)));
+            facets.extend(set.texture_coordinates.iter().flat_map(|facet| words(facet, &images)));
         }
-        if shown.is_empty() {
+        if facets.is_empty() {
             return None;
         }
         let (texels, texel_bytes) =
             texture(gpu, wgpu::TextureFormat::R32Uint, bytemuck::cast_slice(&texels))?;
-        let (shown, shown_bytes) =
-            texture(gpu, wgpu::TextureFormat::Rgba32Uint, bytemuck::cast_slice(&shown))?;
-        Some(Self { textures: [texels, shown], bytes: texel_bytes + shown_bytes, firsts })
+        let (facets, facet_bytes) =
+            texture(gpu, wgpu::TextureFormat::Rgba32Uint, bytemuck::cast_slice(&facets))?;
+        Some(Self { textures: [texels, facets], bytes: texel_bytes + facet_bytes, firsts })
     }
 
     /// Returns the number of the first facet of an item with images.
@@ -56,8 +56,9 @@ impl Images {
 
     /// Returns the bytes that the images of a scene take.
     pub fn bytes_of(scene: &Scene) -> u64 {
-        let of_set =
-            |set: &Arc<FacetSet>| 4 * texels_of(set) + (16 * SHOWN_WORDS * set.shown.len()) as u64;
+        let of_set = |set: &Arc<FacetSet>| {
+            4 * texels_of(set) + (16 * SHOWN_WORDS * set.texture_coordinates.len()) as u64
+        };
         sets(scene).map(|(_, set)| of_set(set)).sum()
     }
 }
@@ -65,7 +66,7 @@ impl Images {
 /// Returns the sets of facets that show images, with the numbers of their items.
 fn sets(scene: &Scene) -> impl Iterator<Item = (usize, &Arc<FacetSet>)> {
     scene.items.iter().enumerate().filter_map(|(number, item)| match item {
-        Item::Facets(set) if !set.shown.is_empty() => Some((number, set)),
+        Item::Facets(set) if !set.texture_coordinates.is_empty() => Some((number, set)),
         _ => None,
     })
 }
@@ -82,9 +83,9 @@ fn side(gpu: &Gpu) -> u32 {
 /// Adds the levels of an image. Returns its first texel, its width and height, and the number of
 /// its coarser levels.
 fn add(image: &Image, texels: &mut Vec<[u8; 4]>) -> [u32; 4] {
-    let own = image.texture();
-    let is_whole = own.texels.len() as u64 == u64::from(own.width) * u64::from(own.height);
-    if !is_whole || own.texels.is_empty() {
+    let base = image.texture();
+    let is_whole = base.texels.len() as u64 == u64::from(base.width) * u64::from(base.height);
+    if !is_whole || base.texels.is_empty() {
         return [0; 4];
     }
     let first = texels.len() as u32;
@@ -93,13 +94,13 @@ fn add(image: &Image, texels: &mut Vec<[u8; 4]>) -> [u32; 4] {
         texels.extend_from_slice(&level.texels);
         levels += 1;
     }
-    [first, own.width, own.height, levels - 1]
+    [first, base.width, base.height, levels - 1]
 }
 
 /// Returns what a facet shows, as the shader reads it.
-fn words(shown: &Shown, images: &[[u32; 4]]) -> [[u32; 4]; SHOWN_WORDS] {
-    let [a, b, c] = shown.places.map(|place| place.to_array().map(f32::to_bits));
-    let image = images.get(shown.image as usize).copied().unwrap_or_default();
+fn words(facet: &TextureCoordinates, images: &[[u32; 4]]) -> [[u32; 4]; SHOWN_WORDS] {
+    let [a, b, c] = facet.places.map(|place| place.to_array().map(f32::to_bits));
+    let image = images.get(facet.image as usize).copied().unwrap_or_default();
     [[a[0], a[1], b[0], b[1]], [c[0], c[1], 0, 0], image]
 }
 

@@ -105,7 +105,7 @@ pub struct Slots {
     slots: wgpu::Buffer,
     bounds: wgpu::Buffer,
     pub counts: wgpu::Buffer,
-    found: wgpu::Buffer,
+    cut_nodes: wgpu::Buffer,
     pub selected: wgpu::Buffer,
     pub arguments: wgpu::Buffer,
     resident: wgpu::Buffer,
@@ -132,8 +132,8 @@ impl NodeChunk<'_> {
 
     /// Returns the other bindings of cut.wgsl.
     pub fn list(&self) -> [wgpu::BufferBinding<'_>; 5] {
-        let Slots { bounds, counts, found, selected, arguments, .. } = self.slots;
-        [bounds, counts, found, selected, arguments].map(|b| b.as_entire_buffer_binding())
+        let Slots { bounds, counts, cut_nodes, selected, arguments, .. } = self.slots;
+        [bounds, counts, cut_nodes, selected, arguments].map(|b| b.as_entire_buffer_binding())
     }
 }
 
@@ -148,8 +148,8 @@ impl Slots {
 
     /// Returns the bytes of the chunk's own buffers.
     pub fn bytes(&self) -> u64 {
-        let own = [&self.nodes, &self.bounds, &self.counts, &self.found, &self.selected];
-        own.map(wgpu::Buffer::size).iter().sum()
+        let buffers = [&self.nodes, &self.bounds, &self.counts, &self.cut_nodes, &self.selected];
+        buffers.map(wgpu::Buffer::size).iter().sum()
     }
 
     /// Returns the number of slots that take part in the frame.
@@ -245,9 +245,9 @@ impl PageCache {
         let mut needed = self.needed(cut)?;
         let most = self.fit(&mut needed, usize::try_from(room / SLOT_BYTES).unwrap_or(usize::MAX));
         let absent: Vec<Needed> =
-            needed.into_iter().filter(|own| !self.table.need(own.page)).collect();
+            needed.into_iter().filter(|request| !self.table.need(request.page)).collect();
         self.recolor(gpu, eye, chunks);
-        let wanted: usize = absent.iter().map(|own| slots_for(own.nodes)).sum();
+        let wanted: usize = absent.iter().map(|request| slots_for(request.nodes)).sum();
         let held = self.table.len();
         let mut grown = Vec::new();
         while self.table.len() < most && self.table.free() < wanted {
@@ -272,13 +272,13 @@ impl PageCache {
     /// Shortens a list of pages to those that fit into `room` slots, but never below one. Returns
     /// the number of slots that the hierarchy may take.
     fn fit(&mut self, needed: &mut Vec<Needed>, room: usize) -> usize {
-        let most = room.max(needed.first().map_or(1, |own| slots_for(own.nodes)));
+        let most = room.max(needed.first().map_or(1, |request| slots_for(request.nodes)));
         let mut taken = 0;
-        let mut fits = |own: &Needed| {
-            taken += slots_for(own.nodes);
+        let mut fits = |request: &Needed| {
+            taken += slots_for(request.nodes);
             taken <= most
         };
-        let count = needed.iter().take_while(|own| fits(own)).count();
+        let count = needed.iter().take_while(|request| fits(request)).count();
         self.missing = needed.len() - count;
         needed.truncate(count);
         most
@@ -300,7 +300,7 @@ impl PageCache {
             slots: buffer(gpu, "slots", 8 * count as u64, Usage::STORAGE),
             bounds: buffer(gpu, "node bounds", count as u64 * SLOT_BOUNDS, Usage::STORAGE),
             counts: buffer(gpu, "cut counts", 4 * u64::from(counts_of(capacity)), Usage::STORAGE),
-            found: buffer(gpu, "found nodes", 4 * u64::from(capacity), Usage::STORAGE),
+            cut_nodes: buffer(gpu, "found nodes", 4 * u64::from(capacity), Usage::STORAGE),
             selected: buffer(gpu, "drawn nodes", 4 * (u64::from(capacity) + 1), Usage::STORAGE),
             arguments: buffer(gpu, "drawn arguments", 12, Usage::STORAGE | Usage::INDIRECT),
             resident: self.resident.clone(),
@@ -322,10 +322,10 @@ impl PageCache {
         chunks: &[(&Slots, &wgpu::Buffer)],
     ) -> Result<()> {
         for batch in absent.chunks(BATCH) {
-            let numbers: Vec<u32> = batch.iter().map(|own| own.page).collect();
+            let numbers: Vec<u32> = batch.iter().map(|request| request.page).collect();
             let pages: Vec<Page> = self.hierarchy.read_pages(&numbers)?;
-            for (&own, content) in batch.iter().zip(&pages) {
-                let Some(slots) = self.table.place(own) else {
+            for (&request, content) in batch.iter().zip(&pages) {
+                let Some(slots) = self.table.place(request) else {
                     self.missing += 1;
                     continue;
                 };
@@ -335,7 +335,7 @@ impl PageCache {
                         trained.eye = Some(eye);
                         let all = 0..content.nodes.len();
                         let seen = trained.seen(all, eye, self.hierarchy.header().origin);
-                        self.trained.insert(own.page, trained);
+                        self.trained.insert(request.page, trained);
                         seen
                     }
                 };
@@ -359,13 +359,13 @@ impl PageCache {
             });
             let stale: Vec<(u32, Part, &Trained)> = stale.collect();
             let seen = |(place, part, page): &(u32, Part, &Trained)| {
-                let own = part.first as usize..(part.first + part.nodes) as usize;
-                (*place, page.seen(own, eye, origin))
+                let range = part.first as usize..(part.first + part.nodes) as usize;
+                (*place, page.seen(range, eye, origin))
             };
             let seen: Vec<(u32, Vec<Splat>)> = stale.par_iter().map(seen).collect();
-            for (place, own) in seen {
+            for (place, recolored) in seen {
                 let at = u64::from(place) * SLOT_HALF;
-                gpu.queue.write_buffer(splats, at, bytemuck::cast_slice(&own));
+                gpu.queue.write_buffer(splats, at, bytemuck::cast_slice(&recolored));
             }
         }
         for page in self.table.needed() {
@@ -407,11 +407,11 @@ fn upload(
 ) {
     for (number, &slot) in slots.iter().enumerate() {
         let slot = slot as usize;
-        let holds = |(own, _): &&(&Slots, &wgpu::Buffer)| {
-            (own.first_slot..own.first_slot + own.count).contains(&slot)
+        let holds = |(chunk, _): &&(&Slots, &wgpu::Buffer)| {
+            (chunk.first_slot..chunk.first_slot + chunk.count).contains(&slot)
         };
-        let Some((own, splats_of)) = chunks.iter().find(holds) else { continue };
-        let place = (slot - own.first_slot) as u64;
+        let Some((chunk, splats_of)) = chunks.iter().find(holds) else { continue };
+        let place = (slot - chunk.first_slot) as u64;
         let first = number * SLOT_NODES as usize;
         let nodes = first..page.nodes.len().min(first + SLOT_NODES as usize);
         let write = |to: &wgpu::Buffer, size: u64, bytes: &[u8]| {
@@ -419,10 +419,10 @@ fn upload(
         };
         let runs = nodes.clone().step_by(RUN_NODES as usize);
         let bounds: Vec<GpuBounds> = runs.map(|first| run_bounds(page, first)).collect();
-        write(&own.bounds, SLOT_BOUNDS, bytemuck::cast_slice(&bounds));
+        write(&chunk.bounds, SLOT_BOUNDS, bytemuck::cast_slice(&bounds));
         write(splats_of, SLOT_HALF, bytemuck::cast_slice(&splats[nodes.clone()]));
         let nodes: Vec<GpuNode> = nodes.map(|index| gpu_node(page, index)).collect();
-        write(&own.nodes, SLOT_HALF, bytemuck::cast_slice(&nodes));
+        write(&chunk.nodes, SLOT_HALF, bytemuck::cast_slice(&nodes));
     }
 }
 
@@ -448,13 +448,14 @@ impl Trained {
     }
 
     /// Returns a range of the splats as an eye sees them; `origin` is that of their positions.
-    fn seen(&self, own: Range<usize>, eye: Eye, origin: DVec3) -> Vec<Splat> {
-        own.map(|index| {
-            let (splat, is_leaf) = (&self.splats[index], self.are_leaves[index]);
-            let place = origin + Vec3::from(splat.center).as_dvec3();
-            trained::drawn(splat, is_leaf, 1.0, self.colors.seen(index, eye.toward(place)))
-        })
-        .collect()
+    fn seen(&self, range: Range<usize>, eye: Eye, origin: DVec3) -> Vec<Splat> {
+        range
+            .map(|index| {
+                let (splat, is_leaf) = (&self.splats[index], self.are_leaves[index]);
+                let place = origin + Vec3::from(splat.center).as_dvec3();
+                trained::drawn(splat, is_leaf, 1.0, self.colors.seen(index, eye.toward(place)))
+            })
+            .collect()
     }
 }
 

@@ -62,7 +62,7 @@ struct LevelledSet {
 
 /// A solid, of which the GPU holds what the clips of the last picture left.
 #[derive(Debug)]
-struct ShownSolid {
+struct ClippedSolid {
     item: usize,
     solid: Arc<Solid>,
     drawn: Option<Arc<FacetSet>>,
@@ -86,7 +86,7 @@ pub struct PreparedScene {
     /// The sets that pictures may show in levels of detail.
     levels: Vec<LevelledSet>,
     /// The solids.
-    solids: Vec<ShownSolid>,
+    solids: Vec<ClippedSolid>,
     /// The trained Gaussians.
     pub(crate) seen: Vec<SeenSet>,
     /// The hierarchies, in the scene's order.
@@ -172,8 +172,8 @@ impl PreparedScene {
                 Item::Facets(set) => prepared.add_facets(gpu, set, number),
                 // Their facets are uploaded as the clips of the first picture leave them.
                 Item::Solid(solid) => {
-                    let own = ShownSolid { item: number, solid: solid.clone(), drawn: None };
-                    prepared.solids.push(own);
+                    let clipped = ClippedSolid { item: number, solid: solid.clone(), drawn: None };
+                    prepared.solids.push(clipped);
                 }
                 Item::Hierarchy(hierarchy) => {
                     prepared.page_caches.push(PageCache::new(gpu, hierarchy, number));
@@ -219,7 +219,7 @@ impl PreparedScene {
     /// [`Renderer::prepare`](crate::gpu::Renderer::prepare) would refuse the function. The scene
     /// then keeps its old one.
     pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
-        self.scene = self.scene.shown_by(item, transfer)?;
+        self.scene = self.scene.with_transfer(item, transfer)?;
         Ok(())
     }
 
@@ -364,7 +364,9 @@ impl PreparedScene {
     /// `Detail::Pixels`.
     pub(crate) fn update_levels(&mut self, gpu: &Gpu, view: &View, pixels: f64) -> Result<()> {
         let mut levels = std::mem::take(&mut self.levels);
-        let done = levels.iter_mut().try_for_each(|own| self.update_level(gpu, own, view, pixels));
+        let done = levels
+            .iter_mut()
+            .try_for_each(|levelled| self.update_level(gpu, levelled, view, pixels));
         self.levels = levels;
         self.number_runs();
         done
@@ -373,24 +375,24 @@ impl PreparedScene {
     fn update_level(
         &mut self,
         gpu: &Gpu,
-        own: &mut LevelledSet,
+        levelled: &mut LevelledSet,
         view: &View,
         pixels: f64,
     ) -> Result<()> {
-        let cut = Cut::new(view, own.levels.origin(), pixels, false);
-        if own.cut == Some(cut) {
+        let cut = Cut::new(view, levelled.levels.origin(), pixels, false);
+        if levelled.cut == Some(cut) {
             return Ok(());
         }
-        let set = own.levels.drawn(&cut)?;
-        own.cut = Some(cut);
-        if own.set.as_ref().is_some_and(|shown| Arc::ptr_eq(shown, &set)) {
+        let set = levelled.levels.drawn(&cut)?;
+        levelled.cut = Some(cut);
+        if levelled.set.as_ref().is_some_and(|last| Arc::ptr_eq(last, &set)) {
             return Ok(());
         }
-        self.remove_chunks(own.item);
-        own.set = None;
+        self.remove_chunks(levelled.item);
+        levelled.set = None;
         gpu.check_memory(self.bytes + splat_bytes(&set))?;
-        self.add_splats(gpu, &in_space_order(&set), own.item);
-        own.set = Some(set);
+        self.add_splats(gpu, &in_space_order(&set), levelled.item);
+        levelled.set = Some(set);
         Ok(())
     }
 
@@ -406,7 +408,7 @@ impl PreparedScene {
             let splats: Vec<Splat> =
                 order.par_iter().map(|index| seen.splats[*index as usize]).collect();
             let harmonics = set.depends_on_eye().then(|| Box::new(Harmonics::new(gpu, set, order)));
-            self.bytes += harmonics.as_ref().map_or(0, |own| own.bytes());
+            self.bytes += harmonics.as_ref().map_or(0, |harmonics| harmonics.bytes());
             let origin = Origin::Splats { set: kind.clone(), harmonics };
             self.add_chunk(gpu, item, origin, bytemuck::cast_slice(&splats), order.len() as u32);
         }
@@ -426,8 +428,8 @@ impl PreparedScene {
         // Without room for the images, facets are cut to texels.
         let plain = if first.is_some() { Cow::Borrowed(&**set) } else { set.baked() };
         for (number, facets) in plain.facets.chunks(most).enumerate() {
-            let shown = first.map_or(0, |first| first + 1 + (number * most) as u32);
-            let origin = Origin::Facets { set: set.clone(), is_culled: false, shown };
+            let first_textured = first.map_or(0, |first| first + 1 + (number * most) as u32);
+            let origin = Origin::Facets { set: set.clone(), is_culled: false, first_textured };
             self.add_chunk(gpu, item, origin, bytemuck::cast_slice(facets), facets.len() as u32);
         }
     }
@@ -436,7 +438,7 @@ impl PreparedScene {
     pub(crate) fn update_solids(&mut self, gpu: &Gpu, settings: &Settings) -> Result<()> {
         let mut has_changed = false;
         for number in 0..self.solids.len() {
-            let ShownSolid { item, solid, drawn } = &mut self.solids[number];
+            let ClippedSolid { item, solid, drawn } = &mut self.solids[number];
             let (item, set) = (*item, solid.facets(&settings.clips));
             if drawn.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &set)) {
                 continue;
@@ -485,8 +487,8 @@ impl PreparedScene {
             volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
         let held = gpu.binding_size() / bytes / slice;
         // If all samples of a chunk are visible, it also holds a span for each.
-        let own = CHUNK_VOXELS.min(gpu.binding_size() / SPAN_BYTES) / slice;
-        let slices = held.saturating_sub(2 * NEIGHBOURS as u64).min(own) as usize;
+        let most = CHUNK_VOXELS.min(gpu.binding_size() / SPAN_BYTES) / slice;
+        let slices = held.saturating_sub(2 * NEIGHBOURS as u64).min(most) as usize;
         if slices == 0 {
             return Err(Error::Argument(format!(
                 "a slice of the volume has {slice} samples, and {} slices are too large for {}; \
@@ -503,9 +505,9 @@ impl PreparedScene {
             let in_slices = |slices: std::ops::Range<usize>| {
                 slices.start * slice as usize..slices.end * slice as usize
             };
-            let own = in_slices(first..end);
+            let samples = in_slices(first..end);
             let dims = [width, height, end - first].map(|n| n as u32);
-            let selection = Selection::new(gpu, dims, &ranges[own.clone()]);
+            let selection = Selection::new(gpu, dims, &ranges[samples.clone()]);
             self.bytes += selection.bytes();
             let origin = Origin::Lattice {
                 volume: volume.clone(),
@@ -522,7 +524,7 @@ impl PreparedScene {
                     &volume.samples.bytes()[part.start * size..part.end * size]
                 }
             };
-            self.add_chunk(gpu, item, origin, bytes, own.len() as u32);
+            self.add_chunk(gpu, item, origin, bytes, samples.len() as u32);
         }
         Ok(())
     }
@@ -543,7 +545,7 @@ impl PreparedScene {
         let room = settings.page_memory.min(self.room_to_read(gpu));
         for index in 0..self.page_caches.len() {
             let cut = self.page_caches[index].cut(view, settings, pixels);
-            let own: Vec<(&Slots, &wgpu::Buffer)> = self
+            let chunks: Vec<(&Slots, &wgpu::Buffer)> = self
                 .chunks
                 .iter()
                 .filter_map(|chunk| match &chunk.origin {
@@ -553,7 +555,8 @@ impl PreparedScene {
                     _ => None,
                 })
                 .collect();
-            let grown = self.page_caches[index].update(gpu, (&cut, Eye::of(view)), room, &own)?;
+            let grown =
+                self.page_caches[index].update(gpu, (&cut, Eye::of(view)), room, &chunks)?;
             for Growth { slots, splats, capacity } in grown {
                 self.bytes += slots.bytes();
                 let item = self.page_caches[index].item;

@@ -27,7 +27,7 @@ pub struct Selection {
     /// The number of selected samples.
     pub count: u32,
     /// The visible ranges that the list was made for; `None` if there is no list.
-    pub shown: Option<[u16; 256]>,
+    pub first_visible: Option<[u16; 256]>,
 }
 
 impl Selection {
@@ -43,18 +43,18 @@ impl Selection {
             counts: Counts::of(ranges),
             selected: buffer(gpu, "selected", 4, Usage::STORAGE),
             count: 0,
-            shown: None,
+            first_visible: None,
         }
     }
 
     /// Whether the list was made for these visible ranges.
-    pub fn is_for(&self, shown: &[u16; 256]) -> bool {
-        self.shown.as_ref() == Some(shown)
+    pub fn is_for(&self, first_visible: &[u16; 256]) -> bool {
+        self.first_visible.as_ref() == Some(first_visible)
     }
 
     /// Drops the list. Returns whether there was one.
     pub fn forget(&mut self, gpu: &Gpu) -> bool {
-        if self.shown.take().is_none() {
+        if self.first_visible.take().is_none() {
             return false;
         }
         self.selected = buffer(gpu, "selected", 4, Usage::STORAGE);
@@ -93,7 +93,7 @@ impl Counts {
     }
 
     /// Returns the number of samples that show something, as select.wgsl counts them.
-    pub fn shown(&self, first_visible: &[u16; 256]) -> u32 {
+    pub fn visible(&self, first_visible: &[u16; 256]) -> u32 {
         let shows = |[low, high]: [u8; 2]| u16::from(high) >= first_visible[usize::from(low)];
         self.ranges.iter().filter(|(range, _)| shows(*range)).map(|(_, count)| count).sum()
     }

@@ -103,15 +103,15 @@ impl SlotTable {
 
     /// Puts a page that the frame needs into free slots. Returns them, in the order of its nodes,
     /// or `None` if there are too few.
-    pub fn place(&mut self, own: Needed) -> Option<Vec<u32>> {
-        let first = self.free.len().checked_sub(slots_for(own.nodes))?;
+    pub fn place(&mut self, request: Needed) -> Option<Vec<u32>> {
+        let first = self.free.len().checked_sub(slots_for(request.nodes))?;
         let mut slots = self.free.split_off(first);
         slots.reverse();
-        for (slot, first) in slots.iter().zip((0..own.nodes).step_by(SLOT_NODES as usize)) {
-            let nodes = SLOT_NODES.min(own.nodes - first);
-            self.slots[*slot as usize] = Some(Part { page: own.page, first, nodes });
+        for (slot, first) in slots.iter().zip((0..request.nodes).step_by(SLOT_NODES as usize)) {
+            let nodes = SLOT_NODES.min(request.nodes - first);
+            self.slots[*slot as usize] = Some(Part { page: request.page, first, nodes });
         }
-        self.pages.insert(own.page, Placed { slots: slots.clone(), last_needed: self.frame });
+        self.pages.insert(request.page, Placed { slots: slots.clone(), last_needed: self.frame });
         Some(slots)
     }
 
@@ -124,8 +124,8 @@ impl SlotTable {
     /// Returns the nodes that the frame needs in a range of slots, each with the number of its slot
     /// in the range.
     pub fn parts(&self, first: usize, count: usize) -> impl Iterator<Item = (u32, Part)> {
-        let own = &self.slots[first..first + count];
-        (0..).zip(own).filter_map(|(number, part)| {
+        let slots = &self.slots[first..first + count];
+        (0..).zip(slots).filter_map(|(number, part)| {
             let part = (*part)?;
             (self.pages.get(&part.page)?.last_needed == self.frame).then_some((number, part))
         })
@@ -155,9 +155,9 @@ mod tests {
         assert_eq!(table.place(Needed { page: 7, nodes: 4096 }), Some((0..8).collect()));
         assert_eq!(table.place(Needed { page: 8, nodes: 1025 }), None);
         assert_eq!(table.place(Needed { page: 8, nodes: 513 }), Some(vec![8, 9]));
-        let own: Vec<(u32, Part)> = table.parts(7, 3).collect();
+        let parts: Vec<(u32, Part)> = table.parts(7, 3).collect();
         let part = |page, first, nodes| Part { page, first, nodes };
-        assert_eq!(own, [(0, part(7, 3584, 512)), (1, part(8, 0, 512)), (2, part(8, 512, 1))]);
+        assert_eq!(parts, [(0, part(7, 3584, 512)), (1, part(8, 0, 512)), (2, part(8, 512, 1))]);
         // Needed pages are not dropped.
         assert!(table.make_room(1).is_empty());
         assert_eq!(table.place(Needed { page: 9, nodes: 1 }), None);

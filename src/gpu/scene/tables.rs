@@ -16,14 +16,14 @@ use crate::{
 /// The tables of all fields, one behind the other.
 #[derive(Debug)]
 pub struct FieldTables {
-    fields: Vec<Own>,
+    fields: Vec<PackedTables>,
     entries: Vec<[f32; 4]>,
     pub buffer: wgpu::Buffer,
 }
 
 /// The tables of one field, whose entries lie with the others.
 #[derive(Debug)]
-struct Own {
+struct PackedTables {
     item: usize,
     transfer: TransferFunction,
     range: [f64; 2],
@@ -40,8 +40,8 @@ impl FieldTables {
         let fields = || numbers.iter().map(|number| (*number, &scene.items[*number]));
         let is_same = |last: &Self| {
             last.fields.len() == numbers.len()
-                && last.fields.iter().zip(fields()).all(|(own, (number, item))| {
-                    own.item == number && item.transfer() == Some(&own.transfer)
+                && last.fields.iter().zip(fields()).all(|(packed, (number, item))| {
+                    packed.item == number && item.transfer() == Some(&packed.transfer)
                 })
         };
         if let Some(last) = last
@@ -55,7 +55,7 @@ impl FieldTables {
             let mut tables = Tables::of(item, transfer, range);
             let starts = pack(&mut tables, &mut entries);
             let (transfer, diagonal) = (transfer.clone(), item.field_diagonal());
-            Some(Own { item: number, transfer, range, diagonal, tables, starts })
+            Some(PackedTables { item: number, transfer, range, diagonal, tables, starts })
         });
         let fields = made.collect();
         if entries.is_empty() {
@@ -79,10 +79,10 @@ impl FieldTables {
         (view, choice): (&View, Option<&Choice>),
         sheets: &Sheets,
     ) -> Vec<Field> {
-        let field = |own: &Own| {
-            let light = settings.light_of(&own.transfer, own.range, own.diagonal);
-            let mut field = Field::new(&scene.items[own.item], view, settings, choice);
-            field.set_tables(&own.tables, &own.transfer, light, view, sheets);
+        let field = |packed: &PackedTables| {
+            let light = settings.light_of(&packed.transfer, packed.range, packed.diagonal);
+            let mut field = Field::new(&scene.items[packed.item], view, settings, choice);
+            field.set_tables(&packed.tables, &packed.transfer, light, view, sheets);
             field
         };
         self.fields.iter().map(field).collect()
@@ -90,8 +90,8 @@ impl FieldTables {
 
     /// Packs the fields of a view, with the places of their tables.
     pub fn pack(&self, fields: &[Field], frame: &mut Frame) {
-        for ((slot, field), own) in frame.fields.iter_mut().zip(fields).zip(&self.fields) {
-            *slot = FrameField::new(field, own.starts);
+        for ((slot, field), packed) in frame.fields.iter_mut().zip(fields).zip(&self.fields) {
+            *slot = FrameField::new(field, packed.starts);
         }
     }
 }

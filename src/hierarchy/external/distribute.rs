@@ -72,7 +72,7 @@ pub fn distribute(
     let mut crowd = Crowd::new(input, most, wanted);
     input.stream.points_of(
         pieces,
-        |found| shares(input, wanted, found),
+        |batch| shares(input, wanted, batch),
         |shares| {
             done += shares.seen;
             tell(watch, Stage::Distributing, done.min(total), total);
@@ -90,7 +90,7 @@ pub fn distribute(
         let total = input.stream.counts().triangles;
         let mut done = 0;
         input.stream.triangles(
-            |_, found| (triangle_shares(input, wanted, found), found.len() as u64),
+            |_, batch| (triangle_shares(input, wanted, batch), batch.len() as u64),
             |((corners, foreign), seen)| {
                 done += seen;
                 tell(watch, Stage::Distributing, done, total);
@@ -109,15 +109,15 @@ pub fn distribute(
 
 /// Returns the points of a part that the wanted regions own or, in a point cloud, have around
 /// them.
-fn shares(input: &Surveyed, wanted: &Range<u32>, found: &[StreamPoint]) -> Shares<StreamPoint> {
-    let mut items = Vec::with_capacity(found.len() + found.len() / 8);
+fn shares(input: &Surveyed, wanted: &Range<u32>, points: &[StreamPoint]) -> Shares<StreamPoint> {
+    let mut items = Vec::with_capacity(points.len() + points.len() / 8);
     let mut around = Vec::new();
     let mut add = |region: u32, point: &StreamPoint| {
         if wanted.contains(&region) {
             items.push((region, *point));
         }
     };
-    for point in found {
+    for point in points {
         let place = Vec3::from(point.position);
         add(input.owner(place), point);
         if input.is_cloud() {
@@ -125,7 +125,7 @@ fn shares(input: &Surveyed, wanted: &Range<u32>, found: &[StreamPoint]) -> Share
             around.iter().for_each(|&region| add(region, point));
         }
     }
-    Shares { items, seen: found.len() as u64 }
+    Shares { items, seen: points.len() as u64 }
 }
 
 type Owned<T> = Vec<(u32, T)>;
@@ -135,11 +135,11 @@ type Owned<T> = Vec<(u32, T)>;
 fn triangle_shares(
     input: &Surveyed,
     wanted: &Range<u32>,
-    found: &[[u32; 3]],
+    batch: &[[u32; 3]],
 ) -> (Owned<[u32; 3]>, Owned<StreamPoint>) {
-    let mut triangles = Vec::with_capacity(found.len() + found.len() / 8);
+    let mut triangles = Vec::with_capacity(batch.len() + batch.len() / 8);
     let mut foreign = Vec::new();
-    for &triangle in found {
+    for &triangle in batch {
         let owners = triangle.map(|vertex| input.owner(input.stream.position(vertex)));
         for (corner, &region) in owners.iter().enumerate() {
             if owners[..corner].contains(&region) || !wanted.contains(&region) {

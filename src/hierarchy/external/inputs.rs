@@ -102,8 +102,8 @@ impl PlannedInput {
 
     /// Returns the points of some regions, which exist, or are the one that owns none.
     pub fn points_of(&self, regions: Range<u32>) -> u64 {
-        let own = &self.regions.points;
-        regions.map(|region| own.get(region as usize).copied().unwrap_or(0)).sum()
+        let points = &self.regions.points;
+        regions.map(|region| points.get(region as usize).copied().unwrap_or(0)).sum()
     }
 
     /// Opens the input, with its tables out of the file that holds all.
@@ -138,8 +138,8 @@ impl PlannedInput {
                 "has not the {points} points of the plan, or no such mesh"
             )));
         }
-        let own = self.read_tables(tables, counts)?;
-        let surveyed = Surveyed::resume(stream, self.facts.clone(), self.regions.clone(), own);
+        let loaded = self.read_tables(tables, counts)?;
+        let surveyed = Surveyed::resume(stream, self.facts.clone(), self.regions.clone(), loaded);
         surveyed.map_err(|message| {
             let message = format!("those of {}: {message}", self.path.display());
             Error::input(tables, "tables", message).hint("make the plan again, with --overwrite")

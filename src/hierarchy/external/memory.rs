@@ -1,6 +1,6 @@
 //! Memory needed by conversions.
 
-use super::{ExternalOptions, Stage, StageWatch, tell, triangles::look};
+use super::{ExternalOptions, Stage, StageWatch, tell, triangles::scan};
 use crate::{
     Error, Result,
     formats::{Counts, Stream},
@@ -84,14 +84,14 @@ pub fn memory_of_stream(stream: &mut Stream, options: &SurfelOptions, enough: u6
     if counts.triangles == 0 {
         return Ok(of_counts(counts));
     }
-    let (_, seen) = look(stream, options, room(counts, enough), None)?;
+    let (_, seen) = scan(stream, options, room(counts, enough), None)?;
     let others = counts.triangles.saturating_sub(seen.long.len() as u64);
     Ok(of_counts(once_cut(counts, others + seen.cut as u64)))
 }
 
 /// Visits the triangles of a mesh that is converted in regions. Returns an error if there are too
 /// many long ones to be subdivided together.
-pub(super) fn look_at_long(
+pub(super) fn scan_long(
     stream: &Stream,
     options: &ExternalOptions,
     watch: StageWatch<'_>,
@@ -101,7 +101,7 @@ pub(super) fn look_at_long(
     let room = usize::try_from(stream.counts().triangles)
         .unwrap_or(usize::MAX)
         .saturating_add(room(none, most));
-    let (pieces, seen) = look(stream, &options.surfels, room, watch)?;
+    let (pieces, seen) = scan(stream, &options.surfels, room, watch)?;
     let need = |triangles: u64| of_counts(once_cut(none, triangles));
     if need(seen.cut as u64) <= most {
         return Ok((pieces, seen));
@@ -135,7 +135,7 @@ pub fn check(
         if stream.counts().triangles > 0 {
             let surfels = SurfelOptions { deadline: limits.deadline(), ..options.surfels.clone() };
             let options = ExternalOptions { surfels, ..options.clone() };
-            look_at_long(&stream, &options, watch).map_err(|error| error.in_file(file))?;
+            scan_long(&stream, &options, watch).map_err(|error| error.in_file(file))?;
         }
     }
     Ok(())

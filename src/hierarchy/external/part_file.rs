@@ -82,7 +82,7 @@ impl PartFile {
             Err(e) => return Err(Error::file(path, "open", e)),
         };
         match Self::read(&mut file, path, label) {
-            Ok(found) => Ok(found.map_err(Into::into)),
+            Ok(part) => Ok(part.map_err(Into::into)),
             Err(e) => Err(Error::file(path, "read", e)),
         }
     }

@@ -140,7 +140,7 @@ impl Plan {
             inputs: inputs?,
             path: folder.join(NAME),
         };
-        plan.hash = plan.own_hash()?;
+        plan.hash = plan.content_hash()?;
         disk::write(&folder.join(TABLES), &tables)?;
         disk::write(&plan.path, (plan.text()? + "\n").as_bytes())?;
         // JSON has no infinities: a plan with one cannot be read back, so it is read here.
@@ -167,17 +167,17 @@ impl Plan {
             format: u32,
             program: String,
         }
-        let found: Version = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
-        if (found.format, &found.program) != (FORMAT, &program()) {
-            let (Version { format, program: by }, own) = (found, program());
+        let version: Version = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+        if (version.format, &version.program) != (FORMAT, &program()) {
+            let (Version { format, program: by }, this) = (version, program());
             return Err(wrong(format!(
-                "was made by {by}, in the format {format}, but this is {own}, which has the \
+                "was made by {by}, in the format {format}, but this is {this}, which has the \
                  format {FORMAT}; all parts of a plan need one version"
             )));
         }
         let mut plan: Self = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
         plan.path = path.to_owned();
-        if plan.own_hash()? != plan.hash {
+        if plan.content_hash()? != plan.hash {
             return Err(wrong("does not match its hash: it was changed or is damaged".into()));
         }
         plan.check().map_err(wrong)?;
@@ -192,12 +192,12 @@ impl Plan {
         let (mut points, mut is_closed) = (0, true);
         for (number, input) in self.inputs.iter().enumerate() {
             within(format!("inputs[{number}]"), input.check())?;
-            let (own, _, solid) = input.outline();
-            points += own;
+            let (owned, _, solid) = input.outline();
+            points += owned;
             is_closed &= solid == Some(true);
         }
-        let Shape { points: told, closed, regions, .. } = self.shape;
-        check(told == points, "shape.points", told, format!("the inputs have {points}"))?;
+        let Shape { points: stated, closed, regions, .. } = self.shape;
+        check(stated == points, "shape.points", stated, format!("the inputs have {points}"))?;
         check(closed == is_closed, "shape.closed", closed, "the inputs say otherwise")?;
         let planned = self.check_parts()?;
         check(regions == planned, "shape.regions", regions, format!("the parts have {planned}"))
@@ -214,12 +214,12 @@ impl Plan {
             let mut points = 0;
             for (at, InputRegions { input, regions }) in part.regions.iter().enumerate() {
                 let place = format!("parts[{number}].regions[{at}]");
-                let own = self.inputs.get(*input as usize).filter(|_| *input >= last);
-                let Some(own) = own else {
+                let source = self.inputs.get(*input as usize).filter(|_| *input >= last);
+                let Some(source) = source else {
                     return check(false, place + ".input", input, "there is none").map(|()| 0);
                 };
                 last = *input;
-                let (_, most, solid) = own.outline();
+                let (_, most, solid) = source.outline();
                 let end = &mut next[*input as usize];
                 // Triangles to be subdivided have a region of their own.
                 let most = most + usize::from(solid.is_some());
@@ -227,7 +227,7 @@ impl Plan {
                 let is_known = follows && regions.end as usize <= most;
                 check(is_known, place, regions, format!("{end} is the next of up to {most}"))?;
                 *end = regions.end;
-                points += own.points_of(regions.clone());
+                points += source.points_of(regions.clone());
             }
             let place = format!("parts[{number}].points");
             check(part.points == points, place, part.points, format!("{points} are expected"))?;
@@ -298,10 +298,10 @@ impl Plan {
             )));
         };
         let (path, label) = (self.part_path(index), self.label(index)?);
-        if let Ok(found) = PartFile::open(&path, label)?
-            && found.is_intact()?
+        if let Ok(finished) = PartFile::open(&path, label)?
+            && finished.is_intact()?
         {
-            let PartFile { bytes, made, .. } = found;
+            let PartFile { bytes, made, .. } = finished;
             let (points, splats) = (part.points, made.splats);
             return Ok(PartMade { points, splats, bytes, was_finished: true });
         }
@@ -321,8 +321,8 @@ impl Plan {
             let tables = disk::folder(&self.path).join(TABLES);
             let surveyed = input.open(&tables, &self.options, limits)?;
             let planned = self.parts.iter().flat_map(|part| &part.regions);
-            let own = planned.filter(|own| own.input as usize == number);
-            let end = own.map(|own| own.regions.end).max();
+            let of_input = planned.filter(|entry| entry.input as usize == number);
+            let end = of_input.map(|entry| entry.regions.end).max();
             if end != Some(surveyed.count()) {
                 let message = "names other regions than there are";
                 return Err(Error::input(&self.path, "plan", message));
@@ -414,7 +414,7 @@ impl Plan {
             .map_err(|e| Error::Argument(format!("the plan cannot be written as JSON: {e}")))
     }
 
-    fn own_hash(&self) -> Result<String> {
+    fn content_hash(&self) -> Result<String> {
         let text = Self { hash: String::new(), ..self.clone() }.text()?;
         Ok(blake3::hash(text.as_bytes()).to_hex().to_string())
     }
@@ -461,7 +461,7 @@ impl PlanText {
     /// Gives a plan the hash of what it says, if it still has the form of a plan.
     pub fn sealed(text: &mut serde_json::Value) {
         if let Ok(plan) = serde_json::from_value::<Plan>(text.clone()) {
-            text["hash"] = plan.own_hash().unwrap().into();
+            text["hash"] = plan.content_hash().unwrap().into();
         }
     }
 }

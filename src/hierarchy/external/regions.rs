@@ -337,13 +337,13 @@ impl Regions {
     }
 
     /// Finds the other regions in which a point at this position may be a neighbour.
-    pub fn around(&self, place: Vec3, found: &mut Vec<u32>) {
-        found.clear();
+    pub fn around(&self, place: Vec3, regions: &mut Vec<u32>) {
+        regions.clear();
         if self.ranges.starts.len() == 1 {
             return;
         }
         let key = self.cube.fine_key(place);
-        let own = self.of_key(key);
+        let owner = self.of_key(key);
         let mut reach = self.reach[(key >> BELOW_COARSE) as usize];
         if reach < 0.0 {
             reach = self.cut.range(..=key).next_back().map_or(0.0, |(_, &reach)| reach);
@@ -359,8 +359,8 @@ impl Regions {
             for &y in steps {
                 for &z in steps {
                     let region = self.of(place + Vec3::new(x, y, z) * reach);
-                    if region != own && !found.contains(&region) {
-                        found.push(region);
+                    if region != owner && !regions.contains(&region) {
+                        regions.push(region);
                     }
                 }
             }
@@ -474,10 +474,10 @@ mod tests {
     #[test]
     fn points_at_one_place_stay_together() {
         let places: Vec<Vec3> = (0..1000).map(|_| Vec3::ONE).chain(spread(100)).collect();
-        let found = counts(&places, &regions(&places, 10));
+        let sizes = counts(&places, &regions(&places, 10));
         assert!(
-            found.iter().filter(|&&count| count > 10).count() == 1
-                && found.iter().sum::<u64>() == 1100
+            sizes.iter().filter(|&&count| count > 10).count() == 1
+                && sizes.iter().sum::<u64>() == 1100
         );
         let alone = vec![Vec3::ONE; 100];
         assert_eq!(counts(&alone, &regions(&alone, 10)), [100]);
@@ -487,16 +487,16 @@ mod tests {
     fn what_is_near_a_border_is_known_beyond_it() {
         let places: Vec<Vec3> = spread(1000).collect();
         let regions = regions(&places, 100);
-        let mut found = Vec::new();
+        let mut near = Vec::new();
         for &place in &places {
-            regions.around(place, &mut found);
-            assert!(!found.contains(&regions.of(place)));
+            regions.around(place, &mut near);
+            assert!(!near.contains(&regions.of(place)));
         }
         let mut apart = 0;
         for &place in places.iter().filter(|place| place.x < 9.0) {
             let other = regions.of(place + Vec3::X);
-            regions.around(place, &mut found);
-            apart += u32::from(other != regions.of(place) && !found.contains(&other));
+            regions.around(place, &mut near);
+            apart += u32::from(other != regions.of(place) && !near.contains(&other));
         }
         assert_eq!(apart, 0);
     }

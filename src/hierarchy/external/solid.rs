@@ -5,7 +5,7 @@ use crate::{
     Result,
     formats::{Counts, Stream},
     math::weld::first_of_equals,
-    surface::{Joining, PiecesClosing, Sides, Told},
+    surface::{Evidence, Joining, PiecesClosing, Sides},
 };
 use glam::Vec3;
 
@@ -43,13 +43,13 @@ pub fn is_solid(
     let joining = Joining::new(triangles as usize);
     let (mut open, mut count) = (Vec::new(), 0);
     stream.triangles(
-        |first, found| (joining.add(first as u32, found, name), found.len()),
-        |(more, found)| {
+        |first, batch| (joining.add(first as u32, batch, name), batch.len()),
+        |(more, visited)| {
             count += more.len() as u64;
             if fits(Joining::memory(triangles, count)) {
                 open.extend(more);
             }
-            seen.add(found)
+            seen.add(visited)
         },
     )?;
     if !fits(Joining::memory(triangles, count)) {
@@ -63,7 +63,7 @@ pub fn is_solid(
     let mut sides = Sides::new(parts.count());
     stream.triangles(
         |first, triangles| {
-            let mut told = Told::default();
+            let mut evidence = Evidence::default();
             for (number, triangle) in (first..).zip(triangles) {
                 let corners = triangle.map(|vertex| stream.vertex(vertex));
                 let is_opaque = corners.iter().all(|corner| stream.is_opaque(corner));
@@ -71,12 +71,12 @@ pub fn is_solid(
                     corners.map(|corner| corner.position.into()),
                     corners.map(|corner| corner.normal.into()),
                 ];
-                told.add(parts.of(number), places, normals, is_opaque);
+                evidence.add(parts.of(number), places, normals, is_opaque);
             }
-            (told, triangles.len())
+            (evidence, triangles.len())
         },
-        |(told, count)| {
-            sides.add(told);
+        |(evidence, count)| {
+            sides.add(evidence);
             seen.add(count)
         },
     )?;

@@ -9,7 +9,7 @@ use super::{
     survey::{Facts, Tables, Triangulated},
 };
 use crate::{
-    about::Stance,
+    about::Orientation,
     hierarchy::{file::WriteOptions, sphere::Sphere},
 };
 use glam::DVec3;
@@ -31,9 +31,9 @@ impl ExternalOptions {
 /// Checks how a hierarchy is written.
 pub fn check_write(options: &WriteOptions) -> Result<(), String> {
     let is_direction = |of: DVec3| of.is_finite() && (of.length() - 1.0).abs() < 1e-6;
-    let Some(Stance { up, front }) = options.stance else { return Ok(()) };
+    let Some(Orientation { up, front }) = options.orientation else { return Ok(()) };
     let is_sound = is_direction(up) && is_direction(front);
-    check(is_sound, "stance", [up, front], "two directions of length 1 are expected")
+    check(is_sound, "orientation", [up, front], "two directions of length 1 are expected")
 }
 
 fn check_place(place: DVec3, field: &str) -> Result<(), String> {
@@ -126,17 +126,18 @@ mod tests {
     }
 
     /// Returns the places of all numbers in JSON.
-    fn numbers(value: &Value, at: &str, found: &mut Vec<String>) {
+    fn numbers(value: &Value, at: &str, places: &mut Vec<String>) {
         match value {
-            Value::Number(_) => found.push(at.to_owned()),
+            Value::Number(_) => places.push(at.to_owned()),
             Value::Array(all) => {
                 // The first and the last of long lists stand for the others.
                 let ends = [0, all.len().saturating_sub(1)];
                 let all = all.iter().enumerate().filter(|(number, _)| ends.contains(number));
-                all.for_each(|(number, own)| numbers(own, &format!("{at}/{number}"), found));
+                all.for_each(|(number, value)| numbers(value, &format!("{at}/{number}"), places));
             }
             Value::Object(all) => {
-                all.iter().for_each(|(name, own)| numbers(own, &format!("{at}/{name}"), found));
+                all.iter()
+                    .for_each(|(name, value)| numbers(value, &format!("{at}/{name}"), places));
             }
             _ => {}
         }

@@ -7,7 +7,7 @@ use super::{
     },
     ExternalOptions, Stage, StageWatch,
     guide::{Guide, Sample, Side},
-    memory::look_at_long,
+    memory::scan_long,
     regions::{Ranges, Reach, Regions},
     solid::is_solid,
     tell,
@@ -104,8 +104,8 @@ impl<'a> Surveyed<'a> {
                         points.iter().map(|point| cube.fine_key(place(point))).collect();
                     (keys, is_first.then(|| Seen::of(points, &sample)))
                 },
-                |(keys, found)| {
-                    found.into_iter().for_each(|found| seen.join(found));
+                |(keys, part)| {
+                    part.into_iter().for_each(|part| seen.join(part));
                     count(&keys);
                     done += keys.len() as u64;
                     tell(watch, Stage::Reading, done, stream.point_count());
@@ -175,14 +175,14 @@ impl<'a> Surveyed<'a> {
 
     /// Returns the pieces of the points that regions may need, ascending.
     pub fn pieces_of(&self, wanted: &std::ops::Range<u32>) -> Vec<usize> {
-        let own = 0..self.regions.count() as u32;
-        let is_everywhere = wanted.end > own.end || *wanted == own;
+        let all = 0..self.regions.count() as u32;
+        let is_everywhere = wanted.end > all.end || *wanted == all;
         let boxes: Vec<[Vec3; 2]> = match is_everywhere {
             true => Vec::new(),
             false => wanted.clone().flat_map(|region| self.regions.boxes(region)).collect(),
         };
         let is_needed =
-            |piece: &PieceBox| is_everywhere || boxes.iter().any(|own| piece.meets(own));
+            |piece: &PieceBox| is_everywhere || boxes.iter().any(|corners| piece.meets(corners));
         (0..).zip(&self.pieces).filter(|(_, piece)| is_needed(piece)).map(|(at, _)| at).collect()
     }
 }
@@ -217,7 +217,7 @@ fn triangulated(
     options: &ExternalOptions,
     watch: StageWatch<'_>,
 ) -> Result<(Triangulated, HashSet<[u32; 3]>)> {
-    let (pieces, seen) = look_at_long(stream, options, watch)?;
+    let (pieces, seen) = scan_long(stream, options, watch)?;
     let longest = seen.longest.min(pieces.longest());
     let long = seen.long.into_iter().flatten().map(name).collect();
     let is_solid = match pieces.closing {

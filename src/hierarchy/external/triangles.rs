@@ -9,14 +9,14 @@ use crate::{
 
 /// Visits the triangles until it is known which are subdivided, and into how many. Stops early if
 /// there are more than `room` triangles after subdivision.
-pub fn look(
+pub fn scan(
     stream: &Stream,
     options: &SurfelOptions,
     room: usize,
     watch: StageWatch<'_>,
 ) -> Result<(MeshPieces, Triangles)> {
     let counts = stream.counts();
-    let look = |length: f32| {
+    let visit = |length: f32| {
         let mut seen = Triangles::default();
         let mut done = 0;
         stream.triangles(
@@ -42,6 +42,6 @@ pub fn look(
         stream.bounds(),
         options,
         room,
-        look,
+        visit,
     )
 }

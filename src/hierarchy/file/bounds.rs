@@ -97,13 +97,13 @@ impl Code {
         fine: Option<f64>,
     ) -> Option<()> {
         let largest = shape.largest();
-        let own = f64::from(extent) * largest;
+        let footprint = f64::from(extent) * largest;
         let fits = (0..=MOST_POWER / SIZE).contains(&self.size)
             && (-MOST_POWER / RADIUS..=MOST_POWER / RADIUS).contains(&self.radius);
         node.cone = *cones().get(usize::try_from(self.cone).ok()?).filter(|_| fits)?;
         node.center = node.splat.center;
         node.radius = match fine {
-            None => (own * power(self.radius * RADIUS)) as f32,
+            None => (footprint * power(self.radius * RADIUS)) as f32,
             Some(step) => {
                 let mut center = DVec3::from(node.splat.center.map(f64::from));
                 for (axis, steps) in shape.axes.iter().zip(self.center) {
@@ -128,7 +128,7 @@ impl Code {
         fine: Option<f64>,
     ) -> Option<Self> {
         let largest = shape.largest();
-        let own = f64::from(extent) * largest;
+        let footprint = f64::from(extent) * largest;
         let around = |node: &Node| {
             let center = node.center().as_dvec3();
             children.iter().map(|child| reach(center, child)).fold(0.0, f64::max) * (1.0 + 1e-12)
@@ -157,7 +157,7 @@ impl Code {
             steps.clamp(-4096.0, 4096.0) as i32 - 1
         };
         code.radius = match fine {
-            None => steps(radius / own, RADIUS),
+            None => steps(radius / footprint, RADIUS),
             Some(step) => (radius / step).min(MOST_STEPS) as i32,
         };
         code.size = steps(f64::from(size) / (FULL_WIDTH * largest), SIZE).max(0);

@@ -174,13 +174,13 @@ fn whole(hierarchy: &Hierarchy, all: &Contents, findings: &mut Findings) {
         return;
     }
     let header = hierarchy.header();
-    for (what, stated, found) in [
+    for (what, stated, counted) in [
         ("leaves", header.leaves, counts.leaves),
         ("nodes", header.nodes, counts.nodes),
         ("blocks", u64::from(hierarchy.block_count()), u64::from(counts.blocks)),
     ] {
-        if stated != found {
-            let message = format!("it states {stated} {what}, but there are {found}");
+        if stated != counted {
+            let message = format!("it states {stated} {what}, but there are {counted}");
             findings.push(Finding::error("counts", "header", message));
         }
     }
@@ -219,7 +219,7 @@ fn check_entries(
         entry::hang(&mut wanted[0], &top.entries, &top.nodes, &top.parents);
     }
     let offset = |page: u32| match page.checked_sub(first) {
-        Some(own) => stated.get(own as usize).map(|entry| entry.place.offset),
+        Some(index) => stated.get(index as usize).map(|entry| entry.place.offset),
         None => top.entries.get(page as usize).map(|entry| entry.place.offset),
     };
     for ((page, entry), wanted) in (first..).zip(stated).zip(wanted) {
@@ -242,12 +242,12 @@ fn runs(stated: &[PageEntry], nodes: &[Node]) -> Vec<Run> {
     let parent = |node: usize| parents.get(node).copied().flatten().unwrap_or(0) as usize;
     let (mut start, mut child) = (0, 1);
     let run = |entry: &PageEntry| {
-        let own = start..(start + entry.nodes as usize).min(nodes.len());
-        let children: usize = nodes[own.clone()].iter().map(|node| node.children as usize).sum();
+        let range = start..(start + entry.nodes as usize).min(nodes.len());
+        let children: usize = nodes[range.clone()].iter().map(|node| node.children as usize).sum();
         let run = Run {
-            parents: parent(own.start)..parent(own.end.saturating_sub(1)) + 1,
+            parents: parent(range.start)..parent(range.end.saturating_sub(1)) + 1,
             children: child..child + children,
-            nodes: own,
+            nodes: range,
         };
         (start, child) = (run.nodes.end, run.children.end);
         run

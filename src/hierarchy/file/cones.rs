@@ -5,12 +5,12 @@ use crate::{hierarchy::Node, splat::decode_normal};
 /// Returns the cosine of [`joint_angle`].
 pub fn joint_cosine(node: &Node, child: &Node) -> f64 {
     let normals = (decode_normal(node.splat.normal), decode_normal(child.splat.normal));
-    let (Some(own), Some(its)) = normals else { return -1.0 };
+    let (Some(axis), Some(child_axis)) = normals else { return -1.0 };
     if child.cone <= -1.0 {
         return -1.0;
     }
-    let (own, its) = (own.as_dvec3(), its.as_dvec3());
-    let (dot, cross) = (own.dot(its), own.cross(its).length());
+    let (axis, child_axis) = (axis.as_dvec3(), child_axis.as_dvec3());
+    let (dot, cross) = (axis.dot(child_axis), axis.cross(child_axis).length());
     let length = (dot * dot + cross * cross).sqrt();
     let (cosine, sine) = (dot / length, cross / length);
     let cone = f64::from(child.cone).min(1.0);
@@ -22,13 +22,13 @@ pub fn joint_cosine(node: &Node, child: &Node) -> f64 {
 /// there is none.
 pub fn joint_angle(node: &Node, child: &Node) -> f64 {
     let normals = (decode_normal(node.splat.normal), decode_normal(child.splat.normal));
-    let (Some(own), Some(its)) = normals else { return std::f64::consts::PI };
+    let (Some(axis), Some(child_axis)) = normals else { return std::f64::consts::PI };
     if child.cone <= -1.0 {
         return std::f64::consts::PI;
     }
-    let (own, its) = (own.as_dvec3(), its.as_dvec3());
+    let (axis, child_axis) = (axis.as_dvec3(), child_axis.as_dvec3());
     let cone = if child.cone < 1.0 { libm::acos(f64::from(child.cone)) } else { 0.0 };
-    let between = libm::atan2(own.cross(its).length(), own.dot(its));
+    let between = libm::atan2(axis.cross(child_axis).length(), axis.dot(child_axis));
     (between + cone).min(std::f64::consts::PI)
 }
 

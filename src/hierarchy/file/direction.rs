@@ -81,12 +81,12 @@ mod tests {
             let direction = random.direction();
             let map = Directions(34);
             let sides = across(before);
-            let found = map.decode(before, sides, map.encode(before, sides, direction)).unwrap();
-            let angle = libm::acos(found.dot(direction).min(1.0)).to_degrees();
+            let decoded = map.decode(before, sides, map.encode(before, sides, direction)).unwrap();
+            let angle = libm::acos(decoded.dot(direction).min(1.0)).to_degrees();
             (sum, most) = (sum + angle, most.max(angle));
-            assert!((found.length() - 1.0).abs() < 1e-9);
-            assert!(unpacked(packed(found)).unwrap().distance(found) < 1e-4);
-            before = found;
+            assert!((decoded.length() - 1.0).abs() < 1e-9);
+            assert!(unpacked(packed(decoded)).unwrap().distance(decoded) < 1e-4);
+            before = decoded;
         }
         assert!(sum / 60_000.0 < 0.67 && most < 1.9, "{} {most}", sum / 60_000.0);
         for axis in [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z] {

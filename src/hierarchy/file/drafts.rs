@@ -99,8 +99,9 @@ pub struct Entries {
 struct Sizes {
     /// In the block that joins the others.
     joint: Vec<f32>,
-    /// In the last ordinary block, and the first page of it.
-    own: Vec<f32>,
+    /// In the last ordinary block.
+    last: Vec<f32>,
+    /// The first page of that block.
     first: u32,
 }
 
@@ -126,24 +127,24 @@ impl Entries {
 }
 
 impl Contents<Listing> for Entries {
-    fn look(&mut self, page: u32) -> io::Result<(u32, u8)> {
+    fn measure(&mut self, page: u32) -> io::Result<(u32, u8)> {
         let entry = self.entry(page)?;
         let joint = self.joint.pages.len() as u32;
-        let Sizes { joint: above, own, first } = &mut self.sizes;
+        let Sizes { joint: above, last, first } = &mut self.sizes;
         if page >= joint && entry.first_node == 0 {
-            own.clear();
+            last.clear();
             *first = page;
         }
         let size_of = |page: u32| match page < joint {
             true => above[page as usize],
-            false => own[(page - *first) as usize],
+            false => last[(page - *first) as usize],
         };
         let sizes = entry.parent_pages.clone().map(size_of);
         let size = sizes.fold(entry.largest_parent_size, f32::min);
         if page < joint {
             above.push(size);
         } else {
-            own.push(size);
+            last.push(size);
         }
         // The exponent of a number that is not negative.
         Ok((entry.place.bytes, (size.to_bits() >> 23) as u8))

@@ -338,10 +338,10 @@ mod tests {
     #[test]
     fn weights_are_near_what_was_counted() {
         for count in 0..=4096 {
-            let found = weight(nearest(count));
+            let coded = weight(nearest(count));
             assert!(
-                count < 4 && found == count
-                    || (0.81..1.23).contains(&(f64::from(found) / f64::from(count)))
+                count < 4 && coded == count
+                    || (0.81..1.23).contains(&(f64::from(coded) / f64::from(count)))
             );
         }
     }
@@ -368,13 +368,13 @@ mod tests {
         encoder.finish(&mut bytes);
         let mut decoder = Decoder::new(&bytes).unwrap();
         for (column, table) in columns.iter().zip(&tables) {
-            let mut found = Vec::new();
+            let mut decoded = Vec::new();
             let each = |symbol| {
-                found.push(symbol);
+                decoded.push(symbol);
                 Some(())
             };
             decoder.take(column.len(), table, &mut Slots::new(), each).unwrap();
-            assert_eq!(found, *column);
+            assert_eq!(decoded, *column);
         }
         assert!(decoder.is_at_end());
     }

@@ -143,9 +143,9 @@ pub fn of_block(
 /// Sets the pages of a block, of which `first` is the first, that contain parents and children.
 pub fn link(block: &mut [PageEntry], first: u32, nodes: u32) {
     for index in 0..block.len() {
-        let own = block[index].range();
+        let range = block[index].range();
         if index > 0 {
-            let [start, end] = [own.start, own.end - 1].map(|node| parent_page(block, node));
+            let [start, end] = [range.start, range.end - 1].map(|node| parent_page(block, node));
             block[index].parent_pages = first + start..first + (end + 1).min(index as u32);
         }
         let children = block[index].first_child;
@@ -252,12 +252,12 @@ impl Kind for Listing {
 
     fn follows(before: &PageEntry, entry: &PageEntry) -> Result<(), String> {
         let is_next = if entry.block == before.block {
-            let (above, own) = (&before.parent_pages, &entry.parent_pages);
+            let (previous, parents) = (&before.parent_pages, &entry.parent_pages);
             entry.first_node == before.range().end
                 && entry.first_child >= before.first_child
                 && entry.portal == before.portal
                 // Parents are in the order of their children.
-                && (before.first_node == 0 || own.start + 1 >= above.end)
+                && (before.first_node == 0 || parents.start + 1 >= previous.end)
         } else {
             entry.block == before.block + 1 && entry.first_node == 0
         };

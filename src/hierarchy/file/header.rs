@@ -3,7 +3,7 @@
 use super::{MAGIC, VERSION, entry::Listing};
 use crate::container::{Cursor, Put, directory::Kind};
 use crate::{
-    about::Stance,
+    about::Orientation,
     gaussians::MOST_DEGREE,
     hierarchy::validate::{fault_of_box, fault_of_extent},
     input::copy,
@@ -37,8 +37,8 @@ pub struct Header {
     /// All nodes, including portals.
     pub nodes: u64,
     /// How the source stands; `None` if unknown.
-    pub stance: Option<Stance>,
-    /// Whether the stance was guessed from the shape, not stated by the source.
+    pub orientation: Option<Orientation>,
+    /// Whether the orientation was guessed from the shape, not stated by the source.
     pub is_guessed: bool,
     /// The name of the world's unit (`"m"`); empty if unknown.
     pub unit: String,
@@ -49,7 +49,7 @@ pub struct Header {
 /// Bytes before the texts.
 pub const FIXED: usize = 160;
 
-/// Where the rotation to the stance begins.
+/// Where the rotation to the orientation begins.
 const TURN: usize = 144;
 
 /// The header as stored, with what the reader needs to find the rest.
@@ -87,11 +87,11 @@ impl Stored {
         out.f32s(&[header.extent]);
         out.u32(self.blocks);
         out.u32(self.pages);
-        let axis = header.stance.map_or(0, |stance| nearest_axis(stance.up));
+        let axis = header.orientation.map_or(0, |orientation| nearest_axis(orientation.up));
         out.put(&[axis, u8::from(header.is_guessed), header.degree.unwrap_or(0) as u8, 0]);
         out.u32(header.unit.len() as u32);
         out.u32(header.source.len() as u32);
-        out.f32s(&header.stance.map_or([0.0; 4], turn_to));
+        out.f32s(&header.orientation.map_or([0.0; 4], turn_to));
         debug_assert_eq!(out.len(), FIXED);
         out.put(header.unit.as_bytes());
         out.put(header.source.as_bytes());
@@ -139,16 +139,16 @@ impl Stored {
         let [blocks, pages] = [cursor.u32()?, cursor.u32()?];
         let axis = match cursor.u8()? {
             0 => None,
-            axis @ 1..=3 => Some(Stance::with_up(DVec3::AXES[usize::from(axis - 1)])),
+            axis @ 1..=3 => Some(Orientation::with_up(DVec3::AXES[usize::from(axis - 1)])),
             _ => return Some(Err(Refusal::Damaged("its up axis is unknown"))),
         };
         let is_guessed = cursor.u8()? != 0;
         let degree = is_trained.then_some(u32::from(cursor.u8()?));
         let mut turn = Cursor::new(fixed.get(TURN..FIXED)?);
-        let stance = match turned_by(turn.f32s()?) {
+        let orientation = match turned_by(turn.f32s()?) {
             // Older files state an axis alone.
             None => axis,
-            Some(Ok(stance)) => Some(stance),
+            Some(Ok(orientation)) => Some(orientation),
             Some(Err(message)) => return Some(Err(Refusal::Damaged(message))),
         };
         let (Ok(unit), Ok(source)) = (copy::text(&texts[..unit]), copy::text(&texts[unit..]))
@@ -179,7 +179,7 @@ impl Stored {
             source_points,
             leaves,
             nodes,
-            stance,
+            orientation,
             is_guessed,
             unit,
             source,
@@ -194,14 +194,14 @@ fn nearest_axis(up: DVec3) -> u8 {
     1 + (along.max_position() as u8)
 }
 
-/// Returns the rotation that turns +Y to a stance's up and +Z to its front, as a quaternion.
-fn turn_to(Stance { up, front }: Stance) -> [f32; 4] {
+/// Returns the rotation that turns +Y to a orientation's up and +Z to its front, as a quaternion.
+fn turn_to(Orientation { up, front }: Orientation) -> [f32; 4] {
     let turn = DQuat::from_mat3(&DMat3::from_cols(up.cross(front), up, front));
     turn.normalize().to_array().map(|part| part as f32)
 }
 
-/// Returns the stance that a quaternion turns to; `None` for zeros, which stand for no stance.
-fn turned_by(turn: [f32; 4]) -> Option<Result<Stance, &'static str>> {
+/// Returns the orientation that a quaternion turns to; `None` for zeros, which stand for no orientation.
+fn turned_by(turn: [f32; 4]) -> Option<Result<Orientation, &'static str>> {
     if turn == [0.0; 4] {
         return None;
     }
@@ -216,7 +216,7 @@ fn turned_by(turn: [f32; 4]) -> Option<Result<Stance, &'static str>> {
         let turned = turn.normalize() * axis;
         DVec3::new(exact(turned.x), exact(turned.y), exact(turned.z))
     };
-    Some(Ok(Stance { up: axis(DVec3::Y), front: axis(DVec3::Z) }))
+    Some(Ok(Orientation { up: axis(DVec3::Y), front: axis(DVec3::Z) }))
 }
 
 /// The lengths of the two texts.
@@ -243,16 +243,19 @@ mod tests {
 
     #[test]
     fn stances_survive() {
-        for stance in [Stance::SURVEY, Stance::RAS, Stance::Y_UP]
+        for orientation in [Orientation::SURVEY, Orientation::RAS, Orientation::Y_UP]
             .into_iter()
-            .chain([DVec3::X, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z].map(Stance::with_up))
+            .chain([DVec3::X, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z].map(Orientation::with_up))
         {
-            assert_eq!(turned_by(turn_to(stance)), Some(Ok(stance)));
+            assert_eq!(turned_by(turn_to(orientation)), Some(Ok(orientation)));
         }
-        let stance = Stance::with_up(DVec3::new(0.2, -0.4, 0.9));
-        let Some(Ok(read)) = turned_by(turn_to(stance)) else { panic!("a stance") };
-        assert!(read.up.distance(stance.up) < 1e-6 && read.front.distance(stance.front) < 1e-6);
-        assert_eq!(nearest_axis(stance.up), 3);
+        let orientation = Orientation::with_up(DVec3::new(0.2, -0.4, 0.9));
+        let Some(Ok(read)) = turned_by(turn_to(orientation)) else { panic!("a orientation") };
+        assert!(
+            read.up.distance(orientation.up) < 1e-6
+                && read.front.distance(orientation.front) < 1e-6
+        );
+        assert_eq!(nearest_axis(orientation.up), 3);
         assert_eq!(turned_by([0.0; 4]), None);
         assert!(turned_by([f32::NAN, 0.0, 0.0, 1.0]).is_some_and(|read| read.is_err()));
         assert!(turned_by([0.0, 0.0, 0.0, 2.0]).is_some_and(|read| read.is_err()));

@@ -80,12 +80,12 @@ fn encode_nodes(
     });
     let firsts: Vec<usize> = firsts.collect();
     let page = |((run, page), first): ((&Run, &PageCodes), &usize)| {
-        let own: Option<Vec<bounds::Code>> =
+        let page_bounds: Option<Vec<bounds::Code>> =
             bounds[*first..*first + page.inner].iter().copied().collect();
-        match (&page.codes, own) {
-            (Some(codes), Some(own)) => {
+        match (&page.codes, page_bounds) {
+            (Some(codes), Some(bounds)) => {
                 let mut out = vec![LOSSY];
-                lossy::encode(&nodes[run.nodes.clone()], codes, &own, fine, &mut out);
+                lossy::encode(&nodes[run.nodes.clone()], codes, &bounds, fine, &mut out);
                 Ok(out)
             }
             _ => lossless_page(&nodes[run.nodes.clone()]),
@@ -309,8 +309,8 @@ fn enclose_children(node: &mut Node, children: &[Node]) {
     let center = node.center().as_dvec3();
     node.radius =
         children.iter().map(|child| round_up(reach(center, child))).fold(node.radius, f32::max);
-    let own = node.size.max(WIDTH * deviation(&node.splat));
-    node.size = children.iter().map(|child| child.size).fold(own, f32::max);
+    let size = node.size.max(WIDTH * deviation(&node.splat));
+    node.size = children.iter().map(|child| child.size).fold(size, f32::max);
     node.cone = children
         .iter()
         .map(|child| cosine_below(joint_angle(node, child)))

@@ -121,16 +121,17 @@ impl Around {
     }
 
     fn enclosing(all: impl Iterator<Item = Self> + Clone) -> Self {
-        let place = |own: &Self| Vec3::from(own.center).as_dvec3();
+        let place = |bounds: &Self| Vec3::from(bounds.center).as_dvec3();
         let (low, high) =
-            all.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), own| {
-                let (center, radius) = (place(&own), f64::from(own.radius));
+            all.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), bounds| {
+                let (center, radius) = (place(&bounds), f64::from(bounds.radius));
                 (low.min(center - radius), high.max(center + radius))
             });
         let center = ((low + high) * 0.5).as_vec3();
-        let reach = |own: &Self| center.as_dvec3().distance(place(own)) + f64::from(own.radius);
-        let radius = all.clone().map(|own| reach(&own)).fold(0.0, f64::max);
-        let largest_size = all.map(|own| own.largest_size).fold(0.0, f32::max);
+        let reach =
+            |bounds: &Self| center.as_dvec3().distance(place(bounds)) + f64::from(bounds.radius);
+        let radius = all.clone().map(|bounds| reach(&bounds)).fold(0.0, f64::max);
+        let largest_size = all.map(|bounds| bounds.largest_size).fold(0.0, f32::max);
         Self { center: center.to_array(), radius: round_up(radius), largest_size }
     }
 

@@ -279,9 +279,9 @@ struct Course {
 }
 
 impl Course {
-    fn new(own: Axes, shape: &Shape, before: &Before, last: DVec3, fineness: &Fineness) -> Self {
+    fn new(kind: Axes, shape: &Shape, before: &Before, last: DVec3, fineness: &Fineness) -> Self {
         let normal = shape.axes[2];
-        if own != Axes::Normal {
+        if kind != Axes::Normal {
             return Self { axes: shape.axes, start: 0.0, fall: [0.0; 2] };
         }
         let along = before.way - normal * before.way.dot(normal);

@@ -193,7 +193,7 @@ impl Hierarchy {
             source_points: tree.source_points,
             leaves: tree.leaf_count(),
             nodes: tree.blocks.iter().map(|block| block.nodes.len() as u64).sum(),
-            stance: None,
+            orientation: None,
             is_guessed: false,
             unit: String::new(),
             source: String::new(),
@@ -248,7 +248,7 @@ impl Hierarchy {
         around: impl Fn(&CutSphere) -> bool + Sync,
         mut each: impl FnMut(&[Run<Listing>]) -> Result<bool>,
     ) -> Result<()> {
-        let wanted = |own: &Around| own.is_endless() || around(&CutSphere::around(own));
+        let wanted = |bounds: &Around| bounds.is_endless() || around(&CutSphere::around(bounds));
         let fail = |fault| self.fault(fault);
         self.directory.visit(self.bytes(), &wanted, &mut each, &fail)
     }
@@ -267,7 +267,7 @@ impl Hierarchy {
     pub fn read_page(&self, page: u32) -> Result<Page> {
         let entry = self.entry(page)?;
         let Content { nodes, colors, links } = self.read_nodes(page, &entry)?;
-        let own: Arc<[Family]> = families(&nodes).into();
+        let page_families: Arc<[Family]> = families(&nodes).into();
         let is_first = entry.first_node == 0;
         let mut parents = Vec::new();
         let mut parent = Vec::with_capacity(nodes.len());
@@ -305,11 +305,11 @@ impl Hierarchy {
                 add(&self.families(above)?)?;
             }
         }
-        add(&own)?;
+        add(&page_families)?;
         if parent.len() != nodes.len() {
             return Err(self.torn(page));
         }
-        self.families.lock().unwrap_or_else(|e| e.into_inner()).keep(page, own);
+        self.families.lock().unwrap_or_else(|e| e.into_inner()).keep(page, page_families);
         let has_portals = self.has_portals(&entry);
         let child_pages = self.child_pages(page, &entry, &nodes, links.as_deref())?;
         Ok(Page { nodes, colors, parents, parent, child_pages, has_portals })
@@ -342,8 +342,8 @@ impl Hierarchy {
         for batch in pages.chunks(most) {
             self.fetch(batch.iter().copied())?;
             // Reports the first of several damaged pages, whichever thread finds one first.
-            let own: Vec<Result<T>> = batch.par_iter().map(|&page| read(page)).collect();
-            all.extend(own.into_iter().collect::<Result<Vec<T>>>()?);
+            let results: Vec<Result<T>> = batch.par_iter().map(|&page| read(page)).collect();
+            all.extend(results.into_iter().collect::<Result<Vec<T>>>()?);
         }
         Ok(all)
     }
@@ -401,22 +401,22 @@ impl Hierarchy {
     /// decode to a whole page of equal nodes.
     pub(in crate::hierarchy) fn check_size(&self) -> Result<()> {
         // Once as pages, and once joined.
-        let found = self.header.nodes.saturating_mul(2 * size_of::<Node>() as u64);
-        self.limits.check(LimitKind::Bytes, &self.path, "the size of the tree in bytes", found)
+        let bytes = self.header.nodes.saturating_mul(2 * size_of::<Node>() as u64);
+        self.limits.check(LimitKind::Bytes, &self.path, "the size of the tree in bytes", bytes)
     }
 
     /// Reads the block whose first page has the number `first`; `entries` are those of its pages.
     pub(super) fn read_block(&self, first: u32, entries: &[PageEntry]) -> Result<Block> {
         let (block, portal) = (entries[0].block, entries[0].portal);
         // A few bytes of the file may decode to a whole page of equal nodes.
-        let found = entries.iter().map(|entry| u64::from(entry.nodes)).sum::<u64>()
+        let bytes = entries.iter().map(|entry| u64::from(entry.nodes)).sum::<u64>()
             * 2
             * size_of::<Node>() as u64;
         self.limits.check(
             LimitKind::Bytes,
             &self.path,
             format!("the size of block {block} in bytes"),
-            found,
+            bytes,
         )?;
         let numbers: Vec<u32> = (first..).take(entries.len()).collect();
         let mut pages = self
@@ -448,7 +448,7 @@ impl Hierarchy {
 
     /// Returns the error for a fault of the directory.
     pub(super) fn fault(&self, fault: Fault) -> Error {
-        let error = told(&self.path, fault);
+        let error = error_of(&self.path, fault);
         match self.bytes() {
             Some(file) => file.why(&self.path, error),
             None => error,
@@ -526,16 +526,16 @@ impl Hierarchy {
             if !node.is_leaf() {
                 while !range.contains(&node.first_child) {
                     let next = if range.is_empty() { below } else { below + 1 };
-                    let found = (next < self.page_count()).then(|| self.entry(next)).transpose()?;
-                    let found = found.filter(|found| {
-                        found.block == entry.block
-                            && (range.is_empty() || found.first_node == range.end)
-                            && found.first_node <= node.first_child
+                    let child = (next < self.page_count()).then(|| self.entry(next)).transpose()?;
+                    let child = child.filter(|child| {
+                        child.block == entry.block
+                            && (range.is_empty() || child.first_node == range.end)
+                            && child.first_node <= node.first_child
                     });
-                    let found = found.ok_or_else(|| {
+                    let child = child.ok_or_else(|| {
                         wrong(format!("no page has node {} of its block", node.first_child))
                     })?;
-                    (below, range) = (next, found.range());
+                    (below, range) = (next, child.range());
                 }
                 return Ok(below);
             }
@@ -581,9 +581,12 @@ fn entries_of(tree: &Tree) -> Result<(Vec<PageEntry>, HashMap<u32, u32>)> {
         let refuse =
             |message| Error::Argument(format!("block {number} of the hierarchy: {message}"));
         in_order(&block.nodes).and_then(|()| check_nodes(&block.nodes)).map_err(refuse)?;
-        let own = block.colors.as_ref().map(|colors| (colors.degree(), colors.len()));
-        if own != tree.degree().map(|degree| (degree, block.nodes.len())) {
-            return Err(refuse(format!("its colours are {own:?} for {} nodes", block.nodes.len())));
+        let colors = block.colors.as_ref().map(|colors| (colors.degree(), colors.len()));
+        if colors != tree.degree().map(|degree| (degree, block.nodes.len())) {
+            return Err(refuse(format!(
+                "its colours are {colors:?} for {} nodes",
+                block.nodes.len()
+            )));
         }
         let first = entries.len() as u32;
         match (number, block.portal) {
@@ -596,10 +599,10 @@ fn entries_of(tree: &Tree) -> Result<(Vec<PageEntry>, HashMap<u32, u32>)> {
         let runs = pages(&block.nodes);
         let places = vec![Place::default(); runs.len()];
         let around = arounds(&block.nodes, &runs);
-        let mut own = entry::of_block(number as u32, first, &runs, &around, &places);
+        let mut block_entries = entry::of_block(number as u32, first, &runs, &around, &places);
         let portal = block.portal.unwrap_or(NO_PORTAL);
-        own.iter_mut().for_each(|entry| entry.portal = portal);
-        entries.extend(own);
+        block_entries.iter_mut().for_each(|entry| entry.portal = portal);
+        entries.extend(block_entries);
     }
     let leaves = top.iter().filter(|node| node.is_leaf()).count();
     if tree.is_joined() && (portals.len() != leaves || tree.blocks.len() != leaves + 1) {
@@ -608,8 +611,8 @@ fn entries_of(tree: &Tree) -> Result<(Vec<PageEntry>, HashMap<u32, u32>)> {
         return Err(Error::Argument(message));
     }
     let top_pages = entries.iter().take_while(|entry| entry.block == 0).count();
-    let (own, below) = entries.split_at_mut(top_pages);
-    entry::hang_all(own, below, top);
+    let (top_entries, below) = entries.split_at_mut(top_pages);
+    entry::hang_all(top_entries, below, top);
     Ok((entries, portals))
 }
 
@@ -629,7 +632,7 @@ fn begin(path: &Path, file: &Bytes, limits: &Limits) -> Result<Begun> {
     let head = file.beginning((stored.length() + MOST_ROOT) as u64)?;
     let place = (stored.length(), kind.end);
     let directory = Directory::open(kind, stored.pages, place, &head);
-    let directory = directory.map_err(|fault| told(path, fault))?;
+    let directory = directory.map_err(|fault| error_of(path, fault))?;
     let Stored { header, file_bytes, blocks, .. } = stored;
     let present = file.len();
     if present > file_bytes {
@@ -639,10 +642,10 @@ fn begin(path: &Path, file: &Bytes, limits: &Limits) -> Result<Begun> {
     if present < file_bytes {
         return Err(incomplete(path, format!("byte {present} of {file_bytes}")));
     }
-    for (what, found) in
+    for (what, count) in
         [("the number of leaves", header.leaves), ("the number of points", header.source_points)]
     {
-        limits.check(LimitKind::Points, path, what, found)?;
+        limits.check(LimitKind::Points, path, what, count)?;
     }
     limits.check(LimitKind::Bytes, path, "the size of the file in bytes", present)?;
     Ok(Begun { header, blocks, directory, portals: None })
@@ -655,7 +658,7 @@ fn listing(stored: &Stored, start: u64) -> Listing {
 }
 
 /// The error for a fault of the directory.
-fn told(path: &Path, fault: Fault) -> Error {
+fn error_of(path: &Path, fault: Fault) -> Error {
     match fault {
         Fault::Incomplete(place) => incomplete(path, place),
         Fault::Damaged(place, message) => damaged(path, place, message),

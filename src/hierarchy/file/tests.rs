@@ -2,7 +2,7 @@
 
 use super::{entry::Listing, page::Frame, *};
 use crate::{
-    about::Stance,
+    about::Orientation,
     container::directory::Shape,
     hierarchy::{
         Block, Detail, Node, Tree,
@@ -19,7 +19,7 @@ use std::path::Path;
 fn options(lossless: bool) -> WriteOptions {
     WriteOptions {
         lossless,
-        stance: Some(Stance::RAS),
+        orientation: Some(Orientation::RAS),
         is_guessed: true,
         unit: "m".into(),
         source: "scan.ply".into(),
@@ -82,8 +82,8 @@ fn lossless_keeps_every_bit() {
         same(&hierarchy.read_tree().unwrap(), &tree);
         let header = hierarchy.header();
         assert_eq!(
-            (header.leaves, header.stance, header.unit.as_str()),
-            (tree.leaf_count(), Some(Stance::RAS), "m")
+            (header.leaves, header.orientation, header.unit.as_str()),
+            (tree.leaf_count(), Some(Orientation::RAS), "m")
         );
         assert_eq!((header.lossless, header.source.as_str()), (true, "scan.ply"));
     }
@@ -103,19 +103,20 @@ fn pages_tell_their_parents(hierarchy: &Hierarchy) {
         assert_eq!(page.nodes.len(), entry.nodes as usize);
         for (index, node) in page.nodes.iter().enumerate() {
             let block = &tree.blocks[entry.block as usize];
-            let own = entry.first_node as usize + index;
-            assert_eq!(*node, block.nodes[own]);
-            let parent = match (own, block.portal) {
+            let node_index = entry.first_node as usize + index;
+            assert_eq!(*node, block.nodes[node_index]);
+            let parent = match (node_index, block.portal) {
                 (0, None) => None,
                 (0, Some(portal)) => {
                     parents[0][portal as usize].map(|parent| tree.blocks[0].nodes[parent as usize])
                 }
-                _ => parents[entry.block as usize][own].map(|parent| block.nodes[parent as usize]),
+                _ => parents[entry.block as usize][node_index]
+                    .map(|parent| block.nodes[parent as usize]),
             };
             match (parent, page.parent[index]) {
                 (None, u32::MAX) => assert_eq!(entry.parents_radius, f32::INFINITY),
-                (Some(parent), told) => {
-                    assert_eq!(page.parents[told as usize], CutSphere::of(&parent));
+                (Some(parent), position) => {
+                    assert_eq!(page.parents[position as usize], CutSphere::of(&parent));
                     let away = (parent.center() - glam::Vec3::from(entry.parents_center)).length()
                         + parent.radius;
                     assert!(
@@ -130,7 +131,7 @@ fn pages_tell_their_parents(hierarchy: &Hierarchy) {
                 let block = hierarchy.entry(below).unwrap();
                 assert_eq!(
                     (tree.blocks[block.block as usize].portal, block.first_node),
-                    (Some(own as u32), 0)
+                    (Some(node_index as u32), 0)
                 );
             } else if node.is_leaf() {
                 assert_eq!(below, NO_PAGE);
@@ -201,7 +202,7 @@ fn small_files() -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn every_flipped_byte_is_told() {
+fn every_flipped_byte_is_reported() {
     let folder = Folder::new();
     for bytes in small_files() {
         let hash = bytes.len() - HASH;
@@ -247,13 +248,13 @@ fn forged(bytes: &[u8], change: impl Fn(&mut [u8])) -> Vec<u8> {
         bytes[range.end - 4..range.end].copy_from_slice(&crc.to_le_bytes());
     }
     let hash = bytes.len() - HASH;
-    let found = blake3::hash(&bytes[..hash]);
-    bytes[hash..].copy_from_slice(found.as_bytes());
+    let digest = blake3::hash(&bytes[..hash]);
+    bytes[hash..].copy_from_slice(digest.as_bytes());
     bytes
 }
 
 #[test]
-fn lies_are_told_though_checksums_fit() {
+fn lies_are_reported_though_checksums_fit() {
     let bytes = to_bytes(&joined(&surface(9_000, 8), 2), &options(false)).unwrap();
     let pages = open(bytes.clone()).page_count();
     let start = header::Stored::decode(&bytes).unwrap().length();
@@ -371,10 +372,11 @@ fn losses_keep_to_the_promises() {
             ([0, 1].map(|i| ellipsoid(&a.splat).0[i]), [0, 1].map(|i| ellipsoid(&b.splat).0[i]));
         assert!((three / one - 1.0).abs() < 0.05 && (four / two - 1.0).abs() < 0.11);
         // The ellipse as a whole: its widening or narrowing in each direction.
-        let [own, its] = [a, b].map(|node| crate::hierarchy::testing::covariance(&node.splat));
+        let [original, coded] =
+            [a, b].map(|node| crate::hierarchy::testing::covariance(&node.splat));
         let along = ellipsoid(&a.splat).1;
         for axis in &along[..2] {
-            let ratio = (axis.dot(its * *axis) / axis.dot(own * *axis)).sqrt();
+            let ratio = (axis.dot(coded * *axis) / axis.dot(original * *axis)).sqrt();
             // The extremes of 60,000 axes; which these are depends on the order of the nodes.
             assert!((0.82..1.22).contains(&ratio), "{ratio}");
         }
@@ -460,17 +462,17 @@ fn disorder_is_refused() {
 #[test]
 fn validation_finds_what_is_loose() {
     let sound = tree(&surface(500, 1));
-    let found = |change: fn(&mut [crate::hierarchy::Node]), code: &str| {
+    let expect_finding = |change: fn(&mut [crate::hierarchy::Node]), code: &str| {
         let mut tree = sound.clone();
         change(&mut tree.blocks[0].nodes);
         let codes: Vec<&str> = validate(&tree).iter().map(|finding| finding.code).collect();
         assert!(codes.contains(&code), "{code}: {codes:?}");
     };
-    found(|nodes| nodes[0].radius *= 0.99, "sphere");
-    found(|nodes| nodes[1].center[0] += 0.5, "sphere");
-    found(|nodes| nodes[0].size = nodes[1].size * 0.5, "size");
+    expect_finding(|nodes| nodes[0].radius *= 0.99, "sphere");
+    expect_finding(|nodes| nodes[1].center[0] += 0.5, "sphere");
+    expect_finding(|nodes| nodes[0].size = nodes[1].size * 0.5, "size");
     // The nodes above a leaf do not have this fault.
-    let found_at_leaf = |change: fn(&mut crate::hierarchy::Node), code: &str| {
+    let expect_at_leaf = |change: fn(&mut crate::hierarchy::Node), code: &str| {
         let mut tree = sound.clone();
         if let Some(leaf) = tree.blocks[0].nodes.iter_mut().find(|node| node.is_leaf()) {
             change(leaf);
@@ -478,17 +480,17 @@ fn validation_finds_what_is_loose() {
         let codes: Vec<&str> = validate(&tree).iter().map(|finding| finding.code).collect();
         assert_eq!(codes, [code]);
     };
-    found_at_leaf(|leaf| leaf.radius *= 0.95, "sphere");
-    found_at_leaf(|leaf| leaf.splat.center[2] += 0.1 * leaf.radius, "sphere");
-    found_at_leaf(|leaf| leaf.size *= 0.95, "size");
-    found_at_leaf(|leaf| leaf.splat.strength = -1.0, "values");
+    expect_at_leaf(|leaf| leaf.radius *= 0.95, "sphere");
+    expect_at_leaf(|leaf| leaf.splat.center[2] += 0.1 * leaf.radius, "sphere");
+    expect_at_leaf(|leaf| leaf.size *= 0.95, "size");
+    expect_at_leaf(|leaf| leaf.splat.strength = -1.0, "values");
     let mut boxed = sound.clone();
     boxed.bounds.max.x += 0.1 * boxed.bounds.diagonal();
     assert_eq!(validate(&boxed).iter().map(|finding| finding.code).collect::<Vec<_>>(), ["bounds"]);
     boxed.extent = 9.0;
     assert_eq!(validate(&boxed)[0].code, "extent");
-    found(|nodes| nodes[1].cone = 1.0, "cone");
-    found(|nodes| nodes[2].splat.center[1] = f32::INFINITY, "values");
+    expect_finding(|nodes| nodes[1].cone = 1.0, "cone");
+    expect_finding(|nodes| nodes[2].splat.center[1] = f32::INFINITY, "values");
 }
 
 /// Values that cannot be drawn are rejected in trees, on writing and on reading.

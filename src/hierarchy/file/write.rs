@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::Stance,
+    about::Orientation,
     gaussians::Colors,
     hierarchy::{
         Block, MOST_CHILDREN, Node, Tree,
@@ -39,8 +39,8 @@ pub struct WriteOptions {
     /// Store every bit, at about eight times the size.
     pub lossless: bool,
     /// How the source stands; `None` if unknown.
-    pub stance: Option<Stance>,
-    /// Whether the stance was guessed from the shape.
+    pub orientation: Option<Orientation>,
+    /// Whether the orientation was guessed from the shape.
     pub is_guessed: bool,
     /// The name of the world's unit.
     pub unit: String,
@@ -176,13 +176,13 @@ impl Writer {
 
     /// Returns an error unless all blocks have colours of one degree for all nodes, or none has.
     fn check_colors(&mut self, block: &Block) -> Result<(), String> {
-        let own = block.colors.as_ref().map(Colors::degree);
-        let degree = *self.degree.get_or_insert(own);
+        let degree = block.colors.as_ref().map(Colors::degree);
+        let first = *self.degree.get_or_insert(degree);
         let count = block.colors.as_ref().map_or(block.nodes.len(), Colors::len);
-        if degree != own || count != block.nodes.len() {
+        if first != degree || count != block.nodes.len() {
             return Err(format!(
-                "it has {count} colours of the degree {own:?} for {} nodes, but the degree of the \
-                 first block is {degree:?}",
+                "it has {count} colours of the degree {degree:?} for {} nodes, but the degree of \
+                 the first block is {first:?}",
                 block.nodes.len()
             ));
         }
@@ -284,9 +284,9 @@ impl Writer {
         page::enclose(&mut nodes);
         check_nodes(&nodes).map_err(refuse)?;
         // Each portal states the first page of its block. The pages on top come before these.
-        let own = pages(&nodes).len() as u32;
+        let top_pages = pages(&nodes).len() as u32;
         for (&portal, first) in top.portals.iter().zip(self.drafts.firsts()) {
-            nodes[portal as usize].first_child = own + first;
+            nodes[portal as usize].first_child = top_pages + first;
         }
         let block = Block { nodes, colors: top.block.colors.clone(), portal: None };
         let (coded, around) = encode_block(&block, self.extent, true).map_err(|e| self.fault(e))?;
@@ -321,7 +321,7 @@ impl Writer {
             source_points: whole.source_points,
             leaves: self.contents.leaves,
             nodes: self.drafts.nodes + joint_nodes,
-            stance: self.options.stance,
+            orientation: self.options.orientation,
             is_guessed: self.options.is_guessed,
             unit: self.options.unit.clone(),
             source: self.options.source.clone(),
@@ -421,9 +421,9 @@ fn encode_block(block: &Block, extent: f32, is_lossless: bool) -> io::Result<(Co
 
 /// Returns an error if a node has values that cannot be drawn.
 pub(super) fn check_nodes(nodes: &[Node]) -> Result<(), String> {
-    let found =
+    let faulty =
         nodes.par_iter().enumerate().find_map_first(|(index, node)| Some((index, fault(node)?)));
-    found.map_or(Ok(()), |(index, fault)| Err(format!("node {index} has {fault}")))
+    faulty.map_or(Ok(()), |(index, fault)| Err(format!("node {index} has {fault}")))
 }
 
 /// Properties of the leaves of ordinary blocks.

@@ -113,11 +113,11 @@ fn install() {
         }
         // Set before our handler is installed, which reads it.
         let _ = PREVIOUS.set(previous);
-        let mut own: libc::sigaction = std::mem::zeroed();
-        own.sa_sigaction = on_fault as *const () as usize;
-        own.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
-        libc::sigemptyset(&raw mut own.sa_mask);
-        libc::sigaction(libc::SIGBUS, &raw const own, std::ptr::null_mut());
+        let mut action: libc::sigaction = std::mem::zeroed();
+        action.sa_sigaction = on_fault as *const () as usize;
+        action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
+        libc::sigemptyset(&raw mut action.sa_mask);
+        libc::sigaction(libc::SIGBUS, &raw const action, std::ptr::null_mut());
     });
 }
 

@@ -14,8 +14,8 @@ pub struct Stamp {
 
 impl Stamp {
     pub fn of(file: &File) -> io::Result<Self> {
-        let found = file.metadata()?;
-        Ok(Self { length: found.len(), written: found.modified().ok() })
+        let metadata = file.metadata()?;
+        Ok(Self { length: metadata.len(), written: metadata.modified().ok() })
     }
 
     /// Describes in words what has changed, or returns `None`.

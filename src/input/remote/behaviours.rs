@@ -163,7 +163,7 @@ fn tried(head: String, then: Then, seconds: u64) -> (String, u64) {
     let link = Link::new(&name, patient()).unwrap();
     let first = 0..FIRST;
     let parts = link.parts(std::slice::from_ref(&first), None, Deadline::after(seconds));
-    (told(parts), link.came())
+    (error_text(parts), link.came())
 }
 
 #[test]
@@ -207,14 +207,14 @@ fn redirects_are_followed_where_the_user_allows_it() {
         opened(Path::new(&name), cache(&Folder::new(), 0))
     };
     let host = place.split('/').nth(2).unwrap().to_owned();
-    let error = told(open(&first));
+    let error = error_text(open(&first));
     assert!(error.contains(&format!("--allow-host {host}")), "{error}");
     assert!(target.asked().is_empty());
     allow_redirects([host]);
     let read = open(&first).unwrap().read(0..1000).unwrap();
     assert!(read[..] == bytes[..]);
     allow_redirects([]);
-    assert!(told(open(&first)).contains("not followed"));
+    assert!(error_text(open(&first)).contains("not followed"));
     // Within the server, nobody is asked.
     let head = to("/b.splk");
     target.fail(move |number, _| match number {
@@ -248,7 +248,7 @@ fn opening_has_one_deadline() {
     let open = || Remote::open_in(Path::new(&name), cache(&Folder::new(), 0), patient(), &limits);
     let mut remote = open().unwrap();
     std::thread::sleep(Duration::from_millis(3100));
-    let error = told(remote.read(MIB..MIB + 3));
+    let error = error_text(remote.read(MIB..MIB + 3));
     assert!(error.contains("takes longer than the limit of 3 s"), "{error}");
     remote.ready();
     assert!(remote.read(MIB..MIB + 3).is_ok());

@@ -54,7 +54,8 @@ impl Default for Cache {
     /// in the folder for temporary files, everyone could guess its name.
     fn default() -> Self {
         use etcetera::BaseStrategy;
-        let folder = etcetera::choose_base_strategy().map(|own| own.cache_dir().join("splatkit"));
+        let folder =
+            etcetera::choose_base_strategy().map(|strategy| strategy.cache_dir().join("splatkit"));
         Self { folder: folder.unwrap_or_default(), bytes: 1 << 30 }
     }
 }
@@ -80,16 +81,16 @@ impl Entry {
         let key = *blake3::hash(format!("{address}\n{stamp:?}").as_bytes()).as_bytes();
         let name = blake3::Hash::from_bytes(key).to_hex();
         let folder = cache.folder.join("objects").join(&name[..DIGITS]);
-        let own = Self {
+        let entry = Self {
             cache: cache.clone(),
             folder,
             key,
             written: AtomicU64::new(0),
             has_failed: AtomicBool::new(false),
         };
-        own.trim();
-        own.keep(USED, &[&[]]);
-        Some(own)
+        entry.trim();
+        entry.keep(USED, &[&[]]);
+        Some(entry)
     }
 
     /// Returns a block of this many bytes. A damaged one is removed.
@@ -140,7 +141,7 @@ impl Entry {
             let path = file.path();
             let Some(mut open) = self.open(&path) else { continue };
             let mut hash = self.hash_of_whole();
-            let is_sound = open.metadata().is_ok_and(|found| found.len() == size)
+            let is_sound = open.metadata().is_ok_and(|metadata| metadata.len() == size)
                 && io::copy(&mut open, &mut hash).is_ok()
                 && *stated == *hash.finalize().to_hex();
             // The file that was checked, not another one that may have its name by now.
@@ -187,7 +188,7 @@ impl Entry {
 
     /// Opens a file of this object. Others, such as links and pipes, are not opened.
     fn open(&self, path: &Path) -> Option<File> {
-        let is_file = || path.symlink_metadata().is_ok_and(|found| found.is_file());
+        let is_file = || path.symlink_metadata().is_ok_and(|metadata| metadata.is_file());
         (self.is_own() && is_file()).then(|| File::open(path).ok())?
     }
 
@@ -253,7 +254,7 @@ impl Entry {
 
 /// A folder itself, not a symbolic link to one.
 fn is_folder(path: &Path) -> bool {
-    path.symlink_metadata().is_ok_and(|found| found.is_dir())
+    path.symlink_metadata().is_ok_and(|metadata| metadata.is_dir())
 }
 
 fn remove_damaged(path: &Path) {
@@ -291,12 +292,12 @@ fn files(objects: &Path) -> Vec<Kept> {
         let used = used.unwrap_or(SystemTime::UNIX_EPOCH);
         for file in fs::read_dir(folder).into_iter().flatten().flatten() {
             // The file itself, also where it is a symbolic link.
-            let Ok(found) = file.metadata() else { continue };
-            let written = found.modified().unwrap_or(SystemTime::UNIX_EPOCH);
+            let Ok(metadata) = file.metadata() else { continue };
+            let written = metadata.modified().unwrap_or(SystemTime::UNIX_EPOCH);
             let name = file.file_name();
             let is_own = name.to_str().is_some_and(|name| is_own_name(name, written));
-            if found.is_file() && is_own {
-                all.push(Kept { path: file.path(), bytes: found.len(), written, used });
+            if metadata.is_file() && is_own {
+                all.push(Kept { path: file.path(), bytes: metadata.len(), written, used });
             }
         }
     }

@@ -130,15 +130,15 @@ enum Ended {
 impl Link {
     pub fn new(name: &Path, patience: Patience) -> Result<Self> {
         let whole = address::whole(name).map_err(|why| Error::input(name, "address", why))?;
-        let shown = address::address(name);
-        let wrong = |message: String| Error::input(&shown, "address", message);
+        let redacted = address::address(name);
+        let wrong = |message: String| Error::input(&redacted, "address", message);
         let (scheme, rest) = whole.split_once("://").unwrap_or_default();
         let (host, key) = rest.split_once('/').unwrap_or((rest, ""));
         if scheme.starts_with("http") && host.contains('@') {
             let message = "contains a name or a password, which are not sent";
             return Err(wrong(message.into()).hint("use an address that is signed in its query"));
         }
-        if shown != name {
+        if redacted != name {
             return Err(wrong("contains a query, which may be secret".into())
                 .hint("open the path that splatkit::input::address returns"));
         }
@@ -182,12 +182,12 @@ impl Link {
         let Some(stamp) = expected.cloned().or(stamp) else {
             return Err(self.error("address", "no range was asked for"));
         };
-        for ((found, bytes), range) in parts.iter().zip(ranges) {
-            if *found != stamp {
+        for ((actual, bytes), range) in parts.iter().zip(ranges) {
+            if *actual != stamp {
                 let message = "the object on the server changed while it was read";
                 return Err(self.error("object", message).hint("try again"));
             }
-            let wanted = range.end.min(found.size).saturating_sub(range.start);
+            let wanted = range.end.min(actual.size).saturating_sub(range.start);
             if bytes.len() as u64 != wanted {
                 return Err(self.explained(range, &Trouble::Short(bytes.len() as u64)));
             }
@@ -241,14 +241,15 @@ impl Link {
         let _permit = self.turns.acquire().await;
         REQUESTS.fetch_add(1, Relaxed);
         let options = GetOptions { range: Some(GetRange::Bounded(range)), ..GetOptions::default() };
-        let found = self.store.get_opts(&self.location, options).await.map_err(Trouble::Store)?;
+        let response =
+            self.store.get_opts(&self.location, options).await.map_err(Trouble::Store)?;
         let stamp = Stamp {
-            size: found.meta.size,
-            tag: found.meta.e_tag.clone(),
-            modified: found.meta.last_modified.timestamp(),
+            size: response.meta.size,
+            tag: response.meta.e_tag.clone(),
+            modified: response.meta.last_modified.timestamp(),
         };
-        let expected = found.range.end - found.range.start;
-        let bytes = found.bytes().await.map_err(Trouble::Store)?;
+        let expected = response.range.end - response.range.start;
+        let bytes = response.bytes().await.map_err(Trouble::Store)?;
         BYTES.fetch_add(bytes.len() as u64, Relaxed);
         if bytes.len() as u64 != expected {
             return Err(Trouble::Short(bytes.len() as u64));
@@ -294,9 +295,9 @@ impl Link {
                     "check the address and the network, then try again",
                 )
             }
-            Trouble::Short(found) => (
+            Trouble::Short(received) => (
                 format!(
-                    "the server was asked for {} bytes and sent {found}",
+                    "the server was asked for {} bytes and sent {received}",
                     range.end - range.start
                 ),
                 "check the server and the network, then try again",

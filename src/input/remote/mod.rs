@@ -109,11 +109,11 @@ impl Remote {
         }
         drop(opened);
         let cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let own = Self::open_in(path, cache.unwrap_or_default(), Patience::default(), limits)?;
+        let remote = Self::open_in(path, cache.unwrap_or_default(), Patience::default(), limits)?;
         let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
         opened.truncate(RECENT - 1);
-        opened.insert(0, (Instant::now(), own.object.clone()));
-        Ok(own)
+        opened.insert(0, (Instant::now(), remote.object.clone()));
+        Ok(remote)
     }
 
     fn open_in(path: &Path, cache: Cache, patience: Patience, limits: &Limits) -> Result<Self> {
@@ -203,10 +203,10 @@ impl Remote {
             return Ok(head.slice(range.start as usize..range.end as usize));
         }
         let numbers = touched(std::slice::from_ref(&range));
-        let found = self.object.obtain(&numbers, self.deadline())?;
+        let blocks = self.object.obtain(&numbers, self.deadline())?;
         let mut all = Vec::with_capacity((range.end - range.start) as usize);
         for number in numbers {
-            let (start, block) = (number * BLOCK, &found[&number]);
+            let (start, block) = (number * BLOCK, &blocks[&number]);
             let from = range.start.saturating_sub(start) as usize;
             let to = (range.end - start).min(block.len() as u64) as usize;
             all.extend_from_slice(&block[from..to]);
@@ -310,7 +310,7 @@ impl Object {
             let bytes = bytes_of(&(number..number + 1), self.stamp.size);
             bytes.end.saturating_sub(bytes.start) as usize
         };
-        let mut found = HashMap::new();
+        let mut blocks = HashMap::new();
         let mut missing = Vec::new();
         for &number in numbers {
             let key = (self.number, number);
@@ -321,12 +321,12 @@ impl Object {
                 Some(block)
             });
             match block {
-                Some(block) => drop(found.insert(number, block)),
+                Some(block) => drop(blocks.insert(number, block)),
                 None => missing.push(number),
             }
         }
         if missing.is_empty() {
-            return Ok(found);
+            return Ok(blocks);
         }
         let spans = joined(missing);
         let ranges: Vec<_> = spans.iter().map(|span| bytes_of(span, self.stamp.size)).collect();
@@ -341,10 +341,10 @@ impl Object {
                 if let Some(entry) = self.entry() {
                     entry.keep_block(number, &block);
                 }
-                found.insert(number, block);
+                blocks.insert(number, block);
             }
         }
-        Ok(found)
+        Ok(blocks)
     }
 
     /// Asks the server when the object is opened again.

@@ -37,7 +37,7 @@ fn opened(path: &Path, cache: Cache) -> Result<Remote> {
 }
 
 /// The error as a user sees it: the message and the hint.
-fn told<T>(result: Result<T>) -> String {
+fn error_text<T>(result: Result<T>) -> String {
     match result.err().expect("an error") {
         error @ Error::Input { .. } => {
             let Error::Input { hint, .. } = &error else { unreachable!() };
@@ -119,20 +119,20 @@ fn faults_that_stay_are_clear() {
     ] {
         let begun = Instant::now();
         server.fail(move |_, _| fault);
-        let error = told(open(&server, cache(&Folder::new(), 0)));
+        let error = error_text(open(&server, cache(&Folder::new(), 0)));
         assert!(error.contains(words) && error.contains("a.splk: bytes 0 to 262144"), "{error}");
         // The same once the object is open.
         server.asked();
         server.fail(move |number, _| if number == 0 { Fault::None } else { fault });
         let remote = open(&server, cache(&Folder::new(), 0)).unwrap();
-        let error = told(remote.read(MIB..MIB + 3));
+        let error = error_text(remote.read(MIB..MIB + 3));
         assert!(error.contains(words), "{error}");
         assert!(begun.elapsed() < Duration::from_secs(20), "{fault:?}");
     }
     let gone = server.address("b.splk");
     drop(server);
     std::thread::sleep(Duration::from_millis(50));
-    let error = told(opened(Path::new(&gone), Cache::default()));
+    let error = error_text(opened(Path::new(&gone), Cache::default()));
     assert!(error.contains("the server cannot be read"), "{error}");
 }
 
@@ -145,7 +145,7 @@ fn changed_objects_are_errors() {
     server.tag(Some("\"second\""));
     // What was fetched before is still that of before.
     assert_eq!(&remote.read(MIB..MIB + 3).unwrap()[..], &bytes[1 << 20..][..3]);
-    let error = told(remote.read(2 * MIB - 5..2 * MIB));
+    let error = error_text(remote.read(2 * MIB - 5..2 * MIB));
     assert!(error.contains("changed while it was read"), "{error}");
     // Bytes of the first object are not taken for those of the second.
     let remote = open(&server, cache(&folder, 1 << 30)).unwrap();
@@ -268,12 +268,12 @@ fn only_what_the_cache_made_is_removed() {
     }
     #[cfg(unix)]
     {
-        let own = folder.path("own");
-        std::fs::create_dir(&own).unwrap();
-        std::fs::write(own.join("0"), &large).unwrap();
-        std::os::unix::fs::symlink(&own, objects.join("f".repeat(32))).unwrap();
-        std::os::unix::fs::symlink(own.join("0"), object.join("3")).unwrap();
-        users.push(own.join("0"));
+        let target = folder.path("own");
+        std::fs::create_dir(&target).unwrap();
+        std::fs::write(target.join("0"), &large).unwrap();
+        std::os::unix::fs::symlink(&target, objects.join("f".repeat(32))).unwrap();
+        std::os::unix::fs::symlink(target.join("0"), object.join("3")).unwrap();
+        users.push(target.join("0"));
     }
     let remote = open(&server, cache(&folder, most)).unwrap();
     remote.fetch(&[MIB..4 * MIB]).unwrap();
@@ -361,14 +361,15 @@ fn secrets_are_not_told() {
     assert!(opened(&name, Cache::default()).is_ok());
     for fault in [Fault::Status(404), Fault::Status(500), Fault::Whole, Fault::Cut(3)] {
         server.fail(move |_, _| fault);
-        let error = told(opened(&name, Cache::default()));
+        let error = error_text(opened(&name, Cache::default()));
         assert!(!error.contains("hidden") && error.contains("c.splk: "), "{error}");
     }
     for address in ["http://me:hidden@127.0.0.1/d", "http://127.0.0.1/e?hidden", "s3://"] {
-        let error = told(Remote::open(Path::new(address), &Limits::default()).map(|_| ()));
+        let error = error_text(Remote::open(Path::new(address), &Limits::default()).map(|_| ()));
         assert!(address == "s3://" || !error.contains("hidden"), "{error}");
-        let error =
-            told(Remote::open(&crate::input::address(address), &Limits::default()).map(|_| ()));
+        let error = error_text(
+            Remote::open(&crate::input::address(address), &Limits::default()).map(|_| ()),
+        );
         assert!(!error.contains("hidden"), "{error}");
     }
 }

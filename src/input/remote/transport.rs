@@ -213,8 +213,9 @@ fn redirected(attempt: Attempt) -> Action {
         && (to.scheme() == first.scheme() || to.scheme() == "https");
     let allowed = ALLOWED.lock().unwrap_or_else(PoisonError::into_inner);
     let host = to.host_str().unwrap_or_default();
-    let is_allowed =
-        allowed.iter().any(|own| own.eq_ignore_ascii_case(&name) || own.eq_ignore_ascii_case(host));
+    let is_allowed = allowed
+        .iter()
+        .any(|entry| entry.eq_ignore_ascii_case(&name) || entry.eq_ignore_ascii_case(host));
     drop(allowed);
     if !(is_within || is_allowed) {
         return attempt.error(Refused::Redirect { to: name });
@@ -241,9 +242,9 @@ struct Service {
 type Answer<'a> = Pin<Box<dyn Future<Output = Result<HttpResponse, HttpError>> + Send + 'a>>;
 
 impl HttpService for Service {
-    fn call<'own, 'answer>(&'own self, request: HttpRequest) -> Answer<'answer>
+    fn call<'service, 'answer>(&'service self, request: HttpRequest) -> Answer<'answer>
     where
-        'own: 'answer,
+        'service: 'answer,
         Self: 'answer,
     {
         Box::pin(self.answer(request))

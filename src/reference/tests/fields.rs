@@ -18,7 +18,7 @@ fn a_constant_field_lets_through_what_its_length_does() {
         let picture = render(&scene, &camera, &settings).unwrap();
         let view = camera.view(settings.size).unwrap();
         let mut crossed = 0;
-        for (i, found) in picture.color.iter().enumerate() {
+        for (i, pixel) in picture.color.iter().enumerate() {
             // The length inside the box, by testing many points.
             let (origin, direction) =
                 view.ray(DVec2::new((i % 24) as f64 + 0.5, (i / 24) as f64 + 0.5));
@@ -31,8 +31,8 @@ fn a_constant_field_lets_through_what_its_length_does() {
             });
             let length = 10.0 * inside.count() as f64 / f64::from(steps);
             let opacity = 1.0 - (-0.8 * length).exp();
-            close(found[3], opacity, 1e-3);
-            (0..3).for_each(|c| close(found[c], f64::from(found[3]) * color[c], 1e-6));
+            close(pixel[3], opacity, 1e-3);
+            (0..3).for_each(|c| close(pixel[c], f64::from(pixel[3]) * color[c], 1e-6));
             crossed += usize::from(length > 0.5);
         }
         assert!(crossed > 50);
@@ -80,9 +80,9 @@ fn scattered_samples_fill_at_most_their_sheets() {
         (100.0 * weight * deviation * profile::Profile::Gaussian.moments(0.0, [from, to])[0])
             .min(plane[1] - plane[0])
     });
-    let found = render(&scene, &camera, &settings).unwrap().color[0][3];
+    let opacity = render(&scene, &camera, &settings).unwrap().color[0][3];
     // Sheets filled to less than a ten-thousandth (the tails) have no value.
-    close(found, 1.0 - (-0.1 * lengths.sum::<f64>()).exp(), 5e-6);
+    close(opacity, 1.0 - (-0.1 * lengths.sum::<f64>()).exp(), 5e-6);
 }
 
 /// Asserts that a field is `constant` + `slope`·x at the faces of a few pixels, within `reach` of

@@ -74,9 +74,9 @@ fn set(payload: Payload, splats: Vec<Splat>) -> SplatSet {
     SplatSet { origin: DVec3::ZERO, payload, splats, extent: 8.0, overlap: 1.0 }
 }
 
-fn close(found: impl Into<f64>, expected: f64, tolerance: f64) {
-    let found = found.into();
-    assert!((found - expected).abs() <= tolerance, "{found} is not {expected} ± {tolerance}");
+fn close(value: impl Into<f64>, expected: f64, tolerance: f64) {
+    let value = value.into();
+    assert!((value - expected).abs() <= tolerance, "{value} is not {expected} ± {tolerance}");
 }
 
 /// A round scattered sample.

@@ -64,8 +64,8 @@ fn scattered_samples_know_what_they_add_up_to() {
     let scene = Scene::new().with_samples(samples, uniform([1.0; 3], 0.8));
     let length = (2.0 * std::f64::consts::PI).sqrt() * 0.5;
     for mode in [Mode::Sheets, Mode::AxisSheets, Mode::Splats(Order::FrontToBack)] {
-        let found = render(&scene, &from_above(9.0, 0.01), &before(mode)).unwrap().color[0][3];
-        close(found, 1.0 - (-0.8 * length * 3.0 / 2.0).exp(), 5e-5);
+        let opacity = render(&scene, &from_above(9.0, 0.01), &before(mode)).unwrap().color[0][3];
+        close(opacity, 1.0 - (-0.8 * length * 3.0 / 2.0).exp(), 5e-5);
     }
 }
 

@@ -79,10 +79,10 @@ fn an_x_ray_is_what_a_field_takes_from_white() {
     let both = scene.clone().with_splats(set(Payload::Radiance, splats));
     let settings = Settings { optics: Optics::XRay, ..Settings::new([1, 1]) };
     let camera = from_above(5.0, 0.01);
-    let found = render(&scene, &camera, &settings).unwrap();
-    found.color[0].iter().for_each(|channel| close(*channel, opacity(2.0), 1e-6));
+    let picture = render(&scene, &camera, &settings).unwrap();
+    picture.color[0].iter().for_each(|channel| close(*channel, opacity(2.0), 1e-6));
     // Half of the light is absorbed over a length of ln 2 / 0.8, from z = 1 on.
-    close(found.depth[0], 4.0 + 2.0_f64.ln() / 0.8, 1e-5);
+    close(picture.depth[0], 4.0 + 2.0_f64.ln() / 0.8, 1e-5);
     let all = render(&both, &camera, &settings).unwrap().color[0];
     all.iter().for_each(|channel| close(*channel, 1.0 - (-1.6_f64 - 0.6).exp(), 1e-4));
 }
@@ -134,8 +134,9 @@ fn steep_places_hold_back_more() {
         for classification in [scene::Classification::PreIntegrated, scene::Classification::Post] {
             for gradient in [Gradient::Analytic, Gradient::Central] {
                 let settings = Settings { classification, gradient, ..unshaded([1, 1]) };
-                let found = render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0][3];
-                close(found, 1.0 - (-0.8_f64 * factor * 3.0).exp(), 2e-3);
+                let drawn_opacity =
+                    render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0][3];
+                close(drawn_opacity, 1.0 - (-0.8_f64 * factor * 3.0).exp(), 2e-3);
             }
         }
     }

@@ -46,8 +46,8 @@ fn a_step_on_a_ramp_is_as_long_as_it_is() {
     let error = |classification, thickness| {
         let settings =
             Settings { classification, sheet_thickness: Some(thickness), ..unshaded([1, 1]) };
-        let found = f64::from(render(&scene, &camera, &settings).unwrap().color[0][3]);
-        (found - (1.0 - (-2.0_f64 * 0.863).exp())).abs()
+        let opacity = f64::from(render(&scene, &camera, &settings).unwrap().color[0][3]);
+        (opacity - (1.0 - (-2.0_f64 * 0.863).exp())).abs()
     };
     for thickness in [0.4, 0.37, 0.3, 0.21] {
         assert!(error(Classification::PreIntegrated, thickness) < 1e-4);
@@ -71,9 +71,9 @@ fn thinner_sheets_change_little() {
         let [thick, thin] = [usual, 0.5 * usual].map(|thickness| {
             render(&scene, &camera, &small(classification, Some(thickness))).unwrap()
         });
-        let found = decibels(&thick, &thin);
-        println!("{classification:?}: halving {found:.1} dB");
-        assert!(found > least, "{classification:?}: {found} dB");
+        let agreement = decibels(&thick, &thin);
+        println!("{classification:?}: halving {agreement:.1} dB");
+        assert!(agreement > least, "{classification:?}: {agreement} dB");
     }
 }
 
@@ -106,14 +106,15 @@ fn sheets_converge_to_the_rays() {
                 .step;
             let truth =
                 integrate(&scene, &camera, &small(Classification::Post, None), 0.0005).unwrap();
-            let found = |classification, share: f64| {
+            let agreement = |classification, share: f64| {
                 let picture =
                     render(&scene, &camera, &small(classification, Some(usual * share))).unwrap();
                 decibels(&picture, &truth)
             };
-            let [post, post_thin] = [1.0, 0.125].map(|share| found(Classification::Post, share));
+            let [post, post_thin] =
+                [1.0, 0.125].map(|share| agreement(Classification::Post, share));
             let [inside, inside_thin] =
-                [1.0, 0.125].map(|share| found(Classification::PreIntegrated, share));
+                [1.0, 0.125].map(|share| agreement(Classification::PreIntegrated, share));
             println!(
                 "{name}: post {post:.1} → {post_thin:.1} dB, \
                  inside {inside:.1} → {inside_thin:.1} dB"
@@ -173,9 +174,9 @@ fn body_centred_samples_and_isosurfaces_converge_too() {
             let picture =
                 render(&scene, &camera, &small(Classification::PreIntegrated, Some(share)))
                     .unwrap();
-            let found = decibels(&picture, &truth);
-            println!("sheets of {share}: {found:.1} dB");
-            assert!(found > least);
+            let agreement = decibels(&picture, &truth);
+            println!("sheets of {share}: {agreement:.1} dB");
+            assert!(agreement > least);
         }
     }
 }

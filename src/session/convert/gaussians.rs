@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::Stance,
+    about::Orientation,
     formats::{self, Kind},
     gaussians::{Gaussians, harmonics},
     hierarchy::{self, BuildOptions, Hierarchy, file::WriteOptions},
@@ -80,14 +80,14 @@ impl<W: Watch> Work<'_, W> {
         let mut all = self.gather_gaussians()?;
         if is_trained && target != Target::Glb {
             // Viewers expect the frame of trainers in these files.
-            all.set.stand(Stance::Y_DOWN);
+            all.set.stand(Orientation::Y_DOWN);
         }
         Ok(all)
     }
 
     /// Returns whether all inputs hold trained Gaussians, also in hierarchies.
     pub fn are_gaussians(&self) -> Result<bool, W::Error> {
-        let reading = self.own.reading(crate::memory::most());
+        let reading = self.conversion.reading(crate::memory::most());
         for path in self.files {
             let is_one = match reading.kind(path)? {
                 Kind::Gaussians => true,
@@ -130,9 +130,15 @@ impl<W: Watch> Work<'_, W> {
     }
 
     fn tree_options(&self, set: &Gaussians, points: u64) -> (BuildOptions, WriteOptions) {
-        let frame =
-            Frame { stance: set.about.stance, is_guessed: false, unit: set.about.length.clone() };
-        (self.own.build_options(false, points), self.own.write_options(self.files, &frame))
+        let frame = Frame {
+            orientation: set.about.orientation,
+            is_guessed: false,
+            unit: set.about.length.clone(),
+        };
+        (
+            self.conversion.build_options(false, points),
+            self.conversion.write_options(self.files, &frame),
+        )
     }
 
     /// Reads all inputs as Gaussians, with colours of the degree that is kept.
@@ -150,7 +156,7 @@ impl<W: Watch> Work<'_, W> {
             }
         }
         let mut all = gathered.ok_or_else(|| wrong("there is nothing to convert"))?;
-        if let Some(degree) = self.own.degree {
+        if let Some(degree) = self.conversion.degree {
             all.set.set_degree(degree.min(all.set.degree));
         }
         Ok(all)
@@ -159,7 +165,7 @@ impl<W: Watch> Work<'_, W> {
     /// Returns the Gaussians of an input, or its splats as Gaussians.
     fn gaussians_of(&self, path: &Path) -> Result<AllGaussians, W::Error> {
         let start = Instant::now();
-        let reading = self.own.reading(crate::memory::most());
+        let reading = self.conversion.reading(crate::memory::most());
         let kind = reading.kind(path)?;
         let trained = match kind {
             Kind::Gaussians => Some(self.trained(path)?),
@@ -169,13 +175,13 @@ impl<W: Watch> Work<'_, W> {
         let Some(mut set) = trained else {
             let Gathered { set, points, frame, .. } = self.splats_of(path, 0)?;
             let mut set = Gaussians::from_splats(&set).map_err(|error| in_file(path, error))?;
-            set.about.stance = frame.stance;
+            set.about.orientation = frame.orientation;
             return Ok(AllGaussians { set, points, read_ms: milliseconds(start) });
         };
         if kind == Kind::Hierarchy {
             self.watch.has_read(slice::from_ref(&path.to_owned()))?;
         }
-        let scale = self.own.radius_scale;
+        let scale = self.conversion.radius_scale;
         set.scales.iter_mut().for_each(|radii| *radii *= scale);
         let points = set.len() as u64;
         Ok(AllGaussians { set, points, read_ms: milliseconds(start) })
@@ -185,12 +191,12 @@ impl<W: Watch> Work<'_, W> {
     fn trained(&self, path: &Path) -> Result<Gaussians, W::Error> {
         self.watch.stage(&format!("Reading {}", path.display()));
         self.watch.has_colored(false, false)?;
-        let most = self.own.memory.or_else(crate::memory::most);
+        let most = self.conversion.memory.or_else(crate::memory::most);
         let Data::Gaussians(mut set) = self.data(path, most)? else {
             return Err(Error::input(path, "file", "holds no Gaussians").into());
         };
         // Files of trainers do not say what is up: it is −y.
-        set.about.stance = set.about.stance.or(Some(Stance::Y_DOWN));
+        set.about.orientation = set.about.orientation.or(Some(Orientation::Y_DOWN));
         Ok(set)
     }
 }

@@ -33,12 +33,13 @@ pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough:
     let mut is_stream = false;
     let mut between = Vec::new();
     for file in files {
-        let own = file_bytes(file);
+        let size = file_bytes(file);
         match Stream::open(file, limits) {
             Ok(Some(stream)) => {
                 is_stream = true;
                 between.push(
-                    memory_between(stream.counts(), options).map(|bytes| bytes.saturating_add(own)),
+                    memory_between(stream.counts(), options)
+                        .map(|bytes| bytes.saturating_add(size)),
                 );
                 continue;
             }
@@ -48,7 +49,7 @@ pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough:
         }
         let is_packed =
             file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splk"));
-        between.push([own.saturating_mul(if is_packed { OF_PACKED_BYTE } else { OF_BYTE }); 2]);
+        between.push([size.saturating_mul(if is_packed { OF_PACKED_BYTE } else { OF_BYTE }); 2]);
     }
     let blocks = if is_stream { BLOCKS } else { 0 };
     for (index, file) in files.iter().enumerate() {
@@ -79,9 +80,9 @@ fn sums(between: &[[u64; 2]], blocks: u64) -> [u64; 2] {
 /// Scans a file that is read in pieces and returns the memory that it needs. A need above `enough`
 /// may be larger than the result.
 fn scanned(file: &Path, limits: &Limits, options: &SurfelOptions, enough: u64) -> Result<u64> {
-    let own = file_bytes(file);
-    let Some(mut stream) = Stream::open(file, limits)? else { return Ok(own) };
-    Ok(memory_of_stream(&mut stream, options, enough.saturating_sub(own))?.saturating_add(own))
+    let size = file_bytes(file);
+    let Some(mut stream) = Stream::open(file, limits)? else { return Ok(size) };
+    Ok(memory_of_stream(&mut stream, options, enough.saturating_sub(size))?.saturating_add(size))
 }
 
 /// Refuses an input that needs more than `most` bytes of memory, together with the bytes that

@@ -132,8 +132,8 @@ impl Target {
         ];
         // A name that is an extension alone has none.
         let has_stem = path.extension().is_some();
-        let found = all.into_iter().find(|(end, _)| has_stem && name.ends_with(end));
-        found.map(|(_, target)| target).ok_or_else(|| {
+        let entry = all.into_iter().find(|(end, _)| has_stem && name.ends_with(end));
+        entry.map(|(_, target)| target).ok_or_else(|| {
             Error::Argument(format!(
                 "{}: only .splk, .ply, .splat, .spz, .glb, .nrrd and .splv files can be written",
                 path.display()
@@ -292,7 +292,7 @@ impl Conversion {
         output: &Path,
         watch: &W,
     ) -> Result<Converted, W::Error> {
-        let work = Work { own: self, files, output, watch };
+        let work = Work { conversion: self, files, output, watch };
         match Target::of(output)? {
             Target::Hierarchy => work.hierarchy(),
             Target::Nrrd => work.nrrd(),
@@ -311,7 +311,7 @@ impl Conversion {
         output: &Path,
         watch: &W,
     ) -> Result<Expected, W::Error> {
-        let work = Work { own: self, files, output, watch };
+        let work = Work { conversion: self, files, output, watch };
         match Target::of(output)? {
             Target::Hierarchy => work.expect_hierarchy(),
             Target::Nrrd => work.expect_nrrd(),
@@ -332,7 +332,7 @@ impl Conversion {
         watch: &W,
         may_write: impl FnOnce() -> Result<(), W::Error>,
     ) -> Result<Plan, W::Error> {
-        let work = Work { own: self, files, output: folder, watch };
+        let work = Work { conversion: self, files, output: folder, watch };
         let (options, write) = work.region_options(work.need(), true)?;
         may_write()?;
         let watch = |stage, done, all| work.region_stage(stage, done, all);
@@ -381,10 +381,10 @@ impl Conversion {
     /// Returns the options for writing a hierarchy. The `frame` counts unless the caller overrides
     /// it.
     fn write_options(&self, files: &[PathBuf], frame: &Frame) -> WriteOptions {
-        let up = self.up.map(crate::about::Stance::with_up);
+        let up = self.up.map(crate::about::Orientation::with_up);
         WriteOptions {
             lossless: self.lossless,
-            stance: up.or(frame.stance),
+            orientation: up.or(frame.orientation),
             is_guessed: up.is_none() && frame.is_guessed,
             unit: self.unit.clone().unwrap_or_else(|| frame.unit.clone()),
             source: files.iter().filter_map(|path| name_of(path)).collect::<Vec<_>>().join(", "),
@@ -394,7 +394,7 @@ impl Conversion {
 
 /// A conversion with its inputs and its output.
 struct Work<'a, W> {
-    own: &'a Conversion,
+    conversion: &'a Conversion,
     files: &'a [PathBuf],
     output: &'a Path,
     watch: &'a W,
@@ -403,7 +403,7 @@ struct Work<'a, W> {
 impl<W: Watch> Work<'_, W> {
     /// Reads an input, which may take `memory` bytes.
     fn data(&self, path: &Path, memory: Option<u64>) -> Result<Data, W::Error> {
-        let reading = self.own.reading(memory);
+        let reading = self.conversion.reading(memory);
         let opened = reading.open(path)?;
         let data = opened.read()?;
         self.watch.has_read(&opened.files())?;

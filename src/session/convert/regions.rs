@@ -15,9 +15,9 @@ use crate::{
 impl<W: Watch> Work<'_, W> {
     /// Converts inputs that need more memory than may be used.
     pub fn in_regions(&self, need: Need) -> Result<Converted, W::Error> {
-        let (options, write) = self.region_options(need, self.own.in_regions)?;
+        let (options, write) = self.region_options(need, self.conversion.in_regions)?;
         let watch = |stage, done, all| self.region_stage(stage, done, all);
-        let limits = self.own.reading.limits();
+        let limits = self.conversion.reading.limits();
         let done = convert(self.files, limits, self.output, &options, &write, Some(&watch))?;
         Ok(Converted::Regions(done))
     }
@@ -25,11 +25,11 @@ impl<W: Watch> Work<'_, W> {
     /// Finds the memory that converting region by region takes.
     pub fn expect_regions(&self, need: Need) -> Result<Expected, W::Error> {
         let as_a_whole = need.bytes;
-        let (options, _) = self.region_options(need, self.own.in_regions)?;
+        let (options, _) = self.region_options(need, self.conversion.in_regions)?;
         let watch = |stage, done, all| self.region_stage(stage, done, all);
-        check(self.files, self.own.reading.limits(), &options, Some(&watch))?;
+        check(self.files, self.conversion.reading.limits(), &options, Some(&watch))?;
         // The blocks being built take this much in any case.
-        Ok(Expected::Regions { as_a_whole, memory: self.own.most_memory().max(BLOCKS) })
+        Ok(Expected::Regions { as_a_whole, memory: self.conversion.most_memory().max(BLOCKS) })
     }
 
     pub fn region_stage(&self, stage: Stage, done: u64, all: u64) {
@@ -43,7 +43,7 @@ impl<W: Watch> Work<'_, W> {
         need: Need,
         is_asked: bool,
     ) -> Result<(ExternalOptions, WriteOptions), W::Error> {
-        let most = self.own.most_memory();
+        let most = self.conversion.most_memory();
         if let Some(file) = need.whole? {
             let file = file.display();
             let [wanted, most] = [need.bytes, most].map(|bytes| bytes >> 20);
@@ -61,31 +61,31 @@ impl<W: Watch> Work<'_, W> {
             })
             .into());
         }
-        let limits = self.own.reading.limits();
+        let limits = self.conversion.reading.limits();
         let first = self.files.first().map(|file| Stream::open(file, limits));
         let first = first.transpose()?.flatten();
         let frame = match &first {
-            Some(first) => Frame::of(first.stance(), || first.guess_stance())?,
+            Some(first) => Frame::of(first.orientation(), || first.guess_orientation())?,
             None => Frame::default(),
         };
         let is_cloud = first.is_some_and(|file| file.counts().triangles == 0);
         let options = ExternalOptions {
             memory: most,
-            preset: self.own.preset,
+            preset: self.conversion.preset,
             block_splats: BuildOptions::default().block_splats,
             // Each region has its own deadline.
-            surfels: self.own.surfel_options(Deadline::NEVER),
+            surfels: self.conversion.surfel_options(Deadline::NEVER),
             paint: self.paint_in_regions(&frame, is_cloud)?,
-            scalar: self.own.attribute().map(str::to_owned),
-            parts: self.own.parts,
+            scalar: self.conversion.attribute().map(str::to_owned),
+            parts: self.conversion.parts,
         };
-        Ok((options, self.own.write_options(self.files, &frame)))
+        Ok((options, self.conversion.write_options(self.files, &frame)))
     }
 
     /// Returns what colours the points, which the first file decides.
     fn paint_in_regions(&self, frame: &Frame, is_cloud: bool) -> Result<Option<Paint>, W::Error> {
-        let (coloring, attribute) = (&self.own.coloring, self.own.attribute());
-        let up = frame.up(self.own.up);
+        let (coloring, attribute) = (&self.conversion.coloring, self.conversion.attribute());
+        let up = frame.up(self.conversion.up);
         let paint = coloring.surface_paint(up, [attribute.is_some(), false, is_cloud]);
         let paint = paint.map(|paint| coloring.with_classes(paint, attribute.unwrap_or_default()));
         let has_values = matches!(paint, Some(Paint::Values { .. }));

@@ -3,7 +3,7 @@
 use super::{Built, Converted, Expected, Watch, Work, memory, milliseconds, wrong};
 use crate::{
     Error, Result,
-    about::Stance,
+    about::Orientation,
     hierarchy::{
         self,
         external::{memory_of_mesh, memory_of_splats},
@@ -33,28 +33,32 @@ pub struct Gathered {
 /// Facts about an input's coordinates, for viewers.
 #[derive(Default)]
 pub struct Frame {
-    pub stance: Option<Stance>,
-    /// Whether the stance was guessed from the shape.
+    pub orientation: Option<Orientation>,
+    /// Whether the orientation was guessed from the shape.
     pub is_guessed: bool,
     pub unit: String,
 }
 
 impl Frame {
-    /// Takes what a file says of its stance, or a guess.
+    /// Takes what a file says of its orientation, or a guess.
     pub fn of(
-        stated: Option<Stance>,
-        guess: impl FnOnce() -> Result<Option<Stance>>,
+        stated: Option<Orientation>,
+        guess: impl FnOnce() -> Result<Option<Orientation>>,
     ) -> Result<Self> {
-        let stance = match stated {
-            Some(stance) => Some(stance),
+        let orientation = match stated {
+            Some(orientation) => Some(orientation),
             None => guess()?,
         };
-        Ok(Self { stance, is_guessed: stated.is_none() && stance.is_some(), unit: String::new() })
+        Ok(Self {
+            orientation,
+            is_guessed: stated.is_none() && orientation.is_some(),
+            unit: String::new(),
+        })
     }
 
     /// Returns the direction in which heights are measured: that to be recorded, or the input's.
     pub fn up(&self, recorded: Option<DVec3>) -> DVec3 {
-        recorded.unwrap_or(self.stance.map_or(DVec3::Y, |stance| stance.up))
+        recorded.unwrap_or(self.orientation.map_or(DVec3::Y, |orientation| orientation.up))
     }
 }
 
@@ -64,7 +68,7 @@ impl<W: Watch> Work<'_, W> {
             return self.gaussian_hierarchy();
         }
         let need = self.need();
-        if need.bytes > self.own.most_memory() || self.own.in_regions {
+        if need.bytes > self.conversion.most_memory() || self.conversion.in_regions {
             return self.in_regions(need);
         }
         let gathered = self.gather()?;
@@ -73,8 +77,8 @@ impl<W: Watch> Work<'_, W> {
         let watch =
             |done: u64, _: u64| self.watch.progress("Building the hierarchy", done, splats as u64);
         watch(0, 0);
-        let build = self.own.build_options(gathered.closed, gathered.points);
-        let write = self.own.write_options(self.files, &gathered.frame);
+        let build = self.conversion.build_options(gathered.closed, gathered.points);
+        let write = self.conversion.write_options(self.files, &gathered.frame);
         let built = hierarchy::build_file(&gathered.set, self.output, &build, &write, Some(&watch));
         built.map_err(|error| self.at_fault(error))?;
         Ok(Converted::Hierarchy(gathered.built(milliseconds(start))))
@@ -85,7 +89,7 @@ impl<W: Watch> Work<'_, W> {
             return self.expect_gaussian_hierarchy();
         }
         let need = self.need();
-        if need.bytes > self.own.most_memory() || self.own.in_regions {
+        if need.bytes > self.conversion.most_memory() || self.conversion.in_regions {
             return self.expect_regions(need);
         }
         self.extrapolated(&self.gather()?, need.bytes)
@@ -103,8 +107,8 @@ impl<W: Watch> Work<'_, W> {
         let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
         let splats_of_part = splats[first..first + count].to_vec();
         let part = SplatSet { origin, payload, splats: splats_of_part, extent, overlap };
-        let build = self.own.build_options(gathered.closed, gathered.points);
-        let write = self.own.write_options(self.files, &gathered.frame);
+        let build = self.conversion.build_options(gathered.closed, gathered.points);
+        let write = self.conversion.write_options(self.files, &gathered.frame);
         let start = Instant::now();
         let tree = hierarchy::Tree::build(&part, &build, None);
         let tree = tree.map_err(|error| self.at_fault(error))?;
@@ -116,9 +120,9 @@ impl<W: Watch> Work<'_, W> {
 
     /// Returns the memory for converting all inputs as a whole.
     pub fn need(&self) -> memory::Need {
-        let limits = self.own.reading.limits();
-        let options = self.own.surfel_options(limits.deadline());
-        memory::need(self.files, limits, &options, self.own.most_memory())
+        let limits = self.conversion.reading.limits();
+        let options = self.conversion.surfel_options(limits.deadline());
+        memory::need(self.files, limits, &options, self.conversion.most_memory())
     }
 
     /// Reads all inputs and makes splats of them, relative to the first input's origin.
@@ -140,18 +144,18 @@ impl<W: Watch> Work<'_, W> {
     pub fn splats_of(&self, path: &Path, taken: u64) -> Result<Gathered, W::Error> {
         self.watch.stage(&format!("Reading {}", path.display()));
         let start = Instant::now();
-        let most = self.own.most_memory();
+        let most = self.conversion.most_memory();
         // One deadline covers reading the input and making its splats.
-        let deadline = self.own.reading.limits().deadline();
-        let reading = self.own.reading(Some(most));
-        let opened = reading.open_colored(path, self.own.attribute())?;
+        let deadline = self.conversion.reading.limits().deadline();
+        let reading = self.conversion.reading(Some(most));
+        let opened = reading.open_colored(path, self.conversion.attribute())?;
         let data = opened.read()?.with_surface_of_bare_cells()?;
         self.watch.has_read(&opened.files())?;
         let read_ms = milliseconds(start);
         let start = Instant::now();
         let mut gathered = match data {
             Data::Mesh(mesh) => {
-                let options = self.own.surfel_options(deadline);
+                let options = self.conversion.surfel_options(deadline);
                 let (mesh, frame) = self.painted(path, mesh)?;
                 self.watch.stage(&format!("Making splats of {} points", mesh.positions.len()));
                 let need = memory_of_mesh(&mesh, &options, most.saturating_sub(taken));
@@ -167,11 +171,12 @@ impl<W: Watch> Work<'_, W> {
                 let header = hierarchy.header();
                 memory::check(path, memory_of_splats(header.leaves as usize), taken, most)?;
                 let mut set = hierarchy.leaves()?;
-                let scale = self.own.radius_scale;
+                let scale = self.conversion.radius_scale;
                 let larger = |factor: [f32; 6]| factor.map(|entry| entry * scale);
                 set.splats.iter_mut().for_each(|splat| splat.factor = larger(splat.factor));
                 let unit = header.unit.clone();
-                let frame = Frame { stance: header.stance, is_guessed: header.is_guessed, unit };
+                let frame =
+                    Frame { orientation: header.orientation, is_guessed: header.is_guessed, unit };
                 let (closed, points) = (header.closed, header.source_points);
                 Gathered { set, closed, frame, points, read_ms, splats_ms: 0.0 }
             }
@@ -193,10 +198,10 @@ impl<W: Watch> Work<'_, W> {
 
     /// Returns a mesh or point cloud in its colours, and how it stands.
     fn painted(&self, path: &Path, mut mesh: Mesh) -> Result<(Mesh, Frame), W::Error> {
-        let frame = Frame::of(mesh.about.stance, || Ok(mesh.guess_stance()))?;
-        let named = self.own.reading.options.scalar.is_some();
-        let up = frame.up(self.own.up);
-        let legend = self.own.coloring.paint(&Name::of_file(path), &mut mesh, up, named)?;
+        let frame = Frame::of(mesh.about.orientation, || Ok(mesh.guess_orientation()))?;
+        let named = self.conversion.reading.options.scalar.is_some();
+        let up = frame.up(self.conversion.up);
+        let legend = self.conversion.coloring.paint(&Name::of_file(path), &mut mesh, up, named)?;
         self.watch.has_colored(true, legend.is_some())?;
         Ok((mesh, frame))
     }
@@ -214,9 +219,9 @@ impl Gathered {
         self.set.splats.append(&mut set.splats);
         // A statement counts more than a guess before it.
         let frame = other.frame;
-        let states = frame.stance.is_some() && !frame.is_guessed;
-        if self.frame.stance.is_none() || (self.frame.is_guessed && states) {
-            (self.frame.stance, self.frame.is_guessed) = (frame.stance, frame.is_guessed);
+        let states = frame.orientation.is_some() && !frame.is_guessed;
+        if self.frame.orientation.is_none() || (self.frame.is_guessed && states) {
+            (self.frame.orientation, self.frame.is_guessed) = (frame.orientation, frame.is_guessed);
         }
         self.closed &= other.closed;
         self.points += other.points;

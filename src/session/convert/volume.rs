@@ -59,16 +59,16 @@ impl<W: Watch> Work<'_, W> {
     pub fn nrrd(&self) -> Result<Converted, W::Error> {
         let file = self.single()?;
         self.watch.stage(&format!("Reading {}", file.display()));
-        let most = self.own.most_memory();
+        let most = self.conversion.most_memory();
         let input = self.input(file, most)?;
-        memory::check(file, input.memory_on(self.own.lattice), 0, most)?;
+        memory::check(file, input.memory_on(self.conversion.lattice), 0, most)?;
         let volume = match input {
             Input::Whole(volume) => *volume,
             Input::Stream(_) => self.whole(file, None)?,
         };
         let samples_read = volume.len();
         self.watch.stage("Resampling");
-        let volume = on_lattice(volume, self.own.lattice)?;
+        let volume = on_lattice(volume, self.conversion.lattice)?;
         self.watch.stage(&format!("Writing {}", self.output.display()));
         formats::nrrd::write(&volume, self.output)?;
         let sample_type = volume.samples.type_name();
@@ -89,7 +89,7 @@ impl<W: Watch> Work<'_, W> {
         let input = self.input_of_bricks(file)?;
         let (lattice, scalar) = input.shape();
         let options = WriteOptions {
-            unit: self.own.unit.clone().unwrap_or_default(),
+            unit: self.conversion.unit.clone().unwrap_or_default(),
             source: name_of(file).unwrap_or_default(),
         };
         let watch = |done, all| self.watch.progress("Writing bricks, slice by slice", done, all);
@@ -120,7 +120,7 @@ impl<W: Watch> Work<'_, W> {
 
     fn input_of_bricks(&self, file: &Path) -> Result<Input, W::Error> {
         self.watch.stage(&format!("Reading {}", file.display()));
-        let most = self.own.most_memory();
+        let most = self.conversion.most_memory();
         let input = self.input(file, most)?;
         memory::check(file, input.memory_of_bricks(), 0, most)?;
         Ok(input)
@@ -137,7 +137,7 @@ impl<W: Watch> Work<'_, W> {
     /// Opens the input: slice by slice if possible, or as a whole in `most` bytes of memory.
     fn input(&self, file: &Path, most: u64) -> Result<Input, W::Error> {
         let name = file.display();
-        let refused = match self.own.reading(crate::memory::most()).kind(file)? {
+        let refused = match self.conversion.reading(crate::memory::most()).kind(file)? {
             Kind::Volume => None,
             Kind::Bricks => Some(format!(
                 "{name} holds a volume in bricks already; convert the volume it was made from"
@@ -153,7 +153,7 @@ impl<W: Watch> Work<'_, W> {
         if let Some(message) = refused {
             return Err(wrong(message).into());
         }
-        if let Some(stream) = self.own.reading.stream(file)? {
+        if let Some(stream) = self.conversion.reading.stream(file)? {
             self.watch.has_read(slice::from_ref(&stream.path().to_owned()))?;
             return Ok(Input::Stream(Box::new(stream)));
         }

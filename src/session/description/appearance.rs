@@ -250,8 +250,8 @@ impl AppearanceEntry {
     /// # Errors
     /// Those of reading transfer functions and kernels, and of what cannot be one.
     pub fn showing(&self, limits: &Limits) -> Result<Showing> {
-        let transfer = self.transfer.as_ref().map(|own| own.open(limits)).transpose()?;
-        let surfaces = self.isosurfaces.iter().flatten().map(|own| own.surface());
+        let transfer = self.transfer.as_ref().map(|entry| entry.open(limits)).transpose()?;
+        let surfaces = self.isosurfaces.iter().flatten().map(|entry| entry.surface());
         let appearance = Appearance {
             transfer,
             opacity_unit: self.opacity_unit,
@@ -304,7 +304,7 @@ impl AppearanceEntry {
                 let extent = self.extent.ok_or_else(|| needs_extent("a table of values"))?;
                 Kernel::table(values.clone(), extent)
             }
-            Some(own @ KernelEntry::Name(name)) => match own.file() {
+            Some(entry @ KernelEntry::Name(name)) => match entry.file() {
                 None => Kernel::named(name, self.sigma, self.extent).map_err(|error| match error {
                     Error::Argument(message) if !Kernel::NAMES.contains(&name.as_str()) => {
                         Error::Argument(format!("{message}, or a file"))

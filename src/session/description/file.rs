@@ -31,8 +31,8 @@ pub(super) fn read(path: &Path, limits: &Limits) -> Result<Description> {
         match neighbour::leaves(&folder, &home, &name) {
             None => Ok(folder.join(file)),
             Some(why) => {
-                let shown: String = name.chars().take(80).collect();
-                let message = format!("names “{shown}”, {why}");
+                let start: String = name.chars().take(80).collect();
+                let message = format!("names “{start}”, {why}");
                 Err(Error::input(path, place, message)
                     .hint("if you trust the scene, add --trust-scene"))
             }
@@ -63,7 +63,7 @@ pub(super) fn parse(text: &str) -> std::result::Result<Description, (String, Str
         struct Version {
             splatkit_scene: u64,
         }
-        serde_json::from_str::<Version>(text).ok().map(|own| own.splatkit_scene)
+        serde_json::from_str::<Version>(text).ok().map(|scene| scene.splatkit_scene)
     };
     let ours = u64::from(Description::VERSION);
     if let Some(other) = version(text).filter(|version| *version != ours) {
@@ -85,12 +85,12 @@ pub(super) fn parse(text: &str) -> std::result::Result<Description, (String, Str
 /// Refuses texts that are too long.
 fn check_texts(scene: &Description) -> std::result::Result<(), (String, String)> {
     let of_reading = |place: String, reading: &ReadingEntry| {
-        let own = [
+        let fields = [
             ("scalar", reading.scalar.clone()),
             ("series", reading.series.clone()),
             ("dataset", reading.dataset.clone()),
         ];
-        own.map(|(name, text)| (format!("{place}.{name}"), text))
+        fields.map(|(name, text)| (format!("{place}.{name}"), text))
     };
     let mut texts: Vec<(String, Option<String>)> = Vec::new();
     texts.extend(of_reading("reading".into(), &scene.reading));
@@ -109,8 +109,8 @@ fn check_texts(scene: &Description) -> std::result::Result<(), (String, String)>
     });
     match long {
         None => Ok(()),
-        Some((place, found)) => {
-            Err((place, format!("has {found} bytes, but may have at most {MOST_TEXT}")))
+        Some((place, bytes)) => {
+            Err((place, format!("has {bytes} bytes, but may have at most {MOST_TEXT}")))
         }
     }
 }
@@ -121,9 +121,9 @@ fn check_taken(scene: &Description) -> std::result::Result<(), (String, String)>
     let places =
         places.map(|(number, input)| (format!("inputs[{number}].reading"), &input.reading));
     for (place, reading) in places.chain([("reading".to_owned(), &scene.reading)]) {
-        if let Some((name, found, most)) = reading.limits.raised() {
+        if let Some((name, value, most)) = reading.limits.raised() {
             let message = format!(
-                "is {found}, but a scene may only lower this limit, which is {most}; if you trust \
+                "is {value}, but a scene may only lower this limit, which is {most}; if you trust \
                  the scene, give --limit-{name} on the command line"
             );
             return Err((format!("{place}.limits.{name}"), message));
@@ -171,14 +171,14 @@ fn change_files(
 
 /// Returns the text of a scene file in a folder.
 pub(super) fn to_json(scene: &Description, folder: &Path) -> String {
-    let mut own = scene.clone();
+    let mut copy = scene.clone();
     // It never fails.
-    change_files(&mut own, |_, file| Ok(relative(file, folder))).ok();
+    change_files(&mut copy, |_, file| Ok(relative(file, folder))).ok();
     // The next user decides what may be taken.
-    own.picture.memory = None;
-    own.reading.limits.clear();
+    copy.picture.memory = None;
+    copy.reading.limits.clear();
     // Maps with text keys and numbers always become JSON.
-    let mut text = serde_json::to_string_pretty(&own).unwrap_or_default();
+    let mut text = serde_json::to_string_pretty(&copy).unwrap_or_default();
     text.push('\n');
     text
 }
@@ -200,16 +200,16 @@ fn relative(path: &Path, folder: &Path) -> PathBuf {
         let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
         path.canonicalize().ok()
     };
-    let (Some(own), Some(folder)) = (whole(path), whole(folder)) else {
+    let (Some(path), Some(folder)) = (whole(path), whole(folder)) else {
         return path.to_owned();
     };
     let mut up = PathBuf::new();
     for above in folder.ancestors() {
-        if let Ok(rest) = own.strip_prefix(above) {
+        if let Ok(rest) = path.strip_prefix(above) {
             // Two files that share no folder but the root have no common place to move with.
-            return if above.parent().is_none() { own } else { up.join(rest) };
+            return if above.parent().is_none() { path } else { up.join(rest) };
         }
         up.push("..");
     }
-    own
+    path
 }

@@ -65,14 +65,14 @@ impl Description {
         let checked = self.check();
         checked.map_err(|(place, message)| Error::Argument(format!("{place} {message}")))?;
         // One deadline covers reading all inputs and making their splats.
-        let mut own = self.clone();
-        own.reading = self.reading.begun();
+        let mut begun = self.clone();
+        begun.reading = self.reading.begun();
         let facets = self.picture.draws_facets();
         let surfaces = if facets { Surfaces::Facets } else { Surfaces::Surfels };
         let mut items = Items::new(surfaces);
         let (mut inputs, mut files) = (Vec::new(), self.files());
-        for input in own.visible() {
-            let (data, read) = own.add(input, &mut items, does)?;
+        for input in begun.visible() {
+            let (data, read) = begun.add(input, &mut items, does)?;
             inputs.push(data);
             files.extend(read);
         }
@@ -97,12 +97,12 @@ impl Description {
         let name = &items.contents[number].name.text;
         let is_own = |input: &&InputEntry| input.file.display().to_string() == *name;
         let Some(input) = self.visible().find(is_own) else { return error };
-        let own = self.appearance_of(input);
-        let is_changed = own.range.is_some() || own.opacity_unit.is_some();
+        let appearance = self.appearance_of(input);
+        let is_changed = appearance.range.is_some() || appearance.opacity_unit.is_some();
         let message = format!("{what}; the values are those of {}", input.file.display());
-        match own.transfer.as_ref().and_then(TransferEntry::file) {
+        match appearance.transfer.as_ref().and_then(TransferEntry::file) {
             Some(file) if !is_changed => Error::input(file, "content", message),
-            _ if own.transfer.is_some() || is_changed => Error::Transfer(message),
+            _ if appearance.transfer.is_some() || is_changed => Error::Transfer(message),
             _ => items.at_fault(scene, error),
         }
     }

@@ -106,7 +106,8 @@ impl LimitsEntry {
             ("texels", self.texels, texels),
             ("seconds", self.seconds, seconds),
         ];
-        all.into_iter().find_map(|(name, own, most)| Some((name, own.filter(|v| *v > most)?, most)))
+        all.into_iter()
+            .find_map(|(name, value, most)| Some((name, value.filter(|v| *v > most)?, most)))
     }
 
     /// Removes all.

@@ -59,9 +59,9 @@ fn a_scene_is_written_as_it_is_read() {
 #[test]
 fn inputs_have_what_they_do_not_share() {
     let mut scene = scene();
-    let own = scene.appearance_of(&scene.inputs[1]);
-    assert_eq!((own.opacity, own.range), (Some(0.5), Some([-1.0, 4.5])));
-    assert!(own.sharp && own.color.is_some());
+    let appearance = scene.appearance_of(&scene.inputs[1]);
+    assert_eq!((appearance.opacity, appearance.range), (Some(0.5), Some([-1.0, 4.5])));
+    assert!(appearance.sharp && appearance.color.is_some());
     assert_eq!(scene.appearance_of(&scene.inputs[0]).color, None);
     let reading = scene.reading_of(&scene.inputs[0]);
     assert_eq!((reading.dims, reading.scalar.as_deref()), (Some([2, 3, 4]), Some("heat")));
@@ -94,8 +94,8 @@ fn what_is_wrong_is_named() {
     assert_eq!(place("\"x-ray\"", "\"xray\""), "picture.optics");
     assert_eq!(place("\"cut\": 3.5", "\"cut\": -3.5"), "picture.cut");
     assert_eq!(place("\"mode\": \"splats\"", "\"mode\": \"sheets\""), "picture.back_to_front");
-    let own = r#"{"splatkit_scene": 2, "inputs": [{"file": "a", "appearance": {"opacity": 0}}]}"#;
-    assert_eq!(file::parse(own).expect_err("opacity").0, "inputs[0].appearance.opacity");
+    let text = r#"{"splatkit_scene": 2, "inputs": [{"file": "a", "appearance": {"opacity": 0}}]}"#;
+    assert_eq!(file::parse(text).expect_err("opacity").0, "inputs[0].appearance.opacity");
     let text = scene().to_json(Path::new(""));
     assert!(file::parse(&format!("{text} {{}}")).is_err(), "two texts");
     assert!(file::parse(&text[..text.len() / 2]).is_err(), "half a text");
@@ -164,9 +164,9 @@ fn paths_are_relative_to_the_file() {
     let read = Description::read_trusted(&path, &Limits::default()).expect("read");
     let file = read.appearance.transfer.as_ref().and_then(TransferEntry::file);
     assert!(file.is_some_and(Path::exists));
-    let [found, wanted] = [read.inputs[0].file.clone(), data.join("a.ply")]
+    let [stored, wanted] = [read.inputs[0].file.clone(), data.join("a.ply")]
         .map(|path| path.canonicalize().expect("a file"));
-    assert_eq!(found, wanted);
+    assert_eq!(stored, wanted);
 }
 
 /// Makes files in a folder and in the folder of a scene inside it. Returns the latter, and names
@@ -205,11 +205,11 @@ fn files_elsewhere_need_the_users_word() {
     let (inside, elsewhere) = inside_and_elsewhere(folder.path());
     let file = inside.join("s.json");
     let good = ["a.ply", "mri", "below/t.json", "below/t.json", "hann"];
-    let write = |[input, own, all, labels, kernel]: [&str; 5]| {
+    let write = |[input, transfer, all, labels, kernel]: [&str; 5]| {
         let text = json!({
             "splatkit_scene": 2,
             "inputs": [{"file": "a.ply"},
-                       {"file": input, "visible": false, "appearance": {"transfer": own}}],
+                       {"file": input, "visible": false, "appearance": {"transfer": transfer}}],
             "appearance": {"transfer": all, "kernel": kernel},
             "reading": {"labels": labels},
         });
@@ -233,8 +233,8 @@ fn files_elsewhere_need_the_users_word() {
             let mut names = good;
             names[number] = name;
             let error = write(names).expect_err(name);
-            let Error::Input { place: found, hint, .. } = &error else { panic!("{error}") };
-            assert_eq!(found, place, "{name}: {error}");
+            let Error::Input { place: named, hint, .. } = &error else { panic!("{error}") };
+            assert_eq!(named, place, "{name}: {error}");
             assert!(hint.as_deref().is_some_and(|hint| hint.contains("--trust-scene")));
             assert!(Description::read_trusted(&file, &Limits::default()).is_ok(), "{name}");
         }
@@ -251,6 +251,6 @@ fn the_schema_is_that_of_the_types() {
     if std::env::var_os("SPLATKIT_WRITE").is_some() {
         std::fs::write(&path, &text).expect("written");
     }
-    let found = std::fs::read_to_string(&path).expect("docs/scene.schema.json");
-    assert!(found == text, "docs/scene.schema.json is old: run this test with SPLATKIT_WRITE=1");
+    let stored = std::fs::read_to_string(&path).expect("docs/scene.schema.json");
+    assert!(stored == text, "docs/scene.schema.json is old: run this test with SPLATKIT_WRITE=1");
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     Error, Result,
-    about::{About, Stance},
+    about::{About, Orientation},
     parallel::prelude::*,
     session::Data,
 };
@@ -53,8 +53,9 @@ impl TransformEntry {
         if self.translate.is_some_and(|by| !by.iter().all(|part| part.is_finite())) {
             return Err(("translate", "must be three finite numbers".into()));
         }
-        let turn =
-            self.rotate.map(|own| (DVec3::from_array(own.axis).try_normalize(), own.degrees));
+        let turn = self
+            .rotate
+            .map(|rotation| (DVec3::from_array(rotation.axis).try_normalize(), rotation.degrees));
         if turn.is_some_and(|(axis, angle)| axis.is_none() || !angle.is_finite()) {
             return Err(("rotate", "must be an axis with a length above 0, and an angle".into()));
         }
@@ -98,7 +99,10 @@ impl TransformEntry {
             Data::Samples(points) => {
                 by.turn(&mut points.origin, &mut points.positions);
                 points.radii.par_iter_mut().for_each(|radius| *radius *= by.scale as f32);
-                points.covariances.par_iter_mut().for_each(|own| *own = by.covariance(*own));
+                points
+                    .covariances
+                    .par_iter_mut()
+                    .for_each(|covariance| *covariance = by.covariance(*covariance));
                 by.stand(&mut points.about);
             }
             Data::Cells(cells) => {
@@ -134,22 +138,24 @@ impl Similarity {
 
     fn turn(&self, origin: &mut DVec3, positions: &mut [Vec3]) {
         *origin = self.place(*origin);
-        let own = (self.rotation * self.scale).as_mat3();
-        positions.par_iter_mut().for_each(|position| *position = own * *position);
+        let linear = (self.rotation * self.scale).as_mat3();
+        positions.par_iter_mut().for_each(|position| *position = linear * *position);
     }
 
     fn covariance(&self, [xx, xy, xz, yy, yz, zz]: [f32; 6]) -> [f32; 6] {
         let rows = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| row.map(f64::from));
-        let own = self.rotation * self.scale;
-        let turned = own * DMat3::from_cols_array_2d(&rows) * own.transpose();
+        let linear = self.rotation * self.scale;
+        let turned = linear * DMat3::from_cols_array_2d(&rows) * linear.transpose();
         let [x, y, z] = turned.to_cols_array_2d();
         [x[0], x[1], x[2], y[1], y[2], z[2]].map(|part| part as f32)
     }
 
     fn stand(&self, about: &mut About) {
-        let turned =
-            |Stance { up, front }| Stance { up: self.rotation * up, front: self.rotation * front };
-        about.stance = about.stance.map(turned);
+        let turned = |Orientation { up, front }| Orientation {
+            up: self.rotation * up,
+            front: self.rotation * front,
+        };
+        about.orientation = about.orientation.map(turned);
     }
 }
 

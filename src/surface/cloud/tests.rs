@@ -95,8 +95,12 @@ fn what_a_scanner_saw_faces_it_and_what_the_file_says_stays() {
     mesh.sensors[0].points = 2500..9999;
     assert!(agreement(&mesh, |_| Vec3::NEG_Z) == 1.0, "the other one is free, and faces outward");
     mesh.normals = (0..5000).map(|i| if i % 2 == 0 { Vec3::X } else { Vec3::ZERO }).collect();
-    let found = normals(&mesh);
-    assert!((0..5000).all(|i| if i % 2 == 0 { found[i].x > 0.999 } else { found[i].z < -0.999 }));
+    let normals = normals(&mesh);
+    assert!((0..5000).all(|i| if i % 2 == 0 {
+        normals[i].x > 0.999
+    } else {
+        normals[i].z < -0.999
+    }));
 }
 
 #[test]
@@ -163,7 +167,7 @@ fn several_points_at_a_place_close_the_surface() {
         let positions = (0..1600).flat_map(|i| (0..copies).map(move |k| place(i, k))).collect();
         let mesh = Mesh { positions, ..Mesh::default() };
         let splats = mesh.surfels(&SurfelOptions::default()).unwrap().splats;
-        let mut sizes: Vec<f32> = splats.iter().map(|own| own.deviations().x).collect();
+        let mut sizes: Vec<f32> = splats.iter().map(|splat| splat.deviations().x).collect();
         sizes.sort_by(f32::total_cmp);
         (splats.len(), sizes[sizes.len() / 2])
     };

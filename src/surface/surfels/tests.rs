@@ -108,8 +108,8 @@ fn normals_point_outward() {
     let computed = surfels(&knot);
     let options = SurfelOptions { largest_spacing: 10.0, ..SurfelOptions::default() };
     assert_eq!(given.splats.len(), computed.splats.len());
-    let own = knot.surfels(&options).expect("surfels");
-    assert_eq!(own.splats.len(), knot.positions.len());
+    let uncut = knot.surfels(&options).expect("surfels");
+    assert_eq!(uncut.splats.len(), knot.positions.len());
     for (a, b) in given.splats.iter().zip(&computed.splats) {
         let (a, b) = (
             decode_normal(a.normal).expect("a normal"),
@@ -329,14 +329,14 @@ fn textures_keep_to_the_budget() {
                 ..Mesh::default()
             };
             let options = SurfelOptions { most_triangles: 30_000, ..SurfelOptions::default() };
-            let (told, made) = (
+            let (counted, made) = (
                 mesh.triangles_once_cut(&options, usize::MAX).unwrap(),
                 surfels_of(&mesh, &options),
             );
             // The minimum that its size requires is 35,000.
             assert!(
-                made < 100_000 && 2 * told > made,
-                "{far} {across}: {made} surfels, {told} triangles told"
+                made < 100_000 && 2 * counted > made,
+                "{far} {across}: {made} surfels, {counted} triangles told"
             );
         }
     }
@@ -429,8 +429,8 @@ fn options_are_numbers_that_surfels_can_be_made_of() {
     let spaced =
         |largest_spacing| fine(SurfelOptions { largest_spacing, ..SurfelOptions::default() });
     let deep = |optical_depth| fine(SurfelOptions { optical_depth, ..SurfelOptions::default() });
-    let refused = |found: Result<usize>, message: &str| {
-        let error = found.unwrap_err().to_string();
+    let refused = |result: Result<usize>, message: &str| {
+        let error = result.unwrap_err().to_string();
         assert!(error.contains(message), "{error}");
     };
     // However coarse the spacing is, everything is drawn.

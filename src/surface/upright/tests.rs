@@ -152,10 +152,10 @@ fn things_stand_as_people_know_them() {
             // than most shapes have.
             let is_usual = up == DVec3::Y || up == DVec3::Z;
             let may_be =
-                |found: DVec3| found == up || !is_usual && [DVec3::Y, DVec3::Z].contains(&found);
-            let found = mesh.guess_stance().expect("a stance").up;
-            if !may_be(found) {
-                wrong.push(format!("{name} with {up} up: {found}"));
+                |guess: DVec3| guess == up || !is_usual && [DVec3::Y, DVec3::Z].contains(&guess);
+            let guess = mesh.guess_orientation().expect("a orientation").up;
+            if !may_be(guess) {
+                wrong.push(format!("{name} with {up} up: {guess}"));
             }
             if *name == "bowl" && up.min_element() < 0.0 {
                 // Its points alone hide its inside too little to count against the habit.
@@ -164,9 +164,9 @@ fn things_stand_as_people_know_them() {
             // Points without triangles stand as the surface does.
             mesh.positions = mesh.spread();
             mesh.triangles.clear();
-            let found = mesh.guess_stance().expect("a stance").up;
-            if !may_be(found) {
-                wrong.push(format!("points of a {name} with {up} up: {found}"));
+            let guess = mesh.guess_orientation().expect("a orientation").up;
+            if !may_be(guess) {
+                wrong.push(format!("points of a {name} with {up} up: {guess}"));
             }
         }
     }
@@ -176,8 +176,8 @@ fn things_stand_as_people_know_them() {
 #[test]
 fn a_plate_lies() {
     for (up, turn) in turns() {
-        let found = rotated(&gear(), turn).guess_stance().expect("a stance").up;
-        assert!(found.dot(up).abs() > 0.999, "{up}: {found}");
+        let guess = rotated(&gear(), turn).guess_orientation().expect("a orientation").up;
+        assert!(guess.dot(up).abs() > 0.999, "{up}: {guess}");
     }
 }
 
@@ -190,7 +190,7 @@ fn a_terrain_is_seen_from_above() {
     };
     let terrain = Mesh { positions: (0..8100).map(place).collect(), ..Mesh::default() };
     for (up, turn) in turns().filter(|(up, _)| up.min_element() >= 0.0) {
-        assert_eq!(rotated(&terrain, turn).guess_stance().expect("a stance").up, up);
+        assert_eq!(rotated(&terrain, turn).guess_orientation().expect("a orientation").up, up);
     }
 }
 
@@ -199,21 +199,21 @@ fn a_few_points_far_away_do_not_turn_a_shape() {
     let mut mesh = Mesh { positions: bottle().spread(), ..Mesh::default() };
     let count = mesh.positions.len();
     mesh.positions.extend((0..count / 1500).map(|n| Vec3::new(40.0, 3.0 * n as f32, -9.0)));
-    assert_eq!(mesh.guess_stance().expect("a stance").up, DVec3::Z);
+    assert_eq!(mesh.guess_orientation().expect("a orientation").up, DVec3::Z);
 }
 
 #[test]
 fn balls_stand_and_flat_and_empty_shapes_do_not() {
-    assert!(Mesh::sphere(4).guess_stance().is_some());
-    assert_eq!(Mesh::default().guess_stance(), None);
+    assert!(Mesh::sphere(4).guess_orientation().is_some());
+    assert_eq!(Mesh::default().guess_orientation(), None);
     let square = of(|mesh| add_box(mesh, [0.0; 3], [1.0, 1.0, 0.0]));
-    assert_eq!(square.guess_stance(), None);
+    assert_eq!(square.guess_orientation(), None);
     let broken = Mesh {
         positions: vec![Vec3::NAN, Vec3::ONE, Vec3::INFINITY],
         triangles: vec![[0, 1, 2], [9, 1, 1]],
         ..Mesh::default()
     };
-    assert_eq!(broken.guess_stance(), None);
+    assert_eq!(broken.guess_orientation(), None);
 }
 
 /// An animal that looks along +X: a body on four legs, a neck and a head, and a tail.
@@ -247,14 +247,14 @@ fn animals_and_people_look_at_the_camera() {
     for (name, mesh) in [("animal", animal()), ("person", person())] {
         for quarter in 0..4 {
             let turn = DQuat::from_rotation_z(f64::from(quarter) * std::f64::consts::FRAC_PI_2);
-            let stance = rotated(&mesh, turn).guess_stance().unwrap();
-            assert_eq!(stance.up, DVec3::Z, "{name}, {quarter}");
+            let orientation = rotated(&mesh, turn).guess_orientation().unwrap();
+            assert_eq!(orientation.up, DVec3::Z, "{name}, {quarter}");
             let front = turn * DVec3::X;
-            assert!(stance.front.distance(front) < 1e-9, "{name}, {quarter}: {stance:?}");
+            assert!(orientation.front.distance(front) < 1e-9, "{name}, {quarter}: {orientation:?}");
         }
         let turn = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
-        let stance = rotated(&mesh, turn).guess_stance().unwrap();
-        assert_eq!((stance.up, stance.front), (DVec3::Y, DVec3::X), "{name}");
+        let orientation = rotated(&mesh, turn).guess_orientation().unwrap();
+        assert_eq!((orientation.up, orientation.front), (DVec3::Y, DVec3::X), "{name}");
     }
 }
 
@@ -277,6 +277,6 @@ fn what_has_no_face_is_seen_from_the_usual_side() {
         ("bottle", bottle()),
     ];
     for (name, mesh) in shapes {
-        assert_eq!(mesh.guess_stance(), Some(Stance::SURVEY), "{name}");
+        assert_eq!(mesh.guess_orientation(), Some(Orientation::SURVEY), "{name}");
     }
 }

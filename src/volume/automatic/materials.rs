@@ -76,11 +76,11 @@ impl Materials {
             .map(|bin| survey.counts[bin])
             .sum();
         let is_enough = |peak: &&Peak| peak.mass > LEAST_SHARE * outside;
-        let found = peaks.iter().filter(is_enough).copied();
+        let materials = peaks.iter().filter(is_enough).copied();
         let mut below: Vec<Peak> =
-            found.clone().filter(|peak| peak.value < first.value.min(background[0])).collect();
+            materials.clone().filter(|peak| peak.value < first.value.min(background[0])).collect();
         below.reverse();
-        let above = found.filter(|peak| peak.value > last.value.max(background[1])).collect();
+        let above = materials.filter(|peak| peak.value > last.value.max(background[1])).collect();
         Self { background, mode: common.value, below, above }
     }
 }
@@ -89,11 +89,11 @@ impl Materials {
 fn quantile(survey: &Survey, share: f64) -> f64 {
     let wanted = share * survey.edges.iter().sum::<f64>();
     let mut seen = 0.0;
-    let found = survey.edges.iter().position(|count| {
+    let bin = survey.edges.iter().position(|count| {
         seen += count;
         seen >= wanted
     });
-    survey.value(found.unwrap_or(0) as f64)
+    survey.value(bin.unwrap_or(0) as f64)
 }
 
 /// Returns the peaks of the background, ascending: those that many samples along the edges of the
@@ -158,8 +158,9 @@ fn peaks(counts: &[f64], blur: f64) -> Vec<Peak> {
     let mut peaks: Vec<Peak> = (0..heads.len())
         .filter(|&peak| heads[peak].1 == peak)
         .map(|peak| {
-            let own = |bin: &usize| owner[*bin] != usize::MAX && head(&heads, owner[*bin]) == peak;
-            let bins: Vec<usize> = (0..smooth.len()).filter(own).collect();
+            let belongs =
+                |bin: &usize| owner[*bin] != usize::MAX && head(&heads, owner[*bin]) == peak;
+            let bins: Vec<usize> = (0..smooth.len()).filter(belongs).collect();
             peak_of(counts, heads[peak].0, &bins)
         })
         .collect();
@@ -171,9 +172,10 @@ fn peaks(counts: &[f64], blur: f64) -> Vec<Peak> {
 /// steeper side, because the other side may be another material's.
 fn peak_of(counts: &[f64], top: usize, bins: &[usize]) -> Peak {
     let side = |is_own: &dyn Fn(usize) -> bool| {
-        let own = || bins.iter().copied().filter(|&bin| is_own(bin));
-        let mass: f64 = own().map(|bin| counts[bin]).sum();
-        let square = own().map(|bin| counts[bin] * (bin as f64 - top as f64).powi(2)).sum::<f64>();
+        let on_side = || bins.iter().copied().filter(|&bin| is_own(bin));
+        let mass: f64 = on_side().map(|bin| counts[bin]).sum();
+        let square =
+            on_side().map(|bin| counts[bin] * (bin as f64 - top as f64).powi(2)).sum::<f64>();
         if mass > 0.0 { (square / mass).sqrt() } else { f64::INFINITY }
     };
     let spread = side(&|bin| bin <= top).min(side(&|bin| bin >= top));
@@ -216,11 +218,11 @@ mod tests {
                 1000.0 * bell(bin, 20.0, 6.0) + 300.0 * dent * bell(bin, 150.0, 10.0)
             })
             .collect();
-        let found = peaks(&counts, 2.0);
-        assert_eq!(found.len(), 2, "{found:?}");
-        assert!((found[0].value - 20.0).abs() <= 1.0 && (found[0].spread - 6.0).abs() < 1.0);
-        assert!((found[1].value - 150.0).abs() <= 5.0, "{found:?}");
-        assert!(found[0].bins[1] < found[1].bins[0]);
+        let detected = peaks(&counts, 2.0);
+        assert_eq!(detected.len(), 2, "{detected:?}");
+        assert!((detected[0].value - 20.0).abs() <= 1.0 && (detected[0].spread - 6.0).abs() < 1.0);
+        assert!((detected[1].value - 150.0).abs() <= 5.0, "{detected:?}");
+        assert!(detected[0].bins[1] < detected[1].bins[0]);
         assert!(peaks(&[0.0; 5], 1.0).is_empty());
         assert_eq!(peaks(&[7.0], 1.0).len(), 1);
     }

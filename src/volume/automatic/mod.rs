@@ -183,7 +183,7 @@ fn general(survey: &Survey, materials: &Materials, hidden: &Hidden) -> Points {
             let of = |side: &Side, ramp: &[[f64; 3]]| {
                 let points =
                     if side.has_borders() { side.of_solids(ramp) } else { side.of_field(ramp) };
-                side.own(points)
+                side.with_sign(points)
             };
             of(&below, &colours::BELOW).with(of(&above, &colours::ABOVE))
         }
@@ -195,7 +195,7 @@ fn general(survey: &Survey, materials: &Materials, hidden: &Hidden) -> Points {
             } else {
                 side.of_field(&colours::FIELD)
             };
-            side.own(points)
+            side.with_sign(points)
         }
         // The values fill the box, as noise and turbulence do: a haze that lets half of the light
         // through, and in which the rarest values are densest.
@@ -203,7 +203,7 @@ fn general(survey: &Survey, materials: &Materials, hidden: &Hidden) -> Points {
             let all = Materials { background: [materials.mode; 2], ..materials.clone() };
             let of = |above: bool, ramp: &[[f64; 3]]| {
                 let side = Side::new(survey, &all, above);
-                side.own(side.of_haze(ramp))
+                side.with_sign(side.of_haze(ramp))
             };
             of(false, &colours::BELOW).with(of(true, &colours::ABOVE))
         }

@@ -41,7 +41,7 @@ pub fn points(
     let (ramp, is_lit) = ramp;
     let points =
         if is_lit && side.has_borders() { side.of_solids(ramp) } else { side.of_field(ramp) };
-    Some((side.own(points), is_lit))
+    Some((side.with_sign(points), is_lit))
 }
 
 /// Whether values look like Hounsfield units: whole or not, with air around and tissue inside.

@@ -74,10 +74,10 @@ pub struct Side<'a> {
 
 impl<'a> Side<'a> {
     /// The side above the background if `above`, else the one below it.
-    pub fn new(survey: &'a Survey, found: &Materials, above: bool) -> Self {
+    pub fn new(survey: &'a Survey, materials: &Materials, above: bool) -> Self {
         let sign = if above { 1.0 } else { -1.0 };
-        let start = found.background[usize::from(above)] * sign;
-        let peaks: &[Peak] = if above { &found.above } else { &found.below };
+        let start = materials.background[usize::from(above)] * sign;
+        let peaks: &[Peak] = if above { &materials.above } else { &materials.below };
         let mut counts: Vec<(f64, f64)> = (0..survey.counts.len())
             .map(|bin| (survey.value(bin as f64) * sign, survey.counts[bin]))
             .filter(|(value, _)| *value > start)
@@ -88,7 +88,7 @@ impl<'a> Side<'a> {
         Self {
             survey,
             sign,
-            mode: found.mode * sign,
+            mode: materials.mode * sign,
             start,
             top: survey.window[usize::from(above)] * sign,
             materials: peaks.iter().map(|peak| (peak.value * sign, peak.spread)).collect(),
@@ -121,11 +121,11 @@ impl<'a> Side<'a> {
     fn quantile(&self, share: f64) -> f64 {
         let wanted = share * self.mass();
         let mut seen = 0.0;
-        let found = self.counts.iter().find(|(_, count)| {
+        let entry = self.counts.iter().find(|(_, count)| {
             seen += count;
             seen >= wanted
         });
-        found.map_or(self.top, |(value, _)| *value)
+        entry.map_or(self.top, |(value, _)| *value)
     }
 
     /// Returns the mean gradient at a value, in value per world length; 0 if unknown.
@@ -219,12 +219,12 @@ impl<'a> Side<'a> {
         let count = boundaries.len();
         let mut points = Points::default();
         for (number, &(middle, half)) in boundaries.iter().enumerate() {
-            let own = colours::at(&colours::MATERIALS, number as f64 / count as f64);
+            let color = colours::at(&colours::MATERIALS, number as f64 / count as f64);
             if number + 1 == count {
                 let solid = self.solid();
                 let far = self.quantile(0.995).max(middle + 1.5 * half);
-                points.add(middle - half, own, 0.0);
-                points.add(middle + half, own, solid);
+                points.add(middle - half, color, 0.0);
+                points.add(middle + half, color, solid);
                 points.add(
                     0.5 * (middle + half + far),
                     colours::at(&colours::MATERIALS, 0.7),
@@ -241,12 +241,12 @@ impl<'a> Side<'a> {
             let slope = self.slope(middle);
             let length = if slope > 0.0 { half / slope } else { self.survey.spacing };
             let depth = -(1.0 - opacity).ln() / length.max(0.5 * self.survey.spacing);
-            points.add(middle - half, own, 0.0);
-            points.add(middle, own, depth);
+            points.add(middle - half, color, 0.0);
+            points.add(middle, color, depth);
             // What is inside a shell that hides little stays solid.
             let rest = (1.0 - 2.0 * share).max(0.0) * 0.5 * self.solid();
-            points.add(end, own, rest);
-            points.add(next - next_half, own, rest);
+            points.add(end, color, rest);
+            points.add(next - next_half, color, rest);
         }
         points
     }
@@ -295,8 +295,9 @@ impl<'a> Side<'a> {
         points
     }
 
-    /// Returns points of this side as points of the field's own values.
-    pub fn own(&self, points: Points) -> Points {
+    /// Returns points of this side with the values of the field. On the side below the background,
+    /// these have the other sign.
+    pub fn with_sign(&self, points: Points) -> Points {
         if self.sign < 0.0 { points.turned() } else { points }
     }
 }

@@ -10,7 +10,7 @@ use glam::DVec3;
 /// Most bins of a histogram.
 const BINS: usize = 256;
 /// About so many samples of a volume are looked at.
-const LOOKS: f64 = 2e6;
+const SAMPLES: f64 = 2e6;
 /// Share of the values that may be outliers, at either end.
 const OUTLIERS: f64 = 5e-4;
 /// Most values that may be labels.
@@ -47,7 +47,7 @@ pub struct Survey {
 
 /// What is known of one sample.
 #[derive(Debug, Clone, Copy)]
-struct Look {
+struct Sample {
     value: f64,
     /// Magnitude of the gradient, in value per world length.
     slope: f64,
@@ -64,8 +64,8 @@ impl Survey {
     /// Surveys a volume, which must be valid. A window replaces the values without outliers.
     pub fn of_volume(volume: &Volume, window: Option<[f64; 2]>) -> Self {
         let lattice = &volume.lattice;
-        let looks = each_type!(volume.samples, values => {
-            looks(lattice, |at: usize| f64::from(values[at]))
+        let samples = each_type!(volume.samples, values => {
+            samples(lattice, |at: usize| f64::from(values[at]))
         });
         let spacing = lattice.spacing();
         let wide = DVec3::from_array(lattice.dims.map(|n| if n > 1 { 1.0 } else { f64::INFINITY }));
@@ -75,9 +75,9 @@ impl Survey {
         };
         let [first, last] = volume.bounds();
         let is_float = volume.samples.scalar() == Scalar::F32;
-        let mut survey = Self::of_looks(&looks, volume.range, window, is_float);
+        let mut survey = Self::of_samples(&samples, volume.range, window, is_float);
         (survey.spacing, survey.diagonal) = (spacing, (last - first).length());
-        survey.add_slopes(&looks);
+        survey.add_slopes(&samples);
         survey
     }
 
@@ -88,8 +88,8 @@ impl Survey {
         window: Option<[f64; 2]>,
         diagonal: f64,
     ) -> Self {
-        let step = (values.len() as f64 / LOOKS).ceil().max(1.0) as usize;
-        let look = |value: &f32| Look {
+        let step = (values.len() as f64 / SAMPLES).ceil().max(1.0) as usize;
+        let sample = |value: &f32| Sample {
             value: f64::from(*value),
             slope: 0.0,
             mask: None,
@@ -97,22 +97,27 @@ impl Survey {
             faces: [false; 6],
         };
         let finite = values.iter().step_by(step).filter(|value| value.is_finite());
-        let looks: Vec<Look> = finite.map(look).collect();
-        let mut survey = Self::of_looks(&looks, range, window, true);
+        let samples: Vec<Sample> = finite.map(sample).collect();
+        let mut survey = Self::of_samples(&samples, range, window, true);
         (survey.diagonal, survey.spacing) = (diagonal, diagonal / 100.0);
         survey.flat.clone_from(&survey.counts);
         survey
     }
 
     /// Fills the histograms of values.
-    fn of_looks(looks: &[Look], range: [f64; 2], window: Option<[f64; 2]>, is_float: bool) -> Self {
-        let mut values: Vec<f64> = looks.iter().map(|look| look.value).collect();
+    fn of_samples(
+        samples: &[Sample],
+        range: [f64; 2],
+        window: Option<[f64; 2]>,
+        is_float: bool,
+    ) -> Self {
+        let mut values: Vec<f64> = samples.iter().map(|sample| sample.value).collect();
         values.par_sort_unstable_by(f64::total_cmp);
         let extremes = [values.first(), values.last()].map(|end| end.copied().unwrap_or(0.0));
         let is_whole = !is_float || values.iter().all(|value| value.fract() == 0.0);
         let window = window.unwrap_or_else(|| without_outliers(&values, range));
         let (window, bins) = bins(window, is_whole);
-        let labels = if is_whole { labels(&values, looks) } else { Vec::new() };
+        let labels = if is_whole { labels(&values, samples) } else { Vec::new() };
         let mut survey = Self {
             range,
             window,
@@ -121,18 +126,18 @@ impl Survey {
             slopes: vec![0.0; bins],
             edges: vec![0.0; bins],
             faces: std::array::from_fn(|_| vec![0.0; bins]),
-            noise: noise(looks, extremes, is_whole && !is_float),
+            noise: noise(samples, extremes, is_whole && !is_float),
             spacing: 1.0,
             diagonal: 1.0,
             labels,
         };
-        for look in looks {
-            let bin = survey.bin(look.value);
+        for sample in samples {
+            let bin = survey.bin(sample.value);
             survey.counts[bin] += 1.0;
-            for (face, _) in survey.faces.iter_mut().zip(look.faces).filter(|(_, is_at)| *is_at) {
+            for (face, _) in survey.faces.iter_mut().zip(sample.faces).filter(|(_, is_at)| *is_at) {
                 face[bin] += 1.0;
             }
-            let axes = [0, 2, 4].map(|face| look.faces[face] || look.faces[face + 1]);
+            let axes = [0, 2, 4].map(|face| sample.faces[face] || sample.faces[face + 1]);
             let is_edge = axes.iter().filter(|is_at| **is_at).count() >= 2;
             survey.edges[bin] += f64::from(u8::from(is_edge));
         }
@@ -140,13 +145,13 @@ impl Survey {
     }
 
     /// Fills the histograms that need gradients.
-    fn add_slopes(&mut self, looks: &[Look]) {
+    fn add_slopes(&mut self, samples: &[Sample]) {
         let [low, high] = self.window;
         let flat = (2.0 * self.noise_slope()).max(0.01 * (high - low) / self.spacing);
-        for look in looks {
-            let bin = self.bin(look.value);
-            self.slopes[bin] += look.slope;
-            self.flat[bin] += f64::from(u8::from(look.slope <= flat));
+        for sample in samples {
+            let bin = self.bin(sample.value);
+            self.slopes[bin] += sample.slope;
+            self.flat[bin] += f64::from(u8::from(sample.slope <= flat));
         }
         for (slope, count) in self.slopes.iter_mut().zip(&self.counts) {
             *slope /= count.max(1.0);
@@ -178,10 +183,10 @@ impl Survey {
     }
 }
 
-/// Looks at samples that are evenly spread over a lattice.
-fn looks(lattice: &Lattice, value: impl Fn(usize) -> f64 + Sync) -> Vec<Look> {
+/// Returns samples that are evenly spread over a lattice.
+fn samples(lattice: &Lattice, value: impl Fn(usize) -> f64 + Sync) -> Vec<Sample> {
     let dims = lattice.dims;
-    let step = (lattice.len() as f64 / LOOKS).cbrt().ceil().max(1.0) as usize;
+    let step = (lattice.len() as f64 / SAMPLES).cbrt().ceil().max(1.0) as usize;
     // Steps that divide the number of samples of a row would look at one column only.
     let count = |axis: usize| dims[axis].div_ceil(if dims[axis] < 2 * step { 1 } else { step });
     let counts = [0, 1, 2].map(count);
@@ -191,14 +196,14 @@ fn looks(lattice: &Lattice, value: impl Fn(usize) -> f64 + Sync) -> Vec<Look> {
     };
     let row = |number: usize| {
         let (j, k) = (place(1, number % counts[1]), place(2, number / counts[1]));
-        (0..counts[0]).map(|i| look(lattice, [place(0, i), j, k], &value)).collect::<Vec<_>>()
+        (0..counts[0]).map(|i| sample(lattice, [place(0, i), j, k], &value)).collect::<Vec<_>>()
     };
     (0..counts[1] * counts[2]).into_par_iter().flat_map_iter(row).collect()
 }
 
-/// Looks at one sample. On a body-centred lattice, its neighbours are those of its own cubic
+/// Returns one sample. On a body-centred lattice, its neighbours are those of its own cubic
 /// lattice.
-fn look(lattice: &Lattice, index: [usize; 3], value: impl Fn(usize) -> f64) -> Look {
+fn sample(lattice: &Lattice, index: [usize; 3], value: impl Fn(usize) -> f64) -> Sample {
     let [nx, ny, _] = lattice.dims;
     let is_centred = matches!(lattice.arrangement, crate::volume::Arrangement::BodyCentred);
     let strides: [usize; 3] = if is_centred { [1, 1, 2] } else { [1; 3] };
@@ -224,7 +229,7 @@ fn look(lattice: &Lattice, index: [usize; 3], value: impl Fn(usize) -> f64) -> L
             if face % 2 == 0 { index[axis] } else { lattice.dims[axis] - 1 - index[axis] };
         from_face < margin
     });
-    Look {
+    Sample {
         value: here,
         slope: squared.sqrt(),
         mask: mask(lattice, index, strides, at),
@@ -275,19 +280,19 @@ fn mask(
 /// Returns the standard deviation of the noise, of values whose least and largest one are given. It
 /// is taken from a low percentile of the mask, because structure raises the high ones. Values that
 /// are saturated or padding have no noise.
-fn noise(looks: &[Look], [low, high]: [f64; 2], is_integer: bool) -> f64 {
+fn noise(samples: &[Sample], [low, high]: [f64; 2], is_integer: bool) -> f64 {
     let is_saturated =
-        |look: &Look| (look.value == low || look.value == high) && look.mask == Some(0.0);
-    let unsaturated = looks.iter().filter(|look| !is_saturated(look));
-    let mut found: Vec<f64> = unsaturated.filter_map(|look| look.mask).collect();
+        |sample: &Sample| (sample.value == low || sample.value == high) && sample.mask == Some(0.0);
+    let unsaturated = samples.iter().filter(|sample| !is_saturated(sample));
+    let mut responses: Vec<f64> = unsaturated.filter_map(|sample| sample.mask).collect();
     // The deviation of numbers that were rounded to integers.
     let rounding = if is_integer { 12f64.sqrt().recip() } else { 0.0 };
     // Where most of a volume is saturated, the rest is structure.
-    if found.len() < (looks.len() / 20).max(16) {
+    if responses.len() < (samples.len() / 20).max(16) {
         return rounding;
     }
-    let quarter = found.len() / 4;
-    (*found.select_nth_unstable_by(quarter, f64::total_cmp).1 / QUARTER).max(rounding)
+    let quarter = responses.len() / 4;
+    (*responses.select_nth_unstable_by(quarter, f64::total_cmp).1 / QUARTER).max(rounding)
 }
 
 /// Returns the range without outliers, of values in ascending order. A range that outliers do not
@@ -317,7 +322,7 @@ fn bins([low, high]: [f64; 2], is_whole: bool) -> ([f64; 2], usize) {
 
 /// Returns the distinct values, of whole values in ascending order, if they look like labels: few,
 /// constant over regions, and with neighbours of any difference.
-fn labels(values: &[f64], looks: &[Look]) -> Vec<f64> {
+fn labels(values: &[f64], samples: &[Sample]) -> Vec<f64> {
     let mut distinct = values.to_vec();
     distinct.dedup();
     let (mut equal, mut near, mut far) = (0u64, 0u64, 0u64);
@@ -325,8 +330,8 @@ fn labels(values: &[f64], looks: &[Look]) -> Vec<f64> {
         return Vec::new();
     }
     let rank = |value: f64| distinct.partition_point(|label| *label < value);
-    for look in looks.iter().filter(|look| look.next.is_finite()) {
-        match rank(look.value).abs_diff(rank(look.next)) {
+    for sample in samples.iter().filter(|sample| sample.next.is_finite()) {
+        match rank(sample.value).abs_diff(rank(sample.next)) {
             0 => equal += 1,
             1 => near += 1,
             _ => far += 1,

@@ -146,14 +146,14 @@ fn outliers_change_little() {
     };
     let usual = of(800.0);
     for outlier in [32e3, 1e9, -1e9] {
-        let found = of(outlier);
-        found.validate().unwrap();
+        let transfer = of(outlier);
+        transfer.validate().unwrap();
         for value in [0.0, 120.0, 300.0, 550.0, 800.0] {
-            let (a, b) = (found.opacity(value), usual.opacity(value));
+            let (a, b) = (transfer.opacity(value), usual.opacity(value));
             assert!((a - b).abs() < 0.1, "{outlier} at {value}: {a} {b}");
         }
         // What cannot be told apart beside the outliers cannot be drawn.
-        let [low, high] = found.span();
+        let [low, high] = transfer.span();
         assert!(high - low > 2e-6 * outlier.abs());
     }
 }
@@ -171,15 +171,15 @@ fn units_change_nothing() {
     for (unit, zero, length) in
         [(1e12, 0.0, 1.0), (1e-12, 0.0, 1.0), (1.0, 1e5, 1.0), (1.0, 0.0, 1e-6), (1.0, 0.0, 1e6)]
     {
-        let found = of(unit, zero, length);
-        assert!((found.unit / usual.unit / length - 1.0).abs() < 1e-6);
+        let transfer = of(unit, zero, length);
+        assert!((transfer.unit / usual.unit / length - 1.0).abs() < 1e-6);
         for i in 0..=80 {
             let value = f64::from(i) * 10.0;
-            let (a, b) = (found.opacity(zero + unit * value), usual.opacity(value));
+            let (a, b) = (transfer.opacity(zero + unit * value), usual.opacity(value));
             assert!((a - b).abs() < 0.02, "{unit} {zero} {length} at {value}: {a} {b}");
         }
         let certain = |t: &TransferFunction| t.shade.unwrap().certain.unwrap()[0];
-        assert!((certain(&found) * length / unit / certain(&usual) - 1.0).abs() < 0.02);
+        assert!((certain(&transfer) * length / unit / certain(&usual) - 1.0).abs() < 0.02);
     }
 }
 
@@ -205,8 +205,8 @@ fn a_window_limits_the_values() {
     let mut windowed = floats(|at| 1000.0 * (1.0 - at.length()).max(0.0).powi(2) + noise(at));
     let usual = TransferFunction::automatic(&windowed);
     windowed.about.window = Some([100.0, 300.0]);
-    let found = TransferFunction::automatic(&windowed);
-    assert!(found.span()[1] <= 301.0 && usual.span()[1] > 400.0, "{found:?} {usual:?}");
+    let transfer = TransferFunction::automatic(&windowed);
+    assert!(transfer.span()[1] <= 301.0 && usual.span()[1] > 400.0, "{transfer:?} {usual:?}");
     // A window beside the values says nothing.
     windowed.about.window = Some([5000.0, 6000.0]);
     assert_eq!(TransferFunction::automatic(&windowed), usual);

@@ -104,12 +104,12 @@ impl Report {
         for line in page.lines() {
             match (title(line), parts.last_mut()) {
                 (None, Some((_, part))) => *part += &format!("{line}\n"),
-                (own, _) => parts.push((own, format!("{line}\n"))),
+                (heading, _) => parts.push((heading, format!("{line}\n"))),
             }
         }
         for table in &self.tables {
             let text = table.markdown();
-            match parts.iter_mut().find(|(own, _)| own.as_deref() == Some(table.title)) {
+            match parts.iter_mut().find(|(heading, _)| heading.as_deref() == Some(table.title)) {
                 Some((_, part)) => *part = text,
                 None => parts.push((Some(table.title.to_owned()), text)),
             }

@@ -35,12 +35,12 @@ def made_up_head(side=96):
 
 def main(source=None, output="ct.png", size=(800, 600)):
     scene = pysplatkit.Scene()
-    look = {"transfer": "ct-bone"}
+    options = {"transfer": "ct-bone"}
     if source:
-        scene.add(source, **look)
+        scene.add(source, **options)
     else:
         volume, spacing = made_up_head()
-        scene.add_volume(volume, spacing=spacing, modality="ct", unit="mm", **look)
+        scene.add_volume(volume, spacing=spacing, modality="ct", unit="mm", **options)
     # The upper third is cut away.
     (_, _, low), (_, _, high) = scene.bounds
     below = pysplatkit.Clip.plane((0, 0, 1), low + 0.7 * (high - low))

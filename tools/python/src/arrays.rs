@@ -63,8 +63,8 @@ pub fn positions(array: &Bound<'_, PyAny>) -> Result<(DVec3, Vec<Vec3>), Error> 
 
 fn settled<T>(rows: &[T], place: impl Fn(&T) -> DVec3) -> Result<(DVec3, Vec<Vec3>), Error> {
     if let Some(row) = rows.iter().position(|row| !place(row).is_finite()) {
-        let found = place(&rows[row]);
-        return Err(wrong(format!("the position {found} in row {row} is not finite")));
+        let position = place(&rows[row]);
+        return Err(wrong(format!("the position {position} in row {row} is not finite")));
     }
     let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let grow = |(low, high): (DVec3, DVec3), row: &T| (low.min(place(row)), high.max(place(row)));
@@ -106,14 +106,14 @@ pub fn samples(array: &Bound<'_, PyAny>) -> Result<([usize; 3], Samples), Error>
     let &[nz, ny, nx] = untyped.shape() else {
         return Err(wrong(format!("a volume has three axes, not {:?}", untyped.shape())));
     };
-    let found = untyped.dtype().str().map(|own| own.to_string()).unwrap_or_default();
-    let scalar = match found.as_str() {
+    let dtype = untyped.dtype().str().map(|name| name.to_string()).unwrap_or_default();
+    let scalar = match dtype.as_str() {
         "uint8" => Scalar::U8,
         "uint16" => Scalar::U16,
         "int16" => Scalar::I16,
         "int32" => Scalar::I32,
         "float32" => Scalar::F32,
-        _ => return Err(wrong(format!("samples of the type {found} are not drawn"))),
+        _ => return Err(wrong(format!("samples of the type {dtype} are not drawn"))),
     };
     let buffer = PyUntypedBuffer::get(array).map_err(|error| wrong(error.to_string()))?;
     if !buffer.is_c_contiguous() {

@@ -82,6 +82,6 @@ fn nodes_of<'a>(offsets: &[i64], nodes: &'a [u32], cell: usize) -> Result<&'a [u
 }
 
 fn kind(number: u8) -> Result<CellKind, Error> {
-    let found = CellKind::of_vtk(number.into());
-    found.ok_or_else(|| wrong(format!("cells of VTK's type {number} do not fill space")))
+    let kind = CellKind::of_vtk(number.into());
+    kind.ok_or_else(|| wrong(format!("cells of VTK's type {number} do not fill space")))
 }

@@ -53,11 +53,12 @@ pub fn convert(
     output: PathBuf,
     conversion: &str,
     load: &str,
-    look: &str,
+    appearance: &str,
 ) -> PyResult<()> {
     let made = || -> Result<Work, Error> {
-        let (given, look): (Conversion, _) = (options(conversion)?, appearance(look)?);
-        let (overwrite, conversion) = (given.overwrite, given.conversion(&look, load)?);
+        let (given, appearance): (Conversion, _) =
+            (options(conversion)?, self::appearance(appearance)?);
+        let (overwrite, conversion) = (given.overwrite, given.conversion(&appearance, load)?);
         // From here on, numbers that are wrong are those of files.
         conversion.surfel_options(Deadline::NEVER).validate()?;
         Ok(Work { files, output, overwrite, conversion })
@@ -72,7 +73,7 @@ impl Conversion {
     /// Returns the conversion of the library.
     fn conversion(
         self,
-        look: &AppearanceEntry,
+        appearance: &AppearanceEntry,
         load: &str,
     ) -> Result<session::convert::Conversion, Error> {
         let up = self.up.map(|up| DVec3::from_array(up).try_normalize());
@@ -83,7 +84,7 @@ impl Conversion {
         Ok(session::convert::Conversion {
             reading: load.reading(),
             fits_memory: load.limits.bytes.is_none(),
-            coloring: look.coloring(),
+            coloring: appearance.coloring(),
             preset: self.preset()?,
             lattice: self.lattice()?,
             lossless: self.lossless,

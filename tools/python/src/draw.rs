@@ -55,7 +55,7 @@ struct Versioned {
     /// Grows with each input.
     version: usize,
     /// Grows with each change of a transfer function.
-    look: usize,
+    transfer_version: usize,
 }
 
 /// An input, and how it is shown.
@@ -69,7 +69,7 @@ pub struct Added {
 struct Kept {
     version: usize,
     /// The version of the transfer functions.
-    look: usize,
+    transfer_version: usize,
     scene: Arc<Scene>,
     subject: Subject,
     seen: Option<(Vec<Clip>, Arc<Vec<DVec3>>)>,
@@ -134,26 +134,26 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Stage {
     /// Adds an input, unless the caller has stopped waiting for it.
     pub fn add(&self, added: Added, stop: &Stop) -> Result<(), Error> {
-        let mut own = locked(&self.items);
-        let before = own.items.mark();
+        let mut versioned = locked(&self.items);
+        let before = versioned.items.mark();
         let Added { name, input, showing } = added;
-        own.items.add(&name, input, &showing, &|_| ())?;
-        let last = own.items.contents.len() - 1;
-        let field = own.items.fields().last().filter(|(number, _)| *number == last);
+        versioned.items.add(&name, input, &showing, &|_| ())?;
+        let last = versioned.items.contents.len() - 1;
+        let field = versioned.items.fields().last().filter(|(number, _)| *number == last);
         let checked = field.and_then(|(_, item)| item.transfer()).map_or(Ok(()), |t| t.validate());
         let checked = if stop.is_requested() { Err(Error::Stopped) } else { checked };
         if checked.is_err() {
-            own.items.restore(before);
+            versioned.items.restore(before);
             return checked;
         }
-        own.version += 1;
+        versioned.version += 1;
         *locked(&self.kept) = [None, None];
         Ok(())
     }
 
     /// Returns what the scene holds: kind, name, and the number of splats or samples.
     pub fn contents(&self) -> Vec<(&'static str, String, u64)> {
-        let short = |own: &Content| (own.kind, own.name.text.clone(), own.count);
+        let short = |content: &Content| (content.kind, content.name.text.clone(), content.count);
         locked(&self.items).items.contents.iter().map(short).collect()
     }
 
@@ -164,9 +164,9 @@ impl Stage {
     }
 
     /// Returns the way up, and the diagonal of the box around the scene in world units.
-    pub fn stance(&self) -> (DVec3, f64) {
+    pub fn orientation(&self) -> (DVec3, f64) {
         let subject = &locked(&self.items).items.subject;
-        (subject.stance.up, subject.bounds.diagonal())
+        (subject.orientation.up, subject.bounds.diagonal())
     }
 
     /// Returns the fields of the scene.
@@ -184,18 +184,19 @@ impl Stage {
 
     /// Returns how often the values of an item's field are; nothing if it has no field.
     pub fn histogram(&self, number: usize) -> Vec<u64> {
-        let field =
-            |items: &Items| items.fields().find(|own| own.0 == number).map(|own| own.1.clone());
+        let field = |items: &Items| {
+            items.fields().find(|entry| entry.0 == number).map(|entry| entry.1.clone())
+        };
         let item = field(&locked(&self.items).items);
         let histogram = item.and_then(|item| Histogram::of_item(&item));
-        histogram.map(|own| own.counts).unwrap_or_default()
+        histogram.map(|histogram| histogram.counts).unwrap_or_default()
     }
 
     /// Sets the transfer function of an item's field.
     pub fn set_transfer(&self, number: usize, transfer: TransferFunction) -> Result<(), Error> {
-        let mut own = locked(&self.items);
-        own.items.set_transfer(number, transfer)?;
-        own.look += 1;
+        let mut versioned = locked(&self.items);
+        versioned.items.set_transfer(number, transfer)?;
+        versioned.transfer_version += 1;
         Ok(())
     }
 
@@ -239,16 +240,16 @@ impl Stage {
     /// Only an exact picture is reduced to the asked size.
     pub fn draw(
         &self,
-        own: Option<&str>,
+        given: Option<&str>,
         draw: &Draw,
         effort: Effort,
         stop: &Stop,
     ) -> Result<Drawn, Error> {
-        let own = own.map(camera).transpose()?;
-        let is_fitted = own.is_none();
+        let given = given.map(camera).transpose()?;
+        let is_fitted = given.is_none();
         let mut kept = self.take(draw.draws_facets())?;
         let settings = draw.settings(&kept, stop)?;
-        let camera = match own {
+        let camera = match given {
             Some(camera) => camera,
             None => {
                 let seen = kept.seen(&settings.clips)?;
@@ -290,15 +291,22 @@ impl Stage {
         let mut kept = locked(&self.kept);
         let slot = &mut kept[usize::from(facets)];
         match slot {
-            Some(own) if own.version == version => {
-                let subject = own.subject.clone();
-                let (scene, seen) = (own.scene.clone(), own.seen.clone());
-                let renderer = own.renderer.take();
-                let kept = Kept { version, look: own.look, scene, subject, seen, renderer };
-                return if kept.look == items.look {
+            Some(current) if current.version == version => {
+                let subject = current.subject.clone();
+                let (scene, seen) = (current.scene.clone(), current.seen.clone());
+                let renderer = current.renderer.take();
+                let kept = Kept {
+                    version,
+                    transfer_version: current.transfer_version,
+                    scene,
+                    subject,
+                    seen,
+                    renderer,
+                };
+                return if kept.transfer_version == items.transfer_version {
                     Ok(kept)
                 } else {
-                    kept.shown_by(&items, facets)
+                    kept.with_transfers_of(&items, facets)
                 };
             }
             _ => {}
@@ -310,15 +318,15 @@ impl Stage {
         if subject.is_one_place() {
             subject.bounds = scene.bounds();
         }
-        let look = items.look;
-        Ok(Kept { version, look, scene, subject, seen: None, renderer: None })
+        let transfer_version = items.transfer_version;
+        Ok(Kept { version, transfer_version, scene, subject, seen: None, renderer: None })
     }
 
     /// Keeps what a picture was drawn with, unless the scene has changed.
-    fn put(&self, own: Kept, facets: bool) {
+    fn put(&self, used: Kept, facets: bool) {
         let items = locked(&self.items);
-        if items.version == own.version {
-            locked(&self.kept)[usize::from(facets)] = Some(own);
+        if items.version == used.version {
+            locked(&self.kept)[usize::from(facets)] = Some(used);
         }
     }
 }
@@ -334,17 +342,17 @@ impl Versioned {
 
 impl Kept {
     /// Takes over the transfer functions of a scene that has not changed otherwise.
-    fn shown_by(mut self, items: &Versioned, facets: bool) -> Result<Self, Error> {
+    fn with_transfers_of(mut self, items: &Versioned, facets: bool) -> Result<Self, Error> {
         let scene = items.scene(facets)?;
         if let Some(renderer) = &mut self.renderer {
             for number in scene.fields() {
-                let [old, new] = [&self.scene, &scene].map(|own| own.items[number].transfer());
+                let [old, new] = [&self.scene, &scene].map(|scene| scene.items[number].transfer());
                 if let Some(new) = new.filter(|_| old != new) {
                     renderer.set_transfer(number, new)?;
                 }
             }
         }
-        Ok(Self { look: items.look, scene, seen: None, ..self })
+        Ok(Self { transfer_version: items.transfer_version, scene, seen: None, ..self })
     }
 
     /// Returns the points that a camera is fitted to; none if it has a distance already.
@@ -361,8 +369,8 @@ impl Kept {
 
     /// Returns the points that span what is seen with these clips.
     fn seen(&mut self, clips: &[Clip]) -> Result<Arc<Vec<DVec3>>, Error> {
-        if let Some((own, seen)) = &self.seen
-            && own == clips
+        if let Some((kept_clips, seen)) = &self.seen
+            && kept_clips == clips
         {
             return Ok(seen.clone());
         }
@@ -374,9 +382,9 @@ impl Kept {
 
 /// Returns the thickness of the sheets of the finest volume, about as the scene chooses it.
 fn sheet_of(scene: &Scene) -> Option<f64> {
-    let own = scene.items.iter().filter_map(|item| match item {
+    let thicknesses = scene.items.iter().filter_map(|item| match item {
         Item::Volume(volume, ..) => Some(4.0 / 3.0 * volume.lattice.kernel_spacing()),
         _ => None,
     });
-    own.reduce(f64::min)
+    thicknesses.reduce(f64::min)
 }

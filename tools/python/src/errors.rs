@@ -33,8 +33,8 @@ fn made(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
         Error::Input { file, place, message, hint } => {
             new(py, "InputError", (file, place, message, hint.as_deref()))
         }
-        Error::Limit { file, what, kind, found, limit } => {
-            new(py, "LimitError", (file, what, name(*kind), *found, *limit))
+        Error::Limit { file, what, kind, found: amount, limit } => {
+            new(py, "LimitError", (file, what, name(*kind), *amount, *limit))
         }
         Error::File { file, action, source } => {
             let class = match source.kind() {
@@ -45,8 +45,8 @@ fn made(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
             new(py, class, (file, format!("cannot {action}"), source.raw_os_error(), plain(source)))
         }
         Error::Output { file, source } => {
-            let told = (file, "cannot be written", source.raw_os_error(), plain(source));
-            new(py, "OutputError", told)
+            let arguments = (file, "cannot be written", source.raw_os_error(), plain(source));
+            new(py, "OutputError", arguments)
         }
         Error::Argument(_) => new(py, "ArgumentError", (text,)),
         Error::Transfer(_) => new(py, "TransferError", (text,)),

@@ -46,7 +46,7 @@ impl Hierarchy {
             "degree": header.degree,
             "has_color": header.has_color,
             "has_normals": header.has_normals,
-            "up": header.stance.map(|stance| stance.up.to_array()),
+            "up": header.orientation.map(|orientation| orientation.up.to_array()),
             "is_guessed": header.is_guessed,
             "unit": header.unit,
             "source": header.source,
@@ -58,8 +58,8 @@ impl Hierarchy {
 
     /// The splats of the finest level.
     fn leaves<'py>(&self, py: Python<'py>) -> PyResult<Leaves<'py>> {
-        let own = self.0.clone();
-        let set = run(py, &Stop::default(), move || own.leaves())?;
+        let hierarchy = self.0.clone();
+        let set = run(py, &Stop::default(), move || hierarchy.leaves())?;
         let (splats, origin) = (&set.splats, set.origin.to_array());
         let place = |splat: &Splat| [0, 1, 2].map(|i| origin[i] + f64::from(splat.center[i]));
         let positions: Vec<f64> = splats.iter().flat_map(place).collect();

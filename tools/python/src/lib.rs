@@ -65,20 +65,20 @@ fn moved_camera(
     elevation: f64,
     zoom: f64,
 ) -> PyResult<String> {
-    let mut own = camera::camera(text).map_err(|error| raise(py, &error))?;
-    own.azimuth(azimuth);
-    own.elevation(elevation);
-    own.zoom(zoom);
-    own.view([1, 1]).map_err(|error| raise(py, &error))?;
-    Ok(camera::to_json(&own))
+    let mut camera = camera::camera(text).map_err(|error| raise(py, &error))?;
+    camera.azimuth(azimuth);
+    camera.elevation(elevation);
+    camera.zoom(zoom);
+    camera.view([1, 1]).map_err(|error| raise(py, &error))?;
+    Ok(camera::to_json(&camera))
 }
 
 /// Returns the same view without perspective.
 #[pyfunction]
 fn orthographic_camera(py: Python<'_>, text: &str) -> PyResult<String> {
-    let mut own = camera::camera(text).map_err(|error| raise(py, &error))?;
-    own.make_orthographic();
-    Ok(camera::to_json(&own))
+    let mut camera = camera::camera(text).map_err(|error| raise(py, &error))?;
+    camera.make_orthographic();
+    Ok(camera::to_json(&camera))
 }
 
 /// Removes the unfinished files of conversions that go on although they were interrupted. To be

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 use splatkit::{
     Deadline, Error, Stop,
-    about::{About, Frame, Label, Modality, Stance},
+    about::{About, Frame, Label, Modality, Orientation},
     formats,
     gaussians::{Gaussians, harmonics},
     glam::{DMat3, DVec3, Quat, Vec3},
@@ -36,7 +36,7 @@ pub struct Scene(Arc<Stage>);
 /// What a caller says of an array.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct Told {
+struct ArrayFacts {
     name: String,
     /// World position of the first sample.
     origin: Option<[f64; 3]>,
@@ -68,13 +68,13 @@ enum ArrayLabels {
 
 impl ArrayLabels {
     /// Returns a volume with labels as the caller says; without a word, they are guessed.
-    fn apply(own: Option<&Self>, volume: Volume) -> Result<Volume, Error> {
+    fn apply(labels: Option<&Self>, volume: Volume) -> Result<Volume, Error> {
         let named = |(value, name): &(i32, String)| Label {
             value: *value,
             name: name.clone(),
             ..Label::default()
         };
-        Ok(match own {
+        Ok(match labels {
             None => volume.with_guessed_labels(),
             Some(Self::Are(false)) => volume,
             Some(Self::Are(true)) => volume.with_labels(Vec::new()),
@@ -86,7 +86,7 @@ impl ArrayLabels {
     }
 }
 
-impl Told {
+impl ArrayFacts {
     fn about(&self) -> Result<About, Error> {
         let mut about = About::default();
         about.name.clone_from(&self.value_name);
@@ -105,17 +105,17 @@ impl Told {
                 )));
             }
         };
-        about.stance = match self.frame.as_deref() {
-            Some("lps" | "ras") => Some(Stance::RAS),
+        about.orientation = match self.frame.as_deref() {
+            Some("lps" | "ras") => Some(Orientation::RAS),
             _ => None,
         };
-        if about.stance.is_some() {
+        if about.orientation.is_some() {
             about.frame = Frame::Patient;
         }
         if let Some(up) = self.up {
             let up = DVec3::from_array(up).try_normalize();
             let up = up.ok_or_else(|| wrong("up is a direction with a length above 0"))?;
-            about.stance = Some(Stance::with_up(up));
+            about.orientation = Some(Orientation::with_up(up));
         }
         Ok(about)
     }
@@ -160,7 +160,8 @@ impl MeshArrays<'_> {
         if let Some(faces) = &self.faces {
             mesh.triangles = rows::<u32, 3>(faces)?;
             let count = mesh.positions.len() as u32;
-            let bad = mesh.triangles.iter().position(|own| own.iter().any(|&at| at >= count));
+            let bad =
+                mesh.triangles.iter().position(|triangle| triangle.iter().any(|&at| at >= count));
             if let Some(face) = bad {
                 return Err(wrong(format!(
                     "face {face} names the vertices {:?}, but there are {count}",
@@ -188,9 +189,9 @@ impl MeshArrays<'_> {
             ("values", mesh.values.len()),
         ];
         let count = mesh.positions.len();
-        match lists.into_iter().find(|(_, found)| *found > 0 && *found != count) {
-            Some((name, found)) => {
-                Err(wrong(format!("there are {found} {name} for {count} positions")))
+        match lists.into_iter().find(|(_, length)| *length > 0 && *length != count) {
+            Some((name, length)) => {
+                Err(wrong(format!("there are {length} {name} for {count} positions")))
             }
             None => Ok(mesh),
         }
@@ -302,33 +303,33 @@ impl Scene {
         &self.0
     }
 
-    /// Adds what an array has become, with its looks.
+    /// Adds what an array has become, with its appearance.
     fn add(
         &self,
         py: Python<'_>,
         input: Data,
-        told: Told,
+        facts: ArrayFacts,
         more: (ReadingEntry, AppearanceEntry),
     ) -> PyResult<()> {
-        let (stage, (load, look)) = (self.0.clone(), more);
-        input.warn_of_holes(&told.name);
-        let name = Name { text: told.name, is_file: false };
+        let (stage, (load, appearance)) = (self.0.clone(), more);
+        input.warn_of_holes(&facts.name);
+        let name = Name { text: facts.name, is_file: false };
         let stop = Stop::default();
-        let own = stop.clone();
+        let worker_stop = stop.clone();
         run(py, &stop, move || {
-            let showing = load.complete(look.showing(&load.limits())?, Deadline::NEVER)?;
-            stage.add(Added { name, input, showing }, &own)
+            let showing = load.complete(appearance.showing(&load.limits())?, Deadline::NEVER)?;
+            stage.add(Added { name, input, showing }, &worker_stop)
         })
     }
 }
 
 /// Reads the options of an array.
-fn told(
-    told: &str,
+fn array_options(
+    facts: &str,
     load: &str,
-    look: &str,
-) -> Result<(Told, (ReadingEntry, AppearanceEntry)), Error> {
-    Ok((options(told)?, (reading(load)?, appearance(look)?)))
+    appearance: &str,
+) -> Result<(ArrayFacts, (ReadingEntry, AppearanceEntry)), Error> {
+    Ok((options(facts)?, (reading(load)?, self::appearance(appearance)?)))
 }
 
 #[pymethods]
@@ -339,19 +340,25 @@ impl Scene {
     }
 
     /// Adds a file.
-    fn add_file(&self, py: Python<'_>, path: PathBuf, load: &str, look: &str) -> PyResult<()> {
-        let own = told("{}", load, look).map_err(|error| raise(py, &error))?;
-        let (_, (load, look)) = own;
+    fn add_file(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        load: &str,
+        appearance: &str,
+    ) -> PyResult<()> {
+        let parsed = array_options("{}", load, appearance).map_err(|error| raise(py, &error))?;
+        let (_, (load, appearance)) = parsed;
         let (stage, stop) = (self.0.clone(), Stop::default());
-        let own = stop.clone();
+        let worker_stop = stop.clone();
         run(py, &stop, move || {
             // One deadline covers reading the input and making its splats.
             let deadline = load.limits().deadline();
-            let showing = load.complete(look.showing(&load.limits())?, deadline)?;
+            let showing = load.complete(appearance.showing(&load.limits())?, deadline)?;
             let attribute = showing.coloring().attribute();
             let mut input = load.reading().open_colored(&path, attribute)?.read()?;
             load.reading().give_radii(&path, &mut input, showing.point_radius.as_deref())?;
-            stage.add(Added { name: Name::of_file(&path), input, showing }, &own)
+            stage.add(Added { name: Name::of_file(&path), input, showing }, &worker_stop)
         })
     }
 
@@ -359,7 +366,7 @@ impl Scene {
     /// JSON: its camera, how one is fitted, the picture, and what is written over it.
     fn add_scene(&self, py: Python<'_>, path: PathBuf, is_trusted: bool) -> PyResult<String> {
         let (stage, stop) = (self.0.clone(), Stop::default());
-        let own = stop.clone();
+        let worker_stop = stop.clone();
         run(py, &stop, move || {
             let limits = Limits::default();
             let mut scene = match is_trusted {
@@ -373,8 +380,10 @@ impl Scene {
                 let attribute = showing.coloring().attribute();
                 let opened = reading.open_colored(&input.file, attribute)?;
                 let data = scene.read_input(input, &opened, &showing)?;
-                stage
-                    .add(Added { name: Name::of_file(&input.file), input: data, showing }, &own)?;
+                stage.add(
+                    Added { name: Name::of_file(&input.file), input: data, showing },
+                    &worker_stop,
+                )?;
             }
             let Description { camera, framing, picture, overlay, .. } = &scene;
             let drawn = serde_json::json!({
@@ -389,15 +398,16 @@ impl Scene {
         &self,
         py: Python<'_>,
         array: Bound<'_, PyAny>,
-        told: &str,
+        facts: &str,
         load: &str,
-        look: &str,
+        appearance: &str,
     ) -> PyResult<()> {
-        let (told, more) = self::told(told, load, look).map_err(|error| raise(py, &error))?;
-        let made = samples(&array).and_then(|(dims, samples)| Ok((dims, samples, told.about()?)));
+        let (facts, more) =
+            array_options(facts, load, appearance).map_err(|error| raise(py, &error))?;
+        let made = samples(&array).and_then(|(dims, samples)| Ok((dims, samples, facts.about()?)));
         let (dims, samples, about) = made.map_err(|error| raise(py, &error))?;
-        let (lattice, missing) = (told.lattice(dims), told.missing);
-        let labels = told.labels.clone();
+        let (lattice, missing) = (facts.lattice(dims), facts.missing);
+        let labels = facts.labels.clone();
         let measured = move || {
             let mut volume = Volume::with_missing(lattice, samples, missing)?;
             let holes = std::mem::replace(&mut volume.about, about).holes;
@@ -405,7 +415,7 @@ impl Scene {
             ArrayLabels::apply(labels.as_ref(), volume)
         };
         let volume: Volume = run(py, &Stop::default(), measured)?;
-        self.add(py, Data::Volume(volume), told, more)
+        self.add(py, Data::Volume(volume), facts, more)
     }
 
     /// Adds a mesh, or points if there are no faces.
@@ -413,14 +423,14 @@ impl Scene {
         &self,
         py: Python<'_>,
         arrays: MeshArrays<'_>,
-        told: &str,
+        facts: &str,
         load: &str,
-        look: &str,
+        appearance: &str,
     ) -> PyResult<()> {
-        let made = self::told(told, load, look)
-            .and_then(|(told, more)| Ok((arrays.mesh(told.about()?)?, told, more)));
-        let (mesh, told, more) = made.map_err(|error| raise(py, &error))?;
-        self.add(py, Data::Mesh(mesh), told, more)
+        let made = array_options(facts, load, appearance)
+            .and_then(|(facts, more)| Ok((arrays.mesh(facts.about()?)?, facts, more)));
+        let (mesh, facts, more) = made.map_err(|error| raise(py, &error))?;
+        self.add(py, Data::Mesh(mesh), facts, more)
     }
 
     /// Adds cells.
@@ -428,13 +438,14 @@ impl Scene {
         &self,
         py: Python<'_>,
         arrays: CellArrays<'_>,
-        told: &str,
-        look: &str,
+        facts: &str,
+        appearance: &str,
     ) -> PyResult<()> {
-        let made = self::told(told, "{}", look)
-            .and_then(|(told, more)| Ok((arrays.cells(told.about()?, told.missing)?, told, more)));
-        let (cells, told, more) = made.map_err(|error| raise(py, &error))?;
-        self.add(py, Data::Cells(cells), told, more)
+        let made = array_options(facts, "{}", appearance).and_then(|(facts, more)| {
+            Ok((arrays.cells(facts.about()?, facts.missing)?, facts, more))
+        });
+        let (cells, facts, more) = made.map_err(|error| raise(py, &error))?;
+        self.add(py, Data::Cells(cells), facts, more)
     }
 
     /// Adds samples at any positions.
@@ -442,14 +453,15 @@ impl Scene {
         &self,
         py: Python<'_>,
         arrays: SampleArrays<'_>,
-        told: &str,
+        facts: &str,
         load: &str,
-        look: &str,
+        appearance: &str,
     ) -> PyResult<()> {
-        let made = self::told(told, load, look)
-            .and_then(|(told, more)| Ok((arrays.points(told.about()?, told.missing)?, told, more)));
-        let (points, told, more) = made.map_err(|error| raise(py, &error))?;
-        self.add(py, Data::Samples(points), told, more)
+        let made = array_options(facts, load, appearance).and_then(|(facts, more)| {
+            Ok((arrays.points(facts.about()?, facts.missing)?, facts, more))
+        });
+        let (points, facts, more) = made.map_err(|error| raise(py, &error))?;
+        self.add(py, Data::Samples(points), facts, more)
     }
 
     /// Adds trained Gaussians.
@@ -457,12 +469,12 @@ impl Scene {
         &self,
         py: Python<'_>,
         arrays: GaussianArrays<'_>,
-        told: &str,
+        facts: &str,
     ) -> PyResult<()> {
-        let made = self::told(told, "{}", "{}")
-            .and_then(|(told, more)| Ok((arrays.set(told.about()?)?, told, more)));
-        let (set, told, more) = made.map_err(|error| raise(py, &error))?;
-        self.add(py, Data::Gaussians(set), told, more)
+        let made = array_options(facts, "{}", "{}")
+            .and_then(|(facts, more)| Ok((arrays.set(facts.about()?)?, facts, more)));
+        let (set, facts, more) = made.map_err(|error| raise(py, &error))?;
+        self.add(py, Data::Gaussians(set), facts, more)
     }
 
     /// What the scene holds: kind, name, and the number of splats or samples.
@@ -493,10 +505,10 @@ impl Scene {
 
     /// The camera that is fitted to the scene, as JSON.
     fn camera(&self, py: Python<'_>, fit: &str, draw: &str) -> PyResult<String> {
-        let own = framing(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
-        let (fit, draw) = own.map_err(|error| raise(py, &error))?;
+        let parsed = framing(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
+        let (fit, draw) = parsed.map_err(|error| raise(py, &error))?;
         let stage = self.0.clone();
-        run(py, &Stop::default(), move || stage.camera(&fit, &draw).map(|own| to_json(&own)))
+        run(py, &Stop::default(), move || stage.camera(&fit, &draw).map(|camera| to_json(&camera)))
     }
 
     /// The cameras of a turntable, as JSON.
@@ -507,8 +519,8 @@ impl Scene {
         fit: &str,
         draw: &str,
     ) -> PyResult<Vec<String>> {
-        let own = framing(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
-        let (fit, draw) = own.map_err(|error| raise(py, &error))?;
+        let parsed = framing(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
+        let (fit, draw) = parsed.map_err(|error| raise(py, &error))?;
         let stage = self.0.clone();
         run(py, &Stop::default(), move || {
             Ok(stage.turntable(&fit, &draw, frames)?.iter().map(to_json).collect())
@@ -519,9 +531,10 @@ impl Scene {
     fn render(&self, py: Python<'_>, camera: Option<String>, draw: &str) -> PyResult<Picture> {
         let draw = Draw::parse(draw).map_err(|error| raise(py, &error))?;
         let (stage, stop) = (self.0.clone(), Stop::default());
-        let own = stop.clone();
-        let drawn =
-            run(py, &stop, move || stage.draw(camera.as_deref(), &draw, Effort::EXACT, &own))?;
+        let worker_stop = stop.clone();
+        let drawn = run(py, &stop, move || {
+            stage.draw(camera.as_deref(), &draw, Effort::EXACT, &worker_stop)
+        })?;
         Ok(drawn.into())
     }
 }
@@ -539,8 +552,8 @@ pub fn write_scene(
 ) -> PyResult<()> {
     let made = || -> Result<Description, Error> {
         let mut scene = Description::new([]);
-        for (file, load, look) in inputs {
-            let (reading, appearance) = (reading(&load)?, appearance(&look)?);
+        for (file, load, appearance) in inputs {
+            let (reading, appearance) = (reading(&load)?, self::appearance(&appearance)?);
             scene.inputs.push(InputEntry { reading, appearance, ..InputEntry::new(file) });
         }
         scene.camera = camera.as_deref().map(options).transpose()?;

@@ -97,16 +97,16 @@ pub fn moved_by_hand(
     moved(scene, camera, size, gesture).map_err(|error| raise(py, &error))
 }
 
-fn moved(scene: &Scene, own: &str, size: [u32; 2], gesture: &str) -> Result<String, Error> {
-    let own = camera(own)?;
-    let view = own.view(size)?;
+fn moved(scene: &Scene, text: &str, size: [u32; 2], gesture: &str) -> Result<String, Error> {
+    let camera = camera(text)?;
+    let view = camera.view(size)?;
     let depth = |point: Option<[f64; 3]>| {
         let depth = point.map(|point| view.to_view(DVec3::from_array(point)).z);
         depth.filter(|depth| *depth > 0.0)
     };
-    let (up, diagonal) = scene.stage().stance();
-    let up = axis_of(&own, up);
-    let mut orbit = Orbit::new(own, up, diagonal);
+    let (up, diagonal) = scene.stage().orientation();
+    let up = axis_of(&camera, up);
+    let mut orbit = Orbit::new(camera, up, diagonal);
     match options(gesture)? {
         Gesture::Turn { drag } => orbit.turn(DVec2::from_array(drag), size),
         Gesture::LookAround { drag } => orbit.look_around(DVec2::from_array(drag), size),
@@ -135,7 +135,7 @@ fn axis_of(camera: &Camera, scene: DVec3) -> DVec3 {
         (part.length() > 0.02).then(|| part.normalize())
     };
     match (in_picture(camera.view_up), in_picture(scene)) {
-        (Some(own), Some(usual)) if own.dot(usual) < 0.999 => camera.view_up,
+        (Some(current), Some(usual)) if current.dot(usual) < 0.999 => camera.view_up,
         _ => scene,
     }
 }
@@ -149,10 +149,10 @@ pub fn picked(
     size: [u32; 2],
     cursor: [f64; 2],
 ) -> PyResult<Option<[f64; 3]>> {
-    let view = camera(picture.camera()).and_then(|own| own.view(size));
+    let view = camera(picture.camera()).and_then(|camera| camera.view(size));
     let view = view.map_err(|error| raise(py, &error))?;
-    let found = Probe::picked(picture.pixels(), &view, DVec2::from_array(cursor));
-    Ok(found.map(|point| point.to_array()))
+    let hit = Probe::picked(picture.pixels(), &view, DVec2::from_array(cursor));
+    Ok(hit.map(|point| point.to_array()))
 }
 
 /// Draws a picture with less effort than the exact one has, unless `stop` is requested.
@@ -166,9 +166,9 @@ pub fn render_frame(
     stop: &Stop,
 ) -> PyResult<Picture> {
     let draw = Draw::parse(draw).map_err(|error| raise(py, &error))?;
-    let (stage, own) = (scene.stage().clone(), stop.0.clone());
+    let (stage, worker_stop) = (scene.stage().clone(), stop.0.clone());
     let effort = effort_of(effort);
-    let drawn = run(py, &stop.0, move || stage.draw(Some(&camera), &draw, effort, &own))?;
+    let drawn = run(py, &stop.0, move || stage.draw(Some(&camera), &draw, effort, &worker_stop))?;
     Ok(drawn.into())
 }
 

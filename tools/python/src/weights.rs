@@ -49,31 +49,31 @@ fn of_item(item: &Item) -> Result<Vec<[f64; 4]>> {
 /// The bricks of the finest level that show something.
 fn of_bricks(bricks: &Bricks, transfer: &TransferFunction) -> Vec<[f64; 4]> {
     let (level, lattice) = (bricks.level(0), bricks.lattice(0));
-    let shown = first_visible(transfer, bricks.header().range);
+    let visible = first_visible(transfer, bricks.header().range);
     let ranges = bricks.ranges(0).into_iter().zip(0u32..);
-    let shows = |[low, high]: [u8; 2]| u16::from(high) >= shown[usize::from(low)];
-    let own = ranges.filter(|(range, _)| shows(*range)).map(|(_, brick)| {
+    let shows = |[low, high]: [u8; 2]| u16::from(high) >= visible[usize::from(low)];
+    let weights = ranges.filter(|(range, _)| shows(*range)).map(|(_, brick)| {
         let first = level.place(brick).map(|at| at * SIDE);
         let last = [0, 1, 2].map(|axis| (first[axis] + SIDE).min(level.dims[axis]));
         let middle = [0, 1, 2].map(|axis| 0.5 * (first[axis] + last[axis]) as f64 - 0.5);
         let count: usize = [0, 1, 2].map(|axis| last[axis] - first[axis]).iter().product();
         weighted(lattice.position(DVec3::from_array(middle)), count as f64)
     });
-    own.collect()
+    weights.collect()
 }
 
 /// The pages of a hierarchy below the root's.
 fn of_hierarchy(hierarchy: &Hierarchy) -> Result<Vec<[f64; 4]>> {
     let origin = hierarchy.header().origin;
     let place = |center: [f32; 3]| Vec3::from_array(center).as_dvec3() + origin;
-    let mut own = Vec::new();
+    let mut weights = Vec::new();
     for page in 0..hierarchy.page_count() {
         let entry = hierarchy.entry(page)?;
         if entry.parents_radius.is_finite() {
-            own.push(weighted(place(entry.parents_center), f64::from(entry.nodes)));
+            weights.push(weighted(place(entry.parents_center), f64::from(entry.nodes)));
         }
     }
-    Ok(own)
+    Ok(weights)
 }
 
 /// The samples that show something.
@@ -82,8 +82,8 @@ fn of_volume(volume: &Volume, transfer: &TransferFunction) -> Vec<[f64; 4]> {
     let shows = |at: &usize| transfer.visible([volume.value(*at); 2]);
     let step = step(volume.len());
     let place = |at: usize| lattice.position(lattice.steps(lattice.index(at)));
-    let own = (0..volume.len()).step_by(step).filter(shows);
-    own.map(|at| weighted(place(at), step as f64)).collect()
+    let samples = (0..volume.len()).step_by(step).filter(shows);
+    samples.map(|at| weighted(place(at), step as f64)).collect()
 }
 
 fn sampled(count: usize, place: impl Fn(usize) -> DVec3) -> Vec<[f64; 4]> {

@@ -75,9 +75,9 @@ pub fn run<T: Send + 'static>(
 /// Refuses to work in a copy of a process that has threads: they are missing in the copy, and work
 /// would wait for them for ever.
 fn check_process(py: Python<'_>) -> PyResult<()> {
-    let own = process::id();
-    match PROCESS.compare_exchange(0, own, Relaxed, Relaxed) {
-        Err(other) if other != own => Err(raise(
+    let current = process::id();
+    match PROCESS.compare_exchange(0, current, Relaxed, Relaxed) {
+        Err(other) if other != current => Err(raise(
             py,
             &Error::Argument(
                 "this process is a fork of one that has used splatkit, and lacks its threads; \

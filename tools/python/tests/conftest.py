@@ -88,7 +88,7 @@ def write_cells(path):
     lines += [f"POINTS {len(points)} double"]
     lines += [" ".join(map(repr, row)) for row in points.tolist()]
     lines += [f"CELLS {len(cells)} {9 * len(cells)}"]
-    lines += ["8 " + " ".join(map(str, own)) for own in cells]
+    lines += ["8 " + " ".join(map(str, cell)) for cell in cells]
     lines += [f"CELL_TYPES {len(cells)}", *(["12"] * len(cells))]
     lines += [f"POINT_DATA {len(points)}", "SCALARS heat double 1", "LOOKUP_TABLE default"]
     lines += [repr(value) for value in values.tolist()]

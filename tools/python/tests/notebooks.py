@@ -33,9 +33,9 @@ def _():
 
 
 def free_port():
-    with socket.socket() as own:
-        own.bind(("127.0.0.1", 0))
-        return own.getsockname()[1]
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
 
 
 @contextmanager
@@ -43,7 +43,7 @@ def served(folder, arguments, path):
     """Runs a server in a folder, and yields the address of a page once it answers."""
     port = free_port()
     address = f"http://127.0.0.1:{port}"
-    own = [part.format(port=port, folder=folder) for part in arguments]
+    options = [part.format(port=port, folder=folder) for part in arguments]
     places = ("CONFIG_DIR", "DATA_DIR", "RUNTIME_DIR")
     environment = {
         **os.environ,
@@ -54,7 +54,7 @@ def served(folder, arguments, path):
     }
     with (folder / "log.txt").open("w") as log:
         server = subprocess.Popen(
-            [sys.executable, "-m", *own], cwd=folder, env=environment, stdout=log, stderr=log
+            [sys.executable, "-m", *options], cwd=folder, env=environment, stdout=log, stderr=log
         )
         try:
             deadline = time.monotonic() + PATIENCE

@@ -65,8 +65,8 @@ def test_arrays_are_shared(whole, kind):
     step = TransferFunction([(0, "red")], [(0.5, 0), (1, 0.5)])
     transfer = step if kind == "?" else TRANSFER
 
-    def drawn(own):
-        return Scene().add_volume(own, transfer=transfer).render(SIZE).color
+    def drawn(volume):
+        return Scene().add_volume(volume, transfer=transfer).render(SIZE).color
 
     before, after = drawn(array), drawn(turned)
     assert not np.array_equal(before, after)
@@ -301,4 +301,4 @@ def test_warnings_name_the_line_of_the_program():
     for call in (lambda: Scene().add(holes), lambda: pysplatkit.render(holes, size=(8, 8))):
         with pytest.warns(pysplatkit.DataWarning, match="missing") as caught:
             call()
-        assert {own.filename for own in caught} == {__file__}
+        assert {warning.filename for warning in caught} == {__file__}

@@ -22,7 +22,7 @@ def inside(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def shown(path):
+def covered(path):
     """Returns the share of pixels that differ from the corner."""
     pixels = read_png(path)
     return (pixels != pixels[0, 0]).any(axis=-1).mean()
@@ -31,7 +31,7 @@ def shown(path):
 @pytest.mark.parametrize("name", ["ct", "sph", "scan"])
 def test_made_up_data(name):
     run(name, size=SIZE)
-    assert shown(f"{name}.png") > 0.1
+    assert covered(f"{name}.png") > 0.1
 
 
 def test_files(data):
@@ -39,9 +39,9 @@ def test_files(data):
     density = 2 + values
     np.save("own.npy", np.column_stack([positions, density, np.full(len(values), 0.4)]))
     run("sph", "own.npy", "own.png", SIZE)
-    assert shown("own.png") > 0.1
+    assert covered("own.png") > 0.1
     run("scan", data / "cloud.ply", "scanned.png", SIZE)
-    assert shown("scanned.png") > 0.05
+    assert covered("scanned.png") > 0.05
 
 
 def test_a_turntable(data):
@@ -52,4 +52,4 @@ def test_a_turntable(data):
         "0002.png",
     ]
     run("turntable", None, "knot", 2)
-    assert shown("knot/0001.png") > 0.1
+    assert covered("knot/0001.png") > 0.1

@@ -27,10 +27,10 @@ NAMES = [
 def test_facts_and_findings_are_those_of_the_command(command, data, name):
     path = data / name
     assert pysplatkit.info(path) == json.loads(command("info", "--json", path))
-    told = json.loads(command("check", "--json", path))
+    expected = json.loads(command("check", "--json", path))
     report = pysplatkit.check(path)
-    assert bool(report) and report.ok == told["ok"]
-    assert [finding._asdict() for finding in report.findings] == told["findings"]
+    assert bool(report) and report.ok == expected["ok"]
+    assert [finding._asdict() for finding in report.findings] == expected["findings"]
 
 
 def test_an_input_out_of_sight_is_found(tmp_path):
@@ -65,11 +65,11 @@ CONVERSIONS = [
 
 @pytest.mark.parametrize(("name", "kind", "flags", "options"), CONVERSIONS)
 def test_conversions_are_those_of_the_command(command, data, tmp_path, name, kind, flags, options):
-    theirs, own = tmp_path / f"theirs.{kind}", tmp_path / f"own.{kind}"
+    theirs, ours = tmp_path / f"theirs.{kind}", tmp_path / f"own.{kind}"
     command("convert", data / name, "-o", theirs, *flags)
-    assert pysplatkit.convert(data / name, own, **options) == own
-    assert own.read_bytes() == theirs.read_bytes()
-    assert sorted(path.name for path in tmp_path.iterdir()) == [own.name, theirs.name]
+    assert pysplatkit.convert(data / name, ours, **options) == ours
+    assert ours.read_bytes() == theirs.read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == [ours.name, theirs.name]
 
 
 def test_scans_larger_than_memory_are_converted_in_regions(data, tmp_path):
@@ -98,22 +98,22 @@ def test_hierarchies_are_open_books(data):
 
 
 def test_errors_say_what_to_do(data, tmp_path):
-    with pytest.raises(FileNotFoundError) as found:
+    with pytest.raises(FileNotFoundError) as caught:
         pysplatkit.render(tmp_path / "none.ply")
-    assert isinstance(found.value, pysplatkit.FileError) and found.value.errno == 2
-    assert found.value.file == tmp_path / "none.ply" and found.value.filename.endswith("none.ply")
+    assert isinstance(caught.value, pysplatkit.FileError) and caught.value.errno == 2
+    assert caught.value.file == tmp_path / "none.ply" and caught.value.filename.endswith("none.ply")
     (tmp_path / "bad.ply").write_text("ply\nformat ascii 1.0\nelement vertex x\nend_header\n")
-    with pytest.raises(pysplatkit.InputError) as found:
+    with pytest.raises(pysplatkit.InputError) as caught:
         pysplatkit.render(tmp_path / "bad.ply")
-    assert found.value.file.name == "bad.ply" and found.value.place and found.value.message
+    assert caught.value.file.name == "bad.ply" and caught.value.place and caught.value.message
     (tmp_path / "what.xyzzy").write_bytes(b"\0\1\2")
-    with pytest.raises(pysplatkit.InputError, match="no format") as found:
+    with pytest.raises(pysplatkit.InputError, match="no format") as caught:
         pysplatkit.info(tmp_path / "what.xyzzy")
-    assert "dims" in found.value.hint
+    assert "dims" in caught.value.hint
     with pytest.raises(pysplatkit.LimitError) as limit:
         pysplatkit.render(data / "mesh.ply", limits={"points": 10})
     assert (limit.value.kind, limit.value.limit) == ("points", 10) and limit.value.found > 10
-    with pytest.raises(pysplatkit.OutputError) as found:
+    with pytest.raises(pysplatkit.OutputError) as caught:
         pysplatkit.convert(data / "mesh.ply", data / "tree.splk")
     with pytest.raises(pysplatkit.OutputError, match="No such file"):
         pysplatkit.convert(data / "mesh.ply", tmp_path / "none" / "a.splk")
@@ -123,7 +123,7 @@ def test_errors_say_what_to_do(data, tmp_path):
         pysplatkit.convert(data / "mesh.ply", tmp_path / "a.splv")
     with pytest.raises(pysplatkit.InputError):
         pysplatkit.Hierarchy(data / "mesh.ply")
-    for error in (limit.value, found.value):
+    for error in (limit.value, caught.value):
         again = pickle.loads(pickle.dumps(error))
         assert type(again) is type(error) and str(again) == str(error)
 
@@ -138,4 +138,4 @@ def test_raw_volumes_and_names(tmp_path):
         pysplatkit.info(path, dims=(4, 3, 2))
     with pytest.raises(TypeError, match="did you mean 'sample_type'"):
         pysplatkit.info(path, sampletype="u16")
-    assert any("ply" in own.extensions for own in pysplatkit.formats())
+    assert any("ply" in known.extensions for known in pysplatkit.formats())

@@ -244,8 +244,8 @@ def test_grids_of_cells(data, tmp_path):
     camera = Scene().add(grid).camera(SIZE)
     range_ = (float(heat.min()), float(heat.max()))
     pictures = [
-        Scene().add(own, colormap="turbo", range=range_).render(SIZE, camera).color
-        for own in (grid, curved)
+        Scene().add(source, colormap="turbo", range=range_).render(SIZE, camera).color
+        for source in (grid, curved)
     ]
     assert np.abs(pictures[0] - pictures[1]).max() < 0.02
     for scene in (Scene().add(curved), Scene().add_points(curved), Scene().add_points(grid)):
@@ -325,39 +325,39 @@ def test_data_arrays():
         name: np.arange(n) * s + o
         for name, n, s, o in zip("xyz", DIMS[::-1], SPACING, ORIGIN, strict=True)
     }
-    own = xarray.DataArray(array, dims=("z", "y", "x"), coords=lines, name="own")
+    field = xarray.DataArray(array, dims=("z", "y", "x"), coords=lines, name="own")
     wanted = plain(array, spacing=SPACING, origin=ORIGIN)
     for same in (
-        own,
-        own.transpose("x", "z", "y"),
-        own.expand_dims(time=1),
-        own.rename(x="lon", y="lat", z="level"),
-        own.chunk() if _has("dask") else own,
+        field,
+        field.transpose("x", "z", "y"),
+        field.expand_dims(time=1),
+        field.rename(x="lon", y="lat", z="level"),
+        field.chunk() if _has("dask") else field,
     ):
         assert np.array_equal(drawn(same), wanted)
     # Coordinates that descend, as latitudes do.
-    turned = own.isel(y=slice(None, None, -1))
-    camera = Scene().add(own).camera(SIZE)
+    turned = field.isel(y=slice(None, None, -1))
+    camera = Scene().add(field).camera(SIZE)
     pictures = [
         Scene().add_volume(one, transfer=TRANSFER).render(SIZE, camera).color
-        for one in (own, turned)
+        for one in (field, turned)
     ]
     assert np.abs(pictures[0] - pictures[1]).max() < 1e-4
-    uneven = own.assign_coords(z=np.cumsum(np.arange(1.0, DIMS[0] + 1)))
+    uneven = field.assign_coords(z=np.cumsum(np.arange(1.0, DIMS[0] + 1)))
     places = [lines["x"], lines["y"], uneven.z.values]
     assert np.array_equal(drawn(uneven), plain(array, coordinates=places))
     down = uneven.isel(z=slice(None, None, -1))
     assert np.array_equal(drawn(down), drawn(uneven))
     bare = xarray.DataArray(array)
     assert np.array_equal(drawn(bare), plain(array))
-    several = xarray.Dataset({"own": own, "other": 2 * own})
+    several = xarray.Dataset({"own": field, "other": 2 * field})
     assert np.array_equal(drawn(several, scalar="own"), wanted)
     with pytest.raises(ArgumentError, match="'own', 'other'"):
         drawn(several)
     with pytest.raises(ArgumentError, match="isel"):
-        drawn(own.expand_dims(time=2))
+        drawn(field.expand_dims(time=2))
     with pytest.raises(ArgumentError, match="neither ascend nor descend"):
-        drawn(own.assign_coords(x=np.zeros(DIMS[2])))
+        drawn(field.assign_coords(x=np.zeros(DIMS[2])))
 
 
 def test_arrays_in_chunks():
@@ -447,20 +447,20 @@ def test_open3d(kind):
 def test_plyfile(data):
     plyfile = pytest.importorskip("plyfile")
     for name in ("mesh", "colors", "cloud"):
-        own = plyfile.PlyData.read(data / f"{name}.ply")
-        scene, file = Scene().add(own), Scene().add(data / f"{name}.ply")
+        cloud = plyfile.PlyData.read(data / f"{name}.ply")
+        scene, file = Scene().add(cloud), Scene().add(data / f"{name}.ply")
         assert scene.contents[0][::2] == file.contents[0][::2]
         assert np.array_equal(picture(scene), picture(file))
-    by_value = picture(Scene().add_points(own, scalar="red"))
-    assert not np.array_equal(by_value, picture(Scene().add_points(own)))
+    by_value = picture(Scene().add_points(cloud, scalar="red"))
+    assert not np.array_equal(by_value, picture(Scene().add_points(cloud)))
     with pytest.raises(ArgumentError, match="no array 'gray'; its arrays: 'x'"):
-        Scene().add(own, scalar="gray")
+        Scene().add(cloud, scalar="gray")
 
 
 def test_dictionaries():
     vertices, faces = ball()
     heights = vertices[:, 2]
-    for own, scene in [
+    for source, scene in [
         ({"vertices": vertices, "faces": faces}, Scene().add_mesh(vertices, faces)),
         ({"positions": vertices, "values": heights}, Scene().add_points(vertices, values=heights)),
         (
@@ -472,7 +472,7 @@ def test_dictionaries():
             Scene().add_volume(phantom(), spacing=SPACING),
         ),
     ]:
-        assert np.array_equal(picture(Scene().add(own)), picture(scene))
+        assert np.array_equal(picture(Scene().add(source)), picture(scene))
     red = picture(Scene().add({"vertices": vertices, "faces": faces}, color="red"))
     assert np.array_equal(red, picture(Scene().add_mesh(vertices, faces, color="red")))
     with pytest.raises(TypeError, match="dictionary of the arguments"):
@@ -491,10 +491,10 @@ def test_points_of_laspy():
         def __init__(self, places, most):
             self.x, self.y, self.z = places.T
             ramp = np.linspace(0, most, len(places)).astype(np.uint16)
-            self._own = {"red": ramp, "green": ramp, "blue": ramp, "intensity": ramp}
+            self._columns = {"red": ramp, "green": ramp, "blue": ramp, "intensity": ramp}
 
         def __getitem__(self, name):
-            return self._own[name]
+            return self._columns[name]
 
     LasData.__module__ = "laspy.lasdata"
     places = np.random.default_rng(1).random((500, 3)) * (3, 3, 0.2)

@@ -48,7 +48,7 @@ if widget._still:
 """
 
 
-@pytest.fixture(scope="module", params=[jupyterlab, marimo], ids=lambda own: own.__name__)
+@pytest.fixture(scope="module", params=[jupyterlab, marimo], ids=lambda server: server.__name__)
 def notebook(request, tmp_path_factory):
     """Returns a page that shows the widget, and the folder of its notebook."""
     folder = tmp_path_factory.mktemp(request.param.__name__)
@@ -60,7 +60,7 @@ def notebook(request, tmp_path_factory):
         start(page)
         try:
             page.wait_for_selector(".splatkit canvas", timeout=1000 * PATIENCE)
-            yield Shown(page, folder)
+            yield NotebookPage(page, folder)
         except Exception:
             print((folder / "log.txt").read_text())
             raise
@@ -68,7 +68,7 @@ def notebook(request, tmp_path_factory):
         assert not [error for error in errors if "splatkit" in error]
 
 
-class Shown:
+class NotebookPage:
     """A widget on a page."""
 
     def __init__(self, page, folder):
@@ -95,9 +95,9 @@ class Shown:
         while time.monotonic() < deadline:
             facts = self.facts()
             if facts and is_new(facts) and self.state() == "exact":
-                shown = self.pixels()
-                if shown.ravel().tolist() == facts["pixels"]:
-                    assert shown.shape == (SIZE[1], SIZE[0], 4)
+                pixels = self.pixels()
+                if pixels.ravel().tolist() == facts["pixels"]:
+                    assert pixels.shape == (SIZE[1], SIZE[0], 4)
                     return facts
             time.sleep(0.1)
         log = (self.folder / "log.txt").read_text()

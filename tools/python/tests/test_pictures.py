@@ -128,7 +128,7 @@ def test_cameras_are_those_of_the_command(command, data, tmp_path):
         (["--distance", "90"], {"distance": 90}),
     ]:
         out = tmp_path / "camera.png"
-        told = command(
+        printed = command(
             "render",
             *files,
             "--engine",
@@ -142,7 +142,7 @@ def test_cameras_are_those_of_the_command(command, data, tmp_path):
             out,
         )
         camera = scene.camera((640, 480), **options)
-        assert json.loads(camera.to_json()) == json.loads(told)["camera"]
+        assert json.loads(camera.to_json()) == json.loads(printed)["camera"]
         assert np.array_equal(read_png(out), scene.render((640, 480), camera).rgba)
 
 
@@ -157,20 +157,20 @@ def test_a_turntable_keeps_its_distance():
 
 def test_arrays_are_drawn_as_their_files(data):
     def same(array, file, **options):
-        own = pysplatkit.render(array, size=SIZE, **options)
-        assert np.array_equal(own.rgba, pysplatkit.render(data / file, size=SIZE).rgba)
+        picture = pysplatkit.render(array, size=SIZE, **options)
+        assert np.array_equal(picture.rgba, pysplatkit.render(data / file, size=SIZE).rgba)
 
     same(np.load(data / "volume.npy"), "volume.npy")
     same(np.load(data / "bytes.npy"), "bytes.npy")
     rows = np.load(data / "samples.npy")
-    own = Scene().add_samples(rows[:, :3], rows[:, 3]).render(SIZE)
-    assert np.array_equal(own.rgba, pysplatkit.render(data / "samples.npy", size=SIZE).rgba)
+    picture = Scene().add_samples(rows[:, :3], rows[:, 3]).render(SIZE)
+    assert np.array_equal(picture.rgba, pysplatkit.render(data / "samples.npy", size=SIZE).rgba)
     vertices, faces = ball()
-    own = Scene().add_mesh(vertices, faces).render(SIZE)
-    assert np.array_equal(own.rgba, pysplatkit.render(data / "mesh.ply", size=SIZE).rgba)
+    picture = Scene().add_mesh(vertices, faces).render(SIZE)
+    assert np.array_equal(picture.rgba, pysplatkit.render(data / "mesh.ply", size=SIZE).rgba)
     colors = np.clip(255 * (0.5 + 0.5 * vertices), 0, 255).astype("u1")
-    own = Scene().add_points(vertices.astype("f4"), colors=colors).render(SIZE)
-    assert np.array_equal(own.rgba, pysplatkit.render(data / "cloud.ply", size=SIZE).rgba)
+    picture = Scene().add_points(vertices.astype("f4"), colors=colors).render(SIZE)
+    assert np.array_equal(picture.rgba, pysplatkit.render(data / "cloud.ply", size=SIZE).rgba)
 
 
 def test_lattices_lie_where_they_are_told():
@@ -183,14 +183,14 @@ def test_lattices_lie_where_they_are_told():
 
 
 def test_transfer_functions(tmp_path):
-    own = TransferFunction([(0, "black"), (1, (1, 0.5, 0))], [(0.3, 0), (1, 0.5)], unit=2)
-    again = TransferFunction.from_json(own.to_json())
-    assert again.to_json() == own.to_json() and again.colors[1] == (1, (1, 0.5, 0))
+    function = TransferFunction([(0, "black"), (1, (1, 0.5, 0))], [(0.3, 0), (1, 0.5)], unit=2)
+    again = TransferFunction.from_json(function.to_json())
+    assert again.to_json() == function.to_json() and again.colors[1] == (1, (1, 0.5, 0))
     path = tmp_path / "own.json"
-    path.write_text(own.to_json())
+    path.write_text(function.to_json())
     pictures = [
         pysplatkit.render(blob(), size=SIZE, transfer=transfer).rgba
-        for transfer in (own, path, str(path), own.to_json())
+        for transfer in (function, path, str(path), function.to_json())
     ]
     assert all(np.array_equal(pictures[0], picture) for picture in pictures)
     assert set(pysplatkit.TRANSFER_FUNCTIONS) >= {"ct-bone", "mri"}
@@ -290,10 +290,10 @@ def test_scenes_are_saved_for_the_command(command, data, tmp_path):
     scene.save(path, camera, **drawn)
     out = tmp_path / "command.png"
     command("render", path, "--engine", "cpu", "-o", out)
-    own = scene.render(camera=camera, **drawn)
-    assert np.array_equal(read_png(out), own.rgba)
+    picture = scene.render(camera=camera, **drawn)
+    assert np.array_equal(read_png(out), picture.rgba)
     opened = Scene.open(path)
-    assert np.array_equal(opened.render().rgba, own.rgba)
+    assert np.array_equal(opened.render().rgba, picture.rgba)
     assert opened.render((20, 10)).size == (20, 10)
     with pytest.raises(pysplatkit.ArgumentError, match="arrays"):
         Scene().add_points(np.eye(3)).save(path)

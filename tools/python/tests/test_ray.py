@@ -61,10 +61,10 @@ def same(drawn, alone, least=60):
     """Whether two pictures agree, and show something."""
     assert drawn.rgba.shape == alone.rgba.shape
     assert (alone.color[..., 3] > 0.1).mean() > 0.02
-    found = decibels(drawn.color, alone.color)
-    assert found >= least, f"{found:.1f} dB"
+    quality = decibels(drawn.color, alone.color)
+    assert quality >= least, f"{quality:.1f} dB"
     assert np.abs(drawn.rgba.astype(int) - alone.rgba).max() <= 6
-    return found
+    return quality
 
 
 @pytest.mark.parametrize("view", VIEWS, ids=["usual", "behind", "flat"])
@@ -72,25 +72,25 @@ def test_a_volume_in_bricks(cluster, bricks, view):
     alone = pysplatkit.Scene().add(bricks, transfer="generic")
     camera = alone.camera(SIZE, **view)
     with renderer(bricks, transfer="generic", memory=64 << 20) as ranks:
-        own = ranks.render(SIZE, camera, background="navy")
-        same(own, alone.render(SIZE, camera, background="navy"))
-        told = own.statistics["ranks"]
+        picture = ranks.render(SIZE, camera, background="navy")
+        same(picture, alone.render(SIZE, camera, background="navy"))
+        reports = picture.statistics["ranks"]
         # No rank reads all bricks.
         whole = alone.render(SIZE, camera).statistics["bricks"]
-        assert len(told) == 4 and max(rank["bricks"] for rank in told) < whole
-        assert own.camera == camera and own.statistics["moved_bytes"] > 0
+        assert len(reports) == 4 and max(rank["bricks"] for rank in reports) < whole
+        assert picture.camera == camera and picture.statistics["moved_bytes"] > 0
 
 
 def test_an_array(cluster):
     volume = (200 * blob((40, 50, 60))).astype("u1")
     alone = pysplatkit.Scene().add(volume, transfer="generic")
     with renderer(volume, transfer="generic") as ranks:
-        own, one = ranks.render(SIZE), alone.render(SIZE)
-        same(own, one)
-        both = np.isfinite(own.depth) & np.isfinite(one.depth)
-        assert (np.isfinite(own.depth) == np.isfinite(one.depth)).mean() > 0.995
+        picture, one = ranks.render(SIZE), alone.render(SIZE)
+        same(picture, one)
+        both = np.isfinite(picture.depth) & np.isfinite(one.depth)
+        assert (np.isfinite(picture.depth) == np.isfinite(one.depth)).mean() > 0.995
         bounds = np.array(alone.bounds)
-        off = np.abs(own.depth[both] - one.depth[both]) / np.linalg.norm(bounds[1] - bounds[0])
+        off = np.abs(picture.depth[both] - one.depth[both]) / np.linalg.norm(bounds[1] - bounds[0])
         assert np.median(off) < 1e-3 and np.quantile(off, 0.99) < 0.1
 
 
@@ -111,8 +111,8 @@ def test_a_mesh_in_a_volume(cluster):
     volume = blob((40, 50, 60)).astype("f4")
 
     def scene():
-        own = pysplatkit.Scene().add_mesh(15 * vertices + [30, 25, 20], faces, color="gold")
-        return own.add_volume(volume, transfer="generic")
+        made = pysplatkit.Scene().add_mesh(15 * vertices + [30, 25, 20], faces, color="gold")
+        return made.add_volume(volume, transfer="generic")
 
     alone = scene()
     with renderer(scene) as ranks:
@@ -150,11 +150,11 @@ def test_one_rank_draws_the_same_bytes(cluster, bricks):
 
 def test_ranks_with_little_memory_agree_on_a_level(cluster, bricks):
     with renderer(bricks, ranks=3, transfer="generic", memory=300_000) as ranks:
-        own = ranks.render((400, 300))
-        levels = {rank["level"] for rank in own.statistics["ranks"]}
+        picture = ranks.render((400, 300))
+        levels = {rank["level"] for rank in picture.statistics["ranks"]}
         assert len(levels) == 1 and levels.pop() > 0
         alone = pysplatkit.Scene().add(bricks, transfer="generic").render((400, 300))
-        assert decibels(own.color, alone.color) > 25
+        assert decibels(picture.color, alone.color) > 25
 
 
 def test_a_killed_rank_is_started_again(cluster, bricks):
@@ -164,9 +164,9 @@ def test_a_killed_rank_is_started_again(cluster, bricks):
         victim = ray.get(ranks.ranks[2].pid.remote())
         timer = threading.Timer(0.3, os.kill, (victim, signal.SIGKILL))
         timer.start()
-        own = ranks.render((600, 450), samples=4)
+        picture = ranks.render((600, 450), samples=4)
         assert timer.finished.is_set(), "the picture was done before the rank was killed"
-        same(own, alone)
+        same(picture, alone)
         assert ray.get(ranks.ranks[2].pid.remote()) != victim
 
 

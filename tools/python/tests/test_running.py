@@ -41,8 +41,8 @@ def test_threads_draw_at_once():
 
     def draw(turn):
         at = turn % len(cameras)
-        own = Scene().add_volume(blob()).add_mesh(*ball()) if turn % 2 else shared
-        return at, own.render(SIZE, cameras[at]).rgba
+        scene = Scene().add_volume(blob()).add_mesh(*ball()) if turn % 2 else shared
+        return at, scene.render(SIZE, cameras[at]).rgba
 
     with ThreadPoolExecutor(4) as pool:
         for at, picture in pool.map(draw, range(24)):
@@ -216,5 +216,5 @@ def test_a_fork_is_refused_rather_than_hangs():
 def test_the_module_has_a_version_and_documentation():
     assert pysplatkit.__version__.count(".") == 2
     for name in pysplatkit.__all__:
-        own = getattr(pysplatkit, name)
-        assert isinstance(own, tuple) or own.__doc__
+        member = getattr(pysplatkit, name)
+        assert isinstance(member, tuple) or member.__doc__

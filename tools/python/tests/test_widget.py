@@ -28,10 +28,10 @@ def scene():
 
 @pytest.fixture
 def widget(scene):
-    own = scene.show(size=SIZE)
-    rest(own)
-    yield own
-    own.close()
+    opened = scene.show(size=SIZE)
+    rest(opened)
+    yield opened
+    opened.close()
 
 
 def rest(widget):
@@ -65,8 +65,8 @@ def test_the_still_picture_is_that_of_render(scene, widget, tmp_path):
     for gesture in (("ready", {"ratio": 1}), ("turn", {"drag": [30, 10]})):
         tell(widget, gesture)
         wanted = scene.render(SIZE, widget.camera).rgba
-        shown = pixels(widget._still, tmp_path)
-        assert np.array_equal(shown, wanted[..., : shown.shape[2]])
+        still = pixels(widget._still, tmp_path)
+        assert np.array_equal(still, wanted[..., : still.shape[2]])
         assert np.array_equal(widget.snapshot(), wanted)
         assert widget._status["exact"] and tuple(widget._status["size"]) == SIZE
 
@@ -138,9 +138,9 @@ def place(camera, point):
     right = np.cross(forward, camera.view_up)
     right = right / np.linalg.norm(right)
     down = np.cross(forward, right)
-    own = np.subtract(point, camera.position)
-    scale = SIZE[1] / 2 / np.tan(np.radians(camera.view_angle / 2)) / (own @ forward)
-    return [SIZE[0] / 2 + own @ right * scale, SIZE[1] / 2 + own @ down * scale]
+    offset = np.subtract(point, camera.position)
+    scale = SIZE[1] / 2 / np.tan(np.radians(camera.view_angle / 2)) / (offset @ forward)
+    return [SIZE[0] / 2 + offset @ right * scale, SIZE[1] / 2 + offset @ down * scale]
 
 
 def test_the_camera_is_read_and_set(scene, widget):
@@ -175,19 +175,19 @@ def test_transfer_functions_are_edited():
     assert widget.transfer.colors != loaded.colors
     widget.transfer = "generic"
     assert np.array_equal(rest(widget).snapshot(), scene.render(SIZE, widget.camera).rgba)
-    own = TransferFunction([(0, "red")], [(0.2, 0.0), (0.5, 0.9)], unit=2.0)
-    widget.transfer = own
-    assert widget.transfer == TransferFunction.from_json(own.to_json())
+    function = TransferFunction([(0, "red")], [(0.2, 0.0), (0.5, 0.9)], unit=2.0)
+    widget.transfer = function
+    assert widget.transfer == TransferFunction.from_json(function.to_json())
 
 
 def test_an_edited_function_is_that_of_a_new_scene(scene, tmp_path):
     """A renderer that is kept draws with a new function as a new renderer does."""
-    own = TransferFunction([(0, "red"), (1, "blue")], [(0.1, 0.0), (0.6, 0.8)])
+    function = TransferFunction([(0, "red"), (1, "blue")], [(0.1, 0.0), (0.6, 0.8)])
     first = Scene().add_volume(blob())
     first.render(SIZE)
     widget = rest(first.show(first.camera(SIZE, view="front"), SIZE))
-    widget.transfer = own
-    wanted = Scene().add_volume(blob(), transfer=own).render(SIZE, widget.camera)
+    widget.transfer = function
+    wanted = Scene().add_volume(blob(), transfer=function).render(SIZE, widget.camera)
     assert np.array_equal(rest(widget).snapshot(), wanted.rgba)
 
 

@@ -190,7 +190,7 @@ impl Convert {
 
     fn extension(&self) -> String {
         let extension = self.output().extension();
-        extension.map_or(String::new(), |own| own.to_string_lossy().to_ascii_lowercase())
+        extension.map_or(String::new(), |text| text.to_string_lossy().to_ascii_lowercase())
     }
 
     /// Warns of flags that change nothing in any conversion of these files.

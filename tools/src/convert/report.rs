@@ -13,8 +13,8 @@ use splatkit::{
 impl Convert {
     /// Returns the bytes of the output.
     fn bytes(&self) -> Result<u64, Failure> {
-        let found = self.output().metadata();
-        Ok(found.map_err(|error| Error::file(self.output(), "read", error))?.len())
+        let metadata = self.output().metadata();
+        Ok(metadata.map_err(|error| Error::file(self.output(), "read", error))?.len())
     }
 
     /// Prints what was written in this many milliseconds.

@@ -55,8 +55,8 @@ impl<'a> Laid<'a> {
         if count <= room {
             return (bar.labels.clone(), String::new());
         }
-        let shown = room.saturating_sub(1).max(1);
-        (bar.labels[..shown].to_vec(), format!("… {} more", count - shown))
+        let kept = room.saturating_sub(1).max(1);
+        (bar.labels[..kept].to_vec(), format!("… {} more", count - kept))
     }
 
     /// Draws the list of labels below the title.

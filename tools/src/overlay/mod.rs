@@ -119,7 +119,7 @@ impl Overlay {
 
     #[cfg(all(test, feature = "window"))]
     pub fn bar_colors(&self) -> Vec<[f32; 3]> {
-        self.captions.legends.iter().flat_map(|own| own.1.colors.clone()).collect()
+        self.captions.legends.iter().flat_map(|(_, bar)| bar.colors.clone()).collect()
     }
 
     /// Returns a picture to draw on, and its area without a margin.
@@ -189,9 +189,9 @@ impl Overlay {
     fn laid(&self, canvas: &Canvas, area: Area) -> (Vec<Laid<'_>>, f64) {
         let size = canvas.size;
         let height = (0.62 * area.height()).max(8.0 * size).min(area.height());
-        let shown = self.captions.legends.len().min(MOST_BARS);
-        let most = (0.5 * area.width() / shown as f64).max(5.0 * size);
-        let bars = self.captions.legends.iter().map(|own| &own.1).take(MOST_BARS);
+        let count = self.captions.legends.len().min(MOST_BARS);
+        let most = (0.5 * area.width() / count as f64).max(5.0 * size);
+        let bars = self.captions.legends.iter().map(|(_, bar)| bar).take(MOST_BARS);
         (bars.map(|bar| Laid::new(canvas, bar, height, most)).collect(), height)
     }
 
@@ -203,8 +203,8 @@ impl Overlay {
         let lines = laid.iter().map(Laid::title_lines).max().unwrap_or(0);
         let mut right = area.right;
         for bar in laid.iter().rev() {
-            let own = Area { left: area.left, top, right, bottom: top + height };
-            bar.draw(canvas, own, lines);
+            let bar_area = Area { left: area.left, top, right, bottom: top + height };
+            bar.draw(canvas, bar_area, lines);
             right -= bar.width + BETWEEN * size;
         }
         laid.iter().map(Laid::to_json).collect()
@@ -302,20 +302,20 @@ mod tests {
                 let mut others = [true; 4];
                 others[one] = false;
                 let without = drawn(others, size, None);
-                let own = |at: &usize| all.color[*at] != without.color[*at];
-                let found: Vec<usize> = (0..taken.len()).filter(own).collect();
-                assert!(found.len() > 60, "{size:?}: {one} draws {} pixels", found.len());
+                let changed = |at: &usize| all.color[*at] != without.color[*at];
+                let pixels: Vec<usize> = (0..taken.len()).filter(changed).collect();
+                assert!(pixels.len() > 60, "{size:?}: {one} draws {} pixels", pixels.len());
             }
             // The bar, the axes and the scale bar, which nothing else moves if there is no caption.
             for one in 0..3 {
                 let mut which = [false; 4];
                 which[one] = true;
                 which[2] |= one == 0;
-                let own = drawn(which, size, None);
+                let picture = drawn(which, size, None);
                 let ruler = drawn([false, false, true, false], size, None);
                 for (at, taken) in taken.iter_mut().enumerate() {
                     let is_ruler = one == 0 && ruler.color[at][3] > 0.0;
-                    if own.color[at][3] > 0.05 && !is_ruler {
+                    if picture.color[at][3] > 0.05 && !is_ruler {
                         assert!(!*taken, "{size:?}: {one} covers another at {at}");
                         *taken = true;
                     }
@@ -365,8 +365,8 @@ mod tests {
         };
         let rows = |share: f64| {
             let wanted = scale.color(share);
-            let found = (0..picture.color.len()).filter(|&at| near(&picture.color[at], wanted));
-            found.map(|at| at / 600).collect::<Vec<_>>()
+            let pixels = (0..picture.color.len()).filter(|&at| near(&picture.color[at], wanted));
+            pixels.map(|at| at / 600).collect::<Vec<_>>()
         };
         let (low, high) = (rows(0.0), rows(1.0));
         assert!(!low.is_empty() && !high.is_empty());

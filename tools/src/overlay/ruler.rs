@@ -19,14 +19,14 @@ impl Ruler {
     /// Returns the longest round length that is at most `most` pixels long. Of a camera with
     /// perspective, it holds at the distance of the point that the camera looks at.
     pub fn new(camera: &Camera, height: u32, most: f64, unit: &str) -> Option<Self> {
-        let shown = match camera.projection {
+        let visible = match camera.projection {
             Projection::Orthographic { height } => height,
             Projection::Perspective { view_angle } => {
                 let distance = camera.position.distance(camera.focal_point);
                 2.0 * distance * (0.5 * view_angle.to_radians()).tan()
             }
         };
-        let scale = f64::from(height) / shown;
+        let scale = f64::from(height) / visible;
         let length = round_below(most / scale);
         let pixels = length * scale;
         let fits = pixels.is_finite() && length.is_finite() && length > 0.0 && pixels <= most;

@@ -127,7 +127,7 @@ impl Mask {
             let (last, half) = (&runs[runs.len() - 1], 1 << (runs.len() - 1));
             let longer = last.iter().enumerate();
             let next = |at: usize| if at < last.len() { last[at] } else { 0.0 };
-            runs.push(longer.map(|(at, own)| own.max(next(at + half))).collect());
+            runs.push(longer.map(|(at, run)| run.max(next(at + half))).collect());
         }
         let (width, height) = (self.width as i64, (self.coverage.len() / self.width.max(1)) as i64);
         for dy in -reach..=reach {
@@ -140,8 +140,8 @@ impl Mask {
                     let from = ((y - dy) * width + x - half) as usize;
                     let run = &runs[level];
                     let most = run[from].max(run[from + other as usize]);
-                    let own = &mut wider.coverage[(y * width + x) as usize];
-                    *own = own.max(most);
+                    let pixel = &mut wider.coverage[(y * width + x) as usize];
+                    *pixel = pixel.max(most);
                 }
             }
         }
@@ -160,8 +160,8 @@ impl Mask {
             let row = &mut self.coverage[(y * width) as usize..][from as usize..to as usize];
             let source = &other.coverage[((y - dy) * width) as usize..]
                 [(from - dx) as usize..(to - dx) as usize];
-            for (own, other) in row.iter_mut().zip(source) {
-                *own = own.max(other * share);
+            for (pixel, other) in row.iter_mut().zip(source) {
+                *pixel = pixel.max(other * share);
             }
         }
     }

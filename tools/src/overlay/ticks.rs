@@ -8,9 +8,9 @@ pub fn ticks([low, high]: [f64; 2], most: usize, is_log: bool) -> Vec<f64> {
         return vec![low];
     }
     if is_log && low > 0.0 {
-        let found = log_ticks([low, high], most);
-        if found.len() > 1 {
-            return found;
+        let values = log_ticks([low, high], most);
+        if values.len() > 1 {
+            return values;
         }
     }
     let step = round_above((high - low) / most as f64);
@@ -134,9 +134,9 @@ mod tests {
     fn ranges_at_the_ends_of_numbers_have_ticks() {
         for range in [[-1.5e308, 1.5e308], [1.0, 1.0 + 1e-15], [0.0, 5e-324], [1e300, 1e301]] {
             for is_log in [false, true] {
-                let found = ticks(range, 5, is_log);
-                assert!((1..=12).contains(&found.len()), "{range:?}: {found:?}");
-                assert_eq!(labels(&found).len(), found.len());
+                let values = ticks(range, 5, is_log);
+                assert!((1..=12).contains(&values.len()), "{range:?}: {values:?}");
+                assert_eq!(labels(&values).len(), values.len());
             }
         }
     }

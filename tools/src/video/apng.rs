@@ -57,10 +57,10 @@ impl Apng {
 impl Encoder for Apng {
     fn add(&mut self, rgba: &[u8]) -> Result<bool, Failure> {
         // At most 10 s, because of the least frame rate.
-        let shown = self.film.shown(self.count, 1000.0) as u16;
+        let delay = self.film.duration(self.count, 1000.0) as u16;
         self.count += 1;
         let written =
-            self.writer.set_frame_delay(shown, 1000).and_then(|()| match self.film.background {
+            self.writer.set_frame_delay(delay, 1000).and_then(|()| match self.film.background {
                 Some(_) => self.writer.write_image_data(&rgb(rgba)),
                 None => self.writer.write_image_data(rgba),
             });

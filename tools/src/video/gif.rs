@@ -46,11 +46,11 @@ impl Encoder for Gif {
         let is_transparent = self.film.background.is_none();
         let (palette, indices, transparent) = indexed(rgba, self.film.size[0], is_transparent);
         let [width, height] = self.film.size.map(|side| side as u16);
-        let shown = self.film.shown(self.count, 100.0).max(2);
+        let delay = self.film.duration(self.count, 100.0).max(2);
         self.count += 1;
         let frame = Frame {
             // At most 10 s, because of the least frame rate.
-            delay: shown as u16,
+            delay: delay as u16,
             // Otherwise the frame before would show through.
             dispose: if is_transparent { DisposalMethod::Background } else { DisposalMethod::Keep },
             transparent,

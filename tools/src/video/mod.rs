@@ -31,7 +31,7 @@ pub struct Film {
 impl Film {
     /// Returns how long a frame is shown, in units of which a second has `units`. The sum of all
     /// frames is off by less than a unit.
-    fn shown(&self, frame: u32, units: f64) -> u32 {
+    fn duration(&self, frame: u32, units: f64) -> u32 {
         let begins = |frame: u32| (f64::from(frame) * units / self.rate).round();
         (begins(frame + 1) - begins(frame)) as u32
     }
@@ -153,11 +153,11 @@ mod tests {
     fn the_frames_last_as_long_as_the_film() {
         for (rate, units) in [(30.0, 100.0), (24.0, 1000.0), (29.97, 1000.0), (0.1, 100.0)] {
             let film = Film { size: [1, 1], frames: 100, rate, background: None };
-            let shown = (0..100).map(|frame| film.shown(frame, units));
-            let sum: u32 = shown.clone().sum();
+            let durations = (0..100).map(|frame| film.duration(frame, units));
+            let sum: u32 = durations.clone().sum();
             assert!((f64::from(sum) - 100.0 * units / rate).abs() <= 0.5, "{rate}: {sum}");
             let even = units / rate;
-            assert!(shown.into_iter().all(|shown| (f64::from(shown) - even).abs() < 1.0));
+            assert!(durations.into_iter().all(|duration| (f64::from(duration) - even).abs() < 1.0));
         }
     }
 }

@@ -216,8 +216,8 @@ mod tests {
             block.map(|at| f32::from(color(at)[c])).sum::<f32>() / 64.0
         };
         for c in 0..3 {
-            let found = mean(&|at| palette[usize::from(indices[at])], c);
-            assert!((found - mean(&|at| pixels[at], c)).abs() < 1.0, "channel {c}");
+            let average = mean(&|at| palette[usize::from(indices[at])], c);
+            assert!((average - mean(&|at| pixels[at], c)).abs() < 1.0, "channel {c}");
         }
     }
 
@@ -228,8 +228,9 @@ mod tests {
         for color in smooth(50) {
             let wanted = color.map(f32::from);
             let colors = finder.colors.clone();
-            let [own, all] = [finder.nearest(wanted), nearest(&colors, 0..colors.len(), wanted)];
-            assert_eq!(distance(colors[own], wanted), distance(colors[all], wanted));
+            let [by_cells, all] =
+                [finder.nearest(wanted), nearest(&colors, 0..colors.len(), wanted)];
+            assert_eq!(distance(colors[by_cells], wanted), distance(colors[all], wanted));
         }
     }
 

@@ -75,9 +75,11 @@ impl Encoder for Webp {
         })?;
         let mut frame = Vec::with_capacity(pixels.len() + 32);
         // The corner of the frame, its size, and how long it is shown.
-        let shown = self.film.shown(self.count, 1000.0);
+        let duration = self.film.duration(self.count, 1000.0);
         let [width, height] = self.film.size;
-        [0, 0, width - 1, height - 1, shown].into_iter().for_each(|part| push_24(&mut frame, part));
+        [0, 0, width - 1, height - 1, duration]
+            .into_iter()
+            .for_each(|part| push_24(&mut frame, part));
         frame.push(REPLACES);
         frame.extend(pixels);
         let mut chunk = Vec::with_capacity(frame.len() + 8);

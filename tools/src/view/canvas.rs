@@ -31,20 +31,20 @@ fn corner(@builtin(vertex_index) index: u32) -> Corner {
 }
 
 @fragment
-fn color(own: Corner) -> @location(0) vec4<f32> {
-    return textureSampleLevel(picture, mixed, own.place, 0.0);
+fn color(input: Corner) -> @location(0) vec4<f32> {
+    return textureSampleLevel(picture, mixed, input.place, 0.0);
 }
 ";
 
 /// The picture on the screen.
 pub struct Canvas {
-    own: Option<Own>,
+    gpu: Option<Gpu>,
     /// Without a device of the window's: a texture of egui's.
     texture: Option<TextureHandle>,
 }
 
 /// What draws on the window's device.
-struct Own {
+struct Gpu {
     device: wgpu::Device,
     queue: wgpu::Queue,
     pipeline: wgpu::RenderPipeline,
@@ -52,10 +52,10 @@ struct Own {
     /// For pictures with wider pixels than the screen's, and for others.
     samplers: [wgpu::Sampler; 2],
     format: wgpu::TextureFormat,
-    shown: Option<Shown>,
+    picture: Option<Uploaded>,
 }
 
-struct Shown {
+struct Uploaded {
     texture: wgpu::Texture,
     is_exact: bool,
     group: wgpu::BindGroup,
@@ -63,14 +63,14 @@ struct Shown {
 
 impl Canvas {
     pub fn new(state: Option<&RenderState>) -> Self {
-        Self { own: state.map(Own::new), texture: None }
+        Self { gpu: state.map(Gpu::new), texture: None }
     }
 
     /// Takes a picture: rows from the top, and red, green, blue and opacity of each pixel. Those of
     /// an exact one are the screen's.
     pub fn set(&mut self, context: &Context, size: [u32; 2], rgba: &[u8], is_exact: bool) {
-        if let Some(own) = &mut self.own {
-            own.set(size, rgba, is_exact);
+        if let Some(gpu) = &mut self.gpu {
+            gpu.set(size, rgba, is_exact);
             return;
         }
         let image = ColorImage::from_rgba_unmultiplied(size.map(|side| side as usize), rgba);
@@ -83,8 +83,8 @@ impl Canvas {
 
     pub fn clear(&mut self) {
         self.texture = None;
-        if let Some(own) = &mut self.own {
-            own.shown = None;
+        if let Some(gpu) = &mut self.gpu {
+            gpu.picture = None;
         }
     }
 
@@ -93,16 +93,16 @@ impl Canvas {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(texture.id(), area, whole, Color32::WHITE);
         }
-        if let Some(own) = &self.own
-            && let Some(shown) = &own.shown
+        if let Some(gpu) = &self.gpu
+            && let Some(picture) = &gpu.picture
         {
-            let (pipeline, group) = (own.pipeline.clone(), shown.group.clone());
+            let (pipeline, group) = (gpu.pipeline.clone(), picture.group.clone());
             ui.painter().add(Callback::new_paint_callback(area, Paint { pipeline, group }));
         }
     }
 }
 
-impl Own {
+impl Gpu {
     fn new(state: &RenderState) -> Self {
         let device = &state.device;
         let layout = layout(device);
@@ -127,27 +127,28 @@ impl Own {
             samplers: [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest].map(sampler),
             layout,
             format,
-            shown: None,
+            picture: None,
         }
     }
 
     fn set(&mut self, [width, height]: [u32; 2], rgba: &[u8], is_exact: bool) {
         let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
-        let is_same = |shown: &Shown| shown.texture.size() == size && shown.is_exact == is_exact;
-        if !self.shown.as_ref().is_some_and(is_same) {
-            self.shown = Some(self.make(size, is_exact));
+        let is_same =
+            |picture: &Uploaded| picture.texture.size() == size && picture.is_exact == is_exact;
+        if !self.picture.as_ref().is_some_and(is_same) {
+            self.picture = Some(self.make(size, is_exact));
         }
-        if let Some(shown) = &self.shown {
+        if let Some(picture) = &self.picture {
             let layout = wgpu::TexelCopyBufferLayout {
                 offset: 0,
                 bytes_per_row: Some(4 * width),
                 rows_per_image: None,
             };
-            self.queue.write_texture(shown.texture.as_image_copy(), rgba, layout, size);
+            self.queue.write_texture(picture.texture.as_image_copy(), rgba, layout, size);
         }
     }
 
-    fn make(&self, size: wgpu::Extent3d, is_exact: bool) -> Shown {
+    fn make(&self, size: wgpu::Extent3d, is_exact: bool) -> Uploaded {
         let texture = self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),
             size,
@@ -173,7 +174,7 @@ impl Own {
                 },
             ],
         });
-        Shown { texture, is_exact, group }
+        Uploaded { texture, is_exact, group }
     }
 }
 

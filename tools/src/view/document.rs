@@ -126,13 +126,13 @@ impl Document {
     pub fn set_transfers(&mut self, transfers: &[(&Path, TransferFunction)], has_surfaces: bool) {
         for (file, transfer) in transfers {
             let Some(number) = self.input_of(file) else { continue };
-            let own = &mut self.now.inputs[number].appearance;
-            (own.transfer, own.range, own.isosurfaces) = (None, None, None);
-            (own.opacity_unit, own.gradient_opacity) = (None, None);
+            let appearance = &mut self.now.inputs[number].appearance;
+            (appearance.transfer, appearance.range, appearance.isosurfaces) = (None, None, None);
+            (appearance.opacity_unit, appearance.gradient_opacity) = (None, None);
             let whole = Some(TransferEntry::Whole(transfer.clone()));
             match transfers.len() {
                 1 => self.now.appearance.transfer = whole,
-                _ => own.transfer = whole,
+                _ => appearance.transfer = whole,
             }
         }
         let shared = &mut self.now.appearance;
@@ -157,7 +157,7 @@ impl Document {
         // An edited transfer function needs no loading; a file or a name does.
         let of_inputs = scene.inputs.iter_mut().map(|input| &mut input.appearance);
         for appearance in of_inputs.chain([&mut scene.appearance]) {
-            appearance.transfer.take_if(|own| matches!(own, TransferEntry::Whole(_)));
+            appearance.transfer.take_if(|transfer| matches!(transfer, TransferEntry::Whole(_)));
         }
         // The way up turns what is added.
         let framing = Framing { up: scene.framing.up, ..Framing::default() };
@@ -230,12 +230,12 @@ mod tests {
     fn flags_become_a_scene_and_a_scene_flags() {
         let words = "splatkit render a.nrrd b.ply --iso 1,2:red --no-shade --size 64x48 \
                      --clip x<50% --azimuth 20 --colormap viridis_r --cut 3.5 --caption hello";
-        let own = document(words);
-        let scene = own.scene();
+        let parsed = document(words);
+        let scene = parsed.scene();
         assert_eq!((scene.picture.size, scene.inputs.len()), (Some([64, 48]), 2));
         assert_eq!(scene.appearance.isosurfaces.as_ref().map(Vec::len), Some(2));
-        assert!(own.job([9, 9]).is_ok());
-        let line = own.command_line().expect("a command");
+        assert!(parsed.job([9, 9]).is_ok());
+        let line = parsed.command_line().expect("a command");
         assert!(line.starts_with("splatkit render ") && line.contains("--no-shade"), "{line}");
         assert_eq!(document(&line.replace('\'', "")).scene(), scene, "{line}");
     }
@@ -259,11 +259,11 @@ mod tests {
         assert_eq!(document.transfer_of(c), None);
         document.set_transfers(&[(b, transfer(1.0)), (c, transfer(2.0))], true);
         let scene = document.scene();
-        let found = [a, b, c].map(|file| document.transfer_of(file));
-        assert_eq!(found, [None, Some(transfer(1.0)), Some(transfer(2.0))]);
+        let transfers = [a, b, c].map(|file| document.transfer_of(file));
+        assert_eq!(transfers, [None, Some(transfer(1.0)), Some(transfer(2.0))]);
         let surfaces =
             scene.inputs.iter().map(|input| &input.appearance).chain([&scene.appearance]);
-        assert!(surfaces.into_iter().all(|own| own.isosurfaces.is_none()));
+        assert!(surfaces.into_iter().all(|appearance| appearance.isosurfaces.is_none()));
         assert!(document.job([9, 9]).is_ok());
     }
 

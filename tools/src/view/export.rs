@@ -41,7 +41,7 @@ impl Exporting {
     pub fn start(film: Film, tell: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let (progress, stop) = (Arc::new(Progress::kept()), Stop::default());
         let (send, result) = channel();
-        let (own, own_stop) = (Arc::clone(&progress), stop.clone());
+        let (thread_progress, thread_stop) = (Arc::clone(&progress), stop.clone());
         std::thread::Builder::new().name("film".into()).spawn(move || {
             let export = Export {
                 loaded: &film.stage.loaded,
@@ -49,9 +49,10 @@ impl Exporting {
                 path: film.path,
                 rate: film.rate,
                 output: &film.output,
-                stop: own_stop,
+                stop: thread_stop,
             };
-            let done = render::export(&film.job, export, &own).map_err(|failure| text_of(&failure));
+            let done = render::export(&film.job, export, &thread_progress)
+                .map_err(|failure| text_of(&failure));
             // Nobody waits any more if the film was cancelled.
             send.send(done).ok();
             tell();

@@ -50,8 +50,8 @@ impl Window {
 
     /// Writes the camera and the size that are shown into the scene.
     fn fix_view(&mut self) {
-        let Some(shown) = &self.shown else { return };
-        let (camera, size) = (CameraEntry::from(shown.orbit.camera()), self.size);
+        let Some(scene_view) = &self.scene_view else { return };
+        let (camera, size) = (CameraEntry::from(scene_view.orbit.camera()), self.size);
         self.document.set_camera(camera);
         self.document.adjust(|scene| scene.picture.size = Some(size));
     }
@@ -98,8 +98,8 @@ impl Window {
 
     /// Starts to write a film along the path of the camera.
     pub fn export(&mut self, output: PathBuf) {
-        let Some(shown) = &self.shown else { return };
-        let stage = Arc::clone(&shown.stage);
+        let Some(scene_view) = &self.scene_view else { return };
+        let stage = Arc::clone(&scene_view.stage);
         let repaint = self.context.clone();
         let started = self
             .document
@@ -138,13 +138,13 @@ impl Window {
         if self.save_to.is_none() || !self.rests() {
             return;
         }
-        let (Some(path), Some(frame), Some(shown)) =
-            (self.save_to.take(), &self.frame, &self.shown)
+        let (Some(path), Some(frame), Some(scene_view)) =
+            (self.save_to.take(), &self.frame, &self.scene_view)
         else {
             return;
         };
         let written = PictureFormat::of(&path)
-            .and_then(|format| frame.picture.encode(format, shown.finish.background))
+            .and_then(|format| frame.picture.encode(format, scene_view.finish.background))
             .and_then(|bytes| splatkit::disk::write(&path, &bytes));
         self.say_saved(&path, written);
     }

@@ -245,8 +245,8 @@ mod tests {
     #[test]
     fn handles_move_what_they_are_on() {
         let mut clip = plane([0.0, 0.0, 3.0, 9.0]);
-        let found = &handles(&[clip], &BOX)[0];
-        assert_eq!((found.at, found.axis), (DVec3::new(1.0, 2.0, 3.0), DVec3::Z));
+        let handle = &handles(&[clip], &BOX)[0];
+        assert_eq!((handle.at, handle.axis), (DVec3::new(1.0, 2.0, 3.0), DVec3::Z));
         change(&mut clip, Part::Offset, 1.0, &BOX);
         assert_eq!(clip.plane, Some([0.0, 0.0, 3.0, 12.0]));
         change(&mut clip, Part::Offset, 100.0, &BOX);

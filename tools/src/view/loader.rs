@@ -27,10 +27,10 @@ impl Loading {
     pub fn start(job: Job, tell: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let progress = Arc::new(Progress::kept());
         let (send, result) = channel();
-        let own = Arc::clone(&progress);
+        let thread_progress = Arc::clone(&progress);
         std::thread::Builder::new().name("loader".into()).spawn(move || {
             let loaded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                load(&job, &own).map_err(|failure| text_of(&failure))
+                load(&job, &thread_progress).map_err(|failure| text_of(&failure))
             }));
             let loaded = loaded.unwrap_or_else(|_| Err("the file could not be read".into()));
             // Nobody waits any more if loading was cancelled.
@@ -77,11 +77,11 @@ fn load(job: &Job, progress: &Progress) -> Result<Stage, Failure> {
 
 /// Returns the thickness of the sheets of the finest volume, about as [`Scene::sheets`] chooses it.
 fn sheet_of(scene: &Scene) -> Option<f64> {
-    let own = scene.items.iter().filter_map(|item| match item {
+    let thicknesses = scene.items.iter().filter_map(|item| match item {
         Item::Volume(volume, ..) => Some(4.0 / 3.0 * volume.lattice.kernel_spacing()),
         _ => None,
     });
-    own.reduce(f64::min)
+    thicknesses.reduce(f64::min)
 }
 
 /// Returns a failure as a message, with its hint.

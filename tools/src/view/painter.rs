@@ -42,15 +42,15 @@ impl Stage {
 
     /// Returns how often the values of an item's field are.
     pub fn histogram(&self, item: usize) -> Option<&Histogram> {
-        let own = self.histograms.iter().find(|(own, _)| *own == item);
-        own.map(|(_, histogram)| histogram)
+        let entry = self.histograms.iter().find(|(number, _)| *number == item);
+        entry.map(|(_, histogram)| histogram)
     }
 
     /// Returns the transfer functions that the scene was loaded with, with the numbers of their
     /// items.
     pub fn transfers(&self) -> Vec<(usize, TransferFunction)> {
         let items = self.loaded.scene.items.iter().enumerate();
-        items.filter_map(|(item, own)| Some((item, own.transfer()?.clone()))).collect()
+        items.filter_map(|(number, item)| Some((number, item.transfer()?.clone()))).collect()
     }
 }
 
@@ -129,8 +129,10 @@ impl Painter {
             wake: Condvar::new(),
             tell: Box::new(tell),
         });
-        let own = Arc::clone(&shared);
-        let thread = std::thread::Builder::new().name("painter".into()).spawn(move || run(&own))?;
+        let thread_shared = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("painter".into())
+            .spawn(move || run(&thread_shared))?;
         Ok(Self { shared, thread: Some(thread) })
     }
 
@@ -284,24 +286,24 @@ fn draw(
     effort: Effort,
     stop: Stop,
 ) -> splatkit::Result<(Picture, FrameStats)> {
-    let is_other = |own: &mut Prepared| !Arc::ptr_eq(&own.stage, &order.stage);
+    let is_other = |kept: &mut Prepared| !Arc::ptr_eq(&kept.stage, &order.stage);
     prepared.take_if(is_other);
-    let own = match prepared {
-        Some(own) => own,
+    let current = match prepared {
+        Some(current) => current,
         none => {
             let renderer = Renderer::new(&order.stage.device, &order.stage.loaded.scene)?;
             let (stage, transfers) = (Arc::clone(&order.stage), order.stage.transfers());
             none.insert(Prepared { stage, renderer, transfers })
         }
     };
-    for new in order.transfers.iter().filter(|new| !own.transfers.contains(new)) {
-        own.renderer.set_transfer(new.0, &new.1)?;
+    for new in order.transfers.iter().filter(|new| !current.transfers.contains(new)) {
+        current.renderer.set_transfer(new.0, &new.1)?;
     }
-    own.transfers.clone_from(&order.transfers);
+    current.transfers.clone_from(&order.transfers);
     let mut exact = order.settings.clone();
     exact.stop = stop;
     let settings = effort.settings(&exact, exact.sheet_thickness.or(order.stage.sheet));
-    let (picture, stats) = own.renderer.render(&order.camera, &settings)?;
+    let (picture, stats) = current.renderer.render(&order.camera, &settings)?;
     if effort != Effort::EXACT {
         return Ok((picture, stats));
     }

@@ -39,11 +39,11 @@ struct Key {
     volume: Weak<Volume>,
     kernel: Kernel,
     index: usize,
-    look: Look,
+    mapping: Mapping,
 }
 
 #[derive(Clone, PartialEq)]
-enum Look {
+enum Mapping {
     Window([f64; 2]),
     Transfer(TransferFunction),
 }
@@ -76,12 +76,12 @@ impl SlicePanes {
         let mut chosen = None;
         ui.push_id("slices", |ui| {
             self.toolbar(ui, volume.range);
-            let look = match self.is_colored {
-                true => Look::Transfer(transfer.clone()),
-                false => Look::Window(self.window.unwrap_or(volume.range)),
+            let mapping = match self.is_colored {
+                true => Mapping::Transfer(transfer.clone()),
+                false => Mapping::Window(self.window.unwrap_or(volume.range)),
             };
             let mut pane = |ui: &mut Ui, axis: usize| {
-                let place = self.pane(ui, axis, volume, kernel, &look);
+                let place = self.pane(ui, axis, volume, kernel, &mapping);
                 chosen = place.or(chosen);
             };
             if ui.available_width() >= WIDE {
@@ -125,7 +125,7 @@ impl SlicePanes {
         axis: usize,
         volume: &Arc<Volume>,
         kernel: &Kernel,
-        look: &Look,
+        mapping: &Mapping,
     ) -> Option<DVec3> {
         let lattice = &volume.lattice;
         let place = self.place.unwrap_or_else(|| {
@@ -143,14 +143,16 @@ impl SlicePanes {
                 chosen = Some(Slice::moved_onto(lattice, axis, index, place));
             }
         });
-        if let Err(message) = self.cut(ui, axis, index, (volume, kernel), look) {
+        if let Err(message) = self.cut(ui, axis, index, (volume, kernel), mapping) {
             ui.colored_label(ui.visuals().error_fg_color, message);
             return chosen;
         }
         let Some(pane) = &self.panes[axis] else { return chosen };
         let area = picture(ui, axis, pane);
         let mut levelled = None;
-        if let (true, Look::Window(window)) = (area.dragged_by(PointerButton::Secondary), look) {
+        if let (true, Mapping::Window(window)) =
+            (area.dragged_by(PointerButton::Secondary), mapping)
+        {
             let delta = area.drag_delta();
             let whole = volume.range[1] - volume.range[0];
             let [wider, higher] = [delta.x, -delta.y].map(|part| f64::from(part) * whole / WHOLE);
@@ -174,20 +176,20 @@ impl SlicePanes {
         axis: usize,
         index: usize,
         (volume, kernel): (&Arc<Volume>, &Kernel),
-        look: &Look,
+        mapping: &Mapping,
     ) -> Result<(), String> {
         let is_same = |key: &Key| {
             key.index == index
                 && std::ptr::eq(key.volume.as_ptr(), Arc::as_ptr(volume))
                 && key.kernel == *kernel
-                && key.look == *look
+                && key.mapping == *mapping
         };
         if self.panes[axis].as_ref().is_some_and(|pane| is_same(&pane.key)) {
             return Ok(());
         }
-        let shading = match look {
-            Look::Window(window) => Shading::Window(*window),
-            Look::Transfer(transfer) => Shading::Transfer(transfer),
+        let shading = match mapping {
+            Mapping::Window(window) => Shading::Window(*window),
+            Mapping::Transfer(transfer) => Shading::Transfer(transfer),
         };
         self.panes[axis] = None;
         let slice = Slice::of_volume(volume, kernel, axis, index, shading)
@@ -196,7 +198,7 @@ impl SlicePanes {
         let name = format!("slice {axis}");
         let texture = ui.ctx().load_texture(name, image(&slice, most), TextureOptions::NEAREST);
         let volume = Arc::downgrade(volume);
-        let key = Key { volume, kernel: kernel.clone(), index, look: look.clone() };
+        let key = Key { volume, kernel: kernel.clone(), index, mapping: mapping.clone() };
         self.panes[axis] = Some(Pane { key, slice, texture });
         Ok(())
     }

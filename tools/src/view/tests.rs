@@ -19,11 +19,11 @@ fn harness(folder: &Path) -> Harness<'static, Option<Window>> {
     Harness::builder().with_size(egui::vec2(800.0, 1600.0)).build_ui_state(
         move |ui, window: &mut Option<Window>| {
             let context = ui.ctx().clone();
-            let own = window.get_or_insert_with(|| {
+            let opened = window.get_or_insert_with(|| {
                 let document = document.take().expect("one window");
                 Window::new(document, &context, None).expect("a window")
             });
-            own.ui(ui);
+            opened.ui(ui);
         },
         None,
     )
@@ -37,8 +37,8 @@ fn window<'a>(harness: &'a mut Harness<'static, Option<Window>>) -> &'a mut Wind
 fn rest(harness: &mut Harness<'static, Option<Window>>) {
     for _ in 0..2000 {
         harness.step();
-        let own = window(harness);
-        if own.rests() && (own.frame.is_some() || own.document.scene().inputs.is_empty()) {
+        let state = window(harness);
+        if state.rests() && (state.frame.is_some() || state.document.scene().inputs.is_empty()) {
             harness.step();
             return;
         }
@@ -65,7 +65,7 @@ fn a_drag_turns_the_scene_and_undo_does_not_turn_it_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut harness = harness(folder.path());
     let before = picture_of(&mut harness);
-    let camera = window(&mut harness).shown.as_ref().expect("a scene").orbit.camera().clone();
+    let camera = window(&mut harness).scene_view.as_ref().expect("a scene").orbit.camera().clone();
     harness.drag_at(egui::pos2(120.0, 200.0));
     harness.step();
     harness.hover_at(egui::pos2(190.0, 220.0));
@@ -73,7 +73,7 @@ fn a_drag_turns_the_scene_and_undo_does_not_turn_it_back() {
     harness.drop_at(egui::pos2(190.0, 220.0));
     let after = picture_of(&mut harness);
     assert!(before != after, "nothing turned");
-    let turned = window(&mut harness).shown.as_ref().expect("a scene").orbit.camera().clone();
+    let turned = window(&mut harness).scene_view.as_ref().expect("a scene").orbit.camera().clone();
     let distance = |c: &splatkit::math::Camera| (c.position - c.focal_point).length();
     assert_ne!(turned.position, camera.position);
     assert!((distance(&turned) / distance(&camera) - 1.0).abs() < 1e-9);
@@ -164,8 +164,8 @@ fn pictures_and_scenes_are_saved() {
     window(&mut harness).save_scene(&scene);
     rest(&mut harness);
     assert!(picture.exists() && scene.exists());
-    let own = Description::read(&scene, &splatkit::input::Limits::default()).expect("a scene");
-    assert!(own.camera.is_some() && own.picture.size.is_some());
+    let saved = Description::read(&scene, &splatkit::input::Limits::default()).expect("a scene");
+    assert!(saved.camera.is_some() && saved.picture.size.is_some());
     let text = std::fs::read_to_string(&scene).expect("text");
     assert!(text.contains("\"v.nrrd\""), "{text}");
     let again = folder.path().join("again.png");
@@ -235,7 +235,7 @@ fn transfer_functions_are_saved_and_loaded() {
     harness.get_by_label("Scalar bar").click();
     harness.step();
     assert!(picture_of(&mut harness) != unlit, "there is no bar");
-    let finish = window(&mut harness).shown.as_ref().expect("a scene").finish.clone();
+    let finish = window(&mut harness).scene_view.as_ref().expect("a scene").finish.clone();
     assert!(finish.bar_colors().iter().all(|color| color[2] > 0.9), "the bar is an old one");
     window(&mut harness).document.undo();
     window(&mut harness).document.undo();
@@ -295,8 +295,8 @@ fn a_window_without_room_draws_nothing_and_comes_back() {
         rest(&mut harness);
     }
     // A narrow window makes the panels narrow, so that the picture is a wider one.
-    let shown = picture_of(&mut harness).iter().filter(|pixel| pixel[3] > 0.9).count();
-    assert!(shown > 10_000, "{shown}");
+    let opaque = picture_of(&mut harness).iter().filter(|pixel| pixel[3] > 0.9).count();
+    assert!(opaque > 10_000, "{opaque}");
 }
 
 /// The file may go while its scene is shown: it is in memory.
@@ -332,14 +332,14 @@ fn one_of_several_fields_is_edited() {
     splatkit::formats::nrrd::write(&ball, &file).expect("written");
     window(&mut harness).open(vec![file]);
     let before = picture_of(&mut harness);
-    let shown = |harness: &mut Harness<'static, Option<Window>>| {
-        let shown = window(harness).shown.as_ref().expect("a scene");
-        (shown.field, shown.fields())
+    let fields_of = |harness: &mut Harness<'static, Option<Window>>| {
+        let scene_view = window(harness).scene_view.as_ref().expect("a scene");
+        (scene_view.field, scene_view.fields())
     };
-    let (field, fields) = shown(&mut harness);
+    let (field, fields) = fields_of(&mut harness);
     assert_eq!((field, fields.len(), &*fields[1].1), (0, 2, "ball.nrrd"));
     // The second field is chosen and changed; the first one stays.
-    window(&mut harness).shown.as_mut().expect("a scene").field = 1;
+    window(&mut harness).scene_view.as_mut().expect("a scene").field = 1;
     harness.step();
     let first = window(&mut harness).transfer_of(0).expect("a field");
     let mut transfer = window(&mut harness).transfer().expect("a field");

@@ -30,7 +30,7 @@ use std::{path::PathBuf, sync::Arc};
 const MOST_SIDE: u32 = 8192;
 
 /// The scene that is shown, and how.
-pub struct Shown {
+pub struct SceneView {
     pub stage: Arc<Stage>,
     pub orbit: Orbit,
     settings: Settings,
@@ -38,26 +38,26 @@ pub struct Shown {
     /// The inputs that were loaded: those of the items.
     inputs: Vec<PathBuf>,
     /// The transfer functions that the scene was loaded with, with the numbers of their items.
-    own_transfers: Vec<(usize, TransferFunction)>,
+    loaded_transfers: Vec<(usize, TransferFunction)>,
     /// The item whose field is edited.
     pub field: usize,
 }
 
-impl Shown {
+impl SceneView {
     /// Returns the items that have a field, with their names.
     pub fn fields(&self) -> Vec<(usize, String)> {
         let name = |item: usize| {
             let name = self.inputs.get(item).and_then(|file| file.file_name());
             name.map_or(String::new(), |name| name.to_string_lossy().into_owned())
         };
-        self.own_transfers.iter().map(|(item, _)| (*item, name(*item))).collect()
+        self.loaded_transfers.iter().map(|(item, _)| (*item, name(*item))).collect()
     }
 }
 
 /// What the window is used for when a point is clicked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tool {
-    Look,
+    Navigate,
     Measure,
 }
 
@@ -65,7 +65,7 @@ pub enum Tool {
 #[derive(PartialEq)]
 struct SetFor {
     /// The scene without its camera and its transfer function.
-    look: Description,
+    scene: Description,
     size: [u32; 2],
     /// Whether the camera is fitted to the scene.
     is_fitted: bool,
@@ -76,7 +76,7 @@ struct SetFor {
 /// The window's state.
 pub struct Window {
     pub document: Document,
-    pub shown: Option<Shown>,
+    pub scene_view: Option<SceneView>,
     pub tool: Tool,
     /// Points that were picked to be measured, in world units.
     pub measured: Vec<DVec3>,
@@ -113,8 +113,8 @@ impl Window {
         let repaint = context.clone();
         Ok(Self {
             document,
-            shown: None,
-            tool: Tool::Look,
+            scene_view: None,
+            tool: Tool::Navigate,
             measured: Vec::new(),
             frame: None,
             canvas: Canvas::new(state),
@@ -164,7 +164,7 @@ impl Window {
             .frame
             .as_ref()
             .is_some_and(|frame| frame.is_exact() && frame.number == self.last_order);
-        self.loading.is_none() && (self.shown.is_none() || is_exact)
+        self.loading.is_none() && (self.scene_view.is_none() || is_exact)
     }
 
     /// Returns the step that loading is at, and how much of it is done.
@@ -207,7 +207,7 @@ impl Window {
     /// Goes back to the scene that is shown, which can be redone.
     fn give_up(&mut self) {
         self.loading = None;
-        if self.shown.is_some() && self.document.can_undo() {
+        if self.scene_view.is_some() && self.document.can_undo() {
             self.document.undo();
             self.loaded_by = Some(self.document.loaded_by());
         }
@@ -224,57 +224,62 @@ impl Window {
 
     /// Moves the camera.
     pub fn move_camera(&mut self, change: impl FnOnce(&mut Orbit)) {
-        let Some(shown) = &mut self.shown else { return };
-        change(&mut shown.orbit);
-        let camera = CameraEntry::from(shown.orbit.camera());
+        let Some(scene_view) = &mut self.scene_view else { return };
+        change(&mut scene_view.orbit);
+        let camera = CameraEntry::from(scene_view.orbit.camera());
         self.document.set_camera(camera);
     }
 
     /// Returns the transfer functions that show the fields, with the numbers of their items.
     pub fn transfers(&self) -> Vec<(usize, TransferFunction)> {
-        let Some(shown) = &self.shown else { return Vec::new() };
-        let mut all = shown.own_transfers.clone();
+        let Some(scene_view) = &self.scene_view else { return Vec::new() };
+        let mut all = scene_view.loaded_transfers.clone();
         for (item, transfer) in self.edited_transfers() {
-            all.iter_mut().filter(|own| own.0 == item).for_each(|own| own.1.clone_from(&transfer));
+            all.iter_mut()
+                .filter(|entry| entry.0 == item)
+                .for_each(|entry| entry.1.clone_from(&transfer));
         }
         all
     }
 
     /// Returns the transfer function that shows an item's field.
     pub fn transfer_of(&self, item: usize) -> Option<TransferFunction> {
-        self.transfers().into_iter().find(|(own, _)| *own == item).map(|(_, transfer)| transfer)
+        self.transfers()
+            .into_iter()
+            .find(|(number, _)| *number == item)
+            .map(|(_, transfer)| transfer)
     }
 
     /// Returns the transfer function that is edited, if the scene has a field.
     pub fn transfer(&self) -> Option<TransferFunction> {
-        self.transfer_of(self.shown.as_ref()?.field)
+        self.transfer_of(self.scene_view.as_ref()?.field)
     }
 
     /// Returns the transfer functions that may be others than those that the scene was loaded with.
     fn edited_transfers(&self) -> Vec<(usize, TransferFunction)> {
-        let Some(shown) = &self.shown else { return Vec::new() };
+        let Some(scene_view) = &self.scene_view else { return Vec::new() };
         let edited = |(item, _): &(usize, TransferFunction)| {
-            let file = shown.inputs.get(*item)?;
+            let file = scene_view.inputs.get(*item)?;
             Some((*item, self.document.transfer_of(file)?))
         };
-        shown.own_transfers.iter().filter_map(edited).collect()
+        scene_view.loaded_transfers.iter().filter_map(edited).collect()
     }
 
     /// Sets the transfer function that is edited, without a step that can be undone.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
         let mut transfers = self.transfers();
-        let Some(shown) = &self.shown else { return };
-        let edited = transfers.iter_mut().filter(|own| own.0 == shown.field);
-        edited.for_each(|own| own.1.clone_from(transfer));
+        let Some(scene_view) = &self.scene_view else { return };
+        let edited = transfers.iter_mut().filter(|entry| entry.0 == scene_view.field);
+        edited.for_each(|entry| entry.1.clone_from(transfer));
         let of_file = |(item, transfer): (usize, TransferFunction)| {
-            Some((shown.inputs.get(item)?.as_path(), transfer))
+            Some((scene_view.inputs.get(item)?.as_path(), transfer))
         };
         let transfers: Vec<_> = transfers.into_iter().filter_map(of_file).collect();
         let has_surfaces =
-            shown.stage.loaded.scene.items.iter().any(|item| item.transfer().is_none());
+            scene_view.stage.loaded.scene.items.iter().any(|item| item.transfer().is_none());
         self.document.set_transfers(&transfers, has_surfaces);
         // What was loaded stays loaded.
-        if self.loading.is_none() && self.shown.is_some() {
+        if self.loading.is_none() && self.scene_view.is_some() {
             self.loaded_by = Some(self.document.loaded_by());
         }
     }
@@ -315,7 +320,7 @@ impl Window {
         }
         self.take_sides(ui);
         if pressed(Modifiers::NONE, Key::M) {
-            self.tool = if self.tool == Tool::Measure { Tool::Look } else { Tool::Measure };
+            self.tool = if self.tool == Tool::Measure { Tool::Navigate } else { Tool::Measure };
             self.measured.clear();
         }
         if pressed(Modifiers::NONE, Key::F1) || pressed(Modifiers::NONE, Key::H) {
@@ -370,10 +375,10 @@ impl Window {
             (if is_plain { step } else { DVec3::ZERO }, f64::from(input.stable_dt.min(0.1)))
         });
         if held != DVec3::ZERO
-            && let Some(shown) = &self.shown
+            && let Some(scene_view) = &self.scene_view
         {
             // Across the distance of the focal point in two seconds.
-            let camera = shown.orbit.camera();
+            let camera = scene_view.orbit.camera();
             let speed = 0.5 * (camera.focal_point - camera.position).length();
             self.move_camera(|orbit| orbit.fly(held * speed * time));
             ui.ctx().request_repaint();
@@ -388,7 +393,7 @@ impl Window {
             .map(|side| ((side * scale).round() as u32).clamp(1, MOST_SIDE));
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "The picture"));
         self.canvas.paint(ui, area);
-        if self.shown.is_some() {
+        if self.scene_view.is_some() {
             self.answer(ui, &response, area, scale);
             self.draw_over(ui, area, scale);
         } else if self.loading.is_none() {
@@ -491,8 +496,8 @@ impl Window {
 
     /// Draws clips, and the points that were picked, over the picture.
     fn draw_over(&mut self, ui: &Ui, area: Rect, scale: f32) {
-        let Some(shown) = &self.shown else { return };
-        let Ok(view) = shown.orbit.camera().view(self.size) else { return };
+        let Some(scene_view) = &self.scene_view else { return };
+        let Ok(view) = scene_view.orbit.camera().view(self.size) else { return };
         let screen = Screen { view, area, scale };
         self.draw_measured(ui, &screen);
         let mut clips = self.document.scene().picture.clips.clone();
@@ -515,7 +520,9 @@ impl Window {
 
     /// Draws the points that were picked, and the distance between them.
     fn draw_measured(&self, ui: &Ui, screen: &Screen) {
-        let (Some(shown), false) = (&self.shown, self.measured.is_empty()) else { return };
+        let (Some(scene_view), false) = (&self.scene_view, self.measured.is_empty()) else {
+            return;
+        };
         let points: Vec<Pos2> =
             self.measured.iter().filter_map(|point| screen.place(*point)).collect();
         let ink = Color32::from_rgb(255, 210, 60);
@@ -524,7 +531,7 @@ impl Window {
         }
         if let ([a, b], [first, second]) = (&points[..], &self.measured[..]) {
             ui.painter().line_segment([*a, *b], egui::Stroke::new(1.5, ink));
-            let unit = &shown.stage.loaded.captions.length;
+            let unit = &scene_view.stage.loaded.captions.length;
             let text = format!("{:.4} {unit}", (*second - *first).length());
             let at = a.lerp(*b, 0.5);
             let font = FontId::proportional(14.0);
@@ -576,7 +583,7 @@ impl Window {
 
     /// Shows nothing.
     fn clear(&mut self) {
-        (self.shown, self.frame, self.set_for, self.ordered) = (None, None, None, None);
+        (self.scene_view, self.frame, self.set_for, self.ordered) = (None, None, None, None);
         self.canvas.clear();
         self.painter.clear();
     }
@@ -621,19 +628,19 @@ impl Window {
         self.document.take_clips(&settings.clips);
         self.loaded_by = Some(self.document.loaded_by());
         let size = stage.loaded.subject.bounds.diagonal();
-        let own_transfers = stage.transfers();
+        let loaded_transfers = stage.transfers();
         // An input may have become several items.
         let names = stage.loaded.items.contents.iter().map(|content| &content.name.text);
         let inputs = names.map(PathBuf::from).collect();
-        let field = own_transfers.first().map_or(0, |(item, _)| *item);
+        let field = loaded_transfers.first().map_or(0, |(item, _)| *item);
         self.panels.scene_changed(&stage);
-        self.shown = Some(Shown {
+        self.scene_view = Some(SceneView {
             stage: Arc::new(stage),
             orbit: Orbit::new(camera, up, size),
             settings,
             finish: Arc::new(finish),
             inputs,
-            own_transfers,
+            loaded_transfers,
             field,
         });
         (self.set_for, self.ordered) = (None, None);
@@ -642,54 +649,56 @@ impl Window {
 
     /// Makes the settings anew if they changed, and orders a picture if anything did.
     fn order(&mut self) -> Result<(), String> {
-        if self.shown.is_none() || self.size.contains(&0) {
+        if self.scene_view.is_none() || self.size.contains(&0) {
             return Ok(());
         }
-        let mut look = self.document.scene().clone();
-        let is_fitted = look.camera.is_none();
-        (look.camera, look.appearance.transfer) = (None, None);
-        look.inputs.iter_mut().for_each(|input| input.appearance.transfer = None);
-        let shows_bars = look.overlay.scalar_bar;
+        let mut scene = self.document.scene().clone();
+        let is_fitted = scene.camera.is_none();
+        (scene.camera, scene.appearance.transfer) = (None, None);
+        scene.inputs.iter_mut().for_each(|input| input.appearance.transfer = None);
+        let shows_bars = scene.overlay.scalar_bar;
         let bars = if shows_bars { self.edited_transfers() } else { Vec::new() };
-        let Some(shown) = &mut self.shown else { return Ok(()) };
+        let Some(scene_view) = &mut self.scene_view else { return Ok(()) };
         // A fitted camera follows from the settings.
-        let wanted = SetFor { look, size: self.size, is_fitted, bars: bars.clone() };
+        let wanted = SetFor { scene, size: self.size, is_fitted, bars: bars.clone() };
         let is_set = self.set_for.as_ref() == Some(&wanted);
         if !is_set {
             self.set_for = Some(wanted);
             let job = self.document.job(self.size).map_err(|failure| text_of(&failure))?;
-            let loaded = &shown.stage.loaded;
-            shown.settings = job.settings(loaded).map_err(|error| error.to_string())?;
+            let loaded = &scene_view.stage.loaded;
+            scene_view.settings = job.settings(loaded).map_err(|error| error.to_string())?;
             let finish = match &bars[..] {
                 [] => job.finish(loaded),
                 bars => job.finish_with(loaded, bars),
             };
-            shown.finish = Arc::new(finish.map_err(|failure| text_of(&failure))?);
-            let camera = job.camera(loaded, &shown.settings, &shown.finish);
-            shown.orbit.set_camera(camera.map_err(|error| error.to_string())?);
+            scene_view.finish = Arc::new(finish.map_err(|failure| text_of(&failure))?);
+            let camera = job.camera(loaded, &scene_view.settings, &scene_view.finish);
+            scene_view.orbit.set_camera(camera.map_err(|error| error.to_string())?);
         } else if let Some(camera) = &self.document.scene().camera {
-            shown.orbit.set_camera(camera.camera()?);
+            scene_view.orbit.set_camera(camera.camera()?);
         }
         if is_set && self.ordered.as_ref() == Some(self.document.scene()) {
             return Ok(());
         }
         self.ordered = Some(self.document.scene().clone());
         let transfers = self.transfers();
-        let Some(shown) = &self.shown else { return Ok(()) };
+        let Some(scene_view) = &self.scene_view else { return Ok(()) };
         self.last_order = self.painter.order(Order {
-            stage: Arc::clone(&shown.stage),
-            camera: shown.orbit.camera().clone(),
-            settings: shown.settings.clone(),
-            finish: Arc::clone(&shown.finish),
+            stage: Arc::clone(&scene_view.stage),
+            camera: scene_view.orbit.camera().clone(),
+            settings: scene_view.settings.clone(),
+            finish: Arc::clone(&scene_view.finish),
             transfers,
         });
         Ok(())
     }
 
     fn take_frame(&mut self) {
-        let (Some(frame), Some(shown)) = (self.painter.take_frame(), &self.shown) else { return };
+        let (Some(frame), Some(scene_view)) = (self.painter.take_frame(), &self.scene_view) else {
+            return;
+        };
         // Where the picture is transparent, the window is black.
-        let background = shown.finish.background.unwrap_or_default();
+        let background = scene_view.finish.background.unwrap_or_default();
         let size = [frame.picture.width, frame.picture.height];
         let bytes = frame.picture.to_rgba8(Some(background));
         self.canvas.set(&self.context, size, &bytes, frame.is_exact());

@@ -22,19 +22,21 @@ pub fn words_of(scene: &Description) -> Result<Vec<String>, String> {
     }
     words.extend(scene.picture.clips.iter().map(flag_of_clip));
     let shared = scene.appearance.isosurfaces.iter();
-    words.extend(shared.map(|own| format!("--iso={}", surfaces(own))));
-    words.extend(scene.appearance.transfer.iter().map(|own| format!("--transfer={}", text(own))));
+    words.extend(shared.map(|entries| format!("--iso={}", surfaces(entries))));
+    words.extend(
+        scene.appearance.transfer.iter().map(|transfer| format!("--transfer={}", text(transfer))),
+    );
     for input in scene.visible() {
         let file = input.file.to_string_lossy();
-        let mut own = input.appearance.clone();
+        let mut appearance = input.appearance.clone();
         let values = [
-            ("color", own.color.take().map(|color| color.to_string())),
-            ("opacity", own.opacity.take().map(|opacity| opacity.to_string())),
-            ("transfer", own.transfer.take().map(|transfer| text(&transfer))),
-            ("range", own.range.take().map(|[low, high]| format!("{low},{high}"))),
-            ("iso", own.isosurfaces.take().map(|own| surfaces(&own))),
+            ("color", appearance.color.take().map(|color| color.to_string())),
+            ("opacity", appearance.opacity.take().map(|opacity| opacity.to_string())),
+            ("transfer", appearance.transfer.take().map(|transfer| text(&transfer))),
+            ("range", appearance.range.take().map(|[low, high]| format!("{low},{high}"))),
+            ("iso", appearance.isosurfaces.take().map(|entries| surfaces(&entries))),
         ];
-        let is_plain = own == Default::default()
+        let is_plain = appearance == Default::default()
             && input.reading == Default::default()
             && input.transform == Default::default();
         if !is_plain {
@@ -106,16 +108,16 @@ fn text(transfer: &TransferEntry) -> String {
 
 /// Returns isosurfaces as a flag takes them.
 pub fn surfaces(entries: &[IsosurfaceEntry]) -> String {
-    let surface = |own: &IsosurfaceEntry| {
-        let mut text = match (own.value, own.percent) {
+    let surface = |entry: &IsosurfaceEntry| {
+        let mut text = match (entry.value, entry.percent) {
             (Some(value), _) => value.to_string(),
             (None, share) => format!("{}%", share.unwrap_or_default()),
         };
-        if let Some(color) = &own.color {
+        if let Some(color) = &entry.color {
             text += &format!(":{}", plain(&serde_json::json!(color)));
         }
-        if own.opacity < 1.0 {
-            text += &format!(":{}", own.opacity);
+        if entry.opacity < 1.0 {
+            text += &format!(":{}", entry.opacity);
         }
         text
     };

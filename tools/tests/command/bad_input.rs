@@ -302,8 +302,8 @@ fn each_wrong_input_has_its_message() {
     let mut others = Vec::new();
     for (arguments, code, message) in WRONG {
         let run = folder.run(&format!("render {arguments} -o out.png"));
-        let is_told = run.code() == Some(*code) && run.stderr().contains(message);
-        if !is_told || folder.path("out.png").exists() {
+        let is_reported = run.code() == Some(*code) && run.stderr().contains(message);
+        if !is_reported || folder.path("out.png").exists() {
             others.push(format!("{arguments}: {:?}, {}", run.code(), run.stderr()));
         }
     }
@@ -429,13 +429,13 @@ fn each_limit_names_its_flag() {
     folder.run("convert a.nrrd -o a.splv").ok();
     for (arguments, message, flag) in OVER {
         let run = folder.run(arguments);
-        let told = run.stderr();
+        let stderr = run.stderr();
         run.fails(3, &[message, &format!("raise {flag}")]);
         // The number in the hint is enough for the limit that was exceeded.
         let number = |text: &str| text.split(' ').find_map(|word| word.parse::<u64>().ok());
         let least =
-            told.split_once(&format!("raise {flag} to ")).and_then(|(_, rest)| number(rest));
-        assert!(least.is_some() || flag == &"--limit-seconds", "{arguments}: {told}");
+            stderr.split_once(&format!("raise {flag} to ")).and_then(|(_, rest)| number(rest));
+        assert!(least.is_some() || flag == &"--limit-seconds", "{arguments}: {stderr}");
         if let (Some(least), Some((start, _))) = (least, arguments.rsplit_once(' ')) {
             let again = folder.run(&format!("{start} {}", least + 1)).stderr();
             assert!(!again.contains(message), "{arguments}: {again}");
@@ -493,9 +493,9 @@ fn clouds_of_every_text_draw() {
         ),
     ] {
         folder.put(name, content);
-        let found =
+        let report =
             folder.json(&format!("render {name} -o out.png --overwrite --json --size 32x24"));
-        assert!(found["splats"].as_u64().is_some_and(|count| count >= 3), "{name}: {found}");
+        assert!(report["splats"].as_u64().is_some_and(|count| count >= 3), "{name}: {report}");
     }
 }
 
@@ -522,15 +522,15 @@ fn what_is_unusual_draws() {
         "a.nrrd --x-ray",
         "a.nrrd --clip plane:1,1,0,15 --clip y>20% --cut-out box:0,0,0:50%,50%,50%",
     ] {
-        let found =
+        let report =
             folder.json(&format!("render {arguments} -o out.png --overwrite --json --size 32x24"));
-        let settings = &found["settings"];
+        let settings = &report["settings"];
         for name in ["mode", "classify", "optics", "clips"] {
-            assert!(!settings[name].is_null(), "{arguments}: {name}: {found}");
+            assert!(!settings[name].is_null(), "{arguments}: {name}: {report}");
         }
         assert!(
             arguments.contains("twins") || settings["field"]["kernel"]["extent"].is_f64(),
-            "{found}"
+            "{report}"
         );
     }
     // Only the picture shows that several clips together leave nothing.
@@ -609,10 +609,10 @@ fn no_text_of_a_file_commands_the_terminal() {
     hostile_files(&folder);
     let is_quiet = |run: &Run, what: &str| {
         let printed = run.printed();
-        let found = printed
+        let control = printed
             .chars()
             .find(|&c| (c.is_control() && c != '\n') || ('\u{202a}'..='\u{202e}').contains(&c));
-        assert_eq!(found, None, "{what}: {printed:?}");
+        assert_eq!(control, None, "{what}: {printed:?}");
         printed
     };
     let mut warned = 0;
@@ -703,15 +703,15 @@ fn points_at_one_place_draw() {
         "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: raw\n\n\x07",
     );
     for name in ["one.xyz", "three.xyz", "far.xyz", "one.nrrd --transfer generic"] {
-        let found = folder
+        let report = folder
             .json(&format!("render {name} -o out.png --overwrite --json --size 32x24 --reference"));
         let number = |vector: &serde_json::Value, axis: usize| vector[axis].as_f64().unwrap();
-        let camera = &found["camera"];
+        let camera = &report["camera"];
         let way = (0..3).map(|axis| {
             (number(&camera["position"], axis) - number(&camera["focal_point"], axis)).powi(2)
         });
         let distance = way.sum::<f64>().sqrt();
-        assert!((1.0..100.0).contains(&distance), "{name}: {found}");
+        assert!((1.0..100.0).contains(&distance), "{name}: {report}");
         let file = std::fs::read(folder.path("out.png")).unwrap();
         assert!(file.len() > 100, "{name}: an empty picture");
     }

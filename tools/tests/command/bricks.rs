@@ -15,18 +15,15 @@ fn volumes_of_any_format_become_bricks() {
     folder.put("a.vti", vti());
     let range = folder.json("info a.vti --json")["range"].clone();
     let slice_by_slice = |arguments: &str| {
-        let told = folder.json(&format!("convert {arguments} -o a.splv --overwrite --json"));
+        let report = folder.json(&format!("convert {arguments} -o a.splv --overwrite --json"));
         assert_eq!(
-            (told["dims"].clone(), told["type"].as_str()),
+            (report["dims"].clone(), report["type"].as_str()),
             (serde_json::json!([16, 16, 16]), Some("u8"))
         );
         folder.run("check a.splv").ok();
-        let told_of = folder.json("info a.splv --json");
-        assert_eq!(
-            (told_of["kind"].as_str(), &told_of["range"]),
-            (Some("volume in bricks"), &range)
-        );
-        told["slice_by_slice"].as_bool().unwrap()
+        let facts = folder.json("info a.splv --json");
+        assert_eq!((facts["kind"].as_str(), &facts["range"]), (Some("volume in bricks"), &range));
+        report["slice_by_slice"].as_bool().unwrap()
     };
     assert!(slice_by_slice("a.raw --dims 16x16x16 --type u8"));
     assert!(slice_by_slice("a.nrrd"));
@@ -46,14 +43,14 @@ fn bricks_tell_what_they_hold() {
     assert!(!folder.path("a.splv").exists());
     let text = folder.run(arguments).ok().stdout;
     assert!(String::from_utf8_lossy(&text).contains("280000 (100 × 40 × 70, u8)"));
-    let told = folder.json("info a.splv --json");
+    let facts = folder.json("info a.splv --json");
     assert_eq!(
-        (told["dims"].clone(), told["spacing"].clone()),
+        (facts["dims"].clone(), facts["spacing"].clone()),
         (serde_json::json!([100, 40, 70]), serde_json::json!([1.0, 2.0, 3.0]))
     );
     // 4 × 2 × 3, 2 × 1 × 2 and 1 bricks.
-    assert_eq!((told["levels"].as_u64(), told["bricks"].as_u64()), (Some(3), Some(29)));
-    assert_eq!((told["unit"].as_str(), told["source"].as_str()), (Some("mm"), Some("a.raw")));
+    assert_eq!((facts["levels"].as_u64(), facts["bricks"].as_u64()), (Some(3), Some(29)));
+    assert_eq!((facts["unit"].as_str(), facts["source"].as_str()), (Some("mm"), Some("a.raw")));
     assert_eq!(folder.json("check a.splv --json")["ok"].as_bool(), Some(true));
     // The first bytes of a file name its kind.
     std::fs::rename(folder.path("a.splv"), folder.path("b")).unwrap();
@@ -75,10 +72,10 @@ fn damaged_bricks_are_found() {
     damaged[whole.len() - 100] ^= 1;
     folder.put("flip.splv", &damaged);
     let run = folder.run("check flip.splv");
-    let told = run.stdout();
+    let stdout = run.stdout();
     assert!(
-        told.contains("error (hash)") && told.contains("error (brick) level 0, brick 23"),
-        "{told}"
+        stdout.contains("error (hash)") && stdout.contains("error (brick) level 0, brick 23"),
+        "{stdout}"
     );
     folder.put("cut.splv", &whole[..whole.len() - 7]);
     folder.run("info cut.splv").fails(3, &["cut.splv", "the file is incomplete"]);
@@ -110,8 +107,11 @@ fn what_cannot_be_cut_in_bricks_is_told() {
 fn generated_bytes_come_slice_by_slice() {
     let folder = Folder::new();
     folder.run("generate ball -o a.nrrd --dims 40x30x20 --type u8").ok();
-    let told = folder.json("convert a.nrrd -o a.splv --json");
-    assert_eq!((told["type"].as_str(), told["slice_by_slice"].as_bool()), (Some("u8"), Some(true)));
+    let report = folder.json("convert a.nrrd -o a.splv --json");
+    assert_eq!(
+        (report["type"].as_str(), report["slice_by_slice"].as_bool()),
+        (Some("u8"), Some(true))
+    );
     assert_eq!(folder.json("info a.nrrd --json")["dims"], serde_json::json!([40, 30, 20]));
     folder.run("generate head -o b.nrrd --type u8").fails(2, &["head"]);
 }

@@ -43,22 +43,22 @@ fn folder() -> Folder {
 #[test]
 fn values_colour_surfaces_and_the_bar_says_how() {
     let folder = folder();
-    let shown = |flags: &str| {
-        let found = folder.json(&format!("render {flags} -o out.png --scalar-bar {SMALL}"));
-        found["overlay"]["scalar_bars"][0].clone()
+    let bar_of = |flags: &str| {
+        let report = folder.json(&format!("render {flags} -o out.png --scalar-bar {SMALL}"));
+        report["overlay"]["scalar_bars"][0].clone()
     };
-    let bar = shown("sheet.ply --scalar heat");
+    let bar = bar_of("sheet.ply --scalar heat");
     assert_eq!((bar["title"].as_str(), &bar["range"]), (Some("heat"), &json!([0.0, 200.0])));
-    assert_eq!(shown("sheet.ply --color heat"), bar);
+    assert_eq!(bar_of("sheet.ply --color heat"), bar);
     // Outliers of point clouds do not count; the name may leave out what CloudCompare adds.
-    assert_eq!(shown("cloud.ply --color heat")["range"], bar["range"]);
-    assert_eq!(shown("cloud.ply --color age")["range"], json!([7.0, 7.0]));
-    assert_eq!(shown("sheet.ply --color heat --range 10,50")["range"], json!([10.0, 50.0]));
-    let height = shown("sheet.ply --color height --up +Y");
+    assert_eq!(bar_of("cloud.ply --color heat")["range"], bar["range"]);
+    assert_eq!(bar_of("cloud.ply --color age")["range"], json!([7.0, 7.0]));
+    assert_eq!(bar_of("sheet.ply --color heat --range 10,50")["range"], json!([10.0, 50.0]));
+    let height = bar_of("sheet.ply --color height --up +Y");
     assert_eq!((height["title"].as_str(), &height["range"]), (Some("height"), &json!([0.0, 20.0])));
-    let log = shown("sheet.ply --color heat --log-colors --colormap turbo_r --nan-color red");
+    let log = bar_of("sheet.ply --color heat --log-colors --colormap turbo_r --nan-color red");
     assert_eq!((&log["log"], &log["range"]), (&json!(true), &json!([10.0, 200.0])));
-    let volume = shown("a.nrrd --colormap coolwarm --range 0,255 --iso 50:orange");
+    let volume = bar_of("a.nrrd --colormap coolwarm --range 0,255 --iso 50:orange");
     assert_eq!(volume["range"], json!([0.0, 255.0]));
     assert_eq!(volume["ticks"][1], 100.0);
 }

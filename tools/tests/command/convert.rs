@@ -22,13 +22,13 @@ fn volumes_of_any_format_become_nrrd() {
         folder.put("a.nrrd", nrrd("uint8", &ball())),
         "a.raw --dims 16x16x16 --type u8",
     ] {
-        let told = folder.json(&format!("convert {input} -o out.nrrd --overwrite --json"));
+        let report = folder.json(&format!("convert {input} -o out.nrrd --overwrite --json"));
         assert_eq!(
-            (told["samples_read"].as_u64(), told["samples_written"].as_u64()),
+            (report["samples_read"].as_u64(), report["samples_written"].as_u64()),
             (Some(4096), Some(4096))
         );
         assert_eq!(
-            (told["lattice"].as_str(), told["type"].as_str()),
+            (report["lattice"].as_str(), report["type"].as_str()),
             (Some("cartesian"), Some("u8"))
         );
         let (read, written) = (volume(&folder, "a.nrrd"), volume(&folder, "out.nrrd"));
@@ -65,7 +65,7 @@ fn a_hierarchy_of_a_hierarchy_keeps_what_is_told_of_it() {
     folder.run("convert a.splk -o b.splk --radius-scale 2 --lossless").ok();
     let open = |name: &str| Hierarchy::open(folder.path(name), &Limits::default()).unwrap();
     let (a, b) = (open("a.splk"), open("b.splk"));
-    assert_eq!((b.header().stance, b.header().unit.as_str()), (a.header().stance, "mm"));
+    assert_eq!((b.header().orientation, b.header().unit.as_str()), (a.header().orientation, "mm"));
     let widths = |hierarchy: &Hierarchy| {
         let mut widths: Vec<f32> =
             hierarchy.leaves().unwrap().splats.iter().map(|splat| splat.factor[0]).collect();

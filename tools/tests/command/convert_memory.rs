@@ -92,9 +92,9 @@ fn inputs_keep_to_the_memory_together() {
         folder.put(&format!("{name}.obj"), &obj);
     }
     let in_regions = |arguments: &str| {
-        let told =
+        let report =
             folder.json(&format!("convert {arguments} -o a.splk --memory 260MiB --dry-run --json"));
-        told["in_regions"].as_bool() == Some(true)
+        report["in_regions"].as_bool() == Some(true)
     };
     assert!(!in_regions("a.ply b.ply") && in_regions("a.ply b.ply c.ply"));
     folder.run("convert a.obj -o a.splk --memory 34MiB --dry-run").ok();

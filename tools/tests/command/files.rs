@@ -53,8 +53,8 @@ fn texts_of_files_do_not_command_the_terminal() {
     let folder = Folder::new();
     folder.put("a.ply", PLY);
     folder.run_with(&["convert", "a.ply", "-o", "a.splk", "--unit", "\u{1b}[31m"]).ok();
-    let told = folder.run("info a.splk").stdout();
-    assert!(told.contains(r"\u{1b}[31m") && !told.contains('\u{1b}'), "{told:?}");
+    let stdout = folder.run("info a.splk").stdout();
+    assert!(stdout.contains(r"\u{1b}[31m") && !stdout.contains('\u{1b}'), "{stdout:?}");
 }
 
 #[test]
@@ -204,10 +204,10 @@ fn pictures_are_compared() {
         (&same["psnr"], same["different_pixels"].as_u64()),
         (&serde_json::Value::Null, Some(0))
     );
-    let found = folder.json("compare a.png b.png --json");
-    assert!((found["psnr"].as_f64().unwrap() - 20.0).abs() < 0.5, "{found}");
-    assert_eq!(found["different_pixels"].as_u64(), Some(256));
-    assert!(found["ssim"].is_f64() && found["max_difference"].is_f64());
+    let comparison = folder.json("compare a.png b.png --json");
+    assert!((comparison["psnr"].as_f64().unwrap() - 20.0).abs() < 0.5, "{comparison}");
+    assert_eq!(comparison["different_pixels"].as_u64(), Some(256));
+    assert!(comparison["ssim"].is_f64() && comparison["max_difference"].is_f64());
     folder.run("compare a.png b.png --threshold 10").ok();
     folder.run("compare a.png b.png --threshold 30").fails(5, &["30"]);
     folder.run("compare a.png c.png").fails(5, &["16x16", "8x8"]);
@@ -221,9 +221,12 @@ fn the_cpu_engine_needs_no_adapter() {
     let folder = Folder::new();
     folder.put("a.ply", PLY);
     folder.run("render a.ply -o a.png --engine cpu --size 64x48").ok();
-    let found = folder.json("bench a.ply --engine cpu --size 64x48 --frames 1 --threads 1 --json");
-    assert_eq!(found["adapter"], "CPU");
-    assert!(found["splats"].as_u64() > Some(0) && found["entries"].as_u64() > Some(0), "{found}");
+    let report = folder.json("bench a.ply --engine cpu --size 64x48 --frames 1 --threads 1 --json");
+    assert_eq!(report["adapter"], "CPU");
+    assert!(
+        report["splats"].as_u64() > Some(0) && report["entries"].as_u64() > Some(0),
+        "{report}"
+    );
     folder
         .run("render a.ply -o b.png --engine cpu --pass-entries 100")
         .fails(2, &["--engine cpu cannot be used with"]);
@@ -268,7 +271,7 @@ fn names_that_are_no_text_are_told() {
     ] {
         std::fs::write(folder.path(OsStr::from_bytes(name)), bytes).unwrap();
     }
-    for (arguments, told) in [
+    for (arguments, expected) in [
         (&b"info \xff.ply"[..], "\u{fffd}.ply"),
         (b"info \xff.ply --json", "\u{fffd}.ply"),
         (b"convert \xff.ply -o \xff.splk --json", "\u{fffd}.splk"),
@@ -280,7 +283,7 @@ fn names_that_are_no_text_are_told() {
         let arguments: Vec<_> =
             arguments.split(|byte| *byte == b' ').map(OsStr::from_bytes).collect();
         let run = folder.run_with(&arguments);
-        assert!(run.stdout().contains(told), "{arguments:?}: {}", run.stderr());
+        assert!(run.stdout().contains(expected), "{arguments:?}: {}", run.stderr());
         run.ok();
     }
     let turntable = b"render \xff.ply -o t\xff.png --turntable 2 --reference --size 8x6";
@@ -296,8 +299,8 @@ fn formats_are_listed() {
     let list = folder.json("formats --json");
     let text = folder.run("formats").stdout();
     let named = |name: &str| {
-        let found = list.as_array().unwrap().iter().find(|format| format["name"] == name);
-        found.unwrap_or_else(|| panic!("no {name}")).clone()
+        let format = list.as_array().unwrap().iter().find(|format| format["name"] == name);
+        format.unwrap_or_else(|| panic!("no {name}")).clone()
     };
     assert_eq!(named("LAS")["extensions"], serde_json::json!(["las", "laz"]));
     assert_eq!(
@@ -343,12 +346,12 @@ fn formats_are_listed() {
 fn phantoms_become_files() {
     let folder = Folder::new();
     folder.run("generate ball -o ball.nrrd --dims 9x7x5").ok();
-    let found = folder.json("info ball.nrrd --json");
+    let facts = folder.json("info ball.nrrd --json");
     assert_eq!(
-        (&found["dims"], found["type"].as_str()),
+        (&facts["dims"], facts["type"].as_str()),
         (&serde_json::json!([9, 7, 5]), Some("f32"))
     );
-    assert_eq!(found["bounds"]["max"], serde_json::json!([1.0, 1.0, 1.0]));
+    assert_eq!(facts["bounds"]["max"], serde_json::json!([1.0, 1.0, 1.0]));
     folder.run("generate ball -o ball.csv --points 12").ok();
     assert_eq!(std::fs::read_to_string(folder.path("ball.csv")).unwrap().lines().count(), 13);
     folder.run("generate ball -o ball.csv").fails(1, &["ball.csv", "exists", "--overwrite"]);
@@ -374,10 +377,13 @@ fn one_of_ten_writers_of_a_new_name_wins() {
     let (won, lost): (Vec<_>, Vec<_>) = done.into_iter().partition(|one| one.status.success());
     assert_eq!(won.len(), 1);
     for one in lost {
-        let told = String::from_utf8_lossy(&one.stderr).into_owned();
-        assert_eq!(one.status.code(), Some(1), "{told}");
-        let is_named = told.contains("appeared while") || told.contains("exists already");
-        assert!(is_named && told.contains("new.splk") && told.contains("--overwrite"), "{told}");
+        let stderr = String::from_utf8_lossy(&one.stderr).into_owned();
+        assert_eq!(one.status.code(), Some(1), "{stderr}");
+        let is_named = stderr.contains("appeared while") || stderr.contains("exists already");
+        assert!(
+            is_named && stderr.contains("new.splk") && stderr.contains("--overwrite"),
+            "{stderr}"
+        );
     }
     folder.run("check new.splk").ok();
     let mut left: Vec<_> = std::fs::read_dir(folder.path("")).unwrap().flatten().collect();

@@ -18,7 +18,7 @@ const VERSION: &str = "3.7.0";
 /// Returns the program; `None` if there is none.
 fn program() -> Option<&'static Path> {
     static PROGRAM: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let found = || {
+    let find = || {
         let named = std::env::var_os("SPLATKIT_SPLAT_TRANSFORM").map(PathBuf::from);
         let program = named.or_else(installed)?;
         let runs = Command::new(&program).arg("--version").output();
@@ -28,7 +28,7 @@ fn program() -> Option<&'static Path> {
         println!("skipped: {} does not run here", program.display());
         None
     };
-    PROGRAM.get_or_init(found).as_deref()
+    PROGRAM.get_or_init(find).as_deref()
 }
 
 /// Returns the program in the build folder, and installs it there if it is missing.
@@ -92,7 +92,9 @@ fn what_is_written_is_read_alike() {
     for degree in 0..=3 {
         let set = scene(degree);
         // It does not read glTF.
-        for (extension, highest, most) in WRITTEN.into_iter().filter(|(own, ..)| *own != "glb") {
+        for (extension, highest, most) in
+            WRITTEN.into_iter().filter(|(extension, ..)| *extension != "glb")
+        {
             let name = format!("ours-{degree}.{extension}");
             write(&set, extension, &folder.path(&name));
             transform(program, &folder, &[], &name, "theirs.ply");

@@ -17,11 +17,11 @@ fn near(a: &Value, b: &Value, most: f64) -> bool {
 /// Converts to a format. A glTF file stands upright: it is turned by 180° about x.
 fn converted(folder: &Folder, extension: &str) -> (String, splatkit::gaussians::Gaussians) {
     let name = format!("made.{extension}");
-    let told = folder.json(&format!("convert scene.ply -o {name} --json"));
-    assert_eq!(told["splats"], json!(COUNT), "{name}");
-    let found = load(folder, &name);
-    let found = if extension == "glb" { half_turn(found, 0) } else { found };
-    (name, found)
+    let report = folder.json(&format!("convert scene.ply -o {name} --json"));
+    assert_eq!(report["splats"], json!(COUNT), "{name}");
+    let set = load(folder, &name);
+    let set = if extension == "glb" { half_turn(set, 0) } else { set };
+    (name, set)
 }
 
 #[test]
@@ -31,9 +31,9 @@ fn every_format_keeps_the_numbers_within_its_steps() {
     let set = scene(DEGREE);
     write(&set, "ply", &folder.path("scene.ply"));
     for (extension, highest, most) in WRITTEN {
-        let (name, found) = converted(&folder, extension);
-        assert_eq!((found.degree, found.broken.all()), (DEGREE.min(highest), 0), "{name}");
-        Apart::of(&found, &set).within(&most, &name);
+        let (name, made) = converted(&folder, extension);
+        assert_eq!((made.degree, made.broken.all()), (DEGREE.min(highest), 0), "{name}");
+        Apart::of(&made, &set).within(&most, &name);
         folder.run(&format!("convert {name} -o back.ply --overwrite")).ok();
         Apart::of(&load(&folder, "back.ply"), &set).within(&most, &format!("{name}, back in PLY"));
     }
@@ -48,26 +48,26 @@ fn every_format_keeps_the_numbers_within_its_steps() {
 fn info_says_the_same_of_every_format() {
     let folder = Folder::new();
     write(&scene(1), "ply", &folder.path("scene.ply"));
-    let told = folder.json("info scene.ply --json");
+    let expected = folder.json("info scene.ply --json");
     assert_eq!(
-        (&told["kind"], &told["count"], &told["degree"], &told["broken"]),
+        (&expected["kind"], &expected["count"], &expected["degree"], &expected["broken"]),
         (&json!("trained Gaussians"), &json!(COUNT), &json!(1), &json!(0))
     );
     for (extension, highest, most) in WRITTEN {
         let (name, _) = converted(&folder, extension);
         let facts = folder.json(&format!("info {name} --json"));
         for key in ["kind", "count", "invisible", "broken", "attributes"] {
-            assert_eq!(facts[key], told[key], "{name}: {key}");
+            assert_eq!(facts[key], expected[key], "{name}: {key}");
         }
         assert_eq!(facts["degree"], json!(highest.min(1)), "{name}");
         assert_eq!(facts["bytes"], json!(folder.path(&name).metadata().unwrap().len()), "{name}");
         // Deviations are at most 0.23.
-        assert!(near(&facts["scales"], &told["scales"], 0.25 * most.scale), "{name}: {facts}");
-        assert!(near(&facts["opacities"], &told["opacities"], most.opacity), "{name}: {facts}");
+        assert!(near(&facts["scales"], &expected["scales"], 0.25 * most.scale), "{name}: {facts}");
+        assert!(near(&facts["opacities"], &expected["opacities"], most.opacity), "{name}: {facts}");
         for end in ["min", "max"].into_iter().filter(|_| extension != "glb") {
-            let (found, wanted) = (&facts["bounds"][end], &told["bounds"][end]);
+            let (actual, wanted) = (&facts["bounds"][end], &expected["bounds"][end]);
             let reach = most.center + most.scale + 2.0 * most.turn;
-            assert!(near(found, wanted, reach), "{name}: {found} {wanted}");
+            assert!(near(actual, wanted, reach), "{name}: {actual} {wanted}");
         }
     }
     let text = folder.run("info scene.ply").stdout();
@@ -83,9 +83,12 @@ fn every_format_gives_the_same_picture() {
     write(&set, "ply", &folder.path("scene.ply"));
     sog(&folder, "made.sog", &set);
     folder.run("convert scene.ply -o flat.ply --degree 0").ok();
-    let found = folder.json(&format!("render scene.ply -o scene.png --json {VIEW}"));
-    assert_eq!((found["up"].as_str(), found["up_from"].as_str()), (Some("-Y"), Some("convention")));
-    let camera = format!("--camera={}", found["camera"]);
+    let report = folder.json(&format!("render scene.ply -o scene.png --json {VIEW}"));
+    assert_eq!(
+        (report["up"].as_str(), report["up_from"].as_str()),
+        (Some("-Y"), Some("convention"))
+    );
+    let camera = format!("--camera={}", report["camera"]);
     let draw = |name: &str| {
         let (picture, size) = (format!("{name}.png"), "--size=96x72");
         folder.run_with(&["render", name, "-o", &picture, size, "--engine=cpu", &camera]).ok();
@@ -217,10 +220,10 @@ fn check_names_what_is_odd() {
     put(2, 9, -9.0);
     put(3, 10, 4.0);
     folder.write("odd.ply", bytes);
-    let found = folder.json("check odd.ply --json");
-    assert_eq!(found["ok"], json!(true));
-    let findings = found["findings"].as_array().unwrap();
-    let codes: Vec<&str> = findings.iter().filter_map(|found| found["code"].as_str()).collect();
+    let report = folder.json("check odd.ply --json");
+    assert_eq!(report["ok"], json!(true));
+    let findings = report["findings"].as_array().unwrap();
+    let codes: Vec<&str> = findings.iter().filter_map(|finding| finding["code"].as_str()).collect();
     assert_eq!(codes, ["not-finite", "no-rotation", "invisible", "needles"]);
     let run = folder.run("check odd.ply");
     let text = run.stdout();
@@ -250,12 +253,16 @@ fn surfaces_become_gaussians() {
     for input in ["mesh.ply", "tree.splk"] {
         for (extension, ..) in WRITTEN {
             let name = format!("made.{extension}");
-            let told = folder.json(&format!("convert {input} -o {name} --json --overwrite"));
+            let report = folder.json(&format!("convert {input} -o {name} --json --overwrite"));
             let facts = folder.json(&format!("info {name} --json"));
             assert_eq!(facts["kind"], json!("trained Gaussians"), "{name}");
-            assert_eq!((&facts["count"], &facts["degree"]), (&told["splats"], &json!(0)), "{name}");
+            assert_eq!(
+                (&facts["count"], &facts["degree"]),
+                (&report["splats"], &json!(0)),
+                "{name}"
+            );
             let expected = folder.json(&format!("convert {input} -o {name} --json --dry-run"));
-            assert_eq!(expected["splats"], told["splats"], "{name}");
+            assert_eq!(expected["splats"], report["splats"], "{name}");
         }
     }
     // Twice as wide, in the same places.
@@ -273,14 +280,14 @@ fn colours_keep_a_degree() {
     write(&set, "ply", &folder.path("scene.ply"));
     for degree in [0, 1, 3] {
         let name = format!("degree-{degree}.spz");
-        let told = folder.json(&format!("convert scene.ply -o {name} --degree {degree} --json"));
-        assert_eq!(told["degree"], json!(degree));
+        let report = folder.json(&format!("convert scene.ply -o {name} --degree {degree} --json"));
+        assert_eq!(report["degree"], json!(degree));
         let mut wanted = set.clone();
         wanted.set_degree(degree);
-        let found = load(&folder, &name);
-        assert_eq!(found.degree, degree);
+        let loaded = load(&folder, &name);
+        assert_eq!(loaded.degree, degree);
         let (.., most) = WRITTEN[3];
-        Apart::of(&found, &wanted).within(&most, &name);
+        Apart::of(&loaded, &wanted).within(&most, &name);
     }
     // A file of a lower degree stays as it is.
     folder.run("convert degree-1.spz -o again.spz --degree 3").ok();
@@ -297,10 +304,10 @@ fn scenes_are_merged() {
         write(&scene(degree), "ply", &folder.path(format!("{degree}.ply")));
     }
     folder.put("mesh.ply", PLY);
-    let told = folder.json("convert 0.ply 2.ply -o both.ply --json");
-    assert_eq!((&told["splats"], &told["degree"]), (&json!(2 * COUNT), &json!(2)));
-    let told = folder.json("convert 2.ply mesh.ply -o mixed.spz --json");
-    assert!(told["splats"].as_u64() > Some(COUNT as u64), "{told}");
+    let report = folder.json("convert 0.ply 2.ply -o both.ply --json");
+    assert_eq!((&report["splats"], &report["degree"]), (&json!(2 * COUNT), &json!(2)));
+    let report = folder.json("convert 2.ply mesh.ply -o mixed.spz --json");
+    assert!(report["splats"].as_u64() > Some(COUNT as u64), "{report}");
 }
 
 #[test]
@@ -311,9 +318,9 @@ fn gaussians_are_drawn_with_a_volume_and_a_mesh() {
     write(&scene(1), "spz", &folder.path("scene.spz"));
     let inputs = ["scene.spz", "ball.nrrd", "mesh.ply"];
     let all = inputs.join(" ");
-    let found = folder.json(&format!("render {all} -o all.png --json --up +Z {VIEW}"));
-    assert_eq!(found["up"].as_str(), Some("+Z"));
-    let camera = format!("--camera={}", found["camera"]);
+    let report = folder.json(&format!("render {all} -o all.png --json --up +Z {VIEW}"));
+    assert_eq!(report["up"].as_str(), Some("+Z"));
+    let camera = format!("--camera={}", report["camera"]);
     // Without any of them, the picture is another one.
     for left_out in inputs {
         let rest = inputs.iter().filter(|name| **name != left_out);

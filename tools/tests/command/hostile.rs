@@ -56,7 +56,7 @@ fn with_far_vertex(x: f32) -> Vec<u8> {
 #[test]
 fn texture_coordinates_do_not_keep_it_busy() {
     let folder = Folder::new();
-    for [coordinates, told] in
+    for [coordinates, printed] in
         [["inf 0.5", "[inf"], ["nan 0.5", "[NaN"], ["0.5 -1e39", "inf]"], ["1e400 0", "[inf"]]
     {
         textured(&folder, "a.obj", 12, coordinates);
@@ -69,7 +69,7 @@ fn texture_coordinates_do_not_keep_it_busy() {
         ] {
             let begin = Instant::now();
             let run = folder.run(command);
-            assert!(run.stderr().contains(told), "{coordinates}: {}", run.stderr());
+            assert!(run.stderr().contains(printed), "{coordinates}: {}", run.stderr());
             run.fails(3, &words);
             assert!(begin.elapsed() < SOON, "{command}, {coordinates}: {:?}", begin.elapsed());
         }
@@ -97,8 +97,8 @@ fn a_far_vertex_is_named_at_once() {
         folder.run("convert a.ply -o a.splk").fails(3, &words);
         folder.run("convert a.ply -o a.splk --dry-run").fails(3, &words);
         folder.run("render a.ply -o a.png --reference --size 32x32").fails(3, &words);
-        let told = folder.run("check a.ply");
-        assert!(told.code() == Some(3) && told.stdout().contains(words[1]), "{}", told.stdout());
+        let run = folder.run("check a.ply");
+        assert!(run.code() == Some(3) && run.stdout().contains(words[1]), "{}", run.stdout());
         assert!(begin.elapsed() < SOON, "{x}: {:?}", begin.elapsed());
     }
     folder.put("a.ply", with_far_vertex(1e3));
@@ -165,12 +165,12 @@ fn two_commands_write_one_file() {
         let running = ["a", "b", "a"].map(start);
         for child in running {
             let output = child.wait_with_output().unwrap();
-            let told = String::from_utf8_lossy(&output.stderr);
-            assert!(output.status.success(), "round {round}: {:?} {told}", output.status);
+            let stderr = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "round {round}: {:?} {stderr}", output.status);
         }
-        let found = std::fs::read(folder.path("out.splk")).unwrap();
+        let written = std::fs::read(folder.path("out.splk")).unwrap();
         // The file contains its source's name, so the results of a and b differ.
-        assert!(whole.contains(&found), "round {round}: neither of them");
+        assert!(whole.contains(&written), "round {round}: neither of them");
     }
     let mut left = folder.names();
     left.retain(|name| name.ends_with("part"));
@@ -232,15 +232,15 @@ fn without_threads_one_does_the_work() {
     for case in cases {
         let begin = Instant::now();
         let output = run_by(&folder, case, "convert a.ply -o b.splk --overwrite");
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{case}: {:?} {told}", output.status);
-        assert!(!told.contains("panicked"), "{case}: {told}");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{case}: {:?} {stderr}", output.status);
+        assert!(!stderr.contains("panicked"), "{case}: {stderr}");
         let word = match case {
             "RAYON_NUM_THREADS=100000" => "RAYON_NUM_THREADS=100000 is more than",
             "RAYON_NUM_THREADS=0" => "",
             _ => "one thread does all the work",
         };
-        assert!(told.contains(word), "{case}: {told}");
+        assert!(stderr.contains(word), "{case}: {stderr}");
         assert!(begin.elapsed() < SOON, "{case}: {:?}", begin.elapsed());
         assert!(std::fs::read(folder.path("b.splk")).unwrap() == whole, "{case}: another file");
         std::fs::remove_file(folder.path("b.splk")).unwrap();

@@ -83,15 +83,16 @@ fn no_flag_is_without_effect_in_silence() {
     let folder = folder();
     let mut wrong = Vec::new();
     for input in INPUTS {
-        let (code, told, plain) = draw(&folder, input, "");
-        assert_eq!(code, Some(0), "{input}: {told}");
+        let (code, stderr, plain) = draw(&folder, input, "");
+        assert_eq!(code, Some(0), "{input}: {stderr}");
         for flag in FLAGS {
-            let (code, told, picture) = draw(&folder, input, flag);
+            let (code, stderr, picture) = draw(&folder, input, flag);
             let name = flag.split(' ').next().expect("a name");
-            let says = code != Some(0) || (told.contains("has no effect") && told.contains(name));
+            let says =
+                code != Some(0) || (stderr.contains("has no effect") && stderr.contains(name));
             let changes = code == Some(0) && picture != plain;
             if says == changes && !ALIKE.contains(&(input, name)) {
-                wrong.push(format!("{input} {flag}: {code:?}, changes: {changes}: {told}"));
+                wrong.push(format!("{input} {flag}: {code:?}, changes: {changes}: {stderr}"));
             }
         }
     }

@@ -75,10 +75,10 @@ fn stop(
             stop(moment, &mut child);
             let status = child.wait().unwrap();
             let took = begin.elapsed();
-            let found = std::fs::read(folder.path(file)).ok();
-            let is_old = found.as_deref() == has_old.then_some(OLD);
+            let written = std::fs::read(folder.path(file)).ok();
+            let is_old = written.as_deref() == has_old.then_some(OLD);
             assert!(
-                is_old || found.as_ref() == Some(&new),
+                is_old || written.as_ref() == Some(&new),
                 "{output}, moment {moment}: neither old nor new"
             );
             finished += u32::from(!is_old);
@@ -189,10 +189,10 @@ fn who_finds_no_room_says_so() {
         let blocks = folder.path(file).metadata().unwrap().len() / 512;
         folder.put(file, OLD);
         for room in [0, 1, blocks / 2, blocks - 1] {
-            let (code, told) = with_room_for(&folder, room, &arguments);
+            let (code, stderr) = with_room_for(&folder, room, &arguments);
             assert!(
-                code == Some(1) && told.contains(file) && told.contains("make room"),
-                "{output}: {code:?} {told}"
+                code == Some(1) && stderr.contains(file) && stderr.contains("make room"),
+                "{output}: {code:?} {stderr}"
             );
             assert_eq!(std::fs::read(folder.path(file)).unwrap(), OLD, "{output}");
             assert_eq!(left(&folder, file), [""; 0], "{output}");
@@ -220,9 +220,9 @@ fn who_finds_no_memory_says_so_or_ends() {
         let output =
             Command::new("sh").args(["-c", &script]).current_dir(&folder).output().unwrap();
         let code = output.status.code();
-        let told = String::from_utf8_lossy(&output.stderr);
+        let stderr = String::from_utf8_lossy(&output.stderr);
         let picture = std::fs::read(folder.path("a.png")).ok();
-        println!("{mebibytes} MiB: {code:?} {}", told.lines().last().unwrap_or_default());
+        println!("{mebibytes} MiB: {code:?} {}", stderr.lines().last().unwrap_or_default());
         match code {
             Some(0) => {
                 assert!(picture.as_ref() == Some(&whole), "{mebibytes} MiB: another picture");
@@ -232,7 +232,7 @@ fn who_finds_no_memory_says_so_or_ends() {
             Some(3 | 4 | 134 | 135 | 139) | None => {
                 assert!(picture.is_none(), "{mebibytes} MiB: {code:?}, with a picture");
             }
-            _ => panic!("{mebibytes} MiB: {code:?}: {told}"),
+            _ => panic!("{mebibytes} MiB: {code:?}: {stderr}"),
         }
         drawn += u32::from(code == Some(0));
         assert_eq!(left(&folder, "a.png"), [""; 0], "{mebibytes} MiB");
@@ -244,17 +244,17 @@ fn who_finds_no_memory_says_so_or_ends() {
 fn where_nothing_can_be_written_it_is_told() {
     let folder = folder();
     std::fs::create_dir(folder.path("folder.splk")).unwrap();
-    let own = format!(
+    let onto_itself = format!(
         "a.nrrd -o ../{}/a.nrrd --overwrite",
         folder.as_ref().file_name().unwrap().display()
     );
-    for (arguments, told) in [
+    for (arguments, words) in [
         ("a.ply -o none/a.splk", ["none/a.splk", "make the folder first"]),
         ("a.ply -o folder.splk --overwrite", ["folder.splk", "is a folder"]),
         ("a.ply -o a.ply --overwrite", ["a.ply: is an input too", "give another name"]),
-        (&own, ["is an input too", "give another name"]),
+        (&onto_itself, ["is an input too", "give another name"]),
     ] {
-        folder.run(&format!("convert {arguments}")).fails(1, &told);
+        folder.run(&format!("convert {arguments}")).fails(1, &words);
     }
     // A folder that nobody may write to, not even root.
     if cfg!(target_os = "linux") && Path::new("/sys/kernel").is_dir() {
@@ -281,7 +281,7 @@ fn inputs_that_are_cut_meanwhile_are_told() {
     let samples = vec![7; 128 * 128 * 128];
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 128\nencoding: raw\n\n";
     let volume = [header.as_bytes(), &samples].concat();
-    let (mut told, mut codes) = (0, Vec::new());
+    let (mut reported, mut codes) = (0, Vec::new());
     for (name, bytes, output) in [
         ("in.ply", &mesh, "a.splk --memory 8MiB"),
         ("in.nrrd", &volume, "a.splv"),
@@ -293,9 +293,9 @@ fn inputs_that_are_cut_meanwhile_are_told() {
         folder.run(&arguments).ok();
         let mut whole = begin.elapsed();
         // Ten moments, and more if all came too early or too late.
-        let before = told;
+        let before = reported;
         for moment in (0..10).cycle().take(40) {
-            if moment == 0 && told > before + 1 {
+            if moment == 0 && reported > before + 1 {
                 break;
             }
             folder.put(name, bytes);
@@ -321,10 +321,10 @@ fn inputs_that_are_cut_meanwhile_are_told() {
                 "{arguments}, moment {moment}: {} {text}",
                 output.status
             );
-            told += u32::from(text.contains("changed while it was"));
+            reported += u32::from(text.contains("changed while it was"));
             codes.push(output.status.code());
         }
     }
-    println!("cut: {told} told of {}", codes.len());
-    assert!(told > 3, "{codes:?}");
+    println!("cut: {reported} told of {}", codes.len());
+    assert!(reported > 3, "{codes:?}");
 }

@@ -75,22 +75,23 @@ fn expressions_are_understood() {
 #[test]
 fn what_is_built_in_may_be_passed_on() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let told = |command: &mut Command| {
+    let stdout_of = |command: &mut Command| {
         String::from_utf8(command.current_dir(&root).output().unwrap().stdout).unwrap()
     };
     let machine =
-        told(Command::new(std::env::var_os("RUSTC").unwrap_or("rustc".into())).arg("-vV"));
+        stdout_of(Command::new(std::env::var_os("RUSTC").unwrap_or("rustc".into())).arg("-vV"));
     let machine = machine.lines().find_map(|line| line.strip_prefix("host: ")).unwrap();
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let arguments = ["metadata", "--locked", "--format-version", "1", "--filter-platform", machine];
-    let found: Value = serde_json::from_str(&told(Command::new(cargo).args(arguments))).unwrap();
+    let metadata: Value =
+        serde_json::from_str(&stdout_of(Command::new(cargo).args(arguments))).unwrap();
     let rules = std::fs::read_to_string(root.join("deny.toml")).unwrap();
     let allowed = allowed(&rules);
     assert!(
         allowed.contains(&"MIT") && allowed.iter().all(|name| !name.contains(' ')),
         "{allowed:?}"
     );
-    let packages = found["packages"].as_array().unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
     assert!(packages.len() > 50);
     for package in packages {
         let (name, licence) = (&package["name"], package["license"].as_str().unwrap_or_default());

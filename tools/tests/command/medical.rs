@@ -43,9 +43,9 @@ fn study() -> Folder {
 #[test]
 fn a_folder_is_described_and_drawn() {
     let folder = study();
-    let told = folder.json("info study --json");
-    assert_eq!(told["dims"], serde_json::json!([2, 2, 3]));
-    let series = told["series"].as_array().unwrap();
+    let facts = folder.json("info study --json");
+    assert_eq!(facts["dims"], serde_json::json!([2, 2, 3]));
+    let series = facts["series"].as_array().unwrap();
     assert_eq!(series.len(), 2);
     assert_eq!((series[0]["number"].as_i64(), series[0]["drawn"].as_bool()), (Some(4), Some(true)));
     assert_eq!(series[1]["description"], "Chest thick");
@@ -91,9 +91,9 @@ fn labels_are_named_and_lie_in_the_frame_of_the_patient() {
     folder.write("a.seg.nrrd", segmentation());
     folder.write("table.txt", "40 bone 250 240 230 0\n");
     folder.write("wrong.txt", "bone 1\n");
-    let told = folder.run("info a.seg.nrrd --labels table.txt");
-    assert!(told.stdout().contains("labels          7 left ear, 40 bone"), "{}", told.stdout());
-    assert!(told.stdout().contains("frame           RAS"), "{}", told.stdout());
+    let run = folder.run("info a.seg.nrrd --labels table.txt");
+    assert!(run.stdout().contains("labels          7 left ear, 40 bone"), "{}", run.stdout());
+    assert!(run.stdout().contains("frame           RAS"), "{}", run.stdout());
     let render = |arguments: &str| {
         folder.run(&format!("render {arguments} -o b.png --engine cpu --overwrite --size 64x64"))
     };

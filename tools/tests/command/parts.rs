@@ -47,9 +47,9 @@ fn parts_are_planned_made_and_joined() {
             assert_eq!(folder.json(&part)["was_finished"].as_bool(), Some(true));
         }
         assert_eq!(Some(points), plan["points"].as_u64());
-        let told = folder.run("convert --part parts/plan.json --index 1").ok();
+        let run = folder.run("convert --part parts/plan.json --index 1").ok();
         assert!(
-            String::from_utf8_lossy(&told.stdout).contains("part 1 of 3 is finished and intact")
+            String::from_utf8_lossy(&run.stdout).contains("part 1 of 3 is finished and intact")
         );
         folder.run("convert --join parts/plan.json -o all.splk --overwrite").ok();
         assert!(same(&folder, "one.splk", "all.splk"), "{input}");

@@ -21,13 +21,13 @@ fn too_little_memory_for_pages_is_told() {
     let folder = Folder::new();
     folder.put("sheet.ply", sheet(120));
     folder.run("convert sheet.ply -o a.splk").ok();
-    let told = |memory: &str| {
+    let warns = |memory: &str| {
         let run =
             format!("render a.splk -o a.png --overwrite --engine cpu --cut 0 {SMALL} {memory}");
         let run = folder.run(&run).ok();
         String::from_utf8_lossy(&run.stderr).contains("pages that the picture needs do not fit")
     };
-    assert!(told("--memory 200KiB") && !told(""));
+    assert!(warns("--memory 200KiB") && !warns(""));
 }
 
 /// Cells are solid bodies in the colours of their values, and a clip shows the field inside.
@@ -80,16 +80,16 @@ fn every_format_gives_a_picture() {
         "a.vti",
         "a.raw --dims 16x16x16 --type u8 --spacing 1,1,1",
     ] {
-        let found = folder.json(&format!("render {input} -o out.png --overwrite --json {SMALL}"));
+        let report = folder.json(&format!("render {input} -o out.png --overwrite --json {SMALL}"));
         assert!(is_png(&std::fs::read(folder.path("out.png")).unwrap(), 64, 48), "{input}");
-        assert_eq!((found["width"].as_u64(), found["height"].as_u64()), (Some(64), Some(48)));
-        assert_eq!(found["output"].as_str(), Some("out.png"));
-        let shows = found["entries"].as_u64() > Some(0) || found["gathered"].as_u64() > Some(0);
-        assert!(shows && found["gpu_bytes"].as_u64() > Some(0), "{input}: {found}");
+        assert_eq!((report["width"].as_u64(), report["height"].as_u64()), (Some(64), Some(48)));
+        assert_eq!(report["output"].as_str(), Some("out.png"));
+        let shows = report["entries"].as_u64() > Some(0) || report["gathered"].as_u64() > Some(0);
+        assert!(shows && report["gpu_bytes"].as_u64() > Some(0), "{input}: {report}");
         assert!(
-            found["frame_ms"].as_f64() > Some(0.0)
-                && found["load_ms"].is_f64()
-                && found["adapter"].is_string()
+            report["frame_ms"].as_f64() > Some(0.0)
+                && report["load_ms"].is_f64()
+                && report["adapter"].is_string()
         );
     }
     // The same bytes under a name without an extension are recognised by their content.
@@ -163,8 +163,8 @@ fn the_engine_draws_what_the_reference_draws() {
             // The reference takes its time.
             let arguments = format!("render {scene} --overwrite --size 32x24 {flags}");
             folder.run(&format!("{arguments} -o engine.png")).ok();
-            let found = folder.json(&format!("{arguments} -o reference.png --reference --json"));
-            assert_eq!(found["adapter"], "reference");
+            let report = folder.json(&format!("{arguments} -o reference.png --reference --json"));
+            assert_eq!(report["adapter"], "reference");
             // The engine computes in 32 and 16 bits, the reference in 64: their bytes differ by
             // steps of 1/255.
             folder.run("compare engine.png reference.png --threshold 40").ok();
@@ -176,8 +176,8 @@ fn the_engine_draws_what_the_reference_draws() {
 fn cameras_and_pictures_follow_their_flags() {
     let folder = folder();
     let view = "--distance 50 --focal-point 7.5,7.5,7.5 --zoom 1.3 --up +Y";
-    let found = folder.json(&format!("render a.vti -o a.png --json {view} {SMALL}"));
-    let camera = &found["camera"];
+    let report = folder.json(&format!("render a.vti -o a.png --json {view} {SMALL}"));
+    let camera = &report["camera"];
     let text = |name: &str| {
         let numbers = camera[name].as_array().unwrap().iter().map(ToString::to_string);
         numbers.collect::<Vec<_>>().join(",")
@@ -225,9 +225,9 @@ fn cameras_and_pictures_follow_their_flags() {
 #[test]
 fn bench_measures() {
     let folder = folder();
-    let found = folder.json(&format!("bench a.ply a.vti --frames 2 --json {SMALL}"));
-    let ms = |name: &str| found["frame_ms"][name].as_f64().unwrap();
-    assert!(0.0 < ms("min") && ms("min") <= ms("median") && ms("median") <= ms("max"), "{found}");
+    let report = folder.json(&format!("bench a.ply a.vti --frames 2 --json {SMALL}"));
+    let ms = |name: &str| report["frame_ms"][name].as_f64().unwrap();
+    assert!(0.0 < ms("min") && ms("min") <= ms("median") && ms("median") <= ms("max"), "{report}");
     for name in [
         "scene",
         "adapter",
@@ -239,12 +239,12 @@ fn bench_measures() {
         "culled",
         "gpu_bytes",
     ] {
-        assert!(!found[name].is_null(), "{name}: {found}");
+        assert!(!report[name].is_null(), "{name}: {report}");
     }
-    let passes = found["passes"].as_array().unwrap();
+    let passes = report["passes"].as_array().unwrap();
     assert!(
         passes.iter().any(|pass| pass["name"] == "march" && pass["ms"].as_f64() > Some(0.0)),
-        "{found}"
+        "{report}"
     );
 }
 

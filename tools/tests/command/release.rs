@@ -50,22 +50,22 @@ fn archives_are_named_as_binstall_expects() {
     let targets = targets();
     assert_eq!(targets.len(), 5, "{targets:?}");
     for target in &targets {
-        let own = |key: &str| {
-            let own = &metadata["overrides"][target][key];
-            if own.is_null() { metadata[key].clone() } else { own.clone() }
+        let field = |key: &str| {
+            let value = &metadata["overrides"][target][key];
+            if value.is_null() { metadata[key].clone() } else { value.clone() }
         };
         let mut release = Command::new(root().join("tools/release"));
         let archive = stdout(release.args(["--archive", target]));
         let archive = archive.trim_end();
         let version = env!("CARGO_PKG_VERSION");
         let url = format!("{{ repo }}/releases/download/v{version}/{archive}");
-        assert_eq!(fill(&own("pkg-url"), target), url);
+        assert_eq!(fill(&field("pkg-url"), target), url);
         let format = if archive.ends_with(".zip") { "zip" } else { "txz" };
-        assert_eq!(own("pkg-fmt"), format, "{target}");
+        assert_eq!(field("pkg-fmt"), format, "{target}");
         // tools/release packs one folder of the archive's name, and looks for the program there.
         let folder = archive.trim_end_matches(".zip").trim_end_matches(".tar.xz");
         let program = if target.contains("windows") { "splatkit.exe" } else { "splatkit" };
-        assert_eq!(fill(&own("bin-dir"), target), format!("{folder}/{program}"));
+        assert_eq!(fill(&field("bin-dir"), target), format!("{folder}/{program}"));
     }
     let overrides = metadata["overrides"].as_object().unwrap();
     assert!(overrides.keys().all(|target| targets.contains(target)), "{overrides:?}");
@@ -76,6 +76,6 @@ fn notes_need_a_tag_of_this_version() {
     let mut release = Command::new(root().join("tools/release"));
     let output = release.args(["--notes", "v999.0.0"]).output().unwrap();
     assert!(!output.status.success());
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(told.contains("the tag must be v"), "{told}");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(stderr.contains("the tag must be v"), "{stderr}");
 }

@@ -47,8 +47,8 @@ fn addresses_are_inputs() {
     assert!(!printed.contains("secret"), "{printed}");
     let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
     assert!(read("own.png") == read("far.png") && folder.path("kept/objects").is_dir());
-    let [own, far] = ["a.splk", &address].map(|path| folder.json(&format!("info {path} --json")));
-    assert_eq!((&own["count"], &own["bytes"]), (&far["count"], &far["bytes"]));
+    let [local, far] = ["a.splk", &address].map(|path| folder.json(&format!("info {path} --json")));
+    assert_eq!((&local["count"], &local["bytes"]), (&far["count"], &far["bytes"]));
     assert!(far["file"].as_str().unwrap().ends_with("/a.splk"));
     folder.run(&format!("check {address} --cache-size 0")).ok();
     folder.run(&format!("convert {address} -o far.ply")).ok();
@@ -67,9 +67,9 @@ fn other_files_are_fetched_as_a_whole() {
     folder.put("a.obj", ball());
     let server = Server::of(ball().into_bytes());
     let address = server.address("a.obj");
-    let [own, far] =
+    let [local, far] =
         ["a.obj", &address].map(|path| folder.json(&format!("info {path} --json --cache kept")));
-    assert_eq!((&own["count"], &own["bounds"]), (&far["count"], &far["bounds"]));
+    assert_eq!((&local["count"], &local["bounds"]), (&far["count"], &far["bounds"]));
     // Too small a cache, one that cannot be written, and none: temporary files.
     folder.put("file", "in the place of a folder");
     for (flags, words) in [
@@ -78,10 +78,13 @@ fn other_files_are_fetched_as_a_whole() {
         ("--cache-size 0", ""),
     ] {
         let run = folder.run(&format!("info {address} --json {flags}"));
-        let told = run.stderr();
-        assert!(told.contains(words) && !(words.is_empty() && told.contains("cache")), "{told}");
+        let stderr = run.stderr();
+        assert!(
+            stderr.contains(words) && !(words.is_empty() && stderr.contains("cache")),
+            "{stderr}"
+        );
         let again: serde_json::Value = serde_json::from_str(&run.stdout()).unwrap();
-        assert_eq!(again["bounds"], own["bounds"], "{flags}");
+        assert_eq!(again["bounds"], local["bounds"], "{flags}");
     }
 }
 

@@ -63,16 +63,16 @@ fn a_scene_file_draws_what_its_flags_draw() {
     // The file itself draws beside itself.
     folder.run("scenes/s.json -o same.png --trust-scene").ok();
     assert_eq!(read("same.png"), read("scene.png"));
-    let found = folder.json("bench scenes/s.json --trust-scene --frames 1 --json");
-    assert!(found.is_object());
+    let report = folder.json("bench scenes/s.json --trust-scene --frames 1 --json");
+    assert!(report.is_object());
 }
 
 #[test]
 fn a_camera_that_was_printed_is_taken_again() {
     let folder = folder();
     let flags = "--size 64x48 --engine cpu --orthographic --azimuth 33";
-    let found = folder.json(&format!("render a.ply {flags} -o a.png --json"));
-    let camera = found["camera"].to_string();
+    let report = folder.json(&format!("render a.ply {flags} -o a.png --json"));
+    let camera = report["camera"].to_string();
     folder
         .run_with(&[
             "render",
@@ -125,29 +125,29 @@ fn scenes_of_strangers_are_bounded() {
         folder.put("s/s.json", text);
         folder.run("render s/s.json -o s.png --engine cpu --size 8x8")
     };
-    let own = r#"{"file": "a.ply"}"#;
-    scene(own, r#", "reading": {"limits": {"bytes": 1000000, "seconds": 60}}"#).ok();
-    let many = vec![own; 10_001].join(",");
+    let input = r#"{"file": "a.ply"}"#;
+    scene(input, r#", "reading": {"limits": {"bytes": 1000000, "seconds": 60}}"#).ok();
+    let many = vec![input; 10_001].join(",");
     let letters = "A".repeat(500_000);
     for (inputs, more, words) in [
         (r#"{"file": "../a.ply"}"#, "", ["inputs[0].file", "--trust-scene"]),
         (r#"{"file": "https://127.0.0.1:1/a.ply"}"#, "", ["inputs[0].file", "--trust-scene"]),
         (
-            own,
+            input,
             r#", "appearance": {"transfer": "/etc/hostname"}"#,
             ["“/etc/hostname”", "--trust-scene"],
         ),
-        (own, r#", "reading": {"labels": "../a.ply"}"#, ["reading.labels", "--trust-scene"]),
+        (input, r#", "reading": {"labels": "../a.ply"}"#, ["reading.labels", "--trust-scene"]),
         (
-            own,
+            input,
             r#", "reading": {"limits": {"bytes": 9000000000000}}"#,
             ["reading.limits.bytes", "only lower"],
         ),
-        (own, r#", "picture": {"memory": 1000000000}"#, ["picture.memory", "--memory"]),
-        (own, r#", "gpu_timeout": 1e9"#, ["gpu_timeout", "unknown field"]),
+        (input, r#", "picture": {"memory": 1000000000}"#, ["picture.memory", "--memory"]),
+        (input, r#", "gpu_timeout": 1e9"#, ["gpu_timeout", "unknown field"]),
         (&many, "", ["there are 10001", "at most 10000"]),
         (
-            own,
+            input,
             &format!(r#", "overlay": {{"caption": "{letters}"}}"#),
             ["overlay.caption", "has 500000 letters"],
         ),

@@ -91,8 +91,8 @@ fn presets_follow_the_unit_of_length() {
                 .ok();
         }
         for name in ["km", "nm"] {
-            let found = folder.json(&format!("compare mm.png {name}.png --json"));
-            let psnr = found["psnr"].as_f64().unwrap_or(f64::INFINITY);
+            let comparison = folder.json(&format!("compare mm.png {name}.png --json"));
+            let psnr = comparison["psnr"].as_f64().unwrap_or(f64::INFINITY);
             assert!(psnr > 50.0, "{name} {flags}: {psnr} dB");
         }
     }
@@ -110,8 +110,8 @@ fn each_volume_has_its_own_function() {
     let mut render = |flags: &str| {
         drawn += 1;
         let name = format!("{drawn}.png");
-        let found = folder.json(&format!("render a.nrrd b.nrrd {SMALL} {flags} -o {name} --json"));
-        (std::fs::read(folder.path(&name)).unwrap(), found)
+        let report = folder.json(&format!("render a.nrrd b.nrrd {SMALL} {flags} -o {name} --json"));
+        (std::fs::read(folder.path(&name)).unwrap(), report)
     };
     let both = render("--transfer mri");
     assert!(render("--transfer a.nrrd=mri --transfer b.nrrd=mri").0 == both.0);
@@ -119,13 +119,13 @@ fn each_volume_has_its_own_function() {
     assert!(one.0 != both.0);
     assert!(render("--transfer a.nrrd=mri --transfer b.nrrd=generic").0 == one.0);
     assert!(render("--transfer b.nrrd=mri --transfer a.nrrd=generic").0 != one.0);
-    let shown = render("--transfer mri --iso b.nrrd=50%:red,90 --iso b.nrrd=20 --scalar-bar").1;
-    let fields = shown["settings"]["fields"].as_array().unwrap();
+    let report = render("--transfer mri --iso b.nrrd=50%:red,90 --iso b.nrrd=20 --scalar-bar").1;
+    let fields = report["settings"]["fields"].as_array().unwrap();
     let surfaces = |field: usize| fields[field]["isosurfaces"].as_array().unwrap().len();
-    assert_eq!((fields.len(), surfaces(0), surfaces(1)), (2, 0, 3), "{shown}");
-    let bars = shown["overlay"]["scalar_bars"].as_array().unwrap();
+    assert_eq!((fields.len(), surfaces(0), surfaces(1)), (2, 0, 3), "{report}");
+    let bars = report["overlay"]["scalar_bars"].as_array().unwrap();
     let titles: Vec<&str> = bars.iter().map(|bar| bar["title"].as_str().unwrap()).collect();
-    assert_eq!(titles, ["a", "b"], "{shown}");
+    assert_eq!(titles, ["a", "b"], "{report}");
     // Both engines draw them.
     let by = ["cpu", "gpu --gpu software"]
         .map(|engine| render(&format!("--transfer mri --engine {engine}")).1["output"].clone());

@@ -10,7 +10,7 @@ const PIXELS: usize = 64 * 48;
 /// A film as it was read: RGBA of each frame, and how long each is shown, in milliseconds.
 struct Decoded {
     frames: Vec<Vec<u8>>,
-    shown: Vec<u32>,
+    delays: Vec<u32>,
 }
 
 fn folder() -> Folder {
@@ -32,18 +32,18 @@ fn png(path: &Path) -> Decoded {
     let count = control.map_or(1, |control| control.num_frames);
     // An animation repeats for ever.
     assert!(control.is_none_or(|control| control.num_plays == 0));
-    let (mut frames, mut shown) = (Vec::new(), Vec::new());
+    let (mut frames, mut delays) = (Vec::new(), Vec::new());
     for _ in 0..count {
         let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
         let frame = reader.next_frame(&mut bytes).unwrap();
         assert_eq!((frame.width, frame.height), (64, 48));
         frames.push(rgba(&bytes[..frame.buffer_size()], frame.color_type.samples()));
         if let Some(frame) = reader.info().frame_control() {
-            shown.push(1000 * u32::from(frame.delay_num) / u32::from(frame.delay_den));
+            delays.push(1000 * u32::from(frame.delay_num) / u32::from(frame.delay_den));
             assert_eq!(frame.blend_op, png::BlendOp::Source);
         }
     }
-    Decoded { frames, shown }
+    Decoded { frames, delays }
 }
 
 fn webp(path: &Path) -> Decoded {
@@ -51,28 +51,28 @@ fn webp(path: &Path) -> Decoded {
     let mut decoder = image_webp::WebPDecoder::new(file).unwrap();
     assert!(decoder.is_animated() && decoder.dimensions() == (64, 48));
     assert_eq!(decoder.loop_count(), image_webp::LoopCount::Forever);
-    let (mut frames, mut shown) = (Vec::new(), Vec::new());
+    let (mut frames, mut delays) = (Vec::new(), Vec::new());
     let channels = if decoder.has_alpha() { 4 } else { 3 };
     for _ in 0..decoder.num_frames() {
         let mut bytes = vec![0; decoder.output_buffer_size().unwrap()];
-        shown.push(decoder.read_frame(&mut bytes).unwrap());
+        delays.push(decoder.read_frame(&mut bytes).unwrap());
         frames.push(rgba(&bytes, channels));
     }
-    Decoded { frames, shown }
+    Decoded { frames, delays }
 }
 
 fn gif(path: &Path) -> Decoded {
     let mut options = gif::DecodeOptions::new();
     options.set_color_output(gif::ColorOutput::RGBA);
     let mut decoder = options.read_info(fs::File::open(path).unwrap()).unwrap();
-    let (mut frames, mut shown) = (Vec::new(), Vec::new());
+    let (mut frames, mut delays) = (Vec::new(), Vec::new());
     while let Some(frame) = decoder.read_next_frame().unwrap() {
         assert_eq!((frame.width, frame.height, frame.left, frame.top), (64, 48, 0, 0));
-        shown.push(10 * u32::from(frame.delay));
+        delays.push(10 * u32::from(frame.delay));
         frames.push(frame.buffer.to_vec());
     }
     assert_eq!(decoder.repeat(), gif::Repeat::Infinite);
-    Decoded { frames, shown }
+    Decoded { frames, delays }
 }
 
 /// The mean square difference of two pictures as decibels below white.
@@ -103,27 +103,27 @@ fn a_film_has_the_frames_of_the_numbered_pictures() {
             gif(&folder.path("film.gif")),
         ];
         for film in &films {
-            assert_eq!((film.frames.len(), film.shown.len()), (5, 5));
+            assert_eq!((film.frames.len(), film.delays.len()), (5, 5));
         }
         // Five thirtieths of a second.
-        assert_eq!(films[0].shown, [33, 34, 33, 33, 34]);
-        assert_eq!(films[1].shown, films[0].shown);
-        assert_eq!(films[2].shown, [30, 40, 30, 30, 40]);
-        assert_eq!(gif(&folder.path("slow.gif")).shown, [100; 5]);
+        assert_eq!(films[0].delays, [33, 34, 33, 33, 34]);
+        assert_eq!(films[1].delays, films[0].delays);
+        assert_eq!(films[2].delays, [30, 40, 30, 30, 40]);
+        assert_eq!(gif(&folder.path("slow.gif")).delays, [100; 5]);
         assert!(films[0].frames == stills, "{back}: APNG loses nothing");
         assert!(films[1].frames == stills, "{back}: WebP loses nothing");
-        for (found, still) in films[2].frames.iter().zip(&stills) {
+        for (frame, still) in films[2].frames.iter().zip(&stills) {
             // GIF has pixels that are opaque and pixels that are transparent.
             let seen = |picture: &[u8]| -> Vec<bool> {
                 picture.chunks_exact(4).map(|pixel| pixel[3] >= 128).collect()
             };
-            assert_eq!(seen(found), seen(still), "{back}");
+            assert_eq!(seen(frame), seen(still), "{back}");
             let colors = |picture: &[u8]| -> Vec<u8> {
                 let drawn =
                     picture.chunks_exact(4).zip(seen(still)).filter(|(_, is_seen)| *is_seen);
                 drawn.flat_map(|(pixel, _)| pixel[..3].to_vec()).collect()
             };
-            let quality = psnr(&colors(found), &colors(still));
+            let quality = psnr(&colors(frame), &colors(still));
             // Every pixel of the tetrahedron has a colour of its own, and 256 must do for all.
             assert!(quality > 32.0, "{back}: {quality} dB");
         }
@@ -154,10 +154,10 @@ fn path_of(times: [f64; 3]) -> String {
 fn a_path_passes_through_its_keyframes() {
     let folder = folder();
     folder.put("path.json", path_of([0.5, 1.5, 2.0]));
-    let found =
+    let report =
         folder.json(&format!("render a.ply -o out.png --path path.json --fps 4 {SMALL} --json"));
-    assert_eq!(found["frames"], 7);
-    assert_eq!(found["camera"]["position"], serde_json::json!(CAMERAS[2].0));
+    assert_eq!(report["frames"], 7);
+    assert_eq!(report["camera"]["position"], serde_json::json!(CAMERAS[2].0));
     for (frame, (position, focal_point, angle)) in [0, 4, 6].into_iter().zip(CAMERAS) {
         let text = |numbers: [f64; 3]| numbers.map(|number| number.to_string()).join(",");
         folder
@@ -202,9 +202,9 @@ fn raw_frames_go_to_stdout() {
         folder.run(&format!("render a.ply -o out{count}.png {flags} {SMALL}")).ok();
         let raw = folder.run(&format!("render a.ply -o - --raw {flags} {SMALL}")).ok().stdout;
         assert_eq!(raw.len(), count * PIXELS * 4);
-        for (frame, found) in raw.chunks_exact(PIXELS * 4).enumerate() {
+        for (frame, pixels) in raw.chunks_exact(PIXELS * 4).enumerate() {
             let name = if count == 1 { "out1.png".into() } else { format!("out3_000{frame}.png") };
-            assert!(png(&folder.path(name)).frames[0] == found, "{flags} {frame}");
+            assert!(png(&folder.path(name)).frames[0] == pixels, "{flags} {frame}");
         }
     }
     // A reader that leaves ends the work, and is no error.
@@ -327,16 +327,16 @@ mod ffmpeg {
         ] {
             run(&folder, &bin, &format!("-o {name} --turntable 3 {flags}")).ok();
             assert_eq!(fs::read(folder.path(name)).unwrap(), b"film\n", "{name}");
-            let told = fs::read_to_string(folder.path("arguments")).unwrap();
+            let arguments = fs::read_to_string(folder.path("arguments")).unwrap();
             for word in words.iter().chain(&["rawvideo", "rgba", "64x48"]) {
-                assert!(told.contains(word), "{name}: no {word} in {told}");
+                assert!(arguments.contains(word), "{name}: no {word} in {arguments}");
             }
-            let found = fs::read(folder.path("frames")).unwrap();
-            assert_eq!(found.len(), 3 * PIXELS * 4, "{name}");
+            let frames = fs::read(folder.path("frames")).unwrap();
+            assert_eq!(frames.len(), 3 * PIXELS * 4, "{name}");
             if flags.contains("none") {
-                assert!(found.chunks_exact(4).any(|pixel| pixel[3] == 0), "{name}");
+                assert!(frames.chunks_exact(4).any(|pixel| pixel[3] == 0), "{name}");
             } else {
-                assert!(found == raw, "{name}");
+                assert!(frames == raw, "{name}");
             }
         }
         // MP4 has no opacity: a warning says so, and the background is black.

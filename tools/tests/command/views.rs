@@ -71,26 +71,26 @@ fn statements_count_more_than_conventions_and_these_more_than_guesses() {
         ("survey.xyz square.glb", "+Z", "file"),
         ("y.obj --up -X", "-X", "flag"),
     ] {
-        let found = draw(&folder, inputs);
-        assert_eq!((found["up"].as_str(), found["up_from"].as_str()), (Some(up), Some(from)));
+        let report = draw(&folder, inputs);
+        assert_eq!((report["up"].as_str(), report["up_from"].as_str()), (Some(up), Some(from)));
     }
-    let told = folder.run(&format!("render survey.xyz square.glb -o b.png {SMALL}")).stderr();
+    let stderr = folder.run(&format!("render survey.xyz square.glb -o b.png {SMALL}")).stderr();
     assert!(
-        told.contains("square.glb is turned: it stands with +Y up, and the input before with +Z"),
-        "{told}"
+        stderr.contains("square.glb is turned: it stands with +Y up, and the input before with +Z"),
+        "{stderr}"
     );
-    let told = folder.run(&format!("render y.obj -o c.png {SMALL}")).stderr();
+    let stderr = folder.run(&format!("render y.obj -o c.png {SMALL}")).stderr();
     assert!(
-        told.contains("up: +Y, front: +Z, guessed from the shape; --up sets another"),
-        "{told}"
+        stderr.contains("up: +Y, front: +Z, guessed from the shape; --up sets another"),
+        "{stderr}"
     );
     // Warnings of the library look as those of the command do.
     let text = std::fs::read_to_string(folder.path("y.obj")).expect("text");
     folder.write("m.obj", format!("mtllib none.mtl\n{text}"));
-    let told = folder.run(&format!("render m.obj -o e.png {SMALL}")).stderr();
-    assert!(told.lines().any(|line| line.starts_with("warning: m.obj: mtllib")), "{told}");
-    let told = folder.run(&format!("render y.obj -o d.png -q {SMALL}")).stderr();
-    assert_eq!(told, "");
+    let stderr = folder.run(&format!("render m.obj -o e.png {SMALL}")).stderr();
+    assert!(stderr.lines().any(|line| line.starts_with("warning: m.obj: mtllib")), "{stderr}");
+    let stderr = folder.run(&format!("render y.obj -o d.png -q {SMALL}")).stderr();
+    assert_eq!(stderr, "");
 }
 
 #[test]
@@ -101,15 +101,15 @@ fn a_hierarchy_is_drawn_as_its_mesh_is() {
         folder.run(&format!("convert {name} -o tree.splk --overwrite")).ok();
         let (mesh, tree) = (draw(&folder, name), draw(&folder, "tree.splk"));
         assert_eq!((&mesh["up"], &mesh["up_from"]), (&tree["up"], &tree["up_from"]), "{name}");
-        let [a, b] = [&mesh, &tree].map(|found| numbers(&found["camera"]["position"]));
+        let [a, b] = [&mesh, &tree].map(|report| numbers(&report["camera"]["position"]));
         let size = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
         let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(apart < 1e-2 * size, "{name}: {a:?} {b:?}");
     }
     folder.run("convert y.obj -o tree.splk --overwrite --up -z").ok();
     assert_eq!(folder.json("info tree.splk --json")["up"], "-Z");
-    let found = draw(&folder, "tree.splk");
-    assert_eq!((found["up"].as_str(), found["up_from"].as_str()), (Some("-Z"), Some("file")));
+    let report = draw(&folder, "tree.splk");
+    assert_eq!((report["up"].as_str(), report["up_from"].as_str()), (Some("-Z"), Some("file")));
 }
 
 #[test]
@@ -124,16 +124,16 @@ fn named_views_look_from_their_sides() {
         ("bottom", [0.0, 0.0, -1.0]),
         ("iso", [1.0, -1.0, 1.0].map(|v: f64| v / 3f64.sqrt())),
     ] {
-        let found = draw(&folder, &format!("z.obj --view {view}"));
-        let [eye, focus] = ["position", "focal_point"].map(|name| numbers(&found["camera"][name]));
+        let report = draw(&folder, &format!("z.obj --view {view}"));
+        let [eye, focus] = ["position", "focal_point"].map(|name| numbers(&report["camera"][name]));
         let away: [f64; 3] = std::array::from_fn(|axis| eye[axis] - focus[axis]);
         let length = away.iter().map(|v| v * v).sum::<f64>().sqrt();
         for axis in 0..3 {
             assert!((away[axis] / length - toward[axis]).abs() < 1e-9, "{view}: {away:?}");
         }
     }
-    let found = draw(&folder, "z.obj --view right --azimuth 90 --distance 7");
-    let [eye, focus] = ["position", "focal_point"].map(|name| numbers(&found["camera"][name]));
+    let report = draw(&folder, "z.obj --view right --azimuth 90 --distance 7");
+    let [eye, focus] = ["position", "focal_point"].map(|name| numbers(&report["camera"][name]));
     assert!((eye[1] - focus[1] - 7.0).abs() < 1e-9, "{eye:?}");
 }
 
@@ -141,12 +141,15 @@ fn named_views_look_from_their_sides() {
 fn a_turntable_keeps_its_distance() {
     let folder = folder();
     let run = folder.run(&format!("render z.obj -o turn.png --turntable 5 --json {SMALL}"));
-    let told = run.stderr();
-    assert!(told.contains("turn_0000.png to turn_0004.png: 5 frames of 64 × 48 pixels"), "{told}");
+    let stderr = run.stderr();
+    assert!(
+        stderr.contains("turn_0000.png to turn_0004.png: 5 frames of 64 × 48 pixels"),
+        "{stderr}"
+    );
     let last: Value = serde_json::from_slice(&run.ok().stdout).expect("JSON");
     let first = draw(&folder, "z.obj");
-    let distance = |found: &Value| {
-        let [eye, focus] = ["position", "focal_point"].map(|name| numbers(&found["camera"][name]));
+    let distance = |report: &Value| {
+        let [eye, focus] = ["position", "focal_point"].map(|name| numbers(&report["camera"][name]));
         eye.iter().zip(focus).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
     };
     // All frames fit, so none is nearer than a fitted one.
@@ -156,12 +159,12 @@ fn a_turntable_keeps_its_distance() {
 #[test]
 fn a_file_alone_is_drawn_beside_itself() {
     let folder = folder();
-    let mut told = folder.run(&format!("z.obj {SMALL}")).stderr();
-    assert!(told.contains("z.png: 64 × 48 pixels, "), "{told}");
+    let mut stderr = folder.run(&format!("z.obj {SMALL}")).stderr();
+    assert!(stderr.contains("z.png: 64 × 48 pixels, "), "{stderr}");
     let first = std::fs::read(folder.path("z.png")).expect("a picture");
     assert!(is_png(&first, 64, 48));
-    told = folder.run(&format!("render z.obj --view top {SMALL}")).stderr();
-    assert!(told.contains("z_2.png: 64 × 48 pixels, "), "{told}");
+    stderr = folder.run(&format!("render z.obj --view top {SMALL}")).stderr();
+    assert!(stderr.contains("z_2.png: 64 × 48 pixels, "), "{stderr}");
     assert_eq!(std::fs::read(folder.path("z.png")).expect("a picture"), first);
     folder.run(&format!("z.obj --view top --overwrite {SMALL}")).ok();
     assert_ne!(std::fs::read(folder.path("z.png")).expect("a picture"), first);

@@ -297,9 +297,9 @@ fn wrong_uses_are_answered() {
             false => (*arguments).to_owned(),
         };
         let run = folder.run(&small);
-        let told = run.stderr();
-        if run.code() != Some(*code) || !told.contains(says) {
-            wrong.push(format!("{meant}: {arguments}: {:?}: {told}", run.code()));
+        let stderr = run.stderr();
+        if run.code() != Some(*code) || !stderr.contains(says) {
+            wrong.push(format!("{meant}: {arguments}: {:?}: {stderr}", run.code()));
         }
         fs::remove_file(folder.path("out.png")).ok();
     }
@@ -326,6 +326,6 @@ fn the_page_of_wrong_uses_is_current() {
     if std::env::var_os("SPLATKIT_WRITE").is_some() {
         fs::write(&path, &page).expect("a page");
     }
-    let found = fs::read_to_string(&path).unwrap_or_default().replace('\r', "");
-    assert_eq!(found, page, "docs/wrong-uses.md is not current: SPLATKIT_WRITE=1 writes it");
+    let content = fs::read_to_string(&path).unwrap_or_default().replace('\r', "");
+    assert_eq!(content, page, "docs/wrong-uses.md is not current: SPLATKIT_WRITE=1 writes it");
 }

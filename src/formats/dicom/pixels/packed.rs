@@ -18,8 +18,8 @@ pub fn parts<'b>(decoder: &Decoder, fragments: &[&'b [u8]], number: u32) -> Resu
     };
     let number = number as usize;
     let frames = frames_of(decoder);
-    if let Some(&own) = fragments.get(number).filter(|_| fragments.len() == frames) {
-        return Ok(own.into());
+    if let Some(&fragment) = fragments.get(number).filter(|_| fragments.len() == frames) {
+        return Ok(fragment.into());
     }
     let starts = starts(decoder, table, fragments, frames);
     let joined = |from: usize, to: usize| match &fragments[from..to] {
@@ -190,8 +190,8 @@ fn jpeg<'a>(decoder: &Decoder, bytes: &[u8], place: &str) -> Result<Plain<'a>> {
             native.flat_map(u16::to_le_bytes).collect()
         }
         (format, channels, width) => {
-            let found = format.map_or("nothing".into(), |format| format!("{format:?}"));
-            let message = format!("{found} where {channels} × {} bits were expected", 8 * width);
+            let actual = format.map_or("nothing".into(), |format| format!("{format:?}"));
+            let message = format!("{actual} where {channels} × {} bits were expected", 8 * width);
             return Err(refuse(decoder, place, message));
         }
     };
@@ -243,9 +243,9 @@ fn jpeg_size(bytes: &[u8]) -> Option<[usize; 2]> {
 }
 
 /// Refuses a stream of another size before it is unpacked: its size decides what memory that takes.
-fn check_size(decoder: &Decoder, found: Option<[usize; 2]>, place: &str) -> Result<()> {
+fn check_size(decoder: &Decoder, size: Option<[usize; 2]>, place: &str) -> Result<()> {
     let (columns, rows) = (decoder.layout.columns, decoder.layout.rows);
-    match found {
+    match size {
         Some(size) if size == [columns, rows] => Ok(()),
         Some([x, y]) => {
             let message = format!("a picture of {x} × {y} pixels, not of {columns} × {rows}");

@@ -160,9 +160,9 @@ impl Made {
             header.bytes(tags::MEDIA_CLASS, "UI", class);
         }
         header.bytes(tags::TRANSFER_SYNTAX, "UI", &identifier);
-        let mut own = self.clone();
-        own.without(tags::MEDIA_CLASS);
-        let mut set = own.set();
+        let mut data = self.clone();
+        data.without(tags::MEDIA_CLASS);
+        let mut set = data.set();
         if self.syntax == ".1.99" {
             let mut packer = DeflateEncoder::new(Vec::new(), Compression::default());
             packer.write_all(&set).unwrap();

@@ -25,11 +25,11 @@ fn segmentation(kind: &str, frames: &[(f64, u16)]) -> Made {
             let place = item(|made| {
                 made.text(tags::POSITION, &format!("0\\0\\{z}"));
             });
-            let own = item(|made| {
+            let identification = item(|made| {
                 made.short(tags::SEGMENT_NUMBER, segment);
             });
             made.sequence(tags::PLANE_POSITIONS, &[place]);
-            made.sequence(tags::SEGMENT_IDENTIFICATIONS, &[own]);
+            made.sequence(tags::SEGMENT_IDENTIFICATIONS, &[identification]);
         })
     };
     let segment = |number: u16, name: &str, lab: [u16; 3]| {
@@ -77,12 +77,12 @@ fn frames_of_segments_are_one_label_map() {
     let (lung, node) = (labels.get(1).unwrap(), labels.get(4).unwrap());
     assert_eq!((&*lung.name, &*node.name), ("lung", "node"));
     let near = |label: &crate::about::Label, expected: [f64; 3]| {
-        let found = label.color.unwrap();
-        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.01), "{found:?}");
+        let color = label.color.unwrap();
+        assert!(color.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.01), "{color:?}");
     };
     near(lung, [0.502; 3]);
     near(node, [1.0, 0.0, 0.0]);
-    assert_eq!(volume.about.stance, Some(Stance::RAS));
+    assert_eq!(volume.about.orientation, Some(Orientation::RAS));
 }
 
 #[test]
@@ -106,8 +106,12 @@ fn values_of_label_maps_are_segments() {
 fn frames_between_slices_are_refused() {
     let mut made = segmentation("BINARY", &[(0.0, 1), (5.0, 1), (8.0, 1)]);
     made.bits(1, 1, 0).bytes(tags::PIXEL_DATA, "OB", &[0; 4]);
-    assert!(told(&made.file()).contains("are not multiples of 3"), "{}", told(&made.file()));
+    assert!(
+        error_of(&made.file()).contains("are not multiples of 3"),
+        "{}",
+        error_of(&made.file())
+    );
     let mut made = segmentation("BINARY", &[(0.0, 1), (5e7, 1)]);
     made.bits(1, 1, 0).bytes(tags::PIXEL_DATA, "OB", &[0; 2]);
-    assert!(told(&made.file()).contains("at most 65536"), "{}", told(&made.file()));
+    assert!(error_of(&made.file()).contains("at most 65536"), "{}", error_of(&made.file()));
 }

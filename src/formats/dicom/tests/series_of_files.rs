@@ -51,7 +51,7 @@ fn slices_are_ordered_by_their_positions() {
     assert_eq!(volume.lattice.axes.z_axis, DVec3::new(0.0, 0.0, 2.5));
     // The patient's x leads to the right and y to the front.
     assert_eq!(volume.lattice.origin, DVec3::new(-1.0, -2.0, 2.5));
-    assert_eq!(volume.about.stance, Some(Stance::RAS));
+    assert_eq!(volume.about.orientation, Some(Orientation::RAS));
     // Rounded positions are even all the same.
     let volume = stack(&[at(0.0), at(0.63), at(1.25), at(1.88), at(2.5)]);
     assert_eq!(volume.lattice.arrangement, Arrangement::Cartesian);
@@ -238,13 +238,13 @@ fn a_series_is_chosen() {
     let limits = Limits::default();
     let source = Source::open_any(folder.as_ref(), &limits).unwrap();
     let listed = crate::formats::series(&source, &ReadOptions::default()).unwrap();
-    let told: Vec<_> = listed
+    let summary: Vec<_> = listed
         .iter()
         .map(|one| (one.number, &*one.description, one.pictures, one.is_drawn))
         .collect();
     let expected =
         [(2, "Scout", 1, false), (4, "Chest thin", 3, true), (7, "Chest thick", 2, false)];
-    assert_eq!(told, expected.map(|(n, words, count, is)| (Some(n), words, count, is)));
+    assert_eq!(summary, expected.map(|(n, words, count, is)| (Some(n), words, count, is)));
     assert!(crate::formats::load_volume(&folder, &limits, &ReadOptions::default()).is_ok());
     let none = Folder::new();
     none.write("a.txt", "text");

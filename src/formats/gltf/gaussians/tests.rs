@@ -80,9 +80,9 @@ fn primitive(value: &mut Value) -> &mut Value {
     &mut value["meshes"][0]["primitives"][0]
 }
 
-fn is_near(found: &[f32], wanted: &[f32]) -> bool {
-    found.len() == wanted.len()
-        && found.iter().zip(wanted).all(|(a, b)| (a - b).abs() <= 5e-6 * b.abs().max(1.0))
+fn is_near(actual: &[f32], wanted: &[f32]) -> bool {
+    actual.len() == wanted.len()
+        && actual.iter().zip(wanted).all(|(a, b)| (a - b).abs() <= 5e-6 * b.abs().max(1.0))
 }
 
 /// The covariance of a Gaussian.
@@ -104,7 +104,7 @@ fn numbers_are_those_of_the_file() {
         assert_eq!(set.harmonics_of(0)[term], values[..3]);
         assert_eq!(set.harmonics_of(1)[term], values[3..]);
     }
-    assert_eq!((set.about.stance, set.broken.all()), (Some(Stance::Y_UP), 0));
+    assert_eq!((set.about.orientation, set.broken.all()), (Some(Orientation::Y_UP), 0));
     set.validate().expect("valid");
 }
 
@@ -176,16 +176,16 @@ fn nodes_move_shapes_and_colours() {
         moved.validate().expect("valid");
         for index in 0..2 {
             let center = linear * still.centers[index].as_dvec3() + DVec3::new(10.0, 20.0, 30.0);
-            let found = moved.origin + moved.centers[index].as_dvec3();
-            assert!(found.distance(center) < 1e-5, "{found} is not {center}");
+            let actual = moved.origin + moved.centers[index].as_dvec3();
+            assert!(actual.distance(center) < 1e-5, "{actual} is not {center}");
             let wanted = linear * covariance(&still, index) * linear.transpose();
-            let found = covariance(&moved, index);
-            assert!(found.abs_diff_eq(wanted, 1e-4), "{found} is not {wanted}");
+            let actual = covariance(&moved, index);
+            assert!(actual.abs_diff_eq(wanted, 1e-4), "{actual} is not {wanted}");
             for direction in [DVec3::X, DVec3::Y, DVec3::NEG_Z, DVec3::ONE.normalize()] {
                 let wanted = color(1, still.harmonics_of(index), direction.as_vec3());
                 let seen = (turned * direction).as_vec3();
-                let found = color(1, moved.harmonics_of(index), seen);
-                assert!(is_near(&found, &wanted), "{found:?} is not {wanted:?}");
+                let actual = color(1, moved.harmonics_of(index), seen);
+                assert!(is_near(&actual, &wanted), "{actual:?} is not {wanted:?}");
             }
         }
     }
@@ -249,8 +249,8 @@ fn linear_colours_are_converted() {
     let set = read_json(&value).expect("loads");
     let [r, g, b] = [0, 1, 2].map(|channel| 0.5 + CONSTANT * TERMS[0][channel]);
     let wanted = displayed([r, g, b, 1.0]);
-    let found = color(0, set.harmonics_of(0), Vec3::Y);
-    assert!(is_near(&found, &wanted[..3]), "{found:?} is not {wanted:?}");
+    let actual = color(0, set.harmonics_of(0), Vec3::Y);
+    assert!(is_near(&actual, &wanted[..3]), "{actual:?} is not {wanted:?}");
 }
 
 /// A change of a file, and a word of the error.
@@ -299,8 +299,8 @@ fn wrong_files_are_refused() {
 /// Removes an attribute of the extension, or one of glTF.
 fn without(primitive: &mut Value, name: &str) {
     let attributes = primitive["attributes"].as_object_mut().expect("an object");
-    let own = format!("KHR_gaussian_splatting:{name}");
-    attributes.remove(&own).or_else(|| attributes.remove(name)).expect("an attribute");
+    let key = format!("KHR_gaussian_splatting:{name}");
+    attributes.remove(&key).or_else(|| attributes.remove(name)).expect("an attribute");
 }
 
 #[test]
@@ -412,11 +412,11 @@ fn written_files_are_read_back() {
         assert_eq!((read.len(), read.degree), (set.len(), degree));
         for index in 0..set.len() {
             let wanted = set.origin + set.centers[index].as_dvec3();
-            let found = read.origin + read.centers[index].as_dvec3();
-            assert!(found.distance(wanted) < 1e-6, "{found} is not {wanted}");
-            let [found, wanted] =
+            let actual = read.origin + read.centers[index].as_dvec3();
+            assert!(actual.distance(wanted) < 1e-6, "{actual} is not {wanted}");
+            let [actual, wanted] =
                 [&read, &set].map(|set| Mat3::from_quat(set.rotations[index]).to_cols_array());
-            assert!(is_near(&found, &wanted));
+            assert!(is_near(&actual, &wanted));
         }
         assert_eq!(read.scales, set.scales);
         assert_eq!(read.opacities, set.opacities);

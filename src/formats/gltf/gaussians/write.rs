@@ -4,7 +4,7 @@
 use super::NAME;
 use crate::{
     Error, Result,
-    about::Stance,
+    about::Orientation,
     disk,
     gaussians::{
         Gaussians,
@@ -23,7 +23,7 @@ const UNSIGNED_SHORT: u32 = 5123;
 const ARRAY_BUFFER: u32 = 34962;
 
 /// Writes Gaussians as a GLB with the extension `KHR_gaussian_splatting`. Positions are relative to
-/// the origin, which is the translation of the node. A scene with a stance stands upright in
+/// the origin, which is the translation of the node. A scene with a orientation stands upright in
 /// viewers: a node turns it, without which −y would be up in scenes of trainers. Programs without
 /// the extension show points with the constant part of the colours.
 ///
@@ -35,7 +35,7 @@ pub fn write_gaussians(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     if set.is_empty() {
         return Err(Error::Argument("a glTF file needs at least one Gaussian".into()));
     }
-    let nodes = nodes(set.origin, set.about.stance.unwrap_or(Stance::Y_UP))?;
+    let nodes = nodes(set.origin, set.about.orientation.unwrap_or(Orientation::Y_UP))?;
     let columns = columns(set.degree);
     let (json, binary) = scene(set, &columns, &nodes);
     let mut text = json.to_string().into_bytes();
@@ -125,17 +125,17 @@ fn linear(value: f32) -> f32 {
 
 /// Returns the attributes in their order in the file.
 fn columns(degree: u32) -> Vec<Column> {
-    let own = |name: &str, values| Column { name: format!("{NAME}:{name}"), values };
+    let column = |name: &str, values| Column { name: format!("{NAME}:{name}"), values };
     let mut columns = vec![
         Column { name: "POSITION".into(), values: Values::Center },
-        own("ROTATION", Values::Rotation),
-        own("SCALE", Values::Scale),
-        own("OPACITY", Values::Opacity),
+        column("ROTATION", Values::Rotation),
+        column("SCALE", Values::Scale),
+        column("OPACITY", Values::Opacity),
     ];
     for l in 0..=degree {
         let first = l as usize * l as usize;
         columns.extend((0..=2 * l as usize).map(|coefficient| {
-            own(&format!("SH_DEGREE_{l}_COEF_{coefficient}"), Values::Term(first + coefficient))
+            column(&format!("SH_DEGREE_{l}_COEF_{coefficient}"), Values::Term(first + coefficient))
         }));
     }
     columns.push(Column { name: "COLOR_0".into(), values: Values::Color });
@@ -144,7 +144,7 @@ fn columns(degree: u32) -> Vec<Column> {
 
 /// Returns the nodes. Their translations are read in 32 bits, so a second node adds what one of
 /// them does not hold. A scene that does not stand as glTF's do is turned by a node above them.
-fn nodes(origin: DVec3, Stance { up, front }: Stance) -> Result<Value> {
+fn nodes(origin: DVec3, Orientation { up, front }: Orientation) -> Result<Value> {
     let shift = origin.as_vec3();
     if !shift.is_finite() {
         return Err(Error::Argument(format!("the origin {origin} is too far for a glTF file")));

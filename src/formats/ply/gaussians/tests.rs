@@ -149,8 +149,8 @@ fn flat_ones_and_painted_ones() {
             let path = folder.write("a.ply", &painted);
             assert!(read_with(&path, holds_gaussians).unwrap());
             let set = load(painted).unwrap();
-            for (found, part) in set.harmonics[0].iter().zip([1.0, 0.0, 0.2]) {
-                assert!((found - constant_of(part)).abs() < 1e-5, "{format} {kind}");
+            for (actual, part) in set.harmonics[0].iter().zip([1.0, 0.0, 0.2]) {
+                assert!((actual - constant_of(part)).abs() < 1e-5, "{format} {kind}");
             }
         }
     }
@@ -246,13 +246,13 @@ fn compressed_ones_by_hand() {
         // The largest is y; w is the end of its range.
         let half = std::f32::consts::FRAC_1_SQRT_2;
         let turns = [Quat::from_xyzw(0.0, half, 0.0, half), Quat::IDENTITY];
-        for (found, wanted) in set.rotations.iter().zip(turns) {
-            assert!((*found - wanted).length() < 2e-3, "{found}");
+        for (actual, wanted) in set.rotations.iter().zip(turns) {
+            assert!((*actual - wanted).length() < 2e-3, "{actual}");
         }
         assert_eq!(set.opacities, [0.2, 1.0]);
-        let near = |found: [f32; 3], wanted: [f32; 3]| {
-            let near = found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-5);
-            assert!(near, "{found:?} {wanted:?}");
+        let near = |actual: [f32; 3], wanted: [f32; 3]| {
+            let near = actual.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-5);
+            assert!(near, "{actual:?} {wanted:?}");
         };
         near(set.harmonics_of(0)[0], [1.0, 2.0, 0.0].map(constant_of));
         near(set.harmonics_of(1)[0], [0.2, 0.8, 0.6].map(constant_of));
@@ -298,8 +298,8 @@ fn what_is_wrong_in_compressed_ones_is_named() {
         ("element sh", "element harmonics", ""),
     ] {
         assert!(text.contains(from));
-        let found = load(text.replacen(from, to, 1));
-        match found {
+        let result = load(text.replacen(from, to, 1));
+        match result {
             Ok(set) => assert!(word.is_empty() && set.degree == 0),
             Err(error) => {
                 let message = error.to_string();
@@ -372,8 +372,8 @@ fn what_is_written_reads_back() {
         assert_eq!((read.len(), read.degree, read.broken.all()), (set.len(), degree, 0));
         assert!(read.scales[0].z < 1e-18);
         for index in 1..set.len() {
-            let found = differences((&read, index), (&set, index));
-            assert!(found.iter().all(|v| *v < 2e-5), "{index}: {found:?}");
+            let errors = differences((&read, index), (&set, index));
+            assert!(errors.iter().all(|v| *v < 2e-5), "{index}: {errors:?}");
         }
         let path = folder.path("compressed.ply");
         write_compressed_gaussians(&set, &path).unwrap();
@@ -383,10 +383,10 @@ fn what_is_written_reads_back() {
         for index in 1..set.len() {
             let far = |other: &usize| center(&read, *other).distance(center(&set, index));
             let near = (0..read.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
-            let found = differences((&read, near), (&set, index));
+            let errors = differences((&read, near), (&set, index));
             // Half a step of each number, and a little more.
             let allowed = [1e-2, 2e-2, 1e-4, 2e-3, 1.7e-2];
-            assert!(found.iter().zip(allowed).all(|(v, most)| *v < most), "{index}: {found:?}");
+            assert!(errors.iter().zip(allowed).all(|(v, most)| *v < most), "{index}: {errors:?}");
         }
     }
 }

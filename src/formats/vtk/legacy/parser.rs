@@ -52,9 +52,9 @@ impl<'a> Parser<'a> {
             match words[..] {
                 [keyword, kind] if keyword.eq_ignore_ascii_case("DATASET") => {
                     let kind = kind.to_ascii_uppercase();
-                    let found = known.iter().position(|known| *known == kind);
+                    let index = known.iter().position(|known| *known == kind);
                     let message = format!("the data set {kind} is not supported");
-                    return Ok((parser, found.ok_or_else(|| source.error(place, message))?));
+                    return Ok((parser, index.ok_or_else(|| source.error(place, message))?));
                 }
                 // Data of the whole file may come first.
                 [keyword, _, count] if keyword.eq_ignore_ascii_case("FIELD") => {
@@ -315,13 +315,13 @@ impl<'a> Parser<'a> {
         let mut rest = &numbers[..];
         for cell in 0..count {
             // Casts saturate: a negative number of corners becomes 0.
-            let found = rest.split_first().and_then(|(&n, rest)| rest.split_at_checked(n as usize));
-            let Some((own, after)) = found else {
+            let split = rest.split_first().and_then(|(&n, rest)| rest.split_at_checked(n as usize));
+            let Some((listed, after)) = split else {
                 return Err(self
                     .source
                     .error(place, format!("cell {cell} has more corners than are listed")));
             };
-            corners.extend_from_slice(own);
+            corners.extend_from_slice(listed);
             ends.push(corners.len() as f64);
             rest = after;
         }
@@ -330,9 +330,9 @@ impl<'a> Parser<'a> {
 
     /// Returns the bytes of the next `count` words of a text file.
     fn length_of(&self, place: &str, count: usize) -> Result<usize> {
-        length_of_words(self.rest(), count).map_err(|found| {
+        length_of_words(self.rest(), count).map_err(|numbers| {
             let message =
-                format!("there are {found} numbers where {count} were expected: the file ends");
+                format!("there are {numbers} numbers where {count} were expected: the file ends");
             self.source.error(place, message)
         })
     }
@@ -398,8 +398,8 @@ fn arguments(keyword: &[u8]) -> Option<usize> {
         ("TEXTURE_COORDINATES", 3),
         ("EXTENT", 6),
     ];
-    let found = COUNTS.iter().find(|(name, _)| keyword.eq_ignore_ascii_case(name.as_bytes()));
-    found.map(|(_, count)| *count)
+    let entry = COUNTS.iter().find(|(name, _)| keyword.eq_ignore_ascii_case(name.as_bytes()));
+    entry.map(|(_, count)| *count)
 }
 
 /// An array of a field: `part` is `None` if its values are not numbers that can be read.
@@ -432,11 +432,11 @@ fn sample_type(name: &str) -> Option<SampleType> {
 /// Returns the bytes up to the end of the `count`-th word. If there are fewer words, the error is
 /// their number.
 fn length_of_words(bytes: &[u8], count: usize) -> Result<usize, usize> {
-    let (mut found, mut at) = (0, 0);
-    while found < count {
-        at += bytes[at..].iter().position(|b| !b.is_ascii_whitespace()).ok_or(found)?;
+    let (mut words, mut at) = (0, 0);
+    while words < count {
+        at += bytes[at..].iter().position(|b| !b.is_ascii_whitespace()).ok_or(words)?;
         at += bytes[at..].iter().position(u8::is_ascii_whitespace).unwrap_or(bytes.len() - at);
-        found += 1;
+        words += 1;
     }
     Ok(at)
 }

@@ -82,9 +82,9 @@ const IMAGE: &[(&str, &str, &str)] = &[
 fn structured_points() {
     for binary in [false, true] {
         let whole = file(binary, IMAGE);
-        let found = volume(&whole).unwrap();
-        assert_eq!(found.samples, Samples::U8(vec![0, 1, 2, 30, 4, 255]));
-        assert_eq!(found.bounds(), [DVec3::new(10.0, 20.0, 30.0), DVec3::new(11.0, 21.0, 30.0)]);
+        let loaded = volume(&whole).unwrap();
+        assert_eq!(loaded.samples, Samples::U8(vec![0, 1, 2, 30, 4, 255]));
+        assert_eq!(loaded.bounds(), [DVec3::new(10.0, 20.0, 30.0), DVec3::new(11.0, 21.0, 30.0)]);
         // Without the line end after the last number, the file is still whole. A text without its
         // last digits has a shorter number.
         for end in 0..whole.len() - if binary { 1 } else { 3 } {
@@ -110,9 +110,9 @@ fn rectilinear_grids() {
                 ("POINT_DATA 6\nFIELD FieldData 1\nmy%20field 1 6 float", "float", "0 1 2 3 4 5.5"),
             ],
         );
-        let found = volume(&grid).unwrap();
-        assert_eq!((found.range, found.lattice.dims), ([0.0, 5.5], [3, 2, 1]));
-        assert_eq!(found.lattice.sample_position(5), DVec3::new(5.0, 1.0, 7.0));
+        let loaded = volume(&grid).unwrap();
+        assert_eq!((loaded.range, loaded.lattice.dims), ([0.0, 5.5], [3, 2, 1]));
+        assert_eq!(loaded.lattice.sample_position(5), DVec3::new(5.0, 1.0, 7.0));
     }
 }
 
@@ -260,9 +260,9 @@ fn arrays_that_are_not_numbers_are_skipped() {
     bytes.extend(b"CELL_DATA 1\nCOLOR_SCALARS rgb 3\n\xff\x80\x00\n");
     for content in [text.as_bytes(), &bytes] {
         let names = |arrays: Vec<Array>| -> Vec<(String, String, bool)> {
-            arrays.into_iter().map(|own| (own.name, own.kind, own.is_drawn)).collect()
+            arrays.into_iter().map(|array| (array.name, array.kind, array.is_drawn)).collect()
         };
-        let found = names(with(content, Some("v"), arrays).unwrap());
+        let listed = names(with(content, Some("v"), arrays).unwrap());
         let row = |name: &str, kind: &str, drawn| (name.to_owned(), kind.to_owned(), drawn);
         let rows = [
             row("b", "bit", false),
@@ -270,7 +270,7 @@ fn arrays_that_are_not_numbers_are_skipped() {
             row("v", "f32", true),
             row("rgb", "u8", false),
         ];
-        assert_eq!(found, rows);
+        assert_eq!(listed, rows);
         assert_eq!(with(content, Some("v"), read_mesh).unwrap().values, [5.0, 1.0, 2.0]);
         let mesh: Mesh = with(content, None, read_mesh).unwrap();
         assert_eq!((mesh.colors, mesh.values.len()), (vec![[255, 128, 0, 255]; 3], 0));

@@ -99,19 +99,19 @@ pub fn row(tree: &Tree) -> splatkit::Result<(Hierarchy, Vec<Cell>)> {
 /// leaf is the one. Splats of one vertex share their position and differ in direction and size.
 fn nearest<'a>(leaf: &Node, kept: &[&'a Node]) -> &'a Node {
     let (place, normal) = (Vec3::from(leaf.splat.center), decode_normal(leaf.splat.normal));
-    let mut found = (f32::INFINITY, kept[0]);
+    let mut best = (f32::INFINITY, kept[0]);
     for other in kept {
         let apart = place.distance(other.splat.center.into());
-        if apart < found.0 {
+        if apart < best.0 {
             let turned =
                 normal.zip(decode_normal(other.splat.normal)).map_or(0.0, |(a, b)| a.distance(b));
             let distance = apart + 0.2 * (leaf.size * turned + (leaf.size - other.size).abs());
-            if distance < found.0 {
-                found = (distance, other);
+            if distance < best.0 {
+                best = (distance, other);
             }
         }
     }
-    found.1
+    best.1
 }
 
 /// Returns the mean distance of the nearest neighbours that are not at the same position.

@@ -97,9 +97,9 @@ pub fn tables(
             let small = Settings::new(SMALL);
             let truth = reference::trained(&case.set, &camera, &small)?;
             for (_, mode) in MODES {
-                let (found, _) = cpu.render(&camera, &settings(SMALL, mode))?;
-                cells.push(Cell::Number(psnr(&found, &truth)?, 1));
-                save(case, pictures, &camera, mode, &found)?;
+                let (picture, _) = cpu.render(&camera, &settings(SMALL, mode))?;
+                cells.push(Cell::Number(psnr(&picture, &truth)?, 1));
+                save(case, pictures, &camera, mode, &picture)?;
             }
             save_truth(case, pictures, &camera, &truth)?;
         }

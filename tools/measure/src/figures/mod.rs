@@ -123,7 +123,7 @@ impl Stage {
 impl Figures {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         let block = self.write.as_deref().map(|path| Block::open(path, "figures")).transpose()?;
-        self.look_at_inputs()?;
+        self.check_inputs()?;
         if self.pictures.is_some() && self.surfaces.is_empty() && self.gaussians.is_none() {
             return Err(Failure::Usage("--pictures is for --surfaces and --gaussians".into()));
         }
@@ -219,24 +219,24 @@ impl Figures {
     }
 
     /// Refuses files that cannot be measured, before any file is.
-    fn look_at_inputs(&self) -> Result<(), Failure> {
+    fn check_inputs(&self) -> Result<(), Failure> {
         if !self.files.is_empty() && !self.measures(Part::Dense) {
             return Err(Failure::Usage(
                 "volumes are for the part dense, which --only leaves out".into(),
             ));
         }
-        let look = |path: &Path, kinds: &[Kind], message: &str| match kinds
+        let check = |path: &Path, kinds: &[Kind], message: &str| match kinds
             .contains(&self.load.kind(path)?)
         {
             true => Ok(()),
             false => Err(Failure::from(Error::input(path, "file", message))),
         };
-        self.files.iter().try_for_each(|file| look(file, &[Kind::Volume], dense::OTHER))?;
+        self.files.iter().try_for_each(|file| check(file, &[Kind::Volume], dense::OTHER))?;
         self.surfaces
             .iter()
-            .try_for_each(|source| look(&source.path, &[Kind::Mesh], surfaces::OTHER))?;
+            .try_for_each(|source| check(&source.path, &[Kind::Mesh], surfaces::OTHER))?;
         let kinds = [Kind::Mesh, Kind::Hierarchy];
-        self.detail.iter().try_for_each(|source| look(&source.path, &kinds, detail::OTHER))
+        self.detail.iter().try_for_each(|source| check(&source.path, &kinds, detail::OTHER))
     }
 
     fn dense(&self, stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {

@@ -77,19 +77,22 @@ impl Truth {
         stage: &mut Stage,
         scene: &Scene,
         detail: Detail,
-    ) -> splatkit::Result<(Picture, Found, u64)> {
+    ) -> splatkit::Result<(Picture, Deviation, u64)> {
         let mut prepared = stage.prepare(scene)?;
         let settings = Settings { detail, ..self.settings.clone() };
         let (picture, stats) = stage.renderer.render(&mut prepared, &self.camera, &settings)?;
-        let found =
-            Found::between(&picture, &self.picture, self.camera.view(self.settings.size)?.scale)?;
-        Ok((picture, found, stats.splats))
+        let deviation = Deviation::between(
+            &picture,
+            &self.picture,
+            self.camera.view(self.settings.size)?.scale,
+        )?;
+        Ok((picture, deviation, stats.splats))
     }
 }
 
 /// How far a picture of splats is from its truth.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct Deviation {
     psnr: Option<f64>,
     /// Shares of the squared error: at the silhouette, at steps in depth within it, and elsewhere.
     shares: [f64; 3],
@@ -104,14 +107,14 @@ pub struct Found {
     holes: [usize; 2],
 }
 
-impl Found {
+impl Deviation {
     /// Compares a picture with its truth. `scale` is how many pixels a unit of world length covers
     /// at distance 1 in a perspective view.
     fn between(picture: &Picture, truth: &Picture, scale: f64) -> splatkit::Result<Self> {
         let comparison = compare_pictures(picture, truth)?;
         let size = [truth.width, truth.height].map(|side| side as usize);
         let covered = |at: usize| truth.color[at][3] >= 0.5;
-        let mut found = Self {
+        let mut deviation = Self {
             psnr: comparison.psnr,
             shares: [0.0; 3],
             over: Vec::new(),
@@ -120,11 +123,11 @@ impl Found {
             holes: [0; 2],
         };
         for at in 0..truth.color.len() {
-            let (own, wanted) = (picture.color[at], truth.color[at]);
+            let (pixel, wanted) = (picture.color[at], truth.color[at]);
             let around = || around(at, size, BESIDE);
             let at_outline = around().any(|i| truth.color[i][3] > 0.0)
                 && around().any(|i| truth.color[i][3] < 1.0);
-            let error: f64 = own.iter().zip(wanted).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+            let error: f64 = pixel.iter().zip(wanted).map(|(a, b)| f64::from(a - b).powi(2)).sum();
             let place = if at_outline {
                 0
             } else if wanted[3] > 0.0 && around().any(|i| is_step(&truth.depth, i, size[0], scale))
@@ -133,21 +136,21 @@ impl Found {
             } else {
                 2
             };
-            found.shares[place] += error;
-            match (own[3] >= 0.5, covered(at)) {
-                (true, false) => found.over.push(nearest(at, size, covered)),
-                (false, true) => found.under += 1,
+            deviation.shares[place] += error;
+            match (pixel[3] >= 0.5, covered(at)) {
+                (true, false) => deviation.over.push(nearest(at, size, covered)),
+                (false, true) => deviation.under += 1,
                 _ => {}
             }
             if wanted[3] > 0.0 && !at_outline {
-                found.holes[0] += usize::from(own[3] < 0.9);
-                found.holes[1] += usize::from(own[3] < 0.5);
+                deviation.holes[0] += usize::from(pixel[3] < 0.9);
+                deviation.holes[1] += usize::from(pixel[3] < 0.5);
             }
         }
-        let sum: f64 = found.shares.iter().sum();
-        found.shares = found.shares.map(|share| share / sum.max(f64::MIN_POSITIVE));
-        found.over.sort_by(f64::total_cmp);
-        Ok(found)
+        let sum: f64 = deviation.shares.iter().sum();
+        deviation.shares = deviation.shares.map(|share| share / sum.max(f64::MIN_POSITIVE));
+        deviation.over.sort_by(f64::total_cmp);
+        Ok(deviation)
     }
 
     /// Returns the cells in the order of the columns in [`tables`].
@@ -184,11 +187,11 @@ fn around(at: usize, [width, height]: [usize; 2], reach: usize) -> impl Iterator
 
 /// Whether depth jumps between a pixel and the next ones to the right and below.
 fn is_step(depth: &[f32], at: usize, width: usize, scale: f64) -> bool {
-    let own = depth[at];
+    let here = depth[at];
     [1, width]
         .iter()
         .filter_map(|step| depth.get(at + step))
-        .any(|&next| f64::from((next - own).abs()) * scale > STEP * f64::from(own.min(next)))
+        .any(|&next| f64::from((next - here).abs()) * scale > STEP * f64::from(here.min(next)))
 }
 
 /// Returns the distance to the nearest covered pixel, at most 64 pixels.
@@ -218,17 +221,17 @@ pub fn pictures(
         ["truth", "splats"].map(|what| folder.join(format!("{}_{what}.png", source.name())))
     };
     let files: Vec<_> = sources.iter().map(files_of).collect();
-    for (at, own) in files.iter().enumerate() {
-        if let Some(first) = files[..at].iter().position(|other| other == own) {
+    for (at, paths) in files.iter().enumerate() {
+        if let Some(first) = files[..at].iter().position(|other| other == paths) {
             let [first, second] = [first, at].map(|at| sources[at].path.display());
-            let picture = own[0].display();
+            let picture = paths[0].display();
             return Err(Failure::Usage(format!(
                 "{picture} would be the picture of {first} and of {second}: rename one, or \
                  measure them one by one"
             )));
         }
-        own.iter().try_for_each(|file| output::check(file, overwrite))?;
-        output::try_writing(&own[0], &[])?;
+        paths.iter().try_for_each(|file| output::check(file, overwrite))?;
+        output::try_writing(&paths[0], &[])?;
     }
     Ok(files)
 }
@@ -282,17 +285,17 @@ pub fn tables(
             ..BuildOptions::default()
         };
         let tree = Tree::build(&splats, &options, None)?;
-        let (picture, found, drawn) =
+        let (picture, deviation, drawn) =
             truth.measure(stage, &Scene::new().with_splats(splats), Detail::default())?;
-        table.row(source.name(), found.cells(drawn));
+        table.row(source.name(), deviation.cells(drawn));
         let (hierarchy, cells) = files::row(&tree)?;
         sizes.row(source.name(), cells);
         let scene = Scene::new().with_hierarchy(hierarchy);
         for (name, pixels) in
             [("file, leaves", 0.0), ("file, 1 pixel", 1.0), ("file, 2 pixels", 2.0)]
         {
-            let (_, found, drawn) = truth.measure(stage, &scene, Detail::Pixels(pixels))?;
-            table.row(format!("{}, {name}", source.name()), found.cells(drawn));
+            let (_, deviation, drawn) = truth.measure(stage, &scene, Detail::Pixels(pixels))?;
+            table.row(format!("{}, {name}", source.name()), deviation.cells(drawn));
         }
         if let Some([of_truth, of_splats]) = keep.get(at) {
             truth.picture.save(of_truth, Some([0.0; 3]))?;
@@ -317,19 +320,19 @@ mod tests {
     #[test]
     fn outlines_and_holes_are_counted() {
         let truth = bar(10, 30, |_| 1.0);
-        let none = Found::between(&truth, &truth, 100.0).unwrap();
+        let none = Deviation::between(&truth, &truth, 100.0).unwrap();
         assert_eq!((none.psnr, none.over.len(), none.under, none.holes), (None, 0, 0, [0, 0]));
         let picture =
             bar(8, 29, |x| [1.0, 0.8, 0.4][usize::from(x == 20) + 2 * usize::from(x == 21)]);
-        let found = Found::between(&picture, &truth, 100.0).unwrap();
-        assert_eq!((found.over.len(), found.under, found.covered), (14, 14, 140));
-        assert_eq!((found.over[0], found.over[13]), (1.0, 2.0));
-        assert_eq!(found.holes, [14, 7]);
+        let deviation = Deviation::between(&picture, &truth, 100.0).unwrap();
+        assert_eq!((deviation.over.len(), deviation.under, deviation.covered), (14, 14, 140));
+        assert_eq!((deviation.over[0], deviation.over[13]), (1.0, 2.0));
+        assert_eq!(deviation.holes, [14, 7]);
         // At the outline, two columns and one column of error 1; 0.04 and 0.36 elsewhere.
         assert!(
-            (found.shares[0] - 3.0 / 3.4).abs() < 1e-6 && found.shares[1] == 0.0,
+            (deviation.shares[0] - 3.0 / 3.4).abs() < 1e-6 && deviation.shares[1] == 0.0,
             "{:?}",
-            found.shares
+            deviation.shares
         );
     }
 

@@ -96,6 +96,6 @@ pub fn effective(volume: &Volume, kernel: &Kernel, transfer: &TransferFunction) 
 /// Returns a scene of a volume under a transfer function, and how many of its samples are visible.
 pub fn volume(volume: Arc<Volume>, transfer: TransferFunction) -> (Scene, u64) {
     let kernel = Kernel::default();
-    let shown = effective(&volume, &kernel, &transfer);
-    (Scene::new().with_volume(volume, kernel, transfer), shown)
+    let visible = effective(&volume, &kernel, &transfer);
+    (Scene::new().with_volume(volume, kernel, transfer), visible)
 }

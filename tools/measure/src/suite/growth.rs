@@ -59,8 +59,8 @@ fn volume(side: usize, size: u32) -> Result<Case> {
     let [min, max] = volume.bounds();
     // One transfer function for all sizes: the range of values is the same, and opacity holds for a
     // length.
-    let shown = Phantom::Specimen.sample_bytes([64; 3])?;
-    let (kernel, transfer) = (Kernel::default(), TransferFunction::automatic(&shown));
+    let small = Phantom::Specimen.sample_bytes([64; 3])?;
+    let (kernel, transfer) = (Kernel::default(), TransferFunction::automatic(&small));
     let effective = case::effective(&volume, &kernel, &transfer);
     let samples = volume.len() as f64;
     let scene = Scene::new().with_bricks(Bricks::from_volume(Arc::new(volume))?, kernel, transfer);

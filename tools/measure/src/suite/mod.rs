@@ -75,7 +75,7 @@ impl Part {
     }
 
     /// Returns the name, the title and a description.
-    fn told(self) -> [&'static str; 3] {
+    fn labels(self) -> [&'static str; 3] {
         match self {
             Self::Seed => [
                 "seed",
@@ -113,14 +113,14 @@ impl Suite {
             let left_out = Part::value_variants()
                 .iter()
                 .filter(|part| !self.measures(**part))
-                .map(|part| part.told());
+                .map(|part| part.labels());
             let parts = left_out.map(|[name, title, _]| (name.to_owned(), title));
             check_kept(&block.inside()?, &machine, parts, "--only")?;
         }
         let counts = Counts { frames: frames.unwrap_or(FRAMES), runs: self.repeat };
         let mut chapters = Vec::new();
         for part in Part::value_variants().iter().filter(|part| self.measures(**part)) {
-            let [name, title, note] = part.told();
+            let [name, title, note] = part.labels();
             let outcomes = measure::outcomes(
                 part.plans(*effort, self.data.as_deref())?,
                 &mut device,

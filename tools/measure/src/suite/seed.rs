@@ -28,13 +28,13 @@ const SIZE: u32 = 512;
 
 /// How the table shows a volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Look {
+enum Style {
     /// Opaque from a value on.
     Surface,
     /// Translucent from a value on.
     Semi,
 }
-use Look::{Semi, Surface};
+use Style::{Semi, Surface};
 
 /// A row of the table.
 #[derive(Debug, Clone, Copy)]
@@ -45,7 +45,7 @@ struct Row {
     dims: [usize; 3],
     /// Whether its lattice is body-centred cubic.
     centred: bool,
-    look: Look,
+    style: Style,
     seed: Seed,
     /// The phantom that replaces it, and half the width of the cube that is sampled: a wider cube
     /// leaves more air around the phantom.
@@ -57,12 +57,12 @@ const fn row(
     name: &'static str,
     file: &'static str,
     dims: [usize; 3],
-    look: Look,
+    style: Style,
     splats: u64,
     fps: f64,
 ) -> Row {
     let seed = Seed { splats, fps };
-    Row { name, file, dims, centred: false, look, seed, phantom: Phantom::Specimen, reach: 1.0 }
+    Row { name, file, dims, centred: false, style, seed, phantom: Phantom::Specimen, reach: 1.0 }
 }
 
 impl Row {
@@ -158,7 +158,7 @@ impl Row {
         if self.name == AXIS_ALIGNED {
             settings.mode = Mode::AxisSheets;
         }
-        let transfer = self.look.transfer(&volume, wanted);
+        let transfer = self.style.transfer(&volume, wanted);
         let (scene, effective) = case::volume(Arc::new(volume), transfer);
         let subject = Subject::new(Bounds { min, max }, DVec3::Z);
         let mut case = Case::new(format!("{drawn}, {dims}"), scene, subject, settings, effective);
@@ -198,7 +198,7 @@ fn name_of(phantom: Phantom) -> &'static str {
         .unwrap_or("phantom")
 }
 
-impl Look {
+impl Style {
     /// Returns a transfer function that shows the values above a threshold. The threshold brings
     /// the number of splats closest to `wanted`.
     fn transfer(self, volume: &Volume, wanted: u64) -> TransferFunction {
@@ -207,12 +207,12 @@ impl Look {
             .drawn_ranges(&Kernel::default())
             .iter()
             .for_each(|[_, high]| counts[usize::from(*high)] += 1);
-        let mut shown = 0;
+        let mut visible = 0;
         // From the largest value down: if the values up to a step are transparent, the samples that
         // reach a higher step are visible.
         let start = (0..255usize).rev().map(|step| {
-            shown += counts[step + 1];
-            (shown.abs_diff(wanted), step)
+            visible += counts[step + 1];
+            (visible.abs_diff(wanted), step)
         });
         let start = start.min().map_or(0, |(_, step)| step);
         let [low, high] = volume.range;

@@ -40,8 +40,8 @@ impl Chapter {
     pub fn markdown(&self) -> String {
         let tables = [self.cases(), self.passes()].map(|table| table.markdown());
         let mut text = tables.join("\n");
-        for found in series::slopes(self.measured()) {
-            text += &format!("\n{found}\n");
+        for slope in series::slopes(self.measured()) {
+            text += &format!("\n{slope}\n");
         }
         for Outcome { name, result } in &self.outcomes {
             if let Err(error) = result {
@@ -53,7 +53,7 @@ impl Chapter {
 
     pub fn json(&self) -> Value {
         let cases: Value = self.outcomes.iter().map(case_json).collect();
-        let slopes: Value = series::slopes(self.measured()).map(|found| found.json()).collect();
+        let slopes: Value = series::slopes(self.measured()).map(|slope| slope.json()).collect();
         json!({ "name": self.name, "cases": cases, "slopes": slopes })
     }
 
@@ -62,9 +62,9 @@ impl Chapter {
     }
 
     fn cases(&self) -> Table {
-        let seeded = self.measured().any(|found| found.seed.is_some());
-        let repeated = self.measured().any(|found| found.same_bytes.is_some());
-        let gathered = self.measured().any(|found| found.gathered.is_some());
+        let seeded = self.measured().any(|measured| measured.seed.is_some());
+        let repeated = self.measured().any(|measured| measured.same_bytes.is_some());
+        let gathered = self.measured().any(|measured| measured.gathered.is_some());
         let mut columns = COLUMNS.to_vec();
         columns.extend(MEMORY);
         if gathered {
@@ -78,15 +78,15 @@ impl Chapter {
         }
         let mut table = Table::new(self.title, self.note, &columns);
         for Outcome { name, result } in &self.outcomes {
-            let Ok(found) = result else { continue };
-            let mut cells = cells(found);
+            let Ok(measured) = result else { continue };
+            let mut cells = cells(measured);
             if gathered {
-                cells.extend(gathered_cells(found));
+                cells.extend(gathered_cells(measured));
             }
-            if let Some(seed) = found.seed {
+            if let Some(seed) = measured.seed {
                 cells.extend([Cell::Number(seed.splats as f64, 0), Cell::Number(seed.fps, 2)]);
             }
-            if let Some(same) = found.same_bytes {
+            if let Some(same) = measured.same_bytes {
                 cells.push(Cell::Text(if same { "yes" } else { "NO" }.into()));
             }
             table.row(name, cells);
@@ -96,9 +96,9 @@ impl Chapter {
 
     fn passes(&self) -> Table {
         let mut names: Vec<&str> = Vec::new();
-        let steps = |found: &'_ Measured| {
-            let gathered = found.gathered.iter().flat_map(|gathered| &gathered.steps);
-            found.steps.iter().chain(gathered).map(|step| step.0).collect::<Vec<_>>()
+        let steps = |measured: &'_ Measured| {
+            let gathered = measured.gathered.iter().flat_map(|gathered| &gathered.steps);
+            measured.steps.iter().chain(gathered).map(|step| step.0).collect::<Vec<_>>()
         };
         for name in self.measured().flat_map(steps) {
             if !names.contains(&name) {
@@ -108,9 +108,9 @@ impl Chapter {
         let columns: Vec<_> = std::iter::once("case").chain(names.iter().copied()).collect();
         let mut table = Table::new("Passes.", "Milliseconds of each in a frame.", &columns);
         for Outcome { name, result } in &self.outcomes {
-            let Ok(found) = result else { continue };
-            table.row(name, step_cells(&names, &found.steps));
-            if let Some(gathered) = &found.gathered {
+            let Ok(measured) = result else { continue };
+            table.row(name, step_cells(&names, &measured.steps));
+            if let Some(gathered) = &measured.gathered {
                 table.row(format!("{name}, gathered"), step_cells(&names, &gathered.steps));
             }
         }
@@ -127,36 +127,36 @@ fn step_cells(names: &[&str], steps: &[(&'static str, f64)]) -> Vec<Cell> {
     names.iter().map(cell).collect()
 }
 
-fn gathered_cells(found: &Measured) -> [Cell; 2] {
-    let Some(gathered) = &found.gathered else { return [Cell::None, Cell::None] };
+fn gathered_cells(measured: &Measured) -> [Cell; 2] {
+    let Some(gathered) = &measured.gathered else { return [Cell::None, Cell::None] };
     [Cell::Number(gathered.times.median, 1), Cell::Number((gathered.bytes >> 20) as f64, 0)]
 }
 
-fn cells(found: &Measured) -> Vec<Cell> {
-    let Measured { drawn, size: [width, height], times, stats, .. } = found;
+fn cells(measured: &Measured) -> Vec<Cell> {
+    let Measured { drawn, size: [width, height], times, stats, .. } = measured;
     let count = |count: u64| Cell::Number(count as f64, 0);
     let mebibytes = |bytes: u64| count(bytes >> 20);
     vec![
         Cell::Text(drawn.clone()),
         Cell::Text(format!("{width}×{height}")),
-        count(found.effective),
+        count(measured.effective),
         count(stats.splats),
         count(stats.hidden),
         count(stats.entries),
         count(u64::from(stats.passes)),
         Cell::Number(times.median, 1),
         Cell::Text(format!("{:.1}–{:.1}", times.min, times.max)),
-        Cell::Number(found.fps(), 2),
-        Cell::Number(found.per_second(stats.splats) / 1e6, 2),
-        Cell::Number(found.per_second(stats.entries) / 1e6, 2),
+        Cell::Number(measured.fps(), 2),
+        Cell::Number(measured.per_second(stats.splats) / 1e6, 2),
+        Cell::Number(measured.per_second(stats.entries) / 1e6, 2),
         mebibytes(stats.gpu_bytes),
-        found.cpu_peak.map_or(Cell::None, mebibytes),
+        measured.cpu_peak.map_or(Cell::None, mebibytes),
     ]
 }
 
 fn case_json(Outcome { name, result }: &Outcome) -> Value {
-    let found = match result {
-        Ok(found) => found,
+    let measured = match result {
+        Ok(measured) => measured,
         Err(error) => return json!({ "name": name, "error": error.to_string() }),
     };
     let Measured {
@@ -170,7 +170,7 @@ fn case_json(Outcome { name, result }: &Outcome) -> Value {
         gathered,
         same_bytes,
         ..
-    } = found;
+    } = measured;
     json!({
         "name": name,
         "drawn": drawn,
@@ -183,9 +183,9 @@ fn case_json(Outcome { name, result }: &Outcome) -> Value {
         "gathered": stats.gathered,
         "depth_passes": stats.passes,
         "frame_ms": times.json(),
-        "fps": found.fps(),
-        "splats_per_second": found.per_second(stats.splats),
-        "entries_per_second": found.per_second(stats.entries),
+        "fps": measured.fps(),
+        "splats_per_second": measured.per_second(stats.splats),
+        "entries_per_second": measured.per_second(stats.entries),
         "gpu_bytes": stats.gpu_bytes,
         "cpu_peak_bytes": cpu_peak,
         "passes": timing::steps(steps),
@@ -195,6 +195,6 @@ fn case_json(Outcome { name, result }: &Outcome) -> Value {
             "passes": timing::steps(&gathered.steps),
         })),
         "same_bytes": same_bytes,
-        "seed": found.seed.map(|seed| json!({ "splats": seed.splats, "fps": seed.fps })),
+        "seed": measured.seed.map(|seed| json!({ "splats": seed.splats, "fps": seed.fps })),
     })
 }

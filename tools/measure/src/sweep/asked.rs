@@ -44,7 +44,8 @@ impl Asked {
     /// Returns how many times as much this asks for as `other`, in the quantity that grows most; at
     /// least 1.
     pub fn times(&self, other: &Self) -> f64 {
-        let ratio = |own: f64, other: f64| if own > 0.0 && other > 0.0 { own / other } else { 1.0 };
+        let ratio =
+            |value: f64, other: f64| if value > 0.0 && other > 0.0 { value / other } else { 1.0 };
         let ratios = [
             ratio(self.pixels, other.pixels),
             ratio(self.on_rays, other.on_rays),
@@ -211,8 +212,8 @@ mod tests {
 
     #[test]
     fn places_on_rays_are_counted() {
-        let near = |found: f64, wanted: f64| {
-            assert!((found / wanted - 1.0).abs() < 0.05, "{found} {wanted}");
+        let near = |actual: f64, wanted: f64| {
+            assert!((actual / wanted - 1.0).abs() < 0.05, "{actual} {wanted}");
         };
         // 40 × 40 pixels of 10 samples each.
         near(field().on_rays(&view(), None), 16_000.0);

@@ -62,8 +62,11 @@ fn is_undrawn(error: &Error) -> bool {
 /// frame times, because other programs do not lower them.
 pub fn compared<'a>(outcomes: &'a [Outcome], outcome: &Outcome) -> Option<(&'a Outcome, Ratio)> {
     let neighbour = &outcomes[outcome.against?];
-    let (own, other) = (outcome.result.as_ref().ok()?, neighbour.result.as_ref().ok()?);
-    Some((neighbour, Ratio::of((own.times.min, &own.asked), (other.times.min, &other.asked))))
+    let (measured, other) = (outcome.result.as_ref().ok()?, neighbour.result.as_ref().ok()?);
+    Some((
+        neighbour,
+        Ratio::of((measured.times.min, &measured.asked), (other.times.min, &other.asked)),
+    ))
 }
 
 /// How steps are measured.
@@ -81,13 +84,13 @@ impl Measure<'_> {
             let result = self.result(axis, plan);
             outcomes.push(Outcome { name: plan.name.clone(), against: plan.against, result });
         }
-        self.look_again(axis, &plans, &mut outcomes);
+        self.remeasure(axis, &plans, &mut outcomes);
         outcomes
     }
 
     /// Measures both sides of each low cliff once more, because another program may have used the
     /// processor. That would not explain a high cliff.
-    fn look_again(&mut self, axis: &str, plans: &[Plan], outcomes: &mut [Outcome]) {
+    fn remeasure(&mut self, axis: &str, plans: &[Plan], outcomes: &mut [Outcome]) {
         let mut sides: Vec<usize> = Vec::new();
         for (at, outcome) in outcomes.iter().enumerate() {
             if let (Some(other), Some((_, ratio))) = (outcome.against, compared(outcomes, outcome))

@@ -114,7 +114,7 @@ impl Axis {
     }
 
     /// Returns the title and a description.
-    fn told(self) -> [&'static str; 2] {
+    fn labels(self) -> [&'static str; 2] {
         match self {
             Self::Distance => [
                 "Distance.",
@@ -171,7 +171,7 @@ impl Sweep {
         let machine = Machine::of(&device);
         if let Some(block) = &block {
             let left_out = Axis::value_variants().iter().filter(|axis| !self.measures(**axis));
-            let parts = left_out.map(|axis| (axis.name(), axis.told()[0]));
+            let parts = left_out.map(|axis| (axis.name(), axis.labels()[0]));
             check_kept(&block.inside()?, &machine, parts, "--axes")?;
         }
         let frames = frames.map_or(self::frames(*effort), |frames| {
@@ -182,7 +182,7 @@ impl Sweep {
             Measure { device: &mut device, evaluate: self.evaluate.into(), frames, progress };
         let mut chapters = Vec::new();
         for axis in Axis::value_variants().iter().filter(|axis| self.measures(**axis)) {
-            let ([title, note], name) = (axis.told(), axis.name());
+            let ([title, note], name) = (axis.labels(), axis.name());
             let outcomes = measure.outcomes(&name, axis.plans(*effort));
             chapters.push(Chapter { name, title, note, outcomes });
         }

@@ -18,9 +18,9 @@ pub struct Ratio {
 
 impl Ratio {
     /// Compares a step with its neighbour. Each is given by its milliseconds and its work.
-    pub fn of(own: (f64, &Asked), neighbour: (f64, &Asked)) -> Self {
-        let time = own.0 / neighbour.0;
-        let asked = if time > 1.0 { own.1.times(neighbour.1) } else { neighbour.1.times(own.1) };
+    pub fn of(step: (f64, &Asked), neighbour: (f64, &Asked)) -> Self {
+        let time = step.0 / neighbour.0;
+        let asked = if time > 1.0 { step.1.times(neighbour.1) } else { neighbour.1.times(step.1) };
         Self { time, asked }
     }
 

@@ -40,8 +40,8 @@ impl Chapter {
     pub fn markdown(&self) -> String {
         let mut table = Table::new(self.title, self.note, &COLUMNS);
         for outcome in &self.outcomes {
-            if let Ok(found) = &outcome.result {
-                table.row(&outcome.name, cells(found, compared(&self.outcomes, outcome)));
+            if let Ok(measured) = &outcome.result {
+                table.row(&outcome.name, cells(measured, compared(&self.outcomes, outcome)));
             }
         }
         let mut text = table.markdown();
@@ -83,7 +83,7 @@ impl Chapter {
     fn step(&self, outcome: &Outcome) -> Value {
         let Outcome { name, result, .. } = outcome;
         let Measured { size: [width, height], asked, times, stats } = match result {
-            Ok(found) => found,
+            Ok(measured) => measured,
             Err(error) => return json!({ "name": name, "error": error.to_string() }),
         };
         let compared = compared(&self.outcomes, outcome);
@@ -108,8 +108,8 @@ impl Chapter {
     }
 }
 
-fn cells(found: &Measured, compared: Option<(&Outcome, Ratio)>) -> Vec<Cell> {
-    let Measured { size: [width, height], asked, times, stats } = found;
+fn cells(measured: &Measured, compared: Option<(&Outcome, Ratio)>) -> Vec<Cell> {
+    let Measured { size: [width, height], asked, times, stats } = measured;
     let part = |part: f64, digits| if part > 0.0 { Cell::Number(part, digits) } else { Cell::None };
     let count = |count| part(count, 0);
     let mut cells = vec![
@@ -153,13 +153,13 @@ mod tests {
 
     fn outcome(name: &str, against: Option<usize>, ms: f64) -> Outcome {
         let asked = Asked { pixels: 100.0, on_rays: 1000.0, in_view: 10.0 };
-        let found = Measured {
+        let measured = Measured {
             size: [9, 9],
             asked,
             times: Times::of(vec![ms]),
             stats: FrameStats::default(),
         };
-        Outcome { name: name.into(), against, result: Ok(found) }
+        Outcome { name: name.into(), against, result: Ok(measured) }
     }
 
     #[test]

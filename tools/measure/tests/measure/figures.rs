@@ -5,7 +5,7 @@ use crate::common::*;
 /// Returns a figure of a table, by the beginning of its row's name.
 fn figure(table: &serde_json::Value, row: &str, column: &str) -> f64 {
     let rows = table["rows"].as_array().unwrap();
-    let row = rows.iter().find(|found| found["name"].as_str().unwrap().starts_with(row)).unwrap();
+    let row = rows.iter().find(|entry| entry["name"].as_str().unwrap().starts_with(row)).unwrap();
     row[column].as_f64().unwrap()
 }
 
@@ -25,13 +25,13 @@ fn figures_are_measured_and_written() {
     assert!(page.starts_with("before\n<!--") && page.ends_with("-->\nafter\n"), "{page}");
     assert!(page.contains("\n**Another.** Kept.\n"), "{page}");
     assert!(page.contains("| Gaussian, σ 0.6, extent 2 (default) | 1."), "{page}");
-    let found = folder.json("figures --only bleeding --json");
-    let bleeding = &found["tables"][0];
+    let report = folder.json("figures --only bleeding --json");
+    let bleeding = &report["tables"][0];
     // Slices of the data along the other axis contain both slabs side by side.
     assert!(
         figure(bleeding, "axis-aligned sheets", "50°")
             > 2.0 * figure(bleeding, "image-aligned sheets", "50°"),
-        "{found}"
+        "{report}"
     );
 }
 

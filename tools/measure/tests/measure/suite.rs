@@ -34,15 +34,15 @@ fn the_suite_measures_growth() {
         "a\n<!-- suite: written by `splatkit-measure suite --write` -->\n### other\n\nkept\n\
          <!-- end of suite -->\nb\n",
     );
-    let found = folder.json(
+    let report = folder.json(
         "suite --engine gpu --effort quick --only growth --frames 1 --repeat 2 --json \
          --write page.md",
     );
     assert!(
-        !found["machine"]["adapter"].as_str().unwrap().is_empty()
-            && found["machine"]["cores"].as_u64() > Some(0)
+        !report["machine"]["adapter"].as_str().unwrap().is_empty()
+            && report["machine"]["cores"].as_u64() > Some(0)
     );
-    let [growth] = &found["parts"].as_array().unwrap()[..] else { panic!("{found}") };
+    let [growth] = &report["parts"].as_array().unwrap()[..] else { panic!("{report}") };
     let cases = growth["cases"].as_array().unwrap();
     assert_eq!((growth["name"].as_str(), cases.len()), (Some("growth"), 6));
     for case in cases {
@@ -104,8 +104,8 @@ fn the_classic_table_takes_files() {
     let run =
         folder.run("suite --engine gpu --effort quick --only seed --data . --frames 1 --json");
     assert_eq!(run.code(), Some(1), "{}", run.stderr());
-    let found: Value = serde_json::from_str(&run.stdout()).unwrap();
-    let cases = found["parts"][0]["cases"].as_array().unwrap();
+    let report: Value = serde_json::from_str(&run.stdout()).unwrap();
+    let cases = report["parts"][0]["cases"].as_array().unwrap();
     let case = |name: &str| cases.iter().find(|case| case["name"] == name).unwrap();
     assert_eq!(case("Aneurism")["drawn"], "aneurism.nrrd, 16×16×16");
     assert_eq!(case("Aneurism")["seed"]["fps"], 9.1);

@@ -8,11 +8,11 @@ fn the_sweep_compares_neighbours() {
     let page = "a\n<!-- sweep: written by `splatkit-measure sweep --write` -->\n\
         <!-- end of sweep -->\nb\n";
     folder.put("page.md", page);
-    let found = folder.json(
+    let report = folder.json(
         "sweep --engine cpu --effort quick --axes size,kernel --frames 1 --json \
          --write page.md",
     );
-    let [size, kernel] = &found["axes"].as_array().unwrap()[..] else { panic!("{found}") };
+    let [size, kernel] = &report["axes"].as_array().unwrap()[..] else { panic!("{report}") };
     assert_eq!((size["name"].as_str(), kernel["name"].as_str()), (Some("size"), Some("kernel")));
     let steps = size["steps"].as_array().unwrap();
     assert!(steps.len() > 4 && steps[0]["beside"].is_null(), "{size}");

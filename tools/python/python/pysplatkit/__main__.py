@@ -49,12 +49,12 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add(scene: Scene, path: Path, given: argparse.Namespace) -> None:
     """Adds a file to a scene, read by splatkit or by another package."""
-    look = {name: getattr(given, name) for name in ("transfer", "colormap", "color")}
-    look = {name: value for name, value in look.items() if value is not None}
+    appearance = {name: getattr(given, name) for name in ("transfer", "colormap", "color")}
+    appearance = {name: value for name, value in appearance.items() if value is not None}
     reading = {name: getattr(given, name) for name in ("scalar", "time")}
     reading = {name: value for name, value in reading.items() if value is not None}
     try:
-        scene.add(path, **reading, **look)
+        scene.add(path, **reading, **appearance)
         return
     except InputError:
         # Files that are not there have another error.
@@ -64,11 +64,11 @@ def _add(scene: Scene, path: Path, given: argparse.Namespace) -> None:
     for word in words:
         _say(f"{path}: {word}")
     _say(f"{path}: read by {package}")
-    for own in objects:
-        options: dict[str, Any] = dict(look)
+    for item in objects:
+        options: dict[str, Any] = dict(appearance)
         if given.scalar is not None:
             options["scalar"] = given.scalar
-        scene.add(own, **options)
+        scene.add(item, **options)
 
 
 def _say(text: object) -> None:

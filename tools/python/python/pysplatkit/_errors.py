@@ -63,8 +63,8 @@ class LimitError(Error):
         self.limit = limit
 
     def __str__(self) -> str:
-        found = f"{self.what} is {self.found}, over the limit of {self.limit}"
-        return f"{self.file}: {found} (limits={{'{self.kind}': …}} raises it)"
+        text = f"{self.what} is {self.found}, over the limit of {self.limit}"
+        return f"{self.file}: {text} (limits={{'{self.kind}': …}} raises it)"
 
 
 class FileError(Error, OSError):

@@ -52,8 +52,8 @@ class Report:
 def check(path: PathLike, **reading: Unpack[Reading]) -> Report:
     """Checks a file: every checksum and guarantee of hierarchies and bricks, oddities of others."""
     given = _options.checked(reading, _options.READING, "check")
-    found = json.loads(_pysplatkit.check(os.fspath(path), _options.reading(given)))
-    return Report(found["ok"], [Finding(**own) for own in found["findings"]])
+    report = json.loads(_pysplatkit.check(os.fspath(path), _options.reading(given)))
+    return Report(report["ok"], [Finding(**finding) for finding in report["findings"]])
 
 
 class Format(NamedTuple):
@@ -68,7 +68,7 @@ class Format(NamedTuple):
 
 def formats() -> list[Format]:
     """Returns the formats that are read."""
-    return [Format(*own) for own in _pysplatkit.known_formats()]
+    return [Format(*fields) for fields in _pysplatkit.known_formats()]
 
 
 def convert(
@@ -122,13 +122,13 @@ def convert(
         "lattice": lattice,
         "memory": memory,
     }
-    look = {"color": color, "colormap": colormap, "range": range}
+    appearance = {"color": color, "colormap": colormap, "range": range}
     _pysplatkit.convert(
         paths,
         os.fspath(output),
         _options.text(conversion),
         _options.reading(given),
-        _options.look(look),
+        _options.appearance(appearance),
     )
     return Path(output)
 
@@ -173,12 +173,12 @@ class Hierarchy:
 
     def __init__(self, path: PathLike) -> None:
         self.path = Path(os.fspath(path))
-        self._own = _pysplatkit.Hierarchy(os.fspath(path), "{}")
-        self.__dict__.update(json.loads(self._own.header))
+        self._native = _pysplatkit.Hierarchy(os.fspath(path), "{}")
+        self.__dict__.update(json.loads(self._native.header))
 
     def leaves(self) -> Leaves:
         """Reads the splats of the finest level into memory."""
-        positions, factors, depths, colors, normals = self._own.leaves()
+        positions, factors, depths, colors, normals = self._native.leaves()
         lower = np.zeros((len(depths), 3, 3), np.float32)
         # The entries of the lower triangle, row by row.
         lower[:, [0, 1, 1, 2, 2, 2], [0, 0, 1, 0, 1, 2]] = factors.reshape(-1, 6)

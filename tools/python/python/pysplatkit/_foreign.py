@@ -40,12 +40,12 @@ def _only(time: int | None) -> None:
 
 def _chosen(count: int, time: int | None) -> tuple[int, list[str]]:
     """Returns the number of the time to read, by the rule of the files that splatkit reads."""
-    own = time or 0
-    if not 0 <= own < count:
-        raise ValueError(f"has {count} times, but number {own} was asked for")
+    number = time or 0
+    if not 0 <= number < count:
+        raise ValueError(f"has {count} times, but number {number} was asked for")
     many = count > 1 and time is None
     words = [f"shows the first of {count} times; --time 1 shows the second"] if many else []
-    return own, words
+    return number, words
 
 
 _EXODUS = frozenset(("e", "exo", "ex2", "g", "gen"))
@@ -63,8 +63,8 @@ def _pyvista(path: Path, time: int | None) -> tuple[list[Any], list[str]]:
         reader = pyvista.get_reader(path)
     words: list[str] = []
     if hasattr(reader, "number_time_points") and reader.number_time_points:
-        own, words = _chosen(reader.number_time_points, time)
-        reader.set_active_time_point(own)
+        number, words = _chosen(reader.number_time_points, time)
+        reader.set_active_time_point(number)
     else:
         _only(time)
     read = reader.read()
@@ -113,7 +113,9 @@ def _meshio(path: Path, time: int | None) -> tuple[list[Any], list[str]]:
         faces = _boundary([(kind, cells) for kind, cells, _ in solids])
     if not faces:
         return [points], []
-    triangles = [own[:, [0, i, i + 1]] for own in faces for i in range(1, own.shape[1] - 1)]
+    triangles = [
+        polygons[:, [0, i, i + 1]] for polygons in faces for i in range(1, polygons.shape[1] - 1)
+    ]
     surface = {"vertices": points, "faces": np.concatenate(triangles)}
     if values is not None and not of_cells:
         surface["values"] = values
@@ -138,13 +140,13 @@ def _values(mesh: Any, blocks: list[int]) -> tuple[Any, bool]:
 
 
 def _length(data: Any) -> Any:
-    own = np.asarray(data, float)
-    return own if own.ndim == 1 else np.linalg.norm(own.reshape(len(own), -1), axis=1)
+    values = np.asarray(data, float)
+    return values if values.ndim == 1 else np.linalg.norm(values.reshape(len(values), -1), axis=1)
 
 
 def _boundary(solids: list[tuple[int, Any]]) -> list[Any]:
     """Returns the faces that only one cell has."""
-    found = []
+    faces = []
     for size in (3, 4):
         sides = [
             cells[:, side] for kind, cells in solids for side in _SIDES[kind] if len(side) == size
@@ -154,8 +156,8 @@ def _boundary(solids: list[tuple[int, Any]]) -> list[Any]:
             _, first, count = np.unique(
                 np.sort(every, axis=1), axis=0, return_index=True, return_counts=True
             )
-            found.append(every[first[count == 1]])
-    return found
+            faces.append(every[first[count == 1]])
+    return faces
 
 
 def _trimesh(path: Path, time: int | None) -> tuple[list[Any], list[str]]:
@@ -182,8 +184,8 @@ def _nibabel(path: Path, time: int | None) -> tuple[list[Any], list[str]]:
         return [{"vertices": vertices, "faces": faces}], []
     words: list[str] = []
     if len(image.shape) == 4:
-        own, words = _chosen(image.shape[3], time)
-        image = image.slicer[..., own]
+        number, words = _chosen(image.shape[3], time)
+        image = image.slicer[..., number]
     else:
         _only(time)
     # Of another class, whose affine is that of NIfTI.
@@ -195,11 +197,11 @@ def _nibabel(path: Path, time: int | None) -> tuple[list[Any], list[str]]:
 
 def _xarray(path: Path, time: int | None) -> tuple[list[Any], list[str]]:
     data = _of("xarray").open_dataset(path, engine="scipy")
-    array = max(data.data_vars.values(), key=lambda own: (own.ndim >= 3, own.size))
+    array = max(data.data_vars.values(), key=lambda values: (values.ndim >= 3, values.size))
     words: list[str] = []
     if array.ndim == 4:
-        own, words = _chosen(array.shape[0], time)
-        array = array[own]
+        number, words = _chosen(array.shape[0], time)
+        array = array[number]
     else:
         _only(time)
     return [array.load()], words
@@ -256,8 +258,8 @@ def _molecule(path: Path, time: int | None) -> tuple[list[Any], list[str]]:
     models = [model for model in models if model]
     if not models:
         raise ValueError("holds no atoms")
-    own, words = _chosen(len(models), time)
-    return [_balls(models[own])], words
+    number, words = _chosen(len(models), time)
+    return [_balls(models[number])], words
 
 
 def _balls(atoms: list[tuple[str, list[float]]]) -> Mapping[str, Any]:
@@ -272,9 +274,9 @@ def _balls(atoms: list[tuple[str, list[float]]]) -> Mapping[str, Any]:
         corners = np.vstack([np.stack(third, 1).reshape(-1, 3) for third in thirds])
         corners /= np.linalg.norm(corners, axis=1, keepdims=True)
         faces = np.arange(len(corners)).reshape(-1, 3)
-    looks = [_ELEMENTS.get(name.upper(), ("ff1493", 1.7)) for name, _ in atoms]
-    radii = np.array([radius for _, radius in looks])
-    tones = np.array([list(bytes.fromhex(color)) for color, _ in looks], "u1")
+    styles = [_ELEMENTS.get(name.upper(), ("ff1493", 1.7)) for name, _ in atoms]
+    radii = np.array([radius for _, radius in styles])
+    tones = np.array([list(bytes.fromhex(color)) for color, _ in styles], "u1")
     places = np.array([place for _, place in atoms])
     vertices = places[:, None] + radii[:, None, None] * corners
     shifts = len(corners) * np.arange(len(atoms))
@@ -319,12 +321,12 @@ _MARKS = (
 
 def suited(path: Path) -> list[Reader]:
     """Returns the readers of a file, by its extension or its first bytes."""
-    own = path.suffix[1:].lower()
-    if not any(own in reader.extensions for reader in READERS) and path.is_file():
+    extension = path.suffix[1:].lower()
+    if not any(extension in reader.extensions for reader in READERS) and path.is_file():
         with path.open("rb") as file:
             first = file.read(64)
-        own = next((name for mark, name in _MARKS if first.startswith(mark)), own)
-    return [reader for reader in READERS if own in reader.extensions]
+        extension = next((name for mark, name in _MARKS if first.startswith(mark)), extension)
+    return [reader for reader in READERS if extension in reader.extensions]
 
 
 def read(path: Path, time: int | None) -> tuple[str, list[Any], list[str]]:

@@ -22,7 +22,7 @@ Color = str | Sequence[float]
 Vector = Sequence[float]
 
 
-class FieldLook(TypedDict, total=False):
+class FieldAppearance(TypedDict, total=False):
     """How values are shown: those of volumes, samples and cells."""
 
     #: A `TransferFunction`, the name of one, a JSON file or its text. Default: made for the values.
@@ -41,7 +41,7 @@ class FieldLook(TypedDict, total=False):
     log_colors: bool
 
 
-class KernelLook(TypedDict, total=False):
+class KernelAppearance(TypedDict, total=False):
     """How a volume is reconstructed from its samples. Lengths are in samples."""
 
     #: gaussian, b-spline, hann, linear, catmull-rom, cubic-b-spline, or values from 0 to extent.
@@ -54,7 +54,7 @@ class KernelLook(TypedDict, total=False):
     sharp: bool
 
 
-class SurfaceLook(TypedDict, total=False):
+class SurfaceAppearance(TypedDict, total=False):
     """How meshes and point clouds are shown."""
 
     #: file, values, height, normal, an attribute of the file, or a colour.
@@ -86,7 +86,7 @@ class SurfaceLook(TypedDict, total=False):
     line_width: float | str
 
 
-class CellLook(FieldLook, total=False):
+class CellAppearance(FieldAppearance, total=False):
     """How cells are shown."""
 
     #: values, height, normal, or a colour. Default: values.
@@ -99,7 +99,7 @@ class CellLook(FieldLook, total=False):
     crease: float
 
 
-class VolumeLook(FieldLook, KernelLook):
+class VolumeAppearance(FieldAppearance, KernelAppearance):
     """How a volume is shown."""
 
 
@@ -138,7 +138,7 @@ class Reading(TypedDict, total=False):
     limits: Mapping[str, int]
 
 
-class FileOptions(VolumeLook, SurfaceLook, Reading):
+class FileOptions(VolumeAppearance, SurfaceAppearance, Reading):
     """How a file is read and shown."""
 
     #: Cells: solid, an opaque body with the field inside where clips cut it, or volume, the field
@@ -146,11 +146,11 @@ class FileOptions(VolumeLook, SurfaceLook, Reading):
     cells: str
 
 
-FIELD = frozenset(FieldLook.__annotations__)
-VOLUME = frozenset(VolumeLook.__annotations__)
-SURFACE = frozenset(SurfaceLook.__annotations__)
+FIELD = frozenset(FieldAppearance.__annotations__)
+VOLUME = frozenset(VolumeAppearance.__annotations__)
+SURFACE = frozenset(SurfaceAppearance.__annotations__)
 #: `cells` is called `style` where cells are an argument.
-CELLS = frozenset(CellLook.__annotations__) | {"cells"}
+CELLS = frozenset(CellAppearance.__annotations__) | {"cells"}
 READING = frozenset(Reading.__annotations__)
 
 
@@ -231,21 +231,21 @@ def direction(value: str | Vector | None) -> list[float] | None:
     return [sign if axis == name.upper() else 0.0 for axis in "XYZ"]
 
 
-def look(options: Mapping[str, Any]) -> str:
+def appearance(options: Mapping[str, Any]) -> str:
     """Returns how an item looks, as JSON."""
     given = {name: options[name] for name in options if name in VOLUME | SURFACE | CELLS}
     transfer = given.get("transfer")
     if transfer is not None:
         given["transfer"] = TransferFunction.of(transfer)
     if "isosurfaces" in given:
-        own = given["isosurfaces"]
-        surfaces = [own] if isinstance(own, (int, float, np.number)) else own
+        value = given["isosurfaces"]
+        surfaces = [value] if isinstance(value, (int, float, np.number)) else value
         given["isosurfaces"] = [_surface(surface) for surface in surfaces]
     if given.get("nan_color") is not None:
         given["nan_color"] = color(given["nan_color"])
-    own = given.get("color")
-    if own is not None and not isinstance(own, str):
-        given["color"] = "#" + "".join(f"{round(part * 255):02x}" for part in color(own))
+    given_color = given.get("color")
+    if given_color is not None and not isinstance(given_color, str):
+        given["color"] = "#" + "".join(f"{round(part * 255):02x}" for part in color(given_color))
     return text(given)
 
 
@@ -253,9 +253,9 @@ def _surface(value: Any) -> dict[str, Any]:
     if isinstance(value, (int, float, np.number)):
         return {"value": float(value), "color": None, "opacity": 1.0}
     try:
-        value, own, *rest = value
+        value, tone, *rest = value
         opacity = float(rest[0]) if rest else 1.0
-        return {"value": float(value), "color": own and color(own), "opacity": opacity}
+        return {"value": float(value), "color": tone and color(tone), "opacity": opacity}
     except (TypeError, ValueError) as error:
         form = "an isosurface is a value, or (value, colour, opacity)"
         raise ArgumentError(f"{form}, not {value!r}") from error

@@ -24,14 +24,14 @@ class Picture:
     Its arrays are read-only; `picture.rgba.copy()` can be changed.
     """
 
-    def __init__(self, own: _pysplatkit.Picture, background: list[float] | None) -> None:
-        self._own = own
+    def __init__(self, native: _pysplatkit.Picture, background: list[float] | None) -> None:
+        self._native = native
         self._background = background
 
     @property
     def size(self) -> tuple[int, int]:
         """The width and the height in pixels."""
-        return self._own.size
+        return self._native.size
 
     @cached_property
     def rgba(self) -> npt.NDArray[np.uint8]:
@@ -39,41 +39,41 @@ class Picture:
 
         Over a background the opacity is 255. Without one, colours are not multiplied by it.
         """
-        return self._shaped(self._own.rgba(self._background), 4)
+        return self._shaped(self._native.rgba(self._background), 4)
 
     @cached_property
     def color(self) -> npt.NDArray[np.float32]:
         """Red, green and blue, multiplied by opacity, and opacity: (height, width, 4), 0 to 1,
         without the background, before they are rounded to bytes."""
-        return self._shaped(self._own.color(), 4)
+        return self._shaped(self._native.color(), 4)
 
     @cached_property
     def depth(self) -> npt.NDArray[np.float32]:
         """How far in front of the eye half of the light is absorbed, in world units along the view
         direction: (height, width). Infinite where less than half is absorbed."""
-        return self._shaped(self._own.depth())
+        return self._shaped(self._native.depth())
 
     @property
     def camera(self) -> Camera:
         """The camera that the picture was taken with."""
-        return Camera.from_json(self._own.camera)
+        return Camera.from_json(self._native.camera)
 
     @cached_property
     def statistics(self) -> dict[str, Any]:
         """What was drawn: splats, bricks, bytes of memory, …."""
-        return dict(json.loads(self._own.statistics))
+        return dict(json.loads(self._native.statistics))
 
     def over(self, background: _options.Color | None) -> Picture:
         """Returns the same picture over another background; None for transparency."""
-        return Picture(self._own, _options.background(background))
+        return Picture(self._native, _options.background(background))
 
     def save(self, path: _options.PathLike, *, overwrite: bool = True) -> Path:
         """Writes a .png or .jpg file, which appears whole or not at all. Returns its path."""
-        return self._written(path, overwrite, lambda to: self._own.save(to, self._background))
+        return self._written(path, overwrite, lambda to: self._native.save(to, self._background))
 
     def save_depth(self, path: _options.PathLike, *, overwrite: bool = True) -> Path:
         """Writes the depths as a grey PNG of 16 bits: white for the nearest, black for nothing."""
-        return self._written(path, overwrite, self._own.save_depth)
+        return self._written(path, overwrite, self._native.save_depth)
 
     def _written(self, path: _options.PathLike, overwrite: bool, write: Any) -> Path:
         to = Path(os.fspath(path))
@@ -93,7 +93,7 @@ class Picture:
         return array.copy() if copy else array
 
     def _repr_png_(self) -> bytes:
-        return self._own.png(self._background)
+        return self._native.png(self._background)
 
     def __repr__(self) -> str:
         width, height = self.size

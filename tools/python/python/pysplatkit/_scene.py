@@ -14,7 +14,15 @@ import numpy as np
 from . import _arrays, _neighbours, _options, _pysplatkit
 from ._camera import Camera, Clip
 from ._errors import ArgumentError, DataWarning, KindError
-from ._options import CellLook, Color, FieldLook, FileOptions, SurfaceLook, Vector, VolumeLook
+from ._options import (
+    CellAppearance,
+    Color,
+    FieldAppearance,
+    FileOptions,
+    SurfaceAppearance,
+    Vector,
+    VolumeAppearance,
+)
 from ._picture import Picture
 
 if TYPE_CHECKING:
@@ -30,7 +38,7 @@ class Scene:
     """
 
     def __init__(self) -> None:
-        self._own = _pysplatkit.Scene()
+        self._native = _pysplatkit.Scene()
         # The files that were added, with how each is read and shown; None beside arrays.
         self._files: list[tuple[str, str, str]] | None = []
         # What a scene file says of the picture.
@@ -47,7 +55,7 @@ class Scene:
             trusted: Whether the scene may name files outside its folder, and addresses.
         """
         scene = cls()
-        scene._described = json.loads(scene._own.add_scene(os.fspath(path), trusted))
+        scene._described = json.loads(scene._native.add_scene(os.fspath(path), trusted))
         scene._files = None
         if scene._described["overlay"]:
             message = (
@@ -76,9 +84,9 @@ class Scene:
         given = _options.checked(drawing, known, "save")
         if "background" in given or drawing.get("background", "") is None:
             given["background"] = _options.background(drawing["background"]) or "none"
-        own = None if camera is None else camera.to_json()
+        text = None if camera is None else camera.to_json()
         draw = _drawn(size=size, **given)
-        _pysplatkit.write_scene(os.fspath(path), self._files, own, "{}", draw)
+        _pysplatkit.write_scene(os.fspath(path), self._files, text, "{}", draw)
 
     def add(self, source: Any, **options: Unpack[FileOptions]) -> Scene:
         """Adds a file, a folder of DICOM slices, an array, or an object of another package.
@@ -91,18 +99,18 @@ class Scene:
             known = _options.VOLUME | _options.SURFACE | _options.CELLS | _options.READING
             given = _options.checked(options, known, "add")
             path = os.fspath(source)
-            reading, look = _options.reading(given), _options.look(given)
-            self._own.add_file(path, reading, look)
+            reading, appearance = _options.reading(given), _options.appearance(given)
+            self._native.add_file(path, reading, appearance)
             if self._files is not None:
-                self._files.append((path, reading, look))
+                self._files.append((path, reading, appearance))
             return self
-        own = _neighbours.found(source, options.get("scalar"))
-        if own is not None:
+        parts = _neighbours.parts_of(source, options.get("scalar"))
+        if parts is not None:
             options.pop("scalar", None)
             arguments: dict[str, Any] = dict(options)
-            if own.method == "add_cells" and "cells" in arguments:
+            if parts.method == "add_cells" and "cells" in arguments:
                 arguments["style"] = arguments.pop("cells")
-            return getattr(self, own.method)(own, **arguments)  # type: ignore[no-any-return]
+            return getattr(self, parts.method)(parts, **arguments)  # type: ignore[no-any-return]
         if isinstance(source, Mapping):
             return self._add_arguments(source, options)
         shape = np.shape(source)
@@ -150,7 +158,7 @@ class Scene:
         up: str | Vector | None = None,
         labels: bool | Mapping[int, str] | str | os.PathLike[str] | None = None,
         name: str = "volume",
-        **look: Unpack[VolumeLook],
+        **appearance: Unpack[VolumeAppearance],
     ) -> Scene:
         """Adds the samples of an array, which is indexed [z, y, x] whatever its order in memory.
 
@@ -175,34 +183,34 @@ class Scene:
                 names as {value: name}; or the path of a table with names and colours. Default:
                 values that look like labels are.
         """
-        given = _options.checked(look, _options.VOLUME, "add_volume")
-        own = _neighbours.of_kind(_neighbours.Volume, array, scalar, "add_volume")
-        own = own or _neighbours.Volume(array)
-        samples = _arrays.samples(own.samples, copy)
-        axes = own.axes if axes is None else axes
-        coordinates = own.coordinates if coordinates is None else coordinates
+        given = _options.checked(appearance, _options.VOLUME, "add_volume")
+        volume = _neighbours.of_kind(_neighbours.Volume, array, scalar, "add_volume")
+        volume = volume or _neighbours.Volume(array)
+        samples = _arrays.samples(volume.samples, copy)
+        axes = volume.axes if axes is None else axes
+        coordinates = volume.coordinates if coordinates is None else coordinates
         matrix = None
         if axes is not None:
             matrix = _arrays.rows(axes, 3, "axes", "f8")
             if matrix.shape != (3, 3):
                 raise ArgumentError(f"axes is a matrix of 3 × 3, not {matrix.shape}")
-        told = {
+        facts = {
             "name": name,
-            "spacing": _options.vector(own.spacing if spacing is None else spacing),
-            "origin": _options.vector(own.origin if origin is None else origin),
+            "spacing": _options.vector(volume.spacing if spacing is None else spacing),
+            "origin": _options.vector(volume.origin if origin is None else origin),
             "axes": matrix,
             "coordinates": _coordinates(coordinates, samples.shape),
             "missing": missing,
             "modality": modality,
-            "value_name": own.value_name if value_name is None else value_name,
-            "value_unit": own.value_unit if value_unit is None else value_unit,
-            "unit": own.unit if unit is None else unit,
+            "value_name": volume.value_name if value_name is None else value_name,
+            "value_unit": volume.value_unit if value_unit is None else value_unit,
+            "unit": volume.unit if unit is None else unit,
             "up": _options.direction(up),
-            "frame": own.frame,
+            "frame": volume.frame,
             "labels": _labels(labels),
         }
         self._files = None
-        self._own.add_volume(samples, _options.text(told), "{}", _options.look(given))
+        self._native.add_volume(samples, _options.text(facts), "{}", _options.appearance(given))
         return self
 
     def add_mesh(
@@ -216,7 +224,7 @@ class Scene:
         values: Any = None,
         up: str | Vector | None = None,
         name: str = "mesh",
-        **look: Unpack[SurfaceLook],
+        **appearance: Unpack[SurfaceAppearance],
     ) -> Scene:
         """Adds triangles.
 
@@ -231,14 +239,14 @@ class Scene:
             values: One number for each vertex, to colour it by `colormap`; NaN for none.
             up: The world direction that is up. Default: guessed from the shape.
         """
-        given = _options.checked(look, _options.SURFACE, "add_mesh")
-        own = _neighbours.of_kind(_neighbours.Surface, vertices, scalar, "add_mesh")
-        own = own or _neighbours.Surface(vertices)
+        given = _options.checked(appearance, _options.SURFACE, "add_mesh")
+        surface = _neighbours.of_kind(_neighbours.Surface, vertices, scalar, "add_mesh")
+        surface = surface or _neighbours.Surface(vertices)
         if faces is not None:
-            own.faces = faces
-        if own.faces is None:
+            surface.faces = faces
+        if surface.faces is None:
             raise KindError("add_mesh() needs faces: add_points() adds points without")
-        return self._add_mesh(own.with_given(normals, colors, values), up, name, given)
+        return self._add_mesh(surface.with_given(normals, colors, values), up, name, given)
 
     def add_points(
         self,
@@ -250,7 +258,7 @@ class Scene:
         normals: Any = None,
         up: str | Vector | None = None,
         name: str = "points",
-        **look: Unpack[SurfaceLook],
+        **appearance: Unpack[SurfaceAppearance],
     ) -> Scene:
         """Adds a point cloud: points of a surface, each drawn as a disc.
 
@@ -258,21 +266,21 @@ class Scene:
         `add_samples`. The arguments are those of `add_mesh`. Of a mesh of another package the
         vertices are drawn.
         """
-        given = _options.checked(look, _options.SURFACE, "add_points")
-        own = _neighbours.points(positions, scalar, "add_points")
-        own = own or _neighbours.Surface(positions)
-        up = own.up if up is None else up
-        return self._add_mesh(own.with_given(normals, colors, values), up, name, given)
+        given = _options.checked(appearance, _options.SURFACE, "add_points")
+        surface = _neighbours.points(positions, scalar, "add_points")
+        surface = surface or _neighbours.Surface(positions)
+        up = surface.up if up is None else up
+        return self._add_mesh(surface.with_given(normals, colors, values), up, name, given)
 
     def _add_mesh(
         self,
-        own: _neighbours.Surface,
+        surface: _neighbours.Surface,
         up: str | Vector | None,
         name: str,
         given: Mapping[str, Any],
     ) -> Scene:
-        vertices, faces, normals = own.positions, own.faces, own.normals
-        colors, values = own.colors, own.values
+        vertices, faces, normals = surface.positions, surface.faces, surface.normals
+        colors, values = surface.colors, surface.values
         positions = _arrays.positions(vertices, "vertices" if faces is not None else "positions")
         count = len(positions)
         arrays = {
@@ -282,11 +290,11 @@ class Scene:
             "colors": None if colors is None else _arrays.colors(colors, count),
             "values": None if values is None else _arrays.column(values, "values"),
         }
-        told = _options.text({"name": name, "up": _options.direction(up)})
+        facts = _options.text({"name": name, "up": _options.direction(up)})
         # Values colour a surface even if it has colours.
         named = {"scalar": "values"} if values is not None else {}
         self._files = None
-        self._own.add_mesh(arrays, told, _options.text(named), _options.look(given))
+        self._native.add_mesh(arrays, facts, _options.text(named), _options.appearance(given))
         return self
 
     def add_cells(
@@ -301,7 +309,7 @@ class Scene:
         up: str | Vector | None = None,
         name: str = "cells",
         style: str | None = None,
-        **look: Unpack[CellLook],
+        **appearance: Unpack[CellAppearance],
     ) -> Scene:
         """Adds cells that fill space, such as those of a solver, with the field inside. Triangles
         (VTK's type 5), polygons (7) and quadrilaterals (8, 9) are drawn with their boundary.
@@ -319,24 +327,24 @@ class Scene:
                 field by a transfer function. Default: solid, unless another option is one of
                 fields.
         """
-        given = _options.checked(look, _options.CELLS - {"cells"}, "add_cells")
+        given = _options.checked(appearance, _options.CELLS - {"cells"}, "add_cells")
         if style is not None:
             given["cells"] = style
-        own = _neighbours.of_kind(_neighbours.Cells, points, scalar, "add_cells")
-        if own is None:
+        grid = _neighbours.of_kind(_neighbours.Cells, points, scalar, "add_cells")
+        if grid is None:
             if cells is None:
                 raise KindError("add_cells() needs points and cells, or a grid")
             arrays = _arrays.cells(cells, kinds)
         else:
-            points = own.positions
-            arrays = _arrays.raw_cells(own.kinds, own.offsets, own.nodes)
-        is_told = own is not None and values is None
+            points = grid.positions
+            arrays = _arrays.raw_cells(grid.kinds, grid.offsets, grid.nodes)
+        uses_grid = grid is not None and values is None
         positions = _arrays.positions(points, "points")
-        numbers = own.values if is_told else values
+        numbers = grid.values if uses_grid else values
         column = None if numbers is None else _arrays.column(numbers, "values")
         count, of_cells = len(arrays["kinds"]), False
         if column is not None:
-            of_cells = own.of_cells if is_told else len(column) == count != len(positions)
+            of_cells = grid.of_cells if uses_grid else len(column) == count != len(positions)
             if len(column) != (count if of_cells else len(positions)):
                 raise ArgumentError(
                     f"there are {len(column)} values for {len(positions)} points and {count} cells"
@@ -348,9 +356,9 @@ class Scene:
             "values": column if of_cells or column is None else column[points],
             "of_cells": of_cells,
         }
-        told = {"name": name, "missing": missing, "up": _options.direction(up)}
+        facts = {"name": name, "missing": missing, "up": _options.direction(up)}
         self._files = None
-        self._own.add_cells(given_arrays, _options.text(told), _options.look(given))
+        self._native.add_cells(given_arrays, _options.text(facts), _options.appearance(given))
         return self
 
     def add_samples(
@@ -366,7 +374,7 @@ class Scene:
         slopes: bool | None = None,
         up: str | Vector | None = None,
         name: str = "samples",
-        **look: Unpack[FieldLook],
+        **appearance: Unpack[FieldAppearance],
     ) -> Scene:
         """Adds values at any positions, such as those of particles, and draws the field between.
 
@@ -380,7 +388,7 @@ class Scene:
             neighbours: The number of neighbours that kernels are made from, 4 to 64.
             slopes: Whether samples carry slopes. Default: True.
         """
-        given = _options.checked(look, _options.FIELD, "add_samples")
+        given = _options.checked(appearance, _options.FIELD, "add_samples")
         arrays = {
             "positions": _arrays.positions(positions, "positions"),
             "values": _arrays.column(values, "values"),
@@ -389,11 +397,11 @@ class Scene:
         }
         if covariances is not None:
             arrays["covariances"] = _arrays.rows(covariances, 6, "covariances")
-        told = {"name": name, "missing": missing, "up": _options.direction(up)}
+        facts = {"name": name, "missing": missing, "up": _options.direction(up)}
         load = {"radius": radius, "neighbours": neighbours, "slopes": slopes}
         self._files = None
-        self._own.add_samples(
-            arrays, _options.text(told), _options.text(load), _options.look(given)
+        self._native.add_samples(
+            arrays, _options.text(facts), _options.text(load), _options.appearance(given)
         )
         return self
 
@@ -431,8 +439,8 @@ class Scene:
                 raise ArgumentError(f"harmonics has the shape {terms.shape}; {form}")
         else:
             # The constant term of the harmonics.
-            own = _arrays.colors(colors, len(places))[:, :3]
-            terms = (own.astype(np.float64) / 255.0 - 0.5) / 0.28209479177387814
+            rgb = _arrays.colors(colors, len(places))[:, :3]
+            terms = (rgb.astype(np.float64) / 255.0 - 0.5) / 0.28209479177387814
         arrays = {
             "centers": places,
             "scales": _arrays.rows(scales, 3, "scales"),
@@ -440,9 +448,9 @@ class Scene:
             "opacities": _arrays.column(opacities, "opacities"),
             "harmonics": np.ascontiguousarray(terms.reshape(-1, 3), dtype=np.float32),
         }
-        told = {"name": name, "up": _options.direction(up)}
+        facts = {"name": name, "up": _options.direction(up)}
         self._files = None
-        self._own.add_gaussians(arrays, _options.text(told))
+        self._native.add_gaussians(arrays, _options.text(facts))
         return self
 
     def camera(
@@ -468,7 +476,7 @@ class Scene:
         """
         given = dict(locals())
         fit = _fit(**{name: given[name] for name in _FIT})
-        return Camera.from_json(self._own.camera(fit, _drawn(size, clips)))
+        return Camera.from_json(self._native.camera(fit, _drawn(size, clips)))
 
     def turntable(
         self, frames: int, size: tuple[int, int] = (1280, 720), **view: Any
@@ -481,7 +489,7 @@ class Scene:
         given = _options.checked(view, frozenset(_FIT), "turntable")
         if frames < 1:
             raise ArgumentError("a turntable has at least one frame")
-        cameras = self._own.turntable(frames, _fit(**given), _drawn(size, clips))
+        cameras = self._native.turntable(frames, _fit(**given), _drawn(size, clips))
         return [Camera.from_json(text) for text in cameras]
 
     def render(
@@ -530,11 +538,11 @@ class Scene:
         said: dict[str, Any] = dict(self._described.get("picture", {}))
         behind = said.pop("background", "black") if background == "auto" else background
         # What is given counts more than what the scene file says.
-        own = {name: given[name] for name in _DRAW if given[name] is not None}
-        if {"cut", "budget"} & own.keys():
+        chosen = {name: given[name] for name in _DRAW if given[name] is not None}
+        if {"cut", "budget"} & chosen.keys():
             for name in ("cut", "budget", "frame_time"):
                 said.pop(name, None)
-        draw = {**said, **own}
+        draw = {**said, **chosen}
         if camera is None:
             camera = self._described_camera(draw)
         return Picture(self._pixels(camera, draw), _options.background(behind))
@@ -546,12 +554,12 @@ class Scene:
             return Camera.from_json(json.dumps(camera))
         if not framing:
             return None
-        return Camera.from_json(self._own.camera(json.dumps(framing), _drawn(**draw)))
+        return Camera.from_json(self._native.camera(json.dumps(framing), _drawn(**draw)))
 
     def _pixels(self, camera: Camera | None, draw: Mapping[str, Any]) -> _pysplatkit.Picture:
         """Draws with options by their names."""
-        own = None if camera is None else camera.to_json()
-        return self._own.render(own, _drawn(**draw))
+        text = None if camera is None else camera.to_json()
+        return self._native.render(text, _drawn(**draw))
 
     def show(
         self, camera: Camera | None = None, size: tuple[int, int] = (800, 600), **drawing: Any
@@ -577,16 +585,16 @@ class Scene:
     @property
     def bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
         """The smallest and the largest x, y, z of samples and vertices; None for an empty scene."""
-        own = self._own.bounds
-        return None if own is None else (tuple(own[0]), tuple(own[1]))
+        bounds = self._native.bounds
+        return None if bounds is None else (tuple(bounds[0]), tuple(bounds[1]))
 
     @property
     def contents(self) -> list[tuple[str, str, int]]:
         """What was added: its kind, its name, and the number of splats or samples."""
-        return self._own.contents
+        return self._native.contents
 
     def __len__(self) -> int:
-        return len(self._own.contents)
+        return len(self._native.contents)
 
     def __repr__(self) -> str:
         items = ", ".join(f"{kind} {name!r} of {count}" for kind, name, count in self.contents)

@@ -90,12 +90,12 @@ class TransferFunction:
         from ._options import color
 
         shade = dict(_LIGHT) if self.shade is True else self.shade or None
-        surfaces = [dict(own, color=color(own["color"])) for own in self.isosurfaces]
+        surfaces = [dict(surface, color=color(surface["color"])) for surface in self.isosurfaces]
         return {
-            "color": [[float(value), *color(own)] for value, own in self.colors],
-            "opacity": [[float(value), float(own)] for value, own in self.opacities],
+            "color": [[float(value), *color(tone)] for value, tone in self.colors],
+            "opacity": [[float(value), float(opacity)] for value, opacity in self.opacities],
             "unit": float(self.unit),
             "shade": shade,
-            "gradient": [[float(value), float(own)] for value, own in self.gradient],
+            "gradient": [[float(value), float(factor)] for value, factor in self.gradient],
             "isosurfaces": surfaces,
         }

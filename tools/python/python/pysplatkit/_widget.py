@@ -94,11 +94,13 @@ class Widget(anywidget.AnyWidget):
         self._grabbed: list[float] | None = None
         self._loop = _running_loop()
         # Refuses sizes and options that cannot be drawn.
-        scene._own.check(self._draws(size))
-        own = self._fitted(size) if camera is None else camera
-        _pysplatkit.moved_by_hand(scene._own, own.to_json(), size, '{"turn": {"drag": [0, 0]}}')
+        scene._native.check(self._draws(size))
+        start = self._fitted(size) if camera is None else camera
+        _pysplatkit.moved_by_hand(
+            scene._native, start.to_json(), size, '{"turn": {"drag": [0, 0]}}'
+        )
         super().__init__(
-            camera=own,
+            camera=start,
             size=size,
             _presets=list(_pysplatkit.TRANSFER_FUNCTIONS),
             _maps=list(_pysplatkit.COLOR_MAPS),
@@ -132,10 +134,12 @@ class Widget(anywidget.AnyWidget):
     def transfer(self, value: Any) -> None:
         if not self._transfers:
             raise ArgumentError("the scene has no field, and so no transfer function")
-        own = TransferFunction.of(value)
-        if isinstance(own, str):
-            own = self._named(self.field, own)
-        self._set_transfer(self.field, json.loads(_pysplatkit.checked_transfer(json.dumps(own))))
+        function = TransferFunction.of(value)
+        if isinstance(function, str):
+            function = self._named(self.field, function)
+        self._set_transfer(
+            self.field, json.loads(_pysplatkit.checked_transfer(json.dumps(function)))
+        )
 
     def snapshot(self) -> npt.NDArray[np.uint8]:
         """Returns the exact picture: red, green, blue and opacity, (height, width, 4) bytes."""
@@ -144,13 +148,13 @@ class Widget(anywidget.AnyWidget):
             exact = self._exact
         if exact is not None and exact.order == order and exact.picture is not None:
             return Picture(exact.picture, self._background).rgba
-        picture = self._scene._own.render(order.camera, order.draw)
+        picture = self._scene._native.render(order.camera, order.draw)
         return Picture(picture, self._background).rgba
 
     def refresh(self) -> None:
         """Draws the scene again: after items were added, or a transfer function was changed
         elsewhere."""
-        fields = json.loads(_pysplatkit.fields(self._scene._own))
+        fields = json.loads(_pysplatkit.fields(self._scene._native))
         counted = len(self._fields)
         # Items are only ever added. Those that are known keep the function they came with.
         self._fields += fields[counted:]
@@ -219,13 +223,13 @@ class Widget(anywidget.AnyWidget):
 
     def _on_preset(self, field: int, name: str) -> None:
         """Sets a transfer function by name; the one that the field came with if it is empty."""
-        own = self._named(field, name) if name else self._fields[field]["transfer"]
-        self._set_transfer(field, own)
+        function = self._named(field, name) if name else self._fields[field]["transfer"]
+        self._set_transfer(field, function)
 
     def _on_colors(self, field: int, name: str) -> None:
         """Sets the colours of a map."""
-        own = json.dumps(self._transfers[field])
-        text = _pysplatkit.recolored(own, name, tuple(self._ranges[field]))
+        function = json.dumps(self._transfers[field])
+        text = _pysplatkit.recolored(function, name, tuple(self._ranges[field]))
         self._set_transfer(field, json.loads(text))
 
     def _on_transfer(self, field: int, transfer: dict[str, Any]) -> None:
@@ -238,12 +242,14 @@ class Widget(anywidget.AnyWidget):
         return _scene._drawn(size, **self._drawing)
 
     def _fitted(self, size: tuple[int, int], view: str | None = None) -> Camera:
-        own = self._scene._own.camera(_scene._fit(view=view), self._draws(size))
-        return Camera.from_json(own)
+        text = self._scene._native.camera(_scene._fit(view=view), self._draws(size))
+        return Camera.from_json(text)
 
     def _order(self) -> Order:
-        looks = json.dumps(self._transfers)
-        return Order(self._scene._own, self.camera.to_json(), self._draws(self.pixels), looks)
+        transfers = json.dumps(self._transfers)
+        return Order(
+            self._scene._native, self.camera.to_json(), self._draws(self.pixels), transfers
+        )
 
     def _draw(self) -> None:
         if self._painter is not None:
@@ -257,8 +263,8 @@ class Widget(anywidget.AnyWidget):
 
     def _move(self, **gesture: Any) -> None:
         text = _options.text(gesture)
-        own = self.camera.to_json()
-        moved = _pysplatkit.moved_by_hand(self._scene._own, own, self.pixels, text)
+        before = self.camera.to_json()
+        moved = _pysplatkit.moved_by_hand(self._scene._native, before, self.pixels, text)
         self.camera = Camera.from_json(moved)
 
     def _picked(self, cursor: list[float]) -> list[float] | None:
@@ -270,17 +276,17 @@ class Widget(anywidget.AnyWidget):
 
     def _named(self, field: int, name: str) -> dict[str, Any]:
         """Returns a preset for a field. Light fades where the gradient is noise, as before."""
-        own = self._fields[field]
-        text = _pysplatkit.named_transfer(name, own["range"], own["diagonal"])
+        entry = self._fields[field]
+        text = _pysplatkit.named_transfer(name, entry["range"], entry["diagonal"])
         named: dict[str, Any] = json.loads(text)
-        certain = (own["transfer"].get("shade") or {}).get("certain")
+        certain = (entry["transfer"].get("shade") or {}).get("certain")
         if named.get("shade") and certain is not None:
             named["shade"]["certain"] = certain
         return named
 
     def _set_transfer(self, field: int, transfer: dict[str, Any]) -> None:
         item = self._fields[field]["item"]
-        _pysplatkit.set_transfer(self._scene._own, item, json.dumps(transfer))
+        _pysplatkit.set_transfer(self._scene._native, item, json.dumps(transfer))
         transfers = list(self._transfers)
         transfers[field] = transfer
         self._transfers = transfers
@@ -288,7 +294,7 @@ class Widget(anywidget.AnyWidget):
 
     def _count(self, field: int) -> None:
         """Counts the values of a field, on a thread of its own."""
-        counts = _pysplatkit.histogram(self._scene._own, self._fields[field]["item"])
+        counts = _pysplatkit.histogram(self._scene._native, self._fields[field]["item"])
 
         def take() -> None:
             histograms = list(self._histograms)

@@ -127,12 +127,12 @@ pub fn draw(
     let painter = ui.painter_at(plot.rect.expand(0.5 * HANDLE));
     let color = ui.visuals().strong_text_color();
     // Roots of linear functions are curves. At points the function has corners or steps.
-    let shown = |value: f64| plot.range[0] <= value && value <= plot.range[1];
+    let in_plot = |value: f64| plot.range[0] <= value && value <= plot.range[1];
     let mut line: Vec<Pos2> = plot
         .columns()
         .flatten()
         .map(|x| pos2(x, plot.y(function(plot.value(x)))))
-        .chain(points.iter().filter(|point| shown(point.0)).map(|&point| plot.at(point)))
+        .chain(points.iter().filter(|point| in_plot(point.0)).map(|&point| plot.at(point)))
         .collect();
     // The sort keeps the order of points at one value.
     line.sort_by(|a, b| a.x.total_cmp(&b.x));

@@ -2,7 +2,7 @@
 
 use super::plot::Zoom;
 use eframe::egui::Ui;
-use splatkit::{color::ColorMap, session::shown_of, volume::TransferFunction};
+use splatkit::{color::ColorMap, session::visible_range_of, volume::TransferFunction};
 
 /// Shows the menu. A function by name replaces all but the factors of the gradient; `diagonal` is
 /// that of the data's box. A colour map replaces the colours of the values that are shown.
@@ -44,7 +44,7 @@ pub fn menu(
 
 /// Spreads a colour map over the values that the function shows.
 fn spread(transfer: &mut TransferFunction, map: ColorMap, values: [f64; 2]) {
-    let [low, high] = shown_of(transfer, values);
+    let [low, high] = visible_range_of(transfer, values);
     let point = |(share, color)| (low + (high - low) * share, color);
     transfer.color = map.points().into_iter().map(point).collect();
 }

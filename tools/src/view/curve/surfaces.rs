@@ -26,18 +26,18 @@ pub fn lines(ui: &Ui, plot: &Plot, surfaces: &mut Vec<Isosurface>, grab: &mut Ve
     }
 }
 
-/// Shows value, colour and opacity of each surface. `shown` are the values in the plot.
-pub fn list(ui: &mut Ui, transfer: &mut TransferFunction, shown: [f64; 2]) {
+/// Shows value, colour and opacity of each surface. `range`: the values in the plot.
+pub fn list(ui: &mut Ui, transfer: &mut TransferFunction, range: [f64; 2]) {
     let mut removed = None;
     for (i, surface) in transfer.isosurfaces.iter_mut().enumerate() {
         let of = format!("of isosurface {}", i + 1);
         ui.horizontal(|ui| {
             color(ui, &format!("Colour {of}"), &mut surface.color);
-            let slider = Slider::new(&mut surface.value, shown[0]..=shown[1])
+            let slider = Slider::new(&mut surface.value, range[0]..=range[1])
                 .clamping(SliderClamping::Edits)
                 .show_value(false);
             ui.add(slider).accessible_name(format!("Slider {of}"));
-            let speed = (shown[1] - shown[0]) / 500.0;
+            let speed = (range[1] - range[0]) / 500.0;
             ui.add(field(&mut surface.value, f64::MIN..=f64::MAX, speed))
                 .accessible_name(format!("Value {of}"));
             ui.add(field(&mut surface.opacity, 0.001..=1.0, 0.005))
@@ -55,7 +55,7 @@ pub fn list(ui: &mut Ui, transfer: &mut TransferFunction, shown: [f64; 2]) {
     let has_room = transfer.isosurfaces.len() < TransferFunction::MAX_ISOSURFACES;
     ui.add_enabled_ui(has_room, |ui| {
         if ui.button("Add isosurface").clicked() {
-            let value = 0.5 * (shown[0] + shown[1]);
+            let value = 0.5 * (range[0] + range[1]);
             let color = transfer.color(value);
             transfer.isosurfaces.push(Isosurface { value, color, opacity: 1.0 });
         }

@@ -84,8 +84,8 @@ fn drag(harness: &mut Harness<'_, State>, from: Pos2, to: Pos2) {
     harness.run();
 }
 
-fn near(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() < tolerance, "{found} is not {expected}");
+fn near(value: f64, expected: f64, tolerance: f64) {
+    assert!((value - expected).abs() < tolerance, "{value} is not {expected}");
 }
 
 #[test]
@@ -283,7 +283,7 @@ fn colours_and_functions_by_name() {
     harness.get_by_label("viridis").click();
     harness.run();
     let colors = &harness.state().transfer.color;
-    assert!(colors.len() > 40 && colors[0].0 == named.shown_range().unwrap()[0], "{colors:?}");
+    assert!(colors.len() > 40 && colors[0].0 == named.visible_range().unwrap()[0], "{colors:?}");
     assert_eq!(harness.state().edits, [Edit::Committed; 2]);
 }
 

@@ -48,7 +48,7 @@ impl Flight {
 }
 
 pub fn show(window: &mut Window, ui: &mut Ui) {
-    let camera = window.shown.as_ref().map(|shown| shown.orbit.camera().clone());
+    let camera = window.scene_view.as_ref().map(|scene_view| scene_view.orbit.camera().clone());
     let Some(camera) = camera else { return };
     buttons(window, ui, &camera);
     let mut chosen = keyframes(&mut window.panels.flight, ui, &camera);
@@ -74,9 +74,9 @@ fn buttons(window: &mut Window, ui: &mut Ui, camera: &Camera) {
         }
         let turns = ui.button("Turn around").on_hover_text("Keyframes once around the scene");
         if turns.clicked()
-            && let Some(shown) = &window.shown
+            && let Some(scene_view) = &window.scene_view
         {
-            let mut orbit = shown.orbit.clone();
+            let mut orbit = scene_view.orbit.clone();
             let flight = &mut window.panels.flight;
             flight.keyframes.clear();
             for number in 0..TURNS {

@@ -1,10 +1,10 @@
 //! The menu, the panels beside the picture, and the windows over it.
 
+mod appearance;
 mod asked;
 mod clips;
 mod flight;
 mod inputs;
-mod look;
 mod transfer;
 
 pub use asked::Ask;
@@ -160,7 +160,7 @@ pub fn menu(window: &mut Window, ui: &mut Ui) {
         ui.menu_button("View", |ui| view_menu(window, ui));
         let measures = window.tool == Tool::Measure;
         if ui.selectable_label(measures, "Measure").clicked() {
-            window.tool = if measures { Tool::Look } else { Tool::Measure };
+            window.tool = if measures { Tool::Navigate } else { Tool::Measure };
             window.measured.clear();
         }
         ui.toggle_value(&mut window.panels.shows_slices, "Slices");
@@ -183,9 +183,9 @@ pub fn status(window: &mut Window, ui: &mut Ui) {
     ui.horizontal(|ui| {
         if let Some(DVec3 { x, y, z }) = window.panels.under_cursor {
             ui.label(format!("{x:.4}, {y:.4}, {z:.4}"));
-            if let Some(shown) = &window.shown
+            if let Some(scene_view) = &window.scene_view
                 && let Some(value) =
-                    Probe::new(&shown.stage.loaded.scene).value_at(DVec3 { x, y, z })
+                    Probe::new(&scene_view.stage.loaded.scene).value_at(DVec3 { x, y, z })
             {
                 ui.label(format!("value {value:.4}"));
             }
@@ -214,7 +214,9 @@ pub fn side(window: &mut Window, ui: &mut Ui) {
             .default_open(true)
             .show(ui, |ui| transfer::show(window, ui));
     }
-    egui::CollapsingHeader::new("Look").default_open(true).show(ui, |ui| look::show(window, ui));
+    egui::CollapsingHeader::new("Look")
+        .default_open(true)
+        .show(ui, |ui| appearance::show(window, ui));
     egui::CollapsingHeader::new("Clips").default_open(false).show(ui, |ui| clips::show(window, ui));
     egui::CollapsingHeader::new("Camera path")
         .default_open(false)
@@ -234,7 +236,10 @@ pub fn slices(window: &mut Window, ui: &mut Ui) {
         return;
     }
     let (Some((stage, field)), Some(mut panes)) = (
-        window.shown.as_ref().map(|shown| (Arc::clone(&shown.stage), shown.field)),
+        window
+            .scene_view
+            .as_ref()
+            .map(|scene_view| (Arc::clone(&scene_view.stage), scene_view.field)),
         window.panels.slices.take(),
     ) else {
         return;
@@ -275,7 +280,8 @@ fn frame(window: &mut Window, ui: &mut Ui) {
         row("Bytes", stats.gpu_bytes.to_string());
         row("Frame", format!("{:.1} ms", frame.milliseconds));
         row("Behind the hand", format!("{:.1} ms", window.delay));
-        let device = window.shown.as_ref().map(|shown| shown.stage.device.name().to_owned());
+        let device =
+            window.scene_view.as_ref().map(|scene_view| scene_view.stage.device.name().to_owned());
         row("Device", device.unwrap_or_default());
     });
 }

@@ -12,7 +12,7 @@ pub fn show(window: &mut Window, ui: &mut Ui) {
     let field = choose(window, ui);
     let (Some(mut transfer), Some(stage), Some(mut curve)) = (
         window.transfer(),
-        window.shown.as_ref().map(|shown| Arc::clone(&shown.stage)),
+        window.scene_view.as_ref().map(|scene_view| Arc::clone(&scene_view.stage)),
         window.panels.curve.take(),
     ) else {
         return;
@@ -45,29 +45,30 @@ pub fn show(window: &mut Window, ui: &mut Ui) {
 
 /// Lets one of several fields be chosen. Returns the item whose field is edited.
 fn choose(window: &mut Window, ui: &mut Ui) -> usize {
-    let Some(shown) = &mut window.shown else { return 0 };
-    let fields = shown.fields();
+    let Some(scene_view) = &mut window.scene_view else { return 0 };
+    let fields = scene_view.fields();
     if fields.len() > 1 {
-        let own = fields.iter().find(|(item, _)| *item == shown.field);
-        let own = own.map_or("", |(_, name)| name);
+        let current = fields.iter().find(|(item, _)| *item == scene_view.field);
+        let current = current.map_or("", |(_, name)| name);
         ui.horizontal(|ui| {
             let label = ui.label("Field");
-            let choice = ComboBox::from_id_salt("field").selected_text(own);
+            let choice = ComboBox::from_id_salt("field").selected_text(current);
             let list = choice.show_ui(ui, |ui| {
                 for (item, name) in &fields {
-                    ui.selectable_value(&mut shown.field, *item, name);
+                    ui.selectable_value(&mut scene_view.field, *item, name);
                 }
             });
             list.response.labelled_by(label.id);
         });
     }
-    shown.field
+    scene_view.field
 }
 
 /// Moves and widens the transfer function as a hand drags.
 pub fn window_level(window: &mut Window, drag: Vec2) {
     let Some(mut transfer) = window.transfer() else { return };
-    let values = window.shown.as_ref().map(|shown| shown.stage.values(shown.field));
+    let values =
+        window.scene_view.as_ref().map(|scene_view| scene_view.stage.values(scene_view.field));
     let Some(values) = values else { return };
     curve::window_level(&mut transfer, drag, values);
     window.set_transfer(&transfer);

@@ -51,9 +51,9 @@ impl Run {
     /// Runs a command with these arguments.
     pub fn of(command: &mut Command, arguments: &[impl AsRef<OsStr>]) -> Self {
         let output = command.args(arguments).output();
-        let told: Vec<_> =
+        let words: Vec<_> =
             arguments.iter().map(|argument| argument.as_ref().to_string_lossy()).collect();
-        Self(told.join(" "), output.unwrap())
+        Self(words.join(" "), output.unwrap())
     }
 
     pub fn code(&self) -> Option<i32> {

@@ -76,9 +76,9 @@ pub fn half_turn(mut set: Gaussians, axis: usize) -> Gaussians {
     set.origin *= signs.as_dvec3();
     set.centers.iter_mut().for_each(|center| *center *= signs);
     let turn = Quat::from_axis_angle([Vec3::X, Vec3::Y, Vec3::Z][axis], PI);
-    set.rotations.iter_mut().for_each(|own| *own = turn * *own);
-    for own in set.harmonics.chunks_exact_mut(terms(set.degree)) {
-        for (term, odd) in own.iter_mut().zip(ODD) {
+    set.rotations.iter_mut().for_each(|rotation| *rotation = turn * *rotation);
+    for harmonics in set.harmonics.chunks_exact_mut(terms(set.degree)) {
+        for (term, odd) in harmonics.iter_mut().zip(ODD) {
             let is_turned = (0..3).filter(|at| *at != axis && odd[*at]).count() == 1;
             *term = term.map(|part| if is_turned { -part } else { part });
         }
@@ -108,16 +108,16 @@ impl Apart {
         Self { center: 1e-5, scale: 1e-5, turn: 1e-5, opacity: 1e-5, constant: 1e-5, rest: 1e-5 };
 
     /// Measures each Gaussian of a scene beside the nearest one that was found.
-    pub fn of(found: &Gaussians, wanted: &Gaussians) -> Self {
-        assert_eq!((found.len(), found.validate()), (wanted.len(), Ok(())));
+    pub fn of(actual: &Gaussians, wanted: &Gaussians) -> Self {
+        assert_eq!((actual.len(), actual.validate()), (wanted.len(), Ok(())));
         let mut apart = Self::default();
         let mut met = BTreeSet::new();
         for index in 0..wanted.len() {
-            let away = |other: usize| place(found, other).distance(place(wanted, index));
-            let nearest = (0..found.len()).min_by(|a, b| away(*a).total_cmp(&away(*b)));
+            let away = |other: usize| place(actual, other).distance(place(wanted, index));
+            let nearest = (0..actual.len()).min_by(|a, b| away(*a).total_cmp(&away(*b)));
             let nearest = nearest.expect("a Gaussian");
             assert!(met.insert(nearest), "two Gaussians are nearest to number {nearest}");
-            apart.widen((found, nearest), (wanted, index));
+            apart.widen((actual, nearest), (wanted, index));
         }
         apart
     }
@@ -141,7 +141,7 @@ impl Apart {
 
     /// Asserts that nothing is further apart than this.
     pub fn within(&self, most: &Self, what: &str) {
-        for (name, found, most) in [
+        for (name, distance, most) in [
             ("centres", self.center, most.center),
             ("deviations", self.scale, most.scale),
             ("turns", self.turn, most.turn),
@@ -149,7 +149,7 @@ impl Apart {
             ("constant terms", self.constant, most.constant),
             ("other terms", self.rest, most.rest),
         ] {
-            assert!(found <= most, "{what}: {name} are {found} apart, more than {most}");
+            assert!(distance <= most, "{what}: {name} are {distance} apart, more than {most}");
         }
     }
 }
@@ -216,8 +216,8 @@ pub fn load(folder: &Folder, name: &str) -> Gaussians {
 
 /// Returns how alike two pictures are, in dB.
 pub fn psnr(folder: &Folder, a: &str, b: &str) -> f64 {
-    let found = compare_files(&folder.path(a), &folder.path(b), &Limits::default());
-    found.expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
+    let comparison = compare_files(&folder.path(a), &folder.path(b), &Limits::default());
+    comparison.expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
 }
 
 /// A codebook of equal steps.

@@ -31,7 +31,7 @@ _FAMILIES = {
 }
 
 
-def found(source: Any, scalar: str | None) -> Parts | None:
+def parts_of(source: Any, scalar: str | None) -> Parts | None:
     """Returns the parts of an object of another package, None for arrays and anything else.
 
     `scalar` names the array of the object that has the values.
@@ -42,26 +42,26 @@ def found(source: Any, scalar: str | None) -> Parts | None:
         return None
     for base in type(source).__mro__:
         family = _FAMILIES.get(base.__module__.partition(".")[0])
-        own = None if family is None else family(source, scalar)
-        if own is not None:
-            return own
+        parts = None if family is None else family(source, scalar)
+        if parts is not None:
+            return parts
     return None
 
 
 def of_kind(kind: type[Parts], source: Any, scalar: str | None, method: str) -> Any:
     """Returns the parts of an object that must be of this kind, None for arrays."""
-    own = found(source, scalar)
-    if own is None:
+    parts = parts_of(source, scalar)
+    if parts is None:
         if scalar is not None:
             raise KindError(
                 f"{method}(): scalar names an array of an object, not of {_kind(source)}"
             )
         return None
-    if isinstance(own, kind):
-        return own
+    if isinstance(parts, kind):
+        return parts
     raise KindError(
-        f"{method}() takes {kind.ARTICLE}, but {_kind(source)} is {own.ARTICLE}: call "
-        f"{own.method}() or add()"
+        f"{method}() takes {kind.ARTICLE}, but {_kind(source)} is {parts.ARTICLE}: call "
+        f"{parts.method}() or add()"
     )
 
 
@@ -91,7 +91,9 @@ def unknown(source: Any, what: str, also: str = "") -> KindError:
 
 
 def _kind(source: Any) -> str:
-    own = type(source)
+    kind = type(source)
     return (
-        own.__qualname__ if own.__module__ == "builtins" else f"{own.__module__}.{own.__qualname__}"
+        kind.__qualname__
+        if kind.__module__ == "builtins"
+        else f"{kind.__module__}.{kind.__qualname__}"
     )

@@ -46,8 +46,8 @@ def of_itk(source: Any, scalar: str | None) -> Volume | None:
     _no_name(scalar, "an image of ITK")
     if source.GetImageDimension() != 3:
         return _flat(source.GetImageDimension())
-    own = source.GetDirection().GetVnlMatrix()
-    direction = np.array([[own.get(row, column) for column in range(3)] for row in range(3)])
+    matrix = source.GetDirection().GetVnlMatrix()
+    direction = np.array([[matrix.get(row, column) for column in range(3)] for row in range(3)])
     first = source.GetBufferedRegion().GetIndex()
     origin = source.TransformIndexToPhysicalPoint(first)
     return Volume(
@@ -69,15 +69,17 @@ def of_simple_itk(source: Any, scalar: str | None) -> Volume | None:
     # The module is there, because it has made the image.
     samples = sys.modules["SimpleITK"].GetArrayViewFromImage(source)
     direction = np.reshape(source.GetDirection(), (3, 3))
-    own = held(samples, source)
-    return Volume(own, source.GetSpacing(), source.GetOrigin(), direction, frame="lps")
+    kept = held(samples, source)
+    return Volume(kept, source.GetSpacing(), source.GetOrigin(), direction, frame="lps")
 
 
 def of_xarray(source: Any, scalar: str | None) -> Volume | None:
     """Returns the volume of a data array. Names of dimensions say which axis is x, y or z; others
     take the axes that are left, in the order z, y, x."""
     if hasattr(source, "data_vars"):
-        deep = {name: own for name, own in source.data_vars.items() if own.squeeze().ndim == 3}
+        deep = {
+            name: array for name, array in source.data_vars.items() if array.squeeze().ndim == 3
+        }
         if scalar is None and len(deep) != 1:
             listed = ", ".join(map(repr, deep)) or "none"
             raise ArgumentError(f"choose one of the data set's volumes as scalar: {listed}")
@@ -126,9 +128,9 @@ def _world(source: Any) -> list[Any]:
     """Returns the dimensions along x, y and z of a data array."""
 
     def axis_of(name: Any) -> int | None:
-        told = source.coords[name].attrs.get("axis") if name in source.coords else None
-        if told in ("X", "Y", "Z"):
-            return "XYZ".index(told)
+        letter = source.coords[name].attrs.get("axis") if name in source.coords else None
+        if letter in ("X", "Y", "Z"):
+            return "XYZ".index(letter)
         low = str(name).lower()
         return next((axis for axis, names in enumerate(_NAMES) if low in names), None)
 

@@ -23,31 +23,31 @@ def of_trimesh(source: Any, scalar: str | None) -> Surface | None:
         colors = np.asarray(source.colors)
         _no_arrays(scalar, "a point cloud of trimesh")
         return Surface(positions, colors=colors if len(colors) == len(positions) else None)
-    own = Surface(positions, np.asarray(source.faces))
+    surface = Surface(positions, np.asarray(source.faces))
     if scalar is not None:
         of_faces, of_vertices = dict(source.face_attributes), dict(source.vertex_attributes)
         values = chosen({**of_faces, **of_vertices}, scalar, "the mesh")
         if scalar not in of_vertices:
-            return own.by_face(None, np.asarray(values))
-        own.values = np.asarray(values)
-        return own
+            return surface.by_face(None, np.asarray(values))
+        surface.values = np.asarray(values)
+        return surface
     visual = source.visual
     if visual.kind == "face":
-        return own.by_face(np.asarray(visual.face_colors), None)
+        return surface.by_face(np.asarray(visual.face_colors), None)
     if visual.kind == "texture":
         # The colours of the texture at the vertices.
         visual = visual.to_color()
     if visual.kind is not None:
-        own.colors = np.asarray(visual.vertex_colors)
-    return own
+        surface.colors = np.asarray(visual.vertex_colors)
+    return surface
 
 
 def of_open3d(source: Any, scalar: str | None) -> Surface | None:
     """Returns a mesh or a point cloud, of tensors or of the older kind."""
     if hasattr(source, "vertex") and hasattr(source, "triangle"):
-        own = _of_tensors(source.vertex, scalar)
-        own.faces = _numpy(source.triangle.indices)
-        return own
+        surface = _of_tensors(source.vertex, scalar)
+        surface.faces = _numpy(source.triangle.indices)
+        return surface
     if hasattr(source, "point") and not hasattr(source, "line"):
         return _of_tensors(source.point, scalar)
     if hasattr(source, "vertices") and hasattr(source, "triangles"):
@@ -73,19 +73,19 @@ def _of_tensors(attributes: Any, scalar: str | None) -> Surface:
     arrays = {name: attributes[name] for name in attributes}
     if "positions" not in arrays:
         raise ArgumentError("the object of Open3D has no positions")
-    own = Surface(_numpy(arrays["positions"]))
+    surface = Surface(_numpy(arrays["positions"]))
     if "normals" in arrays:
-        own.normals = _numpy(arrays["normals"])
+        surface.normals = _numpy(arrays["normals"])
     if "colors" in arrays:
-        own.colors = _numpy(arrays["colors"])
+        surface.colors = _numpy(arrays["colors"])
     if scalar is not None:
-        own.values = _numpy(chosen(arrays, scalar, "it"))
-    return own
+        surface.values = _numpy(chosen(arrays, scalar, "it"))
+    return surface
 
 
 def _numpy(tensor: Any) -> Array:
-    own: Array = tensor.cpu().numpy()
-    return own
+    numbers: Array = tensor.cpu().numpy()
+    return numbers
 
 
 def of_plyfile(source: Any, scalar: str | None) -> Surface | None:
@@ -102,14 +102,14 @@ def of_plyfile(source: Any, scalar: str | None) -> Surface | None:
         has_all = set(names) <= set(arrays)
         return np.stack([arrays[name] for name in names], axis=1) if has_all else None
 
-    own = Surface(np.stack([arrays[axis] for axis in "xyz"], axis=1), _faces_of_ply(elements))
-    own.normals = joined("nx", "ny", "nz")
-    own.colors = joined("red", "green", "blue", "alpha")
-    if own.colors is None:
-        own.colors = joined("red", "green", "blue")
+    surface = Surface(np.stack([arrays[axis] for axis in "xyz"], axis=1), _faces_of_ply(elements))
+    surface.normals = joined("nx", "ny", "nz")
+    surface.colors = joined("red", "green", "blue", "alpha")
+    if surface.colors is None:
+        surface.colors = joined("red", "green", "blue")
     if scalar is not None:
-        own.values = np.asarray(chosen(arrays, scalar, "the PLY data"))
-    return own
+        surface.values = np.asarray(chosen(arrays, scalar, "the PLY data"))
+    return surface
 
 
 def _faces_of_ply(elements: dict[str, Array]) -> Array | None:
@@ -124,7 +124,7 @@ def _faces_of_ply(elements: dict[str, Array]) -> Array | None:
     lists = faces[names[0]]
     if lists.ndim == 2:
         return lists
-    offsets = np.concatenate([[0], np.cumsum([len(own) for own in lists])])
+    offsets = np.concatenate([[0], np.cumsum([len(row) for row in lists])])
     return fans(offsets, np.concatenate(list(lists)).astype(np.int64))[0]
 
 
@@ -139,14 +139,14 @@ def of_laspy(source: Any, scalar: str | None) -> Surface | None:
         return None
     positions = np.stack([np.asarray(getattr(source, axis), float) for axis in "xyz"], axis=1)
     names = list(source.point_format.dimension_names)
-    own = Surface(positions, up="+Z")
+    surface = Surface(positions, up="+Z")
     if scalar is not None:
         if scalar not in names:
             raise ArgumentError(f"the points have no {scalar!r}, but {', '.join(names)}")
-        own.values = np.asarray(source[scalar], float)
+        surface.values = np.asarray(source[scalar], float)
     elif {"red", "green", "blue"} <= set(names):
         colors = np.stack([np.asarray(source[name]) for name in ("red", "green", "blue")], axis=1)
         # Many programs write bytes into the fields of 16 bits.
         is_bytes = colors.size > 0 and colors.max() <= 255
-        own.colors = colors.astype(np.uint8 if is_bytes else np.uint16)
-    return own
+        surface.colors = colors.astype(np.uint8 if is_bytes else np.uint16)
+    return surface

@@ -68,15 +68,15 @@ class Surface(Parts):
     def with_given(self, normals: Any, colors: Any, values: Any) -> Surface:
         """Returns the same with other arrays where they are given."""
         given = {"normals": normals, "colors": colors, "values": values}
-        return replace(self, **{name: own for name, own in given.items() if own is not None})
+        return replace(self, **{name: array for name, array in given.items() if array is not None})
 
     def by_face(self, colors: Array | None, values: Array | None) -> Surface:
         """Returns the mesh with colours or values of its faces: no two faces share a vertex."""
         assert self.faces is not None
         at = self.faces.ravel()
 
-        def repeated(own: Array | None) -> Array | None:
-            return None if own is None else np.repeat(own, self.faces.shape[1], axis=0)  # type: ignore[union-attr]
+        def repeated(array: Array | None) -> Array | None:
+            return None if array is None else np.repeat(array, self.faces.shape[1], axis=0)  # type: ignore[union-attr]
 
         return Surface(
             self.positions[at],

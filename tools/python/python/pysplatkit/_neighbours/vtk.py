@@ -53,8 +53,10 @@ def points(source: Any, scalar: str | None) -> Surface | None:
 def _image(source: Any, scalar: str | None) -> Volume:
     values, of_cells = _values(source, scalar)
     dims = np.array(source.GetDimensions())
-    own = source.GetDirectionMatrix()
-    direction = np.array([[own.GetElement(row, column) for column in range(3)] for row in range(3)])
+    matrix = source.GetDirectionMatrix()
+    direction = np.array(
+        [[matrix.GetElement(row, column) for column in range(3)] for row in range(3)]
+    )
     spacing = np.array(source.GetSpacing())
     origin = np.array(source.GetPoint(0))
     if of_cells:
@@ -67,8 +69,8 @@ def _image(source: Any, scalar: str | None) -> Volume:
 def _rectilinear(source: Any, scalar: str | None) -> Volume:
     values, of_cells = _values(source, scalar)
     lines = [
-        _array(own).ravel()
-        for own in (source.GetXCoordinates(), source.GetYCoordinates(), source.GetZCoordinates())
+        _array(line).ravel()
+        for line in (source.GetXCoordinates(), source.GetYCoordinates(), source.GetZCoordinates())
     ]
     if of_cells:
         lines = [line if len(line) == 1 else 0.5 * (line[1:] + line[:-1]) for line in lines]
@@ -90,11 +92,11 @@ def _structured(source: Any, scalar: str | None) -> Parts:
     if len(wide) == 2:
         at = at.squeeze()
         corners = [at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]]
-        quads = np.stack([own.ravel() for own in corners], axis=1)
+        quads = np.stack([corner.ravel() for corner in corners], axis=1)
         return _surface(source, scalar, quads, np.arange(len(quads)))
     flat = [at[:, :-1, :-1], at[:, :-1, 1:], at[:, 1:, 1:], at[:, 1:, :-1]]
-    corners = [*(own[:-1] for own in flat), *(own[1:] for own in flat)]
-    nodes = np.stack([own.ravel() for own in corners], axis=1)
+    corners = [*(layer[:-1] for layer in flat), *(layer[1:] for layer in flat)]
+    nodes = np.stack([corner.ravel() for corner in corners], axis=1)
     values, of_cells = _values(source, scalar)
     kinds = np.full(len(nodes), 12, np.uint8)
     offsets = np.arange(len(nodes) + 1) * 8
@@ -129,11 +131,11 @@ def _unstructured(source: Any, scalar: str | None) -> Parts:
 
 def _kinds(source: Any) -> Array:
     try:
-        own = source.GetCellTypes()
+        types = source.GetCellTypes()
     except TypeError:
         # Before VTK 9.6 that was another method.
-        own = source.GetCellTypesArray()
-    return _array(own).ravel().astype(np.uint8)
+        types = source.GetCellTypesArray()
+    return _array(types).ravel().astype(np.uint8)
 
 
 def _flat(source: Any, scalar: str | None, kinds: Array, offsets: Array, nodes: Array) -> Surface:
@@ -159,9 +161,9 @@ def _polygons(source: Any, scalar: str | None) -> Surface:
     triangles, owners = fans(offsets, nodes)
     # Values of cells are in the order points, lines, polygons, strips.
     before = source.GetNumberOfVerts() + source.GetNumberOfLines()
-    own = source.GetStrips()
-    if own.GetNumberOfCells():
-        starts, more = _lists(own)
+    strip_cells = source.GetStrips()
+    if strip_cells.GetNumberOfCells():
+        starts, more = _lists(strip_cells)
         strips = [_strip(more[a:b]) for a, b in pairwise(starts)]
         numbers = np.repeat(np.arange(len(strips)), [len(strip) for strip in strips])
         triangles = np.concatenate([triangles, *strips])
@@ -173,14 +175,14 @@ def _polygons(source: Any, scalar: str | None) -> Surface:
     return _surface(source, scalar, triangles, before + owners)
 
 
-def _lists(own: Any) -> tuple[Array, Array]:
+def _lists(cells: Any) -> tuple[Array, Array]:
     """Returns where the nodes of each cell of an array of cells begin and end, and all nodes."""
-    count, width = own.GetNumberOfCells(), own.IsHomogeneous()
-    nodes = _array(own.GetConnectivityArray()).ravel().astype(np.int64)
+    count, width = cells.GetNumberOfCells(), cells.IsHomogeneous()
+    nodes = _array(cells.GetConnectivityArray()).ravel().astype(np.int64)
     if count and width > 0:
         # VTK may keep no list of offsets then.
         return np.arange(count + 1) * width, nodes
-    return _array(own.GetOffsetsArray()).ravel().astype(np.int64), nodes
+    return _array(cells.GetOffsetsArray()).ravel().astype(np.int64), nodes
 
 
 def _strip(nodes: Array) -> Array:
@@ -193,27 +195,27 @@ def _strip(nodes: Array) -> Array:
 def _surface(source: Any, scalar: str | None, faces: Array, owners: Array) -> Surface:
     """Returns a mesh. `owners` are the cells of the faces."""
     values, of_cells = _values(source, scalar, is_needed=False)
-    own = Surface(_positions(source), faces, _normals(source))
+    surface = Surface(_positions(source), faces, _normals(source))
     colors, values = _colors(values)
     numbers = None if values is None else _scalars(values)
     if of_cells:
-        return own.by_face(
+        return surface.by_face(
             None if colors is None else colors[owners], None if numbers is None else numbers[owners]
         )
-    own.colors, own.values = colors, numbers
-    return own
+    surface.colors, surface.values = colors, numbers
+    return surface
 
 
 def _positions(source: Any) -> Array:
-    own = source.GetPoints()
-    if own is None or own.GetNumberOfPoints() == 0:
+    points = source.GetPoints()
+    if points is None or points.GetNumberOfPoints() == 0:
         raise ArgumentError("the data set has no points")
-    return _array(own.GetData())
+    return _array(points.GetData())
 
 
 def _normals(source: Any) -> Array | None:
-    own = source.GetPointData().GetNormals()
-    return None if own is None else _array(own)
+    normals = source.GetPointData().GetNormals()
+    return None if normals is None else _array(normals)
 
 
 def _values(source: Any, scalar: str | None, is_needed: bool = True) -> tuple[Any, bool]:
@@ -221,25 +223,29 @@ def _values(source: Any, scalar: str | None, is_needed: bool = True) -> tuple[An
     one, or where values are needed the first."""
     data = [source.GetPointData(), source.GetCellData()]
     if scalar is None:
-        for of_cells, own in enumerate(data):
-            if own.GetScalars() is not None:
-                return _array(own.GetScalars()), bool(of_cells)
+        for of_cells, attributes in enumerate(data):
+            if attributes.GetScalars() is not None:
+                return _array(attributes.GetScalars()), bool(of_cells)
         if not is_needed:
             return None, False
-        for of_cells, own in enumerate(data):
-            if own.GetNumberOfArrays() and own.GetArray(0) is not None:
-                return _array(own.GetArray(0)), bool(of_cells)
+        for of_cells, attributes in enumerate(data):
+            if attributes.GetNumberOfArrays() and attributes.GetArray(0) is not None:
+                return _array(attributes.GetArray(0)), bool(of_cells)
         raise ArgumentError("the data set has no arrays of points or cells")
     # As for files, “velocity:0” is the first component.
     name, _, part = scalar.rpartition(":")
-    for of_cells, own in enumerate(data):
-        if own.GetArray(scalar) is not None:
-            return _array(own.GetArray(scalar)), bool(of_cells)
-        if part.isdigit() and own.GetArray(name) is not None:
-            values = _array(own.GetArray(name))
+    for of_cells, attributes in enumerate(data):
+        if attributes.GetArray(scalar) is not None:
+            return _array(attributes.GetArray(scalar)), bool(of_cells)
+        if part.isdigit() and attributes.GetArray(name) is not None:
+            values = _array(attributes.GetArray(name))
             if values.ndim == 2 and int(part) < values.shape[1]:
                 return values[:, int(part)], bool(of_cells)
-    names = [own.GetArrayName(at) for own in data for at in range(own.GetNumberOfArrays())]
+    names = [
+        attributes.GetArrayName(at)
+        for attributes in data
+        for at in range(attributes.GetNumberOfArrays())
+    ]
     listed = ", ".join(map(repr, names)) or "none"
     raise ArgumentError(f"the data set has no array {scalar!r}; its arrays: {listed}")
 
@@ -260,11 +266,11 @@ def _scalars(values: Any) -> Any:
     return np.linalg.norm(values.astype(np.float64), axis=1)
 
 
-def _array(own: Any) -> Array:
+def _array(array: Any) -> Array:
     """Returns the numbers of an array of VTK, where they are if they have memory."""
     try:
-        return np.asarray(memoryview(own))
+        return np.asarray(memoryview(array))
     except (TypeError, ValueError, BufferError):
-        count, width = own.GetNumberOfTuples(), own.GetNumberOfComponents()
-        rows = np.array([own.GetTuple(row) for row in range(count)]).reshape(count, width)
+        count, width = array.GetNumberOfTuples(), array.GetNumberOfComponents()
+        rows = np.array([array.GetTuple(row) for row in range(count)]).reshape(count, width)
         return rows[:, 0] if width == 1 else rows

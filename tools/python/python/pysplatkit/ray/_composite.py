@@ -46,9 +46,9 @@ def cropped(color: Any, depth: Any, box: Box, precision: str) -> Part:
         none = np.zeros((0, 0, 4), precision)
         return Part(shape, (0, 0), none, np.zeros((0, 0), np.float32), box)
     area = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
-    own = np.ascontiguousarray(color[area], precision)
+    kept = np.ascontiguousarray(color[area], precision)
     corner = (int(rows[0]), int(columns[0]))
-    return Part(shape, corner, own, np.ascontiguousarray(depth[area]), box)
+    return Part(shape, corner, kept, np.ascontiguousarray(depth[area]), box)
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ class Window:
         leave it."""
         width, height = self.size
         eye, focus, up = (
-            np.array(own, dtype=float)
-            for own in (self.camera.position, self.camera.focal_point, self.camera.view_up)
+            np.array(vector, dtype=float)
+            for vector in (self.camera.position, self.camera.focal_point, self.camera.view_up)
         )
         ahead = (focus - eye) / np.linalg.norm(focus - eye)
         right = np.cross(ahead, up)
@@ -121,7 +121,7 @@ def _add(color: Any, depth: Any, part: Part, window: Window) -> None:
     if rows.size:
         first, beside = part.corner
         enter, leave = window.depths(part.box, rows + first, columns + beside)
-        own = part.color[..., 3][thin].astype(np.float64)
-        whole = -np.log(np.maximum(1.0 - own, 1e-6))
+        opacity = part.color[..., 3][thin].astype(np.float64)
+        whole = -np.log(np.maximum(1.0 - opacity, 1e-6))
         share = np.log(2.0 * before[thin]) / np.maximum(whole, 1e-6)
         depth[thin] = enter + np.clip(share, 0.0, 1.0) * np.maximum(leave - enter, 0.0)

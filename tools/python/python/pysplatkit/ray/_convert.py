@@ -75,9 +75,9 @@ def convert(
         raise OutputError(to, "cannot be written", None, "it exists already")
     if not ray.is_initialized():
         ray.init(include_dashboard=False)
-    own = None if folder is None else Path(os.path.abspath(os.fspath(folder)))
+    given_folder = None if folder is None else Path(os.path.abspath(os.fspath(folder)))
     try:
-        at = own or Path(tempfile.mkdtemp(prefix=f".{to.name}-parts-", dir=to.parent))
+        at = given_folder or Path(tempfile.mkdtemp(prefix=f".{to.name}-parts-", dir=to.parent))
     except OSError as error:
         raise OutputError(to, "cannot be written", error.errno, error.strerror or "") from error
     try:
@@ -92,7 +92,7 @@ def convert(
             task_options or {},
         )
     finally:
-        if own is None:
+        if given_folder is None:
             shutil.rmtree(at, ignore_errors=True)
 
 
@@ -110,12 +110,12 @@ def _converted(
     if not plan.is_file():
         count = [] if parts is None else ["--parts", str(parts)]
         run(["convert", *files, "-o", str(to), "--plan", str(folder), *count, *options])
-    found = len(json.loads(plan.read_text())["parts"])
+    part_count = len(json.loads(plan.read_text())["parts"])
     # A plan may have fewer parts than were asked for: a part has at least one point.
-    if parts is not None and found > parts:
-        raise ArgumentError(f"{plan} has {found} parts, not {parts}; choose another folder")
+    if parts is not None and part_count > parts:
+        raise ArgumentError(f"{plan} has {part_count} parts, not {parts}; choose another folder")
     make = ray.remote(max_retries=_RETRIES, num_cpus=cpus, **task_options)(_part)
-    waiting = [make.remote(str(plan), index) for index in range(found)]
+    waiting = [make.remote(str(plan), index) for index in range(part_count)]
     while waiting:
         ready, waiting = ray.wait(waiting)
         try:
@@ -135,12 +135,12 @@ def _part(plan: str, index: int) -> None:
 def run(words: Sequence[str]) -> str:
     """Runs the command. Returns what it prints."""
     command = os.environ.get("SPLATKIT_COMMAND") or "splatkit"
-    found = shutil.which(command)
-    if found is None:
+    program = shutil.which(command)
+    if program is None:
         raise ArgumentError(
             f"there is no command {command}: build splatkit's, or let SPLATKIT_COMMAND name it"
         )
-    done = subprocess.run([found, *words], capture_output=True, text=True, check=False)
+    done = subprocess.run([program, *words], capture_output=True, text=True, check=False)
     if done.returncode:
         raise CommandError(["splatkit", *words], done.returncode, done.stderr)
     return done.stdout

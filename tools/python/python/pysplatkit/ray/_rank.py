@@ -77,7 +77,7 @@ class Rank:
     def survey(self, source: Source) -> tuple[Any, Any]:
         """Returns the scene's bounds, and where work lies: rows of x, y, z and a weight."""
         scene = self._scene(source)
-        return scene.bounds, scene._own.weights().reshape(-1, 4)
+        return scene.bounds, scene._native.weights().reshape(-1, 4)
 
     def camera(self, source: Source, size: tuple[int, int], view: Mapping[str, Any]) -> Camera:
         """Returns the camera that sees the whole scene."""
@@ -128,9 +128,9 @@ class Rank:
         self, source: Source, camera: Camera, options: Mapping[str, Any]
     ) -> tuple[Any, Any, str]:
         """Draws a whole picture. Returns colours, depths and statistics."""
-        own = self._scene(source)._pixels(camera, options)
-        picture = Picture(own, None)
-        return picture.color, picture.depth, own.statistics
+        native = self._scene(source)._pixels(camera, options)
+        picture = Picture(native, None)
+        return picture.color, picture.depth, native.statistics
 
 
 def rows_of(height: int, strips: int) -> list[tuple[int, int]]:

@@ -55,10 +55,10 @@ def _halved(outer: Any, inner: Any, weights: Any, count: int, boxes: list[Box]) 
     axis, place = _plane(inner, weights, share)
     is_low = weights[:, axis] < place
     halves = []
-    for side, own, number in ((1, is_low, below), (0, ~is_low, count - below)):
+    for side, mask, number in ((1, is_low, below), (0, ~is_low, count - below)):
         around, around_scene = ([corner.copy() for corner in box] for box in (outer, inner))
         around[side][axis] = around_scene[side][axis] = place
-        halves.append(_halved(around, around_scene, weights[own], number, boxes))
+        halves.append(_halved(around, around_scene, weights[mask], number, boxes))
     return Split(axis, place, *halves)
 
 
@@ -87,11 +87,11 @@ def order(tree: Tree, camera: Camera) -> list[int]:
     return order(near, camera) + order(far, camera)
 
 
-def sees_low_first(own: Split, camera: Camera) -> bool:
+def sees_low_first(plane: Split, camera: Camera) -> bool:
     """Whether the lower side of a plane may hide the upper one, and not the reverse."""
-    eye, axis = camera.position[own.axis], own.axis
+    eye, axis = camera.position[plane.axis], plane.axis
     if camera.height is None:
-        return eye < own.place
+        return eye < plane.place
     return camera.focal_point[axis] >= eye
 
 

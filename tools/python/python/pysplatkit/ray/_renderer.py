@@ -104,8 +104,8 @@ class Renderer:
     def camera(self, size: tuple[int, int] = (1280, 720), **view: Any) -> Camera:
         """Returns the camera that sees the whole scene, as `Scene.camera` does."""
         _options.checked(view, frozenset({*_FIT, "clips"}), "camera")
-        found: Camera = get(self._first.camera.remote(self._source, size, view))
-        return found
+        camera: Camera = get(self._first.camera.remote(self._source, size, view))
+        return camera
 
     def render(
         self,
@@ -141,7 +141,7 @@ class Renderer:
         color, depth, sent = self._composited(tree, Window(camera, whole, (0, whole[1])), strips)
         if is_fitted and not (color[..., 3] >= _LEAST_OPACITY).any():
             raise NothingToDrawError("the picture is empty: nothing has opacity")
-        about = (_told(reports, sent), camera.to_json())
+        about = (_statistics(reports, sent), camera.to_json())
         factor = whole[0] // size[0]
         pixels = (color.reshape(-1, 4), depth.ravel(), whole, factor, about)
         return Picture(_pysplatkit.Picture(*pixels), back)
@@ -164,8 +164,8 @@ class Renderer:
         path = list(cameras)
         for number, (color, depth, statistics) in self._frames(path, given):
             about = (statistics, path[number].to_json())
-            own = _pysplatkit.Picture(color.reshape(-1, 4), depth.ravel(), size, 1, about)
-            yield Picture(own, back)
+            native = _pysplatkit.Picture(color.reshape(-1, 4), depth.ravel(), size, 1, about)
+            yield Picture(native, back)
 
     @property
     def _first(self) -> Any:
@@ -186,7 +186,7 @@ class Renderer:
                 raise NothingToDrawError("the scene is empty")
             tree, boxes = _regions.split(bounds, weights, self._count)
             inner = [_regions.common(box, bounds) for box in boxes]
-            self._surveyed = tree, [Region(*own) for own in zip(boxes, inner, strict=True)]
+            self._surveyed = tree, [Region(*pair) for pair in zip(boxes, inner, strict=True)]
         return self._surveyed
 
     def _drawn(
@@ -197,8 +197,8 @@ class Renderer:
         level = 0.0
         while True:
             drawn = []
-            for rank, own in zip(self._ranks, regions, strict=True):
-                region = Region(own.box, own.inner, level)
+            for rank, whole in zip(self._ranks, regions, strict=True):
+                region = Region(whole.box, whole.inner, level)
                 draw = rank.draw.options(num_returns=strips + 1)
                 drawn.append(draw.remote(self._source, region, camera, given, strips))
             reports: list[Report] = get([refs[0] for refs in drawn])
@@ -221,9 +221,9 @@ class Renderer:
         order = _regions.order(tree, window.camera)
         refs = []
         for at, rows in enumerate(_rank.rows_of(window.size[1], self._count)):
-            own = Window(window.camera, window.size, rows)
+            strip = Window(window.camera, window.size, rows)
             parts = [strips[number][at] for number in order]
-            refs.append(self._ranks[at].composite.remote(own, *parts))
+            refs.append(self._ranks[at].composite.remote(strip, *parts))
         done = get(refs)
         sent = sum(color.nbytes + depth.nbytes for color, depth in done)
         return *_stacked(done), sent
@@ -231,11 +231,11 @@ class Renderer:
     def _swapped(self, tree: Tree, window: Window, strips: list[list[Any]]) -> tuple[Any, Any, int]:
         """Binary swap: in each round, pairs of ranks exchange halves of their strips."""
 
-        def swapped(own: Tree) -> list[tuple[int, Window, list[Any]]]:
-            if not isinstance(own, Split):
-                return [(own, window, strips[own])]
-            sides = [swapped(own.low), swapped(own.high)]
-            is_low_first = _regions.sees_low_first(own, window.camera)
+        def swapped(branch: Tree) -> list[tuple[int, Window, list[Any]]]:
+            if not isinstance(branch, Split):
+                return [(branch, window, strips[branch])]
+            sides = [swapped(branch.low), swapped(branch.high)]
+            is_low_first = _regions.sees_low_first(branch, window.camera)
             done = []
             for pair in zip(*sides, strict=True):
                 for half, (rank, rows, _) in enumerate(pair):
@@ -279,8 +279,10 @@ class Renderer:
         if waiting:
             return waiting.pop(0) if waiting[0] < following + 4 * self._count else None
         numbers = [number for number, _ in drawing.values()]
-        own = [n for n in numbers if n >= following and n not in done and numbers.count(n) == 1]
-        return min(own, default=None)
+        candidates = [
+            n for n in numbers if n >= following and n not in done and numbers.count(n) == 1
+        ]
+        return min(candidates, default=None)
 
 
 def _maker(scene: Any, options: Mapping[str, Any]) -> Callable[[], Scene]:
@@ -299,7 +301,7 @@ def _maker(scene: Any, options: Mapping[str, Any]) -> Callable[[], Scene]:
     return lambda: Scene().add(ray.get(shared), **given)
 
 
-def _told(reports: list[Report], composited: int) -> str:
+def _statistics(reports: list[Report], composited: int) -> str:
     """Returns the statistics of a picture."""
     total: dict[str, Any] = {}
     for name in reports[0].statistics:
@@ -307,8 +309,13 @@ def _told(reports: list[Report], composited: int) -> str:
         total[name] = combine(report.statistics[name] for report in reports)
     total["moved_bytes"] = composited + sum(report.sent for report in reports)
     total["ranks"] = [
-        {**own.statistics, "seconds": own.seconds, "peak_memory": own.peak, "sent_bytes": own.sent}
-        for own in reports
+        {
+            **report.statistics,
+            "seconds": report.seconds,
+            "peak_memory": report.peak,
+            "sent_bytes": report.sent,
+        }
+        for report in reports
     ]
     return json.dumps(total)
 

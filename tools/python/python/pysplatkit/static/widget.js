@@ -116,7 +116,7 @@ class View {
     this.hand = hand;
     this.moveWindow = moveWindow;
     this.number = 0;
-    this.shown = 0;
+    this.drawnNumber = 0;
     this.canvas = make("canvas", { tabIndex: 0, role: "img", title: HELP });
     this.canvas.setAttribute("aria-label", `Picture of a scene. ${HELP}`);
     this.status = make("span", { className: "splatkit-status", textContent: "Drawing …" });
@@ -226,8 +226,8 @@ class View {
     const number = ++this.number;
     const bitmap = await createImageBitmap(new Blob([png], { type: "image/png" }));
     // A picture that took longer to decode than the next one is dropped.
-    if (number > this.shown) {
-      this.shown = number;
+    if (number > this.drawnNumber) {
+      this.drawnNumber = number;
       this.canvas.width = bitmap.width;
       this.canvas.height = bitmap.height;
       this.canvas.getContext("2d").drawImage(bitmap, 0, 0);
@@ -579,9 +579,9 @@ class Editor {
 
 function buttons(model, hand) {
   const button = (text, title, onClick) => {
-    const own = make("button", { type: "button", textContent: text, title });
-    own.addEventListener("click", onClick);
-    return own;
+    const element = make("button", { type: "button", textContent: text, title });
+    element.addEventListener("click", onClick);
+    return element;
   };
   const side = (name, text, title) => button(text, title, () => hand.do("view", { name }));
   const save = () => {

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 /// A point in the file's own coordinates.
-pub(crate) struct Found {
+pub(crate) struct RawPoint {
     pub row: usize,
     pub position: DVec3,
     pub normal: Vec3,

@@ -15,7 +15,7 @@ pub const BLOCK: usize = 4;
 /// samples, a bit for each sample. For a level in bricks, a bit stands for a block of samples with
 /// a known range.
 #[derive(Debug)]
-pub struct Shown {
+pub struct VisibleBlocks {
     /// Samples along each axis.
     pub dims: [usize; 3],
     /// Bits stand for cells of 2 to the power of this many samples along each axis.
@@ -61,7 +61,7 @@ pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
     ranges
 }
 
-impl Shown {
+impl VisibleBlocks {
     /// `dims` is the number of samples along each axis, `ranges` the extremes around each sample.
     /// For each minimum, `first` is the smallest maximum with which something is visible.
     pub fn new(dims: [usize; 3], ranges: &[[u8; 2]], first: &[u16; 256]) -> Self {
@@ -103,14 +103,14 @@ impl Shown {
         let words = sheets.count().div_ceil(64);
         let [columns, rows, layers] = self.blocks;
         let slice = |layer: usize| {
-            let mut own = vec![0u64; tiles[0] * tiles[1] * words];
+            let mut marks = vec![0u64; tiles[0] * tiles[1] * words];
             for block in 0..columns * rows {
                 let words = self.words[layer * columns * rows + block];
                 let place = [block % columns, block / columns, layer].map(|at| at * BLOCK);
                 if self.coarse == 0 {
                     if words != [0; 2] {
                         let block = Cube { first: place, side: BLOCK };
-                        self.mark(lattice, view, sheets, &block, &mut own);
+                        self.mark(lattice, view, sheets, &block, &mut marks);
                     }
                     continue;
                 }
@@ -122,12 +122,12 @@ impl Shown {
                             let at = [place[0] + x, place[1] + y, place[2] + 2 * half];
                             let first = at.map(|at| at << self.coarse);
                             let cells = Cube { first, side: 2 << self.coarse };
-                            self.mark(lattice, view, sheets, &cells, &mut own);
+                            self.mark(lattice, view, sheets, &cells, &mut marks);
                         }
                     }
                 }
             }
-            own
+            marks
         };
         let join = |mut a: Vec<u64>, b: Vec<u64>| {
             a.iter_mut().zip(b).for_each(|(a, b)| *a |= b);
@@ -191,9 +191,9 @@ impl Shown {
         let words = sheets.count().div_ceil(64);
         for row in first[1]..=last[1] {
             for column in first[0]..=last[0] {
-                let own = &mut marks[(row * tiles[0] + column) * words..][..words];
+                let tile = &mut marks[(row * tiles[0] + column) * words..][..words];
                 for sheet in from..to {
-                    own[sheet / 64] |= 1 << (sheet % 64);
+                    tile[sheet / 64] |= 1 << (sheet % 64);
                 }
             }
         }
@@ -214,13 +214,13 @@ mod tests {
         let (dims, odd) = ([5, 3, 6], |sample: usize| sample * sample % 7 == 2);
         let ranges: Vec<[u8; 2]> =
             (0..90).map(|sample| [0, if odd(sample) { 200 } else { 10 }]).collect();
-        let shown = Shown::new(dims, &ranges, &[100; 256]);
-        assert_eq!(shown.blocks, [2, 1, 2]);
+        let visible = VisibleBlocks::new(dims, &ranges, &[100; 256]);
+        assert_eq!(visible.blocks, [2, 1, 2]);
         for (sample, _) in ranges.iter().enumerate() {
             let at = [sample % 5, sample / 5 % 3, sample / 15];
             let block = at[2] / BLOCK * 2 + at[0] / BLOCK;
             let (half, bit) = bit_of(at);
-            assert_eq!(shown.words[block][half] >> bit & 1 != 0, odd(sample), "{at:?}");
+            assert_eq!(visible.words[block][half] >> bit & 1 != 0, odd(sample), "{at:?}");
         }
     }
 }

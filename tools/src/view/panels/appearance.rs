@@ -29,10 +29,10 @@ fn switch(
 }
 
 /// Shows a text that counts once it is left. Returns it if it changed.
-pub fn edited(ui: &mut Ui, name: &str, label: &str, own: &str, hint: &str) -> Option<String> {
+pub fn edited(ui: &mut Ui, name: &str, label: &str, current: &str, hint: &str) -> Option<String> {
     let id = ui.scope_id().with(name);
     let held = ui.data(|data| data.get_temp::<String>(id));
-    let mut text = held.unwrap_or_else(|| own.to_owned());
+    let mut text = held.unwrap_or_else(|| current.to_owned());
     let label = ui.label(label);
     let response = ui.add(egui::TextEdit::singleline(&mut text).hint_text(hint));
     let response = response.labelled_by(label.id);
@@ -41,7 +41,7 @@ pub fn edited(ui: &mut Ui, name: &str, label: &str, own: &str, hint: &str) -> Op
         return None;
     }
     ui.data_mut(|data| data.remove::<String>(id));
-    (response.lost_focus() && text != own).then(|| text.trim().to_owned())
+    (response.lost_focus() && text != current).then(|| text.trim().to_owned())
 }
 
 /// A value that is edited as a text.
@@ -60,14 +60,14 @@ const FIELDS: [Field; 8] = [
         name: "color",
         label: "Colour",
         hint: "a colour, height, an attribute, …",
-        text: |scene| shown(&scene.appearance.color),
+        text: |scene| text_of(&scene.appearance.color),
         set: |scene, text| taken(text, str::parse, &mut scene.appearance.color),
     },
     Field {
         name: "scalar",
         label: "Array",
         hint: "the file's first",
-        text: |scene| shown(&scene.reading.scalar),
+        text: |scene| text_of(&scene.reading.scalar),
         set: |scene, text| taken(text, |text| Ok(text.to_owned()), &mut scene.reading.scalar),
     },
     Field {
@@ -93,14 +93,14 @@ const FIELDS: [Field; 8] = [
         name: "radius-scale",
         label: "Radius",
         hint: "1",
-        text: |scene| shown(&scene.appearance.radius_scale),
+        text: |scene| text_of(&scene.appearance.radius_scale),
         set: |scene, text| taken(text, parse::radius_scale, &mut scene.appearance.radius_scale),
     },
     Field {
         name: "cut",
         label: "Cut (pixels)",
         hint: "2",
-        text: |scene| shown(&scene.picture.cut),
+        text: |scene| text_of(&scene.picture.cut),
         set: |scene, text| taken(text, parse::not_negative, &mut scene.picture.cut),
     },
     Field {
@@ -114,12 +114,12 @@ const FIELDS: [Field; 8] = [
         name: "caption",
         label: "Caption",
         hint: "",
-        text: |scene| shown(&scene.overlay.caption),
+        text: |scene| text_of(&scene.overlay.caption),
         set: |scene, text| taken(text, |text| Ok(text.to_owned()), &mut scene.overlay.caption),
     },
 ];
 
-fn shown(value: &Option<impl ToString>) -> String {
+fn text_of(value: &Option<impl ToString>) -> String {
     value.as_ref().map(ToString::to_string).unwrap_or_default()
 }
 
@@ -135,8 +135,8 @@ fn taken<T>(
 
 /// Shows a value that is edited as a text.
 fn field(window: &mut Window, ui: &mut Ui, field: &Field) {
-    let own = (field.text)(window.document.scene());
-    if let Some(text) = edited(ui, field.name, field.label, &own, field.hint) {
+    let current = (field.text)(window.document.scene());
+    if let Some(text) = edited(ui, field.name, field.label, &current, field.hint) {
         let text = Some(text.as_str()).filter(|text| !text.is_empty());
         let mut changed = window.document.scene().clone();
         match (field.set)(&mut changed, text) {
@@ -150,9 +150,9 @@ fn field(window: &mut Window, ui: &mut Ui, field: &Field) {
 pub fn show(window: &mut Window, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let label = ui.label("Background");
-        let own = window.document.scene().picture.background;
-        let is_own = |name: &str| name.parse::<Background>().ok() == own;
-        let name = BACKGROUNDS.into_iter().find(|name| is_own(name)).unwrap_or(match own {
+        let current = window.document.scene().picture.background;
+        let is_current = |name: &str| name.parse::<Background>().ok() == current;
+        let name = BACKGROUNDS.into_iter().find(|name| is_current(name)).unwrap_or(match current {
             None => "black",
             Some(_) => "another colour",
         });
@@ -175,6 +175,6 @@ pub fn show(window: &mut Window, ui: &mut Ui) {
     switch(window, ui, "Scale bar", overlay.scale_bar, |scene, on| scene.overlay.scale_bar = on);
     switch(window, ui, "Scalar bar", overlay.scalar_bar, |scene, on| scene.overlay.scalar_bar = on);
     Grid::new("look").num_columns(2).show(ui, |ui| {
-        FIELDS.iter().for_each(|own| field(window, ui, own));
+        FIELDS.iter().for_each(|entry| field(window, ui, entry));
     });
 }

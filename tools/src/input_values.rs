@@ -12,12 +12,12 @@ use std::{
 
 /// A value for all inputs, or for one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Own<T> {
+pub struct InputValue<T> {
     file: Option<PathBuf>,
     value: T,
 }
 
-impl<T> Own<T> {
+impl<T> InputValue<T> {
     /// Parses `VALUE` or `FILE=VALUE`. The value has no `=`.
     pub fn parse(
         text: &str,
@@ -34,8 +34,8 @@ impl<T> Own<T> {
     pub fn try_map<U>(
         &self,
         make: impl FnOnce(&T) -> splatkit::Result<U>,
-    ) -> splatkit::Result<Own<U>> {
-        Ok(Own { file: self.file.clone(), value: make(&self.value)? })
+    ) -> splatkit::Result<InputValue<U>> {
+        Ok(InputValue { file: self.file.clone(), value: make(&self.value)? })
     }
 
     /// A value for all inputs.
@@ -45,13 +45,13 @@ impl<T> Own<T> {
 
     /// Returns an input's own value, or else that of all inputs.
     pub fn of<'a>(values: &'a [Self], path: &Path) -> Option<&'a T> {
-        let own = values.iter().find(|own| own.file.as_deref() == Some(path));
-        own.map(|own| &own.value).or_else(|| Self::shared(values))
+        let single = values.iter().find(|entry| entry.file.as_deref() == Some(path));
+        single.map(|entry| &entry.value).or_else(|| Self::shared(values))
     }
 
     /// Returns the value of all inputs that have none of their own.
     pub fn shared(values: &[Self]) -> Option<&T> {
-        values.iter().find(|own| own.file.is_none()).map(|own| &own.value)
+        values.iter().find(|entry| entry.file.is_none()).map(|entry| &entry.value)
     }
 
     /// Refuses values of files that are no inputs.
@@ -60,7 +60,7 @@ impl<T> Own<T> {
             [] => return Ok(()),
             _ => inputs.iter().map(PathBuf::as_path).collect(),
         };
-        let files = values.iter().filter_map(|own| own.file.as_deref());
+        let files = values.iter().filter_map(|entry| entry.file.as_deref());
         match files.into_iter().find(|file| !known.contains(file)) {
             None => Ok(()),
             Some(file) => Err(Failure::Usage(format!(
@@ -74,9 +74,9 @@ impl<T> Own<T> {
     pub fn check(values: &[Self], flag: &str, inputs: &[PathBuf]) -> Result<(), Failure> {
         Self::check_files(values, flag, inputs)?;
         let mut seen = HashSet::new();
-        for own in values {
-            if !seen.insert(own.file.as_deref()) {
-                let whose = own
+        for entry in values {
+            if !seen.insert(entry.file.as_deref()) {
+                let whose = entry
                     .file
                     .as_ref()
                     .map_or("all inputs".into(), |file| file.display().to_string());
@@ -108,7 +108,7 @@ impl Shared {
     pub fn set_each<T: Clone>(
         scene: &mut Description,
         field: impl Fn(&mut AppearanceEntry) -> &mut Option<T>,
-        values: &[Own<T>],
+        values: &[InputValue<T>],
         join: impl Fn(&mut T, T),
     ) {
         if values.is_empty() {
@@ -122,7 +122,7 @@ impl Shared {
         *field(&mut scene.appearance) = None;
         // However many inputs have values of their own, each is found at once.
         let mut of_files: HashMap<&Path, Option<T>> = HashMap::new();
-        for Own { file, value } in values {
+        for InputValue { file, value } in values {
             match file {
                 Some(file) => add(of_files.entry(file).or_default(), value.clone()),
                 None => add(field(&mut scene.appearance), value.clone()),
@@ -141,42 +141,48 @@ mod tests {
     #[test]
     fn inputs_have_their_own_values() {
         let number = |text: &str| text.parse::<f32>().map_err(|error| error.to_string());
-        let values = ["0.5", "a=b.ply=0.25"].map(|text| Own::parse(text, number).unwrap());
-        let [own, other] = ["a=b.ply", "c.ply"].map(PathBuf::from);
-        assert_eq!(Own::of(&values, &own), Some(&0.25));
-        assert_eq!(Own::of(&values, &other), Some(&0.5));
-        assert!(Own::check(&values, "opacity", &[own, other.clone()]).is_ok());
-        let error = Own::check(&values, "opacity", &[other]).unwrap_err();
+        let values = ["0.5", "a=b.ply=0.25"].map(|text| InputValue::parse(text, number).unwrap());
+        let [file, other] = ["a=b.ply", "c.ply"].map(PathBuf::from);
+        assert_eq!(InputValue::of(&values, &file), Some(&0.25));
+        assert_eq!(InputValue::of(&values, &other), Some(&0.5));
+        assert!(InputValue::check(&values, "opacity", &[file, other.clone()]).is_ok());
+        let error = InputValue::check(&values, "opacity", &[other]).unwrap_err();
         assert!(error.to_string().contains("a=b.ply"));
-        let twice = [Own::of_all(1.0), Own::of_all(2.0)];
-        assert!(Own::check(&twice, "opacity", &[]).is_err());
-        assert!(Own::parse("a=x", number).is_err());
-        let many = ["1", "a.ply=2", "3", "a.ply=4"].map(|text| Own::parse(text, number).unwrap());
-        let [own, other] = ["a.ply", "b.ply"].map(PathBuf::from);
-        assert!(Own::check_files(&many, "iso", std::slice::from_ref(&own)).is_ok());
-        assert!(Own::check_files(&many, "iso", std::slice::from_ref(&other)).is_err());
-        let mut scene = Description::new([own, other]);
+        let twice = [InputValue::of_all(1.0), InputValue::of_all(2.0)];
+        assert!(InputValue::check(&twice, "opacity", &[]).is_err());
+        assert!(InputValue::parse("a=x", number).is_err());
+        let many =
+            ["1", "a.ply=2", "3", "a.ply=4"].map(|text| InputValue::parse(text, number).unwrap());
+        let [file, other] = ["a.ply", "b.ply"].map(PathBuf::from);
+        assert!(InputValue::check_files(&many, "iso", std::slice::from_ref(&file)).is_ok());
+        assert!(InputValue::check_files(&many, "iso", std::slice::from_ref(&other)).is_err());
+        let mut scene = Description::new([file, other]);
         scene.inputs[1].appearance.opacity = Some(0.1);
-        Shared::set_each(&mut scene, |own| &mut own.opacity, &many, |before, more| *before += more);
-        let found: Vec<_> = scene.inputs.iter().map(|input| input.appearance.opacity).collect();
-        assert_eq!((found, scene.appearance.opacity), (vec![Some(6.0), None], Some(4.0)));
+        Shared::set_each(
+            &mut scene,
+            |appearance| &mut appearance.opacity,
+            &many,
+            |before, more| *before += more,
+        );
+        let opacities: Vec<_> = scene.inputs.iter().map(|input| input.appearance.opacity).collect();
+        assert_eq!((opacities, scene.appearance.opacity), (vec![Some(6.0), None], Some(4.0)));
     }
 
     #[test]
     fn many_inputs_with_values_of_their_own_are_found_at_once() {
         let inputs: Vec<PathBuf> = (0..200_000).map(|i| format!("a/{i}.ply").into()).collect();
-        let own = |(number, path): (usize, &PathBuf)| Own {
+        let entry = |(number, path): (usize, &PathBuf)| InputValue {
             file: Some(path.clone()),
             value: number as f32,
         };
-        let all: Vec<Own<f32>> = inputs.iter().enumerate().map(own).collect();
+        let all: Vec<InputValue<f32>> = inputs.iter().enumerate().map(entry).collect();
         // A search from the first for each input would take hours.
         let begin = std::time::Instant::now();
-        assert!(Own::check(&all, "opacity", &inputs).is_ok());
+        assert!(InputValue::check(&all, "opacity", &inputs).is_ok());
         let mut scene = Description::new(inputs);
-        Shared::set_each(&mut scene, |own| &mut own.opacity, &all, |_, _| {});
-        let found = scene.inputs.iter().map(|input| input.appearance.opacity);
-        assert!(found.enumerate().all(|(number, own)| own == Some(number as f32)));
+        Shared::set_each(&mut scene, |appearance| &mut appearance.opacity, &all, |_, _| {});
+        let opacities = scene.inputs.iter().map(|input| input.appearance.opacity);
+        assert!(opacities.enumerate().all(|(number, opacity)| opacity == Some(number as f32)));
         assert!(begin.elapsed().as_secs() < 60, "{:?}", begin.elapsed());
     }
 }
