@@ -3,7 +3,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use splatkit::{
-    gpu::{Gpu, Output, PendingFrame, PreparedScene, Progress, Renderer},
+    gpu::{Depth, Gpu, Output, PendingFrame, PreparedScene, Progress, Renderer},
     math::{Camera, View},
     scene::{Scene, Settings},
     wgpu,
@@ -125,7 +125,8 @@ impl Compositor {
                 let output = Output::Textures {
                     color: self.textures.colors.clone(),
                     format: self.textures.colors.texture().format(),
-                    depth: Some(self.textures.depths.clone()),
+                    depth: Some(Depth::Linear(self.textures.depths.clone())),
+                    over: false,
                 };
                 let (renderer, prepared) = (&mut self.renderer, &mut self.prepared);
                 let settings = Settings::new(self.size);

@@ -12,17 +12,17 @@ impl View {
     /// Returns the view of a host's camera for a picture of `size` pixels (width, height).
     ///
     /// `view` maps world coordinates to the camera's, whose origin is the eye. `projection` maps
-    /// these to clip space with x to the right and y up, as wgpu, Vulkan, Metal and OpenGL use it.
+    /// these to clip space with x to the right and y up, as wgpu, Metal, Direct3D and OpenGL use it.
     /// Both may be left-handed or right-handed, together. Only the first, second and fourth row of
     /// `projection` count, so any range of depths is fine: 0 to 1, −1 to 1, reversed, infinite. The
     /// optical axis may lie anywhere in the picture, so eyes side by side, parts of a wall of
     /// screens, and jitter by parts of a pixel are possible.
     ///
     /// ```
-    /// use splatkit::{glam::{DMat4, DVec3}, math::View};
+    /// use splatkit::{glam::{DVec3, dcamera::rh}, math::View};
     ///
-    /// let view = DMat4::look_at_rh(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y);
-    /// let projection = DMat4::perspective_rh(0.8, 640.0 / 480.0, 0.1, 100.0);
+    /// let view = rh::view::look_at_mat4(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y);
+    /// let projection = rh::proj::directx::perspective(0.8, 640.0 / 480.0, 0.1, 100.0);
     /// let view = View::from_matrices(view, projection, [640, 480])?;
     /// assert!((view.position - DVec3::Z * 5.0).length() < 1e-9);
     /// # Ok::<(), splatkit::Error>(())
@@ -106,6 +106,10 @@ fn eye(planes: [DVec4; 3]) -> DVec3 {
 mod tests {
     use super::*;
     use crate::math::{Camera, Projection};
+    use glam::dcamera::{
+        lh, rh,
+        rh::proj::{directx, opengl},
+    };
 
     const EYE: DVec3 = DVec3::new(3.0, -7.0, 2.0);
     const TARGET: DVec3 = DVec3::new(0.5, 1.0, -1.0);
@@ -127,15 +131,15 @@ mod tests {
     fn matrices_of_every_convention_give_the_cameras_view() {
         let expected = camera(Projection::Perspective { view_angle: 40.0 });
         let (angle, aspect) = (40f64.to_radians(), 640.0 / 480.0);
-        let right = DMat4::look_at_rh(EYE, TARGET, DVec3::Z);
-        let left = DMat4::look_at_lh(EYE, TARGET, DVec3::Z);
-        let reversed = DMat4::perspective_infinite_reverse_rh(angle, aspect, 0.1);
+        let right = rh::view::look_at_mat4(EYE, TARGET, DVec3::Z);
+        let left = lh::view::look_at_mat4(EYE, TARGET, DVec3::Z);
+        let reversed = directx::perspective_infinite_reverse(angle, aspect, 0.1);
         for (view, projection) in [
-            (right, DMat4::perspective_rh(angle, aspect, 0.1, 50.0)),
-            (right, DMat4::perspective_rh_gl(angle, aspect, 0.1, 50.0)),
-            (right, DMat4::perspective_infinite_rh(angle, aspect, 0.1)),
+            (right, directx::perspective(angle, aspect, 0.1, 50.0)),
+            (right, opengl::perspective(angle, aspect, 0.1, 50.0)),
+            (right, directx::perspective_infinite(angle, aspect, 0.1)),
             (right, reversed),
-            (left, DMat4::perspective_lh(angle, aspect, 0.1, 50.0)),
+            (left, lh::proj::directx::perspective(angle, aspect, 0.1, 50.0)),
             // In 32 bits, and scaled.
             (right.as_mat4().as_dmat4(), reversed.as_mat4().as_dmat4()),
             (DMat4::from_scale(DVec3::splat(0.01)) * right, reversed),
@@ -144,8 +148,8 @@ mod tests {
         }
         let flat = camera(Projection::Orthographic { height: 6.0 });
         for projection in [
-            DMat4::orthographic_rh(-4.0, 4.0, -3.0, 3.0, 0.1, 50.0),
-            DMat4::orthographic_rh(-4.0, 4.0, -3.0, 3.0, 50.0, 0.1),
+            directx::orthographic(-4.0, 4.0, -3.0, 3.0, 0.1, 50.0),
+            directx::orthographic(-4.0, 4.0, -3.0, 3.0, 50.0, 0.1),
         ] {
             is_near(&View::from_matrices(right, projection, [640, 480]).unwrap(), &flat);
         }
@@ -166,8 +170,8 @@ mod tests {
 
     #[test]
     fn matrices_that_are_no_view_are_named() {
-        let view = DMat4::look_at_rh(EYE, TARGET, DVec3::Z);
-        let projection = DMat4::perspective_rh(0.7, 640.0 / 480.0, 0.1, 50.0);
+        let view = rh::view::look_at_mat4(EYE, TARGET, DVec3::Z);
+        let projection = directx::perspective(0.7, 640.0 / 480.0, 0.1, 50.0);
         let error = |view, projection, size| {
             View::from_matrices(view, projection, size).unwrap_err().to_string()
         };

@@ -439,7 +439,7 @@ fn memory_is_shared_evenly() {
         let pictures = |cameras: &[&Camera]| {
             let mut renderer = Renderer::new(&gpu);
             let mut prepared = renderer.prepare(&scene)?;
-            let draw = |camera: &&Camera| renderer.render(&mut prepared, camera, &settings);
+            let draw = |camera: &&Camera| renderer.render(&mut prepared, *camera, &settings);
             cameras.iter().map(draw).collect::<splatkit::Result<Vec<_>>>()
         };
         let (alone, later) = (pictures(&[&camera]), pictures(&[&nearer, &camera]));

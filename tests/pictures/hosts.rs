@@ -9,7 +9,7 @@ use compositor::{Compositor, Corner};
 use splatkit::{
     Error,
     glam::{DVec2, DVec3, DVec4},
-    gpu::{Budget, Gpu, Output, PreparedScene, Progress, Renderer},
+    gpu::{Budget, Depth, Gpu, Output, PreparedScene, Progress, Renderer},
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree, file},
     input::Limits,
     math::{Camera, Kernel},
@@ -158,7 +158,8 @@ fn check(name: &str, scene: &Scene, settings: &Settings, budget: Budget) -> u32 
     let output = Output::Textures {
         color: color.clone(),
         format: TextureFormat::Rgba32Float,
-        depth: Some(depth.clone()),
+        depth: Some(Depth::Linear(depth.clone())),
+        over: false,
     };
     // First of all, so that nothing is left of another picture.
     let batches = drawn(gpu, &mut renderer, &mut prepared, view, output).expect(name);
@@ -284,7 +285,8 @@ fn misuse_is_refused_with_what_to_do() {
     let usual = texture(gpu, TextureFormat::Rgba8Unorm, SIZE);
     let textures = |color: &wgpu::TextureView, depth: Option<&wgpu::TextureView>| {
         let format = color.texture().format();
-        Output::Textures { color: color.clone(), format, depth: depth.cloned() }
+        let depth = depth.cloned().map(Depth::Linear);
+        Output::Textures { color: color.clone(), format, depth, over: false }
     };
     let small = buffer(gpu, 100, wgpu::BufferUsages::COPY_SRC);
     let narrow = texture(gpu, TextureFormat::Rgba8Unorm, [80, 70]);

@@ -184,7 +184,7 @@ impl DeviceFlags {
                 Device::Gpu(gpu, _) if gpu.beyond(scene).is_none() => {
                     Device::Gpu(gpu, self.passes())
                 }
-                Device::Gpu(..) | Device::Cpu => Device::Cpu,
+                _ => Device::Cpu,
             }),
             Engine::Auto | Engine::Gpu => Ok(Device::Gpu(self.gpu()?, self.passes())),
         }

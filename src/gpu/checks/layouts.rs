@@ -152,7 +152,7 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
     );
     let present = layout!(Present:
         size, first_row, is_srgb, center, scale, perspective, word, wanted, stalled, far, has_depth,
-        unused,
+        are_distances, depth_shift, depth_factor,
     );
     let eye = layout!(GpuEye: place, count, terms, unused);
     [

@@ -17,7 +17,7 @@ impl Machine {
     pub fn of(device: &Device) -> Self {
         let cores = available_parallelism().map_or(1, NonZero::get);
         match device {
-            Device::Cpu => Self {
+            Device::Cpu | Device::CpuFor(_) => Self {
                 adapter: device.name().to_owned(),
                 driver: String::new(),
                 cores,
