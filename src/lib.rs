@@ -138,5 +138,5 @@ pub use error::{Error, Result};
 pub use plan::FrameStats;
 #[cfg(feature = "gpu")]
 pub use renderer::Frame;
-pub use renderer::{Device, Renderer};
+pub use renderer::{Device, ItemId, Renderer};
 pub use stop::Stop;

@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     cells::{Place, Tetrahedra},
+    math::View,
     parallel::prelude::*,
     plan::TILE,
     scene::Optics,
@@ -76,18 +77,18 @@ struct Linear {
 }
 
 impl<'a> CellField<'a> {
-    pub fn new(plan: &Plan, tetrahedra: &'a Tetrahedra, visible: &Visible) -> Self {
+    /// `view` is the plan's as it is from the tetrahedra.
+    pub fn new(plan: &Plan, view: &View, tetrahedra: &'a Tetrahedra, visible: &Visible) -> Self {
         let [zero, per_value] =
             [plan.field.values.zero, plan.field.values.per_value].map(f64::from);
         let entry = |value: f32| ((f64::from(value) - zero) * per_value) as f32;
         let of_points = tetrahedra.place() == Place::Points;
         let point = |(number, at): (usize, &Vec3)| {
-            let [x, y, z] =
-                plan.view.to_view(tetrahedra.origin + at.as_dvec3()).as_vec3().to_array();
+            let [x, y, z] = view.to_view(tetrahedra.origin + at.as_dvec3()).as_vec3().to_array();
             [x, y, z, if of_points { entry(tetrahedra.values[number]) } else { 0.0 }]
         };
         let points: Vec<[f32; 4]> = tetrahedra.points.par_iter().enumerate().map(point).collect();
-        let turn = plan.view.rotation * (per_value * f64::from(plan.field.gradients.length));
+        let turn = view.rotation * (per_value * f64::from(plan.field.gradients.length));
         let turn: Mat3 = turn.as_mat3();
         let needs = plan.has_gradients() && of_points;
         let gradients = if needs { &tetrahedra.gradients[..] } else { &[] };

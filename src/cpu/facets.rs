@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     facet::{FacetSet, Image, Sides},
+    math::View,
     plan::source::Source,
     scene::Settings,
     splat::{NO_NORMAL, decode_normal, encode_normal},
@@ -35,8 +36,13 @@ pub struct FacetProjector<'a> {
 }
 
 impl<'a> FacetProjector<'a> {
-    pub fn new(plan: &'a Plan<'a>, set: &'a Arc<FacetSet>, settings: &Settings) -> Self {
-        let view = plan.view;
+    /// `view` is the plan's as it is from the set.
+    pub fn new(
+        plan: &'a Plan<'a>,
+        view: &View,
+        set: &'a Arc<FacetSet>,
+        settings: &Settings,
+    ) -> Self {
         let is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
         let source = Source::of_radiance(view, set.origin, 0.0);
         let place = plan.with_images.iter().position(|other| Arc::ptr_eq(other, set));

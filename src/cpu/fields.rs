@@ -15,7 +15,7 @@ use crate::{
     Result,
     bricks::{Bricks, Choice},
     hierarchy::Detail,
-    math::{Bounds, Kernel, Sheets, View},
+    math::{Bounds, Kernel, Pose, Sheets, View},
     plan::{
         gathering,
         visible::{self, VisibleBlocks},
@@ -27,7 +27,7 @@ use crate::{
         reach::{EVERYTHING, first_visible},
     },
 };
-use std::slice;
+use std::{slice, sync::Arc};
 
 /// A field of a scene.
 #[derive(Debug)]
@@ -35,6 +35,8 @@ pub struct FieldState {
     /// The number of its item.
     pub number: usize,
     pub item: Item,
+    /// Where the item's data are moved to, unless they are moved themselves.
+    pub pose: Pose,
     /// The ranges of the field around the samples of a gathered lattice.
     ranges: Option<Vec<[u8; 2]>>,
     /// The kernel sums of a gathered lattice, if four weights an axis do not suffice.
@@ -51,16 +53,32 @@ pub struct FieldState {
 impl FieldState {
     /// Returns the fields of a scene.
     pub fn all(scene: &Scene) -> Vec<Self> {
-        let field = |number: usize| Self {
+        scene.fields().into_iter().map(|number| Self::new(scene, number)).collect()
+    }
+
+    /// Returns the field of an item.
+    pub fn new(scene: &Scene, number: usize) -> Self {
+        Self {
             number,
             item: scene.items[number].clone(),
+            pose: scene.view_pose(number),
             ranges: None,
             blend: None,
             shares: None,
             visible_samples: None,
             levels: None,
-        };
-        scene.fields().into_iter().map(field).collect()
+        }
+    }
+
+    /// Takes the item as it is in the scene, and its pose.
+    pub fn update(&mut self, item: &Item, pose: Pose) {
+        if let (Item::Volume(last, ..), Item::Volume(volume, ..)) = (&self.item, item)
+            && !Arc::ptr_eq(last, volume)
+        {
+            // Its sums are on a lattice of the last pose.
+            self.blend = None;
+        }
+        (self.item, self.pose) = (item.clone(), pose);
     }
 
     /// Returns the bytes of memory held for drawing.
@@ -168,7 +186,7 @@ impl FieldState {
     ) -> DrawnField<'a> {
         let (mut means, mut marks) = (Means::Nothing, Vec::new());
         if let Item::Cells(cells, _) = &self.item {
-            means = Means::Cells(CellField::new(plan, cells, visible));
+            means = Means::Cells(CellField::new(plan, &self.pose.view(plan.view), cells, visible));
         } else if !outline.gathers {
             means = if plan.has_field { Means::Scattered } else { Means::Nothing };
         } else if let Some(gather) = self.gather(plan, sheets, outline, prepared, visible) {

@@ -18,7 +18,7 @@ use crate::{
     facet::FacetSet,
     gaussians::{Eye, Gaussians},
     hierarchy::{Cut, Levels},
-    math::{Kernel, View},
+    math::{Kernel, Pose, View},
     parallel::prelude::*,
     plan::{source::Source, tables::Values},
     scene::{Item, Settings},
@@ -45,6 +45,8 @@ pub enum Prepared {
     /// A solid, and what the clips of the last picture left of it.
     Solid {
         solid: Arc<Solid>,
+        /// Where it is moved to.
+        pose: Pose,
         drawn: Arc<FacetSet>,
     },
     /// Trained Gaussians, and the splats that the eye of the last view saw.
@@ -74,7 +76,8 @@ impl Prepared {
             }
             Item::Facets(set) => Self::Facets(set.clone()),
             Item::Solid(solid) => {
-                Self::Solid { solid: solid.clone(), drawn: solid.boundary().clone() }
+                let (pose, drawn) = (Pose::IDENTITY, solid.boundary().clone());
+                Self::Solid { solid: solid.clone(), pose, drawn }
             }
             Item::Gaussians(set) => Self::Gaussians { set: set.clone(), seen: None },
             Item::Hierarchy(hierarchy) => Self::Hierarchy(Box::new(PageCache::new(hierarchy))),
@@ -88,6 +91,16 @@ impl Prepared {
                 Self::Bricks(Box::new(BrickCache::new(bricks, kernel)))
             }
             Item::Cells(..) => Self::Cells,
+        }
+    }
+
+    /// Takes the item's pose, and the lattice of a volume.
+    pub fn update(&mut self, item: &Item, moved: Pose) {
+        match (self, item) {
+            (Self::Hierarchy(pages), _) => pages.pose = moved,
+            (Self::Solid { pose, .. }, _) => *pose = moved,
+            (Self::Volume { volume, .. }, Item::Volume(moved, ..)) => *volume = moved.clone(),
+            _ => {}
         }
     }
 
@@ -117,22 +130,22 @@ impl Prepared {
     }
 
     /// Returns the records of all splats that meet the picture, in batches of [`BATCH`] candidates.
-    /// `field` is what the picture draws of the item's field, if it has one.
+    /// `view` is the plan's as it is from the item's data, and `field` is what the picture draws of
+    /// the item's field, if it has one.
     pub fn records(
         &mut self,
-        plan: &Plan,
+        (plan, view): (&Plan, &View),
         settings: &Settings,
         outline: &Outline,
         field: Option<&FieldOutline>,
         spare: &mut Spare,
     ) -> Result<Vec<Vec<Record>>> {
-        let view = plan.view;
         let cut_pixels = &outline.cut_pixels;
         let choice = field.and_then(|field| field.choice.as_ref());
         let visible = field.map_or(&EVERYTHING, |field| &field.visible_ranges);
         match self {
             Self::Set { drawn, .. } if drawn.payload == Payload::Radiance => {
-                Ok(radiance(plan, drawn, spare))
+                Ok(radiance((plan, view), drawn, spare))
             }
             Self::Gaussians { set, seen } => {
                 let eye = Eye::of(view);
@@ -144,7 +157,9 @@ impl Prepared {
                     }
                     None => *seen = Some((eye, set.seen_from(eye))),
                 }
-                Ok(seen.as_ref().map_or_else(Vec::new, |(_, seen)| radiance(plan, seen, spare)))
+                Ok(seen
+                    .as_ref()
+                    .map_or_else(Vec::new, |(_, seen)| radiance((plan, view), seen, spare)))
             }
             Self::Set { drawn, .. } => {
                 let source = Source::of_splats(view, drawn);
@@ -154,13 +169,13 @@ impl Prepared {
                     records.extend(batch.iter().filter_map(to_record));
                 }))
             }
-            Self::Facets(set) => Ok(facets(plan, set, settings, spare)),
-            Self::Solid { solid, drawn } => {
-                *drawn = solid.facets(&settings.clips);
-                Ok(facets(plan, drawn, settings, spare))
+            Self::Facets(set) => Ok(facets((plan, view), set, settings, spare)),
+            Self::Solid { solid, pose, drawn } => {
+                *drawn = solid.facets(&pose.clips(&settings.clips)?);
+                Ok(facets((plan, view), drawn, settings, spare))
             }
             Self::Hierarchy(pages) => {
-                pages.update(view, settings, *cut_pixels)?;
+                pages.update(plan.view, settings, *cut_pixels)?;
                 Ok(pages.records(plan, settings, *cut_pixels, spare))
             }
             Self::Volume { volume, kernel, ranges, listed } => {
@@ -188,8 +203,8 @@ impl Prepared {
 }
 
 /// Returns the records of splats that carry their own colour.
-fn radiance(plan: &Plan, set: &SplatSet, spare: &mut Spare) -> Vec<Vec<Record>> {
-    let projector = Projector::new(plan, Source::of_splats(plan.view, set));
+fn radiance((plan, view): (&Plan, &View), set: &SplatSet, spare: &mut Spare) -> Vec<Vec<Record>> {
+    let projector = Projector::new(plan, Source::of_splats(view, set));
     batches(&set.splats, spare, |_, batch: &[Splat], records| {
         lanes!(Level::new(), simd => projector.add(
             simd,
@@ -201,12 +216,12 @@ fn radiance(plan: &Plan, set: &SplatSet, spare: &mut Spare) -> Vec<Vec<Record>> 
 
 /// Returns the records of facets.
 fn facets(
-    plan: &Plan,
+    (plan, view): (&Plan, &View),
     set: &Arc<FacetSet>,
     settings: &Settings,
     spare: &mut Spare,
 ) -> Vec<Vec<Record>> {
-    let projector = FacetProjector::new(plan, set, settings);
+    let projector = FacetProjector::new(plan, view, set, settings);
     batches(&set.facets, spare, |first, batch, records| {
         let numbers = first..first + batch.len();
         records.extend(numbers.filter_map(|number| projector.record(number)));

@@ -13,6 +13,7 @@
 //! | module | purpose |
 //! |---|---|
 //! | `plan` | data that all tiles of a picture share |
+//! | `changes` | adds items to a scene that is prepared, and takes them out |
 //! | `items`, `page_cache`, `nodes`, `brick_cache` | which splats of the scene a view needs |
 //! | `fields` | what is kept of each field between pictures, and what a view needs of it |
 //! | `footprint`, `project` | the pixels and sheets that splats cover, one or eight at a time |
@@ -35,6 +36,7 @@ mod bins;
 mod blend;
 mod brick_cache;
 mod cells;
+mod changes;
 mod close;
 mod covered;
 mod facets;
@@ -73,6 +75,7 @@ use crate::{
 };
 use bins::{BLOCK, Bins, TileLists};
 use brick_cache::most_bricks;
+pub(crate) use changes::Parked;
 use close::{NO_VALUE, Visible};
 use fearless_simd::Level;
 use fields::FieldState;
@@ -124,10 +127,14 @@ impl CpuRenderer {
     /// # Errors
     /// [`Error::Argument`] for a scene that [`Scene::validate`] refuses.
     pub fn new(scene: &Scene) -> Result<Self> {
-        scene.validate()?;
+        scene.validate_unless_empty()?;
+        let mut prepared: Vec<_> = scene.items.iter().map(Prepared::new).collect();
+        for (number, prepared) in prepared.iter_mut().enumerate() {
+            prepared.update(&scene.items[number], scene.view_pose(number));
+        }
         Ok(Self {
             scene: scene.clone(),
-            prepared: scene.items.iter().map(Prepared::new).collect(),
+            prepared,
             fields: FieldState::all(scene),
             pace: Pace::default(),
             level: Level::new(),
@@ -161,6 +168,7 @@ impl CpuRenderer {
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
         let start = Instant::now();
+        self.scene.check_items()?;
         self.scene.validate_settings(settings)?;
         let view = viewpoint.view(settings.size)?;
         let bounds = self.scene.bounds();
@@ -237,8 +245,9 @@ impl CpuRenderer {
             }
             if !field_outline.is_some_and(|outline| outline.gathers) {
                 let plan = &plans[field.unwrap_or(0)];
+                let view = &self.scene.view_of(number, plan.view);
                 records.extend(prepared.records(
-                    plan,
+                    (plan, view),
                     settings,
                     outline,
                     field_outline,
@@ -282,7 +291,9 @@ impl CpuRenderer {
             Detail::Milliseconds(_) => Detail::PIXELS,
         };
         let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
-        self.prepared.iter_mut().try_for_each(|prepared| prepared.update_levels(view, pixels))?;
+        for (number, prepared) in self.prepared.iter_mut().enumerate() {
+            prepared.update_levels(&self.scene.view_of(number, view), pixels)?;
+        }
         let bounds = self.scene.bounds();
         let scene = &self.scene;
         let choice = |field: &FieldState| field.choice(scene, view, settings, detail, &bounds);

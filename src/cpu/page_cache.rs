@@ -15,7 +15,7 @@ use crate::{
         Cut, Hierarchy, SHARE_UNIT,
         needed::{self, needed},
     },
-    math::View,
+    math::{Pose, View},
     parallel::prelude::*,
     plan::source::Source,
     scene::Settings,
@@ -41,6 +41,8 @@ struct Held {
 #[derive(Debug)]
 pub struct PageCache {
     pub hierarchy: Arc<Hierarchy>,
+    /// Where the hierarchy is moved to.
+    pub pose: Pose,
     held: HashMap<u32, Held>,
     /// The pages that take part in the last view, in order.
     active: Vec<u32>,
@@ -53,6 +55,7 @@ impl PageCache {
     pub fn new(hierarchy: &Arc<Hierarchy>) -> Self {
         Self {
             hierarchy: hierarchy.clone(),
+            pose: Pose::IDENTITY,
             held: HashMap::new(),
             active: Vec::new(),
             frame: 0,
@@ -62,8 +65,9 @@ impl PageCache {
 
     fn cut(&self, view: &View, settings: &Settings, pixels: f64) -> Cut {
         let header = self.hierarchy.header();
+        let view = &self.pose.view(view);
         let culls = settings.culls(header.closed, &header.bounds, view);
-        let region = settings.region.map(|region| region.bounds);
+        let region = settings.region.map(|region| self.pose.inverse().bounds(&region.bounds));
         Cut::new(view, header.origin, pixels, culls).within(header.origin, region)
     }
 
@@ -145,9 +149,9 @@ impl PageCache {
         spare: &mut Spare,
     ) -> Vec<Vec<Record>> {
         let (level, cut) = (Level::new(), self.cut(plan.view, settings, pixels));
-        let header = self.hierarchy.header();
-        let source = Source::of_nodes(plan.view, header);
-        let (projector, eye) = (Projector::new(plan, source), Eye::of(plan.view));
+        let (header, view) = (self.hierarchy.header(), self.pose.view(plan.view));
+        let source = Source::of_nodes(&view, header);
+        let (projector, eye) = (Projector::new(plan, source), Eye::of(&view));
         let mut records = spare_for(spare, self.active.len());
         records.par_iter_mut().zip(&self.active).for_each(|(records, page)| {
             let Some(Held { nodes, .. }) = self.held.get(page) else { return };

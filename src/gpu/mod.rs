@@ -64,5 +64,6 @@ pub use device::{AdapterChoice, Gpu};
 pub use output::{Depth, Output};
 pub use pending::PendingFrame;
 pub use renderer::{Progress, Renderer};
+pub(crate) use scene::Parked;
 pub use scene::PreparedScene;
 pub(crate) use upload::Upload;

@@ -155,6 +155,7 @@ impl PendingFrame {
                 let nodes = most.saturating_mul(8).max(1 << 16);
                 let mut pixels = 0.0f64;
                 for cache in &prepared.page_caches {
+                    let view = prepared.scene.view_of(cache.item, &view);
                     pixels = pixels.max(cache.finest_within(&view, settings, nodes)?);
                 }
                 prepared.update_forests(&engine.gpu, &view, settings, pixels)?;
@@ -290,7 +291,9 @@ impl PendingFrame {
         for chunk in &prepared.chunks {
             let isotropic = request.is_isotropic(&prepared.scene.items[chunk.item]);
             let field = fields.iter().position(|item| *item == chunk.item).unwrap_or(0);
-            let source = chunk.source(view, isotropic, &prepared.page_caches).of_field(field);
+            let source = chunk
+                .source(&prepared.scene.view_of(chunk.item, view), isotropic, &prepared.page_caches)
+                .of_field(field);
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
         }
         let request = targets::Request {
@@ -320,7 +323,11 @@ impl PendingFrame {
         let mut commands = Commands::new(encoder);
         for chunk in &prepared.chunks {
             if let Origin::Nodes { slots, .. } = &chunk.origin {
-                let source = chunk.source(&self.view, false, &prepared.page_caches);
+                let source = chunk.source(
+                    &prepared.scene.view_of(chunk.item, &self.view),
+                    false,
+                    &prepared.page_caches,
+                );
                 gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
                 let nodes = slots.chunk(&chunk.uniform, &chunk.data);
                 engine.passes.cut.encode_tally(gpu, &mut commands, &nodes, &counters);

@@ -199,6 +199,7 @@ impl Renderer {
         sink: Sink,
     ) -> Result<PendingFrame> {
         self.guarded(prepared, |renderer, prepared| {
+            prepared.scene.check_items()?;
             prepared.scene.validate_settings(settings)?;
             if settings.region.is_some() {
                 let what = "the GPU engine does not draw regions yet; the CPU engine does";

@@ -12,6 +12,7 @@ mod kernel;
 mod matrices;
 pub(crate) mod neighbours;
 mod path;
+mod pose;
 mod sheets;
 pub(crate) mod weld;
 
@@ -21,4 +22,5 @@ pub(crate) use eigen::eigen;
 pub(crate) use factor::lower;
 pub use kernel::{Kernel, Profile, Tensor};
 pub use path::{CameraPath, Keyframe};
+pub use pose::Pose;
 pub use sheets::Sheets;

@@ -76,8 +76,9 @@ impl Cover {
 /// Returns the facets of a scene that a view shows.
 pub(super) fn gather<'a>(scene: &'a Scene, view: &View, settings: &Settings) -> Vec<Facet<'a>> {
     let mut facets = Vec::new();
-    for item in &scene.items {
+    for (item_number, item) in scene.items.iter().enumerate() {
         let Item::Facets(set) = item else { continue };
+        let view = &*scene.view_of(item_number, view);
         let is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
         for number in 0..set.facets.len() {
             if let Some(rod) = set.facets[number].rod() {

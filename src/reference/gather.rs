@@ -30,9 +30,9 @@ pub(super) fn radiance<'a>(
     before: Option<Before>,
 ) -> Vec<Kernel<'a>> {
     let mut kernels = Vec::new();
-    for item in &scene.items {
+    for (number, item) in scene.items.iter().enumerate() {
         if item.transfer().is_none() || before.is_some() {
-            add_item(&mut kernels, item, before, view);
+            add_item(&mut kernels, item, before, &scene.view_of(number, view));
         }
     }
     kernels

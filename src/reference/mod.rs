@@ -303,30 +303,33 @@ pub fn render(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Pic
 
 /// Returns the scene with volumes in bricks replaced by whole volumes, at their finest level.
 fn without_bricks(scene: &Scene) -> Result<Scene> {
-    let whole = |item: &Item| match item {
+    scene.map(|(_, item)| match item {
         Item::Bricks(bricks, kernel, transfer) => {
             Ok(Item::Volume(bricks.volume(0)?.into(), kernel.clone(), transfer.clone()))
         }
         other => Ok(other.clone()),
-    };
-    Ok(Scene { items: scene.items.iter().map(whole).collect::<Result<_>>()? })
+    })
 }
 
 /// Returns the scene with hierarchies replaced by the splats of their cuts, Gaussians by those that
 /// are seen, and solids by the facets that clips leave of them.
 fn with_cuts(scene: &Scene, view: &View, settings: &Settings) -> Result<Scene> {
-    let flat = |item: &Item| match item {
-        Item::Hierarchy(hierarchy) => {
-            let header = hierarchy.header();
-            let culls = settings.culls(header.closed, &header.bounds, view);
-            let cut = hierarchy.read_tree()?.cut(view, settings.detail, Some(culls))?;
-            Ok(Item::Radiance(cut.into()))
-        }
-        Item::Gaussians(set) => Ok(Item::Radiance(set.seen_from(Eye::of(view)).into())),
-        Item::Solid(solid) => Ok(Item::Facets(solid.facets(&settings.clips))),
-        other => Ok(other.clone()),
-    };
-    Ok(Scene { items: scene.items.iter().map(flat).collect::<Result<_>>()? })
+    scene.map(|(number, item)| {
+        let view = &*scene.view_of(number, view);
+        Ok(match item {
+            Item::Hierarchy(hierarchy) => {
+                let header = hierarchy.header();
+                let culls = settings.culls(header.closed, &header.bounds, view);
+                let cut = hierarchy.read_tree()?.cut(view, settings.detail, Some(culls))?;
+                Item::Radiance(cut.into())
+            }
+            Item::Gaussians(set) => Item::Radiance(set.seen_from(Eye::of(view)).into()),
+            Item::Solid(solid) => {
+                Item::Facets(solid.facets(&scene.view_pose(number).clips(&settings.clips)?))
+            }
+            other => other.clone(),
+        })
+    })
 }
 
 /// Builds the picture from the composites of all rays, row by row.
@@ -393,8 +396,11 @@ impl<'a> Frame<'a> {
         let has_field = flat.items.iter().any(|item| item.transfer().is_some());
         let shade = flat.items.iter().find_map(|item| item.light(settings)).filter(|_| !is_dark);
         // Bricks have become volumes by now.
-        let drawn = |item| Drawn::new(item, &view, settings, &sheets);
-        let fields = flat.items.iter().filter(|_| !before).filter_map(drawn).collect();
+        let drawn = |(number, item): (usize, &'a Item)| {
+            Drawn::new(item, &flat.view_of(number, &view), settings, &sheets)
+        };
+        let items = flat.items.iter().enumerate();
+        let fields = items.filter(|_| !before).filter_map(drawn).collect();
         let before_shade = before.then_some(Before { lit: shade.is_some() });
         Self {
             has_trained: scene.items.iter().any(Item::is_trained),

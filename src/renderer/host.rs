@@ -92,7 +92,10 @@ impl Renderer {
         settings: &Settings,
         output: impl Into<Output>,
     ) -> Result<Frame> {
-        let view = viewpoint.view(settings.size)?;
+        let (view, output) = (viewpoint.view(settings.size)?, output.into());
+        if self.scene.items.is_empty() {
+            return self.encode_clear(encoder, view, settings, output);
+        }
         match &mut self.drawer {
             Drawer::Gpu(engine, prepared) => {
                 let frame = engine.encode(encoder, prepared, &view, settings, output)?;
@@ -100,19 +103,33 @@ impl Renderer {
             }
             Drawer::Cpu(worker) => {
                 if self.upload.is_none() {
-                    return Err(Error::Argument(
-                        "Device::Cpu has no device to write textures of; use Device::CpuFor".into(),
-                    ));
+                    return Err(no_device());
                 }
-                let output = output.into();
                 output.check(&view)?;
                 worker.begin(view.clone(), settings);
-                let number = FRAMES.fetch_add(1, Ordering::Relaxed);
-                self.frame = number;
-                let frame = CpuFrame { number, view, output, stage: Stage::Drawing };
-                Ok(Frame(Engine::Cpu(Box::new(frame))))
+                Ok(self.begin(view, output, Stage::Drawing))
             }
         }
+    }
+
+    /// Encodes the frame of a scene without items.
+    fn encode_clear(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        view: View,
+        settings: &Settings,
+        output: Output,
+    ) -> Result<Frame> {
+        let picture = super::clear(&view, settings)?;
+        output.check(&view)?;
+        let Some(upload) = &mut self.upload else { return Err(no_device()) };
+        upload.encode(encoder, &picture, &view, &output)?;
+        Ok(self.begin(view, output, Stage::Done(FrameStats::default())))
+    }
+
+    fn begin(&mut self, view: View, output: Output, stage: Stage) -> Frame {
+        self.frame = FRAMES.fetch_add(1, Ordering::Relaxed);
+        Frame(Engine::Cpu(Box::new(CpuFrame { number: self.frame, view, output, stage })))
     }
 
     /// Encodes the next batch of a frame, after [`poll`](Self::poll) has asked for it.
@@ -129,7 +146,7 @@ impl Renderer {
             (Drawer::Gpu(engine, prepared), Engine::Gpu(frame)) => {
                 engine.encode_next(encoder, prepared, frame)
             }
-            (Drawer::Cpu(_), Engine::Cpu(frame)) if frame.number == self.frame => {
+            (_, Engine::Cpu(frame)) if frame.number == self.frame => {
                 let Some(upload) = &mut self.upload else { return Err(abandoned()) };
                 let Stage::Drawn(picture, stats) = &frame.stage else {
                     return Err(Error::Argument(
@@ -154,8 +171,8 @@ impl Renderer {
     pub fn poll(&mut self, frame: &mut Frame) -> Result<Progress> {
         match (&mut self.drawer, &mut frame.0) {
             (Drawer::Gpu(engine, prepared), Engine::Gpu(frame)) => engine.poll(prepared, frame),
-            (Drawer::Cpu(worker), Engine::Cpu(frame)) if frame.number == self.frame => {
-                if let Stage::Drawing = frame.stage {
+            (drawer, Engine::Cpu(frame)) if frame.number == self.frame => {
+                if let (Drawer::Cpu(worker), Stage::Drawing) = (drawer, &frame.stage) {
                     let Poll::Ready(drawn) = worker.poll(None) else {
                         return Ok(Progress::Working);
                     };
@@ -173,6 +190,11 @@ impl Renderer {
     }
 }
 
+fn no_device() -> Error {
+    let message = "Device::Cpu has no device to write textures of; use Device::CpuFor";
+    Error::Argument(message.into())
+}
+
 fn abandoned() -> Error {
     Error::Argument("another frame was begun with this renderer; drop the older one".into())
 }
@@ -180,7 +202,7 @@ fn abandoned() -> Error {
 /// Returns what uploads pictures of the CPU engine to a host's device.
 pub fn upload(device: &super::Device) -> Option<Upload> {
     match device {
-        super::Device::CpuFor(gpu) => Some(Upload::new(gpu)),
-        _ => None,
+        super::Device::Gpu(gpu, _) | super::Device::CpuFor(gpu) => Some(Upload::new(gpu)),
+        super::Device::Cpu => None,
     }
 }

@@ -3,6 +3,7 @@
 mod device;
 #[cfg(feature = "gpu")]
 mod host;
+mod items;
 mod worker;
 
 #[cfg(feature = "gpu")]
@@ -14,16 +15,18 @@ use crate::{
     picture::Picture,
     plan::FrameStats,
     scene::{Scene, Settings},
-    volume::TransferFunction,
 };
 pub use device::Device;
 #[cfg(feature = "gpu")]
 pub use host::Frame;
+pub use items::ItemId;
+use items::Slot;
 use std::future::poll_fn;
 use worker::Worker;
 
-/// Draws one scene on one device. The viewpoint, the settings and the transfer functions may change
-/// from picture to picture.
+/// Draws one scene on one device. The viewpoint and the settings may change from picture to picture.
+/// Items are added, hidden, moved and removed by their names ([`ItemId`]), while the others stay
+/// prepared.
 ///
 /// | method | waits | the picture is |
 /// |---|---|---|
@@ -56,6 +59,9 @@ pub struct Renderer {
     scene: Scene,
     device: Device,
     drawer: Drawer,
+    slots: Vec<Slot>,
+    /// The number in the name of the next item.
+    next_item: usize,
     /// The number of the CPU engine's last frame for a host; 0 if it is abandoned.
     frame: u64,
     /// What uploads the CPU engine's frames.
@@ -85,6 +91,15 @@ impl Drawer {
     }
 }
 
+/// Returns the picture of a scene without items.
+fn clear(viewpoint: &impl Viewpoint, settings: &Settings) -> Result<Picture> {
+    Scene::new().validate_settings(settings)?;
+    let [width, height] = viewpoint.view(settings.size)?.size;
+    let pixels = width as usize * height as usize;
+    let (color, depth) = (vec![[0.0; 4]; pixels], vec![f32::INFINITY; pixels]);
+    Ok(Picture { width, height, color, depth })
+}
+
 /// Returned where a browser's GPU would have to be waited for.
 #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
 fn cannot_wait<T>() -> Result<T> {
@@ -92,7 +107,8 @@ fn cannot_wait<T>() -> Result<T> {
 }
 
 impl Renderer {
-    /// Prepares a scene on a device.
+    /// Prepares a scene on a device. A scene without items is one to which they are added later; its
+    /// pictures are clear.
     ///
     /// # Errors
     /// [`Error::Argument`] if [`Scene::validate`] or the engine refuses the scene;
@@ -102,6 +118,8 @@ impl Renderer {
             scene: scene.clone(),
             device: device.clone(),
             drawer: Drawer::new(device, scene)?,
+            slots: items::slots(scene),
+            next_item: scene.items.len(),
             frame: 0,
             #[cfg(feature = "gpu")]
             upload: host::upload(device),
@@ -140,6 +158,9 @@ impl Renderer {
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
         self.frame = 0;
+        if self.scene.items.is_empty() {
+            return Ok((clear(viewpoint, settings)?, FrameStats::default()));
+        }
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Drawer::Gpu(renderer, prepared) => renderer.render(prepared, viewpoint, settings),
@@ -162,6 +183,9 @@ impl Renderer {
     ) -> Result<(Picture, FrameStats)> {
         let view = viewpoint.view(settings.size)?;
         self.frame = 0;
+        if self.scene.items.is_empty() {
+            return Ok((clear(&view, settings)?, FrameStats::default()));
+        }
         match &mut self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(renderer, prepared) => {
@@ -182,7 +206,9 @@ impl Renderer {
     pub fn draw(&mut self, viewpoint: &impl Viewpoint, settings: &Settings) -> Result<FrameStats> {
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Drawer::Gpu(renderer, prepared) => renderer.draw(prepared, viewpoint, settings),
+            Drawer::Gpu(renderer, prepared) if !self.scene.items.is_empty() => {
+                renderer.draw(prepared, viewpoint, settings)
+            }
             _ => Ok(self.render_once(viewpoint, settings)?.1),
         }
     }
@@ -198,23 +224,10 @@ impl Renderer {
     ) -> Result<FrameStats> {
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Drawer::Gpu(renderer, prepared) => renderer.profile(prepared, viewpoint, settings),
+            Drawer::Gpu(renderer, prepared) if !self.scene.items.is_empty() => {
+                renderer.profile(prepared, viewpoint, settings)
+            }
             _ => Ok(self.render_once(viewpoint, settings)?.1),
-        }
-    }
-
-    /// Sets the transfer function of the field of an item, by its number in the scene
-    /// ([`Scene::fields`]).
-    ///
-    /// # Errors
-    /// [`Error::Argument`] if the item has no field; [`Error::Transfer`] if [`new`](Self::new)
-    /// would refuse the function. The scene then keeps its old one.
-    pub fn set_transfer(&mut self, item: usize, transfer: &TransferFunction) -> Result<()> {
-        self.scene = self.scene.with_transfer(item, transfer)?;
-        match &mut self.drawer {
-            #[cfg(feature = "gpu")]
-            Drawer::Gpu(_, prepared) => prepared.set_transfer(item, transfer),
-            Drawer::Cpu(worker) => worker.engine().set_transfer(item, transfer),
         }
     }
 
@@ -228,6 +241,12 @@ impl Renderer {
             self.device = Device::Gpu(gpu.reopened()?, *budget);
         }
         self.drawer = Drawer::new(&self.device, &self.scene)?;
+        self.frame = 0;
+        self.forget_parked();
+        #[cfg(feature = "gpu")]
+        {
+            self.upload = host::upload(&self.device);
+        }
         Ok(())
     }
 }

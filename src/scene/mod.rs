@@ -3,6 +3,7 @@
 mod choice;
 mod item;
 mod numbers;
+mod poses;
 mod seen;
 mod settings;
 mod sheets;
@@ -21,11 +22,11 @@ use crate::{
     facet::FacetSet,
     gaussians::Gaussians,
     hierarchy::Hierarchy,
-    math::{Bounds, Kernel, Tensor},
+    math::{Bounds, Kernel, Pose, Tensor},
     splat::{BRIGHTEST_TRAINED, SplatSet},
     volume::{TransferFunction, Volume},
 };
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 /// The items of a picture. All are drawn together, in the same sheets.
 ///
@@ -52,6 +53,14 @@ use std::sync::Arc;
 pub struct Scene {
     /// The items, in any order.
     pub items: Vec<Item>,
+    /// Where items are moved to that are not where their data are, by their numbers.
+    poses: BTreeMap<usize, Pose>,
+}
+
+impl From<Vec<Item>> for Scene {
+    fn from(items: Vec<Item>) -> Self {
+        Self { items, poses: BTreeMap::new() }
+    }
 }
 
 impl Scene {
@@ -155,9 +164,7 @@ impl Scene {
     /// [`validate`](Self::validate) would refuse the function.
     pub(crate) fn with_transfer(&self, number: usize, transfer: &TransferFunction) -> Result<Self> {
         let mut scene = self.clone();
-        let Some(item) = scene.items.get_mut(number) else {
-            return Err(Error::Argument(format!("the scene has no item {number}")));
-        };
+        let Some(item) = scene.items.get_mut(number) else { return Err(poses::no_item(number)) };
         let Some(function) = item.transfer_mut() else {
             return Err(Error::Argument(format!(
                 "item {number} of the scene has colours of its own, and no transfer function"
@@ -182,10 +189,7 @@ impl Scene {
 
     /// Returns the scene without its fields, except that of item `number`.
     pub(crate) fn with_one_field(&self, number: usize) -> Self {
-        let is_kept =
-            |(index, item): &(usize, &Item)| *index == number || item.transfer().is_none();
-        let items = self.items.iter().enumerate().filter(is_kept);
-        Self { items: items.map(|(_, item)| item.clone()).collect() }
+        self.filtered(|index| index == number || self.items[index].transfer().is_none())
     }
 
     /// Returns the kernel of the scene's first volume of tensor products: the function along each
@@ -212,7 +216,8 @@ impl Scene {
 
     /// Returns the box around everything that can be seen, footprints included.
     pub fn bounds(&self) -> Bounds {
-        self.items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds()))
+        let bounds = (0..self.items.len()).map(|number| self.bounds_of(number));
+        bounds.fold(Bounds::EMPTY, Bounds::union)
     }
 
     /// Whether the scene contains explicit splats (surfaces or scattered samples). These are

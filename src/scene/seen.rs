@@ -77,7 +77,7 @@ impl Scene {
             points.extend(outermost);
         }
         if points.is_empty() {
-            points.extend(self.items.iter().flat_map(|item| item.bounds().corners()));
+            points.extend((0..self.items.len()).flat_map(|item| self.bounds_of(item).corners()));
         }
         Ok(points)
     }

@@ -67,7 +67,7 @@ impl Scene {
             let some = set.facets.iter().step_by(step(set.facets.len()));
             usual(some.map(|facet| facet.corners[0].into()).collect(), set.origin)
         };
-        let of_item = |item: &Item| {
+        let of_item = |(number, item): (usize, &Item)| {
             let bounds = match item {
                 Item::Radiance(set) if !set.splats.is_empty() => {
                     let some = set.splats.iter().step_by(step(set.splats.len()));
@@ -81,9 +81,10 @@ impl Scene {
                 }
                 _ => None,
             };
-            bounds.unwrap_or_else(|| item.bounds())
+            let bounds = bounds.unwrap_or_else(|| item.bounds());
+            self.view_pose(number).bounds(&bounds)
         };
-        let all = self.items.iter().map(of_item).fold(Bounds::EMPTY, Bounds::union);
+        let all = self.items.iter().enumerate().map(of_item).fold(Bounds::EMPTY, Bounds::union);
         100.0 * all.diagonal()
     }
 

@@ -37,35 +37,37 @@ impl Scene {
     /// [`Error::Argument`] with the reason; [`Error::NothingToDraw`] for a scene without splats and
     /// samples.
     pub fn validate(&self) -> Result<()> {
-        for item in &self.items {
-            let (set, payload) = match item {
-                Item::Radiance(set) => (set, Payload::Radiance),
-                Item::Scalar(set, _) => (set, Payload::Scalar),
-                Item::Facets(_)
-                | Item::Solid(_)
-                | Item::Gaussians(_)
-                | Item::Hierarchy(_)
-                | Item::Volume(..)
-                | Item::Bricks(..)
-                | Item::Cells(..) => continue,
-            };
-            if set.payload != payload {
-                return Err(Error::Argument(format!(
-                    "a set of {:?} splats was added as {payload:?}",
-                    set.payload
-                )));
-            }
-            if !(set.extent > 0.0 && set.extent <= SplatSet::MAX_EXTENT) {
-                let most = SplatSet::MAX_EXTENT;
-                return Err(Error::Argument(format!(
-                    "a splat set's extent must lie in 0 … {most}, is {}",
-                    set.extent
-                )));
-            }
+        (0..self.items.len()).try_for_each(|number| self.validate_item(number))?;
+        self.validate_fields()?;
+        if self.bounds().is_empty() {
+            return Err(Error::NothingToDraw("the scene contains no splats".into()));
         }
-        for (number, item) in self.items.iter().enumerate() {
-            numbers::check_item(item).map_err(numbers::of_item(number))?;
+        Ok(())
+    }
+
+    /// Like [`validate`](Self::validate), but a scene without items is one to which they are added
+    /// later.
+    pub(crate) fn validate_unless_empty(&self) -> Result<()> {
+        if self.items.is_empty() { Ok(()) } else { self.validate() }
+    }
+
+    /// Returns an error if there is nothing to draw.
+    pub(crate) fn check_items(&self) -> Result<()> {
+        match self.items.is_empty() {
+            true => Err(Error::NothingToDraw("the scene contains no items".into())),
+            false => Ok(()),
         }
+    }
+
+    /// Checks one item.
+    pub(crate) fn validate_item(&self, number: usize) -> Result<()> {
+        let item = &self.items[number];
+        check_payload(item)?;
+        numbers::check_item(item).map_err(numbers::of_item(number))
+    }
+
+    /// Checks the number of fields.
+    pub(crate) fn validate_fields(&self) -> Result<()> {
         let (fields, most) = (self.fields().len(), Self::MAX_FIELDS);
         if fields > most {
             return Err(Error::Argument(format!(
@@ -73,11 +75,37 @@ impl Scene {
                  scene has {fields}"
             )));
         }
-        if self.bounds().is_empty() {
-            return Err(Error::NothingToDraw("the scene contains no splats".into()));
-        }
         Ok(())
     }
+}
+
+/// Returns an error if an item's splats carry something else than it shows.
+fn check_payload(item: &Item) -> Result<()> {
+    let (set, payload) = match item {
+        Item::Radiance(set) => (set, Payload::Radiance),
+        Item::Scalar(set, _) => (set, Payload::Scalar),
+        Item::Facets(_)
+        | Item::Solid(_)
+        | Item::Gaussians(_)
+        | Item::Hierarchy(_)
+        | Item::Volume(..)
+        | Item::Bricks(..)
+        | Item::Cells(..) => return Ok(()),
+    };
+    if set.payload != payload {
+        return Err(Error::Argument(format!(
+            "a set of {:?} splats was added as {payload:?}",
+            set.payload
+        )));
+    }
+    if !(set.extent > 0.0 && set.extent <= SplatSet::MAX_EXTENT) {
+        let most = SplatSet::MAX_EXTENT;
+        return Err(Error::Argument(format!(
+            "a splat set's extent must lie in 0 … {most}, is {}",
+            set.extent
+        )));
+    }
+    Ok(())
 }
 
 fn check_size([width, height]: [u32; 2]) -> Result<()> {

@@ -9,6 +9,7 @@ mod head;
 pub(crate) mod holes;
 mod labels;
 mod lattice;
+mod moved;
 pub(crate) mod overshoot;
 pub mod phantoms;
 mod prefilter;

@@ -46,7 +46,7 @@ fn with_kernel(case: &Case, kernel: &Kernel, is_sharp: bool) -> Case {
         }
         other => other.clone(),
     });
-    let scene = Scene { items: items.collect() };
+    let scene = Scene::from(items.collect::<Vec<_>>());
     Case { name: case.name, scene, camera: case.camera.clone(), settings: case.settings.clone() }
 }
 
@@ -67,7 +67,7 @@ fn random(lattice: Lattice) -> Case {
         }
         other => other.clone(),
     });
-    Case { name: "random", scene: Scene { items: items.collect() }, ..case }
+    Case { name: "random", scene: Scene::from(items.collect::<Vec<_>>()), ..case }
 }
 
 fn edges(dims: [usize; 3]) -> DMat3 {

@@ -246,7 +246,7 @@ fn fields_are_not_exchanged() {
     let case = by(Evaluate::Scatter, fields::two_volumes());
     let picture = drawn(&case, Budget::default());
     let truth = |items: Vec<Item>| {
-        reference::render(&Scene { items }, &case.camera, &case.settings).expect(case.name)
+        reference::render(&Scene::from(items), &case.camera, &case.settings).expect(case.name)
     };
     let items = &case.scene.items;
     let [Item::Volume(a, kernel_a, transfer_a), Item::Volume(b, kernel_b, transfer_b)] = &items[..]

@@ -28,7 +28,7 @@ fn referenced(case: &Case) -> Picture {
 /// The same case with other items.
 fn of_items(case: &Case, items: Vec<Item>) -> Case {
     let (camera, settings) = (case.camera.clone(), case.settings.clone());
-    Case { name: case.name, scene: Scene { items }, camera, settings }
+    Case { name: case.name, scene: Scene::from(items), camera, settings }
 }
 
 fn largest_difference(a: &Picture, b: &Picture) -> f32 {
@@ -140,7 +140,7 @@ fn sheets_suit_the_finest_field() {
     let case = fields::two_volumes();
     let view = case.camera.view(case.settings.size).expect("a view");
     let thickness = |items: &[Item]| {
-        let scene = Scene { items: items.to_vec() };
+        let scene = Scene::from(items.to_vec());
         scene.sheets(&view, &case.settings).step
     };
     let both = thickness(&case.scene.items);

@@ -40,7 +40,7 @@ fn with_kernel(case: &Case, tensor: Tensor, is_sharp: bool) -> Case {
         }
         other => other.clone(),
     });
-    let scene = Scene { items: items.collect() };
+    let scene = Scene::from(items.collect::<Vec<_>>());
     let settings = Settings { size: SIZE, ..case.settings.clone() };
     Case { name: case.name, scene, camera: case.camera.clone(), settings }
 }
@@ -65,7 +65,7 @@ fn border(dims: [usize; 3]) -> Case {
         other => other.clone(),
     });
     let settings = Settings { volume_shade: Some(None), ..case.settings.clone() };
-    Case { name: "border", scene: Scene { items: items.collect() }, settings, ..case }
+    Case { name: "border", scene: Scene::from(items.collect::<Vec<_>>()), settings, ..case }
 }
 
 fn drawn(case: &Case) -> splatkit::Result<Picture> {

@@ -39,9 +39,9 @@ impl Recolor {
 
     /// Gives Gaussians the colours for a view's eye.
     pub fn update(&self, gpu: &Gpu, prepared: &mut PreparedScene, view: &View) -> Result<()> {
-        let eye = Eye::of(view);
         for number in 0..prepared.seen.len() {
             let SeenSet { item, set, eye: last } = &mut prepared.seen[number];
+            let eye = Eye::of(&prepared.scene.view_of(*item, view));
             let (item, set, last) = (*item, set.clone(), last.replace(eye));
             if last.is_none() {
                 gpu.check_memory(prepared.bytes + gaussian_bytes(&set))?;

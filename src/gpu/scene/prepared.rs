@@ -35,7 +35,13 @@ use crate::{
     },
 };
 use glam::{UVec3, Vec3};
-use std::{borrow::Cow, sync::Arc};
+use std::{
+    borrow::Cow,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+};
 
 /// Maximum number of voxels in a chunk, apart from those of its neighbours. The spans of all its
 /// voxels then fit a binding of 128 MiB.
@@ -51,8 +57,8 @@ const MOST_PLACES: usize = 8192;
 
 /// A set of splats with levels of detail. The GPU holds the splats that the last view showed.
 #[derive(Debug)]
-struct LevelledSet {
-    item: usize,
+pub(super) struct LevelledSet {
+    pub item: usize,
     levels: Levels,
     /// The cut of the last view.
     cut: Option<Cut>,
@@ -62,8 +68,8 @@ struct LevelledSet {
 
 /// A solid, of which the GPU holds what the clips of the last picture left.
 #[derive(Debug)]
-struct ClippedSolid {
-    item: usize,
+pub(super) struct ClippedSolid {
+    pub item: usize,
     solid: Arc<Solid>,
     drawn: Option<Arc<FacetSet>>,
 }
@@ -84,9 +90,9 @@ pub struct PreparedScene {
     pub(crate) scene: Scene,
     pub(crate) chunks: Vec<Chunk>,
     /// The sets that pictures may show in levels of detail.
-    levels: Vec<LevelledSet>,
+    pub(super) levels: Vec<LevelledSet>,
     /// The solids.
-    solids: Vec<ClippedSolid>,
+    pub(super) solids: Vec<ClippedSolid>,
     /// The trained Gaussians.
     pub(crate) seen: Vec<SeenSet>,
     /// The hierarchies, in the scene's order.
@@ -95,6 +101,8 @@ pub struct PreparedScene {
     pub(crate) brick_cache: Option<BrickCache>,
     /// The data to gather the scene's volume. It is made for the first picture that gathers.
     pub(crate) field: Option<Field>,
+    /// The number of its item.
+    pub(super) field_item: usize,
     /// The images that facets show.
     pub(crate) images: Option<Images>,
     /// The tables of the last picture's fields.
@@ -105,12 +113,27 @@ pub struct PreparedScene {
     pub(crate) bytes: u64,
     /// The data on the GPU cannot be trusted, because an error occurred there.
     pub(crate) broken: bool,
+    /// The number of this upload among all.
+    pub(super) upload: u64,
     /// The number of the picture that was begun last.
     pub(crate) picture: u64,
-    /// The box around everything, which does not change.
+    /// The box around everything.
     pub(crate) bounds: Bounds,
     /// The device that holds the data.
-    gpu: Gpu,
+    pub(super) gpu: Gpu,
+}
+
+/// The numbers of uploads, all different.
+static UPLOADS: AtomicU64 = AtomicU64::new(1);
+
+/// Returns an error that names what of a scene the device does not draw.
+pub(super) fn check_drawable(gpu: &Gpu, scene: &Scene) -> Result<()> {
+    match gpu.beyond(scene) {
+        None => Ok(()),
+        Some(what) => Err(Error::Argument(format!(
+            "the GPU engine does not draw {what} yet; the CPU engine does"
+        ))),
+    }
 }
 
 impl Gpu {
@@ -126,12 +149,8 @@ impl Gpu {
 impl PreparedScene {
     /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
     pub(crate) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
-        scene.validate()?;
-        if let Some(what) = gpu.beyond(scene) {
-            return Err(Error::Argument(format!(
-                "the GPU engine does not draw {what} yet; the CPU engine does"
-            )));
-        }
+        scene.validate_unless_empty()?;
+        check_drawable(gpu, scene)?;
         let mut prepared = Self {
             scene: scene.clone(),
             chunks: Vec::new(),
@@ -141,11 +160,13 @@ impl PreparedScene {
             page_caches: Vec::new(),
             brick_cache: None,
             field: None,
+            field_item: 0,
             tables: None,
             images: None,
             runs: 0,
             bytes: 0,
             broken: false,
+            upload: UPLOADS.fetch_add(1, Ordering::Relaxed),
             picture: 0,
             bounds: scene.bounds(),
             gpu: gpu.clone(),
@@ -153,42 +174,48 @@ impl PreparedScene {
         gpu.check_memory(Images::bytes_of(scene))?;
         prepared.images = Images::of(gpu, scene);
         prepared.bytes += prepared.images.as_ref().map_or(0, |images| images.bytes);
-        for (number, item) in scene.items.iter().enumerate() {
-            if let Item::Radiance(set) | Item::Scalar(set, _) = item
-                && let Some(levels) = Levels::new(set)
-            {
-                prepared.levels.push(LevelledSet { item: number, levels, cut: None, set: None });
-                continue;
+        (0..scene.items.len()).try_for_each(|number| prepared.prepare_item(gpu, number))?;
+        Ok(prepared)
+    }
+
+    /// Uploads an item of the scene, unless it is uploaded for the first picture.
+    pub(super) fn prepare_item(&mut self, gpu: &Gpu, number: usize) -> Result<()> {
+        let item = self.scene.items[number].clone();
+        if let Item::Radiance(set) | Item::Scalar(set, _) = &item
+            && let Some(levels) = Levels::new(set)
+        {
+            self.levels.push(LevelledSet { item: number, levels, cut: None, set: None });
+            return Ok(());
+        }
+        gpu.check_memory(self.bytes + bytes_of(&item))?;
+        match &item {
+            Item::Radiance(set) | Item::Scalar(set, _) => {
+                self.add_splats(gpu, &in_space_order(set), number);
             }
-            gpu.check_memory(prepared.bytes + bytes_of(item))?;
-            match item {
-                Item::Radiance(set) | Item::Scalar(set, _) => {
-                    prepared.add_splats(gpu, &in_space_order(set), number);
-                }
-                // They are uploaded as the first picture sees them.
-                Item::Gaussians(set) => {
-                    prepared.seen.push(SeenSet { item: number, set: set.clone(), eye: None });
-                }
-                Item::Facets(set) => prepared.add_facets(gpu, set, number),
-                // Their facets are uploaded as the clips of the first picture leave them.
-                Item::Solid(solid) => {
-                    let clipped = ClippedSolid { item: number, solid: solid.clone(), drawn: None };
-                    prepared.solids.push(clipped);
-                }
-                Item::Hierarchy(hierarchy) => {
-                    prepared.page_caches.push(PageCache::new(gpu, hierarchy, number));
-                }
-                // Other volumes are uploaded when a picture first gathers or scatters them.
-                Item::Volume(volume, kernel, _) if unsuited(volume, kernel).is_some() => {
-                    prepared.add_volume(gpu, volume, kernel.clone(), number)?;
-                }
-                Item::Volume(..) | Item::Cells(..) => {}
-                Item::Bricks(bricks, kernel, _) => {
-                    prepared.brick_cache = Some(BrickCache::new(bricks, kernel, number));
-                }
+            // They are uploaded as the first picture sees them.
+            Item::Gaussians(set) => {
+                self.seen.push(SeenSet { item: number, set: set.clone(), eye: None });
+            }
+            Item::Facets(set) => self.add_facets(gpu, set, number),
+            // Their facets are uploaded as the clips of the first picture leave them.
+            Item::Solid(solid) => {
+                self.solids.push(ClippedSolid { item: number, solid: solid.clone(), drawn: None });
+            }
+            Item::Hierarchy(hierarchy) => {
+                let index = self.page_caches.iter().filter(|other| other.item < number).count();
+                self.renumber_caches(|old| old + usize::from(old >= index));
+                self.page_caches.insert(index, PageCache::new(gpu, hierarchy, number));
+            }
+            // Other volumes are uploaded when a picture first gathers or scatters them.
+            Item::Volume(volume, kernel, _) if unsuited(volume, kernel).is_some() => {
+                self.add_volume(gpu, volume, kernel.clone(), number)?;
+            }
+            Item::Volume(..) | Item::Cells(..) => {}
+            Item::Bricks(bricks, kernel, _) => {
+                self.brick_cache = Some(BrickCache::new(bricks, kernel, number));
             }
         }
-        Ok(prepared)
+        Ok(())
     }
 
     /// Returns an error if the scene was prepared on another device.
@@ -225,11 +252,18 @@ impl PreparedScene {
 
     /// Prepares the scene's volume to be gathered, and drops the lists of its samples to scatter.
     pub(crate) fn update_field(&mut self, gpu: &Gpu, settings: &Settings) -> Result<()> {
-        let volume = self.scene.items.iter().find_map(|item| match item {
-            Item::Volume(volume, kernel, transfer) => Some((volume, kernel, transfer)),
+        let items = self.scene.items.iter().enumerate();
+        let volume = items.into_iter().find_map(|(number, item)| match item {
+            Item::Volume(volume, kernel, transfer) => Some((number, volume, kernel, transfer)),
             _ => None,
         });
-        let Some((volume, kernel, transfer)) = volume else { return Ok(()) };
+        let Some((number, volume, kernel, transfer)) = volume else { return Ok(()) };
+        if self.field_item != number
+            && let Some(other) = self.field.take()
+        {
+            self.bytes = self.bytes.saturating_sub(other.bytes());
+        }
+        self.field_item = number;
         let first = match settings.optics {
             Optics::Maximum => EVERYTHING,
             _ => first_visible(transfer, volume.range),
@@ -379,6 +413,7 @@ impl PreparedScene {
         view: &View,
         pixels: f64,
     ) -> Result<()> {
+        let view = &self.scene.view_of(levelled.item, view);
         let cut = Cut::new(view, levelled.levels.origin(), pixels, false);
         if levelled.cut == Some(cut) {
             return Ok(());
@@ -439,7 +474,8 @@ impl PreparedScene {
         let mut has_changed = false;
         for number in 0..self.solids.len() {
             let ClippedSolid { item, solid, drawn } = &mut self.solids[number];
-            let (item, set) = (*item, solid.facets(&settings.clips));
+            let pose = self.scene.view_pose(*item);
+            let (item, set) = (*item, solid.facets(&pose.clips(&settings.clips)?));
             if drawn.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &set)) {
                 continue;
             }
@@ -468,6 +504,7 @@ impl PreparedScene {
     pub(crate) fn update_facets(&mut self, view: &View, settings: &Settings) {
         for chunk in &mut self.chunks {
             if let Origin::Facets { set, is_culled, .. } = &mut chunk.origin {
+                let view = &self.scene.view_of(chunk.item, view);
                 *is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
             }
         }
@@ -544,6 +581,7 @@ impl PreparedScene {
     ) -> Result<()> {
         let room = settings.page_memory.min(self.room_to_read(gpu));
         for index in 0..self.page_caches.len() {
+            let view = &*self.scene.view_of(self.page_caches[index].item, view);
             let cut = self.page_caches[index].cut(view, settings, pixels);
             let chunks: Vec<(&Slots, &wgpu::Buffer)> = self
                 .chunks
