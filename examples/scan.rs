@@ -3,7 +3,6 @@
 
 use splatkit::{
     Device, Renderer, formats,
-    glam::DVec3,
     input::Limits,
     math::Camera,
     scene::{Scene, Settings},
@@ -25,10 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene::new().with_splats(surfels);
     let mut renderer = Renderer::new(&Device::automatic(), &scene)?;
     let settings = Settings::new([800, 600]);
-    // From the front (along -z), with y up.
-    let mut camera = Camera::framing(&scene.bounds(), DVec3::NEG_Z, DVec3::Y, 800.0 / 600.0);
-    camera.azimuth(30.0);
-    camera.fit(&scene.bounds(), settings.size, 0.05)?;
+    let camera = Camera::fit(&scene, settings.size)?;
 
     let (picture, stats) = renderer.render(&camera, &settings)?;
     picture.save("scan.png", Some([1.0; 3]))?;

@@ -153,7 +153,7 @@ impl Camera {
     ///
     /// # Errors
     /// As [`view`](Self::view).
-    pub fn fit(&mut self, bounds: &Bounds, size: [u32; 2], margin: f64) -> Result<()> {
+    pub fn tighten(&mut self, bounds: &Bounds, size: [u32; 2], margin: f64) -> Result<()> {
         let view = self.view(size)?;
         let mut widest: f64 = 0.0;
         for corner in bounds.corners() {
@@ -469,7 +469,7 @@ mod tests {
             if orthographic {
                 camera.make_orthographic();
             }
-            camera.fit(&bounds, [640, 480], 0.05).unwrap();
+            camera.tighten(&bounds, [640, 480], 0.05).unwrap();
             let view = camera.view([640, 480]).unwrap();
             let reach = bounds.corners().map(|corner| {
                 let p = view.to_view(corner);

@@ -58,6 +58,9 @@ impl Scene {
         for (number, item) in self.items.iter().enumerate() {
             let kind = if item.is_trained() { Kind::Trained } else { Kind::Measured };
             let spread = |points: &[Vec3], origin| near(points, kind, number, origin);
+            let pose = self.view_pose(number);
+            // A box that is cut out of a turned item is left out of the question.
+            let clips = &pose.clips(clips).unwrap_or_default();
             let outermost = match item {
                 Item::Radiance(set) => of_splats(set, |_| true, clips, spread),
                 Item::Scalar(set, transfer) => of_samples(set, transfer, clips, spread),
@@ -74,7 +77,7 @@ impl Scene {
                     of_volume(&bricks.volume(overview(bricks))?, transfer, clips)
                 }
             };
-            points.extend(outermost);
+            points.extend(outermost.into_iter().map(|point| pose.apply(point)));
         }
         if points.is_empty() {
             points.extend((0..self.items.len()).flat_map(|item| self.bounds_of(item).corners()));

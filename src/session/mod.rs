@@ -24,6 +24,7 @@ pub mod convert;
 mod data;
 mod description;
 mod facts;
+mod fit;
 mod framing;
 mod items;
 mod legend;

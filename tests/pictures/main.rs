@@ -12,6 +12,7 @@ mod gpu_engine;
 mod hierarchies;
 mod hosts;
 mod images;
+mod items;
 mod labels;
 mod near;
 mod occlusion;

@@ -61,7 +61,7 @@ impl Truth {
         );
         camera.azimuth(30.0);
         camera.elevation(20.0);
-        camera.fit(&bounds, size, 0.04).expect("a camera");
+        camera.tighten(&bounds, size, 0.04).expect("a camera");
         camera.position = camera.focal_point + (camera.position - camera.focal_point) / nearer;
         let settings = Settings::new(size);
         let crease = SurfelOptions::default().crease_angle_degrees;

@@ -110,6 +110,6 @@ fn camera(bounds: &Bounds, size: [u32; 2]) -> splatkit::Result<Camera> {
         Camera::framing(bounds, DVec3::Y, DVec3::Z, f64::from(size[0]) / f64::from(size[1]));
     camera.azimuth(30.0);
     camera.elevation(20.0);
-    camera.fit(bounds, size, 0.04)?;
+    camera.tighten(bounds, size, 0.04)?;
     Ok(camera)
 }
