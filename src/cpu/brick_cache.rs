@@ -50,7 +50,7 @@ pub fn slot_bytes(bricks: &Bricks) -> u64 {
 
 /// Returns the number of bricks that fit into the settings' memory, at least one.
 pub fn most_bricks(bricks: &Bricks, settings: &Settings) -> usize {
-    usize::try_from(settings.page_memory / slot_bytes(bricks)).unwrap_or(usize::MAX).max(1)
+    usize::try_from(settings.controls.page_memory / slot_bytes(bricks)).unwrap_or(usize::MAX).max(1)
 }
 
 impl BrickCache {

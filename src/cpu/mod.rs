@@ -182,7 +182,7 @@ impl CpuRenderer {
         clock.step("project");
         let drawn = self.draw(&plans, &outline, &records, &mut clock);
         self.spare = records;
-        if settings.stop.is_requested() {
+        if settings.controls.stop.is_requested() {
             return Err(Error::Stopped);
         }
         let (picture, mut stats) = drawn;
@@ -306,7 +306,7 @@ impl CpuRenderer {
         if fields.is_empty() && settings.evaluate == Evaluate::Gather {
             return Err(gathering::not_gathered("a scene without a volume on a lattice"));
         }
-        let stop = settings.stop.clone();
+        let stop = settings.controls.stop.clone();
         Ok(Outline { cut_pixels, sheets, fields, stop })
     }
 

@@ -82,7 +82,7 @@ impl PageCache {
         let cut = self.cut(view, settings, pixels);
         let mut wanted = needed(&self.hierarchy, &cut)?;
         let degree = self.hierarchy.header().degree;
-        let mut room = settings.page_memory;
+        let mut room = settings.controls.page_memory;
         let (mut most, mut absent, mut more) = (0, Vec::new(), 0);
         for entry in &wanted {
             let bytes = Nodes::bytes_of(entry.nodes as usize, degree);
@@ -100,7 +100,7 @@ impl PageCache {
         wanted.truncate(most);
         let mut needed: Vec<u32> = wanted.into_iter().map(|entry| entry.page).collect();
         needed.sort_unstable();
-        self.make_room(&needed, more, settings.page_memory);
+        self.make_room(&needed, more, settings.controls.page_memory);
         for batch in absent.chunks(BATCH) {
             let pages = self.hierarchy.read_pages(batch)?;
             let held = |page| Held { nodes: Nodes::new(page), last_needed: self.frame };

@@ -93,7 +93,7 @@ impl Request<'_> {
         let Some(brick_cache) = &prepared.brick_cache else { return Ok(None) };
         // The other half of the memory is for the lists of visible samples.
         let room = prepared.room_to_read(gpu);
-        let bytes = settings.page_memory.min(room / 2);
+        let bytes = settings.controls.page_memory.min(room / 2);
         let held = usize::try_from(bytes / slot_bytes(&brick_cache.bricks)).unwrap_or(usize::MAX);
         let Some(wanted) = choose(prepared, held) else { return Ok(None) };
         let most_runs = u64::from(targets::most_runs(gpu)).saturating_sub(prepared.other_runs());

@@ -57,8 +57,13 @@ impl Worker {
     pub fn begin(&mut self, view: View, settings: &Settings) {
         drop(self.engine());
         let (stop, slot) = (Stop::default(), Arc::<Mutex<Slot>>::default());
-        let job = Job { slot: slot.clone(), stop: stop.clone(), host_stop: settings.stop.clone() };
-        let (engine, settings) = (self.engine.clone(), Settings { stop, ..settings.clone() });
+        let job = Job {
+            slot: slot.clone(),
+            stop: stop.clone(),
+            host_stop: settings.controls.stop.clone(),
+        };
+        let (engine, mut settings) = (self.engine.clone(), settings.clone());
+        settings.controls.stop = stop;
         spawn(move || {
             let drawn = lock(&engine).render(&view, &settings);
             let mut slot = lock(&slot);

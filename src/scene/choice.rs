@@ -26,7 +26,7 @@ impl Scene {
     ) -> Option<Choice> {
         let choice_of = |item: &Item| match item {
             Item::Bricks(bricks, kernel, transfer) => {
-                let room = settings.page_memory / bricks::slot_bytes(bricks);
+                let room = settings.controls.page_memory / bricks::slot_bytes(bricks);
                 let (pixels, room) = match detail {
                     Detail::Pixels(pixels) => (pixels, room),
                     Detail::Splats(splats) => {

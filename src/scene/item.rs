@@ -33,7 +33,7 @@ pub enum Item {
     Volume(Arc<Volume>, Kernel, TransferFunction),
     /// A volume that may be larger than memory. A picture shows the bricks that it needs
     /// ([`Settings::detail`](super::Settings::detail),
-    /// [`Settings::page_memory`](super::Settings::page_memory)).
+    /// [`Controls::page_memory`](super::Controls::page_memory)).
     Bricks(Arc<Bricks>, Kernel, TransferFunction),
     /// Tetrahedra with a linear field inside, shown by a transfer function.
     Cells(Arc<Tetrahedra>, TransferFunction),

@@ -12,7 +12,9 @@ mod validate;
 
 pub use crate::math::{Clip, ClipShape};
 pub use item::Item;
-pub use settings::{Classification, Evaluate, Gradient, Mode, Optics, Order, Region, Settings};
+pub use settings::{
+    Classification, Controls, Evaluate, Gradient, Mode, Optics, Order, Region, Settings,
+};
 pub(crate) use sheets::MOST_GATHERED;
 
 use crate::{

@@ -151,14 +151,27 @@ pub struct Settings {
     /// the front hides them, and loses parts of the picture where it does not. `None` leaves them
     /// out if the source was solid, is seen from outside its bounds, and is not clipped.
     pub cull_backfaces: Option<bool>,
-    /// GPU memory, in bytes, for the pages of each hierarchy and for the bricks of a volume. The
-    /// lists that frames make from bricks take more.
-    pub page_memory: u64,
     /// Nearest distance that perspective views show, in world units; at least a millionth of the
     /// scene's size. `None` is a thousandth of that size.
     pub near: Option<f64>,
+    /// What limits the drawing of the picture.
+    pub controls: Controls,
+}
+
+/// What limits the drawing of a picture: the picture that it should be stays the same.
+#[derive(Debug, Clone)]
+pub struct Controls {
     /// Whether drawing is to end before the picture is finished.
     pub stop: Stop,
+    /// GPU memory, in bytes, for the pages of each hierarchy and for the bricks of a volume. The
+    /// lists that frames make from bricks take more.
+    pub page_memory: u64,
+}
+
+impl Default for Controls {
+    fn default() -> Self {
+        Self { stop: Stop::default(), page_memory: 1 << 30 }
+    }
 }
 
 impl Settings {
@@ -191,9 +204,8 @@ impl Settings {
             occlusion: true,
             detail: Detail::default(),
             cull_backfaces: None,
-            page_memory: 1 << 30,
             near: None,
-            stop: Stop::default(),
+            controls: Controls::default(),
         }
     }
 

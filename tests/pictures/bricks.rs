@@ -73,6 +73,11 @@ fn renderer() -> Renderer {
 }
 
 /// Settings that let the steps between samples cover `pixels` pixels at most.
+fn with_memory(mut settings: Settings, page_memory: u64) -> Settings {
+    settings.controls.page_memory = page_memory;
+    settings
+}
+
 fn settings(pixels: f64) -> Settings {
     // The GPU engine scatters bricks. Whole volumes match them most closely if they are scattered
     // too.
@@ -179,7 +184,7 @@ fn budgets_are_kept_by_coarser_levels() {
     assert_eq!((all.lambda, all.bricks, all.read_bricks), (0.0, 64, 64));
     let slot = 32 * 32 * 32 + 1024;
     for (count, lambda) in [(64, 0.0), (20, 1.0), (8, 1.0), (1, 2.0)] {
-        let settings = Settings { page_memory: count * slot, ..settings(0.0) };
+        let settings = with_memory(settings(0.0), count * slot);
         let (picture, stats) = draw(&mut renderer, &scene, camera, &settings);
         assert_eq!(stats.lambda, lambda, "{count}");
         assert!(stats.brick_bytes <= count * slot, "{count}: {}", stats.brick_bytes);
@@ -190,7 +195,7 @@ fn budgets_are_kept_by_coarser_levels() {
     // Two views that need different bricks share the slots. The first view looks the same
     // afterwards.
     let mut prepared = renderer.prepare(&scene).expect("a scene");
-    let room = Settings { page_memory: 16 * slot, ..settings(0.0) };
+    let room = with_memory(settings(0.0), 16 * slot);
     let mut corner = camera.clone();
     corner.projection = Projection::Orthographic { height: 12.0 };
     corner.position -= 20.0;
@@ -376,15 +381,15 @@ fn processors_hold_few_bricks() {
     let mut beside = near.clone();
     beside.azimuth(140.0);
     let settings =
-        Settings { evaluate: Evaluate::Gather, page_memory: 30 * 48_000, ..settings(0.0) };
+        Settings { evaluate: Evaluate::Gather, ..with_memory(settings(0.0), 30 * 48_000) };
     let mut renderer = CpuRenderer::new(&scene).expect("a scene");
     let draw = |renderer: &mut CpuRenderer, camera: &Camera| {
         renderer.render(camera, &settings).expect("a picture")
     };
     let (first, stats) = draw(&mut renderer, &near);
-    assert!(stats.lambda > 0.0 && stats.brick_bytes <= settings.page_memory, "{stats:?}");
+    assert!(stats.lambda > 0.0 && stats.brick_bytes <= settings.controls.page_memory, "{stats:?}");
     let (_, stats) = draw(&mut renderer, &beside);
-    assert!(stats.brick_bytes <= settings.page_memory, "{stats:?}");
+    assert!(stats.brick_bytes <= settings.controls.page_memory, "{stats:?}");
     let (again, _) = draw(&mut renderer, &near);
     assert_shows_something(&first);
     assert_eq!(first.color, again.color);
@@ -392,7 +397,7 @@ fn processors_hold_few_bricks() {
     // own.
     let part = |from: f64, to: f64| {
         let mut settings = settings.clone();
-        settings.page_memory = 1 << 30;
+        settings.controls.page_memory = 1 << 30;
         let shape = ClipShape::Box(Bounds { min: DVec3::splat(from), max: DVec3::splat(to) });
         settings.clips = vec![Clip { shape, inside: true }];
         settings

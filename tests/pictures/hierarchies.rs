@@ -52,6 +52,11 @@ fn renderer() -> Renderer {
     Renderer::new(gpu())
 }
 
+fn with_memory(mut settings: Settings, page_memory: u64) -> Settings {
+    settings.controls.page_memory = page_memory;
+    settings
+}
+
 fn settings(pixels: f64) -> Settings {
     Settings { detail: Detail::Pixels(pixels), ..Settings::new([160, 160]) }
 }
@@ -399,7 +404,7 @@ fn a_page_cache_of_any_size_draws_a_whole_picture() {
         let hierarchy = Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
         let mut prepared =
             renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
-        let settings = Settings { page_memory: room, ..settings(detail) };
+        let settings = with_memory(settings(detail), room);
         renderer.render(&mut prepared, &camera, &settings).expect("a picture")
     };
     let (all, stats) = draw(1 << 30, 0.0);
@@ -440,7 +445,7 @@ fn a_view_looks_the_same_however_it_was_reached() {
         renderer.prepare(&Scene::new().with_hierarchy(hierarchy())).expect("prepared");
     for part in [0.1, 2.0, 0.9, 4.0, 0.3] {
         let camera = camera(&set.bounds(), part);
-        let settings = Settings { page_memory: 20 * 4096 * 96, ..settings(2.0) };
+        let settings = with_memory(settings(2.0), 20 * 4096 * 96);
         let (picture, _) = renderer.render(&mut wanderer, &camera, &settings).expect("a picture");
         let mut fresh =
             renderer.prepare(&Scene::new().with_hierarchy(hierarchy())).expect("prepared");

@@ -359,7 +359,7 @@ fn frames_of_a_thread_can_be_abandoned_and_stopped() {
     let refused = renderer.poll(&mut slow).unwrap_err().to_string();
     assert!(refused.contains("another frame was begun"), "{refused}");
     let mut stopped = renderer.encode(&mut encoder, &camera, &large, &color).unwrap();
-    large.stop.request();
+    large.controls.stop.request();
     let error = loop {
         match renderer.poll(&mut stopped) {
             Ok(Progress::Working) => std::thread::yield_now(),

@@ -322,7 +322,8 @@ pub fn export(job: &Job, export: Export<'_>, progress: &Progress) -> Result<(), 
     let frames = flags.frames(output, &motion, &film, (&job.inputs(), progress))?;
     let files = frames.files();
     files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.files))?;
-    let settings = Settings { stop, ..job.settings(loaded)? };
+    let mut settings = job.settings(loaded)?;
+    settings.controls.stop = stop;
     let ready = Ready { job, loaded, settings, finish: job.finish(loaded)? };
     let mut drawer = Drawer::engine(job, loaded, progress)?;
     for (item, transfer) in transfers {
@@ -400,7 +401,7 @@ impl Run<'_> {
             None => progress.stage(format!("{what} {}", frames.name(frame))),
         };
         for (frame, camera) in cameras.into_iter().enumerate() {
-            if settings.stop.is_requested() {
+            if settings.controls.stop.is_requested() {
                 return Err(Error::Stopped.into());
             }
             tell("Drawing", frame);

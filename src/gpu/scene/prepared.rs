@@ -579,7 +579,7 @@ impl PreparedScene {
         settings: &Settings,
         pixels: f64,
     ) -> Result<()> {
-        let room = settings.page_memory.min(self.room_to_read(gpu));
+        let room = settings.controls.page_memory.min(self.room_to_read(gpu));
         for index in 0..self.page_caches.len() {
             let view = &*self.scene.view_of(self.page_caches[index].item, view);
             let cut = self.page_caches[index].cut(view, settings, pixels);

@@ -268,7 +268,7 @@ impl PictureEntry {
             _ => Detail::Pixels(self.cut.unwrap_or(Detail::PIXELS) * wider),
         };
         settings.cull_backfaces = self.cull_backfaces;
-        settings.page_memory = self.memory.unwrap_or(settings.page_memory);
+        settings.controls.page_memory = self.memory.unwrap_or(settings.controls.page_memory);
         settings.clips = self.clips_of(scene, subject)?;
         scene.validate_settings(&settings)?;
         Ok(settings)

@@ -120,7 +120,7 @@ impl Draw {
     /// Returns the settings of a picture before it is averaged down.
     fn settings(&self, kept: &Kept, stop: &Stop) -> Result<Settings, Error> {
         let mut settings = self.picture.settings(&kept.scene, &kept.subject)?;
-        settings.stop = stop.clone();
+        settings.controls.stop = stop.clone();
         settings.region = self.region.map(Region::from);
         kept.scene.validate_settings(&settings)?;
         Ok(settings)

@@ -301,7 +301,7 @@ fn draw(
     }
     current.transfers.clone_from(&order.transfers);
     let mut exact = order.settings.clone();
-    exact.stop = stop;
+    exact.controls.stop = stop;
     let settings = effort.settings(&exact, exact.sheet_thickness.or(order.stage.sheet));
     let (picture, stats) = current.renderer.render(&order.camera, &settings)?;
     if effort != Effort::EXACT {
