@@ -43,14 +43,16 @@
 //! # }
 //! ```
 //!
-//! A renderer keeps its scene prepared. The camera, the settings and the transfer function may
-//! change from picture to picture.
+//! A renderer keeps its scene prepared. The viewpoint and the settings may change from picture to
+//! picture, and items come, go and move. A host application with a device of its own encodes frames
+//! among its passes ([`Renderer::encode`]).
 //!
 //! # What is where
 //!
 //! | task | module |
 //! |---|---|
-//! | read a file of any known format, or bytes in memory | [`formats`] |
+//! | read a file of any kind | [`read`], with options [`session::Reading`] |
+//! | read a file of a known kind, or bytes in memory | [`formats`] |
 //! | limit what a file may take: memory, points, time | [`input::Limits`] |
 //! | work with meshes and volumes | [`surface`], [`volume`] |
 //! | work with scattered samples and cells | [`scattered`], [`cells`] |
@@ -58,7 +60,7 @@
 //! | colour them by a named map | [`color`] |
 //! | draw data larger than memory | [`hierarchy`], [`bricks`] |
 //! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |
-//! | use the device of a host application | [`gpu::Gpu::from_wgpu`] |
+//! | draw among the passes of a host application | [`Renderer::encode`], [`gpu::Gpu::from_wgpu`] |
 //! | move a camera by hand, keep a pace | [`interaction`] |
 //! | compare pictures | [`compare`] |
 //! | count values, look under a cursor, cut slices: what windows need | [`interaction`] |
@@ -98,9 +100,11 @@ pub mod bricks;
 pub mod cells;
 pub mod color;
 pub mod compare;
-pub mod container;
+pub(crate) mod container;
 pub mod cpu;
 pub mod deadline;
+// For the project's own front ends.
+#[doc(hidden)]
 pub mod disk;
 pub mod error;
 pub mod facet;
@@ -112,6 +116,8 @@ pub mod hierarchy;
 pub mod input;
 pub mod interaction;
 pub mod math;
+// For the project's own front ends.
+#[doc(hidden)]
 pub mod memory;
 pub(crate) mod parallel;
 pub mod picture;
@@ -133,10 +139,12 @@ pub use glam;
 #[cfg(feature = "gpu")]
 pub use wgpu;
 
+pub use container::{Finding, Report, Severity};
 pub use deadline::Deadline;
 pub use error::{Error, Result};
 pub use plan::FrameStats;
 #[cfg(feature = "gpu")]
 pub use renderer::Frame;
 pub use renderer::{Device, ItemId, Renderer};
+pub use session::read;
 pub use stop::Stop;

@@ -24,7 +24,9 @@ mod validate;
 pub use build::{BuildOptions, Preset, build_file, check_splats};
 pub use cut::{BLEND_BAND, Cut, Detail, SHARE_UNIT};
 pub(crate) use cut::{MOST_PIXELS, cone_margin};
-pub use file::{CutSphere, Hierarchy};
+#[doc(hidden)]
+pub use file::CutSphere;
+pub use file::Hierarchy;
 pub(crate) use levels::Levels;
 pub use node::{Block, MOST_CHILDREN, Node, Tree};
 pub use trained::build_gaussians;

@@ -52,6 +52,6 @@ pub use framing::{Framing, Side};
 pub use items::{Captions, Content, Items, Mark};
 pub use legend::Legend;
 pub use name::Name;
-pub use reading::{Opened, Reading};
+pub use reading::{Opened, Reading, read};
 pub use showing::{CellStyle, Showing, Surfaces};
 pub use subject::{Origin, Subject};

@@ -27,6 +27,25 @@ pub struct Reading {
     whole: Limits,
 }
 
+/// Reads a file of any kind, a folder of pictures, or a remote object, as [`Reading`] does by
+/// default.
+///
+/// ```no_run
+/// use splatkit::session::Data;
+///
+/// match splatkit::read("scan.ply")? {
+///     Data::Mesh(mesh) => println!("{} points", mesh.positions.len()),
+///     data => println!("{:?}", data.kind()),
+/// }
+/// # Ok::<(), splatkit::Error>(())
+/// ```
+///
+/// # Errors
+/// Those of [`Reading::open`] and [`Opened::read`].
+pub fn read(path: impl AsRef<Path>) -> Result<Data> {
+    Reading::default().open(path.as_ref())?.read()
+}
+
 impl Reading {
     /// Creates the way to read inputs within these limits.
     pub fn new(options: ReadOptions, limits: Limits) -> Self {

@@ -4,8 +4,8 @@
 use crate::testing::{gpu::gpu, psnr::measured};
 use glam::{DVec3, Vec3};
 use splatkit::{
+    Severity,
     bricks::Bricks,
-    container::Severity,
     gpu::Renderer,
     hierarchy::{
         BuildOptions, Cut, Detail, Hierarchy, Preset, SHARE_UNIT, Tree,

@@ -10,13 +10,7 @@ use crate::{
 };
 use clap::Args;
 use serde_json::json;
-use splatkit::{
-    bricks,
-    container::{Finding, Severity},
-    formats::Kind,
-    hierarchy::file,
-    memory,
-};
+use splatkit::{Finding, Severity, bricks, formats::Kind, hierarchy::file, memory};
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]

@@ -27,9 +27,12 @@ mod tests;
 mod write;
 
 pub use check::check;
+#[doc(hidden)]
 pub use entry::PageEntry;
 pub use header::Header;
-pub use read::{CutSphere, Hierarchy, NO_PAGE, Page};
+pub use read::Hierarchy;
+#[doc(hidden)]
+pub use read::{CutSphere, NO_PAGE, Page};
 pub use write::{Top, Whole, WriteOptions, Writer, to_bytes, write};
 
 /// The maximum number of nodes in a page.

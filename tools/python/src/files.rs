@@ -4,8 +4,7 @@ use crate::{errors::raise, parts::reading, worker::run};
 use pyo3::prelude::*;
 use serde_json::{Map, Value, json};
 use splatkit::{
-    Error, Stop, bricks,
-    container::{Finding, Severity},
+    Error, Finding, Severity, Stop, bricks,
     formats::{self, FORMATS, Kind},
     hierarchy::file,
     session::ReadingEntry,

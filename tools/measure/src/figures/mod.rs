@@ -1,6 +1,7 @@
 //! `splatkit-measure figures`: measures what the documentation says about quality.
 
 mod bleeding;
+mod changes;
 mod dense;
 mod detail;
 mod files;
@@ -98,10 +99,13 @@ enum Part {
     Popping,
     /// Sheets against dense integration.
     Dense,
+    /// How long a change of one of ten items takes.
+    Changes,
 }
 
 /// The engine, which draws one scene after another.
 struct Stage {
+    gpu: Gpu,
     renderer: Renderer,
 }
 
@@ -136,7 +140,7 @@ impl Figures {
             .as_deref()
             .map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
         let gpu = Gpu::headless(&choice)?;
-        let mut stage = Stage { renderer: Renderer::new(&gpu) };
+        let mut stage = Stage { gpu: gpu.clone(), renderer: Renderer::new(&gpu) };
         let mut report = Report { adapter: gpu.info.name.clone(), tables: Vec::new() };
         self.measure(&mut stage, &pictures, &mut report, progress)?;
         progress.clear();
@@ -175,6 +179,10 @@ impl Figures {
         }
         if self.measures(Part::Dense) {
             report.tables.push(self.dense(stage, progress)?);
+        }
+        // Times are of a machine, and stand in no page.
+        if self.only.contains(&Part::Changes) {
+            report.tables.push(changes::table(&stage.gpu, progress)?);
         }
         if !self.surfaces.is_empty() {
             let open = |path: &Path| self.load.open(path);
