@@ -1,6 +1,6 @@
 //! Flags that have no effect on the inputs: a table of what each flag needs, and the warnings.
 
-use crate::{progress::Progress, scene_file};
+use crate::{flag_names, progress::Progress};
 use clap::{ArgMatches, parser::ValueSource};
 use splatkit::{
     formats::{Format, Kind},
@@ -153,7 +153,7 @@ impl Given {
                 let is_negated = *value == serde_json::json!(false) && field != "cull_backfaces";
                 all.insert(match is_negated {
                     true => format!("no-{}", field.replace('_', "-")),
-                    false => scene_file::flag_of(field),
+                    false => flag_names::flag_of(field),
                 });
             }
         }

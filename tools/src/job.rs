@@ -136,7 +136,7 @@ impl Job {
         job.scene.check().map_err(|(place, message)| match &job.stated {
             Some(stated) => stated.wrong(place, message),
             None => {
-                let flag = crate::scene_file::flag_of(&place);
+                let flag = crate::flag_names::flag_of(&place);
                 Failure::Usage(format!("--{flag}: {message}"))
             }
         })?;

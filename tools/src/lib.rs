@@ -23,6 +23,7 @@ mod describe;
 pub mod engine;
 #[doc(hidden)]
 pub mod failure;
+mod flag_names;
 mod formats;
 mod frames;
 #[doc(hidden)]

@@ -1,6 +1,10 @@
 //! Scene files on the command line. Flags beside a scene file count more than its own fields.
 
-use crate::{failure::Failure, given::Given};
+use crate::{
+    failure::Failure,
+    flag_names::{field_of, flag_of},
+    given::Given,
+};
 use serde_json::Value;
 use splatkit::{
     Error,
@@ -200,30 +204,4 @@ fn flags_in(message: &str) -> impl Iterator<Item = &str> {
         let name = word.trim_start_matches('-');
         name.split(['=', '<']).next().unwrap_or(name)
     })
-}
-
-/// Fields of a scene whose flags have other names.
-const FLAGS: &[(&str, &[&str])] = &[
-    ("isosurfaces", &["iso"]),
-    ("clips", &["clip", "cut-out"]),
-    ("shade", &["shade", "no-shade", "flat"]),
-    ("optics", &["optics", "mip", "x-ray"]),
-    ("slopes", &["no-slopes"]),
-    ("occlusion", &["no-occlusion"]),
-];
-
-/// Returns the name of the field that a flag sets.
-fn field_of(flag: &str) -> String {
-    let other = FLAGS.iter().find(|(_, flags)| flags.contains(&flag));
-    other.map_or_else(|| flag.replace('-', "_"), |(field, _)| (*field).to_owned())
-}
-
-/// Returns the name of the flag that sets a field at a place such as `picture.size`.
-pub fn flag_of(place: &str) -> String {
-    let field = place.rsplit('.').next().unwrap_or(place);
-    if place.contains(".limits.") {
-        return format!("limit-{field}");
-    }
-    let other = FLAGS.iter().find(|(name, _)| *name == field);
-    other.map_or_else(|| field.replace('_', "-"), |(_, flags)| flags[0].to_owned())
 }

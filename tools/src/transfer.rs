@@ -1,7 +1,7 @@
 //! `splatkit transfer`: the transfer function that a picture would have, as a file to start from.
 
 use crate::{
-    failure::Failure, load::LoadFlags, output, parse, progress::Progress, scene_file,
+    failure::Failure, flag_names, load::LoadFlags, output, parse, progress::Progress,
     show::ShowFlags,
 };
 use clap::Args;
@@ -40,7 +40,7 @@ impl Transfer {
         self.load.apply(&mut scene);
         self.show.color.check_effect(false, true)?;
         scene.check().map_err(|(place, message)| {
-            Failure::Usage(format!("--{}: {message}", scene_file::flag_of(&place)))
+            Failure::Usage(format!("--{}: {message}", flag_names::flag_of(&place)))
         })?;
         let is_stdout = self.output.as_os_str() == "-";
         if !is_stdout {
