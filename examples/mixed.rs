@@ -13,11 +13,11 @@ use splatkit::{
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let volume = Phantom::Specimen.sample_bytes([96; 3])?;
     let transfer = TransferFunction::automatic(&volume);
-    let [low, high] = volume.bounds();
+    let bounds = volume.bounds();
 
     // A knot around the middle of the volume, in its units.
     let mut knot = Mesh::knot(400, 40);
-    let (middle, size) = (0.5 * (low + high).as_vec3(), 0.3 * (high - low).as_vec3());
+    let (middle, size) = (bounds.center().as_vec3(), 0.3 * bounds.size().as_vec3());
     for place in &mut knot.positions {
         *place = middle + size * *place / 3.0;
     }

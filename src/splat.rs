@@ -273,7 +273,7 @@ impl SplatSet {
         };
         let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
         let (low, high) = self.splats.par_iter().fold(|| none, grow).reduce(|| none, both);
-        Bounds { min: self.origin + low.as_dvec3(), max: self.origin + high.as_dvec3() }
+        Bounds::between(self.origin, [low, high])
     }
 }
 

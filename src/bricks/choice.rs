@@ -121,14 +121,17 @@ fn visible(
     // The samples that bricks from the first to the last one along each axis reach, if they may be
     // in the picture.
     let in_picture = |[first, last]: [[usize; 3]; 2]| {
-        let low = DVec3::from_array(first.map(|at| (at * SIDE) as f64)) - extent;
+        let min = DVec3::from_array(first.map(|at| (at * SIDE) as f64)) - extent;
         let last: [usize; 3] =
             std::array::from_fn(|axis| ((last[axis] + 1) * SIDE).min(level.dims[axis]) - 1);
-        let high = DVec3::from_array(last.map(|at| at as f64)) + extent;
-        if region.is_some_and(|region| !meets(&region, &lattice, [low - BEYOND, high + BEYOND])) {
+        let max = DVec3::from_array(last.map(|at| at as f64)) + extent;
+        let samples = Bounds { min, max };
+        if region
+            .is_some_and(|region| !meets(&region, &lattice, &samples.widened(DVec3::splat(BEYOND))))
+        {
             return None;
         }
-        let corners = corners(&lattice, [low, high]).map(|corner| view.to_view(corner));
+        let corners = corners(&lattice, &samples).map(|corner| view.to_view(corner));
         let outside = |(normal, reach): &(DVec3, f64)| {
             corners.iter().all(|corner| normal.dot(*corner) + reach < 0.0)
         };
@@ -137,12 +140,12 @@ fn visible(
         {
             return None;
         }
-        Some([low, high])
+        Some(samples)
     };
     let visible_brick = |(brick, range): (u32, [u8; 2])| {
         let place = level.place(brick);
-        let [low, high] = shows(range).then(|| in_picture([place; 2])).flatten()?;
-        let center = view.to_view(lattice.position(0.5 * (low + high)));
+        let samples = shows(range).then(|| in_picture([place; 2])).flatten()?;
+        let center = view.to_view(lattice.position(samples.center()));
         Some((if view.perspective { center.length() } else { center.z }, brick))
     };
     let candidates = bricks.ranges_within(number, |group| in_picture(group).is_some());
@@ -150,15 +153,13 @@ fn visible(
 }
 
 /// Returns the corners of a box of samples in the world.
-fn corners(lattice: &Lattice, [min, max]: [DVec3; 2]) -> [DVec3; 8] {
-    Bounds { min, max }.corners().map(|corner| lattice.position(corner))
+fn corners(lattice: &Lattice, samples: &Bounds) -> [DVec3; 8] {
+    samples.corners().map(|corner| lattice.position(corner))
 }
 
 /// Whether a box of samples may meet a box of the world: the world's boxes around both overlap.
-fn meets(bounds: &Bounds, lattice: &Lattice, samples: [DVec3; 2]) -> bool {
-    let point = |at: DVec3| Bounds { min: at, max: at };
-    let around =
-        corners(lattice, samples).map(point).into_iter().fold(Bounds::EMPTY, Bounds::union);
+fn meets(bounds: &Bounds, lattice: &Lattice, samples: &Bounds) -> bool {
+    let around = Bounds::around(corners(lattice, samples));
     (around.min.cmple(bounds.max) & around.max.cmpge(bounds.min)).all()
 }
 

@@ -205,8 +205,7 @@ impl Bricks {
 
     /// Returns the smallest and largest world coordinates of the samples of level 0.
     pub fn bounds(&self) -> Bounds {
-        let [min, max] = self.header.lattice.bounds();
-        Bounds { min, max }
+        self.header.lattice.bounds()
     }
 
     /// Returns, for each brick of a level, the range of all its blocks ([`Brick::blocks`]). A brick

@@ -33,9 +33,9 @@ impl Half {
     }
 
     /// Returns how far the places of a box lie outside, at least and at most.
-    pub fn reach(&self, [low, high]: [DVec3; 2]) -> [f64; 2] {
-        let middle = self.beyond(0.5 * (low + high));
-        let half = self.normal.abs().dot(0.5 * (high - low));
+    pub fn reach(&self, bounds: &Bounds) -> [f64; 2] {
+        let middle = self.beyond(bounds.center());
+        let half = self.normal.abs().dot(0.5 * bounds.size());
         [middle - half, middle + half]
     }
 }
@@ -133,7 +133,7 @@ impl Kept {
 
     /// Returns whether places in a box are all kept (`Some(true)`), all removed (`Some(false)`), or
     /// maybe both.
-    pub fn of_box(&self, bounds: [DVec3; 2]) -> Option<bool> {
+    pub fn of_box(&self, bounds: &Bounds) -> Option<bool> {
         let mut is_whole = true;
         for half in &self.halves {
             let [low, high] = half.reach(bounds);

@@ -22,6 +22,7 @@ pub use tetrahedra::Tetrahedra;
 
 use crate::{
     about::About,
+    math::Bounds,
     parallel::prelude::*,
     volume::{TransferFunction, Volume},
 };
@@ -225,7 +226,7 @@ impl Cells {
     }
 
     /// Returns the smallest and largest world coordinates of the cells' nodes.
-    pub fn bounds(&self) -> [DVec3; 2] {
+    pub fn bounds(&self) -> Bounds {
         let none = || [Vec3::INFINITY, Vec3::NEG_INFINITY];
         let add = |[low, high]: [Vec3; 2], node: u32| {
             let at = self.points[node as usize];
@@ -235,8 +236,7 @@ impl Cells {
             .into_par_iter()
             .fold(none, |ends, cell| self.points_of(cell).fold(ends, add))
             .reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-        let ends = self.faces.corners.iter().copied().fold(ends, add);
-        ends.map(|end| self.origin + end.as_dvec3())
+        Bounds::between(self.origin, self.faces.corners.iter().copied().fold(ends, add))
     }
 
     /// Counts the values in each of `bins` equal parts of the range. The largest value counts in
@@ -293,8 +293,7 @@ impl Cells {
             [0.369, 0.789, 0.383],
             [0.993, 0.906, 0.144],
         ];
-        let [first, last] = self.bounds();
-        let diagonal = (last - first).length();
+        let diagonal = self.bounds().diagonal();
         let unit = if diagonal > 0.0 { diagonal / 20.0 } else { 1.0 };
         let ends = self.inner_range();
         let Some([low, high]) = ends.filter(|[low, high]| low < high) else {

@@ -98,7 +98,7 @@ struct Inside {
     /// The number of tetrahedra before each cell.
     starts: Vec<u32>,
     /// The boxes around groups of [`TOGETHER`] tetrahedra.
-    boxes: Vec<[DVec3; 2]>,
+    boxes: Vec<Bounds>,
 }
 
 /// Tetrahedra, and facets, that are looked at together.
@@ -283,7 +283,7 @@ impl Solid {
             let mut left = Vec::new();
             for facet in facets {
                 let [a, b, c] = facet.corners.map(|corner| Vec3::from(corner).as_dvec3());
-                match kept.of_box([a.min(b).min(c), a.max(b).max(c)]) {
+                match kept.of_box(&Bounds::around([a, b, c])) {
                     Some(true) => left.push(*facet),
                     Some(false) => {}
                     None => left.extend(parts(facet, kept)),
@@ -301,7 +301,7 @@ impl Solid {
         let Section { plane, within } = section;
         let of_some = |group: usize| {
             let mut facets = Vec::new();
-            if within.of_box(inside.boxes[group]) != Some(false) {
+            if within.of_box(&inside.boxes[group]) != Some(false) {
                 for polygon in inside.polygons(group, plane) {
                     for part in within.cut(polygon.1) {
                         self.add_part(&part, plane.normal.as_vec3(), &mut facets);
@@ -402,20 +402,16 @@ impl Inside {
         let made = divided.and_then(|(made, starts)| Ok((made.finish(false)?, starts)));
         // Cells without volume have nothing inside.
         let (tetrahedra, starts) = made.ok()?;
-        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-        let add = |[low, high]: [DVec3; 2], corner: &u32| {
-            let at = tetrahedra.points[*corner as usize].as_dvec3();
-            [low.min(at), high.max(at)]
-        };
-        let around = |group: &[[u32; 4]]| group.as_flattened().iter().fold(none, add);
+        let place = |corner: &u32| tetrahedra.points[*corner as usize].as_dvec3();
+        let around = |group: &[[u32; 4]]| Bounds::around(group.as_flattened().iter().map(place));
         let boxes = tetrahedra.corners.par_chunks(TOGETHER).map(around).collect();
         Some(Self { tetrahedra, starts, boxes })
     }
 
     /// Returns the groups of tetrahedra that a plane may cut.
     fn met(&self, plane: &Half) -> Vec<usize> {
-        let is_met = |bounds: &[DVec3; 2]| {
-            let [low, high] = plane.reach(*bounds);
+        let is_met = |bounds: &Bounds| {
+            let [low, high] = plane.reach(bounds);
             // Rounding must not lose any.
             let slack = 1e-9 * (high - low);
             low <= slack && high > -slack

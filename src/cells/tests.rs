@@ -1,4 +1,5 @@
 use super::{CellKind, Cells, Place};
+use crate::math::Bounds;
 use glam::{DVec3, Vec3};
 
 /// The corners of a unit cube, x fastest, each with the sum of its coordinates.
@@ -24,14 +25,15 @@ fn facts_of_a_cube() {
     cells.push(CellKind::Polyhedron, faces());
     cells.validate().expect("a cube");
     assert_eq!((cells.len(), cells.range()), (2, [0.0, 3.0]));
-    assert_eq!(cells.bounds(), [DVec3::X, DVec3::new(2.0, 1.0, 1.0)]);
+    let bounds = Bounds { min: DVec3::X, max: DVec3::new(2.0, 1.0, 1.0) };
+    assert_eq!(cells.bounds(), bounds);
     assert_eq!(cells.histogram(3).unwrap(), [1, 3, 4]);
     assert_eq!(cells.points_of(1).count(), 24);
     // Points without a cell do not count, values that are holes neither.
     cells.points.push(Vec3::splat(9.0));
     cells.values.push(f32::NAN);
     cells.validate().expect("a hole");
-    assert_eq!(cells.bounds()[1], DVec3::new(2.0, 1.0, 1.0));
+    assert_eq!(cells.bounds(), bounds);
     assert_eq!(cells.range(), [0.0, 3.0]);
 }
 

@@ -183,11 +183,9 @@ impl Tetrahedra {
             let range = [a.0[0].min(b.0[0]), a.0[1].max(b.0[1])];
             (range, [a.1[0].min(b.1[0]), a.1[1].max(b.1[1])])
         };
-        let (range, [low, high]) =
-            (0..self.len()).into_par_iter().fold(none, add).reduce(none, join);
+        let (range, corners) = (0..self.len()).into_par_iter().fold(none, add).reduce(none, join);
         self.range = range.map(f64::from);
-        self.bounds =
-            Bounds { min: self.origin + low.as_dvec3(), max: self.origin + high.as_dvec3() };
+        self.bounds = Bounds::between(self.origin, corners);
         // The edge of a regular tetrahedron of the same volume is (√2·determinant)^⅓.
         let size = |corners: &[u32; 4]| {
             let volume = edges(&self.points, *corners).determinant().abs();

@@ -687,7 +687,7 @@ mod tests {
         let is_sloped = matches!(lattice.arrangement, Arrangement::Rectilinear(_));
         for at in 0..lattice.len() {
             let index = lattice.index(at);
-            let steps = lattice.steps(index) - lattice.step_range()[0];
+            let steps = lattice.steps(index) - lattice.step_range().min;
             let unit = lattice.unit(index);
             let away = place - steps;
             let [h, s] = weight_of(kernel, (away / unit).length());
@@ -729,11 +729,11 @@ mod tests {
     /// Returns places in the box of a lattice, or up to `beyond` steps outside it, in steps from
     /// its first sample.
     fn places(lattice: &Lattice, round: usize, beyond: f64) -> [[f32; 8]; 3] {
-        let [low, high] = lattice.step_range();
+        let size = lattice.step_range().size();
         [0, 1, 2].map(|axis| {
             std::array::from_fn(|lane| {
                 let part = ((round * 8 + lane) as f64 * [0.618, 0.7549, 0.5698][axis]).fract();
-                (part * (high[axis] - low[axis] + 2.0 * beyond) - beyond) as f32
+                (part * (size[axis] + 2.0 * beyond) - beyond) as f32
             })
         })
     }

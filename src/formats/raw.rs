@@ -201,7 +201,7 @@ mod tests {
                     let volume = read_with(&path, |source| read(source, &layout)).unwrap();
                     assert_eq!(volume.samples, Samples::I16(values.clone()));
                     assert_eq!(volume.range, [-9000.0, 14000.0]);
-                    assert_eq!(volume.bounds()[1], DVec3::new(1.0, 4.0, 9.0));
+                    assert_eq!(volume.bounds().max, DVec3::new(1.0, 4.0, 9.0));
                 }
             }
         }

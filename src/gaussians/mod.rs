@@ -169,7 +169,7 @@ impl Gaussians {
         };
         let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
         let (low, high) = (0..self.len()).into_par_iter().map(one).reduce(|| none, both);
-        Bounds { min: self.origin + low.as_dvec3(), max: self.origin + high.as_dvec3() }
+        Bounds::between(self.origin, [low, high])
     }
 
     /// Returns what is wrong with the lists: their lengths, or a number out of its range.

@@ -93,8 +93,7 @@ impl Footprints {
         if !self.low.cmple(self.high).all() {
             return;
         }
-        let actual =
-            Bounds { min: origin + self.low.as_dvec3(), max: origin + self.high.as_dvec3() };
+        let actual = Bounds::between(origin, [self.low, self.high]);
         let most =
             BOX * actual.diagonal().max(stated.diagonal()) + BOX_OF_WIDEST * f64::from(self.widest);
         let off =

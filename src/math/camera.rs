@@ -6,9 +6,9 @@
 //! half-integers.
 
 use crate::{Error, Result};
-use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
+use glam::{DMat3, DMat4, DVec2, DVec3, DVec4, Vec3};
 
-/// A box along the world's axes.
+/// A box along the axes: of the world, where nothing else is said.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// The smallest coordinates.
@@ -20,6 +20,34 @@ pub struct Bounds {
 impl Bounds {
     /// The box of no points. Its union with a point is that point.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    /// Returns the smallest box around these points.
+    pub fn around(points: impl IntoIterator<Item = DVec3>) -> Self {
+        points
+            .into_iter()
+            .fold(Self::EMPTY, |all, point| all.union(Self { min: point, max: point }))
+    }
+
+    /// Returns the box between two corners that are relative to an origin.
+    pub(crate) fn between(origin: DVec3, [low, high]: [Vec3; 2]) -> Self {
+        Self { min: origin + low.as_dvec3(), max: origin + high.as_dvec3() }
+    }
+
+    /// Returns whether all coordinates are finite.
+    pub fn is_finite(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite()
+    }
+
+    /// Returns whether a point lies in the box or on its border.
+    pub fn contains(&self, point: DVec3) -> bool {
+        (point.cmpge(self.min) & point.cmple(self.max)).all()
+    }
+
+    /// Returns the box widened by `margin` to all sides.
+    #[must_use]
+    pub fn widened(&self, margin: DVec3) -> Self {
+        Self { min: self.min - margin, max: self.max + margin }
+    }
 
     /// Returns whether the box contains no point. A NaN makes it empty.
     pub fn is_empty(&self) -> bool {
@@ -37,9 +65,14 @@ impl Bounds {
         0.5 * (self.min + self.max)
     }
 
+    /// Returns the lengths of the sides.
+    pub fn size(&self) -> DVec3 {
+        self.max - self.min
+    }
+
     /// Length of the diagonal.
     pub fn diagonal(&self) -> f64 {
-        (self.max - self.min).length()
+        self.size().length()
     }
 
     /// Whether the box is so large that no camera has all of it in reach

@@ -31,7 +31,7 @@ impl Clip {
     pub fn keeps(&self, point: DVec3) -> bool {
         let inside = match self.shape {
             ClipShape::HalfSpace { normal, offset } => normal.dot(point) <= offset,
-            ClipShape::Box(Bounds { min, max }) => (point.cmpge(min) & point.cmple(max)).all(),
+            ClipShape::Box(bounds) => bounds.contains(point),
         };
         inside == self.inside
     }

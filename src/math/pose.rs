@@ -70,10 +70,7 @@ impl Pose {
         if *self == Self::IDENTITY || bounds.is_empty() {
             return *bounds;
         }
-        let corners = bounds.corners().map(|corner| self.apply(corner));
-        corners
-            .into_iter()
-            .fold(Bounds::EMPTY, |all, corner| all.union(Bounds { min: corner, max: corner }))
+        Bounds::around(bounds.corners().map(|corner| self.apply(corner)))
     }
 
     /// Returns a view as it is from an item that is moved. Lengths and view-space coordinates stay

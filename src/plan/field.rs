@@ -169,13 +169,13 @@ impl Field {
         let rows = inverse.transpose();
         self.axes = [rows.x_axis, rows.y_axis, rows.z_axis].map(narrow);
         // Relative to the first sample, for the precision of 32-bit numbers.
-        let [low, high] = lattice.step_range();
-        self.origin = narrow(-(inverse * view.to_view(lattice.position(low))));
+        let samples = lattice.step_range();
+        self.origin = narrow(-(inverse * view.to_view(lattice.position(samples.min))));
         // An axis with a single sample still fills that sample's cell.
         let unit = lattice.unit([0; 3]);
-        let margin = DVec3::select((high - low).cmpgt(DVec3::ZERO), DVec3::ZERO, 0.5 * unit);
+        let margin = DVec3::select(samples.size().cmpgt(DVec3::ZERO), DVec3::ZERO, 0.5 * unit);
         self.low = narrow(-margin);
-        self.high = narrow(high - low + margin);
+        self.high = narrow(samples.size() + margin);
         self.is_on_lattice = true;
     }
 

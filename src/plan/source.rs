@@ -74,7 +74,7 @@ impl Source {
         let kernel_axes = axes * DMat3::from_diagonal(lattice.unit([0; 3]) * kernel.unit());
         Self {
             to_view: axes.as_mat3(),
-            origin: view.to_view(lattice.position(lattice.step_range()[0])).as_vec3(),
+            origin: view.to_view(lattice.position(lattice.step_range().min)).as_vec3(),
             covariance: (kernel_axes * kernel_axes.transpose()).as_mat3(),
             unit: kernel.unit() as f32,
             extent: kernel.radius() as f32,

@@ -2,7 +2,7 @@
 
 use super::ray::Ray;
 use crate::{
-    math::View,
+    math::{Bounds, View},
     scene::{Clip, ClipShape},
     volume::Lattice,
 };
@@ -16,7 +16,7 @@ pub(super) fn allowed(ray: &Ray, view: &View, clips: &[Clip]) -> Vec<[f64; 2]> {
             ClipShape::HalfSpace { normal, offset } => {
                 half_space(offset - normal.dot(origin), normal.dot(direction))
             }
-            ClipShape::Box(bounds) => within(origin, direction, [bounds.min, bounds.max]),
+            ClipShape::Box(bounds) => within(origin, direction, &bounds),
         };
         if clip.inside { intersection(&parts, inside) } else { difference(&parts, inside) }
     })
@@ -27,15 +27,15 @@ pub(super) fn allowed(ray: &Ray, view: &View, clips: &[Clip]) -> Vec<[f64; 2]> {
 pub(super) fn sample_box(ray: &Ray, view: &View, lattice: &Lattice) -> Option<[f64; 2]> {
     let (origin, direction) = in_world(ray, view);
     let to_steps = lattice.axes.inverse();
-    let [mut low, mut high] = lattice.step_range();
+    let mut samples = lattice.step_range();
     let unit = lattice.unit([0; 3]);
     for axis in 0..3 {
-        if low[axis] == high[axis] {
-            low[axis] -= 0.5 * unit[axis];
-            high[axis] += 0.5 * unit[axis];
+        if samples.min[axis] == samples.max[axis] {
+            samples.min[axis] -= 0.5 * unit[axis];
+            samples.max[axis] += 0.5 * unit[axis];
         }
     }
-    within(to_steps * (origin - lattice.origin), to_steps * direction, [low, high])
+    within(to_steps * (origin - lattice.origin), to_steps * direction, &samples)
 }
 
 /// Intersects the parts of a ray with an interval.
@@ -72,12 +72,12 @@ fn half_space(rest: f64, slope: f64) -> Option<[f64; 2]> {
 }
 
 /// Returns the part of a line inside an axis-aligned box.
-fn within(origin: DVec3, direction: DVec3, [low, high]: [DVec3; 2]) -> Option<[f64; 2]> {
+fn within(origin: DVec3, direction: DVec3, bounds: &Bounds) -> Option<[f64; 2]> {
     let mut interval = Some([f64::NEG_INFINITY, f64::INFINITY]);
     for axis in 0..3 {
         for side in [
-            half_space(high[axis] - origin[axis], direction[axis]),
-            half_space(origin[axis] - low[axis], -direction[axis]),
+            half_space(bounds.max[axis] - origin[axis], direction[axis]),
+            half_space(origin[axis] - bounds.min[axis], -direction[axis]),
         ] {
             interval =
                 interval.and_then(|interval| intersection(&[interval], side).first().copied());
@@ -89,7 +89,6 @@ fn within(origin: DVec3, direction: DVec3, [low, high]: [DVec3; 2]) -> Option<[f
 #[cfg(test)]
 mod tests {
     use super::{super::ray::tests::views, *};
-    use crate::math::Bounds;
     use glam::{DMat3, DVec2};
 
     #[test]
@@ -150,11 +149,10 @@ mod tests {
                 for step in 0..1000 {
                     let s = 0.01 * f64::from(step) + 0.003_141;
                     let p = view.rotation.transpose() * ray.point(s) + view.position;
-                    let inside =
-                        |[low, high]: [DVec3; 2]| p.cmpge(low).all() && p.cmple(high).all();
+                    let inside = |min: DVec3, max: DVec3| Bounds { min, max }.contains(p);
                     let expected = p.dot(DVec3::new(1.0, 2.0, -0.5)) <= 1.0
-                        && !inside([DVec3::splat(0.2), DVec3::new(0.9, 0.7, 0.8)])
-                        && inside([DVec3::splat(-2.0), DVec3::splat(2.5)]);
+                        && !inside(DVec3::splat(0.2), DVec3::new(0.9, 0.7, 0.8))
+                        && inside(DVec3::splat(-2.0), DVec3::splat(2.5));
                     assert_eq!(contains(&parts, s), expected, "{p}");
                 }
             }

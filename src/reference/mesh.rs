@@ -3,7 +3,7 @@
 use super::{composite::Composite, composite::Medium, picture, ray::Ray, shade};
 use crate::{
     Deadline, Error, Result,
-    math::{Bounds, Camera, View},
+    math::{Camera, View},
     parallel::prelude::*,
     picture::Picture,
     scene::{Scene, Settings},
@@ -50,8 +50,8 @@ pub fn trace(
     }
     mesh.validate()?;
     Scene::new().validate_settings(settings)?;
-    if let Some([min, max]) = mesh.bounds() {
-        view.validate_for(&Bounds { min, max })?;
+    if let Some(bounds) = mesh.bounds() {
+        view.validate_for(&bounds)?;
     }
     let traced = Traced::new(mesh, crease_angle_degrees, &view, settings)?;
     let [width, height] = settings.size;

@@ -439,7 +439,7 @@ impl Cells {
         let lattice = volume.drawn_lattice();
         let ranges = volume.drawn_ranges(kernel);
         let first = first_visible(transfer, volume.range);
-        let [_, last] = lattice.step_range();
+        let last = lattice.step_range().max;
         let dims = last.to_array().map(|last| last.ceil() as usize + 1);
         let mut marked = vec![false; dims.iter().product()];
         for (at, [low, high]) in ranges.iter().enumerate() {

@@ -16,6 +16,7 @@ pub use splats::SampleOptions;
 
 use crate::{
     about::About,
+    math::Bounds,
     parallel::prelude::*,
     volume::{TransferFunction, Volume},
 };
@@ -141,14 +142,14 @@ impl Points {
     }
 
     /// Returns the smallest and largest world coordinates of the positions. Kernels reach further.
-    pub fn bounds(&self) -> [DVec3; 2] {
+    pub fn bounds(&self) -> Bounds {
         let none = || [Vec3::INFINITY, Vec3::NEG_INFINITY];
         let ends = self
             .positions
             .par_iter()
             .fold(none, |[low, high], &at| [low.min(at), high.max(at)])
             .reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-        ends.map(|end| self.origin + end.as_dvec3())
+        Bounds::between(self.origin, ends)
     }
 
     /// Counts the values in each of `bins` equal parts of the range. The largest value counts in
@@ -176,8 +177,6 @@ impl Points {
     /// Derives a transfer function from the samples, as [`TransferFunction::automatic`] does from a
     /// volume ([`TransferFunction::of_values`]).
     pub fn automatic_transfer(&self) -> TransferFunction {
-        let [first, last] = self.bounds();
-        let diagonal = (last - first).length();
-        TransferFunction::of_values(&self.values, diagonal, &self.about)
+        TransferFunction::of_values(&self.values, self.bounds().diagonal(), &self.about)
     }
 }

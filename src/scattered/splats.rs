@@ -94,8 +94,7 @@ impl Points {
         let place = |index: usize| places[place_of[index] as usize];
         // 32-bit coordinates cannot resolve distances below this, so a narrower kernel would vanish
         // in rounding.
-        let [low, high] = self.bounds();
-        let finest = ((high - low).length() * 1e-7).max(f64::from(f32::MIN_POSITIVE));
+        let finest = (self.bounds().diagonal() * 1e-7).max(f64::from(f32::MIN_POSITIVE));
         let mut shapes: Vec<Shape> = (0..self.len())
             .into_par_iter()
             .map(|index| self.shape(options, index, place(index), finest))

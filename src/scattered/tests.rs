@@ -1,6 +1,7 @@
 use super::*;
 use crate::{
     Error,
+    math::Bounds,
     splat::{Splat, SplatSet},
 };
 
@@ -336,7 +337,8 @@ fn ranges_bounds_and_histograms() {
     };
     assert_eq!((samples.range(), samples.histogram(4).unwrap()), ([-4.0, 4.0], vec![1, 0, 1, 1]));
     assert!(matches!(samples.histogram(usize::MAX), Err(crate::Error::Argument(_))));
-    assert_eq!(samples.bounds(), [DVec3::ZERO, DVec3::new(2.0, 2.0, 0.0)]);
+    let bounds = Bounds { min: DVec3::ZERO, max: DVec3::new(2.0, 2.0, 0.0) };
+    assert_eq!(samples.bounds(), bounds);
     let transfer = samples.automatic_transfer();
     transfer.validate().unwrap();
     assert!(!transfer.visible([-4.0, -4.0]) && transfer.visible([4.0, 4.0]));

@@ -153,14 +153,7 @@ impl Item {
     /// Returns the length of the diagonal of the box around the field's samples. Scattered samples
     /// are searched for it.
     pub(crate) fn field_diagonal(&self) -> f64 {
-        let bounds = self.lattice().map_or_else(
-            || self.bounds(),
-            |lattice| {
-                let [min, max] = lattice.bounds();
-                Bounds { min, max }
-            },
-        );
-        bounds.diagonal()
+        self.lattice().map_or_else(|| self.bounds(), Lattice::bounds).diagonal()
     }
 
     /// Returns the box around the item, footprints included.
@@ -185,6 +178,5 @@ fn reached(lattice: &Lattice, kernel: &Kernel) -> Bounds {
     let axes = lattice.axes * DMat3::from_diagonal(lattice.largest_unit());
     let reach = kernel.extent
         * DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
-    let [low, high] = lattice.bounds();
-    Bounds { min: low - reach, max: high + reach }
+    lattice.bounds().widened(reach)
 }

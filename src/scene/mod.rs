@@ -242,9 +242,8 @@ impl Scene {
         const OPTICAL_DEPTH: f64 = 7.0;
         self.items.iter().any(|item| {
             let Some(transfer) = item.transfer() else { return true };
-            let Bounds { min, max } = item.bounds();
             !transfer.isosurfaces.is_empty()
-                || transfer.most_extinction() * (max - min).length() > OPTICAL_DEPTH
+                || transfer.most_extinction() * item.bounds().diagonal() > OPTICAL_DEPTH
         })
     }
 }

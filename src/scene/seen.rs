@@ -307,7 +307,7 @@ fn of_volume(volume: &Volume, transfer: &TransferFunction, clips: &[Clip]) -> Ve
     let rows = Rows::new(volume, transfer, clips);
     let Some(limits) = rows.limits() else { return Vec::new() };
     let lattice = &volume.lattice;
-    let middle = lattice.position(0.5 * (lattice.step_range()[0] + lattice.step_range()[1]));
+    let middle = lattice.position(lattice.step_range().center());
     let ends = rows.ends(&limits);
     let places: Vec<Vec3> = ends
         .iter()
@@ -355,15 +355,15 @@ impl<'a> Rows<'a> {
             rows.of_labels =
                 (0..count).map(|at| transfer.extinction(low + at as f64) as f32).collect();
         }
-        let [first, last] = volume.bounds();
-        let least = (FAINT / (0.1 * (last - first).length())) as f32;
+        let diagonal = volume.bounds().diagonal();
+        let least = (FAINT / (0.1 * diagonal)) as f32;
         let means = rows.block_means();
         // What is fainter is seen only if nothing is more opaque.
         let most = means.iter().copied().fold(0.0, f32::max);
         let least = if rows.noise > 0.0 { least.min(0.05 * most) } else { 0.0 };
         rows.blocks = means.iter().map(|mean| *mean > 0.0 && *mean >= least).collect();
         // More than what makes a block opaque does not count.
-        let side = (last - first).length() * BLOCK as f64 / nx.max(ny).max(nz) as f64;
+        let side = diagonal * BLOCK as f64 / nx.max(ny).max(nz) as f64;
         let weights: Vec<f32> = means.iter().map(|mean| mean.min((OPAQUE / side) as f32)).collect();
         let dims = rows.block_dims();
         take_specks(&mut rows.blocks, dims, &weights, rows.noise);

@@ -59,8 +59,7 @@ impl Scene {
         const SHARE: f64 = 0.05;
         let usual = |places: Vec<Vec3>, origin: DVec3| {
             let [low, high] = percentiles(&places, SHARE);
-            (places.len() >= FEWEST)
-                .then(|| Bounds { min: origin + low.as_dvec3(), max: origin + high.as_dvec3() })
+            (places.len() >= FEWEST).then(|| Bounds::between(origin, [low, high]))
         };
         let step = |count: usize| count.div_ceil(MOST).max(1);
         let of_facets = |set: &FacetSet| {
@@ -257,7 +256,7 @@ impl Scene {
                 Arrangement::BodyCentred => 0.5,
                 Arrangement::Rectilinear(_) => (lattice.spacing() / lattice.edges()).max_element(),
             };
-            (normal.dot(view.to_view(lattice.position(lattice.step_range()[0]))), distance * share)
+            (normal.dot(view.to_view(lattice.position(lattice.step_range().min))), distance * share)
         });
         let (start, thickness) = slices.unwrap_or_else(|| {
             let middle =

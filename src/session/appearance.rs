@@ -5,10 +5,10 @@ use crate::{
     Error, Result,
     bricks::{Bricks, Level},
     cells::Cells,
+    math::Bounds,
     scattered::Points,
     volume::{Isosurface, Shade, TransferFunction, Volume},
 };
-use glam::DVec3;
 
 /// How the values of an input are shown. What is not given follows from the values.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -180,8 +180,8 @@ impl Appearance {
 }
 
 impl<'a> Values<'a> {
-    fn new(name: &'a str, range: [f64; 2], [first, last]: [DVec3; 2]) -> Self {
-        Self { name, range, diagonal: (last - first).length() }
+    fn new(name: &'a str, range: [f64; 2], bounds: Bounds) -> Self {
+        Self { name, range, diagonal: bounds.diagonal() }
     }
 }
 

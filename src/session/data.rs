@@ -79,16 +79,15 @@ impl Data {
 
     /// Returns the box around everything, in world units; `None` for a mesh without points.
     pub fn bounds(&self) -> Option<Bounds> {
-        let bounds = match self {
+        Some(match self {
             Self::Mesh(mesh) => mesh.bounds()?,
             Self::Volume(volume) => volume.bounds(),
             Self::Samples(points) => points.bounds(),
             Self::Cells(cells) => cells.bounds(),
-            Self::Gaussians(set) => return Some(set.bounds()),
-            Self::Hierarchy(hierarchy) => return Some(hierarchy.header().bounds),
-            Self::Bricks(bricks) => return Some(bricks.bounds()),
-        };
-        Some(Bounds { min: bounds[0], max: bounds[1] })
+            Self::Gaussians(set) => set.bounds(),
+            Self::Hierarchy(hierarchy) => hierarchy.header().bounds,
+            Self::Bricks(bricks) => bricks.bounds(),
+        })
     }
 
     /// Returns how many values are missing.

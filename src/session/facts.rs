@@ -15,7 +15,6 @@ use crate::{
     surface::Mesh,
     volume::Volume,
 };
-use glam::DVec3;
 use serde_json::{Map, Value, json};
 
 /// What is known of an input.
@@ -140,7 +139,7 @@ fn of_mesh(mesh: &Mesh) -> Map<String, Value> {
         }
     }
     stand(&mut facts, mesh.about.orientation);
-    facts.insert("bounds".into(), bounds(mesh.bounds()));
+    facts.insert("bounds".into(), json!(mesh.bounds().map(bounds)));
     facts
 }
 
@@ -159,7 +158,7 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     if let Some(labels) = &volume.about.labels {
         facts.insert("labels".into(), json!(labels.listed()));
     }
-    facts.insert("bounds".into(), bounds(Some(volume.bounds())));
+    facts.insert("bounds".into(), bounds(volume.bounds()));
     facts
 }
 
@@ -206,7 +205,7 @@ fn of_bricks(bricks: &Bricks) -> Map<String, Value> {
     facts.insert("bricks".into(), json!(count));
     texts(&mut facts, [("unit", &header.unit), ("source", &header.source)]);
     facts.insert("attributes".into(), json!(["value"]));
-    facts.insert("bounds".into(), bounds_of(bricks.bounds()));
+    facts.insert("bounds".into(), bounds(bricks.bounds()));
     facts
 }
 
@@ -233,7 +232,7 @@ fn of_hierarchy(hierarchy: &Hierarchy) -> Map<String, Value> {
     let attributes =
         present([("position", true), ("normal", header.has_normals), ("color", header.has_color)]);
     facts.insert("attributes".into(), attributes);
-    facts.insert("bounds".into(), bounds_of(header.bounds));
+    facts.insert("bounds".into(), bounds(header.bounds));
     facts
 }
 
@@ -249,7 +248,7 @@ fn of_samples(points: &Points) -> Map<String, Value> {
     ]);
     facts.insert("attributes".into(), attributes);
     stand(&mut facts, points.about.orientation);
-    facts.insert("bounds".into(), bounds(Some(points.bounds())));
+    facts.insert("bounds".into(), bounds(points.bounds()));
     facts
 }
 
@@ -273,7 +272,7 @@ fn of_cells(cells: &Cells) -> Map<String, Value> {
     }
     facts.insert("attributes".into(), json!(attributes));
     stand(&mut facts, cells.about.orientation);
-    facts.insert("bounds".into(), bounds(Some(cells.bounds())));
+    facts.insert("bounds".into(), bounds(cells.bounds()));
     facts
 }
 
@@ -288,7 +287,7 @@ fn of_gaussians(set: &Gaussians) -> Map<String, Value> {
     facts.insert("broken".into(), json!(set.broken.all()));
     facts.insert("attributes".into(), json!(["position", "covariance", "opacity", "color"]));
     stand(&mut facts, set.about.orientation);
-    facts.insert("bounds".into(), bounds_of(set.bounds()));
+    facts.insert("bounds".into(), bounds(set.bounds()));
     facts
 }
 
@@ -304,10 +303,6 @@ fn up(orientation: &Orientation) -> Value {
     json!(direction_name(orientation.up).trim_start_matches('+'))
 }
 
-fn bounds(bounds: Option<[DVec3; 2]>) -> Value {
-    bounds.map_or(Value::Null, |[min, max]| json!({ "min": min.to_array(), "max": max.to_array() }))
-}
-
-fn bounds_of(Bounds { min, max }: Bounds) -> Value {
-    bounds(Some([min, max]))
+fn bounds(Bounds { min, max }: Bounds) -> Value {
+    json!({ "min": min.to_array(), "max": max.to_array() })
 }

@@ -307,7 +307,7 @@ impl Adding<'_> {
             self.items.edges.push(Edges::of(&mesh).into());
         }
         let options = showing.surfel_options(self.items.surfaces);
-        let bounds = mesh.bounds().map(|[min, max]| Bounds { min, max });
+        let bounds = mesh.bounds();
         let fault = |error| name.fault(error);
         if let Some(lines) = mesh.line_rods(&options).map_err(fault)? {
             self.push_rods("lines", lines, bounds);
@@ -420,7 +420,7 @@ impl Adding<'_> {
         self.values(&transfer, volume.range, Legend::title(title, unit), labels.as_ref());
         self.unit(&volume.about);
         self.stand(*frame, *orientation);
-        let [min, max] = volume.bounds();
+        let bounds = volume.bounds();
         let kernel = showing.kernel.clone();
         if showing.is_sharp {
             self.does("Sharpening");
@@ -428,7 +428,7 @@ impl Adding<'_> {
         }
         let count = volume.len();
         let item = Item::Volume(volume.into(), kernel, transfer);
-        self.push("volume", count, Bounds { min, max }, item);
+        self.push("volume", count, bounds, item);
         Ok(())
     }
 
@@ -439,8 +439,8 @@ impl Adding<'_> {
         let splats = splats.expect("the volume has colours");
         self.unit(&volume.about);
         self.stand(volume.about.frame, volume.about.orientation);
-        let [min, max] = volume.bounds();
-        self.push("volume", volume.len(), Bounds { min, max }, Item::Radiance(splats.into()));
+        let item = Item::Radiance(splats.into());
+        self.push("volume", volume.len(), volume.bounds(), item);
         Ok(())
     }
 
@@ -457,8 +457,7 @@ impl Adding<'_> {
         options.validate()?;
         let splats = points.to_splats(&options).map_err(|error| name.fault(error))?;
         self.stand(*frame, *orientation);
-        let [min, max] = points.bounds();
-        let bounds = Bounds { min, max }.union(splats.bounds());
+        let bounds = points.bounds().union(splats.bounds());
         self.push("samples", points.len(), bounds, Item::Scalar(splats.into(), transfer));
         Ok(())
     }
@@ -499,8 +498,7 @@ impl Adding<'_> {
         self.unit(&cells.about);
         self.does("Finding the boundary of");
         let fault = |error| name.fault(error);
-        let (count, [min, max]) = (cells.len() + cells.faces.len(), cells.bounds());
-        let bounds = Bounds { min, max };
+        let (count, bounds) = (cells.len() + cells.faces.len(), cells.bounds());
         let is_clear = showing.opacity.is_some_and(|opacity| opacity < 1.0);
         if is_clear || self.items.surfaces == Surfaces::Surfels {
             let surfels = showing.surfel_options(Surfaces::Surfels);

@@ -5,7 +5,7 @@ use crate::{
     Result,
     cells::{CellOptions, Cells, Solid, Tint},
     color::{ColorScale, Spread},
-    math::{Bounds, Clip},
+    math::Clip,
     picture::Edges,
     scene::Item,
     surface::{Paint, Values},
@@ -142,8 +142,7 @@ impl Coloring {
 fn own_range(of: Values, scale: &ColorScale, cells: &Cells) -> Option<[f64; 2]> {
     match of {
         Values::Height(up) => {
-            let [min, max] = cells.bounds();
-            let heights = Bounds { min, max }.corners().map(|corner| corner.dot(up));
+            let heights = cells.bounds().corners().map(|corner| corner.dot(up));
             let low = heights.into_iter().fold(f64::INFINITY, f64::min);
             Some([low, heights.into_iter().fold(f64::NEG_INFINITY, f64::max)])
         }

@@ -21,6 +21,7 @@ use crate::{
     Deadline, Error, Result,
     deadline::Clock,
     facet::{FacetSet, Size},
+    math::Bounds,
     memory,
     parallel::prelude::*,
     splat::{Payload, Splat, SplatSet},
@@ -246,8 +247,8 @@ impl Mesh {
 
     /// Returns the smallest and the largest world coordinates of what is drawn: the corners of all
     /// triangles, or all positions if there are no triangles. `None` if there is nothing.
-    pub fn bounds(&self) -> Option<[DVec3; 2]> {
-        Some(self.local_bounds()?.map(|corner| self.origin + corner.as_dvec3()))
+    pub fn bounds(&self) -> Option<Bounds> {
+        Some(Bounds::between(self.origin, self.local_bounds()?))
     }
 
     /// Like [`bounds`](Self::bounds), relative to the origin. Added to a distant origin, the size

@@ -60,8 +60,7 @@ impl Volume {
         let is_seen = |&index: &usize| opacities[usize::from(densities[index])] > LEAST_OPACITY;
         let count = (0..colors.len()).into_par_iter().filter(is_seen).count();
         memory::room("making splats of colours", (count * size_of::<Splat>()) as u64)?;
-        let [low, high] = self.bounds();
-        let origin = 0.5 * (low + high);
+        let origin = self.bounds().center();
         let splat = |index: usize| {
             let opacity = opacities[usize::from(densities[index])].min(MOST_OPACITY);
             // Kernels of neighbours overlap, and together are as deep as the sample's step.

@@ -1,6 +1,6 @@
 //! Where the samples of a volume lie.
 
-use crate::Error;
+use crate::{Error, math::Bounds};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
@@ -221,17 +221,18 @@ impl Lattice {
         }
     }
 
-    /// Returns the smallest and the largest steps of all samples.
-    pub fn step_range(&self) -> [DVec3; 2] {
+    /// Returns the box around all samples, in steps.
+    pub fn step_range(&self) -> Bounds {
         let last = self.dims.map(|n| n.saturating_sub(1));
         match &self.arrangement {
             Arrangement::BodyCentred => {
                 // Samples of both kinds along x and y, unless there is only one layer.
                 let displaced = if last[2] > 0 { 0.5 } else { 0.0 };
                 let [x, y, z] = last.map(|n| n as f64);
-                [DVec3::ZERO, DVec3::new(x + displaced, y + displaced, 0.5 * z)]
+                let max = DVec3::new(x + displaced, y + displaced, 0.5 * z);
+                Bounds { min: DVec3::ZERO, max }
             }
-            _ => [self.steps([0; 3]), self.steps(last)],
+            _ => Bounds { min: self.steps([0; 3]), max: self.steps(last) },
         }
     }
 
@@ -258,19 +259,8 @@ impl Lattice {
 
     /// Returns the smallest and largest world coordinates of the sample positions. Kernels reach
     /// further.
-    pub fn bounds(&self) -> [DVec3; 2] {
-        let [first, last] = self.step_range();
-        let corners = (0..8).map(|corner| {
-            let at_end = DVec3::new(
-                f64::from(corner & 1),
-                f64::from(corner >> 1 & 1),
-                f64::from(corner >> 2),
-            );
-            self.position(first + (last - first) * at_end)
-        });
-        corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| {
-            [low.min(p), high.max(p)]
-        })
+    pub fn bounds(&self) -> Bounds {
+        Bounds::around(self.step_range().corners().map(|steps| self.position(steps)))
     }
 
     /// Checks that samples can lie on this lattice.
@@ -337,10 +327,11 @@ impl Lattice {
         if directions.determinant().abs() < 1e-6 {
             return Err("the directions of the axes lie in one plane".into());
         }
-        let [low, high] = self.bounds();
-        if !(high - low).is_finite() {
+        let bounds = self.bounds();
+        if !bounds.size().is_finite() {
+            let Bounds { min, max } = bounds;
             return Err(format!(
-                "the samples reach from {low} to {high}, too far for 64-bit numbers"
+                "the samples reach from {min} to {max}, too far for 64-bit numbers"
             ));
         }
         Ok(())
@@ -356,7 +347,8 @@ mod tests {
         let axes =
             DMat3::from_cols(DVec3::new(0.0, 1.0, 0.0), DVec3::new(-2.0, 0.5, 0.0), DVec3::Z);
         let lattice = Lattice::cartesian([3, 2, 1], DVec3::new(10.0, 0.0, 0.0), axes);
-        assert_eq!(lattice.bounds(), [DVec3::new(8.0, 0.0, 0.0), DVec3::new(10.0, 2.5, 0.0)]);
+        let (min, max) = (DVec3::new(8.0, 0.0, 0.0), DVec3::new(10.0, 2.5, 0.0));
+        assert_eq!(lattice.bounds(), Bounds { min, max });
         assert_eq!(lattice.spacing(), DVec3::new(1.0, 4.25f64.sqrt(), 1.0));
         lattice.validate().unwrap();
     }

@@ -198,7 +198,7 @@ fn smooth(t: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::TransferFunction;
+    use crate::{math::Bounds, volume::TransferFunction};
 
     #[test]
     fn values_by_hand() {
@@ -227,7 +227,8 @@ mod tests {
     #[test]
     fn samples_lie_where_they_should() {
         let volume = Phantom::Ball.sample([5, 3, 1]).unwrap();
-        assert_eq!(volume.bounds(), [DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 0.0)]);
+        let (min, max) = (DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 0.0));
+        assert_eq!(volume.bounds(), Bounds { min, max });
         assert_eq!((volume.value(7), volume.range), (1.0, [0.0, 1.0]));
         assert_eq!(Phantom::Constant(0.5).sample_bytes([2, 2, 2]).unwrap().range, [128.0, 128.0]);
         assert!(Phantom::Ball.sample([0, 2, 2]).is_err());

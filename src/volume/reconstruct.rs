@@ -84,7 +84,7 @@ impl<'a> Reconstruction<'a> {
     /// Returns the value of a tensor product at a position in steps, inside the box of the samples.
     fn product_at(&self, tensor: Tensor, steps: DVec3) -> Option<f64> {
         let lattice = &self.volume.lattice;
-        let [_, last] = lattice.step_range();
+        let last = lattice.step_range().max;
         // An axis of one sample extends half a step to either side.
         let margin = DVec3::select(last.cmpgt(DVec3::ZERO), DVec3::splat(1e-9), DVec3::splat(0.5));
         if !(steps.cmpge(-margin).all() && steps.cmple(last + margin).all()) {

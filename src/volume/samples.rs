@@ -6,7 +6,7 @@ use super::{
 use crate::{
     Error, Result,
     about::About,
-    math::{Kernel, Tensor},
+    math::{Bounds, Kernel, Tensor},
     parallel::{self, prelude::*},
 };
 use std::{borrow::Cow, sync::Arc};
@@ -205,7 +205,7 @@ impl PartialEq for Samples {
 /// assert_eq!(volume.range, [0.0, 23.0]);
 /// // The first axis is the fastest in memory.
 /// assert_eq!(volume.value(1 + 2 * 2 + 3 * 6), 23.0);
-/// assert_eq!(volume.bounds(), [DVec3::ZERO, DVec3::new(1.0, 2.0, 7.5)]);
+/// assert_eq!(volume.bounds().max, DVec3::new(1.0, 2.0, 7.5));
 /// # Ok::<(), splatkit::Error>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -371,7 +371,7 @@ impl Volume {
     }
 
     /// Returns the smallest and largest world coordinates of the sample positions.
-    pub fn bounds(&self) -> [glam::DVec3; 2] {
+    pub fn bounds(&self) -> Bounds {
         self.lattice.bounds()
     }
 

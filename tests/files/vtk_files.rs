@@ -3,11 +3,11 @@
 //! no package `vtk`; `SPLATKIT_PYTHON` names another Python.
 
 use crate::testing::folder::Folder;
-use glam::DVec3;
 use serde_json::Value;
 use splatkit::{
     formats::{self, Kind, ReadOptions},
     input::Limits,
+    math::Bounds,
     surface::Mesh,
 };
 use std::{path::Path, process::Command};
@@ -39,7 +39,7 @@ fn area(mesh: &Mesh) -> f64 {
 struct Summary {
     points: usize,
     cells: Option<usize>,
-    bounds: [DVec3; 2],
+    bounds: Bounds,
     range: [f64; 2],
     area: Option<f64>,
 }
@@ -110,7 +110,7 @@ fn check(folder: &Folder, facts: &Value, scalar: Option<&str>, key: &str) {
     for (axis, ends) in bounds.chunks(2).enumerate().filter(|_| !(of_cells && kind == Kind::Volume))
     {
         let size = ends[0].abs().max(ends[1].abs());
-        let actual = [summary.bounds[0][axis], summary.bounds[1][axis]];
+        let actual = [summary.bounds.min[axis], summary.bounds.max[axis]];
         let fits = near(actual[0], ends[0], size) && near(actual[1], ends[1], size);
         assert!(fits, "{what}: axis {axis}: {actual:?} instead of {ends:?}");
     }

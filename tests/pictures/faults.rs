@@ -24,7 +24,7 @@ fn scene(in_bricks: bool) -> Scene {
     let volume = Arc::new(Phantom::Specimen.sample_bytes([48; 3]).unwrap());
     let transfer = TransferFunction::automatic(&volume);
     let mut knot = Mesh::knot(200, 16);
-    let middle = (0.5 * (volume.bounds()[0] + volume.bounds()[1])).as_vec3();
+    let middle = volume.bounds().center().as_vec3();
     knot.positions.iter_mut().for_each(|place| *place = *place * 0.5 + middle);
     let scene = Scene::new().with_splats(knot.surfels(&SurfelOptions::default()).unwrap());
     match in_bricks {

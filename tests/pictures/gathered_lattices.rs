@@ -59,8 +59,7 @@ fn random(lattice: Lattice) -> Case {
         64 + (random >> 58) as u8 * 2
     });
     let mut volume = Volume::new(lattice, Samples::U8(values.collect())).expect("a volume");
-    let [low, high] = volume.bounds();
-    volume.lattice.origin += scenes::ORIGIN - 0.5 * (low + high);
+    volume.lattice.origin += scenes::ORIGIN - volume.bounds().center();
     let items = case.scene.items.iter().map(|item| match item {
         Item::Volume(_, kernel, transfer) => {
             Item::Volume(volume.clone().into(), kernel.clone(), transfer.clone())

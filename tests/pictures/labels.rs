@@ -140,12 +140,15 @@ fn each_label_is_seen_and_nothing_between() {
 #[test]
 fn each_sample_is_framed() {
     let volume = labels();
-    let [first, last] = volume.bounds();
+    let bounds = volume.bounds();
     let seen = scene(None).seen(&[]).expect("points");
     let around = |point: DVec3| seen.iter().any(|seen| seen.distance(point) < 0.31);
     let lone = volume.lattice.sample_position((16 * SIDE + 3) * SIDE + 17);
     assert!(around(lone + DVec3::X * 0.25), "{lone} is not framed");
-    assert!(seen.iter().all(|seen| seen.z < last.z - 0.5 && seen.z > first.z), "air is framed");
+    assert!(
+        seen.iter().all(|seen| seen.z < bounds.max.z - 0.5 && seen.z > bounds.min.z),
+        "air is framed"
+    );
 }
 
 #[test]

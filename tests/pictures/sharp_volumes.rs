@@ -132,7 +132,7 @@ fn slack(volume: &Volume, kernel: &Kernel, random: &mut Random) -> f64 {
     let [low, high] = volume.range;
     let unit = coefficients.lattice.axes * DMat3::from_diagonal(coefficients.lattice.unit([0; 3]));
     let inverse = volume.lattice.axes.inverse();
-    let [first, last] = volume.lattice.step_range();
+    let samples = volume.lattice.step_range();
     let mut tightest = f64::INFINITY;
     for (sample, range) in coefficients.ranges.iter().enumerate() {
         for place in 0..4 {
@@ -145,7 +145,7 @@ fn slack(volume: &Volume, kernel: &Kernel, random: &mut Random) -> f64 {
             let position = coefficients.lattice.sample_position(sample) + unit * offset;
             // Beyond the volume sums are incomplete.
             let steps = inverse * (position - volume.lattice.origin);
-            if offset.length() > kernel.extent || steps.clamp(first, last) != steps {
+            if offset.length() > kernel.extent || !samples.contains(steps) {
                 continue;
             }
             let step = (field.value_at(position).unwrap() - low) / (high - low) * 255.0;

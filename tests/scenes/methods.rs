@@ -20,8 +20,7 @@ fn volume_scene(volume: Volume, kernel: Kernel, transfer: TransferFunction) -> S
 /// The blobs on a lattice of any kind around the centre of the scenes, as floats of 0 … 1.
 fn blobs_on(dims: [usize; 3], axes: DMat3, arrangement: Arrangement) -> Volume {
     let mut lattice = Lattice { dims, origin: DVec3::ZERO, axes, arrangement };
-    let [low, high] = lattice.step_range();
-    lattice.origin = ORIGIN - axes * (0.5 * (low + high));
+    lattice.origin = ORIGIN - axes * lattice.step_range().center();
     let values =
         (0..lattice.len()).map(|i| blobs(lattice.sample_position(i) - ORIGIN) as f32).collect();
     Volume::new(lattice, Samples::F32(values)).expect("the samples fill the lattice")

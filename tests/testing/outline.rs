@@ -5,7 +5,7 @@ use glam::DVec3;
 use splatkit::{
     formats::{ReadOptions, load_mesh},
     input::Limits,
-    math::{Bounds, Camera},
+    math::Camera,
     picture::Picture,
     reference::trace,
     scene::Settings,
@@ -50,8 +50,7 @@ impl Truth {
     /// The view from the right and from above that shows the whole mesh, with +Z up, or from
     /// `nearer` times as near.
     pub fn new(mesh: &Mesh, size: [u32; 2], nearer: f64) -> Self {
-        let [min, max] = mesh.bounds().expect("bounds");
-        let bounds = Bounds { min, max };
+        let bounds = mesh.bounds().expect("bounds");
         let mut camera = Camera::framing_with(
             &bounds,
             DVec3::Y,

@@ -333,8 +333,8 @@ mod tests {
         let cartesian = 41f64.powi(3);
         // Whole cells reach a little beyond the cube.
         assert!((0.6..0.85).contains(&(lattice.len() as f64 / cartesian)), "{}", lattice.len());
-        let [low, high] = lattice.bounds();
-        assert!(low.max_element() <= -1.0 && high.min_element() >= 1.0);
+        let bounds = lattice.bounds();
+        assert!(bounds.min.max_element() <= -1.0 && bounds.max.min_element() >= 1.0);
     }
 
     fn text(write: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {

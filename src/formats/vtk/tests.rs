@@ -5,6 +5,7 @@ use crate::{
     cells::{self, CellKind},
     formats::Place,
     input::testing::*,
+    math::Bounds,
     volume::Samples,
 };
 use glam::{DVec3, Vec3};
@@ -347,7 +348,8 @@ fn rectilinear_grids() {
         let volume = with(text, None, read_volume).unwrap();
         assert_eq!((volume.lattice.dims, volume.range), ([3, 2, 1], [0.0, 5.0]));
         assert_eq!(volume.lattice.sample_position(5), DVec3::new(5.0, 1.0, 7.0));
-        assert_eq!(volume.bounds(), [DVec3::new(0.0, -1.0, 7.0), DVec3::new(5.0, 1.0, 7.0)]);
+        let (min, max) = (DVec3::new(0.0, -1.0, 7.0), DVec3::new(5.0, 1.0, 7.0));
+        assert_eq!(volume.bounds(), Bounds { min, max });
     }
     every_cut(&Folder::new(), "a.vtr", whole.as_bytes(), |source| {
         read_volume(source, &ReadOptions::default())

@@ -1,5 +1,6 @@
 use super::*;
 use crate::{
+    math::Bounds,
     splat::decode_normal,
     surface::{Material, Texture},
 };
@@ -350,7 +351,8 @@ fn surfels_of(mesh: &Mesh, options: &SurfelOptions) -> usize {
 fn bounds_are_in_the_world() {
     let mut mesh = Mesh::cube(2.0);
     mesh.origin = DVec3::X * 100.0;
-    assert_eq!(mesh.bounds(), Some([DVec3::new(99.0, -1.0, -1.0), DVec3::new(101.0, 1.0, 1.0)]));
+    let (min, max) = (DVec3::new(99.0, -1.0, -1.0), DVec3::new(101.0, 1.0, 1.0));
+    assert_eq!(mesh.bounds(), Some(Bounds { min, max }));
     assert_eq!(Mesh::default().bounds(), None);
 }
 

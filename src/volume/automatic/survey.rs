@@ -73,10 +73,9 @@ impl Survey {
             finest if finest.is_finite() && finest > 0.0 => finest,
             _ => spacing.max_element(),
         };
-        let [first, last] = volume.bounds();
         let is_float = volume.samples.scalar() == Scalar::F32;
         let mut survey = Self::of_samples(&samples, volume.range, window, is_float);
-        (survey.spacing, survey.diagonal) = (spacing, (last - first).length());
+        (survey.spacing, survey.diagonal) = (spacing, volume.bounds().diagonal());
         survey.add_slopes(&samples);
         survey
     }

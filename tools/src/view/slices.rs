@@ -128,10 +128,7 @@ impl SlicePanes {
         mapping: &Mapping,
     ) -> Option<DVec3> {
         let lattice = &volume.lattice;
-        let place = self.place.unwrap_or_else(|| {
-            let [first, last] = lattice.step_range();
-            lattice.position(0.5 * (first + last))
-        });
+        let place = self.place.unwrap_or_else(|| lattice.position(lattice.step_range().center()));
         let mut chosen = None;
         let mut index = Slice::nearest(lattice, axis, place);
         let last = Slice::count(lattice, axis) - 1;

@@ -8,6 +8,7 @@ use crate::{
     Error, Result,
     cells::{self, CellKind},
     input::testing::*,
+    math::Bounds,
     scattered::Points,
     surface::Mesh,
     volume::{Samples, Volume},
@@ -84,7 +85,8 @@ fn structured_points() {
         let whole = file(binary, IMAGE);
         let loaded = volume(&whole).unwrap();
         assert_eq!(loaded.samples, Samples::U8(vec![0, 1, 2, 30, 4, 255]));
-        assert_eq!(loaded.bounds(), [DVec3::new(10.0, 20.0, 30.0), DVec3::new(11.0, 21.0, 30.0)]);
+        let (min, max) = (DVec3::new(10.0, 20.0, 30.0), DVec3::new(11.0, 21.0, 30.0));
+        assert_eq!(loaded.bounds(), Bounds { min, max });
         // Without the line end after the last number, the file is still whole. A text without its
         // last digits has a shorter number.
         for end in 0..whole.len() - if binary { 1 } else { 3 } {

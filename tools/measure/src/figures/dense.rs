@@ -80,8 +80,7 @@ pub fn table(
     );
     for case in cases {
         let scene = case.scene();
-        let [min, max] = case.volume.bounds();
-        let camera = camera(&Bounds { min, max }, size)?;
+        let camera = camera(&case.volume.bounds(), size)?;
         let mut settings = Settings::new(size);
         settings.volume_shade = Some(None);
         progress.stage(format!("Integrating {}", case.name));

@@ -38,7 +38,7 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
         ],
     );
     let specimen = Phantom::Specimen.sample_bytes([SIDE; 3])?;
-    let [min, max] = specimen.bounds();
+    let bounds = specimen.bounds();
     let transfer = TransferFunction::automatic(&specimen);
     let mut scene =
         stage.prepare(&Scene::new().with_volume(specimen, Kernel::default(), transfer))?;
@@ -49,7 +49,7 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
         let mut pictures = Vec::new();
         for step in -STEPS..=STEPS {
             progress.stage(format!("Popping, {name}, {step:+}"));
-            let camera = camera(&Bounds { min, max }, 45.0 + STEP * f64::from(step));
+            let camera = camera(&bounds, 45.0 + STEP * f64::from(step));
             pictures.push(stage.draw(&mut scene, &camera, &settings)?);
         }
         let changes: Vec<[f64; 2]> =

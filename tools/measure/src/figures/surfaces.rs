@@ -7,7 +7,7 @@ use splatkit::{
     Error,
     compare::compare_pictures,
     hierarchy::{BuildOptions, Detail, Tree},
-    math::{Bounds, Camera},
+    math::Camera,
     picture::Picture,
     reference,
     scene::{Scene, Settings},
@@ -61,9 +61,9 @@ pub struct Truth {
 impl Truth {
     pub fn of(mesh: &Mesh, up: DVec3) -> splatkit::Result<Self> {
         let settings = Settings::new([PIXELS; 2]);
-        let [min, max] =
+        let bounds =
             mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
-        let subject = Subject::new(Bounds { min, max }, up);
+        let subject = Subject::new(bounds, up);
         let camera = Framing::default().camera(&subject, settings.size)?;
         let crease = SurfelOptions::default().crease_angle_degrees;
         let picture = reference::trace(mesh, crease, &camera, &settings, RAYS)?;

@@ -81,7 +81,7 @@ fn clear_volume(effort: Effort) -> Result<Case> {
 
 fn volume(effort: Effort, opacity: f64) -> Result<Case> {
     let volume = Phantom::Specimen.sample_bytes([effort.side(SIDE); 3])?;
-    let [min, max] = volume.bounds();
+    let bounds = volume.bounds();
     let transfer = TransferFunction {
         color: vec![(20.0, [0.7, 0.3, 0.2]), (255.0, [1.0, 0.9, 0.7])],
         opacity: vec![(20.0, 0.0), (60.0, opacity)],
@@ -90,7 +90,7 @@ fn volume(effort: Effort, opacity: f64) -> Result<Case> {
         ..TransferFunction::default()
     };
     let (scene, effective) = case::volume(Arc::new(volume), transfer);
-    let subject = Subject::new(splatkit::math::Bounds { min, max }, DVec3::Z);
+    let subject = Subject::new(bounds, DVec3::Z);
     Ok(Case::new(
         "generated: specimen",
         scene,

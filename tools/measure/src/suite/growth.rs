@@ -11,7 +11,7 @@ use splatkit::session::Subject;
 use splatkit::{
     Result,
     bricks::Bricks,
-    math::{Bounds, Kernel},
+    math::Kernel,
     scene::{Scene, Settings},
     volume::{TransferFunction, phantoms::Phantom},
 };
@@ -56,7 +56,7 @@ pub fn plans(effort: Effort) -> Vec<Plan> {
 
 fn volume(side: usize, size: u32) -> Result<Case> {
     let volume = Phantom::Specimen.sample_bytes([side; 3])?;
-    let [min, max] = volume.bounds();
+    let bounds = volume.bounds();
     // One transfer function for all sizes: the range of values is the same, and opacity holds for a
     // length.
     let small = Phantom::Specimen.sample_bytes([64; 3])?;
@@ -64,7 +64,7 @@ fn volume(side: usize, size: u32) -> Result<Case> {
     let effective = case::effective(&volume, &kernel, &transfer);
     let samples = volume.len() as f64;
     let scene = Scene::new().with_bricks(Bricks::from_volume(Arc::new(volume))?, kernel, transfer);
-    let subject = Subject::new(Bounds { min, max }, DVec3::Z);
+    let subject = Subject::new(bounds, DVec3::Z);
     let mut case = Case::new(
         "generated: specimen, in bricks",
         scene,

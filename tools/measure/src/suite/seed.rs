@@ -12,7 +12,7 @@ use splatkit::{
     Error, Result,
     formats::{self, Kind},
     input::Limits,
-    math::{Bounds, Kernel},
+    math::Kernel,
     scene::{Mode, Settings},
     volume::{
         Arrangement, Lattice, Samples, Shade, TransferFunction, Volume, body_centred,
@@ -153,14 +153,14 @@ impl Row {
             }
         };
         let dims = volume.lattice.dims.map(|n| n.to_string()).join("×");
-        let [min, max] = volume.bounds();
+        let bounds = volume.bounds();
         let mut settings = Settings::new([effort.pixels(SIZE); 2]);
         if self.name == AXIS_ALIGNED {
             settings.mode = Mode::AxisSheets;
         }
         let transfer = self.style.transfer(&volume, wanted);
         let (scene, effective) = case::volume(Arc::new(volume), transfer);
-        let subject = Subject::new(Bounds { min, max }, DVec3::Z);
+        let subject = Subject::new(bounds, DVec3::Z);
         let mut case = Case::new(format!("{drawn}, {dims}"), scene, subject, settings, effective);
         case.seed = Some(self.seed);
         Ok(case)

@@ -56,9 +56,8 @@ pub fn knot(points: u32) -> Mesh {
 
 /// Builds the hierarchy of a closed mesh; also returns the box around the mesh.
 pub fn hierarchy(mesh: &Mesh) -> Result<(Hierarchy, Bounds)> {
-    let [min, max] =
-        mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
+    let bounds = mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
     let options = BuildOptions { closed: true, ..BuildOptions::default() };
     let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, None)?;
-    Ok((Hierarchy::from_tree(tree)?, Bounds { min, max }))
+    Ok((Hierarchy::from_tree(tree)?, bounds))
 }

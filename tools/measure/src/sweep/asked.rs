@@ -140,10 +140,10 @@ impl Field {
     }
 
     fn in_view(&self, view: &View) -> f64 {
-        let Bounds { min, max } = self.bounds;
+        let Self { bounds, .. } = self;
         let place = |at: u32| {
             let index = [at % SAMPLES, at / SAMPLES % SAMPLES, at / SAMPLES.pow(2)].map(f64::from);
-            min + (max - min) * (DVec3::from(index) + 0.5) / f64::from(SAMPLES)
+            bounds.min + bounds.size() * (DVec3::from(index) + 0.5) / f64::from(SAMPLES)
         };
         let seen = (0..SAMPLES.pow(3))
             .map(place)

@@ -77,8 +77,7 @@ impl Show {
     }
 
     fn bounds(&self) -> Bounds {
-        let [min, max] = self.volume.bounds();
-        Bounds { min, max }
+        self.volume.bounds()
     }
 
     /// Returns the step as `bench` sees it.
@@ -116,7 +115,7 @@ fn density(lattice: &Lattice, bounds: &Bounds) -> DVec3 {
         Arrangement::BodyCentred => (DVec3::new(x, y, 0.5 * z), 2f64.cbrt()),
         Arrangement::Cartesian | Arrangement::Rectilinear(_) => (DVec3::new(x, y, z), 1.0),
     };
-    more * counts / (bounds.max - bounds.min)
+    more * counts / bounds.size()
 }
 
 /// Plans one step for each value, with the usual volume changed by it.
@@ -401,9 +400,9 @@ mod tests {
                 "{:?}",
                 lattice.dims
             );
-            let [min, max] = lattice.bounds();
+            let bounds = lattice.bounds();
+            let Bounds { min, max } = bounds;
             assert!(min.max_element() < -0.97 && max.min_element() > 0.97, "{min} {max}");
-            let bounds = Bounds { min, max };
             let cube: f64 = density(&lattice, &bounds).to_array().iter().product();
             assert!(
                 (0.8..1.2).contains(&(cube / (0.5 * SIDE as f64).powi(3)))
