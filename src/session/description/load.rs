@@ -43,6 +43,8 @@ pub struct LoadedInput {
     pub is_solid: bool,
     /// Whether the description gave its layout, because the file has no format of its own.
     pub is_raw: bool,
+    /// The names of the values that may colour it, if it is a mesh or a point cloud.
+    pub attributes: Vec<String>,
 }
 
 impl LoadedInput {
@@ -50,7 +52,12 @@ impl LoadedInput {
         let has_lines = matches!(data, Data::Mesh(mesh) if !mesh.lines.is_empty());
         let is_cloud = !has_lines && matches!(data, Data::Mesh(mesh) if mesh.triangles.is_empty());
         let is_solid = matches!(data, Data::Cells(_)) && showing.cell_style()? == CellStyle::Solid;
-        Ok(Self { file, kind: data.kind(), is_cloud, has_lines, is_solid, is_raw })
+        let attributes = match data {
+            Data::Mesh(mesh) => mesh.about.attributes.clone(),
+            _ => Vec::new(),
+        };
+        let kind = data.kind();
+        Ok(Self { file, kind, is_cloud, has_lines, is_solid, is_raw, attributes })
     }
 }
 

@@ -11,11 +11,13 @@ mod plot;
 mod points;
 mod presets;
 mod surfaces;
+mod swatch;
 #[cfg(test)]
 mod tests;
 
 pub use level::window_level;
 pub use number::{field, plain};
+pub use swatch::swatch;
 
 use backdrop::JointPicture;
 use eframe::egui::{
@@ -59,6 +61,10 @@ pub struct CurveEditor {
     shade: Shade,
     /// The diagonal of the data's box, in world units.
     diagonal: f64,
+    /// Whether the values are Hounsfield units, as the presets for CT expect.
+    is_hounsfield: bool,
+    /// What is to be said about the last change.
+    note: Option<String>,
 }
 
 /// A point, by its number in its list.
@@ -95,7 +101,19 @@ impl CurveEditor {
             joint: JointPicture::default(),
             shade: Shade::default(),
             diagonal,
+            is_hounsfield: false,
+            note: None,
         }
+    }
+
+    /// Sets whether the values are Hounsfield units.
+    pub fn set_hounsfield(&mut self, is_hounsfield: bool) {
+        self.is_hounsfield = is_hounsfield;
+    }
+
+    /// Takes what is to be said about the last change.
+    pub fn take_note(&mut self) -> Option<String> {
+        self.note.take()
     }
 
     /// Shows the editor of a function over the values of the data, and says what was changed.
@@ -158,7 +176,10 @@ impl CurveEditor {
                 self.values.reset();
                 self.magnitudes.reset();
             }
-            presets::menu(ui, transfer, values, self.diagonal, &mut self.values);
+            let Self { diagonal, is_hounsfield, .. } = *self;
+            let data = presets::Data { values, diagonal, is_hounsfield };
+            let note = presets::menu(ui, transfer, &data, &mut self.values);
+            self.note = note.or(self.note.take());
         });
     }
 

@@ -9,7 +9,9 @@ use crate::{
 };
 use splatkit::{
     scene::Clip,
-    session::{CameraEntry, Description, Framing, OverlayEntry, PictureEntry, TransferEntry},
+    session::{
+        CameraEntry, Description, Framing, InputEntry, OverlayEntry, PictureEntry, TransferEntry,
+    },
     volume::TransferFunction,
 };
 use std::path::{Path, PathBuf};
@@ -26,6 +28,8 @@ pub struct Document {
     now: Description,
     undone: Vec<Description>,
     done: Vec<Description>,
+    /// The scene before the step that the hand is making.
+    begun: Option<Description>,
     /// What draws, apart from the engine, which the description names.
     device: DeviceFlags,
     /// The file that the scene was read from or saved to.
@@ -37,7 +41,7 @@ pub struct Document {
 impl Document {
     pub fn new(now: Description, device: DeviceFlags) -> Self {
         let (undone, done) = (Vec::new(), Vec::new());
-        Self { now, undone, done, device, path: None, is_trusting: false }
+        Self { now, undone, done, begun: None, device, path: None, is_trusting: false }
     }
 
     /// Shows another scene, without a history.
@@ -50,8 +54,23 @@ impl Document {
         &self.now
     }
 
+    /// Returns the title of a window that shows the scene: the name of the scene file or of the
+    /// first input, and the program's.
+    pub fn title(&self) -> String {
+        let inputs = &self.now.inputs;
+        let others = if self.path.is_some() { 0 } else { inputs.len().saturating_sub(1) };
+        let file = self.path.as_ref().or(inputs.first().map(|input| &input.file));
+        let Some(file) = file else { return "splatkit".into() };
+        let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+        match others {
+            0 => format!("{name} — splatkit"),
+            others => format!("{name} + {others} — splatkit"),
+        }
+    }
+
     /// Changes the scene as one step that can be undone.
     pub fn change(&mut self, change: impl FnOnce(&mut Description)) {
+        self.end_step();
         let before = self.now.clone();
         change(&mut self.now);
         self.keep(before);
@@ -62,8 +81,23 @@ impl Document {
         change(&mut self.now);
     }
 
+    /// Changes the scene as a part of the step that the hand is making.
+    pub fn drag(&mut self, change: impl FnOnce(&mut Description)) {
+        self.begun.get_or_insert_with(|| self.now.clone());
+        change(&mut self.now);
+    }
+
+    /// Ends the step that the hand is making. Moving the camera is no step.
+    pub fn end_step(&mut self) {
+        if let Some(mut before) = self.begun.take() {
+            before.camera = self.now.camera;
+            before.framing.clone_from(&self.now.framing);
+            self.keep(before);
+        }
+    }
+
     /// Makes the changes since `before` one step.
-    pub fn keep(&mut self, before: Description) {
+    fn keep(&mut self, before: Description) {
         if before != self.now {
             self.done.push(before);
             self.undone.clear();
@@ -82,6 +116,7 @@ impl Document {
 
     /// Takes the last step back. The camera and the size stay.
     pub fn undo(&mut self) {
+        self.end_step();
         if let Some(before) = self.done.pop() {
             let after = self.replace(before);
             self.undone.push(after);
@@ -90,6 +125,7 @@ impl Document {
 
     /// Takes the step again that was last taken back.
     pub fn redo(&mut self) {
+        self.end_step();
         if let Some(after) = self.undone.pop() {
             let before = self.replace(after);
             self.done.push(before);
@@ -138,9 +174,15 @@ impl Document {
         let shared = &mut self.now.appearance;
         (shared.range, shared.isosurfaces) = (None, None);
         (shared.opacity_unit, shared.gradient_opacity) = (None, None);
-        // The map also colours surfaces.
-        if !has_surfaces {
-            shared.color = None;
+        // The function has the colours of the map by now. The map also colours surfaces, which keep
+        // one of their own.
+        let (map, log) = (shared.colormap.take(), std::mem::take(&mut shared.log_colors));
+        if has_surfaces && map.is_some() {
+            let is_field = |input: &InputEntry| transfers.iter().any(|one| one.0 == input.file);
+            for input in self.now.inputs.iter_mut().filter(|input| !is_field(input)) {
+                input.appearance.colormap = input.appearance.colormap.or(map);
+                input.appearance.log_colors |= log;
+            }
         }
     }
 
@@ -265,6 +307,45 @@ mod tests {
             scene.inputs.iter().map(|input| &input.appearance).chain([&scene.appearance]);
         assert!(surfaces.into_iter().all(|appearance| appearance.isosurfaces.is_none()));
         assert!(document.job([9, 9]).is_ok());
+    }
+
+    /// An edited function has its own colours: a map that stayed would replace them when the saved
+    /// scene is drawn.
+    #[test]
+    fn edited_colours_replace_the_map_of_a_field() {
+        let transfer = TransferFunction::default();
+        let mut alone = document("splatkit render a.nrrd --colormap hot");
+        alone.set_transfers(&[(Path::new("a.nrrd"), transfer.clone())], false);
+        assert_eq!(alone.scene().appearance.colormap, None);
+        let mut both = document("splatkit render a.nrrd b.ply --colormap hot");
+        both.set_transfers(&[(Path::new("a.nrrd"), transfer)], true);
+        let scene = both.scene();
+        let maps = [0, 1].map(|number| scene.appearance_of(&scene.inputs[number]).colormap);
+        assert_eq!(maps.map(|map| map.map(|map| map.to_string())), [None, Some("hot".into())]);
+    }
+
+    /// What the hand changes while it moves is one step, and moving the camera is none.
+    #[test]
+    fn a_drag_is_one_step() {
+        let mut document = plain(&["a.ply"]);
+        for cut in [1.0, 2.0, 3.0] {
+            document.drag(|scene| scene.picture.cut = Some(cut));
+        }
+        document.end_step();
+        document.drag(|_| {});
+        document.end_step();
+        document.undo();
+        assert_eq!((document.scene().picture.cut, document.can_undo()), (None, false));
+    }
+
+    #[test]
+    fn titles_name_the_scene_or_its_inputs() {
+        let titled = |document: &Document| document.title();
+        assert_eq!(titled(&plain(&["scans/a.ply"])), "a.ply — splatkit");
+        let mut document = plain(&["a.ply", "b.ply", "c.ply"]);
+        assert_eq!(titled(&document), "a.ply + 2 — splatkit");
+        document.path = Some("scenes/knee.json".into());
+        assert_eq!(titled(&document), "knee.json — splatkit");
     }
 
     #[test]

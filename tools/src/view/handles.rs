@@ -29,29 +29,14 @@ struct Handle {
     axis: DVec3,
 }
 
-/// What a hand did with the clips.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moved {
-    Nothing,
-    Begun,
-    Dragged,
-    Ended,
-}
-
 /// Draws the clips over the picture, and moves them as a hand drags their handles.
-pub fn show(ui: &Ui, screen: &Screen, bounds: &Bounds, clips: &mut [ClipEntry]) -> Moved {
+pub fn show(ui: &Ui, screen: &Screen, bounds: &Bounds, clips: &mut [ClipEntry]) {
     for clip in clips.iter() {
         outline(ui, screen, bounds, clip);
     }
-    let mut moved = Moved::Nothing;
     for handle in handles(clips, bounds) {
         let Some(place) = screen.place(handle.at) else { continue };
         let response = grip(ui, screen, &handle, place);
-        if response.drag_started() {
-            moved = Moved::Begun;
-        } else if response.drag_stopped() {
-            moved = Moved::Ended;
-        }
         if response.dragged() {
             // A step of this length is long enough to be seen and short enough to be straight.
             let length = 1e-3 * bounds.diagonal();
@@ -62,11 +47,9 @@ pub fn show(ui: &Ui, screen: &Screen, bounds: &Bounds, clips: &mut [ClipEntry]) 
             if steepness * (bounds.diagonal() as f32).powi(2) > 1.0 {
                 let step = response.drag_delta().dot(direction) / steepness;
                 change(&mut clips[handle.clip], handle.part, f64::from(step), bounds);
-                moved = if moved == Moved::Nothing { Moved::Dragged } else { moved };
             }
         }
     }
-    moved
 }
 
 /// Shows a handle that can be dragged.

@@ -23,14 +23,23 @@ pub struct Loading {
 }
 
 impl Loading {
-    /// Starts to load. `tell` is called at the end.
-    pub fn start(job: Job, tell: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+    /// Starts to load. A stage that is given has the scene already: only the device is opened.
+    /// `tell` is called at the end.
+    pub fn start(
+        job: Job,
+        kept: Option<Arc<Stage>>,
+        tell: impl Fn() + Send + 'static,
+    ) -> std::io::Result<Self> {
         let progress = Arc::new(Progress::kept());
         let (send, result) = channel();
         let thread_progress = Arc::clone(&progress);
         std::thread::Builder::new().name("loader".into()).spawn(move || {
             let loaded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                load(&job, &thread_progress).map_err(|failure| text_of(&failure))
+                let stage = match &kept {
+                    Some(stage) => reopened(&job, stage, &thread_progress),
+                    None => load(&job, &thread_progress),
+                };
+                stage.map_err(|failure| text_of(&failure))
             }));
             let loaded = loaded.unwrap_or_else(|_| Err("the file could not be read".into()));
             // Nobody waits any more if loading was cancelled.
@@ -72,7 +81,15 @@ fn load(job: &Job, progress: &Progress) -> Result<Stage, Failure> {
     let of_item = |item: usize| Some((item, Histogram::of_item(&items[item])?));
     let histograms = loaded.scene.fields().into_iter().filter_map(of_item).collect();
     let sheet = sheet_of(&loaded.scene);
-    Ok(Stage { loaded, device, histograms, sheet })
+    Ok(Stage { loaded: Arc::new(loaded), device, histograms, sheet })
+}
+
+/// Opens another device for a scene that is in memory.
+fn reopened(job: &Job, stage: &Stage, progress: &Progress) -> Result<Stage, Failure> {
+    progress.stage("Opening the device");
+    let device = job.open_device(&stage.loaded.scene)?;
+    let (loaded, histograms) = (Arc::clone(&stage.loaded), Arc::clone(&stage.histograms));
+    Ok(Stage { loaded, device, histograms, sheet: stage.sheet })
 }
 
 /// Returns the thickness of the sheets of the finest volume, about as [`Scene::sheets`] chooses it.

@@ -1,18 +1,26 @@
 //! `splatkit view`: a window.
 //!
 //! A [`Document`] says what is shown, as a scene file. The [`Window`](window::Window) loads it in
-//! the background ([`loader`]), gives orders to the [`painter`], and shows its frames and the
-//! [`panels`]. What it shows is what `splatkit render` draws from the same scene file.
+//! the background ([`loader`]), gives orders to the [`painter`], and shows its frames. The
+//! [`panels`], the [`keys`] and the [`hand`] in the picture show models and return [`action`]s,
+//! which the window applies. What it shows is what `splatkit render` draws from the same scene
+//! file.
 
+mod action;
+mod arrays;
 mod canvas;
 mod curve;
+mod dialogs;
 mod document;
 mod export;
-mod files;
+mod hand;
 mod handles;
+mod keys;
 mod loader;
 mod painter;
 mod panels;
+mod recent;
+mod scene_view;
 mod screen;
 mod slices;
 #[cfg(test)]
@@ -22,11 +30,13 @@ mod words;
 
 use crate::{failure::Failure, given::Given, progress::Progress, render::Render};
 use clap::Args;
+use dialogs::Dialogs;
 use document::Document;
 use eframe::egui;
+use recent::Recent;
 use splatkit::Error;
 use std::path::Path;
-use window::Window;
+use window::{Surroundings, Window};
 
 /// The size of the window at first, in points.
 const SIZE: [f32; 2] = [1280.0, 800.0];
@@ -83,7 +93,7 @@ fn open(document: Document) -> Result<(), Failure> {
     let size = document.scene().picture.size.map_or(SIZE, |size| size.map(|side| side as f32));
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
-            .with_title("splatkit")
+            .with_title(document.title())
             .with_inner_size(size)
             .with_drag_and_drop(true),
         // It would cost a processor without a GPU much, and a picture must not be changed.
@@ -91,7 +101,10 @@ fn open(document: Document) -> Result<(), Failure> {
         ..eframe::NativeOptions::default()
     };
     let create = |context: &eframe::CreationContext<'_>| {
-        let window = Window::new(document, &context.egui_ctx, context.wgpu_render_state.as_ref())?;
+        let surroundings =
+            Surroundings { recent: Recent::of_user(), dialogs: Dialogs::of_system() };
+        let state = context.wgpu_render_state.as_ref();
+        let window = Window::new(document, surroundings, &context.egui_ctx, state)?;
         Ok(Box::new(App(window)) as Box<dyn eframe::App>)
     };
     eframe::run_native("splatkit", options, Box::new(create)).map_err(|error| {

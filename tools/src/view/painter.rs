@@ -3,6 +3,7 @@
 use crate::job::{Finish, Loaded};
 use splatkit::{
     Device, Error, FrameStats, Renderer, Stop,
+    about::Modality,
     interaction::{Effort, Histogram, Pace},
     math::Camera,
     picture::Picture,
@@ -25,10 +26,10 @@ const CALM: Duration = Duration::from_millis(70);
 
 /// A loaded scene, and the device that draws it.
 pub struct Stage {
-    pub loaded: Loaded,
+    pub loaded: Arc<Loaded>,
     pub device: Device,
     /// How often the values of the fields are, with the numbers of their items.
-    pub histograms: Vec<(usize, Histogram)>,
+    pub histograms: Arc<[(usize, Histogram)]>,
     /// The thickness of a sheet that the volume's spacing asks for, in world units.
     pub sheet: Option<f64>,
 }
@@ -38,6 +39,21 @@ impl Stage {
     pub fn values(&self, item: usize) -> [f64; 2] {
         let item = self.loaded.scene.items.get(item);
         item.and_then(Item::value_range).unwrap_or([0.0, 1.0])
+    }
+
+    /// Returns whether the values of an item's field are Hounsfield units: because the file says
+    /// so, or, if it says nothing, because they reach from air to bone.
+    pub fn is_hounsfield(&self, item: usize) -> bool {
+        let [low, high] = self.values(item);
+        let is_likely = (-4096.0..=-200.0).contains(&low) && (200.0..=32768.0).contains(&high);
+        match self.loaded.scene.items.get(item) {
+            Some(Item::Volume(volume, ..)) => match volume.about.modality {
+                Some(modality) => modality == Modality::Ct,
+                None => volume.about.unit == "HU" || (volume.about.unit.is_empty() && is_likely),
+            },
+            Some(Item::Bricks(..)) => is_likely,
+            _ => false,
+        }
     }
 
     /// Returns how often the values of an item's field are.

@@ -1,12 +1,17 @@
 //! Three orthogonal slices of a volume, with a crosshair at one place.
 
+mod plane;
+
 use super::curve::{field, plain};
-use eframe::egui::{
-    Align2, Color32, ColorImage, PointerButton, Pos2, Rect, Response, Role, Sense, Slider,
-    TextStyle, TextureHandle, TextureOptions, Ui, WidgetInfo, pos2, vec2,
+use eframe::{
+    egui::{
+        Align2, Color32, ColorImage, Mesh, PointerButton, Pos2, Response, Role, ScrollArea, Sense,
+        Slider, TextStyle, TextureHandle, TextureOptions, Ui, WidgetInfo, pos2, vec2,
+    },
+    epaint::Vertex,
 };
+use plane::{Plane, Turn};
 use splatkit::{
-    about::Frame,
     glam::{DVec2, DVec3},
     interaction::{Shading, Slice},
     math::Kernel,
@@ -30,6 +35,8 @@ pub struct SlicePanes {
 struct Pane {
     key: Key,
     slice: Slice,
+    plane: Plane,
+    turn: Turn,
     texture: TextureHandle,
 }
 
@@ -48,10 +55,10 @@ enum Mapping {
     Transfer(TransferFunction),
 }
 
-/// Names of the axes across which slices are cut.
-const AXES: [&str; 3] = ["first axis", "second axis", "third axis"];
-/// Height of a pane's picture in points, at most.
-const HEIGHT: f32 = 260.0;
+/// Height of a pane's picture in points, at least.
+const LEAST: f32 = 80.0;
+/// Height of the rows above and below a pane's picture, in points.
+const ROWS: f32 = 48.0;
 /// Below this width in points, panes stand one below the other.
 const WIDE: f32 = 600.0;
 /// A drag over so many points moves the grey window over all values.
@@ -80,19 +87,24 @@ impl SlicePanes {
                 true => Mapping::Transfer(transfer.clone()),
                 false => Mapping::Window(self.window.unwrap_or(volume.range)),
             };
-            let mut pane = |ui: &mut Ui, axis: usize| {
-                let place = self.pane(ui, axis, volume, kernel, &mapping);
+            let (room, is_wide) = (ui.available_height(), ui.available_width() >= WIDE);
+            let height = if is_wide { room - ROWS } else { room / 3.0 - ROWS }.max(LEAST);
+            let mut pane = |ui: &mut Ui, plane: Plane| {
+                let place = self.pane(ui, (plane, height), volume, kernel, &mapping);
                 chosen = place.or(chosen);
             };
-            if ui.available_width() >= WIDE {
-                ui.columns(3, |columns| {
-                    for (axis, ui) in columns.iter_mut().enumerate() {
-                        pane(ui, axis);
-                    }
-                });
-            } else {
-                (0..3).for_each(|axis| pane(ui, axis));
-            }
+            let planes = Plane::of(volume);
+            ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
+                if is_wide {
+                    ui.columns(3, |columns| {
+                        for (plane, ui) in planes.into_iter().zip(columns) {
+                            pane(ui, plane);
+                        }
+                    });
+                } else {
+                    planes.into_iter().for_each(|plane| pane(ui, plane));
+                }
+            });
         });
         self.place = chosen.or(self.place);
         chosen
@@ -122,30 +134,32 @@ impl SlicePanes {
     fn pane(
         &mut self,
         ui: &mut Ui,
-        axis: usize,
+        (plane, height): (Plane, f32),
         volume: &Arc<Volume>,
         kernel: &Kernel,
         mapping: &Mapping,
     ) -> Option<DVec3> {
+        let axis = plane.axis;
         let lattice = &volume.lattice;
         let place = self.place.unwrap_or_else(|| lattice.position(lattice.step_range().center()));
         let mut chosen = None;
         let mut index = Slice::nearest(lattice, axis, place);
         let last = Slice::count(lattice, axis) - 1;
         ui.horizontal(|ui| {
+            ui.strong(plane.name);
             ui.spacing_mut().slider_width = (ui.available_width() - 90.0).max(60.0);
             let slider = Slider::new(&mut index, 0..=last).integer();
-            let name = format!("Slice across the {}", AXES[axis]);
+            let name = format!("{} slice", plane.name);
             if ui.add(slider).accessible_name(name).changed() {
                 chosen = Some(Slice::moved_onto(lattice, axis, index, place));
             }
         });
-        if let Err(message) = self.cut(ui, axis, index, (volume, kernel), mapping) {
+        if let Err(message) = self.cut(ui, plane, index, (volume, kernel), mapping) {
             ui.colored_label(ui.visuals().error_fg_color, message);
             return chosen;
         }
         let Some(pane) = &self.panes[axis] else { return chosen };
-        let area = picture(ui, axis, pane);
+        let area = picture(ui, pane, height);
         let mut levelled = None;
         if let (true, Mapping::Window(window)) =
             (area.dragged_by(PointerButton::Secondary), mapping)
@@ -170,11 +184,12 @@ impl SlicePanes {
     fn cut(
         &mut self,
         ui: &Ui,
-        axis: usize,
+        plane: Plane,
         index: usize,
         (volume, kernel): (&Arc<Volume>, &Kernel),
         mapping: &Mapping,
     ) -> Result<(), String> {
+        let axis = plane.axis;
         let is_same = |key: &Key| {
             key.index == index
                 && std::ptr::eq(key.volume.as_ptr(), Arc::as_ptr(volume))
@@ -196,7 +211,8 @@ impl SlicePanes {
         let texture = ui.ctx().load_texture(name, image(&slice, most), TextureOptions::NEAREST);
         let volume = Arc::downgrade(volume);
         let key = Key { volume, kernel: kernel.clone(), index, mapping: mapping.clone() };
-        self.panes[axis] = Some(Pane { key, slice, texture });
+        let turn = plane.turn(&slice);
+        self.panes[axis] = Some(Pane { key, slice, plane, turn, texture });
         Ok(())
     }
 }
@@ -216,10 +232,13 @@ fn image(slice: &Slice, most: usize) -> ColorImage {
 }
 
 /// Draws a slice as large as it fits, with the proportions of the world.
-fn picture(ui: &mut Ui, axis: usize, pane: &Pane) -> Response {
+fn picture(ui: &mut Ui, pane: &Pane, height: f32) -> Response {
     let slice = &pane.slice;
-    let size = [0, 1].map(|side| slice.size[side] as f64 * slice.spacing[side]);
-    let room = [f64::from(ui.available_width().max(20.0)), f64::from(HEIGHT)];
+    let mut size = [0, 1].map(|side| slice.size[side] as f64 * slice.spacing[side]);
+    if pane.turn.swaps {
+        size.reverse();
+    }
+    let room = [f64::from(ui.available_width().max(20.0)), f64::from(height)];
     let scale = (room[0] / size[0]).min(room[1] / size[1]);
     // A slice of a single sample's thickness is still seen.
     let [width, height] = size.map(|length| ((length * scale) as f32).max(4.0));
@@ -227,23 +246,33 @@ fn picture(ui: &mut Ui, axis: usize, pane: &Pane) -> Response {
     // In a row, because columns stretch what they hold.
     let row = ui.horizontal(|ui| ui.allocate_exact_size(size, Sense::click_and_drag()));
     let (rect, area) = row.inner;
-    let name = format!("Picture across the {}", AXES[axis]);
+    let name = format!("{} picture", pane.plane.name);
     area.widget_info(|| WidgetInfo::labeled(Role::Image, ui.is_enabled(), &name));
-    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-    ui.painter().image(pane.texture.id(), rect, whole, Color32::WHITE);
+    let mut mesh = Mesh::with_texture(pane.texture.id());
+    let corner = |[x, y]: [f64; 2]| {
+        let stored = pane.turn.stored(DVec2::new(x, y));
+        Vertex {
+            pos: rect.lerp_inside(vec2(x as f32, y as f32)),
+            uv: pos2(stored.x as f32, stored.y as f32),
+            color: Color32::WHITE,
+        }
+    };
+    mesh.vertices.extend([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(corner));
+    mesh.indices.extend([0, 1, 2, 2, 1, 3]);
+    ui.painter().add(mesh);
     area
 }
 
 /// Returns the point of the slice under a point of the screen, within the slice.
 fn pixel(pane: &Pane, area: &Response, at: Pos2) -> DVec2 {
     let share = (at - area.rect.min) / area.rect.size();
-    let size = pane.slice.size.map(|count| count as f64);
-    let within = |share: f32, count: f64| (f64::from(share) * count).clamp(0.5, count - 0.5);
-    DVec2::new(within(share.x, size[0]), within(share.y, size[1]))
+    let place = DVec2::new(f64::from(share.x), f64::from(share.y));
+    let last = DVec2::from_array(pane.slice.size.map(|count| count as f64 - 0.5));
+    pane.turn.pixel(place, pane.slice.size).clamp(DVec2::splat(0.5), last)
 }
 
 fn crosshair(ui: &Ui, pane: &Pane, area: &Response, place: DVec3) {
-    let share = pane.slice.pixel(place) / DVec2::from_array(pane.slice.size.map(|n| n as f64));
+    let share = pane.turn.place(pane.slice.pixel(place), pane.slice.size);
     let at = area.rect.min + area.rect.size() * vec2(share.x as f32, share.y as f32);
     let painter = ui.painter_at(area.rect);
     let stroke = (1.0, Color32::from_rgb(255, 200, 0).gamma_multiply(0.8));
@@ -271,36 +300,21 @@ fn name_of(pane: &Pane, value: f64) -> String {
     labels.map_or_else(|| plain(value), |labels| labels.name(value as i32))
 }
 
-/// Writes the sides of a patient at the edges of a slice.
+/// Writes at the edges of a slice what they lead to.
 fn letters(ui: &Ui, pane: &Pane, area: &Response) {
-    let Some(volume) = pane.key.volume.upgrade() else { return };
-    if volume.about.frame != Frame::Patient {
-        return;
-    }
-    let at = |pixel: DVec2| pane.slice.position(pixel);
-    let start = at(DVec2::ZERO);
-    let [right, down] = [DVec2::X, DVec2::Y].map(|way| side_of(at(way) - start));
+    let [left, right, above, below] = pane.plane.sides(&pane.slice, pane.turn);
     let painter = ui.painter_at(area.rect);
     let rect = area.rect.shrink(4.0);
     let ink = Color32::from_rgb(255, 200, 0);
     let font = TextStyle::Body.resolve(ui.style());
     for (place, align, letter) in [
-        (rect.left_center(), Align2::LEFT_CENTER, right[1]),
-        (rect.right_center(), Align2::RIGHT_CENTER, right[0]),
-        (rect.center_top(), Align2::CENTER_TOP, down[1]),
-        (rect.center_bottom(), Align2::CENTER_BOTTOM, down[0]),
+        (rect.left_center(), Align2::LEFT_CENTER, left),
+        (rect.right_center(), Align2::RIGHT_CENTER, right),
+        (rect.center_top(), Align2::CENTER_TOP, above),
+        (rect.center_bottom(), Align2::CENTER_BOTTOM, below),
     ] {
         painter.text(place, align, letter, font.clone(), ink);
     }
-}
-
-/// Returns the letters of the side of a patient that a direction leads to, and of the opposite one.
-fn side_of(way: DVec3) -> [&'static str; 2] {
-    let sides = [["R", "L"], ["A", "P"], ["S", "I"]];
-    let axis =
-        (0..3).fold(0, |most, axis| if way[axis].abs() > way[most].abs() { axis } else { most });
-    let [towards, from] = sides[axis];
-    if way[axis] < 0.0 { [from, towards] } else { [towards, from] }
 }
 
 #[cfg(test)]
@@ -346,7 +360,7 @@ mod tests {
     }
 
     fn slider(harness: &Harness<'_, State>, axis: usize, value: f64) {
-        let name = format!("Slice across the {}", AXES[axis]);
+        let name = format!("{} slice", ["x", "y", "z"][axis]);
         harness.get_by_role_and_label(Role::Slider, &name).set_value_accesskit(value);
     }
 
@@ -367,7 +381,7 @@ mod tests {
     fn clicks_set_the_place_of_all_panes() {
         let mut harness = harness();
         harness.run();
-        let rect = harness.get_by_label("Picture across the third axis").rect();
+        let rect = harness.get_by_label("z picture").rect();
         // World proportions: 8 wide, 8 high.
         assert!((rect.width() - rect.height()).abs() < 1.0, "{rect}");
         let at = rect.lerp_inside(vec2(1.5 / 8.0, 0.5 / 4.0));
@@ -388,17 +402,45 @@ mod tests {
     fn the_value_under_the_pointer_is_told() {
         let mut harness = harness();
         harness.run();
-        let rect = harness.get_by_label("Picture across the third axis").rect();
+        let rect = harness.get_by_label("z picture").rect();
         harness.hover_at(rect.lerp_inside(vec2(2.5 / 8.0, 3.5 / 4.0)));
         harness.run();
         harness.get_by_label("132 at 2, 6, 2");
     }
 
+    /// All three pictures are inside the window, however high it is.
     #[test]
-    fn directions_lead_to_sides() {
-        assert_eq!(side_of(DVec3::new(-2.0, 1.0, 0.5)), ["L", "R"]);
-        assert_eq!(side_of(DVec3::new(0.1, -1.0, 0.5)), ["P", "A"]);
-        assert_eq!(side_of(DVec3::Z), ["S", "I"]);
+    fn slices_fit_their_panes() {
+        for size in [[300.0, 500.0], [300.0, 1200.0], [900.0, 400.0]] {
+            let mut harness = harness();
+            harness.set_size(vec2(size[0], size[1]));
+            harness.run();
+            let heights = ["x", "y", "z"].map(|name| {
+                let rect = harness.get_by_label(&format!("{name} picture")).rect();
+                assert!(rect.bottom() <= size[1] && rect.right() <= size[0], "{name}: {rect}");
+                rect.height()
+            });
+            assert!(heights.iter().all(|height| *height > 50.0), "{heights:?}");
+        }
+    }
+
+    /// A click on a turned slice chooses the place that it shows.
+    #[test]
+    fn clicks_choose_what_turned_slices_show() {
+        let mut harness = harness();
+        let mut patient = Volume::clone(&volume());
+        patient.about.frame = splatkit::about::Frame::Patient;
+        harness.state_mut().volume = Arc::new(patient);
+        harness.run();
+        // The patient's right side is at the left, the front above: x and y grow to there.
+        let rect = harness.get_by_label("Axial picture").rect();
+        let at = rect.lerp_inside(vec2(0.5 / 8.0, 0.5 / 4.0));
+        harness.drag_at(at);
+        harness.run();
+        harness.drop_at(at);
+        harness.run();
+        let place = harness.state().chosen.unwrap();
+        assert!(place.distance(DVec3::new(7.0, 6.0, 2.0)) < 0.1, "{place}");
     }
 
     #[test]

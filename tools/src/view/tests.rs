@@ -1,27 +1,42 @@
 //! The window without a screen: it is driven by events, and draws on the CPU engine.
 
-use super::{document::Document, window::Window};
+mod tasks;
+
+use super::{
+    dialogs::Dialogs,
+    document::Document,
+    recent::Recent,
+    window::{Surroundings, Window},
+};
 use crate::{Command, Task, engine::DeviceFlags, given::Given, progress::Progress};
 use clap::{CommandFactory, FromArgMatches};
 use eframe::egui;
 use egui_kittest::{Harness, kittest::Queryable};
-use splatkit::session::{Description, Engine};
-use std::path::Path;
+use splatkit::session::{Description, Engine, SurfaceColor};
+use std::path::{Path, PathBuf};
 
 /// A window that shows a small volume in a folder.
 fn harness(folder: &Path) -> Harness<'static, Option<Window>> {
     let volume = splatkit::volume::phantoms::Phantom::Specimen.sample([16; 3]).expect("a volume");
     let file = folder.join("v.nrrd");
     splatkit::formats::nrrd::write(&volume, &file).expect("written");
+    harness_of(folder, file)
+}
+
+/// A window that shows a file, with its settings in a folder.
+fn harness_of(folder: &Path, file: PathBuf) -> Harness<'static, Option<Window>> {
     let mut scene = Description::new([file]);
     scene.engine = Engine::Cpu;
     let mut document = Some(Document::new(scene, DeviceFlags::default()));
-    Harness::builder().with_size(egui::vec2(800.0, 1600.0)).build_ui_state(
+    let store = folder.join("settings").join("recent.json");
+    Harness::builder().with_size(egui::vec2(800.0, 1600.0)).allow_missing_glyphs().build_ui_state(
         move |ui, window: &mut Option<Window>| {
             let context = ui.ctx().clone();
             let opened = window.get_or_insert_with(|| {
                 let document = document.take().expect("one window");
-                Window::new(document, &context, None).expect("a window")
+                let recent = Recent::at(store.clone());
+                let surroundings = Surroundings { recent, dialogs: Dialogs::plain() };
+                Window::new(document, surroundings, &context, None).expect("a window")
             });
             opened.ui(ui);
         },
@@ -53,6 +68,42 @@ fn unfold(harness: &mut Harness<'static, Option<Window>>, name: &str) {
     for _ in 0..30 {
         harness.step();
     }
+}
+
+/// Chooses an entry of a list.
+fn choose(harness: &mut Harness<'static, Option<Window>>, list: &str, entry: &str) {
+    harness.get_by_role_and_label(egui::Role::ComboBox, list).click();
+    for _ in 0..5 {
+        harness.step();
+    }
+    harness.get_by_role_and_label(egui::Role::Button, entry).click();
+    for _ in 0..5 {
+        harness.step();
+    }
+}
+
+/// Picks a strong colour: by a click into the square of the picker that a button opens.
+fn pick(harness: &mut Harness<'static, Option<Window>>, button: &str) {
+    harness.get_by_label(button).click();
+    for _ in 0..5 {
+        harness.step();
+    }
+    let area = harness.ctx.memory(|memory| {
+        let picker = memory.areas().top_layer_id(egui::Order::Foreground).expect("a picker");
+        memory.area_rect(picker.id).expect("a picker")
+    });
+    let at = area.left_bottom() + egui::vec2(240.0, -240.0);
+    harness.hover_at(at);
+    harness.drag_at(at);
+    for _ in 0..3 {
+        harness.step();
+    }
+    harness.drop_at(at);
+    for _ in 0..3 {
+        harness.step();
+    }
+    harness.key_press(egui::Key::Escape);
+    harness.step();
 }
 
 fn picture_of(harness: &mut Harness<'static, Option<Window>>) -> Vec<[f32; 4]> {
@@ -188,7 +239,8 @@ fn a_path_of_the_camera_is_played_saved_and_exported() {
     unfold(&mut harness, "Camera path");
     harness.get_by_label("Turn around").click();
     harness.step();
-    assert_eq!(window(&mut harness).panels.flight.keyframes.len(), 5);
+    harness.step();
+    assert_eq!(window(&mut harness).keyframes.len(), 5);
     let before = window(&mut harness).document.scene().camera;
     harness.get_by_label("Play").click();
     for _ in 0..10 {
@@ -200,15 +252,15 @@ fn a_path_of_the_camera_is_played_saved_and_exported() {
     assert!(camera.is_some() && camera != before, "the camera stood still");
     let (path, film) = (folder.path().join("path.json"), folder.path().join("film.gif"));
     window(&mut harness).save_path(&path);
-    window(&mut harness).panels.flight.keyframes.clear();
+    window(&mut harness).keyframes.clear();
     window(&mut harness).load_path(&path);
-    assert_eq!(window(&mut harness).panels.flight.keyframes.len(), 5);
-    window(&mut harness).panels.flight.rate = 1.0;
+    assert_eq!(window(&mut harness).keyframes.len(), 5);
+    window(&mut harness).player.rate = 1.0;
     window(&mut harness).size = [40, 30];
     window(&mut harness).export(film.clone());
     for _ in 0..2000 {
         harness.step();
-        if window(&mut harness).panels.flight.exporting.is_none() {
+        if window(&mut harness).exporting.is_none() {
             break;
         }
         std::thread::sleep(std::time::Duration::from_millis(5));
@@ -256,14 +308,12 @@ fn surfaces_have_a_colour_and_an_opacity() {
     window(&mut harness).document.change(|scene| scene.inputs.clear());
     window(&mut harness).open(vec![file]);
     let gray = picture_of(&mut harness);
-    harness.get_by_label("Own colour").focus();
-    harness.step();
-    harness.get_by_label("Own colour").type_text("red");
-    harness.step();
-    harness.key_press(egui::Key::Enter);
-    harness.step();
+    choose(&mut harness, "Colour", "one colour");
+    rest(&mut harness);
+    pick(&mut harness, "Colour of the surface");
     let color = window(&mut harness).document.scene().inputs[0].appearance.color.clone();
-    assert_eq!(color.map(|color| color.to_string()).as_deref(), Some("#ff0000"));
+    let Some(SurfaceColor::Plain([r, g, b])) = color else { panic!("{color:?}") };
+    assert!(r > g && r > b, "{color:?} is not the picked colour");
     let red = picture_of(&mut harness);
     assert!(red != gray, "the colour is the same");
     window(&mut harness).document.change(|scene| scene.inputs[0].appearance.opacity = Some(0.3));
@@ -281,7 +331,7 @@ fn slices_stand_beside_the_picture() {
     let width = window(&mut harness).size[0];
     harness.get_by_label("Slices").click();
     rest(&mut harness);
-    harness.get_by_label("Picture across the third axis");
+    harness.get_by_label("z picture");
     assert!(window(&mut harness).size[0] < width);
 }
 
@@ -341,16 +391,19 @@ fn one_of_several_fields_is_edited() {
     // The second field is chosen and changed; the first one stays.
     window(&mut harness).scene_view.as_mut().expect("a scene").field = 1;
     harness.step();
-    let first = window(&mut harness).transfer_of(0).expect("a field");
+    let transfer_of = |harness: &mut Harness<'static, Option<Window>>, item: usize| {
+        let state = window(harness);
+        let scene_view = state.scene_view.as_ref().expect("a scene");
+        scene_view.transfer_of(&state.document, item)
+    };
+    let first = transfer_of(&mut harness, 0).expect("a field");
     let mut transfer = window(&mut harness).transfer().expect("a field");
     transfer.color = vec![(0.0, [0.0, 0.0, 1.0])];
-    let step = window(&mut harness).document.scene().clone();
     window(&mut harness).set_transfer(&transfer);
-    window(&mut harness).document.keep(step);
     harness.step();
     assert!(picture_of(&mut harness) != before, "the colours are the same");
-    assert_eq!(window(&mut harness).transfer_of(1), Some(transfer));
-    assert_eq!(window(&mut harness).transfer_of(0), Some(first));
+    assert_eq!(transfer_of(&mut harness, 1), Some(transfer));
+    assert_eq!(transfer_of(&mut harness, 0), Some(first));
     let scene = window(&mut harness).document.scene().clone();
     assert!(scene.appearance.transfer.is_none());
     assert!(scene.inputs.iter().all(|input| input.appearance.transfer.is_some()));

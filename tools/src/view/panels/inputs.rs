@@ -1,76 +1,165 @@
-//! The inputs: which are drawn, and the colours and opacities of surfaces.
+//! The inputs: which are drawn, their arrays, and the colours and opacities of surfaces.
 
-use super::{Ask, appearance::edited};
-use crate::{given, view::window::Window};
+use super::lists::{choice, color, held};
+use crate::{
+    given::{self, Kinds},
+    view::{
+        action::{Action, Purpose},
+        arrays::{self, Arrays},
+    },
+};
 use eframe::egui::{DragValue, Ui};
-use splatkit::session::InputEntry;
+use splatkit::session::{Description, InputEntry, LoadedInput, SurfaceColor};
 
-pub fn show(window: &mut Window, ui: &mut Ui) {
-    let entries = window.document.scene().inputs.clone();
-    let kinds = window.scene_view.as_ref().map_or(Vec::new(), |s| s.stage.loaded.kinds());
-    let mut kinds = kinds.into_iter();
-    for (number, entry) in entries.iter().enumerate() {
-        // Kinds are known of what is loaded.
-        let kind = if entry.visible { kinds.next() } else { None };
+/// The colour of a surface when one colour is chosen for it first.
+const PLAIN: [f32; 3] = [0.8, 0.8, 0.8];
+
+/// What the panel shows.
+pub struct Inputs<'a> {
+    pub scene: &'a Description,
+    /// What the visible inputs are, as far as they are loaded.
+    pub loaded: &'a [LoadedInput],
+    pub arrays: &'a Arrays,
+}
+
+pub fn show(ui: &mut Ui, model: &Inputs) -> Vec<Action> {
+    let mut actions = Vec::new();
+    for (number, entry) in model.scene.inputs.iter().enumerate() {
         ui.push_id(number, |ui| {
-            let mut changed = entry.clone();
-            if head(ui, &mut changed) {
-                window.document.change(|scene| {
-                    scene.inputs.remove(number);
-                });
-                return;
-            }
-            if kind.is_some_and(|kind| kind & (given::MESH | given::CLOUD) != 0) {
-                surface(ui, &mut changed);
-            }
-            if changed != *entry {
-                window.document.change(|scene| scene.inputs[number] = changed);
-            }
+            head(ui, number, entry, &mut actions);
+            let loaded = model.loaded.iter().find(|input| input.file == entry.file);
+            let Some(loaded) = loaded.filter(|_| entry.visible) else { return };
+            ui.indent("input", |ui| {
+                array(ui, number, entry, model, &mut actions);
+                let kinds: Kinds = given::kinds_of_input(loaded);
+                if kinds & (given::MESH | given::CLOUD) != 0 {
+                    colors(ui, number, entry, (model.scene, loaded), &mut actions);
+                    opacity(ui, number, entry, &mut actions);
+                }
+            });
         });
     }
     if ui.button("Add…").clicked() {
-        window.panels.ask(Ask::Open);
+        actions.push(Action::Ask(Purpose::Open));
     }
+    actions
 }
 
-/// Shows the name of an input. Returns whether it is to be removed.
-fn head(ui: &mut Ui, entry: &mut InputEntry) -> bool {
+/// Shows the name of an input, whether it is drawn, and what removes it.
+fn head(ui: &mut Ui, number: usize, entry: &InputEntry, actions: &mut Vec<Action>) {
     let name = entry.file.file_name().unwrap_or(entry.file.as_os_str());
     let name = name.to_string_lossy().into_owned();
-    let path = entry.file.display().to_string();
-    let row = ui.horizontal(|ui| {
-        ui.checkbox(&mut entry.visible, &*name).on_hover_text(path);
-        ui.small_button("×").on_hover_text(format!("Remove {name}")).clicked()
+    ui.horizontal(|ui| {
+        let mut visible = entry.visible;
+        let path = entry.file.display().to_string();
+        if ui.checkbox(&mut visible, &*name).on_hover_text(path).changed() {
+            actions.push(Action::change(move |scene| scene.inputs[number].visible = visible));
+        }
+        if ui.small_button("×").on_hover_text(format!("Remove {name}")).clicked() {
+            actions.push(Action::change(move |scene| drop(scene.inputs.remove(number))));
+        }
     });
-    row.inner
 }
 
-/// Shows the colour and the opacity of a surface.
-fn surface(ui: &mut Ui, entry: &mut InputEntry) {
+/// Shows the arrays of an input, if it has several.
+fn array(
+    ui: &mut Ui,
+    number: usize,
+    entry: &InputEntry,
+    model: &Inputs,
+    actions: &mut Vec<Action>,
+) {
+    let names = model.arrays.names(model.scene, entry);
+    let current = arrays::chosen(model.scene, entry);
+    if names.len() < 2 && current.is_none() {
+        return;
+    }
+    let automatic = [("automatic".to_owned(), None)];
+    let named = names.into_iter().map(|name| (name.clone(), Some(name)));
     ui.horizontal(|ui| {
-        ui.add_space(18.0);
-        let text = entry.appearance.color.as_ref().map(ToString::to_string).unwrap_or_default();
-        let hint = "colour, attribute, height, …";
-        if let Some(color) = edited(ui, "color", "Own colour", &text, hint) {
-            entry.appearance.color = color.parse().ok();
+        let entries = automatic.into_iter().chain(named);
+        if let Some(array) = choice(ui, "Array", entries, &current, current.as_deref()) {
+            actions.push(Action::change(move |scene| arrays::choose(scene, number, array)));
         }
     });
+}
+
+/// Shows what can colour a surface.
+fn colors(
+    ui: &mut Ui,
+    number: usize,
+    entry: &InputEntry,
+    (scene, loaded): (&Description, &LoadedInput),
+    actions: &mut Vec<Action>,
+) {
+    let current = scene.appearance_of(entry).color;
+    let plain = match current {
+        Some(SurfaceColor::Plain(color)) => Some(color),
+        _ => None,
+    };
+    let one = SurfaceColor::Plain(plain.unwrap_or(PLAIN));
+    let fixed = [
+        ("automatic", None),
+        ("the file's colours", Some(SurfaceColor::File)),
+        ("one colour", Some(one)),
+        ("height", Some(SurfaceColor::Height)),
+        ("direction of the surface", Some(SurfaceColor::Normal)),
+    ];
+    let fixed = fixed.into_iter().map(|(name, color)| (name.to_owned(), color));
+    let attribute = |name: &String| (name.clone(), Some(SurfaceColor::Attribute(name.clone())));
+    let entries = fixed.chain(loaded.attributes.iter().map(attribute));
+    let name = current.as_ref().map(ToString::to_string);
     ui.horizontal(|ui| {
-        ui.add_space(18.0);
-        let id = ui.scope_id().with("opacity");
-        let current = f64::from(entry.appearance.opacity.unwrap_or(1.0));
-        let mut opacity = ui.data(|data| data.get_temp::<f64>(id)).unwrap_or(current);
+        let mut chosen = choice(ui, "Colour", entries, &current, name.as_deref());
+        if let Some(plain) = plain
+            && let Some(picked) = color(ui, "Colour of the surface", plain)
+        {
+            chosen = Some(Some(SurfaceColor::Plain(picked)));
+        }
+        if let Some(color) = chosen {
+            actions.push(Action::change(move |scene| set_color(scene, number, color)));
+        }
+    });
+}
+
+/// Colours one surface. What colours all of them becomes what colours each.
+fn set_color(scene: &mut Description, number: usize, color: Option<SurfaceColor>) {
+    if let Some(shared) = scene.appearance.color.take() {
+        for input in &mut scene.inputs {
+            input.appearance.color.get_or_insert_with(|| shared.clone());
+        }
+    }
+    scene.inputs[number].appearance.color = color;
+}
+
+/// Shows the opacity of a surface. Its splats are made anew: once, at the end of a drag.
+fn opacity(ui: &mut Ui, number: usize, entry: &InputEntry, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
         let label = ui.label("Opacity");
-        let field = DragValue::new(&mut opacity).range(0.01..=1.0).speed(0.005);
-        let response = ui.add(field.update_while_editing(false)).labelled_by(label.id);
-        // The splats are made anew: once, at the end of a drag.
-        if response.dragged() {
-            ui.data_mut(|data| data.insert_temp(id, opacity));
-        } else {
-            ui.data_mut(|data| data.remove::<f64>(id));
-            if opacity != current {
-                entry.appearance.opacity = Some(opacity as f32).filter(|value| *value < 1.0);
-            }
+        let current = f64::from(entry.appearance.opacity.unwrap_or(1.0));
+        let opacity = held(ui, "opacity", current, |ui, opacity| {
+            let field = DragValue::new(opacity).range(0.01..=1.0).speed(0.005);
+            ui.add(field.update_while_editing(false)).labelled_by(label.id);
+        });
+        if let Some(opacity) = opacity {
+            let opacity = Some(opacity as f32).filter(|value| *value < 1.0);
+            actions.push(Action::change(move |scene| {
+                scene.inputs[number].appearance.opacity = opacity;
+            }));
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_coloured_all_colours_each() {
+        let mut scene = Description::new(["a.ply".into(), "b.ply".into()]);
+        scene.appearance.color = Some(SurfaceColor::Height);
+        set_color(&mut scene, 1, None);
+        let colors = [0, 1].map(|number| scene.appearance_of(&scene.inputs[number]).color);
+        assert_eq!(colors, [Some(SurfaceColor::Height), None]);
+    }
 }

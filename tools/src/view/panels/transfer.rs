@@ -1,75 +1,49 @@
 //! The transfer functions of the fields, of which one is edited.
 
-use super::Ask;
+use super::lists::choice;
 use crate::view::{
-    curve::{self, Edit},
-    window::Window,
+    action::{Action, Purpose},
+    curve::{CurveEditor, Edit},
 };
-use eframe::egui::{ComboBox, Ui, Vec2};
-use std::sync::Arc;
+use eframe::egui::Ui;
+use splatkit::{interaction::Histogram, volume::TransferFunction};
 
-pub fn show(window: &mut Window, ui: &mut Ui) {
-    let field = choose(window, ui);
-    let (Some(mut transfer), Some(stage), Some(mut curve)) = (
-        window.transfer(),
-        window.scene_view.as_ref().map(|scene_view| Arc::clone(&scene_view.stage)),
-        window.panels.curve.take(),
-    ) else {
-        return;
-    };
-    ui.horizontal(|ui| {
-        if ui.button("Load…").clicked() {
-            window.panels.ask(Ask::OpenTransfer);
-        }
-        if ui.button("Save…").clicked() {
-            window.panels.ask(Ask::SaveTransfer);
-        }
-    });
-    let histogram = stage.histogram(field);
-    let edit =
-        ui.push_id(field, |ui| curve.show(ui, histogram, &mut transfer, stage.values(field)));
-    let edit = edit.inner;
-    window.panels.curve = Some(curve);
-    if edit == Edit::Unchanged {
-        return;
-    }
-    // A drag is one step.
-    let before = window.panels.before_edit.take();
-    let before = before.unwrap_or_else(|| window.document.scene().clone());
-    window.set_transfer(&transfer);
-    match edit {
-        Edit::Committed => window.document.keep(before),
-        _ => window.panels.before_edit = Some(before),
-    }
+/// What the panel shows.
+pub struct Transfer<'a> {
+    /// The items that have a field, with their names, and the one that is edited.
+    pub fields: &'a [(usize, String)],
+    pub field: usize,
+    pub transfer: &'a TransferFunction,
+    pub histogram: Option<&'a Histogram>,
+    /// The smallest and the largest value, and whether they are Hounsfield units.
+    pub values: [f64; 2],
+    pub is_hounsfield: bool,
 }
 
-/// Lets one of several fields be chosen. Returns the item whose field is edited.
-fn choose(window: &mut Window, ui: &mut Ui) -> usize {
-    let Some(scene_view) = &mut window.scene_view else { return 0 };
-    let fields = scene_view.fields();
-    if fields.len() > 1 {
-        let current = fields.iter().find(|(item, _)| *item == scene_view.field);
-        let current = current.map_or("", |(_, name)| name);
+pub fn show(ui: &mut Ui, model: &Transfer, curve: &mut CurveEditor) -> Vec<Action> {
+    let mut actions = Vec::new();
+    if model.fields.len() > 1 {
+        let entries = model.fields.iter().map(|(item, name)| (name.clone(), *item));
         ui.horizontal(|ui| {
-            let label = ui.label("Field");
-            let choice = ComboBox::from_id_salt("field").selected_text(current);
-            let list = choice.show_ui(ui, |ui| {
-                for (item, name) in &fields {
-                    ui.selectable_value(&mut scene_view.field, *item, name);
-                }
-            });
-            list.response.labelled_by(label.id);
+            actions
+                .extend(choice(ui, "Field", entries, &model.field, None).map(Action::ChooseField));
         });
     }
-    scene_view.field
-}
-
-/// Moves and widens the transfer function as a hand drags.
-pub fn window_level(window: &mut Window, drag: Vec2) {
-    let Some(mut transfer) = window.transfer() else { return };
-    let values =
-        window.scene_view.as_ref().map(|scene_view| scene_view.stage.values(scene_view.field));
-    let Some(values) = values else { return };
-    curve::window_level(&mut transfer, drag, values);
-    window.set_transfer(&transfer);
+    ui.horizontal(|ui| {
+        if ui.button("Load…").clicked() {
+            actions.push(Action::Ask(Purpose::OpenTransfer));
+        }
+        if ui.button("Save…").clicked() {
+            actions.push(Action::Ask(Purpose::SaveTransfer));
+        }
+    });
+    curve.set_hounsfield(model.is_hounsfield);
+    let mut transfer = model.transfer.clone();
+    let shown = |ui: &mut Ui| curve.show(ui, model.histogram, &mut transfer, model.values);
+    let edit = ui.push_id(model.field, shown).inner;
+    actions.extend(curve.take_note().map(Action::Say));
+    if edit != Edit::Unchanged {
+        actions.push(Action::Transfer(Box::new(transfer)));
+    }
+    actions
 }

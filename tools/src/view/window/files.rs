@@ -1,14 +1,21 @@
 //! What the window reads and writes besides inputs: pictures, scenes, transfer functions, paths of
 //! the camera, and films.
 
-use super::{
-    export::{Exporting, Film},
-    loader::text_of,
-    window::Window,
+use super::Window;
+use crate::{
+    motion::read_path,
+    scene_file,
+    view::{
+        export::{Exporting, Film},
+        loader::text_of,
+    },
 };
-use crate::{motion::read_path, scene_file};
 use splatkit::{
-    input::Limits, picture::PictureFormat, session::CameraEntry, volume::TransferFunction,
+    input::Limits,
+    math::CameraPath,
+    picture::PictureFormat,
+    session::{CameraEntry, InputEntry},
+    volume::TransferFunction,
 };
 use std::{
     path::{Path, PathBuf},
@@ -16,6 +23,32 @@ use std::{
 };
 
 impl Window {
+    /// Adds files to the scene, or opens a scene file in place of it.
+    pub fn open(&mut self, files: Vec<PathBuf>) {
+        if let Some(path) = files.iter().find(|path| scene_file::is_scene(path)) {
+            let is_trusting = self.document.is_trusting;
+            match scene_file::read(path, is_trusting) {
+                Ok(scene) => {
+                    self.document.open(scene, path.clone());
+                    self.loaded_by = None;
+                }
+                Err(error) => self.say(text_of(&error.into()), true),
+            }
+            return;
+        }
+        let entries = files.into_iter().map(InputEntry::new);
+        self.document.change(|scene| scene.inputs.extend(entries));
+    }
+
+    /// Puts what is shown at the top of the recent files: the scene file, or else the inputs.
+    pub(super) fn keep_recent(&mut self) {
+        let inputs = || self.document.scene().visible().map(|input| input.file.clone()).collect();
+        let files: Vec<PathBuf> = self.document.path.clone().map_or_else(inputs, |path| vec![path]);
+        if let Err(message) = self.surroundings.recent.add(&files) {
+            self.say(message, false);
+        }
+    }
+
     /// Saves the exact picture as soon as it is drawn.
     pub fn save_picture(&mut self, path: PathBuf) {
         match PictureFormat::of(&path) {
@@ -37,7 +70,7 @@ impl Window {
     }
 
     /// Copies the command that draws what is shown.
-    pub fn copy_command(&mut self) {
+    pub(super) fn copy_command(&mut self) {
         self.fix_view();
         match self.document.command_line() {
             Ok(line) => {
@@ -68,9 +101,8 @@ impl Window {
     pub fn load_transfer(&mut self, path: &Path) {
         match TransferFunction::read(path, &Limits::default()) {
             Ok(transfer) => {
-                let before = self.document.scene().clone();
                 self.set_transfer(&transfer);
-                self.document.keep(before);
+                self.document.end_step();
             }
             Err(error) => self.say(error.to_string(), true),
         }
@@ -85,13 +117,13 @@ impl Window {
     /// Takes the keyframes of a file.
     pub fn load_path(&mut self, path: &Path) {
         match read_path(path, &Limits::default()) {
-            Ok(path) => self.panels.flight.keyframes = path.keyframes().to_vec(),
+            Ok(path) => self.keyframes = path.keyframes().to_vec(),
             Err(error) => self.say(error.to_string(), true),
         }
     }
 
     pub fn save_path(&mut self, path: &Path) {
-        let text = self.panels.flight.path().map(|path| path.to_json());
+        let text = CameraPath::new(self.keyframes.clone()).map(|path| path.to_json());
         let done = text.and_then(|text| splatkit::disk::write(path, text.as_bytes()));
         self.say_saved(path, done);
     }
@@ -104,29 +136,30 @@ impl Window {
         let started = self
             .document
             .job_of_film(self.size)
-            .and_then(|job| Ok((job, self.panels.flight.path()?)))
+            .and_then(|job| Ok((job, CameraPath::new(self.keyframes.clone())?)))
             .map_err(|failure| text_of(&failure))
             .and_then(|(job, path)| {
-                let (transfers, rate) = (self.transfers(), self.panels.flight.rate);
+                let transfers = scene_view.transfers(&self.document);
+                let rate = self.player.rate;
                 let film = Film { job, stage, transfers, path, rate, output };
                 Exporting::start(film, move || repaint.request_repaint())
                     .map_err(|error| error.to_string())
             });
         match started {
-            Ok(exporting) => self.panels.flight.exporting = Some(exporting),
+            Ok(exporting) => self.exporting = Some(exporting),
             Err(message) => self.say(message, true),
         }
     }
 
     /// Says how a film ended.
-    pub fn take_film(&mut self) {
-        let Some(exporting) = &self.panels.flight.exporting else { return };
+    pub(super) fn take_film(&mut self) {
+        let Some(exporting) = &self.exporting else { return };
         let Some((result, notes)) = exporting.take() else {
             // The time runs.
             self.context.request_repaint_after(std::time::Duration::from_millis(200));
             return;
         };
-        self.panels.flight.exporting = None;
+        self.exporting = None;
         notes.into_iter().for_each(|note| self.say(note, false));
         if let Err(message) = result {
             self.say(message, true);
@@ -134,7 +167,7 @@ impl Window {
     }
 
     /// Saves the picture if it is wanted and exact.
-    pub fn save_if_exact(&mut self) {
+    pub(super) fn save_if_exact(&mut self) {
         if self.save_to.is_none() || !self.rests() {
             return;
         }

@@ -1,0 +1,354 @@
+//! What users come for, by mouse and keys alone: each test is one task, told in docs/window.md.
+
+use super::*;
+use egui::{Key, Modifiers, ViewportCommand, ViewportId};
+use std::{fmt::Write as _, path::PathBuf};
+
+type Driven = Harness<'static, Option<Window>>;
+
+fn steps(harness: &mut Driven, count: usize) {
+    for _ in 0..count {
+        harness.step();
+    }
+}
+
+fn click(harness: &mut Driven, label: &str) {
+    harness.get_by_label(label).click();
+    steps(harness, 5);
+}
+
+fn click_part(harness: &mut Driven, label: &str) {
+    harness.get_by_label_contains(label).click();
+    steps(harness, 5);
+}
+
+fn key(harness: &mut Driven, modifiers: Modifiers, key: Key) {
+    harness.key_press_modifiers(modifiers, key);
+    steps(harness, 2);
+}
+
+fn scene(harness: &mut Driven) -> Description {
+    window(harness).document.scene().clone()
+}
+
+fn drag(harness: &mut Driven, from: egui::Pos2, by: egui::Vec2) {
+    harness.hover_at(from);
+    harness.step();
+    harness.drag_at(from);
+    harness.step();
+    for part in 1..5 {
+        harness.hover_at(from + by * (part as f32 / 4.0));
+        harness.step();
+    }
+    harness.drop_at(from + by);
+    steps(harness, 2);
+}
+
+/// A volume of 4³ samples with two arrays, of which the values lie apart.
+fn two_arrays(folder: &Path) -> PathBuf {
+    let mut text = "# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET STRUCTURED_POINTS\n\
+        DIMENSIONS 4 4 4\nORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA 64\n"
+        .to_owned();
+    for (name, first) in [("heat", 0), ("flow", 1000)] {
+        write!(text, "SCALARS {name} float 1\nLOOKUP_TABLE default\n").expect("text");
+        (0..64).for_each(|at| writeln!(text, "{}", first + at * at % 61).expect("text"));
+    }
+    let file = folder.join("two.vtk");
+    std::fs::write(&file, text).expect("written");
+    file
+}
+
+/// A volume in the frame of a patient.
+fn patient(folder: &Path) -> PathBuf {
+    let mut bytes = b"NRRD0005\ntype: uint8\ndimension: 3\nsizes: 6 5 4\nencoding: raw\n\
+        space: right-anterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n\
+        space origin: (0,0,0)\n\n"
+        .to_vec();
+    bytes.extend((0..120u8).map(|at| at.wrapping_mul(37)));
+    let file = folder.join("patient.nrrd");
+    std::fs::write(&file, bytes).expect("written");
+    file
+}
+
+fn surface(folder: &Path) -> PathBuf {
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+        property float z\nproperty float heat\nproperty float flow\nelement face 2\n\
+        property list uchar int vertex_indices\nend_header\n\
+        0 0 0 0 9\n1 0 0 1 8\n0 1 0 2 7\n1 1 0.5 3 1\n3 0 1 2\n3 1 3 2\n";
+    let file = folder.join("surface.ply");
+    std::fs::write(&file, ply).expect("written");
+    file
+}
+
+#[test]
+fn another_array_is_chosen_from_a_list() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness_of(folder.path(), two_arrays(folder.path()));
+    rest(&mut harness);
+    // The list is read in the background.
+    for _ in 0..200 {
+        if harness.query_by_role_and_label(egui::Role::ComboBox, "Array").is_some() {
+            break;
+        }
+        harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let values = |harness: &mut Driven| {
+        let scene_view = window(harness).scene_view.as_ref().expect("a scene");
+        scene_view.stage.values(0)
+    };
+    assert!(values(&mut harness)[1] < 100.0);
+    choose(&mut harness, "Array", "flow");
+    rest(&mut harness);
+    assert_eq!(scene(&mut harness).reading.scalar.as_deref(), Some("flow"));
+    assert!(values(&mut harness)[0] >= 1000.0, "{:?}", values(&mut harness));
+    key(&mut harness, Modifiers::COMMAND, Key::Z);
+    rest(&mut harness);
+    assert!(values(&mut harness)[1] < 100.0, "the array was not undone");
+}
+
+#[test]
+fn a_box_crops_by_its_handle() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    let whole = picture_of(&mut harness);
+    unfold(&mut harness, "Clips");
+    click(&mut harness, "Box");
+    let ends = |harness: &mut Driven| scene(harness).picture.clips[0].corners().expect("a box");
+    let [_, before] = ends(&mut harness);
+    let at = harness.get_by_label("Handle of clip 1, z to").rect().center();
+    drag(&mut harness, at, egui::vec2(0.0, 60.0));
+    let [_, after] = ends(&mut harness);
+    assert!(after[2] < before[2], "{after:?}");
+    assert!(picture_of(&mut harness) != whole, "nothing is cropped");
+    // The whole drag is one step.
+    key(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert_eq!(ends(&mut harness)[1], before);
+    key(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert!(scene(&mut harness).picture.clips.is_empty());
+}
+
+#[test]
+fn three_slices_of_a_patient_have_their_names() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness_of(folder.path(), patient(folder.path()));
+    rest(&mut harness);
+    click(&mut harness, "Slices");
+    let places = ["Axial", "Coronal", "Sagittal"].map(|name| {
+        harness.get_by_label(name);
+        harness.get_by_label(&format!("{name} picture")).rect().top()
+    });
+    assert!(places.is_sorted(), "{places:?}");
+}
+
+#[test]
+fn a_preset_of_ct_says_that_the_values_are_others() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    let before = picture_of(&mut harness);
+    click(&mut harness, "Presets");
+    click(&mut harness, "ct-bone");
+    let after = picture_of(&mut harness);
+    assert!(after != before && after.iter().any(|pixel| pixel[3] > 0.05), "nothing is shown");
+    let (message, is_error) = window(&mut harness).messages.last().expect("a message").clone();
+    assert!(message.contains("not in Hounsfield units") && !is_error, "{message}");
+}
+
+/// A file that says nothing about its values, but has those of a scan, keeps Hounsfield units.
+#[test]
+fn a_preset_of_ct_shows_hounsfield_units_as_they_are() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut bytes = b"NRRD0005\ntype: int16\ndimension: 3\nsizes: 4 4 4\nencoding: raw\n\
+        endian: little\n\n"
+        .to_vec();
+    bytes.extend((0..64i16).flat_map(|at| (at * 40 - 1000).to_le_bytes()));
+    let file = folder.path().join("ct.nrrd");
+    std::fs::write(&file, bytes).expect("written");
+    let mut harness = harness_of(folder.path(), file);
+    rest(&mut harness);
+    click(&mut harness, "Presets");
+    click(&mut harness, "ct-bone");
+    let state = window(&mut harness);
+    let transfer = state.transfer().expect("a field");
+    assert_eq!(transfer.opacity[0].0, 150.0);
+    let messages = state.messages.iter();
+    assert!(messages.into_iter().all(|(text, _)| !text.contains("Hounsfield")));
+}
+
+#[test]
+fn a_colour_is_picked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    choose(&mut harness, "Background", "gray");
+    let gray = scene(&mut harness).picture.background();
+    pick(&mut harness, "Colour of the background");
+    let picked = scene(&mut harness).picture.background().expect("a colour");
+    assert!(picked[0] > picked[1] + 0.3, "{picked:?} is not the picked colour");
+    key(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert_eq!(scene(&mut harness).picture.background(), gray, "picking is one step");
+}
+
+#[test]
+fn maps_and_colours_of_surfaces_are_chosen_from_lists() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness_of(folder.path(), surface(folder.path()));
+    let plain = picture_of(&mut harness);
+    choose(&mut harness, "Colour", "heat");
+    let viridis = picture_of(&mut harness);
+    assert!(viridis != plain, "the values have no colours");
+    choose(&mut harness, "Colour map", "plasma");
+    let plasma = picture_of(&mut harness);
+    assert!(plasma != viridis, "the map is the same");
+    let map = scene(&mut harness).appearance.colormap.expect("a map");
+    assert_eq!(map.to_string(), "plasma");
+    // The range of the map, and back to all values.
+    harness.get_by_role_and_label(egui::Role::SpinButton, "Highest value").set_value_accesskit(1.0);
+    steps(&mut harness, 2);
+    assert_eq!(scene(&mut harness).appearance.range, Some([0.0, 1.0]));
+    rest(&mut harness);
+    click(&mut harness, "All values");
+    assert_eq!(scene(&mut harness).appearance.range, None);
+    assert!(picture_of(&mut harness) == plasma);
+}
+
+#[test]
+fn the_map_of_a_field_is_chosen_from_a_list() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    let before = picture_of(&mut harness);
+    click(&mut harness, "Presets");
+    click_part(&mut harness, "Colours");
+    click(&mut harness, "plasma");
+    assert!(picture_of(&mut harness) != before, "the colours are the same");
+}
+
+#[test]
+fn the_up_axis_and_the_view_are_chosen_from_lists() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    let before = picture_of(&mut harness);
+    choose(&mut harness, "Up", "+X");
+    let turned = picture_of(&mut harness);
+    assert_eq!(scene(&mut harness).framing.up, Some(glam::DVec3::X));
+    assert!(turned != before, "nothing turned");
+    choose(&mut harness, "View", "top");
+    assert!(picture_of(&mut harness) != turned);
+    let camera = window(&mut harness).scene_view.as_ref().expect("a scene").orbit.camera().clone();
+    let way = (camera.focal_point - camera.position).normalize();
+    assert!(way.x < -0.99, "{way} is not from above");
+}
+
+#[test]
+fn a_film_is_exported_by_the_dialog() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    harness.set_size(egui::vec2(480.0, 1600.0));
+    rest(&mut harness);
+    unfold(&mut harness, "Camera path");
+    click(&mut harness, "Turn around");
+    harness
+        .get_by_role_and_label(egui::Role::SpinButton, "Frames per second")
+        .set_value_accesskit(1.0);
+    steps(&mut harness, 2);
+    click(&mut harness, "Export film…");
+    let film = folder.path().join("film.gif");
+    key(&mut harness, Modifiers::COMMAND, Key::A);
+    harness.event(egui::Event::Text(film.display().to_string()));
+    harness.step();
+    harness.key_press(Key::Enter);
+    steps(&mut harness, 2);
+    for _ in 0..4000 {
+        harness.step();
+        if window(&mut harness).exporting.is_none() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(film.exists(), "{:?}", window(&mut harness).messages);
+}
+
+#[test]
+fn keys_undo_and_redo() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    click(&mut harness, "Axes");
+    assert!(scene(&mut harness).overlay.axes);
+    key(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert!(!scene(&mut harness).overlay.axes);
+    key(&mut harness, Modifiers::COMMAND, Key::Y);
+    assert!(scene(&mut harness).overlay.axes);
+}
+
+#[test]
+fn recent_files_are_opened_again_and_missing_ones_say_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    let other = surface(folder.path());
+    window(&mut harness).open(vec![other.clone()]);
+    window(&mut harness).document.change(|scene| drop(scene.inputs.remove(0)));
+    rest(&mut harness);
+    click(&mut harness, "File");
+    click_part(&mut harness, "Open recent");
+    click(&mut harness, "v.nrrd");
+    rest(&mut harness);
+    let files = |harness: &mut Driven| {
+        scene(harness).inputs.into_iter().map(|input| input.file).collect::<Vec<_>>()
+    };
+    assert_eq!(files(&mut harness), [folder.path().join("v.nrrd")]);
+    std::fs::remove_file(&other).expect("removed");
+    click(&mut harness, "File");
+    click_part(&mut harness, "Open recent");
+    click(&mut harness, "surface.ply (missing)");
+    assert_eq!(files(&mut harness), [folder.path().join("v.nrrd")], "it cannot be chosen");
+}
+
+#[test]
+fn the_engine_changes_while_the_scene_stays_loaded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    let state = |harness: &mut Driven| {
+        let stage = &window(harness).scene_view.as_ref().expect("a scene").stage;
+        (std::sync::Arc::clone(&stage.loaded), stage.device.name().to_owned())
+    };
+    let (loaded, cpu) = state(&mut harness);
+    std::fs::remove_file(folder.path().join("v.nrrd")).expect("removed");
+    choose(&mut harness, "Engine", "gpu");
+    rest(&mut harness);
+    let (same, gpu) = state(&mut harness);
+    let messages = window(&mut harness).messages.clone();
+    assert!(std::sync::Arc::ptr_eq(&loaded, &same), "the file was read again");
+    assert_ne!(cpu, gpu, "{messages:?}");
+    choose(&mut harness, "Engine", "cpu");
+    rest(&mut harness);
+    assert_eq!(state(&mut harness).1, cpu);
+}
+
+#[test]
+fn the_window_has_a_title_fills_the_screen_and_closes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    let commands = |harness: &mut Driven, key: Option<(Modifiers, Key)>| {
+        if let Some((modifiers, key)) = key {
+            let (physical_key, pressed, repeat) = (None, true, false);
+            harness.event(egui::Event::Key { key, physical_key, pressed, repeat, modifiers });
+        }
+        // Each event has a frame of its own, of which the last one is asked.
+        harness.step();
+        harness.output().viewport_output[&ViewportId::ROOT].commands.clone()
+    };
+    assert_eq!(window(&mut harness).document.title(), "v.nrrd — splatkit");
+    let other = surface(folder.path());
+    window(&mut harness).open(vec![other]);
+    let title = ViewportCommand::Title("v.nrrd + 1 — splatkit".into());
+    let titled = commands(&mut harness, None);
+    assert!(titled.contains(&title), "{titled:?}");
+    let full = commands(&mut harness, Some((Modifiers::NONE, Key::F11)));
+    assert!(full.contains(&ViewportCommand::Fullscreen(true)), "{full:?}");
+    let close = commands(&mut harness, Some((Modifiers::COMMAND, Key::Q)));
+    assert!(close.contains(&ViewportCommand::Close), "{close:?}");
+}
