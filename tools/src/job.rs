@@ -5,7 +5,6 @@ use crate::{
     engine::{self, DeviceFlags},
     failure::Failure,
     given::{self, Given, Kinds},
-    overlay::Overlay,
     progress::Progress,
     scene_file::Stated,
 };
@@ -17,6 +16,7 @@ use splatkit::{
     scene::{Clip, Scene, Settings},
     session::{self, Description, Framing, LoadedInput, TransferEntry},
 };
+use splatkit_media::overlay::Overlay;
 #[cfg(feature = "window")]
 use splatkit::{
     scene::Item,
