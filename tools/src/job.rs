@@ -16,13 +16,13 @@ use splatkit::{
     scene::{Clip, Scene, Settings},
     session::{self, Description, Framing, LoadedInput, TransferEntry},
 };
-use splatkit_media::overlay::Overlay;
 #[cfg(feature = "window")]
 use splatkit::{
     scene::Item,
     session::{Captions, Legend},
     volume::TransferFunction,
 };
+use splatkit_media::overlay::Overlay;
 use std::{
     ops::{Deref, DerefMut},
     path::{Path, PathBuf},

@@ -27,9 +27,9 @@ use splatkit::{
     scene::Settings,
     session::{Background, Description, Origin, Samples},
 };
-use splatkit_media::video::{Film, Format};
 #[cfg(feature = "window")]
 use splatkit::{Stop, math::CameraPath, volume::TransferFunction};
+use splatkit_media::video::{Film, Format};
 use std::{
     path::{Path, PathBuf},
     time::Instant,

@@ -50,6 +50,11 @@ impl Picture {
     pub fn pixels(&self) -> &Pixels {
         &self.pixels
     }
+
+    /// Returns the picture, shared.
+    pub fn shared(&self) -> Arc<Pixels> {
+        self.pixels.clone()
+    }
 }
 
 #[pymethods]

@@ -3,7 +3,7 @@
 
 use crate::{
     camera::{camera, to_json},
-    draw::Draw,
+    draw::{Draw, Viewpoint},
     errors::{options, raise},
     picture::Picture,
     scene::Scene,
@@ -168,7 +168,10 @@ pub fn render_frame(
     let draw = Draw::parse(draw).map_err(|error| raise(py, &error))?;
     let (stage, worker_stop) = (scene.stage().clone(), stop.0.clone());
     let effort = effort_of(effort);
-    let drawn = run(py, &stop.0, move || stage.draw(Some(&camera), &draw, effort, &worker_stop))?;
+    let drawn = run(py, &stop.0, move || {
+        let viewpoint = Viewpoint::Camera(&camera);
+        stage.draw(viewpoint, &draw, effort, &worker_stop)
+    })?;
     Ok(drawn.into())
 }
 

@@ -22,7 +22,7 @@ from ._picture import Picture
 from ._transfer import TransferFunction
 
 _STATIC = Path(__file__).parent / "static"
-_OPTIONS = _scene.DRAWING - {"size", "camera"}
+_OPTIONS = _options.DRAWING
 #: What a message of the browser can lead to. It is shown in the widget.
 _FAILURES = (Error, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 #: Most pixels of the screen in a pixel of CSS that are drawn.
@@ -148,23 +148,34 @@ class Widget(anywidget.AnyWidget):
             exact = self._exact
         if exact is not None and exact.order == order and exact.picture is not None:
             return Picture(exact.picture, self._background).rgba
-        picture = self._scene._native.render(order.camera, order.draw)
+        picture = self._scene._native.render(order.camera, "{}", order.draw)
         return Picture(picture, self._background).rgba
 
     def refresh(self) -> None:
-        """Draws the scene again: after items were added, or a transfer function was changed
-        elsewhere."""
-        fields = json.loads(_pysplatkit.fields(self._scene._native))
-        counted = len(self._fields)
-        # Items are only ever added. Those that are known keep the function they came with.
-        self._fields += fields[counted:]
+        """Draws the scene again: after items were added or changed, or a transfer function was
+        changed elsewhere."""
+        native, items = self._scene._native, self._scene._items
+        fields = json.loads(_pysplatkit.fields(native))
+        contents = native.contents
+        known = {id(field["of"]): field for field in self._fields}
+        histograms = dict(zip(known, self._histograms, strict=True))
+        self._fields = []
+        for field in fields:
+            # Arguments are those of an item as long as nothing but its function changes.
+            of = items[contents[field["item"]][1]].arguments
+            before = known.get(id(of))
+            # “As loaded” is the function that the item came with.
+            loaded = field["transfer"] if before is None else before["transfer"]
+            self._fields.append({**field, "of": of, "transfer": loaded})
         with self.hold_sync():
-            self._names = [field["name"] for field in fields]
+            self.field = max(0, min(self.field, len(fields) - 1))
+            self._names = [items[contents[field["item"]][1]].name for field in fields]
             self._ranges = [field["range"] for field in fields]
-            self._histograms = [*self._histograms, *([] for _ in fields[counted:])]
+            self._histograms = [histograms.get(id(field["of"]), []) for field in self._fields]
             self._transfers = [field["transfer"] for field in fields]
-        for number in range(counted, len(fields)):
-            threading.Thread(target=self._count, args=(number,), daemon=True).start()
+        for number, counts in enumerate(self._histograms):
+            if not counts:
+                threading.Thread(target=self._count, args=(number,), daemon=True).start()
         self._draw()
 
     def close(self) -> None:
@@ -285,8 +296,7 @@ class Widget(anywidget.AnyWidget):
         return named
 
     def _set_transfer(self, field: int, transfer: dict[str, Any]) -> None:
-        item = self._fields[field]["item"]
-        _pysplatkit.set_transfer(self._scene._native, item, json.dumps(transfer))
+        self._scene._set_transfer(self._fields[field]["item"], json.dumps(transfer))
         transfers = list(self._transfers)
         transfers[field] = transfer
         self._transfers = transfers
@@ -294,12 +304,15 @@ class Widget(anywidget.AnyWidget):
 
     def _count(self, field: int) -> None:
         """Counts the values of a field, on a thread of its own."""
-        counts = _pysplatkit.histogram(self._scene._native, self._fields[field]["item"])
+        entry = self._fields[field]
+        counts = _pysplatkit.histogram(self._scene._native, entry["item"])
 
         def take() -> None:
-            histograms = list(self._histograms)
-            histograms[field] = counts
-            self._histograms = histograms
+            # The scene may have changed meanwhile.
+            if field < len(self._fields) and self._fields[field]["of"] is entry["of"]:
+                histograms = list(self._histograms)
+                histograms[field] = counts
+                self._histograms = histograms
 
         self._later(take)
 
