@@ -225,7 +225,7 @@ def test_errors_are_told_and_pass(widget):
         sent.clear()
         tell(widget, gesture)
         assert widget._error
-        assert sent == [({"type": "idle"}, None)]
+        assert sent == [({"type": "idle", "answers": {}}, None)]
     tell(widget, ("turn", {"drag": [3, 3]}))
     assert widget._error == "" and widget._still
     # A picture that cannot be drawn is an error, too, and the next one is drawn again.

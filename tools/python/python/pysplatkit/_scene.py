@@ -867,6 +867,8 @@ def _drawn(
     **draw: Any,
 ) -> str:
     """Returns how a picture is drawn, as JSON."""
+    if draw.get("engine") not in (None, "cpu", "gpu", "auto"):
+        raise ArgumentError(f"engine is cpu, gpu or auto, not {draw['engine']!r}")
     entries = [clip._entry() if isinstance(clip, Clip) else clip for clip in clips or ()]
     overlay = {name: draw.pop(name) for name in _options.OVERLAY & draw.keys()}
     overlay = {name: value for name, value in overlay.items() if value is not None}

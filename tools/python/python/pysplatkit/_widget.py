@@ -87,6 +87,8 @@ class Widget(anywidget.AnyWidget):
         self._drawing.pop("background", None)
         self._ratio = 1.0
         self._orders = 0
+        # The number of the last message of each view of the browser.
+        self._answers: dict[str, int] = {}
         self._lock = threading.Lock()
         self._arrived: tuple[Frame, bytes] | None = None
         self._exact: Frame | None = None
@@ -189,6 +191,8 @@ class Widget(anywidget.AnyWidget):
     def _take_message(self, _: Any, content: Any, __: Any = None) -> None:
         self._loop = _running_loop() or self._loop
         before = self._orders
+        if "view" in content:
+            self._answers = {**self._answers, str(content["view"]): int(content["number"])}
         try:
             for kind, details in content["do"]:
                 getattr(self, f"_on_{kind}")(**details)
@@ -196,7 +200,7 @@ class Widget(anywidget.AnyWidget):
             self._error = str(error) or repr(error)
         if self._orders == before:
             # No frame follows, which the browser would wait for.
-            self.send({"type": "idle"})
+            self.send({"type": "idle", "answers": self._answers})
 
     def _on_ready(self, ratio: float) -> None:
         """A view is there. Its screen has `ratio` pixels in one of CSS."""
@@ -259,7 +263,11 @@ class Widget(anywidget.AnyWidget):
     def _order(self) -> Order:
         transfers = json.dumps(self._transfers)
         return Order(
-            self._scene._native, self.camera.to_json(), self._draws(self.pixels), transfers
+            self._scene._native,
+            self.camera.to_json(),
+            self._draws(self.pixels),
+            transfers,
+            self._answers,
         )
 
     def _draw(self) -> None:
@@ -334,19 +342,22 @@ class Widget(anywidget.AnyWidget):
         frame, png = arrived
         if frame.picture is None:
             self._error = str(frame.error)
-            self.send({"type": "idle"})
+            self.send({"type": "idle", "answers": dict(frame.order.answers)})
             return
         self._shown = frame.picture
         is_exact = frame.is_exact and frame.order == self._order()
         size, took = frame.picture.size, frame.milliseconds
         status = {"size": size, "exact": is_exact, "milliseconds": took}
+        answers = {"answers": dict(frame.order.answers)}
+        if not is_exact:
+            # One message a frame: the status goes with it.
+            self._error = ""
+            self.send({"type": "frame", **status, **answers}, [png])
+            return
         with self.hold_sync():
             self._error = ""
-            self._status = status
-            if is_exact:
-                self._still = png
-        if not is_exact:
-            self.send({"type": "frame", **status}, [png])
+            self._status = {**status, **answers}
+            self._still = png
 
     def _later(self, call: Callable[[], None]) -> None:
         """Calls a function on the kernel's thread, which alone may send messages."""
