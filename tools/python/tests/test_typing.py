@@ -48,7 +48,7 @@ WRONG = {
     'pysplatkit.render("a", views="left")': "views",
     'pysplatkit.render("a", size=(1, 2, 3))': "size",
     'Scene().add("a", colormap=3)': "colormap",
-    'Scene().render(clip=[])': "clip",
+    "Scene().render(clip=[])": "clip",
     'Scene().film("a.gif", bakground="red")': "bakground",
     'Scene().transform("a", rotate=3)': "rotate",
     "Scene().remove(3)": "str",
