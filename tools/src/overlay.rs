@@ -43,3 +43,19 @@ impl OverlayFlags {
         overlay.caption = self.caption.clone().or(overlay.caption.take());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn captions_have_a_length() {
+        assert_eq!(caption(&"é".repeat(MOST_CAPTION)).map(|text| text.len()), Ok(2000));
+        let error = caption(&"A".repeat(500_000)).unwrap_err();
+        assert_eq!(error, "a caption has at most 1000 characters, not 500000");
+        let flag = OverlayFlags::augment_args(clap::Command::new("test"));
+        let flag = flag.get_arguments().find(|flag| flag.get_long() == Some("caption"));
+        let help = flag.unwrap().get_help().unwrap().to_string();
+        assert!(help.contains(&format!("At most {MOST_CAPTION} characters")), "{help}");
+    }
+}

@@ -1,7 +1,7 @@
 """Draws a film that turns once around a scene.
 
-    python turntable.py FILE FILM   # .gif, .webp, .apng, .mp4, .webm, or FOLDER/ for pictures
-    python turntable.py             # draws a made-up knot
+python turntable.py FILE FILM   # .gif, .webp, .apng, .mp4, .webm, or FOLDER/ for pictures
+python turntable.py             # draws a made-up knot
 """
 
 import sys
