@@ -9,7 +9,10 @@ pub use name::{hex, parse};
 
 use crate::{Error, Result, parallel::prelude::*};
 use serde::{Deserialize, Deserializer, Serialize, de};
-use std::{fmt, sync::LazyLock};
+use std::{
+    fmt,
+    sync::{LazyLock, Mutex, PoisonError},
+};
 
 /// A colour map: the colour of each number from 0 to 1.
 ///
@@ -21,12 +24,25 @@ use std::{fmt, sync::LazyLock};
 /// assert_eq!(ColorMap::named("viridis_r")?.color(1.0), map.color(0.0));
 /// # Ok::<(), splatkit::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+///
+/// A map may also be a list of colours at even distances: `ColorMap::named("black, #ff8800, white")`.
+#[derive(Debug, Clone, Copy, Serialize)]
 #[serde(into = "String")]
 pub struct ColorMap {
+    /// The name, or the colours of a list.
     name: &'static str,
     is_reversed: bool,
+    /// The points of a list of colours.
+    listed: Option<&'static Points>,
 }
+
+impl PartialEq for ColorMap {
+    fn eq(&self, other: &Self) -> bool {
+        (self.name, self.is_reversed) == (other.name, other.is_reversed)
+    }
+}
+
+impl Eq for ColorMap {}
 
 /// How values become colours.
 ///
@@ -93,6 +109,10 @@ static MAPS: LazyLock<[(&str, Points); 13]> = LazyLock::new(|| {
     ]
 });
 
+/// The lists of colours that have become maps. They are kept as long as the process lives, so that
+/// maps can be copied like names.
+static LISTED: Mutex<Vec<ColorMap>> = Mutex::new(Vec::new());
+
 /// Values of which percentiles are taken: of more, every second, third, … one.
 const MOST_SAMPLED: usize = 1 << 20;
 
@@ -105,32 +125,74 @@ impl ColorMap {
 
     /// The map that suits most values: even steps of it look even, also to colour-blind people and
     /// in grey.
-    pub const VIRIDIS: Self = Self { name: "viridis", is_reversed: false };
+    pub const VIRIDIS: Self = Self::builtin("viridis", false);
 
     /// From black to white.
-    pub const GRAY: Self = Self { name: "gray", is_reversed: false };
+    pub const GRAY: Self = Self::builtin("gray", false);
 
     /// The classes of airborne scans (LAS): one colour for each whole number, without mixing.
-    pub const CLASSES: Self = Self { name: "classes", is_reversed: false };
+    pub const CLASSES: Self = Self::builtin("classes", false);
 
-    /// Returns the map of a name. Case does not matter; `grey` is `gray`.
+    /// Most colours of a list.
+    pub const MOST_COLORS: usize = 256;
+
+    const fn builtin(name: &'static str, is_reversed: bool) -> Self {
+        Self { name, is_reversed, listed: None }
+    }
+
+    /// Returns the map of a name, or that of a list of colours, separated by commas. Case does not
+    /// matter; `grey` is `gray`.
     ///
     /// # Errors
-    /// [`Error::Argument`] for another name, with the names that there are.
+    /// [`Error::Argument`] for another name, with the names that there are, and for a list of fewer
+    /// than 2 or more than [`MOST_COLORS`](Self::MOST_COLORS) colours.
     pub fn named(name: &str) -> Result<Self> {
+        if name.contains(',') {
+            return Self::of_list(name);
+        }
         let lower = name.trim().to_ascii_lowercase().replace("grey", "gray");
         let (plain, is_reversed) = match lower.strip_suffix("_r") {
             Some(plain) => (plain, true),
             None => (lower.as_str(), false),
         };
         let matching = Self::NAMES.into_iter().find(|known| *known == plain);
-        matching.map(|name| Self { name, is_reversed }).ok_or_else(|| {
+        matching.map(|name| Self::builtin(name, is_reversed)).ok_or_else(|| {
             Error::Argument(format!(
                 "there is no colour map “{name}”; there are {}, and each reversed, such as \
-                 viridis_r",
+                 viridis_r; a list of colours, such as black,orange,white, is a map, too",
                 Self::NAMES.join(", ")
             ))
         })
+    }
+
+    /// Returns the map of a list of colours, which may end with `_r`.
+    fn of_list(text: &str) -> Result<Self> {
+        let (list, is_reversed) = match text.trim().strip_suffix("_r") {
+            Some(list) => (list, true),
+            None => (text, false),
+        };
+        let wrong = |message| Error::Argument(format!("a colour map of colours: {message}"));
+        let colors: Vec<[f32; 3]> =
+            list.split(',').map(parse).collect::<std::result::Result<_, _>>().map_err(wrong)?;
+        if !(2..=Self::MOST_COLORS).contains(&colors.len()) {
+            let most = Self::MOST_COLORS;
+            return Err(wrong(format!("it has {} colours, not 2 to {most}", colors.len())));
+        }
+        let packed: Vec<u32> = colors
+            .into_iter()
+            .map(|color| color.map(|part| (part * 255.0).round() as u8))
+            .map(|[r, g, b]| u32::from_be_bytes([0, r, g, b]))
+            .collect();
+        let name: Vec<String> = packed.iter().map(|color| format!("#{color:06x}")).collect();
+        let name = name.join(",");
+        let mut listed = LISTED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = listed.iter().find(|map| map.name == name) {
+            return Ok(Self { is_reversed, ..*known });
+        }
+        let points = Some(&*Box::leak(Box::new(even(&packed))));
+        let map = Self { name: name.leak(), is_reversed: false, listed: points };
+        listed.push(map);
+        Ok(Self { is_reversed, ..map })
     }
 
     /// Returns whether each whole number has a colour of its own.
@@ -162,6 +224,9 @@ impl ColorMap {
     }
 
     fn table(self) -> &'static Points {
+        if let Some(points) = self.listed {
+            return points;
+        }
         let entry = MAPS.iter().find(|(name, _)| *name == self.name);
         &entry.unwrap_or(&MAPS[0]).1
     }
@@ -326,6 +391,23 @@ mod tests {
         assert_eq!(ColorMap::named("Grey").unwrap(), ColorMap::GRAY);
         let message = ColorMap::named("virids").unwrap_err().to_string();
         assert!(message.contains("viridis, inferno") && message.contains("_r"), "{message}");
+    }
+
+    #[test]
+    fn lists_of_colours_are_maps() {
+        let map = ColorMap::named("black, #ff8800,WHITE").unwrap();
+        assert_eq!(map.to_string(), "#000000,#ff8800,#ffffff");
+        assert_eq!(map.color(0.25).map(|part| (part * 255.0).round()), [128.0, 68.0, 0.0]);
+        let again = ColorMap::named(&map.to_string()).unwrap();
+        assert!(again == map && std::ptr::eq(again.table(), map.table()), "leaked twice");
+        let turned = ColorMap::named(&format!("{map}_r")).unwrap();
+        assert_eq!(turned.color(0.1), map.color(0.9));
+        assert_eq!(turned.to_string(), "#000000,#ff8800,#ffffff_r");
+        let text = serde_json::to_string(&turned).unwrap();
+        assert_eq!(serde_json::from_str::<ColorMap>(&text).unwrap(), turned);
+        for bad in ["red,", "red,no colour", &["red"; 257].join(",")] {
+            assert!(ColorMap::named(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -27,7 +27,9 @@ use std::{
 
 /// What a scene is made of, in the order in which it was added. An input becomes one item, or
 /// several: the lines of a mesh, and points on no surface, have an item of their own.
-#[derive(Default)]
+///
+/// A clone shares what the items were made of.
+#[derive(Clone, Default)]
 pub struct Items {
     /// Where the scene is, and how it stands.
     pub subject: Subject,
@@ -74,12 +76,13 @@ pub struct Mark {
 }
 
 /// What an input has become. Some entries are one item in the usual pictures and another in others.
+#[derive(Clone)]
 enum Entry {
     Ready(Item),
     /// Facets, or surfels.
-    Mesh(Box<Faceted>),
+    Mesh(Arc<Faceted>),
     /// Cells as a solid, or as a field.
-    Solid(Box<ShownSolid>),
+    Solid(Arc<ShownSolid>),
     /// Rods, which are splats in pictures that show no facets.
     Rods {
         facets: Arc<FacetSet>,
@@ -325,7 +328,7 @@ impl Adding<'_> {
             let entry = if self.items.surfaces == Surfaces::Both {
                 let options = SurfelOptions { deadline: Deadline::NEVER, ..options };
                 let (name, surfels) = (name.clone(), OnceLock::new());
-                Entry::Mesh(Box::new(Faceted { name, facets, mesh, options, surfels }))
+                Entry::Mesh(Arc::new(Faceted { name, facets, mesh, options, surfels }))
             } else {
                 Entry::Ready(Item::Facets(facets))
             };
@@ -512,7 +515,7 @@ impl Adding<'_> {
         }
         let solid = Solid::new(cells, &showing.solid_options(tint)).map_err(fault)?;
         let solid = ShownSolid::new(name, solid, showing);
-        self.push("cells", count, bounds, Entry::Solid(Box::new(solid)));
+        self.push("cells", count, bounds, Entry::Solid(Arc::new(solid)));
         Ok(())
     }
 

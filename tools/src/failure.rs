@@ -216,6 +216,18 @@ impl From<Error> for Failure {
     }
 }
 
+impl From<splatkit_media::Failure> for Failure {
+    fn from(failure: splatkit_media::Failure) -> Self {
+        match failure {
+            splatkit_media::Failure::Library(error) => Self::Library(error),
+            splatkit_media::Failure::Usage(message) => Self::Usage(message),
+            splatkit_media::Failure::Output { file, message, hint } => {
+                Self::Output { file, message, hint }
+            }
+        }
+    }
+}
+
 impl fmt::Display for Failure {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         match self {

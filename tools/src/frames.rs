@@ -2,18 +2,20 @@
 
 use crate::{
     failure::Failure,
-    output::Target,
-    video::{Encoder, Film, Format},
+    output::{self, Target},
 };
 use splatkit::picture::{Picture, PictureFormat};
+use splatkit_media::video::{Encoder, Film, Format};
 use std::path::{Path, PathBuf};
 
 /// Where the frames go.
 pub enum Frames {
     /// Each frame is a picture.
     Pictures(Vec<Target>),
-    /// All frames are one film; the path is `-` for stdout.
+    /// All frames are one film.
     Film(PathBuf, Format),
+    /// The bytes of all frames go to stdout.
+    Raw,
 }
 
 impl Frames {
@@ -42,8 +44,8 @@ impl Frames {
     pub fn files(&self) -> Vec<&Path> {
         match self {
             Self::Pictures(targets) => targets.iter().filter_map(Target::file).collect(),
-            Self::Film(_, Format::Raw) => Vec::new(),
             Self::Film(path, _) => vec![path],
+            Self::Raw => Vec::new(),
         }
     }
 
@@ -52,17 +54,18 @@ impl Frames {
         match self {
             Self::Pictures(targets) => targets[frame].name(),
             Self::Film(path, _) => format!("{}, frame {}", path.display(), frame + 1),
+            Self::Raw => format!("-, frame {}", frame + 1),
         }
     }
 
     /// Whether the frames are played at a rate.
     pub fn is_film(&self) -> bool {
-        matches!(self, Self::Film(..))
+        matches!(self, Self::Film(..) | Self::Raw)
     }
 
     /// Whether a player shows the frames at a rate of the file's own.
     pub fn is_played(&self) -> bool {
-        matches!(self, Self::Film(_, format) if *format != Format::Raw)
+        matches!(self, Self::Film(..))
     }
 
     /// Begins to write.
@@ -73,6 +76,7 @@ impl Frames {
                 let back = if format.keeps_opacity() { None } else { Some([0.0; 3]) };
                 (film.background.or(back), Way::Film(format.open(path, film)?))
             }
+            Self::Raw => (film.background, Way::Raw),
         };
         Ok(Writer { background, way })
     }
@@ -87,6 +91,7 @@ pub struct Writer<'a> {
 enum Way<'a> {
     Pictures(std::slice::Iter<'a, Target>),
     Film(Box<dyn Encoder>),
+    Raw,
 }
 
 impl Writer<'_> {
@@ -98,15 +103,16 @@ impl Writer<'_> {
                 target.write(&picture.encode(target.format(), self.background)?)?;
                 Ok(true)
             }
-            Way::Film(encoder) => encoder.add(&picture.to_rgba8(self.background)),
+            Way::Film(encoder) => Ok(encoder.add(&picture.to_rgba8(self.background))?),
+            Way::Raw => output::offer(&picture.to_rgba8(self.background)),
         }
     }
 
     /// Completes a film. Pictures are complete already.
     pub fn finish(self) -> Result<(), Failure> {
         match self.way {
-            Way::Pictures(_) => Ok(()),
-            Way::Film(encoder) => encoder.finish(),
+            Way::Pictures(_) | Way::Raw => Ok(()),
+            Way::Film(encoder) => Ok(encoder.finish()?),
         }
     }
 }

@@ -5,7 +5,6 @@ use crate::{
     engine::{self, DeviceFlags},
     failure::Failure,
     given::{self, Given, Kinds},
-    overlay::Overlay,
     progress::Progress,
     scene_file::Stated,
 };
@@ -23,6 +22,7 @@ use splatkit::{
     session::{Captions, Legend},
     volume::TransferFunction,
 };
+use splatkit_media::overlay::Overlay;
 use std::{
     ops::{Deref, DerefMut},
     path::{Path, PathBuf},

@@ -61,7 +61,6 @@ mod threads;
 #[doc(hidden)]
 pub mod timing;
 mod transfer;
-mod video;
 #[cfg(feature = "window")]
 mod view;
 #[cfg(not(feature = "window"))]

@@ -14,7 +14,6 @@ use crate::{
     progress::Progress,
     scene::SceneFlags,
     timing::milliseconds,
-    video::{Film, Format},
 };
 use clap::Args;
 use splatkit::{
@@ -30,6 +29,7 @@ use splatkit::{
 };
 #[cfg(feature = "window")]
 use splatkit::{Stop, math::CameraPath, volume::TransferFunction};
+use splatkit_media::video::{Film, Format};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -509,7 +509,7 @@ impl OutputFlags {
             return refuse("--raw writes to stdout: give -o -");
         }
         if self.raw {
-            return Ok(Frames::Film(output.to_owned(), Format::Raw));
+            return Ok(Frames::Raw);
         }
         if is_stdout && is_moving {
             return refuse("the frames of an animation can go to stdout only with --raw");

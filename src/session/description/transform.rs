@@ -62,6 +62,14 @@ impl TransformEntry {
         Ok(())
     }
 
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the name of the field that is wrong.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(|(field, message)| Error::Argument(format!("{field}: {message}")))
+    }
+
     fn similarity(&self) -> Similarity {
         let rotation = self.rotate.map_or(DMat3::IDENTITY, |Rotation { axis, degrees }| {
             let axis = DVec3::from_array(axis).normalize_or(DVec3::Z);
@@ -76,7 +84,7 @@ impl TransformEntry {
     /// # Errors
     /// [`Error::Input`] for hierarchies and volumes in bricks, which are read page by page where
     /// they are.
-    pub(super) fn apply(&self, path: &Path, data: &mut Data) -> Result<()> {
+    pub fn apply(&self, path: &Path, data: &mut Data) -> Result<()> {
         if *self == Self::default() {
             return Ok(());
         }

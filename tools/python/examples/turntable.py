@@ -1,13 +1,10 @@
-"""Draws a film that turns once around a scene, as numbered pictures.
+"""Draws a film that turns once around a scene.
 
-    python turntable.py FILE FOLDER
-    python turntable.py             # draws a made-up knot
-
-ffmpeg makes a film of them: ffmpeg -i FOLDER/%04d.png film.mp4
+python turntable.py FILE FILM   # .gif, .webp, .apng, .mp4, .webm, or FOLDER/ for pictures
+python turntable.py             # draws a made-up knot
 """
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -34,16 +31,13 @@ def made_up_knot(around=240, across=24):
     return vertices, quads.reshape(-1, 4)
 
 
-def main(source=None, folder="turntable", frames=24):
+def main(source=None, film="turntable.gif", frames=24):
     scene = pysplatkit.Scene()
     if source:
         scene.add(source)
     else:
         scene.add_mesh(*made_up_knot(), color="tomato")
-    size = (640, 480)
-    Path(folder).mkdir(exist_ok=True)
-    for number, camera in enumerate(scene.turntable(int(frames), size, elevation=25)):
-        print(scene.render(size, camera).save(Path(folder) / f"{number:04}.png"))
+    print(scene.film(film, int(frames), size=(640, 480), elevation=25))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use splatkit::{
     Deadline, Error, Stop, disk,
     glam::DVec3,
-    hierarchy::Preset,
+    hierarchy::{Preset, external::Plan},
     session::{
         self, AppearanceEntry,
         convert::{Resampled, Target},
@@ -35,6 +35,8 @@ struct Conversion {
     radius_scale: Option<f32>,
     lattice: Option<String>,
     memory: Option<u64>,
+    /// The number of parts of a conversion in parts.
+    parts: Option<u32>,
 }
 
 /// A conversion with its files.
@@ -69,6 +71,85 @@ pub fn convert(
     run(py, &stop, move || work.run(&stopped))
 }
 
+/// Plans a conversion in parts, and writes the plan to a folder as `plan.json`. Returns the number
+/// of parts. A plan that is there already is kept.
+#[pyfunction]
+pub fn plan_parts(
+    py: Python<'_>,
+    files: Vec<PathBuf>,
+    folder: PathBuf,
+    conversion: &str,
+    load: &str,
+    appearance: &str,
+) -> PyResult<u32> {
+    let plan = folder.join("plan.json");
+    if plan.exists() {
+        return run(py, &Stop::default(), move || Ok(Plan::open(&plan)?.parts()));
+    }
+    let given: Result<Conversion, Error> = options(conversion);
+    let made = given.and_then(|given| {
+        let conversion = given.conversion(&self::appearance(appearance)?, load)?;
+        conversion.surfel_options(Deadline::NEVER).validate()?;
+        Ok(conversion)
+    });
+    let conversion = made.map_err(|error| raise(py, &error))?;
+    run(py, &Stop::default(), move || Ok(conversion.plan(&files, &folder, &(), || Ok(()))?.parts()))
+}
+
+/// Makes a part of a plan, unless it is finished and intact.
+#[pyfunction]
+pub fn make_part(py: Python<'_>, plan: PathBuf, index: u32, load: &str) -> PyResult<()> {
+    let limits = reading(load).map_err(|error| raise(py, &error))?.limits();
+    run(py, &Stop::default(), move || Plan::open(&plan)?.part(index, &limits, None).map(drop))
+}
+
+/// Joins the parts of a plan to a file, which appears whole or not at all.
+#[pyfunction]
+pub fn join_parts(py: Python<'_>, plan: PathBuf, output: PathBuf, overwrite: bool) -> PyResult<()> {
+    let stop = Stop::default();
+    let stopped = stop.clone();
+    run(py, &stop, move || {
+        let part = part_of(&output);
+        finished(&output, overwrite, &part, &stopped, || {
+            Plan::open(&plan)?.join(&part, None).map(drop)
+        })
+    })
+}
+
+/// Writes a file beside the output, which takes its place at the end. So interrupted work leaves no
+/// file, although nothing stops its thread.
+fn finished(
+    output: &Path,
+    overwrite: bool,
+    part: &Path,
+    stop: &Stop,
+    write: impl FnOnce() -> Result<(), Error>,
+) -> Result<(), Error> {
+    let done = write().and_then(|()| {
+        if stop.is_requested() {
+            return Err(Error::Stopped);
+        }
+        let renamed = disk::rename(part, output, overwrite);
+        renamed.map_err(|error| Error::output(output, error))
+    });
+    if done.is_err() {
+        // It may not be there.
+        fs::remove_file(part).ok();
+    }
+    done.map_err(|error| match error {
+        Error::Output { source, .. } => Error::output(output, source),
+        other => other,
+    })
+}
+
+/// Returns the name of an unfinished file. It ends as the output does.
+fn part_of(output: &Path) -> PathBuf {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let name = output.file_name().unwrap_or_default().to_string_lossy();
+    let (process, count) = (std::process::id(), COUNT.fetch_add(1, Relaxed));
+    output.with_file_name(format!(".splatkit-{process}-{count}-{name}"))
+}
+
 impl Conversion {
     /// Returns the conversion of the library.
     fn conversion(
@@ -93,6 +174,7 @@ impl Conversion {
             unit: self.unit,
             degree: self.degree,
             memory: self.memory,
+            parts: self.parts,
             ..session::convert::Conversion::default()
         })
     }
@@ -123,34 +205,12 @@ impl Conversion {
 }
 
 impl Work {
-    /// Converts to a file beside the output, which takes its place at the end. So an interrupted
-    /// conversion leaves no file, although nothing stops its thread.
     fn run(&self, stop: &Stop) -> Result<(), Error> {
         self.check_output()?;
-        let part = self.part();
-        let done = self.conversion.convert(&self.files, &part, &()).and_then(|_| {
-            if stop.is_requested() {
-                return Err(Error::Stopped);
-            }
-            let renamed = disk::rename(&part, &self.output, self.overwrite);
-            renamed.map_err(|error| Error::output(&self.output, error))
-        });
-        if done.is_err() {
-            // It may not be there.
-            fs::remove_file(&part).ok();
-        }
-        done.map_err(|error| match error {
-            Error::Output { source, .. } => Error::output(&self.output, source),
-            other => other,
+        let part = part_of(&self.output);
+        finished(&self.output, self.overwrite, &part, stop, || {
+            self.conversion.convert(&self.files, &part, &()).map(drop)
         })
-    }
-
-    /// Returns the name of the unfinished file. It ends as the output does.
-    fn part(&self) -> PathBuf {
-        static COUNT: AtomicU64 = AtomicU64::new(0);
-        let name = self.output.file_name().unwrap_or_default().to_string_lossy();
-        let (process, count) = (std::process::id(), COUNT.fetch_add(1, Relaxed));
-        self.output.with_file_name(format!(".splatkit-{process}-{count}-{name}"))
     }
 
     fn check_output(&self) -> Result<(), Error> {

@@ -1,6 +1,12 @@
 //! Drawing a scene: the settings of a picture, and renderers that are used again.
 
-use crate::{camera::camera, errors::options, parts::picture, weights};
+use crate::{
+    camera::camera,
+    errors::{options, wrong},
+    film,
+    parts::picture,
+    weights,
+};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 use splatkit::{
@@ -10,10 +16,17 @@ use splatkit::{
     math::{Bounds, Camera},
     picture::Picture,
     scene::{Clip, Item, Region, Scene, Settings},
-    session::{Content, Data, Framing, Items, Name, PictureEntry, Showing, Subject},
+    session::{
+        Captions, Coloring, Data, Description, Engine, Framing, Items, Legend, Mark, Name,
+        OverlayEntry, PictureEntry, Showing, Subject,
+    },
     volume::TransferFunction,
 };
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use splatkit_media::overlay::Overlay;
+use std::{
+    collections::BTreeSet,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
 
 /// How a picture is drawn.
 #[derive(Debug, Clone)]
@@ -22,6 +35,11 @@ pub struct Draw {
     region: Option<Part>,
     /// Whether the picture keeps all pixels that are drawn, instead of their means.
     keep_samples: bool,
+    /// What is written over the picture.
+    overlay: OverlayEntry,
+    /// The colour behind the picture, which decides the colour of texts.
+    behind: Option<[f32; 3]>,
+    engine: Engine,
 }
 
 /// The part of a picture that one of several machines draws.
@@ -49,9 +67,13 @@ pub struct Stage {
 }
 
 /// The items of a scene, and how often they have changed.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Versioned {
     items: Items,
+    /// How the scene was before each input, and how many items it had.
+    marks: Vec<(Mark, usize)>,
+    /// The items whose transfer function was set since they were added.
+    edited: BTreeSet<usize>,
     /// Grows with each input.
     version: usize,
     /// Grows with each change of a transfer function.
@@ -73,7 +95,7 @@ struct Kept {
     scene: Arc<Scene>,
     subject: Subject,
     seen: Option<(Vec<Clip>, Arc<Vec<DVec3>>)>,
-    renderer: Option<Renderer>,
+    renderer: Option<(Engine, Renderer)>,
 }
 
 /// An item whose values are shown by a transfer function.
@@ -86,6 +108,14 @@ pub struct Field {
     /// The diagonal of the box around the item, in world units.
     pub diagonal: f64,
     pub transfer: TransferFunction,
+}
+
+/// Where a picture is taken from.
+pub enum Viewpoint<'a> {
+    /// A camera as JSON.
+    Camera(&'a str),
+    /// A camera that is fitted to the scene.
+    Fitted(&'a Framing),
 }
 
 /// A finished picture.
@@ -101,10 +131,71 @@ impl Draw {
         let mut all: Map<String, Value> = options(text)?;
         let mut taken = |name: &str| all.remove(name).unwrap_or(Value::Null).to_string();
         let (region, keep_samples) = (taken("region"), taken("keep_samples"));
+        let (overlay, behind, engine) = (taken("overlay"), taken("behind"), taken("engine"));
         let picture = picture(&Value::Object(all).to_string())?;
         let keep_samples: Option<bool> = options(&keep_samples)?;
-        let keep_samples = keep_samples.unwrap_or(false);
-        Ok(Self { picture, region: options(&region)?, keep_samples })
+        let overlay: Option<OverlayEntry> = options(&overlay)?;
+        let engine: Option<Engine> = options(&engine)?;
+        Ok(Self {
+            picture,
+            region: options(&region)?,
+            keep_samples: keep_samples.unwrap_or(false),
+            overlay: overlay.unwrap_or_default(),
+            behind: options(&behind)?,
+            engine: engine.unwrap_or(Engine::Cpu),
+        })
+    }
+
+    /// Returns the texts over the picture, if there are any.
+    fn texts(&self, items: &Mutex<Versioned>) -> Result<Option<Overlay>, Error> {
+        if self.overlay == OverlayEntry::default() {
+            return Ok(None);
+        }
+        let captions = locked(items).captions();
+        let letters = self.overlay.caption.as_ref().map_or(0, |text| text.chars().count());
+        let most = Description::MOST_CAPTION;
+        if letters > most {
+            return Err(wrong(format!("a caption has at most {most} letters, not {letters}")));
+        }
+        Overlay::open(&self.overlay, &captions, self.behind).map_err(film::plain)
+    }
+
+    /// Returns the part of a drawn picture that a camera is fitted to: the middle, beside the
+    /// scalar bars.
+    fn free(
+        &self,
+        kept: &Kept,
+        items: &Mutex<Versioned>,
+        size: [u32; 2],
+    ) -> Result<[u32; 2], Error> {
+        let room = self.texts(items)?.map_or(0, |texts| texts.room(self.picture.size()));
+        let [width, height] = size;
+        Ok([width.saturating_sub(2 * self.factor(&kept.scene) * room).max(1), height])
+    }
+
+    /// Returns what draws.
+    #[cfg(feature = "gpu")]
+    fn device(&self) -> Result<Device, Error> {
+        match self.engine {
+            Engine::Cpu => Ok(Device::Cpu),
+            Engine::Gpu => match Device::automatic() {
+                Device::Cpu => Err(wrong("engine=\"gpu\": this machine has no GPU that can draw")),
+                device => Ok(device),
+            },
+            _ => Ok(Device::automatic()),
+        }
+    }
+
+    /// Returns what draws.
+    #[cfg(not(feature = "gpu"))]
+    fn device(&self) -> Result<Device, Error> {
+        if self.engine == Engine::Gpu {
+            return Err(wrong(
+                "this build of pysplatkit has no GPU engine, so engine=\"gpu\" cannot draw; leave \
+                 it out, or build the package with `maturin build --features gpu` in tools/python",
+            ));
+        }
+        Ok(Device::Cpu)
     }
 
     /// Returns how many pixels are drawn along each side of a pixel.
@@ -136,6 +227,7 @@ impl Stage {
     pub fn add(&self, added: Added, stop: &Stop) -> Result<(), Error> {
         let mut versioned = locked(&self.items);
         let before = versioned.items.mark();
+        let count = versioned.items.contents.len();
         let Added { name, input, showing } = added;
         versioned.items.add(&name, input, &showing, &|_| ())?;
         let last = versioned.items.contents.len() - 1;
@@ -146,15 +238,30 @@ impl Stage {
             versioned.items.restore(before);
             return checked;
         }
+        versioned.marks.push((before, count));
         versioned.version += 1;
         *locked(&self.kept) = [None, None];
         Ok(())
     }
 
-    /// Returns what the scene holds: kind, name, and the number of splats or samples.
-    pub fn contents(&self) -> Vec<(&'static str, String, u64)> {
-        let short = |content: &Content| (content.kind, content.name.text.clone(), content.count);
-        locked(&self.items).items.contents.iter().map(short).collect()
+    /// Returns a scene of the first inputs alone, which shares what they were made into.
+    pub fn forked(&self, count: usize) -> Self {
+        let mut forked = locked(&self.items).clone();
+        if let Some((mark, items)) = forked.marks.get(count).cloned() {
+            forked.items.restore(mark);
+            forked.marks.truncate(count);
+            forked.edited.retain(|item| *item < items);
+        }
+        Self { items: Mutex::new(forked), kept: Mutex::default() }
+    }
+
+    /// Returns what the scene holds: kind, number of the input, and the number of splats or
+    /// samples.
+    pub fn contents(&self) -> Vec<(&'static str, usize, u64)> {
+        let versioned = locked(&self.items);
+        let input = |item: usize| versioned.marks.partition_point(|(_, first)| *first <= item) - 1;
+        let contents = versioned.items.contents.iter().enumerate();
+        contents.map(|(item, content)| (content.kind, input(item), content.count)).collect()
     }
 
     /// Returns the box around samples and vertices; `None` if the scene is empty.
@@ -196,6 +303,7 @@ impl Stage {
     pub fn set_transfer(&self, number: usize, transfer: TransferFunction) -> Result<(), Error> {
         let mut versioned = locked(&self.items);
         versioned.items.set_transfer(number, transfer)?;
+        versioned.edited.insert(number);
         versioned.transfer_version += 1;
         Ok(())
     }
@@ -220,10 +328,22 @@ impl Stage {
     pub fn camera(&self, fit: &Framing, draw: &Draw) -> Result<Camera, Error> {
         let mut kept = self.take(draw.draws_facets())?;
         let settings = draw.settings(&kept, &Stop::default())?;
-        let seen = kept.fitted(fit, &settings.clips)?;
-        let camera = fit.camera(&kept.seen_by(&seen), settings.size);
+        let camera = self.fitted(&mut kept, fit, draw, &settings);
         self.put(kept, draw.draws_facets());
         camera
+    }
+
+    /// Returns the camera that is fitted to what is kept of a scene.
+    fn fitted(
+        &self,
+        kept: &mut Kept,
+        fit: &Framing,
+        draw: &Draw,
+        settings: &Settings,
+    ) -> Result<Camera, Error> {
+        let free = draw.free(kept, &self.items, settings.size)?;
+        let seen = kept.fitted(fit, &settings.clips)?;
+        fit.camera(&kept.seen_by(&seen), free)
     }
 
     /// Returns the cameras of a turntable.
@@ -231,38 +351,35 @@ impl Stage {
         let mut kept = self.take(draw.draws_facets())?;
         let settings = draw.settings(&kept, &Stop::default())?;
         let seen = kept.fitted(fit, &settings.clips)?;
-        let cameras = fit.turntable(&kept.seen_by(&seen), settings.size, frames);
+        let free = draw.free(&kept, &self.items, settings.size)?;
+        let cameras = fit.turntable(&kept.seen_by(&seen), free, frames);
         self.put(kept, draw.draws_facets());
         cameras
     }
 
-    /// Draws a picture with this effort. Without a camera, the usual one is fitted to the scene.
-    /// Only an exact picture is reduced to the asked size.
+    /// Draws a picture with this effort, by a camera or one that is fitted to the scene. Only an
+    /// exact picture is reduced to the asked size.
     pub fn draw(
         &self,
-        given: Option<&str>,
+        viewpoint: Viewpoint<'_>,
         draw: &Draw,
         effort: Effort,
         stop: &Stop,
     ) -> Result<Drawn, Error> {
-        let given = given.map(camera).transpose()?;
-        let is_fitted = given.is_none();
         let mut kept = self.take(draw.draws_facets())?;
         let settings = draw.settings(&kept, stop)?;
-        let camera = match given {
-            Some(camera) => camera,
-            None => {
-                let seen = kept.seen(&settings.clips)?;
-                Framing::default().camera(&kept.seen_by(&seen), settings.size)?
-            }
+        let texts = draw.texts(&self.items)?;
+        let (camera, is_fitted) = match viewpoint {
+            Viewpoint::Camera(text) => (camera(text)?, false),
+            Viewpoint::Fitted(fit) => (self.fitted(&mut kept, fit, draw, &settings)?, true),
         };
         let mut renderer = match kept.renderer.take() {
-            Some(renderer) => renderer,
-            None => Renderer::new(&Device::Cpu, &kept.scene)?,
+            Some((engine, renderer)) if engine == draw.engine => renderer,
+            _ => Renderer::new(&draw.device()?, &kept.scene)?,
         };
         let sheet = settings.sheet_thickness.or_else(|| sheet_of(&kept.scene));
         let done = renderer.render(&camera, &effort.settings(&settings, sheet));
-        kept.renderer = Some(renderer);
+        kept.renderer = Some((draw.engine, renderer));
         let (factor, scene) = (draw.factor(&kept.scene), kept.scene.clone());
         self.put(kept, draw.draws_facets());
         let (mut picture, stats) = done.map_err(|error| match error {
@@ -280,6 +397,9 @@ impl Stage {
                 picture = picture.reduced(factor)?;
             }
             locked(&self.items).items.draw_edges(&mut picture, &camera, &settings.clips)?;
+            if let Some(texts) = texts {
+                texts.draw(&mut picture, &camera);
+            }
         }
         Ok(Drawn { picture, stats, camera })
     }
@@ -338,13 +458,34 @@ impl Versioned {
         scene.validate().map_err(|error| self.items.at_fault(&scene, error))?;
         Ok(Arc::new(scene))
     }
+
+    /// Returns what the inputs say for texts. The colours of a transfer function that was set are
+    /// its own.
+    fn captions(&self) -> Captions {
+        let mut captions = self.items.captions();
+        for (number, legend) in &mut captions.legends {
+            let edited = self.edited.contains(number);
+            let field = self.items.fields().find(|(item, _)| edited && item == number);
+            let Some((_, item)) = field else { continue };
+            let (Some(transfer), Some(range)) = (item.transfer(), item.value_range()) else {
+                continue;
+            };
+            let labels = match item {
+                Item::Volume(volume, ..) => volume.about.labels.as_ref(),
+                _ => None,
+            };
+            let title = (std::mem::take(&mut legend.title), labels);
+            *legend = Legend::of_transfer(&Coloring::default(), transfer, range, title);
+        }
+        captions
+    }
 }
 
 impl Kept {
     /// Takes over the transfer functions of a scene that has not changed otherwise.
     fn with_transfers_of(mut self, items: &Versioned, facets: bool) -> Result<Self, Error> {
         let scene = items.scene(facets)?;
-        if let Some(renderer) = &mut self.renderer {
+        if let Some((_, renderer)) = &mut self.renderer {
             for number in scene.fields() {
                 let [old, new] = [&self.scene, &scene].map(|scene| scene.items[number].transfer());
                 if let Some(new) = new.filter(|_| old != new) {

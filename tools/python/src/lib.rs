@@ -8,12 +8,14 @@ mod convert;
 mod draw;
 mod errors;
 mod files;
+mod film;
 mod hierarchy;
 mod notes;
 mod parts;
 mod picture;
 mod scene;
 mod show;
+mod transform;
 mod weights;
 mod worker;
 
@@ -98,6 +100,7 @@ fn _pysplatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("COLOR_MAPS", ColorMap::NAMES.to_vec())?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<picture::Picture>()?;
+    module.add_class::<film::Film>()?;
     module.add_class::<hierarchy::Hierarchy>()?;
     module.add_function(wrap_pyfunction!(color, module)?)?;
     module.add_function(wrap_pyfunction!(named_transfer, module)?)?;
@@ -109,7 +112,13 @@ fn _pysplatkit(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(files::check, module)?)?;
     module.add_function(wrap_pyfunction!(files::known_formats, module)?)?;
     module.add_function(wrap_pyfunction!(convert::convert, module)?)?;
+    module.add_function(wrap_pyfunction!(convert::plan_parts, module)?)?;
+    module.add_function(wrap_pyfunction!(convert::make_part, module)?)?;
+    module.add_function(wrap_pyfunction!(convert::join_parts, module)?)?;
+    module.add_function(wrap_pyfunction!(film::path_cameras, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::read_scene, module)?)?;
     module.add_function(wrap_pyfunction!(scene::write_scene, module)?)?;
+    module.add_function(wrap_pyfunction!(transform::moved, module)?)?;
     module.add_function(wrap_pyfunction!(abandon, module)?)?;
     show::register(module)
 }

@@ -5,7 +5,7 @@ use crate::{
     camera::to_json,
     draw::Drawn,
     errors::raise,
-    worker::run,
+    worker::{run, run_here},
 };
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyBytes};
@@ -49,6 +49,11 @@ impl Picture {
     /// Returns the picture.
     pub fn pixels(&self) -> &Pixels {
         &self.pixels
+    }
+
+    /// Returns the picture, shared.
+    pub fn shared(&self) -> Arc<Pixels> {
+        self.pixels.clone()
     }
 }
 
@@ -113,9 +118,9 @@ impl Picture {
         py: Python<'py>,
         background: Option<[f32; 3]>,
     ) -> PyResult<Bound<'py, PyBytes>> {
-        let pixels = self.pixels.clone();
-        let encoded = move || pixels.encode(PictureFormat::Png, background);
-        Ok(PyBytes::new(py, &run(py, &Stop::default(), encoded)?))
+        let pixels = &self.pixels;
+        let encoded = run_here(py, || pixels.encode(PictureFormat::Png, background))?;
+        Ok(PyBytes::new(py, &encoded))
     }
 
     /// Writes a PNG or JPEG file.

@@ -4,9 +4,9 @@ use crate::{
     arrays::{numbers, positions, rows, samples},
     camera::{framing, to_json},
     cells::CellArrays,
-    draw::{Added, Draw, Stage},
+    draw::{Added, Draw, Stage, Viewpoint},
     errors::{options, raise, wrong},
-    parts::{appearance, picture, reading},
+    parts::{appearance, reading},
     picture::Picture,
     worker::run,
 };
@@ -22,11 +22,18 @@ use splatkit::{
     input::Limits,
     interaction::Effort,
     scattered::Points,
-    session::{AppearanceEntry, Data, Description, InputEntry, Name, ReadingEntry},
+    scene::Optics,
+    session::{
+        AppearanceEntry, CameraEntry, CellStyle, Data, Description, Framing, InputEntry, Name,
+        OverlayEntry, PictureEntry, ReadingEntry, TransformEntry,
+    },
     surface::Mesh,
     volume::{Arrangement, Lattice, Volume},
 };
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 /// What is drawn together.
 #[pyclass(frozen, module = "pysplatkit._pysplatkit")]
@@ -54,6 +61,19 @@ struct ArrayFacts {
     /// The frame of a patient, `lps` or `ras`.
     frame: Option<String>,
     labels: Option<ArrayLabels>,
+    /// Where the item is moved to.
+    transform: TransformEntry,
+}
+
+/// How a file is added.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct FileFacts {
+    /// Where the item is moved to.
+    transform: TransformEntry,
+    /// Whether pictures show values alone, as other optics than light do: of a volume that has
+    /// colours its brightness, and of cells the field inside.
+    shows_field: bool,
 }
 
 /// What a caller says of the values of a volume: whether they are labels, the labels' names, or a
@@ -151,6 +171,9 @@ struct MeshArrays<'py> {
     colors: Option<Bound<'py, PyAny>>,
     #[pyo3(item)]
     values: Option<Bound<'py, PyAny>>,
+    /// The radius of each point of a cloud, in world units.
+    #[pyo3(item)]
+    radii: Option<Bound<'py, PyAny>>,
 }
 
 impl MeshArrays<'_> {
@@ -183,10 +206,14 @@ impl MeshArrays<'_> {
             let no_value = |value: &mut f32| *value = f32::NAN;
             mesh.values.iter_mut().filter(|value| !value.is_finite()).for_each(no_value);
         }
+        if let Some(radii) = &self.radii {
+            mesh.radii = numbers::<f32>(radii)?;
+        }
         let lists = [
             ("normals", mesh.normals.len()),
             ("colors", mesh.colors.len()),
             ("values", mesh.values.len()),
+            ("radii", mesh.radii.len()),
         ];
         let count = mesh.positions.len();
         match lists.into_iter().find(|(_, length)| *length > 0 && *length != count) {
@@ -307,12 +334,14 @@ impl Scene {
     fn add(
         &self,
         py: Python<'_>,
-        input: Data,
+        mut input: Data,
         facts: ArrayFacts,
         more: (ReadingEntry, AppearanceEntry),
     ) -> PyResult<()> {
         let (stage, (load, appearance)) = (self.0.clone(), more);
         input.warn_of_holes(&facts.name);
+        let moved = facts.transform.apply(Path::new(&facts.name), &mut input);
+        moved.map_err(|error| raise(py, &error))?;
         let name = Name { text: facts.name, is_file: false };
         let stop = Stop::default();
         let worker_stop = stop.clone();
@@ -329,7 +358,9 @@ fn array_options(
     load: &str,
     appearance: &str,
 ) -> Result<(ArrayFacts, (ReadingEntry, AppearanceEntry)), Error> {
-    Ok((options(facts)?, (reading(load)?, self::appearance(appearance)?)))
+    let facts: ArrayFacts = options(facts)?;
+    facts.transform.validate()?;
+    Ok((facts, (reading(load)?, self::appearance(appearance)?)))
 }
 
 #[pymethods]
@@ -346,51 +377,33 @@ impl Scene {
         path: PathBuf,
         load: &str,
         appearance: &str,
+        facts: &str,
     ) -> PyResult<()> {
-        let parsed = array_options("{}", load, appearance).map_err(|error| raise(py, &error))?;
-        let (_, (load, appearance)) = parsed;
+        let parsed = reading(load)
+            .and_then(|load| Ok((load, self::appearance(appearance)?, options(facts)?)));
+        let parsed: (_, _, FileFacts) = parsed.map_err(|error| raise(py, &error))?;
+        let (load, appearance, facts) = parsed;
         let (stage, stop) = (self.0.clone(), Stop::default());
         let worker_stop = stop.clone();
         run(py, &stop, move || {
             // One deadline covers reading the input and making its splats.
             let deadline = load.limits().deadline();
-            let showing = load.complete(appearance.showing(&load.limits())?, deadline)?;
+            let mut showing = load.complete(appearance.showing(&load.limits())?, deadline)?;
+            if facts.shows_field {
+                showing.values_by = showing.values_by.or_else(|| Some("optics".into()));
+                showing.cells = showing.cells.or(Some(CellStyle::Volume));
+            }
             let attribute = showing.coloring().attribute();
             let mut input = load.reading().open_colored(&path, attribute)?.read()?;
             load.reading().give_radii(&path, &mut input, showing.point_radius.as_deref())?;
+            facts.transform.apply(&path, &mut input)?;
             stage.add(Added { name: Name::of_file(&path), input, showing }, &worker_stop)
         })
     }
 
-    /// Adds the inputs of a scene file. Returns how the file says that the picture is drawn, as
-    /// JSON: its camera, how one is fitted, the picture, and what is written over it.
-    fn add_scene(&self, py: Python<'_>, path: PathBuf, is_trusted: bool) -> PyResult<String> {
-        let (stage, stop) = (self.0.clone(), Stop::default());
-        let worker_stop = stop.clone();
-        run(py, &stop, move || {
-            let limits = Limits::default();
-            let mut scene = match is_trusted {
-                true => Description::read_trusted(&path, &limits)?,
-                false => Description::read(&path, &limits)?,
-            };
-            scene.reading = scene.reading.begun();
-            for input in scene.visible() {
-                let showing = scene.showing(input)?;
-                let reading = scene.reading_of(input).reading();
-                let attribute = showing.coloring().attribute();
-                let opened = reading.open_colored(&input.file, attribute)?;
-                let data = scene.read_input(input, &opened, &showing)?;
-                stage.add(
-                    Added { name: Name::of_file(&input.file), input: data, showing },
-                    &worker_stop,
-                )?;
-            }
-            let Description { camera, framing, picture, overlay, .. } = &scene;
-            let drawn = serde_json::json!({
-                "camera": camera, "framing": framing, "picture": picture, "overlay": overlay,
-            });
-            Ok(drawn.to_string())
-        })
+    /// Returns a scene of the first inputs alone, which shares what they were made into.
+    fn forked(&self, count: usize) -> Self {
+        Self(Arc::new(self.0.forked(count)))
     }
 
     /// Adds the samples of an array.
@@ -477,9 +490,9 @@ impl Scene {
         self.add(py, Data::Gaussians(set), facts, more)
     }
 
-    /// What the scene holds: kind, name, and the number of splats or samples.
+    /// What the scene holds: kind, number of the input, and the number of splats or samples.
     #[getter]
-    fn contents(&self) -> Vec<(&'static str, String, u64)> {
+    fn contents(&self) -> Vec<(&'static str, usize, u64)> {
         self.0.contents()
     }
 
@@ -527,38 +540,87 @@ impl Scene {
         })
     }
 
-    /// Draws a picture.
-    fn render(&self, py: Python<'_>, camera: Option<String>, draw: &str) -> PyResult<Picture> {
-        let draw = Draw::parse(draw).map_err(|error| raise(py, &error))?;
+    /// Draws a picture by a camera, or else by one that is fitted to the scene.
+    fn render(
+        &self,
+        py: Python<'_>,
+        camera: Option<String>,
+        fit: &str,
+        draw: &str,
+    ) -> PyResult<Picture> {
+        let parsed = framing(fit).and_then(|fit| Ok((fit, Draw::parse(draw)?)));
+        let (fit, draw) = parsed.map_err(|error| raise(py, &error))?;
         let (stage, stop) = (self.0.clone(), Stop::default());
         let worker_stop = stop.clone();
         let drawn = run(py, &stop, move || {
-            stage.draw(camera.as_deref(), &draw, Effort::EXACT, &worker_stop)
+            let viewpoint = match &camera {
+                Some(camera) => Viewpoint::Camera(camera),
+                None => Viewpoint::Fitted(&fit),
+            };
+            stage.draw(viewpoint, &draw, Effort::EXACT, &worker_stop)
         })?;
         Ok(drawn.into())
     }
 }
 
-/// Writes a scene file: inputs with how each is read and shown, a camera, and how the picture is
-/// drawn, all as JSON.
+/// Reads a scene file. Returns as JSON its visible inputs, with how each is read, moved and shown;
+/// its camera, how one is fitted, the picture, and what is written over it.
+#[pyfunction]
+pub fn read_scene(py: Python<'_>, path: PathBuf, is_trusted: bool) -> PyResult<String> {
+    run(py, &Stop::default(), move || {
+        let limits = Limits::default();
+        let scene = match is_trusted {
+            true => Description::read_trusted(&path, &limits)?,
+            false => Description::read(&path, &limits)?,
+        };
+        let input = |input: &InputEntry| {
+            serde_json::json!({
+                "file": input.file,
+                "reading": scene.reading_of(input),
+                "transform": input.transform,
+                "appearance": scene.appearance_of(input),
+            })
+        };
+        let inputs: Vec<_> = scene.visible().map(input).collect();
+        let shows_field = scene.picture.optics.is_some_and(|optics| optics != Optics::default());
+        let Description { camera, framing, picture, overlay, .. } = &scene;
+        let described = serde_json::json!({
+            "inputs": inputs, "shows_field": shows_field, "camera": camera, "framing": framing,
+            "picture": picture, "overlay": overlay,
+        });
+        Ok(described.to_string())
+    })
+}
+
+/// How the picture of a scene file is drawn: the parts that [`read_scene`] returns.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Described {
+    camera: Option<CameraEntry>,
+    framing: Framing,
+    picture: PictureEntry,
+    overlay: OverlayEntry,
+}
+
+/// Writes a scene file: inputs with how each is read, shown and moved as JSON, and how the picture
+/// is drawn.
 #[pyfunction]
 pub fn write_scene(
     py: Python<'_>,
     path: PathBuf,
-    inputs: Vec<(PathBuf, String, String)>,
-    camera: Option<String>,
-    fit: &str,
-    draw: &str,
+    inputs: Vec<(PathBuf, String, String, String)>,
+    described: &str,
 ) -> PyResult<()> {
     let made = || -> Result<Description, Error> {
         let mut scene = Description::new([]);
-        for (file, load, appearance) in inputs {
+        for (file, load, appearance, transform) in inputs {
             let (reading, appearance) = (reading(&load)?, self::appearance(&appearance)?);
-            scene.inputs.push(InputEntry { reading, appearance, ..InputEntry::new(file) });
+            let (transform, new) = (options(&transform)?, InputEntry::new(file));
+            scene.inputs.push(InputEntry { reading, appearance, transform, ..new });
         }
-        scene.camera = camera.as_deref().map(options).transpose()?;
-        scene.framing = framing(fit)?;
-        scene.picture = picture(draw)?;
+        let Described { camera, framing, picture, overlay } = options(described)?;
+        (scene.camera, scene.framing) = (camera, framing);
+        (scene.picture, scene.overlay) = (picture, overlay);
         scene.check().map_err(|(place, message)| wrong(format!("{place}: {message}")))?;
         Ok(scene)
     };

@@ -3,11 +3,11 @@
 
 use crate::{
     camera::{camera, to_json},
-    draw::Draw,
+    draw::{Draw, Viewpoint},
     errors::{options, raise},
     picture::Picture,
     scene::Scene,
-    worker::run,
+    worker::{run, run_here},
 };
 use pyo3::prelude::*;
 use serde::Deserialize;
@@ -155,21 +155,21 @@ pub fn picked(
     Ok(hit.map(|point| point.to_array()))
 }
 
-/// Draws a picture with less effort than the exact one has, unless `stop` is requested.
+/// Draws a picture with less effort than the exact one has, unless `stop` is requested. The thread
+/// that calls draws.
 #[pyfunction]
 pub fn render_frame(
     py: Python<'_>,
     scene: &Scene,
-    camera: String,
+    camera: &str,
     draw: &str,
     effort: (f64, f64),
     stop: &Stop,
 ) -> PyResult<Picture> {
     let draw = Draw::parse(draw).map_err(|error| raise(py, &error))?;
-    let (stage, worker_stop) = (scene.stage().clone(), stop.0.clone());
-    let effort = effort_of(effort);
-    let drawn = run(py, &stop.0, move || stage.draw(Some(&camera), &draw, effort, &worker_stop))?;
-    Ok(drawn.into())
+    let (stage, effort) = (scene.stage(), effort_of(effort));
+    let viewpoint = Viewpoint::Camera(camera);
+    Ok(run_here(py, || stage.draw(viewpoint, &draw, effort, &stop.0))?.into())
 }
 
 /// Returns the fields of a scene as JSON: the number and the name of the item, the range of its

@@ -72,6 +72,18 @@ pub fn run<T: Send + 'static>(
     }
 }
 
+/// Runs short work, or that of a thread which no signal reaches, without the interpreter's lock and
+/// without a thread of its own.
+pub fn run_here<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    check_process(py)?;
+    let outcome = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
+    notes::warn(py)?;
+    outcome.map_err(|_| bug(py))?.map_err(|error| raise(py, &error))
+}
+
 /// Refuses to work in a copy of a process that has threads: they are missing in the copy, and work
 /// would wait for them for ever.
 fn check_process(py: Python<'_>) -> PyResult<()> {

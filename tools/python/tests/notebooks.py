@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
 import os
 import shutil
 import socket
@@ -113,3 +115,38 @@ def marimo(folder, source):
     arguments = ["marimo", "run", "own.py", "--headless", "--port={port}", "--no-token"]
     with served(folder, arguments, "/") as address:
         yield lambda page: page.goto(address)
+
+
+#: Counts the frames that the widget's canvas gets.
+COUNT = """canvas => {
+    const context = canvas.getContext("2d");
+    const draw = CanvasRenderingContext2D.prototype.drawImage;
+    window.frames_ = [];
+    context.drawImage = function (...parts) {
+        window.frames_.push([performance.now(), canvas.width]);
+        return draw.apply(this, parts);
+    };
+}"""
+
+
+def drag_frames(page, seconds):
+    """Turns the scene by the pointer. Returns the frames a second, the least and the largest width
+    of the frames after the first ones, and the longest time between two in milliseconds."""
+    canvas = page.locator(".splatkit canvas")
+    canvas.evaluate(COUNT)
+    box = canvas.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    start = time.monotonic()
+    step = 0
+    while time.monotonic() < start + seconds:
+        step += 1
+        page.mouse.move(x + 60 * math.sin(step / 30), y + 20 * math.sin(step / 50))
+        time.sleep(0.012)
+    frames = page.evaluate("window.frames_")
+    page.mouse.up()
+    times = [at for at, _ in frames]
+    widths = [width for _, width in frames[len(frames) // 3 :]] or [0]
+    gaps = [b - a for a, b in itertools.pairwise(times)] or [0]
+    return len(frames) / seconds, (min(widths), max(widths)), max(gaps)

@@ -45,11 +45,11 @@ def test_files(data):
 
 
 def test_a_turntable(data):
-    run("turntable", data / "mesh.ply", "frames", 3)
+    run("turntable", data / "mesh.ply", "frames/", 3)
     assert [path.name for path in sorted(Path("frames").iterdir())] == [
         "0000.png",
         "0001.png",
         "0002.png",
     ]
-    run("turntable", None, "knot", 2)
+    run("turntable", None, "knot/", 2)
     assert covered("knot/0001.png") > 0.1

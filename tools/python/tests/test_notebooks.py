@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from notebooks import CHROMIUM, PATIENCE, jupyterlab, marimo
+from notebooks import CHROMIUM, PATIENCE, drag_frames, jupyterlab, marimo
 
 for name in ("anywidget", "jupyterlab", "marimo", "playwright"):
     pytest.importorskip(name, reason=f"{name} is not installed")
@@ -182,3 +182,12 @@ def test_presets_colours_and_the_window_are_chosen(notebook):
     assert higher["opacities"][0][0] > generic["opacities"][0][0]
     notebook.page.get_by_label("Preset").select_option("as loaded")
     notebook.rest(lambda facts: facts["opacities"] != higher["opacities"])
+
+
+def test_frames_follow_the_hand(notebook):
+    """Frames are shown while the pointer moves. `tools/python/frames` measures how many."""
+    notebook.rest()
+    rate, widths, longest = drag_frames(notebook.page, 3)
+    print(f"{rate:.1f} frames/s, {widths} pixels wide, {longest:.0f} ms at most")
+    # Far fewer than usual: the machine may be busy.
+    assert rate > 4 and longest < 1500

@@ -223,63 +223,26 @@ def test_without_ray_the_error_names_the_command(tmp_path):
     assert done.returncode and 'pip install "pysplatkit[ray]"' in done.stderr
 
 
-#: A command that makes parts as splatkit's does, slowly.
-STAND_IN = """#!{python}
-import json, os, pathlib, sys, time
-words = sys.argv[1:]
-value = lambda flag: words[words.index(flag) + 1]
-if "--plan" in words:
-    folder = pathlib.Path(value("--plan"))
-    folder.mkdir(exist_ok=True)
-    parts = [words[1]] * int(value("--parts"))
-    (folder / "plan.json").write_text(json.dumps({{"parts": parts}}))
-elif "--part" in words:
-    plan, index = pathlib.Path(value("--part")), value("--index")
-    with open(plan.with_name("log"), "a") as log:
-        log.write(f"{{index}} {{os.getppid()}}\\n")
-    if os.path.exists(plan.with_name("refuse")):
-        sys.exit("a.las: point 3: is broken")
-    time.sleep(1.5)
-    source = pathlib.Path(json.loads(plan.read_text())["parts"][0]).read_bytes()
-    plan.with_name(index + ".part").write_bytes(source[int(index) :: 4])
-else:
-    plan = pathlib.Path(value("--join"))
-    count = len(json.loads(plan.read_text())["parts"])
-    joined = [plan.with_name(str(at) + ".part").read_bytes() for at in range(count)]
-    pathlib.Path(value("-o")).write_bytes(b"".join(joined))
-"""
+def cloud(path):
+    """Writes a cloud that is divided into parts."""
+    vertices, _ = ball(200, 400)
+    write_ply(path, vertices)
+    return path
 
 
-@pytest.fixture
-def stand_in(tmp_path, monkeypatch):
-    command = tmp_path / "splatkit"
-    command.write_text(STAND_IN.format(python=sys.executable))
-    command.chmod(0o755)
-    return command
+def test_a_killed_worker_costs_its_part(cluster, tmp_path, monkeypatch):
+    from pysplatkit.ray import _convert, convert
 
+    log, killed = tmp_path / "log", []
 
-def in_cluster(command, function, *arguments, **options):
-    """Converts with a command that the workers know too."""
-    environment = {"env_vars": {"SPLATKIT_COMMAND": str(command)}}
-    before = os.environ.get("SPLATKIT_COMMAND")
-    os.environ["SPLATKIT_COMMAND"] = str(command)
-    try:
-        return function(*arguments, task_options={"runtime_env": environment}, **options)
-    finally:
-        del os.environ["SPLATKIT_COMMAND"]
-        if before is not None:
-            os.environ["SPLATKIT_COMMAND"] = before
-
-
-def test_a_killed_worker_costs_its_part(cluster, stand_in, tmp_path):
-    from pysplatkit.ray import convert
-
-    source = bytes(range(200))
-    (tmp_path / "in.bin").write_bytes(source)
-    folder, killed = tmp_path / "parts", []
+    def slow(plan, index, load):
+        # A function inside another one goes to the workers as it is.
+        with open(log, "a") as file:
+            file.write(f"{index} {os.getpid()}\n")
+        time.sleep(1.5)
+        pysplatkit._pysplatkit.make_part(plan, index, load)
 
     def begun():
-        log = folder / "log"
         return [line.split() for line in log.read_text().splitlines()] if log.exists() else []
 
     def kill():
@@ -288,54 +251,57 @@ def test_a_killed_worker_costs_its_part(cluster, stand_in, tmp_path):
         killed.append(int(begun()[0][1]))
         os.kill(killed[0], signal.SIGKILL)
 
+    source = cloud(tmp_path / "cloud.ply")
+    convert(source, tmp_path / "whole.splk", parts=4)
+    monkeypatch.setattr(_convert, "_part", slow)
     killer = threading.Thread(target=kill)
     killer.start()
-    out = in_cluster(
-        stand_in, convert, tmp_path / "in.bin", tmp_path / "out.splk", parts=4, folder=folder
-    )
+    out = convert(source, tmp_path / "out.splk", parts=4, folder=tmp_path / "parts")
     killer.join()
-    assert killed and out.read_bytes() == b"".join(source[at::4] for at in range(4))
+    assert killed and out.read_bytes() == (tmp_path / "whole.splk").read_bytes()
     parts = sorted(index for index, _ in begun())
     assert len(parts) == 5 and set(parts) == {"0", "1", "2", "3"}
+    assert not list(tmp_path.glob(".*"))
 
 
-def test_a_part_that_fails_says_why(cluster, stand_in, tmp_path):
+def test_a_part_that_fails_says_why(cluster, tmp_path):
     from pysplatkit.ray import convert
 
-    (tmp_path / "in.bin").write_bytes(b"any")
-    (tmp_path / "parts").mkdir()
-    (tmp_path / "parts" / "refuse").touch()
-    with pytest.raises(pysplatkit.Error, match=r"a\.las: point 3: is broken"):
-        in_cluster(
-            stand_in,
-            convert,
-            tmp_path / "in.bin",
-            tmp_path / "out.splk",
-            parts=2,
-            folder=tmp_path / "parts",
-        )
-    assert not (tmp_path / "out.splk").exists()
-    (tmp_path / "there.splk").touch()
+    source, out = cloud(tmp_path / "cloud.ply"), tmp_path / "out.splk"
+    folder = tmp_path / "parts"
+    convert(source, out, parts=2, folder=folder)
+    for part in folder.glob("part-*"):
+        part.unlink()
+    write_ply(source, ball(150, 300)[0])
+    with pytest.raises(pysplatkit.InputError, match="when the plan was made"):
+        convert(source, tmp_path / "other.splk", parts=2, folder=folder)
+    assert not (tmp_path / "other.splk").exists()
     with pytest.raises(pysplatkit.OutputError, match="exists already"):
-        convert(tmp_path / "in.bin", tmp_path / "there.splk")
+        convert(source, out)
+    with pytest.raises(pysplatkit.ArgumentError, match="splk"):
+        convert(source, tmp_path / "out.splv")
+    with pytest.raises(pysplatkit.ArgumentError, match="preset"):
+        convert(source, tmp_path / "other.splk", preset="quick")
 
 
-def test_the_parts_of_the_command(cluster, tmp_path):
+def test_parts_need_no_command_and_are_those_of_one_machine(cluster, tmp_path, monkeypatch):
     from pysplatkit.ray import convert
 
     command = os.environ.get("SPLATKIT_COMMAND")
+    source, in_parts = cloud(tmp_path / "cloud.ply"), tmp_path / "in-parts.splk"
+    monkeypatch.delenv("SPLATKIT_COMMAND", raising=False)
+    convert(source, in_parts, parts=4, color="height", lossless=True)
+    assert not pysplatkit.check(in_parts).findings
     if not command or not Path(command).is_file():
         pytest.skip("SPLATKIT_COMMAND names no command")
-    help_ = subprocess.run(
-        [command, "convert", "--help"], capture_output=True, text=True, check=False
-    ).stdout
-    if "--plan" not in help_:
-        pytest.skip("the command does not know --plan")
-    vertices, _ = ball(200, 400)
-    write_ply(tmp_path / "cloud.ply", vertices)
-    at_once, in_parts = tmp_path / "at-once.splk", tmp_path / "in-parts.splk"
-    words = [command, "convert", tmp_path / "cloud.ply", "-o", at_once, "--parts", "4"]
-    subprocess.run(words, check=True)
-    in_cluster(command, convert, tmp_path / "cloud.ply", in_parts, parts=4)
+    at_once = tmp_path / "at-once.splk"
+    words = [command, "convert", source, "-o", at_once, "--parts", "4", "--color", "height"]
+    subprocess.run([*words, "--lossless"], check=True)
     assert at_once.read_bytes() == in_parts.read_bytes()
-    assert not pysplatkit.check(in_parts).findings
+
+
+def test_ranks_take_a_scene(cluster):
+    scene = pysplatkit.Scene().add_volume(blob(), name="a").transform("a", translate=(5, 0, 0))
+    camera = scene.camera(SIZE, view="left")
+    with renderer(scene, ranks=2) as ranks:
+        same(ranks.render(SIZE, camera), scene.render(SIZE, camera))

@@ -213,6 +213,48 @@ def test_items_that_are_added_later_are_drawn_by_refresh():
     assert np.array_equal(widget.snapshot(), scene.render(SIZE, widget.camera).rgba)
 
 
+def test_changed_items_are_drawn_by_refresh():
+    scene = Scene().add_mesh(*ball()).add_volume(blob(), name="first")
+    scene.add_volume(2 + blob(), origin=(2, 0, 0), spacing=0.1, name="second")
+    widget = rest(scene.show(size=SIZE))
+    widget.field = 1
+    function = TransferFunction([(0, "red")], [(0.2, 0.0), (0.5, 0.9)])
+    tell(widget, ("transfer", {"field": 0, "transfer": json.loads(function.to_json())}))
+    edited = widget._transfers[0]
+    # What was edited stays as the items around it change.
+    scene.transform("mesh", scale=0.5).update("second", 3 + blob())
+    widget.refresh()
+    assert rest(widget)._names == ["first", "second"] and widget._transfers[0] == edited
+    assert np.array_equal(widget.snapshot(), scene.render(SIZE, widget.camera).rgba)
+    scene.remove("second")
+    widget.refresh()
+    assert rest(widget)._names == ["first"] and widget.field == 0
+    # “As loaded” is the function that the volume came with.
+    tell(widget, ("preset", {"field": 0, "name": ""}))
+    assert widget._transfers[0] != edited
+    wanted = Scene().add_mesh(*ball()).transform("mesh", scale=0.5).add_volume(blob())
+    assert np.array_equal(widget.snapshot(), wanted.render(SIZE, widget.camera).rgba)
+
+
+def test_every_message_is_answered(widget):
+    """Each view of the browser hears up to which of its messages a frame goes."""
+    sent = messages(widget)
+    turn = [["turn", {"drag": [4, 1]}]]
+    for number in range(1, 9):
+        content = {"do": turn, "view": "one", "number": number}
+        widget._take_message(widget, content, [])
+    widget._take_message(widget, {"do": turn, "view": "two", "number": 5}, [])
+    rest(widget)
+    assert widget._status["exact"] and widget._status["answers"] == {"one": 8, "two": 5}
+    numbers = [content["answers"]["one"] for content, _ in sent]
+    assert numbers == sorted(numbers) and numbers
+    # One that changes nothing is answered, too.
+    sent.clear()
+    content = {"do": [["no such gesture", {}]], "view": "one", "number": 9}
+    widget._take_message(widget, content, [])
+    assert sent == [({"type": "idle", "answers": {"one": 9, "two": 5}}, None)]
+
+
 def test_errors_are_told_and_pass(widget):
     sent = messages(widget)
     for gesture in (
@@ -225,7 +267,7 @@ def test_errors_are_told_and_pass(widget):
         sent.clear()
         tell(widget, gesture)
         assert widget._error
-        assert sent == [({"type": "idle"}, None)]
+        assert sent == [({"type": "idle", "answers": {}}, None)]
     tell(widget, ("turn", {"drag": [3, 3]}))
     assert widget._error == "" and widget._still
     # A picture that cannot be drawn is an error, too, and the next one is drawn again.

@@ -76,7 +76,11 @@ def _say(text: object) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command. Returns its exit status."""
+    """Runs the command. Returns its exit status.
+
+    Args:
+        arguments: Its words. Default: those of the process.
+    """
     given = _parser().parse_args(arguments)
     warnings.showwarning = lambda message, *_, **__: _say(f"warning: {message}")
     try:
@@ -86,9 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         names = ("view", "azimuth", "elevation", "zoom")
         view = {name: getattr(given, name) for name in names}
         view = {name: value for name, value in view.items() if value is not None}
-        picture = scene.render(
-            given.size, scene.camera(given.size, **view), background=given.background
-        )
+        picture = scene.render(given.size, background=given.background, **view)
         picture.save(given.output)
     except (Error, TypeError) as error:
         _say(f"error: {error}")

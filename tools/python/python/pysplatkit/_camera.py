@@ -35,7 +35,11 @@ class Camera:
 
     @classmethod
     def from_json(cls, text: str) -> Camera:
-        """Reads the JSON form, which the command prints with `--json` and takes as `--camera`."""
+        """Reads the JSON form, which the command prints with `--json` and takes as `--camera`.
+
+        Args:
+            text: The JSON.
+        """
         parts = json.loads(text)
         vectors = {name: tuple(parts[name]) for name in ("position", "focal_point", "view_up")}
         return cls(**vectors, view_angle=parts.get("view_angle"), height=parts.get("height"))
@@ -50,15 +54,27 @@ class Camera:
         return text({**parts, "view_angle": self.view_angle, "height": self.height})
 
     def azimuth(self, degrees: float) -> Camera:
-        """Orbits to the right around the up axis (VTK's Azimuth)."""
+        """Orbits to the right around the up axis (VTK's Azimuth).
+
+        Args:
+            degrees: The angle.
+        """
         return self._take(_pysplatkit.moved_camera(self.to_json(), degrees, 0.0, 1.0))
 
     def elevation(self, degrees: float) -> Camera:
-        """Orbits upwards (VTK's Elevation)."""
+        """Orbits upwards (VTK's Elevation).
+
+        Args:
+            degrees: The angle.
+        """
         return self._take(_pysplatkit.moved_camera(self.to_json(), 0.0, degrees, 1.0))
 
     def zoom(self, factor: float) -> Camera:
-        """Narrows the view by a factor (VTK's Zoom)."""
+        """Narrows the view (VTK's Zoom).
+
+        Args:
+            factor: How much larger things appear.
+        """
         return self._take(_pysplatkit.moved_camera(self.to_json(), 0.0, 0.0, factor))
 
     def orthographic(self) -> Camera:
@@ -86,7 +102,13 @@ class Clip:
 
     @classmethod
     def plane(cls, normal: Sequence[float], offset: float, *, inside: bool = True) -> Clip:
-        """Keeps the points x with normal · x ≤ offset, or with `inside=False` the others."""
+        """Keeps one side of a plane: the points x with normal · x ≤ offset.
+
+        Args:
+            normal: The direction across the plane.
+            offset: The place of the plane along the normal.
+            inside: False keeps the other side.
+        """
         from ._options import vector
 
         return cls({"plane": [*vector(normal), float(offset)]}, inside)
@@ -95,7 +117,13 @@ class Clip:
     def box(
         cls, minimum: Sequence[float], maximum: Sequence[float], *, inside: bool = True
     ) -> Clip:
-        """Keeps what lies in a box along the axes, or with `inside=False` what lies outside."""
+        """Keeps what lies in a box along the axes.
+
+        Args:
+            minimum: The smallest x, y and z.
+            maximum: The largest x, y and z.
+            inside: False keeps what lies outside.
+        """
         from ._options import vector
 
         return cls({"box": [vector(minimum), vector(maximum)]}, inside)

@@ -13,12 +13,17 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _options, _pysplatkit
-from ._options import Color, PathLike, Reading, Vector
+from ._options import Color, ColorMap, PathLike, Reading, Vector
 
 
 def info(path: PathLike, **reading: Unpack[Reading]) -> dict[str, Any]:
     """Returns what a file holds: kind, count, bounds, range of values, arrays, …: the facts of
-    `splatkit info --json`."""
+    `splatkit info --json`.
+
+    Args:
+        path: The file, or a folder of DICOM slices.
+        reading: How the file is read: the options of reading of `Scene.add`.
+    """
     given = _options.checked(reading, _options.READING, "info")
     return dict(json.loads(_pysplatkit.info(os.fspath(path), _options.reading(given))))
 
@@ -50,7 +55,12 @@ class Report:
 
 
 def check(path: PathLike, **reading: Unpack[Reading]) -> Report:
-    """Checks a file: every checksum and guarantee of hierarchies and bricks, oddities of others."""
+    """Checks a file: every checksum and guarantee of hierarchies and bricks, oddities of others.
+
+    Args:
+        path: The file.
+        reading: How the file is read: the options of reading of `Scene.add`.
+    """
     given = _options.checked(reading, _options.READING, "check")
     report = json.loads(_pysplatkit.check(os.fspath(path), _options.reading(given)))
     return Report(report["ok"], [Finding(**finding) for finding in report["findings"]])
@@ -85,7 +95,7 @@ def convert(
     lattice: str | None = None,
     memory: int | None = None,
     color: Color | None = None,
-    colormap: str | None = None,
+    colormap: ColorMap | None = None,
     range: tuple[float, float] | None = None,
     **reading: Unpack[Reading],
 ) -> Path:
@@ -96,6 +106,8 @@ def convert(
     volume becomes .splv, levels of bricks, or .nrrd.
 
     Args:
+        files: A file, or several.
+        output: The file to write. Its extension says what the files become.
         overwrite: Replace an existing file.
         preset: Trade the time of building a hierarchy for its quality: fastest, fast, balanced,
             slow or best.
@@ -106,7 +118,10 @@ def convert(
         radius_scale: A factor on all radii.
         lattice: bcc resamples a volume on the body-centred cubic lattice.
         memory: Most bytes of memory. Scans that need more are converted region by region.
-        color, colormap, range: As for `Scene.add`.
+        color: What colours surfaces, as for `Scene.add`.
+        colormap: The colours of values, as for `Scene.add`.
+        range: The values that the colours are spread over.
+        reading: How files are read: the options of reading of `Scene.add`.
     """
     given = _options.checked(reading, _options.READING, "convert")
     several = [files] if isinstance(files, (str, os.PathLike)) else files
@@ -149,7 +164,7 @@ class Leaves(NamedTuple):
 
 
 class Hierarchy:
-    """An open hierarchy (.splk). Only its directory is read; `leaves` reads the rest.
+    """An open hierarchy (.splk) of a `path`. Only its directory is read; `leaves` reads the rest.
 
     Its facts are attributes: splats, nodes, points, pages, closed, lossless, degree, has_color,
     has_normals, up, is_guessed, unit, source, origin and bounds.

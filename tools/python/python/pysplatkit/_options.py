@@ -6,11 +6,12 @@ import difflib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, TypedDict, Union
+from typing import Any, Protocol, TypedDict, Union
 
 import numpy as np
 
 from . import _pysplatkit
+from ._camera import Clip
 from ._errors import ArgumentError, KindError
 from ._transfer import TransferFunction
 
@@ -20,6 +21,20 @@ PathLike = Union[str, "os.PathLike[str]"]
 Color = str | Sequence[float]
 #: Three numbers: x, y, z.
 Vector = Sequence[float]
+
+
+class MatplotlibMap(Protocol):
+    """A colour map of matplotlib, or any other that returns colours for numbers from 0 to 1."""
+
+    @property
+    def N(self) -> int: ...  # noqa: N802 (matplotlib's name)
+
+    def __call__(self, X: Any, /) -> Any: ...  # noqa: N803
+
+
+#: A colour map: a name of `pysplatkit.COLOR_MAPS`, with `_r` at its end reversed; colours at even
+#: distances; or a Colormap of matplotlib.
+ColorMap = str | Sequence[Color] | MatplotlibMap
 
 
 class FieldAppearance(TypedDict, total=False):
@@ -35,8 +50,9 @@ class FieldAppearance(TypedDict, total=False):
     isosurfaces: float | Sequence[float | tuple[float, Color | None, float]]
     #: Factors on the opacity by the magnitude of the gradient: (magnitude, factor), ….
     gradient_opacity: Sequence[tuple[float, float]]
-    #: Colour values by this map (`pysplatkit.COLOR_MAPS`; `_r` at the end reverses it).
-    colormap: str
+    #: Colour values by this map: a name of `pysplatkit.COLOR_MAPS` (`_r` at its end reverses it), a
+    #: list of colours, or a Colormap of matplotlib.
+    colormap: ColorMap
     #: Spread the colour map over the logarithms of the values.
     log_colors: bool
 
@@ -59,8 +75,8 @@ class SurfaceAppearance(TypedDict, total=False):
 
     #: file, values, height, normal, an attribute of the file, or a colour.
     color: Color
-    #: Colour values by this map. Default: viridis.
-    colormap: str
+    #: Colour values by this map, as for volumes. Default: viridis.
+    colormap: ColorMap
     #: Spread the colour map over these values.
     range: tuple[float, float]
     #: Spread the colour map over the logarithms of the values.
@@ -138,7 +154,7 @@ class Reading(TypedDict, total=False):
     limits: Mapping[str, int]
 
 
-class FileOptions(VolumeAppearance, SurfaceAppearance, Reading):
+class FileOptions(VolumeAppearance, SurfaceAppearance, Reading, total=False):
     """How a file is read and shown."""
 
     #: Cells: solid, an opaque body with the field inside where clips cut it, or volume, the field
@@ -146,6 +162,132 @@ class FileOptions(VolumeAppearance, SurfaceAppearance, Reading):
     cells: str
 
 
+class SourceOptions(FileOptions, total=False):
+    """How a file, an array or an object is read and shown: what `Scene.add` takes."""
+
+    #: Volumes of arrays: the world position of the first sample.
+    origin: Vector
+    #: Volumes of arrays: whether the array is copied.
+    copy: bool
+    #: Volumes of arrays: ct, mr, emission, ultrasound or microscopy.
+    modality: str
+    #: Arrays: the world direction that is up.
+    up: str | Vector
+    #: Points and meshes of arrays: a colour for each.
+    colors: Any
+    #: Points and meshes of arrays: a number for each.
+    values: Any
+    #: Points and meshes of arrays: a normal for each.
+    normals: Any
+
+
+class View(TypedDict, total=False):
+    """How a camera is fitted to a scene."""
+
+    #: front, back, left, right, top, bottom or iso.
+    view: str
+    #: Degrees to the right, about the up axis.
+    azimuth: float
+    #: Degrees upwards.
+    elevation: float
+    #: A factor on the size of what is seen.
+    zoom: float
+    #: The point that the camera aims at.
+    focal_point: Vector
+    #: The direction that is up in the picture.
+    view_up: str | Vector
+    #: The vertical angle of view in degrees.
+    view_angle: float
+    #: The distance of the camera from its focal point, in world units.
+    distance: float
+    #: Whether to draw without perspective.
+    orthographic: bool
+    #: The direction that is up in the scene.
+    up: str | Vector
+
+
+class Method(TypedDict, total=False):
+    """How a picture is drawn over any background."""
+
+    #: Pixels that are drawn for each pixel and averaged: 1, 4, 9, 16, 64 or auto.
+    samples: int | str
+    #: sheets, axis-sheets or splats.
+    mode: str
+    #: Whether single splats are composited from back to front.
+    back_to_front: bool
+    #: pre-integrated, post or pre.
+    classify: str
+    #: light, maximum or x-ray.
+    optics: str
+    #: False draws without light, True lights volumes in any case.
+    shade: bool
+    #: Shapes that cut the scene.
+    clips: Sequence[Clip]
+    #: How gradients are made.
+    gradient: str
+    #: Where fields are evaluated.
+    evaluate: str
+    #: The thickness of sheets, in world units.
+    sheet_thickness: float
+    #: The width of the splats of hierarchies, in pixels.
+    cut: float
+    #: About how many splats of hierarchies are drawn.
+    budget: int
+    #: Most bytes of memory for what is read from files as it is drawn.
+    memory: int
+    #: Whether faces that look away are left out.
+    cull_backfaces: bool
+    #: Whether what is hidden is left out early.
+    occlusion: bool
+    #: cpu, gpu or auto.
+    engine: str
+    #: Whether the colours of values are drawn, with their numbers.
+    scalar_bar: bool
+    #: Whether the directions of the axes are drawn.
+    axes: bool
+    #: Whether a round length is drawn.
+    scale_bar: bool
+    #: A text above the picture's content.
+    caption: str
+
+
+class Drawing(Method, total=False):
+    """How a picture is drawn: the options of `Scene.render`, but its size and its camera."""
+
+    #: A colour; None for transparent pixels.
+    background: Color | None
+
+
+class Framed(Drawing, View, total=False):
+    """How a picture is drawn, and how its camera is fitted."""
+
+
+class RenderOptions(SourceOptions, total=False):
+    """What `pysplatkit.render` takes beside its named arguments."""
+
+    focal_point: Vector
+    view_up: str | Vector
+    view_angle: float
+    distance: float
+    mode: str
+    back_to_front: bool
+    classify: str
+    optics: str
+    shade: bool
+    gradient: str
+    evaluate: str
+    sheet_thickness: float
+    cut: float
+    budget: int
+    memory: int
+    cull_backfaces: bool
+    occlusion: bool
+
+
+VIEW = frozenset(View.__annotations__)
+#: The options of texts over a picture.
+OVERLAY = frozenset({"scalar_bar", "axes", "scale_bar", "caption"})
+DRAWING = frozenset(Drawing.__annotations__)
 FIELD = frozenset(FieldAppearance.__annotations__)
 VOLUME = frozenset(VolumeAppearance.__annotations__)
 SURFACE = frozenset(SurfaceAppearance.__annotations__)
@@ -218,6 +360,17 @@ def vector(value: float | Vector | Sequence[str]) -> list[float]:
     return parts
 
 
+def matrix(value: Any) -> list[list[float]]:
+    """Returns the rows of a matrix of 4 × 4."""
+    try:
+        rows = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        rows = np.zeros(0)
+    if rows.shape != (4, 4):
+        raise ArgumentError(f"matrix has 4 × 4 numbers, not the shape {rows.shape}")
+    return [list(map(float, row)) for row in rows]
+
+
 def direction(value: str | Vector | None) -> list[float] | None:
     """Returns three numbers of a direction, which may be an axis such as “+Y”; None for none."""
     if not isinstance(value, str):
@@ -231,27 +384,57 @@ def direction(value: str | Vector | None) -> list[float] | None:
     return [sign if axis == name.upper() else 0.0 for axis in "XYZ"]
 
 
-def appearance(options: Mapping[str, Any]) -> str:
-    """Returns how an item looks, as JSON."""
+def plain_appearance(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns how an item looks, in plain data that nothing else changes."""
     given = {name: options[name] for name in options if name in VOLUME | SURFACE | CELLS}
     transfer = given.get("transfer")
     if transfer is not None:
         given["transfer"] = TransferFunction.of(transfer)
-    if "isosurfaces" in given:
+    if given.get("isosurfaces") is not None:
         value = given["isosurfaces"]
         surfaces = [value] if isinstance(value, (int, float, np.number)) else value
         given["isosurfaces"] = [_surface(surface) for surface in surfaces]
+    if given.get("colormap") is not None:
+        given["colormap"] = colormap(given["colormap"])
     if given.get("nan_color") is not None:
         given["nan_color"] = color(given["nan_color"])
     given_color = given.get("color")
     if given_color is not None and not isinstance(given_color, str):
-        given["color"] = "#" + "".join(f"{round(part * 255):02x}" for part in color(given_color))
-    return text(given)
+        given["color"] = hex_color(given_color)
+    return given
+
+
+def appearance(options: Mapping[str, Any]) -> str:
+    """Returns how an item looks, as JSON."""
+    return text(plain_appearance(options))
+
+
+def hex_color(value: Color) -> str:
+    """Returns a colour as `#rrggbb`."""
+    return "#" + "".join(f"{round(part * 255):02x}" for part in color(value))
+
+
+def colormap(value: Any) -> str:
+    """Returns a colour map as the compiled half takes it: a name, or colours with commas between.
+
+    A map of matplotlib is known by what it does; the package is not imported.
+    """
+    if isinstance(value, str):
+        return value
+    if callable(value) and hasattr(value, "N"):
+        value = np.asarray(value(np.linspace(0.0, 1.0, 256)))[:, :3].clip(0.0, 1.0)
+    try:
+        return ",".join(hex_color(part) for part in value)
+    except TypeError:
+        form = "a colour map is a name, a list of colours, or a Colormap of matplotlib"
+        raise KindError(f"{form}, not {value!r}") from None
 
 
 def _surface(value: Any) -> dict[str, Any]:
     if isinstance(value, (int, float, np.number)):
         return {"value": float(value), "color": None, "opacity": 1.0}
+    if isinstance(value, Mapping):
+        return dict(value)
     try:
         value, tone, *rest = value
         opacity = float(rest[0]) if rest else 1.0

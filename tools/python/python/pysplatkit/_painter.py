@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from . import _pysplatkit
 from ._errors import Error
 
-#: The wanted time of a moving frame, in milliseconds. With what the browser and the kernel take,
-#: there are then ten frames a second or more.
-MOVING = 50.0
+#: The wanted time of a moving frame, in milliseconds. With what encoding takes, and the browser
+#: beside the kernel, there are then twenty frames a second or more.
+MOVING = 30.0
 #: A view that changed less than so many seconds ago may still move: it is not refined yet.
 CALM = 0.12
 #: The effort of the exact picture.
@@ -29,6 +29,8 @@ class Order:
     camera: str
     draw: str
     transfers: str = ""
+    #: The number of the last message of each view of the browser that the order answers.
+    answers: Mapping[str, int] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True)

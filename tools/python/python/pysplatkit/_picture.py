@@ -18,6 +18,18 @@ from ._errors import OutputError
 _T = TypeVar("_T", bound=np.generic)
 
 
+def _restored(
+    color: npt.NDArray[np.float32],
+    depth: npt.NDArray[np.float32],
+    about: tuple[str, str],
+    background: list[float] | None,
+) -> Picture:
+    """Returns a picture that was pickled."""
+    height, width = depth.shape
+    pixels = (color.reshape(-1, 4), depth.ravel(), (width, height), 1, about)
+    return Picture(_pysplatkit.Picture(*pixels), background)
+
+
 class Picture:
     """A finished picture, with rows from the top. `Scene.render` returns it.
 
@@ -64,15 +76,30 @@ class Picture:
         return dict(json.loads(self._native.statistics))
 
     def over(self, background: _options.Color | None) -> Picture:
-        """Returns the same picture over another background; None for transparency."""
+        """Returns the same picture over another background.
+
+        Args:
+            background: A colour; None for transparency.
+        """
         return Picture(self._native, _options.background(background))
 
     def save(self, path: _options.PathLike, *, overwrite: bool = True) -> Path:
-        """Writes a .png or .jpg file, which appears whole or not at all. Returns its path."""
+        """Writes a .png or .jpg file, which appears whole or not at all. Returns its path.
+
+        Args:
+            path: The file.
+            overwrite: Whether a file that is there already is replaced.
+        """
         return self._written(path, overwrite, lambda to: self._native.save(to, self._background))
 
     def save_depth(self, path: _options.PathLike, *, overwrite: bool = True) -> Path:
-        """Writes the depths as a grey PNG of 16 bits: white for the nearest, black for nothing."""
+        """Writes the depths as a grey PNG of 16 bits: white for the nearest, black for nothing.
+        Returns its path.
+
+        Args:
+            path: The file.
+            overwrite: Whether a file that is there already is replaced.
+        """
         return self._written(path, overwrite, self._native.save_depth)
 
     def _written(self, path: _options.PathLike, overwrite: bool, write: Any) -> Path:
@@ -87,6 +114,10 @@ class Picture:
         array = flat.reshape((height, width, *channels))
         array.flags.writeable = False
         return array
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        about = (self._native.statistics, self._native.camera)
+        return _restored, (self.color, self.depth, about, self._background)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
         array = self.rgba if dtype is None else self.rgba.astype(dtype, copy=False)

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import os
-import warnings
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from . import _arrays, _neighbours, _options, _pysplatkit
+from . import _film, _items, _neighbours, _options, _pysplatkit
 from ._camera import Camera, Clip
-from ._errors import ArgumentError, DataWarning, KindError
+from ._errors import ArgumentError
+from ._items import Item
 from ._options import (
     CellAppearance,
     Color,
+    Drawing,
     FieldAppearance,
-    FileOptions,
+    Framed,
+    PathLike,
+    SourceOptions,
     SurfaceAppearance,
     Vector,
+    View,
     VolumeAppearance,
 )
 from ._picture import Picture
@@ -30,115 +36,97 @@ if TYPE_CHECKING:
 
 
 class Scene:
-    """What is drawn together in one picture. Methods that add return the scene.
+    """What is drawn together in one picture. Methods that add or change items return the scene.
 
     >>> Scene().add("skull.nrrd").add("knee.stl", color="ivory").render().save("both.png")
 
-    World coordinates are x, y, z, in any unit. A scene may be drawn by several threads at once.
+    World coordinates are x, y, z, in any unit. Items have names: `update`, `transform` and `remove`
+    take them. A scene may be drawn by several threads at once, copied and pickled.
     """
 
     def __init__(self) -> None:
         self._native = _pysplatkit.Scene()
-        # The files that were added, with how each is read and shown; None beside arrays.
-        self._files: list[tuple[str, str, str]] | None = []
+        self._items: list[Item] = []
         # What a scene file says of the picture.
         self._described: dict[str, Any] = {}
+        # Held while items change.
+        self._lock = threading.RLock()
 
     @classmethod
-    def open(cls, path: str | os.PathLike[str], *, trusted: bool = False) -> Scene:
+    def open(cls, path: PathLike, *, trusted: bool = False) -> Scene:
         """Opens a scene file: that of the window, of `save` or by hand (docs/scene-files.md).
 
         `render` then draws the picture that the file describes, as `splatkit render scene.json`
-        does; its arguments count more than the file. Texts over the picture are the command's.
+        does; its arguments count more than the file.
 
         Args:
+            path: The scene file.
             trusted: Whether the scene may name files outside its folder, and addresses.
         """
+        described = json.loads(_pysplatkit.read_scene(os.fspath(path), trusted))
         scene = cls()
-        scene._described = json.loads(scene._native.add_scene(os.fspath(path), trusted))
-        scene._files = None
-        if scene._described["overlay"]:
-            message = (
-                f"{os.fspath(path)}: the texts over the picture are drawn by the command alone"
-            )
-            warnings.warn(message, DataWarning, stacklevel=2)
+        shows_field = described.pop("shows_field")
+        for file in described.pop("inputs"):
+            arguments = {"source": file["file"], "shows_field": shows_field}
+            arguments |= {"_reading": file["reading"], "_appearance": file["appearance"]}
+            name = scene._unused(None, _items.name_of(file["file"]))
+            item = Item.of(name, "add", arguments)
+            scene._append(replace(item, transform=json.dumps(file["transform"])))
+        scene._described = described
         return scene
 
     def save(
         self,
-        path: str | os.PathLike[str],
+        path: PathLike,
         camera: Camera | None = None,
         size: tuple[int, int] | None = None,
-        **drawing: Any,
+        **drawing: Unpack[Framed],
     ) -> None:
         """Writes a scene file, which the command, the window and `open` draw alike.
 
-        Only scenes of files can be written; save arrays as files first. The arguments are those of
-        `render`.
-        """
-        if self._files is None:
-            raise ArgumentError("a scene file names files: a scene of arrays cannot be saved")
-        if not self._files:
-            raise ArgumentError("the scene is empty")
-        known = frozenset(_DRAW) - {"size"} | {"background"}
-        given = _options.checked(drawing, known, "save")
-        if "background" in given or drawing.get("background", "") is None:
-            given["background"] = _options.background(drawing["background"]) or "none"
-        text = None if camera is None else camera.to_json()
-        draw = _drawn(size=size, **given)
-        _pysplatkit.write_scene(os.fspath(path), self._files, text, "{}", draw)
+        Only scenes of files can be written; save arrays as files first.
 
-    def add(self, source: Any, **options: Unpack[FileOptions]) -> Scene:
+        Args:
+            path: The scene file.
+            camera: The camera. Default: one that is fitted to the scene.
+            size: Width and height of the picture in pixels.
+            drawing: The other options of `render`.
+        """
+        inputs = [item.input for item in self._items]
+        files = [file for file in inputs if file is not None]
+        if len(files) < len(inputs):
+            raise ArgumentError("a scene file names files: a scene of arrays cannot be saved")
+        if not files:
+            raise ArgumentError("the scene is empty")
+        given = _options.checked(drawing, _options.DRAWING | _options.VIEW, "save")
+        if given.pop("engine", None) not in (None, "cpu"):
+            raise ArgumentError("a scene file does not say which engine draws: leave engine out")
+        if "background" in drawing:
+            given["background"] = _options.background(drawing["background"]) or "none"
+        overlay = {name: given.pop(name) for name in _options.OVERLAY & given.keys()}
+        view = {name: given.pop(name) for name in _options.VIEW & given.keys()}
+        described = {
+            "camera": None if camera is None else json.loads(camera.to_json()),
+            "framing": json.loads(_fit(**view)),
+            "picture": json.loads(_drawn(size=size, **given)),
+            "overlay": overlay,
+        }
+        _pysplatkit.write_scene(os.fspath(path), files, json.dumps(described))
+
+    def add(
+        self, source: Any, *, name: str | None = None, **options: Unpack[SourceOptions]
+    ) -> Scene:
         """Adds a file, a folder of DICOM slices, an array, or an object of another package.
 
-        Arrays of three axes are volumes, those of (n, 3) points. A dictionary has the arguments of
-        a method: an `array`, `vertices`, `positions`, `points` or `centers`, and more.
-        `docs/python.md` lists the options, and the objects that are known.
+        Args:
+            source: A path; an array of three axes, a volume, or of (n, 3), points; an object that
+                docs/python.md lists; or a dictionary with the arguments of a method: an `array`,
+                `vertices`, `positions`, `points` or `centers`, and more.
+            name: What the item is called. Default: made of the file's name, or of the kind.
+            options: How the source is read and shown (docs/python.md lists the options).
         """
-        if isinstance(source, (str, os.PathLike)):
-            known = _options.VOLUME | _options.SURFACE | _options.CELLS | _options.READING
-            given = _options.checked(options, known, "add")
-            path = os.fspath(source)
-            reading, appearance = _options.reading(given), _options.appearance(given)
-            self._native.add_file(path, reading, appearance)
-            if self._files is not None:
-                self._files.append((path, reading, appearance))
-            return self
-        parts = _neighbours.parts_of(source, options.get("scalar"))
-        if parts is not None:
-            options.pop("scalar", None)
-            arguments: dict[str, Any] = dict(options)
-            if parts.method == "add_cells" and "cells" in arguments:
-                arguments["style"] = arguments.pop("cells")
-            return getattr(self, parts.method)(parts, **arguments)  # type: ignore[no-any-return]
-        if isinstance(source, Mapping):
-            return self._add_arguments(source, options)
-        shape = np.shape(source)
-        if len(shape) == 3:
-            return self.add_volume(source, **options)  # type: ignore[misc]
-        if len(shape) == 2 and shape[1] == 3:
-            return self.add_points(source, **options)  # type: ignore[misc]
-        if len(shape) == 0:
-            raise _neighbours.unknown(source, "Scene.add", _ALSO)
-        raise ArgumentError(
-            f"an array of the shape {shape} is neither a volume (z, y, x) nor points (n, 3)"
-        )
-
-    def _add_arguments(self, source: Mapping[str, Any], options: Mapping[str, Any]) -> Scene:
-        methods = {
-            "array": self.add_volume,
-            "vertices": self.add_mesh,
-            "centers": self.add_gaussians,
-            "points": self.add_cells,
-            "positions": self.add_points,
-        }
-        if {"positions", "values"} < set(source) and set(source) & {"radii", "covariances"}:
-            methods["positions"] = self.add_samples
-        for first, method in methods.items():
-            if first in source:
-                given = {**source, **options}
-                return method(given.pop(first), **given)  # type: ignore[no-any-return, operator]
-        raise _neighbours.unknown(source, "Scene.add", _ALSO)
+        method, arguments = _arguments(source, dict(options))
+        return self._added(method, {**arguments, "name": name or arguments.get("name")})
 
     def add_volume(
         self,
@@ -157,7 +145,7 @@ class Scene:
         unit: str | None = None,
         up: str | Vector | None = None,
         labels: bool | Mapping[int, str] | str | os.PathLike[str] | None = None,
-        name: str = "volume",
+        name: str | None = None,
         **appearance: Unpack[VolumeAppearance],
     ) -> Scene:
         """Adds the samples of an array, which is indexed [z, y, x] whatever its order in memory.
@@ -178,40 +166,18 @@ class Scene:
                 lists of ascending numbers, in units of the spacing.
             missing: A value that stands for “no value”.
             modality: ct, mr, emission, ultrasound or microscopy: for the automatic colours.
+            value_name: What the values are called: the title of the scalar bar.
+            value_unit: The unit of the values.
+            unit: The unit of lengths.
             up: The world direction that is up: x, y, z, or an axis such as “+Y”. Default: z.
             labels: Whether the values are labels, each drawn where its samples are nearest; their
                 names as {value: name}; or the path of a table with names and colours. Default:
                 values that look like labels are.
+            name: What the item is called. Default: “volume”, with a number if there are several.
+            appearance: `transfer`, `range`, `opacity_unit`, `isosurfaces`, `gradient_opacity`,
+                `colormap`, `log_colors`, `kernel`, `sigma`, `extent`, `sharp` (docs/python.md).
         """
-        given = _options.checked(appearance, _options.VOLUME, "add_volume")
-        volume = _neighbours.of_kind(_neighbours.Volume, array, scalar, "add_volume")
-        volume = volume or _neighbours.Volume(array)
-        samples = _arrays.samples(volume.samples, copy)
-        axes = volume.axes if axes is None else axes
-        coordinates = volume.coordinates if coordinates is None else coordinates
-        matrix = None
-        if axes is not None:
-            matrix = _arrays.rows(axes, 3, "axes", "f8")
-            if matrix.shape != (3, 3):
-                raise ArgumentError(f"axes is a matrix of 3 × 3, not {matrix.shape}")
-        facts = {
-            "name": name,
-            "spacing": _options.vector(volume.spacing if spacing is None else spacing),
-            "origin": _options.vector(volume.origin if origin is None else origin),
-            "axes": matrix,
-            "coordinates": _coordinates(coordinates, samples.shape),
-            "missing": missing,
-            "modality": modality,
-            "value_name": volume.value_name if value_name is None else value_name,
-            "value_unit": volume.value_unit if value_unit is None else value_unit,
-            "unit": volume.unit if unit is None else unit,
-            "up": _options.direction(up),
-            "frame": volume.frame,
-            "labels": _labels(labels),
-        }
-        self._files = None
-        self._native.add_volume(samples, _options.text(facts), "{}", _options.appearance(given))
-        return self
+        return self._added("add_volume", locals())
 
     def add_mesh(
         self,
@@ -223,7 +189,7 @@ class Scene:
         colors: Any = None,
         values: Any = None,
         up: str | Vector | None = None,
-        name: str = "mesh",
+        name: str | None = None,
         **appearance: Unpack[SurfaceAppearance],
     ) -> Scene:
         """Adds triangles.
@@ -238,15 +204,12 @@ class Scene:
             colors: (n, 3) or (n, 4): bytes, 16-bit integers, or real numbers from 0 to 1.
             values: One number for each vertex, to colour it by `colormap`; NaN for none.
             up: The world direction that is up. Default: guessed from the shape.
+            name: What the item is called. Default: “mesh”, with a number if there are several.
+            appearance: `color`, `colormap`, `range`, `log_colors`, `nan_color`, `opacity`,
+                `radius_scale`, `crease`, `edges`, `points`, `point_size`, `line_width`
+                (docs/python.md).
         """
-        given = _options.checked(appearance, _options.SURFACE, "add_mesh")
-        surface = _neighbours.of_kind(_neighbours.Surface, vertices, scalar, "add_mesh")
-        surface = surface or _neighbours.Surface(vertices)
-        if faces is not None:
-            surface.faces = faces
-        if surface.faces is None:
-            raise KindError("add_mesh() needs faces: add_points() adds points without")
-        return self._add_mesh(surface.with_given(normals, colors, values), up, name, given)
+        return self._added("add_mesh", locals())
 
     def add_points(
         self,
@@ -256,46 +219,30 @@ class Scene:
         colors: Any = None,
         values: Any = None,
         normals: Any = None,
+        radius: Any = None,
         up: str | Vector | None = None,
-        name: str = "points",
+        name: str | None = None,
         **appearance: Unpack[SurfaceAppearance],
     ) -> Scene:
-        """Adds a point cloud: points of a surface, each drawn as a disc.
+        """Adds a point cloud: points of a surface are drawn as discs, others as balls.
 
-        `values` colour the points. Values in space, such as those of particles, are drawn by
-        `add_samples`. The arguments are those of `add_mesh`. Of a mesh of another package the
-        vertices are drawn.
+        Values in space, such as those of particles, are drawn by `add_samples`.
+
+        Args:
+            positions: x, y, z, (n, 3), or an object of another package; of a mesh, its vertices.
+            scalar: The name of the array of such an object that colours the points.
+            colors: (n, 3) or (n, 4): bytes, 16-bit integers, or real numbers from 0 to 1.
+            values: One number for each point, to colour it by `colormap`; NaN for none.
+            normals: One normal for each point, (n, 3).
+            radius: The radius of the points in world units, one for all or one for each. Points
+                with a radius are balls.
+            up: The world direction that is up. Default: guessed from the shape.
+            name: What the item is called. Default: “points”, with a number if there are several.
+            appearance: `color`, `colormap`, `range`, `log_colors`, `nan_color`, `opacity`,
+                `radius_scale`, `crease`, `edges`, `points`, `point_size`, `line_width`
+                (docs/python.md).
         """
-        given = _options.checked(appearance, _options.SURFACE, "add_points")
-        surface = _neighbours.points(positions, scalar, "add_points")
-        surface = surface or _neighbours.Surface(positions)
-        up = surface.up if up is None else up
-        return self._add_mesh(surface.with_given(normals, colors, values), up, name, given)
-
-    def _add_mesh(
-        self,
-        surface: _neighbours.Surface,
-        up: str | Vector | None,
-        name: str,
-        given: Mapping[str, Any],
-    ) -> Scene:
-        vertices, faces, normals = surface.positions, surface.faces, surface.normals
-        colors, values = surface.colors, surface.values
-        positions = _arrays.positions(vertices, "vertices" if faces is not None else "positions")
-        count = len(positions)
-        arrays = {
-            "positions": positions,
-            "faces": None if faces is None else _arrays.faces(faces, count),
-            "normals": None if normals is None else _arrays.rows(normals, 3, "normals"),
-            "colors": None if colors is None else _arrays.colors(colors, count),
-            "values": None if values is None else _arrays.column(values, "values"),
-        }
-        facts = _options.text({"name": name, "up": _options.direction(up)})
-        # Values colour a surface even if it has colours.
-        named = {"scalar": "values"} if values is not None else {}
-        self._files = None
-        self._native.add_mesh(arrays, facts, _options.text(named), _options.appearance(given))
-        return self
+        return self._added("add_points", locals())
 
     def add_cells(
         self,
@@ -307,7 +254,7 @@ class Scene:
         scalar: str | None = None,
         missing: float | None = None,
         up: str | Vector | None = None,
-        name: str = "cells",
+        name: str | None = None,
         style: str | None = None,
         **appearance: Unpack[CellAppearance],
     ) -> Scene:
@@ -326,40 +273,13 @@ class Scene:
             style: solid, an opaque body with the field inside where clips cut it, or volume, the
                 field by a transfer function. Default: solid, unless another option is one of
                 fields.
+            missing: A value that stands for “no value”.
+            up: The world direction that is up. Default: z.
+            name: What the item is called. Default: “cells”, with a number if there are several.
+            appearance: The options of fields, as for volumes, and `color`, `nan_color`, `opacity`,
+                `crease` (docs/python.md).
         """
-        given = _options.checked(appearance, _options.CELLS - {"cells"}, "add_cells")
-        if style is not None:
-            given["cells"] = style
-        grid = _neighbours.of_kind(_neighbours.Cells, points, scalar, "add_cells")
-        if grid is None:
-            if cells is None:
-                raise KindError("add_cells() needs points and cells, or a grid")
-            arrays = _arrays.cells(cells, kinds)
-        else:
-            points = grid.positions
-            arrays = _arrays.raw_cells(grid.kinds, grid.offsets, grid.nodes)
-        uses_grid = grid is not None and values is None
-        positions = _arrays.positions(points, "points")
-        numbers = grid.values if uses_grid else values
-        column = None if numbers is None else _arrays.column(numbers, "values")
-        count, of_cells = len(arrays["kinds"]), False
-        if column is not None:
-            of_cells = grid.of_cells if uses_grid else len(column) == count != len(positions)
-            if len(column) != (count if of_cells else len(positions)):
-                raise ArgumentError(
-                    f"there are {len(column)} values for {len(positions)} points and {count} cells"
-                )
-        points, arrays["nodes"] = _arrays.used(arrays["nodes"], len(positions))
-        given_arrays = {
-            **arrays,
-            "positions": positions[points],
-            "values": column if of_cells or column is None else column[points],
-            "of_cells": of_cells,
-        }
-        facts = {"name": name, "missing": missing, "up": _options.direction(up)}
-        self._files = None
-        self._native.add_cells(given_arrays, _options.text(facts), _options.appearance(given))
-        return self
+        return self._added("add_cells", locals())
 
     def add_samples(
         self,
@@ -373,7 +293,7 @@ class Scene:
         neighbours: int | None = None,
         slopes: bool | None = None,
         up: str | Vector | None = None,
-        name: str = "samples",
+        name: str | None = None,
         **appearance: Unpack[FieldAppearance],
     ) -> Scene:
         """Adds values at any positions, such as those of particles, and draws the field between.
@@ -387,23 +307,12 @@ class Scene:
             radius: One radius for all samples.
             neighbours: The number of neighbours that kernels are made from, 4 to 64.
             slopes: Whether samples carry slopes. Default: True.
+            missing: A value that stands for “no value”.
+            up: The world direction that is up. Default: z.
+            name: What the item is called. Default: “samples”, with a number if there are several.
+            appearance: The options of fields, as for volumes (docs/python.md).
         """
-        given = _options.checked(appearance, _options.FIELD, "add_samples")
-        arrays = {
-            "positions": _arrays.positions(positions, "positions"),
-            "values": _arrays.column(values, "values"),
-            "radii": None if radii is None else _arrays.column(radii, "radii"),
-            "covariances": None,
-        }
-        if covariances is not None:
-            arrays["covariances"] = _arrays.rows(covariances, 6, "covariances")
-        facts = {"name": name, "missing": missing, "up": _options.direction(up)}
-        load = {"radius": radius, "neighbours": neighbours, "slopes": slopes}
-        self._files = None
-        self._native.add_samples(
-            arrays, _options.text(facts), _options.text(load), _options.appearance(given)
-        )
-        return self
+        return self._added("add_samples", locals())
 
     def add_gaussians(
         self,
@@ -415,7 +324,7 @@ class Scene:
         colors: Any = None,
         harmonics: Any = None,
         up: str | Vector | None = None,
-        name: str = "gaussians",
+        name: str | None = None,
     ) -> Scene:
         """Adds trained 3D Gaussians.
 
@@ -428,30 +337,81 @@ class Scene:
             harmonics: Coefficients of spherical harmonics, (n, 1, 4, 9 or 16, 3), instead of
                 colours.
             up: The world direction that is up. Default: −y, as trainers have it.
+            name: What the item is called. Default: “gaussians”, with a number if there are several.
         """
-        places = _arrays.positions(centers, "centers")
-        if (colors is None) == (harmonics is None):
-            raise ArgumentError("Gaussians have either colors or harmonics")
-        if harmonics is not None:
-            terms = _arrays.numbers(harmonics, "harmonics")
-            if terms.ndim != 3 or terms.shape[0] != len(places) or terms.shape[2] != 3:
-                form = "(n, terms, 3) is needed"
-                raise ArgumentError(f"harmonics has the shape {terms.shape}; {form}")
-        else:
-            # The constant term of the harmonics.
-            rgb = _arrays.colors(colors, len(places))[:, :3]
-            terms = (rgb.astype(np.float64) / 255.0 - 0.5) / 0.28209479177387814
-        arrays = {
-            "centers": places,
-            "scales": _arrays.rows(scales, 3, "scales"),
-            "rotations": _arrays.rows(rotations, 4, "rotations"),
-            "opacities": _arrays.column(opacities, "opacities"),
-            "harmonics": np.ascontiguousarray(terms.reshape(-1, 3), dtype=np.float32),
-        }
-        facts = {"name": name, "up": _options.direction(up)}
-        self._files = None
-        self._native.add_gaussians(arrays, _options.text(facts))
-        return self
+        return self._added("add_gaussians", locals())
+
+    def update(self, name: str, source: Any = None, **options: Any) -> Scene:
+        """Replaces the data of an item, or changes its options; the rest stays as it is.
+
+        >>> scene.update("skull", colormap="magma").update("flow", values=new_values)
+
+        Items that were added later are made again, because an item may turn those after it.
+
+        Args:
+            name: The item.
+            source: Other data: what `add` takes. Data of another kind begins with no options.
+            options: Arguments of the method that added the item. None is what that method takes
+                by default.
+        """
+        at = self._index(name)
+        with self._lock:
+            return self._replaced(at, _changed(self._items[at], source, options))
+
+    def transform(
+        self,
+        name: str,
+        *,
+        scale: float | None = None,
+        rotate: tuple[Vector | str, float] | None = None,
+        translate: Vector | None = None,
+        matrix: Any = None,
+        reset: bool = False,
+    ) -> Scene:
+        """Moves an item from where it is: it is scaled about the world's origin, then turned, then
+        shifted.
+
+        >>> scene.transform("knee", rotate=("z", 90), translate=(0, 0, 12.5))
+
+        Args:
+            name: The item.
+            scale: A factor on lengths, above 0.
+            rotate: An axis through the world's origin, as x, y, z or a name such as “z”, and an
+                angle in degrees: counter-clockwise for an eye that looks against the axis.
+            translate: A shift along x, y and z in world units.
+            matrix: A matrix of 4 × 4 that scales all axes alike, turns and shifts. It is applied
+                before the other moves.
+            reset: Whether the item is first put back where it was added.
+        """
+        turn = None
+        if rotate is not None:
+            try:
+                axis, degrees = rotate
+                turn = {"axis": _options.direction(axis), "degrees": float(degrees)}
+            except (TypeError, ValueError) as error:
+                form = "rotate is an axis and an angle in degrees, such as ('z', 90)"
+                raise ArgumentError(f"{form}, not {rotate!r}") from error
+        rows = None
+        if matrix is not None:
+            rows = _options.matrix(matrix)
+        shift = None if translate is None else _options.vector(translate)
+        move = {"scale": scale, "rotate": turn, "translate": shift, "matrix": rows}
+        at = self._index(name)
+        with self._lock:
+            item = self._items[at]
+            before = "{}" if reset else item.transform
+            moved = _pysplatkit.moved(before, _options.text(move))
+            return self._replaced(at, replace(item, transform=moved))
+
+    def remove(self, name: str) -> Scene:
+        """Removes an item. The scene is then as if the item had never been added.
+
+        Args:
+            name: The item.
+        """
+        at = self._index(name)
+        with self._lock:
+            return self._replaced(at, None)
 
     def camera(
         self,
@@ -471,22 +431,43 @@ class Scene:
     ) -> Camera:
         """Returns the camera that sees the whole scene in a picture of this size.
 
-        By default it looks from the front, 30° to the right and 20° upwards. `view` is front, back,
-        left, right, top, bottom or iso; `azimuth` and `elevation` turn it further.
+        By default it looks from the front, 30° to the right and 20° upwards.
+
+        Args:
+            size: Width and height of the picture in pixels.
+            view: The side to look from: front, back, left, right, top, bottom or iso.
+            azimuth: Degrees to the right about the up axis, further than `view`.
+            elevation: Degrees upwards, further than `view`.
+            zoom: A factor on the size of what is seen.
+            focal_point: The point that the camera aims at. Default: the middle of what is seen.
+            view_up: The direction that is up in the picture: x, y, z, or an axis such as “+Y”.
+            view_angle: The vertical angle of view in degrees. Default: 30.
+            distance: The distance from the focal point. Default: the scene fills the picture.
+            orthographic: Whether to draw without perspective.
+            up: The direction that is up in the scene. Default: that of its items.
+            clips: Shapes that cut the scene; the camera is fitted to what is left.
         """
         given = dict(locals())
         fit = _fit(**{name: given[name] for name in _FIT})
         return Camera.from_json(self._native.camera(fit, _drawn(size, clips)))
 
     def turntable(
-        self, frames: int, size: tuple[int, int] = (1280, 720), **view: Any
+        self,
+        frames: int,
+        size: tuple[int, int] = (1280, 720),
+        *,
+        clips: Sequence[Clip] = (),
+        **view: Unpack[View],
     ) -> list[Camera]:
         """Returns the cameras of a film that turns once around the scene, all at one distance.
 
-        The options are those of `camera`.
+        Args:
+            frames: The number of cameras.
+            size: Width and height of the pictures in pixels.
+            clips: Shapes that cut the scene.
+            view: The first camera: the other options of `camera`.
         """
-        clips = view.pop("clips", ())
-        given = _options.checked(view, frozenset(_FIT), "turntable")
+        given = _options.checked(view, _options.VIEW, "turntable")
         if frames < 1:
             raise ArgumentError("a turntable has at least one frame")
         cameras = self._native.turntable(frames, _fit(**given), _drawn(size, clips))
@@ -497,6 +478,16 @@ class Scene:
         size: tuple[int, int] | None = None,
         camera: Camera | None = None,
         *,
+        view: str | None = None,
+        azimuth: float | None = None,
+        elevation: float | None = None,
+        zoom: float | None = None,
+        focal_point: Vector | None = None,
+        view_up: str | Vector | None = None,
+        view_angle: float | None = None,
+        distance: float | None = None,
+        orthographic: bool | None = None,
+        up: str | Vector | None = None,
         background: Color | None = "auto",
         samples: int | str | None = None,
         mode: str | None = None,
@@ -513,6 +504,11 @@ class Scene:
         memory: int | None = None,
         cull_backfaces: bool | None = None,
         occlusion: bool | None = None,
+        engine: str | None = None,
+        scalar_bar: bool | None = None,
+        axes: bool | None = None,
+        scale_bar: bool | None = None,
+        caption: str | None = None,
     ) -> Picture:
         """Draws a picture. What is not given is as a scene file says (`open`), or as usual: as
         `splatkit render --engine cpu` does.
@@ -521,8 +517,18 @@ class Scene:
 
         Args:
             size: Width and height in pixels. Default: 1280 × 720.
-            camera: Default: that of `Scene.camera`. If nothing is seen then, that is a
+            camera: Default: one that sees the whole scene. If nothing is seen then, that is a
                 `NothingToDrawError`; with a camera of one's own, the picture is empty.
+            view: The side to look from: front, back, left, right, top, bottom or iso.
+            azimuth: Degrees to the right about the up axis.
+            elevation: Degrees upwards.
+            zoom: A factor on the size of what is seen.
+            focal_point: The point that the camera aims at.
+            view_up: The direction that is up in the picture.
+            view_angle: The vertical angle of view in degrees. Default: 30.
+            distance: The distance of the camera from its focal point.
+            orthographic: Whether to draw without perspective.
+            up: The direction that is up in the scene.
             background: A colour; None for transparent pixels. Default: black.
             samples: Pixels that are drawn for each pixel and averaged: 1, 4, 9, 16, 64 or auto.
                 Default: auto.
@@ -532,37 +538,81 @@ class Scene:
             optics: light, maximum or x-ray. Default: light.
             shade: False draws without light, True lights volumes in any case.
             clips: Shapes that cut the scene.
-            cut, budget: The width of splats of hierarchies, in pixels, or about how many.
+            gradient: How gradients are made (docs/volumes.md).
+            evaluate: Where fields are evaluated (docs/volumes.md).
+            sheet_thickness: The thickness of sheets in world units. Default: that of samples.
+            cut: The width of splats of hierarchies, in pixels.
+            budget: About how many splats of hierarchies are drawn.
+            memory: Most bytes that are kept of files which are read as they are drawn.
+            cull_backfaces: Whether faces that look away are left out.
+            occlusion: Whether what is hidden is left out early. Default: True.
+            engine: cpu, gpu or auto. Default: cpu, the only one of the usual wheel.
+            scalar_bar: Whether the colours of values are drawn, with their numbers.
+            axes: Whether the directions of the axes are drawn; of patients, their sides.
+            scale_bar: Whether a round length is drawn.
+            caption: A text above the picture's content.
         """
         given = dict(locals())
-        said: dict[str, Any] = dict(self._described.get("picture", {}))
-        behind = said.pop("background", "black") if background == "auto" else background
-        # What is given counts more than what the scene file says.
-        chosen = {name: given[name] for name in _DRAW if given[name] is not None}
-        if {"cut", "budget"} & chosen.keys():
-            for name in ("cut", "budget", "frame_time"):
-                said.pop(name, None)
-        draw = {**said, **chosen}
-        if camera is None:
-            camera = self._described_camera(draw)
-        return Picture(self._pixels(camera, draw), _options.background(behind))
+        return self._picture(camera, {name: given[name] for name in _GIVEN})
 
-    def _described_camera(self, draw: Mapping[str, Any]) -> Camera | None:
-        """Returns the camera of a scene file; None if the usual one is drawn."""
-        camera, framing = self._described.get("camera"), self._described.get("framing")
-        if camera is not None:
-            return Camera.from_json(json.dumps(camera))
-        if not framing:
-            return None
-        return Camera.from_json(self._native.camera(json.dumps(framing), _drawn(**draw)))
+    def film(
+        self,
+        path: PathLike,
+        frames: int | None = None,
+        *,
+        cameras: Iterable[Camera] | None = None,
+        keyframes: PathLike | Iterable[tuple[float, Camera]] | None = None,
+        fps: float = 30.0,
+        size: tuple[int, int] | None = None,
+        overwrite: bool = True,
+        **options: Unpack[Framed],
+    ) -> Path:
+        """Draws a film: a turn around the scene, or the way of a camera. Returns its path.
 
-    def _pixels(self, camera: Camera | None, draw: Mapping[str, Any]) -> _pysplatkit.Picture:
-        """Draws with options by their names."""
-        text = None if camera is None else camera.to_json()
-        return self._native.render(text, _drawn(**draw))
+        >>> scene.film("skull.mp4", 120)
+        >>> scene.film("flight.webm", keyframes=[(0, start), (2.5, end)])
+
+        One frame is drawn, encoded and forgotten before the next. A film appears when it is
+        complete.
+
+        Args:
+            path: .gif, .webp or .apng; .mp4, .mov or .webm, which need ffmpeg; or a .png or .jpg
+                for numbered pictures: `{frame:04}` in its name is replaced by the number, or else
+                the number is added. An ending slash makes a folder of pictures.
+            frames: The number of frames of a turn. Default: 90.
+            cameras: One camera for each frame, instead of a turn.
+            keyframes: Times in seconds with cameras, which a smooth way connects, or a file of
+                them (docs/video.md), instead of a turn.
+            fps: Frames per second.
+            size: Width and height in pixels. Default: 1280 × 720.
+            overwrite: Whether files are replaced that are there already.
+            options: The other options of `render`.
+        """
+        known = _options.DRAWING | _options.VIEW
+        given = dict(_options.checked(options, known, "film"))
+        if options.get("background", "") is None:
+            given["background"] = None
+        view = {name: given.pop(name) for name in _options.VIEW & given.keys()}
+        size = size or tuple(self._described.get("picture", {}).get("size") or (1280, 720))
+        ways = [way for way in (frames, cameras, keyframes) if way is not None]
+        if len(ways) > 1:
+            raise ArgumentError("a film has either frames of a turn, cameras or keyframes")
+        if view and frames is None and ways:
+            names = ", ".join(sorted(view))
+            raise ArgumentError(f"the cameras of this film are given already; leave {names} out")
+        if keyframes is not None:
+            shots = _film.along(keyframes, fps)
+        elif cameras is not None:
+            shots = list(cameras)
+        else:
+            shots = self._turn(90 if frames is None else frames, size, view, given)
+        return _film.write(self, path, shots, fps, size, given, overwrite)
 
     def show(
-        self, camera: Camera | None = None, size: tuple[int, int] = (800, 600), **drawing: Any
+        self,
+        camera: Camera | None = None,
+        size: tuple[int, int] = (800, 600),
+        **drawing: Unpack[Drawing],
     ) -> Widget:
         """Returns a widget for notebooks, in which the scene is turned by hand.
 
@@ -583,6 +633,11 @@ class Scene:
         return Widget(self, camera, size, **drawing)
 
     @property
+    def names(self) -> list[str]:
+        """What the items are called, in the order in which they were added."""
+        return [item.name for item in self._items]
+
+    @property
     def bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
         """The smallest and the largest x, y, z of samples and vertices; None for an empty scene."""
         bounds = self._native.bounds
@@ -590,56 +645,212 @@ class Scene:
 
     @property
     def contents(self) -> list[tuple[str, str, int]]:
-        """What was added: its kind, its name, and the number of splats or samples."""
-        return self._native.contents
+        """What the scene holds: kinds, names of items, and numbers of splats or samples.
+
+        An item may have several: a mesh has its triangles, and its lines.
+        """
+        names = self.names
+        return [(kind, names[item], count) for kind, item, count in self._native.contents]
 
     def __len__(self) -> int:
-        return len(self._native.contents)
+        return len(self._items)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
 
     def __repr__(self) -> str:
         items = ", ".join(f"{kind} {name!r} of {count}" for kind, name, count in self.contents)
         return f"<pysplatkit.Scene: {items or 'empty'}>"
 
+    def __copy__(self) -> Scene:
+        scene = Scene()
+        with self._lock:
+            scene._native = self._native.forked(len(self._items))
+            scene._items = list(self._items)
+        scene._described = dict(self._described)
+        return scene
+
+    def __getstate__(self) -> dict[str, Any]:
+        with self._lock:
+            items = [item.portable() for item in self._items]
+        return {"items": items, "described": self._described}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        Scene.__init__(self)
+        for item in state["items"]:
+            self._append(item)
+        self._described = state["described"]
+
+    # How items are kept.
+
+    def _added(self, method: str, given: Mapping[str, Any]) -> Scene:
+        """Adds an item of the arguments of a method."""
+        arguments = {name: given[name] for name in given if name not in ("self", "name")}
+        arguments |= arguments.pop("appearance", {})
+        if method == "add":
+            name = _items.name_of(os.fspath(arguments["source"]))
+        else:
+            name = method.removeprefix("add_")
+        with self._lock:
+            name = self._unused(given.get("name"), name)
+            self._append(Item.of(name, method, arguments))
+        return self
+
+    def _unused(self, name: str | None, usual: str) -> str:
+        """Returns the name of a new item: the one that is given, or the usual one."""
+        if name is None:
+            return _items.unused(usual, self.names)
+        if not isinstance(name, str) or not name:
+            raise ArgumentError(f"the name of an item is a text, not {name!r}")
+        if name in self.names:
+            raise ArgumentError(f"the scene has an item {name!r} already; names differ")
+        return name
+
+    def _append(self, item: Item) -> None:
+        with self._lock:
+            item.put(self._native)
+            self._items.append(item)
+
+    def _index(self, name: str) -> int:
+        if name in self.names:
+            return self.names.index(name)
+        names = ", ".join(map(repr, self.names)) or "none"
+        raise ArgumentError(f"the scene has no item {name!r}; its items are {names}")
+
+    def _replaced(self, at: int, item: Item | None) -> Scene:
+        """Puts an item in the place of another, or removes that one. After an error, the scene is
+        as before."""
+        items = [*([] if item is None else [item]), *self._items[at + 1 :]]
+        native = self._native.forked(at)
+        for other in items:
+            other.put(native)
+        self._native, self._items = native, [*self._items[:at], *items]
+        return self
+
+    def _set_transfer(self, number: int, transfer: str) -> None:
+        """Sets the transfer function of a field, by the number of the field in the contents."""
+        with self._lock:
+            _pysplatkit.set_transfer(self._native, number, transfer)
+            at = self._native.contents[number][1]
+            self._items[at] = replace(self._items[at], transfer=transfer)
+
+    # How pictures are drawn.
+
+    def _picture(self, camera: Camera | None, given: Mapping[str, Any]) -> Picture:
+        """Draws with options by their names; those that are None are not given."""
+        said: dict[str, Any] = dict(self._described.get("picture", {}))
+        behind = said.pop("background", "black")
+        if given.get("background", "auto") != "auto":
+            behind = given["background"]
+        # What is given counts more than what the scene file says.
+        chosen = {name: given[name] for name in given if given[name] is not None}
+        chosen.pop("background", None)
+        view = {name: chosen.pop(name) for name in _options.VIEW & chosen.keys()}
+        if camera is not None and view:
+            names = ", ".join(sorted(view))
+            raise ArgumentError(f"a picture has either a camera or a view; leave {names} out")
+        if {"cut", "budget"} & chosen.keys():
+            for name in ("cut", "budget", "frame_time"):
+                said.pop(name, None)
+        background = _options.background(behind)
+        draw = {**said, **(self._described.get("overlay") or {}), **chosen, "behind": background}
+        if camera is None and not view and self._described.get("camera") is not None:
+            camera = Camera.from_json(json.dumps(self._described["camera"]))
+        fit = {**(self._described.get("framing") or {}), **json.loads(_fit(**view))}
+        return Picture(self._pixels(camera, draw, json.dumps(fit)), background)
+
+    def _pixels(
+        self, camera: Camera | None, draw: Mapping[str, Any], fit: str = "{}"
+    ) -> _pysplatkit.Picture:
+        """Draws with options by their names."""
+        text = None if camera is None else camera.to_json()
+        return self._native.render(text, fit, _drawn(**draw))
+
+    def _turn(
+        self,
+        frames: int,
+        size: tuple[int, ...],
+        view: Mapping[str, Any],
+        given: Mapping[str, Any],
+    ) -> list[Camera]:
+        """Returns the cameras of a turn, which leave room for scalar bars."""
+        if frames < 1:
+            raise ArgumentError("a turn has at least one frame")
+        said = self._described
+        names = ("clips", *_options.OVERLAY)
+        parts = {**said.get("picture", {}), **(said.get("overlay") or {})}
+        draw = {name: {**parts, **given}.get(name) for name in names}
+        fit = {**(said.get("framing") or {}), **json.loads(_fit(**view))}
+        cameras = self._native.turntable(frames, json.dumps(fit), _drawn(size, **draw))
+        return [Camera.from_json(text) for text in cameras]
+
 
 #: What else `Scene.add` takes.
 _ALSO = "a path, a dictionary of the arguments of a method, "
 
-_FIT = (
-    "view",
-    "azimuth",
-    "elevation",
-    "zoom",
-    "focal_point",
-    "view_up",
-    "view_angle",
-    "distance",
-    "orthographic",
-    "up",
-)
+#: The options of a camera that is fitted, in their order.
+_FIT = tuple(View.__annotations__)
+#: The options of `Scene.render` beside the camera.
+_GIVEN = _options.DRAWING | _options.VIEW | {"size"}
 
 
-#: The names of the options of `Scene.render`.
-DRAWING = frozenset(inspect.signature(Scene.render).parameters) - {"self"}
-#: Those that the compiled half takes.
-_DRAW = DRAWING - {"camera", "background"}
+def _arguments(source: Any, options: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Returns the method that adds a source, and its arguments."""
+    if isinstance(source, (str, os.PathLike)):
+        return "add", {"source": source, **options}
+    parts = _neighbours.parts_of(source, options.get("scalar"))
+    if parts is not None:
+        options.pop("scalar", None)
+        if parts.method == "add_cells" and "cells" in options:
+            options["style"] = options.pop("cells")
+        return parts.method, {_items.FIRST[parts.method]: parts, **options}
+    if isinstance(source, Mapping):
+        methods = {
+            "array": "add_volume",
+            "vertices": "add_mesh",
+            "centers": "add_gaussians",
+            "points": "add_cells",
+            "positions": "add_points",
+        }
+        if {"positions", "values"} < set(source) and set(source) & {"radii", "covariances"}:
+            methods["positions"] = "add_samples"
+        for first, method in methods.items():
+            if first in source:
+                return method, {**source, **options}
+        raise _neighbours.unknown(source, "Scene.add", _ALSO)
+    shape = np.shape(source)
+    if len(shape) == 3:
+        return "add_volume", {"array": source, **options}
+    if len(shape) == 2 and shape[1] == 3:
+        return "add_points", {"positions": source, **options}
+    if len(shape) == 0:
+        raise _neighbours.unknown(source, "Scene.add", _ALSO)
+    raise ArgumentError(
+        f"an array of the shape {shape} is neither a volume (z, y, x) nor points (n, 3)"
+    )
 
 
-def _labels(given: bool | Mapping[int, str] | str | os.PathLike[str] | None) -> Any:
-    if isinstance(given, Mapping):
-        return [(int(value), str(name)) for value, name in given.items()]
-    return given if given is None or isinstance(given, bool) else os.fspath(given)
-
-
-def _coordinates(given: Sequence[Any] | None, shape: tuple[int, ...]) -> list[Any] | None:
-    if given is None:
-        return None
-    lines = [_arrays.numbers(line, "coordinates").ravel().astype(float) for line in given]
-    if tuple(map(len, reversed(lines))) != shape:
-        raise ArgumentError(
-            f"coordinates of {' × '.join(str(len(line)) for line in lines)} samples along x, y and z "
-            f"do not fit an array of the shape {shape}"
-        )
-    return [line.tolist() for line in lines]
+def _changed(item: Item, source: Any, options: dict[str, Any]) -> Item:
+    """Returns an item with other data or other options."""
+    if source is None:
+        return item.changed(options)
+    first = _items.FIRST[item.method]
+    is_path = isinstance(source, (str, os.PathLike))
+    is_object = not is_path and _neighbours.parts_of(source, options.get("scalar")) is not None
+    if not is_path and not is_object and not isinstance(source, Mapping):
+        # Rows of three numbers are positions, whatever they are positions of.
+        axes = 3 if item.method == "add_volume" else 2
+        if item.method != "add" and np.ndim(source) == axes:
+            return item.changed({first: source, **options})
+    method, arguments = _arguments(source, options)
+    arguments.pop("name", None)
+    if method != item.method:
+        return replace(Item.of(item.name, method, arguments), transform=item.transform)
+    if is_object:
+        said = _items.SAID[method]
+        kept = {name: item.arguments[name] for name in item.arguments if name not in said}
+        item = replace(item, arguments=kept)
+    return item.changed(arguments)
 
 
 def _fit(**given: Any) -> str:
@@ -651,8 +862,14 @@ def _fit(**given: Any) -> str:
 
 
 def _drawn(
-    size: tuple[int, int] | None = None, clips: Sequence[Clip | dict[str, Any]] = (), **draw: Any
+    size: tuple[int, ...] | None = None,
+    clips: Sequence[Clip | dict[str, Any]] | None = (),
+    **draw: Any,
 ) -> str:
     """Returns how a picture is drawn, as JSON."""
+    if draw.get("engine") not in (None, "cpu", "gpu", "auto"):
+        raise ArgumentError(f"engine is cpu, gpu or auto, not {draw['engine']!r}")
     entries = [clip._entry() if isinstance(clip, Clip) else clip for clip in clips or ()]
-    return _options.text({**draw, "size": size, "clips": entries})
+    overlay = {name: draw.pop(name) for name in _options.OVERLAY & draw.keys()}
+    overlay = {name: value for name, value in overlay.items() if value is not None}
+    return _options.text({**draw, "size": size, "clips": entries, "overlay": overlay or None})

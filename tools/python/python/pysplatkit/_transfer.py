@@ -42,17 +42,24 @@ class TransferFunction:
     def named(
         cls, name: str, range: tuple[float, float] = (0.0, 1.0), *, diagonal: float | None = None
     ) -> TransferFunction:
-        """Returns a preset (`pysplatkit.TRANSFER_FUNCTIONS`).
+        """Returns a preset. Those of CT expect Hounsfield units.
 
-        Those of CT expect Hounsfield units; “mri” and “generic” are spread over `range`. Opacities
-        hold for a length of 1, or for 1/350 of `diagonal`, the diagonal of the box around the data.
+        Args:
+            name: A name of `pysplatkit.TRANSFER_FUNCTIONS`.
+            range: The values that “mri” and “generic” are spread over.
+            diagonal: The diagonal of the box around the data. Opacities hold for 1/350 of it.
+                Default: they hold for a length of 1.
         """
         low, high = range
         return cls.from_json(_pysplatkit.named_transfer(name, [float(low), float(high)], diagonal))
 
     @classmethod
     def from_json(cls, text: str) -> TransferFunction:
-        """Reads the JSON form, which the command and the window write."""
+        """Reads the JSON form, which the command and the window write.
+
+        Args:
+            text: The JSON.
+        """
         parts = json.loads(_pysplatkit.checked_transfer(text))
         return cls(
             colors=[(value, tuple(rgb)) for value, *rgb in parts["color"]],
@@ -65,12 +72,20 @@ class TransferFunction:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> TransferFunction:
-        """Reads a JSON file."""
+        """Reads a JSON file.
+
+        Args:
+            path: The file.
+        """
         return cls.from_json(_pysplatkit.read_transfer(os.fspath(path)))
 
     @classmethod
     def of(cls, value: Any) -> Any:
-        """Returns what the compiled half takes: a name, or the parts of the JSON form."""
+        """Returns what the compiled half takes: a name, or the parts of the JSON form.
+
+        Args:
+            value: A function, a name, a JSON file or its text.
+        """
         if isinstance(value, TransferFunction):
             return value._parts()
         if isinstance(value, os.PathLike):

@@ -22,7 +22,7 @@ from ._picture import Picture
 from ._transfer import TransferFunction
 
 _STATIC = Path(__file__).parent / "static"
-_OPTIONS = _scene.DRAWING - {"size", "camera"}
+_OPTIONS = _options.DRAWING
 #: What a message of the browser can lead to. It is shown in the widget.
 _FAILURES = (Error, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 #: Most pixels of the screen in a pixel of CSS that are drawn.
@@ -87,6 +87,8 @@ class Widget(anywidget.AnyWidget):
         self._drawing.pop("background", None)
         self._ratio = 1.0
         self._orders = 0
+        # The number of the last message of each view of the browser.
+        self._answers: dict[str, int] = {}
         self._lock = threading.Lock()
         self._arrived: tuple[Frame, bytes] | None = None
         self._exact: Frame | None = None
@@ -148,23 +150,34 @@ class Widget(anywidget.AnyWidget):
             exact = self._exact
         if exact is not None and exact.order == order and exact.picture is not None:
             return Picture(exact.picture, self._background).rgba
-        picture = self._scene._native.render(order.camera, order.draw)
+        picture = self._scene._native.render(order.camera, "{}", order.draw)
         return Picture(picture, self._background).rgba
 
     def refresh(self) -> None:
-        """Draws the scene again: after items were added, or a transfer function was changed
-        elsewhere."""
-        fields = json.loads(_pysplatkit.fields(self._scene._native))
-        counted = len(self._fields)
-        # Items are only ever added. Those that are known keep the function they came with.
-        self._fields += fields[counted:]
+        """Draws the scene again: after items were added or changed, or a transfer function was
+        changed elsewhere."""
+        native, items = self._scene._native, self._scene._items
+        fields = json.loads(_pysplatkit.fields(native))
+        contents = native.contents
+        known = {id(field["of"]): field for field in self._fields}
+        histograms = dict(zip(known, self._histograms, strict=True))
+        self._fields = []
+        for field in fields:
+            # Arguments are those of an item as long as nothing but its function changes.
+            of = items[contents[field["item"]][1]].arguments
+            before = known.get(id(of))
+            # “As loaded” is the function that the item came with.
+            loaded = field["transfer"] if before is None else before["transfer"]
+            self._fields.append({**field, "of": of, "transfer": loaded})
         with self.hold_sync():
-            self._names = [field["name"] for field in fields]
+            self.field = max(0, min(self.field, len(fields) - 1))
+            self._names = [items[contents[field["item"]][1]].name for field in fields]
             self._ranges = [field["range"] for field in fields]
-            self._histograms = [*self._histograms, *([] for _ in fields[counted:])]
+            self._histograms = [histograms.get(id(field["of"]), []) for field in self._fields]
             self._transfers = [field["transfer"] for field in fields]
-        for number in range(counted, len(fields)):
-            threading.Thread(target=self._count, args=(number,), daemon=True).start()
+        for number, counts in enumerate(self._histograms):
+            if not counts:
+                threading.Thread(target=self._count, args=(number,), daemon=True).start()
         self._draw()
 
     def close(self) -> None:
@@ -178,6 +191,8 @@ class Widget(anywidget.AnyWidget):
     def _take_message(self, _: Any, content: Any, __: Any = None) -> None:
         self._loop = _running_loop() or self._loop
         before = self._orders
+        if "view" in content:
+            self._answers = {**self._answers, str(content["view"]): int(content["number"])}
         try:
             for kind, details in content["do"]:
                 getattr(self, f"_on_{kind}")(**details)
@@ -185,7 +200,7 @@ class Widget(anywidget.AnyWidget):
             self._error = str(error) or repr(error)
         if self._orders == before:
             # No frame follows, which the browser would wait for.
-            self.send({"type": "idle"})
+            self.send({"type": "idle", "answers": self._answers})
 
     def _on_ready(self, ratio: float) -> None:
         """A view is there. Its screen has `ratio` pixels in one of CSS."""
@@ -248,7 +263,11 @@ class Widget(anywidget.AnyWidget):
     def _order(self) -> Order:
         transfers = json.dumps(self._transfers)
         return Order(
-            self._scene._native, self.camera.to_json(), self._draws(self.pixels), transfers
+            self._scene._native,
+            self.camera.to_json(),
+            self._draws(self.pixels),
+            transfers,
+            self._answers,
         )
 
     def _draw(self) -> None:
@@ -285,8 +304,7 @@ class Widget(anywidget.AnyWidget):
         return named
 
     def _set_transfer(self, field: int, transfer: dict[str, Any]) -> None:
-        item = self._fields[field]["item"]
-        _pysplatkit.set_transfer(self._scene._native, item, json.dumps(transfer))
+        self._scene._set_transfer(self._fields[field]["item"], json.dumps(transfer))
         transfers = list(self._transfers)
         transfers[field] = transfer
         self._transfers = transfers
@@ -294,12 +312,15 @@ class Widget(anywidget.AnyWidget):
 
     def _count(self, field: int) -> None:
         """Counts the values of a field, on a thread of its own."""
-        counts = _pysplatkit.histogram(self._scene._native, self._fields[field]["item"])
+        entry = self._fields[field]
+        counts = _pysplatkit.histogram(self._scene._native, entry["item"])
 
         def take() -> None:
-            histograms = list(self._histograms)
-            histograms[field] = counts
-            self._histograms = histograms
+            # The scene may have changed meanwhile.
+            if field < len(self._fields) and self._fields[field]["of"] is entry["of"]:
+                histograms = list(self._histograms)
+                histograms[field] = counts
+                self._histograms = histograms
 
         self._later(take)
 
@@ -321,19 +342,22 @@ class Widget(anywidget.AnyWidget):
         frame, png = arrived
         if frame.picture is None:
             self._error = str(frame.error)
-            self.send({"type": "idle"})
+            self.send({"type": "idle", "answers": dict(frame.order.answers)})
             return
         self._shown = frame.picture
         is_exact = frame.is_exact and frame.order == self._order()
         size, took = frame.picture.size, frame.milliseconds
         status = {"size": size, "exact": is_exact, "milliseconds": took}
+        answers = {"answers": dict(frame.order.answers)}
+        if not is_exact:
+            # One message a frame: the status goes with it.
+            self._error = ""
+            self.send({"type": "frame", **status, **answers}, [png])
+            return
         with self.hold_sync():
             self._error = ""
-            self._status = status
-            if is_exact:
-                self._still = png
-        if not is_exact:
-            self.send({"type": "frame", **status}, [png])
+            self._status = {**status, **answers}
+            self._still = png
 
     def _later(self, call: Callable[[], None]) -> None:
         """Calls a function on the kernel's thread, which alone may send messages."""

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, Self
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, Self, Unpack
 
 import numpy as np
 import ray
 
 from .. import _options, _pysplatkit
-from .._camera import Camera
+from .._camera import Camera, Clip
 from .._errors import ArgumentError, NothingToDrawError
-from .._options import Color
+from .._options import Color, Method, SourceOptions, View
 from .._picture import Picture
-from .._scene import _FIT, DRAWING, Scene
+from .._scene import Scene
 from . import _composite, _rank, _regions
 from ._composite import Window
 from ._rank import Region, Report
 from ._regions import Split, Tree
 from ._results import get
 
+#: The options of pictures. Ranks draw no texts.
+_DRAWING = _options.DRAWING - _options.OVERLAY - {"background", "engine"}
 #: The ways of drawing whose regions can be composited.
 _COMPOSED = {"mode": "sheets", "optics": "light"}
 #: The most ranks that send strips to all others; more swap halves, if their number is a power of 2.
@@ -47,13 +49,13 @@ class Renderer:
         cpus: int = 1,
         precision: str = "float32",
         actor_options: Mapping[str, Any] | None = None,
-        **options: Any,
+        **options: Unpack[SourceOptions],
     ) -> None:
         """Starts the ranks. Without `ray.init`, a local cluster is started.
 
         Args:
             scene: A file that all ranks can read, an array, or a function without arguments that
-                returns a `Scene`, which each rank calls.
+                returns a `Scene`, which each rank calls; or a `Scene`.
             ranks: Their number. Default: one for each node of the cluster.
             memory: Bytes that each rank may take for bricks, and for the pages of each hierarchy.
                 Default: 1 GiB.
@@ -101,10 +103,23 @@ class Renderer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def camera(self, size: tuple[int, int] = (1280, 720), **view: Any) -> Camera:
-        """Returns the camera that sees the whole scene, as `Scene.camera` does."""
-        _options.checked(view, frozenset({*_FIT, "clips"}), "camera")
-        camera: Camera = get(self._first.camera.remote(self._source, size, view))
+    def camera(
+        self,
+        size: tuple[int, int] = (1280, 720),
+        *,
+        clips: Sequence[Clip] = (),
+        **view: Unpack[View],
+    ) -> Camera:
+        """Returns the camera that sees the whole scene, as `Scene.camera` does.
+
+        Args:
+            size: Width and height of the picture in pixels.
+            clips: Shapes that cut the scene.
+            view: The other options of `Scene.camera`.
+        """
+        _options.checked(view, _options.VIEW, "camera")
+        fit = {**view, "clips": clips}
+        camera: Camera = get(self._first.camera.remote(self._source, size, fit))
         return camera
 
     def render(
@@ -113,13 +128,19 @@ class Renderer:
         camera: Camera | None = None,
         *,
         background: Color | None = "black",
-        **options: Any,
+        **options: Unpack[Method],
     ) -> Picture:
         """Draws a picture: each rank its region of the scene, which are then composited.
 
         The options are those of `Scene.render`, and so is the picture. Its `statistics` also have
         the list `ranks`. The modes “axis-sheets” and “splats”, the optics “maximum” and “x-ray”,
         and a `budget` need the whole scene: `render_path` draws them.
+
+        Args:
+            size: Width and height in pixels.
+            camera: Default: one that sees the whole scene.
+            background: A colour; None for transparent pixels.
+            options: The other options of `Scene.render`.
         """
         given = self._drawing(options, "render")
         for name, only in _COMPOSED.items():
@@ -152,12 +173,18 @@ class Renderer:
         size: tuple[int, int] = (1280, 720),
         *,
         background: Color | None = "black",
-        **options: Any,
+        **options: Unpack[Method],
     ) -> Iterator[Picture]:
         """Draws the frames of a film, each by one rank with the whole scene, in their order.
 
         A rank that is done takes the next frame. At the end, idle ranks also draw the frames that
         others still draw, and the first result counts, so that a slow rank delays nothing.
+
+        Args:
+            cameras: One camera for each frame.
+            size: Width and height in pixels.
+            background: A colour; None for transparent pixels.
+            options: The other options of `Scene.render`.
         """
         given = {**self._drawing(options, "render_path"), "size": size}
         back = _options.background(background)
@@ -174,7 +201,7 @@ class Renderer:
         return self._ranks[0]
 
     def _drawing(self, options: Mapping[str, Any], where: str) -> dict[str, Any]:
-        given = _options.checked(options, DRAWING, where)
+        given = _options.checked(options, _DRAWING, where)
         if self._memory is not None:
             given.setdefault("memory", self._memory)
         return given
@@ -287,12 +314,16 @@ class Renderer:
 
 def _maker(scene: Any, options: Mapping[str, Any]) -> Callable[[], Scene]:
     """Returns what makes the scene on a rank."""
+    if isinstance(scene, Scene):
+        kept = ray.put(scene)
+        scene = lambda: ray.get(kept)
     if callable(scene):
         if options:
             raise ArgumentError(f"the options {list(options)} belong into the function")
         made: Callable[[], Scene] = scene
         return made
-    given = _options.checked(options, _options.VOLUME | _options.SURFACE | _options.READING, "add")
+    known = frozenset(SourceOptions.__annotations__)
+    given: Any = _options.checked(options, known, "Renderer")
     if isinstance(scene, (str, os.PathLike)):
         path = os.path.abspath(os.fspath(scene))
         return lambda: Scene().add(path, **given)

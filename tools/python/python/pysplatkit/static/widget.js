@@ -3,6 +3,8 @@
 
 /** Longest wait for an answer of the kernel, in milliseconds. */
 const PATIENCE = 3000;
+/** Most messages that wait for an answer of the kernel. */
+const AHEAD = 2;
 /** Most pixels of the screen in one of CSS that are drawn. */
 const MOST_RATIO = 3;
 /** A turn by an arrow key, as a share of the picture's height. */
@@ -53,20 +55,24 @@ function ofRange(value, [low, high]) {
 }
 
 /**
- * Sends what the hand does. While the kernel has not answered, further gestures are joined, so that
- * no queue builds up.
+ * Sends what the hand does. Two messages may wait for an answer: while the kernel draws the first
+ * view, the second is there already. Further gestures are joined, so that no queue builds up.
  */
 class Hand {
   constructor(model, onIdle, onLate) {
     this.model = model;
     this.onIdle = onIdle;
     this.onLate = onLate;
+    this.view = Math.random().toString(36).slice(2);
     this.waiting = [];
     this.timer = null;
+    /** The numbers of the last message that was sent, and of the last that was answered. */
+    this.sent = 0;
+    this.answeredTo = 0;
   }
 
   get isIdle() {
-    return this.timer === null && this.waiting.length === 0;
+    return this.sent === this.answeredTo && this.waiting.length === 0;
   }
 
   do(kind, details = {}) {
@@ -87,19 +93,28 @@ class Hand {
   }
 
   flush() {
-    if (this.timer !== null || this.waiting.length === 0) return;
-    this.timer = setTimeout(() => {
-      this.onLate();
-      this.answered();
-    }, PATIENCE);
-    this.model.send({ do: this.waiting });
+    if (this.sent - this.answeredTo >= AHEAD || this.waiting.length === 0) return;
+    this.sent += 1;
+    this.model.send({ do: this.waiting, view: this.view, number: this.sent });
     this.waiting = [];
+    this.wait();
   }
 
-  /** The kernel has answered. */
-  answered() {
+  /** Waits for an answer, but not for ever. */
+  wait() {
     clearTimeout(this.timer);
     this.timer = null;
+    if (this.sent === this.answeredTo) return;
+    this.timer = setTimeout(() => {
+      this.onLate();
+      this.answered({ [this.view]: this.sent });
+    }, PATIENCE);
+  }
+
+  /** The kernel has answered the messages of views up to these numbers. */
+  answered(numbers = {}) {
+    this.answeredTo = Math.max(this.answeredTo, numbers[this.view] ?? 0);
+    this.wait();
     this.flush();
     if (this.isIdle) this.onIdle();
   }
@@ -624,11 +639,11 @@ function render({ model, el }) {
     const png = model.get("_still");
     if (!png?.byteLength) return;
     view.show(png, model.get("_status"));
-    hand.answered();
+    hand.answered(model.get("_status").answers);
   };
   on("msg:custom", (message, buffers) => {
     if (message.type === "frame") view.show(buffers[0], message);
-    hand.answered();
+    hand.answered(message.answers);
   });
   on("change:_still", showStill);
   on("change:_error", () => view.fail(model.get("_error")));

@@ -1,15 +1,14 @@
-//! Films: the pictures of a moving camera in one file, or as raw frames on stdout. Each frame goes
-//! to an encoder as soon as it is drawn, and is not kept.
+//! Films: the pictures of a moving camera in one file. Each frame goes to an encoder as soon as it
+//! is drawn, and is not kept.
 
 mod apng;
 mod ffmpeg;
 mod gif;
 mod palette;
-mod raw;
 mod webp;
 
-use crate::failure::Failure;
-use ffmpeg::Container;
+use crate::Failure;
+pub use ffmpeg::Container;
 use splatkit::{Error, disk::AtomicFile};
 use std::{
     io::{BufWriter, Write},
@@ -21,6 +20,7 @@ use std::{
 pub struct Film {
     /// Width and height in pixels.
     pub size: [u32; 2],
+    /// The number of frames.
     pub frames: u32,
     /// Frames per second.
     pub rate: f64,
@@ -38,25 +38,32 @@ impl Film {
 }
 
 /// Takes the frames of a film, one after the other.
-pub trait Encoder {
+pub trait Encoder: Send {
     /// Adds a frame: rows from the top, and red, green, blue and opacity of each pixel (not
-    /// premultiplied). Returns whether more frames are wanted: the reader of stdout may be gone.
+    /// premultiplied). Returns whether more frames are wanted: who reads them may be gone.
+    ///
+    /// # Errors
+    /// [`Failure`] of the file or of its encoder.
     fn add(&mut self, rgba: &[u8]) -> Result<bool, Failure>;
 
     /// Completes the film. A file gets its name only now.
+    ///
+    /// # Errors
+    /// [`Failure`] of the file or of its encoder.
     fn finish(self: Box<Self>) -> Result<(), Failure>;
 }
 
 /// How a film is stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Format {
+    /// Animated GIF.
     Gif,
+    /// Animated WebP.
     Webp,
+    /// Animated PNG.
     Apng,
     /// Encoded by ffmpeg.
     Coded(Container),
-    /// The bytes of the frames on stdout.
-    Raw,
 }
 
 impl Format {
@@ -75,12 +82,15 @@ impl Format {
     }
 
     /// Refuses, before the work is done, a film that cannot be written.
+    ///
+    /// # Errors
+    /// [`Failure`] for pictures that are too large for the format, and where ffmpeg is missing.
     pub fn check(self, path: &Path, film: &Film) -> Result<(), Failure> {
         let most = match self {
             Self::Gif => gif::MOST,
             Self::Webp => webp::MOST,
             Self::Coded(_) => return ffmpeg::check(path),
-            Self::Apng | Self::Raw => return Ok(()),
+            Self::Apng => return Ok(()),
         };
         let [width, height] = film.size;
         if width.max(height) <= most {
@@ -112,13 +122,15 @@ impl Format {
     }
 
     /// Begins a film. No file of its name appears before the last frame.
+    ///
+    /// # Errors
+    /// [`Failure`] for a file that cannot be created, and an ffmpeg that does not start.
     pub fn open(self, path: &Path, film: Film) -> Result<Box<dyn Encoder>, Failure> {
         Ok(match self {
             Self::Gif => Box::new(gif::Gif::open(path, film)?),
             Self::Webp => Box::new(webp::Webp::open(path, film)?),
             Self::Apng => Box::new(apng::Apng::open(path, film)?),
             Self::Coded(container) => Box::new(ffmpeg::Ffmpeg::open(container, path, film)?),
-            Self::Raw => Box::new(raw::Raw),
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Films that ffmpeg encodes, which must be installed: it reads the raw frames from a pipe.
 
 use super::{Encoder, Film};
-use crate::failure::Failure;
+use crate::Failure;
 use splatkit::disk::AtomicFile;
 use std::{
     ffi::OsString,
@@ -21,8 +21,11 @@ const LINES: usize = 4;
 /// A kind of file that ffmpeg writes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Container {
+    /// H.264.
     Mp4,
+    /// VP9.
     Webm,
+    /// H.264, or ProRes with opacity.
     Mov,
 }
 

@@ -1,14 +1,13 @@
 //! Animated PNG: lossless, with opacity.
 
 use super::{Encoder, Film, Out, commit, create, rgb};
-use crate::failure::Failure;
+use crate::Failure;
 use png::{BlendOp, ColorType, EncodingError, Writer};
 use splatkit::Error;
 use std::{
-    cell::RefCell,
     io::{self, Write},
     path::{Path, PathBuf},
-    rc::Rc,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 pub struct Apng {
@@ -22,21 +21,27 @@ pub struct Apng {
 
 /// The file of a writer that does not return it.
 #[derive(Clone)]
-struct Shared(Rc<RefCell<Out>>);
+struct Shared(Arc<Mutex<Out>>);
+
+impl Shared {
+    fn out(&self) -> MutexGuard<'_, Out> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 impl Write for Shared {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.borrow_mut().write(bytes)
+        self.out().write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.0.borrow_mut().flush()
+        self.out().flush()
     }
 }
 
 impl Apng {
     pub fn open(path: &Path, film: Film) -> Result<Self, Failure> {
-        let file = Shared(Rc::new(RefCell::new(create(path)?)));
+        let file = Shared(Arc::new(Mutex::new(create(path)?)));
         let [width, height] = film.size;
         let mut encoder = png::Encoder::new(file.clone(), width, height);
         encoder.set_color(match film.background {
@@ -71,8 +76,8 @@ impl Encoder for Apng {
     fn finish(self: Box<Self>) -> Result<(), Failure> {
         let Self { path, writer, file, .. } = *self;
         writer.finish().map_err(|error| failure(&path, error))?;
-        match Rc::into_inner(file.0) {
-            Some(file) => commit(file.into_inner(), &path),
+        match Arc::into_inner(file.0).map(Mutex::into_inner) {
+            Some(file) => commit(file.unwrap_or_else(PoisonError::into_inner), &path),
             None => Err(Failure::output(&path, "it is still being written")),
         }
     }

@@ -8,11 +8,10 @@ mod ruler;
 mod text;
 mod ticks;
 
-use crate::failure::Failure;
+use crate::Failure;
 use axes::Names;
 use bar::Laid;
 use canvas::{Align, Area, Canvas, Ink};
-use clap::Args;
 use glam::DVec2;
 use ruler::Ruler;
 use serde_json::{Value, json};
@@ -20,46 +19,16 @@ use splatkit::{
     Error,
     math::Camera,
     picture::Picture,
-    session::{Captions, Description, OverlayEntry},
+    session::{Captions, OverlayEntry},
 };
 use text::{Face, Pen};
 
-/// What is written over the picture.
-#[derive(Args, Debug, Clone)]
-#[command(next_help_heading = "Texts")]
-pub struct OverlayFlags {
-    /// Draw the colours of the values, with their name, their unit and round numbers.
-    #[arg(long)]
-    scalar_bar: bool,
-    /// Draw how the axes X, Y and Z lie; of patients, left and right (L, R), front and back (A, P),
-    /// head and feet (S, I).
-    #[arg(long)]
-    axes: bool,
-    /// Draw a round length in the file's unit. In perspective it holds at the distance of the focal
-    /// point; with --orthographic, everywhere.
-    #[arg(long)]
-    scale_bar: bool,
-    /// Write this text above the picture's content; \n begins a new line. At most 1000 characters.
-    #[arg(long, value_name = "TEXT", value_parser = caption)]
-    caption: Option<String>,
-}
-
-/// The texts of a run's pictures.
+/// The texts of pictures.
 pub struct Overlay {
     entry: OverlayEntry,
     captions: Captions,
     face: Face,
     ink: Ink,
-}
-
-const MOST_CAPTION: usize = Description::MOST_CAPTION;
-
-/// Takes a caption, unless it is too long.
-fn caption(text: &str) -> Result<String, String> {
-    match text.chars().count() {
-        ..=MOST_CAPTION => Ok(text.to_owned()),
-        count => Err(format!("a caption has at most {MOST_CAPTION} characters, not {count}")),
-    }
 }
 
 /// Most scalar bars; more would hide the picture.
@@ -69,20 +38,12 @@ const BETWEEN: f64 = 1.2;
 /// The most of a picture's width that is left free at each side.
 const MOST_ROOM: f64 = 0.25;
 
-impl OverlayFlags {
-    /// Changes what is written over the picture of a scene: by the flags that are given.
-    pub fn apply(&self, scene: &mut Description) {
-        let overlay = &mut scene.overlay;
-        overlay.scalar_bar |= self.scalar_bar;
-        overlay.axes |= self.axes;
-        overlay.scale_bar |= self.scale_bar;
-        overlay.caption = self.caption.clone().or(overlay.caption.take());
-    }
-}
-
 impl Overlay {
     /// Returns the texts to draw over pictures with a background; `None` if none are asked for. A
     /// text that has nothing to say is an error.
+    ///
+    /// # Errors
+    /// [`Failure::Usage`] for a scalar bar where nothing is coloured by values.
     pub fn open(
         entry: &OverlayEntry,
         captions: &Captions,
@@ -93,8 +54,9 @@ impl Overlay {
         }
         if entry.scalar_bar && captions.legends.is_empty() {
             return Err(Failure::Usage(
-                "--scalar-bar has nothing to show, because nothing here is coloured by values; \
-                 --color height or --color with an attribute of the file colours surfaces"
+                "--scalar-bar (in Python, scalar_bar) has nothing to show, because nothing here is \
+                 coloured by values; --color (in Python, color) with height or with an attribute \
+                 of the file colours surfaces"
                     .into(),
             ));
         }
@@ -117,7 +79,7 @@ impl Overlay {
         (bars + area.left).min(MOST_ROOM * f64::from(width)) as u32
     }
 
-    #[cfg(all(test, feature = "window"))]
+    /// Returns the colours of all scalar bars.
     pub fn bar_colors(&self) -> Vec<[f32; 3]> {
         self.captions.legends.iter().flat_map(|(_, bar)| bar.colors.clone()).collect()
     }
@@ -410,16 +372,5 @@ mod tests {
         }
         canvas.text(&long, DVec2::new(0.0, 20.0), Align::Left);
         assert!(canvas.picture.color.iter().any(|pixel| pixel[3] > 0.5));
-    }
-
-    #[test]
-    fn captions_have_a_length() {
-        assert_eq!(caption(&"é".repeat(MOST_CAPTION)).map(|text| text.len()), Ok(2000));
-        let error = caption(&"A".repeat(500_000)).unwrap_err();
-        assert_eq!(error, "a caption has at most 1000 characters, not 500000");
-        let flag = OverlayFlags::augment_args(clap::Command::new("test"));
-        let flag = flag.get_arguments().find(|flag| flag.get_long() == Some("caption"));
-        let help = flag.unwrap().get_help().unwrap().to_string();
-        assert!(help.contains(&format!("At most {MOST_CAPTION} characters")), "{help}");
     }
 }

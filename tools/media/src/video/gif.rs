@@ -5,7 +5,7 @@ use super::{
     Encoder, Film, Out, commit, create,
     palette::{Color, chosen, dithered},
 };
-use crate::failure::Failure;
+use crate::Failure;
 use gif::{DisposalMethod, EncodingError, Frame, Repeat};
 use splatkit::Error;
 use std::{

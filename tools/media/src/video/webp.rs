@@ -2,7 +2,7 @@
 //! of animations (“Extended File Format” of Google's WebP Container Specification).
 
 use super::{Encoder, Film, Out, commit, create, rgb};
-use crate::failure::Failure;
+use crate::Failure;
 use image_webp::{ColorType, EncodingError, WebPEncoder};
 use splatkit::Error;
 use std::{
