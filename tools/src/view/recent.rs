@@ -105,6 +105,7 @@ mod tests {
         for number in 0..12 {
             recent.add(&[file(number)]).expect("kept");
         }
+        assert_eq!(recent.files().len(), 10);
         recent.add(&[file(7)]).expect("kept");
         let numbers = [7, 11, 10, 9, 8, 6, 5, 4, 3, 2].map(file);
         assert_eq!(recent.files(), numbers);
