@@ -11,7 +11,7 @@ use splatkit::{
     },
     input::Limits,
     math::Kernel,
-    splat::SplatSet,
+    splat::Surfels,
     surface::{Mesh, SurfelOptions},
     volume::{Volume, phantoms::Phantom, reach::neighbourhood_ranges},
 };
@@ -24,7 +24,7 @@ fn mesh() -> Mesh {
     Mesh::knot(480, 40)
 }
 
-fn surfels() -> SplatSet {
+fn surfels() -> Surfels {
     mesh().surfels(&SurfelOptions::default()).expect("surfels of a knot")
 }
 

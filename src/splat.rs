@@ -4,6 +4,7 @@ use crate::{Error, Result, math::Bounds, parallel::prelude::*};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use half::f16;
+use std::sync::Arc;
 
 /// An ellipsoidal Gaussian splat as stored in memory and on the GPU (48 bytes).
 ///
@@ -14,17 +15,17 @@ use half::f16;
 pub struct Splat {
     /// World position, relative to the set's origin.
     pub center: [f32; 3],
-    /// Radiance payload: the optical depth through the centre. Scalar payload: the sample's value.
+    /// Surfels: the optical depth through the centre. Samples: the value.
     pub strength: f32,
     /// B row by row: b00, b10, b11, b20, b21, b22, in world units.
     pub factor: [f32; 6],
-    /// Radiance: red, green, blue and opacity, 8 bits each, red in the lowest bits. The opacity is
+    /// Surfels: red, green, blue and opacity, 8 bits each, red in the lowest bits. The opacity is
     /// a factor on the strength. A splat with an opacity below 1 is translucent: where it is
-    /// widened in the picture, its optical depth shrinks as its area grows. Scalar: the weight as a
-    /// 16-bit float, and a part of the slope ([`Splat::sample`]).
+    /// widened in the picture, its optical depth shrinks as its area grows. Samples: the weight as
+    /// a 16-bit float, and a part of the slope ([`Splat::sample`]).
     pub color: u32,
-    /// Radiance: the unit normal, octahedral, two signed 16-bit components ([`encode_normal`]);
-    /// [`NO_NORMAL`] if there is none, which draws the splat unshaded. Scalar: the rest of the
+    /// Surfels: the unit normal, octahedral, two signed 16-bit components ([`encode_normal`]);
+    /// [`NO_NORMAL`] if there is none, which draws the splat unshaded. Samples: the rest of the
     /// slope.
     pub normal: u32,
 }
@@ -134,39 +135,79 @@ pub fn encode_trained_color(color: [f32; 3]) -> [u32; 2] {
     [FLOAT | (green >> 8) << 16 | red, FLOAT | (green & 255) << 16 | blue]
 }
 
-/// Unpacks the colour of a splat with the payload [`Payload::Trained`].
+/// Unpacks the colour of a splat of [`TrainedSplats`].
 pub fn decode_trained_color(splat: &Splat) -> [f32; 3] {
     let green = (splat.color >> 16 & 255) << 8 | splat.normal >> 16 & 255;
     [splat.color & 0xffff, green, splat.normal & 0xffff].map(|part| part as f32 * TRAINED_COLOR)
 }
 
-/// What the splats of a set carry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Payload {
-    /// Colour, optical depth and normal, already classified.
-    Radiance,
-    /// A sample value, classified after interpolation by the scene's transfer function.
-    Scalar,
-    /// Colour and opacity of a trained Gaussian ([`crate::gaussians`]). A negative strength is
-    /// minus what it covers at its centre. A positive one is an optical depth: such a splat stands
-    /// for several Gaussians, seen from afar. The colour is that of [`decode_trained_color`].
-    Trained,
-}
-
-/// Splats with the same payload around a common origin.
+/// Splats that carry their own colour, optical depth and normal, around a common origin: those of
+/// meshes, point clouds and hierarchies.
 #[derive(Debug, Clone)]
-pub struct SplatSet {
+pub struct Surfels {
     /// World position that the centres are relative to.
     pub origin: DVec3,
-    /// What all of the splats carry.
-    pub payload: Payload,
     /// The splats, in any order.
     pub splats: Vec<Splat>,
     /// Footprints end this many standard deviations from the centre.
     pub extent: f32,
-    /// Scalar payload: the average sum of the weighted kernels inside the set. Used when samples
-    /// are classified before they are added. 1 for radiance.
+}
+
+/// Splats that carry a value each ([`Splat::sample`]), around a common origin: those of scattered
+/// samples. A transfer function classifies their values after interpolation.
+#[derive(Debug, Clone)]
+pub struct SampleSplats {
+    /// World position that the centres are relative to.
+    pub origin: DVec3,
+    /// The splats, in any order.
+    pub splats: Vec<Splat>,
+    /// Footprints end this many standard deviations from the centre.
+    pub extent: f32,
+    /// The average sum of the weighted kernels inside the set. Used when samples are classified
+    /// before they are added.
     pub overlap: f32,
+}
+
+/// Splats that carry the colour and opacity of trained Gaussians ([`crate::gaussians`]) as one eye
+/// sees them, around a common origin.
+///
+/// A negative strength is minus what a splat covers at its centre. A positive one is an optical
+/// depth: such a splat stands for several Gaussians, seen from afar. The colour is that of
+/// [`decode_trained_color`].
+#[derive(Debug, Clone)]
+pub struct TrainedSplats {
+    /// World position that the centres are relative to.
+    pub origin: DVec3,
+    /// The splats, in any order.
+    pub splats: Vec<Splat>,
+    /// Footprints end this many standard deviations from the centre.
+    pub extent: f32,
+}
+
+/// The splats of an item that has explicit ones.
+#[derive(Debug, Clone)]
+pub(crate) enum Splats {
+    Surfels(Arc<Surfels>),
+    Samples(Arc<SampleSplats>),
+}
+
+/// What all splats of a set have in common.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Common {
+    pub origin: DVec3,
+    pub extent: f32,
+    pub payload: Payload,
+}
+
+/// What the splats of a set carry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Payload {
+    /// Colour, optical depth and normal, already classified.
+    Radiance,
+    /// A sample's value, classified after interpolation. `overlap` is that of [`SampleSplats`].
+    Scalar { overlap: f32 },
+    /// Colour and opacity of a trained Gaussian.
+    Trained,
 }
 
 /// Packs a unit vector into 32 bits (octahedral, Meyer et al. 2010).
@@ -200,6 +241,9 @@ impl Splat {
     /// neighbours' depths in sums.
     pub const MOST_OPTICAL_DEPTH: f32 = 1e10;
 
+    /// The farthest that footprints of a set may end from the centre, in standard deviations.
+    pub const MAX_EXTENT: f32 = 8.0;
+
     /// The standard deviations along the coordinate axes: the lengths of the rows of the factor.
     pub(crate) fn deviations(&self) -> Vec3 {
         let [b00, b10, b11, b20, b21, b22] = self.factor;
@@ -211,19 +255,14 @@ impl Splat {
     }
 }
 
-impl SplatSet {
-    /// The largest `extent` that the engine accepts, in standard deviations.
-    pub const MAX_EXTENT: f32 = 8.0;
-
-    /// Returns a set of the same kind without splats.
-    pub(crate) fn empty(&self) -> Self {
-        Self { splats: Vec::new(), ..*self }
+impl Surfels {
+    /// Returns the box around all footprints, in world coordinates.
+    pub fn bounds(&self) -> Bounds {
+        bounds(&self.common(), &self.splats)
     }
 
-    /// Returns the smallest and the largest value of a scalar set.
-    pub fn value_range(&self) -> [f64; 2] {
-        let values = self.splats.iter().map(|splat| f64::from(splat.strength));
-        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    pub(crate) fn common(&self) -> Common {
+        Common { origin: self.origin, extent: self.extent, payload: Payload::Radiance }
     }
 
     /// Changes the origin of the set; all splats stay where they are in the world.
@@ -262,19 +301,68 @@ impl SplatSet {
         }
         Ok(())
     }
+}
+
+impl SampleSplats {
+    /// Returns the smallest and the largest value.
+    pub fn value_range(&self) -> [f64; 2] {
+        let values = self.splats.iter().map(|splat| f64::from(splat.strength));
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    }
 
     /// Returns the box around all footprints, in world coordinates.
     pub fn bounds(&self) -> Bounds {
-        let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        let grow = |(low, high): (Vec3, Vec3), splat: &Splat| {
-            let reach = self.extent * splat.deviations();
-            let center = Vec3::from(splat.center);
-            (low.min(center - reach), high.max(center + reach))
-        };
-        let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
-        let (low, high) = self.splats.par_iter().fold(|| none, grow).reduce(|| none, both);
-        Bounds::between(self.origin, [low, high])
+        bounds(&self.common(), &self.splats)
     }
+
+    pub(crate) fn common(&self) -> Common {
+        let payload = Payload::Scalar { overlap: self.overlap };
+        Common { origin: self.origin, extent: self.extent, payload }
+    }
+}
+
+impl TrainedSplats {
+    pub(crate) fn common(&self) -> Common {
+        Common { origin: self.origin, extent: self.extent, payload: Payload::Trained }
+    }
+}
+
+impl Splats {
+    pub fn splats(&self) -> &[Splat] {
+        match self {
+            Self::Surfels(set) => &set.splats,
+            Self::Samples(set) => &set.splats,
+        }
+    }
+
+    pub fn common(&self) -> Common {
+        match self {
+            Self::Surfels(set) => set.common(),
+            Self::Samples(set) => set.common(),
+        }
+    }
+
+    /// Whether both are the same set in memory.
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Surfels(set), Self::Surfels(other)) => Arc::ptr_eq(set, other),
+            (Self::Samples(set), Self::Samples(other)) => Arc::ptr_eq(set, other),
+            _ => false,
+        }
+    }
+}
+
+/// Returns the box around the footprints of splats, in world coordinates.
+fn bounds(common: &Common, splats: &[Splat]) -> Bounds {
+    let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let grow = |(low, high): (Vec3, Vec3), splat: &Splat| {
+        let reach = common.extent * splat.deviations();
+        let center = Vec3::from(splat.center);
+        (low.min(center - reach), high.max(center + reach))
+    };
+    let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+    let (low, high) = splats.par_iter().fold(|| none, grow).reduce(|| none, both);
+    Bounds::between(common.origin, [low, high])
 }
 
 #[cfg(test)]
@@ -330,13 +418,7 @@ mod tests {
             ..Splat::zeroed()
         };
         let splats = vec![splat(0.0), splat(0.25)];
-        let mut set = SplatSet {
-            origin: DVec3::X,
-            payload: Payload::Radiance,
-            splats,
-            extent: 3.0,
-            overlap: 1.0,
-        };
+        let mut set = Surfels { origin: DVec3::X, splats, extent: 3.0 };
         set.move_origin(DVec3::new(1001.0, 0.0, 0.0)).unwrap();
         let places: Vec<f64> =
             set.splats.iter().map(|s| set.origin.x + f64::from(s.center[0])).collect();

@@ -22,7 +22,7 @@ use crate::{
     parallel::prelude::*,
     plan::{source::Source, tables::Values},
     scene::{Item, Settings},
-    splat::{Payload, Splat, SplatSet},
+    splat::{Common, Splat, Splats, TrainedSplats},
     volume::{Arrangement, Lattice, SampleSlice, Samples, Volume, reach::EVERYTHING},
 };
 use fearless_simd::Level;
@@ -39,7 +39,7 @@ pub enum Prepared {
     /// A set of splats: its levels of detail, and the set that replaces it in the last view.
     Set {
         levels: Option<Box<Levels>>,
-        drawn: Arc<SplatSet>,
+        drawn: Splats,
     },
     Facets(Arc<FacetSet>),
     /// A solid, and what the clips of the last picture left of it.
@@ -52,7 +52,7 @@ pub enum Prepared {
     /// Trained Gaussians, and the splats that the eye of the last view saw.
     Gaussians {
         set: Arc<Gaussians>,
-        seen: Option<(Eye, SplatSet)>,
+        seen: Option<(Eye, TrainedSplats)>,
     },
     Hierarchy(Box<PageCache>),
     /// A volume. If it is scattered, also the extremes around each sample, and the list of visible
@@ -70,10 +70,10 @@ pub enum Prepared {
 
 impl Prepared {
     pub fn new(item: &Item) -> Self {
+        let set = |drawn: Splats| Self::Set { levels: Levels::new(&drawn).map(Box::new), drawn };
         match item {
-            Item::Radiance(set) | Item::Scalar(set, _) => {
-                Self::Set { levels: Levels::new(set).map(Box::new), drawn: set.clone() }
-            }
+            Item::Radiance(splats) => set(Splats::Surfels(splats.clone())),
+            Item::Scalar(splats, _) => set(Splats::Samples(splats.clone())),
             Item::Facets(set) => Self::Facets(set.clone()),
             Item::Solid(solid) => {
                 let (pose, drawn) = (Pose::IDENTITY, solid.boundary().clone());
@@ -144,8 +144,8 @@ impl Prepared {
         let choice = field.and_then(|field| field.choice.as_ref());
         let visible = field.map_or(&EVERYTHING, |field| &field.visible_ranges);
         match self {
-            Self::Set { drawn, .. } if drawn.payload == Payload::Radiance => {
-                Ok(radiance((plan, view), drawn, spare))
+            Self::Set { drawn: Splats::Surfels(set), .. } => {
+                Ok(radiance((plan, view), &set.common(), &set.splats, spare))
             }
             Self::Gaussians { set, seen } => {
                 let eye = Eye::of(view);
@@ -157,15 +157,15 @@ impl Prepared {
                     }
                     None => *seen = Some((eye, set.seen_from(eye))),
                 }
-                Ok(seen
-                    .as_ref()
-                    .map_or_else(Vec::new, |(_, seen)| radiance((plan, view), seen, spare)))
+                Ok(seen.as_ref().map_or_else(Vec::new, |(_, seen)| {
+                    radiance((plan, view), &seen.common(), &seen.splats, spare)
+                }))
             }
-            Self::Set { drawn, .. } => {
-                let source = Source::of_splats(view, drawn);
+            Self::Set { drawn: Splats::Samples(set), .. } => {
+                let source = Source::of_splats(view, &set.common());
                 let to_record =
                     |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
-                Ok(batches(&drawn.splats, spare, |_, batch, records| {
+                Ok(batches(&set.splats, spare, |_, batch, records| {
                     records.extend(batch.iter().filter_map(to_record));
                 }))
             }
@@ -203,9 +203,14 @@ impl Prepared {
 }
 
 /// Returns the records of splats that carry their own colour.
-fn radiance((plan, view): (&Plan, &View), set: &SplatSet, spare: &mut Spare) -> Vec<Vec<Record>> {
+fn radiance(
+    (plan, view): (&Plan, &View),
+    set: &Common,
+    splats: &[Splat],
+    spare: &mut Spare,
+) -> Vec<Vec<Record>> {
     let projector = Projector::new(plan, Source::of_splats(view, set));
-    batches(&set.splats, spare, |_, batch: &[Splat], records| {
+    batches(splats, spare, |_, batch: &[Splat], records| {
         lanes!(Level::new(), simd => projector.add(
             simd,
             batch.iter().map(|splat| (splat, 1.0)),

@@ -5,7 +5,7 @@ use crate::{
     Error, Result,
     math::lower,
     parallel::prelude::*,
-    splat::{NO_NORMAL, Payload, Splat, SplatSet, decode_normal, encode_normal},
+    splat::{NO_NORMAL, Splat, Surfels, decode_normal, encode_normal},
 };
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -242,15 +242,13 @@ const OPAQUE: f32 = 14.0;
 impl FacetSet {
     /// Returns splats that stand for the rods of the set, for methods that draw no facets. A pixel
     /// is a thousandth of the set's diagonal. The splats are not lit.
-    pub fn rod_splats(&self) -> SplatSet {
+    pub fn rod_splats(&self) -> Surfels {
         let pixel = self.bounds().diagonal() as f32 * Size::PIXEL;
         let rods = self.facets.par_iter().filter_map(Facet::rod);
-        SplatSet {
+        Surfels {
             origin: self.origin,
-            payload: Payload::Radiance,
             splats: rods.flat_map_iter(|rod| rod.splats(pixel)).collect(),
             extent: 3.0,
-            overlap: 1.0,
         }
     }
 }

@@ -4,7 +4,7 @@ use super::{Gaussians, harmonics};
 use crate::{
     math::View,
     parallel::prelude::*,
-    splat::{Payload, Splat, SplatSet, encode_trained_color},
+    splat::{Splat, TrainedSplats, encode_trained_color},
 };
 use glam::{DMat3, DVec3, Vec3};
 
@@ -41,9 +41,8 @@ impl Eye {
 }
 
 impl Gaussians {
-    /// Returns the splats that an eye sees, in the order of the Gaussians. Their payload is
-    /// [`Payload::Trained`].
-    pub fn seen_from(&self, eye: Eye) -> SplatSet {
+    /// Returns the splats that an eye sees, in the order of the Gaussians.
+    pub fn seen_from(&self, eye: Eye) -> TrainedSplats {
         let splat = |index: usize| {
             let [color, normal] = self.color(index, eye);
             Splat {
@@ -54,12 +53,10 @@ impl Gaussians {
                 normal,
             }
         };
-        SplatSet {
+        TrainedSplats {
             origin: self.origin,
-            payload: Payload::Trained,
             splats: (0..self.len()).into_par_iter().map(splat).collect(),
             extent: EXTENT,
-            overlap: 1.0,
         }
     }
 
@@ -140,7 +137,7 @@ mod tests {
     #[test]
     fn colours_follow_the_eye() {
         let scene = scene();
-        let red = |set: &SplatSet| decode_trained_color(&set.splats[1])[0];
+        let red = |set: &TrainedSplats| decode_trained_color(&set.splats[1])[0];
         let place = DVec3::new(100.0, 1.0, 0.0);
         let mut set = scene.seen_from(Eye::At(place - DVec3::X));
         assert!((red(&set) - (0.5 + 0.488_602_5 * 0.5)).abs() < 1e-4, "{}", red(&set));

@@ -2,35 +2,22 @@
 
 use super::{Gaussians, harmonics::constant_of};
 use crate::{
-    Error, Result,
+    Result,
     math::eigen,
     memory,
     parallel::prelude::*,
-    splat::{Payload, Splat, SplatSet},
+    splat::{Splat, Surfels},
 };
 use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
 impl Gaussians {
-    /// Returns splats as Gaussians that cover as much along a ray through their centres. Their
+    /// Returns surfels as Gaussians that cover as much along a ray through their centres. Their
     /// colours are the same in all directions: the shading of the splats is lost, and so is the
     /// extent of their footprints.
     ///
     /// # Errors
-    /// [`Error::Argument`] for splats that are not surfels. Samples of a volume have no colours,
-    /// and those of a trained scene have only those of one view. [`Error::Memory`] if the Gaussians
-    /// do not fit in memory.
-    pub fn from_splats(set: &SplatSet) -> Result<Self> {
-        let refused = match set.payload {
-            Payload::Radiance => None,
-            Payload::Scalar => Some("samples of a volume have no colours to write as Gaussians"),
-            Payload::Trained => Some(
-                "the splats of a trained scene have only the colours of one view; use its \
-                 Gaussians",
-            ),
-        };
-        if let Some(message) = refused {
-            return Err(Error::Argument(message.into()));
-        }
+    /// [`Error::Memory`](crate::Error::Memory) if the Gaussians do not fit in memory.
+    pub fn from_splats(set: &Surfels) -> Result<Self> {
         // One more list of shapes until they are in lists of their own.
         const OF_ONE: usize = 2 * size_of::<(Vec3, Quat)>() + size_of::<(Vec3, [f32; 3], f32)>();
         memory::room("making Gaussians of splats", (OF_ONE * set.splats.len()) as u64)?;
@@ -106,20 +93,6 @@ mod tests {
             let miss = miss.to_cols_array().iter().map(|v| v.abs()).fold(0.0, f64::max);
             let largest = f64::from(gaussians.scales[index].max_element());
             assert!(miss < 1e-5 * largest * largest, "{miss}");
-        }
-    }
-
-    #[test]
-    fn only_surfels_are_gaussians() {
-        let mut set = Mesh::sphere(1).surfels(&Default::default()).unwrap();
-        for (payload, word) in
-            [(Payload::Scalar, "have no colours"), (Payload::Trained, "of one view")]
-        {
-            set.payload = payload;
-            match Gaussians::from_splats(&set) {
-                Err(Error::Argument(message)) => assert!(message.contains(word), "{message}"),
-                other => panic!("{payload:?}: {other:?}"),
-            }
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::{
         tables::{Factors, Values},
     },
     scene::{Scene, Settings},
-    splat::SplatSet,
+    splat::Common,
     volume::{Arrangement, Lattice, TransferFunction},
 };
 use bytemuck::{Pod, Zeroable};
@@ -247,7 +247,7 @@ impl Source {
     }
 
     /// Returns the source of a chunk of explicit splats.
-    pub fn of_splats(view: &View, set: &SplatSet) -> Self {
+    pub fn of_splats(view: &View, set: &Common) -> Self {
         Self::new(&source::Source::of_splats(view, set))
     }
 

@@ -16,7 +16,7 @@ use crate::{
     memory,
     parallel::{self, prelude::*},
     progress::{Watch, tell},
-    splat::{Payload, Splat, SplatSet},
+    splat::{Splat, Surfels},
 };
 use serde::{Deserialize, Serialize};
 use std::{
@@ -75,14 +75,14 @@ impl Tree {
     /// # Errors
     /// Those of [`check_splats`]; [`Error::Timeout`] after the deadline; [`Error::Memory`] if there
     /// is too little memory.
-    pub fn build(set: &SplatSet, options: &BuildOptions, watch: Watch<'_>) -> Result<Self> {
+    pub fn build(set: &Surfels, options: &BuildOptions, watch: Watch<'_>) -> Result<Self> {
         tree_colored(set, options, watch, None)
     }
 }
 
 /// Builds the tree of a set whose splats have these colours, if any.
 pub(super) fn tree_colored(
-    set: &SplatSet,
+    set: &Surfels,
     options: &BuildOptions,
     watch: Watch<'_>,
     colors: Option<&LeafColors>,
@@ -141,7 +141,7 @@ fn root_color(block: &Block) -> Harmonics {
 /// Those of [`Tree::build`], and [`Error::Output`] if the file cannot be written; then there is no
 /// file.
 pub fn build_file(
-    set: &SplatSet,
+    set: &Surfels,
     path: impl AsRef<Path>,
     build: &BuildOptions,
     write: &WriteOptions,
@@ -152,7 +152,7 @@ pub fn build_file(
 
 /// As [`build_file`], of a set whose splats have these colours, if any.
 pub(super) fn build_colored(
-    set: &SplatSet,
+    set: &Surfels,
     path: &Path,
     build: &BuildOptions,
     write: &WriteOptions,
@@ -189,7 +189,7 @@ pub(super) fn build_colored(
 pub(crate) const WORK: &str = "building the hierarchy";
 
 /// Bytes needed to sort the splats.
-fn order_bytes(set: &SplatSet) -> u64 {
+fn order_bytes(set: &Surfels) -> u64 {
     24 * set.splats.len() as u64
 }
 
@@ -255,13 +255,13 @@ impl Builder {
 }
 
 /// Builds the block of the splats with the indices `part`. Its root's sphere lies in `outer`.
-pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Sphere) -> Block {
+pub(crate) fn block_of(set: &Surfels, part: &[u32], preset: Preset, outer: Sphere) -> Block {
     colored_block_of(set, part, preset, outer, None)
 }
 
 /// As [`block_of`], of splats with these colours, if any.
 fn colored_block_of(
-    set: &SplatSet,
+    set: &Surfels,
     part: &[u32],
     preset: Preset,
     outer: Sphere,
@@ -306,19 +306,14 @@ const FARTHEST: f32 = 1e9;
 ///
 /// # Errors
 /// [`Error::Argument`] if values are not finite, or too large to be added up in 32 bits; if an
-/// optical depth is above [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH); and for samples.
+/// optical depth is above [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH).
 /// [`Error::NothingToDraw`] if there are no splats.
-pub fn check_splats(set: &SplatSet) -> Result<()> {
-    if set.payload != Payload::Radiance {
-        return Err(Error::Argument(
-            "a hierarchy is built of splats that carry colour, not of samples".into(),
-        ));
-    }
+pub fn check_splats(set: &Surfels) -> Result<()> {
     if set.splats.is_empty() {
         return Err(Error::NothingToDraw("there are no splats to build a hierarchy of".into()));
     }
-    if !(set.extent > 0.0 && set.extent <= SplatSet::MAX_EXTENT) {
-        let most = SplatSet::MAX_EXTENT;
+    if !(set.extent > 0.0 && set.extent <= Splat::MAX_EXTENT) {
+        let most = Splat::MAX_EXTENT;
         return Err(Error::Argument(format!(
             "a splat set's extent must lie in 0 … {most}, is {}",
             set.extent
@@ -361,13 +356,7 @@ mod tests {
     #[test]
     fn building_keeps_to_the_deadline() {
         let splats = surface(500, 1);
-        let set = SplatSet {
-            origin: glam::DVec3::ZERO,
-            payload: Payload::Radiance,
-            splats,
-            extent: 3.0,
-            overlap: 1.0,
-        };
+        let set = Surfels { origin: glam::DVec3::ZERO, splats, extent: 3.0 };
         let options = BuildOptions { deadline: Deadline::after(0), ..BuildOptions::default() };
         let built = [
             Tree::build(&set, &options, None).map(drop),

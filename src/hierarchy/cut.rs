@@ -18,7 +18,7 @@ use crate::{
     gaussians::Eye,
     math::{Bounds, View},
     parallel::prelude::*,
-    splat::{Payload, Splat, SplatSet, decode_normal},
+    splat::{Splat, Surfels, TrainedSplats, decode_normal},
 };
 use glam::{DMat3, DVec3, Vec3, Vec4};
 
@@ -241,6 +241,25 @@ pub(crate) fn cone_margin() -> (f32, f32) {
     (libm::sin(angle) as f32, libm::cos(angle) as f32)
 }
 
+/// The splats of a cut: of a tree of surfels, or of one of trained Gaussians.
+#[derive(Debug, Clone)]
+pub enum CutSplats {
+    /// Splats that carry their own colour.
+    Surfels(Surfels),
+    /// Splats as the view's eye sees them.
+    Trained(TrainedSplats),
+}
+
+impl CutSplats {
+    /// Returns the splats.
+    pub fn splats(&self) -> &[Splat] {
+        match self {
+            Self::Surfels(set) => &set.splats,
+            Self::Trained(set) => &set.splats,
+        }
+    }
+}
+
 impl Tree {
     /// Returns the splats of a cut in the order of the nodes, each with its share of its optical
     /// depth. This visits the whole tree: it is the oracle for the engine's selection.
@@ -256,7 +275,7 @@ impl Tree {
         view: &View,
         detail: Detail,
         cull_backfaces: Option<bool>,
-    ) -> Result<SplatSet> {
+    ) -> Result<CutSplats> {
         for (number, block) in self.blocks.iter().enumerate() {
             in_order(&block.nodes)
                 .map_err(|message| Error::Argument(format!("block {number}: {message}")))?;
@@ -278,22 +297,16 @@ impl Tree {
             }
         };
         Ok(match self.degree() {
-            Some(_) => self.seen_at_cut(&cut, Eye::of(view)),
-            None => self.at_cut(&cut),
+            Some(_) => CutSplats::Trained(self.seen_at_cut(&cut, Eye::of(view))),
+            None => CutSplats::Surfels(self.at_cut(&cut)),
         })
     }
 
     /// Returns the splats of a cut, as [`Self::cut`] does, of a tree whose nodes are in order.
-    pub(super) fn at_cut(&self, cut: &Cut) -> SplatSet {
+    pub(super) fn at_cut(&self, cut: &Cut) -> Surfels {
         let splats =
             self.selected(cut).iter().map(|(node, share)| faded(&node.splat, *share)).collect();
-        SplatSet {
-            origin: self.origin,
-            payload: Payload::Radiance,
-            splats,
-            extent: self.extent,
-            overlap: 1.0,
-        }
+        Surfels { origin: self.origin, splats, extent: self.extent }
     }
 
     /// Returns the nodes of a cut with their shares in units of 1/[`SHARE_UNIT`].

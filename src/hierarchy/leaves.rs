@@ -3,7 +3,7 @@
 use super::{Hierarchy, file::Page};
 use crate::{
     Result, memory,
-    splat::{Payload, Splat, SplatSet},
+    splat::{Splat, Surfels},
 };
 
 impl Hierarchy {
@@ -18,7 +18,7 @@ impl Hierarchy {
     ///
     /// # Errors
     /// Those of [`read_tree`](Self::read_tree), and [`Error::Memory`](crate::Error::Memory).
-    pub fn leaves(&self) -> Result<SplatSet> {
+    pub fn leaves(&self) -> Result<Surfels> {
         self.check_size()?;
         // Once page by page, and once joined.
         memory::room(
@@ -32,12 +32,6 @@ impl Hierarchy {
         let pages = self.each_page(of_page)?;
         let header = self.header();
         let splats = pages.concat();
-        Ok(SplatSet {
-            origin: header.origin,
-            payload: Payload::Radiance,
-            splats,
-            extent: header.extent,
-            overlap: 1.0,
-        })
+        Ok(Surfels { origin: header.origin, splats, extent: header.extent })
     }
 }

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     Result, memory, scattered,
-    splat::{Payload, SplatSet},
+    splat::{SampleSplats, Splats, Surfels},
 };
 use glam::DVec3;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ const CELL: f64 = 0.5;
 /// A set of splats, and the smaller sets derived from it.
 #[derive(Debug)]
 pub struct Levels {
-    set: Arc<SplatSet>,
+    set: Splats,
     probes: Vec<Node>,
     /// The number of splats in the set for each probe.
     each: usize,
@@ -41,60 +41,59 @@ enum Fewer {
     Nothing,
     Tree(Tree),
     /// Samples merged in cells whose edge is 2 to this power.
-    Cells(i32, Arc<SplatSet>),
+    Cells(i32, Arc<SampleSplats>),
 }
 
 impl Levels {
     /// Returns `None` for sets that are drawn as they are. They are small, or no tree can be built
     /// of them, or a tree would take half of the available memory.
-    pub fn new(set: &Arc<SplatSet>) -> Option<Self> {
-        let count = set.splats.len();
+    pub fn new(set: &Splats) -> Option<Self> {
+        let count = set.splats().len();
         let bytes = 2 * (count * size_of::<Node>()) as u64;
-        let is_refused = match set.payload {
-            Payload::Scalar => false,
-            Payload::Radiance => check_splats(set).is_err(),
-            Payload::Trained => true,
+        let is_refused = match set {
+            Splats::Samples(_) => false,
+            Splats::Surfels(set) => check_splats(set).is_err(),
         };
         if count < FEWEST || is_refused || memory::most().is_some_and(|most| bytes > most / 2) {
             return None;
         }
         let each = count.div_ceil(PROBES);
         // Samples have no normals, but only the positions and widths of probes are used.
-        let probes = set.splats.iter().step_by(each).map(|splat| leaf(splat, set.extent)).collect();
+        let extent = set.common().extent;
+        let probes = set.splats().iter().step_by(each).map(|splat| leaf(splat, extent)).collect();
         Some(Self { set: set.clone(), probes, each, fewer: Fewer::Nothing })
     }
 
     /// The origin of the set's positions.
     pub fn origin(&self) -> DVec3 {
-        self.set.origin
+        self.set.common().origin
     }
 
     /// Returns the set to draw for a cut: the whole set, or a smaller one in its place.
     ///
     /// # Errors
     /// Those of [`Tree::build`].
-    pub fn drawn(&mut self, cut: &Cut) -> Result<Arc<SplatSet>> {
+    pub fn drawn(&mut self, cut: &Cut) -> Result<Splats> {
         if !self.pays(cut) {
             return Ok(self.set.clone());
         }
-        match self.set.payload {
-            Payload::Radiance => self.nodes(cut),
-            Payload::Scalar => Ok(self.cells(cut)),
-            Payload::Trained => Ok(self.set.clone()),
-        }
+        Ok(match self.set.clone() {
+            Splats::Surfels(set) => Splats::Surfels(self.nodes(set, cut)?),
+            Splats::Samples(set) => Splats::Samples(self.cells(&set, cut)),
+        })
     }
 
-    fn nodes(&mut self, cut: &Cut) -> Result<Arc<SplatSet>> {
+    fn nodes(&mut self, set: Arc<Surfels>, cut: &Cut) -> Result<Arc<Surfels>> {
         if !matches!(self.fewer, Fewer::Tree(_)) {
             let options = BuildOptions { preset: Preset::Fastest, ..BuildOptions::default() };
-            self.fewer = Fewer::Tree(Tree::build(&self.set, &options, None)?);
+            self.fewer = Fewer::Tree(Tree::build(&set, &options, None)?);
         }
-        let Fewer::Tree(tree) = &self.fewer else { return Ok(self.set.clone()) };
+        let Fewer::Tree(tree) = &self.fewer else { return Ok(set) };
         Ok(Arc::new(tree.at_cut(cut)))
     }
 
-    fn cells(&mut self, cut: &Cut) -> Arc<SplatSet> {
-        let around = enclosing(&self.set.splats, self.set.extent);
+    fn cells(&mut self, all: &SampleSplats, cut: &Cut) -> Arc<SampleSplats> {
+        let around = enclosing(&all.splats, all.extent);
         let unit = CutSphere {
             center: around.center.as_vec3().to_array(),
             radius: around.radius as f32,
@@ -107,7 +106,7 @@ impl Levels {
         {
             return set.clone();
         }
-        let set = Arc::new(scattered::merged(&self.set, f64::from(power).exp2()));
+        let set = Arc::new(scattered::merged(all, f64::from(power).exp2()));
         self.fewer = Fewer::Cells(power, set.clone());
         set
     }
@@ -128,11 +127,11 @@ mod tests {
     use super::*;
     use crate::{
         math::{Bounds, Camera, View},
-        splat::{Payload, Splat},
+        splat::Splat,
     };
 
     /// A square grid of `side`² splats.
-    fn grid(side: u32) -> Arc<SplatSet> {
+    fn grid(side: u32) -> Splats {
         let step = 1.0 / side as f32;
         let splat = |i: u32| {
             let center = [(i % side) as f32 * step, (i / side) as f32 * step, 0.0];
@@ -140,13 +139,7 @@ mod tests {
             Splat { center, strength: 1.0, factor, color: u32::MAX, normal: 0 }
         };
         let splats = (0..side * side).map(splat).collect();
-        Arc::new(SplatSet {
-            origin: DVec3::ZERO,
-            payload: Payload::Radiance,
-            splats,
-            extent: 3.0,
-            overlap: 1.0,
-        })
+        Splats::Surfels(Arc::new(Surfels { origin: DVec3::ZERO, splats, extent: 3.0 }))
     }
 
     fn view(size: [u32; 2]) -> View {
@@ -159,16 +152,16 @@ mod tests {
         let set = grid(400);
         let mut levels = Levels::new(&set).expect("levels");
         let count = |levels: &mut Levels, side, pixels| {
-            let cut = Cut::new(&view([side; 2]), set.origin, pixels, false);
-            levels.drawn(&cut).expect("a set").splats.len()
+            let cut = Cut::new(&view([side; 2]), set.common().origin, pixels, false);
+            levels.drawn(&cut).expect("a set").splats().len()
         };
-        assert_eq!(count(&mut levels, 1000, 2.0), set.splats.len());
+        assert_eq!(count(&mut levels, 1000, 2.0), set.splats().len());
         assert!(matches!(levels.fewer, Fewer::Nothing));
         let few = count(&mut levels, 40, 2.0);
         assert!(few < 4000, "{few}");
         assert!(count(&mut levels, 1, 2.0) < 40);
         // A cut of 0 draws the leaves.
-        assert_eq!(count(&mut levels, 40, 0.0), set.splats.len());
+        assert_eq!(count(&mut levels, 40, 0.0), set.splats().len());
         assert!(Levels::new(&grid(300)).is_none());
     }
 }

@@ -22,7 +22,7 @@ pub(crate) mod trained;
 mod validate;
 
 pub use build::{BuildOptions, Preset, build_file, check_splats};
-pub use cut::{BLEND_BAND, Cut, Detail, SHARE_UNIT};
+pub use cut::{BLEND_BAND, Cut, CutSplats, Detail, SHARE_UNIT};
 pub(crate) use cut::{MOST_PIXELS, cone_margin};
 #[doc(hidden)]
 pub use file::CutSphere;

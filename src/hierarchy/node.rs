@@ -75,7 +75,7 @@ pub struct Block {
 /// // From afar, few splats stand for the whole.
 /// let camera = Camera::framing(&tree.bounds, DVec3::NEG_Z, DVec3::Y, 1.0);
 /// let cut = tree.cut(&camera.view([64, 64])?, Detail::Pixels(8.0), None)?;
-/// assert!(cut.splats.len() < ball.splats.len() / 4);
+/// assert!(cut.splats().len() < ball.splats.len() / 4);
 /// # Ok::<(), splatkit::Error>(())
 /// ```
 #[derive(Debug, Clone)]

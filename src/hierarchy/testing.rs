@@ -3,7 +3,7 @@
 use super::{Block, Node, Tree, file};
 use crate::{
     math::{Bounds, eigen},
-    splat::{NO_NORMAL, Payload, Splat, SplatSet, decode_normal, encode_normal},
+    splat::{NO_NORMAL, Splat, Surfels, decode_normal, encode_normal},
 };
 use glam::{DMat3, DVec3, Vec3};
 
@@ -268,8 +268,6 @@ fn whole(blocks: Vec<Block>, points: usize) -> Tree {
     let mut tree =
         Tree { origin, extent: EXTENT, closed: true, bounds, source_points: points as u64, blocks };
     let splats = tree.nodes().filter(|node| node.is_leaf()).map(|node| node.splat).collect();
-    tree.bounds =
-        SplatSet { origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 }
-            .bounds();
+    tree.bounds = Surfels { origin, splats, extent: EXTENT }.bounds();
     tree
 }

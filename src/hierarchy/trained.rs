@@ -13,28 +13,27 @@ use crate::{
     gaussians::{Colors, Eye, Gaussians, harmonics::terms},
     parallel::prelude::*,
     progress::Watch,
-    splat::{NO_NORMAL, Payload, Splat, SplatSet, TRAINED_OPACITIES, encode_trained_color},
+    splat::{NO_NORMAL, Splat, Surfels, TRAINED_OPACITIES, TrainedSplats, encode_trained_color},
 };
 use glam::Vec3;
 use std::path::Path;
 
 /// Returns the splats that a tree is built of, and the number of the Gaussian of each. Gaussians
 /// that cover less than 1/255 of any pixel are left out.
-fn splats_of(set: &Gaussians) -> Result<(SplatSet, Vec<u32>)> {
+fn splats_of(set: &Gaussians) -> Result<(Surfels, Vec<u32>)> {
     set.validate().map_err(Error::Argument)?;
     let [least, most] = TRAINED_OPACITIES;
     let shows = |index: &u32| f64::from(set.opacities[*index as usize]) >= least;
     let numbers: Vec<u32> = (0..set.len() as u32).filter(shows).collect();
-    let mut splats = set.seen_from(Eye::Along(glam::DVec3::Z));
+    let seen = set.seen_from(Eye::Along(glam::DVec3::Z));
     let leaf = |index: &u32| {
-        let splat = splats.splats[*index as usize];
+        let splat = seen.splats[*index as usize];
         let opacity = f64::from(set.opacities[*index as usize]).min(most);
         let strength = -(-opacity).ln_1p() as f32;
         Splat { strength, color: u32::MAX, normal: NO_NORMAL, ..splat }
     };
-    splats.splats = numbers.par_iter().map(leaf).collect();
-    splats.payload = Payload::Radiance;
-    Ok((splats, numbers))
+    let splats = numbers.par_iter().map(leaf).collect();
+    Ok((Surfels { origin: seen.origin, splats, extent: seen.extent }, numbers))
 }
 
 /// Returns a node's splat as it is drawn, with its share and its colour: a leaf by its trainer's
@@ -63,8 +62,8 @@ impl Tree {
         self.blocks.first().and_then(|block| block.colors.as_ref()).map(Colors::degree)
     }
 
-    /// Returns the splats of a cut as an eye sees them. Their payload is [`Payload::Trained`].
-    pub(super) fn seen_at_cut(&self, cut: &Cut, eye: Eye) -> SplatSet {
+    /// Returns the splats of a cut as an eye sees them.
+    pub(super) fn seen_at_cut(&self, cut: &Cut, eye: Eye) -> TrainedSplats {
         let of_block = |(index, block): (usize, &Block)| {
             let Some(colors) = &block.colors else { return Vec::new() };
             let seen = |(node, share): (u32, u32)| {
@@ -76,13 +75,7 @@ impl Tree {
             self.selected_of(index, block, cut).into_iter().map(seen).collect()
         };
         let parts: Vec<Vec<Splat>> = self.blocks.par_iter().enumerate().map(of_block).collect();
-        SplatSet {
-            origin: self.origin,
-            payload: Payload::Trained,
-            splats: parts.concat(),
-            extent: self.extent,
-            overlap: 1.0,
-        }
+        TrainedSplats { origin: self.origin, splats: parts.concat(), extent: self.extent }
     }
 }
 
@@ -133,7 +126,7 @@ mod tests {
     use super::*;
     use crate::{
         gaussians::harmonics::constant_of,
-        hierarchy::{Detail, file::to_bytes, validate},
+        hierarchy::{CutSplats, Detail, file::to_bytes, validate},
         input::Limits,
         math::{Camera, Projection},
     };
@@ -180,7 +173,9 @@ mod tests {
         let mut wanted = set.seen_from(Eye::of(&view)).splats;
         wanted.retain(|splat| splat.strength < -0.01);
         let key = |splat: &Splat| splat.center.map(f32::to_bits);
-        let mut drawn = cut.splats;
+        let CutSplats::Trained(TrainedSplats { splats: mut drawn, .. }) = cut else {
+            panic!("{cut:?}")
+        };
         wanted.sort_by_key(key);
         drawn.sort_by_key(key);
         assert_eq!(drawn.len(), wanted.len());
@@ -195,8 +190,8 @@ mod tests {
         let set = ball(2000);
         let tree = Tree::of_gaussians(&set, &BuildOptions::default(), None).unwrap();
         let cut = tree.cut(&view(40.0), Detail::Pixels(4.0), None).unwrap();
-        assert!(cut.splats.len() < 200 && cut.payload == Payload::Trained);
-        for splat in &cut.splats {
+        assert!(cut.splats().len() < 200 && matches!(cut, CutSplats::Trained(_)));
+        for splat in cut.splats() {
             let [red, green, _] = crate::splat::decode_trained_color(splat);
             if splat.center[2].abs() > 0.3 {
                 assert_eq!(splat.center[2] > 0.0, red > green, "{splat:?}");

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     container::{Finding, Findings},
     math::Bounds,
-    splat::{Splat, SplatSet},
+    splat::Splat,
 };
 use glam::{DVec3, Vec3};
 
@@ -241,7 +241,7 @@ pub fn fault_of_box(origin: DVec3, bounds: &Bounds) -> Option<&'static str> {
 
 /// Returns a message if the extent of footprints, in standard deviations, is not valid.
 pub fn fault_of_extent(extent: f32) -> Option<String> {
-    let most = SplatSet::MAX_EXTENT;
+    let most = Splat::MAX_EXTENT;
     let is_sound = extent > 0.0 && extent <= most;
     (!is_sound).then(|| format!("its extent is {extent}; it must lie in 0 … {most}"))
 }

@@ -367,9 +367,8 @@ mod tests {
             let factor = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
             crate::splat::Splat::sample(glam::Vec3::ZERO, value, factor, 1.0, glam::Vec3::ZERO)
         };
-        let set = crate::splat::SplatSet {
+        let set = crate::splat::SampleSplats {
             origin: DVec3::ZERO,
-            payload: crate::splat::Payload::Scalar,
             splats: (0..volume.len()).map(splat).collect(),
             extent: 3.0,
             overlap: 1.0,

@@ -4,7 +4,7 @@
 use crate::{
     hierarchy::file::Header,
     math::{Kernel, Profile, View},
-    splat::{FOOTPRINT_BLUR, Payload, SplatSet, TRAINED_BLUR, TRAINED_BLUR_ALONG},
+    splat::{Common, FOOTPRINT_BLUR, Payload, TRAINED_BLUR, TRAINED_BLUR_ALONG},
     volume::Lattice,
 };
 use glam::{DMat3, DVec3, Mat3, Vec3};
@@ -42,9 +42,9 @@ impl Source {
     }
 
     /// Returns the source of explicit splats.
-    pub fn of_splats(view: &View, set: &SplatSet) -> Self {
+    pub fn of_splats(view: &View, set: &Common) -> Self {
         Self {
-            has_radiance: set.payload != Payload::Scalar,
+            has_radiance: !matches!(set.payload, Payload::Scalar { .. }),
             is_trained: set.payload == Payload::Trained,
             ..Self::of_radiance(view, set.origin, set.extent)
         }

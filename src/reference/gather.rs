@@ -1,6 +1,7 @@
 //! The kernels of a scene, in view space.
 
 use super::{
+    Trained,
     kernel::{Amount, Kernel, Load, Radiance, Sample},
     profile::Profile,
 };
@@ -8,7 +9,7 @@ use crate::{
     math::{self, View},
     scene::{Item, Scene},
     splat::{
-        FOOTPRINT_BLUR, Payload, STEP_BACK, Splat, SplatSet, TRAINED_BLUR, TRAINED_BLUR_ALONG,
+        Common, FOOTPRINT_BLUR, Payload, STEP_BACK, Splat, TRAINED_BLUR, TRAINED_BLUR_ALONG,
         decode_normal, decode_trained_color,
     },
     volume::{Arrangement, Lattice, TransferFunction, Volume},
@@ -25,7 +26,7 @@ pub(super) struct Before {
 /// Returns all kernels of a scene that are radiance, in the scene's order. If `before` is set,
 /// samples become radiance.
 pub(super) fn radiance<'a>(
-    scene: &'a Scene,
+    (scene, trained): (&'a Scene, &Trained),
     view: &View,
     before: Option<Before>,
 ) -> Vec<Kernel<'a>> {
@@ -33,6 +34,11 @@ pub(super) fn radiance<'a>(
     for (number, item) in scene.items.iter().enumerate() {
         if item.transfer().is_none() || before.is_some() {
             add_item(&mut kernels, item, before, &scene.view_of(number, view));
+        }
+        if let Some(set) = trained.get(&number) {
+            let (common, view) = (set.common(), scene.view_of(number, view));
+            let to_kernel = |splat| from_splat(&common, splat, None, &view);
+            kernels.extend(set.splats.iter().filter_map(to_kernel));
         }
     }
     kernels
@@ -54,11 +60,12 @@ fn add_item<'a>(
 ) {
     match item {
         Item::Radiance(set) => {
-            let to_kernel = |splat| from_splat(set, splat, None, view);
+            let common = set.common();
+            let to_kernel = |splat| from_splat(&common, splat, None, view);
             kernels.extend(set.splats.iter().filter_map(to_kernel));
         }
-        // Facets are no kernels. A hierarchy's cut, Gaussians and solids have become sets by now,
-        // and bricks a volume.
+        // Facets are no kernels. Hierarchies, Gaussians, solids and bricks have become other items
+        // by now, or splats beside the items.
         Item::Facets(_)
         | Item::Solid(_)
         | Item::Gaussians(_)
@@ -67,7 +74,8 @@ fn add_item<'a>(
         | Item::Cells(..) => {}
         Item::Scalar(set, transfer) => {
             let before = before.map(|before| (before, transfer));
-            let to_kernel = |splat| from_splat(set, splat, before, view);
+            let common = set.common();
+            let to_kernel = |splat| from_splat(&common, splat, before, view);
             kernels.extend(set.splats.iter().filter_map(to_kernel));
         }
         // Tensor products are not radial functions: their field is evaluated point by point
@@ -112,7 +120,7 @@ fn classified(
 /// Returns a splat's kernel, widened so that it cannot fall between pixels; `None` if the splat has
 /// no volume or is not finite.
 fn from_splat<'a>(
-    set: &SplatSet,
+    set: &Common,
     splat: &Splat,
     before: Option<(Before, &TransferFunction)>,
     view: &View,
@@ -134,7 +142,7 @@ fn from_splat<'a>(
     let factor = cholesky(sharp * sharp.transpose() + blur)?;
     let mut center = center;
     let load = match set.payload {
-        Payload::Scalar => {
+        Payload::Scalar { overlap } => {
             let (weight, slope) = splat.weight_and_slope();
             // A widened sample keeps its weight over space. Otherwise a sample far smaller than a
             // pixel would drown its surroundings.
@@ -146,7 +154,7 @@ fn from_splat<'a>(
             let slope = slope.unwrap_or(DVec3::ZERO);
             match before {
                 Some(before) => {
-                    classified(value, weight / f64::from(set.overlap), slope, center, before, view)
+                    classified(value, weight / f64::from(overlap), slope, center, before, view)
                 }
                 None => Load::Sample(Sample { value, weight, slope }),
             }
@@ -302,13 +310,8 @@ mod tests {
             color: u32::MAX,
             normal: NO_NORMAL,
         };
-        let set = SplatSet {
-            origin: DVec3::new(0.1, 0.2, 0.3),
-            payload: Payload::Radiance,
-            splats: vec![splat],
-            extent: 8.0,
-            overlap: 1.0,
-        };
+        let origin = DVec3::new(0.1, 0.2, 0.3);
+        let set = Common { origin, extent: 8.0, payload: Payload::Radiance };
         for projection in
             [Projection::Perspective { view_angle: 50.0 }, Projection::Orthographic { height: 3.0 }]
         {
@@ -316,7 +319,7 @@ mod tests {
             let camera =
                 Camera { position, focal_point: DVec3::ZERO, view_up: DVec3::Z, projection };
             let view = camera.view([40, 30]).unwrap();
-            let kernel = from_splat(&set, &set.splats[0], None, &view).unwrap();
+            let kernel = from_splat(&set, &splat, None, &view).unwrap();
             let pixel = if view.perspective { kernel.center.length() } else { 1.0 } / view.scale;
             // The rows of B give Σ along the world's axes: Σ_xx is 0.5² and Σ_xy is −0.1.
             let covariance =

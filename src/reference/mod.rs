@@ -270,10 +270,12 @@ pub use truth::integrate;
 use crate::{
     Result,
     gaussians::Eye,
+    hierarchy::CutSplats,
     math::{Camera, View},
     parallel::prelude::*,
     picture::Picture,
     scene::{Classification, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
+    splat::TrainedSplats,
     volume::{Lattice, Shade},
 };
 use composite::{Composite, Medium};
@@ -283,6 +285,7 @@ use glam::{DVec2, DVec3};
 use kernel::Kernel;
 use ray::Ray;
 use sheet::Light;
+use std::collections::BTreeMap;
 
 /// Draws a scene by the definition above. Returns premultiplied colour, and depth. Rows are drawn
 /// in parallel; the time is proportional to pixels times kernels.
@@ -295,8 +298,8 @@ pub fn render(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Pic
     let view = camera.view(settings.size)?;
     view.validate_for(&scene.bounds())?;
     let scene = &without_bricks(scene)?;
-    let flat = with_cuts(scene, &view, settings)?;
-    let frame = Frame::new(scene, &flat, view, settings);
+    let (flat, trained) = with_cuts(scene, &view, settings)?;
+    let frame = Frame::new(scene, &flat, &trained, view, settings);
     let rows = (0..settings.size[1]).into_par_iter().map(|row| frame.row(row.into())).collect();
     Ok(picture(&frame.view, rows))
 }
@@ -311,25 +314,39 @@ fn without_bricks(scene: &Scene) -> Result<Scene> {
     })
 }
 
-/// Returns the scene with hierarchies replaced by the splats of their cuts, Gaussians by those that
-/// are seen, and solids by the facets that clips leave of them.
-fn with_cuts(scene: &Scene, view: &View, settings: &Settings) -> Result<Scene> {
-    scene.map(|(number, item)| {
+/// The splats that are seen of trained Gaussians and of their hierarchies, by item.
+type Trained = BTreeMap<usize, TrainedSplats>;
+
+/// Returns the scene with hierarchies of surfels replaced by the splats of their cuts, and solids
+/// by the facets that clips leave of them. Also returns what is seen of trained items, which stay.
+fn with_cuts(scene: &Scene, view: &View, settings: &Settings) -> Result<(Scene, Trained)> {
+    let mut trained = Trained::new();
+    let scene = scene.map(|(number, item)| {
         let view = &*scene.view_of(number, view);
         Ok(match item {
             Item::Hierarchy(hierarchy) => {
                 let header = hierarchy.header();
                 let culls = settings.culls(header.closed, &header.bounds, view);
                 let cut = hierarchy.read_tree()?.cut(view, settings.detail, Some(culls))?;
-                Item::Radiance(cut.into())
+                match cut {
+                    CutSplats::Surfels(set) => Item::Radiance(set.into()),
+                    CutSplats::Trained(set) => {
+                        trained.insert(number, set);
+                        item.clone()
+                    }
+                }
             }
-            Item::Gaussians(set) => Item::Radiance(set.seen_from(Eye::of(view)).into()),
+            Item::Gaussians(set) => {
+                trained.insert(number, set.seen_from(Eye::of(view)));
+                item.clone()
+            }
             Item::Solid(solid) => {
                 Item::Facets(solid.facets(&scene.view_pose(number).clips(&settings.clips)?))
             }
             other => other.clone(),
         })
-    })
+    })?;
+    Ok((scene, trained))
 }
 
 /// Builds the picture from the composites of all rays, row by row.
@@ -387,8 +404,15 @@ struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// `flat` is the scene with its hierarchies and solids cut.
-    fn new(scene: &'a Scene, flat: &'a Scene, view: View, settings: &Settings) -> Self {
+    /// `flat` is the scene with its hierarchies and solids cut, and `trained` what is seen of
+    /// trained items.
+    fn new(
+        scene: &'a Scene,
+        flat: &'a Scene,
+        trained: &Trained,
+        view: View,
+        settings: &Settings,
+    ) -> Self {
         let sheets = scene.sheets(&view, settings);
         let is_dark = settings.optics == Optics::XRay;
         let before =
@@ -411,7 +435,7 @@ impl<'a> Frame<'a> {
             clips: settings.clips.clone(),
             planes: sheets.planes,
             near: nearest(scene, &view, settings),
-            kernels: gather::radiance(flat, &view, before_shade),
+            kernels: gather::radiance((flat, trained), &view, before_shade),
             facets: facets::gather(flat, &view, settings),
             fields,
             lattice: flat.items.iter().find_map(Item::lattice),

@@ -4,7 +4,7 @@
 use super::splats::{WEIGHTS, factor};
 use crate::{
     parallel::prelude::*,
-    splat::{Splat, SplatSet},
+    splat::{SampleSplats, Splat},
 };
 use glam::{DMat3, DVec3, Vec3};
 
@@ -16,7 +16,7 @@ const MOST_CELLS: f64 = (1u64 << 21) as f64;
 /// of their kernels, of kernels times position and value, and of the products that give its
 /// covariance and slope. The same set always gives the same result. A set that spans too many cells
 /// is returned unchanged.
-pub(crate) fn merged(set: &SplatSet, edge: f64) -> SplatSet {
+pub(crate) fn merged(set: &SampleSplats, edge: f64) -> SampleSplats {
     let centers = || set.splats.par_iter().map(|splat| Vec3::from_array(splat.center));
     let low = centers().reduce(|| Vec3::INFINITY, Vec3::min).as_dvec3();
     let high = centers().reduce(|| Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
@@ -34,11 +34,11 @@ pub(crate) fn merged(set: &SplatSet, edge: f64) -> SplatSet {
     order.par_sort_unstable();
     let cells: Vec<&[(u64, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
     let splats = cells.par_iter().map(|cell| one_of(set, cell)).collect();
-    SplatSet { splats, ..set.empty() }
+    SampleSplats { splats, ..*set }
 }
 
 /// Returns the sample that stands for those of a cell.
-fn one_of(set: &SplatSet, cell: &[(u64, u32)]) -> Splat {
+fn one_of(set: &SampleSplats, cell: &[(u64, u32)]) -> Splat {
     let members = || cell.iter().map(|&(_, index)| &set.splats[index as usize]);
     let first = &set.splats[cell[0].1 as usize];
     if cell.len() == 1 {
@@ -121,7 +121,7 @@ mod tests {
         let few = merged(&set, 0.5);
         assert!(few.splats.len() * 27 < set.splats.len() * 2, "{}", few.splats.len());
         let mass =
-            |set: &SplatSet| set.splats.iter().map(|splat| Part::of(splat).mass).sum::<f64>();
+            |set: &SampleSplats| set.splats.iter().map(|splat| Part::of(splat).mass).sum::<f64>();
         assert!((mass(&few) / mass(&set) - 1.0).abs() < 2e-3, "{} {}", mass(&few), mass(&set));
         for splat in &few.splats {
             let part = Part::of(splat);

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     Deadline, Error, Result, memory,
     parallel::prelude::*,
-    splat::{Payload, Splat, SplatSet},
+    splat::{SampleSplats, Splat},
 };
 use glam::{DVec3, Vec3};
 
@@ -86,7 +86,7 @@ impl Points {
     ///   their ranges.
     /// - [`Error::Timeout`] after the deadline.
     /// - [`Error::Memory`] if there is too little.
-    pub fn to_splats(&self, options: &SampleOptions) -> Result<SplatSet> {
+    pub fn to_splats(&self, options: &SampleOptions) -> Result<SampleSplats> {
         self.validate()?;
         options.validate()?;
         memory::room("making splats of samples", OF_SAMPLE.saturating_mul(self.len() as u64))?;
@@ -116,13 +116,7 @@ impl Points {
         let splats: Vec<Splat> = (0..self.len()).into_par_iter().map(splat).collect();
         options.deadline.check("comparing kernels")?;
         let overlap = overlap(&splats);
-        Ok(SplatSet {
-            origin: self.origin,
-            payload: Payload::Scalar,
-            splats,
-            extent: EXTENT,
-            overlap,
-        })
+        Ok(SampleSplats { origin: self.origin, splats, extent: EXTENT, overlap })
     }
 
     /// Returns the kernel of a sample, with its weight up to a common factor.

@@ -2,7 +2,7 @@ use super::*;
 use crate::{
     Error,
     math::Bounds,
-    splat::{Splat, SplatSet},
+    splat::{SampleSplats, Splat},
 };
 
 /// Evenly distributed numbers in 0 … 1, always the same sequence.
@@ -30,12 +30,12 @@ fn random(count: usize, value: impl Fn(Vec3) -> f32) -> Points {
     points((0..count).map(|_| random.place()).collect(), value)
 }
 
-fn splats(points: &Points) -> SplatSet {
+fn splats(points: &Points) -> SampleSplats {
     points.to_splats(&SampleOptions::default()).unwrap()
 }
 
 /// The weighted kernel sum and the normalised sum at a position, over all splats.
-fn field(set: &SplatSet, at: Vec3) -> (f64, f64) {
+fn field(set: &SampleSplats, at: Vec3) -> (f64, f64) {
     let (mut sum, mut values) = (0.0, 0.0);
     for splat in &set.splats {
         let d = (at - Vec3::from(splat.center)).as_dvec3();
@@ -53,7 +53,7 @@ fn field(set: &SplatSet, at: Vec3) -> (f64, f64) {
     (sum, values / sum)
 }
 
-fn deviation(set: &SplatSet, index: usize) -> f32 {
+fn deviation(set: &SampleSplats, index: usize) -> f32 {
     let [b00, b10, b11, b20, b21, b22] = set.splats[index].factor;
     assert_eq!((b00, b10, b20, b21, b22), (b11, 0.0, 0.0, 0.0, b00), "round");
     b00
@@ -139,7 +139,7 @@ fn the_density_of_samples_does_not_show() {
     let truth = |p: Vec3| 4.0 * p.x + p.y;
     let mut samples = points(positions, truth);
     // Mean and largest error in the layer around the border.
-    let error = |set: &SplatSet| {
+    let error = |set: &SampleSplats| {
         let mut random = Random(5);
         let places =
             (0..400).map(|_| random.place() * Vec3::new(0.1, 0.6, 0.6) + Vec3::new(0.45, 0.2, 0.2));
@@ -270,7 +270,7 @@ fn covariances_become_factors() {
 /// The field is the same in any unit of values, and with large values alone.
 #[test]
 fn slopes_of_any_unit_are_no_trouble() {
-    let places = |set: &SplatSet| {
+    let places = |set: &SampleSplats| {
         let mut random = Random(9);
         (0..50).map(|_| field(set, random.place()).1).collect::<Vec<f64>>()
     };

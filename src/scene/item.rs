@@ -9,7 +9,7 @@ use crate::{
     gaussians::Gaussians,
     hierarchy::Hierarchy,
     math::{Bounds, Kernel},
-    splat::SplatSet,
+    splat::{SampleSplats, Splats, Surfels},
     volume::{Lattice, Shade, TransferFunction, Volume},
 };
 use glam::{DMat3, DVec3};
@@ -19,7 +19,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub enum Item {
     /// Surfels or 3D Gaussians: splats that carry their own colour and optical depth.
-    Radiance(Arc<SplatSet>),
+    Radiance(Arc<Surfels>),
     /// Facets: splats whose footprint is a triangle.
     Facets(Arc<FacetSet>),
     /// A trained scene of 3D Gaussians, whose colours depend on the view.
@@ -28,7 +28,7 @@ pub enum Item {
     /// ([`Settings::detail`](super::Settings::detail)).
     Hierarchy(Arc<Hierarchy>),
     /// Scattered samples: splats that carry a value, shown by a transfer function.
-    Scalar(Arc<SplatSet>, TransferFunction),
+    Scalar(Arc<SampleSplats>, TransferFunction),
     /// Samples on a lattice, each the centre of one kernel, shown by a transfer function.
     Volume(Arc<Volume>, Kernel, TransferFunction),
     /// A volume that may be larger than memory. A picture shows the bricks that it needs
@@ -89,6 +89,21 @@ impl Item {
             Self::Gaussians(_) => true,
             Self::Hierarchy(hierarchy) => hierarchy.header().degree.is_some(),
             _ => false,
+        }
+    }
+
+    /// Returns the item's explicit splats, if it has any that do not depend on the view.
+    pub(crate) fn splats(&self) -> Option<Splats> {
+        match self {
+            Self::Radiance(set) => Some(Splats::Surfels(set.clone())),
+            Self::Scalar(set, _) => Some(Splats::Samples(set.clone())),
+            Self::Facets(_)
+            | Self::Solid(_)
+            | Self::Gaussians(_)
+            | Self::Hierarchy(_)
+            | Self::Volume(..)
+            | Self::Bricks(..)
+            | Self::Cells(..) => None,
         }
     }
 
@@ -159,7 +174,8 @@ impl Item {
     /// Returns the box around the item, footprints included.
     pub fn bounds(&self) -> Bounds {
         match self {
-            Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
+            Self::Radiance(set) => set.bounds(),
+            Self::Scalar(set, _) => set.bounds(),
             Self::Facets(set) => set.bounds(),
             Self::Solid(solid) => solid.bounds(),
             Self::Gaussians(set) => set.bounds(),

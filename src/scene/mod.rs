@@ -25,7 +25,7 @@ use crate::{
     gaussians::Gaussians,
     hierarchy::Hierarchy,
     math::{Bounds, Kernel, Pose, Tensor},
-    splat::{BRIGHTEST_TRAINED, SplatSet},
+    splat::{BRIGHTEST_TRAINED, SampleSplats, Surfels},
     volume::{TransferFunction, Volume},
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -76,7 +76,7 @@ impl Scene {
 
     /// Adds splats that carry their own colour and optical depth.
     #[must_use]
-    pub fn with_splats(mut self, set: impl Into<Arc<SplatSet>>) -> Self {
+    pub fn with_splats(mut self, set: impl Into<Arc<Surfels>>) -> Self {
         self.items.push(Item::Radiance(set.into()));
         self
     }
@@ -106,7 +106,7 @@ impl Scene {
     #[must_use]
     pub fn with_samples(
         mut self,
-        set: impl Into<Arc<SplatSet>>,
+        set: impl Into<Arc<SampleSplats>>,
         transfer: TransferFunction,
     ) -> Self {
         self.items.push(Item::Scalar(set.into(), transfer));

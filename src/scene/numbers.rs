@@ -9,7 +9,7 @@ use crate::{
     hierarchy::Detail,
     math::{Bounds, Kernel},
     parallel::prelude::*,
-    splat::{Payload, Splat, SplatSet},
+    splat::{Common, Payload, Splat, Splats},
     volume::TransferFunction,
 };
 
@@ -54,21 +54,28 @@ pub(super) fn check_field(item: &Item) -> Result<()> {
 /// Checks the numbers of an item.
 pub(super) fn check_item(item: &Item) -> Result<()> {
     item.kernel().map_or(Ok(()), Kernel::validate)?;
+    if let Some(set) = item.splats() {
+        check_set(&set).map_err(Error::Argument)?;
+    }
     match item {
-        Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(Error::Argument)?,
         Item::Facets(set) => check_facets(set).map_err(Error::Argument)?,
         Item::Solid(solid) => check_facets(solid.boundary()).map_err(Error::Argument)?,
         Item::Gaussians(set) => set.validate().map_err(Error::Argument)?,
         Item::Volume(volume, ..) => volume.validate().map_err(Error::Argument)?,
         // Tetrahedra are checked as they are made.
-        Item::Hierarchy(_) | Item::Bricks(..) | Item::Cells(..) => {}
+        Item::Radiance(_)
+        | Item::Scalar(..)
+        | Item::Hierarchy(_)
+        | Item::Bricks(..)
+        | Item::Cells(..) => {}
     }
     check_field(item)?;
     let Bounds { min, max } = item.bounds();
     let holds = |v: f64| v.abs() <= f64::from(f32::MAX);
     // The bounds of an empty set are not finite. That is no error.
     let is_none = match item {
-        Item::Radiance(set) | Item::Scalar(set, _) => set.splats.is_empty(),
+        Item::Radiance(set) => set.splats.is_empty(),
+        Item::Scalar(set, _) => set.splats.is_empty(),
         Item::Facets(set) => set.facets.is_empty(),
         Item::Gaussians(set) => set.is_empty(),
         _ => false,
@@ -113,16 +120,23 @@ fn check_facets(set: &FacetSet) -> Result<(), String> {
     }
 }
 
-fn check_set(set: &SplatSet) -> Result<(), String> {
-    if !set.origin.is_finite() {
-        return Err(format!("the origin {} is not finite", set.origin));
+fn check_set(set: &Splats) -> Result<(), String> {
+    let (Common { origin, payload, extent }, splats) = (set.common(), set.splats());
+    let most = Splat::MAX_EXTENT;
+    if !(extent > 0.0 && extent <= most) {
+        return Err(format!("a splat set's extent must lie in 0 … {most}, is {extent}"));
+    }
+    if !origin.is_finite() {
+        return Err(format!("the origin {origin} is not finite"));
     }
     // The inverse of a subnormal number is not finite.
-    if !(set.overlap > 0.0 && set.overlap.is_normal()) {
-        return Err(format!("the overlap is {}; a positive number is needed", set.overlap));
+    if let Payload::Scalar { overlap } = payload
+        && !(overlap > 0.0 && overlap.is_normal())
+    {
+        return Err(format!("the overlap is {overlap}; a positive number is needed"));
     }
-    let first = set.splats.par_iter().position_first(|splat| fault(splat, set.payload).is_some());
-    match first.and_then(|index| Some((index, fault(&set.splats[index], set.payload)?))) {
+    let first = splats.par_iter().position_first(|splat| fault(splat, payload).is_some());
+    match first.and_then(|index| Some((index, fault(&splats[index], payload)?))) {
         Some((index, fault)) => Err(format!("splat {index}: {fault}")),
         None => Ok(()),
     }
@@ -146,11 +160,11 @@ fn fault(splat: &Splat, payload: Payload) -> Option<String> {
             ))
         }
         // A kernel of a field needs a volume. Radiance may be flat, because the picture widens it.
-        Payload::Scalar if [factor[0], factor[2], factor[5]].contains(&0.0) => {
+        Payload::Scalar { .. } if [factor[0], factor[2], factor[5]].contains(&0.0) => {
             Some(format!("the factor {factor:?} is that of a flat kernel"))
         }
-        Payload::Scalar if !strength.is_finite() => Some(format!("the value is {strength}")),
-        Payload::Scalar => {
+        Payload::Scalar { .. } if !strength.is_finite() => Some(format!("the value is {strength}")),
+        Payload::Scalar { .. } => {
             let (weight, slope) = splat.weight_and_slope();
             let is_sound = weight >= 0.0 && weight.is_finite() && slope.is_finite();
             (!is_sound).then(|| format!("the weight is {weight} and the slope {slope}"))

@@ -10,7 +10,7 @@ use crate::{
     hierarchy::{Hierarchy, file::Page, needed::coarsest},
     math::hull::{Kind, outermost, without_strays},
     parallel::prelude::*,
-    splat::{Splat, SplatSet, TRAINED_OPACITIES},
+    splat::{SampleSplats, Splat, Surfels, TRAINED_OPACITIES},
     volume::{Lattice, TransferFunction, Volume, steps::Steps},
 };
 use glam::{DVec3, Vec3};
@@ -62,14 +62,15 @@ impl Scene {
             // A box that is cut out of a turned item is left out of the question.
             let clips = &pose.clips(clips).unwrap_or_default();
             let outermost = match item {
-                Item::Radiance(set) => of_splats(set, |_| true, clips, spread),
+                Item::Radiance(set) => of_splats(set.origin, &set.splats, |_| true, clips, spread),
                 Item::Scalar(set, transfer) => of_samples(set, transfer, clips, spread),
                 Item::Facets(set) => of_facets(set, clips, number),
                 // Its facets end at the clips.
                 Item::Solid(solid) => of_facets(&solid.facets(clips), &[], number),
                 Item::Gaussians(set) => of_gaussians(set, clips, spread),
                 Item::Hierarchy(hierarchy) => {
-                    of_splats(&coarse(hierarchy)?, |_| true, clips, spread)
+                    let set = coarse(hierarchy)?;
+                    of_splats(set.origin, &set.splats, |_| true, clips, spread)
                 }
                 Item::Cells(cells, transfer) => of_cells(cells, transfer, clips),
                 Item::Volume(volume, _, transfer) => of_volume(volume, transfer, clips),
@@ -114,17 +115,18 @@ fn near(points: &[Vec3], kind: Kind, item: usize, origin: DVec3) -> Option<[Vec3
 /// Returns the outermost of the splats that `shows` chooses, with their reach. `near` returns the
 /// corners of the box around those that belong together.
 fn of_splats(
-    set: &SplatSet,
+    origin: DVec3,
+    splats: &[Splat],
     shows: impl Fn(&Splat) -> bool,
     clips: &[Clip],
     near: impl Fn(&[Vec3], DVec3) -> Option<[Vec3; 2]>,
 ) -> Vec<DVec3> {
-    let world = |point: Vec3| set.origin + point.as_dvec3();
+    let world = |point: Vec3| origin + point.as_dvec3();
     let kept = |point: Vec3| clips.iter().all(|clip| clip.keeps(world(point)));
-    let visible = set.splats.iter().filter(|splat| shows(splat) && kept(Vec3::from(splat.center)));
+    let visible = splats.iter().filter(|splat| shows(splat) && kept(Vec3::from(splat.center)));
     let mut splats: Vec<&Splat> = visible.collect();
     let mut centers: Vec<Vec3> = splats.iter().map(|splat| Vec3::from(splat.center)).collect();
-    let Some([low, high]) = near(&centers, set.origin) else { return Vec::new() };
+    let Some([low, high]) = near(&centers, origin) else { return Vec::new() };
     let is_near = |center: &Vec3| center.cmpge(low).all() && center.cmple(high).all();
     splats.retain(|splat| is_near(&Vec3::from(splat.center)));
     centers.retain(is_near);
@@ -144,8 +146,9 @@ fn of_gaussians(
     clips: &[Clip],
     near: impl Fn(&[Vec3], DVec3) -> Option<[Vec3; 2]>,
 ) -> Vec<DVec3> {
-    let splats = set.seen_from(Eye::Along(DVec3::Z));
-    of_splats(&splats, |splat| f64::from(-splat.strength) >= TRAINED_OPACITIES[0], clips, near)
+    let splats = set.seen_from(Eye::Along(DVec3::Z)).splats;
+    let shows = |splat: &Splat| f64::from(-splat.strength) >= TRAINED_OPACITIES[0];
+    of_splats(set.origin, &splats, shows, clips, near)
 }
 
 /// Returns the outermost corners of facets.
@@ -193,14 +196,15 @@ fn of_rods(set: &FacetSet, clips: &[Clip], item: usize) -> Vec<DVec3> {
 
 /// Returns the outermost samples that a transfer function shows.
 fn of_samples(
-    set: &SplatSet,
+    set: &SampleSplats,
     transfer: &TransferFunction,
     clips: &[Clip],
     near: impl Fn(&[Vec3], DVec3) -> Option<[Vec3; 2]>,
 ) -> Vec<DVec3> {
     let values = set.splats.iter().map(|splat| f64::from(splat.strength));
     let sides = Sides::of(transfer, values);
-    of_splats(set, |splat| sides.show(transfer, f64::from(splat.strength)), clips, near)
+    let shows = |splat: &Splat| sides.show(transfer, f64::from(splat.strength));
+    of_splats(set.origin, &set.splats, shows, clips, near)
 }
 
 /// Returns the outermost corners of the tetrahedra that a transfer function shows.
@@ -220,7 +224,7 @@ fn of_cells(cells: &Tetrahedra, transfer: &TransferFunction, clips: &[Clip]) -> 
 }
 
 /// Returns the leaves of a hierarchy, or, if it has many pages, the nodes of its coarse pages.
-fn coarse(hierarchy: &Hierarchy) -> Result<SplatSet> {
+fn coarse(hierarchy: &Hierarchy) -> Result<Surfels> {
     if hierarchy.page_count() as usize <= MOST_PAGES {
         return hierarchy.leaves();
     }
@@ -234,13 +238,7 @@ fn coarse(hierarchy: &Hierarchy) -> Result<SplatSet> {
     };
     let pages: Vec<Vec<Splat>> = hierarchy.read_pages(&read)?.par_iter().map(of_page).collect();
     let header = hierarchy.header();
-    Ok(SplatSet {
-        origin: header.origin,
-        payload: crate::splat::Payload::Radiance,
-        splats: pages.concat(),
-        extent: header.extent,
-        overlap: 1.0,
-    })
+    Ok(Surfels { origin: header.origin, splats: pages.concat(), extent: header.extent })
 }
 
 /// Returns the finest level of bricks that is read quickly, or the coarsest.

@@ -5,7 +5,6 @@ use crate::{
     Error, Result,
     cells::{Place, Tetrahedra},
     math::{Bounds, Kernel, Profile, Tensor},
-    splat::{Payload, SplatSet},
     volume::{Arrangement, Lattice, TransferFunction, Volume},
 };
 
@@ -29,9 +28,8 @@ impl Scene {
         if self.fields().len() > 1 { check_several(settings) } else { Ok(()) }
     }
 
-    /// Checks that the engines can draw the scene: payloads that match their items, finite numbers
-    /// (the error names the item and the splat), and at most [`MAX_FIELDS`](Self::MAX_FIELDS)
-    /// fields.
+    /// Checks that the engines can draw the scene: finite numbers (the error names the item and the
+    /// splat), and at most [`MAX_FIELDS`](Self::MAX_FIELDS) fields.
     ///
     /// # Errors
     /// [`Error::Argument`] with the reason; [`Error::NothingToDraw`] for a scene without splats and
@@ -61,9 +59,7 @@ impl Scene {
 
     /// Checks one item.
     pub(crate) fn validate_item(&self, number: usize) -> Result<()> {
-        let item = &self.items[number];
-        check_payload(item)?;
-        numbers::check_item(item).map_err(numbers::of_item(number))
+        numbers::check_item(&self.items[number]).map_err(numbers::of_item(number))
     }
 
     /// Checks the number of fields.
@@ -77,35 +73,6 @@ impl Scene {
         }
         Ok(())
     }
-}
-
-/// Returns an error if an item's splats carry something else than it shows.
-fn check_payload(item: &Item) -> Result<()> {
-    let (set, payload) = match item {
-        Item::Radiance(set) => (set, Payload::Radiance),
-        Item::Scalar(set, _) => (set, Payload::Scalar),
-        Item::Facets(_)
-        | Item::Solid(_)
-        | Item::Gaussians(_)
-        | Item::Hierarchy(_)
-        | Item::Volume(..)
-        | Item::Bricks(..)
-        | Item::Cells(..) => return Ok(()),
-    };
-    if set.payload != payload {
-        return Err(Error::Argument(format!(
-            "a set of {:?} splats was added as {payload:?}",
-            set.payload
-        )));
-    }
-    if !(set.extent > 0.0 && set.extent <= SplatSet::MAX_EXTENT) {
-        let most = SplatSet::MAX_EXTENT;
-        return Err(Error::Argument(format!(
-            "a splat set's extent must lie in 0 … {most}, is {}",
-            set.extent
-        )));
-    }
-    Ok(())
 }
 
 fn check_size([width, height]: [u32; 2]) -> Result<()> {

@@ -16,7 +16,7 @@ use crate::{
     picture::{Edges, Picture},
     scattered::Points,
     scene::{Clip, Item, Scene},
-    splat::SplatSet,
+    splat::Surfels,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
 };
@@ -86,7 +86,7 @@ enum Entry {
     /// Rods, which are splats in pictures that show no facets.
     Rods {
         facets: Arc<FacetSet>,
-        splats: OnceLock<Arc<SplatSet>>,
+        splats: OnceLock<Arc<Surfels>>,
     },
 }
 
@@ -95,7 +95,7 @@ struct Faceted {
     facets: Arc<FacetSet>,
     mesh: Mesh,
     options: SurfelOptions,
-    surfels: OnceLock<Arc<SplatSet>>,
+    surfels: OnceLock<Arc<Surfels>>,
 }
 
 /// An input that becomes an item.
@@ -572,7 +572,7 @@ impl Adding<'_> {
 }
 
 impl Faceted {
-    fn surfels(&self) -> Result<Arc<SplatSet>> {
+    fn surfels(&self) -> Result<Arc<Surfels>> {
         if let Some(surfels) = self.surfels.get() {
             return Ok(surfels.clone());
         }

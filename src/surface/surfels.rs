@@ -24,7 +24,7 @@ use crate::{
     math::Bounds,
     memory,
     parallel::prelude::*,
-    splat::{Payload, Splat, SplatSet},
+    splat::{Splat, Surfels},
 };
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -199,7 +199,7 @@ impl Mesh {
     ///   [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH). Also for a mesh whose origin, positions
     ///   or texture coordinates are not finite, or whose indices or attributes do not match its
     ///   positions.
-    pub fn surfels(&self, options: &SurfelOptions) -> Result<SplatSet> {
+    pub fn surfels(&self, options: &SurfelOptions) -> Result<Surfels> {
         let _span = tracing::info_span!("surfels").entered();
         self.check(options)?;
         let mut splats = match (self.triangles.is_empty(), self.lines.is_empty()) {
@@ -223,7 +223,7 @@ impl Mesh {
     ///
     /// # Errors
     /// As [`surfels`](Self::surfels).
-    pub fn points(&self, options: &SurfelOptions) -> Result<(Option<SplatSet>, Option<FacetSet>)> {
+    pub fn points(&self, options: &SurfelOptions) -> Result<(Option<Surfels>, Option<FacetSet>)> {
         let _span = tracing::info_span!("points").entered();
         self.check(options)?;
         let Parts { surfels, dots } = cloud::parts(self, options)?;
@@ -235,14 +235,8 @@ impl Mesh {
         Ok((surfels, dots))
     }
 
-    fn set_of(&self, splats: Vec<Splat>) -> SplatSet {
-        SplatSet {
-            origin: self.origin,
-            payload: Payload::Radiance,
-            splats,
-            extent: EXTENT,
-            overlap: 1.0,
-        }
+    fn set_of(&self, splats: Vec<Splat>) -> Surfels {
+        Surfels { origin: self.origin, splats, extent: EXTENT }
     }
 
     /// Returns the smallest and the largest world coordinates of what is drawn: the corners of all

@@ -7,7 +7,7 @@ use super::{Samples, TransferFunction, Volume};
 use crate::{
     Result, memory,
     parallel::prelude::*,
-    splat::{NO_NORMAL, Payload, Splat, SplatSet, encode_normal},
+    splat::{NO_NORMAL, Splat, Surfels, encode_normal},
 };
 use glam::{DMat3, DVec3};
 use std::f64::consts::TAU;
@@ -45,7 +45,7 @@ impl Volume {
     ///
     /// # Errors
     /// [`Error::Memory`](crate::Error::Memory) if there is too little for the splats.
-    pub fn colored_splats(&self) -> Result<Option<SplatSet>> {
+    pub fn colored_splats(&self) -> Result<Option<Surfels>> {
         let Some(colors) = self.colors.as_deref().filter(|all| all.len() == self.len()) else {
             return Ok(None);
         };
@@ -78,8 +78,7 @@ impl Volume {
         };
         let seen = (0..colors.len()).into_par_iter().filter(is_seen);
         let splats = seen.map(splat).collect();
-        let payload = Payload::Radiance;
-        Ok(Some(SplatSet { origin, payload, splats, extent: EXTENT, overlap: 1.0 }))
+        Ok(Some(Surfels { origin, splats, extent: EXTENT }))
     }
 
     /// Returns how far each colour is from the background, and how opaque that is.

@@ -8,7 +8,7 @@ use splatkit::{
     bricks::Bricks,
     gpu::Renderer,
     hierarchy::{
-        BuildOptions, Cut, Detail, Hierarchy, Preset, SHARE_UNIT, Tree,
+        BuildOptions, Cut, CutSplats, Detail, Hierarchy, Preset, SHARE_UNIT, Tree,
         file::{WriteOptions, to_bytes},
         validate,
     },
@@ -17,14 +17,14 @@ use splatkit::{
     picture::Picture,
     reference,
     scene::{Clip, ClipShape, Scene, Settings},
-    splat::{Splat, SplatSet},
+    splat::{Splat, Surfels},
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, phantoms::Phantom},
 };
 use std::{path::Path, sync::Arc};
 
 /// A knotted tube of about `count` vertices, coloured by position.
-fn knot(count: u32) -> SplatSet {
+fn knot(count: u32) -> Surfels {
     let around = f64::from(count / 12).sqrt() as u32;
     let mut mesh = Mesh::knot(12 * around, around);
     mesh.origin = DVec3::new(1000.0, -2000.0, 300.0);
@@ -36,7 +36,15 @@ fn knot(count: u32) -> SplatSet {
     mesh.surfels(&SurfelOptions::default()).expect("surfels")
 }
 
-fn build(set: &SplatSet, block_splats: usize) -> Tree {
+/// The splats of a cut of a tree of surfels.
+fn cut(tree: &Tree, view: &View, detail: Detail, culls: Option<bool>) -> Surfels {
+    match tree.cut(view, detail, culls) {
+        Ok(CutSplats::Surfels(set)) => set,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn build(set: &Surfels, block_splats: usize) -> Tree {
     Tree::build(set, &BuildOptions { block_splats, ..BuildOptions::default() }, None)
         .expect("a tree")
 }
@@ -294,7 +302,7 @@ fn the_engine_draws_the_cut_that_the_oracle_finds() {
                     let (picture, stats) =
                         renderer.render(&mut prepared, &camera, &settings).expect("a picture");
                     let view = camera.view(settings.size).expect("a view");
-                    let cut = tree.cut(&view, settings.detail, None).expect("a cut");
+                    let cut = cut(&tree, &view, settings.detail, None);
                     if part <= 1.0 {
                         assert_eq!(stats.splats, cut.splats.len() as u64, "{part} {pixels}");
                     }
@@ -528,7 +536,7 @@ fn an_opened_surface_shows_its_back() {
 #[test]
 fn optical_depths_beyond_what_can_be_drawn_are_refused() {
     let mut set = knot(500);
-    let built = |set: &SplatSet| Tree::build(set, &BuildOptions::default(), None);
+    let built = |set: &Surfels| Tree::build(set, &BuildOptions::default(), None);
     set.splats[7].strength = Splat::MOST_OPTICAL_DEPTH;
     let tree = built(&set).expect("a tree");
     let scene = Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("a hierarchy"));
@@ -566,7 +574,7 @@ fn smooth_normals_over_edges_lose_nothing() {
             let camera = Camera::framing(&set.bounds(), DVec3::new(1.0, side, 0.3), DVec3::Z, 1.0);
             let [all, culled] = [false, true].map(|culls| {
                 let view = camera.view([64, 64]).expect("a view");
-                let cut = tree.cut(&view, Detail::Pixels(2.0), Some(culls)).expect("a cut");
+                let cut = cut(&tree, &view, Detail::Pixels(2.0), Some(culls));
                 counts[usize::from(culls)] += cut.splats.len();
                 let scene = Scene::new().with_splats(cut);
                 reference::render(&scene, &camera, &Settings::new([64, 64])).expect("draws").color

@@ -25,7 +25,7 @@ use triangles::Corner;
 
 const SIZE: [u32; 2] = [90, 70];
 
-fn knot() -> splatkit::splat::SplatSet {
+fn knot() -> splatkit::splat::Surfels {
     Mesh::knot(200, 24).surfels(&SurfelOptions::default()).expect("surfels")
 }
 

@@ -14,6 +14,7 @@ use splatkit::{
     picture::Picture,
     reference,
     scene::{Item, Scene, Settings},
+    splat::Surfels,
     surface::{Mesh, SurfelOptions},
 };
 
@@ -239,14 +240,15 @@ fn what_cannot_be_added_leaves_the_scene_as_it_was() {
     let cells = fields::all().into_iter().flat_map(|case| case.scene.items);
     let cells = cells.into_iter().find(|item| matches!(item, Item::Cells(..))).unwrap();
     let Item::Radiance(surfels) = &items[0].0 else { panic!("surfels") };
-    let scalar = Item::Scalar(surfels.clone(), items[4].0.transfer().unwrap().clone());
+    let endless = Surfels { extent: f32::INFINITY, ..Surfels::clone(surfels) };
     for device in devices() {
         let scene =
             Scene::from(items[..2].iter().map(|(item, _)| item.clone()).collect::<Vec<_>>());
         let mut renderer = Renderer::new(&device, &scene).unwrap();
         let before = renderer.render(&camera, &settings).unwrap().0;
-        let refused = renderer.add(scalar.clone()).unwrap_err().to_string();
-        assert!(refused.contains("a set of Radiance splats was added as Scalar"), "{refused}");
+        let refused = renderer.add(Item::Radiance(endless.clone().into()));
+        let refused = refused.unwrap_err().to_string();
+        assert!(refused.contains("extent must lie in 0 … 8, is inf"), "{refused}");
         if let Device::Gpu(..) = device {
             let refused = renderer.add(cells.clone()).unwrap_err().to_string();
             assert!(refused.contains("does not draw cells"), "{refused}");

@@ -12,8 +12,8 @@ use splatkit::{
     picture::Picture,
     reference,
     scattered::{Points, SampleOptions},
-    scene::{Clip, ClipShape, Scene, Settings},
-    splat::{NO_NORMAL, Payload, Splat, SplatSet, encode_normal},
+    scene::{Clip, ClipShape, Item, Scene, Settings},
+    splat::{NO_NORMAL, SampleSplats, Splat, Surfels, encode_normal},
     surface::{Mesh, SurfelOptions},
     volume::{Lattice, Samples, Shade, TransferFunction, Volume},
 };
@@ -46,7 +46,7 @@ fn drawn(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Picture>
 }
 
 /// A ball of 64 splats.
-fn ball() -> SplatSet {
+fn ball() -> Surfels {
     let splat = |i: u32| {
         let z = 1.0 - (2.0 * i as f32 + 1.0) / 64.0;
         let turn = 2.4 * i as f32;
@@ -61,11 +61,12 @@ fn ball() -> SplatSet {
         }
     };
     let splats = (0..64).map(splat).collect();
-    SplatSet { origin: DVec3::ZERO, payload: Payload::Radiance, splats, extent: 3.0, overlap: 1.0 }
+    Surfels { origin: DVec3::ZERO, splats, extent: 3.0 }
 }
 
-fn samples() -> SplatSet {
-    let mut set = SplatSet { payload: Payload::Scalar, ..ball() };
+fn samples() -> SampleSplats {
+    let Surfels { origin, splats, extent } = ball();
+    let mut set = SampleSplats { origin, splats, extent, overlap: 1.0 };
     for (i, splat) in set.splats.iter_mut().enumerate() {
         *splat =
             Splat::sample(Vec3::from(splat.center), i as f32 / 64.0, splat.factor, 1.0, Vec3::ZERO);
@@ -164,11 +165,18 @@ fn numbers_of(splat: &mut Splat) -> [(&'static str, &mut f32); 10] {
         .unwrap_or_else(|_| unreachable!("ten numbers"))
 }
 
-fn scene_of(set: SplatSet) -> Scene {
-    match set.payload {
-        Payload::Radiance => Scene::new().with_splats(set),
-        Payload::Scalar => Scene::new().with_samples(set, transfer()),
-        Payload::Trained => unreachable!("Gaussians are no set of splats"),
+/// A ball of surfels and one of samples, each with its name.
+fn sets() -> [(&'static str, Item); 2] {
+    let samples = Item::Scalar(samples().into(), transfer());
+    [("surfels", Item::Radiance(ball().into())), ("samples", samples)]
+}
+
+/// The splats of a set.
+fn splats_of(item: &mut Item) -> &mut [Splat] {
+    match item {
+        Item::Radiance(set) => &mut Arc::make_mut(set).splats,
+        Item::Scalar(set, _) => &mut Arc::make_mut(set).splats,
+        other => panic!("{other:?}"),
     }
 }
 
@@ -189,7 +197,7 @@ fn triangles_far_from_the_origin_come_to_an_end() {
 /// An empty set of samples has no range of values.
 #[test]
 fn no_samples_beside_a_surface_are_nothing() {
-    let none = SplatSet { splats: Vec::new(), ..samples() };
+    let none = SampleSplats { splats: Vec::new(), ..samples() };
     let mut faults = Faults::default();
     let scene = Scene::new().with_splats(ball()).with_samples(none, transfer());
     faults.inspect("no samples", &scene, &camera(), &settings());
@@ -198,79 +206,74 @@ fn no_samples_beside_a_surface_are_nothing() {
 
 #[test]
 fn splats_that_are_not_finite_are_named() {
-    for set in [ball(), samples()] {
+    for (_, set) in sets() {
         for number in 0..10 {
             for poison in NOT_FINITE {
                 let mut set = set.clone();
-                let (name, value) = numbers_of(&mut set.splats[POISONED])
+                let (name, value) = numbers_of(&mut splats_of(&mut set)[POISONED])
                     .into_iter()
                     .nth(number)
                     .expect("a number");
                 *value = poison;
                 // The first item is sound, so the error names the second.
-                let scene = match set.payload {
-                    Payload::Radiance => Scene::new().with_splats(ball()).with_splats(set),
-                    Payload::Scalar => {
-                        Scene::new().with_splats(ball()).with_samples(set, transfer())
-                    }
-                    Payload::Trained => unreachable!("Gaussians are no set of splats"),
-                };
+                let scene = Scene::from(vec![Item::Radiance(ball().into()), set]);
                 assert_refused(&scene, &camera(), &settings(), &["item 1", "splat 17", name]);
             }
         }
     }
     let mut negative = ball();
     negative.splats[POISONED].strength = -1.0;
-    assert_refused(&scene_of(negative), &camera(), &settings(), &["item 0", "splat 17", "-1"]);
+    let scene = Scene::new().with_splats(negative);
+    assert_refused(&scene, &camera(), &settings(), &["item 0", "splat 17", "-1"]);
     let mut weightless = samples();
     let splat = &mut weightless.splats[POISONED];
     *splat = Splat::sample(Vec3::ZERO, 0.5, splat.factor, f32::NAN, Vec3::ZERO);
-    assert_refused(
-        &scene_of(weightless),
-        &camera(),
-        &settings(),
-        &["item 0", "splat 17", "weight"],
-    );
+    let scene = Scene::new().with_samples(weightless, transfer());
+    assert_refused(&scene, &camera(), &settings(), &["item 0", "splat 17", "weight"]);
 }
 
 #[test]
 fn sets_that_are_not_finite_are_named() {
-    let refused = |change: &dyn Fn(&mut SplatSet), word: &str| {
+    let refused = |change: &dyn Fn(&mut Surfels), word: &str| {
         let mut set = ball();
         change(&mut set);
-        assert_refused(&scene_of(set), &camera(), &settings(), &[word]);
+        assert_refused(&Scene::new().with_splats(set), &camera(), &settings(), &[word]);
+    };
+    let overlap_refused = |overlap: f32| {
+        let scene = Scene::new().with_samples(SampleSplats { overlap, ..samples() }, transfer());
+        assert_refused(&scene, &camera(), &settings(), &["overlap"]);
     };
     for poison in NOT_FINITE {
         refused(&|set| set.origin.y = poison.into(), "origin");
         refused(&|set| set.extent = poison, "extent");
-        refused(&|set| set.overlap = poison, "overlap");
+        overlap_refused(poison);
     }
     refused(&|set| set.extent = -1.0, "extent");
-    refused(&|set| set.overlap = 1e-45, "overlap");
+    overlap_refused(1e-45);
     refused(&|set| set.origin = DVec3::splat(1e300), "beyond");
 }
 
 #[test]
 fn odd_splats_are_drawn_or_refused() {
     let mut faults = Faults::default();
-    for set in [ball(), samples()] {
+    for (kind, set) in sets() {
         for number in 0..10 {
             for odd in ODD {
                 let mut set = set.clone();
-                *numbers_of(&mut set.splats[POISONED])
+                *numbers_of(&mut splats_of(&mut set)[POISONED])
                     .into_iter()
                     .nth(number)
                     .expect("a number")
                     .1 = odd;
-                let what = format!("{:?} with number {number} {odd:e}", set.payload);
-                faults.inspect(&what, &scene_of(set), &camera(), &settings());
+                let what = format!("{kind} with number {number} {odd:e}");
+                faults.inspect(&what, &Scene::from(vec![set]), &camera(), &settings());
             }
         }
         for odd in ODD {
             let mut set = set.clone();
-            set.splats[POISONED].factor = [odd, 0.0, odd, 0.0, 0.0, odd];
-            let what = format!("{:?} of size {odd:e}", set.payload);
-            faults.inspect(&what, &scene_of(set), &camera(), &settings());
+            splats_of(&mut set)[POISONED].factor = [odd, 0.0, odd, 0.0, 0.0, odd];
+            let what = format!("{kind} of size {odd:e}");
+            faults.inspect(&what, &Scene::from(vec![set]), &camera(), &settings());
         }
     }
     faults.tell();
@@ -395,7 +398,8 @@ fn scattered_samples_are_drawn_or_refused() {
             match points.to_splats(&SampleOptions::default()) {
                 Ok(set) => {
                     let what = format!("a sample with {what} {odd:e}");
-                    faults.inspect(&what, &scene_of(set), &camera(), &settings());
+                    let scene = Scene::new().with_samples(set, transfer());
+                    faults.inspect(&what, &scene, &camera(), &settings());
                 }
                 Err(error) => {
                     assert!(
@@ -459,7 +463,7 @@ fn transfer_functions_are_named() {
 #[test]
 fn cameras_are_refused_or_draw() {
     let mut faults = Faults::default();
-    let scene = scene_of(ball());
+    let scene = Scene::new().with_splats(ball());
     for poison in NOT_FINITE.map(f64::from) {
         for change in [
             &(|camera: &mut Camera| camera.position.y = poison) as &dyn Fn(&mut Camera),
@@ -501,7 +505,7 @@ fn cameras_are_refused_or_draw() {
 
 #[test]
 fn settings_are_named() {
-    let scene = scene_of(ball());
+    let scene = Scene::new().with_splats(ball());
     for poison in NOT_FINITE.map(f64::from).into_iter().chain([-1.0]) {
         let refused =
             |settings: Settings, word| assert_refused(&scene, &camera(), &settings, &[word]);

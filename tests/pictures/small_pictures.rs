@@ -15,7 +15,7 @@ use splatkit::{
     reference,
     scattered::{Points, SampleOptions},
     scene::{Evaluate, Scene, Settings},
-    splat::SplatSet,
+    splat::Surfels,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume, phantoms::Phantom},
 };
@@ -25,7 +25,7 @@ use std::{
 };
 
 /// A hilly surface of `side`² vertices over a unit square.
-fn hills(side: u32) -> SplatSet {
+fn hills(side: u32) -> Surfels {
     let at = |i: u32| i as f32 / (side - 1) as f32;
     let place = |x: f32, y: f32| Vec3::new(x, y, 0.08 * (9.0 * x).sin() * (7.0 * y).cos());
     let positions = (0..side * side).map(|i| place(at(i % side), at(i / side))).collect();

@@ -13,7 +13,7 @@ use splatkit::{
     reference,
     scattered::{Points, SampleOptions},
     scene::{Clip, ClipShape, Evaluate, Scene, Settings},
-    splat::{Payload, Splat, SplatSet, encode_normal},
+    splat::{Splat, Surfels, encode_normal},
     volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
 };
 
@@ -123,13 +123,10 @@ impl Units {
                 normal: encode_normal(normal.as_vec3()),
             }
         });
-        let (payload, splats) = (Payload::Radiance, splats.collect());
-        Scene::new().with_splats(SplatSet {
-            payload,
+        Scene::new().with_splats(Surfels {
             origin: DVec3::ZERO,
             extent: 3.0,
-            overlap: 1.0,
-            splats,
+            splats: splats.collect(),
         })
     }
 }

@@ -21,7 +21,7 @@ use splatkit::{
     scene::{
         Classification, Clip, ClipShape, Evaluate, Gradient, Mode, Optics, Order, Scene, Settings,
     },
-    splat::SplatSet,
+    splat::Surfels,
     surface::{Mesh, SurfelOptions},
     volume::{
         Arrangement, Isosurface, Lattice, Samples, Shade, TransferFunction, Volume,
@@ -194,7 +194,7 @@ fn solid() -> Result<Scene> {
     Ok(Scene::new().with_solid(Solid::new(cells, &SolidOptions::new(Tint::Values(scale)))?))
 }
 
-fn surfels() -> Result<SplatSet> {
+fn surfels() -> Result<Surfels> {
     Mesh::sphere(2).surfels(&SurfelOptions::default())
 }
 

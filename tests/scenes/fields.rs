@@ -11,7 +11,7 @@ use splatkit::{
     hierarchy::Detail,
     math::{Kernel, Projection, Tensor},
     scene::{Classification, Evaluate, Gradient, Item, Optics, Scene, Settings},
-    splat::SplatSet,
+    splat::SampleSplats,
     volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
 };
 use std::sync::Arc;
@@ -157,7 +157,7 @@ fn two_cubic() -> Scene {
 
 /// Two volumes, with a set of samples between them that has none.
 fn around_nothing() -> Scene {
-    let nothing = SplatSet { splats: Vec::new(), ..scattered() };
+    let nothing = SampleSplats { splats: Vec::new(), ..scattered() };
     blob_scene().with_samples(nothing, transfer(1.0, None)).with_volume(
         other_volume(),
         Kernel::default(),

@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3, Vec3};
 use splatkit::{
     math::{Camera, Kernel, Projection},
     scene::{Gradient, Scene, Settings},
-    splat::{NO_NORMAL, Payload, Splat, SplatSet, encode_normal},
+    splat::{NO_NORMAL, SampleSplats, Splat, Surfels, encode_normal},
     volume::{Lattice, Samples, Shade, TransferFunction, Volume},
 };
 
@@ -64,8 +64,8 @@ impl Random {
 
 /// Splats around `ORIGIN`, away from the origin of the world. Their coordinates are relative to
 /// it.
-fn set(payload: Payload, extent: f32, splats: Vec<Splat>) -> SplatSet {
-    SplatSet { origin: ORIGIN, payload, splats, extent, overlap: 1.0 }
+fn surfels(splats: Vec<Splat>) -> Surfels {
+    Surfels { origin: ORIGIN, splats, extent: 3.0 }
 }
 
 pub const ORIGIN: DVec3 = DVec3::new(10.0, -20.0, 30.0);
@@ -87,13 +87,13 @@ fn unshaded() -> Settings {
     Settings { surface_shade: None, volume_shade: Some(None), ..settings() }
 }
 
-fn ellipsoids() -> SplatSet {
+fn ellipsoids() -> Surfels {
     let mut random = Random(1);
     let splats = (0..300).map(|_| {
         let center = random.point(1.0);
         random.ellipsoid(center, 0.08)
     });
-    set(Payload::Radiance, 3.0, splats.collect())
+    surfels(splats.collect())
 }
 
 /// Skewed ellipsoids with normals.
@@ -172,7 +172,7 @@ pub fn splats_below_a_pixel() -> Case {
         let splat = random.ellipsoid(center, 0.002);
         Splat { strength: 1.5, normal: encode_normal(center), ..splat }
     });
-    let scene = Scene::new().with_splats(set(Payload::Radiance, 3.0, splats.collect()));
+    let scene = Scene::new().with_splats(surfels(splats.collect()));
     Case {
         name: "splats_below_a_pixel",
         scene,
@@ -189,7 +189,7 @@ pub fn flat_discs_head_on() -> Case {
         let (factor, normal) = ([0.06, 0.0, 0.06, 0.0, 0.0, 0.001], encode_normal(Vec3::Z));
         Splat { center: center.to_array(), strength: 3.0, factor, color: random.color(), normal }
     });
-    let scene = Scene::new().with_splats(set(Payload::Radiance, 3.0, splats.collect()));
+    let scene = Scene::new().with_splats(surfels(splats.collect()));
     let camera = Camera { view_up: DVec3::Y, ..camera(DVec3::new(0.0, 0.0, 6.0), ORTHOGRAPHIC) };
     Case { name: "flat_discs_head_on", scene, camera, settings: settings() }
 }
@@ -243,14 +243,14 @@ fn blobs(at: DVec3) -> f64 {
 }
 
 /// Samples scattered where the blobs are.
-fn scattered() -> SplatSet {
+fn scattered() -> SampleSplats {
     let mut random = Random(6);
     let splats = (0..600).map(|_| {
         let center = random.point(0.8);
         let splat = random.ellipsoid(center, 0.12);
         Splat::sample(center, blobs(center.as_dvec3()) as f32, splat.factor, 1.0, Vec3::ZERO)
     });
-    set(Payload::Scalar, 3.0, splats.collect())
+    SampleSplats { origin: ORIGIN, splats: splats.collect(), extent: 3.0, overlap: 1.0 }
 }
 
 pub fn scattered_samples() -> Case {
@@ -408,7 +408,7 @@ fn mixed_scene() -> Scene {
         };
         Splat { strength: 4.0, normal: encode_normal(outward), ..splat }
     });
-    blob_scene().with_splats(set(Payload::Radiance, 3.0, balls.collect()))
+    blob_scene().with_splats(surfels(balls.collect()))
 }
 
 pub fn surface_in_a_volume() -> Case {

@@ -130,7 +130,7 @@ fn ply(seeds: &mut Seeds) -> Result<()> {
     let cloud = seeds.written(|path| formats::ply::write(&cloud, path))?;
     seeds.known("ply", cloud)?;
     let set = tetrahedron().surfels(&Default::default())?;
-    let few = splatkit::splat::SplatSet { splats: set.splats[..3].to_vec(), ..set };
+    let few = splatkit::splat::Surfels { splats: set.splats[..3].to_vec(), ..set };
     let few = Gaussians::from_splats(&few)?;
     let gaussians = seeds.written(|path| formats::ply::write_gaussians(&few, path))?;
     seeds.known("ply", gaussians)?;
@@ -920,7 +920,7 @@ fn hierarchies(seeds: &mut Seeds) -> Result<()> {
     })?;
     for (count, block_splats) in [(1, 64), (7, 64), (150, 64)] {
         let splats: Vec<_> = whole.splats.iter().copied().take(count).collect();
-        let set = splatkit::splat::SplatSet { splats, ..whole.clone() };
+        let set = splatkit::splat::Surfels { splats, ..whole.clone() };
         let tree =
             Tree::build(&set, &BuildOptions { block_splats, ..BuildOptions::default() }, None)?;
         for lossless in [false, true] {

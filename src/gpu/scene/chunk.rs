@@ -15,7 +15,7 @@ use crate::{
         uniforms::{COARSE, NODES, Source},
     },
     math::{Kernel, View},
-    splat::SplatSet,
+    splat::Common,
     volume::{Scalar, Volume},
 };
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub const WORKGROUP_CANDIDATES: u32 = 64 * RUN;
 #[derive(Debug)]
 pub enum Origin {
     Splats {
-        set: Arc<SplatSet>,
+        set: Common,
         /// Of trained Gaussians whose colours depend on the eye.
         harmonics: Option<Box<Harmonics>>,
     },

@@ -28,7 +28,7 @@ use crate::{
     math::{Bounds, Kernel, View},
     parallel::prelude::*,
     scene::{Item, Optics, Scene, Settings},
-    splat::{Splat, SplatSet},
+    splat::{SampleSplats, Splat, Splats, Surfels},
     volume::{
         Arrangement, Lattice, TransferFunction, Volume,
         reach::{EVERYTHING, first_visible},
@@ -63,7 +63,7 @@ pub(super) struct LevelledSet {
     /// The cut of the last view.
     cut: Option<Cut>,
     /// The splats on the GPU.
-    set: Option<Arc<SplatSet>>,
+    set: Option<Splats>,
 }
 
 /// A solid, of which the GPU holds what the clips of the last picture left.
@@ -181,16 +181,17 @@ impl PreparedScene {
     /// Uploads an item of the scene, unless it is uploaded for the first picture.
     pub(super) fn prepare_item(&mut self, gpu: &Gpu, number: usize) -> Result<()> {
         let item = self.scene.items[number].clone();
-        if let Item::Radiance(set) | Item::Scalar(set, _) = &item
-            && let Some(levels) = Levels::new(set)
-        {
+        if let Some(levels) = item.splats().as_ref().and_then(Levels::new) {
             self.levels.push(LevelledSet { item: number, levels, cut: None, set: None });
             return Ok(());
         }
         gpu.check_memory(self.bytes + bytes_of(&item))?;
         match &item {
-            Item::Radiance(set) | Item::Scalar(set, _) => {
-                self.add_splats(gpu, &in_space_order(set), number);
+            Item::Radiance(set) => {
+                self.add_splats(gpu, &in_space_order(Splats::Surfels(set.clone())), number);
+            }
+            Item::Scalar(set, _) => {
+                self.add_splats(gpu, &in_space_order(Splats::Samples(set.clone())), number);
             }
             // They are uploaded as the first picture sees them.
             Item::Gaussians(set) => {
@@ -420,13 +421,13 @@ impl PreparedScene {
         }
         let set = levelled.levels.drawn(&cut)?;
         levelled.cut = Some(cut);
-        if levelled.set.as_ref().is_some_and(|last| Arc::ptr_eq(last, &set)) {
+        if levelled.set.as_ref().is_some_and(|last| last.is_same(&set)) {
             return Ok(());
         }
         self.remove_chunks(levelled.item);
         levelled.set = None;
-        gpu.check_memory(self.bytes + splat_bytes(&set))?;
-        self.add_splats(gpu, &in_space_order(&set), levelled.item);
+        gpu.check_memory(self.bytes + splat_bytes(set.splats()))?;
+        self.add_splats(gpu, &in_space_order(set.clone()), levelled.item);
         levelled.set = Some(set);
         Ok(())
     }
@@ -435,7 +436,6 @@ impl PreparedScene {
     pub(crate) fn add_gaussians(&mut self, gpu: &Gpu, set: &Gaussians, item: usize, eye: Eye) {
         let seen = set.seen_from(eye);
         let order = space_order(&seen.splats);
-        let kind = Arc::new(seen.empty());
         let each = Harmonics::bytes_of(set).max(size_of::<Splat>() as u64);
         // Whole blocks of harmonics.
         let most = (gpu.binding_size() / each) as usize / 64 * 64;
@@ -444,15 +444,15 @@ impl PreparedScene {
                 order.par_iter().map(|index| seen.splats[*index as usize]).collect();
             let harmonics = set.depends_on_eye().then(|| Box::new(Harmonics::new(gpu, set, order)));
             self.bytes += harmonics.as_ref().map_or(0, |harmonics| harmonics.bytes());
-            let origin = Origin::Splats { set: kind.clone(), harmonics };
+            let origin = Origin::Splats { set: seen.common(), harmonics };
             self.add_chunk(gpu, item, origin, bytemuck::cast_slice(&splats), order.len() as u32);
         }
     }
 
-    fn add_splats(&mut self, gpu: &Gpu, set: &Arc<SplatSet>, item: usize) {
+    fn add_splats(&mut self, gpu: &Gpu, set: &Splats, item: usize) {
         let most = (gpu.binding_size() / size_of::<Splat>() as u64) as usize;
-        for splats in set.splats.chunks(most) {
-            let origin = Origin::Splats { set: set.clone(), harmonics: None };
+        for splats in set.splats().chunks(most) {
+            let origin = Origin::Splats { set: set.common(), harmonics: None };
             self.add_chunk(gpu, item, origin, bytemuck::cast_slice(splats), splats.len() as u32);
         }
     }
@@ -648,18 +648,17 @@ impl PreparedScene {
 /// Sorts splats along the curve of Morton (1966), so that neighbours in the list are neighbours in
 /// space. The splats of a batch then meet the same tiles and sheets, and are hidden together. Short
 /// lists keep their order.
-fn in_space_order(set: &Arc<SplatSet>) -> Arc<SplatSet> {
+fn in_space_order(set: Splats) -> Splats {
     const FEW: usize = 1 << 15;
-    if set.splats.len() <= FEW {
-        return set.clone();
+    if set.splats().len() <= FEW {
+        return set;
     }
-    Arc::new(ordered(set, &space_order(&set.splats)))
-}
-
-/// Returns the set with its splats in an order of their numbers.
-fn ordered(set: &SplatSet, order: &[u32]) -> SplatSet {
-    let splats = order.par_iter().map(|index| set.splats[*index as usize]).collect();
-    SplatSet { splats, ..set.empty() }
+    let order = space_order(set.splats());
+    let splats = order.par_iter().map(|index| set.splats()[*index as usize]).collect();
+    match set {
+        Splats::Surfels(set) => Splats::Surfels(Surfels { splats, ..*set }.into()),
+        Splats::Samples(set) => Splats::Samples(SampleSplats { splats, ..*set }.into()),
+    }
 }
 
 /// Returns the numbers of splats along the curve of Morton.
@@ -708,7 +707,8 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
 /// its span or the range around it. Items that are read on demand take none yet.
 fn bytes_of(item: &Item) -> u64 {
     match item {
-        Item::Radiance(set) | Item::Scalar(set, _) => splat_bytes(set),
+        Item::Radiance(set) => splat_bytes(&set.splats),
+        Item::Scalar(set, _) => splat_bytes(&set.splats),
         Item::Gaussians(set) => gaussian_bytes(set),
         Item::Volume(volume, ..) => {
             let sample =
@@ -726,9 +726,9 @@ fn facet_bytes(set: &FacetSet) -> u64 {
     set.facets.len() as u64 * (size_of::<Facet>() as u64 + SPAN_BYTES)
 }
 
-/// Returns the bytes of a set's splats on the GPU, and of their spans.
-fn splat_bytes(set: &SplatSet) -> u64 {
-    set.splats.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES)
+/// Returns the bytes of splats on the GPU, and of their spans.
+fn splat_bytes(splats: &[Splat]) -> u64 {
+    splats.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES)
 }
 
 /// Returns the bytes of trained Gaussians on the GPU, with their harmonics and spans.

@@ -18,7 +18,7 @@ use crate::{
     formats::StreamPoint,
     memory,
     parallel::{self, prelude::*},
-    splat::{Payload, Splat, SplatSet},
+    splat::{Splat, Surfels},
     surface::{EXTENT, Known, Mesh, SurfelOptions, cloud_piece},
 };
 use glam::{DVec3, Vec3};
@@ -95,8 +95,7 @@ impl<W: Write> Work<'_, W> {
         if splats.is_empty() {
             return Ok(());
         }
-        let mut set =
-            SplatSet { origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 };
+        let mut set = Surfels { origin, splats, extent: EXTENT };
         set.move_origin(self.shape.origin)?;
         check_splats(&set)?;
         let parts = partition::blocks(&set.splats, self.options.block_splats.max(64));

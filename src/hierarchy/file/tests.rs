@@ -453,7 +453,7 @@ fn disorder_is_refused() {
     // It is not drawn either.
     let view =
         Camera::framing(&sound.bounds, DVec3::X, DVec3::Z, 1.0).view([9, 9]).expect("a view");
-    assert!(!sound.cut(&view, Detail::Pixels(1.0), None).expect("a cut").splats.is_empty());
+    assert!(!sound.cut(&view, Detail::Pixels(1.0), None).expect("a cut").splats().is_empty());
     let mut torn = sound.clone();
     torn.blocks[0].nodes[0].first_child = u32::MAX;
     assert!(matches!(torn.cut(&view, Detail::Pixels(1.0), None), Err(crate::Error::Argument(_))));

@@ -91,7 +91,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`Error::Output`] if nothing can be written beside `path`; [`Error::Argument`] if the extent
-    /// is not a positive number, or above [`MAX_EXTENT`](crate::splat::SplatSet::MAX_EXTENT).
+    /// is not a positive number, or above [`MAX_EXTENT`](crate::splat::Splat::MAX_EXTENT).
     pub fn new(path: impl AsRef<Path>, extent: f32, options: &WriteOptions) -> Result<Self> {
         let path = path.as_ref();
         Self::begin(Some(path.to_owned()), extent, options, || Spill::beside(path))

@@ -58,7 +58,7 @@ fn scattered_samples_fill_at_most_their_sheets() {
     let camera = camera(PROJECTIONS[1]);
     let settings = unshaded([1, 1]);
     let field = |splats: Vec<Splat>| {
-        let scene = Scene::new().with_samples(set(Payload::Scalar, splats), uniform([1.0; 3], 0.8));
+        let scene = Scene::new().with_samples(sample_splats(splats), uniform([1.0; 3], 0.8));
         render(&scene, &camera, &settings).unwrap().color[0][3]
     };
     // One sample: ∫ exp(−s²/2σ²) ds = √(2π)·σ, with σ² widened by (0.35 · 4)² (the only pixel is 4
@@ -71,7 +71,7 @@ fn scattered_samples_fill_at_most_their_sheets() {
     // A hundred samples at one place: a sheet's W counts up to the sheet's thickness.
     let transfer = uniform([1.0; 3], 0.1);
     let many = vec![sample(Vec3::ZERO, 7.0, 0.8); 100];
-    let scene = Scene::new().with_samples(set(Payload::Scalar, many), transfer);
+    let scene = Scene::new().with_samples(sample_splats(many), transfer);
     let settings = Settings { sheet_thickness: Some(0.5), ..settings };
     let eye = camera.position.length();
     let planes = scene.sheets(&camera.view(settings.size).unwrap(), &settings).planes;
@@ -97,7 +97,7 @@ fn assert_linear(
 ) {
     let settings = Settings { sheet_thickness: Some(0.2), ..Settings::new([32, 24]) };
     let view = camera(projection).view(settings.size).unwrap();
-    let frame = Frame::new(scene, scene, view, &settings);
+    let frame = Frame::new(scene, scene, &Trained::new(), view, &settings);
     let field = &frame.fields[0];
     let everywhere: Vec<&Kernel> = field.kernels.iter().collect();
     let mut met = 0;
@@ -235,7 +235,7 @@ fn a_linear_field_of_scattered_samples_with_slopes_is_linear() {
             in_kernel.as_vec3(),
         )
     });
-    let set = SplatSet { extent: 3.0, ..set(Payload::Scalar, samples.collect()) };
+    let set = SampleSplats { extent: 3.0, ..sample_splats(samples.collect()) };
     let scene = Scene::new().with_samples(set, uniform([1.0; 3], 0.8));
     for projection in PROJECTIONS {
         // Slopes have 11 bits.
@@ -255,11 +255,17 @@ fn heavier_samples_count_more() {
         )
     };
     let scene = Scene::new().with_samples(
-        set(Payload::Scalar, vec![at(-0.2, 1.0, 3.0), at(0.2, 5.0, 1.0)]),
+        sample_splats(vec![at(-0.2, 1.0, 3.0), at(0.2, 5.0, 1.0)]),
         uniform([1.0; 3], 0.8),
     );
     let settings = unshaded([1, 1]);
-    let frame = Frame::new(&scene, &scene, from_above(5.0, 0.1).view([1, 1]).unwrap(), &settings);
+    let frame = Frame::new(
+        &scene,
+        &scene,
+        &Trained::new(),
+        from_above(5.0, 0.1).view([1, 1]).unwrap(),
+        &settings,
+    );
     let field = &frame.fields[0];
     let everywhere: Vec<&Kernel> = field.kernels.iter().collect();
     let faces = field.faces(&frame.ray(0, 0), &everywhere, &frame.planes);
@@ -271,12 +277,12 @@ fn the_mean_of_a_sample_with_a_slope_is_that_of_many_points() {
     let (center, slope) = (DVec3::new(0.1, -0.2, 0.1), DVec3::new(0.5, 1.0, 2.0));
     let factor = [0.5, 0.1, 0.3, -0.2, 0.1, 0.4];
     let splats = vec![Splat::sample(center.as_vec3(), 3.0, factor, 2.0, slope.as_vec3())];
-    let scene = Scene::new().with_samples(set(Payload::Scalar, splats), uniform([1.0; 3], 0.8));
+    let scene = Scene::new().with_samples(sample_splats(splats), uniform([1.0; 3], 0.8));
     // With so many pixels, widening is negligible.
     let settings = unshaded([4001, 4001]);
     for projection in PROJECTIONS {
         let view = camera(projection).view(settings.size).unwrap();
-        let frame = Frame::new(&scene, &scene, view, &settings);
+        let frame = Frame::new(&scene, &scene, &Trained::new(), view, &settings);
         let ray = frame.ray(2000, 2000);
         let kernel = &frame.fields[0].kernels[0];
         let kernel::Load::Sample(carried) = &kernel.load else { panic!("a sample is no radiance") };

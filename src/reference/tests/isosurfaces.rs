@@ -23,7 +23,7 @@ fn a_ball_has_its_depth_and_its_normals() {
         for classification in [scene::Classification::PreIntegrated, scene::Classification::Post] {
             let settings = Settings { classification, ..Settings::new([41, 31]) };
             let view = camera(projection).view(settings.size).unwrap();
-            let frame = Frame::new(&scene, &scene, view, &settings);
+            let frame = Frame::new(&scene, &scene, &Trained::new(), view, &settings);
             for (column, row) in [(20, 15), (22, 12), (17, 17), (2, 2)] {
                 let ray = frame.ray(column, row);
                 let composite = pixel(&frame, column, row);
@@ -52,9 +52,13 @@ fn a_translucent_ball_is_met_twice() {
     let scene = ball(0.5, None);
     let settings = unshaded([31, 31]);
     let view = camera(PROJECTIONS[1]).view(settings.size).unwrap();
-    let composite = pixel(&Frame::new(&scene, &scene, view, &settings), 15, 15);
+    let composite = pixel(&Frame::new(&scene, &scene, &Trained::new(), view, &settings), 15, 15);
     close(composite.opacity, 0.75, 1e-9);
     let xray = Settings { optics: Optics::XRay, ..settings };
     let view = camera(PROJECTIONS[1]).view(xray.size).unwrap();
-    close(pixel(&Frame::new(&scene, &scene, view, &xray), 15, 15).opacity, 0.0, 0.0);
+    close(
+        pixel(&Frame::new(&scene, &scene, &Trained::new(), view, &xray), 15, 15).opacity,
+        0.0,
+        0.0,
+    );
 }

@@ -12,7 +12,7 @@ use crate::{
     compare::compare_pictures,
     math::{Kernel as Shape, Projection},
     scene,
-    splat::{NO_NORMAL, Payload, Splat, SplatSet},
+    splat::{NO_NORMAL, SampleSplats, Splat, Surfels},
     volume::{Samples, TransferFunction, Volume},
 };
 use glam::{DMat3, Vec3};
@@ -70,8 +70,12 @@ fn round(center: Vec3, strength: f32, deviation: f32) -> Splat {
     Splat { center: center.to_array(), strength, factor, color: 0xff_40_80_c0, normal: NO_NORMAL }
 }
 
-fn set(payload: Payload, splats: Vec<Splat>) -> SplatSet {
-    SplatSet { origin: DVec3::ZERO, payload, splats, extent: 8.0, overlap: 1.0 }
+fn surfels(splats: Vec<Splat>) -> Surfels {
+    Surfels { origin: DVec3::ZERO, splats, extent: 8.0 }
+}
+
+fn sample_splats(splats: Vec<Splat>) -> SampleSplats {
+    SampleSplats { origin: DVec3::ZERO, splats, extent: 8.0, overlap: 1.0 }
 }
 
 fn close(value: impl Into<f64>, expected: f64, tolerance: f64) {

@@ -60,7 +60,7 @@ fn classified_before_a_constant_field_is_as_dense_as_it_is() {
 #[test]
 fn scattered_samples_know_what_they_add_up_to() {
     let heavy = Splat::sample(Vec3::ZERO, 7.0, [5.0, 0.0, 5.0, 0.0, 0.0, 0.5], 3.0, Vec3::ZERO);
-    let samples = SplatSet { overlap: 2.0, ..set(Payload::Scalar, vec![heavy]) };
+    let samples = SampleSplats { overlap: 2.0, ..sample_splats(vec![heavy]) };
     let scene = Scene::new().with_samples(samples, uniform([1.0; 3], 0.8));
     let length = (2.0 * std::f64::consts::PI).sqrt() * 0.5;
     for mode in [Mode::Sheets, Mode::AxisSheets, Mode::Splats(Order::FrontToBack)] {
@@ -77,7 +77,7 @@ fn both_orders_make_one_picture() {
         let normal = crate::splat::encode_normal(random.point().as_vec3());
         Splat { color, normal, ..round(random.point().as_vec3(), 0.8, 0.2) }
     });
-    let scene = Scene::new().with_splats(set(Payload::Radiance, splats.collect()));
+    let scene = Scene::new().with_splats(surfels(splats.collect()));
     for projection in PROJECTIONS {
         let draw = |order| {
             let settings = Settings { mode: Mode::Splats(order), ..Settings::new([32, 24]) };
@@ -94,7 +94,7 @@ fn single_splats_are_composited_by_distance() {
     let at = |z: f32, color: u32| Splat { color, ..round(Vec3::new(0.0, 0.0, z), 0.7, 1.0) };
     // Red is in front of blue, though they overlap; green is behind the eye.
     let splats = vec![at(-0.5, 0xffff_0000), at(0.5, 0xff00_00ff), at(9.0, 0xff00_ff00)];
-    let scene = Scene::new().with_splats(set(Payload::Radiance, splats));
+    let scene = Scene::new().with_splats(surfels(splats));
     let camera =
         Camera { projection: Projection::Perspective { view_angle: 0.1 }, ..from_above(5.0, 1.0) };
     let alpha = 1.0 - (-0.7_f64).exp();
@@ -171,7 +171,7 @@ fn axis_sheets_follow_the_data() {
     // Two walls of different colours lie in one thick sheet, or in two thin ones.
     let at = |z: f32, color: u32| Splat { color, ..round(Vec3::new(0.0, 0.0, z), 2.0, 1.0) };
     let splats = vec![at(0.0, 0xff00_00ff), at(1.0, 0xffff_0000)];
-    let scene = Scene::new().with_splats(set(Payload::Radiance, splats));
+    let scene = Scene::new().with_splats(surfels(splats));
     for (thickness, before, behind) in [(100.0, 0.5, 0.5), (0.1, (-2.0_f64).exp(), 1.0)] {
         let settings =
             Settings { sheet_thickness: Some(thickness), sheet_pixels: 1e9, ..before_alone() };

@@ -56,7 +56,7 @@ fn clips_cut_where_they_are() {
 
 #[test]
 fn splats_are_clipped_by_their_closest_approach() {
-    let splats = set(Payload::Radiance, vec![round(Vec3::new(0.0, 0.0, 0.5), 3.0, 0.4)]);
+    let splats = surfels(vec![round(Vec3::new(0.0, 0.0, 0.5), 3.0, 0.4)]);
     let scene = Scene::new().with_splats(splats);
     let camera = from_above(5.0, 0.01);
     for mode in [Mode::Sheets, Mode::AxisSheets, Mode::Splats(scene::Order::FrontToBack)] {
@@ -76,7 +76,7 @@ fn an_x_ray_is_what_a_field_takes_from_white() {
         TransferFunction { shade: Some(Shade::default()), ..uniform([0.1, 0.5, 0.2], 0.8) };
     let scene = Scene::new().with_volume(volume(lattice, |_| 5.0), Shape::default(), transfer);
     let splats = vec![round(Vec3::ZERO, 0.6, 0.3)];
-    let both = scene.clone().with_splats(set(Payload::Radiance, splats));
+    let both = scene.clone().with_splats(surfels(splats));
     let settings = Settings { optics: Optics::XRay, ..Settings::new([1, 1]) };
     let camera = from_above(5.0, 0.01);
     let picture = render(&scene, &camera, &settings).unwrap();

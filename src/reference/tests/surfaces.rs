@@ -8,10 +8,8 @@ fn one_round_splat_is_its_projection() {
     for projection in PROJECTIONS {
         let camera = camera(projection);
         let (center, deviation, strength) = (DVec3::new(0.1, 0.2, -0.1), 0.3, 2.0);
-        let scene = Scene::new().with_splats(set(
-            Payload::Radiance,
-            vec![round(center.as_vec3(), strength, deviation)],
-        ));
+        let scene =
+            Scene::new().with_splats(surfels(vec![round(center.as_vec3(), strength, deviation)]));
         let settings = unshaded([24, 20]);
         let picture = render(&scene, &camera, &settings).unwrap();
         let view = camera.view(settings.size).unwrap();
@@ -47,7 +45,7 @@ fn opacity_scales_the_strength_and_normals_catch_the_light() {
         normal: encode_normal(slant.as_vec3()),
         ..round(Vec3::ZERO, 3.0, 5.0)
     };
-    let scene = Scene::new().with_splats(set(Payload::Radiance, vec![splat]));
+    let scene = Scene::new().with_splats(surfels(vec![splat]));
     let shade = Shade { ambient: 0.1, diffuse: 0.4, specular: 0.2, power: 4.0, certain: None };
     // An odd number of pixels: one lies in the middle.
     let settings = Settings { surface_shade: Some(shade), ..Settings::new([1, 1]) };
@@ -70,8 +68,7 @@ fn the_depth_of_an_opaque_wall_is_where_it_stands() {
         // A disc in the plane z = 0.25, much thinner than the sheets.
         let factor = [3.0, 0.0, 3.0, 0.0, 0.0, 1e-3];
         let wall = Splat { factor, ..round(Vec3::new(0.0, 0.0, 0.25), 80.0, 1.0) };
-        let scene = Scene::new()
-            .with_splats(SplatSet { extent: 3.0, ..set(Payload::Radiance, vec![wall]) });
+        let scene = Scene::new().with_splats(Surfels { extent: 3.0, ..surfels(vec![wall]) });
         let settings = Settings { sheet_thickness: Some(0.02), ..unshaded([24, 20]) };
         let picture = render(&scene, &camera, &settings).unwrap();
         let pixel =
@@ -82,8 +79,7 @@ fn the_depth_of_an_opaque_wall_is_where_it_stands() {
             close(z, 4.75, pixel);
             assert!(z <= 4.75 + 0.02);
         }
-        let background =
-            Scene::new().with_splats(set(Payload::Radiance, vec![round(Vec3::ZERO, 0.5, 0.1)]));
+        let background = Scene::new().with_splats(surfels(vec![round(Vec3::ZERO, 0.5, 0.1)]));
         assert!(
             render(&background, &camera, &settings)
                 .unwrap()
@@ -114,10 +110,10 @@ fn a_surface_in_a_translucent_volume_is_veiled_by_what_lies_before_it() {
                     Shape::default(),
                     uniform(veil, extinction),
                 )
-                .with_splats(SplatSet { extent: 3.0, ..set(Payload::Radiance, vec![wall]) });
+                .with_splats(Surfels { extent: 3.0, ..surfels(vec![wall]) });
             let settings = Settings { sheet_thickness: Some(0.01), ..unshaded([801, 801]) };
             let view = camera.view(settings.size).unwrap();
-            let frame = Frame::new(&scene, &scene, view, &settings);
+            let frame = Frame::new(&scene, &scene, &Trained::new(), view, &settings);
             for (column, row) in [(400, 400), (420, 370)] {
                 let ray = frame.ray(column, row);
                 let composite = pixel(&frame, column, row);
@@ -141,8 +137,6 @@ fn what_cannot_be_drawn_is_told() {
     let camera = camera(PROJECTIONS[0]);
     let settings = unshaded([4, 4]);
     assert!(matches!(render(&Scene::new(), &camera, &settings), Err(Error::NothingToDraw(_))));
-    let scene = Scene::new().with_splats(set(Payload::Scalar, vec![round(Vec3::ZERO, 1.0, 1.0)]));
-    assert!(matches!(render(&scene, &camera, &settings), Err(Error::Argument(_))));
-    let scene = Scene::new().with_splats(set(Payload::Radiance, vec![round(Vec3::ZERO, 1.0, 1.0)]));
+    let scene = Scene::new().with_splats(surfels(vec![round(Vec3::ZERO, 1.0, 1.0)]));
     assert!(matches!(render(&scene, &camera, &unshaded([0, 4])), Err(Error::Argument(_))));
 }

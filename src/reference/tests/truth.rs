@@ -193,7 +193,7 @@ fn rays_are_refused_where_they_cannot_be_followed() {
     assert!(refused(&scene, &settings, 0.0) && refused(&scene, &settings, f64::NAN));
     assert!([1e-12, 1e-300, 5e-324].iter().all(|&step| refused(&scene, &settings, step)));
     assert!(refused(&scene, &Settings { optics: Optics::XRay, ..settings.clone() }, 0.1));
-    let splats = set(Payload::Radiance, vec![round(Vec3::ZERO, 1.0, 1.0)]);
+    let splats = surfels(vec![round(Vec3::ZERO, 1.0, 1.0)]);
     assert!(refused(&scene.with_splats(splats), &settings, 0.1));
 }
 

@@ -9,7 +9,7 @@ use crate::{
         external::{memory_of_mesh, memory_of_splats},
     },
     session::{Data, Name},
-    splat::SplatSet,
+    splat::Surfels,
     surface::Mesh,
 };
 use glam::DVec3;
@@ -21,7 +21,7 @@ const SAMPLE: usize = 1 << 17;
 
 /// The splats of inputs, and facts about their source.
 pub struct Gathered {
-    pub set: SplatSet,
+    pub set: Surfels,
     closed: bool,
     /// The frame of the first input.
     pub frame: Frame,
@@ -104,9 +104,9 @@ impl<W: Watch> Work<'_, W> {
         let memory = need.max(2 * memory_of_splats(splats.len()));
         let count = splats.len().min(SAMPLE);
         let first = (splats.len() - count) / 2;
-        let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
+        let Surfels { origin, extent, .. } = gathered.set;
         let splats_of_part = splats[first..first + count].to_vec();
-        let part = SplatSet { origin, payload, splats: splats_of_part, extent, overlap };
+        let part = Surfels { origin, splats: splats_of_part, extent };
         let build = self.conversion.build_options(gathered.closed, gathered.points);
         let write = self.conversion.write_options(self.files, &gathered.frame);
         let start = Instant::now();

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// The optical depth of a ray, by brute force: strength · exp(−ρ²/2), with ρ its whitened distance
 /// from the centre.
-fn depth(set: &SplatSet, point: DVec3, direction: DVec3) -> f64 {
+fn depth(set: &Surfels, point: DVec3, direction: DVec3) -> f64 {
     set.splats
         .iter()
         .map(|splat| {
@@ -33,7 +33,7 @@ fn depth(set: &SplatSet, point: DVec3, direction: DVec3) -> f64 {
 
 /// The smallest optical depth seen along the triangles' normals, over points on up to 60 of the
 /// triangles.
-fn least_depth(mesh: &Mesh, set: &SplatSet) -> f64 {
+fn least_depth(mesh: &Mesh, set: &Surfels) -> f64 {
     let step = (mesh.triangles.len() / 60).max(1);
     let points = |n: usize| {
         (0..=n)
@@ -51,7 +51,7 @@ fn least_depth(mesh: &Mesh, set: &SplatSet) -> f64 {
         .reduce(|| f64::INFINITY, f64::min)
 }
 
-fn surfels(mesh: &Mesh) -> SplatSet {
+fn surfels(mesh: &Mesh) -> Surfels {
     mesh.surfels(&SurfelOptions::default()).expect("surfels")
 }
 

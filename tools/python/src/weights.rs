@@ -6,6 +6,7 @@ use splatkit::{
     glam::{DVec3, Vec3},
     hierarchy::Hierarchy,
     scene::{Item, Scene},
+    splat::Splat,
     volume::{TransferFunction, Volume, reach::first_visible},
 };
 
@@ -21,15 +22,17 @@ pub fn of_scene(scene: &Scene) -> Result<Vec<[f64; 4]>> {
     Ok(items.concat())
 }
 
+fn of_splats(origin: DVec3, splats: &[Splat]) -> Vec<[f64; 4]> {
+    sampled(splats.len(), |at| Vec3::from(splats[at].center).as_dvec3() + origin)
+}
+
 fn of_item(item: &Item) -> Result<Vec<[f64; 4]>> {
     Ok(match item {
         Item::Bricks(bricks, _, transfer) => of_bricks(bricks, transfer),
         Item::Hierarchy(hierarchy) => of_hierarchy(hierarchy)?,
         Item::Volume(volume, _, transfer) => of_volume(volume, transfer),
-        Item::Radiance(set) | Item::Scalar(set, _) => {
-            let place = |at: usize| Vec3::from(set.splats[at].center).as_dvec3() + set.origin;
-            sampled(set.splats.len(), place)
-        }
+        Item::Radiance(set) => of_splats(set.origin, &set.splats),
+        Item::Scalar(set, _) => of_splats(set.origin, &set.splats),
         Item::Facets(set) => {
             let place = |at: usize| Vec3::from(set.facets[at].corners[0]).as_dvec3() + set.origin;
             sampled(set.facets.len(), place)
