@@ -177,8 +177,8 @@ impl Orientation {
         axes(wanted) * axes(self).transpose()
     }
 
-    /// Returns the orientation with this direction up, and the front that is usual for it: −Y if Z or −Z
-    /// is nearest to the direction, otherwise +Z; made perpendicular to it.
+    /// Returns the orientation with this direction up, and the front that is usual for it: −Y if Z
+    /// or −Z is nearest to the direction, otherwise +Z; made perpendicular to it.
     ///
     /// # Panics
     /// If the direction has no length, or is not finite.

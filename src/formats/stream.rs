@@ -154,7 +154,8 @@ impl<'a> Stream<'a> {
         self.form.orientation()
     }
 
-    /// Guesses how its points stand ([`Mesh::guess_orientation`]), from pieces spread over the file.
+    /// Guesses how its points stand ([`Mesh::guess_orientation`]), from pieces spread over the
+    /// file.
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) for damaged pieces.

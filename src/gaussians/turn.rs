@@ -205,7 +205,7 @@ mod tests {
         assert!(old.iter().zip(new).all(|(a, b)| (a - b).abs() < 1e-5), "{old:?} {new:?}");
         set.stand(Orientation::Y_UP);
         assert!((set.axes(0) - before.axes(0)).to_cols_array().iter().all(|v| v.abs() < 1e-6));
-        // Without a orientation there is nothing to turn from.
+        // Without an orientation there is nothing to turn from.
         set.about.orientation = None;
         let centers = set.centers.clone();
         set.stand(Orientation::Y_DOWN);

@@ -12,11 +12,12 @@ impl View {
     /// Returns the view of a host's camera for a picture of `size` pixels (width, height).
     ///
     /// `view` maps world coordinates to the camera's, whose origin is the eye. `projection` maps
-    /// these to clip space with x to the right and y up, as wgpu, Metal, Direct3D and OpenGL use it.
-    /// Both may be left-handed or right-handed, together. Only the first, second and fourth row of
-    /// `projection` count, so any range of depths is fine: 0 to 1, −1 to 1, reversed, infinite. The
-    /// optical axis may lie anywhere in the picture, so eyes side by side, parts of a wall of
-    /// screens, and jitter by parts of a pixel are possible.
+    /// these to clip space with x to the right and y up, as wgpu, Metal, Direct3D and OpenGL have
+    /// it. The world is right-handed; the host of a left-handed one flips an axis of it.
+    ///
+    /// Any range of depths is fine: 0 to 1, −1 to 1, reversed, infinite. The optical axis may lie
+    /// anywhere in the picture: eyes side by side, parts of a wall of screens, and jitter by parts
+    /// of a pixel are possible.
     ///
     /// ```
     /// use splatkit::{glam::{DVec3, dcamera::rh}, math::View};
@@ -56,7 +57,7 @@ impl View {
         if per_unit == 0.0 || (!perspective && per_unit < 0.0) {
             return wrong("map all points to infinity");
         }
-        // Pixel coordinates are across · (point, 1) / z, or across · (point, 1) without perspective.
+        // Pixel coordinates are across · (point, 1), in perspective divided by z.
         let across = [half.x * (rows.x_axis + w) / per_unit, half.y * (w - rows.y_axis) / per_unit];
         let forward = if perspective { w.xyz() / per_unit } else { DVec3::ZERO };
         let shift = DVec2::from_array(across.map(|row| row.xyz().dot(forward)));
@@ -66,18 +67,19 @@ impl View {
         if !(scale > 0.0 && scale.is_finite()) {
             return wrong("map the whole world to a line");
         }
-        if !is_even {
-            return wrong(
-                "have pixels that are not square; the aspect must be that of the picture",
-            );
-        }
         let (right, down) = (right.normalize(), down.normalize());
         let forward = if perspective { forward } else { right.cross(down) };
         if right.dot(down).abs() > TOLERANCE {
             return wrong("shear the world");
         }
-        if right.cross(down).dot(forward) < 0.0 {
-            return wrong("mirror the world");
+        if !is_even {
+            return wrong(
+                "have pixels that are not square; the aspect must be that of the picture",
+            );
+        }
+        let is_mirrored = DMat3::from_mat4(view).determinant() < 0.0;
+        if is_mirrored || right.cross(down).dot(forward) < 0.0 {
+            return wrong("mirror the world, which is right-handed");
         }
         let right = (right - right.dot(forward) * forward).normalize();
         let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
@@ -132,14 +134,12 @@ mod tests {
         let expected = camera(Projection::Perspective { view_angle: 40.0 });
         let (angle, aspect) = (40f64.to_radians(), 640.0 / 480.0);
         let right = rh::view::look_at_mat4(EYE, TARGET, DVec3::Z);
-        let left = lh::view::look_at_mat4(EYE, TARGET, DVec3::Z);
         let reversed = directx::perspective_infinite_reverse(angle, aspect, 0.1);
         for (view, projection) in [
             (right, directx::perspective(angle, aspect, 0.1, 50.0)),
             (right, opengl::perspective(angle, aspect, 0.1, 50.0)),
             (right, directx::perspective_infinite(angle, aspect, 0.1)),
             (right, reversed),
-            (left, lh::proj::directx::perspective(angle, aspect, 0.1, 50.0)),
             // In 32 bits, and scaled.
             (right.as_mat4().as_dmat4(), reversed.as_mat4().as_dmat4()),
             (DMat4::from_scale(DVec3::splat(0.01)) * right, reversed),
@@ -180,6 +180,9 @@ mod tests {
         assert!(error(view, projection, [0, 480]).contains("no pixels"));
         let mirror = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
         assert!(error(view, mirror * projection, size).contains("mirror"));
+        let left = lh::view::look_at_mat4(EYE, TARGET, DVec3::Z);
+        let flat = lh::proj::directx::orthographic(-4.0, 4.0, -3.0, 3.0, 0.1, 50.0);
+        assert!(error(left, flat, size).contains("mirror"));
         let mut shear = DMat4::IDENTITY;
         shear.y_axis.x = 0.3;
         assert!(error(view, shear * projection, size).contains("shear"));

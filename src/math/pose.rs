@@ -157,7 +157,7 @@ mod tests {
         ];
         let moved = pose().clips(&clips).unwrap();
         for number in 0..1000 {
-            let at = [7, 11, 13].map(|prime| f64::from(number * prime % 41) / 10.0 - 2.0);
+            let at = [7, 11, 13].map(|prime| f64::from(number * prime % 41) / 10.0 - 2.03);
             let point = pose().inverse().apply(DVec3::from_array(at) + pose().translation);
             let place = pose().apply(point);
             let kept = moved.iter().all(|clip| clip.keeps(point));

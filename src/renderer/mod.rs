@@ -24,15 +24,15 @@ use items::Slot;
 use std::future::poll_fn;
 use worker::Worker;
 
-/// Draws one scene on one device. The viewpoint and the settings may change from picture to picture.
-/// Items are added, hidden, moved and removed by their names ([`ItemId`]), while the others stay
-/// prepared.
+/// Draws one scene on one device. The viewpoint and the settings may change from picture to
+/// picture. Items are added, hidden, moved and removed by their names ([`ItemId`]), while the
+/// others stay prepared.
 ///
 /// | method | waits | the picture is |
 /// |---|---|---|
 /// | [`render`](Self::render) | yes | returned |
 /// | [`render_async`](Self::render_async) | no, it is awaited | returned |
-/// | [`encode`](Self::encode), [`poll`](Self::poll) | no | written to textures or buffers of a host application |
+/// | [`encode`](Self::encode), [`poll`](Self::poll) | no | written to textures or buffers |
 /// | [`draw`](Self::draw), [`profile`](Self::profile) | yes | left on the device |
 ///
 /// The CPU engine draws everywhere; [`Device::automatic`] takes a GPU if there is one:
@@ -107,8 +107,8 @@ fn cannot_wait<T>() -> Result<T> {
 }
 
 impl Renderer {
-    /// Prepares a scene on a device. A scene without items is one to which they are added later; its
-    /// pictures are clear.
+    /// Prepares a scene on a device. A scene without items is one to which they are added later;
+    /// its pictures are clear.
     ///
     /// # Errors
     /// [`Error::Argument`] if [`Scene::validate`] or the engine refuses the scene;

@@ -115,8 +115,8 @@ impl Subject {
         }
     }
 
-    /// Takes the orientation of a mesh, or guesses it. A mesh that stands otherwise than an input before
-    /// is turned.
+    /// Takes the orientation of a mesh, or guesses it. A mesh that stands otherwise than an input
+    /// before is turned.
     pub fn stand_mesh(&mut self, name: &str, mesh: &mut Mesh) -> Option<String> {
         match mesh.about.orientation {
             Some(orientation) => self.turn(name, orientation, |wanted| mesh.stand(wanted)),
@@ -128,8 +128,8 @@ impl Subject {
         }
     }
 
-    /// Takes the orientation of trained Gaussians, or the convention of trainers. Gaussians that stand
-    /// otherwise than an input before are turned.
+    /// Takes the orientation of trained Gaussians, or the convention of trainers. Gaussians that
+    /// stand otherwise than an input before are turned.
     pub fn stand_gaussians(&mut self, name: &str, set: &mut Gaussians) -> Option<String> {
         match set.about.orientation {
             Some(orientation) => self.turn(name, orientation, |wanted| set.stand(wanted)),
@@ -149,7 +149,8 @@ impl Subject {
         orientation.into_iter().chain(frame).collect()
     }
 
-    /// Takes a orientation that a file states. If the scene stands otherwise, `turn` turns the input.
+    /// Takes an orientation that a file states. If the scene stands otherwise, `turn` turns the
+    /// input.
     fn turn(
         &mut self,
         name: &str,
@@ -165,8 +166,8 @@ impl Subject {
         })
     }
 
-    /// Takes a orientation if it comes from a more certain origin than the one before. Returns whether
-    /// it contradicts that one, although both come from files.
+    /// Takes an orientation if it comes from a more certain origin than the one before. Returns
+    /// whether it contradicts that one, although both come from files.
     fn consider(&mut self, orientation: Orientation, origin: Origin) -> bool {
         if origin > self.origin {
             (self.orientation, self.origin) = (orientation, origin);

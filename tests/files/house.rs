@@ -45,9 +45,9 @@ const ROOMS: [&str; 32] = [
 ];
 
 /// The rooms of src/gpu, in the same way.
-const GPU: [&str; 13] = [
+const GPU: [&str; 14] = [
     "device", "output", "pipeline", "budget", "variant", "uniforms", "scene", "targets", "passes",
-    "frame", "outline", "pending", "renderer",
+    "upload", "frame", "outline", "pending", "renderer",
 ];
 
 /// Maximum length of a line, in characters.

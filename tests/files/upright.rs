@@ -43,7 +43,7 @@ fn shared_scans_stand() {
             let turned = |p: glam::Vec3| (turn * p.as_dvec3()).as_vec3();
             let positions = bare.positions.iter().map(|p| turned(*p)).collect();
             let mesh = Mesh { positions, triangles: bare.triangles.clone(), ..Mesh::default() };
-            let guess = mesh.guess_orientation().expect("a orientation").up;
+            let guess = mesh.guess_orientation().expect("an orientation").up;
             assert!(guess.distance(turned_up) < 1e-9, "{name} with {turned_up} up: {guess}");
         }
     }

@@ -178,7 +178,10 @@ fn add(case: &Case, settings: &Settings, is_usual: bool, variants: &mut Distinct
             [(false, Budget::default()), (true, Budget::default()), (false, stopping)]
         {
             let (scene, view, choice) = (&case.scene, &view, choice.as_ref());
-            let shows = |item: &Item| matches!(item, Item::Facets(set) if !set.texture_coordinates.is_empty());
+            let shows = |item: &Item| match item {
+                Item::Facets(set) => !set.texture_coordinates.is_empty(),
+                _ => false,
+            };
             let images = scene.items.iter().any(shows);
             variants.add(
                 case.name,

@@ -194,13 +194,13 @@ fn nearest_axis(up: DVec3) -> u8 {
     1 + (along.max_position() as u8)
 }
 
-/// Returns the rotation that turns +Y to a orientation's up and +Z to its front, as a quaternion.
+/// Returns the rotation that turns +Y to an orientation's up and +Z to its front, as a quaternion.
 fn turn_to(Orientation { up, front }: Orientation) -> [f32; 4] {
     let turn = DQuat::from_mat3(&DMat3::from_cols(up.cross(front), up, front));
     turn.normalize().to_array().map(|part| part as f32)
 }
 
-/// Returns the orientation that a quaternion turns to; `None` for zeros, which stand for no orientation.
+/// Returns the orientation that a quaternion turns to; `None` for zeros, which stand for none.
 fn turned_by(turn: [f32; 4]) -> Option<Result<Orientation, &'static str>> {
     if turn == [0.0; 4] {
         return None;
@@ -250,7 +250,7 @@ mod tests {
             assert_eq!(turned_by(turn_to(orientation)), Some(Ok(orientation)));
         }
         let orientation = Orientation::with_up(DVec3::new(0.2, -0.4, 0.9));
-        let Some(Ok(read)) = turned_by(turn_to(orientation)) else { panic!("a orientation") };
+        let Some(Ok(read)) = turned_by(turn_to(orientation)) else { panic!("an orientation") };
         assert!(
             read.up.distance(orientation.up) < 1e-6
                 && read.front.distance(orientation.front) < 1e-6

@@ -153,7 +153,7 @@ fn things_stand_as_people_know_them() {
             let is_usual = up == DVec3::Y || up == DVec3::Z;
             let may_be =
                 |guess: DVec3| guess == up || !is_usual && [DVec3::Y, DVec3::Z].contains(&guess);
-            let guess = mesh.guess_orientation().expect("a orientation").up;
+            let guess = mesh.guess_orientation().expect("an orientation").up;
             if !may_be(guess) {
                 wrong.push(format!("{name} with {up} up: {guess}"));
             }
@@ -164,7 +164,7 @@ fn things_stand_as_people_know_them() {
             // Points without triangles stand as the surface does.
             mesh.positions = mesh.spread();
             mesh.triangles.clear();
-            let guess = mesh.guess_orientation().expect("a orientation").up;
+            let guess = mesh.guess_orientation().expect("an orientation").up;
             if !may_be(guess) {
                 wrong.push(format!("points of a {name} with {up} up: {guess}"));
             }
@@ -176,7 +176,7 @@ fn things_stand_as_people_know_them() {
 #[test]
 fn a_plate_lies() {
     for (up, turn) in turns() {
-        let guess = rotated(&gear(), turn).guess_orientation().expect("a orientation").up;
+        let guess = rotated(&gear(), turn).guess_orientation().expect("an orientation").up;
         assert!(guess.dot(up).abs() > 0.999, "{up}: {guess}");
     }
 }
@@ -190,7 +190,7 @@ fn a_terrain_is_seen_from_above() {
     };
     let terrain = Mesh { positions: (0..8100).map(place).collect(), ..Mesh::default() };
     for (up, turn) in turns().filter(|(up, _)| up.min_element() >= 0.0) {
-        assert_eq!(rotated(&terrain, turn).guess_orientation().expect("a orientation").up, up);
+        assert_eq!(rotated(&terrain, turn).guess_orientation().expect("an orientation").up, up);
     }
 }
 
@@ -199,7 +199,7 @@ fn a_few_points_far_away_do_not_turn_a_shape() {
     let mut mesh = Mesh { positions: bottle().spread(), ..Mesh::default() };
     let count = mesh.positions.len();
     mesh.positions.extend((0..count / 1500).map(|n| Vec3::new(40.0, 3.0 * n as f32, -9.0)));
-    assert_eq!(mesh.guess_orientation().expect("a orientation").up, DVec3::Z);
+    assert_eq!(mesh.guess_orientation().expect("an orientation").up, DVec3::Z);
 }
 
 #[test]

@@ -23,7 +23,7 @@ const UNSIGNED_SHORT: u32 = 5123;
 const ARRAY_BUFFER: u32 = 34962;
 
 /// Writes Gaussians as a GLB with the extension `KHR_gaussian_splatting`. Positions are relative to
-/// the origin, which is the translation of the node. A scene with a orientation stands upright in
+/// the origin, which is the translation of the node. A scene with an orientation stands upright in
 /// viewers: a node turns it, without which −y would be up in scenes of trainers. Programs without
 /// the extension show points with the constant part of the colours.
 ///

@@ -27,9 +27,8 @@ pub fn table(gpu: &Gpu, progress: &Progress) -> Result<Table, Failure> {
     let mut table = Table::new(
         "Changes.",
         format!(
-            "{ITEMS} items of {count} surfels, {}×{} pixels: medians of {TIMES} in ms, each with the \
-             picture after it beside a picture without a change, and the megabytes that the device \
-             gets.",
+            "{ITEMS} items of {count} surfels, {}×{} pixels: medians of {TIMES} in ms, each with \
+             the picture after it, and the megabytes that the device gets.",
             SIZE[0], SIZE[1]
         ),
         &["change", "GPU engine", "its MB", "CPU engine"],
@@ -53,7 +52,7 @@ pub fn table(gpu: &Gpu, progress: &Progress) -> Result<Table, Failure> {
 }
 
 /// Returns an item of its own splats, so that nothing is shared.
-fn surfels_of(set: &Arc<splatkit::splat::SplatSet>) -> impl Fn(usize) -> Item {
+fn surfels_of(set: &Arc<splatkit::splat::Surfels>) -> impl Fn(usize) -> Item {
     let set = set.clone();
     move |_| Item::Radiance(Arc::new((*set).clone()))
 }
