@@ -13,7 +13,7 @@ from ._errors import Error
 
 #: The wanted time of a moving frame, in milliseconds. With what encoding takes, and the browser
 #: beside the kernel, there are then twenty frames a second or more.
-MOVING = 30.0
+MOVING = 25.0
 #: A view that changed less than so many seconds ago may still move: it is not refined yet.
 CALM = 0.12
 #: The effort of the exact picture.
