@@ -25,7 +25,8 @@ use std::{
 /// # Ok::<(), splatkit::Error>(())
 /// ```
 ///
-/// A map may also be a list of colours at even distances: `ColorMap::named("black, #ff8800, white")`.
+/// A map may also be a list of colours at even distances:
+/// `ColorMap::named("black, #ff8800, white")`.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(into = "String")]
 pub struct ColorMap {
