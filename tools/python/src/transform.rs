@@ -36,14 +36,14 @@ pub fn moved(py: Python<'_>, before: &str, further: &str) -> PyResult<String> {
     let text = || -> Result<String, Error> {
         let (before, further): (TransformEntry, Move) = (options(before)?, options(further)?);
         let Move { scale, rotate, translate, matrix } = further;
-        let own = TransformEntry { scale, rotate, translate };
-        own.validate()?;
+        let step = TransformEntry { scale, rotate, translate };
+        step.validate()?;
         // A first move keeps its numbers.
         let after = match matrix {
-            None if before == TransformEntry::default() => own,
-            None => Similarity::of(&own).after(&Similarity::of(&before)).entry(),
+            None if before == TransformEntry::default() => step,
+            None => Similarity::of(&step).after(&Similarity::of(&before)).entry(),
             Some(rows) => {
-                let whole = Similarity::of(&own).after(&Similarity::of_matrix(rows)?);
+                let whole = Similarity::of(&step).after(&Similarity::of_matrix(rows)?);
                 whole.after(&Similarity::of(&before)).entry()
             }
         };

@@ -70,8 +70,8 @@ def test_a_program_of_twenty_calls_is_well_typed(tmp_path):
     status, said = checked(tmp_path, head + "\n".join(WRONG) + "\n")
     lines = said.splitlines()
     for number, name in enumerate(WRONG.values(), 3):
-        found = [line for line in lines if f"script.py:{number}: error" in line]
-        assert found and any(name in line for line in found), said
+        errors = [line for line in lines if f"script.py:{number}: error" in line]
+        assert errors and any(name in line for line in errors), said
     assert status == 1
 
 

@@ -197,8 +197,8 @@ def _plain_points(given: Arguments) -> Arguments:
 
 def _plain_surface(surface: _neighbours.Surface, given: Arguments, method: str) -> Arguments:
     """Returns the arrays of a surface, and how it looks."""
-    own = (given.pop(name, None) for name in ("normals", "colors", "values"))
-    surface = surface.with_given(*own)
+    replacements = (given.pop(name, None) for name in ("normals", "colors", "values"))
+    surface = surface.with_given(*replacements)
     up = _options.direction(given.pop("up", None))
     appearance = _options.checked(given, _options.SURFACE, method)
     faces, normals, colors = surface.faces, surface.normals, surface.colors
