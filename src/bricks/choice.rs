@@ -47,8 +47,9 @@ const STEPS: f64 = 16.0;
 
 /// Chooses the levels whose step between samples covers [`Wish::pixels`] pixels where the volume is
 /// nearest to the eye. Of these levels it chooses the bricks that are in the picture and hold
-/// values that show according to `first_visible` ([`Choice::first_visible`]). `extent` is the kernel's, in
-/// samples of the drawn level. Of a region, it chooses the bricks that the region needs.
+/// values that show according to `first_visible` ([`Choice::first_visible`]). `extent` is the
+/// kernel's, in samples of the drawn level. Of a region, it chooses the bricks that the region
+/// needs.
 ///
 /// The level is a real number λ = log₂(`pixels` / p), at least [`Wish::least`] and at most the
 /// coarsest level. Here p is the size in pixels of the longest step of level 0 at the point of the

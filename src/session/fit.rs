@@ -10,9 +10,9 @@ use crate::{
 
 impl Camera {
     /// Returns the camera that shows the whole of a scene in a picture of `size` pixels (width,
-    /// height): from the front, a little from the right and from above, close enough for what is
-    /// seen to fill the picture. It is the camera of `splatkit render`, if the items say which way
-    /// is up; a mesh that a program adds does not, and stands with +y up.
+    /// height). It looks from the front, a little from the right and from above, and what is seen
+    /// fills the picture. This is the camera of `splatkit render` if the items say which way is up.
+    /// A mesh that a program adds does not, and stands with +y up.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) for a scene that no camera can hold. Errors of

@@ -24,6 +24,9 @@ fn threads_change_nothing() {
 }
 
 #[test]
-fn scenes_without_anything_are_refused() {
-    assert!(CpuRenderer::new(&Scene::new()).is_err());
+fn scenes_without_anything_are_not_drawn() {
+    let case = scenes::ellipsoids_in_perspective();
+    let mut renderer = CpuRenderer::new(&Scene::new()).unwrap();
+    let drawn = renderer.render(&case.camera, &case.settings);
+    assert!(matches!(drawn, Err(splatkit::Error::NothingToDraw(_))));
 }
