@@ -52,12 +52,12 @@ mod tests {
         let volume = Phantom::Ball.sample_bytes([12; 3]).unwrap();
         let transfer = TransferFunction::automatic(&volume);
         let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
-        assert_eq!(Camera::fit(&scene, [40, 30]).unwrap().view_up, DVec3::Z);
+        let is_up = |scene: &Scene, axis: DVec3| {
+            Camera::fit(scene, [40, 30]).unwrap().view_up.dot(axis) > 0.9
+        };
+        assert!(is_up(&scene, DVec3::Z));
         let ball = Mesh::sphere(2).surfels(&SurfelOptions::default()).unwrap();
-        assert_eq!(
-            Camera::fit(&Scene::new().with_splats(ball), [40, 30]).unwrap().view_up,
-            DVec3::Y
-        );
+        assert!(is_up(&Scene::new().with_splats(ball), DVec3::Y));
     }
 
     #[test]

@@ -173,7 +173,7 @@ fn mirrors() -> BTreeMap<&'static str, Layout> {
         // WGSL pads the end of a structure by itself, and has no three numbers without alignment.
         ("Bounds", layout!(GpuBounds: center, radius, size, unused).without_padding("unused")),
         ("Cut", cut),
-        ("Present", present.without_padding("unused")),
+        ("Present", present),
     ]
     .into()
 }
