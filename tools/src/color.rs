@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 #[command(next_help_heading = "Appearance")]
 pub struct ColorFlags {
     /// Colour values by this map: viridis, inferno, magma, plasma, cividis, turbo, coolwarm, gray,
-    /// hot, jet, twilight, blues or classes. NAME_r is reversed. Of volumes and samples, the
-    /// opacity stays that of the transfer function [default: viridis for surfaces, the transfer
-    /// function's colours for volumes]
-    #[arg(long, value_name = "NAME", value_parser = map)]
+    /// hot, jet, twilight, blues or classes, or a list of colours such as black,#ff8800,white.
+    /// NAME_r is reversed. Of volumes and samples, the opacity stays that of the transfer function
+    /// [default: viridis for surfaces, the transfer function's colours for volumes]
+    #[arg(long, value_name = "NAME|COLORS", value_parser = map)]
     colormap: Option<ColorMap>,
     /// Colour meshes and point clouds by an attribute of the file (intensity, classification,
     /// confidence, …), by values (those of --scalar), height or normal, or in one colour. file
