@@ -5,7 +5,7 @@ use super::{
     plan::Plan,
     scatter::{OpenTile, Window},
     sums::{Sums, WINDOW},
-    vector::{Lanes, exp, three},
+    vector::{Lanes, each, exp, three},
 };
 use crate::facet::NEARER;
 use fearless_simd::{Simd, mask32x8, prelude::*};
@@ -52,7 +52,7 @@ impl<S: Simd> OpenTile<'_, S> {
         let Covered { share, seen, distance, color, covers, side } = *covered;
         let none = Lanes::splat(simd, 0.0);
         for offset in usize::from(window.is_continued)..WINDOW {
-            let [front, back] = [0, 1].map(|next| plan.planes[window.front + offset + next]);
+            let [front, back] = each!([0, 1], NEXT => plan.planes[window.front + offset + NEXT]);
             let mut inside: mask32x8<S> = distance.simd_lt(back) & covers;
             if offset > 0 {
                 inside &= distance.simd_ge(front);
@@ -60,7 +60,7 @@ impl<S: Simd> OpenTile<'_, S> {
             if !inside.any_true() {
                 continue;
             }
-            let [share, seen] = [share, seen].map(|value| inside.select(value, none));
+            let (share, seen) = (inside.select(share, none), inside.select(seen, none));
             let pixel = if plan.view.perspective { front.max(1e-30) } else { 1.0 };
             let per_pixel = NEARER as f32 * plan.frame.scale / pixel;
             let behind =

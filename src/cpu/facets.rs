@@ -1,163 +1,17 @@
-//! Facets: the pixels and sheets that they cover, and their shares of pixels
-//! (shaders/shared/facets.wgsl).
+//! The shares of pixels that facets fill (shaders/shared/facets.wgsl).
 
 use super::{
     close::Packet,
     covered::{Covered, LEAST_SHARE, Side},
-    footprint::{Kind, Record},
+    footprint::Record,
     plan::Plan,
-    rods,
     scatter::{OpenTile, Window, is_kept},
     sums::{Sums, WINDOW},
-    vector::{Lanes, three},
+    vector::{Lanes, dot_with, three},
 };
-use crate::{
-    facet::{FacetSet, Image, Sides},
-    math::View,
-    plan::source::Source,
-    scene::Settings,
-    splat::{NO_NORMAL, decode_normal, encode_normal},
-};
+use crate::{facet::Image, splat::decode_normal};
 use fearless_simd::{Simd, mask32x8, prelude::*};
 use glam::{Vec2, Vec3};
-use std::sync::Arc;
-
-/// `extent2` of the record of a facet that ends at the clips already.
-const CUT: f32 = 1.0;
-
-/// Facets of a set in a view.
-pub struct FacetProjector<'a> {
-    plan: &'a Plan<'a>,
-    set: &'a FacetSet,
-    /// One more than the place of the set among those with images; 0 without.
-    images: u32,
-    source: Source,
-    is_culled: bool,
-}
-
-impl<'a> FacetProjector<'a> {
-    /// `view` is the plan's as it is from the set.
-    pub fn new(
-        plan: &'a Plan<'a>,
-        view: &View,
-        set: &'a Arc<FacetSet>,
-        settings: &Settings,
-    ) -> Self {
-        let is_culled = settings.culls(set.sides == Sides::Closed, &set.bounds(), view);
-        let source = Source::of_radiance(view, set.origin, 0.0);
-        let place = plan.with_images.iter().position(|other| Arc::ptr_eq(other, set));
-        let images = place.map_or(0, |place| place as u32 + 1);
-        Self { plan, set, images, source, is_culled }
-    }
-
-    /// Returns the record of a facet, or `None` if it meets no pixel or no sheet, or faces away and
-    /// its back is never seen.
-    pub fn record(&self, number: usize) -> Option<Record> {
-        let (plan, facet) = (self.plan, &self.set.facets[number]);
-        let Source { to_view, origin, .. } = self.source;
-        if facet.is_rod() {
-            return rods::record(plan, facet, to_view, origin);
-        }
-        let corners = facet.corners.map(|corner| to_view * Vec3::from(corner) + origin);
-        let [a, b, c] = corners;
-        let across = (b - a).cross(c - a);
-        let away = if plan.view.perspective { across.dot(a) } else { across.z };
-        if self.is_culled && away >= 0.0 {
-            return None;
-        }
-        let pixels = pixels(plan, corners)?;
-        let sheets = sheets(plan, corners)?;
-        // On a set that winds in any way, all facets count as fronts.
-        let is_front = away < 0.0 || self.set.sides == Sides::Mixed;
-        let normals = facet.normals.map(|normal| {
-            let turned = decode_normal(normal).map(|normal| encode_normal(to_view * normal));
-            f32::from_bits(turned.unwrap_or(NO_NORMAL))
-        });
-        let colors = facet.colors.map(f32::from_bits);
-        Some(Record {
-            center: a.to_array(),
-            strength: if is_front { 1.0 } else { -1.0 },
-            whitening: [b.x, b.y, b.z, c.x, c.y, c.z],
-            extent2: if self.set.whole.is_some() { CUT } else { 0.0 },
-            kind: Kind::Facet,
-            payload: [
-                normals[0],
-                normals[1],
-                normals[2],
-                colors[0],
-                colors[1],
-                colors[2],
-                f32::from_bits(self.images),
-                f32::from_bits(number as u32),
-            ],
-            pixels,
-            sheets,
-            field: self.plan.number,
-        })
-    }
-}
-
-/// Returns the first and the last pixel that a facet may cover in part.
-fn pixels(plan: &Plan, corners: [Vec3; 3]) -> Option<[[i32; 2]; 2]> {
-    let frame = &plan.frame;
-    let (low, high) = if plan.view.perspective && corners.iter().any(|p| p.z <= frame.z_near) {
-        let (low, high) = around(corners);
-        if high.z <= frame.z_near {
-            return None;
-        }
-        // Bounds of x/z over the part of the box beyond the nearest visible z.
-        let z = [frame.z_near.max(low.z), high.z];
-        let least = |v: f32| v / if v < 0.0 { z[0] } else { z[1] };
-        let most = |v: f32| v / if v < 0.0 { z[1] } else { z[0] };
-        (Vec2::new(least(low.x), least(low.y)), Vec2::new(most(high.x), most(high.y)))
-    } else {
-        let places =
-            corners.map(|p| if plan.view.perspective { p.truncate() / p.z } else { p.truncate() });
-        let [a, b, c] = places;
-        (a.min(b).min(c), a.max(b).max(c))
-    };
-    let apron = plan.apron() as f32;
-    let mut pixels = [[0; 2]; 2];
-    for axis in 0..2 {
-        let limit = frame.size[axis] as f32 + apron;
-        let first = low[axis] * frame.scale + frame.center[axis] - 0.01;
-        let last = high[axis] * frame.scale + frame.center[axis] + 0.01;
-        let first = first.clamp(-apron, limit).floor();
-        let last = last.clamp(-apron - 1.0, limit - 1.0).floor();
-        // NaN fails.
-        let is_some = first <= last;
-        if !is_some {
-            return None;
-        }
-        (pixels[0][axis], pixels[1][axis]) = (first as i32, last as i32);
-    }
-    Some(pixels)
-}
-
-fn around([a, b, c]: [Vec3; 3]) -> (Vec3, Vec3) {
-    (a.min(b).min(c), a.max(b).max(c))
-}
-
-/// Returns the first and the last sheet that a facet may meet.
-fn sheets(plan: &Plan, corners: [Vec3; 3]) -> Option<[u16; 2]> {
-    let [mut near, mut far] = [f32::INFINITY, f32::NEG_INFINITY];
-    if plan.view.perspective {
-        let center = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let reach = corners.iter().map(|p| p.distance(center)).fold(0.0, f32::max);
-        let distance = center.length();
-        // A pixel's ray is up to a pixel beside the facet.
-        (near, far) = (distance - reach, distance + reach);
-        let pixel = far / plan.frame.scale;
-        (near, far) = (near - pixel, far + pixel);
-    } else {
-        for corner in corners {
-            (near, far) = (near.min(corner.z), far.max(corner.z));
-        }
-    }
-    // NaN fails.
-    let meets = far >= plan.planes[1] && near < plan.planes[plan.sheets + 1];
-    meets.then(|| [plan.sheet_of(near) as u16, plan.sheet_of(far).max(1) as u16])
-}
 
 /// A facet on its way to the pixels of a tile.
 struct DrawnFacet<'a> {
@@ -168,8 +22,12 @@ struct DrawnFacet<'a> {
     places: Option<[Vec2; 3]>,
     /// One over the corners' z in perspective; 1 otherwise.
     nearness: [f32; 3],
-    normals: [Vec3; 3],
+    /// The distances along the view's axis, the normals and the colours of the corners: corner by
+    /// corner, for each axis and channel.
+    z: [f32; 3],
+    normals: [[f32; 3]; 3],
     colors: [[f32; 3]; 3],
+    has_normals: bool,
     is_front: bool,
     /// Whether the facet ends at the clips already.
     is_cut: bool,
@@ -235,20 +93,17 @@ impl<'a> DrawnFacet<'a> {
         let corners = [Vec3::from(record.center), Vec3::new(bx, by, bz), Vec3::new(cx, cy, cz)];
         let frame = &plan.frame;
         let center = Vec2::from(frame.center);
-        let is_before = !plan.view.perspective || corners.iter().all(|p| p.z > frame.z_near);
-        let nearness = corners.map(|p| if plan.view.perspective { 1.0 / p.z } else { 1.0 });
-        let places = is_before.then(|| {
-            [0, 1, 2].map(|i| center + corners[i].truncate() * (frame.scale * nearness[i]))
-        });
-        let unpack = |bits: f32| {
-            let [red, green, blue, _] = bits.to_bits().to_le_bytes();
-            [red, green, blue].map(|part| f32::from(part) * (1.0 / 255.0))
-        };
-        let [a, b, c, d, e, f, images, number] = record.payload;
+        let (is_perspective, z_near) = (plan.view.perspective, frame.z_near);
+        let z: [f32; 3] = three!(I => corners[I].z);
+        let is_before = !is_perspective || (z[0] > z_near && z[1] > z_near && z[2] > z_near);
+        let nearness: [f32; 3] = three!(I => if is_perspective { 1.0 / z[I] } else { 1.0 });
+        let places = is_before
+            .then_some(three!(I => center + corners[I].truncate() * (frame.scale * nearness[I])));
         let [p, q, r] = corners;
         let across = (q - p).cross(r - p);
-        let away = if plan.view.perspective { across.dot(p) } else { across.z };
+        let away = if is_perspective { across.dot(p) } else { across.z };
         let turn = if away < 0.0 { -1.0 } else { 1.0 };
+        let [.., images, number] = record.payload;
         let set = (images.to_bits() as usize).checked_sub(1).map(|set| &plan.with_images[set]);
         let image = set.and_then(|set| set.image_of(number.to_bits() as usize));
         let image = image.map(|(image, places)| {
@@ -256,13 +111,21 @@ impl<'a> DrawnFacet<'a> {
                 linear_weights(plan, corners).map(|part| part.map(|weight| weight * turn));
             Mapped { image, weights, places }
         });
+        let normals: [Vec3; 3] = if plan.lit_surfaces {
+            three!(I => decode_normal(record.payload[I].to_bits()).unwrap_or(Vec3::ZERO))
+        } else {
+            [Vec3::ZERO; 3]
+        };
+        let colors: [[u8; 4]; 3] = three!(I => record.payload[3 + I].to_bits().to_le_bytes());
         Self {
             image,
             corners,
             places,
             nearness,
-            normals: [a, b, c].map(|bits| decode_normal(bits.to_bits()).unwrap_or(Vec3::ZERO)),
-            colors: [d, e, f].map(unpack),
+            z,
+            normals: three!(J => three!(I => normals[I][J])),
+            colors: three!(J => three!(I => f32::from(colors[I][J]) * (1.0 / 255.0))),
+            has_normals: normals != [Vec3::ZERO; 3],
             is_front: record.strength > 0.0,
             is_cut: record.extent2 > 0.0,
             turn,
@@ -380,13 +243,11 @@ impl<S: Simd> OpenTile<'_, S> {
         if !covers.any_true() {
             return;
         }
-        let of =
-            |parts: [f32; 3]| weights[0] * parts[0] + weights[1] * parts[1] + weights[2] * parts[2];
-        let distance = of(facet.corners.map(|corner| corner.z)) / rays.cosine;
+        let distance = dot_with(facet.z, weights) / rays.cosine;
         if plan.has_clips() && !facet.is_cut {
             covers &= is_kept(plan, rays, distance);
         }
-        let mut color = three!(I => of(facet.colors.map(|color| color[I])));
+        let mut color = three!(I => dot_with(facet.colors[I], weights));
         if let Some(image) = &facet.image {
             // Only what lies in this window is needed.
             covers &= distance.simd_lt(plan.planes[window.front + WINDOW]);
@@ -401,19 +262,17 @@ impl<S: Simd> OpenTile<'_, S> {
                 return;
             }
         }
-        if plan.lit_surfaces {
-            let normal = three!(I => of(facet.normals.map(|normal| normal[I])));
-            // Facets without normals keep their colours.
-            if facet.normals != [Vec3::ZERO; 3] {
-                color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
-            }
+        // Facets without normals keep their colours.
+        if plan.lit_surfaces && facet.has_normals {
+            let normal = three!(I => dot_with(facet.normals[I], weights));
+            color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
         }
         let side = if facet.is_front { Side::Front } else { Side::Back };
         let covered = Covered { share, seen: seen_share, distance, color, covers, side };
         Self::add_covered(simd, plan, &covered, window, packet, sums);
     }
 
-    /// Adds a facet's window to all packets that it meets.
+    /// Adds a facet's window to the packets that it meets, given as bits.
     #[inline(always)]
     pub fn add_facet(
         &mut self,
@@ -421,11 +280,12 @@ impl<S: Simd> OpenTile<'_, S> {
         plan: &Plan,
         record: &Record,
         window: Window,
-        packets: impl Iterator<Item = usize>,
+        mut packets: u8,
     ) {
         let facet = DrawnFacet::new(plan, record);
-        for number in packets {
-            let packet = &self.packets[number];
+        while packets != 0 {
+            let packet = &self.packets[packets.trailing_zeros() as usize];
+            packets &= packets - 1;
             if !packet.is_done || plan.central {
                 Self::add_facet_to(simd, plan, &facet, window, packet, &mut self.sums);
             }

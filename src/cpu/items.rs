@@ -3,11 +3,11 @@
 use super::{
     bins::BATCH,
     brick_cache::{BESIDE, BrickCache, SLOT, SLOT_SIDE},
-    facets::FacetProjector,
     footprint::{Candidate, Carried, Record, counted, record, widened},
     page_cache::PageCache,
     plan::{FieldOutline, Outline, Plan},
     project::Projector,
+    project_facets::FacetProjector,
     spare::{Spare, spare_for},
     vector::lanes,
 };
@@ -228,8 +228,7 @@ fn facets(
 ) -> Vec<Vec<Record>> {
     let projector = FacetProjector::new(plan, view, set, settings);
     batches(&set.facets, spare, |first, batch, records| {
-        let numbers = first..first + batch.len();
-        records.extend(numbers.filter_map(|number| projector.record(number)));
+        lanes!(Level::new(), simd => projector.add(simd, first, batch, records));
     })
 }
 

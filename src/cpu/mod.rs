@@ -51,6 +51,7 @@ mod nodes;
 mod page_cache;
 mod plan;
 mod project;
+mod project_facets;
 mod radial;
 mod rays;
 mod rectilinear;

@@ -126,7 +126,7 @@ impl<'a> Projector<'a> {
         let payload: [[f32; 8]; 7] = each!([0, 1, 2, 3, 4, 5, 6], I => payload[I].into());
         let center: [[f32; 8]; 3] = three!(I => splats.center[I].into());
         let whitening: [[f32; 8]; 6] = each!([0, 1, 2, 3, 4, 5], I => whitening[I].into());
-        let sheets = [self.sheets_of(simd, near), self.sheets_of(simd, far)];
+        let sheets = [sheets_of(self.plan, simd, near), sheets_of(self.plan, simd, far)];
         let [[left, top], [right, bottom]]: [[[i32; 8]; 2]; 2] =
             each!([0, 1], I => each!([0, 1], J => i32x8::truncate_from(pixels[I][J]).into()));
         records.reserve(8);
@@ -373,37 +373,36 @@ impl<'a> Projector<'a> {
         }
         (pixels, has_pixels)
     }
+}
 
-    /// Returns the sheets that contain distances.
-    #[inline(always)]
-    fn sheets_of<S: Simd>(&self, simd: S, distance: Lanes<S>) -> [u16; 8] {
-        let plan = self.plan;
-        let frame = &plan.frame;
-        let one = Lanes::splat(simd, 1.0);
-        let near = plan.planes[1];
-        let geometric = frame.geometric_sheets as usize;
-        let turn = plan.planes[1 + geometric];
-        let log = log2(simd, (distance * (1.0 / near)).max(one)) * frame.per_ratio_log2;
-        let even = (distance - turn) * frame.per_step + geometric as f32;
-        let estimate = distance.simd_lt(turn).select(log, even).floor() + 1.0;
-        let estimate = estimate.max(one).min(Lanes::splat(simd, plan.sheets as f32));
-        let [distances, estimates]: [[f32; 8]; 2] = [distance.into(), estimate.into()];
-        let mut sheets = [0; 8];
-        for ((sheet, estimate), distance) in sheets.iter_mut().zip(estimates).zip(distances) {
-            let mut number = (estimate as usize).min(plan.sheets);
-            // The closed form may be off by one or two where rounding meets a plane. The list
-            // decides.
-            for _ in 0..2 {
-                if distance < plan.planes[number] {
-                    number -= 1;
-                } else if distance >= plan.planes[number + 1] && number < plan.sheets {
-                    number += 1;
-                }
+/// Returns the sheets that contain distances.
+#[inline(always)]
+pub fn sheets_of<S: Simd>(plan: &Plan, simd: S, distance: Lanes<S>) -> [u16; 8] {
+    let frame = &plan.frame;
+    let one = Lanes::splat(simd, 1.0);
+    let near = plan.planes[1];
+    let geometric = frame.geometric_sheets as usize;
+    let turn = plan.planes[1 + geometric];
+    let log = log2(simd, (distance * (1.0 / near)).max(one)) * frame.per_ratio_log2;
+    let even = (distance - turn) * frame.per_step + geometric as f32;
+    let estimate = distance.simd_lt(turn).select(log, even).floor() + 1.0;
+    let estimate = estimate.max(one).min(Lanes::splat(simd, plan.sheets as f32));
+    let [distances, estimates]: [[f32; 8]; 2] = [distance.into(), estimate.into()];
+    let mut sheets = [0; 8];
+    for ((sheet, estimate), distance) in sheets.iter_mut().zip(estimates).zip(distances) {
+        let mut number = (estimate as usize).min(plan.sheets);
+        // The closed form may be off by one or two where rounding meets a plane. The list
+        // decides.
+        for _ in 0..2 {
+            if distance < plan.planes[number] {
+                number -= 1;
+            } else if distance >= plan.planes[number + 1] && number < plan.sheets {
+                number += 1;
             }
-            *sheet = number as u16;
         }
-        sheets
+        *sheet = number as u16;
     }
+    sheets
 }
 
 /// The whitening M = L⁻¹ of covariances L·Lᵀ: m00, m10, m20, m11, m21, m22.

@@ -284,7 +284,7 @@ impl<S: Simd> OpenTile<'_, S> {
         Self::add_covered(simd, plan, &covered, window, packet, sums);
     }
 
-    /// Adds a rod's window to all packets that it meets.
+    /// Adds a rod's window to the packets that it meets, given as bits.
     #[inline(always)]
     pub fn add_rod(
         &mut self,
@@ -292,11 +292,12 @@ impl<S: Simd> OpenTile<'_, S> {
         plan: &Plan,
         record: &Record,
         window: Window,
-        packets: impl Iterator<Item = usize>,
+        mut packets: u8,
     ) {
         let rod = DrawnRod::new(record);
-        for number in packets {
-            let packet = &self.packets[number];
+        while packets != 0 {
+            let packet = &self.packets[packets.trailing_zeros() as usize];
+            packets &= packets - 1;
             if !packet.is_done || plan.central {
                 Self::add_rod_to(simd, plan, &rod, window, packet, &mut self.sums);
             }

@@ -448,13 +448,12 @@ impl<S: Simd> OpenTile<'_, S> {
     #[inline(always)]
     pub fn add(&mut self, simd: S, plan: &Plan, record: &Record, window: Window) {
         let [first, last] = record.pixels;
-        let inside = |pixel: [i32; 2]| [0, 1].map(|axis| pixel[axis] - self.corner[axis]);
-        let from = inside(first).map(|at| at.max(0) as usize);
-        let to = inside(last).map(|at| at.min(TILE as i32 - 1) as usize);
+        let from = each!([0, 1], AXIS => (first[AXIS] - self.corner[AXIS]).max(0) as usize);
+        let to = each!([0, 1], AXIS => {
+            (last[AXIS] - self.corner[AXIS]).min(TILE as i32 - 1) as usize
+        });
         if matches!(record.kind, Kind::Facet | Kind::Rod) {
-            let rows = from[1] / HIGH..=to[1] / HIGH;
-            let columns = from[0] / WIDE..=to[0] / WIDE;
-            let packets = rows.flat_map(|row| columns.clone().map(move |column| row * 2 + column));
+            let packets = packets_between(from, to);
             match record.kind {
                 Kind::Rod => self.add_rod(simd, plan, record, window, packets),
                 _ => self.add_facet(simd, plan, record, window, packets),
@@ -479,6 +478,18 @@ impl<S: Simd> OpenTile<'_, S> {
             }
         }
     }
+}
+
+/// Returns the packets of a tile that a box of pixels meets, as bits.
+#[inline(always)]
+fn packets_between(from: [usize; 2], to: [usize; 2]) -> u8 {
+    // Two packets stand in a row: a bit and the next one.
+    let row = (u8::from(from[0] < WIDE)) | (u8::from(to[0] >= WIDE) << 1);
+    let mut packets = 0;
+    for number in from[1] / HIGH..=to[1] / HIGH {
+        packets |= row << (2 * number);
+    }
+    packets
 }
 
 /// Returns the number of a window's planes that its splat reaches. That is one more than its last

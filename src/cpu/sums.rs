@@ -87,7 +87,8 @@ impl<S: Simd> Cover<S> {
 
 /// The sums of splats that carry their own colour.
 pub struct Sums<S: Simd> {
-    pub radiance: [[Radiance<S>; PACKETS]; WINDOW],
+    /// Empty in a picture without radiance.
+    pub radiance: Vec<[Radiance<S>; PACKETS]>,
     /// The packets that have radiance, as bits.
     pub has_radiance: [u8; WINDOW],
     /// Empty in a scene without facets.
@@ -133,8 +134,10 @@ impl<S: Simd> Sums<S> {
     pub fn new(simd: S, plan: &Plan) -> Self {
         let none = Lanes::splat(simd, 0.0);
         let no_facets = [FacetSums::none(none); PACKETS];
+        let no_radiance = [[none; 8]; PACKETS];
+        let has_radiance = plan.has_radiance || plan.is_classified;
         Self {
-            radiance: [[[none; 8]; PACKETS]; WINDOW],
+            radiance: if has_radiance { vec![no_radiance; WINDOW] } else { Vec::new() },
             has_radiance: [0; WINDOW],
             facets: if plan.has_facets { vec![no_facets; WINDOW] } else { Vec::new() },
             has_seen: !plan.with_images.is_empty() || plan.has_rods,
@@ -230,7 +233,11 @@ impl<S: Simd> Sums<S> {
             self.has_radiance[slot] = 0;
         }
         if self.has_facets[slot] != 0 {
-            self.facets[slot] = [FacetSums::none(self.none); PACKETS];
+            for (packet, sums) in self.facets[slot].iter_mut().enumerate() {
+                if self.has_facets[slot] & (1 << packet) != 0 {
+                    *sums = FacetSums::none(self.none);
+                }
+            }
             self.has_facets[slot] = 0;
         }
     }
