@@ -68,11 +68,14 @@
 //!
 //! # Features
 //!
-//! Cargo features leave out what a program does not need. These are `gpu` and its backends
-//! `vulkan`, `metal`, `dx12` and `webgpu`, and the formats `ply`, `obj`, `gltf`, `las`, `e57`,
-//! `vtk` and `dicom`. Others are `files` larger than memory, `remote` inputs, `rayon` and
-//! `reference`. All are on by default except `webgpu` and `remote`. docs/library.md says what each
-//! brings.
+//! Cargo features leave out what a program does not need:
+//!
+//! - `gpu`, and its backends `vulkan`, `metal`, `dx12` and `webgpu`;
+//! - the formats `ply`, `obj`, `gltf`, `las`, `e57`, `vtk`, `dicom`, `tiff`, `npz`, `sog` and
+//!   `hdf5`;
+//! - `files` larger than memory, `remote` inputs, `rayon` and `reference`.
+//!
+//! All are on by default except `webgpu` and `remote`. docs/library.md says what each brings.
 //!
 //! # Units and frames
 //!

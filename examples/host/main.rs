@@ -1,9 +1,10 @@
 //! A host application with its own device, camera and triangles, and splatkit's frame among them:
 //! `cargo run --release --example host`, or `… host cpu` for the CPU engine. Writes host.png.
 //!
-//! frame.rs shows how splatkit is embedded, triangles.rs is the host's own drawing.
+//! frame.rs shows how splatkit is embedded; target.rs and triangles.rs are the host's own drawing.
 
 mod frame;
+mod target;
 mod triangles;
 
 use frame::Host;

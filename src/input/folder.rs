@@ -112,13 +112,13 @@ mod tests {
         let inside = folder.path("study");
         fs::create_dir(&inside).unwrap();
         folder.write("outside", "bytes");
-        folder.write("study/own", "bytes");
+        folder.write("study/local", "bytes");
         symlink(folder.path("outside"), inside.join("out")).unwrap();
-        symlink("own", inside.join("in")).unwrap();
+        symlink("local", inside.join("in")).unwrap();
         symlink("..", inside.join("up")).unwrap();
         symlink("/dev/zero", inside.join("zero")).unwrap();
         let limits = Limits::default();
         let source = Source::open_any(&inside, &limits).unwrap();
-        assert_eq!(source.folder(), Some(&[inside.join("in"), inside.join("own")][..]));
+        assert_eq!(source.folder(), Some(&[inside.join("in"), inside.join("local")][..]));
     }
 }

@@ -163,8 +163,8 @@ mod tests {
             let view = View { center: DVec2::new(-100.25, 501.0), ..camera(projection) };
             let clip = view.clip_from_world(0.5, 20.0);
             let rigid = DMat4::from_mat3(view.rotation) * DMat4::from_translation(-view.position);
-            let found = View::from_matrices(rigid, clip * rigid.inverse(), view.size).unwrap();
-            is_near(&found, &view);
+            let again = View::from_matrices(rigid, clip * rigid.inverse(), view.size).unwrap();
+            is_near(&again, &view);
         }
     }
 

@@ -172,9 +172,9 @@ mod tests {
     #[test]
     fn matrices_that_are_no_motion_are_refused() {
         let rigid = DMat4::from_rotation_translation(pose().rotation, pose().translation);
-        let found = Pose::from_matrix(rigid).unwrap();
-        assert!(found.apply(DVec3::X).abs_diff_eq(pose().apply(DVec3::X), 1e-12));
-        assert!(found.after(&found.inverse()).translation.length() < 1e-12);
+        let again = Pose::from_matrix(rigid).unwrap();
+        assert!(again.apply(DVec3::X).abs_diff_eq(pose().apply(DVec3::X), 1e-12));
+        assert!(again.after(&again.inverse()).translation.length() < 1e-12);
         for wrong in [
             DMat4::from_scale(DVec3::splat(2.0)),
             DMat4::NAN,

@@ -115,11 +115,11 @@ impl Renderer {
             }
             (Some(Hidden { scene, parked }), true) => {
                 let kept = scene.clone();
-                let shown = self.show(place, scene, parked);
-                if shown.is_err() {
+                let result = self.show(place, scene, parked);
+                if result.is_err() {
                     self.slots[place].hidden = Some(Hidden { scene: kept, parked: None });
                 }
-                shown
+                result
             }
             (hidden, _) => {
                 self.slots[place].hidden = hidden;

@@ -1,4 +1,5 @@
-//! Comments are short: sentences and paragraphs that can be understood at first reading.
+//! Comments and documents are short: sentences and paragraphs that can be understood at first
+//! reading.
 
 use crate::house::{files, root};
 use std::{fs, path::Path};
@@ -100,7 +101,7 @@ fn words(text: &str) -> Vec<usize> {
     for word in plain.split_whitespace() {
         let place = sentences.len() - 1;
         sentences[place] += usize::from(word.contains(char::is_alphanumeric));
-        if word.trim_end_matches([')', '"', '”', ']']).ends_with(['.', '!', '?']) {
+        if word.trim_end_matches([')', '"', '”', ']', '*']).ends_with(['.', '!', '?']) {
             sentences.push(0);
         }
     }
@@ -136,6 +137,60 @@ fn comments_are_short() {
         "sentences have at most {SENTENCE} words, and paragraphs {PARAGRAPH}:\n{}",
         long.join("\n")
     );
+}
+
+/// Returns the paragraphs of a document, each with its first line. Code, tables, headings and what
+/// programs write are left out.
+fn document(text: &str) -> Vec<Paragraph> {
+    let (mut inside, mut lines, mut is_written) = (Comment::default(), Vec::new(), false);
+    for (number, line) in (1..).zip(text.lines()) {
+        let is_mark = line.starts_with("<!--");
+        if is_mark {
+            is_written = !line.contains("end of");
+        }
+        let is_code = line.starts_with("    ") && !inside.goes_on;
+        let is_left_out = is_mark || is_written || is_code;
+        inside.add(if is_left_out { "" } else { line });
+        lines.resize(inside.paragraphs.len(), number);
+    }
+    let paragraphs = lines.into_iter().zip(inside.paragraphs);
+    paragraphs.map(|(line, text)| Paragraph { line, text }).collect()
+}
+
+#[test]
+fn sentences_of_documents_are_short() {
+    let mut all = Vec::new();
+    files(&root().join("docs"), &mut all);
+    all.extend(fs::read_dir(root()).expect("a folder").map(|entry| entry.expect("a file").path()));
+    all.retain(|path| path.extension().is_some_and(|kind| kind == "md"));
+    assert!(all.len() > 25, "the documents are elsewhere");
+    let mut long = Vec::new();
+    for path in &all {
+        let name = path.strip_prefix(root()).unwrap_or(Path::new("")).display().to_string();
+        for Paragraph { line, text } in document(&fs::read_to_string(path).expect("a text")) {
+            let most = words(&text).into_iter().max().unwrap_or_default();
+            if most > SENTENCE {
+                let beginning: String = text.chars().take(50).collect();
+                long.push(format!("{name}:{line}: a sentence of {most} words in “{beginning}…”"));
+            }
+        }
+    }
+    assert!(
+        long.is_empty(),
+        "sentences of documents have at most {SENTENCE} words:\n{}",
+        long.join("\n")
+    );
+}
+
+#[test]
+fn documents_are_read_without_code_tables_and_written_blocks() {
+    let text = "# Title\n\nOne *two.* Three\nfour.\n\n    code\n\n- five\n  six\n| a | b |\n\
+                <!-- list: written -->\nseven\n<!-- end of list -->\n```\ncode\n```\neight\n";
+    let paragraphs = document(text);
+    let texts: Vec<&str> = paragraphs.iter().map(|paragraph| paragraph.text.as_str()).collect();
+    assert_eq!(texts, ["One *two.* Three four.", "five six", "eight"]);
+    assert_eq!(paragraphs.iter().map(|paragraph| paragraph.line).collect::<Vec<_>>(), [3, 8, 17]);
+    assert_eq!(words(texts[0]), [2, 2, 0]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::{
 use syn::{Attribute, Item, ItemMod, ItemUse, Meta, UseTree, visit::Visit};
 
 /// The rooms of src. Each imports only from rooms before it.
-const ROOMS: [&str; 32] = [
+pub const ROOMS: [&str; 32] = [
     "error",
     "parallel",
     "deadline",
@@ -54,7 +54,7 @@ const GPU: [&str; 14] = [
 const COLUMNS: usize = 100;
 
 /// A module, by the names from the crate's root on.
-type Module = Vec<String>;
+pub type Module = Vec<String>;
 
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -178,7 +178,7 @@ impl<'ast> Visit<'ast> for Named {
 
 /// Returns the modules of a crate that other modules may import, each with the modules it imports.
 /// Modules for tests alone are left out. `source`: the folder of the crate's root.
-fn imports(source: &str) -> BTreeMap<Module, BTreeSet<Module>> {
+pub fn imports(source: &str) -> BTreeMap<Module, BTreeSet<Module>> {
     let source = root().join(source);
     let mut all = Vec::new();
     files(&source, &mut all);

@@ -2,6 +2,7 @@
 //! modules, and the tables of its documentation.
 
 mod comments;
+mod documents;
 mod external;
 mod frames;
 mod house;

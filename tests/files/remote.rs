@@ -117,7 +117,7 @@ fn clouds_are_converted_piece_by_piece() {
         convert(&[input], &limits, &out, &options, &write, None).unwrap();
         std::fs::read(out).unwrap()
     };
-    let local = converted(folder.path("a.laz"), "own.splk");
+    let local = converted(folder.path("a.laz"), "local.splk");
     forget();
     server.fail(|number, _| if number % 5 == 2 { Fault::Cut(1000) } else { Fault::None });
     assert!(converted(server.address("a.laz").into(), "far.splk") == local);

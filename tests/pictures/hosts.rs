@@ -3,6 +3,8 @@
 
 #[path = "../../examples/host/frame.rs"]
 mod frame;
+#[path = "../../examples/host/target.rs"]
+mod target;
 #[path = "../../examples/host/triangles.rs"]
 mod triangles;
 

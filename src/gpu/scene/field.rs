@@ -34,7 +34,7 @@ pub const FOUR: u32 = 5;
 const SHARES: u32 = 0;
 
 /// Capacity behind the samples' bits: a bit for every sheet and tile of a picture (`MOST_BINS` in
-/// pipeline/variant.rs), and the tables.
+/// variant/mod.rs), and the tables.
 const TAIL_BYTES: u64 = 64 << 20;
 
 /// Returns why the engine can't gather a volume, whatever the settings.

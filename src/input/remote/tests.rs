@@ -268,7 +268,7 @@ fn only_what_the_cache_made_is_removed() {
     }
     #[cfg(unix)]
     {
-        let target = folder.path("own");
+        let target = folder.path("local");
         std::fs::create_dir(&target).unwrap();
         std::fs::write(target.join("0"), &large).unwrap();
         std::os::unix::fs::symlink(&target, objects.join("f".repeat(32))).unwrap();

@@ -111,11 +111,11 @@ impl SlicePanes {
     }
 
     fn toolbar(&mut self, ui: &mut Ui, range: [f64; 2]) {
-        ui.horizontal_wrapped(|ui| {
-            ui.checkbox(&mut self.is_colored, "Transfer function's colours");
-            if self.is_colored {
-                return;
-            }
+        ui.checkbox(&mut self.is_colored, "Transfer function's colours");
+        if self.is_colored {
+            return;
+        }
+        ui.horizontal(|ui| {
             let mut window = self.window.unwrap_or(range);
             let speed = (range[1] - range[0]).abs() / 500.0;
             for (end, name) in window.iter_mut().zip(["Black", "White"]) {

@@ -147,8 +147,8 @@ impl Window {
         self.arrays.take();
         let mut actions = dropped(ui);
         actions.extend(keys::take(ui));
-        let shown = Panel::top("menu").show(ui, |ui| menu::menu(ui, &self.menu()));
-        actions.extend(shown.inner);
+        let top = Panel::top("menu").show(ui, |ui| menu::menu(ui, &self.menu()));
+        actions.extend(top.inner);
         Panel::bottom("status").show(ui, |ui| menu::status(ui, &self.status()));
         if self.parts.side {
             Panel::right("side").default_size(330.0).show(ui, |ui| {

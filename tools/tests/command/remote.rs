@@ -41,19 +41,19 @@ fn addresses_are_inputs() {
     folder.run("convert a.obj -o a.splk").ok();
     let server = Server::of(std::fs::read(folder.path("a.splk")).unwrap());
     let address = server.address("a.splk?signature=secret");
-    folder.run(&format!("render a.splk -o own.png {DRAWN}")).ok();
+    folder.run(&format!("render a.splk -o local.png {DRAWN}")).ok();
     let printed = folder.run(&format!("render {address} -o far.png {DRAWN} --cache kept --json"));
     let printed = printed.printed();
     assert!(!printed.contains("secret"), "{printed}");
     let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
-    assert!(read("own.png") == read("far.png") && folder.path("kept/objects").is_dir());
+    assert!(read("local.png") == read("far.png") && folder.path("kept/objects").is_dir());
     let [local, far] = ["a.splk", &address].map(|path| folder.json(&format!("info {path} --json")));
     assert_eq!((&local["count"], &local["bytes"]), (&far["count"], &far["bytes"]));
     assert!(far["file"].as_str().unwrap().ends_with("/a.splk"));
     folder.run(&format!("check {address} --cache-size 0")).ok();
     folder.run(&format!("convert {address} -o far.ply")).ok();
-    folder.run("convert a.splk -o own.ply").ok();
-    assert!(read("own.ply") == read("far.ply"));
+    folder.run("convert a.splk -o local.ply").ok();
+    assert!(read("local.ply") == read("far.ply"));
     // Beside an address nothing can be written.
     folder.run(&format!("{address} --engine cpu --size 32x32 -q --cache kept")).ok();
     assert!(folder.path("a.png").is_file());
@@ -141,9 +141,9 @@ fn buckets_of_s3_are_inputs() {
     let address = "s3://bucket/some place/a.splk";
     let drawn = ["--engine", "cpu", "--size", "64x64", "-q", "--cache", "kept"];
     run(&[&["render", address, "-o", "far.png"], &drawn[..]].concat()).ok();
-    folder.run(&format!("render a.splk -o own.png {DRAWN}")).ok();
+    folder.run(&format!("render a.splk -o local.png {DRAWN}")).ok();
     let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
-    assert!(read("own.png") == read("far.png"));
+    assert!(read("local.png") == read("far.png"));
     run(&["check", address, "--cache", "kept"]).ok();
     run(&["info", "s3://bucket/none.splk"]).fails(3, &["no such object (404)"]);
 }

@@ -366,7 +366,7 @@ fn what_is_written_reads_back() {
     for degree in 0..=3 {
         let mut set = random(300, degree);
         set.scales[0].z = 0.0;
-        let path = folder.path("own.ply");
+        let path = folder.path("made.ply");
         write_gaussians(&set, &path).unwrap();
         let read = read_with(&path, read_gaussians).unwrap();
         assert_eq!((read.len(), read.degree, read.broken.all()), (set.len(), degree, 0));

@@ -87,8 +87,8 @@ fn up(ui: &mut Ui, model: &Appearance, actions: &mut Vec<Action>) {
 fn background(ui: &mut Ui, scene: &Description, actions: &mut Vec<Action>) {
     let current = scene.picture.background;
     let entries = BACKGROUNDS.map(|name| (name.to_owned(), name.parse::<Background>().ok()));
-    let shown = current.or_else(|| BACKGROUNDS[0].parse().ok());
-    let mut chosen = choice(ui, "Background", entries, &shown, Some("a colour"));
+    let effective = current.or_else(|| BACKGROUNDS[0].parse().ok());
+    let mut chosen = choice(ui, "Background", entries, &effective, Some("a colour"));
     if let Some(plain) = scene.picture.background()
         && let Some(picked) = color(ui, "Colour of the background", plain)
     {

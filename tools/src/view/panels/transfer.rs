@@ -39,8 +39,8 @@ pub fn show(ui: &mut Ui, model: &Transfer, curve: &mut CurveEditor) -> Vec<Actio
     });
     curve.set_hounsfield(model.is_hounsfield);
     let mut transfer = model.transfer.clone();
-    let shown = |ui: &mut Ui| curve.show(ui, model.histogram, &mut transfer, model.values);
-    let edit = ui.push_id(model.field, shown).inner;
+    let show_curve = |ui: &mut Ui| curve.show(ui, model.histogram, &mut transfer, model.values);
+    let edit = ui.push_id(model.field, show_curve).inner;
     actions.extend(curve.take_note().map(Action::Say));
     if edit != Edit::Unchanged {
         actions.push(Action::Transfer(Box::new(transfer)));

@@ -33,7 +33,7 @@ impl Window {
             let panel = |ui: &mut Ui| transfer::show(ui, &model, curve);
             take(part(ui, "Transfer function", true, panel));
         }
-        take(part(ui, "Look", true, |ui| self.appearance(ui)));
+        take(part(ui, "Appearance", true, |ui| self.appearance(ui)));
         if let Some(scene_view) = &self.scene_view {
             let model = clips::Clips {
                 clips: &self.document.scene().picture.clips,
