@@ -1,8 +1,13 @@
 //! A finished picture: colour, opacity and depth of every pixel.
 
 mod edges;
+mod encoding;
+#[cfg(feature = "pictures")]
+mod exr;
 
 pub use edges::Edges;
+pub(crate) use encoding::{DPI, wrong_dpi};
+pub use encoding::{Encoding, PictureFormat};
 
 use crate::{Error, Result, disk};
 use std::path::Path;
@@ -26,16 +31,26 @@ impl Picture {
     /// Converts the picture to 8 bits a channel over a background colour. `None` keeps the opacity
     /// (not premultiplied).
     pub fn to_rgba8(&self, background: Option<[f32; 3]>) -> Vec<u8> {
-        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+        self.quantised(background, |v| (v * 255.0).round() as u8)
+    }
+
+    /// As [`to_rgba8`](Self::to_rgba8), with 16 bits a channel.
+    pub fn to_rgba16(&self, background: Option<[f32; 3]>) -> Vec<u16> {
+        self.quantised(background, |v| (v * 65535.0).round() as u16)
+    }
+
+    /// Returns all channels as whole numbers, which `round` makes of 0 … 1.
+    fn quantised<T: Copy>(&self, background: Option<[f32; 3]>, round: impl Fn(f32) -> T) -> Vec<T> {
+        let whole = |v: f32| round(v.clamp(0.0, 1.0));
         let mut out = Vec::with_capacity(4 * self.color.len());
         for &[r, g, b, a] in &self.color {
             out.extend(match background {
                 Some(back) => {
-                    let over = |c: f32, under: f32| byte(c + (1.0 - a) * under);
-                    [over(r, back[0]), over(g, back[1]), over(b, back[2]), 255]
+                    let over = |c: f32, under: f32| whole(c + (1.0 - a) * under);
+                    [over(r, back[0]), over(g, back[1]), over(b, back[2]), whole(1.0)]
                 }
-                None if a > 0.0 => [byte(r / a), byte(g / a), byte(b / a), byte(a)],
-                None => [0; 4],
+                None if a > 0.0 => [whole(r / a), whole(g / a), whole(b / a), whole(a)],
+                None => [whole(0.0); 4],
             });
         }
         out
@@ -93,37 +108,55 @@ impl Picture {
         Ok(Self { width, height, color, depth })
     }
 
-    /// Writes a PNG or JPEG, chosen by the extension. JPEG has no opacity: without a background,
-    /// the picture is drawn over black.
+    /// Writes a picture file, whose extension says the format. Without a background, a JPEG, which
+    /// has no opacity, is drawn over black.
     ///
     /// # Errors
     /// [`Error::Argument`] for other extensions, and [`Error::Output`] if the file cannot be
     /// written.
     pub fn save(&self, path: impl AsRef<Path>, background: Option<[f32; 3]>) -> Result<()> {
         let path = path.as_ref();
-        let bytes = self.encode(PictureFormat::of(path)?, background)?;
-        disk::write(path, &bytes)
+        self.save_as(path, &Encoding { background, ..Encoding::new(PictureFormat::of(path)?) })
     }
 
-    /// Returns the bytes of a picture file. JPEG has no opacity: without a background, the picture
-    /// is drawn over black.
+    /// Writes a picture file with these options, whatever its extension.
     ///
     /// # Errors
-    /// [`Error::Argument`] if the format cannot store the picture, or if the picture does not have
-    /// one colour for each pixel.
-    pub fn encode(&self, format: PictureFormat, background: Option<[f32; 3]>) -> Result<Vec<u8>> {
-        self.check_colors()?;
-        let rgba = |back| {
-            let picture = image::RgbaImage::from_raw(self.width, self.height, self.to_rgba8(back));
-            picture.map(image::DynamicImage::from).ok_or_else(too_large)
-        };
-        match format {
-            PictureFormat::Png => encode(&rgba(background)?, image::ImageFormat::Png),
-            PictureFormat::Jpeg => {
-                let opaque = rgba(background.or(Some([0.0; 3])))?.to_rgb8();
-                encode(&opaque.into(), image::ImageFormat::Jpeg)
-            }
+    /// Those of [`encode`](Self::encode), and [`Error::Output`] if the file cannot be written.
+    pub fn save_as(&self, path: impl AsRef<Path>, encoding: &Encoding) -> Result<()> {
+        disk::write(path.as_ref(), &self.encode(encoding)?)
+    }
+
+    /// Pastes another picture over a part of this one. Colours and depths are replaced.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the other picture reaches beyond this one, or if one of them does not
+    /// have a colour and a depth for each pixel.
+    pub fn paste(&mut self, other: &Self, [left, top]: [u32; 2]) -> Result<()> {
+        for picture in [&*self, other] {
+            picture.check_colors()?;
+            picture.check_depths()?;
         }
+        let ends = [left.checked_add(other.width), top.checked_add(other.height)];
+        if ends[0].is_none_or(|end| end > self.width) || ends[1].is_none_or(|end| end > self.height)
+        {
+            return Err(Error::Argument("a picture is pasted beyond the sides of another".into()));
+        }
+        let [wide, from] = [self.width as usize, left as usize];
+        let width = other.width as usize;
+        for row in 0..other.height as usize {
+            let at = (top as usize + row) * wide + from;
+            let source = row * width;
+            self.color[at..at + width].copy_from_slice(&other.color[source..source + width]);
+            self.depth[at..at + width].copy_from_slice(&other.depth[source..source + width]);
+        }
+        Ok(())
+    }
+
+    /// Returns a picture that shows nothing.
+    pub fn blank([width, height]: [u32; 2]) -> Self {
+        let count = width as usize * height as usize;
+        Self { width, height, color: vec![[0.0; 4]; count], depth: vec![f32::INFINITY; count] }
     }
 
     /// Encodes the depths as a 16-bit grey PNG. The nearest depth of the picture is 65535, falling
@@ -144,49 +177,10 @@ impl Picture {
             _ => u16::MAX,
         };
         let pixels: Vec<u16> = self.depth.iter().map(grey).collect();
-        let picture =
-            image::ImageBuffer::<image::Luma<u16>, _>::from_raw(self.width, self.height, pixels);
-        encode(&picture.ok_or_else(too_large)?.into(), image::ImageFormat::Png)
+        let bytes: Vec<u8> = pixels.into_iter().flat_map(u16::to_be_bytes).collect();
+        let kind = (png::ColorType::Grayscale, png::BitDepth::Sixteen);
+        encoding::png(&bytes, [self.width, self.height], kind, None)
     }
-}
-
-/// The format of a picture file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum PictureFormat {
-    /// PNG: lossless, with opacity.
-    Png,
-    /// JPEG: lossy, without opacity.
-    Jpeg,
-}
-
-impl PictureFormat {
-    /// Returns the format for a file's extension.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] for other extensions.
-    pub fn of(path: &Path) -> Result<Self> {
-        match image::ImageFormat::from_path(path) {
-            Ok(image::ImageFormat::Png) => Ok(Self::Png),
-            Ok(image::ImageFormat::Jpeg) => Ok(Self::Jpeg),
-            _ => Err(Error::Argument(format!(
-                "{}: unknown picture format, use .png or .jpg",
-                path.display()
-            ))),
-        }
-    }
-}
-
-fn too_large() -> Error {
-    Error::Argument("the picture is too large to be stored".into())
-}
-
-fn encode(picture: &image::DynamicImage, format: image::ImageFormat) -> Result<Vec<u8>> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    picture
-        .write_to(&mut bytes, format)
-        .map_err(|e| Error::Argument(format!("the picture cannot be stored: {e}")))?;
-    Ok(bytes.into_inner())
 }
 
 #[cfg(test)]
@@ -219,7 +213,7 @@ mod tests {
             let picture = Picture { width: size, height: size, color, depth: vec![1.0; depths] };
             refused(picture.reduced(2).map(|_| ()));
             if colors != 4 {
-                refused(picture.encode(PictureFormat::Png, None).map(|_| ()));
+                refused(picture.encode(&Encoding::new(PictureFormat::Png)).map(|_| ()));
                 refused(crate::compare::compare_pictures(&picture, &picture).map(|_| ()));
             }
             if depths != 4 {
@@ -236,10 +230,14 @@ mod tests {
     }
 
     #[test]
-    fn formats_are_known_by_extension() {
-        assert_eq!(PictureFormat::of(Path::new("a.PNG")).unwrap(), PictureFormat::Png);
-        assert_eq!(PictureFormat::of(Path::new("a.jpeg")).unwrap(), PictureFormat::Jpeg);
-        assert!(PictureFormat::of(Path::new("a.gif")).is_err());
-        assert!(PictureFormat::of(Path::new("a")).is_err());
+    fn pictures_are_pasted_into_others_and_not_beyond() {
+        let mut whole = Picture::blank([3, 2]);
+        let part = Picture { width: 2, height: 1, color: vec![[0.5; 4]; 2], depth: vec![7.0; 2] };
+        whole.paste(&part, [1, 1]).unwrap();
+        let places: Vec<usize> = (0..6).filter(|at| whole.color[*at][3] > 0.0).collect();
+        assert_eq!((places, whole.depth[4], whole.depth[3]), (vec![4, 5], 7.0, f32::INFINITY));
+        for at in [[2, 0], [0, 2], [u32::MAX, 0]] {
+            assert!(matches!(whole.paste(&part, at), Err(Error::Argument(_))), "{at:?}");
+        }
     }
 }

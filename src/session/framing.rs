@@ -5,7 +5,7 @@ use super::{Origin, Subject};
 use crate::{
     Error, Result,
     about::Orientation,
-    math::{Bounds, Camera},
+    math::{Bounds, Camera, Projection},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -189,6 +189,23 @@ impl Framing {
             }
         }
         cameras.iter_mut().for_each(|camera| camera.zoom(self.zoom.unwrap_or(1.0)));
+        Ok(cameras)
+    }
+
+    /// Returns the cameras of pictures of one size that show the scene from several sides. All have
+    /// the same scale: a length in the focal plane is as long in each.
+    ///
+    /// # Errors
+    /// Those of [`camera`](Self::camera).
+    pub fn views(&self, subject: &Subject, size: [u32; 2], sides: &[Side]) -> Result<Vec<Camera>> {
+        let from = |side: &Side| Self { view: Some(*side), ..self.clone() }.camera(subject, size);
+        let mut cameras: Vec<Camera> = sides.iter().map(from).collect::<Result<_>>()?;
+        let distance = |camera: &Camera| match camera.projection {
+            Projection::Perspective { .. } => camera.position.distance(camera.focal_point),
+            Projection::Orthographic { height } => height,
+        };
+        let most = cameras.iter().map(distance).fold(0.0, f64::max);
+        cameras.iter_mut().for_each(|camera| camera.set_distance(most));
         Ok(cameras)
     }
 

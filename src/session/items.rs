@@ -184,14 +184,17 @@ impl Items {
     }
 
     /// Draws the edges of meshes and cells over a finished picture with these clips, where they are
-    /// asked for.
+    /// asked for. `width` is that of the lines, in pixels.
     ///
     /// # Errors
     /// Those of [`Camera::view`].
-    pub fn draw_edges(&self, picture: &mut Picture, camera: &Camera, clips: &[Clip]) -> Result<()> {
+    pub fn draw_edges(
+        &self,
+        picture: &mut Picture,
+        camera: &Camera,
+        (clips, width): (&[Clip], f64),
+    ) -> Result<()> {
         let view = camera.view([picture.width, picture.height])?;
-        // A line is a pixel wide, and wider in large pictures.
-        let width = (f64::from(picture.height) / 720.0).max(1.0);
         self.edges(clips).iter().for_each(|edges| picture.draw_edges(edges, &view, width));
         Ok(())
     }

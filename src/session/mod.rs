@@ -30,6 +30,7 @@ mod items;
 mod legend;
 mod name;
 mod oddities;
+mod panels;
 mod reading;
 mod showing;
 mod solid;
@@ -44,14 +45,15 @@ pub use data::{Data, warn_of_holes};
 pub use description::{
     AppearanceEntry, Axis, Background, CameraEntry, ClipEntry, ClipSide, ColorEntry, Composite,
     Description, Engine, InputEntry, IsosurfaceEntry, KernelEntry, LimitsEntry, Loaded,
-    LoadedInput, OverlayEntry, PictureEntry, Place, ReadingEntry, Rotation, Samples, TransferEntry,
-    TransformEntry,
+    LoadedInput, OverlayEntry, PaperLength, PictureEntry, Place, ReadingEntry, Rotation, Samples,
+    TransferEntry, TransformEntry,
 };
 pub use facts::Facts;
 pub use framing::{Framing, Side};
 pub use items::{Captions, Content, Items, Mark};
 pub use legend::Legend;
 pub use name::Name;
+pub use panels::{Panel, PanelLabels};
 pub use reading::{Opened, Reading, read};
 pub use showing::{CellStyle, Showing, Surfaces};
 pub use subject::{Origin, Subject};

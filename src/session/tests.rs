@@ -12,7 +12,7 @@ use crate::{
 use crate::{
     about::{Frame, Orientation},
     cells::{CellKind, Cells},
-    math::Bounds,
+    math::{Bounds, Camera},
     scene::{Clip, ClipShape, Item},
     surface::{Mesh, PointStyle},
     volume::{Lattice, Samples, Volume},
@@ -114,6 +114,36 @@ fn oddities_are_found() {
     let path = folder.write("c.bin", [0, 1, 2, 3, 4, 5, 6, 7]);
     assert_eq!(codes(raw(1.0), &path), [""; 0]);
     assert_eq!(codes(raw(1e30), &path), ["out-of-sight"]);
+}
+
+/// Pictures of several views have one scale, so that one scale bar holds for all.
+#[test]
+fn views_have_one_scale_and_show_everything() {
+    let bounds = Bounds { min: DVec3::new(-4.0, -1.0, -2.0), max: DVec3::new(4.0, 1.0, 2.0) };
+    let subject = Subject::new(bounds, DVec3::Z);
+    let sides = [Side::Front, Side::Left, Side::Top];
+    for orthographic in [false, true] {
+        let framing = Framing { orthographic, ..Framing::default() };
+        let cameras = framing.views(&subject, [320, 240], &sides).unwrap();
+        let pixels = |camera: &Camera| {
+            let view = camera.view([320, 240]).unwrap();
+            let far = view.to_view(camera.focal_point).z;
+            view.scale / if view.perspective { far } else { 1.0 }
+        };
+        for (camera, side) in cameras.iter().zip(sides) {
+            assert!((pixels(camera) / pixels(&cameras[0]) - 1.0).abs() < 1e-9, "{side:?}");
+            let view = camera.view([320, 240]).unwrap();
+            for corner in bounds.corners() {
+                let place = view.to_view(corner);
+                let share = if view.perspective { place.z } else { 1.0 };
+                let at = view.center + view.scale * place.truncate() / share;
+                let is_inside = at.x > 0.0 && at.x < 320.0 && at.y > 0.0 && at.y < 240.0;
+                assert!(is_inside, "{side:?}: {at}");
+            }
+        }
+        let [front, left] = [0, 1].map(|at| cameras[at].position - cameras[at].focal_point);
+        assert!(front.normalize().dot(left.normalize()).abs() < 1e-6);
+    }
 }
 
 /// The first statement of a file decides how a scene stands, then the convention.

@@ -1,10 +1,7 @@
 //! The flags of the camera.
 
-use crate::parse;
-use clap::{
-    Args,
-    builder::{PossibleValuesParser, TypedValueParser},
-};
+use crate::{figure::sides, parse};
+use clap::Args;
 use glam::DVec3;
 use splatkit::{
     math::Camera,
@@ -107,6 +104,10 @@ impl CameraFlags {
             scene.camera = None;
         }
         scene.camera = self.camera.or(scene.camera);
+        if self.camera.is_some() || self.view.is_some() || self.camera_position.is_some() {
+            scene.picture.views.clear();
+            (scene.picture.columns, scene.picture.panel_labels) = (None, None);
+        }
         let mut before = std::mem::take(&mut scene.framing);
         if framing.camera_position.is_some() {
             (before.view, before.distance) = (None, None);
@@ -129,13 +130,6 @@ impl CameraFlags {
             up: framing.up.or(before.up),
         };
     }
-}
-
-/// Parses a side to look from.
-fn sides() -> impl TypedValueParser<Value = Side> {
-    PossibleValuesParser::new(Side::ALL.map(Side::name)).map(|name| {
-        Side::ALL.into_iter().find(|side| side.name() == name).expect("a name of the list")
-    })
 }
 
 /// Parses a camera that [`to_json`] has written.

@@ -9,7 +9,7 @@ use clap::{Args, Parser};
 use splatkit::{
     Error, disk, formats, gaussians,
     hierarchy::{BuildOptions, build_file, file::WriteOptions},
-    picture::PictureFormat,
+    picture::{Encoding, PictureFormat},
     session::Samples,
     surface::{Mesh, SurfelOptions},
     volume::phantoms::Phantom,
@@ -178,7 +178,9 @@ impl Demo {
         let (later_ms, picture, stats) = draw()?;
         job.require_content(&picture)?;
         let path = self.folder.join(shot.name);
-        disk::write(&path, &picture.encode(PictureFormat::Png, BACKGROUND)?)?;
+        let mut encoding = Encoding::new(PictureFormat::Png);
+        encoding.background = BACKGROUND;
+        disk::write(&path, &picture.encode(&encoding)?)?;
         progress.clear();
         if first {
             output::line(format_args!("Drawn on {}", drawer.adapter()))?;

@@ -230,6 +230,11 @@ impl DeviceFlags {
 }
 
 impl EngineFlags {
+    /// Whether the size of the picture is given, in pixels.
+    pub fn has_size(&self) -> bool {
+        self.size.is_some()
+    }
+
     /// Changes how the picture of a scene is drawn: by the flags that are given.
     pub fn apply(&self, scene: &mut Description) {
         let picture = &mut scene.picture;

@@ -4,7 +4,7 @@ use crate::{
     failure::Failure,
     output::{self, Target},
 };
-use splatkit::picture::{Picture, PictureFormat};
+use splatkit::picture::{Encoding, Picture, PictureFormat};
 use splatkit_media::video::{Encoder, Film, Format};
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ impl Frames {
     /// camera. Fails if one of the files exists and may not be replaced.
     pub fn pictures(output: &Path, count: Option<u32>, overwrite: bool) -> Result<Self, Failure> {
         let Some(count) = count else {
-            if Format::of(output).is_some() {
+            if Format::of(output).is_some() && PictureFormat::of(output).is_err() {
                 let message = "an animation needs --turntable or --path";
                 return Err(Failure::Usage(format!("{}: {message}", output.display())));
             }
@@ -32,7 +32,7 @@ impl Frames {
         if PictureFormat::of(output).is_err() {
             return Err(Failure::Usage(format!(
                 "{}: unknown format of an animation, use .gif, .webp, .apng, .mp4, .webm or .mov, \
-                 or .png or .jpg for numbered pictures",
+                 or .png, .jpg, .tiff or .exr for numbered pictures",
                 output.display()
             )));
         }
@@ -69,7 +69,7 @@ impl Frames {
     }
 
     /// Begins to write.
-    pub fn open(&self, film: Film) -> Result<Writer<'_>, Failure> {
+    pub fn open(&self, film: Film, how: Storing) -> Result<Writer<'_>, Failure> {
         let (background, way) = match self {
             Self::Pictures(targets) => (film.background, Way::Pictures(targets.iter())),
             Self::Film(path, format) => {
@@ -78,13 +78,45 @@ impl Frames {
             }
             Self::Raw => (film.background, Way::Raw),
         };
-        Ok(Writer { background, way })
+        Ok(Writer { background, how, way })
+    }
+
+    /// Refuses bits that a picture file of this kind cannot have.
+    pub fn check(&self, how: Storing) -> Result<(), Failure> {
+        match self {
+            Self::Pictures(targets) => {
+                targets.iter().take(1).try_for_each(|it| how.of(it.format(), None).check())?;
+            }
+            Self::Film(..) | Self::Raw if how.bits.is_some() => {
+                let message = "--bits is for pictures: films and raw frames have 8 bits a channel";
+                return Err(Failure::Usage(message.into()));
+            }
+            Self::Film(..) | Self::Raw => {}
+        }
+        Ok(())
+    }
+}
+
+/// How pictures are stored: bits a channel, and pixels an inch.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Storing {
+    pub bits: Option<u32>,
+    pub dpi: Option<f64>,
+}
+
+impl Storing {
+    /// Returns how a picture over a background becomes a file of a format.
+    pub fn of(self, format: PictureFormat, background: Option<[f32; 3]>) -> Encoding {
+        let mut encoding = Encoding::new(format);
+        (encoding.background, encoding.bits, encoding.dpi) = (background, self.bits, self.dpi);
+        encoding
     }
 }
 
 /// Writes frames one after the other.
 pub struct Writer<'a> {
     background: Option<[f32; 3]>,
+    how: Storing,
     way: Way<'a>,
 }
 
@@ -100,7 +132,8 @@ impl Writer<'_> {
         match &mut self.way {
             Way::Pictures(targets) => {
                 let Some(target) = targets.next() else { return Ok(false) };
-                target.write(&picture.encode(target.format(), self.background)?)?;
+                let encoding = self.how.of(target.format(), self.background);
+                target.write(&picture.encode(&encoding)?)?;
                 Ok(true)
             }
             Way::Film(encoder) => Ok(encoder.add(&picture.to_rgba8(self.background))?),

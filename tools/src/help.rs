@@ -122,6 +122,7 @@ mod tests {
         ),
         ("Kernel", "kernel sigma extent sharp"),
         ("Animation", "turntable path fps"),
+        ("Figures", "width height dpi views columns panel-labels"),
         ("Texts", "scalar-bar axes scale-bar caption"),
         (
             "Camera",

@@ -14,7 +14,7 @@ use splatkit::{
     math::Camera,
     picture::Picture,
     scene::{Clip, Scene, Settings},
-    session::{self, Description, Framing, LoadedInput, TransferEntry},
+    session::{self, Description, Framing, LoadedInput, PanelLabels, TransferEntry},
 };
 #[cfg(feature = "window")]
 use splatkit::{
@@ -22,7 +22,10 @@ use splatkit::{
     session::{Captions, Legend},
     volume::TransferFunction,
 };
-use splatkit_media::overlay::Overlay;
+use splatkit_media::{
+    figure::Figure,
+    overlay::{Overlay, Page},
+};
 use std::{
     ops::{Deref, DerefMut},
     path::{Path, PathBuf},
@@ -76,6 +79,10 @@ pub struct Finish {
     overlay: Option<Overlay>,
     /// The clips of the picture, which also cut edges.
     clips: Vec<Clip>,
+    /// The width of edges, in pixels.
+    edge_width: f64,
+    /// Pixels an inch.
+    pub dpi: Option<f64>,
 }
 
 impl Finish {
@@ -87,7 +94,7 @@ impl Finish {
         loaded: &Loaded,
     ) -> splatkit::Result<Picture> {
         let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
-        loaded.items.draw_edges(&mut picture, camera, &self.clips)?;
+        loaded.items.draw_edges(&mut picture, camera, (&self.clips, self.edge_width))?;
         Ok(picture)
     }
 
@@ -95,6 +102,11 @@ impl Finish {
     pub fn overlaid(&self, picture: &mut Picture, camera: &Camera) -> serde_json::Value {
         let overlay = self.overlay.as_ref();
         overlay.map_or(serde_json::Value::Null, |overlay| overlay.draw(picture, camera))
+    }
+
+    /// Returns the texts over pictures.
+    pub fn overlay(&self) -> Option<&Overlay> {
+        self.overlay.as_ref()
     }
 
     /// Returns the colours of the scalar bars.
@@ -270,9 +282,24 @@ impl Job {
     pub fn finish(&self, loaded: &Loaded) -> Result<Finish, Failure> {
         let picture = &self.scene.picture;
         let (factor, background) = (picture.factor(&loaded.scene), picture.background());
-        let overlay = Overlay::open(&self.scene.overlay, &loaded.captions, background)?;
+        let overlay = Overlay::open(&self.scene.overlay, &loaded.captions, self.page())?;
         let clips = picture.clips_of(&loaded.scene, &loaded.subject)?;
-        Ok(Finish { factor, background, overlay, clips })
+        let (edge_width, dpi) = (picture.edge_width(), picture.dpi);
+        Ok(Finish { factor, background, overlay, clips, edge_width, dpi })
+    }
+
+    /// Returns the page that texts are written on.
+    fn page(&self) -> Page {
+        let picture = &self.scene.picture;
+        let labels = picture.panel_labels.unwrap_or_default();
+        let has_labels = !picture.views.is_empty() && labels != PanelLabels::None;
+        Page { background: picture.background(), dpi: picture.dpi, has_labels }
+    }
+
+    /// Returns the panels of a picture of several views; `None` for a picture of one view.
+    pub fn figure(&self, loaded: &Loaded, finish: &Finish) -> splatkit::Result<Option<Figure>> {
+        let overlay = finish.overlay.as_ref();
+        Figure::new(&self.scene.picture, overlay, (&self.framing()?, &loaded.subject))
     }
 
     /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,
@@ -333,8 +360,7 @@ impl Job {
         transfers: &[(usize, TransferFunction)],
     ) -> Result<Finish, Failure> {
         let captions = self.captions_with(loaded, transfers);
-        let background = self.scene.picture.background();
-        let overlay = Overlay::open(&self.scene.overlay, &captions, background)?;
+        let overlay = Overlay::open(&self.scene.overlay, &captions, self.page())?;
         Ok(Finish { overlay, ..self.finish(loaded)? })
     }
 

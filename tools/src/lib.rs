@@ -23,6 +23,7 @@ mod describe;
 pub mod engine;
 #[doc(hidden)]
 pub mod failure;
+mod figure;
 mod flag_names;
 mod formats;
 mod frames;

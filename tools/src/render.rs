@@ -5,7 +5,8 @@ use crate::{
     describe,
     engine::EngineFlags,
     failure::Failure,
-    frames::{Frames, numbered},
+    figure::FigureFlags,
+    frames::{Frames, Storing, Writer, numbered},
     given::Given,
     job::{Finish, Job, Loaded},
     motion::{Motion, MotionFlags},
@@ -29,7 +30,10 @@ use splatkit::{
 };
 #[cfg(feature = "window")]
 use splatkit::{Stop, math::CameraPath, volume::TransferFunction};
-use splatkit_media::video::{Film, Format};
+use splatkit_media::{
+    figure::Figure,
+    video::{Film, Format},
+};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -38,7 +42,8 @@ use std::{
 /// Where the picture goes.
 #[derive(Args, Debug, Default)]
 struct OutputFlags {
-    /// Write the picture to this .png or .jpg file, or to stdout as PNG if it is `-`. With
+    /// Write the picture to this .png, .jpg, .tiff, .webp or .exr file, or to stdout as PNG if it
+    /// is `-`. OpenEXR files hold linear light and the depths. With
     /// --turntable or --path, write an animation to this .gif, .webp or .apng file, or with ffmpeg,
     /// if it is installed, to this .mp4, .webm or .mov file. Or write numbered pictures: out.png
     /// becomes out_0000.png, and {frame} or {frame:04} in the name is replaced by the number
@@ -50,6 +55,9 @@ struct OutputFlags {
     /// for red, green, blue and opacity.
     #[arg(long, requires = "output")]
     raw: bool,
+    /// Set the bits a channel: 8 or 16 for .png and .tiff, 16 or 32 for .exr [default: the first]
+    #[arg(long, value_name = "NUMBER")]
+    bits: Option<u32>,
     /// Also write the depths to this file: a grey PNG of 16 bits, white for the nearest, black for
     /// nothing.
     #[arg(long, value_name = "FILE.png", conflicts_with_all = ["turntable", "path"])]
@@ -67,7 +75,7 @@ pub struct Render {
     #[command(flatten)]
     output: OutputFlags,
     /// Set the background colour: a name, '#rgb', '#rrggbb', or none for transparent pixels: of
-    /// .png, .gif, .webp, .apng, .webm and .mov files.
+    /// .png, .tiff, .webp, .exr, .gif, .apng, .webm and .mov files.
     /// [default: black]
     #[arg(long, value_name = "COLOR")]
     background: Option<Background>,
@@ -81,6 +89,8 @@ pub struct Render {
     motion: MotionFlags,
     #[command(flatten)]
     overlay: OverlayFlags,
+    #[command(flatten)]
+    figure: FigureFlags,
     #[command(flatten)]
     camera: CameraFlags,
     #[command(flatten)]
@@ -144,6 +154,8 @@ struct Ready<'a> {
     /// The settings of a picture before it is averaged down.
     settings: Settings,
     finish: Finish,
+    /// The views of a picture of several.
+    figure: Option<Figure>,
 }
 
 /// A film of a scene that a window shows.
@@ -204,6 +216,7 @@ impl Render {
         self.camera.apply(scene);
         self.engine.apply(scene);
         self.overlay.apply(scene);
+        self.figure.apply(scene, self.engine.has_size());
         scene.picture.background = self.background.or(scene.picture.background);
         scene.picture.samples = self.samples.or(scene.picture.samples);
         Ok(())
@@ -238,13 +251,19 @@ impl Render {
             rate: self.motion.rate(),
             background: job.scene.picture.background(),
         };
+        if is_moving && !job.scene.picture.views.is_empty() {
+            let message = "an animation shows one view: leave out --turntable or --path, or the \
+                           several views (--views)";
+            return Err(Failure::Usage(message.into()));
+        }
         let frames = self.output.frames(&output, &motion, &film, (&inputs, progress))?;
         if let Some(warning) = self.motion.idle(frames.is_played()) {
             progress.warn(warning);
         }
         let mut loaded = job.load(progress)?;
         let (settings, finish) = self.prepare(job, &mut loaded, (&frames, &motion), progress)?;
-        let ready = Ready { job, loaded: &loaded, settings, finish };
+        let figure = job.figure(&loaded, &finish)?;
+        let ready = Ready { job, loaded: &loaded, settings, finish, figure };
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
@@ -324,7 +343,7 @@ pub fn export(job: &Job, export: Export<'_>, progress: &Progress) -> Result<(), 
     files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.files))?;
     let mut settings = job.settings(loaded)?;
     settings.controls.stop = stop;
-    let ready = Ready { job, loaded, settings, finish: job.finish(loaded)? };
+    let ready = Ready { job, loaded, settings, finish: job.finish(loaded)?, figure: None };
     let mut drawer = Drawer::engine(job, loaded, progress)?;
     for (item, transfer) in transfers {
         drawer.set_transfer(*item, transfer)?;
@@ -338,9 +357,10 @@ pub fn export(job: &Job, export: Export<'_>, progress: &Progress) -> Result<(), 
 impl Run<'_> {
     /// Returns what `--json` prints about the frames.
     fn facts(&self, drawn: &Drawn) -> Result<serde_json::Value, Failure> {
-        let Run { ready: Ready { job, loaded, settings, .. }, film, frames, .. } = self;
+        let Run { ready: Ready { job, loaded, settings, figure, .. }, film, frames, .. } = self;
         let Drawn { stats, camera, frame_ms, overlay } = drawn;
         let (orientation, origin) = job.framing()?.orientation(&loaded.subject);
+        let panels = figure.as_ref().map(|figure| figure.to_json(crate::camera::to_json));
         Ok(serde_json::json!({
             "width": film.size[0],
             "height": film.size[1],
@@ -356,6 +376,7 @@ impl Run<'_> {
             "frame_ms": frame_ms,
             "load_ms": loaded.load_ms,
             "camera": crate::camera::to_json(camera),
+            "panels": panels,
             "overlay": overlay,
             "up": direction_name(orientation.up),
             "up_from": origin.name(),
@@ -384,16 +405,24 @@ impl Run<'_> {
         }
     }
 
-    /// Draws and writes the frames.
+    /// Draws and writes the frames, or the picture of several views.
     fn draw_frames(&self, drawer: &mut Drawer, progress: &Progress) -> Result<Drawn, Failure> {
-        let Run { ready: Ready { job, loaded, settings, finish }, motion, film, frames, .. } = self;
+        let Run {
+            ready: Ready { job, loaded, settings, finish, .. }, motion, film, frames, ..
+        } = self;
+        let storing = Storing { bits: self.output.bits, dpi: finish.dpi };
+        let mut writer = frames.open(*film, storing)?;
+        if let Some(figure) = &self.ready.figure {
+            let drawn = self.draw_figure(figure, drawer, (&mut writer, progress))?;
+            writer.finish()?;
+            return Ok(drawn);
+        }
         let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
         let free = job.free(settings, finish);
         let cameras = motion.cameras(&job.framing()?, &loaded.subject, free)?;
         let mut last = (FrameStats::default(), cameras[0].clone());
         let (mut is_shown, mut missing) = (false, 0);
-        let mut writer = frames.open(*film)?;
         let count = cameras.len();
         let bar = (count > 1).then(|| progress.bar("Drawing frames", count as u64));
         let tell = |what: &str, frame: usize| match &bar {
@@ -406,11 +435,8 @@ impl Run<'_> {
             }
             tell("Drawing", frame);
             let start = Instant::now();
-            let drawn = drawer.draw(loaded, &camera, settings).map_err(|error| {
-                let path = self.path.map(|file| (file, motion.place(frame)));
-                job.undrawn(error, loaded, (&camera, settings.size), path)
-            });
-            let (picture, stats) = drawn?;
+            let path = self.path.map(|file| (file, motion.place(frame)));
+            let (picture, stats) = self.draw_view(drawer, &camera, (settings, path))?;
             times.push(milliseconds(start));
             match job.require_content(&picture) {
                 Ok(()) => is_shown = true,
@@ -422,9 +448,7 @@ impl Run<'_> {
             tell("Writing", frame);
             texts = finish.overlaid(&mut picture, &camera);
             let is_wanted = writer.add(&picture)?;
-            if let Some(depth) = &self.output.depth {
-                disk::write(depth, &picture.encode_depth()?)?;
-            }
+            self.write_depth(&picture)?;
             missing = missing.max(stats.missing_pages);
             last = (stats, camera);
             if !is_wanted {
@@ -432,15 +456,75 @@ impl Run<'_> {
             }
         }
         writer.finish()?;
-        if missing > 0 {
-            progress.warn(format_args!(
-                "{missing} of the pages that the picture needs do not fit in memory, so it is \
-                 coarser there; --memory raises the limit"
-            ));
-        }
+        warn_of_pages(missing, progress);
         times.sort_by(f64::total_cmp);
         let (stats, camera) = last;
         Ok(Drawn { stats, camera, frame_ms: times[times.len() / 2], overlay: texts })
+    }
+
+    /// Draws what a camera sees, before it is averaged down. `path` is the file of the camera's
+    /// path and the place in it, for errors.
+    fn draw_view(
+        &self,
+        drawer: &mut Drawer,
+        camera: &Camera,
+        (settings, path): (&Settings, Option<(&Path, String)>),
+    ) -> Result<(Picture, FrameStats), Failure> {
+        let Ready { job, loaded, .. } = self.ready;
+        let drawn = drawer.draw(loaded, camera, settings);
+        drawn.map_err(|error| job.undrawn(error, loaded, (camera, settings.size), path))
+    }
+
+    /// Draws and writes a picture of several views. The statistics are sums over them.
+    fn draw_figure(
+        &self,
+        figure: &Figure,
+        drawer: &mut Drawer,
+        (writer, progress): (&mut Writer<'_>, &Progress),
+    ) -> Result<Drawn, Failure> {
+        let Ready { job, loaded, settings, finish, .. } = self.ready;
+        let mut settings = settings.clone();
+        settings.size = figure.panel_size().map(|side| side.saturating_mul(finish.factor));
+        let name = self.frames.name(0);
+        progress.stage(format!("Drawing {name}"));
+        let start = Instant::now();
+        let mut sum = FrameStats::default();
+        let (picture, overlay) = figure.draw(finish.overlay(), |camera| {
+            let (picture, stats) = self.draw_view(drawer, camera, (&settings, None))?;
+            let before = std::mem::replace(&mut sum, stats);
+            sum.splats += before.splats;
+            sum.hidden += before.hidden;
+            sum.entries += before.entries;
+            sum.gathered += before.gathered;
+            sum.passes += before.passes;
+            sum.missing_pages = sum.missing_pages.max(before.missing_pages);
+            Ok::<_, Failure>(finish.reduced(picture, camera, loaded)?)
+        })?;
+        job.require_content(&picture)?;
+        let frame_ms = milliseconds(start);
+        progress.stage(format!("Writing {name}"));
+        writer.add(&picture)?;
+        self.write_depth(&picture)?;
+        warn_of_pages(sum.missing_pages, progress);
+        Ok(Drawn { stats: sum, camera: figure.cameras()[0].clone(), frame_ms, overlay })
+    }
+
+    /// Writes the depths of a picture, if they are asked for.
+    fn write_depth(&self, picture: &Picture) -> Result<(), Failure> {
+        match &self.output.depth {
+            Some(depth) => Ok(disk::write(depth, &picture.encode_depth()?)?),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Warns of pages that did not fit in memory.
+fn warn_of_pages(missing: u64, progress: &Progress) {
+    if missing > 0 {
+        progress.warn(format_args!(
+            "{missing} of the pages that the picture needs do not fit in memory, so it is coarser \
+             there; --memory raises the limit"
+        ));
     }
 }
 
@@ -475,6 +559,7 @@ impl OutputFlags {
         (inputs, progress): (&[PathBuf], &Progress),
     ) -> Result<Frames, Failure> {
         let frames = self.unchecked_frames(output, motion, film)?;
+        frames.check(Storing { bits: self.bits, dpi: None })?;
         if let Frames::Film(path, format) = &frames {
             format.check(path, film)?;
             if let Some(warning) = format.loss(film) {

@@ -20,6 +20,7 @@ use std::{
 /// Flags that say what the command does, rather than what the picture is.
 pub const NOT_OF_PICTURES: &[&str] = &[
     "output",
+    "bits",
     "depth",
     "overwrite",
     "json",

@@ -11,6 +11,7 @@ mod clip;
 mod color;
 mod file;
 mod kernel_file;
+mod length;
 mod load;
 mod picture;
 mod reading;
@@ -22,6 +23,7 @@ pub use appearance::{AppearanceEntry, IsosurfaceEntry, KernelEntry, TransferEntr
 pub use camera::CameraEntry;
 pub use clip::{Axis, ClipEntry, ClipSide, Place};
 pub use color::{Background, ColorEntry};
+pub use length::PaperLength;
 pub use load::{Loaded, LoadedInput};
 pub use picture::{Composite, PictureEntry, Samples};
 pub use reading::{LimitsEntry, ReadingEntry};
@@ -262,6 +264,12 @@ impl Description {
         self.framing.validate().map_err(|message| ("framing".to_owned(), message))?;
         let camera = self.camera.as_ref().map(CameraEntry::camera).transpose();
         camera.map_err(|message| ("camera".to_owned(), message))?;
+        let is_placed = self.camera.is_some() || self.framing.camera_position.is_some();
+        if is_placed && !self.picture.views.is_empty() {
+            let message = "sides to look from need a camera that is fitted to the scene: leave out \
+                           the place of the camera (--camera, --camera-position), or the sides";
+            return Err(("picture.views".into(), message.into()));
+        }
         let letters = self.overlay.caption.as_ref().map_or(0, |text| text.chars().count());
         if letters > Self::MOST_CAPTION {
             let message =

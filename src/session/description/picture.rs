@@ -1,11 +1,12 @@
 //! How a picture is drawn, as a description says it.
 
-use super::{Background, ClipEntry, appearance::Wrong};
+use super::{Background, ClipEntry, PaperLength, appearance::Wrong};
 use crate::{
     Error, Result,
     hierarchy::Detail,
+    picture::{DPI, wrong_dpi},
     scene::{Classification, Clip, Evaluate, Gradient, Item, Mode, Optics, Order, Scene, Settings},
-    session::Subject,
+    session::{Panel, PanelLabels, Side, Subject},
 };
 use serde::{Deserialize, Serialize};
 
@@ -14,9 +15,28 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PictureEntry {
-    /// Width and height in pixels; by default [`SIZE`](Self::SIZE).
+    /// Width and height in pixels; by default [`SIZE`](Self::SIZE), or square panels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 2]>,
+    /// The printed width, instead of `size`. Needs `dpi`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub width: Option<PaperLength>,
+    /// The printed height, instead of `size`. Needs `dpi`. By default the width gives it, and the
+    /// other way round.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height: Option<PaperLength>,
+    /// Pixels an inch. Files store it, and texts are then as high as on paper.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dpi: Option<f64>,
+    /// Sides that the picture shows beside each other, in panels of one scale.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub views: Vec<Side>,
+    /// The number of panels in a row; by default all of up to four, else about a square of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub columns: Option<u32>,
+    /// What is written into the corner of each panel; by default the name of its side.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub panel_labels: Option<PanelLabels>,
     /// The colour behind the picture; by default black.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub background: Option<Background>,
@@ -171,6 +191,15 @@ impl PictureEntry {
     /// The size of a picture of which nobody says it.
     pub const SIZE: [u32; 2] = [1280, 720];
 
+    /// The width and the height of a panel of a picture of which nobody says the size.
+    const PANEL: u32 = 640;
+
+    /// Most panels of a picture.
+    pub const MOST_VIEWS: usize = 64;
+
+    /// The largest side of a picture that is given as a length, in pixels.
+    const MOST_PIXELS: f64 = 1e6;
+
     /// Checks what does not depend on the scene.
     ///
     /// # Errors
@@ -183,6 +212,7 @@ impl PictureEntry {
         if self.size.is_some_and(|size| size.contains(&0)) {
             return Err(("size", "a picture needs a width and a height above 0".into()));
         }
+        self.check_page()?;
         if self.back_to_front && self.mode != Some(Composite::Splats) {
             let message =
                 "needs the mode splats (--mode splats): it sets the order of single splats";
@@ -210,9 +240,88 @@ impl PictureEntry {
         self.clips.iter().try_for_each(ClipEntry::check).map_err(|message| ("clips", message))
     }
 
+    /// Checks the size, the resolution and the panels.
+    fn check_page(&self) -> std::result::Result<(), Wrong> {
+        if self.dpi.is_some_and(|dpi| !DPI.contains(&dpi)) {
+            return Err(("dpi", wrong_dpi().replacen("dpi: ", "", 1)));
+        }
+        for (name, length) in [("width", self.width), ("height", self.height)] {
+            let Some(length) = length else { continue };
+            let Some(dpi) = self.dpi else {
+                let message = "a length on paper needs the pixels an inch (--dpi, in JSON dpi)";
+                return Err((name, message.into()));
+            };
+            if self.size.is_some() {
+                let message = "the size in pixels (--size) and a length are both given: leave out \
+                               one of them";
+                return Err((name, message.into()));
+            }
+            let pixels = length.pixels(dpi);
+            if !(0.5..=Self::MOST_PIXELS).contains(&pixels) {
+                let message = format!("{length} at {dpi} pixels an inch are {pixels:.1} pixels");
+                return Err((name, message));
+            }
+        }
+        let (count, most) = (self.views.len(), Self::MOST_VIEWS);
+        if count > most {
+            let message = format!("{count} sides are given; at most {most} are allowed");
+            return Err(("views", message));
+        }
+        let without = count == 0 && (self.columns.is_some() || self.panel_labels.is_some());
+        if without {
+            let name = if self.columns.is_some() { "columns" } else { "panel_labels" };
+            return Err((name, "needs several views (--views): it says how they lie".into()));
+        }
+        match self.columns {
+            Some(0) => Err(("columns", "must be a number above 0".into())),
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the number of panels in a row and in a column.
+    fn cells(&self) -> [u32; 2] {
+        let count = self.views.len().max(1) as u32;
+        let usual = if count <= 4 { count } else { f64::from(count).sqrt().ceil() as u32 };
+        let columns = self.columns.unwrap_or(usual).clamp(1, count);
+        [columns, count.div_ceil(columns)]
+    }
+
     /// Returns width and height in pixels.
     pub fn size(&self) -> [u32; 2] {
-        self.size.unwrap_or(Self::SIZE)
+        let usual = match self.views.is_empty() {
+            true => Self::SIZE,
+            false => self.cells().map(|count| count * Self::PANEL),
+        };
+        let dpi = self.dpi.unwrap_or(0.0);
+        let pixels = |length: PaperLength| length.pixels(dpi);
+        let [wide, high] = usual.map(f64::from);
+        let sides = match (self.width.map(pixels), self.height.map(pixels)) {
+            (None, None) => return self.size.unwrap_or(usual),
+            (Some(width), Some(height)) => [width, height],
+            (Some(width), None) => [width, width * high / wide],
+            (None, Some(height)) => [height * wide / high, height],
+        };
+        sides.map(|side| side.round().clamp(1.0, Self::MOST_PIXELS) as u32)
+    }
+
+    /// Returns the panels of a picture of several views, with their sides, within the part of the
+    /// picture that texts leave free; none for a picture of one view.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the panels would have no pixels.
+    pub fn panels(&self, free: Panel) -> Result<Vec<(Side, Panel)>> {
+        let panels = free.grid(self.views.len() as u32, self.cells()[0])?;
+        Ok(self.views.iter().copied().zip(panels).collect())
+    }
+
+    /// Returns the width of the edges of meshes, in pixels: a pixel, and more in large pictures; on
+    /// paper half a point.
+    pub fn edge_width(&self) -> f64 {
+        let width = match self.dpi {
+            Some(dpi) => 0.5 / 72.0 * dpi,
+            None => f64::from(self.size()[1]) / 720.0,
+        };
+        width.max(1.0)
     }
 
     /// Returns the colour behind the picture: red, green and blue in 0 … 1; `None` for
@@ -306,6 +415,48 @@ impl PictureEntry {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Returns the picture of a JSON text.
+    fn picture(text: &str) -> PictureEntry {
+        serde_json::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn lengths_on_paper_and_panels_give_the_size() {
+        let size = |text: &str| picture(text).size();
+        assert_eq!(size("{}"), [1280, 720]);
+        assert_eq!(size(r#"{"width": "85mm", "dpi": 300}"#), [1004, 565]);
+        assert_eq!(size(r#"{"width": "4in", "height": "72pt", "dpi": 100}"#), [400, 100]);
+        assert_eq!(size(r#"{"views": ["front", "left", "top"]}"#), [1920, 640]);
+        assert_eq!(size(r#"{"views": ["front", "left", "top"], "columns": 2}"#), [1280, 1280]);
+        let wide = r#"{"views": ["front", "left", "top"], "width": "6in", "dpi": 300}"#;
+        assert_eq!(size(wide), [1800, 600]);
+        assert_eq!(picture(wide).panels(Panel::whole([1800, 600])).unwrap()[2].1.at, [1200, 0]);
+        let five = r#"{"views": ["iso", "left", "top", "back", "right"], "size": [300, 200]}"#;
+        let panels = picture(five).panels(Panel::whole([300, 200])).unwrap();
+        assert_eq!(panels[4], (Side::Right, Panel { at: [100, 100], size: [100, 100] }));
+        let text = serde_json::to_string(&picture(wide)).unwrap();
+        assert_eq!(picture(&text), picture(wide));
+    }
+
+    #[test]
+    fn pages_that_cannot_be_are_refused() {
+        for (text, field, says) in [
+            (r#"{"width": "85mm"}"#, "width", "needs the pixels an inch"),
+            (r#"{"height": "1in", "dpi": 90, "size": [9, 9]}"#, "height", "leave out"),
+            (r#"{"width": "900in", "dpi": 9000}"#, "width", "8100000.0 pixels"),
+            (r#"{"width": "0.001pt", "dpi": 9}"#, "width", "0.0 pixels"),
+            (r#"{"dpi": 0}"#, "dpi", "1 to 10000 pixels an inch"),
+            (r#"{"columns": 2}"#, "columns", "several views"),
+            (r#"{"panel_labels": "none"}"#, "panel_labels", "several views"),
+            (r#"{"columns": 0, "views": ["iso"]}"#, "columns", "above 0"),
+        ] {
+            let (place, message) = picture(text).check().unwrap_err();
+            assert!(place == field && message.contains(says), "{text}: {place} {message}");
+        }
+        let many = PictureEntry { views: vec![Side::Top; 65], ..PictureEntry::default() };
+        assert_eq!(many.check().unwrap_err().0, "views");
+    }
 
     #[test]
     fn small_pictures_take_more_pixels() {

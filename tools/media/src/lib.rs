@@ -1,6 +1,7 @@
-//! What becomes of finished pictures: films, and texts over them. The command and the Python
-//! package share it.
+//! What becomes of finished pictures: films, several views in one, and texts over them. The command
+//! and the Python package share it.
 
+pub mod figure;
 pub mod overlay;
 pub mod video;
 

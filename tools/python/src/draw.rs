@@ -18,11 +18,14 @@ use splatkit::{
     scene::{Clip, Item, Region, Scene, Settings},
     session::{
         Captions, Coloring, Data, Description, Engine, Framing, Items, Legend, Mark, Name,
-        OverlayEntry, PictureEntry, Showing, Subject,
+        OverlayEntry, PanelLabels, PictureEntry, Showing, Subject,
     },
     volume::TransferFunction,
 };
-use splatkit_media::overlay::Overlay;
+use splatkit_media::{
+    figure::Figure,
+    overlay::{Overlay, Page},
+};
 use std::{
     collections::BTreeSet,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -148,7 +151,9 @@ impl Draw {
 
     /// Returns the texts over the picture, if there are any.
     fn texts(&self, items: &Mutex<Versioned>) -> Result<Option<Overlay>, Error> {
-        if self.overlay == OverlayEntry::default() {
+        let labels = self.picture.panel_labels.unwrap_or_default();
+        let has_labels = !self.picture.views.is_empty() && labels != PanelLabels::None;
+        if self.overlay == OverlayEntry::default() && !has_labels {
             return Ok(None);
         }
         let captions = locked(items).captions();
@@ -157,7 +162,8 @@ impl Draw {
         if letters > most {
             return Err(wrong(format!("a caption has at most {most} letters, not {letters}")));
         }
-        Overlay::open(&self.overlay, &captions, self.behind).map_err(film::plain)
+        let page = Page { background: self.behind, dpi: self.picture.dpi, has_labels };
+        Overlay::open(&self.overlay, &captions, page).map_err(film::plain)
     }
 
     /// Returns the part of a drawn picture that a camera is fitted to: the middle, beside the
@@ -369,14 +375,16 @@ impl Stage {
         let mut kept = self.take(draw.draws_facets())?;
         let settings = draw.settings(&kept, stop)?;
         let texts = draw.texts(&self.items)?;
+        if !draw.picture.views.is_empty() {
+            let drawn = self.draw_figure(&mut kept, (viewpoint, draw), texts, &settings);
+            self.put(kept, draw.draws_facets());
+            return drawn;
+        }
         let (camera, is_fitted) = match viewpoint {
             Viewpoint::Camera(text) => (camera(text)?, false),
             Viewpoint::Fitted(fit) => (self.fitted(&mut kept, fit, draw, &settings)?, true),
         };
-        let mut renderer = match kept.renderer.take() {
-            Some((engine, renderer)) if engine == draw.engine => renderer,
-            _ => Renderer::new(&draw.device()?, &kept.scene)?,
-        };
+        let mut renderer = kept.renderer_of(draw)?;
         let sheet = settings.sheet_thickness.or_else(|| sheet_of(&kept.scene));
         let done = renderer.render(&camera, &effort.settings(&settings, sheet));
         kept.renderer = Some((draw.engine, renderer));
@@ -388,20 +396,57 @@ impl Stage {
             }
             other => other,
         })?;
-        // An opacity that rounds to 0 in a file of 8 bits counts as none.
-        if is_fitted && picture.color.iter().all(|pixel| pixel[3] < 0.5 / 255.0) {
-            return Err(Error::NothingToDraw("the picture is empty: nothing has opacity".into()));
+        if is_fitted {
+            require_content(&picture)?;
         }
         if effort == Effort::EXACT && !draw.keep_samples {
             if factor > 1 {
                 picture = picture.reduced(factor)?;
             }
-            locked(&self.items).items.draw_edges(&mut picture, &camera, &settings.clips)?;
+            let edges = (&settings.clips[..], draw.picture.edge_width());
+            locked(&self.items).items.draw_edges(&mut picture, &camera, edges)?;
             if let Some(texts) = texts {
                 texts.draw(&mut picture, &camera);
             }
         }
         Ok(Drawn { picture, stats, camera })
+    }
+
+    /// Draws a picture of several views. The statistics are those of the last.
+    fn draw_figure(
+        &self,
+        kept: &mut Kept,
+        (viewpoint, draw): (Viewpoint<'_>, &Draw),
+        texts: Option<Overlay>,
+        settings: &Settings,
+    ) -> Result<Drawn, Error> {
+        let Viewpoint::Fitted(fit) = viewpoint else {
+            return Err(wrong("a picture has either a camera or views; leave one of them out"));
+        };
+        if fit.camera_position.is_some() || draw.keep_samples {
+            return Err(wrong("views need a camera that is fitted to the scene"));
+        }
+        let seen = kept.fitted(fit, &settings.clips)?;
+        let subject = kept.seen_by(&seen);
+        let figure = Figure::new(&draw.picture, texts.as_ref(), (fit, &subject))?;
+        let Some(figure) = figure else { return Err(wrong("there are no views")) };
+        let factor = draw.factor(&kept.scene);
+        let mut settings = settings.clone();
+        settings.size = figure.panel_size().map(|side| side.saturating_mul(factor));
+        let mut renderer = kept.renderer_of(draw)?;
+        let mut last = FrameStats::default();
+        let drawn = figure.draw(texts.as_ref(), |camera| {
+            let (picture, stats) = renderer.render(camera, &settings)?;
+            last = stats;
+            let mut picture = if factor > 1 { picture.reduced(factor)? } else { picture };
+            let edges = (&settings.clips[..], draw.picture.edge_width());
+            locked(&self.items).items.draw_edges(&mut picture, camera, edges)?;
+            Ok::<_, Error>(picture)
+        });
+        kept.renderer = Some((draw.engine, renderer));
+        let (picture, _) = drawn?;
+        require_content(&picture)?;
+        Ok(Drawn { picture, stats: last, camera: figure.cameras()[0].clone() })
     }
 
     /// Takes what is kept of the scene, or makes it.
@@ -481,7 +526,24 @@ impl Versioned {
     }
 }
 
+/// Refuses a picture that shows nothing.
+fn require_content(picture: &Picture) -> Result<(), Error> {
+    // An opacity that rounds to 0 in a file of 8 bits counts as none.
+    if picture.color.iter().all(|pixel| pixel[3] < 0.5 / 255.0) {
+        return Err(Error::NothingToDraw("the picture is empty: nothing has opacity".into()));
+    }
+    Ok(())
+}
+
 impl Kept {
+    /// Takes the renderer that is kept, or makes one for these options.
+    fn renderer_of(&mut self, draw: &Draw) -> Result<Renderer, Error> {
+        match self.renderer.take() {
+            Some((engine, renderer)) if engine == draw.engine => Ok(renderer),
+            _ => Renderer::new(&draw.device()?, &self.scene),
+        }
+    }
+
     /// Takes over the transfer functions of a scene that has not changed otherwise.
     fn with_transfers_of(mut self, items: &Versioned, facets: bool) -> Result<Self, Error> {
         let scene = items.scene(facets)?;

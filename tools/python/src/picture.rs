@@ -11,7 +11,7 @@ use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyBytes};
 use splatkit::{
     Error, Stop, disk,
-    picture::{Picture as Pixels, PictureFormat},
+    picture::{Encoding, Picture as Pixels, PictureFormat},
 };
 use std::{path::PathBuf, sync::Arc};
 
@@ -119,14 +119,27 @@ impl Picture {
         background: Option<[f32; 3]>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let pixels = &self.pixels;
-        let encoded = run_here(py, || pixels.encode(PictureFormat::Png, background))?;
+        let mut encoding = Encoding::new(PictureFormat::Png);
+        encoding.background = background;
+        let encoded = run_here(py, || pixels.encode(&encoding))?;
         Ok(PyBytes::new(py, &encoded))
     }
 
-    /// Writes a PNG or JPEG file.
-    fn save(&self, py: Python<'_>, path: PathBuf, background: Option<[f32; 3]>) -> PyResult<()> {
+    /// Writes a picture file with these bits a channel and pixels an inch.
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        background: Option<[f32; 3]>,
+        bits: Option<u32>,
+        dpi: Option<f64>,
+    ) -> PyResult<()> {
         let pixels = self.pixels.clone();
-        run(py, &Stop::default(), move || pixels.save(path, background))
+        run(py, &Stop::default(), move || {
+            let mut encoding = Encoding::new(PictureFormat::of(&path)?);
+            (encoding.background, encoding.bits, encoding.dpi) = (background, bits, dpi);
+            pixels.save_as(path, &encoding)
+        })
     }
 
     /// Writes the depths as a grey PNG of 16 bits.

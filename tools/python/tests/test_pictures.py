@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import pickle
+import struct
 
 import numpy as np
 import pytest
@@ -48,9 +50,47 @@ def test_backgrounds_and_files(tmp_path):
         clear.rgba[0, 0] = 0
 
 
+def test_figures_have_a_size_on_paper_and_several_views(tmp_path):
+    picture = pysplatkit.render(
+        blob(), views=["front", "left"], width="2in", dpi=100, panel_labels="none", background=None
+    )
+    assert picture.size == (200, 100)
+    left, right = picture.depth[:, :100], picture.depth[:, 100:]
+    assert np.isfinite(left).any() and np.isfinite(right).any()
+    again = pickle.loads(pickle.dumps(picture))
+    files = [one.save(tmp_path / f"{number}.png") for number, one in enumerate((picture, again))]
+    assert files[0].read_bytes() == files[1].read_bytes()
+    # Pixels a metre.
+    assert b"pHYs" + struct.pack(">IIB", 3937, 3937, 1) in files[0].read_bytes()
+    for wrong in (
+        {"views": ["front"], "camera": picture.camera},
+        {"views": ["front"], "view": "left"},
+        {"width": "2in"},
+        {"columns": 2},
+    ):
+        with pytest.raises(pysplatkit.ArgumentError, match=r"views|dpi"):
+            pysplatkit.render(blob(), **wrong)
+
+
+def test_pictures_have_many_formats(tmp_path):
+    picture = pysplatkit.render(blob(), size=SIZE, background=None)
+    starts = {"a.tiff": b"II", "a.webp": b"RIFF", "a.exr": b"\x76\x2f\x31\x01"}
+    for name, start in starts.items():
+        assert picture.save(tmp_path / name).read_bytes().startswith(start)
+    deep = picture.save(tmp_path / "deep.png", bits=16).read_bytes()
+    assert deep[24] == 16
+    with pytest.raises(pysplatkit.ArgumentError, match="8 bits a channel"):
+        picture.save(tmp_path / "a.jpg", bits=16)
+
+
 #: Files, flags of the command, and the options that mean the same.
 CASES = [
     ("volume.npy", [], {}),
+    (
+        "volume.npy",
+        ["--views", "front,top", "--dpi", "150", "--scale-bar"],
+        {"views": ["front", "top"], "dpi": 150, "scale_bar": True},
+    ),
     ("bytes.npy", ["--mode", "splats"], {"mode": "splats"}),
     ("bytes.npy", ["--optics", "maximum"], {"optics": "maximum"}),
     ("bytes.npy", ["--transfer", "generic"], {"transfer": "generic"}),

@@ -176,7 +176,7 @@ impl Purpose {
     pub fn endings(self) -> &'static [&'static str] {
         match self {
             Self::Open => &[],
-            Self::SavePicture => &["png", "jpg", "jpeg"],
+            Self::SavePicture => &["png", "jpg", "jpeg", "tiff", "tif", "webp", "exr"],
             Self::Export => &["webp", "gif", "apng", "mp4", "webm", "mov", "png"],
             _ => &["json"],
         }

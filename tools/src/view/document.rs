@@ -39,7 +39,15 @@ pub struct Document {
 }
 
 impl Document {
-    pub fn new(now: Description, device: DeviceFlags) -> Self {
+    /// A window shows one view, whose size is its own: several views and lengths on paper are left
+    /// out.
+    pub fn new(mut now: Description, device: DeviceFlags) -> Self {
+        let picture = &mut now.picture;
+        if picture.width.is_some() || picture.height.is_some() {
+            (picture.size, picture.width, picture.height) = (Some(picture.size()), None, None);
+        }
+        picture.views.clear();
+        (picture.columns, picture.panel_labels) = (None, None);
         let (undone, done) = (Vec::new(), Vec::new());
         Self { now, undone, done, begun: None, device, path: None, is_trusting: false }
     }
@@ -253,6 +261,23 @@ mod tests {
     use super::*;
     use crate::{Command, Task};
     use clap::{CommandFactory, FromArgMatches};
+
+    /// A window that saves its scene must not save a camera beside several views.
+    #[test]
+    fn figures_become_one_view() {
+        let flags = "splatkit render a.ply --views front,left --width 2in --dpi 100 --columns 1";
+        let mut document = document(flags);
+        document.set_camera(CameraEntry {
+            position: [0.0, 0.0, 9.0],
+            focal_point: [0.0; 3],
+            view_up: [0.0, 1.0, 0.0],
+            view_angle: Some(30.0),
+            height: None,
+        });
+        assert_eq!(document.scene().check(), Ok(()));
+        assert_eq!(document.scene().picture.size(), [200, 400]);
+        assert!(document.job([64, 48]).is_ok());
+    }
 
     fn document(words: &str) -> Document {
         let matches = Command::command().try_get_matches_from(words.split(' ')).expect("flags");

@@ -6,6 +6,7 @@ mod colors;
 mod common;
 mod convert;
 mod convert_memory;
+mod figures;
 mod files;
 #[cfg(unix)]
 mod gaussian_oracle;

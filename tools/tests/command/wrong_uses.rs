@@ -37,7 +37,44 @@ const USES: &[(&str, &str, i32, &str)] = &[
         "an animation in another format",
         "render a.ply -o out.avi --turntable 9",
         2,
-        "use .gif, .webp, .apng, .mp4, .webm or .mov, or .png or .jpg for numbered pictures",
+        "use .gif, .webp, .apng, .mp4, .webm or .mov, or .png, .jpg, .tiff or .exr for numbered \
+         pictures",
+    ),
+    (
+        "bits that a format lacks",
+        "render a.ply -o out.jpg --bits 16",
+        2,
+        "a .jpg file has 8 bits a channel, not 16",
+    ),
+    (
+        "a width on paper without a resolution",
+        "render a.ply -o out.png --width 85mm",
+        2,
+        "--width: a length on paper needs the pixels an inch (--dpi, in JSON dpi)",
+    ),
+    (
+        "a width on paper without a unit",
+        "render a.ply -o out.png --width 85 --dpi 300",
+        2,
+        "the form is a number above 0 with mm, cm, in or pt, such as 85mm",
+    ),
+    (
+        "several views from one side",
+        "render a.ply -o out.png --views front,left --view top",
+        2,
+        "cannot be used with",
+    ),
+    (
+        "columns of one view",
+        "render a.ply -o out.png --columns 2",
+        2,
+        "--columns: needs several views (--views)",
+    ),
+    (
+        "an animation of several views",
+        "render a.ply -o out.gif --views front,left --turntable 9",
+        2,
+        "cannot be used with",
     ),
     (
         "an animation as a picture on stdout",

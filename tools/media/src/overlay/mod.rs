@@ -19,7 +19,7 @@ use splatkit::{
     Error,
     math::Camera,
     picture::Picture,
-    session::{Captions, OverlayEntry},
+    session::{Captions, OverlayEntry, Panel},
 };
 use text::{Face, Pen};
 
@@ -28,28 +28,58 @@ pub struct Overlay {
     entry: OverlayEntry,
     captions: Captions,
     face: Face,
+    page: Page,
     ink: Ink,
 }
+
+/// The page that texts are written on.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Page {
+    /// The colour behind the picture, red, green and blue in 0 … 1; `None` for transparency.
+    pub background: Option<[f32; 3]>,
+    /// Pixels an inch, which set the height of texts; else the picture's size sets it.
+    pub dpi: Option<f64>,
+    /// Whether parts of the picture have labels.
+    pub has_labels: bool,
+}
+
+/// A part of a picture, or the whole of it.
+pub struct Part<'a> {
+    /// Where it is.
+    pub panel: Panel,
+    /// The camera that it was taken with.
+    pub camera: &'a Camera,
+    /// The text in its corner, if it is not empty.
+    pub label: String,
+}
+
+/// The height of letters of pictures with a resolution, in points.
+const POINTS: f64 = 8.0;
+
+/// The smallest height of letters, in pixels.
+const LEAST: f64 = 8.5;
 
 /// Most scalar bars; more would hide the picture.
 const MOST_BARS: usize = 4;
 /// The space between bars, in heights of letters.
 const BETWEEN: f64 = 1.2;
+/// Most lines of a caption.
+const CAPTION_LINES: usize = 3;
 /// The most of a picture's width that is left free at each side.
 const MOST_ROOM: f64 = 0.25;
 
 impl Overlay {
-    /// Returns the texts to draw over pictures with a background; `None` if none are asked for. A
-    /// text that has nothing to say is an error.
+    /// Returns the texts to draw over pictures of a page; `None` if none are asked for. A text that
+    /// has nothing to say is an error.
     ///
     /// # Errors
     /// [`Failure::Usage`] for a scalar bar where nothing is coloured by values.
     pub fn open(
         entry: &OverlayEntry,
         captions: &Captions,
-        background: Option<[f32; 3]>,
+        page: Page,
     ) -> Result<Option<Self>, Failure> {
-        if *entry == OverlayEntry::default() {
+        if *entry == OverlayEntry::default() && !page.has_labels {
             return Ok(None);
         }
         if entry.scalar_bar && captions.legends.is_empty() {
@@ -63,7 +93,7 @@ impl Overlay {
         let face = Face::open();
         let face = face.ok_or_else(|| Error::Argument("the built-in font is damaged".into()))?;
         let (entry, captions) = (entry.clone(), captions.clone());
-        Ok(Some(Self { entry, captions, face, ink: Ink::over(background) }))
+        Ok(Some(Self { entry, captions, face, page, ink: Ink::over(page.background) }))
     }
 
     /// Returns how many pixels at its left and at its right a scene that is fitted to a picture
@@ -79,6 +109,18 @@ impl Overlay {
         (bars + area.left).min(MOST_ROOM * f64::from(width)) as u32
     }
 
+    /// Returns the part of a picture that the caption and the scalar bars leave free for panels.
+    pub fn free(&self, size: [u32; 2]) -> Panel {
+        let [width, height] = size;
+        let mut blank = Picture { width, height, color: Vec::new(), depth: Vec::new() };
+        let (canvas, area) = self.canvas(&mut blank);
+        let caption = self.entry.caption.as_ref().map_or(0.0, |text| {
+            area.top + canvas.lines_height(canvas.wrapped(text, area.width(), CAPTION_LINES).len())
+        });
+        let top = caption.min(MOST_ROOM * f64::from(height)) as u32;
+        Panel { at: [0, top], size: [width - self.room(size), height - top] }
+    }
+
     /// Returns the colours of all scalar bars.
     pub fn bar_colors(&self) -> Vec<[f32; 3]> {
         self.captions.legends.iter().flat_map(|(_, bar)| bar.colors.clone()).collect()
@@ -87,48 +129,86 @@ impl Overlay {
     /// Returns a picture to draw on, and its area without a margin.
     fn canvas<'a>(&'a self, picture: &'a mut Picture) -> (Canvas<'a>, Area) {
         let (width, height) = (f64::from(picture.width), f64::from(picture.height));
-        let size = (width.min(height) / 34.0).max(8.5);
-        let margin = (0.9 * size).min(0.1 * width.min(height));
+        let shorter = width.min(height);
+        let size = self.page.dpi.map_or(shorter / 34.0, |dpi| POINTS / 72.0 * dpi);
+        let size = size.min(shorter / 8.0).max(LEAST);
+        let margin = (0.9 * size).min(0.1 * shorter);
         let area = Area { left: 0.0, top: 0.0, right: width, bottom: height }.grown(-margin);
         (Canvas { picture, face: &self.face, ink: self.ink, size }, area)
     }
 
     /// Draws the texts over a picture, and returns what was drawn.
     pub fn draw(&self, picture: &mut Picture, camera: &Camera) -> Value {
-        let pixels = picture.height;
+        let panel = Panel::whole([picture.width, picture.height]);
+        self.draw_parts(picture, &[Part { panel, camera, label: String::new() }])
+    }
+
+    /// Draws the texts over a picture of several parts, and returns what was drawn. The parts have
+    /// one scale: the scale bar is in the last one. Axes and labels are in each.
+    pub fn draw_parts(&self, picture: &mut Picture, parts: &[Part<'_>]) -> Value {
         let (mut canvas, mut area) = self.canvas(picture);
-        let size = canvas.size;
         let mut drawn = json!({});
         if let Some(text) = &self.entry.caption {
             drawn["caption"] = json!(text);
             area.top += self.caption(&mut canvas, area, text);
         }
-        if self.entry.axes {
-            let side = (7.0 * size).min(0.42 * area.width()).min(area.height());
-            let square = Area {
-                left: area.left,
-                top: area.bottom - side,
-                right: area.left + side,
-                bottom: area.bottom,
-            };
-            if let Ok(view) = camera.view([canvas.picture.width, pixels]) {
-                axes::draw(&mut canvas, square, view.rotation, self.names());
+        for part in parts {
+            self.label(&mut canvas, part);
+            // Smaller panels have smaller axes.
+            let side = if parts.len() > 1 { 4.5 } else { 7.0 } * canvas.size;
+            if self.entry.axes && self.axes(&mut canvas, part, side) {
                 drawn["axes"] = json!(self.names().concat().concat());
             }
         }
-        if self.entry.scale_bar {
-            let most = 0.3 * area.width();
-            if let Some(ruler) = Ruler::new(camera, pixels, most, &self.captions.length) {
-                ruler.draw(&mut canvas, area);
-                area.bottom -= 2.4 * size;
-                let Ruler { length, pixels, text } = ruler;
-                drawn["scale_bar"] = json!({ "length": length, "pixels": pixels, "text": text });
+        let last = parts.last().filter(|_| self.entry.scale_bar);
+        if let Some((ruler, place)) = last.and_then(|part| self.ruler(&canvas, part)) {
+            ruler.draw(&mut canvas, place);
+            if place.right == area.right {
+                area.bottom -= 2.4 * canvas.size;
             }
+            let Ruler { length, pixels, text } = ruler;
+            drawn["scale_bar"] = json!({ "length": length, "pixels": pixels, "text": text });
         }
         if self.entry.scalar_bar {
             drawn["scalar_bars"] = self.bars(&mut canvas, area);
         }
         drawn
+    }
+
+    /// Returns the area of a part without a margin.
+    fn area_of(&self, canvas: &Canvas, Panel { at, size }: Panel) -> Area {
+        let [left, top] = at.map(f64::from);
+        let [width, height] = size.map(f64::from);
+        let whole = [canvas.picture.width, canvas.picture.height].map(f64::from);
+        let margin = (0.9 * canvas.size).min(0.1 * whole[0].min(whole[1]));
+        Area { left, top, right: left + width, bottom: top + height }.grown(-margin)
+    }
+
+    /// Writes the label of a part into its upper left corner.
+    fn label(&self, canvas: &mut Canvas, part: &Part<'_>) {
+        let area = self.area_of(canvas, part.panel);
+        let label = canvas.shortened(part.label.clone(), area.width());
+        let at = DVec2::new(area.left, area.top + 0.5 * canvas.size);
+        canvas.text(&label, at, Align::Left);
+    }
+
+    /// Draws the axes into the lower left corner of a part, in a square with a side of so many
+    /// pixels. Returns whether there is a view.
+    fn axes(&self, canvas: &mut Canvas, part: &Part<'_>, side: f64) -> bool {
+        let area = self.area_of(canvas, part.panel);
+        let side = side.min(0.42 * area.width()).min(area.height());
+        let (right, top) = (area.left + side, area.bottom - side);
+        let Ok(view) = part.camera.view(part.panel.size) else { return false };
+        axes::draw(canvas, Area { right, top, ..area }, view.rotation, self.names());
+        true
+    }
+
+    /// Returns the scale bar of a part, and the area at whose lower right it lies.
+    fn ruler(&self, canvas: &Canvas, part: &Part<'_>) -> Option<(Ruler, Area)> {
+        let area = self.area_of(canvas, part.panel);
+        let [_, height] = part.panel.size;
+        let ruler = Ruler::new(part.camera, height, 0.3 * area.width(), &self.captions.length)?;
+        Some((ruler, area))
     }
 
     /// Returns the names of the axes: those of patients for the frames of patients.
@@ -138,13 +218,13 @@ impl Overlay {
 
     /// Draws the caption, and returns the height that it takes.
     fn caption(&self, canvas: &mut Canvas, area: Area, text: &str) -> f64 {
-        let lines = canvas.wrapped(text, area.width(), 3);
+        let lines = canvas.wrapped(text, area.width(), CAPTION_LINES);
         let middle = 0.5 * (area.left + area.right);
         for (line, text) in lines.iter().enumerate() {
             let y = area.top + (0.5 + 1.3 * line as f64) * canvas.size;
             canvas.text(text, DVec2::new(middle, y), Align::Middle);
         }
-        (1.3 * lines.len() as f64 + 0.4) * canvas.size
+        canvas.lines_height(lines.len())
     }
 
     /// Lays out the bars, and returns their height, too.
@@ -174,6 +254,11 @@ impl Overlay {
 }
 
 impl Canvas<'_> {
+    /// Returns the height that some lines of text take, with the space below them.
+    fn lines_height(&self, count: usize) -> f64 {
+        (1.3 * count as f64 + 0.4) * self.size
+    }
+
     /// Returns the lines of a text, none wider than `most` pixels and at most so many. What does
     /// not fit ends with “…”.
     pub(self) fn wrapped(&self, text: &str, most: f64, count: usize) -> Vec<String> {
@@ -238,7 +323,8 @@ mod tests {
         let [scalar_bar, axes, scale_bar, has_caption] = which;
         let caption = has_caption.then(|| "A chest, from the front".to_owned());
         let entry = OverlayEntry { scalar_bar, axes, scale_bar, caption };
-        Overlay::open(&entry, &captions(is_patient), background).unwrap().unwrap()
+        let page = Page { background, ..Page::default() };
+        Overlay::open(&entry, &captions(is_patient), page).unwrap().unwrap()
     }
 
     fn drawn(which: [bool; 4], size: [u32; 2], background: Option<[f32; 3]>) -> Picture {

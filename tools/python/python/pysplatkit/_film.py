@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ._scene import Scene
 
 #: The extensions of numbered pictures.
-_PICTURES = (".png", ".jpg", ".jpeg")
+_PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr")
 
 
 def along(keyframes: PathLike | Iterable[tuple[float, Camera]], fps: float) -> list[Camera]:

@@ -251,6 +251,23 @@ class Method(TypedDict, total=False):
     caption: str
 
 
+class Page(TypedDict, total=False):
+    """How large a picture is on paper, and what it shows beside each other."""
+
+    #: The width on paper, such as "85mm", instead of a size. Needs dpi.
+    width: str
+    #: The height on paper.
+    height: str
+    #: Pixels an inch, which set the height of texts, and which files store.
+    dpi: float
+    #: Sides that the picture shows beside each other: front, back, left, right, top, bottom, iso.
+    views: Sequence[str]
+    #: The number of views in a row.
+    columns: int
+    #: What the corner of each view says: names, letters or none.
+    panel_labels: str
+
+
 class Drawing(Method, total=False):
     """How a picture is drawn: the options of `Scene.render`, but its size and its camera."""
 
@@ -282,11 +299,19 @@ class RenderOptions(SourceOptions, total=False):
     memory: int
     cull_backfaces: bool
     occlusion: bool
+    width: str
+    height: str
+    dpi: float
+    views: Sequence[str]
+    columns: int
+    panel_labels: str
 
 
 VIEW = frozenset(View.__annotations__)
 #: The options of texts over a picture.
 OVERLAY = frozenset({"scalar_bar", "axes", "scale_bar", "caption"})
+#: The options of the page of a picture.
+PAGE = frozenset(Page.__annotations__)
 DRAWING = frozenset(Drawing.__annotations__)
 FIELD = frozenset(FieldAppearance.__annotations__)
 VOLUME = frozenset(VolumeAppearance.__annotations__)

@@ -23,11 +23,12 @@ def _restored(
     depth: npt.NDArray[np.float32],
     about: tuple[str, str],
     background: list[float] | None,
+    dpi: float | None = None,
 ) -> Picture:
     """Returns a picture that was pickled."""
     height, width = depth.shape
     pixels = (color.reshape(-1, 4), depth.ravel(), (width, height), 1, about)
-    return Picture(_pysplatkit.Picture(*pixels), background)
+    return Picture(_pysplatkit.Picture(*pixels), background, dpi)
 
 
 class Picture:
@@ -36,9 +37,15 @@ class Picture:
     Its arrays are read-only; `picture.rgba.copy()` can be changed.
     """
 
-    def __init__(self, native: _pysplatkit.Picture, background: list[float] | None) -> None:
+    def __init__(
+        self,
+        native: _pysplatkit.Picture,
+        background: list[float] | None,
+        dpi: float | None = None,
+    ) -> None:
         self._native = native
         self._background = background
+        self._dpi = dpi
 
     @property
     def size(self) -> tuple[int, int]:
@@ -67,7 +74,7 @@ class Picture:
 
     @property
     def camera(self) -> Camera:
-        """The camera that the picture was taken with."""
+        """The camera that the picture was taken with; of several views, that of the first."""
         return Camera.from_json(self._native.camera)
 
     @cached_property
@@ -81,16 +88,33 @@ class Picture:
         Args:
             background: A colour; None for transparency.
         """
-        return Picture(self._native, _options.background(background))
+        return Picture(self._native, _options.background(background), self._dpi)
 
-    def save(self, path: _options.PathLike, *, overwrite: bool = True) -> Path:
-        """Writes a .png or .jpg file, which appears whole or not at all. Returns its path.
+    def save(
+        self,
+        path: _options.PathLike,
+        *,
+        bits: int | None = None,
+        dpi: float | None = None,
+        overwrite: bool = True,
+    ) -> Path:
+        """Writes a .png, .jpg, .tiff, .webp or .exr file, which appears whole or not at all.
+        Returns its path.
+
+        OpenEXR files hold colours in linear light, multiplied by opacity, and depths.
 
         Args:
             path: The file.
+            bits: Bits a channel: 8 or 16 for .png and .tiff, 16 or 32 for .exr. Default: the first.
+            dpi: Pixels an inch, which all but .webp store. Default: what `render` was given.
             overwrite: Whether a file that is there already is replaced.
         """
-        return self._written(path, overwrite, lambda to: self._native.save(to, self._background))
+        density = self._dpi if dpi is None else float(dpi)
+
+        def write(to: Path) -> None:
+            self._native.save(to, self._background, bits, density)
+
+        return self._written(path, overwrite, write)
 
     def save_depth(self, path: _options.PathLike, *, overwrite: bool = True) -> Path:
         """Writes the depths as a grey PNG of 16 bits: white for the nearest, black for nothing.
@@ -117,7 +141,7 @@ class Picture:
 
     def __reduce__(self) -> tuple[Any, ...]:
         about = (self._native.statistics, self._native.camera)
-        return _restored, (self.color, self.depth, about, self._background)
+        return _restored, (self.color, self.depth, about, self._background, self._dpi)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
         array = self.rgba if dtype is None else self.rgba.astype(dtype, copy=False)

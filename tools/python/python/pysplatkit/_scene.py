@@ -98,7 +98,7 @@ class Scene:
             raise ArgumentError("a scene file names files: a scene of arrays cannot be saved")
         if not files:
             raise ArgumentError("the scene is empty")
-        given = _options.checked(drawing, _options.DRAWING | _options.VIEW, "save")
+        given = _options.checked(drawing, _options.DRAWING | _options.PAGE | _options.VIEW, "save")
         if given.pop("engine", None) not in (None, "cpu"):
             raise ArgumentError("a scene file does not say which engine draws: leave engine out")
         if "background" in drawing:
@@ -489,6 +489,12 @@ class Scene:
         orthographic: bool | None = None,
         up: str | Vector | None = None,
         background: Color | None = "auto",
+        width: str | None = None,
+        height: str | None = None,
+        dpi: float | None = None,
+        views: Sequence[str] | None = None,
+        columns: int | None = None,
+        panel_labels: str | None = None,
         samples: int | str | None = None,
         mode: str | None = None,
         back_to_front: bool | None = None,
@@ -530,6 +536,15 @@ class Scene:
             orthographic: Whether to draw without perspective.
             up: The direction that is up in the scene.
             background: A colour; None for transparent pixels. Default: black.
+            width: The width on paper instead of a size, such as "85mm"; also cm, in and pt. Needs
+                dpi.
+            height: The height on paper. Without one of them, the other gives it.
+            dpi: Pixels an inch. Files store them, letters are 8 points high, and edges half a
+                point wide.
+            views: Sides that the picture shows beside each other in one scale, such as
+                ["front", "left", "top"].
+            columns: The number of views in a row. Default: all of up to four.
+            panel_labels: What the corner of each view says: names, letters or none. Default: names.
             samples: Pixels that are drawn for each pixel and averaged: 1, 4, 9, 16, 64 or auto.
                 Default: auto.
             mode: sheets, axis-sheets or splats. Default: sheets.
@@ -749,15 +764,24 @@ class Scene:
         if camera is not None and view:
             names = ", ".join(sorted(view))
             raise ArgumentError(f"a picture has either a camera or a view; leave {names} out")
+        if "view" in view and "views" in chosen:
+            raise ArgumentError("a picture has either a view or views; leave one of them out")
+        if {"size", "width", "height"} & chosen.keys():
+            for name in ("size", "width", "height"):
+                said.pop(name, None)
+        if camera is not None or "view" in view:
+            for name in ("views", "columns", "panel_labels"):
+                said.pop(name, None)
         if {"cut", "budget"} & chosen.keys():
             for name in ("cut", "budget", "frame_time"):
                 said.pop(name, None)
         background = _options.background(behind)
         draw = {**said, **(self._described.get("overlay") or {}), **chosen, "behind": background}
-        if camera is None and not view and self._described.get("camera") is not None:
+        is_fitted = bool(view) or "views" in chosen
+        if camera is None and not is_fitted and self._described.get("camera") is not None:
             camera = Camera.from_json(json.dumps(self._described["camera"]))
         fit = {**(self._described.get("framing") or {}), **json.loads(_fit(**view))}
-        return Picture(self._pixels(camera, draw, json.dumps(fit)), background)
+        return Picture(self._pixels(camera, draw, json.dumps(fit)), background, draw.get("dpi"))
 
     def _pixels(
         self, camera: Camera | None, draw: Mapping[str, Any], fit: str = "{}"
@@ -791,7 +815,7 @@ _ALSO = "a path, a dictionary of the arguments of a method, "
 #: The options of a camera that is fitted, in their order.
 _FIT = tuple(View.__annotations__)
 #: The options of `Scene.render` beside the camera.
-_GIVEN = _options.DRAWING | _options.VIEW | {"size"}
+_GIVEN = _options.DRAWING | _options.PAGE | _options.VIEW | {"size"}
 
 
 def _arguments(source: Any, options: dict[str, Any]) -> tuple[str, dict[str, Any]]:

@@ -3,6 +3,8 @@
 
 use super::Window;
 use crate::{
+    frames::Storing,
+    job::Finish,
     motion::read_path,
     scene_file,
     view::{
@@ -13,7 +15,7 @@ use crate::{
 use splatkit::{
     input::Limits,
     math::CameraPath,
-    picture::PictureFormat,
+    picture::{Encoding, PictureFormat},
     session::{CameraEntry, InputEntry},
     volume::TransferFunction,
 };
@@ -177,8 +179,13 @@ impl Window {
             return;
         };
         let written = PictureFormat::of(&path)
-            .and_then(|format| frame.picture.encode(format, scene_view.finish.background))
+            .and_then(|format| frame.picture.encode(&encoding_of(format, &scene_view.finish)))
             .and_then(|bytes| splatkit::disk::write(&path, &bytes));
         self.say_saved(&path, written);
     }
+}
+
+/// Returns how a finished picture becomes a file of a format.
+fn encoding_of(format: PictureFormat, finish: &Finish) -> Encoding {
+    Storing { bits: None, dpi: finish.dpi }.of(format, finish.background)
 }
