@@ -70,7 +70,7 @@
 //!
 //! Cargo features leave out what a program does not need. These are `gpu` and its backends
 //! `vulkan`, `metal`, `dx12` and `webgpu`, and the formats `ply`, `obj`, `gltf`, `las`, `e57`,
-//! `vtk` and `dicom`. Others are `files` larger than memory, `remote` inputs, `rayon` and
+//! `vtk` and `dicom`. Others are `files` larger than memory, `remote` inputs and
 //! `reference`. All are on by default except `webgpu` and `remote`. docs/library.md says what each
 //! brings.
 //!
@@ -133,6 +133,7 @@ pub mod splat;
 mod stop;
 pub mod surface;
 pub mod volume;
+pub(crate) mod warning;
 
 // What the public functions take and return of these crates, in the versions that they need.
 pub use glam;
