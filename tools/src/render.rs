@@ -389,7 +389,7 @@ impl Run<'_> {
         let Run { ready: Ready { job, loaded, settings, finish }, motion, film, frames, .. } = self;
         let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
-        let free = job.free(settings, finish);
+        let free = job.free(finish);
         let cameras = motion.cameras(&job.framing()?, &loaded.subject, free)?;
         let mut last = (FrameStats::default(), cameras[0].clone());
         let (mut is_shown, mut missing) = (false, 0);

@@ -22,12 +22,12 @@ pub use appearance::{AppearanceEntry, IsosurfaceEntry, KernelEntry, TransferEntr
 pub use camera::CameraEntry;
 pub use clip::{Axis, ClipEntry, ClipSide, Place};
 pub use color::{Background, ColorEntry};
-pub use load::{Loaded, LoadedInput};
+pub use load::{Loaded, LoadedInput, ReadInput};
 pub use picture::{Composite, PictureEntry, Samples};
 pub use reading::{LimitsEntry, ReadingEntry};
 pub use transform::{Rotation, TransformEntry};
 
-use super::{CellStyle, Data, Framing, Opened, Showing};
+use super::{CellStyle, Framing, Showing};
 use crate::{Error, Result, input::Limits};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -119,6 +119,27 @@ pub enum Engine {
     Cpu,
 }
 
+impl OverlayEntry {
+    /// Checks the texts.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the name of the field that is wrong.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(|(field, message)| Error::Argument(format!("{field}: {message}")))
+    }
+
+    fn check(&self) -> std::result::Result<(), appearance::Wrong> {
+        let letters = self.caption.as_ref().map_or(0, |text| text.chars().count());
+        let most = Description::MOST_CAPTION;
+        match letters {
+            letters if letters > most => {
+                Err(("caption", format!("has {letters} letters, but may have at most {most}")))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 fn yes() -> bool {
     true
 }
@@ -201,25 +222,6 @@ impl Description {
         Ok(showing)
     }
 
-    /// Reads the data of an input that was opened, with all that the input says of it: radii of
-    /// points that `showing` names, and where it is moved to.
-    ///
-    /// # Errors
-    /// Those of [`Opened::read`] and [`Reading::give_radii`](super::Reading::give_radii);
-    /// [`Error::Input`] for a file that cannot be moved.
-    pub fn read_input(
-        &self,
-        input: &InputEntry,
-        opened: &Opened<'_>,
-        showing: &Showing,
-    ) -> Result<Data> {
-        let mut data = opened.read()?;
-        let reading = self.reading_of(input).reading();
-        reading.give_radii(&input.file, &mut data, showing.point_radius.as_deref())?;
-        input.transform.apply(&input.file, &mut data)?;
-        Ok(data)
-    }
-
     /// Returns how the camera looks at the scene.
     ///
     /// # Errors
@@ -262,13 +264,7 @@ impl Description {
         self.framing.validate().map_err(|message| ("framing".to_owned(), message))?;
         let camera = self.camera.as_ref().map(CameraEntry::camera).transpose();
         camera.map_err(|message| ("camera".to_owned(), message))?;
-        let letters = self.overlay.caption.as_ref().map_or(0, |text| text.chars().count());
-        if letters > Self::MOST_CAPTION {
-            let message =
-                format!("has {letters} letters, but may have at most {}", Self::MOST_CAPTION);
-            return Err(("overlay.caption".into(), message));
-        }
-        Ok(())
+        self.overlay.check().map_err(place("overlay"))
     }
 
     /// Returns the files that the description names beside its inputs.
