@@ -73,7 +73,8 @@
 //! - `gpu`, and its backends `vulkan`, `metal`, `dx12` and `webgpu`;
 //! - the formats `ply`, `obj`, `gltf`, `las`, `e57`, `vtk`, `dicom`, `tiff`, `npz`, `sog` and
 //!   `hdf5`;
-//! - `files` larger than memory, `remote` inputs, `rayon` and `reference`.
+//! - `files` larger than memory, `pictures` in other files than PNG, `remote` inputs and
+//!   `reference`.
 //!
 //! All are on by default except `webgpu` and `remote`. docs/library.md says what each brings.
 //!
@@ -136,6 +137,7 @@ pub mod splat;
 mod stop;
 pub mod surface;
 pub mod volume;
+pub(crate) mod warning;
 
 // What the public functions take and return of these crates, in the versions that they need.
 pub use glam;

@@ -18,7 +18,7 @@ mod tests;
 mod volume;
 
 use super::{ReadOptions, Series};
-use crate::{Error, Result, input::Source, volume::Volume};
+use crate::{Error, Result, input::Source, volume::Volume, warning};
 use file::File;
 pub(super) use file::is_dicom;
 use head::Head;
@@ -111,7 +111,7 @@ fn listed(source: &Source) -> Result<Option<Vec<PathBuf>>> {
     }
     if missing > 0 {
         let path = source.path.display();
-        tracing::warn!("{path}: {missing} of the files that it lists are not beside it");
+        warning::give!("{path}: {missing} of the files that it lists are not beside it");
     }
     if paths.is_empty() {
         let message = "lists no files that are beside it";
@@ -199,12 +199,12 @@ impl SeriesList {
     /// Says what was passed over, and which series was chosen if nobody named it.
     fn tell(&self, source: &Source, options: &ReadOptions, chosen: usize) {
         let path = source.path.display();
-        self.words.iter().for_each(|word| tracing::warn!("{path}: {word}"));
+        self.words.iter().for_each(|word| warning::give!("{path}: {word}"));
         let count = self.series.len();
         if count > 1 && options.series.is_none() {
             let name = self.series[chosen].heads[0].series.title();
             let reason = "has the most pictures and is read; see --series";
-            tracing::warn!("{path}: of {count} series, {name} {reason}");
+            warning::give!("{path}: of {count} series, {name} {reason}");
         }
     }
 

@@ -21,6 +21,7 @@ use crate::{
     about::Orientation,
     input::{Source, copy, positions},
     surface::{Mesh, Texture},
+    warning,
 };
 use ::gltf::json::{self, mesh::Mode, mesh::Semantic, validation::Checked};
 use buffers::Buffers;
@@ -475,7 +476,7 @@ impl Builder<'_> {
             return Err(self.source.error("scene", "contains no meshes with positions"));
         }
         if self.has_gaussians {
-            tracing::warn!(
+            warning::give!(
                 "{}: contains meshes and trained 3D Gaussians; the Gaussians are left out",
                 self.source.path.display()
             );
@@ -483,7 +484,7 @@ impl Builder<'_> {
         if !self.idle.is_empty() {
             let idle: Vec<&str> = self.idle.iter().map(String::as_str).collect();
             let file = self.source.path.display();
-            tracing::warn!("{file}: drawn without its {}", idle.join(", "));
+            warning::give!("{file}: drawn without its {}", idle.join(", "));
         }
         let positions = &self.positions;
         (self.mesh.origin, self.mesh.positions) =

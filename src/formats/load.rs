@@ -15,6 +15,7 @@ use crate::{
     scattered::Points,
     surface::Mesh,
     volume::Volume,
+    warning,
 };
 use std::path::Path;
 
@@ -47,20 +48,10 @@ pub fn read_mesh(source: &Source, options: &ReadOptions) -> Result<Mesh> {
 /// As [`read_mesh`], in the formats of a table, but does not check whether the file changed
 /// meanwhile.
 pub(super) fn mesh_of(table: &[Format], source: &Source, options: &ReadOptions) -> Result<Mesh> {
-    let may = |format: &Format| format.mesh.is_some();
-    match find(table, source, may)?.and_then(|format| format.mesh) {
-        Some(read) => {
-            let mut mesh = read(source, options)?;
-            keep_visible(source, &mut mesh);
-            Ok(mesh)
-        }
-        None => Err(foreign(table, source).unwrap_or_else(|| {
-            let message = format!("“.{}” is not a mesh format that can be read", named(source));
-            source
-                .error("path", message)
-                .hint(format!("meshes and point clouds are read from {}", extensions(table, may)))
-        })),
-    }
+    let names = ["a mesh format", "meshes and point clouds"];
+    let mut mesh = reader(table, source, names, |format| format.mesh)?(source, options)?;
+    keep_visible(source, &mut mesh);
+    Ok(mesh)
 }
 
 /// Reads a volume. The extension selects the format if it is one of a volume. Any other file is
@@ -88,7 +79,7 @@ pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let volume = source.unless_changed(volume_of(FORMATS, source, options))?;
     let volume = volume.with_guessed_labels().with_label_table(&options.labels);
     if !options.labels.is_empty() && volume.about.labels.is_none() {
-        tracing::warn!(
+        warning::give!(
             "{}: the table of labels is not used: it lacks some of the values, or they are no \
              whole numbers",
             source.path.display()
@@ -163,22 +154,8 @@ pub(super) fn samples_of(
     source: &Source,
     options: &ReadOptions,
 ) -> Result<Points> {
-    let may = |format: &Format| format.samples.is_some();
-    match find(table, source, may)?.and_then(|format| format.samples) {
-        Some(read) => read(source, options),
-        None => {
-            if let Some(error) = foreign(table, source) {
-                return Err(error);
-            }
-            let named = named(source);
-            Err(source
-                .error(
-                    "path",
-                    format!("“.{named}” is not a format of scattered samples that can be read"),
-                )
-                .hint(format!("scattered samples are read from {}", extensions(table, may))))
-        }
-    }
+    let names = ["a format of scattered samples", "scattered samples"];
+    reader(table, source, names, |format| format.samples)?(source, options)
 }
 
 /// Reads cells. The file's extension selects the format; for other extensions, the first bytes do.
@@ -188,7 +165,7 @@ pub(super) fn samples_of(
 /// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file that is in no
 /// format of cells.
 pub fn load_cells(path: impl AsRef<Path>, limits: &Limits, options: &ReadOptions) -> Result<Cells> {
-    read_cells(&Source::open(path.as_ref(), limits)?, options)
+    read_cells(&Source::open_any(path.as_ref(), limits)?, options)
 }
 
 /// As [`load_cells`], but reads from an open source, which may be in memory
@@ -198,22 +175,8 @@ pub fn load_cells(path: impl AsRef<Path>, limits: &Limits, options: &ReadOptions
 /// Those of [`load_cells`], except those of opening the file.
 pub fn read_cells(source: &Source, options: &ReadOptions) -> Result<Cells> {
     let _span = tracing::info_span!("load_cells", file = %source.path.display()).entered();
-    source.unless_changed(cells_of(FORMATS, source, options))
-}
-
-/// As [`read_cells`], in the formats of a table, but does not check whether the file changed
-/// meanwhile.
-pub(super) fn cells_of(table: &[Format], source: &Source, options: &ReadOptions) -> Result<Cells> {
-    let may = |format: &Format| format.cells.is_some();
-    match find(table, source, may)?.and_then(|format| format.cells) {
-        Some(read) => read(source, options),
-        None => Err(source
-            .error(
-                "path",
-                format!("“.{}” is not a format of cells that can be read", named(source)),
-            )
-            .hint(format!("cells are read from {}", extensions(table, may)))),
-    }
+    let read = reader(FORMATS, source, ["a format of cells", "cells"], |format| format.cells);
+    source.unless_changed(read.and_then(|read| read(source, options)))
 }
 
 /// Reads trained 3D Gaussians. The file's extension selects the format; for other extensions, the
@@ -227,7 +190,7 @@ pub fn load_gaussians(
     limits: &Limits,
     options: &ReadOptions,
 ) -> Result<Gaussians> {
-    read_gaussians(&Source::open(path.as_ref(), limits)?, options)
+    read_gaussians(&Source::open_any(path.as_ref(), limits)?, options)
 }
 
 /// As [`load_gaussians`], but reads from an open source, which may be in memory
@@ -237,30 +200,33 @@ pub fn load_gaussians(
 /// Those of [`load_gaussians`], except those of opening the file.
 pub fn read_gaussians(source: &Source, options: &ReadOptions) -> Result<Gaussians> {
     let _span = tracing::info_span!("load_gaussians", file = %source.path.display()).entered();
-    source.unless_changed(gaussians_of(FORMATS, source, options))
+    let names = ["a format of trained Gaussians", "trained Gaussians"];
+    let read = reader(FORMATS, source, names, |format| format.gaussians);
+    source.unless_changed(read.and_then(|read| read(source, options)))
 }
 
-/// As [`read_gaussians`], in the formats of a table, but does not check whether the file changed
-/// meanwhile.
-pub(super) fn gaussians_of(
+/// Returns the reader of a kind of data that a table has for a file. `names` are what a format of the
+/// kind and what such data are called.
+fn reader<R>(
     table: &[Format],
     source: &Source,
-    options: &ReadOptions,
-) -> Result<Gaussians> {
-    let may = |format: &Format| format.gaussians.is_some();
-    match find(table, source, may)?.and_then(|format| format.gaussians) {
-        Some(read) => read(source, options),
-        None => {
-            let named = named(source);
-            let message = format!("“.{named}” is not a format of trained Gaussians");
-            let hint = format!("trained Gaussians are read from {}", extensions(table, may));
-            Err(source.error("path", message).hint(hint))
-        }
+    names: [&str; 2],
+    of: impl Fn(&Format) -> Option<R>,
+) -> Result<R> {
+    let may = |format: &Format| of(format).is_some();
+    if let Some(read) = find(table, source, may)?.and_then(&of) {
+        return Ok(read);
     }
+    Err(foreign(table, source).unwrap_or_else(|| {
+        let [format, data] = names;
+        let message = format!("“.{}” is not {format} that can be read", named(source));
+        let hint = format!("{data} are read from {}", extensions(table, may));
+        source.error("path", message).hint(hint)
+    }))
 }
 
-/// Returns the error for a file of a kind that is known, but not read. Files of a format of the
-/// table, of which another function reads them, are none.
+/// Returns the error for a file of a kind that is known, but not read. There is none for files that
+/// another function reads.
 fn foreign(table: &[Format], source: &Source) -> Option<Error> {
     let is_read = find(table, source, |_| true).ok().flatten().is_some();
     let advice = advice(source).filter(|_| !is_read)?;
@@ -271,4 +237,35 @@ fn foreign(table: &[Format], source: &Source) -> Option<Error> {
 /// Returns a file's extension in lower case, for messages.
 fn named(source: &Source) -> String {
     source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{error::Error, input::testing::Folder};
+
+    /// Each function opens files and folders, and says in the same way what it does not read.
+    #[test]
+    fn all_kinds_refuse_what_they_do_not_read() {
+        let (limits, options) = (Limits::default(), ReadOptions::default());
+        let folder = Folder::new();
+        let file = folder.write("a.xcf", b"gimp xcf v011");
+        let all = |path: &Path| {
+            [
+                load_mesh(path, &limits, &options).map(drop),
+                load_samples(path, &limits, &options).map(drop),
+                load_cells(path, &limits, &options).map(drop),
+                load_gaussians(path, &limits, &options).map(drop),
+            ]
+        };
+        let data = ["meshes and point clouds", "scattered samples", "cells", "trained Gaussians"];
+        for (result, data) in all(&file).into_iter().zip(data) {
+            let Err(Error::Input { message, hint, .. }) = result else { panic!("{data}") };
+            assert!(message.starts_with("“.xcf” is not a ") && message.ends_with("can be read"));
+            assert!(hint.is_some_and(|hint| hint.starts_with(data)), "{message}");
+        }
+        let folder = file.parent().expect("a folder");
+        let errors = all(folder).map(|result| result.expect_err("a folder").to_string());
+        assert!(errors.iter().all(|error| !error.contains("regular file")), "{errors:?}");
+    }
 }

@@ -14,6 +14,7 @@ use crate::{
     Result,
     input::Source,
     volume::{Samples, Volume},
+    warning,
 };
 use flate2::read::MultiGzDecoder;
 use header::{Header, LONGEST};
@@ -175,7 +176,7 @@ fn volume(
     if more != [1, 1] {
         let message =
             format!("the file has {} axes, of which the first five are read", header.axes);
-        tracing::warn!("{}: header: {message}", header_file.path.display());
+        warning::give!("{}: header: {message}", header_file.path.display());
     }
     let numbers = match form {
         Form::Scalar => 1,
@@ -247,7 +248,7 @@ fn wanted(source: &Source, header: &Header, options: &ReadOptions) -> Result<std
         "" => {
             if count > 1 {
                 let path = source.path.display();
-                tracing::warn!(
+                warning::give!(
                     "{path}: shows the first of {count} components; --scalar :1 shows the second"
                 );
             }

@@ -14,6 +14,7 @@ use crate::{
     input::{Source, isolate::isolated},
     surface::Mesh,
     volume::Volume,
+    warning,
 };
 use cloud::Columns;
 use std::io::{Cursor, Read};
@@ -75,7 +76,7 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     let chosen = &entries[chosen];
     if volumes > 1 && options.dataset.is_none() {
         let (path, name) = (source.path.display(), &chosen.name);
-        tracing::warn!(
+        warning::give!(
             "{path}: shows “{name}”, the largest of {volumes} volumes; --dataset names another"
         );
     }
@@ -179,7 +180,7 @@ fn entries(source: &Source, archive: &mut ZipArchive<Cursor<&[u8]>>) -> Result<V
                 shaped: npy::shaped(&header, &place),
                 header,
             }),
-            Err(error) => tracing::warn!("{error}; the array is left out"),
+            Err(error) => warning::give!("{error}; the array is left out"),
         }
     }
     Ok(entries)

@@ -26,6 +26,7 @@ use crate::{
     input::{Source, positions},
     parallel::prelude::*,
     surface::{Material, Mesh},
+    warning,
 };
 use faces::Faces;
 pub use gaussians::{holds_gaussians, read_gaussians, write_compressed_gaussians, write_gaussians};
@@ -151,7 +152,7 @@ fn give_textures(
     }
     if mesh.uvs.is_empty() {
         let file = source.path.display();
-        tracing::warn!(
+        warning::give!(
             "{file}: names a picture, but neither vertices nor faces have texture coordinates; \
              drawn without it"
         );
@@ -164,7 +165,7 @@ fn give_textures(
     // Texture coordinates of vertices refer to the first picture.
     let used = if of_corners { textures.len() } else { 1 };
     if textures.len() > used {
-        tracing::warn!(
+        warning::give!(
             "{}: names {} pictures, of which vertices can have coordinates in the first only",
             source.path.display(),
             textures.len()
@@ -190,7 +191,7 @@ fn give_textures(
 fn warn_of_face_colors(source: &Source, element: &Element) {
     if element.count > 0 && ROLES[COLOR..ALPHA].iter().all(|names| element.column(names).is_some())
     {
-        tracing::warn!(
+        warning::give!(
             "{}: colours of faces are not drawn; give them to the vertices, in MeshLab by \
              “Transfer Color: Face to Vertex”",
             source.path.display()

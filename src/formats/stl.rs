@@ -8,6 +8,7 @@ use crate::{
     Result,
     input::{Source, copy, growing::Growing, positions, text},
     surface::Mesh,
+    warning,
 };
 use glam::DVec3;
 
@@ -73,7 +74,7 @@ fn count(source: &Source) -> Result<Option<usize>> {
     let claimed = claimed.map(|&count| u32::from_le_bytes(count) as usize);
     let present = bytes.len().saturating_sub(HEADER + 4) / FACET;
     let rest = bytes.len().saturating_sub(HEADER + 4) % FACET;
-    let warn = |message: String| tracing::warn!("{}: {message}", source.path.display());
+    let warn = |message: String| warning::give!("{}: {message}", source.path.display());
     match claimed {
         // Some writers append a few bytes of their own.
         Some(claimed) if claimed == present && (claimed > 0 || !is_text(bytes)) => {
@@ -221,12 +222,12 @@ fn of_text(source: &Source) -> Result<Facets> {
 fn warn_of_text(source: &Source, skipped: Option<(usize, String)>, is_open: bool) {
     let file = source.path.display();
     if let Some((number, word)) = skipped {
-        tracing::warn!(
+        warning::give!(
             "{file}: line {number}: “{word}” is not a word of STL; such lines are skipped"
         );
     }
     if is_open {
-        tracing::warn!("{file}: ends before “endsolid”; it may be cut");
+        warning::give!("{file}: ends before “endsolid”; it may be cut");
     }
 }
 

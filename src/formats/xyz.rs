@@ -15,6 +15,7 @@ use crate::{
         text::{Text, Want, first_words},
     },
     surface::Mesh,
+    warning,
 };
 use glam::DVec3;
 
@@ -317,7 +318,7 @@ fn brightest(source: &Source, table: &Table, triples: &[[usize; 3]]) -> Option<[
     let [before, after] =
         [[first[0], first[1]], [second[1], second[2]]].map(|[a, b]| table.difference(a, b));
     let chosen = if 2.0 * before < after { first } else { second };
-    tracing::warn!(
+    warning::give!(
         "{}: columns {} to {} are read as the colour; name the columns in the first line if they \
          are not",
         source.path.display(),

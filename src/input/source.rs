@@ -150,6 +150,14 @@ impl<'a> Source<'a> {
         Ok(Self::of(name, limits, Content::Held(bytes), budget))
     }
 
+    /// Returns the bytes of the caller, if they stand for a file.
+    pub(crate) fn held(&self) -> Option<&[u8]> {
+        match self.content {
+            Content::Held(bytes) => Some(bytes),
+            _ => None,
+        }
+    }
+
     /// Returns whether this source holds bytes from the caller or from a server, which have no
     /// neighbouring files.
     pub(crate) fn is_alone(&self) -> bool {

@@ -8,13 +8,14 @@
 //! iterators are compiled anew for each loop, with all that splits and joins them: a third of the
 //! library's code, before. Here that work is done once, in [`run`], by numbers of parts.
 //!
-//! Results are joined in the order of the items. Without the feature `rayon` there is one part,
-//! and the calling thread runs it.
+//! Results are joined in the order of the items. Where there are no threads, as in a browser, rayon
+//! has one worker, the calling thread. There is one part then.
 
 mod ends;
 mod sources;
 mod steps;
 
+use crate::warning::Gathering;
 use std::sync::{Mutex, PoisonError};
 
 /// What a module with parallel loops imports.
@@ -26,7 +27,6 @@ pub mod prelude {
 }
 
 /// Parts for each thread, so that threads with slow parts are helped by the others.
-#[cfg(feature = "rayon")]
 const PARTS: usize = 32;
 
 /// A sequence that can be divided into parts, each with an iterator over its items.
@@ -62,16 +62,9 @@ pub struct Part {
     end: usize,
 }
 
-#[cfg(feature = "rayon")]
 pub use rayon::current_num_threads;
 
-#[cfg(not(feature = "rayon"))]
-pub fn current_num_threads() -> usize {
-    1
-}
-
 /// Calls `of` with each number below `count`, on all threads.
-#[cfg(feature = "rayon")]
 fn run(count: usize, of: &(dyn Fn(usize) + Sync)) {
     fn halves(first: usize, end: usize, of: &(dyn Fn(usize) + Sync)) {
         match end - first {
@@ -86,17 +79,9 @@ fn run(count: usize, of: &(dyn Fn(usize) + Sync)) {
     halves(0, count, of);
 }
 
-#[cfg(not(feature = "rayon"))]
-fn run(count: usize, of: &(dyn Fn(usize) + Sync)) {
-    (0..count).for_each(of);
-}
-
 /// Returns where to divide a sequence of this length, into parts of at least `least` places.
 fn cuts(length: usize, least: usize) -> Vec<usize> {
-    #[cfg(feature = "rayon")]
     let most = if current_num_threads() == 1 { 1 } else { PARTS * current_num_threads() };
-    #[cfg(not(feature = "rayon"))]
-    let most = 1;
     let parts = (length / least.max(1)).clamp(1, most).min(length);
     // 128 bits, because the product may exceed 64.
     let cut = |part: usize| (part as u128 * length as u128 / parts.max(1) as u128) as usize;
@@ -111,7 +96,12 @@ fn each_part<P: Parallel>(sequence: P, of: impl Fn(&P::Divided, Part) + Sync) {
 }
 
 fn run_parts(cuts: &[usize], of: &(dyn Fn(Part) + Sync)) {
-    run(cuts.len() - 1, &|number| of(Part { number, start: cuts[number], end: cuts[number + 1] }));
+    let part = |number: usize| Part { number, start: cuts[number], end: cuts[number + 1] };
+    match Gathering::current() {
+        None => run(cuts.len() - 1, &|number| of(part(number))),
+        // The warnings of all threads belong to the work of this one.
+        Some(gathering) => run(cuts.len() - 1, &|number| gathering.within(|| of(part(number)))),
+    }
 }
 
 /// Returns the results for all parts, in order. A part without one has `R::default()`.

@@ -351,39 +351,27 @@ impl<T> ParallelSlice<T> for [T] {
     where
         T: Send,
     {
-        #[cfg(feature = "rayon")]
         rayon::slice::ParallelSliceMut::par_sort_by_key(self, key);
-        #[cfg(not(feature = "rayon"))]
-        self.sort_by_key(key);
     }
 
     fn par_sort_unstable_by_key<K: Ord>(&mut self, key: impl Fn(&T) -> K + Sync)
     where
         T: Send,
     {
-        #[cfg(feature = "rayon")]
         rayon::slice::ParallelSliceMut::par_sort_unstable_by_key(self, key);
-        #[cfg(not(feature = "rayon"))]
-        self.sort_unstable_by_key(key);
     }
 
     fn par_sort_unstable_by(&mut self, compare: impl Fn(&T, &T) -> Ordering + Sync)
     where
         T: Send,
     {
-        #[cfg(feature = "rayon")]
         rayon::slice::ParallelSliceMut::par_sort_unstable_by(self, compare);
-        #[cfg(not(feature = "rayon"))]
-        self.sort_unstable_by(compare);
     }
 
     fn par_sort_unstable(&mut self)
     where
         T: Ord + Send,
     {
-        #[cfg(feature = "rayon")]
         rayon::slice::ParallelSliceMut::par_sort_unstable(self);
-        #[cfg(not(feature = "rayon"))]
-        self.sort_unstable();
     }
 }

@@ -4,6 +4,7 @@ mod device;
 #[cfg(feature = "gpu")]
 mod host;
 mod items;
+mod loaded;
 mod worker;
 
 #[cfg(feature = "gpu")]

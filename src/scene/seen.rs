@@ -12,6 +12,7 @@ use crate::{
     parallel::prelude::*,
     splat::{SampleSplats, Splat, Surfels, TRAINED_OPACITIES},
     volume::{Lattice, TransferFunction, Volume, steps::Steps},
+    warning,
 };
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
@@ -104,7 +105,7 @@ fn near(points: &[Vec3], kind: Kind, item: usize, origin: DVec3) -> Option<[Vec3
     if let Some(point) = farthest {
         let [x, y, z] = (origin + point.as_dvec3()).as_vec3().to_array();
         let (all, item, lie) = (points.len(), item + 1, if count == 1 { "lies" } else { "lie" });
-        tracing::warn!(
+        warning::give!(
             "input {item}: {count} of {all} splats {lie} far from the others, outside of what the \
              camera is fitted to; the farthest is at {x}, {y}, {z}"
         );

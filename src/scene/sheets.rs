@@ -108,6 +108,16 @@ impl Scene {
         self.sheets_of(view, settings, &choices, &bounds)
     }
 
+    /// Returns the thickness of the sheets of the finest volume in memory, about as
+    /// [`sheets`](Self::sheets) chooses it: what coarser pictures of moving views begin with.
+    pub fn finest_sheet(&self) -> Option<f64> {
+        let thicknesses = self.items.iter().filter_map(|item| match item {
+            Item::Volume(volume, ..) => Some(4.0 / 3.0 * volume.lattice.kernel_spacing()),
+            _ => None,
+        });
+        thicknesses.reduce(f64::min)
+    }
+
     /// Returns the sheets for the known choices of bricks, one for each volume in bricks, and the
     /// scene's known bounds.
     pub(crate) fn sheets_of(

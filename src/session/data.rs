@@ -11,6 +11,7 @@ use crate::{
     scattered::Points,
     surface::Mesh,
     volume::Volume,
+    warning,
 };
 use std::sync::Arc;
 
@@ -121,7 +122,7 @@ impl Data {
 pub fn warn_of_holes(name: &str, holes: u64, all: u64, done: &str) {
     if holes > 0 {
         let (holes, all) = (grouped(holes), grouped(all));
-        tracing::warn!("{name}: {holes} of {all} values missing: {done}");
+        warning::give!("{name}: {holes} of {all} values missing: {done}");
     }
 }
 

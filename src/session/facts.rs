@@ -18,6 +18,7 @@ use crate::{
 use serde_json::{Map, Value, json};
 
 /// What is known of an input.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
     /// Names and values: kind, count, bytes, bounds in world units, attributes and what the kind
     /// has of its own.
@@ -48,6 +49,11 @@ impl Opened<'_> {
     /// # Errors
     /// Those of [`series`](Self::series), of [`arrays`](Self::arrays) and of asking for sizes.
     pub fn facts(&self, data: &Data) -> Result<Facts> {
+        Ok(Facts { series: self.series()?, arrays: self.arrays()?, ..self.cheap_facts(data)? })
+    }
+
+    /// Returns the facts without series and arrays, for which files are read once more.
+    pub(super) fn cheap_facts(&self, data: &Data) -> Result<Facts> {
         let mut named = match data {
             Data::Mesh(mesh) => of_mesh(mesh),
             Data::Volume(volume) => of_volume(volume),
@@ -69,11 +75,14 @@ impl Opened<'_> {
         if !matches!(data, Data::Hierarchy(_)) {
             named.entry("levels").or_insert(json!(1));
         }
-        Ok(Facts { named, series: self.series()?, arrays: self.arrays()? })
+        Ok(Facts { named, series: Vec::new(), arrays: Vec::new() })
     }
 
     /// Returns the bytes of a file, or of the files of a folder that were read.
     fn bytes(&self) -> Result<u64> {
+        if let Some(bytes) = self.held() {
+            return Ok(bytes.len() as u64);
+        }
         if !self.path().is_dir() {
             return input::size(self.path());
         }

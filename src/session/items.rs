@@ -1,7 +1,7 @@
 //! The items of a scene, made from inputs.
 
 use super::{
-    CellStyle, Data, Framing, Legend, Name, Showing, Subject, Surfaces,
+    CellStyle, Coloring, Data, Framing, Legend, Name, Showing, Subject, Surfaces,
     solid::{ShownSolid, field_of},
 };
 use crate::{
@@ -19,6 +19,7 @@ use crate::{
     splat::Surfels,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume},
+    warning,
 };
 use std::{
     path::Path,
@@ -267,6 +268,26 @@ impl Items {
         Ok(scene)
     }
 
+    /// Returns the scene, which can be drawn, and its subject. `facets` says whether its pictures
+    /// can show facets; `fault` makes the error of a scene that cannot be drawn more exact.
+    ///
+    /// # Errors
+    /// Those of [`scene`](Self::scene) and of [`Scene::validate`].
+    pub fn assembled(
+        &self,
+        facets: bool,
+        fault: impl Fn(&Scene, Error) -> Error,
+    ) -> Result<(Scene, Subject)> {
+        let scene = self.scene(facets)?;
+        scene.validate().map_err(|error| fault(&scene, error))?;
+        let mut subject = self.subject.clone();
+        // Points that all lie at one place have no extent, but their splats have one.
+        if subject.is_one_place() {
+            subject.bounds = scene.bounds();
+        }
+        Ok((scene, subject))
+    }
+
     /// Returns the first item of a scene that cannot be drawn by itself, and why.
     pub fn unfit(scene: &Scene) -> Option<(usize, Error)> {
         scene.items.iter().enumerate().find_map(|(at, item)| Some((at, item.validate().err()?)))
@@ -281,9 +302,30 @@ impl Items {
         }
     }
 
+    /// Returns the error for a picture of `size` pixels that an engine did not draw: that of the
+    /// input that reaches farthest, if the usual camera cannot see the scene either. Also returns
+    /// whether only this camera cannot see it.
+    pub fn undrawn(
+        &self,
+        (scene, subject): (&Scene, &Subject),
+        error: Error,
+        camera: &Camera,
+        size: [u32; 2],
+    ) -> (Error, bool) {
+        let bounds = scene.bounds();
+        let is_seen = || camera.view(size)?.validate_for(&bounds);
+        if !matches!(error, Error::Argument(_)) || is_seen().is_ok() {
+            return (error, false);
+        }
+        match Framing::usual_fault(subject, &bounds, size) {
+            Some(fault) => (self.out_of_sight(scene, fault), false),
+            None => (error, true),
+        }
+    }
+
     /// Returns the error for a scene that its own usual camera cannot see, for the reason `fault`:
     /// that of the file that reaches farthest.
-    pub fn out_of_sight(&self, scene: &Scene, fault: Error) -> Error {
+    fn out_of_sight(&self, scene: &Scene, fault: Error) -> Error {
         let reach = |item: &Item| {
             let Bounds { min, max } = item.bounds();
             min.abs().max(max.abs()).max_element()
@@ -294,6 +336,31 @@ impl Items {
                 Framing::out_of_sight(name.text.as_ref(), item.bounds(), &fault)
             }
             _ => fault,
+        }
+    }
+}
+
+impl Captions {
+    /// Takes the colours of transfer functions that show fields of a scene instead of those that it
+    /// was made with. Each function comes with the number of its item. `coloring` says by what the
+    /// functions are coloured.
+    pub fn take_transfers<'a>(
+        &mut self,
+        scene: &Scene,
+        transfers: impl IntoIterator<Item = (usize, &'a TransferFunction)>,
+        coloring: &Coloring,
+    ) {
+        for (number, transfer) in transfers {
+            let Some(item) = scene.items.get(number) else { continue };
+            let Some(values) = item.value_range() else { continue };
+            let labels = match item {
+                Item::Volume(volume, ..) => volume.about.labels.as_ref(),
+                _ => None,
+            };
+            for (_, legend) in self.legends.iter_mut().filter(|(item, _)| *item == number) {
+                let named = (std::mem::take(&mut legend.title), labels);
+                *legend = Legend::of_transfer(coloring, transfer, values, named);
+            }
         }
     }
 }
@@ -415,7 +482,7 @@ impl Adding<'_> {
         if volume.colors.is_some() {
             match &showing.values_by {
                 None => return self.add_colors(&volume),
-                Some(option) => tracing::warn!(
+                Some(option) => warning::give!(
                     "{} has colours; {option} shows their brightness instead",
                     name.text
                 ),
@@ -592,5 +659,5 @@ impl From<Item> for Entry {
 
 /// Passes warnings on.
 fn warn(warnings: impl IntoIterator<Item = String>) {
-    warnings.into_iter().for_each(|warning| tracing::warn!("{warning}"));
+    warnings.into_iter().for_each(|warning| warning::give!("{warning}"));
 }

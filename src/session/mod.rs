@@ -23,6 +23,7 @@ mod coloring;
 pub mod convert;
 mod data;
 mod description;
+mod drawing;
 mod facts;
 mod fit;
 mod framing;
@@ -45,9 +46,10 @@ pub use data::{Data, warn_of_holes};
 pub use description::{
     AppearanceEntry, Axis, Background, CameraEntry, ClipEntry, ClipSide, ColorEntry, Composite,
     Description, Engine, InputEntry, IsosurfaceEntry, KernelEntry, LimitsEntry, Loaded,
-    LoadedInput, OverlayEntry, PaperLength, PictureEntry, Place, ReadingEntry, Rotation, Samples,
-    TransferEntry, TransformEntry,
+    LoadedInput, OverlayEntry, PaperLength, PictureEntry, Place, ReadInput, ReadingEntry, Rotation,
+    Samples, TransferEntry, TransformEntry,
 };
+pub use drawing::Drawing;
 pub use facts::Facts;
 pub use framing::{Framing, Side};
 pub use items::{Captions, Content, Items, Mark};

@@ -1,12 +1,15 @@
 //! The oddities of an input without checksums: parts that draw nothing, or that are drawn
 //! differently than meant.
 
-use super::{Data, Framing, Subject};
+use super::{Data, Framing, Opened, Subject};
 use crate::{
-    Deadline, Error, Result,
+    Deadline, Error, Result, bricks,
     container::{Finding, Severity},
+    formats::Kind,
     gaussians::Gaussians,
+    hierarchy,
     math::Bounds,
+    progress::Watch,
     surface::{Mesh, SurfelOptions},
 };
 use glam::DVec3;
@@ -29,6 +32,29 @@ impl Data {
         };
         findings.extend(self.bounds().and_then(of_bounds));
         Ok(findings)
+    }
+}
+
+impl Opened<'_> {
+    /// Checks an input: every checksum and guarantee of a hierarchy or of bricks; of other inputs,
+    /// which are read, their oddities ([`Data::oddities`]). `watch` hears how many bricks are
+    /// checked, and of how many.
+    ///
+    /// # Errors
+    /// Those of [`read`](Self::read) and of [`Data::oddities`].
+    pub fn findings(&self, watch: Watch<'_>) -> Result<Vec<Finding>> {
+        let (path, limits) = (self.path(), self.limits());
+        // Reading counts, too.
+        let deadline = limits.deadline();
+        Ok(match self.kind() {
+            Kind::Hierarchy if self.held().is_some() => self.hierarchy()?.check().findings,
+            Kind::Bricks if self.held().is_some() => self.bricks()?.check(watch).findings,
+            Kind::Hierarchy => hierarchy::file::check(path, limits).findings,
+            Kind::Bricks => bricks::check(path, limits, watch).findings,
+            _ => {
+                self.read()?.oddities(deadline).map_err(|error| error.stated_in(path, "content"))?
+            }
+        })
     }
 }
 

@@ -91,12 +91,36 @@ impl Reading {
         path: &'a Path,
         attribute: Option<&'a str>,
     ) -> Result<Opened<'a>> {
-        let opened =
-            |source, kind, is_raw| Opened { reading: self, path, attribute, source, kind, is_raw };
         if let Some(kind @ (Kind::Hierarchy | Kind::Bricks)) = Kind::at_once(path, &self.limits)? {
-            return Ok(opened(None, kind, false));
+            let source = None;
+            return Ok(Opened { reading: self, path, attribute, source, kind, is_raw: false });
         }
-        let source = Source::open_any(path, &self.whole)?;
+        self.opened(Source::open_any(path, &self.whole)?, attribute)
+    }
+
+    /// Opens bytes in memory, for programs that get their data from elsewhere, such as browsers.
+    /// `name` stands for the path in errors, and its extension says the format as a file's does.
+    /// Files that the bytes refer to are not read.
+    ///
+    /// ```
+    /// use splatkit::{formats::Kind, session::Reading};
+    ///
+    /// let reading = Reading::default();
+    /// let opened = reading.open_bytes("a.xyz".as_ref(), b"0 0 0\n1 0 0\n0 1 0\n")?;
+    /// assert_eq!(opened.kind(), Kind::Mesh);
+    /// assert_eq!(opened.read()?.count(), 3);
+    /// # Ok::<(), splatkit::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Limit`] for more bytes than the limits allow; [`Error::Input`] for bytes of no kind
+    /// that is read.
+    pub fn open_bytes<'a>(&'a self, name: &'a Path, bytes: &'a [u8]) -> Result<Opened<'a>> {
+        self.opened(Source::from_bytes(name, bytes, &self.whole)?, None)
+    }
+
+    fn opened<'a>(&'a self, source: Source<'a>, attribute: Option<&'a str>) -> Result<Opened<'a>> {
+        let path = source.path;
         let kind = match attribute {
             None => Kind::of_source(&source, &self.options)?,
             Some(_) => {
@@ -104,32 +128,12 @@ impl Reading {
                 Kind::of_source(&source, &options)?.map(|kind| as_cloud(path, kind))
             }
         };
-        match kind {
-            Some(kind) => Ok(opened(Some(source), kind, false)),
-            None if self.options.raw.is_some() => Ok(opened(Some(source), Kind::Volume, true)),
-            None => Err(foreign(&source).unwrap_or_else(|| unknown(path))),
-        }
-    }
-
-    /// Gives a point cloud that was read from a file the radii that an attribute of the file holds,
-    /// if one is named. Other data stays as it is.
-    ///
-    /// # Errors
-    /// Those of [`open`](Self::open) and of reading; [`Error::Input`] for an attribute that points
-    /// do not have.
-    pub fn give_radii(&self, path: &Path, data: &mut Data, attribute: Option<&str>) -> Result<()> {
-        let (Some(attribute), Data::Mesh(mesh)) = (attribute, data) else { return Ok(()) };
-        let values = match self.open_colored(path, Some(attribute))?.read()? {
-            Data::Mesh(colored) => colored.values,
-            _ => Vec::new(),
+        let (kind, is_raw) = match kind {
+            Some(kind) => (kind, false),
+            None if self.options.raw.is_some() => (Kind::Volume, true),
+            None => return Err(foreign(&source).unwrap_or_else(|| unknown(path))),
         };
-        if values.len() != mesh.positions.len() {
-            let message = format!("“{attribute}” is no attribute of points");
-            return Err(Error::input(path, "attributes", message)
-                .hint("`splatkit info` lists the attributes"));
-        }
-        mesh.radii = values;
-        Ok(())
+        Ok(Opened { reading: self, path, attribute, source: Some(source), kind, is_raw })
     }
 
     /// Returns the kind of an input, even if it is damaged, or larger than memory. An object on a
@@ -174,7 +178,7 @@ pub struct Opened<'a> {
     reading: &'a Reading,
     path: &'a Path,
     attribute: Option<&'a str>,
-    /// None for hierarchies and bricks, which map or fetch parts.
+    /// None for files of hierarchies and bricks, which map or fetch parts.
     source: Option<Source<'a>>,
     kind: Kind,
     is_raw: bool,
@@ -191,6 +195,11 @@ impl Opened<'_> {
         self.is_raw
     }
 
+    /// Returns the limits of reading it.
+    pub(super) fn limits(&self) -> &Limits {
+        &self.reading.limits
+    }
+
     /// Returns its path, or the address of a remote object.
     pub fn path(&self) -> &Path {
         self.path
@@ -203,10 +212,8 @@ impl Opened<'_> {
     pub fn read(&self) -> Result<Data> {
         let Reading { limits, options, label_table, .. } = self.reading;
         let data = match (self.kind, &self.source) {
-            (Kind::Bricks, _) => Data::Bricks(Arc::new(Bricks::open(self.path, limits)?)),
-            (Kind::Hierarchy, _) | (_, None) => {
-                Data::Hierarchy(Arc::new(Hierarchy::open(self.path, limits)?))
-            }
+            (Kind::Bricks, _) => Data::Bricks(Arc::new(self.bricks()?)),
+            (Kind::Hierarchy, _) | (_, None) => Data::Hierarchy(Arc::new(self.hierarchy()?)),
             (Kind::Mesh, Some(source)) => {
                 let mut options = options.clone();
                 options.scalar = self.attribute.map(str::to_owned).or(options.scalar);
@@ -231,6 +238,50 @@ impl Opened<'_> {
         };
         data.warn_of_holes(&self.path.display().to_string());
         Ok(data)
+    }
+
+    /// Opens a hierarchy.
+    pub(super) fn hierarchy(&self) -> Result<Hierarchy> {
+        let limits = &self.reading.limits;
+        match self.held() {
+            Some(bytes) => Hierarchy::from_bytes(bytes.to_vec(), self.path, limits),
+            None => Hierarchy::open(self.path, limits),
+        }
+    }
+
+    /// Opens a volume in bricks.
+    pub(super) fn bricks(&self) -> Result<Bricks> {
+        match self.held() {
+            Some(bytes) => Bricks::from_bytes(bytes.to_vec(), self.path),
+            None => Bricks::open(self.path, &self.reading.limits),
+        }
+    }
+
+    /// Returns the bytes of the caller, if there is no file.
+    pub(super) fn held(&self) -> Option<&[u8]> {
+        self.source.as_ref().and_then(Source::held)
+    }
+
+    /// Gives a point cloud that was read from this input the radii that an attribute holds, if one
+    /// is named. Other data stays as it is.
+    ///
+    /// # Errors
+    /// Those of reading; [`Error::Input`] for an attribute that points do not have.
+    pub fn give_radii(&self, data: &mut Data, attribute: Option<&str>) -> Result<()> {
+        let (Some(attribute), Data::Mesh(mesh), Some(source)) = (attribute, data, &self.source)
+        else {
+            return Ok(());
+        };
+        let scalar = Some(attribute.to_owned());
+        let options = ReadOptions { scalar, ..self.reading.options.clone() };
+        let values = formats::read_mesh(source, &options)?.values;
+        if values.len() != mesh.positions.len() {
+            let message = format!("“{attribute}” is no attribute of points");
+            return Err(Error::input(self.path, "attributes", message)
+                .hint("`splatkit info` lists the attributes"));
+        }
+        mesh.radii = values;
+        Ok(())
     }
 
     /// Returns the files opened so far: its own, those it refers to, and a table of labels.

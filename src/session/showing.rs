@@ -33,7 +33,7 @@ pub struct Showing {
     /// The diameter of points that are drawn as balls or discs.
     pub point_size: Option<Size>,
     /// The array that holds the radii of points
-    /// ([`Reading::give_radii`](super::Reading::give_radii)).
+    /// ([`Opened::give_radii`](super::Opened::give_radii)).
     pub point_radius: Option<String>,
     /// The width of lines.
     pub line_width: Option<Size>,

@@ -411,3 +411,41 @@ fn points_and_lines_have_items_of_their_own() {
         without.validate().unwrap();
     }
 }
+
+/// A host without a subscriber of `tracing` also hears what is wrong with an input.
+#[test]
+fn a_loaded_scene_has_its_warnings_and_facts() {
+    let folder = Folder::new();
+    let [table, mesh] =
+        [("b.csv", TABLE), ("a.obj", MESH)].map(|(name, text)| folder.write(name, text.as_bytes()));
+    let loaded = Description::new([mesh, table]).load(&|_| {}).unwrap();
+    let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
+    assert!(warning.contains("b.csv: 1 of 4 values missing"), "{warning}");
+    let facts = |number: usize| loaded.inputs[number].facts.to_json();
+    assert_eq!((&facts(0)["triangles"], &facts(0)["count"]), (&1.into(), &3.into()));
+    assert_eq!((&facts(1)["kind"], &facts(1)["missing"]), (&"samples".into(), &1.into()));
+}
+
+#[test]
+fn bytes_in_memory_are_opened_by_their_name() {
+    let reading = Reading::default();
+    let open = |name: &'static str, bytes| reading.open_bytes(name.as_ref(), bytes);
+    let opened = open("b.csv", TABLE.as_bytes()).unwrap();
+    let data = opened.read().unwrap();
+    assert_eq!((opened.kind(), data.count()), (Kind::Samples, 3));
+    assert_eq!(opened.facts(&data).unwrap().to_json()["bytes"], TABLE.len());
+    let error = open("b.txyz", b"hello").err().expect("an error").to_string();
+    assert!(error.contains("b.txyz") && error.contains("no format that can be read"), "{error}");
+    // What is read page by page from a file is also read from memory.
+    let surfels = Mesh::sphere(2).surfels(&Default::default()).unwrap();
+    let folder = Folder::new();
+    let path = folder.write("a.splk", b"");
+    let build = crate::hierarchy::BuildOptions::default();
+    crate::hierarchy::build_file(&surfels, &path, &build, &Default::default(), None).unwrap();
+    let bytes = std::fs::read(path).unwrap();
+    let opened = open("c.splk", &bytes).unwrap();
+    assert_eq!((opened.kind(), opened.read().unwrap().kind()), (Kind::Hierarchy, Kind::Hierarchy));
+    assert!(opened.findings(None).unwrap().is_empty());
+    let damaged = open("c.splk", &bytes[..bytes.len() - 9]).unwrap();
+    assert!(damaged.findings(None).map_or(true, |findings| !findings.is_empty()));
+}

@@ -6,7 +6,7 @@
 //! of a part is outside.
 
 use super::{Material, Mesh, fan::Sums, mesh::given, parts::Joining, survey::Closing};
-use crate::{memory, parallel::prelude::*};
+use crate::{memory, parallel::prelude::*, warning};
 use glam::Vec3;
 
 /// The tolerated fraction of a part's area with normals on the wrong side. Also the tolerated
@@ -148,7 +148,7 @@ impl Mesh {
         // The part of each triangle, and the unmatched edges. If they do not fit in memory, backs
         // are drawn too, which is always correct.
         if memory::room("joining the parts of a mesh", 40 * self.triangles.len() as u64).is_err() {
-            tracing::warn!(
+            warning::give!(
                 "too little memory to tell whether all parts are turned outward: \
                  backs will be drawn"
             );

@@ -1,16 +1,12 @@
 //! `splatkit check`.
 
 use crate::{
-    failure::{Failure, in_file},
-    load::LoadFlags,
-    output, parse,
-    progress::Progress,
-    scene_file,
+    failure::Failure, load::LoadFlags, output, parse, progress::Progress, scene_file,
     terminal::safe,
 };
 use clap::Args;
 use serde_json::json;
-use splatkit::{Finding, Severity, bricks, formats::Kind, hierarchy::file, memory};
+use splatkit::{Finding, Severity, memory};
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
@@ -31,19 +27,11 @@ impl Check {
         scene_file::refuse(&self.file)?;
         self.load = self.load.begun();
         progress.stage(format!("Checking {}", self.file.display()));
-        let limits = self.load.limits();
-        let deadline = limits.deadline();
         let reading = self.load.reading(memory::most());
         let opened = reading.open(&self.file)?;
-        let findings = match opened.kind() {
-            Kind::Hierarchy => file::check(&self.file, &limits).findings,
-            Kind::Bricks => {
-                let stages = progress.stages();
-                let watch = |done, all| stages.set("Checking bricks", done, all);
-                bricks::check(&self.file, &limits, Some(&watch)).findings
-            }
-            _ => opened.read()?.oddities(deadline).map_err(|error| in_file(&self.file, error))?,
-        };
+        let stages = progress.stages();
+        let watch = |done, all| stages.set("Checking bricks", done, all);
+        let findings = opened.findings(Some(&watch))?;
         progress.clear();
         let ok = findings.iter().all(|finding| finding.severity != Severity::Error);
         if self.json {

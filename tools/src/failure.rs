@@ -205,11 +205,6 @@ fn room(error: &io::Error) -> Option<&'static str> {
     }
 }
 
-/// Makes wrong values in an input the input's fault, and adds its name to errors that lack it.
-pub fn in_file(path: &Path, error: Error) -> Error {
-    error.stated_in(path, "content")
-}
-
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         Self::Library(error)

@@ -13,13 +13,12 @@ use splatkit::{
     formats::Kind,
     math::Camera,
     picture::Picture,
-    scene::{Clip, Scene, Settings},
-    session::{self, Description, Framing, LoadedInput, PanelLabels, TransferEntry},
+    scene::{Scene, Settings},
+    session::{self, Description, Drawing, Framing, LoadedInput, PanelLabels, TransferEntry},
 };
 #[cfg(feature = "window")]
 use splatkit::{
-    scene::Item,
-    session::{Captions, Legend},
+    session::{Captions, Coloring},
     volume::TransferFunction,
 };
 use splatkit_media::{
@@ -72,15 +71,10 @@ impl Loaded {
 
 /// How a drawn picture becomes the final one.
 pub struct Finish {
-    /// Pixels drawn along each side of a pixel of the picture.
-    pub factor: u32,
+    pub drawing: Drawing,
     #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "for the window"))]
     pub background: Option<[f32; 3]>,
     overlay: Option<Overlay>,
-    /// The clips of the picture, which also cut edges.
-    clips: Vec<Clip>,
-    /// The width of edges, in pixels.
-    edge_width: f64,
     /// Pixels an inch.
     pub dpi: Option<f64>,
 }
@@ -93,9 +87,7 @@ impl Finish {
         camera: &Camera,
         loaded: &Loaded,
     ) -> splatkit::Result<Picture> {
-        let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
-        loaded.items.draw_edges(&mut picture, camera, (&self.clips, self.edge_width))?;
-        Ok(picture)
+        self.drawing.reduced(picture, &loaded.items, camera)
     }
 
     /// Draws the texts over a picture, and returns what they say.
@@ -260,7 +252,7 @@ impl Job {
 
     /// Returns the settings of a picture before it is averaged down.
     pub fn settings(&self, loaded: &Loaded) -> splatkit::Result<Settings> {
-        self.scene.picture.settings(&loaded.scene, &loaded.subject)
+        Ok(loaded.drawing(&self.scene.picture)?.settings)
     }
 
     /// Returns a warning if light or optics that the picture asks for change nothing.
@@ -281,11 +273,9 @@ impl Job {
     /// Returns how pictures of a scene are finished.
     pub fn finish(&self, loaded: &Loaded) -> Result<Finish, Failure> {
         let picture = &self.scene.picture;
-        let (factor, background) = (picture.factor(&loaded.scene), picture.background());
+        let (drawing, background) = (loaded.drawing(picture)?, picture.background());
         let overlay = Overlay::open(&self.scene.overlay, &loaded.captions, self.page())?;
-        let clips = picture.clips_of(&loaded.scene, &loaded.subject)?;
-        let (edge_width, dpi) = (picture.edge_width(), picture.dpi);
-        Ok(Finish { factor, background, overlay, clips, edge_width, dpi })
+        Ok(Finish { drawing, background, overlay, dpi: picture.dpi })
     }
 
     /// Returns the page that texts are written on.
@@ -304,27 +294,14 @@ impl Job {
 
     /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,
     /// beside the bars.
-    pub fn free(&self, settings: &Settings, finish: &Finish) -> [u32; 2] {
+    pub fn free(&self, finish: &Finish) -> [u32; 2] {
         let room = finish.overlay.as_ref().map_or(0, |overlay| overlay.room(self.size()));
-        let [width, height] = settings.size;
-        [width.saturating_sub(2 * finish.factor * room).max(1), height]
+        finish.drawing.free(room)
     }
 
     /// Returns an error if a picture shows nothing.
     pub fn require_content(&self, picture: &Picture) -> Result<(), Failure> {
-        // An opacity that rounds to 0 in a file of 8 bits counts as none.
-        if picture.color.iter().any(|pixel| pixel[3] >= 0.5 / 255.0) {
-            return Ok(());
-        }
-        let clips: Vec<String> = self.scene.picture.clips.iter().map(ToString::to_string).collect();
-        let left = match &clips[..] {
-            [] => String::new(),
-            clips => format!(" after clipping by {}", clips.join(" ")),
-        };
-        Err(Error::NothingToDraw(format!(
-            "the picture is empty: the camera sees no splat that has opacity{left}"
-        ))
-        .into())
+        Ok(self.scene.picture.require_content(picture)?)
     }
 }
 
@@ -343,13 +320,8 @@ impl Job {
     }
 
     /// Returns the camera of a single picture.
-    pub fn camera(
-        &self,
-        loaded: &Loaded,
-        settings: &Settings,
-        finish: &Finish,
-    ) -> splatkit::Result<Camera> {
-        self.framing()?.camera(&loaded.subject, self.free(settings, finish))
+    pub fn camera(&self, loaded: &Loaded, finish: &Finish) -> splatkit::Result<Camera> {
+        self.framing()?.camera(&loaded.subject, self.free(finish))
     }
 
     /// Returns how pictures are finished if other transfer functions show the fields of these
@@ -368,21 +340,10 @@ impl Job {
     /// these items.
     fn captions_with(&self, loaded: &Loaded, transfers: &[(usize, TransferFunction)]) -> Captions {
         let mut captions = loaded.captions.clone();
-        for (item, legend) in &mut captions.legends {
-            let item = *item;
-            let entry = transfers.iter().find(|(number, _)| *number == item);
-            let values = loaded.scene.items[item].value_range();
-            let (Some((_, transfer)), Some(values)) = (entry, values) else { continue };
-            let labels = match &loaded.scene.items[item] {
-                Item::Volume(volume, ..) => volume.about.labels.as_ref(),
-                _ => None,
-            };
-            // The colours are the function's own by now, also those of a map.
-            let named = (std::mem::take(&mut legend.title), labels);
-            let mut coloring = self.scene.appearance.coloring();
-            coloring.range = None;
-            *legend = Legend::of_transfer(&coloring, transfer, values, named);
-        }
+        // The colours are the function's own by now, also those of a map.
+        let coloring = Coloring { range: None, ..self.scene.appearance.coloring() };
+        let transfers = transfers.iter().map(|(item, transfer)| (*item, transfer));
+        captions.take_transfers(&loaded.scene, transfers, &coloring);
         captions
     }
 

@@ -419,7 +419,7 @@ impl Run<'_> {
         }
         let mut texts = serde_json::Value::Null;
         let mut times = Vec::new();
-        let free = job.free(settings, finish);
+        let free = job.free(finish);
         let cameras = motion.cameras(&job.framing()?, &loaded.subject, free)?;
         let mut last = (FrameStats::default(), cameras[0].clone());
         let (mut is_shown, mut missing) = (false, 0);
@@ -484,7 +484,7 @@ impl Run<'_> {
     ) -> Result<Drawn, Failure> {
         let Ready { job, loaded, settings, finish, .. } = self.ready;
         let mut settings = settings.clone();
-        settings.size = figure.panel_size().map(|side| side.saturating_mul(finish.factor));
+        settings.size = figure.panel_size().map(|side| side.saturating_mul(finish.drawing.factor));
         let name = self.frames.name(0);
         progress.stage(format!("Drawing {name}"));
         let start = Instant::now();

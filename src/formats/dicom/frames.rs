@@ -1,7 +1,7 @@
 //! Where the frames of a file lie, and how their values are scaled.
 
 use super::{element::Set, tags};
-use crate::{Result, input::Source};
+use crate::{Result, input::Source, warning};
 use glam::DVec3;
 
 /// One picture of a file.
@@ -237,7 +237,7 @@ fn classic(source: &Source, set: &Set, whole: &Frame, count: u32) -> Result<Vec<
         return Ok((0..count).map(in_time).collect());
     }
     let step = whole.step.or(whole.spacing.map(|spacing| spacing[0])).unwrap_or_else(|| {
-        tracing::warn!("{}: no step from frame to frame is given", source.path.display());
+        warning::give!("{}: no step from frame to frame is given", source.path.display());
         1.0
     });
     let step = set.decimal(tags::SPACING_BETWEEN_SLICES).filter(|&s| s != 0.0).unwrap_or(step);

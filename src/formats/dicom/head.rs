@@ -8,7 +8,7 @@ use super::{
     syntax::Packing,
     tags,
 };
-use crate::{Result, about::Modality, input::Source};
+use crate::{Result, about::Modality, input::Source, warning};
 use std::path::PathBuf;
 
 /// A file of pictures, without its pixels.
@@ -169,7 +169,7 @@ fn layout(file: &File, set: &Set) -> Result<Layout> {
         [first.min(last), first.max(last)]
     });
     if has(tags::MODALITY_TABLES) && set.decimal(tags::SLOPE).is_none() {
-        tracing::warn!("{}: its table of values is not applied", source.path.display());
+        warning::give!("{}: its table of values is not applied", source.path.display());
     }
     Ok(Layout {
         columns: need(tags::COLUMNS, "Columns")?,

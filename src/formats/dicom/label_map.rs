@@ -17,6 +17,7 @@ use crate::{
     },
     input::Source,
     volume::{Lattice, Samples, Volume},
+    warning,
 };
 use glam::{DMat3, DVec3};
 
@@ -87,7 +88,7 @@ pub fn read(source: &Source, heads: &[Head], options: &ReadOptions) -> Result<Vo
     }
     if overlaps > 0 {
         let path = source.path.display();
-        tracing::warn!(
+        warning::give!(
             "{path}: segments overlap in {overlaps} voxels, which belong to the later one"
         );
     }

@@ -17,6 +17,7 @@ use crate::{
     input::Source,
     parallel::{self, prelude::*},
     volume::{Samples, Scalar, Volume, each_type},
+    warning,
 };
 
 /// Reads the volume of a series that the options choose.
@@ -250,8 +251,8 @@ fn inverted(source: &Source, mut volume: Volume) -> Result<Volume> {
 /// Says what was left out.
 fn tell(source: &Source, stack: &Stack) {
     let path = source.path.display();
-    stack.words.iter().for_each(|word| tracing::warn!("{path}: {word}"));
+    stack.words.iter().for_each(|word| warning::give!("{path}: {word}"));
     if stack.slices.len() == 1 && source.folder().is_none() {
-        tracing::warn!("{path}: holds one slice; name its folder to draw the whole series");
+        warning::give!("{path}: holds one slice; name its folder to draw the whole series");
     }
 }

@@ -27,6 +27,7 @@ use crate::{
     formats::shared::trained::{Trained, settle},
     gaussians::{Gaussians, MOST_DEGREE, harmonics, turn::map_colors},
     input::Source,
+    warning,
 };
 use ::gltf::json::{self, mesh::Mode, validation::Checked};
 use glam::{Quat, Vec3};
@@ -191,7 +192,7 @@ fn check(
         return Err(source.error(place, "Gaussians need the mode 0 (points)"));
     }
     if let Some(projection) = mark.projection.as_deref().filter(|name| *name != "perspective") {
-        tracing::warn!(
+        warning::give!(
             "{}: {place}: the projection “{projection}” is not known; “perspective” is used",
             source.path.display()
         );
@@ -353,7 +354,7 @@ impl Primitive<'_> {
     }
 
     fn warn(&self, message: &str) {
-        tracing::warn!("{}: {}: {message}", self.source.path.display(), self.place);
+        warning::give!("{}: {}: {message}", self.source.path.display(), self.place);
     }
 }
 

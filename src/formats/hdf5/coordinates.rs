@@ -15,6 +15,7 @@ use crate::{
     formats::{ReadOptions, shared::length::meters},
     input::Source,
     volume::{Arrangement, Lattice, Volume},
+    warning,
 };
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -98,7 +99,7 @@ impl<'a> Scale<'a> {
         let is_sound = values.iter().all(|v| v.is_finite()) && (ascends || descends);
         if !is_sound {
             let (path, name) = (source.path.display(), self.name);
-            tracing::warn!("{path}: the coordinates “{name}” neither ascend nor descend");
+            warning::give!("{path}: the coordinates “{name}” neither ascend nor descend");
             return Ok(None);
         }
         Ok(Some(Places { values, unit: plain_unit(&self.unit) }))
@@ -196,7 +197,7 @@ impl<'a> Coordinates<'a> {
         if !unclear.is_empty() {
             let path = source.path.display();
             let names = unclear.join(", ");
-            tracing::warn!(
+            warning::give!(
                 "{path}: which dimension of “{}” has which coordinates ({names}) is not clear; \
                  samples are one unit apart there, and --spacing sets other distances",
                 set.path
@@ -241,7 +242,7 @@ impl<'a> Coordinates<'a> {
         if factors.iter().any(Option::is_none) && options.spacing.is_none() {
             let path = source.path.display();
             let [x, y, z] = units.map(|unit| if unit.is_empty() { "none" } else { unit });
-            tracing::warn!(
+            warning::give!(
                 "{path}: the coordinates along x, y and z have different units ({x}, {y}, {z}); \
                  the mean step along x is drawn for others; --spacing sets distances"
             );

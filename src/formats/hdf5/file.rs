@@ -4,6 +4,7 @@ use super::span::Span;
 use crate::{
     Error, Result,
     input::{Source, Watch, isolate::isolated},
+    warning,
 };
 use hdf5_pure::{
     AttrValue, Dataset, Datatype, FileAccessProperties, FormatError, Group, Layout,
@@ -164,7 +165,7 @@ impl<'a> File<'a> {
                 self.source.spend("the size of the list of data sets in bytes", 1024)?;
                 match self.inspect(&path, data_set) {
                     Ok(set) => list.push(set),
-                    Err(error) => tracing::warn!("{error}; the data set is left out"),
+                    Err(error) => warning::give!("{error}; the data set is left out"),
                 }
             }
             // Circles of links end at this depth.

@@ -21,6 +21,7 @@ use crate::{
     input::{Source, growing::Growing, positions},
     surface::Mesh,
     volume::{Lattice, Volume},
+    warning,
 };
 use glam::{DMat3, DVec3};
 use hdf5_pure::AttrValue;
@@ -386,7 +387,7 @@ impl<'a> DataSet<'a> {
         })?;
         if skipped > 0 {
             let file = self.source.path.display();
-            tracing::warn!(
+            warning::give!(
                 "{file}: {skipped} cells that are neither solids, triangles, quadrilaterals nor \
                  polygons, or that are \
                  polyhedra, are left out"

@@ -6,6 +6,7 @@ use crate::{
     Result,
     input::{Source, copy, text::without_mark},
     surface::{Material, Texture},
+    warning,
 };
 use glam::Vec2;
 use std::{
@@ -121,11 +122,11 @@ impl<'a, 'b> Library<'a, 'b> {
     pub fn warn(&self) {
         let file = self.source.path.display();
         if let Some(damaged) = &self.damaged {
-            tracing::warn!("{damaged}; such lines are left out");
+            warning::give!("{damaged}; such lines are left out");
         }
         if !self.idle.is_empty() {
             let idle: Vec<&str> = self.idle.iter().map(String::as_str).collect();
-            tracing::warn!("{file}: its materials have {}, not drawn", idle.join(", "));
+            warning::give!("{file}: its materials have {}, not drawn", idle.join(", "));
         }
     }
 

@@ -4,6 +4,7 @@ use super::super::shared::unplaced;
 use crate::{
     Result,
     input::{Source, copy},
+    warning,
 };
 use std::{
     borrow::Cow,
@@ -78,7 +79,7 @@ impl Survey {
         let Scan { mut survey, counts, ahead, strays, .. } = scan;
         for (kind, stray) in strays.iter().enumerate() {
             if let Some((line, index)) = stray {
-                tracing::warn!(
+                warning::give!(
                     "{}: line {line}: {}; such corners have none",
                     source.path.display(),
                     wrong(*index, kind, counts[kind])

@@ -16,6 +16,7 @@ use crate::{
     Result,
     gaussians::{Gaussians, harmonics},
     input::Source,
+    warning,
 };
 pub use compressed::write_compressed_gaussians;
 pub use write::write_gaussians;
@@ -62,7 +63,7 @@ pub(super) fn are_gaussians(vertex: &Element) -> bool {
 
 /// Warns that 3D Gaussians are read as points, which do not look like the scene.
 pub(super) fn warn(source: &Source) {
-    tracing::warn!(
+    warning::give!(
         "{}: read as a point cloud: the centres of trained Gaussians; their shapes and their own \
          colours are left out",
         source.path.display()

@@ -3,7 +3,7 @@
 //! The caller chooses by number, and the first is the default. Nothing is chosen in silence: a
 //! warning says how many there are and which flag reads another.
 
-use crate::{Result, formats::ReadOptions, input::Source};
+use crate::{Result, formats::ReadOptions, input::Source, warning};
 
 /// Returns the number of the time to read of a file with `count` of them, from 0: the one that
 /// [`ReadOptions::time`] names, else the first, with a warning if there are several. `place` is
@@ -50,14 +50,14 @@ pub(crate) fn of_times(
 pub(crate) fn warn_of_times(source: &Source, count: u64, options: &ReadOptions, names: &str) {
     if count > 1 && options.time.is_none() {
         let path = source.path.display();
-        tracing::warn!("{path}: shows the first of {count} {names}; --time 1 shows the second");
+        warning::give!("{path}: shows the first of {count} {names}; --time 1 shows the second");
     }
 }
 
 /// Says that the first of several channels is shown.
 pub(crate) fn warn_of_channels(source: &Source, count: usize) {
     let path = source.path.display();
-    tracing::warn!(
+    warning::give!(
         "{path}: shows the first of {count} channels; --scalar channel:1 shows the second"
     );
 }

@@ -9,6 +9,7 @@ use crate::{
         neighbour::is_inside,
     },
     surface::Texture,
+    warning,
 };
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use std::{io::Cursor, path::PathBuf, sync::Arc};
@@ -99,7 +100,7 @@ pub(crate) fn find(source: &Source, place: &str, reference: &str) -> Result<Opti
                         .parent()
                         .is_some_and(|folder| !folder.join(&reference).exists())) =>
         {
-            tracing::warn!(
+            warning::give!(
                 "{}: {place}: “{reference}” does not exist; drawn without it",
                 source.path.display()
             );

@@ -5,6 +5,7 @@ use crate::{
     gaussians::{Broken, Gaussians, harmonics::terms},
     input::{Source, positions},
     parallel::prelude::*,
+    warning,
 };
 use glam::{DVec3, Quat, Vec3};
 
@@ -131,7 +132,7 @@ fn leave_out_broken(
         return Err(source.error("file", message));
     }
     if broken.all() > 0 {
-        tracing::warn!(
+        warning::give!(
             "{}: {} of {total} Gaussians have numbers that are not finite, or no rotation; they \
              are left out",
             source.path.display(),

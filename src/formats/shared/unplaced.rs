@@ -2,7 +2,7 @@
 //! was measured or computed. Every reader of points and vertices leaves them out, with the faces
 //! that use them, and says how many.
 
-use crate::{Result, input::Source, parallel::prelude::*, surface::Mesh};
+use crate::{Result, input::Source, parallel::prelude::*, surface::Mesh, warning};
 
 /// Leaves out the vertices of a mesh whose position is not finite, and the triangles that use them.
 /// Warns if there are any.
@@ -67,7 +67,7 @@ pub(crate) fn remove(source: &Source, mesh: &mut Mesh) -> Result<usize> {
 pub(crate) fn warn(source: &Source, left_out: usize, all: usize) {
     let (file, which) = (source.path.display(), if left_out == 1 { "it" } else { "they" });
     let verb = if left_out == 1 { "is" } else { "are" };
-    tracing::warn!(
+    warning::give!(
         "{file}: {left_out} of {all} points {verb} not at finite coordinates: {which} {verb} left \
          out, with the faces that use them"
     );

@@ -1,6 +1,6 @@
 //! Surfaces that a file makes invisible everywhere.
 
-use crate::{input::Source, parallel::prelude::*, surface::Mesh};
+use crate::{input::Source, parallel::prelude::*, surface::Mesh, warning};
 
 /// Makes a mesh or point cloud opaque, with a warning, if the opacities of its vertices are 0
 /// everywhere: some programs write a channel that they do not fill.
@@ -11,7 +11,7 @@ pub(crate) fn keep_visible(source: &Source, mesh: &mut Mesh) {
     if is_clear && !hides {
         mesh.colors.par_iter_mut().for_each(|color| color[3] = 255);
         let file = source.path.display();
-        tracing::warn!("{file}: the opacity of all colours is 0; drawn opaque");
+        warning::give!("{file}: the opacity of all colours is 0; drawn opaque");
     }
 }
 

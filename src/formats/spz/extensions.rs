@@ -2,7 +2,7 @@
 //! names the coordinate system is known.
 
 use super::number;
-use crate::{about::Orientation, input::Source};
+use crate::{about::Orientation, input::Source, warning};
 use glam::DVec3;
 
 /// The kind of `SPZ_ADOBE_coordinate_system`.
@@ -27,7 +27,7 @@ pub(super) fn orientation(source: &Source, system: u32) -> Option<Orientation> {
     let system = system.checked_sub(1).filter(|&system| system < 16)?;
     // Bit 0 is “right”, bit 1 “up”, bit 2 the sign of the third; bit 3 exchanges y and z.
     if (system & 7).count_ones() % 2 == 1 {
-        tracing::warn!(
+        warning::give!(
             "{}: says that its axes are left-handed; the scene is drawn mirrored",
             source.path.display()
         );

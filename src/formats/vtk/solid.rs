@@ -17,6 +17,7 @@ use crate::{
     cells::{self, CellKind, Cells},
     input::{Source, positions},
     scattered::Points,
+    warning,
 };
 
 /// Radius of a cell's sample, in units of the root mean square distance of its corners from its
@@ -125,7 +126,7 @@ fn check_unplaced(source: &Source, unplaced: usize, left: usize) -> Result<()> {
     }
     if unplaced > 0 {
         let file = source.path.display();
-        tracing::warn!("{file}: {unplaced} cells have {what}: they are left out");
+        warning::give!("{file}: {unplaced} cells have {what}: they are left out");
     }
     Ok(())
 }

@@ -12,7 +12,7 @@ use super::{
     data::{Block, Kind, ListKind, Numbers},
     files::visit,
 };
-use crate::{Result, input::Source};
+use crate::{Result, input::Source, warning};
 use std::collections::BTreeSet;
 
 /// Counts of what there is to draw, and the arrays that all data sets together have.
@@ -217,7 +217,7 @@ impl Survey {
         add(grids * u64::from(!is_solid), "grid", "grids");
         if !left.is_empty() {
             let left = left.join(", ");
-            tracing::warn!("{}: left out of the picture: {left}", source.path.display());
+            warning::give!("{}: left out of the picture: {left}", source.path.display());
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::{
     input,
     session::{Data, warn_of_holes},
     volume::{self, Arrangement, Lattice, Scalar, Volume},
+    warning,
 };
 use std::{path::Path, slice};
 
@@ -178,7 +179,7 @@ impl<W: Watch> Work<'_, W> {
             Data::Volume(volume) => {
                 if volume.colors.is_some() {
                     let file = file.display();
-                    tracing::warn!("{file}: the brightness is written, and the colours are not");
+                    warning::give!("{file}: the brightness is written, and the colours are not");
                 }
                 Ok(volume)
             }

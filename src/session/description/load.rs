@@ -1,13 +1,16 @@
 //! Making a scene of a description.
 
-use super::{Description, InputEntry, TransferEntry};
+use super::{Description, InputEntry, PictureEntry, TransferEntry};
 use crate::{
     Error, Result,
     formats::Kind,
     math::Camera,
     memory,
     scene::{Scene, Settings},
-    session::{Captions, CellStyle, Data, Framing, Items, Name, Showing, Subject, Surfaces},
+    session::{
+        Captions, CellStyle, Data, Drawing, Facts, Framing, Items, Name, Showing, Subject, Surfaces,
+    },
+    warning,
 };
 use std::path::PathBuf;
 
@@ -23,6 +26,9 @@ pub struct Loaded {
     pub captions: Captions,
     /// What each input is, in the order of the visible ones.
     pub inputs: Vec<LoadedInput>,
+    /// What was said of the inputs while they were read, such as of parts left out. Subscribers of
+    /// `tracing` hear the same.
+    pub warnings: Vec<String>,
     /// The files that were read: the inputs, those that they refer to, and those that the
     /// description names beside them.
     pub files: Vec<PathBuf>,
@@ -45,10 +51,28 @@ pub struct LoadedInput {
     pub is_raw: bool,
     /// The names of the values that may colour it, if it is a mesh or a point cloud.
     pub attributes: Vec<String>,
+    /// What is known of its content, as `splatkit info --json` prints it. Series and arrays beside
+    /// those that were read are left out ([`Opened::facts`](crate::session::Opened::facts) has
+    /// them).
+    pub facts: Facts,
+}
+
+/// An input that was read, with all that its description says of it.
+pub struct ReadInput {
+    /// What it holds, where it is moved to.
+    pub data: Data,
+    /// How it is shown.
+    pub showing: Showing,
+    /// Whether the description gave its layout.
+    pub is_raw: bool,
+    /// The files that were read.
+    pub files: Vec<PathBuf>,
+    facts: Facts,
 }
 
 impl LoadedInput {
-    fn new(file: PathBuf, data: &Data, is_raw: bool, showing: &Showing) -> Result<Self> {
+    fn new(file: PathBuf, read: &ReadInput) -> Result<Self> {
+        let ReadInput { data, showing, is_raw, facts, .. } = read;
         let has_lines = matches!(data, Data::Mesh(mesh) if !mesh.lines.is_empty());
         let is_cloud = !has_lines && matches!(data, Data::Mesh(mesh) if mesh.triangles.is_empty());
         let is_solid = matches!(data, Data::Cells(_)) && showing.cell_style()? == CellStyle::Solid;
@@ -57,7 +81,8 @@ impl LoadedInput {
             _ => Vec::new(),
         };
         let kind = data.kind();
-        Ok(Self { file, kind, is_cloud, has_lines, is_solid, is_raw, attributes })
+        let (is_raw, facts) = (*is_raw, facts.clone());
+        Ok(Self { file, kind, is_cloud, has_lines, is_solid, is_raw, attributes, facts })
     }
 }
 
@@ -69,6 +94,11 @@ impl Description {
     /// Those of [`check`](Self::check) as [`Error::Argument`], of reading the inputs
     /// ([`Reading`](crate::session::Reading)) and of adding them ([`Items::add`]).
     pub fn load(&self, does: &dyn Fn(String)) -> Result<Loaded> {
+        let (loaded, warnings) = warning::gathered(|| self.load_all(does));
+        Ok(Loaded { warnings, ..loaded? })
+    }
+
+    fn load_all(&self, does: &dyn Fn(String)) -> Result<Loaded> {
         let checked = self.check();
         checked.map_err(|(place, message)| Error::Argument(format!("{place} {message}")))?;
         // One deadline covers reading all inputs and making their splats.
@@ -83,15 +113,10 @@ impl Description {
             inputs.push(data);
             files.extend(read);
         }
-        let scene = items.scene(facets)?;
-        scene.validate().map_err(|error| self.at_fault(&items, &scene, error))?;
-        let mut subject = items.subject.clone();
-        // Points that all lie at one place have no extent, but their splats have one.
-        if subject.is_one_place() {
-            subject.bounds = scene.bounds();
-        }
-        let captions = items.captions();
-        Ok(Loaded { scene, subject, items, captions, inputs, files })
+        let fault = |scene: &Scene, error| self.at_fault(&items, scene, error);
+        let (scene, subject) = items.assembled(facets, fault)?;
+        let (captions, warnings) = (items.captions(), Vec::new());
+        Ok(Loaded { scene, subject, items, captions, inputs, warnings, files })
     }
 
     /// Returns the error for a scene that cannot be drawn. If an item cannot be drawn by itself,
@@ -123,14 +148,27 @@ impl Description {
     ) -> Result<(LoadedInput, Vec<PathBuf>)> {
         let path = &input.file;
         does(format!("Reading {}", path.display()));
-        let showing = self.showing(input)?;
+        let read = self.read_input(input)?;
+        let loaded = LoadedInput::new(path.clone(), &read)?;
+        items.add(&Name::of_file(path), read.data, &read.showing, does)?;
+        Ok((loaded, read.files))
+    }
+
+    /// Reads the data of an input, with all that is said of it: the values that colour it, radii of
+    /// points, and where it is moved to.
+    ///
+    /// # Errors
+    /// Those of [`showing`](Self::showing) and of [`Reading`](crate::session::Reading);
+    /// [`Error::Input`] for a file that cannot be moved.
+    pub fn read_input(&self, input: &InputEntry) -> Result<ReadInput> {
+        let (path, showing) = (&input.file, self.showing(input)?);
         let reading = self.reading_of(input).reading_within(memory::most());
         let opened = reading.open_colored(path, showing.coloring().attribute())?;
-        let data = self.read_input(input, &opened, &showing)?;
-        let loaded = LoadedInput::new(path.clone(), &data, opened.is_raw(), &showing)?;
-        let files = opened.files();
-        items.add(&Name::of_file(path), data, &showing, does)?;
-        Ok((loaded, files))
+        let mut data = opened.read()?;
+        opened.give_radii(&mut data, showing.point_radius.as_deref())?;
+        input.transform.apply(path, &mut data)?;
+        let (is_raw, files, facts) = (opened.is_raw(), opened.files(), opened.cheap_facts(&data)?);
+        Ok(ReadInput { data, showing, is_raw, files, facts })
     }
 }
 
@@ -152,18 +190,16 @@ impl Loaded {
         Ok(())
     }
 
-    /// Returns the error for a picture of `size` pixels that an engine did not draw: that of the
-    /// input that reaches farthest, if the usual camera cannot see the scene either. Also returns
-    /// whether only this camera cannot see it.
+    /// Returns how a picture of the scene is drawn and finished.
+    ///
+    /// # Errors
+    /// Those of [`PictureEntry::settings`].
+    pub fn drawing(&self, picture: &PictureEntry) -> Result<Drawing> {
+        picture.drawing(&self.scene, &self.subject)
+    }
+
+    /// Returns the error for a picture that an engine did not draw ([`Items::undrawn`]).
     pub fn undrawn(&self, error: Error, camera: &Camera, size: [u32; 2]) -> (Error, bool) {
-        let bounds = self.scene.bounds();
-        let is_seen = || camera.view(size)?.validate_for(&bounds);
-        if !matches!(error, Error::Argument(_)) || is_seen().is_ok() {
-            return (error, false);
-        }
-        match Framing::usual_fault(&self.subject, &bounds, size) {
-            Some(fault) => (self.items.out_of_sight(&self.scene, fault), false),
-            None => (error, true),
-        }
+        self.items.undrawn((&self.scene, &self.subject), error, camera, size)
     }
 }

@@ -24,12 +24,12 @@ pub use camera::CameraEntry;
 pub use clip::{Axis, ClipEntry, ClipSide, Place};
 pub use color::{Background, ColorEntry};
 pub use length::PaperLength;
-pub use load::{Loaded, LoadedInput};
+pub use load::{Loaded, LoadedInput, ReadInput};
 pub use picture::{Composite, PictureEntry, Samples};
 pub use reading::{LimitsEntry, ReadingEntry};
 pub use transform::{Rotation, TransformEntry};
 
-use super::{CellStyle, Data, Framing, Opened, Showing};
+use super::{CellStyle, Framing, Showing};
 use crate::{Error, Result, input::Limits};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -121,6 +121,27 @@ pub enum Engine {
     Cpu,
 }
 
+impl OverlayEntry {
+    /// Checks the texts.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the name of the field that is wrong.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(|(field, message)| Error::Argument(format!("{field}: {message}")))
+    }
+
+    fn check(&self) -> std::result::Result<(), appearance::Wrong> {
+        let letters = self.caption.as_ref().map_or(0, |text| text.chars().count());
+        let most = Description::MOST_CAPTION;
+        match letters {
+            letters if letters > most => {
+                Err(("caption", format!("has {letters} letters, but may have at most {most}")))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 fn yes() -> bool {
     true
 }
@@ -203,25 +224,6 @@ impl Description {
         Ok(showing)
     }
 
-    /// Reads the data of an input that was opened, with all that the input says of it: radii of
-    /// points that `showing` names, and where it is moved to.
-    ///
-    /// # Errors
-    /// Those of [`Opened::read`] and [`Reading::give_radii`](super::Reading::give_radii);
-    /// [`Error::Input`] for a file that cannot be moved.
-    pub fn read_input(
-        &self,
-        input: &InputEntry,
-        opened: &Opened<'_>,
-        showing: &Showing,
-    ) -> Result<Data> {
-        let mut data = opened.read()?;
-        let reading = self.reading_of(input).reading();
-        reading.give_radii(&input.file, &mut data, showing.point_radius.as_deref())?;
-        input.transform.apply(&input.file, &mut data)?;
-        Ok(data)
-    }
-
     /// Returns how the camera looks at the scene.
     ///
     /// # Errors
@@ -270,13 +272,7 @@ impl Description {
                            the place of the camera (--camera, --camera-position), or the sides";
             return Err(("picture.views".into(), message.into()));
         }
-        let letters = self.overlay.caption.as_ref().map_or(0, |text| text.chars().count());
-        if letters > Self::MOST_CAPTION {
-            let message =
-                format!("has {letters} letters, but may have at most {}", Self::MOST_CAPTION);
-            return Err(("overlay.caption".into(), message));
-        }
-        Ok(())
+        self.overlay.check().map_err(place("overlay"))
     }
 
     /// Returns the files that the description names beside its inputs.

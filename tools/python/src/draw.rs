@@ -15,10 +15,10 @@ use splatkit::{
     interaction::{Effort, Histogram},
     math::{Bounds, Camera},
     picture::Picture,
-    scene::{Clip, Item, Region, Scene, Settings},
+    scene::{Clip, Item, Region, Scene},
     session::{
-        Captions, Coloring, Data, Description, Engine, Framing, Items, Legend, Mark, Name,
-        OverlayEntry, PanelLabels, PictureEntry, Showing, Subject,
+        Coloring, Data, Drawing, Engine, Framing, Items, Mark, Name, OverlayEntry, PanelLabels,
+        PictureEntry, Showing, Subject,
     },
     volume::TransferFunction,
 };
@@ -137,46 +137,40 @@ impl Draw {
         let (overlay, behind, engine) = (taken("overlay"), taken("behind"), taken("engine"));
         let picture = picture(&Value::Object(all).to_string())?;
         let keep_samples: Option<bool> = options(&keep_samples)?;
-        let overlay: Option<OverlayEntry> = options(&overlay)?;
+        let overlay = options::<Option<OverlayEntry>>(&overlay)?.unwrap_or_default();
+        overlay.validate()?;
         let engine: Option<Engine> = options(&engine)?;
         Ok(Self {
             picture,
             region: options(&region)?,
             keep_samples: keep_samples.unwrap_or(false),
-            overlay: overlay.unwrap_or_default(),
+            overlay,
             behind: options(&behind)?,
             engine: engine.unwrap_or(Engine::Cpu),
         })
     }
 
     /// Returns the texts over the picture, if there are any.
-    fn texts(&self, items: &Mutex<Versioned>) -> Result<Option<Overlay>, Error> {
+    fn texts(&self, kept: &Kept, items: &Mutex<Versioned>) -> Result<Option<Overlay>, Error> {
         let labels = self.picture.panel_labels.unwrap_or_default();
         let has_labels = !self.picture.views.is_empty() && labels != PanelLabels::None;
         if self.overlay == OverlayEntry::default() && !has_labels {
             return Ok(None);
         }
-        let captions = locked(items).captions();
-        let letters = self.overlay.caption.as_ref().map_or(0, |text| text.chars().count());
-        let most = Description::MOST_CAPTION;
-        if letters > most {
-            return Err(wrong(format!("a caption has at most {most} letters, not {letters}")));
-        }
+        let mut captions = locked(items).items.captions();
+        // The colours of a transfer function that was set are its own.
+        let transfer = |&number: &usize| Some((number, kept.scene.items.get(number)?.transfer()?));
+        let edited = locked(items).edited.clone();
+        let transfers = edited.iter().filter_map(transfer);
+        captions.take_transfers(&kept.scene, transfers, &Coloring::default());
         let page = Page { background: self.behind, dpi: self.picture.dpi, has_labels };
         Overlay::open(&self.overlay, &captions, page).map_err(film::plain)
     }
 
     /// Returns the part of a drawn picture that a camera is fitted to: the middle, beside the
     /// scalar bars.
-    fn free(
-        &self,
-        kept: &Kept,
-        items: &Mutex<Versioned>,
-        size: [u32; 2],
-    ) -> Result<[u32; 2], Error> {
-        let room = self.texts(items)?.map_or(0, |texts| texts.room(self.picture.size()));
-        let [width, height] = size;
-        Ok([width.saturating_sub(2 * self.factor(&kept.scene) * room).max(1), height])
+    fn free(&self, drawing: &Drawing, texts: Option<&Overlay>) -> [u32; 2] {
+        drawing.free(texts.map_or(0, |texts| texts.room(self.picture.size())))
     }
 
     /// Returns what draws.
@@ -204,23 +198,18 @@ impl Draw {
         Ok(Device::Cpu)
     }
 
-    /// Returns how many pixels are drawn along each side of a pixel.
-    pub fn factor(&self, scene: &Scene) -> u32 {
-        self.picture.factor(scene)
-    }
-
     /// Whether meshes can be drawn as facets: in sheets that emit and absorb light.
     fn draws_facets(&self) -> bool {
         self.picture.draws_facets()
     }
 
-    /// Returns the settings of a picture before it is averaged down.
-    fn settings(&self, kept: &Kept, stop: &Stop) -> Result<Settings, Error> {
-        let mut settings = self.picture.settings(&kept.scene, &kept.subject)?;
-        settings.controls.stop = stop.clone();
-        settings.region = self.region.map(Region::from);
-        kept.scene.validate_settings(&settings)?;
-        Ok(settings)
+    /// Returns how a picture is drawn and finished.
+    fn drawing(&self, kept: &Kept, stop: &Stop) -> Result<Drawing, Error> {
+        let mut drawing = self.picture.drawing(&kept.scene, &kept.subject)?;
+        drawing.settings.controls.stop = stop.clone();
+        drawing.settings.region = self.region.map(Region::from);
+        kept.scene.validate_settings(&drawing.settings)?;
+        Ok(drawing)
     }
 }
 
@@ -325,7 +314,7 @@ impl Stage {
     /// Refuses options that the scene cannot be drawn with.
     pub fn check(&self, draw: &Draw) -> Result<(), Error> {
         let kept = self.take(draw.draws_facets())?;
-        let checked = draw.settings(&kept, &Stop::default());
+        let checked = draw.drawing(&kept, &Stop::default());
         self.put(kept, draw.draws_facets());
         checked.map(|_| ())
     }
@@ -333,32 +322,22 @@ impl Stage {
     /// Returns the fitted camera of a picture.
     pub fn camera(&self, fit: &Framing, draw: &Draw) -> Result<Camera, Error> {
         let mut kept = self.take(draw.draws_facets())?;
-        let settings = draw.settings(&kept, &Stop::default())?;
-        let camera = self.fitted(&mut kept, fit, draw, &settings);
+        let drawing = draw.drawing(&kept, &Stop::default())?;
+        let texts = draw.texts(&kept, &self.items)?;
+        let camera = kept
+            .fitted(fit, &drawing.settings.clips)
+            .and_then(|subject| fit.camera(&subject, draw.free(&drawing, texts.as_ref())));
         self.put(kept, draw.draws_facets());
         camera
-    }
-
-    /// Returns the camera that is fitted to what is kept of a scene.
-    fn fitted(
-        &self,
-        kept: &mut Kept,
-        fit: &Framing,
-        draw: &Draw,
-        settings: &Settings,
-    ) -> Result<Camera, Error> {
-        let free = draw.free(kept, &self.items, settings.size)?;
-        let seen = kept.fitted(fit, &settings.clips)?;
-        fit.camera(&kept.seen_by(&seen), free)
     }
 
     /// Returns the cameras of a turntable.
     pub fn turntable(&self, fit: &Framing, draw: &Draw, frames: u32) -> Result<Vec<Camera>, Error> {
         let mut kept = self.take(draw.draws_facets())?;
-        let settings = draw.settings(&kept, &Stop::default())?;
-        let seen = kept.fitted(fit, &settings.clips)?;
-        let free = draw.free(&kept, &self.items, settings.size)?;
-        let cameras = fit.turntable(&kept.seen_by(&seen), free, frames);
+        let drawing = draw.drawing(&kept, &Stop::default())?;
+        let texts = draw.texts(&kept, &self.items)?;
+        let subject = kept.fitted(fit, &drawing.settings.clips)?;
+        let cameras = fit.turntable(&subject, draw.free(&drawing, texts.as_ref()), frames);
         self.put(kept, draw.draws_facets());
         cameras
     }
@@ -373,38 +352,34 @@ impl Stage {
         stop: &Stop,
     ) -> Result<Drawn, Error> {
         let mut kept = self.take(draw.draws_facets())?;
-        let settings = draw.settings(&kept, stop)?;
-        let texts = draw.texts(&self.items)?;
+        let drawing = draw.drawing(&kept, stop)?;
+        let (settings, texts) = (&drawing.settings, draw.texts(&kept, &self.items)?);
         if !draw.picture.views.is_empty() {
-            let drawn = self.draw_figure(&mut kept, (viewpoint, draw), texts, &settings);
+            let drawn = self.draw_figure(&mut kept, (viewpoint, draw), texts, drawing);
             self.put(kept, draw.draws_facets());
             return drawn;
         }
         let (camera, is_fitted) = match viewpoint {
             Viewpoint::Camera(text) => (camera(text)?, false),
-            Viewpoint::Fitted(fit) => (self.fitted(&mut kept, fit, draw, &settings)?, true),
+            Viewpoint::Fitted(fit) => {
+                let subject = kept.fitted(fit, &settings.clips)?;
+                (fit.camera(&subject, draw.free(&drawing, texts.as_ref()))?, true)
+            }
         };
         let mut renderer = kept.renderer_of(draw)?;
-        let sheet = settings.sheet_thickness.or_else(|| sheet_of(&kept.scene));
-        let done = renderer.render(&camera, &effort.settings(&settings, sheet));
+        let sheet = settings.sheet_thickness.or_else(|| kept.scene.finest_sheet());
+        let done = renderer.render(&camera, &effort.settings(settings, sheet));
         kept.renderer = Some((draw.engine, renderer));
-        let (factor, scene) = (draw.factor(&kept.scene), kept.scene.clone());
+        let (scene, subject) = (kept.scene.clone(), kept.subject.clone());
         self.put(kept, draw.draws_facets());
-        let (mut picture, stats) = done.map_err(|error| match error {
-            Error::Argument(_) if is_fitted => {
-                locked(&self.items).items.out_of_sight(&scene, error)
-            }
-            other => other,
-        })?;
+        let items = locked(&self.items).items.clone();
+        let (mut picture, stats) = done
+            .map_err(|error| items.undrawn((&scene, &subject), error, &camera, settings.size).0)?;
         if is_fitted {
-            require_content(&picture)?;
+            draw.picture.require_content(&picture)?;
         }
         if effort == Effort::EXACT && !draw.keep_samples {
-            if factor > 1 {
-                picture = picture.reduced(factor)?;
-            }
-            let edges = (&settings.clips[..], draw.picture.edge_width());
-            locked(&self.items).items.draw_edges(&mut picture, &camera, edges)?;
+            picture = drawing.reduced(picture, &items, &camera)?;
             if let Some(texts) = texts {
                 texts.draw(&mut picture, &camera);
             }
@@ -418,7 +393,7 @@ impl Stage {
         kept: &mut Kept,
         (viewpoint, draw): (Viewpoint<'_>, &Draw),
         texts: Option<Overlay>,
-        settings: &Settings,
+        mut drawing: Drawing,
     ) -> Result<Drawn, Error> {
         let Viewpoint::Fitted(fit) = viewpoint else {
             return Err(wrong("a picture has either a camera or views; leave one of them out"));
@@ -426,26 +401,22 @@ impl Stage {
         if fit.camera_position.is_some() || draw.keep_samples {
             return Err(wrong("views need a camera that is fitted to the scene"));
         }
-        let seen = kept.fitted(fit, &settings.clips)?;
-        let subject = kept.seen_by(&seen);
+        let subject = kept.fitted(fit, &drawing.settings.clips)?;
         let figure = Figure::new(&draw.picture, texts.as_ref(), (fit, &subject))?;
         let Some(figure) = figure else { return Err(wrong("there are no views")) };
-        let factor = draw.factor(&kept.scene);
-        let mut settings = settings.clone();
-        settings.size = figure.panel_size().map(|side| side.saturating_mul(factor));
+        let factor = drawing.factor;
+        drawing.settings.size = figure.panel_size().map(|side| side.saturating_mul(factor));
         let mut renderer = kept.renderer_of(draw)?;
         let mut last = FrameStats::default();
+        let items = locked(&self.items).items.clone();
         let drawn = figure.draw(texts.as_ref(), |camera| {
-            let (picture, stats) = renderer.render(camera, &settings)?;
+            let (picture, stats) = renderer.render(camera, &drawing.settings)?;
             last = stats;
-            let mut picture = if factor > 1 { picture.reduced(factor)? } else { picture };
-            let edges = (&settings.clips[..], draw.picture.edge_width());
-            locked(&self.items).items.draw_edges(&mut picture, camera, edges)?;
-            Ok::<_, Error>(picture)
+            drawing.reduced(picture, &items, camera)
         });
         kept.renderer = Some((draw.engine, renderer));
         let (picture, _) = drawn?;
-        require_content(&picture)?;
+        draw.picture.require_content(&picture)?;
         Ok(Drawn { picture, stats: last, camera: figure.cameras()[0].clone() })
     }
 
@@ -477,12 +448,7 @@ impl Stage {
             _ => {}
         }
         drop(kept);
-        let scene = items.scene(facets)?;
-        let mut subject = items.items.subject.clone();
-        // Points that all lie at one place have no extent, but their splats have one.
-        if subject.is_one_place() {
-            subject.bounds = scene.bounds();
-        }
+        let (scene, subject) = items.assembled(facets)?;
         let transfer_version = items.transfer_version;
         Ok(Kept { version, transfer_version, scene, subject, seen: None, renderer: None })
     }
@@ -497,42 +463,12 @@ impl Stage {
 }
 
 impl Versioned {
-    /// Returns the scene. `facets` says whether its pictures can show facets.
-    fn scene(&self, facets: bool) -> Result<Arc<Scene>, Error> {
-        let scene = self.items.scene(facets)?;
-        scene.validate().map_err(|error| self.items.at_fault(&scene, error))?;
-        Ok(Arc::new(scene))
+    /// Returns the scene and its subject. `facets` says whether its pictures can show facets.
+    fn assembled(&self, facets: bool) -> Result<(Arc<Scene>, Subject), Error> {
+        let fault = |scene: &Scene, error| self.items.at_fault(scene, error);
+        let (scene, subject) = self.items.assembled(facets, fault)?;
+        Ok((Arc::new(scene), subject))
     }
-
-    /// Returns what the inputs say for texts. The colours of a transfer function that was set are
-    /// its own.
-    fn captions(&self) -> Captions {
-        let mut captions = self.items.captions();
-        for (number, legend) in &mut captions.legends {
-            let edited = self.edited.contains(number);
-            let field = self.items.fields().find(|(item, _)| edited && item == number);
-            let Some((_, item)) = field else { continue };
-            let (Some(transfer), Some(range)) = (item.transfer(), item.value_range()) else {
-                continue;
-            };
-            let labels = match item {
-                Item::Volume(volume, ..) => volume.about.labels.as_ref(),
-                _ => None,
-            };
-            let title = (std::mem::take(&mut legend.title), labels);
-            *legend = Legend::of_transfer(&Coloring::default(), transfer, range, title);
-        }
-        captions
-    }
-}
-
-/// Refuses a picture that shows nothing.
-fn require_content(picture: &Picture) -> Result<(), Error> {
-    // An opacity that rounds to 0 in a file of 8 bits counts as none.
-    if picture.color.iter().all(|pixel| pixel[3] < 0.5 / 255.0) {
-        return Err(Error::NothingToDraw("the picture is empty: nothing has opacity".into()));
-    }
-    Ok(())
 }
 
 impl Kept {
@@ -546,7 +482,7 @@ impl Kept {
 
     /// Takes over the transfer functions of a scene that has not changed otherwise.
     fn with_transfers_of(mut self, items: &Versioned, facets: bool) -> Result<Self, Error> {
-        let scene = items.scene(facets)?;
+        let (scene, _) = items.assembled(facets)?;
         if let Some((_, renderer)) = &mut self.renderer {
             for number in scene.fields() {
                 let [old, new] = [&self.scene, &scene].map(|scene| scene.items[number].transfer());
@@ -558,16 +494,14 @@ impl Kept {
         Ok(Self { transfer_version: items.transfer_version, scene, seen: None, ..self })
     }
 
-    /// Returns the points that a camera is fitted to; none if it has a distance already.
-    fn fitted(&mut self, fit: &Framing, clips: &[Clip]) -> Result<Arc<Vec<DVec3>>, Error> {
-        if fit.is_placed() { Ok(Arc::default()) } else { self.seen(clips) }
-    }
-
-    /// Returns the subject of which these points span what is seen.
-    fn seen_by(&self, seen: &[DVec3]) -> Subject {
+    /// Returns the subject that a camera is fitted to. It needs no points that span what is seen
+    /// if the camera has a distance already.
+    fn fitted(&mut self, fit: &Framing, clips: &[Clip]) -> Result<Subject, Error> {
         let mut subject = self.subject.clone();
-        subject.seen = seen.to_vec();
-        subject
+        if !fit.is_placed() {
+            subject.seen = self.seen(clips)?.to_vec();
+        }
+        Ok(subject)
     }
 
     /// Returns the points that span what is seen with these clips.
@@ -581,13 +515,4 @@ impl Kept {
         self.seen = Some((clips.to_vec(), seen.clone()));
         Ok(seen)
     }
-}
-
-/// Returns the thickness of the sheets of the finest volume, about as the scene chooses it.
-fn sheet_of(scene: &Scene) -> Option<f64> {
-    let thicknesses = scene.items.iter().filter_map(|item| match item {
-        Item::Volume(volume, ..) => Some(4.0 / 3.0 * volume.lattice.kernel_spacing()),
-        _ => None,
-    });
-    thicknesses.reduce(f64::min)
 }

@@ -4,9 +4,8 @@ use crate::{errors::raise, parts::reading, worker::run};
 use pyo3::prelude::*;
 use serde_json::{Map, Value, json};
 use splatkit::{
-    Error, Finding, Severity, Stop, bricks,
-    formats::{self, FORMATS, Kind},
-    hierarchy::file,
+    Error, Finding, Severity, Stop,
+    formats::{self, FORMATS},
     session::ReadingEntry,
 };
 use std::path::{Path, PathBuf};
@@ -23,7 +22,7 @@ pub fn info(py: Python<'_>, path: PathBuf, load: &str) -> PyResult<String> {
 pub fn check(py: Python<'_>, path: PathBuf, load: &str) -> PyResult<String> {
     let load = reading(load).map_err(|error| raise(py, &error))?;
     run(py, &Stop::default(), move || {
-        let findings = findings(&path, &load)?;
+        let findings = load.reading().open(&path)?.findings(None)?;
         let ok = findings.iter().all(|finding| finding.severity != Severity::Error);
         let findings: Vec<_> = findings.iter().map(Finding::to_json).collect();
         Ok(json!({ "ok": ok, "findings": findings }).to_string())
@@ -41,15 +40,4 @@ fn facts(path: &Path, load: &ReadingEntry) -> Result<Map<String, Value>, Error> 
     let reading = load.reading();
     let opened = reading.open(path)?;
     Ok(opened.facts(&opened.read()?)?.to_json())
-}
-
-fn findings(path: &Path, load: &ReadingEntry) -> Result<Vec<Finding>, Error> {
-    let (reading, limits) = (load.reading(), load.limits());
-    let deadline = limits.deadline();
-    let opened = reading.open(path)?;
-    Ok(match opened.kind() {
-        Kind::Hierarchy => file::check(path, &limits).findings,
-        Kind::Bricks => bricks::check(path, &limits, None).findings,
-        _ => opened.read()?.oddities(deadline).map_err(|error| error.in_file(path))?,
-    })
 }

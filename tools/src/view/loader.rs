@@ -2,10 +2,7 @@
 
 use super::painter::Stage;
 use crate::{failure::Failure, job::Job, progress::Progress};
-use splatkit::{
-    interaction::Histogram,
-    scene::{Item, Scene},
-};
+use splatkit::interaction::Histogram;
 use std::{
     sync::{
         Arc,
@@ -80,7 +77,7 @@ fn load(job: &Job, progress: &Progress) -> Result<Stage, Failure> {
     let items = &loaded.scene.items;
     let of_item = |item: usize| Some((item, Histogram::of_item(&items[item])?));
     let histograms = loaded.scene.fields().into_iter().filter_map(of_item).collect();
-    let sheet = sheet_of(&loaded.scene);
+    let sheet = loaded.scene.finest_sheet();
     Ok(Stage { loaded: Arc::new(loaded), device, histograms, sheet })
 }
 
@@ -90,15 +87,6 @@ fn reopened(job: &Job, stage: &Stage, progress: &Progress) -> Result<Stage, Fail
     let device = job.open_device(&stage.loaded.scene)?;
     let (loaded, histograms) = (Arc::clone(&stage.loaded), Arc::clone(&stage.histograms));
     Ok(Stage { loaded, device, histograms, sheet: stage.sheet })
-}
-
-/// Returns the thickness of the sheets of the finest volume, about as [`Scene::sheets`] chooses it.
-fn sheet_of(scene: &Scene) -> Option<f64> {
-    let thicknesses = scene.items.iter().filter_map(|item| match item {
-        Item::Volume(volume, ..) => Some(4.0 / 3.0 * volume.lattice.kernel_spacing()),
-        _ => None,
-    });
-    thicknesses.reduce(f64::min)
 }
 
 /// Returns a failure as a message, with its hint.

@@ -36,9 +36,9 @@ impl SceneView {
     /// Shows a scene that was loaded by the document's description.
     pub fn new(document: &Document, stage: Stage, size: [u32; 2]) -> Result<Self, Failure> {
         let job = document.job(size)?;
-        let settings = job.settings(&stage.loaded)?;
         let finish = job.finish(&stage.loaded)?;
-        let camera = job.camera(&stage.loaded, &settings, &finish)?;
+        let settings = finish.drawing.settings.clone();
+        let camera = job.camera(&stage.loaded, &finish)?;
         let up = job.up(&stage.loaded)?;
         let orbit = Orbit::new(camera, up, stage.loaded.subject.bounds.diagonal());
         let loaded_transfers = stage.transfers();

@@ -143,13 +143,13 @@ impl Window {
             self.set_for = Some(wanted);
             let job = self.document.job(self.size).map_err(|failure| text_of(&failure))?;
             let loaded = &scene_view.stage.loaded;
-            scene_view.settings = job.settings(loaded).map_err(|error| error.to_string())?;
             let finish = match &bars[..] {
                 [] => job.finish(loaded),
                 bars => job.finish_with(loaded, bars),
             };
             scene_view.finish = Arc::new(finish.map_err(|failure| text_of(&failure))?);
-            let camera = job.camera(loaded, &scene_view.settings, &scene_view.finish);
+            scene_view.settings = scene_view.finish.drawing.settings.clone();
+            let camera = job.camera(loaded, &scene_view.finish);
             scene_view.orbit.set_camera(camera.map_err(|error| error.to_string())?);
         } else if let Some(camera) = &self.document.scene().camera {
             scene_view.orbit.set_camera(camera.camera()?);

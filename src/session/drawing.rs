@@ -1,0 +1,114 @@
+//! The way from a described picture to the finished one: the settings that an engine draws by, the
+//! part of the picture that a camera is fitted to, and what is done to the drawn pixels.
+//!
+//! Every host takes this way. Texts over pictures are drawn by the hosts, because they need fonts.
+
+use super::{Items, PictureEntry, Subject};
+use crate::{
+    Error, Result,
+    math::Camera,
+    picture::Picture,
+    scene::{Scene, Settings},
+};
+
+/// How a picture of a scene is drawn and finished.
+#[derive(Debug, Clone)]
+pub struct Drawing {
+    /// The settings of the drawn picture, before it is averaged down.
+    pub settings: Settings,
+    /// Pixels that are drawn along each side of a pixel of the finished picture.
+    pub factor: u32,
+    /// The width of edges, in pixels of the finished picture.
+    pub edge_width: f64,
+}
+
+/// The smallest opacity that a file of 8 bits keeps.
+const LEAST_OPACITY: f32 = 0.5 / 255.0;
+
+impl PictureEntry {
+    /// Returns how the picture of a scene is drawn and finished.
+    ///
+    /// # Errors
+    /// Those of [`settings`](Self::settings).
+    pub fn drawing(&self, scene: &Scene, subject: &Subject) -> Result<Drawing> {
+        Ok(Drawing {
+            settings: self.settings(scene, subject)?,
+            factor: self.factor(scene),
+            edge_width: self.edge_width(),
+        })
+    }
+
+    /// Refuses a drawn picture that shows nothing.
+    ///
+    /// # Errors
+    /// [`Error::NothingToDraw`].
+    pub fn require_content(&self, picture: &Picture) -> Result<()> {
+        if picture.color.iter().any(|pixel| pixel[3] >= LEAST_OPACITY) {
+            return Ok(());
+        }
+        let clips: Vec<String> = self.clips.iter().map(ToString::to_string).collect();
+        let left = match &clips[..] {
+            [] => String::new(),
+            clips => format!(" after clipping by {}", clips.join(" ")),
+        };
+        Err(Error::NothingToDraw(format!(
+            "the picture is empty: the camera sees no splat that has opacity{left}"
+        )))
+    }
+}
+
+impl Drawing {
+    /// Returns the size of the part of the drawn picture that a camera is fitted to: the middle,
+    /// between margins of `room` pixels of the finished picture at the left and at the right.
+    pub fn free(&self, room: u32) -> [u32; 2] {
+        let [width, height] = self.settings.size;
+        let margins = room.saturating_mul(self.factor).saturating_mul(2);
+        [width.saturating_sub(margins).max(1), height]
+    }
+
+    /// Averages a drawn picture down, and draws the edges of its items over it.
+    ///
+    /// # Errors
+    /// Those of [`Picture::reduced`] and of [`Items::draw_edges`].
+    pub fn reduced(&self, picture: Picture, items: &Items, camera: &Camera) -> Result<Picture> {
+        let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
+        let edges = (&self.settings.clips[..], self.edge_width);
+        items.draw_edges(&mut picture, camera, edges)?;
+        Ok(picture)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{math::Bounds, session::ClipEntry};
+    use glam::DVec3;
+
+    fn picture(opacity: f32) -> Picture {
+        let (color, depth) = (vec![[opacity; 4]; 16], vec![1.0; 16]);
+        Picture { width: 4, height: 4, color, depth }
+    }
+
+    #[test]
+    fn a_camera_is_fitted_beside_bars() {
+        let drawing = Drawing { settings: Settings::new([40, 20]), factor: 2, edge_width: 1.0 };
+        assert_eq!(drawing.free(0), [40, 20]);
+        assert_eq!(drawing.free(3), [28, 20]);
+        // Something is always left.
+        assert_eq!(drawing.free(u32::MAX), [1, 20]);
+        let around = Bounds { min: DVec3::ZERO, max: DVec3::ONE };
+        let camera = Camera::framing(&around, DVec3::NEG_Z, DVec3::Y, 1.0);
+        let small = drawing.reduced(picture(1.0), &Items::default(), &camera);
+        assert_eq!(small.map(|picture| [picture.width, picture.height]).ok(), Some([2, 2]));
+    }
+
+    #[test]
+    fn empty_pictures_are_refused_with_the_clips() {
+        let side = serde_json::json!({"side": {"axis": "x", "below": true, "at": "50%"}});
+        let clip: ClipEntry = serde_json::from_value(side).expect("a clip");
+        let entry = PictureEntry { clips: vec![clip], ..PictureEntry::default() };
+        assert!(entry.require_content(&picture(0.5)).is_ok());
+        let error = entry.require_content(&picture(0.001)).expect_err("an error").to_string();
+        assert!(error.ends_with("opacity after clipping by x<50%"), "{error}");
+    }
+}
