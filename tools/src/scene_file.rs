@@ -9,7 +9,7 @@ use serde_json::Value;
 use splatkit::{
     Error,
     formats::{Kind, ReadOptions},
-    input::Limits,
+    input::{Limits, Source},
     session::Description,
 };
 use std::{
@@ -80,10 +80,21 @@ pub fn is_scene(path: &Path) -> bool {
     path.extension() == Some(OsStr::new("json")) && !matches!(kind(), Ok(Some(Kind::Gaussians)))
 }
 
-/// Refuses a scene file where a file of data is needed.
+/// Refuses a scene file where a file of data is needed, also one that is damaged. A model of glTF
+/// may have a scene file's extension.
 pub fn refuse(path: &Path) -> Result<(), Failure> {
-    if !is_scene(path) || Description::read_trusted(path, &Limits::default()).is_err() {
+    let limits = Limits::default();
+    let is_model = || {
+        let source = Source::open(path, &limits);
+        let text = source.and_then(|source| source.small_text("a model", usize::MAX)).ok();
+        let json: Option<Value> = text.and_then(|text| serde_json::from_str(&text).ok());
+        json.is_some_and(|json| json.get("asset").is_some())
+    };
+    if !is_scene(path) || path.is_dir() {
         return Ok(());
+    }
+    if let Err(error) = Description::read_trusted(path, &limits) {
+        return if is_model() { Ok(()) } else { Err(error.into()) };
     }
     let error = Error::input(path, "file", "is a scene file, which names files of data");
     Err(error.hint("splatkit render draws it; name one of its inputs here").into())

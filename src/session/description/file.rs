@@ -8,6 +8,8 @@ use crate::{
     session::SurfaceColor,
     volume::TransferFunction,
 };
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// The size limit of a scene file. A larger file is something else.
@@ -73,7 +75,8 @@ pub(super) fn parse(text: &str) -> std::result::Result<Description, (String, Str
     let mut json = serde_json::Deserializer::from_str(text);
     let scene: Description = serde_path_to_error::deserialize(&mut json).map_err(|error| {
         let place = error.path().to_string();
-        (if place == "." { "scene".into() } else { place }, error.inner().to_string())
+        let is_whole = [".", "?"].contains(&&*place);
+        (if is_whole { "scene".into() } else { place }, error.inner().to_string())
     })?;
     json.end().map_err(|error| ("scene".to_owned(), error.to_string()))?;
     scene.check()?;
@@ -177,10 +180,56 @@ pub(super) fn to_json(scene: &Description, folder: &Path) -> String {
     // The next user decides what may be taken.
     copy.picture.memory = None;
     copy.reading.limits.clear();
+    join(&mut copy);
     // Maps with text keys and numbers always become JSON.
     let mut text = serde_json::to_string_pretty(&copy).unwrap_or_default();
     text.push('\n');
     text
+}
+
+/// Moves what all inputs say alike to what they share, so that a scene is written alike, whoever has
+/// described it.
+fn join(scene: &mut Description) {
+    let readings = scene.inputs.iter().map(|input| (&input.reading, scene.reading_of(input)));
+    let readings = joined(&scene.reading, readings);
+    let appearances =
+        scene.inputs.iter().map(|input| (&input.appearance, scene.appearance_of(input)));
+    let appearances = joined(&scene.appearance, appearances);
+    if let Some((shared, entries)) = readings {
+        scene.reading = shared;
+        scene.inputs.iter_mut().zip(entries).for_each(|(input, entry)| input.reading = entry);
+    }
+    if let Some((shared, entries)) = appearances {
+        scene.appearance = shared;
+        scene.inputs.iter_mut().zip(entries).for_each(|(input, entry)| input.appearance = entry);
+    }
+}
+
+/// Returns a shared entry and the inputs' entries, without fields in which all inputs agree. Each
+/// input has its entry, and the entry that counts for it beside the shared one.
+fn joined<'a, T: Serialize + DeserializeOwned + 'a>(
+    shared: &T,
+    inputs: impl Iterator<Item = (&'a T, T)>,
+) -> Option<(T, Vec<T>)> {
+    let fields = |entry: &T| match serde_json::to_value(entry) {
+        Ok(Value::Object(fields)) => Some(fields),
+        _ => None,
+    };
+    let mut shared = fields(shared)?;
+    let (mut entries, mut effective) = (Vec::new(), Vec::new());
+    for (entry, counts) in inputs {
+        entries.push(fields(entry)?);
+        effective.push(fields(&counts)?);
+    }
+    let first = effective.first()?;
+    for (name, value) in first {
+        if effective.iter().all(|fields| fields.get(name) == Some(value)) {
+            shared.insert(name.clone(), value.clone());
+            entries.iter_mut().for_each(|fields| drop(fields.remove(name)));
+        }
+    }
+    let entry = |fields| serde_json::from_value(Value::Object(fields)).ok();
+    Some((entry(shared)?, entries.into_iter().map(entry).collect::<Option<_>>()?))
 }
 
 pub(super) fn write(scene: &Description, path: &Path) -> Result<()> {

@@ -254,3 +254,31 @@ fn the_schema_is_that_of_the_types() {
     let stored = std::fs::read_to_string(&path).expect("docs/scene.schema.json");
     assert!(stored == text, "docs/scene.schema.json is old: run this test with SPLATKIT_WRITE=1");
 }
+
+/// Who describes a scene decides what inputs share, but not what is written.
+#[test]
+fn what_all_inputs_say_alike_is_written_once() {
+    let parsed = |more: &str, inputs: [&str; 2]| {
+        let [a, b] = inputs;
+        let text = format!(
+            r#"{{"splatkit_scene": 2, "inputs": [{{"file": "a.ply"{a}}}, {{"file": "b.ply"{b}}}]
+                {more}}}"#
+        );
+        file::parse(&text).expect(&text)
+    };
+    let text = |scene: &Description| scene.to_json(Path::new(""));
+    let shared = parsed(r#", "appearance": {"opacity": 0.3, "edges": true}"#, ["", ""]);
+    let each = r#", "appearance": {"opacity": 0.3, "edges": true}"#;
+    let alike = parsed("", [each, each]);
+    assert_eq!(text(&alike), text(&shared));
+    assert_eq!(file::parse(&text(&alike)), Ok(shared));
+    // What differs stays with the inputs.
+    let other = r#", "appearance": {"opacity": 0.6, "edges": true}"#;
+    let mixed = file::parse(&text(&parsed("", [each, other]))).expect("a scene");
+    assert!(mixed.appearance.edges && mixed.appearance.opacity.is_none());
+    let opacities = [0, 1].map(|number| mixed.inputs[number].appearance.opacity);
+    assert_eq!(opacities, [Some(0.3), Some(0.6)]);
+    // An input that differs from what the others share is written as it was.
+    let one = parsed(r#", "reading": {"scalar": "heat"}"#, ["", r#", "reading": {"scalar": "p"}"#]);
+    assert_eq!(file::parse(&text(&one)), Ok(one));
+}

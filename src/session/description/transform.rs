@@ -1,5 +1,6 @@
 //! Where inputs are moved to.
 
+use super::Axis;
 use crate::{
     Error, Result,
     about::{About, Orientation},
@@ -7,7 +8,7 @@ use crate::{
     session::Data,
 };
 use glam::{DMat3, DVec3, Vec3};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 
 /// Where an input is moved to: it is scaled about the world's origin, then turned, then moved.
@@ -31,10 +32,31 @@ pub struct TransformEntry {
 #[serde(deny_unknown_fields)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Rotation {
-    /// The direction of the axis, of any length above 0.
+    /// The direction of the axis, of any length above 0. In JSON also the name of an axis of the
+    /// world: `"x"`, `"y"` or `"z"`.
+    #[serde(deserialize_with = "axis")]
+    #[cfg_attr(test, schemars(with = "AxisText"))]
     pub axis: [f64; 3],
     /// The angle, counter-clockwise for an eye that looks against the axis.
     pub degrees: f64,
+}
+
+/// [`Rotation::axis`] in JSON.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "an axis is x, y or z, or three numbers")]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+enum AxisText {
+    Named(Axis),
+    Direction([f64; 3]),
+}
+
+fn axis<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<[f64; 3], D::Error> {
+    Ok(match AxisText::deserialize(deserializer)? {
+        AxisText::Named(Axis::X) => [1.0, 0.0, 0.0],
+        AxisText::Named(Axis::Y) => [0.0, 1.0, 0.0],
+        AxisText::Named(Axis::Z) => [0.0, 0.0, 1.0],
+        AxisText::Direction(direction) => direction,
+    })
 }
 
 /// A transform as numbers.
@@ -180,6 +202,19 @@ mod tests {
     /// x becomes 2y + 1 along x, y becomes −2x, z becomes 2z.
     fn place(point: DVec3) -> DVec3 {
         DVec3::new(1.0 - 2.0 * point.y, 2.0 * point.x, 2.0 * point.z)
+    }
+
+    #[test]
+    fn an_axis_has_a_name_or_numbers() {
+        let axis = |axis: serde_json::Value| {
+            let text = serde_json::json!({"axis": axis, "degrees": 90}).to_string();
+            let rotation: std::result::Result<Rotation, _> = serde_json::from_str(&text);
+            rotation.map(|rotation| rotation.axis).map_err(|error| error.to_string())
+        };
+        assert_eq!(axis("y".into()), Ok([0.0, 1.0, 0.0]));
+        assert_eq!(axis(vec![0.0, 2.0, 1.0].into()), Ok([0.0, 2.0, 1.0]));
+        let error = axis("w".into()).expect_err("an error");
+        assert!(error.starts_with("an axis is x, y or z, or three numbers"), "{error}");
     }
 
     #[test]

@@ -24,7 +24,7 @@ use splatkit::{
     scattered::Points,
     scene::Optics,
     session::{
-        AppearanceEntry, CameraEntry, CellStyle, Data, Description, Framing, InputEntry, Name,
+        AppearanceEntry, CameraEntry, Data, Description, Engine, Framing, InputEntry, Name,
         OverlayEntry, PictureEntry, ReadingEntry, TransformEntry,
     },
     surface::Mesh,
@@ -71,9 +71,9 @@ struct ArrayFacts {
 struct FileFacts {
     /// Where the item is moved to.
     transform: TransformEntry,
-    /// Whether pictures show values alone, as other optics than light do: of a volume that has
-    /// colours its brightness, and of cells the field inside.
-    shows_field: bool,
+    /// What pictures compute of fields. Other optics than light show values alone: of a volume that
+    /// has colours its brightness, and of cells the field inside.
+    optics: Option<Optics>,
 }
 
 /// What a caller says of the values of a volume: whether they are labels, the labels' names, or a
@@ -387,17 +387,13 @@ impl Scene {
         let worker_stop = stop.clone();
         run(py, &stop, move || {
             // One deadline covers reading the input and making its splats.
-            let deadline = load.limits().deadline();
-            let mut showing = load.complete(appearance.showing(&load.limits())?, deadline)?;
-            if facts.shows_field {
-                showing.values_by = showing.values_by.or_else(|| Some("optics".into()));
-                showing.cells = showing.cells.or(Some(CellStyle::Volume));
-            }
-            let attribute = showing.coloring().attribute();
-            let mut input = load.reading().open_colored(&path, attribute)?.read()?;
-            load.reading().give_radii(&path, &mut input, showing.point_radius.as_deref())?;
-            facts.transform.apply(&path, &mut input)?;
-            stage.add(Added { name: Name::of_file(&path), input, showing }, &worker_stop)
+            let input = InputEntry { transform: facts.transform, ..InputEntry::new(path) };
+            let mut scene = Description::new([]);
+            (scene.reading, scene.appearance) = (load.begun(), appearance);
+            scene.picture.optics = facts.optics;
+            let read = scene.read_input(&input)?;
+            let name = Name::of_file(&input.file);
+            stage.add(Added { name, input: read.data, showing: read.showing }, &worker_stop)
         })
     }
 
@@ -564,7 +560,7 @@ impl Scene {
 }
 
 /// Reads a scene file. Returns as JSON its visible inputs, with how each is read, moved and shown;
-/// its camera, how one is fitted, the picture, and what is written over it.
+/// its camera, how one is fitted, the picture, what is written over it, and what draws.
 #[pyfunction]
 pub fn read_scene(py: Python<'_>, path: PathBuf, is_trusted: bool) -> PyResult<String> {
     run(py, &Stop::default(), move || {
@@ -582,11 +578,11 @@ pub fn read_scene(py: Python<'_>, path: PathBuf, is_trusted: bool) -> PyResult<S
             })
         };
         let inputs: Vec<_> = scene.visible().map(input).collect();
-        let shows_field = scene.picture.optics.is_some_and(|optics| optics != Optics::default());
-        let Description { camera, framing, picture, overlay, .. } = &scene;
+        let Description { camera, framing, picture, overlay, engine, .. } = &scene;
+        let engine = Some(engine).filter(|engine| **engine != Engine::default());
         let described = serde_json::json!({
-            "inputs": inputs, "shows_field": shows_field, "camera": camera, "framing": framing,
-            "picture": picture, "overlay": overlay,
+            "inputs": inputs, "camera": camera, "framing": framing, "picture": picture,
+            "overlay": overlay, "engine": engine,
         });
         Ok(described.to_string())
     })
@@ -600,6 +596,7 @@ struct Described {
     framing: Framing,
     picture: PictureEntry,
     overlay: OverlayEntry,
+    engine: Option<Engine>,
 }
 
 /// Writes a scene file: inputs with how each is read, shown and moved as JSON, and how the picture
@@ -618,9 +615,10 @@ pub fn write_scene(
             let (transform, new) = (options(&transform)?, InputEntry::new(file));
             scene.inputs.push(InputEntry { reading, appearance, transform, ..new });
         }
-        let Described { camera, framing, picture, overlay } = options(described)?;
+        let Described { camera, framing, picture, overlay, engine } = options(described)?;
         (scene.camera, scene.framing) = (camera, framing);
         (scene.picture, scene.overlay) = (picture, overlay);
+        scene.engine = engine.unwrap_or_default();
         scene.check().map_err(|(place, message)| wrong(format!("{place}: {message}")))?;
         Ok(scene)
     };

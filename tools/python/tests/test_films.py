@@ -43,7 +43,7 @@ def test_texts_are_those_of_the_command(command, data, tmp_path):
     assert (picture.rgba != plain.rgba).any(axis=-1).mean() > 0.05
     with pytest.raises(pysplatkit.ArgumentError, match="nothing to show"):
         pysplatkit.render(data / "mesh.ply", scalar_bar=True)
-    with pytest.raises(pysplatkit.ArgumentError, match="at most 1000 letters"):
+    with pytest.raises(pysplatkit.ArgumentError, match="caption: has 1001 letters"):
         pysplatkit.render(data / "mesh.ply", caption="a" * 1001)
     light = pysplatkit.render(file, size=SIZE, caption="Dark letters", background="white").rgba
     assert light[:20].min() < 40

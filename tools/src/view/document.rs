@@ -257,7 +257,7 @@ pub fn unplaced(framing: &Framing) -> Framing {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::{Command, Task};
     use clap::{CommandFactory, FromArgMatches};
@@ -279,7 +279,8 @@ mod tests {
         assert!(document.job([64, 48]).is_ok());
     }
 
-    fn document(words: &str) -> Document {
+    /// Returns the document of a window with these words of the command.
+    pub fn document(words: &str) -> Document {
         let matches = Command::command().try_get_matches_from(words.split(' ')).expect("flags");
         let Task::Render(render) = Command::from_arg_matches(&matches).expect("a command").task
         else {

@@ -7,6 +7,8 @@
 //! file.
 
 mod action;
+#[cfg(test)]
+mod alike;
 mod arrays;
 mod canvas;
 mod curve;

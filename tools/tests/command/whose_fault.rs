@@ -125,6 +125,16 @@ fn values_of_a_scene_are_the_scenes_fault() {
     for task in ["info", "check"] {
         folder.run(&format!("{task} s.json")).fails(3, &["s.json", "is a scene file"]);
     }
+    // A damaged one is no model either.
+    let damaged = [
+        (r#"{"splatkit_scene": 2, "inputs": [], "pcture": 3}"#, "unknown field `pcture`"),
+        (r#"{"splatkit_scene": 2,"#, "s.json: scene: EOF"),
+    ];
+    for (text, words) in damaged {
+        folder.put("s.json", text);
+        folder.run("info s.json").fails(3, &[words, "splatkit_scene"]);
+    }
+    folder.put("s.json", r#"{"splatkit_scene": 2, "inputs": [{"file": "near.mha"}]}"#);
     // What the user gives beside a scene stays wrong usage.
     for (flags, word) in
         [("--crease 255", "--crease"), ("--camera-position 1e30,0,0", "the camera")]

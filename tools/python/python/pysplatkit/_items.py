@@ -112,7 +112,7 @@ def unused(name: str, names: Sequence[str]) -> str:
 
 def _plain_file(given: Arguments) -> Arguments:
     source = os.fspath(given.pop("source"))
-    hidden = {name: given.pop(name, None) for name in ("_reading", "_appearance", "shows_field")}
+    hidden = {name: given.pop(name, None) for name in ("_reading", "_appearance", "_optics")}
     known = _options.VOLUME | _options.SURFACE | _options.CELLS | _options.READING
     options = _options.checked(given, known, "add")
     options.update(_options.plain_appearance(options))
@@ -129,7 +129,7 @@ def _file_options(arguments: Mapping[str, Any]) -> tuple[str, str]:
 
 def _put_file(native: _pysplatkit.Scene, item: Item) -> None:
     facts = {"transform": json.loads(item.transform)}
-    facts["shows_field"] = bool(item.arguments.get("shows_field"))
+    facts["optics"] = item.arguments.get("_optics")
     path = item.arguments["source"]
     native.add_file(path, *_file_options(item.arguments), _options.text(facts))
 

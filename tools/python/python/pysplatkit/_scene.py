@@ -65,9 +65,9 @@ class Scene:
         """
         described = json.loads(_pysplatkit.read_scene(os.fspath(path), trusted))
         scene = cls()
-        shows_field = described.pop("shows_field")
+        optics = described["picture"].get("optics")
         for file in described.pop("inputs"):
-            arguments = {"source": file["file"], "shows_field": shows_field}
+            arguments = {"source": file["file"], "_optics": optics}
             arguments |= {"_reading": file["reading"], "_appearance": file["appearance"]}
             name = scene._unused(None, _items.name_of(file["file"]))
             item = Item.of(name, "add", arguments)
@@ -84,7 +84,8 @@ class Scene:
     ) -> None:
         """Writes a scene file, which the command, the window and `open` draw alike.
 
-        Only scenes of files can be written; save arrays as files first.
+        Only scenes of files can be written; save arrays as files first. What is not given is as the
+        scene file says that `open` has read, if there is one.
 
         Args:
             path: The scene file.
@@ -99,17 +100,18 @@ class Scene:
         if not files:
             raise ArgumentError("the scene is empty")
         given = _options.checked(drawing, _options.DRAWING | _options.PAGE | _options.VIEW, "save")
-        if given.pop("engine", None) not in (None, "cpu"):
-            raise ArgumentError("a scene file does not say which engine draws: leave engine out")
-        if "background" in drawing:
-            given["background"] = _options.background(drawing["background"]) or "none"
-        overlay = {name: given.pop(name) for name in _options.OVERLAY & given.keys()}
         view = {name: given.pop(name) for name in _options.VIEW & given.keys()}
+        draw = self._drawing({**given, "size": size}, camera is not None or "view" in view)
+        if "background" in drawing:
+            draw["background"] = _options.background(drawing["background"]) or "none"
+        framing = self._described.get("framing") or {} if camera is None else {}
+        shot = None if camera is None else json.loads(camera.to_json())
         described = {
-            "camera": None if camera is None else json.loads(camera.to_json()),
-            "framing": json.loads(_fit(**view)),
-            "picture": json.loads(_drawn(size=size, **given)),
-            "overlay": overlay,
+            "camera": self._described.get("camera") if camera is None and not view else shot,
+            "framing": {**framing, **json.loads(_fit(**view))},
+            "engine": draw.pop("engine", None),
+            "overlay": {name: draw.pop(name) for name in _options.OVERLAY & draw.keys()},
+            "picture": json.loads(_drawn(**draw)),
         }
         _pysplatkit.write_scene(os.fspath(path), files, json.dumps(described))
 
@@ -753,35 +755,48 @@ class Scene:
 
     def _picture(self, camera: Camera | None, given: Mapping[str, Any]) -> Picture:
         """Draws with options by their names; those that are None are not given."""
-        said: dict[str, Any] = dict(self._described.get("picture", {}))
-        behind = said.pop("background", "black")
-        if given.get("background", "auto") != "auto":
-            behind = given["background"]
-        # What is given counts more than what the scene file says.
-        chosen = {name: given[name] for name in given if given[name] is not None}
-        chosen.pop("background", None)
-        view = {name: chosen.pop(name) for name in _options.VIEW & chosen.keys()}
+        is_placed = camera is not None or given.get("view") is not None
+        draw = self._drawing(given, is_placed)
+        behind = draw.pop("background", "black")
+        # None is transparent.
+        if "background" in given and given["background"] is None:
+            behind = None
+        view = {name: draw.pop(name) for name in _options.VIEW & draw.keys()}
         if camera is not None and view:
             names = ", ".join(sorted(view))
             raise ArgumentError(f"a picture has either a camera or a view; leave {names} out")
-        if "view" in view and "views" in chosen:
+        views = given.get("views")
+        if "view" in view and views is not None:
             raise ArgumentError("a picture has either a view or views; leave one of them out")
-        if {"size", "width", "height"} & chosen.keys():
-            for name in ("size", "width", "height"):
-                said.pop(name, None)
-        if camera is not None or "view" in view:
-            for name in ("views", "columns", "panel_labels"):
-                said.pop(name, None)
-        if {"cut", "budget"} & chosen.keys():
-            for name in ("cut", "budget", "frame_time"):
-                said.pop(name, None)
         background = _options.background(behind)
-        draw = {**said, **(self._described.get("overlay") or {}), **chosen, "behind": background}
-        is_fitted = bool(view) or "views" in chosen
+        draw["behind"] = background
+        is_fitted = bool(view) or views is not None
         if camera is None and not is_fitted and self._described.get("camera") is not None:
             camera = Camera.from_json(json.dumps(self._described["camera"]))
         fit = {**(self._described.get("framing") or {}), **json.loads(_fit(**view))}
         return Picture(self._pixels(camera, draw, json.dumps(fit)), background, draw.get("dpi"))
+
+    def _drawing(self, given: Mapping[str, Any], is_placed: bool) -> dict[str, Any]:
+        """Returns the options of a picture by their names: those that are given, unless they are
+        None, and otherwise those of the scene file. A camera or view that is given takes the place
+        of the file's views."""
+        said: dict[str, Any] = {**(self._described.get("picture") or {})}
+        said |= self._described.get("overlay") or {}
+        if self._described.get("engine") is not None:
+            said["engine"] = self._described["engine"]
+        chosen = {name: given[name] for name in given if given[name] is not None}
+        if chosen.get("background") == "auto":
+            del chosen["background"]
+        if {"cut", "budget"} & chosen.keys():
+            for name in ("cut", "budget", "frame_time"):
+                said.pop(name, None)
+        if {"size", "width", "height"} & chosen.keys():
+            for name in ("size", "width", "height"):
+                said.pop(name, None)
+        if is_placed:
+            for name in ("views", "columns", "panel_labels"):
+                said.pop(name, None)
+        return {**said, **chosen}
 
     def _pixels(
         self, camera: Camera | None, draw: Mapping[str, Any], fit: str = "{}"
