@@ -3,12 +3,12 @@
 
 use super::{
     close::Packet,
-    covered::{Covered, LEAST_SHARE, Side},
+    covered::{Covered, Covering, LEAST_SHARE, Side},
     footprint::{Kind, Record},
     plan::Plan,
     rods,
-    scatter::{OpenTile, Window, is_kept},
-    sums::{Sums, WINDOW},
+    scatter::{Window, is_kept},
+    sums::WINDOW,
     vector::{Lanes, three},
 };
 use crate::{
@@ -160,7 +160,7 @@ fn sheets(plan: &Plan, corners: [Vec3; 3]) -> Option<[u16; 2]> {
 }
 
 /// A facet on its way to the pixels of a tile.
-struct DrawnFacet<'a> {
+pub struct DrawnFacet<'a> {
     /// The image that it shows, and where.
     image: Option<Mapped<'a>>,
     corners: [Vec3; 3],
@@ -230,7 +230,7 @@ impl Mapped<'_> {
 
 impl<'a> DrawnFacet<'a> {
     #[inline(always)]
-    fn new(plan: &'a Plan, record: &Record) -> Self {
+    pub fn new(plan: &'a Plan, record: &Record) -> Self {
         let [bx, by, bz, cx, cy, cz] = record.whitening;
         let corners = [Vec3::from(record.center), Vec3::new(bx, by, bz), Vec3::new(cx, cy, cz)];
         let frame = &plan.frame;
@@ -361,33 +361,31 @@ fn part_left<S: Simd>(simd: S, from: [Lanes<S>; 2], to: [Lanes<S>; 2]) -> Lanes<
     rises.select((y[1] - y[0]) * mean, none)
 }
 
-impl<S: Simd> OpenTile<'_, S> {
-    /// Adds a facet's window to a packet.
+impl<S: Simd> Covering<S> for DrawnFacet<'_> {
     #[inline(always)]
-    fn add_facet_to(
+    fn covered(
+        &self,
         simd: S,
         plan: &Plan,
-        facet: &DrawnFacet,
         window: Window,
         packet: &Packet<S>,
-        sums: &mut Sums<S>,
-    ) {
-        let (share, weights) = facet.at(simd, packet);
+    ) -> Option<Covered<S>> {
+        let (share, weights) = self.at(simd, packet);
         // The share that is seen, if the facet shows an image.
         let mut seen_share = share;
         let rays = &packet.rays;
         let mut covers = share.simd_gt(LEAST_SHARE);
         if !covers.any_true() {
-            return;
+            return None;
         }
         let of =
             |parts: [f32; 3]| weights[0] * parts[0] + weights[1] * parts[1] + weights[2] * parts[2];
-        let distance = of(facet.corners.map(|corner| corner.z)) / rays.cosine;
-        if plan.has_clips() && !facet.is_cut {
+        let distance = of(self.corners.map(|corner| corner.z)) / rays.cosine;
+        if plan.has_clips() && !self.is_cut {
             covers &= is_kept(plan, rays, distance);
         }
-        let mut color = three!(I => of(facet.colors.map(|color| color[I])));
-        if let Some(image) = &facet.image {
+        let mut color = three!(I => of(self.colors.map(|color| color[I])));
+        if let Some(image) = &self.image {
             // Only what lies in this window is needed.
             covers &= distance.simd_lt(plan.planes[window.front + WINDOW]);
             if window.is_continued {
@@ -398,37 +396,17 @@ impl<S: Simd> OpenTile<'_, S> {
             seen_share = share * alpha;
             covers &= seen_share.simd_gt(LEAST_SHARE);
             if !covers.any_true() {
-                return;
+                return None;
             }
         }
         if plan.lit_surfaces {
-            let normal = three!(I => of(facet.normals.map(|normal| normal[I])));
+            let normal = three!(I => of(self.normals.map(|normal| normal[I])));
             // Facets without normals keep their colours.
-            if facet.normals != [Vec3::ZERO; 3] {
+            if self.normals != [Vec3::ZERO; 3] {
                 color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
             }
         }
-        let side = if facet.is_front { Side::Front } else { Side::Back };
-        let covered = Covered { share, seen: seen_share, distance, color, covers, side };
-        Self::add_covered(simd, plan, &covered, window, packet, sums);
-    }
-
-    /// Adds a facet's window to all packets that it meets.
-    #[inline(always)]
-    pub fn add_facet(
-        &mut self,
-        simd: S,
-        plan: &Plan,
-        record: &Record,
-        window: Window,
-        packets: impl Iterator<Item = usize>,
-    ) {
-        let facet = DrawnFacet::new(plan, record);
-        for number in packets {
-            let packet = &self.packets[number];
-            if !packet.is_done || plan.central {
-                Self::add_facet_to(simd, plan, &facet, window, packet, &mut self.sums);
-            }
-        }
+        let side = if self.is_front { Side::Front } else { Side::Back };
+        Some(Covered { share, seen: seen_share, distance, color, covers, side })
     }
 }
