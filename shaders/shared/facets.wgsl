@@ -110,13 +110,6 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
         cross(vec3(a.xy, toward.x), vec3(b.xy, toward.y)),
     );
     let continued = (entry & ENTRY_CONTINUED) != 0u;
-    let ahead = vec4(
-        planes[front],
-        planes[front + 1u],
-        planes[front + 2u],
-        planes[front + 3u],
-    );
-    let behind = vec4(ahead.yzw, planes[front + 4u]);
     for (var r = 0u; r < ROWS; r++) {
         let pixel = vec2<f32>(first_pixel + vec2(0, i32(r))) + 0.5;
         var share = 0.0;
@@ -154,7 +147,8 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
         var seen = share;
         if HAS_IMAGES && counts && abs(last.w) > 1.0 {
             // Only what lies in this window is needed.
-            counts = distance < behind.w && (!continued || distance >= ahead.y);
+            counts = distance < planes[front + 4u]
+                && (!continued || distance >= planes[front + 1u]);
             if counts {
                 let ray = vec3((pixel - frame.center) / frame.scale, 1.0);
                 tint = facet_tint(

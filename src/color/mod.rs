@@ -172,9 +172,13 @@ impl ColorMap {
             Some(list) => (list, true),
             None => (text, false),
         };
-        let wrong = |message| Error::Argument(format!("a colour map of colours: {message}"));
-        let colors: Vec<[f32; 3]> =
-            list.split(',').map(parse).collect::<std::result::Result<_, _>>().map_err(wrong)?;
+        let wrong =
+            |message: String| Error::Argument(format!("a colour map of colours: {message}"));
+        let part = |(number, part): (usize, &str)| {
+            let place = || format!("colour {} is “{}”, but ", number + 1, part.trim());
+            parse(part).map_err(|message| wrong(place() + &message))
+        };
+        let colors: Vec<[f32; 3]> = list.split(',').enumerate().map(part).collect::<Result<_>>()?;
         if !(2..=Self::MOST_COLORS).contains(&colors.len()) {
             let most = Self::MOST_COLORS;
             return Err(wrong(format!("it has {} colours, not 2 to {most}", colors.len())));
@@ -406,8 +410,14 @@ mod tests {
         assert_eq!(turned.to_string(), "#000000,#ff8800,#ffffff_r");
         let text = serde_json::to_string(&turned).unwrap();
         assert_eq!(serde_json::from_str::<ColorMap>(&text).unwrap(), turned);
-        for bad in ["red,", "red,no colour", &["red"; 257].join(",")] {
-            assert!(ColorMap::named(bad).is_err(), "{bad}");
+        for (bad, place) in [
+            ("red,", "colour 2 is “”, but a colour is"),
+            ("red, rde ,blue_r", "colour 2 is “rde”, but a colour is"),
+            ("red,blue,#ff880080", "colour 3 is “#ff880080”, but a colour has no opacity"),
+            (&["red"; 257].join(","), "257 colours, not 2 to 256"),
+        ] {
+            let message = ColorMap::named(bad).unwrap_err().to_string();
+            assert!(message.contains(place), "{bad}: {message}");
         }
     }
 

@@ -38,10 +38,45 @@ pub struct Covered<S: Simd> {
     pub side: Side,
 }
 
+/// A facet or a rod on its way to the pixels of a tile.
+pub trait Covering<S: Simd> {
+    /// Returns what it covers of a packet, if it covers any part. Pixels where it lies outside the
+    /// window may be left out.
+    fn covered(
+        &self,
+        simd: S,
+        plan: &Plan,
+        window: Window,
+        packet: &Packet<S>,
+    ) -> Option<Covered<S>>;
+}
+
 impl<S: Simd> OpenTile<'_, S> {
+    /// Adds the window of a facet or a rod to the packets that it meets, given as bits.
+    #[inline(always)]
+    pub fn add_covering(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        drawn: &impl Covering<S>,
+        window: Window,
+        mut packets: u8,
+    ) {
+        while packets != 0 {
+            let packet = &self.packets[packets.trailing_zeros() as usize];
+            packets &= packets - 1;
+            if packet.is_done && !plan.central {
+                continue;
+            }
+            if let Some(covered) = drawn.covered(simd, plan, window, packet) {
+                Self::add_covered(simd, plan, &covered, window, packet, &mut self.sums);
+            }
+        }
+    }
+
     /// Adds what a facet or rod covers in a window of sheets.
     #[inline(always)]
-    pub fn add_covered(
+    fn add_covered(
         simd: S,
         plan: &Plan,
         covered: &Covered<S>,

@@ -2,11 +2,11 @@
 
 use super::{
     close::Packet,
-    covered::{Covered, LEAST_SHARE, Side},
+    covered::{Covered, Covering, LEAST_SHARE, Side},
     footprint::Record,
     plan::Plan,
-    scatter::{OpenTile, Window, is_kept},
-    sums::{Sums, WINDOW},
+    scatter::{Window, is_kept},
+    sums::WINDOW,
     vector::{Lanes, dot_with, three},
 };
 use crate::{facet::Image, splat::decode_normal};
@@ -14,7 +14,7 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 use glam::{Vec2, Vec3};
 
 /// A facet on its way to the pixels of a tile.
-struct DrawnFacet<'a> {
+pub struct DrawnFacet<'a> {
     /// The image that it shows, and where.
     image: Option<Mapped<'a>>,
     corners: [Vec3; 3],
@@ -88,7 +88,7 @@ impl Mapped<'_> {
 
 impl<'a> DrawnFacet<'a> {
     #[inline(always)]
-    fn new(plan: &'a Plan, record: &Record) -> Self {
+    pub fn new(plan: &'a Plan, record: &Record) -> Self {
         let [bx, by, bz, cx, cy, cz] = record.whitening;
         let corners = [Vec3::from(record.center), Vec3::new(bx, by, bz), Vec3::new(cx, cy, cz)];
         let frame = &plan.frame;
@@ -224,31 +224,29 @@ fn part_left<S: Simd>(simd: S, from: [Lanes<S>; 2], to: [Lanes<S>; 2]) -> Lanes<
     rises.select((y[1] - y[0]) * mean, none)
 }
 
-impl<S: Simd> OpenTile<'_, S> {
-    /// Adds a facet's window to a packet.
+impl<S: Simd> Covering<S> for DrawnFacet<'_> {
     #[inline(always)]
-    fn add_facet_to(
+    fn covered(
+        &self,
         simd: S,
         plan: &Plan,
-        facet: &DrawnFacet,
         window: Window,
         packet: &Packet<S>,
-        sums: &mut Sums<S>,
-    ) {
-        let (share, weights) = facet.at(simd, packet);
+    ) -> Option<Covered<S>> {
+        let (share, weights) = self.at(simd, packet);
         // The share that is seen, if the facet shows an image.
         let mut seen_share = share;
         let rays = &packet.rays;
         let mut covers = share.simd_gt(LEAST_SHARE);
         if !covers.any_true() {
-            return;
+            return None;
         }
-        let distance = dot_with(facet.z, weights) / rays.cosine;
-        if plan.has_clips() && !facet.is_cut {
+        let distance = dot_with(self.z, weights) / rays.cosine;
+        if plan.has_clips() && !self.is_cut {
             covers &= is_kept(plan, rays, distance);
         }
-        let mut color = three!(I => dot_with(facet.colors[I], weights));
-        if let Some(image) = &facet.image {
+        let mut color = three!(I => dot_with(self.colors[I], weights));
+        if let Some(image) = &self.image {
             // Only what lies in this window is needed.
             covers &= distance.simd_lt(plan.planes[window.front + WINDOW]);
             if window.is_continued {
@@ -259,36 +257,15 @@ impl<S: Simd> OpenTile<'_, S> {
             seen_share = share * alpha;
             covers &= seen_share.simd_gt(LEAST_SHARE);
             if !covers.any_true() {
-                return;
+                return None;
             }
         }
         // Facets without normals keep their colours.
-        if plan.lit_surfaces && facet.has_normals {
-            let normal = three!(I => dot_with(facet.normals[I], weights));
+        if plan.lit_surfaces && self.has_normals {
+            let normal = three!(I => dot_with(self.normals[I], weights));
             color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
         }
-        let side = if facet.is_front { Side::Front } else { Side::Back };
-        let covered = Covered { share, seen: seen_share, distance, color, covers, side };
-        Self::add_covered(simd, plan, &covered, window, packet, sums);
-    }
-
-    /// Adds a facet's window to the packets that it meets, given as bits.
-    #[inline(always)]
-    pub fn add_facet(
-        &mut self,
-        simd: S,
-        plan: &Plan,
-        record: &Record,
-        window: Window,
-        mut packets: u8,
-    ) {
-        let facet = DrawnFacet::new(plan, record);
-        while packets != 0 {
-            let packet = &self.packets[packets.trailing_zeros() as usize];
-            packets &= packets - 1;
-            if !packet.is_done || plan.central {
-                Self::add_facet_to(simd, plan, &facet, window, packet, &mut self.sums);
-            }
-        }
+        let side = if self.is_front { Side::Front } else { Side::Back };
+        Some(Covered { share, seen: seen_share, distance, color, covers, side })
     }
 }

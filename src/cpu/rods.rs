@@ -3,11 +3,10 @@
 
 use super::{
     close::Packet,
-    covered::{Covered, LEAST_SHARE, Side},
+    covered::{Covered, Covering, LEAST_SHARE, Side},
     footprint::{Kind, Record, box_bounds, tangent_bounds},
     plan::Plan,
-    scatter::{OpenTile, Window, is_kept},
-    sums::Sums,
+    scatter::{Window, is_kept},
     vector::{Lanes, dot, three},
 };
 use crate::{
@@ -110,7 +109,7 @@ fn sheets(plan: &Plan, [a, b]: [Vec3; 2], radii: [f32; 2]) -> Option<[u16; 2]> {
 }
 
 /// A rod on its way to the pixels of a tile.
-struct DrawnRod {
+pub struct DrawnRod {
     /// An end, and the way from there to the other one.
     start: Vec3,
     along: Vec3,
@@ -135,7 +134,7 @@ struct Met<S: Simd> {
 }
 
 impl DrawnRod {
-    fn new(record: &Record) -> Self {
+    pub fn new(record: &Record) -> Self {
         let [x, y, z, first, last, pixels] = record.whitening;
         let start = Vec3::from(record.center);
         let [normal, form, _, from, to, ..] = record.payload;
@@ -255,52 +254,29 @@ impl DrawnRod {
     }
 }
 
-impl<S: Simd> OpenTile<'_, S> {
-    /// Adds a rod's window to a packet.
+impl<S: Simd> Covering<S> for DrawnRod {
     #[inline(always)]
-    fn add_rod_to(
+    fn covered(
+        &self,
         simd: S,
         plan: &Plan,
-        rod: &DrawnRod,
-        window: Window,
+        _window: Window,
         packet: &Packet<S>,
-        sums: &mut Sums<S>,
-    ) {
-        let Met { share, distance, part, normal } = rod.at(simd, plan, packet);
+    ) -> Option<Covered<S>> {
+        let Met { share, distance, part, normal } = self.at(simd, plan, packet);
         let mut covers = share.simd_gt(LEAST_SHARE);
         if !covers.any_true() {
-            return;
+            return None;
         }
         let rays = &packet.rays;
         if plan.has_clips() {
             covers &= is_kept(plan, rays, distance);
         }
-        let [from, to] = rod.colors;
+        let [from, to] = self.colors;
         let mut color = three!(I => part * (to[I] - from[I]) + from[I]);
-        if plan.lit_surfaces && (rod.is_round || rod.normal != Vec3::ZERO) {
+        if plan.lit_surfaces && (self.is_round || self.normal != Vec3::ZERO) {
             color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
         }
-        let covered = Covered { share, seen: share, distance, color, covers, side: Side::Rod };
-        Self::add_covered(simd, plan, &covered, window, packet, sums);
-    }
-
-    /// Adds a rod's window to the packets that it meets, given as bits.
-    #[inline(always)]
-    pub fn add_rod(
-        &mut self,
-        simd: S,
-        plan: &Plan,
-        record: &Record,
-        window: Window,
-        mut packets: u8,
-    ) {
-        let rod = DrawnRod::new(record);
-        while packets != 0 {
-            let packet = &self.packets[packets.trailing_zeros() as usize];
-            packets &= packets - 1;
-            if !packet.is_done || plan.central {
-                Self::add_rod_to(simd, plan, &rod, window, packet, &mut self.sums);
-            }
-        }
+        Some(Covered { share, seen: share, distance, color, covers, side: Side::Rod })
     }
 }

@@ -41,11 +41,7 @@ pub enum Failure {
 impl Failure {
     /// Returns the failure of a result that the operating system could not write.
     pub fn output(file: &Path, error: impl fmt::Display) -> Self {
-        Self::Output {
-            file: file.to_owned(),
-            message: format!("cannot be written: {error}"),
-            hint: None,
-        }
+        splatkit_media::Failure::output(file, error).into()
     }
 
     pub fn code(&self) -> u8 {

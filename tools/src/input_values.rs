@@ -54,6 +54,11 @@ impl<T> InputValue<T> {
         values.iter().find(|entry| entry.file.is_none()).map(|entry| &entry.value)
     }
 
+    /// Returns the input that the value is for, and the value; `None` for a value of all inputs.
+    pub fn single(&self) -> Option<(&Path, &T)> {
+        self.file.as_deref().map(|file| (file, &self.value))
+    }
+
     /// Refuses values of files that are no inputs.
     pub fn check_files(values: &[Self], flag: &str, inputs: &[PathBuf]) -> Result<(), Failure> {
         let known: HashSet<&Path> = match values {

@@ -62,6 +62,7 @@ mod threads;
 #[doc(hidden)]
 pub mod timing;
 mod transfer;
+mod transform;
 #[cfg(feature = "window")]
 mod view;
 #[cfg(not(feature = "window"))]

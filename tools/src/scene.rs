@@ -7,6 +7,7 @@ use crate::{
     parse,
     scene_file::{self, Stated},
     show::ShowFlags,
+    transform::TransformFlags,
 };
 use clap::Args;
 use splatkit::session::Description;
@@ -27,6 +28,8 @@ pub struct SceneFlags {
     #[command(flatten)]
     load: LoadFlags,
     #[command(flatten)]
+    transform: TransformFlags,
+    #[command(flatten)]
     show: ShowFlags,
 }
 
@@ -37,9 +40,10 @@ impl SceneFlags {
         scene_file::open(&self.inputs, self.trust_scene, given)
     }
 
-    /// Changes how the inputs of a scene are read and shown: by the flags that are given.
+    /// Changes how the inputs of a scene are read, moved and shown: by the flags that are given.
     pub fn apply(&self, scene: &mut Description) -> Result<(), Failure> {
         self.load.apply(scene);
+        self.transform.apply(scene)?;
         self.show.apply(scene)
     }
 }

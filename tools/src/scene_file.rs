@@ -201,7 +201,7 @@ impl Stated {
         }
         let inputs = self.fields["inputs"].as_array().map_or(&[][..], Vec::as_slice);
         let place = inputs.iter().enumerate().find_map(|(number, input)| {
-            let part = ["reading", "appearance"].into_iter();
+            let part = ["reading", "transform", "appearance"].into_iter();
             let part = part.into_iter().find(|part| input.get(part).is_some_and(has))?;
             Some(format!("inputs[{number}].{part}.{field}"))
         });

@@ -1,5 +1,6 @@
 //! The passes of a frame. Each has a file here and a shader of the same name in shaders/passes/.
-//! `sources` contains what passes over candidates share.
+//! `sources` contains what passes over candidates share, and `listing` what those share that list
+//! visible samples.
 
 pub(crate) mod bin;
 pub(crate) mod clear;
@@ -7,6 +8,7 @@ pub(crate) mod cull;
 pub(crate) mod cut;
 pub(crate) mod gather;
 pub(crate) mod large;
+pub(crate) mod listing;
 pub(crate) mod march;
 pub(crate) mod mark;
 pub(crate) mod measure;

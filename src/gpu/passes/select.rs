@@ -2,19 +2,15 @@
 //! function (shaders/passes/select.wgsl). Runs when the transfer function makes other samples
 //! visible. Explicit splats have no such list: all are candidates.
 
-use super::scan::Scan;
+use super::{listing::Listing, scan::Scan};
 use crate::{
     Result,
     gpu::{
-        device::{
-            Gpu,
-            buffers::{buffer, upload},
-        },
+        device::{Gpu, buffers::buffer},
         pipeline::{
             commands::Commands,
             recipe::{Binding, Recipe},
             shaders,
-            stage::Stage,
         },
         scene::{
             PreparedScene,
@@ -30,26 +26,17 @@ use wgpu::BufferUsages as Usage;
 
 /// The pass.
 #[derive(Debug)]
-pub struct Select {
-    count: Stage,
-    write: Stage,
-    scan: Scan,
-}
+pub struct Select(Listing);
 
 impl Select {
     pub fn new(gpu: &Gpu, scan: &Scan) -> Self {
-        let [count, write] = Stage::all(gpu, Self::recipes());
-        Self { count, write, scan: scan.clone() }
+        Self(Listing::new(gpu, Self::recipes(), scan))
     }
 
     pub fn recipes() -> [Recipe; 2] {
         use Binding::{Read, Uniform, Write};
         let sources = [shaders::FRAME, shaders::SELECT];
-        let bindings: &[&[Binding]] = &[&[Uniform, Read, Read, Write, Write]];
-        [
-            Recipe::new("select: count", &sources, "count", bindings),
-            Recipe::new("select: write", &sources, "write", bindings),
-        ]
+        Listing::recipes("select", &sources, &[Uniform, Read, Read, Write, Write])
     }
 
     /// Lists the visible samples of lattices again if others have become visible. `all` lists all
@@ -104,19 +91,11 @@ impl Select {
         check(selection.count)?;
         selection.selected =
             buffer(gpu, "selected", 4 * u64::from(selection.count), Usage::STORAGE);
-        let visible =
-            upload(gpu, "visible levels", bytemuck::cast_slice(&first_visible.map(u32::from)));
-        let buffers =
-            [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
-        let bind = |stage: &Stage| {
-            stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
-        };
-        let (blocks, groups) = (selection.block_count, selection.block_count.div_ceil(64));
+        let visible = Listing::levels(gpu, first_visible);
+        let blocks = (&selection.blocks, selection.block_count);
+        let buffers = [uniform, &selection.ranges, &visible, blocks.0, &selection.selected];
         Commands::submit(gpu, "select", |commands| {
-            commands.clear(&selection.blocks);
-            self.count.dispatch(commands, &[&bind(&self.count)], groups);
-            self.scan.encode(gpu, commands, &selection.blocks, blocks + 1);
-            self.write.dispatch(commands, &[&bind(&self.write)], groups);
+            self.0.encode(gpu, commands, buffers, blocks);
         });
         selection.first_visible = Some(*first_visible);
         Ok(())

@@ -1,20 +1,16 @@
 //! Select bricks: lists the samples of the loaded bricks that can add to the picture
 //! (shaders/passes/select_bricks.wgsl).
 
-use super::scan::Scan;
+use super::{listing::Listing, scan::Scan};
 use crate::{
     Result,
     bricks::Choice,
     gpu::{
-        device::{
-            Gpu,
-            buffers::{buffer, upload},
-        },
+        device::{Gpu, buffers::buffer},
         pipeline::{
             commands::Commands,
             recipe::{Binding, Recipe},
             shaders,
-            stage::Stage,
         },
         scene::{
             PreparedScene,
@@ -28,26 +24,18 @@ use wgpu::BufferUsages as Usage;
 
 /// The pass.
 #[derive(Debug)]
-pub struct SelectBricks {
-    count: Stage,
-    write: Stage,
-    scan: Scan,
-}
+pub struct SelectBricks(Listing);
 
 impl SelectBricks {
     pub fn new(gpu: &Gpu, scan: &Scan) -> Self {
-        let [count, write] = Stage::all(gpu, Self::recipes());
-        Self { count, write, scan: scan.clone() }
+        Self(Listing::new(gpu, Self::recipes(), scan))
     }
 
     pub fn recipes() -> [Recipe; 2] {
         use Binding::{Read, Uniform, Write};
         let sources = [shaders::FRAME, shaders::SELECT_BRICKS];
-        let bindings: &[&[Binding]] = &[&[Uniform, Read, Read, Write, Write, Uniform]];
-        [
-            Recipe::new("select bricks: count", &sources, "count", bindings),
-            Recipe::new("select bricks: write", &sources, "write", bindings),
-        ]
+        let bindings = [Uniform, Read, Read, Write, Write, Uniform];
+        Listing::recipes("select bricks", &sources, &bindings)
     }
 
     /// Brings the bricks of a choice to the GPU and lists their visible samples, unless these
@@ -116,8 +104,7 @@ impl SelectBricks {
         slabs: &mut [(&mut Slab, &wgpu::Buffer, u32)],
         first_visible: &[u16; 256],
     ) {
-        let visible =
-            upload(gpu, "visible levels", bytemuck::cast_slice(&first_visible.map(u32::from)));
+        let visible = Listing::levels(gpu, first_visible);
         // All slabs count in the same buffer, one after the other.
         let most = slabs.iter().map(|(slab, ..)| slab.blocks()).max().unwrap_or(0);
         let blocks = buffer(gpu, "select blocks", 4 * (u64::from(most) + 1), Usage::STORAGE);
@@ -130,14 +117,7 @@ impl SelectBricks {
                 }
                 let buffers =
                     [uniform, &slab.ranges, &visible, &blocks, &slab.selected, &slab.slots];
-                let bind = |stage: &Stage| {
-                    stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
-                };
-                let groups = slab.blocks().div_ceil(64);
-                commands.clear(&blocks);
-                self.count.dispatch(commands, &[&bind(&self.count)], groups);
-                self.scan.encode(gpu, commands, &blocks, slab.blocks() + 1);
-                self.write.dispatch(commands, &[&bind(&self.write)], groups);
+                self.0.encode(gpu, commands, buffers, (&blocks, slab.blocks()));
             }
         });
     }

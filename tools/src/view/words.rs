@@ -2,7 +2,7 @@
 //! effect.
 
 use serde_json::Value;
-use splatkit::session::{ClipEntry, Description, IsosurfaceEntry, TransferEntry};
+use splatkit::session::{ClipEntry, Description, IsosurfaceEntry, Rotation, TransferEntry};
 use std::path::Path;
 
 /// Returns the inputs and flags of `render` that draw a scene. An error names a field that no flag
@@ -28,21 +28,22 @@ pub fn words_of(scene: &Description) -> Result<Vec<String>, String> {
     );
     for input in scene.visible() {
         let file = input.file.to_string_lossy();
-        let mut appearance = input.appearance.clone();
+        let (mut appearance, transform) = (input.appearance.clone(), &input.transform);
         let values = [
+            ("scale", transform.scale.map(|factor| factor.to_string())),
+            ("rotate", transform.rotate.as_ref().map(turn)),
+            ("translate", transform.translate.map(|[x, y, z]| format!("{x},{y},{z}"))),
             ("color", appearance.color.take().map(|color| color.to_string())),
             ("opacity", appearance.opacity.take().map(|opacity| opacity.to_string())),
             ("transfer", appearance.transfer.take().map(|transfer| text(&transfer))),
             ("range", appearance.range.take().map(|[low, high]| format!("{low},{high}"))),
             ("iso", appearance.isosurfaces.take().map(|entries| surfaces(&entries))),
         ];
-        let is_plain = appearance == Default::default()
-            && input.reading == Default::default()
-            && input.transform == Default::default();
+        let is_plain = appearance == Default::default() && input.reading == Default::default();
         if !is_plain {
             return Err(format!(
-                "{file} is read, moved or shown in a way of its own that no flag says; save the \
-                 scene, which splatkit render draws"
+                "{file} is read or shown in a way of its own that no flag says; save the scene, \
+                 which splatkit render draws"
             ));
         }
         let file_of = |path: &Path| {
@@ -104,6 +105,11 @@ fn text(transfer: &TransferEntry) -> String {
         TransferEntry::Name(name) => name.clone(),
         TransferEntry::Whole(transfer) => transfer.to_json(),
     }
+}
+
+/// Returns a turn as a flag takes it.
+fn turn(Rotation { axis: [x, y, z], degrees }: &Rotation) -> String {
+    format!("{x},{y},{z}:{degrees}")
 }
 
 /// Returns isosurfaces as a flag takes them.
@@ -185,6 +191,8 @@ mod tests {
             "--scalar heat --dims 4x5x6 --type u8 --spacing 1,1,2.5 --endian big --header 12",
             "--time 3 --series 2 --dataset a/b --missing -999",
             "--radius 0.4 --neighbours 9 --no-slopes",
+            "--scale 0.001 --rotate b.ply=z:90 --translate a.nrrd=-1,0.5,1e-7 --translate 4,5,6",
+            "--rotate -1,0.3,0:-12.25",
         ] {
             let words: Vec<String> = ["a.nrrd", "b.ply"]
                 .into_iter()

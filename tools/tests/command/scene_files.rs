@@ -156,3 +156,43 @@ fn scenes_of_strangers_are_bounded() {
         scene(inputs, more).fails(3, &words);
     }
 }
+
+/// Flags and scene files move inputs alike, and a flag counts more than the scene's own value.
+#[test]
+fn inputs_are_moved_by_flags_as_by_scene_files() {
+    let folder = folder();
+    let scene = |turn: &str| {
+        format!(
+            r#"{{"splatkit_scene": 2, "inputs": [{{"file": "a.nrrd"}}, {{"file": "a.ply",
+                "transform": {{"scale": 9, "rotate": {turn}, "translate": [-3, 0.5, 12]}}}}],
+                "picture": {{"size": [48, 48]}}, "engine": "cpu"}}"#
+        )
+    };
+    folder.put("s.json", scene(r#"{"axis": [0, 1, 1], "degrees": 40}"#));
+    folder.put("other.json", scene(r#"{"axis": [1, 0, 0], "degrees": 5}"#));
+    let given = "render a.nrrd a.ply --size 48x48 --engine cpu";
+    folder.run(&format!("{given} -o still.png")).ok();
+    folder.run("render s.json -o scene.png").ok();
+    folder.run("render other.json -o changed.png --rotate a.ply=0,1,1:40").ok();
+    let moved = "--scale a.ply=9 --rotate a.ply=0,1,1:40 --translate a.ply=-3,0.5,12";
+    folder.run(&format!("{given} {moved} -o flags.png")).ok();
+    let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert_eq!(read("flags.png"), read("scene.png"));
+    assert_eq!(read("flags.png"), read("changed.png"));
+    assert_ne!(read("flags.png"), read("still.png"));
+}
+
+#[test]
+fn moves_that_cannot_be_are_refused() {
+    let folder = folder();
+    for (flags, message) in [
+        ("--rotate w:90", "an axis is one of"),
+        ("--scale b.ply=2", "--scale b.ply=…: no input has this name"),
+        ("--translate 1,2,3 --translate 4,5,6", "--translate is given twice for all inputs"),
+    ] {
+        folder.run(&format!("render a.ply -o a.png {flags}")).fails(2, &[message]);
+    }
+    folder.run("convert a.ply -o a.splk").ok();
+    let refused = ["a.splk: transform", "read page by page", "move the file"];
+    folder.run("render a.splk -o a.png --scale 2").fails(3, &refused);
+}

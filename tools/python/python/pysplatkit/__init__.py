@@ -38,10 +38,11 @@ from ._errors import (
     TransferError,
 )
 from ._files import Finding, Format, Hierarchy, Leaves, Report, check, convert, formats, info
-from ._options import Color, RenderOptions
+from ._options import RenderOptions
 from ._picture import Picture
 from ._scene import Scene
 from ._transfer import TransferFunction
+from ._values import Color
 
 __version__: str = _pysplatkit.__version__
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import _pysplatkit
+from ._values import text, vector
 
 
 @dataclass
@@ -46,8 +47,6 @@ class Camera:
 
     def to_json(self) -> str:
         """Returns the JSON form."""
-        from ._options import text, vector
-
         parts: dict[str, Any] = {
             name: vector(getattr(self, name)) for name in ("position", "focal_point", "view_up")
         }
@@ -109,8 +108,6 @@ class Clip:
             offset: The place of the plane along the normal.
             inside: False keeps the other side.
         """
-        from ._options import vector
-
         return cls({"plane": [*vector(normal), float(offset)]}, inside)
 
     @classmethod
@@ -124,8 +121,6 @@ class Clip:
             maximum: The largest x, y and z.
             inside: False keeps what lies outside.
         """
-        from ._options import vector
-
         return cls({"box": [vector(minimum), vector(maximum)]}, inside)
 
     def _entry(self) -> dict[str, Any]:

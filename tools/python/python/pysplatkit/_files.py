@@ -12,8 +12,9 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 import numpy.typing as npt
 
-from . import _options, _pysplatkit
-from ._options import Color, ColorMap, PathLike, Reading, Vector
+from . import _options, _pysplatkit, _values
+from ._options import ColorMap, PathLike, Reading
+from ._values import Color, Vector
 
 
 def info(path: PathLike, **reading: Unpack[Reading]) -> dict[str, Any]:
@@ -141,7 +142,7 @@ def convert(
     _pysplatkit.convert(
         paths,
         os.fspath(output),
-        _options.text(conversion),
+        _values.text(conversion),
         _options.reading(given),
         _options.appearance(appearance),
     )

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _arrays, _neighbours, _options, _pysplatkit
+from . import _arrays, _neighbours, _options, _pysplatkit, _values
 from ._errors import ArgumentError, KindError
 
 #: The arguments of an item by their names.
@@ -66,7 +66,7 @@ class Item:
     def facts(self, *names: str) -> str:
         """Returns these arguments as JSON, with the name and the place."""
         given = {name: self.arguments.get(name) for name in names}
-        return _options.text({"name": self.name, "transform": json.loads(self.transform), **given})
+        return _values.text({"name": self.name, "transform": json.loads(self.transform), **given})
 
     def portable(self) -> Item:
         """Returns the item for another process, whose folder may be another one."""
@@ -123,7 +123,7 @@ def _file_options(arguments: Mapping[str, Any]) -> tuple[str, str]:
     """Returns how a file is read and shown."""
     parts = []
     for part, text in (("_reading", _options.reading), ("_appearance", _options.appearance)):
-        parts.append(_options.text({**(arguments[part] or {}), **json.loads(text(arguments))}))
+        parts.append(_values.text({**(arguments[part] or {}), **json.loads(text(arguments))}))
     return parts[0], parts[1]
 
 
@@ -131,7 +131,7 @@ def _put_file(native: _pysplatkit.Scene, item: Item) -> None:
     facts = {"transform": json.loads(item.transform)}
     facts["optics"] = item.arguments.get("_optics")
     path = item.arguments["source"]
-    native.add_file(path, *_file_options(item.arguments), _options.text(facts))
+    native.add_file(path, *_file_options(item.arguments), _values.text(facts))
 
 
 def _plain_volume(given: Arguments) -> Arguments:
@@ -150,7 +150,7 @@ def _plain_volume(given: Arguments) -> Arguments:
             raise ArgumentError(f"axes is a matrix of 3 × 3, not {matrix.shape}")
         facts["axes"] = matrix.tolist()
     for name in ("spacing", "origin"):
-        facts[name] = _options.vector(facts[name])
+        facts[name] = _values.vector(facts[name])
     facts["coordinates"] = _coordinates(facts["coordinates"], samples.shape)
     facts["up"] = _options.direction(facts["up"])
     facts["labels"] = _labels(facts["labels"])
@@ -226,7 +226,7 @@ def _put_surface(native: _pysplatkit.Scene, item: Item) -> None:
     # Values colour a surface even if it has colours.
     named = {"scalar": "values"} if arrays["values"] is not None else {}
     appearance = _options.appearance(arguments)
-    native.add_mesh(arrays, item.facts("up"), _options.text(named), appearance)
+    native.add_mesh(arrays, item.facts("up"), _values.text(named), appearance)
 
 
 def _plain_cells(given: Arguments) -> Arguments:
@@ -305,7 +305,7 @@ def _put_samples(native: _pysplatkit.Scene, item: Item) -> None:
     arguments = item.arguments
     names = ("positions", "values", "radii", "covariances")
     arrays = {name: arguments[name] for name in names}
-    load = _options.text({name: arguments[name] for name in _SAMPLES[1:]})
+    load = _values.text({name: arguments[name] for name in _SAMPLES[1:]})
     appearance = _options.appearance(arguments)
     native.add_samples(arrays, item.facts("missing", "up"), load, appearance)
 

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import difflib
-import json
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, TypedDict, Union
 
 import numpy as np
 
-from . import _pysplatkit
 from ._camera import Clip
 from ._errors import ArgumentError, KindError
 from ._transfer import TransferFunction
+from ._values import Color, Vector, color, hex_color, text, vector
 
 #: A path of a file or folder.
 PathLike = Union[str, "os.PathLike[str]"]
-#: A colour: a name or '#rrggbb', or red, green and blue from 0 to 1.
-Color = str | Sequence[float]
-#: Three numbers: x, y, z.
-Vector = Sequence[float]
 
 
 class MatplotlibMap(Protocol):
@@ -332,57 +327,11 @@ def checked(given: Mapping[str, Any], known: frozenset[str], where: str) -> dict
     return {name: value for name, value in given.items() if value is not None}
 
 
-def text(options: Mapping[str, Any]) -> str:
-    """Returns options as JSON, without those that are None."""
-    given = {name: value for name, value in options.items() if value is not None}
-    try:
-        return json.dumps(given, default=_plain, allow_nan=False)
-    except ValueError as error:
-        raise ArgumentError(f"the options {given} are no finite numbers and texts") from error
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    raise ArgumentError(f"{value!r} is not a value for an option")
-
-
-def color(value: Color) -> list[float]:
-    """Returns red, green and blue from 0 to 1."""
-    if isinstance(value, str):
-        return list(_pysplatkit.color(value))
-    try:
-        parts = [float(part) for part in value]
-    except (TypeError, ValueError):
-        parts = []
-    if len(parts) != 3 or not all(0.0 <= part <= 1.0 for part in parts):
-        form = "a colour is a name, '#rrggbb' or three numbers from 0 to 1"
-        raise ArgumentError(f"{form}, not {value}")
-    return parts
-
-
 def background(value: Color | None) -> list[float] | None:
     """Returns the colour behind a picture; None for transparency."""
     if value is None or (isinstance(value, str) and value.strip().lower() == "none"):
         return None
     return color(value)
-
-
-def vector(value: float | Vector | Sequence[str]) -> list[float]:
-    """Returns three numbers, or one number three times."""
-    try:
-        parts = np.asarray(value, dtype=float).ravel().tolist()
-    except (TypeError, ValueError):
-        parts = []
-    if len(parts) == 1:
-        parts *= 3
-    if len(parts) != 3:
-        raise ArgumentError(f"three numbers are needed: x, y, z; not {value!r}")
-    return parts
 
 
 def matrix(value: Any) -> list[list[float]]:
@@ -434,11 +383,6 @@ def appearance(options: Mapping[str, Any]) -> str:
     return text(plain_appearance(options))
 
 
-def hex_color(value: Color) -> str:
-    """Returns a colour as `#rrggbb`."""
-    return "#" + "".join(f"{round(part * 255):02x}" for part in color(value))
-
-
 def colormap(value: Any) -> str:
     """Returns a colour map as the compiled half takes it: a name, or colours with commas between.
 
@@ -479,3 +423,26 @@ def reading(options: Mapping[str, Any]) -> str:
     if given.get("spacing") is not None:
         given["spacing"] = vector(given["spacing"])
     return text(given)
+
+
+def fit(**given: Any) -> str:
+    """Returns how a camera is fitted to a scene, as JSON."""
+    if given.get("focal_point") is not None:
+        given["focal_point"] = vector(given["focal_point"])
+    for name in ("view_up", "up"):
+        given[name] = direction(given.get(name))
+    return text(given)
+
+
+def drawn(
+    size: tuple[int, ...] | None = None,
+    clips: Sequence[Clip | dict[str, Any]] | None = (),
+    **draw: Any,
+) -> str:
+    """Returns how a picture is drawn, as JSON."""
+    if draw.get("engine") not in (None, "cpu", "gpu", "auto"):
+        raise ArgumentError(f"engine is cpu, gpu or auto, not {draw['engine']!r}")
+    entries = [clip._entry() if isinstance(clip, Clip) else clip for clip in clips or ()]
+    overlay = {name: draw.pop(name) for name in OVERLAY & draw.keys()}
+    overlay = {name: value for name, value in overlay.items() if value is not None}
+    return text({**draw, "size": size, "clips": entries, "overlay": overlay or None})

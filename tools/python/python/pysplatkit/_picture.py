@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from . import _options, _pysplatkit
+from . import _options, _pysplatkit, _values
 from ._camera import Camera
 from ._errors import OutputError
 
@@ -82,7 +82,7 @@ class Picture:
         """What was drawn: splats, bricks, bytes of memory, …."""
         return dict(json.loads(self._native.statistics))
 
-    def over(self, background: _options.Color | None) -> Picture:
+    def over(self, background: _values.Color | None) -> Picture:
         """Returns the same picture over another background.
 
         Args:

@@ -12,24 +12,23 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from . import _film, _items, _neighbours, _options, _pysplatkit
+from . import _film, _items, _neighbours, _options, _pysplatkit, _values
 from ._camera import Camera, Clip
 from ._errors import ArgumentError
 from ._items import Item
 from ._options import (
     CellAppearance,
-    Color,
     Drawing,
     FieldAppearance,
     Framed,
     PathLike,
     SourceOptions,
     SurfaceAppearance,
-    Vector,
     View,
     VolumeAppearance,
 )
 from ._picture import Picture
+from ._values import Color, Vector
 
 if TYPE_CHECKING:
     from ._widget import Widget
@@ -108,10 +107,10 @@ class Scene:
         shot = None if camera is None else json.loads(camera.to_json())
         described = {
             "camera": self._described.get("camera") if camera is None and not view else shot,
-            "framing": {**framing, **json.loads(_fit(**view))},
+            "framing": {**framing, **json.loads(_options.fit(**view))},
             "engine": draw.pop("engine", None),
             "overlay": {name: draw.pop(name) for name in _options.OVERLAY & draw.keys()},
-            "picture": json.loads(_drawn(**draw)),
+            "picture": json.loads(_options.drawn(**draw)),
         }
         _pysplatkit.write_scene(os.fspath(path), files, json.dumps(described))
 
@@ -396,13 +395,13 @@ class Scene:
         rows = None
         if matrix is not None:
             rows = _options.matrix(matrix)
-        shift = None if translate is None else _options.vector(translate)
+        shift = None if translate is None else _values.vector(translate)
         move = {"scale": scale, "rotate": turn, "translate": shift, "matrix": rows}
         at = self._index(name)
         with self._lock:
             item = self._items[at]
             before = "{}" if reset else item.transform
-            moved = _pysplatkit.moved(before, _options.text(move))
+            moved = _pysplatkit.moved(before, _values.text(move))
             return self._replaced(at, replace(item, transform=moved))
 
     def remove(self, name: str) -> Scene:
@@ -450,8 +449,8 @@ class Scene:
             clips: Shapes that cut the scene; the camera is fitted to what is left.
         """
         given = dict(locals())
-        fit = _fit(**{name: given[name] for name in _FIT})
-        return Camera.from_json(self._native.camera(fit, _drawn(size, clips)))
+        fit = _options.fit(**{name: given[name] for name in _FIT})
+        return Camera.from_json(self._native.camera(fit, _options.drawn(size, clips)))
 
     def turntable(
         self,
@@ -472,7 +471,7 @@ class Scene:
         given = _options.checked(view, _options.VIEW, "turntable")
         if frames < 1:
             raise ArgumentError("a turntable has at least one frame")
-        cameras = self._native.turntable(frames, _fit(**given), _drawn(size, clips))
+        cameras = self._native.turntable(frames, _options.fit(**given), _options.drawn(size, clips))
         return [Camera.from_json(text) for text in cameras]
 
     def render(
@@ -773,7 +772,7 @@ class Scene:
         is_fitted = bool(view) or views is not None
         if camera is None and not is_fitted and self._described.get("camera") is not None:
             camera = Camera.from_json(json.dumps(self._described["camera"]))
-        fit = {**(self._described.get("framing") or {}), **json.loads(_fit(**view))}
+        fit = {**(self._described.get("framing") or {}), **json.loads(_options.fit(**view))}
         return Picture(self._pixels(camera, draw, json.dumps(fit)), background, draw.get("dpi"))
 
     def _drawing(self, given: Mapping[str, Any], is_placed: bool) -> dict[str, Any]:
@@ -803,7 +802,7 @@ class Scene:
     ) -> _pysplatkit.Picture:
         """Draws with options by their names."""
         text = None if camera is None else camera.to_json()
-        return self._native.render(text, fit, _drawn(**draw))
+        return self._native.render(text, fit, _options.drawn(**draw))
 
     def _turn(
         self,
@@ -819,8 +818,8 @@ class Scene:
         names = ("clips", *_options.OVERLAY)
         parts = {**said.get("picture", {}), **(said.get("overlay") or {})}
         draw = {name: {**parts, **given}.get(name) for name in names}
-        fit = {**(said.get("framing") or {}), **json.loads(_fit(**view))}
-        cameras = self._native.turntable(frames, json.dumps(fit), _drawn(size, **draw))
+        fit = {**(said.get("framing") or {}), **json.loads(_options.fit(**view))}
+        cameras = self._native.turntable(frames, json.dumps(fit), _options.drawn(size, **draw))
         return [Camera.from_json(text) for text in cameras]
 
 
@@ -890,25 +889,3 @@ def _changed(item: Item, source: Any, options: dict[str, Any]) -> Item:
         kept = {name: item.arguments[name] for name in item.arguments if name not in said}
         item = replace(item, arguments=kept)
     return item.changed(arguments)
-
-
-def _fit(**given: Any) -> str:
-    if given.get("focal_point") is not None:
-        given["focal_point"] = _options.vector(given["focal_point"])
-    for name in ("view_up", "up"):
-        given[name] = _options.direction(given.get(name))
-    return _options.text(given)
-
-
-def _drawn(
-    size: tuple[int, ...] | None = None,
-    clips: Sequence[Clip | dict[str, Any]] | None = (),
-    **draw: Any,
-) -> str:
-    """Returns how a picture is drawn, as JSON."""
-    if draw.get("engine") not in (None, "cpu", "gpu", "auto"):
-        raise ArgumentError(f"engine is cpu, gpu or auto, not {draw['engine']!r}")
-    entries = [clip._entry() if isinstance(clip, Clip) else clip for clip in clips or ()]
-    overlay = {name: draw.pop(name) for name in _options.OVERLAY & draw.keys()}
-    overlay = {name: value for name, value in overlay.items() if value is not None}
-    return _options.text({**draw, "size": size, "clips": entries, "overlay": overlay or None})

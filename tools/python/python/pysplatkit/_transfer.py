@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _pysplatkit
+from ._values import color
 
 #: The light of surfaces inside a volume, unless another one is given.
 _LIGHT = {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10.0}
@@ -102,8 +103,6 @@ class TransferFunction:
         return _pysplatkit.checked_transfer(json.dumps(self._parts()))
 
     def _parts(self) -> dict[str, Any]:
-        from ._options import color
-
         shade = dict(_LIGHT) if self.shade is True else self.shade or None
         surfaces = [dict(surface, color=color(surface["color"])) for surface in self.isosurfaces]
         return {

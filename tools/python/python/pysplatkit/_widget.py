@@ -7,19 +7,22 @@ import json
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import anywidget
 import numpy as np
 import numpy.typing as npt
 import traitlets
 
-from . import _options, _pysplatkit, _scene
+from . import _options, _pysplatkit, _values
 from ._camera import Camera
 from ._errors import ArgumentError, Error
 from ._painter import Frame, Order, Painter
 from ._picture import Picture
 from ._transfer import TransferFunction
+
+if TYPE_CHECKING:
+    from ._scene import Scene
 
 _STATIC = Path(__file__).parent / "static"
 _OPTIONS = _options.DRAWING
@@ -76,7 +79,7 @@ class Widget(anywidget.AnyWidget):
 
     def __init__(
         self,
-        scene: _scene.Scene,
+        scene: Scene,
         camera: Camera | None = None,
         size: tuple[int, int] = (800, 600),
         **drawing: Any,
@@ -254,10 +257,10 @@ class Widget(anywidget.AnyWidget):
     # How that is done.
 
     def _draws(self, size: tuple[int, int]) -> str:
-        return _scene._drawn(size, **self._drawing)
+        return _options.drawn(size, **self._drawing)
 
     def _fitted(self, size: tuple[int, int], view: str | None = None) -> Camera:
-        text = self._scene._native.camera(_scene._fit(view=view), self._draws(size))
+        text = self._scene._native.camera(_options.fit(view=view), self._draws(size))
         return Camera.from_json(text)
 
     def _order(self) -> Order:
@@ -281,7 +284,7 @@ class Widget(anywidget.AnyWidget):
         self._draw()
 
     def _move(self, **gesture: Any) -> None:
-        text = _options.text(gesture)
+        text = _values.text(gesture)
         before = self.camera.to_json()
         moved = _pysplatkit.moved_by_hand(self._scene._native, before, self.pixels, text)
         self.camera = Camera.from_json(moved)

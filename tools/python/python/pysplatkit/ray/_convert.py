@@ -11,9 +11,10 @@ from typing import Any, Unpack
 
 import ray
 
-from .. import _options, _pysplatkit
+from .. import _options, _pysplatkit, _values
 from .._errors import ArgumentError, Error, OutputError
-from .._options import Color, ColorMap, PathLike, Reading, Vector
+from .._options import ColorMap, PathLike, Reading
+from .._values import Color, Vector
 from ._results import get
 
 #: How often a part is made again if its worker dies.
@@ -89,7 +90,7 @@ def convert(
     }
     load = _options.reading(_options.checked(reading, _options.READING, "convert"))
     appearance = {"color": color, "colormap": colormap, "range": range}
-    texts = (_options.text(conversion), load, _options.appearance(appearance))
+    texts = (_values.text(conversion), load, _options.appearance(appearance))
     if not ray.is_initialized():
         ray.init(include_dashboard=False)
     given_folder = None if folder is None else Path(os.path.abspath(os.fspath(folder)))

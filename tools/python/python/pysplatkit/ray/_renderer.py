@@ -13,9 +13,10 @@ import ray
 from .. import _options, _pysplatkit
 from .._camera import Camera, Clip
 from .._errors import ArgumentError, NothingToDrawError
-from .._options import Color, Method, SourceOptions, View
+from .._options import Method, SourceOptions, View
 from .._picture import Picture
 from .._scene import Scene
+from .._values import Color
 from . import _composite, _rank, _regions
 from ._composite import Window
 from ._rank import Region, Report
