@@ -551,6 +551,7 @@ impl<'a, S: Simd> CellTile<'a, S> {
             begin: sum.begin.max(rays.inside[0]),
             end: sum.end.min(rays.inside[1]),
             filling: (sum.covered / thickness).min(one),
+            weight: one,
             direction: rays.direction,
             sections: Some([front.across, middle, sum.back.across]),
         };

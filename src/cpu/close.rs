@@ -24,6 +24,23 @@ const LIGHTS: usize = 4;
 const NARROW: f32 = 8.0;
 /// The same for values far beyond the table, as a fraction of the value.
 const NARROW_AFAR: f32 = 1e-6;
+/// Parts of an optical depth of 1, as [`Visible`] counts them, and the largest depth of an entry.
+/// The sum over the entries of a table fits 31 bits.
+const DEPTH_PARTS: f32 = 1024.0;
+const MOST_PARTS_DEPTH: f32 = 64.0;
+/// A range of more entries than this may lie mostly at those that show.
+const WIDE_RANGE: f32 = 512.0;
+/// A sheet that takes at most this share of the light is integrated as one piece, if its field is
+/// straight enough.
+const FAINT: f32 = 0.2;
+/// A field counts as straight if its mean deviates from that of its ends by at most the root of
+/// this many entries of the table, over the root of the share of the light that its sheet takes.
+const EVEN: f32 = 128.0;
+/// One light stands for a piece if the square of the relative change of its gradient, times the
+/// gloss and the share of the light that the piece takes, is at most this.
+const STEADY: f32 = 0.03;
+/// The light of a piece that takes a smaller share than this counts as even.
+const UNSEEN: f32 = 2e-3;
 /// An optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
 /// Minimum divisor where optical depths are divided by.
@@ -137,6 +154,8 @@ pub struct Layer<S: Simd> {
     pub end: Lanes<S>,
     /// The filled fraction of the sheet.
     pub filling: Lanes<S>,
+    /// About the share of a pixel's light that the sheet takes, at most 1: how much detail counts.
+    pub weight: Lanes<S>,
     pub direction: [Lanes<S>; 3],
     /// The gradients in view space at the front, in the middle and at the back, in entries per
     /// thickness of a sheet. `None` where only those of the faces are known, and only across.
@@ -198,9 +217,25 @@ struct Piece<S: Simd> {
     /// The places of both ends, from 0 at the sheet's front to 1 at its back, and the values there.
     places: [Lanes<S>; 2],
     values: [Lanes<S>; 2],
+    /// How much the gradient changes in it, if it is lit.
+    turn: Turn<S>,
 }
 
-/// For each entry of the transfer function's table, the number of visible entries before it.
+/// How much the gradient changes in a sheet.
+#[derive(Clone, Copy)]
+struct Turn<S: Simd> {
+    /// The square of its largest change within a piece, times the gloss: how much light changes
+    /// with the gradient's direction.
+    change2: Lanes<S>,
+    /// The square of its least magnitude.
+    least2: Lanes<S>,
+    /// Where it is too short everywhere to have light.
+    is_short: mask32x8<S>,
+}
+
+/// For each entry of the transfer function's table, the sum of the optical depths of the entries
+/// before it, in parts of [`DEPTH_PARTS`], of a ray through the thickest sheet. A visible entry
+/// counts at least one part.
 pub struct Visible(Vec<u32>);
 
 impl Visible {
@@ -217,17 +252,23 @@ impl Visible {
             return Self(Vec::new());
         }
         let Values { last, place, .. } = plan.field.values;
-        let mut shows: Vec<bool> =
-            plan.tables.colors[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
+        let sheets = plan.planes[1..].windows(2).take(plan.sheets);
+        let thickest = sheets.map(|ends| ends[1] - ends[0]).fold(0.0, f32::max);
+        let parts = |extinction: f32| {
+            let depth = (extinction * thickest).min(MOST_PARTS_DEPTH);
+            if extinction > 0.0 { (depth * DEPTH_PARTS).ceil().max(1.0) as u32 } else { 0 }
+        };
+        let colors = &plan.tables.colors[..=last as usize];
+        let mut depths: Vec<u32> = colors.iter().map(|entry| parts(entry[3])).collect();
         for surface in &plan.field.isosurfaces[..plan.isosurfaces] {
             let at = (surface.value + place).clamp(0.0, last) as usize;
-            let end = (at + 2).min(shows.len());
-            shows[at..end].fill(true);
+            let end = (at + 2).min(depths.len());
+            depths[at..end].fill(parts(f32::MAX));
         }
         let mut sum = 0;
         let mut before = vec![0];
-        before.extend(shows.iter().map(|shows| {
-            sum += u32::from(*shows);
+        before.extend(depths.iter().map(|depth| {
+            sum += depth;
             sum
         }));
         Self(before)
@@ -236,6 +277,13 @@ impl Visible {
     /// Whether any value that a sheet may have is visible.
     #[inline(always)]
     pub fn may_show<S: Simd>(&self, simd: S, plan: &Plan, layer: &Layer<S>) -> bool {
+        self.depth(simd, plan, layer).simd_gt(0.0).any_true()
+    }
+
+    /// Returns about the optical depth of a sheet: the mean over the values that it may have, and
+    /// above the mean if there are many. It is 0 only if none of these values is visible.
+    #[inline(always)]
+    pub fn depth<S: Simd>(&self, simd: S, plan: &Plan, layer: &Layer<S>) -> Lanes<S> {
         let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         // A parabola exceeds the range of its values at both ends and the middle by at most an
@@ -243,12 +291,14 @@ impl Visible {
         let slack = (high - low) * 0.125 + (0.5 * NARROW + 1.0);
         let Values { last, place, .. } = plan.field.values;
         let (none, last) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, last));
-        let low: [i32; 8] = i32x8::truncate_from((low - slack + place).max(none).min(last)).into();
-        let high: [i32; 8] =
-            i32x8::truncate_from((high + slack + place).max(none).min(last)).into();
+        let (low, high) = (low - slack + place, high + slack + place);
+        let span = (high - low).min(Lanes::splat(simd, WIDE_RANGE));
+        let low: [i32; 8] = i32x8::truncate_from(low.max(none).min(last)).into();
+        let high: [i32; 8] = i32x8::truncate_from(high.max(none).min(last)).into();
         let before = words!(simd, L => self.0[low[L] as usize]);
         let behind = words!(simd, L => self.0[high[L] as usize + 1]);
-        behind.simd_gt(before).any_true()
+        let parts = Lanes::float_from((behind - before).bitcast::<i32x8<S>>());
+        parts * (1.0 / DEPTH_PARTS) / span
     }
 }
 
@@ -388,7 +438,7 @@ impl Plan<'_> {
     }
 
     /// Returns the colour of a piece in its mean light: gradients change more within a piece than
-    /// values do.
+    /// values do. If the light is steady, that of the middle stands for it.
     #[inline(always)]
     fn lit_piece<S: Simd>(
         &self,
@@ -396,7 +446,12 @@ impl Plan<'_> {
         color: [Lanes<S>; 3],
         layer: &Layer<S>,
         [place, next_place]: [Lanes<S>; 2],
+        is_steady: bool,
     ) -> [Lanes<S>; 3] {
+        if is_steady {
+            let gradient = self.gradient(layer, (place + next_place) * 0.5);
+            return self.lit_field(simd, color, gradient, layer.direction);
+        }
         let none = Lanes::splat(simd, 0.0);
         let mut sums = [none; 2];
         for number in 0..LIGHTS {
@@ -557,30 +612,64 @@ impl Plan<'_> {
     ) {
         let length = (end - begin).max(Lanes::splat(simd, 0.0));
         let is_curved = self.is_integrated || self.isosurfaces > 0;
-        let parts = if is_curved { PARTS } else { 1 };
-        let step = length * (1.0 / parts as f32);
         let per_thickness = Lanes::splat(simd, 1.0) / layer.thickness;
         let mut place = (begin - layer.start) * per_thickness;
-        let mut value = if is_curved { layer.parabola(place) } else { layer.mean() };
         if self.optics == Optics::Maximum {
-            let mut peak = value;
-            for _ in 0..parts {
-                place += step * per_thickness;
-                peak = peak.max(if is_curved { layer.parabola(place) } else { value });
-            }
+            let peak = layer.peak(place, length * per_thickness, is_curved);
             medium.peak = mask.select(medium.peak.max(peak), medium.peak);
             return;
         }
+        let mut straight = None;
+        if is_curved && self.isosurfaces == 0 {
+            straight = layer.straight([place, place + length * per_thickness]);
+        }
+        let parts = if is_curved && straight.is_none() { PARTS } else { 1 };
+        let step = length * (1.0 / parts as f32);
+        let turn = self.turn(simd, layer, parts);
+        let mut value = if is_curved { layer.parabola(place) } else { layer.mean() };
         for part in 0..parts {
             let begin = begin + step * part as f32;
             let next_place = place + step * per_thickness;
             let next = if is_curved { layer.parabola(next_place) } else { value };
+            let values = straight.unwrap_or([value, next]);
             let places = [place, next_place];
-            let piece = Piece { mask, begin, length: step, places, values: [value, next] };
+            let piece = Piece { mask, begin, length: step, places, values, turn };
             self.pass_piece(simd, layer, &piece, medium);
             place = next_place;
             value = next;
         }
+    }
+
+    /// Returns how much the gradient changes in each of the parts of a sheet, if it is lit.
+    #[inline(always)]
+    fn turn<S: Simd>(&self, simd: S, layer: &Layer<S>, parts: usize) -> Turn<S> {
+        let none = Lanes::splat(simd, 0.0);
+        if !self.is_lit {
+            return Turn { change2: none, least2: none, is_short: none.simd_ge(none) };
+        }
+        let (change2, least2, most2) = match &layer.sections {
+            Some([front, middle, back]) => {
+                let changes = [difference2(front, middle), difference2(middle, back)];
+                let sizes = [dot(*front, *front), dot(*middle, *middle), dot(*back, *back)];
+                (
+                    changes[0].max(changes[1]) * 4.0,
+                    sizes[0].min(sizes[1]).min(sizes[2]),
+                    sizes[0].max(sizes[1]).max(sizes[2]),
+                )
+            }
+            None => {
+                let [front, back] = each!([0, 1], I => {
+                    self.gradient_of_faces(layer, Lanes::splat(simd, I as f32))
+                });
+                let sizes = [dot(front, front), dot(back, back)];
+                (difference2(&front, &back), sizes[0].min(sizes[1]), sizes[0].max(sizes[1]))
+            }
+        };
+        let Light { diffuse, specular, power, .. } = self.field.light;
+        let gloss = (diffuse + specular * power) / (parts * parts) as f32;
+        // A parabola exceeds its values at both ends and in the middle by at most a quarter.
+        let low = self.field.certain_from * 0.8;
+        Turn { change2: change2 * gloss, least2, is_short: most2.simd_le(low * low) }
     }
 
     /// Adds a piece of a sheet: what the transfer function shows in it, and the isosurfaces.
@@ -593,7 +682,8 @@ impl Plan<'_> {
         medium: &mut Medium<S>,
     ) {
         let none = Lanes::splat(simd, 0.0);
-        let Some((color, depth)) = self.color_and_depth(simd, layer, piece) else { return };
+        let left = medium.before * medium.through;
+        let Some((color, depth)) = self.color_and_depth(simd, layer, piece, left) else { return };
         let ([place, next_place], [value, next]) = (piece.places, piece.values);
         let mut done = none;
         for number in 0..self.isosurfaces {
@@ -634,13 +724,15 @@ impl Plan<'_> {
     }
 
     /// Returns the colour and the optical depth that the transfer function shows in a piece, or
-    /// `None` if the piece has no visible value and the transfer function no isosurface.
+    /// `None` if the piece has no visible value and the transfer function no isosurface. `left` is
+    /// the light that reaches the piece.
     #[inline(always)]
     fn color_and_depth<S: Simd>(
         &self,
         simd: S,
         layer: &Layer<S>,
         piece: &Piece<S>,
+        left: Lanes<S>,
     ) -> Option<([Lanes<S>; 3], Lanes<S>)> {
         let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
         let ([place, next_place], [value, next]) = (piece.places, piece.values);
@@ -664,7 +756,8 @@ impl Plan<'_> {
         let inverse = one / emission[3].max(Lanes::splat(simd, 1e-20));
         let mut color = three!(I => (emission[I] * inverse).max(none).min(one));
         if self.is_lit {
-            color = self.lit_piece(simd, color, layer, piece.places);
+            let is_steady = piece.turn.is_steady(depth.min(one) * left);
+            color = self.lit_piece(simd, color, layer, piece.places, is_steady);
         }
         Some((color, depth))
     }
@@ -715,6 +808,7 @@ impl<S: Simd> Layer<S> {
             begin,
             end,
             filling: Lanes::splat(simd, 1.0),
+            weight: Lanes::splat(simd, 1.0),
             direction,
             sections: None,
         }
@@ -725,6 +819,31 @@ impl<S: Simd> Layer<S> {
         let v = 1.0 - u;
         let w = v - u;
         self.front.value * v * w + self.middle * u * v * 4.0 - self.back.value * u * w
+    }
+
+    /// Returns the largest value between a place and the place `length` behind it.
+    #[inline(always)]
+    fn peak(&self, place: Lanes<S>, length: Lanes<S>, is_curved: bool) -> Lanes<S> {
+        if !is_curved {
+            return self.mean();
+        }
+        let step = length * (1.0 / PARTS as f32);
+        let (mut place, mut peak) = (place, self.parabola(place));
+        for _ in 0..PARTS {
+            place += step;
+            peak = peak.max(self.parabola(place));
+        }
+        peak
+    }
+
+    /// Returns the ends of a straight line that has the mean of the field between two places, if a
+    /// line is as good as the parabola for a sheet that takes so little light.
+    #[inline(always)]
+    fn straight(&self, [from, to]: [Lanes<S>; 2]) -> Option<[Lanes<S>; 2]> {
+        let (a, c) = (self.parabola(from), self.parabola(to));
+        let bend = (self.parabola((from + to) * 0.5) * 2.0 - (a + c)) * (1.0 / 3.0);
+        let is_faint = self.weight.simd_le(FAINT) & (bend * bend * self.weight).simd_le(EVEN);
+        is_faint.all_true().then_some([a + bend, c + bend])
     }
 
     #[inline(always)]
@@ -759,6 +878,22 @@ impl<S: Simd> Medium<S> {
         self.through -= share;
         self.depth += depth;
     }
+}
+
+impl<S: Simd> Turn<S> {
+    /// Whether one light stands for a piece that takes this share of the light.
+    #[inline(always)]
+    fn is_steady(&self, share: Lanes<S>) -> bool {
+        let is_even = (self.change2 * share).simd_le(self.least2 * STEADY);
+        (is_even | share.simd_le(UNSEEN) | self.is_short).all_true()
+    }
+}
+
+/// Returns the square of the distance of two vectors.
+#[inline(always)]
+fn difference2<S: Simd>(a: &[Lanes<S>; 3], b: &[Lanes<S>; 3]) -> Lanes<S> {
+    let difference = three!(I => a[I] - b[I]);
+    dot(difference, difference)
 }
 
 /// Returns a colour times a share of light, and a highlight.

@@ -16,9 +16,11 @@ use super::{
 use crate::{math::Kernel, plan::visible::VisibleBlocks, scene::Optics, volume::Volume};
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
-/// If the slopes at a sheet's ends differ by fewer entries of the table per sheet, a cubic between
-/// the ends is as good as one more sample.
-const STRAIGHT: f32 = 64.0;
+/// If the slopes at a sheet's ends differ by fewer entries of the table per sheet, times the share
+/// of the light that the sheet takes, a cubic between the ends is as good as one more sample.
+const STRAIGHT: f32 = 1.0;
+/// If they differ by more entries, a sheet takes one more sample however little light it takes.
+const BENT: f32 = 1024.0;
 
 /// Returns why a volume can't be gathered, whatever the settings.
 pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
@@ -186,8 +188,7 @@ impl Gather<'_> {
         marks: &[u64],
         last: &mut Last<S>,
     ) -> Option<(Layer<S>, mask32x8<S>)> {
-        let plan = self.plan;
-        let (rays, pixels) = (packet.rays_in(plan), &packet.pixels);
+        let (plan, rays, pixels) = (self.plan, packet.rays_in(self.plan), &packet.pixels);
         let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
         let begin = rays.inside[0].max(Lanes::splat(simd, start));
         let end = rays.inside[1].min(Lanes::splat(simd, stop));
@@ -209,12 +210,11 @@ impl Gather<'_> {
         let before = *last;
         let (front, front_along, front_weight) = (before.face, before.along, before.weight);
         self.face(simd, rays, sheet + 1, last);
-        let (back, back_along) = (last.face, last.along);
-        let thickness = stop - start;
-        let sum = front.value + back.value;
+        let (back, thickness) = (last.face, stop - start);
+        let (sum, none) = (front.value + back.value, Lanes::splat(simd, 0.0));
         // Hermite interpolation: the mean of the ends, plus an eighth of the difference of the
         // slopes there.
-        let bend = (front_along - back_along) * thickness;
+        let bend = (front_along - last.along) * thickness;
         let middle = sum * 0.5 + bend * 0.125;
         let of_sheet = [Lanes::splat(simd, start), Lanes::splat(simd, thickness)];
         let mut layer =
@@ -225,10 +225,11 @@ impl Gather<'_> {
         }
         let has_gaps =
             self.is_blended && (mask & front_weight.min(last.weight).simd_le(0.0)).any_true();
-        if !has_gaps && !self.may_show(simd, &layer) {
+        layer.weight = mask.select(self.weight(simd, &layer) * pixels.through, none);
+        if !has_gaps && !layer.weight.simd_gt(0.0).any_true() {
             return None;
         }
-        if !has_gaps && !self.is_bent([&before, last], bend, thickness) {
+        if !has_gaps && !self.is_bent([&before, last], bend, &layer, mask) {
             return Some((layer, mask));
         }
         let inside = self.at(simd, rays, 0.5 * (start + stop));
@@ -238,7 +239,8 @@ impl Gather<'_> {
             let has_field = layer.blend(simd, plan, bend, weights, &inside);
             layer.set_sections(simd, plan, sections, [front_weight, inside.weight, last.weight]);
             let mask = mask & has_field;
-            return (self.may_show(simd, &layer) && mask.any_true()).then_some((layer, mask));
+            layer.weight = mask.select(self.weight(simd, &layer) * pixels.through, none);
+            return layer.weight.simd_gt(0.0).any_true().then_some((layer, mask));
         }
         if plan.has_gradients() {
             layer.sections = Some(sections);
@@ -293,25 +295,43 @@ impl Gather<'_> {
         layer
     }
 
-    /// Whether the field in a sheet differs from what its faces show. `bend` is the difference of
-    /// the slopes at the faces, in entries of the table per sheet.
+    /// Whether the field in a sheet differs from what its faces show, by so much that it counts for
+    /// the share of the light that the sheet takes. `bend` is the difference of the slopes at the
+    /// faces, in entries of the table per sheet.
     #[inline(always)]
     fn is_bent<S: Simd>(
         &self,
         [front, back]: [&Last<S>; 2],
         bend: Lanes<S>,
-        thickness: f32,
+        layer: &Layer<S>,
+        mask: mask32x8<S>,
     ) -> bool {
         let mut most = bend.abs();
         if self.plan.has_gradients() {
             // A step in the middle of the sheet has equal slopes at both faces.
             let chord = back.face.value - front.face.value;
-            most = most.max((chord - (front.along + back.along) * (0.5 * thickness)).abs());
+            most = most.max((chord - (front.along + back.along) * layer.thickness * 0.5).abs());
             // Gradients are per thickness of a sheet.
             let turn = three!(I => (back.gradient[I] - front.gradient[I]).abs());
             most = most.max(turn[0].max(turn[1]).max(turn[2]));
         }
-        most.simd_gt(STRAIGHT).any_true()
+        ((most * layer.weight).simd_gt(STRAIGHT) | (most.simd_gt(BENT) & mask)).any_true()
+    }
+
+    /// Returns about the share of the light that a sheet takes of the light that reaches it: 0 only
+    /// if no value that it may have is visible. It is 1 where more than the light counts.
+    #[inline(always)]
+    fn weight<S: Simd>(&self, simd: S, layer: &Layer<S>) -> Lanes<S> {
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let plan = self.plan;
+        if plan.optics == Optics::Maximum {
+            return one;
+        }
+        let depth = self.visible.depth(simd, plan, layer);
+        if plan.isosurfaces > 0 || plan.has_gradient_opacity {
+            return depth.simd_gt(none).select(one, none);
+        }
+        depth.min(one)
     }
 
     /// Whether any value that a sheet may have counts in the picture.

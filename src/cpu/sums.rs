@@ -305,6 +305,7 @@ impl<S: Simd> ScalarSums<S> {
             begin,
             end,
             filling,
+            weight: one,
             direction: rays.direction,
             sections: None,
         };
