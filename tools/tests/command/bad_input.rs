@@ -420,7 +420,12 @@ fn each_limit_names_its_flag() {
         color: vec![[1.0; 4]; 4],
         depth: Vec::new(),
     };
-    folder.put("a.png", picture.encode(&splatkit::picture::Encoding::new(splatkit::picture::PictureFormat::Png)).unwrap());
+    folder.put(
+        "a.png",
+        picture
+            .encode(&splatkit::picture::Encoding::new(splatkit::picture::PictureFormat::Png))
+            .unwrap(),
+    );
     // 4096 bytes of 7 in a gzip file that stores them uncompressed.
     let stored =
         [&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3, 1, 0x00, 0x10, 0xff, 0xef][..], &[7; 4096]].concat();

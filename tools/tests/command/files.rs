@@ -108,7 +108,9 @@ fn pictures_do_not_replace_what_the_scene_is_read_from() {
     let pixels = vec![[1.0; 4]; 4];
     let texture =
         splatkit::picture::Picture { width: 2, height: 2, color: pixels, depth: vec![1.0; 4] };
-    let png = texture.encode(&splatkit::picture::Encoding::new(splatkit::picture::PictureFormat::Png)).unwrap();
+    let png = texture
+        .encode(&splatkit::picture::Encoding::new(splatkit::picture::PictureFormat::Png))
+        .unwrap();
     folder.put("a.png", &png);
     folder.put("a_0001.png", &png);
     folder.put("raw.png", [7; 64]);

@@ -20,7 +20,12 @@ fn textured(folder: &Folder, name: &str, side: usize, coordinates: &str) {
         color: vec![[0.5, 0.2, 0.1, 1.0]; 64],
         depth: vec![],
     };
-    folder.put("t.png", picture.encode(&splatkit::picture::Encoding::new(splatkit::picture::PictureFormat::Png)).unwrap());
+    folder.put(
+        "t.png",
+        picture
+            .encode(&splatkit::picture::Encoding::new(splatkit::picture::PictureFormat::Png))
+            .unwrap(),
+    );
     folder.put("m.mtl", "newmtl a\nmap_Kd t.png\n");
     let mut out = "mtllib m.mtl\nusemtl a\n".to_owned();
     let at = |vertex: usize| {

@@ -146,7 +146,9 @@ pub fn glb() -> Vec<u8> {
         color.map(|c| [c[0], c[1], c[2], 255].map(|v| f32::from(v) / 255.0)).to_vec();
     let texture =
         splatkit::picture::Picture { width: 2, height: 2, color: pixels, depth: Vec::new() };
-    let png = texture.encode(&splatkit::picture::Encoding::new(splatkit::picture::PictureFormat::Png)).unwrap();
+    let png = texture
+        .encode(&splatkit::picture::Encoding::new(splatkit::picture::PictureFormat::Png))
+        .unwrap();
     let positions = [[0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
     let uvs = [[0f32, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
     let indices = [0u16, 1, 2, 0, 2, 3];
