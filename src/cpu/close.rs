@@ -33,8 +33,8 @@ const WIDE_RANGE: f32 = 512.0;
 /// A sheet that takes at most this share of the light is integrated as one piece, if its field is
 /// straight enough.
 const FAINT: f32 = 0.2;
-/// A field counts as straight if its mean deviates from that of its ends by at most the root of
-/// this many entries of the table, over the root of the share of the light that its sheet takes.
+/// A field is straight if its mean deviates little from that of its ends. The square of that, in
+/// entries of the table, times the share of the light that its sheet takes is at most this.
 const EVEN: f32 = 128.0;
 /// One light stands for a piece if the square of the relative change of its gradient, times the
 /// gloss and the share of the light that the piece takes, is at most this.
@@ -836,8 +836,8 @@ impl<S: Simd> Layer<S> {
         peak
     }
 
-    /// Returns the ends of a straight line that has the mean of the field between two places, if a
-    /// line is as good as the parabola for a sheet that takes so little light.
+    /// Returns the ends of a straight line with the mean of the field between two places. `None` if
+    /// the parabola is better, because the sheet takes too much light.
     #[inline(always)]
     fn straight(&self, [from, to]: [Lanes<S>; 2]) -> Option<[Lanes<S>; 2]> {
         let (a, c) = (self.parabola(from), self.parabola(to));

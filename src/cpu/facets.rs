@@ -5,7 +5,7 @@ use super::{
     covered::{Covered, Covering, LEAST_SHARE, Side},
     footprint::Record,
     plan::Plan,
-    scatter::{Window, is_kept},
+    scatter::{OpenTile, Window, is_kept},
     sums::WINDOW,
     vector::{Lanes, dot_with, three},
 };
@@ -14,7 +14,7 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 use glam::{Vec2, Vec3};
 
 /// A facet on its way to the pixels of a tile.
-pub struct DrawnFacet<'a> {
+struct DrawnFacet<'a> {
     /// The image that it shows, and where.
     image: Option<Mapped<'a>>,
     corners: [Vec3; 3],
@@ -88,7 +88,7 @@ impl Mapped<'_> {
 
 impl<'a> DrawnFacet<'a> {
     #[inline(always)]
-    pub fn new(plan: &'a Plan, record: &Record) -> Self {
+    fn new(plan: &'a Plan, record: &Record) -> Self {
         let [bx, by, bz, cx, cy, cz] = record.whitening;
         let corners = [Vec3::from(record.center), Vec3::new(bx, by, bz), Vec3::new(cx, cy, cz)];
         let frame = &plan.frame;
@@ -267,5 +267,20 @@ impl<S: Simd> Covering<S> for DrawnFacet<'_> {
         }
         let side = if self.is_front { Side::Front } else { Side::Back };
         Some(Covered { share, seen: seen_share, distance, color, covers, side })
+    }
+}
+
+impl<S: Simd> OpenTile<'_, S> {
+    /// Adds the window of a facet to the packets that it meets, given as bits.
+    #[inline(always)]
+    pub fn add_facet(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        record: &Record,
+        window: Window,
+        packets: u8,
+    ) {
+        self.add_covering(simd, plan, &DrawnFacet::new(plan, record), window, packets);
     }
 }

@@ -16,8 +16,8 @@ use super::{
 use crate::{math::Kernel, plan::visible::VisibleBlocks, scene::Optics, volume::Volume};
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
-/// If the slopes at a sheet's ends differ by fewer entries of the table per sheet, times the share
-/// of the light that the sheet takes, a cubic between the ends is as good as one more sample.
+/// The most that the slopes at a sheet's ends may differ, in entries of the table per sheet times
+/// the share of the light that the sheet takes. Up to that, a cubic is as good as one more sample.
 const STRAIGHT: f32 = 1.0;
 /// If they differ by more entries, a sheet takes one more sample however little light it takes.
 const BENT: f32 = 1024.0;

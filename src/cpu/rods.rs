@@ -6,7 +6,7 @@ use super::{
     covered::{Covered, Covering, LEAST_SHARE, Side},
     footprint::{Kind, Record, box_bounds, tangent_bounds},
     plan::Plan,
-    scatter::{Window, is_kept},
+    scatter::{OpenTile, Window, is_kept},
     vector::{Lanes, dot, three},
 };
 use crate::{
@@ -109,7 +109,7 @@ fn sheets(plan: &Plan, [a, b]: [Vec3; 2], radii: [f32; 2]) -> Option<[u16; 2]> {
 }
 
 /// A rod on its way to the pixels of a tile.
-pub struct DrawnRod {
+struct DrawnRod {
     /// An end, and the way from there to the other one.
     start: Vec3,
     along: Vec3,
@@ -134,7 +134,7 @@ struct Met<S: Simd> {
 }
 
 impl DrawnRod {
-    pub fn new(record: &Record) -> Self {
+    fn new(record: &Record) -> Self {
         let [x, y, z, first, last, pixels] = record.whitening;
         let start = Vec3::from(record.center);
         let [normal, form, _, from, to, ..] = record.payload;
@@ -278,5 +278,13 @@ impl<S: Simd> Covering<S> for DrawnRod {
             color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
         }
         Some(Covered { share, seen: share, distance, color, covers, side: Side::Rod })
+    }
+}
+
+impl<S: Simd> OpenTile<'_, S> {
+    /// Adds the window of a rod to the packets that it meets, given as bits.
+    #[inline(always)]
+    pub fn add_rod(&mut self, simd: S, plan: &Plan, record: &Record, window: Window, packets: u8) {
+        self.add_covering(simd, plan, &DrawnRod::new(record), window, packets);
     }
 }

@@ -5,11 +5,9 @@
 use super::{
     cells::CellTile,
     close::Packet,
-    facets::DrawnFacet,
     footprint::{Kind, Record},
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
-    rods::DrawnRod,
     sums::{ScalarSums, Sums, WINDOW},
     vector::{Lanes, dot, each, exp, log2, three},
 };
@@ -457,13 +455,8 @@ impl<S: Simd> OpenTile<'_, S> {
         if matches!(record.kind, Kind::Facet | Kind::Rod) {
             let packets = packets_between(from, to);
             match record.kind {
-                Kind::Rod => {
-                    self.add_covering(simd, plan, &DrawnRod::new(record), window, packets);
-                }
-                _ => {
-                    let facet = DrawnFacet::new(plan, record);
-                    self.add_covering(simd, plan, &facet, window, packets);
-                }
+                Kind::Rod => self.add_rod(simd, plan, record, window, packets),
+                _ => self.add_facet(simd, plan, record, window, packets),
             }
             return;
         }

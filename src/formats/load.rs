@@ -205,8 +205,8 @@ pub fn read_gaussians(source: &Source, options: &ReadOptions) -> Result<Gaussian
     source.unless_changed(read.and_then(|read| read(source, options)))
 }
 
-/// Returns the reader of a kind of data that a table has for a file. `names` are what a format of the
-/// kind and what such data are called.
+/// Returns the reader of a kind of data that a table has for a file. `names` are what a format of
+/// the kind and what such data are called.
 fn reader<R>(
     table: &[Format],
     source: &Source,

@@ -1,5 +1,6 @@
-//! The way from a described picture to the finished one: the settings that an engine draws by, the
-//! part of the picture that a camera is fitted to, and what is done to the drawn pixels.
+//! The way from a described picture to the finished one. It begins with the settings that an engine
+//! draws by, and with the part of the picture that a camera is fitted to. It ends with what is done
+//! to the drawn pixels.
 //!
 //! Every host takes this way. Texts over pictures are drawn by the hosts, because they need fonts.
 
@@ -58,8 +59,8 @@ impl PictureEntry {
 }
 
 impl Drawing {
-    /// Returns the size of the part of the drawn picture that a camera is fitted to: the middle,
-    /// between margins of `room` pixels of the finished picture at the left and at the right.
+    /// Returns the size of the part of the drawn picture that a camera is fitted to. It is the
+    /// middle, between margins of `room` pixels of the finished picture at the left and the right.
     pub fn free(&self, room: u32) -> [u32; 2] {
         let [width, height] = self.settings.size;
         let margins = room.saturating_mul(self.factor).saturating_mul(2);
@@ -109,6 +110,6 @@ mod tests {
         let entry = PictureEntry { clips: vec![clip], ..PictureEntry::default() };
         assert!(entry.require_content(&picture(0.5)).is_ok());
         let error = entry.require_content(&picture(0.001)).expect_err("an error").to_string();
-        assert!(error.ends_with("opacity after clipping by x<50%"), "{error}");
+        assert!(error.ends_with("opacity after clipping by --clip 'x<50%'"), "{error}");
     }
 }

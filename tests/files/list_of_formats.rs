@@ -56,8 +56,18 @@ fn the_list_of_formats_is_current() {
 }
 
 /// The features that are not of formats.
-const OTHERS: [&str; 9] =
-    ["default", "dx12", "files", "gpu", "metal", "reference", "remote", "vulkan", "webgpu"];
+const OTHERS: [&str; 10] = [
+    "default",
+    "dx12",
+    "files",
+    "gpu",
+    "metal",
+    "pictures",
+    "reference",
+    "remote",
+    "vulkan",
+    "webgpu",
+];
 
 fn read(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);

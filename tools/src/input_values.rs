@@ -45,8 +45,9 @@ impl<T> InputValue<T> {
 
     /// Returns an input's own value, or else that of all inputs.
     pub fn of<'a>(values: &'a [Self], path: &Path) -> Option<&'a T> {
-        let single = values.iter().find(|entry| entry.file.as_deref() == Some(path));
-        single.map(|entry| &entry.value).or_else(|| Self::shared(values))
+        let mut singles = values.iter().filter_map(Self::single);
+        let single = singles.find(|(file, _)| *file == name_of(path));
+        single.map(|(_, value)| value).or_else(|| Self::shared(values))
     }
 
     /// Returns the value of all inputs that have none of their own.
@@ -54,19 +55,20 @@ impl<T> InputValue<T> {
         values.iter().find(|entry| entry.file.is_none()).map(|entry| &entry.value)
     }
 
-    /// Returns the input that the value is for, and the value; `None` for a value of all inputs.
+    /// Returns the name of the input that the value is for ([`name_of`]), and the value; `None` for
+    /// a value of all inputs.
     pub fn single(&self) -> Option<(&Path, &T)> {
-        self.file.as_deref().map(|file| (file, &self.value))
+        self.file.as_deref().map(|file| (name_of(file), &self.value))
     }
 
     /// Refuses values of files that are no inputs.
     pub fn check_files(values: &[Self], flag: &str, inputs: &[PathBuf]) -> Result<(), Failure> {
         let known: HashSet<&Path> = match values {
             [] => return Ok(()),
-            _ => inputs.iter().map(PathBuf::as_path).collect(),
+            _ => inputs.iter().map(|input| name_of(input)).collect(),
         };
         let files = values.iter().filter_map(|entry| entry.file.as_deref());
-        match files.into_iter().find(|file| !known.contains(file)) {
+        match files.into_iter().find(|file| !known.contains(name_of(file))) {
             None => Ok(()),
             Some(file) => Err(Failure::Usage(format!(
                 "--{flag} {}=…: no input has this name; write it as the input is written",
@@ -80,7 +82,7 @@ impl<T> InputValue<T> {
         Self::check_files(values, flag, inputs)?;
         let mut seen = HashSet::new();
         for entry in values {
-            if !seen.insert(entry.file.as_deref()) {
+            if !seen.insert(entry.file.as_deref().map(name_of)) {
                 let whose = entry
                     .file
                     .as_ref()
@@ -90,6 +92,12 @@ impl<T> InputValue<T> {
         }
         Ok(())
     }
+}
+
+/// Returns the name by which flags know an input: inputs of a scene file in this folder begin with
+/// `./`, and `a.ply` names one as `./a.ply` does.
+pub fn name_of(path: &Path) -> &Path {
+    path.strip_prefix(".").unwrap_or(path)
 }
 
 /// What a flag sets for all inputs of a scene, instead of what each has of its own.
@@ -129,12 +137,12 @@ impl Shared {
         let mut of_files: HashMap<&Path, Option<T>> = HashMap::new();
         for InputValue { file, value } in values {
             match file {
-                Some(file) => add(of_files.entry(file).or_default(), value.clone()),
+                Some(file) => add(of_files.entry(name_of(file)).or_default(), value.clone()),
                 None => add(field(&mut scene.appearance), value.clone()),
             }
         }
         for input in &mut scene.inputs {
-            *field(&mut input.appearance) = of_files.get(input.file.as_path()).cloned().flatten();
+            *field(&mut input.appearance) = of_files.get(name_of(&input.file)).cloned().flatten();
         }
     }
 }
@@ -150,6 +158,10 @@ mod tests {
         let [file, other] = ["a=b.ply", "c.ply"].map(PathBuf::from);
         assert_eq!(InputValue::of(&values, &file), Some(&0.25));
         assert_eq!(InputValue::of(&values, &other), Some(&0.5));
+        // Inputs of a scene file in this folder.
+        assert_eq!(InputValue::of(&values, Path::new("./a=b.ply")), Some(&0.25));
+        let inputs = [PathBuf::from("./a=b.ply"), other.clone()];
+        assert!(InputValue::check(&values, "opacity", &inputs).is_ok());
         assert!(InputValue::check(&values, "opacity", &[file, other.clone()]).is_ok());
         let error = InputValue::check(&values, "opacity", &[other]).unwrap_err();
         assert!(error.to_string().contains("a=b.ply"));

@@ -1,6 +1,10 @@
 //! The flags that move inputs.
 
-use crate::{failure::Failure, input_values::InputValue, parse};
+use crate::{
+    failure::Failure,
+    input_values::{InputValue, name_of},
+    parse,
+};
 use clap::Args;
 use splatkit::session::{Description, Rotation, TransformEntry};
 use std::{collections::HashMap, path::Path};
@@ -58,7 +62,7 @@ fn set<T: Copy>(
     let shared = InputValue::shared(values);
     let singles: HashMap<&Path, &T> = values.iter().filter_map(InputValue::single).collect();
     for input in &mut scene.inputs {
-        let value = singles.get(input.file.as_path()).copied().or(shared);
+        let value = singles.get(name_of(&input.file)).copied().or(shared);
         *field(&mut input.transform) = value.copied();
     }
     Ok(())

@@ -187,8 +187,8 @@ pub(super) fn to_json(scene: &Description, folder: &Path) -> String {
     text
 }
 
-/// Moves what all inputs say alike to what they share, so that a scene is written alike, whoever has
-/// described it.
+/// Moves what all inputs say alike to what they share, so that a scene is written alike, whoever
+/// has described it.
 fn join(scene: &mut Description) {
     let readings = scene.inputs.iter().map(|input| (&input.reading, scene.reading_of(input)));
     let readings = joined(&scene.reading, readings);

@@ -1,8 +1,8 @@
 //! Tests that a scene is written alike, whoever describes it: the flags, the window, and Python.
 //!
 //! tools/tests/scenes.json holds flags, and the text of the scene file that they describe. The test
-//! of the Python package (tools/python/tests/test_scenes.py) compares its files with the same texts.
-//! `SPLATKIT_WRITE=1` writes the file.
+//! of the Python package (tools/python/tests/test_scenes.py) compares its files with the same
+//! texts. `SPLATKIT_WRITE=1` writes the file.
 
 use super::document::{Document, tests::document};
 use serde_json::{Value, json};

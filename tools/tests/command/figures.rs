@@ -49,9 +49,9 @@ fn scenes_have_several_views() {
     let read = |name: &str| fs::read(folder.path(name)).unwrap();
     assert_eq!(read("scene.png"), read("flags.png"));
     // One view replaces several.
-    folder.run("render scene.json -o one.png --engine cpu --view top").ok();
-    folder.run("render a.obj -o top.png --size 80x40 --engine cpu --view top").ok();
-    assert_eq!(read("one.png"), read("top.png"));
+    folder.run("render scene.json -o one.png --engine cpu --view front").ok();
+    folder.run("render a.obj -o front.png --size 80x40 --engine cpu --view front").ok();
+    assert_eq!(read("one.png"), read("front.png"));
     folder.run("render scene.json -o a.gif --turntable 3").fails(3, &["scene.json", "one view"]);
     folder.put("bad.json", scene.replace("\"size\": [80, 40]", "\"width\": \"9mm\""));
     folder.run("render bad.json -o a.png").fails(3, &["bad.json", "picture.width"]);

@@ -329,7 +329,8 @@ fn wrong_uses_are_answered() {
     let folder = folder();
     let mut wrong = Vec::new();
     for (meant, arguments, code, says) in USES {
-        let small = match arguments.starts_with("render") && !arguments.contains("--size") {
+        let has_size = ["--size", "--width"].iter().any(|flag| arguments.contains(flag));
+        let small = match arguments.starts_with("render") && !has_size {
             true => format!("{arguments} --size 32x24 --engine cpu"),
             false => (*arguments).to_owned(),
         };
