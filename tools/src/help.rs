@@ -112,7 +112,7 @@ mod tests {
         (
             "Input",
             "dims type spacing endian header scalar time series dataset missing radius neighbours \
-            no-slopes labels",
+            no-slopes labels scale rotate translate",
         ),
         ("Limits", "limit-points limit-bytes limit-depth limit-texels limit-seconds"),
         (
