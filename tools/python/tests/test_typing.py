@@ -45,7 +45,7 @@ scene.save("scene.json", size=(64, 48), view="left", background="white")
 
 #: Calls that a type checker refuses, each with a part of what it says.
 WRONG = {
-    'pysplatkit.render("a", views="left")': "views",
+    'pysplatkit.render("a", vews=["left"])': "vews",
     'pysplatkit.render("a", size=(1, 2, 3))': "size",
     'Scene().add("a", colormap=3)': "colormap",
     "Scene().render(clip=[])": "clip",
@@ -119,7 +119,7 @@ def test_options_are_those_of_the_signatures():
     from pysplatkit import _options
 
     names = set(inspect.signature(pysplatkit.Scene.render).parameters) - {"self", "size", "camera"}
-    assert names == set(_options.Framed.__annotations__)
+    assert names == set(_options.Saved.__annotations__)
     one = set(inspect.signature(pysplatkit.render).parameters) - {"source", "size", "camera"}
     rest = set(_options.RenderOptions.__annotations__)
     # `axes` and `up` are also those of an array.

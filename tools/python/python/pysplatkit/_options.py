@@ -274,6 +274,10 @@ class Framed(Drawing, View, total=False):
     """How a picture is drawn, and how its camera is fitted."""
 
 
+class Saved(Framed, Page, total=False):
+    """What a scene file says of its picture."""
+
+
 class RenderOptions(SourceOptions, total=False):
     """What `pysplatkit.render` takes beside its named arguments."""
 

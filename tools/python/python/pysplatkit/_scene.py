@@ -22,6 +22,7 @@ from ._options import (
     FieldAppearance,
     Framed,
     PathLike,
+    Saved,
     SourceOptions,
     SurfaceAppearance,
     View,
@@ -79,7 +80,7 @@ class Scene:
         path: PathLike,
         camera: Camera | None = None,
         size: tuple[int, int] | None = None,
-        **drawing: Unpack[Framed],
+        **drawing: Unpack[Saved],
     ) -> None:
         """Writes a scene file, which the command, the window and `open` draw alike.
 
@@ -784,6 +785,8 @@ class Scene:
         if self._described.get("engine") is not None:
             said["engine"] = self._described["engine"]
         chosen = {name: given[name] for name in given if given[name] is not None}
+        if isinstance(chosen.get("views"), str):
+            chosen["views"] = chosen["views"].split(",")
         if chosen.get("background") == "auto":
             del chosen["background"]
         if {"cut", "budget"} & chosen.keys():
