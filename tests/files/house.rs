@@ -291,6 +291,7 @@ fn assert_no_circle(imports: &BTreeMap<Module, BTreeSet<Module>>) {
 #[test]
 fn no_modules_import_each_other() {
     assert_no_circle(&imports("src"));
+    assert_no_circle(&imports("tools/python/src"));
 }
 
 /// Panels return actions, so that none of them needs the window.

@@ -2,8 +2,7 @@
 
 use crate::{
     camera::camera,
-    errors::{options, wrong},
-    film,
+    errors::{of_media, options, wrong},
     parts::picture,
     weights,
 };
@@ -164,7 +163,7 @@ impl Draw {
         let transfers = edited.iter().filter_map(transfer);
         captions.take_transfers(&kept.scene, transfers, &Coloring::default());
         let page = Page { background: self.behind, dpi: self.picture.dpi, has_labels };
-        Overlay::open(&self.overlay, &captions, page).map_err(film::plain)
+        Overlay::open(&self.overlay, &captions, page).map_err(of_media)
     }
 
     /// Returns the part of a drawn picture that a camera is fitted to: the middle, beside the

@@ -3,6 +3,7 @@
 use pyo3::{intern, prelude::*, types::PyTuple};
 use serde::de::DeserializeOwned;
 use splatkit::{Error, error::LimitKind};
+use splatkit_media::Failure;
 use std::io;
 
 /// Returns the exception for an error.
@@ -13,6 +14,19 @@ pub fn raise(py: Python<'_>, error: &Error) -> PyErr {
 /// Returns the exception for an argument that is wrong.
 pub fn wrong(message: impl Into<String>) -> Error {
     Error::Argument(message.into())
+}
+
+/// Returns the library's error for a failure of a film or a text.
+pub fn of_media(failure: Failure) -> Error {
+    match failure {
+        Failure::Library(error) => error,
+        Failure::Usage(message) => wrong(message),
+        Failure::Output { file, message, hint } => {
+            let message = message.strip_prefix("cannot be written: ").unwrap_or(&message);
+            let hint = hint.map_or_else(String::new, |hint| format!("; {hint}"));
+            Error::output(&file, io::Error::other(format!("{message}{hint}")))
+        }
+    }
 }
 
 /// Reads options that Python has written as JSON. An error names the option.

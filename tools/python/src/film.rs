@@ -2,19 +2,15 @@
 
 use crate::{
     camera::to_json,
-    errors::{raise, wrong},
+    errors::{of_media, raise, wrong},
     notes,
     picture::Picture,
     worker::run,
 };
 use pyo3::prelude::*;
 use splatkit::{Error, Stop, math::CameraPath};
-use splatkit_media::{
-    Failure,
-    video::{Encoder, Film as Facts, Format},
-};
+use splatkit_media::video::{Encoder, Film as Facts, Format};
 use std::{
-    io,
     path::PathBuf,
     sync::{Arc, Mutex, PoisonError},
 };
@@ -28,19 +24,6 @@ pub struct Film {
     /// The encoder; none once the film is complete or has failed.
     encoder: Arc<Mutex<Option<Box<dyn Encoder>>>>,
     background: Option<[f32; 3]>,
-}
-
-/// Returns the library's error for a failure of a film or a text.
-pub fn plain(failure: Failure) -> Error {
-    match failure {
-        Failure::Library(error) => error,
-        Failure::Usage(message) => wrong(message),
-        Failure::Output { file, message, hint } => {
-            let message = message.strip_prefix("cannot be written: ").unwrap_or(&message);
-            let hint = hint.map_or_else(String::new, |hint| format!("; {hint}"));
-            Error::output(&file, io::Error::other(format!("{message}{hint}")))
-        }
-    }
 }
 
 #[pymethods]
@@ -64,7 +47,7 @@ impl Film {
         };
         let facts = Facts { size, frames, rate, background };
         let opened = format.check(&path, &facts).and_then(|()| format.open(&path, facts));
-        let encoder = opened.map_err(|failure| raise(py, &plain(failure)))?;
+        let encoder = opened.map_err(|failure| raise(py, &of_media(failure)))?;
         if let Some(loss) = format.loss(&facts) {
             notes::add(format!("{}: {loss}", path.display()));
             notes::warn(py)?;
@@ -81,7 +64,7 @@ impl Film {
         run(py, &Stop::default(), move || {
             let mut encoder = encoder.lock().unwrap_or_else(PoisonError::into_inner);
             let Some(encoder) = encoder.as_mut() else { return Err(wrong("the film has ended")) };
-            encoder.add(&pixels.to_rgba8(background)).map(drop).map_err(plain)
+            encoder.add(&pixels.to_rgba8(background)).map(drop).map_err(of_media)
         })
     }
 
@@ -90,7 +73,8 @@ impl Film {
         let encoder = self.encoder.clone();
         run(py, &Stop::default(), move || {
             let encoder = encoder.lock().unwrap_or_else(PoisonError::into_inner).take();
-            encoder.map_or_else(|| Err(wrong("the film has ended")), |e| e.finish().map_err(plain))
+            encoder
+                .map_or_else(|| Err(wrong("the film has ended")), |e| e.finish().map_err(of_media))
         })
     }
 }
