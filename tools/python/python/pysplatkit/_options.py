@@ -278,7 +278,7 @@ class Saved(Framed, Page, total=False):
     """What a scene file says of its picture."""
 
 
-class RenderOptions(SourceOptions, total=False):
+class RenderOptions(SourceOptions, Page, total=False):
     """What `pysplatkit.render` takes beside its named arguments."""
 
     focal_point: Vector
@@ -298,12 +298,6 @@ class RenderOptions(SourceOptions, total=False):
     memory: int
     cull_backfaces: bool
     occlusion: bool
-    width: str
-    height: str
-    dpi: float
-    views: Sequence[str]
-    columns: int
-    panel_labels: str
 
 
 VIEW = frozenset(View.__annotations__)
