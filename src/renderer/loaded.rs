@@ -15,13 +15,13 @@ impl Loaded {
     /// drawn. A host that draws many pictures keeps a [`Renderer`] instead.
     ///
     /// ```no_run
-    /// use splatkit::{Device, picture::PictureFormat, session::Description};
+    /// use splatkit::{Device, picture::{Encoding, PictureFormat}, session::Description};
     ///
     /// let scene = Description::read("scene.json", &Default::default())?;
     /// let mut loaded = scene.load(&|step| println!("{step}"))?;
     /// loaded.warnings.iter().for_each(|warning| println!("warning: {warning}"));
     /// let (picture, _) = loaded.draw(&scene, &Device::automatic())?;
-    /// std::fs::write("scene.png", picture.encode(PictureFormat::Png, scene.picture.background())?)
+    /// std::fs::write("scene.png", picture.encode(&Encoding::new(PictureFormat::Png))?)
     ///     .expect("a folder that can be written");
     /// # Ok::<(), splatkit::Error>(())
     /// ```

@@ -160,9 +160,14 @@ impl Table<'_> {
     fn read_row(&self, index: usize, wanted: &[bool], row: &mut Row) -> Result<()> {
         let (columns, vertices) = (&self.columns, self.positions.len());
         let mut stray = None;
+        let mut room = Ok(());
         self.rows.visit(self.source, self.element, index, wanted, |at, value, list| {
             if let Some(list) = list.filter(|_| at == columns.indices) {
                 row.corners.clear();
+                room = self.room_for_corners(list.len(), &row.corners);
+                if room.is_err() {
+                    return;
+                }
                 row.corners.extend(list.iter().map(|&value| match vertex(value, vertices) {
                     None if self.are_strips() && value == -1.0 => MARK,
                     None => *stray.get_or_insert(value) as u32,
@@ -175,10 +180,21 @@ impl Table<'_> {
                 row.picture = value;
             }
         })?;
+        room?;
         let Some(stray) = stray else { return Ok(()) };
         let last = vertices.saturating_sub(1);
         let message = format!("refers to vertex {stray}, but there are {vertices} (0 … {last})");
         Err(self.wrong(index, message))
+    }
+
+    /// Counts the memory by which a list grows that takes the corners of a row. Short lists are not
+    /// counted.
+    fn room_for_corners(&self, count: usize, list: &Vec<u32>) -> Result<()> {
+        if count <= FEW || count <= list.capacity() {
+            return Ok(());
+        }
+        let bytes = size_of::<u32>() * (count - list.capacity());
+        self.source.spend("the size of a polygon in bytes", bytes as u64)
     }
 
     /// Checks a polygon: its memory, its texture coordinates and its picture, which is returned.
