@@ -206,8 +206,8 @@ fn changed_scenes_are_drawn_as_fresh_ones() {
             renderer.draw(view, &settings).unwrap();
         }
         same("added", &device, &mut renderer, view, &settings);
+        let before = renderer.render(view, &settings).unwrap().0;
         for (&id, (_, place)) in ids.iter().zip(&items) {
-            let before = renderer.render(view, &settings).unwrap().0;
             renderer.set_visible(id, false).unwrap();
             assert!(!renderer.is_visible(id).unwrap());
             assert!(before.color != renderer.render(view, &settings).unwrap().0.color, "{id:?}");
