@@ -6,10 +6,12 @@
 
 use super::{
     bins::BLOCK,
-    close::{Face, Layer, OPAQUE, Packet, Visible},
+    close::{OPAQUE, Packet},
+    layer::{Face, Layer},
     plan::Plan,
     rays::{HIGH, PACKETS, WIDE},
     vector::{Lanes, dot_with, each, three},
+    visible::Visible,
 };
 use crate::{
     cells::{Place, Tetrahedra},

@@ -3,9 +3,11 @@
 //! `src/reference` has the definition; shaders/shared/sheet.wgsl does the same.
 
 use super::{
+    layer::{Layer, PARTS},
     plan::Plan,
     rays::Rays,
-    vector::{self, Lanes, dot, each, exp, four, log2, three, words},
+    vector::{self, Lanes, dot, each, exp, four, log2, three},
+    visible::NARROW,
 };
 use crate::{
     plan::{
@@ -14,28 +16,12 @@ use crate::{
     },
     scene::Optics,
 };
-use fearless_simd::{Simd, f32x4, i32x8, mask32x8, prelude::*};
+use fearless_simd::{Simd, f32x4, mask32x8, prelude::*};
 
-/// Number of parts of a sheet in which the transfer function is integrated.
-const PARTS: usize = 3;
 /// Number of places in a part at which its light is taken.
 const LIGHTS: usize = 4;
-/// Values closer together than this, in entries of the table, are taken as this far apart.
-const NARROW: f32 = 8.0;
 /// The same for values far beyond the table, as a fraction of the value.
 const NARROW_AFAR: f32 = 1e-6;
-/// Parts of an optical depth of 1, as [`Visible`] counts them, and the largest depth of an entry.
-/// The sum over the entries of a table fits 31 bits.
-const DEPTH_PARTS: f32 = 1024.0;
-const MOST_PARTS_DEPTH: f32 = 64.0;
-/// A range of more entries than this may lie mostly at those that show.
-const WIDE_RANGE: f32 = 512.0;
-/// A sheet that takes at most this share of the light is integrated as one piece, if its field is
-/// straight enough.
-const FAINT: f32 = 0.2;
-/// A field is straight if its mean deviates little from that of its ends. The square of that, in
-/// entries of the table, times the share of the light that its sheet takes is at most this.
-const EVEN: f32 = 128.0;
 /// One light stands for a piece if the square of the relative change of its gradient, times the
 /// gloss and the share of the light that the piece takes, is at most this.
 const STEADY: f32 = 0.03;
@@ -133,38 +119,6 @@ impl<S: Simd> Packet<S> {
     }
 }
 
-/// The field on a plane between two sheets: its value, in entries of the table, and its gradient
-/// across the ray.
-#[derive(Clone, Copy)]
-pub struct Face<S: Simd> {
-    pub value: Lanes<S>,
-    pub across: [Lanes<S>; 3],
-}
-
-/// The field of a sheet at eight pixels.
-pub struct Layer<S: Simd> {
-    pub front: Face<S>,
-    pub back: Face<S>,
-    /// The value in the middle.
-    pub middle: Lanes<S>,
-    /// The sheet's start and thickness, and the part of the rays that counts.
-    pub start: Lanes<S>,
-    pub thickness: Lanes<S>,
-    pub begin: Lanes<S>,
-    pub end: Lanes<S>,
-    /// The filled fraction of the sheet.
-    pub filling: Lanes<S>,
-    /// About the share of a pixel's light that the sheet takes, at most 1: how much detail counts.
-    pub weight: Lanes<S>,
-    pub direction: [Lanes<S>; 3],
-    /// The gradients in view space at the front, in the middle and at the back, in entries per
-    /// thickness of a sheet. `None` where only those of the faces are known, and only across.
-    pub sections: Option<Sections<S>>,
-}
-
-/// Gradients at three places of a sheet.
-pub type Sections<S> = [[Lanes<S>; 3]; 3];
-
 /// The effect of a sheet on light.
 struct Medium<S: Simd> {
     /// The light that reaches the sheet.
@@ -231,75 +185,6 @@ struct Turn<S: Simd> {
     least2: Lanes<S>,
     /// Where it is too short everywhere to have light.
     is_short: mask32x8<S>,
-}
-
-/// For each entry of the transfer function's table, the sum of the optical depths of the entries
-/// before it, in parts of [`DEPTH_PARTS`], of a ray through the thickest sheet. A visible entry
-/// counts at least one part.
-pub struct Visible(Vec<u32>);
-
-impl Visible {
-    /// Whether any value between two values, in entries of the table, is visible.
-    pub fn may_show_between(&self, plan: &Plan, low: f32, high: f32) -> bool {
-        let slack = 0.5 * NARROW + 1.0;
-        let Values { last, place, .. } = plan.field.values;
-        let at = |value: f32| (value + place).clamp(0.0, last) as usize;
-        self.0[at(high + slack) + 1] > self.0[at(low - slack)]
-    }
-
-    pub fn new(plan: &Plan) -> Self {
-        if !plan.has_field {
-            return Self(Vec::new());
-        }
-        let Values { last, place, .. } = plan.field.values;
-        let sheets = plan.planes[1..].windows(2).take(plan.sheets);
-        let thickest = sheets.map(|ends| ends[1] - ends[0]).fold(0.0, f32::max);
-        let parts = |extinction: f32| {
-            let depth = (extinction * thickest).min(MOST_PARTS_DEPTH);
-            if extinction > 0.0 { (depth * DEPTH_PARTS).ceil().max(1.0) as u32 } else { 0 }
-        };
-        let colors = &plan.tables.colors[..=last as usize];
-        let mut depths: Vec<u32> = colors.iter().map(|entry| parts(entry[3])).collect();
-        for surface in &plan.field.isosurfaces[..plan.isosurfaces] {
-            let at = (surface.value + place).clamp(0.0, last) as usize;
-            let end = (at + 2).min(depths.len());
-            depths[at..end].fill(parts(f32::MAX));
-        }
-        let mut sum = 0;
-        let mut before = vec![0];
-        before.extend(depths.iter().map(|depth| {
-            sum += depth;
-            sum
-        }));
-        Self(before)
-    }
-
-    /// Whether any value that a sheet may have is visible.
-    #[inline(always)]
-    pub fn may_show<S: Simd>(&self, simd: S, plan: &Plan, layer: &Layer<S>) -> bool {
-        self.depth(simd, plan, layer).simd_gt(0.0).any_true()
-    }
-
-    /// Returns about the optical depth of a sheet: the mean over the values that it may have, and
-    /// above the mean if there are many. It is 0 only if none of these values is visible.
-    #[inline(always)]
-    pub fn depth<S: Simd>(&self, simd: S, plan: &Plan, layer: &Layer<S>) -> Lanes<S> {
-        let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        // A parabola exceeds the range of its values at both ends and the middle by at most an
-        // eighth of that range. Integrals cover at least NARROW entries.
-        let slack = (high - low) * 0.125 + (0.5 * NARROW + 1.0);
-        let Values { last, place, .. } = plan.field.values;
-        let (none, last) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, last));
-        let (low, high) = (low - slack + place, high + slack + place);
-        let span = (high - low).min(Lanes::splat(simd, WIDE_RANGE));
-        let low: [i32; 8] = i32x8::truncate_from(low.max(none).min(last)).into();
-        let high: [i32; 8] = i32x8::truncate_from(high.max(none).min(last)).into();
-        let before = words!(simd, L => self.0[low[L] as usize]);
-        let behind = words!(simd, L => self.0[high[L] as usize + 1]);
-        let parts = Lanes::float_from((behind - before).bitcast::<i32x8<S>>());
-        parts * (1.0 / DEPTH_PARTS) / span
-    }
 }
 
 impl Plan<'_> {
@@ -785,70 +670,6 @@ impl Plan<'_> {
         let along = slope * self.field.gradients.length / layer.thickness;
         let (front, back) = (layer.front.across, layer.back.across);
         three!(I => (back[I] - front[I]).mul_add(u, front[I]) + along * layer.direction[I])
-    }
-}
-
-impl<S: Simd> Layer<S> {
-    /// Returns the field of a sheet that is filled, with a value in the middle.
-    #[inline(always)]
-    pub fn new(
-        simd: S,
-        direction: [Lanes<S>; 3],
-        [front, back]: [Face<S>; 2],
-        middle: Lanes<S>,
-        [start, thickness]: [Lanes<S>; 2],
-        [begin, end]: [Lanes<S>; 2],
-    ) -> Self {
-        Self {
-            front,
-            back,
-            middle,
-            start,
-            thickness,
-            begin,
-            end,
-            filling: Lanes::splat(simd, 1.0),
-            weight: Lanes::splat(simd, 1.0),
-            direction,
-            sections: None,
-        }
-    }
-
-    #[inline(always)]
-    fn parabola(&self, u: Lanes<S>) -> Lanes<S> {
-        let v = 1.0 - u;
-        let w = v - u;
-        self.front.value * v * w + self.middle * u * v * 4.0 - self.back.value * u * w
-    }
-
-    /// Returns the largest value between a place and the place `length` behind it.
-    #[inline(always)]
-    fn peak(&self, place: Lanes<S>, length: Lanes<S>, is_curved: bool) -> Lanes<S> {
-        if !is_curved {
-            return self.mean();
-        }
-        let step = length * (1.0 / PARTS as f32);
-        let (mut place, mut peak) = (place, self.parabola(place));
-        for _ in 0..PARTS {
-            place += step;
-            peak = peak.max(self.parabola(place));
-        }
-        peak
-    }
-
-    /// Returns the ends of a straight line with the mean of the field between two places. `None` if
-    /// the parabola is better, because the sheet takes too much light.
-    #[inline(always)]
-    fn straight(&self, [from, to]: [Lanes<S>; 2]) -> Option<[Lanes<S>; 2]> {
-        let (a, c) = (self.parabola(from), self.parabola(to));
-        let bend = (self.parabola((from + to) * 0.5) * 2.0 - (a + c)) * (1.0 / 3.0);
-        let is_faint = self.weight.simd_le(FAINT) & (bend * bend * self.weight).simd_le(EVEN);
-        is_faint.all_true().then_some([a + bend, c + bend])
-    }
-
-    #[inline(always)]
-    fn mean(&self) -> Lanes<S> {
-        (self.front.value + self.middle * 4.0 + self.back.value) * (1.0 / 6.0)
     }
 }
 

@@ -4,12 +4,12 @@ use super::{
     blend::{Blend, Way},
     brick_cache::{BrickCache, Grid, most_bricks},
     cells::CellField,
-    close::Visible,
     field::Typed,
     gather::{self, Gather},
     items::Prepared,
     march::{DrawnField, Means},
     plan::{FieldOutline, Plan},
+    visible::Visible,
 };
 use crate::{
     Result,

@@ -4,14 +4,16 @@
 use super::{
     blend::Way,
     brick_cache::Grid,
-    close::{Face, Layer, OPAQUE, Packet, Sections, Visible},
+    close::{OPAQUE, Packet},
     field::{BEYOND, Typed},
     kernel_sums::{MOST_TAPS, Point},
+    layer::{Face, Layer, Sections},
     plan::Plan,
     rays::Rays,
     scatter::normal_cdf,
     skip::is_marked,
     vector::{Lanes, dot, each, three},
+    visible::Visible,
 };
 use crate::{math::Kernel, plan::visible::VisibleBlocks, scene::Optics, volume::Volume};
 use fearless_simd::{Simd, mask32x8, prelude::*};

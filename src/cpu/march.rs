@@ -4,15 +4,17 @@
 use super::{
     bins::Entry,
     cells::{CellField, CellTile},
-    close::{Layer, Media, OPAQUE, Packet, Pixels, Visible},
+    close::{Media, OPAQUE, Packet, Pixels},
     footprint::Record,
     gather::{Gather, Last},
+    layer::Layer,
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
     scatter::{OpenField, OpenTile, Window},
     skip::is_marked,
     sums::{ScalarSums, Sums, WINDOW, differences},
     vector::{each, four, three},
+    visible::Visible,
 };
 use crate::{
     plan::TILE,

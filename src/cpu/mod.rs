@@ -46,6 +46,7 @@ mod footprint;
 mod gather;
 mod items;
 mod kernel_sums;
+mod layer;
 mod march;
 mod nodes;
 mod page_cache;
@@ -61,6 +62,7 @@ mod skip;
 mod spare;
 mod sums;
 mod vector;
+mod visible;
 mod window;
 
 use crate::{
@@ -77,7 +79,7 @@ use crate::{
 use bins::{BLOCK, Bins, TileLists};
 use brick_cache::most_bricks;
 pub(crate) use changes::Parked;
-use close::{NO_VALUE, Visible};
+use close::NO_VALUE;
 use fearless_simd::Level;
 use fields::FieldState;
 use footprint::Record;
@@ -87,6 +89,7 @@ use plan::{FieldOutline, Outline, Plan};
 use spare::Spare;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use vector::lanes;
+use visible::Visible;
 use web_time::Instant;
 
 /// A scene, prepared for drawing on the CPU. Cameras and settings may change from picture to

@@ -4,7 +4,8 @@
 //! use slot n mod 4.
 
 use super::{
-    close::{Face, Layer, Packet, Pixels},
+    close::{Packet, Pixels},
+    layer::{Face, Layer},
     plan::Plan,
     rays::{PACKETS, Rays},
     vector::{Lanes, three},

@@ -52,8 +52,10 @@ pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
     let mut ranges = volume.drawn_ranges(kernel).into_owned();
     if deviation(kernel).is_some_and(|sigma| sigma <= WIDEST) && volume.coefficients.is_none() {
         let near = neighbourhood_ranges(volume, [1; 3]);
+        let shares: [u8; 256] =
+            std::array::from_fn(|difference| (difference as f64 * FAR_WEIGHT).ceil() as u8);
+        let share = |difference: u8| shares[usize::from(difference)];
         ranges.par_iter_mut().zip(near).for_each(|([low, high], [near_low, near_high])| {
-            let share = |difference: u8| (f64::from(difference) * FAR_WEIGHT).ceil() as u8;
             *low = near_low - share(near_low - *low);
             *high = near_high + share(*high - near_high);
         });

@@ -439,10 +439,12 @@ impl<'a> Rows<'a> {
                 continue;
             }
             self.write((k * ny + j) * nx, &mut scratch, &mut row);
-            for (i, &extinction) in row.iter().enumerate() {
-                let is_seen = blocks[i / BLOCK] && extinction > 0.0;
-                if is_seen && self.is_kept([i, j, k]) {
-                    visit([i, j, k]);
+            for (block, samples) in row.chunks(BLOCK).enumerate().filter(|(at, _)| blocks[*at]) {
+                for (at, _) in samples.iter().enumerate().filter(|(_, sample)| **sample > 0.0) {
+                    let index = [block * BLOCK + at, j, k];
+                    if self.is_kept(index) {
+                        visit(index);
+                    }
                 }
             }
         }

@@ -156,13 +156,23 @@ impl Samples {
             values: &[T],
             first: T,
         ) -> [f64; 2] {
-            let wider = |[low, high]: [T; 2], v: T| {
-                [if v < low { v } else { low }, if v > high { v } else { high }]
+            // Many extremes side by side, which vector instructions find at once.
+            const LANES: usize = 32;
+            let smaller = |a: T, b: T| if b < a { b } else { a };
+            let larger = |a: T, b: T| if b > a { b } else { a };
+            let of_chunk = |chunk: &[T]| {
+                let (mut low, mut high) = ([first; LANES], [first; LANES]);
+                let (whole, rest) = chunk.as_chunks::<LANES>();
+                for values in whole {
+                    low.iter_mut().zip(values).for_each(|(low, v)| *low = smaller(*low, *v));
+                    high.iter_mut().zip(values).for_each(|(high, v)| *high = larger(*high, *v));
+                }
+                let low = low.into_iter().chain(rest.iter().copied()).fold(first, smaller);
+                let high = high.into_iter().chain(rest.iter().copied()).fold(first, larger);
+                [low, high]
             };
-            let ends = values
-                .par_chunks(CHUNK)
-                .map(|chunk| chunk.iter().copied().fold([first, first], wider))
-                .reduce(|| [first, first], |a, b| wider(wider(a, b[0]), b[1]));
+            let join = |a: [T; 2], b: [T; 2]| [smaller(a[0], b[0]), larger(a[1], b[1])];
+            let ends = values.par_chunks(CHUNK).map(of_chunk).reduce(|| [first, first], join);
             ends.map(Into::into)
         }
         if let SampleSlice::F32(values) = self.as_slice() {

@@ -113,6 +113,21 @@ async fn usable_adapters() -> Vec<wgpu::Adapter> {
     adapters
 }
 
+/// The beginnings of the names that Linux gives to files of GPUs: those of drivers in the kernel,
+/// of NVIDIA's, of Windows behind it, and of phones and small boards.
+const GPU_FILES: [&str; 6] = ["dri", "nvidia", "dxg", "kgsl", "mali", "nvhost"];
+
+/// Returns whether a folder of devices has a GPU's file. Without one, there can only be software
+/// adapters. To ask the drivers takes a tenth of a second, because each of them is loaded.
+#[cfg(not(target_arch = "wasm32"))]
+fn has_gpu(devices: &std::path::Path) -> bool {
+    let Ok(entries) = std::fs::read_dir(devices) else { return true };
+    entries.flatten().any(|entry| {
+        let name = entry.file_name();
+        GPU_FILES.iter().any(|file| name.to_string_lossy().starts_with(file))
+    })
+}
+
 impl Gpu {
     /// Returns the adapters that can run the engine, fastest first, with their limits.
     #[cfg(not(target_arch = "wasm32"))]
@@ -126,6 +141,9 @@ impl Gpu {
     #[cfg(not(target_arch = "wasm32"))]
     pub fn hardware() -> Option<Self> {
         let is_named = std::env::var("WGPU_ADAPTER_NAME").is_ok_and(|name| !name.is_empty());
+        if !is_named && cfg!(target_os = "linux") && !has_gpu("/dev".as_ref()) {
+            return None;
+        }
         let gpu = Self::headless(&AdapterChoice::Automatic).ok()?;
         (is_named || !gpu.is_software()).then_some(gpu)
     }
@@ -298,5 +316,24 @@ impl Gpu {
     pub fn binding_size(&self) -> u64 {
         let limits = self.device.limits();
         (limits.max_storage_buffer_binding_size).min(limits.max_buffer_size) / 256 * 256
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::testing::Folder;
+
+    #[test]
+    fn gpus_have_files() {
+        let folder = Folder::new();
+        let devices = folder.path("");
+        folder.write("null", b"");
+        folder.write("random", b"");
+        assert!(!has_gpu(&devices));
+        // What cannot be read says nothing.
+        assert!(has_gpu(&folder.path("missing")));
+        folder.write("nvidiactl", b"");
+        assert!(has_gpu(&devices));
     }
 }

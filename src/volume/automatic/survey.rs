@@ -3,7 +3,7 @@
 
 use crate::{
     parallel::prelude::*,
-    volume::{Lattice, Scalar, Volume, each_type},
+    volume::{Arrangement, Lattice, Scalar, Volume, each_type},
 };
 use glam::DVec3;
 
@@ -52,20 +52,23 @@ struct Sample {
     /// Magnitude of the gradient, in value per world length.
     slope: f64,
     /// The response to Immerkær's mask, in standard deviations of white noise per unit of value.
-    /// `None` at the border.
-    mask: Option<f64>,
-    /// The next value along the first axis.
-    next: f64,
-    /// Whether the sample lies at the low and the high face of the box along each axis.
-    faces: [bool; 6],
+    /// Not a number at the border.
+    mask: f64,
+}
+
+/// Samples that are evenly spread over a box, those of the first axis next to each other.
+struct Spread {
+    samples: Vec<Sample>,
+    /// For each place along each axis, whether it lies at the low and at the high face of the box.
+    faces: [Vec<[bool; 2]>; 3],
 }
 
 impl Survey {
     /// Surveys a volume, which must be valid. A window replaces the values without outliers.
     pub fn of_volume(volume: &Volume, window: Option<[f64; 2]>) -> Self {
         let lattice = &volume.lattice;
-        let samples = each_type!(volume.samples, values => {
-            samples(lattice, |at: usize| f64::from(values[at]))
+        let spread = each_type!(volume.samples, values => {
+            Spread::of(lattice, |at: usize| f64::from(values[at]))
         });
         let spacing = lattice.spacing();
         let wide = DVec3::from_array(lattice.dims.map(|n| if n > 1 { 1.0 } else { f64::INFINITY }));
@@ -73,10 +76,19 @@ impl Survey {
             finest if finest.is_finite() && finest > 0.0 => finest,
             _ => spacing.max_element(),
         };
+        let order = Order::of(&spread.samples, volume.samples.scalar());
+        let neighbours = || {
+            each_type!(volume.samples, values => {
+                neighbours(lattice, |at: usize| f64::from(values[at]))
+            })
+        };
         let is_float = volume.samples.scalar() == Scalar::F32;
-        let mut survey = Self::of_samples(&samples, volume.range, window, is_float);
+        let labels = if order.is_whole { labels(&order, neighbours) } else { Vec::new() };
+        let mut survey = Self::of_samples(&spread, &order, volume.range, window);
+        survey.labels = labels;
+        survey.noise = noise(&spread.samples, order.ends(), order.is_whole && !is_float);
         (survey.spacing, survey.diagonal) = (spacing, volume.bounds().diagonal());
-        survey.add_slopes(&samples);
+        survey.add_slopes(&spread.samples);
         survey
     }
 
@@ -88,16 +100,15 @@ impl Survey {
         diagonal: f64,
     ) -> Self {
         let step = (values.len() as f64 / SAMPLES).ceil().max(1.0) as usize;
-        let sample = |value: &f32| Sample {
-            value: f64::from(*value),
-            slope: 0.0,
-            mask: None,
-            next: f64::NAN,
-            faces: [false; 6],
-        };
+        let sample = |value: &f32| Sample { value: f64::from(*value), slope: 0.0, mask: f64::NAN };
         let finite = values.iter().step_by(step).filter(|value| value.is_finite());
         let samples: Vec<Sample> = finite.map(sample).collect();
-        let mut survey = Self::of_samples(&samples, range, window, true);
+        let nowhere = |count: usize| vec![[false; 2]; count];
+        let faces = [nowhere(samples.len()), nowhere(1), nowhere(1)];
+        let order = Order::of(&samples, Scalar::F32);
+        let labels = if order.is_whole { labels(&order, Vec::new) } else { Vec::new() };
+        let mut survey = Self::of_samples(&Spread { samples, faces }, &order, range, window);
+        survey.labels = labels;
         (survey.diagonal, survey.spacing) = (diagonal, diagonal / 100.0);
         survey.flat.clone_from(&survey.counts);
         survey
@@ -105,18 +116,13 @@ impl Survey {
 
     /// Fills the histograms of values.
     fn of_samples(
-        samples: &[Sample],
+        spread: &Spread,
+        order: &Order,
         range: [f64; 2],
         window: Option<[f64; 2]>,
-        is_float: bool,
     ) -> Self {
-        let mut values: Vec<f64> = samples.iter().map(|sample| sample.value).collect();
-        values.par_sort_unstable_by(f64::total_cmp);
-        let extremes = [values.first(), values.last()].map(|end| end.copied().unwrap_or(0.0));
-        let is_whole = !is_float || values.iter().all(|value| value.fract() == 0.0);
-        let window = window.unwrap_or_else(|| without_outliers(&values, range));
-        let (window, bins) = bins(window, is_whole);
-        let labels = if is_whole { labels(&values, samples) } else { Vec::new() };
+        let window = window.unwrap_or_else(|| without_outliers(order, range));
+        let (window, bins) = bins(window, order.is_whole);
         let mut survey = Self {
             range,
             window,
@@ -125,22 +131,35 @@ impl Survey {
             slopes: vec![0.0; bins],
             edges: vec![0.0; bins],
             faces: std::array::from_fn(|_| vec![0.0; bins]),
-            noise: noise(samples, extremes, is_whole && !is_float),
+            noise: 0.0,
             spacing: 1.0,
             diagonal: 1.0,
-            labels,
+            labels: Vec::new(),
         };
-        for sample in samples {
-            let bin = survey.bin(sample.value);
-            survey.counts[bin] += 1.0;
-            for (face, _) in survey.faces.iter_mut().zip(sample.faces).filter(|(_, is_at)| *is_at) {
-                face[bin] += 1.0;
+        let [along_x, along_y, along_z] = &spread.faces;
+        let mut samples = spread.samples.iter();
+        for z in along_z {
+            for y in along_y {
+                for (x, sample) in along_x.iter().zip(&mut samples) {
+                    survey.count(sample.value, [*x, *y, *z]);
+                }
             }
-            let axes = [0, 2, 4].map(|face| sample.faces[face] || sample.faces[face + 1]);
-            let is_edge = axes.iter().filter(|is_at| **is_at).count() >= 2;
-            survey.edges[bin] += f64::from(u8::from(is_edge));
         }
         survey
+    }
+
+    /// Counts a value that lies at these faces of the box.
+    fn count(&mut self, value: f64, faces: [[bool; 2]; 3]) {
+        let bin = self.bin(value);
+        self.counts[bin] += 1.0;
+        let axes = faces.iter().filter(|[low, high]| *low || *high).count();
+        if axes == 0 {
+            return;
+        }
+        for (face, _) in self.faces.iter_mut().zip(faces.as_flattened()).filter(|(_, at)| **at) {
+            face[bin] += 1.0;
+        }
+        self.edges[bin] += f64::from(u8::from(axes >= 2));
     }
 
     /// Fills the histograms that need gradients.
@@ -182,59 +201,156 @@ impl Survey {
     }
 }
 
-/// Returns samples that are evenly spread over a lattice.
-fn samples(lattice: &Lattice, value: impl Fn(usize) -> f64 + Sync) -> Vec<Sample> {
-    let dims = lattice.dims;
-    let step = (lattice.len() as f64 / SAMPLES).cbrt().ceil().max(1.0) as usize;
-    // Steps that divide the number of samples of a row would look at one column only.
-    let count = |axis: usize| dims[axis].div_ceil(if dims[axis] < 2 * step { 1 } else { step });
-    let counts = [0, 1, 2].map(count);
-    let place = |axis: usize, number: usize| match counts[axis] {
-        1 => 0,
-        count => number * (dims[axis] - 1) / (count - 1),
-    };
-    let row = |number: usize| {
-        let (j, k) = (place(1, number % counts[1]), place(2, number / counts[1]));
-        (0..counts[0]).map(|i| sample(lattice, [place(0, i), j, k], &value)).collect::<Vec<_>>()
-    };
-    (0..counts[1] * counts[2]).into_par_iter().flat_map_iter(row).collect()
+impl Spread {
+    fn of(lattice: &Lattice, value: impl Fn(usize) -> f64 + Sync) -> Self {
+        let places = places(lattice);
+        let [along_x, along_y, along_z] = &places;
+        let none = Sample { value: 0.0, slope: 0.0, mask: f64::NAN };
+        let mut samples = vec![none; along_x.len() * along_y.len() * along_z.len()];
+        let stencil = Stencil::new(lattice, &value);
+        samples.par_chunks_mut(along_x.len().max(1)).enumerate().for_each(|(number, row)| {
+            let (j, k) = (along_y[number % along_y.len()], along_z[number / along_y.len()]);
+            for (sample, &i) in row.iter_mut().zip(along_x) {
+                *sample = stencil.sample([i, j, k]);
+            }
+        });
+        let faces = std::array::from_fn(|axis| {
+            let margin = (lattice.dims[axis] / 32).max(1);
+            let is_at = |place: &usize| [*place < margin, lattice.dims[axis] - 1 - *place < margin];
+            places[axis].iter().map(is_at).collect()
+        });
+        Self { samples, faces }
+    }
 }
 
-/// Returns one sample. On a body-centred lattice, its neighbours are those of its own cubic
-/// lattice.
-fn sample(lattice: &Lattice, index: [usize; 3], value: impl Fn(usize) -> f64) -> Sample {
+/// Returns the places along each axis of a lattice at which samples are looked at.
+fn places(lattice: &Lattice) -> [Vec<usize>; 3] {
+    let step = (lattice.len() as f64 / SAMPLES).cbrt().ceil().max(1.0) as usize;
+    lattice.dims.map(|along| {
+        // Steps that divide the number of samples of a row would look at one column only.
+        match along.div_ceil(if along < 2 * step { 1 } else { step }) {
+            1 => vec![0],
+            count => (0..count).map(|number| number * (along - 1) / (count - 1)).collect(),
+        }
+    })
+}
+
+/// Returns the distance between neighbours along each axis. On a body-centred lattice, the
+/// neighbours of a sample are those of its own cubic lattice.
+fn strides(lattice: &Lattice) -> [usize; 3] {
+    match lattice.arrangement {
+        Arrangement::BodyCentred => [1, 1, 2],
+        _ => [1; 3],
+    }
+}
+
+/// Returns the values of samples and of their next neighbours along the first axis.
+fn neighbours(lattice: &Lattice, value: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
     let [nx, ny, _] = lattice.dims;
-    let is_centred = matches!(lattice.arrangement, crate::volume::Arrangement::BodyCentred);
-    let strides: [usize; 3] = if is_centred { [1, 1, 2] } else { [1; 3] };
-    let at = |[i, j, k]: [usize; 3]| value(i + nx * (j + ny * k));
-    let here = at(index);
-    let moved = |axis: usize, by: isize| {
-        let place = index[axis].checked_add_signed(by * strides[axis] as isize)?;
-        let mut index = index;
-        index[axis] = place;
-        (place < lattice.dims[axis]).then_some(index)
-    };
-    let mut squared = 0.0;
-    for axis in 0..3 {
-        let [before, after] = [-1, 1].map(|by| moved(axis, by).unwrap_or(index));
-        if before != after {
-            let steps = lattice.steps(after) - lattice.steps(before);
-            squared += ((at(after) - at(before)) / (lattice.axes * steps).length()).powi(2);
+    let [along_x, along_y, along_z] = &places(lattice);
+    let mut pairs = Vec::new();
+    for &k in along_z {
+        for &j in along_y {
+            let row = nx * (j + ny * k);
+            let inner = along_x.iter().filter(|i| **i + 1 < nx);
+            pairs.extend(inner.map(|i| [value(row + i), value(row + i + 1)]));
         }
     }
-    let faces = std::array::from_fn(|face| {
-        let (axis, margin) = (face / 2, (lattice.dims[face / 2] / 32).max(1));
-        let from_face =
-            if face % 2 == 0 { index[axis] } else { lattice.dims[axis] - 1 - index[axis] };
-        from_face < margin
-    });
-    Sample {
-        value: here,
-        slope: squared.sqrt(),
-        mask: mask(lattice, index, strides, at),
-        next: moved(0, 1).map_or(f64::NAN, at),
-        faces,
+    pairs
+}
+
+/// What is computed from a sample and its neighbours.
+struct Stencil<'a, V> {
+    lattice: &'a Lattice,
+    value: &'a V,
+    strides: [usize; 3],
+    /// For a Cartesian lattice of at least three samples along each axis, the distances between
+    /// the two neighbours of a sample, in world units.
+    distances: Option<[f64; 3]>,
+}
+
+impl<'a, V: Fn(usize) -> f64> Stencil<'a, V> {
+    fn new(lattice: &'a Lattice, value: &'a V) -> Self {
+        let is_even = matches!(lattice.arrangement, Arrangement::Cartesian);
+        let is_even = is_even && lattice.dims.iter().all(|along| *along > 2);
+        let distance = |axis: usize| {
+            let moved = |to: usize| {
+                let mut index = [1; 3];
+                index[axis] = to;
+                lattice.steps(index)
+            };
+            (lattice.axes * (moved(2) - moved(0))).length()
+        };
+        let distances = is_even.then(|| [0, 1, 2].map(distance));
+        Self { lattice, value, strides: strides(lattice), distances }
     }
+
+    /// Returns the value at a sample.
+    fn at(&self, [i, j, k]: [usize; 3]) -> f64 {
+        let [nx, ny, _] = self.lattice.dims;
+        (self.value)(i + nx * (j + ny * k))
+    }
+
+    fn sample(&self, index: [usize; 3]) -> Sample {
+        let is_inner =
+            (0..3).all(|axis| index[axis] > 0 && index[axis] + 1 < self.lattice.dims[axis]);
+        match self.distances.filter(|_| is_inner) {
+            Some(distances) => self.inner_sample(index, distances),
+            None => self.any_sample(index),
+        }
+    }
+
+    /// As [`any_sample`](Self::any_sample), for a sample of a Cartesian lattice that has all
+    /// neighbours. The result has the same bits, because the terms are added in the same order.
+    fn inner_sample(&self, [i, j, k]: [usize; 3], distances: [f64; 3]) -> Sample {
+        let [nx, ny, _] = self.lattice.dims;
+        let (row, slice) = (nx, nx * ny);
+        let here = i + nx * (j + ny * k);
+        let mut squared = 0.0;
+        for (step, distance) in [1, row, slice].into_iter().zip(distances) {
+            let difference = (self.value)(here + step) - (self.value)(here - step);
+            squared += (difference / distance).powi(2);
+        }
+        let first = here - slice - row - 1;
+        let mut sum = 0.0;
+        for (c, outer) in [1.0, -2.0, 1.0].into_iter().enumerate() {
+            for (b, middle) in [1.0, -2.0, 1.0].into_iter().enumerate() {
+                let (at, weight) = (first + c * slice + b * row, outer * middle);
+                sum += weight * (self.value)(at);
+                sum += -2.0 * weight * (self.value)(at + 1);
+                sum += weight * (self.value)(at + 2);
+            }
+        }
+        Sample { value: (self.value)(here), slope: squared.sqrt(), mask: response(sum, 3) }
+    }
+
+    /// Computes what is known of any sample of any lattice.
+    fn any_sample(&self, index: [usize; 3]) -> Sample {
+        let lattice = self.lattice;
+        let moved = |axis: usize, by: isize| {
+            let place = index[axis].checked_add_signed(by * self.strides[axis] as isize)?;
+            let mut index = index;
+            index[axis] = place;
+            (place < lattice.dims[axis]).then_some(index)
+        };
+        let mut squared = 0.0;
+        for axis in 0..3 {
+            let [before, after] = [-1, 1].map(|by| moved(axis, by).unwrap_or(index));
+            if before != after {
+                let steps = lattice.steps(after) - lattice.steps(before);
+                let difference = self.at(after) - self.at(before);
+                squared += (difference / (lattice.axes * steps).length()).powi(2);
+            }
+        }
+        let mask = mask(lattice, index, self.strides, |index| self.at(index));
+        Sample { value: self.at(index), slope: squared.sqrt(), mask: mask.unwrap_or(f64::NAN) }
+    }
+}
+
+/// Returns the standard deviations of white noise that a sum over the mask of some axes stands for.
+fn response(sum: f64, axes: i32) -> f64 {
+    // The squares of 1, −2 and 1 add up to 6.
+    sum.abs() / 6f64.powi(axes).sqrt()
 }
 
 /// Returns the response to the mask of Immerkær (1996, "Fast noise variance estimation"), here of
@@ -271,9 +387,7 @@ fn mask(
             }
         }
     }
-    // The squares of 1, −2 and 1 add up to 6.
-    let axes = is_long.iter().filter(|is_long| **is_long).count();
-    Some(sum.abs() / 6f64.powi(axes as i32).sqrt())
+    Some(response(sum, is_long.iter().filter(|is_long| **is_long).count() as i32))
 }
 
 /// Returns the standard deviation of the noise, of values whose least and largest one are given. It
@@ -281,9 +395,10 @@ fn mask(
 /// are saturated or padding have no noise.
 fn noise(samples: &[Sample], [low, high]: [f64; 2], is_integer: bool) -> f64 {
     let is_saturated =
-        |sample: &Sample| (sample.value == low || sample.value == high) && sample.mask == Some(0.0);
+        |sample: &Sample| (sample.value == low || sample.value == high) && sample.mask == 0.0;
     let unsaturated = samples.iter().filter(|sample| !is_saturated(sample));
-    let mut responses: Vec<f64> = unsaturated.filter_map(|sample| sample.mask).collect();
+    let responses = unsaturated.map(|sample| sample.mask).filter(|mask| !mask.is_nan());
+    let mut responses: Vec<f64> = responses.collect();
     // The deviation of numbers that were rounded to integers.
     let rounding = if is_integer { 12f64.sqrt().recip() } else { 0.0 };
     // Where most of a volume is saturated, the rest is structure.
@@ -294,12 +409,58 @@ fn noise(samples: &[Sample], [low, high]: [f64; 2], is_integer: bool) -> f64 {
     (*responses.select_nth_unstable_by(quarter, f64::total_cmp).1 / QUARTER).max(rounding)
 }
 
-/// Returns the range without outliers, of values in ascending order. A range that outliers do not
-/// make twice as wide stays.
-fn without_outliers(values: &[f64], range: [f64; 2]) -> [f64; 2] {
-    let last = values.len().saturating_sub(1) as f64;
-    let at = |share: f64| values.get((share * last).round() as usize).copied().unwrap_or(range[0]);
-    let inner = [at(OUTLIERS), at(1.0 - OUTLIERS)];
+/// Values in ascending order, each once.
+struct Order {
+    values: Vec<f64>,
+    /// For each value, the number of samples that have it or a smaller one.
+    sums: Vec<usize>,
+    /// Whether all values are whole.
+    is_whole: bool,
+}
+
+impl Order {
+    fn of(samples: &[Sample], scalar: Scalar) -> Self {
+        /// What is added to values of 8 and 16 bits, so that they count from 0.
+        const LOWEST: i64 = i16::MIN as i64;
+        let mut order = Self { values: Vec::new(), sums: Vec::new(), is_whole: true };
+        if matches!(scalar, Scalar::U8 | Scalar::U16 | Scalar::I16) {
+            let mut counts = vec![0; (i64::from(u16::MAX) - LOWEST) as usize + 1];
+            samples.iter().for_each(|sample| counts[(sample.value as i64 - LOWEST) as usize] += 1);
+            for (number, count) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
+                order.push((number as i64 + LOWEST) as f64, count);
+            }
+            return order;
+        }
+        let mut values: Vec<f64> = samples.iter().map(|sample| sample.value).collect();
+        values.par_sort_unstable_by(f64::total_cmp);
+        values.chunk_by(|a, b| a == b).for_each(|equal| order.push(equal[0], equal.len()));
+        order.is_whole =
+            scalar != Scalar::F32 || order.values.iter().all(|value| value.fract() == 0.0);
+        order
+    }
+
+    /// Adds the next value, which so many samples have.
+    fn push(&mut self, value: f64, count: usize) {
+        self.values.push(value);
+        self.sums.push(count + self.sums.last().copied().unwrap_or(0));
+    }
+
+    /// Returns the smallest and the largest value, or 0 if there is none.
+    fn ends(&self) -> [f64; 2] {
+        [self.values.first(), self.values.last()].map(|end| end.copied().unwrap_or(0.0))
+    }
+
+    /// Returns the value of the sample at a share of the way from the smallest to the largest.
+    fn at(&self, share: f64) -> Option<f64> {
+        let last = self.sums.last()?.saturating_sub(1) as f64;
+        let number = (share * last).round() as usize;
+        self.values.get(self.sums.partition_point(|sum| *sum <= number)).copied()
+    }
+}
+
+/// Returns the range without outliers. A range that outliers do not make twice as wide stays.
+fn without_outliers(order: &Order, range: [f64; 2]) -> [f64; 2] {
+    let inner = [OUTLIERS, 1.0 - OUTLIERS].map(|share| order.at(share).unwrap_or(range[0]));
     let width = |[low, high]: [f64; 2]| high - low;
     if width(inner) > 0.0 && 2.0 * width(inner) < width(range) { inner } else { range }
 }
@@ -319,18 +480,17 @@ fn bins([low, high]: [f64; 2], is_whole: bool) -> ([f64; 2], usize) {
     ([low - 0.5, low - 0.5 + bins * each], bins as usize)
 }
 
-/// Returns the distinct values, of whole values in ascending order, if they look like labels: few,
-/// constant over regions, and with neighbours of any difference.
-fn labels(values: &[f64], samples: &[Sample]) -> Vec<f64> {
-    let mut distinct = values.to_vec();
-    distinct.dedup();
+/// Returns the values, which are whole, if they look like labels: few, constant over regions, and
+/// with neighbours of any difference. `neighbours` returns pairs of values next to each other.
+fn labels(order: &Order, neighbours: impl FnOnce() -> Vec<[f64; 2]>) -> Vec<f64> {
+    let distinct = &order.values;
     let (mut equal, mut near, mut far) = (0u64, 0u64, 0u64);
     if distinct.len() > LABELS || distinct.len() < 2 {
         return Vec::new();
     }
     let rank = |value: f64| distinct.partition_point(|label| *label < value);
-    for sample in samples.iter().filter(|sample| sample.next.is_finite()) {
-        match rank(sample.value).abs_diff(rank(sample.next)) {
+    for [value, next] in neighbours() {
+        match rank(value).abs_diff(rank(next)) {
             0 => equal += 1,
             1 => near += 1,
             _ => far += 1,
@@ -340,5 +500,59 @@ fn labels(values: &[f64], samples: &[Sample]) -> Vec<f64> {
     let is_even = equal as f64 > 0.75 * all;
     let is_abrupt = far as f64 > 0.3 * unequal;
     let are_few = distinct.len() <= 4 && equal as f64 > 0.9 * all;
-    if distinct.len() == 2 || is_even && (is_abrupt || are_few) { distinct } else { Vec::new() }
+    if distinct.len() == 2 || is_even && (is_abrupt || are_few) {
+        distinct.clone()
+    } else {
+        Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+
+    /// Values that look random, in −0.5 … 0.5.
+    fn noise_at(at: usize) -> f64 {
+        (at as f64 * 0.754_877_666).fract() - 0.5
+    }
+
+    #[test]
+    fn inner_samples_have_the_bits_of_any_sample() {
+        let axes = DMat3::from_cols_array(&[0.7, 0.1, 0.0, -0.2, 1.3, 0.3, 0.0, 0.4, 2.1]);
+        let lattice = Lattice::cartesian([5, 6, 4], DVec3::new(0.3, -7.0, 1.1), axes);
+        let stencil = Stencil::new(&lattice, &noise_at);
+        let distances = stencil.distances.expect("three samples along each axis");
+        for index in (0..3 * 4 * 2).map(|at| [1 + at % 3, 1 + at / 3 % 4, 1 + at / 12]) {
+            let bits = |sample: Sample| [sample.value, sample.slope, sample.mask].map(f64::to_bits);
+            let inner = stencil.inner_sample(index, distances);
+            assert_eq!(bits(inner), bits(stencil.any_sample(index)), "{index:?}");
+            assert!(inner.mask > 0.0 && inner.slope > 0.0);
+        }
+        // A flat lattice has no inner samples.
+        let flat = Lattice::cartesian([5, 6, 2], DVec3::ZERO, axes);
+        assert_eq!(Stencil::new(&flat, &noise_at).distances, None);
+    }
+
+    #[test]
+    fn counted_values_are_in_the_order_of_sorted_ones() {
+        let sample = |at: usize| Sample {
+            value: (noise_at(at) * 900.0).round(),
+            slope: 0.0,
+            mask: f64::NAN,
+        };
+        let samples: Vec<Sample> = (0..3000).map(sample).collect();
+        let [counted, sorted] =
+            [Scalar::I16, Scalar::F32].map(|scalar| Order::of(&samples, scalar));
+        assert_eq!(counted.values, sorted.values);
+        assert_eq!(counted.sums, sorted.sums);
+        assert!(counted.is_whole && sorted.is_whole);
+        let mut values: Vec<f64> = samples.iter().map(|sample| sample.value).collect();
+        values.sort_by(f64::total_cmp);
+        for share in [0.0, 0.0005, 0.25, 0.9995, 1.0] {
+            assert_eq!(counted.at(share), Some(values[(share * 2999.0).round() as usize]));
+        }
+        assert_eq!(Order::of(&[], Scalar::U8).at(0.5), None);
+        assert_eq!(Order::of(&[], Scalar::F32).ends(), [0.0; 2]);
+    }
 }
