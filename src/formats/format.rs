@@ -174,6 +174,12 @@ impl Format {
         }
     }
 
+    /// Returns whether files of the format may hold several arrays or series, which
+    /// [`arrays`](super::arrays) and [`series`](super::series) list.
+    pub fn has_choices(&self) -> bool {
+        self.arrays.is_some() || self.series.is_some()
+    }
+
     /// Returns whether this build has no reader of the format, because its feature is off.
     pub fn is_left_out(&self) -> bool {
         let is_read = self.mesh.is_some()

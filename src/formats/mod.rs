@@ -53,6 +53,7 @@ mod stream;
 mod table;
 #[cfg(feature = "tiff")]
 pub mod tiff;
+mod times;
 #[cfg(all(test, any(target_os = "linux", target_os = "macos")))]
 mod vanishing;
 mod volume_stream;
@@ -80,6 +81,7 @@ pub(crate) use shared::texture::decode as decode_picture;
 pub(crate) use stream::Settled;
 pub use stream::Stream;
 pub use table::FORMATS;
+pub use times::{Times, times};
 pub use volume_stream::VolumeStream;
 pub use vtu_write::write_cells;
 

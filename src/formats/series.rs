@@ -24,6 +24,19 @@ pub struct Series {
     pub is_drawn: bool,
 }
 
+impl Series {
+    /// Returns a text that names the series among others: its number, what it shows, what measured
+    /// it, and how many pictures it has.
+    pub fn title(&self) -> String {
+        let Self { description, modality, pictures, .. } = self;
+        let number = self.number.map(|number| number.to_string());
+        let words = [number.as_deref().unwrap_or("–"), modality, description];
+        let words: Vec<&str> = words.into_iter().filter(|word| !word.is_empty()).collect();
+        let noun = if *pictures == 1 { "picture" } else { "pictures" };
+        format!("{} ({pictures} {noun})", words.join(" "))
+    }
+}
+
 /// Returns the series of a folder, or of a file that lists others, in the order of their numbers.
 /// [`ReadOptions::series`] chooses one of them. Empty if the format knows no series.
 ///

@@ -13,7 +13,7 @@ use std::{
 };
 use web_time::Instant;
 
-/// The bytes used, the time reading began, and the files opened.
+/// The bytes used, the time reading began, the files opened, and the times that they hold.
 pub(crate) struct Budget {
     spent: AtomicU64,
     created: Instant,
@@ -21,6 +21,8 @@ pub(crate) struct Budget {
     begun: AtomicU64,
     /// The files opened so far.
     files: Mutex<Vec<PathBuf>>,
+    /// The number of times that the files hold, and the one that is read.
+    times: Mutex<Option<(u64, usize)>>,
 }
 
 impl Budget {
@@ -30,6 +32,7 @@ impl Budget {
             created: Instant::now(),
             begun: AtomicU64::new(0),
             files: Mutex::default(),
+            times: Mutex::default(),
         }
     }
 
@@ -65,6 +68,21 @@ impl Budget {
     /// Returns the files opened so far.
     pub fn files(&self) -> Vec<PathBuf> {
         self.files.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Records the number of times that a file holds, and the one that is read. The file with the
+    /// most times counts.
+    pub fn choose_time(&self, count: u64, time: usize) {
+        let mut times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
+        if times.is_none_or(|(before, _)| before <= count) {
+            *times = Some((count, time));
+        }
+    }
+
+    /// Returns the number of times that the files hold, and the one that is read; `None` if no
+    /// reader has come across times.
+    pub fn times(&self) -> Option<(u64, usize)> {
+        *self.times.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns an error if reading has taken longer than the limit.

@@ -137,6 +137,17 @@ impl<'a> Source<'a> {
         self.budget.files()
     }
 
+    /// Records the number of times that the file holds, and the one that is read.
+    pub(crate) fn choose_time(&self, count: u64, time: usize) {
+        self.budget.choose_time(count, time);
+    }
+
+    /// Returns the number of times that the input holds, and the one that is read; `None` if no
+    /// reader has come across times.
+    pub(crate) fn times(&self) -> Option<(u64, usize)> {
+        self.budget.times()
+    }
+
     /// Uses bytes instead of a file, for programs that get their data from elsewhere. `name` stands
     /// for the path in errors; its extension gives the format where readers look at extensions.
     /// There is no folder, so files that the bytes refer to are not read. Missing materials and

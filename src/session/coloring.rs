@@ -131,7 +131,7 @@ impl Coloring {
     ) -> Result<Option<Legend>> {
         let paint = self.paint_of(mesh, up, named).map_err(|message| {
             let hint = "colours are written as orange or '#ff8800'; the colours height and normal \
-                        suit any surface; values needs --scalar (in Python, scalar)";
+                        suit any surface; values needs --scalar";
             name.unfit("attributes", &message, hint)
         })?;
         let Some(paint) = paint else { return Ok(None) };
@@ -218,9 +218,8 @@ pub fn check_log(scale: &ColorScale) -> Result<()> {
         return Ok(());
     }
     Err(Error::Argument(format!(
-        "colours over logarithms (--log-colors; in Python, log_colors) need a range above 0, such \
-         as {},{high}, but the values shown are {low} to {high}; --range (in Python, range) sets \
-         it",
+        "colours over logarithms (--log-colors) need a range above 0, such as {},{high}, but the \
+         values shown are {low} to {high}; --range sets it",
         if high > 0.0 { high / 1000.0 } else { 1.0 }
     )))
 }

@@ -6,7 +6,7 @@ use crate::{
     about::{About, Frame, Modality, Orientation, direction_name},
     bricks::Bricks,
     cells::{CellKind, Cells, Place},
-    formats::{Array, Series},
+    formats::{Array, Series, Times},
     gaussians::Gaussians,
     hierarchy::Hierarchy,
     input,
@@ -68,6 +68,10 @@ impl Opened<'_> {
         named.insert("count".into(), json!(count));
         named.insert("bytes".into(), json!(bytes));
         named.insert("bytes_per_point".into(), json!(bytes as f64 / count.max(1) as f64));
+        if let Some(Times { count, read }) = self.times() {
+            named.insert("times".into(), json!(count));
+            named.insert("time".into(), json!(read));
+        }
         if data.holes() > 0 {
             named.insert("missing".into(), json!(data.holes()));
         }

@@ -546,7 +546,7 @@ impl Adding<'_> {
     fn add_cell_field(&mut self, cells: &Cells) -> Result<()> {
         let Self { name, showing, .. } = *self;
         if cells.values.is_empty() {
-            let hint = "--cells solid (in Python, cells) draws their boundary";
+            let hint = "`--cells solid` draws their boundary";
             return Err(name.unfit("content", "the cells have no values", hint));
         }
         let transfer = showing.appearance.of_cells(&name.text, cells)?;

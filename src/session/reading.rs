@@ -5,7 +5,8 @@ use crate::{
     Error, Result,
     bricks::Bricks,
     formats::{
-        self, Array, Content, FORMATS, Format, Kind, RawLayout, ReadOptions, Series, VolumeStream,
+        self, Array, Content, FORMATS, Format, Kind, RawLayout, ReadOptions, Series, Times,
+        VolumeStream,
     },
     hierarchy::Hierarchy,
     input::{Limits, Source},
@@ -300,6 +301,11 @@ impl Opened<'_> {
             (None, _) | (_, Kind::Gaussians | Kind::Hierarchy | Kind::Bricks) => Ok(Vec::new()),
             (Some(source), _) => formats::arrays(source, &self.reading.options),
         }
+    }
+
+    /// Returns the times of a file that was [read](Self::read); `None` if it holds only one.
+    pub fn times(&self) -> Option<Times> {
+        self.source.as_ref().and_then(formats::times)
     }
 
     /// Returns the series of a folder of pictures, or of a file that lists others; none for other

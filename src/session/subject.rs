@@ -97,7 +97,7 @@ impl Subject {
             let [up, scene] = [orientation.up, self.orientation.up].map(direction_name);
             format!(
                 "{name} says that {up} is up, but the scene stands with {scene} up, as an input \
-                 before says; --up (in Python, up) sets another"
+                 before says; --up sets another"
             )
         })
     }

@@ -27,6 +27,8 @@ const ORDER: &[&str] = &[
     "faces",
     "dims",
     "spacing",
+    "times",
+    "time",
     "type",
     "range",
     "degree",

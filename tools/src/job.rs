@@ -14,7 +14,9 @@ use splatkit::{
     math::Camera,
     picture::Picture,
     scene::{Scene, Settings},
-    session::{self, Description, Drawing, Framing, LoadedInput, PanelLabels, TransferEntry},
+    session::{
+        self, Description, Drawing, Framing, LoadedInput, PanelLabels, Subject, TransferEntry,
+    },
 };
 #[cfg(feature = "window")]
 use splatkit::{
@@ -287,9 +289,9 @@ impl Job {
     }
 
     /// Returns the panels of a picture of several views; `None` for a picture of one view.
-    pub fn figure(&self, loaded: &Loaded, finish: &Finish) -> splatkit::Result<Option<Figure>> {
+    pub fn figure(&self, subject: &Subject, finish: &Finish) -> splatkit::Result<Option<Figure>> {
         let overlay = finish.overlay.as_ref();
-        Figure::new(&self.scene.picture, overlay, (&self.framing()?, &loaded.subject))
+        Figure::new(&self.scene.picture, overlay, (&self.framing()?, subject))
     }
 
     /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,

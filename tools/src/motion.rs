@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 const MOST_FRAMES: u32 = 100_000;
 
 /// The usual frames per second.
-const RATE: f64 = 30.0;
+pub const RATE: f64 = 30.0;
 
 /// Largest size of a path's file, in bytes.
 const MOST_BYTES: usize = 16 << 20;

@@ -9,7 +9,7 @@ use crate::{
     frames::{Frames, Storing, Writer, numbered},
     given::Given,
     job::{Finish, Job, Loaded},
-    motion::{Motion, MotionFlags},
+    motion::{self, Motion, MotionFlags},
     output,
     overlay::OverlayFlags,
     progress::Progress,
@@ -158,15 +158,15 @@ struct Ready<'a> {
     figure: Option<Figure>,
 }
 
-/// A film of a scene that a window shows.
+/// A film or a figure of a scene that a window shows.
 #[cfg(feature = "window")]
 pub struct Export<'a> {
     pub loaded: &'a Loaded,
-    /// The transfer functions of the fields, with the numbers of their items.
+    /// The transfer functions that were edited, with the numbers of their items.
     pub transfers: &'a [(usize, TransferFunction)],
-    pub path: CameraPath,
-    /// Frames per second.
-    pub rate: f64,
+    /// The path of the camera and the frames per second of a film; `None` for the picture of
+    /// several views that the job describes.
+    pub path: Option<(CameraPath, f64)>,
     /// A film, or a picture's name for numbered pictures.
     pub output: &'a Path,
     pub stop: Stop,
@@ -262,7 +262,7 @@ impl Render {
         }
         let mut loaded = job.load(progress)?;
         let (settings, finish) = self.prepare(job, &mut loaded, (&frames, &motion), progress)?;
-        let figure = job.figure(&loaded, &finish)?;
+        let figure = job.figure(&loaded.subject, &finish)?;
         let ready = Ready { job, loaded: &loaded, settings, finish, figure };
         let start = Instant::now();
         let mut drawer = match self.reference {
@@ -329,13 +329,16 @@ impl Render {
     }
 }
 
-/// Draws and writes a film of a scene that is loaded already. Existing files are replaced.
+/// Draws and writes a film or a figure of a scene that is loaded already. Existing files are
+/// replaced.
 #[cfg(feature = "window")]
 pub fn export(job: &Job, export: Export<'_>, progress: &Progress) -> Result<(), Failure> {
-    let Export { loaded, transfers, path, rate, output, stop } = export;
+    let Export { loaded, transfers, path, output, stop } = export;
     let begun = Instant::now();
     let flags = OutputFlags { overwrite: true, ..OutputFlags::default() };
-    let motion = Motion::along(path, rate, output)?;
+    let rate = path.as_ref().map_or(motion::RATE, |(_, rate)| *rate);
+    let motion =
+        path.map_or(Ok(Motion::Still), |(path, rate)| Motion::along(path, rate, output))?;
     let background = job.scene.picture.background();
     let film = Film { size: job.size(), frames: motion.frames(), rate, background };
     let frames = flags.frames(output, &motion, &film, (&job.inputs(), progress))?;
@@ -343,7 +346,17 @@ pub fn export(job: &Job, export: Export<'_>, progress: &Progress) -> Result<(), 
     files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.files))?;
     let mut settings = job.settings(loaded)?;
     settings.controls.stop = stop;
-    let ready = Ready { job, loaded, settings, finish: job.finish(loaded)?, figure: None };
+    let finish = match transfers {
+        [] => job.finish(loaded)?,
+        edited => job.finish_with(loaded, edited)?,
+    };
+    let mut subject = loaded.subject.clone();
+    if motion.is_fitted() {
+        // The clips may be others than those that the scene was loaded with.
+        subject.seen = loaded.scene.seen(&settings.clips)?;
+    }
+    let figure = job.figure(&subject, &finish)?;
+    let ready = Ready { job, loaded, settings, finish, figure };
     let mut drawer = Drawer::engine(job, loaded, progress)?;
     for (item, transfer) in transfers {
         drawer.set_transfer(*item, transfer)?;

@@ -33,6 +33,7 @@ pub(crate) fn of_times(
 ) -> Result<usize> {
     let time = options.time.unwrap_or(0);
     if (time as u64) < count {
+        source.choose_time(count, time);
         warn_of_times(source, count, options, names);
         return Ok(time);
     }
@@ -65,7 +66,10 @@ pub(crate) fn warn_of_channels(source: &Source, count: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::{Limits, testing::warnings_of};
+    use crate::{
+        formats::{Times, times},
+        input::{Limits, testing::warnings_of},
+    };
     use std::path::Path;
 
     fn chosen(count: u64, wanted: Option<usize>) -> (Result<usize>, Vec<String>) {
@@ -84,6 +88,21 @@ mod tests {
         assert_eq!((time.unwrap(), words.len()), (4, 0));
         let (time, words) = chosen(1, None);
         assert_eq!((time.unwrap(), words.len()), (0, 0));
+    }
+
+    #[test]
+    fn the_times_of_a_file_are_known_once_it_is_read() {
+        let limits = Limits::default();
+        let source = Source::from_bytes(Path::new("a"), &[], &limits).unwrap();
+        let options = ReadOptions { time: Some(3), ..ReadOptions::default() };
+        assert_eq!(times(&source), None);
+        // A file that another one refers to has a single time.
+        for count in [5, 1] {
+            let wanted =
+                ReadOptions { time: options.time.filter(|_| count > 1), ..options.clone() };
+            time(&source, "header", count, &wanted).unwrap();
+        }
+        assert_eq!(times(&source), Some(Times { count: 5, read: 3 }));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::{Description, InputEntry, PictureEntry, TransferEntry};
 use crate::{
     Error, Result,
-    formats::Kind,
+    formats::{Kind, Times},
     math::Camera,
     memory,
     scene::{Scene, Settings},
@@ -51,6 +51,8 @@ pub struct LoadedInput {
     pub is_raw: bool,
     /// The names of the values that may colour it, if it is a mesh or a point cloud.
     pub attributes: Vec<String>,
+    /// Its times, if it holds several.
+    pub times: Option<Times>,
     /// What is known of its content, as `splatkit info --json` prints it. Series and arrays beside
     /// those that were read are left out ([`Opened::facts`](crate::session::Opened::facts) has
     /// them).
@@ -67,12 +69,13 @@ pub struct ReadInput {
     pub is_raw: bool,
     /// The files that were read.
     pub files: Vec<PathBuf>,
+    times: Option<Times>,
     facts: Facts,
 }
 
 impl LoadedInput {
     fn new(file: PathBuf, read: &ReadInput) -> Result<Self> {
-        let ReadInput { data, showing, is_raw, facts, .. } = read;
+        let ReadInput { data, showing, is_raw, times, facts, .. } = read;
         let has_lines = matches!(data, Data::Mesh(mesh) if !mesh.lines.is_empty());
         let is_cloud = !has_lines && matches!(data, Data::Mesh(mesh) if mesh.triangles.is_empty());
         let is_solid = matches!(data, Data::Cells(_)) && showing.cell_style()? == CellStyle::Solid;
@@ -81,8 +84,8 @@ impl LoadedInput {
             _ => Vec::new(),
         };
         let kind = data.kind();
-        let (is_raw, facts) = (*is_raw, facts.clone());
-        Ok(Self { file, kind, is_cloud, has_lines, is_solid, is_raw, attributes, facts })
+        let (is_raw, times, facts) = (*is_raw, *times, facts.clone());
+        Ok(Self { file, kind, is_cloud, has_lines, is_solid, is_raw, attributes, times, facts })
     }
 }
 
@@ -168,7 +171,8 @@ impl Description {
         opened.give_radii(&mut data, showing.point_radius.as_deref())?;
         input.transform.apply(path, &mut data)?;
         let (is_raw, files, facts) = (opened.is_raw(), opened.files(), opened.cheap_facts(&data)?);
-        Ok(ReadInput { data, showing, is_raw, files, facts })
+        let times = opened.times();
+        Ok(ReadInput { data, showing, is_raw, files, times, facts })
     }
 }
 

@@ -90,8 +90,10 @@ impl<'py, T> Arguments<'py> for T where
 
 fn new<'py>(py: Python<'py>, class: &str, arguments: impl Arguments<'py>) -> PyResult<PyErr> {
     let module = py.import(intern!(py, "pysplatkit._errors"))?;
-    let arguments = arguments.into_pyobject(py)?;
-    Ok(PyErr::from_value(module.getattr(class)?.call1(arguments)?))
+    let class = PyTuple::new(py, [class])?;
+    let arguments = class.add(arguments.into_pyobject(py)?)?.cast_into::<PyTuple>()?;
+    // Its texts name options as Python does.
+    Ok(PyErr::from_value(module.getattr(intern!(py, "made"))?.call1(arguments)?))
 }
 
 /// Returns the name of a limit, as `limits` takes it.

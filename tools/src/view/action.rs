@@ -51,7 +51,7 @@ pub enum Action {
     Center(DVec3),
     /// Replace the keyframes of the camera's path.
     Keyframes(Vec<Keyframe>),
-    /// Give up the film that is being written.
+    /// Give up the film or the figure that is being written.
     CancelFilm,
     /// Give up the scene that is being loaded.
     CancelLoading,
@@ -138,6 +138,7 @@ pub enum Purpose {
     Open,
     SaveScene,
     SavePicture,
+    SaveFigure,
     OpenTransfer,
     SaveTransfer,
     OpenPath,
@@ -152,6 +153,7 @@ impl Purpose {
             Self::Open => "Open a file",
             Self::SaveScene => "Save the scene",
             Self::SavePicture => "Save the picture",
+            Self::SaveFigure => "Save the figure",
             Self::OpenTransfer => "Load a transfer function",
             Self::SaveTransfer => "Save the transfer function",
             Self::OpenPath => "Open a path of the camera",
@@ -166,6 +168,7 @@ impl Purpose {
             Self::Open | Self::OpenTransfer | Self::OpenPath => None,
             Self::SaveScene => Some("scene.json"),
             Self::SavePicture => Some("picture.png"),
+            Self::SaveFigure => Some("figure.png"),
             Self::SaveTransfer => Some("transfer.json"),
             Self::SavePath => Some("path.json"),
             Self::Export => Some("film.webp"),
@@ -176,7 +179,9 @@ impl Purpose {
     pub fn endings(self) -> &'static [&'static str] {
         match self {
             Self::Open => &[],
-            Self::SavePicture => &["png", "jpg", "jpeg", "tiff", "tif", "webp", "exr"],
+            Self::SavePicture | Self::SaveFigure => {
+                &["png", "jpg", "jpeg", "tiff", "tif", "webp", "exr"]
+            }
             Self::Export => &["webp", "gif", "apng", "mp4", "webm", "mov", "png"],
             _ => &["json"],
         }

@@ -303,7 +303,7 @@ impl CurveEditor {
                 removes
             }
             _ => {
-                ui.weak("Double-click to add a point, right-click to remove one.");
+                ui.weak("Double-click adds, right-click removes a point.");
                 false
             }
         };

@@ -36,20 +36,24 @@ pub struct Document {
     pub path: Option<PathBuf>,
     /// Whether scene files may name files outside their folders, and addresses.
     pub is_trusting: bool,
+    /// The page of the scene that was opened, if that is a figure of several views.
+    figure: Option<PictureEntry>,
 }
 
 impl Document {
-    /// A window shows one view, whose size is its own: several views and lengths on paper are left
-    /// out.
+    /// A window shows one view, whose size is its own. Several views and lengths on paper are kept
+    /// for the [figure](Self::job_of_figure) alone.
     pub fn new(mut now: Description, device: DeviceFlags) -> Self {
         let picture = &mut now.picture;
+        let figure = (!picture.views.is_empty()).then(|| picture.clone());
         if picture.width.is_some() || picture.height.is_some() {
             (picture.size, picture.width, picture.height) = (Some(picture.size()), None, None);
         }
         picture.views.clear();
         (picture.columns, picture.panel_labels) = (None, None);
         let (undone, done) = (Vec::new(), Vec::new());
-        Self { now, undone, done, begun: None, device, path: None, is_trusting: false }
+        let (begun, path, is_trusting) = (None, None, false);
+        Self { now, undone, done, begun, device, path, is_trusting, figure }
     }
 
     /// Shows another scene, without a history.
@@ -227,6 +231,26 @@ impl Document {
         let mut scene = self.now.clone();
         (scene.camera, scene.picture.size) = (None, Some(size));
         scene.framing = unplaced(&scene.framing);
+        self.job_of(scene)
+    }
+
+    /// Returns the number of views of the figure that was opened; 0 if the scene is of one view.
+    pub fn views(&self) -> usize {
+        self.figure.as_ref().map_or(0, |figure| figure.views.len())
+    }
+
+    /// Returns the job of drawing the figure that was opened, with all its views and its size, of
+    /// the scene as it is now.
+    pub fn job_of_figure(&self) -> Result<Job, Failure> {
+        let mut scene = self.now.clone();
+        scene.camera = None;
+        scene.framing = unplaced(&scene.framing);
+        if let Some(figure) = self.figure.clone() {
+            let picture = &mut scene.picture;
+            (picture.views, picture.columns) = (figure.views, figure.columns);
+            (picture.panel_labels, picture.size) = (figure.panel_labels, figure.size);
+            (picture.width, picture.height) = (figure.width, figure.height);
+        }
         self.job_of(scene)
     }
 

@@ -1,4 +1,4 @@
-//! Writing a film in the background.
+//! Writing a film or a figure in the background.
 
 use super::{loader::text_of, painter::Stage};
 use crate::{
@@ -16,20 +16,37 @@ use std::{
     time::Instant,
 };
 
-/// A film that is to be written.
-pub struct Film {
+/// What is written.
+#[derive(Clone)]
+pub enum What {
+    /// A film along a path of the camera, with this many frames per second.
+    Film(CameraPath, f64),
+    /// The picture of several views that was opened.
+    Figure,
+}
+
+impl What {
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Film(..) => "film",
+            Self::Figure => "figure",
+        }
+    }
+}
+
+/// A film or a figure that is to be written.
+pub struct Order {
     pub job: Job,
     pub stage: Arc<Stage>,
-    /// The transfer functions of the fields, with the numbers of their items.
+    /// The transfer functions that were edited, with the numbers of their items.
     pub transfers: Vec<(usize, TransferFunction)>,
-    pub path: CameraPath,
-    /// Frames per second.
-    pub rate: f64,
+    pub what: What,
     pub output: PathBuf,
 }
 
-/// A film that is being written. Dropping it ends that; the file then does not appear.
+/// A file that is being written. Dropping it ends that; the file then does not appear.
 pub struct Exporting {
+    pub what: What,
     progress: Arc<Progress>,
     stop: Stop,
     result: Receiver<Result<(), String>>,
@@ -38,26 +55,29 @@ pub struct Exporting {
 
 impl Exporting {
     /// Starts to write. `tell` is called at the end.
-    pub fn start(film: Film, tell: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+    pub fn start(order: Order, tell: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let (progress, stop) = (Arc::new(Progress::kept()), Stop::default());
+        let what = order.what.clone();
         let (send, result) = channel();
         let (thread_progress, thread_stop) = (Arc::clone(&progress), stop.clone());
-        std::thread::Builder::new().name("film".into()).spawn(move || {
+        std::thread::Builder::new().name(what.name().into()).spawn(move || {
             let export = Export {
-                loaded: &film.stage.loaded,
-                transfers: &film.transfers,
-                path: film.path,
-                rate: film.rate,
-                output: &film.output,
+                loaded: &order.stage.loaded,
+                transfers: &order.transfers,
+                path: match order.what {
+                    What::Film(path, rate) => Some((path, rate)),
+                    What::Figure => None,
+                },
+                output: &order.output,
                 stop: thread_stop,
             };
-            let done = render::export(&film.job, export, &thread_progress)
+            let done = render::export(&order.job, export, &thread_progress)
                 .map_err(|failure| text_of(&failure));
-            // Nobody waits any more if the film was cancelled.
+            // Nobody waits any more if it was cancelled.
             send.send(done).ok();
             tell();
         })?;
-        Ok(Self { progress, stop, result, since: Instant::now() })
+        Ok(Self { what, progress, stop, result, since: Instant::now() })
     }
 
     /// Returns what is being done.
@@ -70,7 +90,9 @@ impl Exporting {
         let result = match self.result.try_recv() {
             Ok(result) => result,
             Err(TryRecvError::Empty) => return None,
-            Err(TryRecvError::Disconnected) => Err("the film could not be written".into()),
+            Err(TryRecvError::Disconnected) => {
+                Err(format!("the {} could not be written", self.what.name()))
+            }
         };
         Some((result, self.progress.take_notes()))
     }

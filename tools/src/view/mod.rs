@@ -9,8 +9,8 @@
 mod action;
 #[cfg(test)]
 mod alike;
-mod arrays;
 mod canvas;
+mod choices;
 mod curve;
 mod dialogs;
 mod document;

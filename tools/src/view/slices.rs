@@ -111,6 +111,7 @@ impl SlicePanes {
     }
 
     fn toolbar(&mut self, ui: &mut Ui, range: [f64; 2]) {
+        ui.weak("Click a slice to set the place.");
         ui.checkbox(&mut self.is_colored, "Transfer function's colours");
         if self.is_colored {
             return;
@@ -175,7 +176,8 @@ impl SlicePanes {
         }
         crosshair(ui, pane, &area, chosen.unwrap_or(place));
         letters(ui, pane, &area);
-        ui.label(under_pointer(pane, &area));
+        // Without a pointer the row stays, so that nothing moves.
+        ui.label(under_pointer(pane, &area).unwrap_or_default());
         self.window = levelled.filter(|[low, high]| low < high).or(self.window);
         chosen
     }
@@ -281,16 +283,16 @@ fn crosshair(ui: &Ui, pane: &Pane, area: &Response, place: DVec3) {
 }
 
 /// Returns the value and the place under the pointer, as text.
-fn under_pointer(pane: &Pane, area: &Response) -> String {
-    let Some(at) = area.hover_pos() else { return "Click to set the place".to_owned() };
+fn under_pointer(pane: &Pane, area: &Response) -> Option<String> {
+    let at = area.hover_pos()?;
     let pixel = pixel(pane, area, at);
     let value = pane.slice.values[pixel.y as usize * pane.slice.size[0] + pixel.x as usize];
     let place = pane.slice.position(pixel.floor() + 0.5);
     let [x, y, z] = place.to_array().map(plain);
-    match value.is_nan() {
+    Some(match value.is_nan() {
         true => format!("No value at {x}, {y}, {z}"),
         false => format!("{} at {x}, {y}, {z}", name_of(pane, f64::from(value))),
-    }
+    })
 }
 
 /// Returns the name of a label, or the number of another value.

@@ -257,7 +257,7 @@ fn a_path_of_the_camera_is_played_saved_and_exported() {
     assert_eq!(window(&mut harness).keyframes.len(), 5);
     window(&mut harness).player.rate = 1.0;
     window(&mut harness).size = [40, 30];
-    window(&mut harness).export(film.clone());
+    window(&mut harness).export_film(film.clone());
     for _ in 0..2000 {
         harness.step();
         if window(&mut harness).exporting.is_none() {

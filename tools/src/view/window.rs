@@ -7,8 +7,8 @@ mod side;
 
 use super::{
     action::{Action, Purpose},
-    arrays::Arrays,
     canvas::Canvas,
+    choices::Choices,
     curve::CurveEditor,
     dialogs::Dialogs,
     document::{Document, LoadedBy},
@@ -80,9 +80,9 @@ pub struct Window {
     /// The keyframes of the camera's path.
     pub keyframes: Vec<Keyframe>,
     pub player: Player,
-    /// The film that is being written.
+    /// The film or the figure that is being written.
     pub exporting: Option<Exporting>,
-    pub arrays: Arrays,
+    pub choices: Choices,
     pub surroundings: Surroundings,
     painter: Painter,
     loading: Option<Loading>,
@@ -109,7 +109,7 @@ impl Window {
         state: Option<&RenderState>,
     ) -> std::io::Result<Self> {
         let repaint = context.clone();
-        Ok(Self {
+        let mut window = Self {
             document,
             scene_view: None,
             measures: false,
@@ -125,7 +125,7 @@ impl Window {
             keyframes: Vec::new(),
             player: Player::default(),
             exporting: None,
-            arrays: Arrays::default(),
+            choices: Choices::default(),
             surroundings,
             painter: Painter::start(move || repaint.request_repaint())?,
             loading: None,
@@ -137,14 +137,16 @@ impl Window {
             save_to: None,
             title: String::new(),
             context: context.clone(),
-        })
+        };
+        window.say_views();
+        Ok(window)
     }
 
     /// Shows the whole window, and does what the user asks for.
     pub fn ui(&mut self, ui: &mut Ui) {
         // Before the picture is painted, so that a frame is seen at once.
         self.take_frame();
-        self.arrays.take();
+        self.choices.take();
         let mut actions = dropped(ui);
         actions.extend(keys::take(ui));
         let top = Panel::top("menu").show(ui, |ui| menu::menu(ui, &self.menu()));
@@ -240,6 +242,7 @@ impl Window {
         };
         menu::Menu {
             recent: self.surroundings.recent.files(),
+            views: self.document.views(),
             can_undo: self.document.can_undo(),
             can_redo: self.document.can_redo(),
             measures: self.measures,

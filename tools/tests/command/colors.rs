@@ -104,7 +104,7 @@ fn flags_without_effect_are_told() {
         ("sheet.ply --color heats", 3, &["no array “heats”", "scalar_Age"][..]),
         ("a.obj --color heat", 3, &["neither a colour nor an attribute", "orange"]),
         ("a.obj --colormap viridis", 2, &["--colormap has no effect", "--color height"]),
-        ("a.obj --scalar-bar", 2, &["--scalar-bar (in Python", "has nothing to show"]),
+        ("a.obj --scalar-bar", 2, &["--scalar-bar has nothing to show", "--color with height"]),
         ("a.nrrd --color height", 2, &["--color colours meshes"]),
         ("sheet.splk --color height", 2, &["--color colours meshes", "converted"]),
         ("a.nrrd --colormap virids", 2, &["virids", "viridis", "_r"]),

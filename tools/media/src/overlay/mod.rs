@@ -84,9 +84,8 @@ impl Overlay {
         }
         if entry.scalar_bar && captions.legends.is_empty() {
             return Err(Failure::Usage(
-                "--scalar-bar (in Python, scalar_bar) has nothing to show, because nothing here is \
-                 coloured by values; --color (in Python, color) with height or with an attribute \
-                 of the file colours surfaces"
+                "--scalar-bar has nothing to show, because nothing here is coloured by values; \
+                 --color with height or with an attribute of the file colours surfaces"
                     .into(),
             ));
         }

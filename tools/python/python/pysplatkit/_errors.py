@@ -6,6 +6,8 @@ import sys
 import warnings
 from pathlib import Path
 
+from ._keywords import in_python
+
 
 class Error(Exception):
     """An error of splatkit. Its subclasses say what a program can do about it."""
@@ -139,9 +141,17 @@ class DataWarning(UserWarning):
 _FOLDER = str(Path(__file__).parent)
 
 
+def made(name: str, *arguments: object) -> Error:
+    """Returns an exception of the library, with keywords instead of flags in its texts."""
+    texts = [in_python(one) if isinstance(one, str) else one for one in arguments]
+    error = globals()[name](*texts)
+    assert isinstance(error, Error)
+    return error
+
+
 def warn(message: str) -> None:
     """Warns at the line outside this package that has called it, however deep inside it is."""
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_FOLDER):
         frame, level = frame.f_back, level + 1
-    warnings.warn(message, DataWarning, stacklevel=level)
+    warnings.warn(in_python(message), DataWarning, stacklevel=level)

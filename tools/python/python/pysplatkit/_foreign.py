@@ -44,7 +44,7 @@ def _chosen(count: int, time: int | None) -> tuple[int, list[str]]:
     if not 0 <= number < count:
         raise ValueError(f"has {count} times, but number {number} was asked for")
     many = count > 1 and time is None
-    words = [f"shows the first of {count} times; --time 1 shows the second"] if many else []
+    words = [f"shows the first of {count} times; time=1 shows the second"] if many else []
     return number, words
 
 

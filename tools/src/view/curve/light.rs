@@ -1,12 +1,16 @@
 //! The light on gradients, and the length that opacities hold for.
 
 use super::number::number;
-use eframe::egui::{Grid, Ui};
+use eframe::egui::{CollapsingHeader, Grid, Ui};
 use splatkit::volume::{Shade, TransferFunction};
 
-/// Shows the light and the opacity unit. `last` is the light that comes back when it is switched
-/// on.
+/// Shows the light and the opacity unit, folded at first: few people change them. `last` is the
+/// light that comes back when it is switched on.
 pub fn show(ui: &mut Ui, transfer: &mut TransferFunction, last: &mut Shade) {
+    CollapsingHeader::new("Light, opacity unit").show(ui, |ui| numbers(ui, transfer, last));
+}
+
+fn numbers(ui: &mut Ui, transfer: &mut TransferFunction, last: &mut Shade) {
     let mut is_lit = transfer.shade.is_some();
     if ui.checkbox(&mut is_lit, "Light").changed() {
         transfer.shade = is_lit.then_some(*last);

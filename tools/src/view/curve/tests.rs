@@ -312,6 +312,8 @@ fn factors_by_gradient_are_edited_in_the_same_way() {
 fn light_comes_back_as_it_was() {
     let shade = Shade { ambient: 0.5, ..Shade::default() };
     let mut harness = harness_of(TransferFunction { shade: Some(shade), ..transfer() });
+    harness.get_by_label("Light, opacity unit").click();
+    harness.run();
     harness.get_by_role_and_label(Role::SpinButton, "Power").set_value_accesskit(42.0);
     harness.run();
     harness.get_by_label("Light").click();

@@ -42,7 +42,7 @@ pub fn show(ui: &mut Ui, model: &Appearance) -> Vec<Action> {
         background(ui, scene, &mut actions);
         engine(ui, scene, &mut actions);
     });
-    switches(ui, scene, &mut actions);
+    Grid::new("switches").num_columns(2).show(ui, |ui| switches(ui, scene, &mut actions));
     Grid::new("numbers").num_columns(2).show(ui, |ui| {
         if model.has(given::MESH | given::CLOUD) {
             surfaces(ui, model, &mut actions);
@@ -132,6 +132,7 @@ fn switches(ui: &mut Ui, scene: &Description, actions: &mut Vec<Action>) {
     let darken = |scene: &mut Description, on: bool| scene.picture.shade = on.then_some(false);
     switch(ui, "Without light", is_dark, darken, actions);
     switch(ui, "Axes", overlay.axes, |scene, on| scene.overlay.axes = on, actions);
+    ui.end_row();
     let scale_bar = overlay.scale_bar;
     switch(ui, "Scale bar", scale_bar, |scene, on| scene.overlay.scale_bar = on, actions);
     let scalar_bar = overlay.scalar_bar;

@@ -20,7 +20,7 @@ pub fn show(ui: &mut Ui, frame: &Frame, delay: f64, device: &str) {
         row("Entries", stats.entries.to_string());
         row("Passes", stats.passes.to_string());
         row("Missing pages", stats.missing_pages.to_string());
-        row("Bytes", stats.gpu_bytes.to_string());
+        row("Memory", format!("{:.1} MiB", stats.gpu_bytes as f64 / f64::from(1 << 20)));
         row("Frame", format!("{:.1} ms", frame.milliseconds));
         row("Behind the hand", format!("{delay:.1} ms"));
         row("Device", device.to_owned());

@@ -1,15 +1,19 @@
-//! The inputs: which are drawn, their arrays, and the colours and opacities of surfaces.
+//! The inputs: which are drawn, their series, times and arrays, and the colours and opacities of
+//! surfaces.
 
 use super::lists::{choice, color, held};
 use crate::{
     given::{self, Kinds},
     view::{
         action::{Action, Purpose},
-        arrays::{self, Arrays},
+        choices::{self, Choices},
     },
 };
-use eframe::egui::{DragValue, Ui};
-use splatkit::session::{Description, InputEntry, LoadedInput, SurfaceColor};
+use eframe::egui::{DragValue, Slider, Ui};
+use splatkit::{
+    formats::Times,
+    session::{Description, InputEntry, LoadedInput, SurfaceColor},
+};
 
 /// The colour of a surface when one colour is chosen for it first.
 const PLAIN: [f32; 3] = [0.8, 0.8, 0.8];
@@ -19,7 +23,7 @@ pub struct Inputs<'a> {
     pub scene: &'a Description,
     /// What the visible inputs are, as far as they are loaded.
     pub loaded: &'a [LoadedInput],
-    pub arrays: &'a Arrays,
+    pub choices: &'a Choices,
 }
 
 pub fn show(ui: &mut Ui, model: &Inputs) -> Vec<Action> {
@@ -30,6 +34,10 @@ pub fn show(ui: &mut Ui, model: &Inputs) -> Vec<Action> {
             let loaded = model.loaded.iter().find(|input| input.file == entry.file);
             let Some(loaded) = loaded.filter(|_| entry.visible) else { return };
             ui.indent("input", |ui| {
+                series(ui, number, entry, model, &mut actions);
+                if let Some(times) = loaded.times {
+                    time(ui, number, (entry, times), model.scene, &mut actions);
+                }
                 array(ui, number, entry, model, &mut actions);
                 let kinds: Kinds = given::kinds_of_input(loaded);
                 if kinds & (given::MESH | given::CLOUD) != 0 {
@@ -61,6 +69,55 @@ fn head(ui: &mut Ui, number: usize, entry: &InputEntry, actions: &mut Vec<Action
     });
 }
 
+/// Shows the series of an input, if it has several.
+fn series(
+    ui: &mut Ui,
+    number: usize,
+    entry: &InputEntry,
+    model: &Inputs,
+    actions: &mut Vec<Action>,
+) {
+    let all = model.choices.series(model.scene, entry);
+    let named = all.map(|series| (series.title(), Some(series.identifier.clone())));
+    let named: Vec<_> = named.collect();
+    let current = model.scene.reading_of(entry).series;
+    if named.len() < 2 && current.is_none() {
+        return;
+    }
+    let automatic = [("automatic".to_owned(), None)];
+    ui.horizontal(|ui| {
+        let entries = automatic.into_iter().chain(named);
+        if let Some(series) = choice(ui, "Series", entries, &current, current.as_deref()) {
+            actions.push(Action::change(move |scene| {
+                choices::choose_series(scene, number, series);
+            }));
+        }
+    });
+}
+
+/// Shows the times of an input. Another one is read once, at the end of a drag.
+fn time(
+    ui: &mut Ui,
+    number: usize,
+    (entry, times): (&InputEntry, Times),
+    scene: &Description,
+    actions: &mut Vec<Action>,
+) {
+    ui.horizontal(|ui| {
+        let label = ui.label("Time");
+        let last = usize::try_from(times.count - 1).unwrap_or(usize::MAX);
+        let current = scene.reading_of(entry).time.unwrap_or(times.read);
+        let time = held(ui, "time", current, |ui, time| {
+            let slider = Slider::new(time, 0..=last).integer().update_while_editing(false);
+            ui.add(slider).labelled_by(label.id);
+        });
+        ui.weak(format!("of 0 to {last}"));
+        if let Some(time) = time {
+            actions.push(Action::change(move |scene| choices::choose_time(scene, number, time)));
+        }
+    });
+}
+
 /// Shows the arrays of an input, if it has several.
 fn array(
     ui: &mut Ui,
@@ -69,8 +126,8 @@ fn array(
     model: &Inputs,
     actions: &mut Vec<Action>,
 ) {
-    let names = model.arrays.names(model.scene, entry);
-    let current = arrays::chosen(model.scene, entry);
+    let names = model.choices.arrays(model.scene, entry);
+    let current = choices::array_of(model.scene, entry);
     if names.len() < 2 && current.is_none() {
         return;
     }
@@ -79,7 +136,9 @@ fn array(
     ui.horizontal(|ui| {
         let entries = automatic.into_iter().chain(named);
         if let Some(array) = choice(ui, "Array", entries, &current, current.as_deref()) {
-            actions.push(Action::change(move |scene| arrays::choose(scene, number, array)));
+            actions.push(Action::change(move |scene| {
+                choices::choose_array(scene, number, array);
+            }));
         }
     });
 }

@@ -12,6 +12,8 @@ use std::path::PathBuf;
 /// What the menu shows.
 pub struct Menu<'a> {
     pub recent: &'a [PathBuf],
+    /// The number of views of the figure that was opened, or 0.
+    pub views: usize,
     pub can_undo: bool,
     pub can_redo: bool,
     pub measures: bool,
@@ -32,7 +34,7 @@ fn entry(ui: &mut Ui, name: &str, action: Action, actions: &mut Vec<Action>) {
 pub fn menu(ui: &mut Ui, model: &Menu) -> Vec<Action> {
     let mut actions = Vec::new();
     egui::MenuBar::new().ui(ui, |ui| {
-        ui.menu_button("File", |ui| file(ui, model.recent, &mut actions));
+        ui.menu_button("File", |ui| file(ui, model, &mut actions));
         ui.menu_button("Edit", |ui| {
             ui.add_enabled_ui(model.can_undo, |ui| {
                 entry(ui, "Undo (Ctrl+Z)", Action::Undo, &mut actions);
@@ -64,7 +66,8 @@ pub fn menu(ui: &mut Ui, model: &Menu) -> Vec<Action> {
     actions
 }
 
-fn file(ui: &mut Ui, recent: &[PathBuf], actions: &mut Vec<Action>) {
+fn file(ui: &mut Ui, model: &Menu, actions: &mut Vec<Action>) {
+    let recent = model.recent;
     entry(ui, "Open… (Ctrl+O)", Action::Ask(Purpose::Open), actions);
     ui.add_enabled_ui(!recent.is_empty(), |ui| {
         ui.menu_button("Open recent", |ui| {
@@ -85,6 +88,10 @@ fn file(ui: &mut Ui, recent: &[PathBuf], actions: &mut Vec<Action>) {
         });
     });
     entry(ui, "Save picture… (Ctrl+P)", Action::Ask(Purpose::SavePicture), actions);
+    if model.views > 0 {
+        let name = format!("Save figure of {} views…", model.views);
+        entry(ui, &name, Action::Ask(Purpose::SaveFigure), actions);
+    }
     entry(ui, "Save scene… (Ctrl+S)", Action::Ask(Purpose::SaveScene), actions);
     entry(ui, "Copy command (Ctrl+Shift+C)", Action::CopyCommand, actions);
     ui.separator();

@@ -1,7 +1,16 @@
 //! What users come for, by mouse and keys alone: each test is one task, told in docs/window.md.
 
+#[allow(dead_code, reason = "other tests use the rest")]
+#[path = "../../../../tests/inputs/medical.rs"]
+mod inputs;
+#[allow(dead_code, reason = "other tests use the rest")]
+#[path = "../../../../tests/testing/server.rs"]
+mod server;
+
 use super::*;
 use egui::{Key, Modifiers, ViewportCommand, ViewportId};
+use inputs::{dicom, element};
+use server::Server;
 use std::{fmt::Write as _, path::PathBuf};
 
 type Driven = Harness<'static, Option<Window>>;
@@ -85,18 +94,7 @@ fn another_array_is_chosen_from_a_list() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut harness = harness_of(folder.path(), two_arrays(folder.path()));
     rest(&mut harness);
-    // The list is read in the background.
-    for _ in 0..200 {
-        if harness.query_by_role_and_label(egui::Role::ComboBox, "Array").is_some() {
-            break;
-        }
-        harness.step();
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    let values = |harness: &mut Driven| {
-        let scene_view = window(harness).scene_view.as_ref().expect("a scene");
-        scene_view.stage.values(0)
-    };
+    wait_for_list(&mut harness, "Array");
     assert!(values(&mut harness)[1] < 100.0);
     choose(&mut harness, "Array", "flow");
     rest(&mut harness);
@@ -105,6 +103,148 @@ fn another_array_is_chosen_from_a_list() {
     key(&mut harness, Modifiers::COMMAND, Key::Z);
     rest(&mut harness);
     assert!(values(&mut harness)[1] < 100.0, "the array was not undone");
+}
+
+/// Two series in a folder, the second one of two slices.
+fn study(folder: &Path) -> PathBuf {
+    let study = folder.join("study");
+    std::fs::create_dir_all(&study).expect("a folder");
+    for (series, number, words, values) in
+        [("1.2.3", "4", "thin", &[10u8, 20, 30][..]), ("1.2.5", "9", "thick ", &[100, 110])]
+    {
+        for (z, value) in values.iter().enumerate() {
+            let file = dicom(".1", &[*value, value + 1, value + 2, value + 3]);
+            let at = file.windows(4).position(|tag| tag == [0x28, 0, 2, 0]).expect("pixels");
+            let (before, after) = file.split_at(at);
+            let text = |group, tag, kind, text: &str| {
+                let even = if text.len() % 2 == 1 { format!("{text} ") } else { text.to_owned() };
+                element(group, tag, kind, even.as_bytes())
+            };
+            let whole = [
+                before,
+                &text(8, 0x103e, "LO", words),
+                &text(0x20, 0xe, "UI", series),
+                &text(0x20, 0x11, "IS", number),
+                &text(0x20, 0x32, "DS", &format!("0\\0\\{z}")),
+                &text(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0"),
+                after,
+            ];
+            std::fs::write(study.join(format!("{number}-{z}")), whole.concat()).expect("written");
+        }
+    }
+    study
+}
+
+/// Steps until a list is there: it is read in the background.
+fn wait_for_list(harness: &mut Driven, name: &str) {
+    for _ in 0..1000 {
+        if harness.query_by_role_and_label(egui::Role::ComboBox, name).is_some() {
+            return;
+        }
+        harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    panic!("no list “{name}”; messages: {:?}", window(harness).messages);
+}
+
+fn values(harness: &mut Driven) -> [f64; 2] {
+    window(harness).scene_view.as_ref().expect("a scene").stage.values(0)
+}
+
+#[test]
+fn another_series_is_chosen_from_a_list() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness_of(folder.path(), study(folder.path()));
+    rest(&mut harness);
+    wait_for_list(&mut harness, "Series");
+    assert_eq!(values(&mut harness), [10.0, 33.0]);
+    choose(&mut harness, "Series", "9 CT thick (2 pictures)");
+    rest(&mut harness);
+    assert_eq!(scene(&mut harness).reading.series.as_deref(), Some("1.2.5"));
+    assert_eq!(values(&mut harness), [100.0, 113.0]);
+    key(&mut harness, Modifiers::COMMAND, Key::Z);
+    rest(&mut harness);
+    assert_eq!(values(&mut harness), [10.0, 33.0], "the series was not undone");
+}
+
+#[test]
+fn another_time_is_chosen_by_a_slider() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut bytes = b"NRRD0005\ntype: uint8\ndimension: 4\nsizes: 4 4 4 3\nencoding: raw\n\
+        kinds: domain domain domain time\n\n"
+        .to_vec();
+    bytes.extend((0..192u8).map(|at| at % 64 + 70 * (at / 64)));
+    let file = folder.path().join("times.nrrd");
+    std::fs::write(&file, bytes).expect("written");
+    let mut harness = harness_of(folder.path(), file);
+    rest(&mut harness);
+    assert_eq!(values(&mut harness), [0.0, 63.0]);
+    harness.get_by_label("of 0 to 2");
+    harness.get_by_role_and_label(egui::Role::SpinButton, "Time").set_value_accesskit(2.0);
+    steps(&mut harness, 3);
+    rest(&mut harness);
+    assert_eq!(scene(&mut harness).reading.time, Some(2));
+    assert_eq!(values(&mut harness), [140.0, 203.0]);
+    // A file of one time has no slider.
+    let mut alone = harness_of(folder.path(), patient(folder.path()));
+    rest(&mut alone);
+    assert!(alone.query_by_label("Time").is_none());
+}
+
+/// An object on a server was fetched to be drawn, so that its arrays are listed too.
+#[test]
+fn an_array_of_a_remote_file_is_chosen_from_a_list() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = two_arrays(folder.path());
+    let server = Server::of(std::fs::read(file).expect("a file"));
+    let address = splatkit::input::address(server.address("two.vtk"));
+    let mut harness = harness_of(folder.path(), address);
+    rest(&mut harness);
+    wait_for_list(&mut harness, "Array");
+    choose(&mut harness, "Array", "flow");
+    rest(&mut harness);
+    assert!(values(&mut harness)[0] >= 1000.0, "{:?}", values(&mut harness));
+}
+
+/// The file is the one that `render` writes of the same scene.
+#[test]
+fn a_figure_is_saved_with_all_its_views() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut harness = harness(folder.path());
+    rest(&mut harness);
+    let figure = folder.path().join("figure.json");
+    let text = r#"{"splatkit_scene": 1, "inputs": [{"file": "v.nrrd"}], "engine": "cpu",
+        "picture": {"views": ["front", "left"], "size": [96, 48], "samples": 1}}"#;
+    std::fs::write(&figure, text).expect("written");
+    window(&mut harness).open(vec![figure.clone()]);
+    rest(&mut harness);
+    let messages = window(&mut harness).messages.clone();
+    let is_said = |(text, is_error): &(String, bool)| text.contains("2 views") && !is_error;
+    assert!(messages.iter().any(is_said), "{messages:?}");
+    click(&mut harness, "File");
+    click(&mut harness, "Save figure of 2 views…");
+    let [saved, drawn] = ["saved.png", "drawn.png"].map(|name| folder.path().join(name));
+    key(&mut harness, Modifiers::COMMAND, Key::A);
+    harness.event(egui::Event::Text(saved.display().to_string()));
+    harness.step();
+    harness.key_press(Key::Enter);
+    steps(&mut harness, 2);
+    for _ in 0..4000 {
+        harness.step();
+        if window(&mut harness).exporting.is_none() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let words = ["splatkit", "render", &figure.display().to_string(), "-o"].map(str::to_owned);
+    let words = words.into_iter().chain([drawn.display().to_string()]);
+    let matches = Command::command().try_get_matches_from(words).expect("flags");
+    let Task::Render(render) = Command::from_arg_matches(&matches).expect("a command").task else {
+        panic!("another task");
+    };
+    render.run(&Given::of(&matches), &Progress::kept()).expect("a picture");
+    let [saved, drawn] = [saved, drawn].map(|file| std::fs::read(file).expect("a picture"));
+    assert!(saved == drawn, "{:?}", window(&mut harness).messages);
 }
 
 #[test]

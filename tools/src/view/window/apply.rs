@@ -46,8 +46,9 @@ impl Window {
             Action::Center(point) => self.center(point),
             Action::Keyframes(keyframes) => self.keyframes = keyframes,
             Action::CancelFilm => {
-                self.exporting = None;
-                self.say("the film was cancelled", false);
+                if let Some(exporting) = self.exporting.take() {
+                    self.say(format!("the {} was cancelled", exporting.what.name()), false);
+                }
             }
             Action::CancelLoading => self.cancel(),
             Action::CopyCommand => self.copy_command(),
@@ -91,7 +92,8 @@ impl Window {
             Purpose::SaveTransfer => self.save_transfer(&first),
             Purpose::OpenPath => self.load_path(&first),
             Purpose::SavePath => self.save_path(&first),
-            Purpose::Export => self.export(first),
+            Purpose::Export => self.export_film(first),
+            Purpose::SaveFigure => self.export_figure(first),
         }
     }
 

@@ -117,7 +117,7 @@ impl Window {
         (self.curve, self.slices) = (CurveEditor::new(bounds.diagonal()), SlicePanes::default());
         self.hand = Hand::default();
         let repaint = self.context.clone();
-        self.arrays.read(self.document.scene(), move || repaint.request_repaint());
+        self.choices.read(self.document.scene(), move || repaint.request_repaint());
         self.keep_recent();
         (self.set_for, self.ordered) = (None, None);
         self.measured.clear();

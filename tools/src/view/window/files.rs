@@ -3,12 +3,13 @@
 
 use super::Window;
 use crate::{
+    failure::Failure,
     frames::Storing,
-    job::Finish,
+    job::{Finish, Job},
     motion::read_path,
     scene_file,
     view::{
-        export::{Exporting, Film},
+        export::{Exporting, Order, What},
         loader::text_of,
     },
 };
@@ -33,6 +34,7 @@ impl Window {
                 Ok(scene) => {
                     self.document.open(scene, path.clone());
                     self.loaded_by = None;
+                    self.say_views();
                 }
                 Err(error) => self.say(text_of(&error.into()), true),
             }
@@ -40,6 +42,18 @@ impl Window {
         }
         let entries = files.into_iter().map(InputEntry::new);
         self.document.change(|scene| scene.inputs.extend(entries));
+    }
+
+    /// Says that the window shows one view, if a figure of several was opened.
+    pub fn say_views(&mut self) {
+        let views = self.document.views();
+        if views > 0 {
+            let text = format!(
+                "a figure of {views} views: the window shows one of them; File, Save figure saves \
+                 all"
+            );
+            self.say(text, false);
+        }
     }
 
     /// Puts what is shown at the top of the recent files: the scene file, or else the inputs.
@@ -65,6 +79,10 @@ impl Window {
         let done = self.document.save(path);
         let is_saved = done.is_ok();
         self.say_saved(path, done);
+        let views = self.document.views();
+        if is_saved && views > 0 {
+            self.say(format!("the scene has the view that is shown, not the {views} views"), false);
+        }
         if is_saved && scene_file::read(path, false).is_err() {
             let name = path.display();
             self.say(format!("{name} names files elsewhere: open it with --trust-scene"), false);
@@ -131,29 +149,36 @@ impl Window {
     }
 
     /// Starts to write a film along the path of the camera.
-    pub fn export(&mut self, output: PathBuf) {
+    pub fn export_film(&mut self, output: PathBuf) {
+        let path = CameraPath::new(self.keyframes.clone()).map_err(Failure::from);
+        let what = path.map(|path| What::Film(path, self.player.rate));
+        let job = self.document.job_of_film(self.size);
+        self.export(what.and_then(|what| Ok((what, job?))), output);
+    }
+
+    /// Starts to write the figure that was opened, as `render` draws it.
+    pub fn export_figure(&mut self, output: PathBuf) {
+        let job = self.document.job_of_figure();
+        self.export(job.map(|job| (What::Figure, job)), output);
+    }
+
+    fn export(&mut self, wanted: Result<(What, Job), Failure>, output: PathBuf) {
         let Some(scene_view) = &self.scene_view else { return };
         let stage = Arc::clone(&scene_view.stage);
+        let transfers = scene_view.edited_transfers(&self.document);
         let repaint = self.context.clone();
-        let started = self
-            .document
-            .job_of_film(self.size)
-            .and_then(|job| Ok((job, CameraPath::new(self.keyframes.clone())?)))
-            .map_err(|failure| text_of(&failure))
-            .and_then(|(job, path)| {
-                let transfers = scene_view.transfers(&self.document);
-                let rate = self.player.rate;
-                let film = Film { job, stage, transfers, path, rate, output };
-                Exporting::start(film, move || repaint.request_repaint())
-                    .map_err(|error| error.to_string())
-            });
+        let started = wanted.map_err(|failure| text_of(&failure)).and_then(|(what, job)| {
+            let order = Order { job, stage, transfers, what, output };
+            Exporting::start(order, move || repaint.request_repaint())
+                .map_err(|error| error.to_string())
+        });
         match started {
             Ok(exporting) => self.exporting = Some(exporting),
             Err(message) => self.say(message, true),
         }
     }
 
-    /// Says how a film ended.
+    /// Says how a film or a figure ended.
     pub(super) fn take_film(&mut self) {
         let Some(exporting) = &self.exporting else { return };
         let Some((result, notes)) = exporting.take() else {

@@ -62,7 +62,7 @@ impl Window {
         let model = inputs::Inputs {
             scene: self.document.scene(),
             loaded: loaded.unwrap_or_default(),
-            arrays: &self.arrays,
+            choices: &self.choices,
         };
         inputs::show(ui, &model)
     }
