@@ -174,6 +174,11 @@ impl Items {
         self.contents.iter().map(|content| content.count).sum()
     }
 
+    /// Returns the number of items.
+    pub(super) fn len(&self) -> usize {
+        self.entries.len()
+    }
+
     /// Returns the edges of meshes and cells that are drawn over a picture with these clips.
     pub(super) fn edges(&self, clips: &[Clip]) -> Vec<Arc<Edges>> {
         let of_solid = |entry: &Entry| match entry {

@@ -24,7 +24,7 @@ impl Frames {
     pub fn pictures(output: &Path, count: Option<u32>, overwrite: bool) -> Result<Self, Failure> {
         let Some(count) = count else {
             if Format::of(output).is_some() && PictureFormat::of(output).is_err() {
-                let message = "an animation needs --turntable or --path";
+                let message = "an animation needs --turntable, --path or --times";
                 return Err(Failure::Usage(format!("{}: {message}", output.display())));
             }
             return Ok(Self::Pictures(vec![Target::new(output, overwrite)?]));

@@ -185,6 +185,15 @@ impl Job {
         Ok(loaded)
     }
 
+    /// Reads the inputs of a loaded scene again, at another time ([`Description::at_time`]).
+    pub fn at_time(&self, loaded: &Loaded, time: usize) -> Result<(Self, Loaded), Failure> {
+        let mut job = self.clone();
+        job.scene = self.scene.at_time(loaded, time);
+        let start = Instant::now();
+        let session = job.scene.load(&|_| ()).map_err(|error| self.with_flags(error))?;
+        Ok((job, Loaded { session, load_ms: start.elapsed().as_secs_f64() * 1e3 }))
+    }
+
     /// Names the flags that change a transfer function in an error about it.
     fn with_flags(&self, error: Error) -> Failure {
         match error {
@@ -292,6 +301,17 @@ impl Job {
     pub fn figure(&self, subject: &Subject, finish: &Finish) -> splatkit::Result<Option<Figure>> {
         let overlay = finish.overlay.as_ref();
         Figure::new(&self.scene.picture, overlay, (&self.framing()?, subject))
+    }
+
+    /// Returns the panels of a picture of several times.
+    pub fn figure_of_times(
+        &self,
+        subject: &Subject,
+        finish: &Finish,
+        times: &[usize],
+    ) -> splatkit::Result<Figure> {
+        let overlay = finish.overlay.as_ref();
+        Figure::of_times(&self.scene.picture, overlay, (&self.framing()?, subject), times)
     }
 
     /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,

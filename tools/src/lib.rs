@@ -59,6 +59,7 @@ mod show;
 pub mod start;
 mod terminal;
 mod threads;
+mod times;
 #[doc(hidden)]
 pub mod timing;
 mod transfer;

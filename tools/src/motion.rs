@@ -1,6 +1,6 @@
 //! How the camera moves from frame to frame.
 
-use crate::{failure::Failure, parse};
+use crate::{failure::Failure, parse, times::Times};
 use clap::Args;
 use splatkit::{
     Error,
@@ -15,6 +15,9 @@ const MOST_FRAMES: u32 = 100_000;
 
 /// The usual frames per second.
 pub const RATE: f64 = 30.0;
+
+/// The usual frames per second of times.
+const RATE_OF_TIMES: f64 = 10.0;
 
 /// Largest size of a path's file, in bytes.
 const MOST_BYTES: usize = 16 << 20;
@@ -33,7 +36,13 @@ pub struct MotionFlags {
     /// The frames are as many as --fps and the times of the keyframes say.
     #[arg(long, value_name = "FILE.json", conflicts_with_all = ["turntable", "CameraFlags"])]
     path: Option<PathBuf>,
-    /// Set the frames per second of an animation [default: 30]
+    /// Draw a frame for each of these times of the inputs: all, or numbers from 0 and ranges with
+    /// their ends, such as 0,4,8 or 0..20 or 0..20:2. The camera, the transfer functions and the
+    /// ranges of colours are those of the first. In --caption, {time} becomes the number. With
+    /// --columns, all stand beside each other in one picture.
+    #[arg(long, value_name = "all|TIMES", conflicts_with_all = ["turntable", "path", "time"])]
+    times: Option<Times>,
+    /// Set the frames per second of an animation [default: 30; 10 with --times]
     #[arg(long, value_name = "NUMBER", value_parser = parse::rate)]
     fps: Option<f64>,
 }
@@ -46,12 +55,19 @@ pub enum Motion {
     Turntable(u32),
     /// Along a path, in this number of frames.
     Path(CameraPath, u32),
+    /// Not at all, in this number of frames: the inputs change.
+    Times(u32),
 }
 
 impl MotionFlags {
     /// Returns whether there may be several frames.
     pub fn is_moving(&self) -> bool {
-        self.turntable.is_some() || self.path.is_some()
+        self.turntable.is_some() || self.path.is_some() || self.times.is_some()
+    }
+
+    /// Returns the times to draw.
+    pub fn times(&self) -> Option<&Times> {
+        self.times.as_ref()
     }
 
     /// Returns the file of the path.
@@ -61,13 +77,13 @@ impl MotionFlags {
 
     /// Returns the frames per second.
     pub fn rate(&self) -> f64 {
-        self.fps.unwrap_or(RATE)
+        self.fps.unwrap_or(if self.times.is_some() { RATE_OF_TIMES } else { RATE })
     }
 
     /// Returns a warning if the rate has no effect. `is_film`: the frames go to one file that is
     /// played.
     pub fn idle(&self, is_film: bool) -> Option<&'static str> {
-        let counts = self.path.is_some() || self.turntable.is_some() && is_film;
+        let counts = self.path.is_some() || self.is_moving() && is_film;
         (self.fps.is_some() && !counts)
             .then_some("--fps has no effect: it is for animations, and pictures have no rate")
     }
@@ -116,7 +132,7 @@ impl Motion {
     pub fn frames(&self) -> u32 {
         match self {
             Self::Still => 1,
-            Self::Turntable(frames) | Self::Path(_, frames) => *frames,
+            Self::Turntable(frames) | Self::Path(_, frames) | Self::Times(frames) => *frames,
         }
     }
 
@@ -145,6 +161,9 @@ impl Motion {
         match self {
             Self::Still => Ok(vec![framing.camera(subject, size)?]),
             Self::Turntable(frames) => framing.turntable(subject, size, *frames),
+            Self::Times(frames) => {
+                Ok(vec![framing.camera(subject, size)?; (*frames).max(1) as usize])
+            }
             Self::Path(path, frames) => {
                 // The last frame is the last keyframe.
                 let step = path.duration() / f64::from((frames - 1).max(1));
@@ -175,7 +194,7 @@ mod tests {
         let file = folder.join("path.json");
         std::fs::write(&file, format!(r#"{{"splatkit_path":1,"keyframes":[{keyframes}]}}"#))
             .unwrap();
-        let flags = MotionFlags { turntable: None, path: Some(file), fps: Some(rate) };
+        let flags = MotionFlags { turntable: None, path: Some(file), times: None, fps: Some(rate) };
         let motion = flags.open(&Limits::default())?;
         let subject = Subject::new(splatkit::math::Bounds::EMPTY, glam::DVec3::Y);
         let cameras = motion.cameras(&Framing::default(), &subject, [4, 3])?;

@@ -1,5 +1,7 @@
 //! `splatkit render`.
 
+mod times;
+
 use crate::{
     camera::CameraFlags,
     describe,
@@ -44,7 +46,7 @@ use std::{
 struct OutputFlags {
     /// Write the picture to this .png, .jpg, .tiff, .webp or .exr file, or to stdout as PNG if it
     /// is `-`. OpenEXR files hold linear light and the depths. With
-    /// --turntable or --path, write an animation to this .gif, .webp or .apng file, or with ffmpeg,
+    /// --turntable, --path or --times, write an animation to this .gif, .webp or .apng file, or with ffmpeg,
     /// if it is installed, to this .mp4, .webm or .mov file. Or write numbered pictures: out.png
     /// becomes out_0000.png, and {frame} or {frame:04} in the name is replaced by the number
     /// [default: beside the first input: bunny.png for bunny.ply, or bunny_2.png if bunny.png
@@ -60,7 +62,7 @@ struct OutputFlags {
     bits: Option<u32>,
     /// Also write the depths to this file: a grey PNG of 16 bits, white for the nearest, black for
     /// nothing.
-    #[arg(long, value_name = "FILE.png", conflicts_with_all = ["turntable", "path"])]
+    #[arg(long, value_name = "FILE.png", conflicts_with_all = ["turntable", "path", "times"])]
     depth: Option<PathBuf>,
     /// Replace existing files.
     #[arg(long)]
@@ -240,6 +242,9 @@ impl Render {
 
     fn draw(&self, job: &Job, progress: &Progress) -> Result<(), Failure> {
         let begun = Instant::now();
+        if let Some(times) = self.motion.times() {
+            return self.draw_times(times, job, (begun, progress));
+        }
         let inputs = job.inputs();
         let output = self.output.output.clone();
         let is_moving = self.motion.is_moving();
@@ -251,10 +256,8 @@ impl Render {
             rate: self.motion.rate(),
             background: job.scene.picture.background(),
         };
-        if is_moving && !job.scene.picture.views.is_empty() {
-            let message = "an animation shows one view: leave out --turntable or --path, or the \
-                           several views (--views)";
-            return Err(Failure::Usage(message.into()));
+        if is_moving {
+            require_one_view(job)?;
         }
         let frames = self.output.frames(&output, &motion, &film, (&inputs, progress))?;
         if let Some(warning) = self.motion.idle(frames.is_played()) {
@@ -273,6 +276,17 @@ impl Render {
         let path = self.motion.file();
         let run = Run { ready: &ready, output: &self.output, motion, path, film, frames };
         let drawn = run.draw_frames(&mut drawer, progress)?;
+        self.tell(&run, &drawn, (&drawer, upload_ms), (&output, begun, progress))
+    }
+
+    /// Tells what was drawn and written.
+    fn tell(
+        &self,
+        run: &Run<'_>,
+        drawn: &Drawn,
+        (drawer, upload_ms): (&Drawer, f64),
+        (output, begun, progress): (&Path, Instant, &Progress),
+    ) -> Result<(), Failure> {
         progress.clear();
         let stats = &drawn.stats;
         tracing::info!(
@@ -284,7 +298,7 @@ impl Render {
             "drawn"
         );
         if self.output.json {
-            let mut facts = run.facts(&drawn)?;
+            let mut facts = run.facts(drawn)?;
             facts["output"] = output.to_string_lossy().into();
             facts["adapter"] = drawer.adapter().into();
             facts["upload_ms"] = upload_ms.into();
@@ -529,6 +543,16 @@ impl Run<'_> {
             None => Ok(()),
         }
     }
+}
+
+/// Refuses an animation of several views.
+fn require_one_view(job: &Job) -> Result<(), Failure> {
+    if job.scene.picture.views.is_empty() {
+        return Ok(());
+    }
+    let message = "an animation shows one view: leave out --turntable, --path or --times, or the \
+                   several views (--views)";
+    Err(Failure::Usage(message.into()))
 }
 
 /// Warns of pages that did not fit in memory.

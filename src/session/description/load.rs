@@ -53,6 +53,8 @@ pub struct LoadedInput {
     pub attributes: Vec<String>,
     /// Its times, if it holds several.
     pub times: Option<Times>,
+    /// The numbers of its items in the scene.
+    pub items: std::ops::Range<usize>,
     /// What is known of its content, as `splatkit info --json` prints it. Series and arrays beside
     /// those that were read are left out ([`Opened::facts`](crate::session::Opened::facts) has
     /// them).
@@ -85,7 +87,20 @@ impl LoadedInput {
         };
         let kind = data.kind();
         let (is_raw, times, facts) = (*is_raw, *times, facts.clone());
-        Ok(Self { file, kind, is_cloud, has_lines, is_solid, is_raw, attributes, times, facts })
+        // It has none yet.
+        let items = 0..0;
+        Ok(Self {
+            file,
+            kind,
+            is_cloud,
+            has_lines,
+            is_solid,
+            is_raw,
+            attributes,
+            times,
+            items,
+            facts,
+        })
     }
 }
 
@@ -152,8 +167,10 @@ impl Description {
         let path = &input.file;
         does(format!("Reading {}", path.display()));
         let read = self.read_input(input)?;
-        let loaded = LoadedInput::new(path.clone(), &read)?;
+        let mut loaded = LoadedInput::new(path.clone(), &read)?;
+        let first = items.len();
         items.add(&Name::of_file(path), read.data, &read.showing, does)?;
+        loaded.items = first..items.len();
         Ok((loaded, read.files))
     }
 

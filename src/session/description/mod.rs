@@ -17,6 +17,7 @@ mod picture;
 mod reading;
 #[cfg(test)]
 mod tests;
+mod times;
 mod transform;
 
 pub use appearance::{AppearanceEntry, IsosurfaceEntry, KernelEntry, TransferEntry};

@@ -282,3 +282,36 @@ fn what_all_inputs_say_alike_is_written_once() {
     let one = parsed(r#", "reading": {"scalar": "heat"}"#, ["", r#", "reading": {"scalar": "p"}"#]);
     assert_eq!(file::parse(&text(&one)), Ok(one));
 }
+
+/// Two times of a volume: the second has twice the values.
+#[test]
+fn another_time_looks_as_the_first_does() {
+    let folder = crate::input::testing::Folder::new();
+    let values = |factor: u8| (0..27).map(move |at: u8| factor * (at % 9));
+    let head = "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 3 3 2\nencoding: raw\n\
+                kinds: domain domain domain time\n\n";
+    let content: Vec<u8> = head.bytes().chain(values(1)).chain(values(2)).collect();
+    let file = folder.write("t.nrrd", &content);
+    let mut scene = Description::new([file]);
+    scene.appearance.isosurfaces =
+        Some(vec![IsosurfaceEntry { value: None, percent: Some(50.0), color: None, opacity: 0.5 }]);
+    scene.appearance.transfer = Some(TransferEntry::Name("generic".into()));
+    let loaded = scene.load(&|_| ()).expect("the first time");
+    assert_eq!(loaded.inputs[0].times.map(|times| times.count), Some(2));
+    let later = scene.at_time(&loaded, 1);
+    let other = later.load(&|_| ()).expect("the second time");
+    let parts = |loaded: &Loaded| match &loaded.scene.items[..] {
+        [crate::scene::Item::Volume(volume, _, transfer)] => (volume.range, transfer.clone()),
+        items => panic!("{} items", items.len()),
+    };
+    let ((first, transfer), (second, same)) = (parts(&loaded), parts(&other));
+    assert_eq!((first, second), ([0.0, 8.0], [0.0, 16.0]));
+    assert_eq!(transfer, same);
+    assert_eq!(same.isosurfaces.iter().map(|surface| surface.value).collect::<Vec<_>>(), [4.0]);
+    // By itself, the second time would have other ends.
+    scene.reading.time = Some(1);
+    assert_ne!(parts(&scene.load(&|_| ()).expect("the second time")).1, transfer);
+    // And back again.
+    let again = later.at_time(&other, 0).load(&|_| ()).expect("the first time");
+    assert_eq!(parts(&again), (first, transfer));
+}

@@ -6,14 +6,16 @@ use splatkit::{
     Result,
     math::Camera,
     picture::Picture,
-    session::{Framing, Panel, PictureEntry, Side, Subject},
+    session::{Framing, Panel, PictureEntry, Subject},
 };
 
 /// A picture of several views. Its panels have one size and one scale.
 #[derive(Debug, Clone)]
 pub struct Figure {
     size: [u32; 2],
-    panels: Vec<(Side, Panel)>,
+    panels: Vec<Panel>,
+    /// What each panel shows: a side, or a time.
+    names: Vec<String>,
     labels: Vec<String>,
     cameras: Vec<Camera>,
 }
@@ -36,15 +38,46 @@ impl Figure {
         let free = overlay.map_or(Panel::whole(size), |overlay| overlay.free(size));
         let panels = picture.panels(free)?;
         let cameras = framing.views(subject, panels[0].1.size, &picture.views)?;
+        let names = picture.views.iter().map(|side| side.name().to_owned()).collect();
+        let panels = panels.into_iter().map(|(_, panel)| panel).collect();
+        Ok(Some(Self::named(picture, panels, names, cameras)))
+    }
+
+    /// Returns the figure that shows a scene at several times, all by one camera, in rows of
+    /// [`PictureEntry::columns`] panels.
+    ///
+    /// # Errors
+    /// Those of [`Panel::grid`] and [`Framing::camera`].
+    pub fn of_times(
+        picture: &PictureEntry,
+        overlay: Option<&Overlay>,
+        (framing, subject): (&Framing, &Subject),
+        times: &[usize],
+    ) -> Result<Self> {
+        let size = picture.size();
+        let free = overlay.map_or(Panel::whole(size), |overlay| overlay.free(size));
+        let count = times.len() as u32;
+        let panels = free.grid(count, picture.columns.unwrap_or(count))?;
+        let camera = framing.camera(subject, panels[0].size)?;
+        let names = times.iter().map(|time| format!("time {time}")).collect();
+        Ok(Self::named(picture, panels, names, vec![camera; times.len()]))
+    }
+
+    fn named(
+        picture: &PictureEntry,
+        panels: Vec<Panel>,
+        names: Vec<String>,
+        cameras: Vec<Camera>,
+    ) -> Self {
         let labels = picture.panel_labels.unwrap_or_default();
-        let label = |(number, side): (usize, &Side)| labels.text(number, side.name());
-        let labels = picture.views.iter().enumerate().map(label).collect();
-        Ok(Some(Self { size, panels, labels, cameras }))
+        let label = |(number, name): (usize, &String)| labels.text(number, name);
+        let labels = names.iter().enumerate().map(label).collect();
+        Self { size: picture.size(), panels, names, labels, cameras }
     }
 
     /// Returns the size of each panel, in pixels.
     pub fn panel_size(&self) -> [u32; 2] {
-        self.panels[0].1.size
+        self.panels[0].size
     }
 
     /// Returns the cameras, in the order of the views.
@@ -63,11 +96,11 @@ impl Figure {
         mut draw: impl FnMut(&Camera) -> std::result::Result<Picture, E>,
     ) -> std::result::Result<(Picture, Value), E> {
         let mut whole = Picture::blank(self.size);
-        for ((_, panel), camera) in self.panels.iter().zip(&self.cameras) {
+        for (panel, camera) in self.panels.iter().zip(&self.cameras) {
             whole.paste(&draw(camera)?, panel.at)?;
         }
         let parts = self.panels.iter().zip(&self.cameras).zip(&self.labels);
-        let parts = parts.map(|(((_, panel), camera), label)| Part {
+        let parts = parts.map(|((panel, camera), label)| Part {
             panel: *panel,
             camera,
             label: label.clone(),
@@ -79,9 +112,9 @@ impl Figure {
 
     /// Returns where each panel is and what it shows; `camera` is a camera as JSON.
     pub fn to_json(&self, camera: impl Fn(&Camera) -> Value) -> Value {
-        let panels = self.panels.iter().zip(&self.cameras);
-        let facts = panels.map(|((side, panel), of)| {
-            let (view, camera) = (side.name(), camera(of));
+        let panels = self.panels.iter().zip(&self.cameras).zip(&self.names);
+        let facts = panels.map(|((panel, of), view)| {
+            let camera = camera(of);
             json!({ "view": view, "at": panel.at, "size": panel.size, "camera": camera })
         });
         facts.collect()
@@ -120,8 +153,7 @@ mod tests {
             })
         };
         let (whole, texts) = figure.draw(overlay.as_ref(), black).unwrap();
-        let panels = figure.panels.iter().map(|(_, panel)| *panel).collect();
-        (whole, texts, panels)
+        (whole, texts, figure.panels)
     }
 
     /// Returns how many pixels of a part of a picture the letters fill.

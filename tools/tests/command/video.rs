@@ -381,3 +381,78 @@ mod ffmpeg {
         assert!(!folder.path("out.mp4").exists());
     }
 }
+
+/// A ball in a volume of three times, in which it becomes brighter and smaller.
+fn ball_of_times() -> Vec<u8> {
+    const SIDE: i32 = 12;
+    let mut content = format!(
+        "NRRD0004\ntype: uint8\ndimension: 4\nsizes: {SIDE} {SIDE} {SIDE} 3\nencoding: raw\n\
+         kinds: domain domain domain time\n\n"
+    )
+    .into_bytes();
+    for time in 0..3 {
+        let value = |at: i32| {
+            let square = |axis: i32| (2 * (at / SIDE.pow(axis as u32) % SIDE) - SIDE + 1).pow(2);
+            let radius2 = square(0) + square(1) + square(2);
+            if radius2 < 90 - 30 * time { (60 + 60 * time) as u8 } else { 0 }
+        };
+        content.extend((0..SIDE.pow(3)).map(value));
+    }
+    content
+}
+
+#[test]
+fn times_become_frames() {
+    let folder = folder();
+    folder.put("t.nrrd", ball_of_times());
+    let times = format!("--times all {SMALL}");
+    folder.run(&format!("render t.nrrd -o t.png {times}")).ok();
+    let still = |name: &str| png(&folder.path(name)).frames.remove(0);
+    let stills = [0, 1, 2].map(|time| still(&format!("t_000{time}.png")));
+    folder.run(&format!("render t.nrrd -o first.png --time 0 {SMALL}")).ok();
+    assert_eq!(stills[0], still("first.png"));
+    // The camera is that of the first time, so the ball becomes smaller.
+    let drawn = |picture: &[u8]| picture.chunks(4).filter(|pixel| pixel[..3] != [0; 3]).count();
+    let counts = [&stills[0], &stills[1], &stills[2]].map(|picture| drawn(picture));
+    assert!(counts[0] > counts[1] + 50 && counts[1] > counts[2] + 50, "{counts:?}");
+    folder.run(&format!("render t.nrrd -o t.apng {times}")).ok();
+    let film = png(&folder.path("t.apng"));
+    assert_eq!((film.frames, film.delays), (stills.to_vec(), vec![100; 3]));
+    // Captions name the time, in any order.
+    let facts = folder.json(&format!(
+        "render t.nrrd -o turn.png --times 2,0 --caption t={{time}} --json {SMALL}"
+    ));
+    assert_eq!((&facts["frames"], &facts["overlay"]["caption"]), (&2.into(), &"t=0".into()));
+}
+
+#[test]
+fn times_stand_beside_each_other() {
+    let folder = folder();
+    folder.put("t.nrrd", ball_of_times());
+    folder.run(&format!("render t.nrrd -o all.png --times 0..2 --columns 3 {SMALL}")).ok();
+    let whole = png(&folder.path("all.png")).frames.remove(0);
+    // The labels are above.
+    let panel = |number: usize| {
+        let rows = whole.chunks(64 * 4).skip(15);
+        let pixels = rows.flat_map(|row| row[number * 84..][..84].chunks(4));
+        pixels.filter(|pixel| pixel[..3] != [0; 3]).count()
+    };
+    let counts = [0, 1, 2].map(panel);
+    assert!(counts[0] > counts[1] && counts[1] > counts[2] && counts[2] > 0, "{counts:?}");
+}
+
+#[test]
+fn wrong_times_are_named() {
+    let folder = folder();
+    folder.put("t.nrrd", ball_of_times());
+    for (flags, words) in [
+        ("t.nrrd -o t.gif --times 1..3", "--times: there is no time 3: choose from 0 to 2"),
+        ("a.ply -o t.gif --times all", "--times: no input has several times"),
+        ("t.nrrd -o t.gif --times 3..1", "“3..1” is no time"),
+        ("t.nrrd -o t.gif --times all --views front,top", "one view"),
+        ("t.nrrd -o t.gif --times all --time 1", "cannot be used with"),
+        ("t.nrrd -o t.gif --times all --columns 2", "animation"),
+    ] {
+        folder.run(&format!("render {flags} {SMALL}")).fails(2, &[words]);
+    }
+}

@@ -31,7 +31,7 @@ const USES: &[(&str, &str, i32, &str)] = &[
         "an animation of a camera that stands still",
         "render a.ply -o out.gif",
         2,
-        "an animation needs --turntable or --path",
+        "an animation needs --turntable, --path or --times",
     ),
     (
         "an animation in another format",
