@@ -41,8 +41,8 @@ fn missing(path: &Path, error: &std::io::Error) -> Failure {
         ErrorKind::NotFound => "needs the program ffmpeg, which is not installed".to_owned(),
         _ => format!("needs the program ffmpeg, which cannot be started: {error}"),
     };
-    let hint = "install ffmpeg, or write a .gif, .webp or .apng file, numbered pictures \
-                (-o out.png), or raw frames for another encoder (-o - --raw)";
+    let hint = "install ffmpeg, or write a .gif, .webp or .apng file, or numbered pictures, such \
+                as out.png; the command also writes raw frames for another encoder (-o - --raw)";
     Failure::Output { file: path.to_owned(), message, hint: Some(hint) }
 }
 

@@ -18,7 +18,7 @@ _NAMES = {
 }
 
 #: Flags that have no keyword. They stay as they are.
-NO_KEYWORDS = frozenset(("allow-host", "cache", "cache-size", "dry-run", "index", "part"))
+NO_KEYWORDS = frozenset(("allow-host", "cache", "cache-size", "dry-run", "index", "part", "raw"))
 
 #: A value that nobody takes for a word of the sentence: a number, a part of an array, or the last
 #: word before a bracket or a quotation mark closes.

@@ -1,7 +1,7 @@
 //! The path of the camera: keyframes, a preview, and films.
 
 use crate::view::action::{Action, Motion, Purpose};
-use eframe::egui::{DragValue, Slider, Ui};
+use eframe::egui::{Button, DragValue, Slider, Ui};
 use glam::DVec2;
 use splatkit::{
     interaction::Orbit,
@@ -71,11 +71,11 @@ fn buttons(ui: &mut Ui, model: &Flight, player: &mut Player, actions: &mut Vec<A
         if ui.button("Open path…").clicked() {
             actions.push(Action::Ask(Purpose::OpenPath));
         }
-        ui.add_enabled_ui(!model.keyframes.is_empty(), |ui| {
-            if ui.button("Save path…").clicked() {
-                actions.push(Action::Ask(Purpose::SavePath));
-            }
-        });
+        // A part of the panel that is switched off would not wrap to the next row.
+        let save = ui.add_enabled(!model.keyframes.is_empty(), Button::new("Save path…"));
+        if save.clicked() {
+            actions.push(Action::Ask(Purpose::SavePath));
+        }
     });
 }
 

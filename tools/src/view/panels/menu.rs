@@ -174,7 +174,9 @@ pub fn messages(ui: &mut Ui, messages: &[(String, bool)]) {
 /// Shows the help, if it is open.
 pub fn help(ui: &Ui, is_open: bool) -> Vec<Action> {
     let mut stays = is_open;
-    egui::Window::new("Help").open(&mut stays).show(ui.ctx(), |ui| {
+    // Below the menu, which closes the help too.
+    let window = egui::Window::new("Help").default_pos([24.0, 40.0]).resizable(false);
+    window.open(&mut stays).show(ui.ctx(), |ui| {
         Grid::new("help").num_columns(2).show(ui, |ui| {
             for (key, what) in HELP {
                 ui.strong(*key);

@@ -213,7 +213,7 @@ fn a_figure_is_saved_with_all_its_views() {
     let mut harness = harness(folder.path());
     rest(&mut harness);
     let figure = folder.path().join("figure.json");
-    let text = r#"{"splatkit_scene": 1, "inputs": [{"file": "v.nrrd"}], "engine": "cpu",
+    let text = r#"{"splatkit_scene": 2, "inputs": [{"file": "v.nrrd"}], "engine": "cpu",
         "picture": {"views": ["front", "left"], "size": [96, 48], "samples": 1}}"#;
     std::fs::write(&figure, text).expect("written");
     window(&mut harness).open(vec![figure.clone()]);
@@ -387,6 +387,8 @@ fn a_film_is_exported_by_the_dialog() {
     harness.set_size(egui::vec2(480.0, 1600.0));
     rest(&mut harness);
     unfold(&mut harness, "Camera path");
+    let height = harness.get_by_label("Save path…").rect().height();
+    assert!(height < 30.0, "a button is {height} points high");
     click(&mut harness, "Turn around");
     harness
         .get_by_role_and_label(egui::Role::SpinButton, "Frames per second")
