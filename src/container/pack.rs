@@ -1,4 +1,5 @@
-//! Packs and unpacks bytes by zstd, which is C code and comes with the feature `files`.
+//! Packs and unpacks bytes by zstd, which is C code and comes with the feature `files`. In browsers,
+//! Rust code unpacks them.
 
 #[cfg(not(feature = "files"))]
 pub use absent::{Compressor, compress, decompress};
@@ -26,8 +27,24 @@ mod absent {
         none()
     }
 
+    #[cfg(not(target_family = "wasm"))]
     pub fn decompress(_: &[u8], _: usize) -> Result<Vec<u8>> {
         none()
+    }
+
+    /// Unpacks at most so many bytes.
+    #[cfg(target_family = "wasm")]
+    pub fn decompress(packed: &[u8], most: usize) -> Result<Vec<u8>> {
+        use std::io::Read;
+        let broken = |error: &dyn std::fmt::Display| Error::other(error.to_string());
+        let decoder = ruzstd::decoding::StreamingDecoder::new(packed);
+        let decoder = decoder.map_err(|error| broken(&error))?;
+        let mut bytes = Vec::new();
+        decoder.take(most as u64 + 1).read_to_end(&mut bytes)?;
+        if bytes.len() > most {
+            return Err(broken(&format_args!("there are more than {most} bytes")));
+        }
+        Ok(bytes)
     }
 
     fn none<T>() -> Result<T> {

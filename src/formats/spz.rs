@@ -269,7 +269,14 @@ fn unzstd(source: &Source, what: &str, stream: &[u8], size: usize) -> Result<Vec
     source.unpack(what, decoder, size)
 }
 
-#[cfg(not(feature = "files"))]
+#[cfg(all(not(feature = "files"), target_family = "wasm"))]
+fn unzstd(source: &Source, what: &str, stream: &[u8], size: usize) -> Result<Vec<u8>> {
+    let decoder = ruzstd::decoding::StreamingDecoder::new(stream);
+    let broken = |error| source.error(what, format!("cannot be unpacked: {error}"));
+    source.unpack(what, decoder.map_err(broken)?, size)
+}
+
+#[cfg(all(not(feature = "files"), not(target_family = "wasm")))]
 fn unzstd(source: &Source, what: &str, _: &[u8], _: usize) -> Result<Vec<u8>> {
     let message = "is packed by zstd, which comes with the feature “files” of the crate splatkit, \
                    and this program was built without";

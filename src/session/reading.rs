@@ -117,7 +117,18 @@ impl Reading {
     /// [`Error::Limit`] for more bytes than the limits allow; [`Error::Input`] for bytes of no kind
     /// that is read.
     pub fn open_bytes<'a>(&'a self, name: &'a Path, bytes: &'a [u8]) -> Result<Opened<'a>> {
-        self.opened(Source::from_bytes(name, bytes, &self.whole)?, None)
+        self.open_held(name, bytes, None)
+    }
+
+    /// As [`open_bytes`](Self::open_bytes), with the values of an attribute as
+    /// [`open_colored`](Self::open_colored) has.
+    pub(super) fn open_held<'a>(
+        &'a self,
+        name: &'a Path,
+        bytes: &'a [u8],
+        attribute: Option<&'a str>,
+    ) -> Result<Opened<'a>> {
+        self.opened(Source::from_bytes(name, bytes, &self.whole)?, attribute)
     }
 
     fn opened<'a>(&'a self, source: Source<'a>, attribute: Option<&'a str>) -> Result<Opened<'a>> {

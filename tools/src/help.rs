@@ -11,7 +11,7 @@ struct Task {
     examples: &'static str,
 }
 
-const TASKS: [Task; 7] = [
+const TASKS: [Task; 8] = [
     Task {
         name: "render",
         flags: DRAWN,
@@ -26,6 +26,13 @@ const TASKS: [Task; 7] = [
         examples: "  splatkit view
   splatkit view head.nrrd --transfer ct-bone
   splatkit view scan.splk --up +Z",
+    },
+    Task {
+        name: "publish",
+        flags: "output overwrite title viewer background json transfer range iso colormap color view \
+            azimuth elevation zoom up clip",
+        examples: "  splatkit publish scan.ply skull.nrrd scene.spz -o look.html
+  splatkit publish head.nrrd --transfer ct-bone -o site",
     },
     Task {
         name: "convert",
@@ -121,6 +128,7 @@ mod tests {
             point-radius line-width cells crease edges opacity colormap color nan-color log-colors",
         ),
         ("Kernel", "kernel sigma extent sharp"),
+        ("Page", "title viewer"),
         ("Animation", "turntable path fps"),
         ("Figures", "width height dpi views columns panel-labels"),
         ("Texts", "scalar-bar axes scale-bar caption"),

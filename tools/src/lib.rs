@@ -50,6 +50,7 @@ mod overlay;
 pub mod parse;
 #[doc(hidden)]
 pub mod progress;
+mod publish;
 mod render;
 mod scan;
 mod scene;
@@ -100,6 +101,8 @@ enum Task {
     Render(Box<render::Render>),
     /// Show a scene in a window: turn it, edit its transfer function, cut it open, save pictures.
     View(Box<view::View>),
+    /// Make a page that shows a scene in a browser, as one file or as a folder for a static host.
+    Publish(Box<publish::Publish>),
     /// Print what a file contains.
     Info(info::Info),
     /// Build a hierarchy of splats from meshes and point clouds, or write 3D Gaussians; write a
@@ -155,6 +158,7 @@ pub fn main() -> ExitCode {
     let result = match parsed.task {
         Task::Render(task) => task.run(&given, &progress),
         Task::View(task) => task.run(&given, &progress),
+        Task::Publish(task) => task.run(&given, &progress),
         Task::Info(task) => task.run(&given, &progress),
         Task::Convert(task) => task.run(&given, &progress),
         Task::Check(task) => task.run(&progress),

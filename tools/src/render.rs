@@ -224,6 +224,21 @@ impl Render {
         Ok(())
     }
 
+    /// Returns the file that the flags name for the result.
+    pub fn output(&self) -> Option<&Path> {
+        self.output.output.as_deref()
+    }
+
+    /// Whether existing files are replaced.
+    pub fn overwrites(&self) -> bool {
+        self.output.overwrite
+    }
+
+    /// Whether the result is printed as JSON.
+    pub fn prints_json(&self) -> bool {
+        self.output.json
+    }
+
     /// Returns the scene file among the inputs.
     #[cfg(feature = "window")]
     pub fn scene_file(&self) -> Option<&Path> {

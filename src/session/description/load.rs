@@ -12,7 +12,13 @@ use crate::{
     },
     warning,
 };
-use std::path::PathBuf;
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+/// Files in memory, by name.
+type Held = BTreeMap<PathBuf, Vec<u8>>;
 
 /// A scene that was read, and what is known of it.
 pub struct Loaded {
@@ -59,6 +65,8 @@ pub struct LoadedInput {
     /// those that were read are left out ([`Opened::facts`](crate::session::Opened::facts) has
     /// them).
     pub facts: Facts,
+    /// The files that were read: its own, and those that it refers to.
+    pub files: Vec<PathBuf>,
 }
 
 /// An input that was read, with all that its description says of it.
@@ -77,7 +85,7 @@ pub struct ReadInput {
 
 impl LoadedInput {
     fn new(file: PathBuf, read: &ReadInput) -> Result<Self> {
-        let ReadInput { data, showing, is_raw, times, facts, .. } = read;
+        let ReadInput { data, showing, is_raw, files, times, facts } = read;
         let has_lines = matches!(data, Data::Mesh(mesh) if !mesh.lines.is_empty());
         let is_cloud = !has_lines && matches!(data, Data::Mesh(mesh) if mesh.triangles.is_empty());
         let is_solid = matches!(data, Data::Cells(_)) && showing.cell_style()? == CellStyle::Solid;
@@ -86,7 +94,7 @@ impl LoadedInput {
             _ => Vec::new(),
         };
         let kind = data.kind();
-        let (is_raw, times, facts) = (*is_raw, *times, facts.clone());
+        let (is_raw, times, facts, files) = (*is_raw, *times, facts.clone(), files.clone());
         // It has none yet.
         let items = 0..0;
         Ok(Self {
@@ -100,6 +108,7 @@ impl LoadedInput {
             times,
             items,
             facts,
+            files,
         })
     }
 }
@@ -112,11 +121,37 @@ impl Description {
     /// Those of [`check`](Self::check) as [`Error::Argument`], of reading the inputs
     /// ([`Reading`](crate::session::Reading)) and of adding them ([`Items::add`]).
     pub fn load(&self, does: &dyn Fn(String)) -> Result<Loaded> {
-        let (loaded, warnings) = warning::gathered(|| self.load_all(does));
+        let (loaded, warnings) = warning::gathered(|| self.load_all(None, does));
         Ok(Loaded { warnings, ..loaded? })
     }
 
-    fn load_all(&self, does: &dyn Fn(String)) -> Result<Loaded> {
+    /// As [`load`](Self::load), from files in memory, which have the names that the description
+    /// gives its inputs: for programs without a file system, such as browsers.
+    ///
+    /// ```
+    /// use splatkit::session::Description;
+    /// use std::collections::BTreeMap;
+    ///
+    /// let scene = Description::parse(
+    ///     r#"{"splatkit_scene": 2, "inputs": [{"file": "a.xyz"}]}"#,
+    /// )?;
+    /// let files = BTreeMap::from([("a.xyz".into(), b"0 0 0\n1 0 0\n0 1 0\n".to_vec())]);
+    /// assert!(scene.load_held(&files, &|_| {})?.inputs[0].is_cloud);
+    /// # Ok::<(), splatkit::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`load`](Self::load); [`Error::Input`] for an input that is not among the files.
+    pub fn load_held(
+        &self,
+        files: &BTreeMap<PathBuf, Vec<u8>>,
+        does: &dyn Fn(String),
+    ) -> Result<Loaded> {
+        let (loaded, warnings) = warning::gathered(|| self.load_all(Some(files), does));
+        Ok(Loaded { warnings, ..loaded? })
+    }
+
+    fn load_all(&self, held: Option<&Held>, does: &dyn Fn(String)) -> Result<Loaded> {
         let checked = self.check();
         checked.map_err(|(place, message)| Error::Argument(format!("{place} {message}")))?;
         // One deadline covers reading all inputs and making their splats.
@@ -127,7 +162,7 @@ impl Description {
         let mut items = Items::new(surfaces);
         let (mut inputs, mut files) = (Vec::new(), self.files());
         for input in begun.visible() {
-            let (data, read) = begun.add(input, &mut items, does)?;
+            let (data, read) = begun.add(input, held, &mut items, does)?;
             inputs.push(data);
             files.extend(read);
         }
@@ -161,12 +196,13 @@ impl Description {
     fn add(
         &self,
         input: &InputEntry,
+        held: Option<&Held>,
         items: &mut Items,
         does: &dyn Fn(String),
     ) -> Result<(LoadedInput, Vec<PathBuf>)> {
         let path = &input.file;
         does(format!("Reading {}", path.display()));
-        let read = self.read_input(input)?;
+        let read = self.read_from(input, held)?;
         let mut loaded = LoadedInput::new(path.clone(), &read)?;
         let first = items.len();
         items.add(&Name::of_file(path), read.data, &read.showing, does)?;
@@ -181,9 +217,17 @@ impl Description {
     /// Those of [`showing`](Self::showing) and of [`Reading`](crate::session::Reading);
     /// [`Error::Input`] for a file that cannot be moved.
     pub fn read_input(&self, input: &InputEntry) -> Result<ReadInput> {
+        self.read_from(input, None)
+    }
+
+    fn read_from(&self, input: &InputEntry, held: Option<&Held>) -> Result<ReadInput> {
         let (path, showing) = (&input.file, self.showing(input)?);
         let reading = self.reading_of(input).reading_within(memory::most());
-        let opened = reading.open_colored(path, showing.coloring().attribute())?;
+        let attribute = showing.coloring().attribute();
+        let opened = match held {
+            None => reading.open_colored(path, attribute)?,
+            Some(files) => reading.open_held(path, bytes_of(files, path)?, attribute)?,
+        };
         let mut data = opened.read()?;
         opened.give_radii(&mut data, showing.point_radius.as_deref())?;
         input.transform.apply(path, &mut data)?;
@@ -191,6 +235,14 @@ impl Description {
         let times = opened.times();
         Ok(ReadInput { data, showing, is_raw, files, times, facts })
     }
+}
+
+fn bytes_of<'a>(files: &'a Held, path: &Path) -> Result<&'a [u8]> {
+    files.get(path).map(Vec::as_slice).ok_or_else(|| {
+        let names: Vec<_> = files.keys().take(9).map(|name| name.display().to_string()).collect();
+        Error::input(path, "file", "is not among the files in memory")
+            .hint(format!("these are: {}", names.join(", ")))
+    })
 }
 
 impl Loaded {

@@ -303,6 +303,16 @@ impl Description {
         file::read_trusted(path.as_ref(), limits)
     }
 
+    /// Reads the text of a scene file. The paths of its files stay as they are: those of files in
+    /// memory, for [`load_held`](Self::load_held).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the place and what is wrong there.
+    pub fn parse(text: &str) -> Result<Self> {
+        let wrong = |(place, message)| Error::Argument(format!("{place}: {message}"));
+        file::parse(text).map_err(wrong)
+    }
+
     /// Returns the text of a scene file in this folder: paths are written as seen from there, and
     /// what reading and drawing may take is left out.
     pub fn to_json(&self, folder: &Path) -> String {

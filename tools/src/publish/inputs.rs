@@ -1,0 +1,249 @@
+//! The files of a page: those of the inputs as they are, or what they are converted to.
+
+use crate::{failure::Failure, job::Loaded, progress::Progress};
+use splatkit::{
+    Error,
+    formats::{self, Format, Kind},
+    input::{Limits, is_remote},
+    session::{
+        AppearanceEntry, Data, Description, InputEntry, KernelEntry, LoadedInput, ReadInput,
+        ReadingEntry, TransferEntry, convert::Conversion,
+    },
+    volume::TransferFunction,
+};
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    path::{Path, PathBuf},
+    slice,
+};
+
+/// The features of the library that the viewer has (tools/web/Cargo.toml): its readers.
+const READERS: [&str; 6] = ["ply", "obj", "gltf", "las", "e57", "vtk"];
+
+/// A scene file, and the files that it names.
+pub struct Published {
+    pub scene: Description,
+    pub files: BTreeMap<String, Vec<u8>>,
+}
+
+/// Returns the scene of a page and its files. Inputs that the viewer reads stay as they are; the
+/// others are converted.
+pub fn published(
+    scene: &Description,
+    loaded: &Loaded,
+    progress: &Progress,
+) -> Result<Published, Failure> {
+    let mut page = scene.clone();
+    page.inputs.clear();
+    (page.reading, page.appearance) = (ReadingEntry::default(), AppearanceEntry::default());
+    page.picture.memory = None;
+    let mut files = BTreeMap::new();
+    for (number, (input, read)) in scene.visible().zip(&loaded.inputs).enumerate() {
+        let mut entry = input.clone();
+        entry.reading = scene.reading_of(input);
+        entry.reading.limits = Default::default();
+        entry.appearance = without_files(scene.appearance_of(input))?;
+        let folder = match files.contains_key(&name_of(&input.file)) {
+            true => format!("{}/", number + 1),
+            false => String::new(),
+        };
+        match is_read_by_viewer(read, &entry) {
+            true => add_file(&mut entry, read, &folder, &mut files)?,
+            false => {
+                let what = format!("Converting {}", input.file.display());
+                progress.stage(what);
+                add_converted((scene, loaded), input, &mut entry, &folder, &mut files)?;
+            }
+        }
+        page.inputs.push(entry);
+    }
+    let published = Published { scene: page, files };
+    published.try_reading(loaded)?;
+    Ok(published)
+}
+
+/// Returns the last part of a path.
+pub fn name_of(file: &Path) -> String {
+    file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Returns the text of a page's scene file.
+pub fn text_of(scene: &Description) -> String {
+    serde_json::to_string_pretty(scene).unwrap_or_default()
+}
+
+/// Returns whether the viewer reads an input as it is.
+fn is_read_by_viewer(read: &LoadedInput, entry: &InputEntry) -> bool {
+    let format = Format::of_path(&read.file);
+    let has_reader = match format {
+        Some(format) => format.feature.is_none_or(|feature| READERS.contains(&feature)),
+        None => read.is_raw,
+    };
+    has_reader
+        && entry.reading.labels.is_none()
+        && !read.files.iter().any(is_remote)
+        // The viewer has no files beside an input.
+        && read.files.iter().all(|file| *file == read.file)
+        && read.file.is_file()
+}
+
+/// Adds the file of an input as it is.
+fn add_file(
+    entry: &mut InputEntry,
+    read: &LoadedInput,
+    folder: &str,
+    files: &mut BTreeMap<String, Vec<u8>>,
+) -> Result<(), Failure> {
+    let name = format!("{folder}{}", name_of(&read.file));
+    entry.file = name.clone().into();
+    if let Entry::Vacant(place) = files.entry(name) {
+        place.insert(std::fs::read(&read.file).map_err(|source| unread(&read.file, &source))?);
+    }
+    Ok(())
+}
+
+fn unread(file: &Path, source: &std::io::Error) -> Error {
+    Error::input(file, "file", format!("cannot be read: {source}"))
+}
+
+/// Adds what an input is converted to.
+fn add_converted(
+    (scene, loaded): (&Description, &Loaded),
+    input: &InputEntry,
+    entry: &mut InputEntry,
+    folder: &str,
+    files: &mut BTreeMap<String, Vec<u8>>,
+) -> Result<(), Failure> {
+    let ReadInput { data, .. } = scene.read_input(input)?;
+    let (name, bytes) = converted(scene, input, &data)?;
+    // The converted file has one array, is where the input was moved to, and knows its own layout.
+    entry.reading = ReadingEntry::default();
+    entry.transform = Default::default();
+    if let Some(transfer) = transfer_of(loaded, input, &data) {
+        let drawn = &mut entry.appearance;
+        drawn.transfer = Some(TransferEntry::Whole(transfer));
+        (drawn.range, drawn.opacity_unit, drawn.isosurfaces) = (None, None, None);
+        (drawn.gradient_opacity, drawn.colormap) = (None, None);
+    }
+    if data.kind() == Kind::Mesh {
+        // A hierarchy has the colours that the mesh was shown in.
+        entry.appearance = AppearanceEntry::default();
+    }
+    entry.file = format!("{folder}{name}").into();
+    files.insert(format!("{folder}{name}"), bytes);
+    Ok(())
+}
+
+/// Returns the transfer function that shows an input, if it is a field without colours of its own.
+fn transfer_of(loaded: &Loaded, input: &InputEntry, data: &Data) -> Option<TransferFunction> {
+    if !matches!(data.kind(), Kind::Volume | Kind::Cells) {
+        return None;
+    }
+    let name = input.file.display().to_string();
+    let items = loaded.scene.items.iter().zip(&loaded.items.contents);
+    let mut of_input = items.filter(|(_, content)| content.name.text == name);
+    of_input.find_map(|(item, _)| item.transfer().cloned())
+}
+
+/// Returns the name and the bytes of the file that an input is converted to.
+fn converted(
+    scene: &Description,
+    input: &InputEntry,
+    data: &Data,
+) -> Result<(String, Vec<u8>), Failure> {
+    let stem = input.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let extension = match data.kind() {
+        Kind::Volume => "nrrd",
+        Kind::Gaussians => "spz",
+        Kind::Cells => "vtu",
+        Kind::Mesh => "splk",
+        kind @ (Kind::Samples | Kind::Hierarchy | Kind::Bricks) => {
+            let what = format!("{kind:?}").to_lowercase();
+            let message = format!("is read by this program, but not by pages: it holds {what}");
+            let hint = "name a file on this machine; docs/browser.md lists what pages read";
+            return Err(Error::input(&input.file, "file", message).hint(hint).into());
+        }
+    };
+    let name = format!("{stem}.{extension}");
+    let folder = std::env::temp_dir().join(format!("splatkit-publish-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).map_err(|error| Failure::output(&folder, error))?;
+    let path = folder.join(&name);
+    let written = match data {
+        Data::Volume(volume) => formats::nrrd::write(volume, &path),
+        Data::Gaussians(set) => formats::spz::write(set, &path),
+        Data::Cells(cells) => formats::write_cells(cells, &path),
+        _ => hierarchy(scene, input, &path),
+    };
+    let bytes = written.and_then(|()| std::fs::read(&path).map_err(|e| unread(&path, &e)));
+    std::fs::remove_dir_all(&folder).ok();
+    Ok((name, bytes?))
+}
+
+/// Writes the hierarchy of a mesh.
+fn hierarchy(scene: &Description, input: &InputEntry, path: &Path) -> Result<(), Error> {
+    let appearance = scene.appearance_of(input);
+    let conversion = Conversion {
+        reading: scene.reading_of(input).reading(),
+        coloring: appearance.coloring(),
+        radius_scale: appearance.radius_scale.unwrap_or(1.0),
+        ..Conversion::default()
+    };
+    conversion.convert(slice::from_ref(&input.file), path, &()).map(drop)
+}
+
+/// Takes the files into an entry that it names.
+fn without_files(mut entry: AppearanceEntry) -> Result<AppearanceEntry, Failure> {
+    let limits = Limits::default();
+    if let Some(file) = entry.transfer.as_ref().and_then(TransferEntry::file) {
+        let transfer = TransferFunction::read(file, &limits)?;
+        entry.transfer = Some(TransferEntry::Whole(transfer));
+    }
+    if let Some(file) = entry.kernel.as_ref().and_then(KernelEntry::file) {
+        let message = "kernels from files are not published yet";
+        let hint = "write its values into a scene file: \"kernel\": [1, 0.5, 0]";
+        return Err(Error::input(file, "kernel", message).hint(hint).into());
+    }
+    Ok(entry)
+}
+
+impl Published {
+    /// Reads the page's scene as the viewer does, so that a page which cannot be shown is an error
+    /// here.
+    fn try_reading(&self, loaded: &Loaded) -> Result<(), Failure> {
+        let files = self.files.iter().map(|(name, bytes)| (PathBuf::from(name), bytes.clone()));
+        let again = self.scene.load_held(&files.collect(), &|_| {})?;
+        let [before, after] = [&loaded.inputs, &again.inputs];
+        let is_cut = |read: &LoadedInput, other: &LoadedInput| {
+            let stays = read.kind == other.kind;
+            !(stays || other.kind == Kind::Hierarchy)
+        };
+        match before.iter().zip(after).find(|(read, other)| is_cut(read, other)) {
+            None => Ok(()),
+            Some((read, other)) => {
+                let message = format!(
+                    "would be shown as {:?} instead of {:?} in a page",
+                    other.kind, read.kind
+                );
+                Err(Error::input(&read.file, "file", message).into())
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::READERS;
+
+    /// The viewer's readers are those of its manifest.
+    #[test]
+    fn the_viewer_has_these_readers() {
+        let manifest = include_str!("../../web/Cargo.toml");
+        let (_, rest) = manifest.split_once("features = [").expect("the features");
+        let (list, _) = rest.split_once(']').expect("their end");
+        let mut names: Vec<&str> = list.split('"').skip(1).step_by(2).collect();
+        let mut readers = READERS.to_vec();
+        names.sort_unstable();
+        readers.sort_unstable();
+        assert_eq!(names, readers);
+    }
+}

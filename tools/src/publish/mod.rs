@@ -1,0 +1,184 @@
+//! `splatkit publish`: a page that shows a scene, as one file or as a folder for a static host.
+//!
+//! The page has the scene file, the files of its inputs, and the viewer of tools/web, which draws by
+//! the CPU engine. So it shows what `splatkit render` draws of the same scene.
+
+mod inputs;
+mod packing;
+mod page;
+mod viewer;
+
+use crate::{
+    failure::Failure, given::Given, job::Job, output, progress::Progress, render::Render,
+    timing::milliseconds,
+};
+use clap::Args;
+use inputs::Published;
+use page::Page;
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
+use viewer::Viewer;
+
+/// Flags of `render` that are not for pages.
+const NOT_OF_PAGES: [&str; 10] =
+    ["depth", "turntable", "path", "fps", "raw", "reference", "bits", "views", "columns", "dpi"];
+
+#[derive(Args, Debug)]
+// A page has its own output; the flags that write pictures are `render`'s.
+#[command(
+    mut_arg("output", |flag| flag.required(true).help(OUTPUT).long_help(OUTPUT)),
+    mut_arg("json", |flag| flag.help("Print what was written to stdout, as JSON.")),
+    mut_arg("depth", |flag| flag.hide(true)),
+    mut_arg("turntable", |flag| flag.hide(true)),
+    mut_arg("path", |flag| flag.hide(true)),
+    mut_arg("fps", |flag| flag.hide(true)),
+    mut_arg("raw", |flag| flag.hide(true)),
+    mut_arg("reference", |flag| flag.hide(true)),
+    mut_arg("bits", |flag| flag.hide(true)),
+    mut_arg("views", |flag| flag.hide(true)),
+    mut_arg("columns", |flag| flag.hide(true)),
+    mut_arg("dpi", |flag| flag.hide(true)),
+)]
+pub struct Publish {
+    #[command(flatten)]
+    scene: Render,
+    /// Set the title of the page [default: the names of the inputs]
+    #[arg(long, value_name = "TEXT", help_heading = "Page")]
+    title: Option<String>,
+    /// Take the viewer from this folder, which tools/web/build has made [default: the one that this
+    /// program contains, or the folder `viewer` beside it]
+    #[arg(long, value_name = "FOLDER", help_heading = "Page")]
+    viewer: Option<PathBuf>,
+}
+
+/// What `-o` is for.
+const OUTPUT: &str = "Write the page to this .html file, which has everything inside and opens by \
+                      a double click; or to this folder, for any static host";
+
+impl Publish {
+    pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
+        if let Some(flag) = NOT_OF_PAGES.into_iter().find(|flag| given.has(flag)) {
+            return Err(Failure::Usage(format!(
+                "--{flag} is for pictures (`splatkit render`), not for pages"
+            )));
+        }
+        let job = self.scene.job(given)?;
+        let target = self.target()?;
+        target.check(self.scene.overwrites())?;
+        let viewer = Viewer::find(self.viewer.as_deref())?;
+        let page = self.page(&job, &viewer, progress);
+        let written = target.path();
+        page.and_then(|page| target.write(&page, &viewer, (self.scene.prints_json(), progress)))
+            .map_err(|failure| job.blamed(failure, &[written]))
+    }
+
+    /// Returns where the page goes.
+    fn target(&self) -> Result<Target, Failure> {
+        let path = self.scene.output().ok_or_else(|| Failure::Usage(OUTPUT.into()))?.to_owned();
+        let extension = path.extension().map(|end| end.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("html" | "htm") => Ok(Target::File(path)),
+            None => Ok(Target::Folder(path)),
+            Some(_) if path.is_dir() => Ok(Target::Folder(path)),
+            Some(other) => Err(Failure::Usage(format!(
+                "{}: a page is an .html file, or a folder, whose name has no extension; not .{other}",
+                path.display()
+            ))),
+        }
+    }
+
+    /// Reads the inputs, and makes the page of them.
+    fn page(&self, job: &Job, viewer: &Viewer, progress: &Progress) -> Result<Page, Failure> {
+        let start = Instant::now();
+        let loaded = job.load(progress)?;
+        if let Some(warning) = job.idle(&loaded.scene) {
+            progress.warn(warning);
+        }
+        if job.scene.overlay != Default::default() {
+            progress.warn(
+                "texts over pictures (--scalar-bar, --axes, --scale-bar, --caption) are not shown \
+                 in pages yet",
+            );
+        }
+        let written = self.scene.output().unwrap_or(Path::new(""));
+        output::check_unneeded(written, &loaded.files)?;
+        progress.stage("Collecting the inputs");
+        let Published { scene, files } = inputs::published(&job.scene, &loaded, progress)?;
+        tracing::info!(milliseconds = milliseconds(start), "read and collected");
+        let title = self.title.clone().unwrap_or_else(|| {
+            let names = job.inputs().into_iter();
+            let names = names.map(|file| inputs::name_of(&file)).collect::<Vec<_>>();
+            names.join(", ")
+        });
+        let background = scene.picture.background();
+        let scene = inputs::text_of(&scene);
+        Ok(Page { title, scene, files, background, version: viewer.version() })
+    }
+}
+
+/// Where a page goes.
+enum Target {
+    File(PathBuf),
+    Folder(PathBuf),
+}
+
+impl Target {
+    fn path(&self) -> &Path {
+        match self {
+            Self::File(path) | Self::Folder(path) => path,
+        }
+    }
+
+    /// Refuses what exists already.
+    fn check(&self, overwrite: bool) -> Result<(), Failure> {
+        match self {
+            Self::File(path) => output::check(path, overwrite),
+            Self::Folder(path) => {
+                let is_empty =
+                    |path: &Path| path.read_dir().is_ok_and(|mut all| all.next().is_none());
+                let hint = match path.symlink_metadata() {
+                    Ok(meta) if !meta.is_dir() => "give the name of a folder",
+                    Ok(_) if !overwrite && !is_empty(path) => "give --overwrite, or another name",
+                    _ => return Ok(()),
+                };
+                let message = "exists already".to_owned();
+                Err(Failure::Output { file: path.clone(), message, hint: Some(hint) })
+            }
+        }
+    }
+
+    /// Writes the page, and says how many bytes it has.
+    fn write(
+        &self,
+        page: &Page,
+        viewer: &Viewer,
+        (is_json, progress): (bool, &Progress),
+    ) -> Result<(), Failure> {
+        progress.stage(format!("Writing {}", self.path().display()));
+        let bytes = match self {
+            Self::File(path) => page.write_file(path, viewer)?,
+            Self::Folder(path) => page.write_folder(path, viewer)?,
+        };
+        progress.clear();
+        if is_json {
+            let files = page.files.iter().map(|(name, bytes)| (name.clone(), bytes.len().into()));
+            return output::json(&serde_json::json!({
+                "output": self.path().to_string_lossy(),
+                "bytes": bytes,
+                "files": files.collect::<serde_json::Map<_, _>>(),
+            }));
+        }
+        let megabytes = bytes as f64 / 1e6;
+        output::line(format_args!("{}: {megabytes:.2} MB", self.path().display()))?;
+        if let Self::Folder(path) = self {
+            let place = path.display();
+            progress.note(format_args!(
+                "browsers show {place} from a server, not by a double click; for a look: python3 -m \
+                 http.server -d {place}"
+            ));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,178 @@
+//! What JavaScript calls. Errors are texts for people.
+
+use crate::{Stage, Step};
+use glam::{DVec2, DVec3};
+use splatkit::{
+    Error,
+    session::{CameraEntry, ClipEntry, Side},
+    volume::TransferFunction,
+};
+use std::{collections::BTreeMap, path::PathBuf};
+use wasm_bindgen::prelude::*;
+
+/// The files of a scene, by the names that the scene file gives them.
+#[wasm_bindgen]
+#[derive(Default)]
+pub struct Files(BTreeMap<PathBuf, Vec<u8>>);
+
+#[wasm_bindgen]
+impl Files {
+    /// No files.
+    #[wasm_bindgen(constructor)]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a file.
+    pub fn add(&mut self, name: &str, bytes: Vec<u8>) {
+        self.0.insert(name.into(), bytes);
+    }
+}
+
+/// A scene that is shown.
+#[wasm_bindgen]
+pub struct Viewer(Stage);
+
+#[wasm_bindgen]
+impl Viewer {
+    /// Opens a scene, for a picture of this many pixels.
+    #[wasm_bindgen(constructor)]
+    pub fn new(scene: &str, files: Files, width: u32, height: u32) -> Result<Viewer, JsError> {
+        Stage::open(scene, &files.0, [width, height]).map(Self).map_err(|error| told(&error))
+    }
+
+    /// What was said of the inputs while they were read.
+    pub fn warnings(&self) -> Vec<String> {
+        self.0.warnings().to_vec()
+    }
+
+    /// The names of the inputs and what they hold.
+    pub fn summary(&self) -> String {
+        self.0.summary()
+    }
+
+    /// Does the next part of the work. Returns the milliseconds to wait before the next one; −1 if
+    /// nothing is left to do, and −2 if there is a new frame.
+    pub fn step(&mut self) -> Result<f64, JsError> {
+        Ok(match self.0.step().map_err(|error| told(&error))? {
+            Step::Rests => -1.0,
+            Step::Shows => -2.0,
+            Step::Works => 0.0,
+            Step::Waits(milliseconds) => milliseconds,
+        })
+    }
+
+    /// The pixels of the last frame: red, green, blue and opacity.
+    pub fn pixels(&self) -> Vec<u8> {
+        self.0.pixels()
+    }
+
+    /// Of the last frame: its width, its height, whether it is exact, and its milliseconds.
+    pub fn frame(&self) -> Vec<f64> {
+        self.0.frame().map_or(Vec::new(), |frame| {
+            let [width, height] = [frame.picture.width, frame.picture.height].map(f64::from);
+            vec![width, height, f64::from(u8::from(frame.is_exact)), frame.milliseconds]
+        })
+    }
+
+    /// See [`Stage::resize`].
+    pub fn resize(&mut self, width: u32, height: u32) -> Result<(), JsError> {
+        self.0.resize([width, height]).map_err(|error| told(&error))
+    }
+
+    /// See [`Stage::turn`].
+    pub fn turn(&mut self, x: f64, y: f64) {
+        self.0.turn(DVec2::new(x, y));
+    }
+
+    /// See [`Stage::look_around`].
+    pub fn look(&mut self, x: f64, y: f64) {
+        self.0.look_around(DVec2::new(x, y));
+    }
+
+    /// See [`Stage::grab`].
+    pub fn grab(&mut self, x: f64, y: f64) {
+        self.0.grab(DVec2::new(x, y));
+    }
+
+    /// See [`Stage::pan`].
+    pub fn pan(&mut self, x: f64, y: f64) {
+        self.0.pan(DVec2::new(x, y));
+    }
+
+    /// See [`Stage::zoom`].
+    pub fn zoom(&mut self, factor: f64, x: f64, y: f64) {
+        self.0.zoom(factor, DVec2::new(x, y));
+    }
+
+    /// See [`Stage::center`].
+    pub fn center(&mut self, x: f64, y: f64) {
+        self.0.center(DVec2::new(x, y));
+    }
+
+    /// See [`Stage::fly`].
+    pub fn fly(&mut self, right: f64, up: f64, forward: f64) {
+        self.0.fly(DVec3::new(right, up, forward));
+    }
+
+    /// See [`Stage::switch_perspective`].
+    pub fn perspective(&mut self) {
+        self.0.switch_perspective();
+    }
+
+    /// See [`Stage::fit`]. The side is a name, or empty.
+    pub fn fit(&mut self, side: &str) -> Result<(), JsError> {
+        let named = Side::ALL.into_iter().find(|known| known.name() == side);
+        if named.is_none() && !side.is_empty() {
+            let names = Side::ALL.map(Side::name).join(", ");
+            return Err(JsError::new(&format!("there is no side “{side}”, only {names}")));
+        }
+        self.0.fit(named).map_err(|error| told(&error))
+    }
+
+    /// The camera as JSON, as in scene files.
+    pub fn camera(&self) -> String {
+        serde_json::to_string(&self.0.camera()).unwrap_or_default()
+    }
+
+    /// Sets the camera.
+    pub fn set_camera(&mut self, json: &str) -> Result<(), JsError> {
+        let camera: CameraEntry = parsed("camera", json)?;
+        self.0.set_camera(&camera).map_err(|error| told(&error))
+    }
+
+    /// Sets the transfer function of a field.
+    pub fn set_transfer(&mut self, field: usize, json: &str) -> Result<(), JsError> {
+        let transfer = TransferFunction::from_json(json).map_err(|error| told(&error))?;
+        self.0.set_transfer(field, &transfer).map_err(|error| told(&error))
+    }
+
+    /// The transfer functions of the fields, as JSON.
+    pub fn transfers(&self) -> String {
+        serde_json::to_string(&self.0.transfers()).unwrap_or_default()
+    }
+
+    /// Sets the clips.
+    pub fn set_clips(&mut self, json: &str) -> Result<(), JsError> {
+        let clips: Vec<ClipEntry> = parsed("clips", json)?;
+        self.0.set_clips(clips).map_err(|error| told(&error))
+    }
+
+    /// The world point at a pixel; empty if there is none.
+    pub fn point(&self, x: f64, y: f64) -> Vec<f64> {
+        self.0.point_at(DVec2::new(x, y)).map_or(Vec::new(), |point| point.to_array().to_vec())
+    }
+}
+
+fn parsed<T: serde::de::DeserializeOwned>(what: &str, json: &str) -> Result<T, JsError> {
+    serde_json::from_str(json).map_err(|error| JsError::new(&format!("{what}: {error}")))
+}
+
+/// Returns an error as a text, with its hint.
+fn told(error: &Error) -> JsError {
+    let message = error.to_string();
+    match error {
+        Error::Input { hint: Some(hint), .. } => JsError::new(&format!("{message}\n{hint}")),
+        _ => JsError::new(&message),
+    }
+}

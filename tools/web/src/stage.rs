@@ -1,0 +1,416 @@
+//! A scene that a page shows: drawn coarsely while it moves, and exactly once it rests.
+//!
+//! A page has one thread for this, which also hears the hand. So nothing here takes long, apart
+//! from opening the scene: fine frames are drawn in strips, and the hand is heard between them.
+
+use glam::{DVec2, DVec3};
+use splatkit::{
+    Device, Error, Renderer, Result,
+    interaction::{Effort, Orbit, Pace, Probe},
+    math::{Camera, View},
+    picture::Picture,
+    scene::Settings,
+    session::{CameraEntry, ClipEntry, Description, Drawing, Loaded, Side},
+    volume::TransferFunction,
+};
+use std::{collections::BTreeMap, path::PathBuf};
+use web_time::{Duration, Instant};
+
+/// The wanted time of a moving frame, in milliseconds.
+const MOVING: f64 = 30.0;
+
+/// A view that changed less than this ago may still move: it is not refined yet.
+const CALM: Duration = Duration::from_millis(70);
+
+/// The strips of a fine frame. Each finds anew which splats it meets, and rounds positions in its
+/// own way; so their number does not depend on how fast the machine is.
+const STRIPS: u32 = 6;
+
+/// Strips begin where blocks of tiles do.
+const ROWS: u32 = 32;
+
+/// What [`Stage::step`] has done.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Step {
+    /// There is nothing to do: the exact picture is shown.
+    Rests,
+    /// The view may still move. Call again after these milliseconds.
+    Waits(f64),
+    /// A strip was drawn. Call again.
+    Works,
+    /// There is a new frame. Call again.
+    Shows,
+}
+
+/// A frame that was drawn.
+#[derive(Debug)]
+pub struct Frame {
+    /// The finished picture. One that is not exact has fewer pixels.
+    pub picture: Picture,
+    /// The camera that it shows.
+    pub camera: Camera,
+    /// Whether this is the picture that `splatkit render` draws.
+    pub is_exact: bool,
+    /// The time that drawing took, in milliseconds.
+    pub milliseconds: f64,
+}
+
+/// A frame that is being drawn.
+struct Work {
+    effort: Effort,
+    settings: Settings,
+    view: View,
+    picture: Picture,
+    /// The rows that are drawn, and those of a strip.
+    done: u32,
+    rows: u32,
+    milliseconds: f64,
+}
+
+/// A scene, and how it is seen.
+pub struct Stage {
+    description: Description,
+    loaded: Loaded,
+    renderer: Renderer,
+    drawing: Drawing,
+    orbit: Orbit,
+    size: [u32; 2],
+    /// Whether the camera is the one that is fitted to the scene.
+    is_fitted: bool,
+    sheet: Option<f64>,
+    pace: Pace,
+    /// Whether something changed since the last frame was begun, and when.
+    is_changed: bool,
+    changed: Instant,
+    work: Option<Work>,
+    frame: Option<Frame>,
+    /// The depth of the point where a drag began.
+    grabbed: Option<f64>,
+}
+
+impl Stage {
+    /// Reads a scene file, and the inputs that it names, from memory. The picture has `size` pixels
+    /// instead of what the scene file says.
+    ///
+    /// # Errors
+    /// Those of [`Description::parse`], of [`Description::load_held`] and of preparing the scene.
+    pub fn open(text: &str, files: &BTreeMap<PathBuf, Vec<u8>>, size: [u32; 2]) -> Result<Self> {
+        let mut description = Description::parse(text)?;
+        // A page shows one view, in pixels.
+        let picture = &mut description.picture;
+        (picture.width, picture.height) = (None, None);
+        picture.views.clear();
+        (picture.columns, picture.panel_labels) = (None, None);
+        picture.size = Some(size.map(|side| side.max(1)));
+        let mut loaded = description.load_held(files, &|_| {})?;
+        let drawing = loaded.drawing(&description.picture)?;
+        let framing = description.framing()?;
+        loaded.find_seen(&framing, &drawing.settings)?;
+        let camera = framing.camera(&loaded.subject, drawing.free(0))?;
+        let up = framing.orientation(&loaded.subject).0.up;
+        let orbit = Orbit::new(camera, up, loaded.subject.bounds.diagonal());
+        let renderer = Renderer::new(&Device::Cpu, &loaded.scene)?;
+        let sheet = loaded.scene.finest_sheet();
+        let (is_fitted, is_changed) = (description.camera.is_none(), true);
+        Ok(Self {
+            size: drawing_size(&description),
+            description,
+            loaded,
+            renderer,
+            drawing,
+            orbit,
+            is_fitted,
+            sheet,
+            pace: Pace::new(MOVING),
+            is_changed,
+            changed: Instant::now(),
+            work: None,
+            frame: None,
+            grabbed: None,
+        })
+    }
+
+    /// Returns what was said of the inputs while they were read.
+    pub fn warnings(&self) -> &[String] {
+        &self.loaded.warnings
+    }
+
+    /// Returns the names of the inputs, and what they hold, for people who do not see the picture.
+    pub fn summary(&self) -> String {
+        let names = self.loaded.inputs.iter().map(|input| {
+            let name = input.file.file_name().unwrap_or(input.file.as_os_str());
+            format!("{} ({:?})", name.to_string_lossy(), input.kind).to_lowercase()
+        });
+        names.collect::<Vec<_>>().join(", ")
+    }
+
+    /// Returns the camera.
+    pub fn camera(&self) -> CameraEntry {
+        CameraEntry::from(self.orbit.camera())
+    }
+
+    /// Returns the last frame.
+    pub fn frame(&self) -> Option<&Frame> {
+        self.frame.as_ref()
+    }
+
+    /// Returns the pixels of the last frame: red, green, blue and opacity, 8 bits each.
+    pub fn pixels(&self) -> Vec<u8> {
+        let background = self.description.picture.background();
+        self.frame.as_ref().map_or(Vec::new(), |frame| frame.picture.to_rgba8(background))
+    }
+
+    /// Says that the picture has another number of pixels.
+    ///
+    /// # Errors
+    /// Those of [`PictureEntry::settings`](splatkit::session::PictureEntry::settings) and of
+    /// fitting the camera.
+    pub fn resize(&mut self, size: [u32; 2]) -> Result<()> {
+        let size = size.map(|side| side.max(1));
+        if size == self.size {
+            return Ok(());
+        }
+        self.size = size;
+        self.description.picture.size = Some(size);
+        self.redraw()?;
+        if self.is_fitted {
+            self.fit(None)?;
+        }
+        Ok(())
+    }
+
+    /// Takes the settings from the description again.
+    fn redraw(&mut self) -> Result<()> {
+        self.drawing = self.loaded.drawing(&self.description.picture)?;
+        self.touch();
+        Ok(())
+    }
+
+    /// Replaces the clips.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for shapes that cannot be; [`Error::NothingToDraw`] if they leave
+    /// nothing.
+    pub fn set_clips(&mut self, clips: Vec<ClipEntry>) -> Result<()> {
+        let before = std::mem::replace(&mut self.description.picture.clips, clips);
+        let checked = self.description.picture.validate().and_then(|()| self.redraw());
+        checked.inspect_err(|_| self.description.picture.clips = before)
+    }
+
+    /// Replaces the transfer function of a field: the first, the second …
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is no such field, and those of
+    /// [`Renderer::set_transfer`].
+    pub fn set_transfer(&mut self, field: usize, transfer: &TransferFunction) -> Result<()> {
+        let fields = self.loaded.scene.fields();
+        let item = *fields.get(field).ok_or_else(|| {
+            Error::Argument(format!("there is no field {field}: the scene has {}", fields.len()))
+        })?;
+        self.renderer.set_transfer(item, transfer)?;
+        self.touch();
+        Ok(())
+    }
+
+    /// Returns the transfer functions of the fields.
+    pub fn transfers(&self) -> Vec<TransferFunction> {
+        self.renderer.scene().items.iter().filter_map(|item| item.transfer().cloned()).collect()
+    }
+
+    /// Something changed: the last frame no longer shows it.
+    fn touch(&mut self) {
+        (self.is_changed, self.changed) = (true, Instant::now());
+    }
+
+    fn moved(&mut self) {
+        self.is_fitted = false;
+        self.touch();
+    }
+
+    /// Sets the camera.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for one that cannot be.
+    pub fn set_camera(&mut self, camera: &CameraEntry) -> Result<()> {
+        self.orbit.set_camera(camera.camera().map_err(Error::Argument)?);
+        self.moved();
+        Ok(())
+    }
+
+    /// Shows the whole scene, from a side or as at first.
+    ///
+    /// # Errors
+    /// Those of [`Framing::camera`](splatkit::session::Framing::camera).
+    pub fn fit(&mut self, side: Option<Side>) -> Result<()> {
+        let mut framing = self.description.framing()?;
+        if side.is_some() {
+            (framing.camera, framing.camera_position, framing.view) = (None, None, side);
+            (framing.azimuth, framing.elevation) = (None, None);
+        }
+        let camera = framing.camera(&self.loaded.subject, self.drawing.free(0))?;
+        self.orbit.set_camera(camera);
+        self.moved();
+        self.is_fitted = side.is_none() && self.description.camera.is_none();
+        Ok(())
+    }
+
+    /// Turns the scene by a drag in pixels.
+    pub fn turn(&mut self, drag: DVec2) {
+        self.orbit.turn(drag, self.size);
+        self.moved();
+    }
+
+    /// Looks around by a drag in pixels.
+    pub fn look_around(&mut self, drag: DVec2) {
+        self.orbit.look_around(drag, self.size);
+        self.moved();
+    }
+
+    /// A drag begins at a pixel.
+    pub fn grab(&mut self, at: DVec2) {
+        self.grabbed = self.depth_at(at);
+    }
+
+    /// Moves the scene by a drag in pixels.
+    pub fn pan(&mut self, drag: DVec2) {
+        // Without a picture there is nothing to move.
+        if self.orbit.pan(drag, self.size, self.grabbed).is_ok() {
+            self.moved();
+        }
+    }
+
+    /// Comes closer by a factor to what is at a pixel.
+    pub fn zoom(&mut self, factor: f64, at: DVec2) {
+        let depth = self.depth_at(at);
+        let is_factor = factor.is_finite() && factor > 0.0;
+        if is_factor && self.orbit.zoom(factor, at, self.size, depth).is_ok() {
+            self.moved();
+        }
+    }
+
+    /// Turns about the point at a pixel from now on.
+    pub fn center(&mut self, at: DVec2) {
+        if let Some(point) = self.point_at(at) {
+            self.orbit.center(point);
+            self.moved();
+        }
+    }
+
+    /// Flies to the right, up and forwards, by shares of the distance to the focal point.
+    pub fn fly(&mut self, step: DVec3) {
+        let camera = self.orbit.camera();
+        let distance = camera.position.distance(camera.focal_point);
+        self.orbit.fly(step * distance);
+        self.moved();
+    }
+
+    /// Switches perspective on or off.
+    pub fn switch_perspective(&mut self) {
+        let is_flat = self.camera().height.is_some();
+        self.orbit.set_orthographic(!is_flat);
+        self.moved();
+    }
+
+    /// Returns the world point of the last frame at a pixel.
+    pub fn point_at(&self, at: DVec2) -> Option<DVec3> {
+        let frame = self.frame.as_ref()?;
+        Probe::picked(&frame.picture, &frame.camera.view(self.size).ok()?, at)
+    }
+
+    fn depth_at(&self, at: DVec2) -> Option<f64> {
+        let view = self.frame.as_ref()?.camera.view(self.size).ok()?;
+        Some(view.to_view(self.point_at(at)?).z)
+    }
+
+    /// Does the next part of the work, which is short.
+    ///
+    /// # Errors
+    /// Those of [`Renderer::render`]. Nothing more is drawn then, until something changes.
+    pub fn step(&mut self) -> Result<Step> {
+        let done = self.next();
+        if done.is_err() {
+            self.work = None;
+        }
+        done
+    }
+
+    fn next(&mut self) -> Result<Step> {
+        let is_new = std::mem::take(&mut self.is_changed);
+        if is_new {
+            self.work = None;
+            self.pace.changed();
+        }
+        if self.work.is_none() {
+            let Some(effort) = self.pace.next() else { return Ok(Step::Rests) };
+            let calm = self.changed.elapsed();
+            if !is_new && calm < CALM {
+                return Ok(Step::Waits((CALM - calm).as_secs_f64() * 1e3));
+            }
+            self.begin(effort, is_new)?;
+        }
+        self.draw_strip()
+    }
+
+    /// Begins a frame. One that moves is drawn at once.
+    fn begin(&mut self, effort: Effort, moves: bool) -> Result<()> {
+        let exact = &self.drawing.settings;
+        let settings = effort.settings(exact, exact.sheet_thickness.or(self.sheet));
+        let view = self.orbit.camera().view(settings.size)?;
+        let picture = Picture::blank(settings.size);
+        let height = settings.size[1];
+        let rows = if moves { height } else { strip_rows(height) };
+        self.work =
+            Some(Work { effort, settings, view, picture, done: 0, rows, milliseconds: 0.0 });
+        Ok(())
+    }
+
+    fn draw_strip(&mut self) -> Result<Step> {
+        let Some(mut work) = self.work.take() else { return Ok(Step::Rests) };
+        let [width, height] = work.settings.size;
+        let rows = work.rows.min(height - work.done);
+        let start = Instant::now();
+        if rows == height {
+            work.picture = self.renderer.render(&work.view, &work.settings)?.0;
+        } else {
+            let above = DVec2::new(0.0, f64::from(work.done));
+            let size = [width, rows];
+            let view = View { center: work.view.center - above, size, ..work.view.clone() };
+            let settings = Settings { size, ..work.settings.clone() };
+            let strip = self.renderer.render(&view, &settings)?.0;
+            work.picture.paste(&strip, [0, work.done])?;
+        }
+        work.milliseconds += start.elapsed().as_secs_f64() * 1e3;
+        work.done += rows;
+        if work.done < height {
+            self.work = Some(work);
+            return Ok(Step::Works);
+        }
+        self.finish(work)
+    }
+
+    /// Makes a drawn picture the frame that is shown.
+    fn finish(&mut self, work: Work) -> Result<Step> {
+        let Work { effort, picture, milliseconds, .. } = work;
+        self.pace.took(effort, milliseconds);
+        let (camera, is_exact) = (self.orbit.camera().clone(), effort == Effort::EXACT);
+        let picture = match is_exact {
+            true => self.drawing.reduced(picture, &self.loaded.items, &camera)?,
+            false => picture,
+        };
+        self.frame = Some(Frame { picture, camera, is_exact, milliseconds });
+        Ok(Step::Shows)
+    }
+}
+
+/// Returns the size that a description gives its picture.
+fn drawing_size(description: &Description) -> [u32; 2] {
+    description.picture.size()
+}
+
+/// Returns the rows of a strip: whole blocks of tiles.
+fn strip_rows(height: u32) -> u32 {
+    height.div_ceil(STRIPS).div_ceil(ROWS).saturating_mul(ROWS).min(height)
+}
+
+#[cfg(test)]
+mod tests;

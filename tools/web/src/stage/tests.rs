@@ -1,0 +1,102 @@
+//! A stage without a browser.
+
+use super::*;
+use splatkit::compare::compare_pictures;
+
+const SIZE: [u32; 2] = [96, 72];
+
+/// A ball of points that fills most of the picture.
+fn stage() -> (Stage, Description, BTreeMap<PathBuf, Vec<u8>>) {
+    let mut points = String::new();
+    for number in 0..600 {
+        let (turn, height) =
+            (f64::from(number) * 2.4, 1.0 - (2.0 * f64::from(number) + 1.0) / 600.0);
+        let ring = (1.0 - height * height).sqrt();
+        points += &format!("{} {} {height}\n", ring * turn.cos(), ring * turn.sin());
+    }
+    let text = r#"{"splatkit_scene": 2, "inputs": [{"file": "ball.xyz"}], "picture":
+        {"size": [9, 9], "views": ["front", "left"], "samples": 1, "background": "white"}}"#;
+    let files = BTreeMap::from([("ball.xyz".into(), points.into_bytes())]);
+    let stage = Stage::open(text, &files, SIZE).expect("a scene");
+    let mut scene = Description::parse(text).expect("a scene");
+    scene.picture.views.clear();
+    scene.picture.size = Some(SIZE);
+    (stage, scene, files)
+}
+
+/// Draws until nothing is left to do. Returns how often there was a new frame.
+fn rest(stage: &mut Stage) -> usize {
+    let mut frames = 0;
+    loop {
+        match stage.step().expect("a step") {
+            Step::Rests => return frames,
+            Step::Shows => frames += 1,
+            Step::Waits(milliseconds) => {
+                assert!(milliseconds > 0.0 && milliseconds <= 70.0, "{milliseconds}");
+                std::thread::sleep(Duration::from_secs_f64(milliseconds / 1e3));
+            }
+            Step::Works => {}
+        }
+    }
+}
+
+#[test]
+fn a_resting_stage_shows_the_picture_of_a_description() {
+    let (mut stage, scene, files) = stage();
+    assert!(rest(&mut stage) >= 2, "coarse before exact");
+    let frame = stage.frame().expect("a frame");
+    assert!(frame.is_exact);
+    let mut loaded = scene.load_held(&files, &|_| {}).expect("a scene");
+    let (picture, _) = loaded.draw(&scene, &Device::Cpu).expect("a picture");
+    let difference = compare_pictures(&frame.picture, &picture).expect("one size");
+    assert!(difference.psnr.is_none_or(|psnr| psnr > 70.0), "{difference:?}");
+    let pixels = stage.pixels();
+    assert_eq!(pixels.len() as u32, 4 * SIZE[0] * SIZE[1]);
+    assert_eq!(pixels[..4], [255; 4]);
+}
+
+#[test]
+fn a_hand_changes_the_picture_and_comes_back() {
+    let (mut stage, ..) = stage();
+    rest(&mut stage);
+    let (camera, before) = (stage.camera(), stage.pixels());
+    stage.turn(DVec2::new(20.0, 5.0));
+    assert!(rest(&mut stage) >= 1 && stage.camera() != camera);
+    assert_ne!(stage.pixels(), before);
+    let middle = DVec2::new(48.0, 36.0);
+    let point = stage.point_at(middle).expect("the ball is under the cursor");
+    assert!((point.length() - 1.0).abs() < 0.2, "{point}");
+    stage.grab(middle);
+    stage.zoom(1.5, middle);
+    stage.pan(DVec2::new(3.0, 2.0));
+    stage.fly(DVec3::new(0.1, 0.0, 0.1));
+    stage.switch_perspective();
+    assert!(stage.camera().height.is_some());
+    stage.set_camera(&camera).expect("a camera");
+    rest(&mut stage);
+    assert!(stage.pixels() == before, "the same camera shows another picture");
+    stage.resize([50, 40]).expect("a size");
+    rest(&mut stage);
+    assert_eq!(stage.pixels().len(), 4 * 50 * 40);
+}
+
+#[test]
+fn what_cannot_be_is_an_error_and_changes_nothing() {
+    let (mut stage, ..) = stage();
+    rest(&mut stage);
+    let before = stage.pixels();
+    let nothing = serde_json::json!([{"side": {"axis": "x", "below": true, "at": -9}}]);
+    let clips: Vec<ClipEntry> = serde_json::from_value(nothing).expect("a clip");
+    assert!(matches!(stage.set_clips(clips), Err(Error::NothingToDraw(_))));
+    let error = stage.set_transfer(0, &TransferFunction::default()).expect_err("no field");
+    assert!(error.to_string().contains("the scene has 0"), "{error}");
+    rest(&mut stage);
+    assert!(stage.pixels() == before);
+    let missing = Stage::open(
+        r#"{"splatkit_scene": 2, "inputs": [{"file": "b.xyz"}]}"#,
+        &BTreeMap::from([("a.xyz".into(), b"0 0 0\n".to_vec())]),
+        SIZE,
+    );
+    let error = missing.err().expect("a file that is not there").to_string();
+    assert!(error.contains("b.xyz: file: is not among the files in memory"), "{error}");
+}
