@@ -109,8 +109,8 @@ impl Scene {
     }
 
     /// Returns the thickness of the sheets of the finest volume in memory, about as
-    /// [`sheets`](Self::sheets) chooses it: what coarser pictures of moving views begin with. `None`
-    /// beside a label map, which no thicker sheets can show.
+    /// [`sheets`](Self::sheets) chooses it: what coarser pictures of moving views begin with.
+    /// `None` beside a label map, which no thicker sheets can show.
     pub fn finest_sheet(&self) -> Option<f64> {
         if self.items.iter().any(Item::is_label_map) {
             return None;
