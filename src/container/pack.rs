@@ -1,5 +1,5 @@
-//! Packs and unpacks bytes by zstd, which is C code and comes with the feature `files`. In browsers,
-//! Rust code unpacks them.
+//! Packs and unpacks bytes by zstd, which is C code and comes with the feature `files`. In
+//! browsers, Rust code unpacks them.
 
 #[cfg(not(feature = "files"))]
 pub use absent::{Compressor, compress, decompress};

@@ -110,7 +110,11 @@ impl Scene {
 
     /// Returns the thickness of the sheets of the finest volume in memory, about as
     /// [`sheets`](Self::sheets) chooses it: what coarser pictures of moving views begin with.
+    /// `None` beside a label map, which no thicker sheets can show.
     pub fn finest_sheet(&self) -> Option<f64> {
+        if self.items.iter().any(Item::is_label_map) {
+            return None;
+        }
         let thicknesses = self.items.iter().filter_map(|item| match item {
             Item::Volume(volume, ..) => Some(4.0 / 3.0 * volume.lattice.kernel_spacing()),
             _ => None,

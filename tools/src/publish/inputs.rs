@@ -2,12 +2,14 @@
 
 use crate::{failure::Failure, job::Loaded, progress::Progress};
 use splatkit::{
-    Error,
+    Device, Error,
+    compare::compare_pictures,
     formats::{self, Format, Kind},
     input::{Limits, is_remote},
+    scene::Item,
     session::{
         AppearanceEntry, Data, Description, InputEntry, KernelEntry, LoadedInput, ReadInput,
-        ReadingEntry, TransferEntry, convert::Conversion,
+        ReadingEntry, Samples, TransferEntry, convert::Conversion,
     },
     volume::TransferFunction,
 };
@@ -30,14 +32,14 @@ pub struct Published {
 /// others are converted.
 pub fn published(
     scene: &Description,
-    loaded: &Loaded,
+    loaded: &mut Loaded,
     progress: &Progress,
 ) -> Result<Published, Failure> {
     let mut page = scene.clone();
     page.inputs.clear();
     (page.reading, page.appearance) = (ReadingEntry::default(), AppearanceEntry::default());
     page.picture.memory = None;
-    let mut files = BTreeMap::new();
+    let (mut files, mut is_converted) = (BTreeMap::new(), false);
     for (number, (input, read)) in scene.visible().zip(&loaded.inputs).enumerate() {
         let mut entry = input.clone();
         entry.reading = scene.reading_of(input);
@@ -52,13 +54,15 @@ pub fn published(
             false => {
                 let what = format!("Converting {}", input.file.display());
                 progress.stage(what);
+                is_converted = true;
                 add_converted((scene, loaded), input, &mut entry, &folder, &mut files)?;
             }
         }
         page.inputs.push(entry);
     }
     let published = Published { scene: page, files };
-    published.try_reading(loaded)?;
+    progress.stage("Reading the page");
+    published.try_reading(scene, loaded, is_converted)?;
     Ok(published)
 }
 
@@ -165,9 +169,9 @@ fn converted(
         }
     };
     let name = format!("{stem}.{extension}");
-    let folder = std::env::temp_dir().join(format!("splatkit-publish-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).map_err(|error| Failure::output(&folder, error))?;
-    let path = folder.join(&name);
+    let folder = tempfile::tempdir();
+    let folder = folder.map_err(|error| Failure::output(&std::env::temp_dir(), error))?;
+    let path = folder.path().join(&name);
     let written = match data {
         Data::Volume(volume) => formats::nrrd::write(volume, &path),
         Data::Gaussians(set) => formats::spz::write(set, &path),
@@ -175,7 +179,6 @@ fn converted(
         _ => hierarchy(scene, input, &path),
     };
     let bytes = written.and_then(|()| std::fs::read(&path).map_err(|e| unread(&path, &e)));
-    std::fs::remove_dir_all(&folder).ok();
     Ok((name, bytes?))
 }
 
@@ -206,28 +209,53 @@ fn without_files(mut entry: AppearanceEntry) -> Result<AppearanceEntry, Failure>
     Ok(entry)
 }
 
+/// The least likeness of the pictures of a scene and of what its inputs were converted to, in dB.
+/// Splats in place of triangles stay above it.
+const LEAST_ALIKE: f64 = 24.0;
+
 impl Published {
     /// Reads the page's scene as the viewer does, so that a page which cannot be shown is an error
-    /// here.
-    fn try_reading(&self, loaded: &Loaded) -> Result<(), Failure> {
+    /// here. If inputs were converted, small pictures of both are compared.
+    fn try_reading(
+        &self,
+        scene: &Description,
+        loaded: &mut Loaded,
+        is_converted: bool,
+    ) -> Result<(), Failure> {
         let files = self.files.iter().map(|(name, bytes)| (PathBuf::from(name), bytes.clone()));
-        let again = self.scene.load_held(&files.collect(), &|_| {})?;
-        let [before, after] = [&loaded.inputs, &again.inputs];
-        let is_cut = |read: &LoadedInput, other: &LoadedInput| {
-            let stays = read.kind == other.kind;
-            !(stays || other.kind == Kind::Hierarchy)
-        };
-        match before.iter().zip(after).find(|(read, other)| is_cut(read, other)) {
-            None => Ok(()),
-            Some((read, other)) => {
-                let message = format!(
-                    "would be shown as {:?} instead of {:?} in a page",
-                    other.kind, read.kind
-                );
-                Err(Error::input(&read.file, "file", message).into())
-            }
+        let mut again = self.scene.load_held(&files.collect(), &|_| {})?;
+        if !is_converted {
+            return Ok(());
         }
+        let is_label_map =
+            |items: &[Item]| items.iter().map(Item::is_label_map).collect::<Vec<_>>();
+        let has_labels = is_label_map(&loaded.scene.items) == is_label_map(&again.scene.items);
+        let mut is_alike = || -> Result<bool, Error> {
+            let (before, _) = loaded.draw(&small(scene), &Device::Cpu)?;
+            let (after, _) = again.draw(&small(&self.scene), &Device::Cpu)?;
+            let likeness = compare_pictures(&before, &after)?.psnr;
+            Ok(likeness.is_none_or(|likeness| likeness >= LEAST_ALIKE))
+        };
+        if has_labels && is_alike()? {
+            return Ok(());
+        }
+        let names = scene.visible().map(|input| name_of(&input.file)).collect::<Vec<_>>();
+        let message = "would look different in a page: its colours or labels would be lost when \
+                       it is converted";
+        let hint = "write it in a format that pages read: docs/browser.md lists them";
+        Err(Error::input(Path::new(&names.join(", ")), "inputs", message).hint(hint).into())
     }
+}
+
+/// Returns a scene with a small picture.
+fn small(scene: &Description) -> Description {
+    let mut scene = scene.clone();
+    let picture = &mut scene.picture;
+    (picture.size, picture.width, picture.height) = (Some([160, 120]), None, None);
+    picture.views.clear();
+    (picture.columns, picture.panel_labels) = (None, None);
+    picture.samples = Some(Samples::Factor(1));
+    scene
 }
 
 #[cfg(test)]

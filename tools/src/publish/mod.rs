@@ -1,7 +1,7 @@
 //! `splatkit publish`: a page that shows a scene, as one file or as a folder for a static host.
 //!
-//! The page has the scene file, the files of its inputs, and the viewer of tools/web, which draws by
-//! the CPU engine. So it shows what `splatkit render` draws of the same scene.
+//! The page has the scene file, the files of its inputs, and the viewer of tools/web, which draws
+//! by the CPU engine. So it shows what `splatkit render` draws of the same scene.
 
 mod inputs;
 mod packing;
@@ -21,9 +21,24 @@ use std::{
 };
 use viewer::Viewer;
 
-/// Flags of `render` that are not for pages.
-const NOT_OF_PAGES: [&str; 10] =
-    ["depth", "turntable", "path", "fps", "raw", "reference", "bits", "views", "columns", "dpi"];
+/// Flags of `render` that are not for pages, which have their own sizes and one view.
+const NOT_OF_PAGES: [&str; 15] = [
+    "depth",
+    "turntable",
+    "path",
+    "fps",
+    "raw",
+    "reference",
+    "bits",
+    "views",
+    "columns",
+    "panel-labels",
+    "size",
+    "width",
+    "height",
+    "dpi",
+    "engine",
+];
 
 #[derive(Args, Debug)]
 // A page has its own output; the flags that write pictures are `render`'s.
@@ -39,7 +54,12 @@ const NOT_OF_PAGES: [&str; 10] =
     mut_arg("bits", |flag| flag.hide(true)),
     mut_arg("views", |flag| flag.hide(true)),
     mut_arg("columns", |flag| flag.hide(true)),
+    mut_arg("panel_labels", |flag| flag.hide(true)),
+    mut_arg("size", |flag| flag.hide(true)),
+    mut_arg("width", |flag| flag.hide(true)),
+    mut_arg("height", |flag| flag.hide(true)),
     mut_arg("dpi", |flag| flag.hide(true)),
+    mut_arg("engine", |flag| flag.hide(true)),
 )]
 pub struct Publish {
     #[command(flatten)]
@@ -83,7 +103,8 @@ impl Publish {
             None => Ok(Target::Folder(path)),
             Some(_) if path.is_dir() => Ok(Target::Folder(path)),
             Some(other) => Err(Failure::Usage(format!(
-                "{}: a page is an .html file, or a folder, whose name has no extension; not .{other}",
+                "{}: a page is an .html file, or a folder, whose name has no extension; not \
+                 .{other}",
                 path.display()
             ))),
         }
@@ -92,7 +113,7 @@ impl Publish {
     /// Reads the inputs, and makes the page of them.
     fn page(&self, job: &Job, viewer: &Viewer, progress: &Progress) -> Result<Page, Failure> {
         let start = Instant::now();
-        let loaded = job.load(progress)?;
+        let mut loaded = job.load(progress)?;
         if let Some(warning) = job.idle(&loaded.scene) {
             progress.warn(warning);
         }
@@ -105,7 +126,7 @@ impl Publish {
         let written = self.scene.output().unwrap_or(Path::new(""));
         output::check_unneeded(written, &loaded.files)?;
         progress.stage("Collecting the inputs");
-        let Published { scene, files } = inputs::published(&job.scene, &loaded, progress)?;
+        let Published { scene, files } = inputs::published(&job.scene, &mut loaded, progress)?;
         tracing::info!(milliseconds = milliseconds(start), "read and collected");
         let title = self.title.clone().unwrap_or_else(|| {
             let names = job.inputs().into_iter();
@@ -175,8 +196,8 @@ impl Target {
         if let Self::Folder(path) = self {
             let place = path.display();
             progress.note(format_args!(
-                "browsers show {place} from a server, not by a double click; for a look: python3 -m \
-                 http.server -d {place}"
+                "browsers show {place} from a server, not by a double click; for a look: python3 \
+                 -m http.server -d {place}"
             ));
         }
         Ok(())

@@ -103,6 +103,9 @@ impl Page {
     }
 }
 
+/// Browsers have no longer texts.
+const MOST_LETTERS: usize = 500_000_000;
+
 const NO_SCRIPT: &str = "<noscript>This page shows a scene in three dimensions. It needs \
                          JavaScript.</noscript>\n";
 
@@ -110,6 +113,12 @@ const NO_SCRIPT: &str = "<noscript>This page shows a scene in three dimensions. 
 fn packed(text: &mut String, attribute: &str, bytes: &[u8]) -> Result<(), Failure> {
     let packed = packing::packed(bytes);
     let (strides, letters) = packed.map_err(|error| Failure::output(Path::new("page"), error))?;
+    if letters.len() > MOST_LETTERS {
+        return Err(Failure::Usage(format!(
+            "an input has {} MB, too much for a page in one file: publish a folder",
+            bytes.len() / 1_000_000
+        )));
+    }
     writeln!(
         text,
         "<script type=\"text/plain\" {attribute} data-strides=\"{strides}\">{letters}</script>"

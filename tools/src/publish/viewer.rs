@@ -53,8 +53,8 @@ impl Viewer {
         }
     }
 
-    /// Returns the folders in which a viewer may be: beside the program, and where `tools/web/build`
-    /// puts it when the program lies in `target/release`.
+    /// Returns the folders in which a viewer may be: beside the program, and where
+    /// `tools/web/build` puts it when the program lies in `target/release`.
     fn places() -> Vec<PathBuf> {
         let program = std::env::current_exe().unwrap_or_default();
         let home = program.parent().unwrap_or(Path::new(""));

@@ -5,7 +5,7 @@
 
 const STYLE = `
 :host { display: block; position: relative; min-height: 8rem; color-scheme: light dark;
-  font: 14px/1.4 system-ui, sans-serif; --panel: light-dark(#fffd, #1b1f27e6);
+  font: 14px/1.4 system-ui, sans-serif; --panel: light-dark(#fffffff0, #1b1f27f2);
   --ink: light-dark(#1a1d22, #e8eaee); --line: light-dark(#0003, #fff3); }
 :host([hidden]) { display: none; }
 canvas { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: none;

@@ -100,3 +100,19 @@ fn what_cannot_be_is_an_error_and_changes_nothing() {
     let error = missing.err().expect("a file that is not there").to_string();
     assert!(error.contains("b.xyz: file: is not among the files in memory"), "{error}");
 }
+
+/// Sheets of a label map are never thick, so its coarse frames have wide pixels alone.
+#[test]
+fn a_label_map_moves() {
+    let text = r#"{"splatkit_scene": 2, "inputs": [{"file": "a.seg.nrrd"}]}"#;
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n";
+    let segments = "Segment0_ID:=one\nSegment0_LabelValue:=1\nSegment0_Name:=one\n\
+                    Segment1_ID:=two\nSegment1_LabelValue:=2\nSegment1_Name:=two\n\n";
+    let mut labels = format!("{header}{segments}").into_bytes();
+    labels.extend((0..512u32).map(|at| (at % 8 / 4 + 1) as u8));
+    let files = BTreeMap::from([("a.seg.nrrd".into(), labels)]);
+    let mut stage = Stage::open(text, &files, SIZE).expect("a label map");
+    assert!(rest(&mut stage) >= 1);
+    stage.turn(DVec2::new(9.0, 0.0));
+    assert!(rest(&mut stage) >= 1 && stage.frame().is_some_and(|frame| frame.is_exact));
+}
