@@ -31,7 +31,8 @@ pub struct FigureFlags {
         conflicts_with_all = ["view", "camera", "camera_position", "turntable", "path"]
     )]
     views: Vec<Side>,
-    /// Set the number of views in a row [default: all of up to four, else about a square]
+    /// Set the number of views in a row [default: all of up to four, else about a square], or of
+    /// --times in one picture
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..))]
     columns: Option<u32>,
     /// Choose what the corner of each view says [default: names]
@@ -51,6 +52,13 @@ enum Labels {
 }
 
 impl FigureFlags {
+    /// Returns the number of times in a row, and what the corner of each says. `None` if times
+    /// become frames.
+    pub fn row_of_times(&self) -> Option<(u32, PanelLabels)> {
+        let labels = self.panel_labels.map(PanelLabels::from).unwrap_or_default();
+        self.columns.map(|columns| (columns, labels))
+    }
+
     /// Changes the page of a scene's picture: by the flags that are given.
     pub fn apply(&self, scene: &mut Description, has_size: bool) {
         let picture = &mut scene.picture;

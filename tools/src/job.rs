@@ -308,10 +308,22 @@ impl Job {
         &self,
         subject: &Subject,
         finish: &Finish,
-        times: &[usize],
+        times: (&[usize], (u32, PanelLabels)),
     ) -> splatkit::Result<Figure> {
         let overlay = finish.overlay.as_ref();
         Figure::of_times(&self.scene.picture, overlay, (&self.framing()?, subject), times)
+    }
+
+    /// Returns how a picture with several panels is finished, if each has such a label.
+    pub fn finish_with_labels(
+        &self,
+        finish: Finish,
+        loaded: &Loaded,
+        labels: PanelLabels,
+    ) -> Result<Finish, Failure> {
+        let page = Page { has_labels: labels != PanelLabels::None, ..self.page() };
+        let overlay = Overlay::open(&self.scene.overlay, &loaded.captions, page)?;
+        Ok(Finish { overlay, ..finish })
     }
 
     /// Returns the size of the part of a drawn picture that the camera is fitted to: the middle,

@@ -219,6 +219,10 @@ impl Render {
         self.engine.apply(scene);
         self.overlay.apply(scene);
         self.figure.apply(scene, self.engine.has_size());
+        if self.motion.times().is_some() {
+            // They are for the times, not for views.
+            (scene.picture.columns, scene.picture.panel_labels) = (None, None);
+        }
         scene.picture.background = self.background.or(scene.picture.background);
         scene.picture.samples = self.samples.or(scene.picture.samples);
         Ok(())

@@ -6,7 +6,7 @@ use splatkit::{
     Result,
     math::Camera,
     picture::Picture,
-    session::{Framing, Panel, PictureEntry, Subject},
+    session::{Framing, Panel, PanelLabels, PictureEntry, Subject},
 };
 
 /// A picture of several views. Its panels have one size and one scale.
@@ -40,11 +40,12 @@ impl Figure {
         let cameras = framing.views(subject, panels[0].1.size, &picture.views)?;
         let names = picture.views.iter().map(|side| side.name().to_owned()).collect();
         let panels = panels.into_iter().map(|(_, panel)| panel).collect();
-        Ok(Some(Self::named(picture, panels, names, cameras)))
+        let labels = picture.panel_labels.unwrap_or_default();
+        Ok(Some(Self::named((size, labels), panels, names, cameras)))
     }
 
-    /// Returns the figure that shows a scene at several times, all by one camera, in rows of
-    /// [`PictureEntry::columns`] panels.
+    /// Returns the figure that shows a scene at several times, all by one camera, with this number
+    /// of them in a row.
     ///
     /// # Errors
     /// Those of [`Panel::grid`] and [`Framing::camera`].
@@ -52,27 +53,26 @@ impl Figure {
         picture: &PictureEntry,
         overlay: Option<&Overlay>,
         (framing, subject): (&Framing, &Subject),
-        times: &[usize],
+        (times, (columns, labels)): (&[usize], (u32, PanelLabels)),
     ) -> Result<Self> {
         let size = picture.size();
         let free = overlay.map_or(Panel::whole(size), |overlay| overlay.free(size));
         let count = times.len() as u32;
-        let panels = free.grid(count, picture.columns.unwrap_or(count))?;
+        let panels = free.grid(count, columns)?;
         let camera = framing.camera(subject, panels[0].size)?;
         let names = times.iter().map(|time| format!("time {time}")).collect();
-        Ok(Self::named(picture, panels, names, vec![camera; times.len()]))
+        Ok(Self::named((size, labels), panels, names, vec![camera; times.len()]))
     }
 
     fn named(
-        picture: &PictureEntry,
+        (size, labels): ([u32; 2], PanelLabels),
         panels: Vec<Panel>,
         names: Vec<String>,
         cameras: Vec<Camera>,
     ) -> Self {
-        let labels = picture.panel_labels.unwrap_or_default();
         let label = |(number, name): (usize, &String)| labels.text(number, name);
         let labels = names.iter().enumerate().map(label).collect();
-        Self { size: picture.size(), panels, names, labels, cameras }
+        Self { size, panels, names, labels, cameras }
     }
 
     /// Returns the size of each panel, in pixels.

@@ -5,7 +5,7 @@ use crate::{
     failure::Failure, frames::Storing, job::Job, motion::Motion, progress::Progress, times::Times,
     timing::milliseconds,
 };
-use splatkit::{FrameStats, Renderer, math::Camera, picture::Picture};
+use splatkit::{FrameStats, Renderer, math::Camera, picture::Picture, session::PanelLabels};
 use splatkit_media::video::Film;
 use std::time::Instant;
 
@@ -24,7 +24,8 @@ impl Render {
         let mut loaded = job.load(progress)?;
         let counts = loaded.inputs.iter().filter_map(|input| input.times);
         let numbers = times.numbers(counts.map(|times| times.count).max().unwrap_or(1))?;
-        let motion = match job.scene.picture.columns {
+        let row = self.figure.row_of_times();
+        let motion = match row {
             Some(_) => Motion::Still,
             None => Motion::Times(numbers.len() as u32),
         };
@@ -43,6 +44,10 @@ impl Render {
             progress.warn(warning);
         }
         let (settings, finish) = self.prepare(&job, &mut loaded, (&frames, &motion), progress)?;
+        let finish = match row {
+            Some((_, labels)) => job.finish_with_labels(finish, &loaded, labels)?,
+            None => finish,
+        };
         let ready = Ready { job: &job, loaded: &loaded, settings, finish, figure: None };
         let start = Instant::now();
         let mut drawer = match self.reference {
@@ -51,9 +56,9 @@ impl Render {
         };
         let upload_ms = milliseconds(start);
         let run = Run { ready: &ready, output: &self.output, motion, path: None, film, frames };
-        let drawn = match run.motion {
-            Motion::Still => run.draw_beside(&numbers, &mut drawer, progress)?,
-            _ => run.draw_film(&numbers, &mut drawer, progress)?,
+        let drawn = match row {
+            Some(row) => run.draw_beside((&numbers, row), &mut drawer, progress)?,
+            None => run.draw_film(&numbers, &mut drawer, progress)?,
         };
         self.tell(&run, &drawn, (&drawer, upload_ms), (&output, begun, progress))
     }
@@ -99,14 +104,14 @@ impl Run<'_> {
     /// Draws and writes one picture with a panel for each time.
     fn draw_beside(
         &self,
-        times: &[usize],
+        (times, row): (&[usize], (u32, PanelLabels)),
         drawer: &mut Drawer,
         progress: &Progress,
     ) -> Result<Drawn, Failure> {
         let Ready { job, loaded, finish, .. } = self.ready;
         let storing = Storing { bits: self.output.bits, dpi: finish.dpi };
         let mut writer = self.frames.open(self.film, storing)?;
-        let figure = job.figure_of_times(&loaded.subject, finish, times)?;
+        let figure = job.figure_of_times(&loaded.subject, finish, (times, row))?;
         let size = figure.panel_size();
         let mut numbers = times.iter().copied().enumerate();
         let mut stats = FrameStats::default();

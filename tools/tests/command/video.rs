@@ -307,7 +307,7 @@ mod ffmpeg {
         for name in ["out.mp4", "out.webm", "out.mov"] {
             run(&folder, &empty, &format!("-o {name} --turntable 3")).fails(
                 1,
-                &[name, "ffmpeg", "not installed", ".gif", ".webp", "-o out.png", "--raw"],
+                &[name, "ffmpeg", "not installed", ".gif", ".webp", "out.png", "--raw"],
             );
         }
         assert_eq!(folder.names().len(), 2, "{:?}", folder.names());
