@@ -305,10 +305,8 @@ mod ffmpeg {
         let empty = folder.path("empty");
         fs::create_dir(&empty).unwrap();
         for name in ["out.mp4", "out.webm", "out.mov"] {
-            run(&folder, &empty, &format!("-o {name} --turntable 3")).fails(
-                1,
-                &[name, "ffmpeg", "not installed", ".gif", ".webp", "out.png", "--raw"],
-            );
+            run(&folder, &empty, &format!("-o {name} --turntable 3"))
+                .fails(1, &[name, "ffmpeg", "not installed", ".gif", ".webp", "out.png", "--raw"]);
         }
         assert_eq!(folder.names().len(), 2, "{:?}", folder.names());
     }
