@@ -129,7 +129,7 @@ mod tests {
         ),
         ("Kernel", "kernel sigma extent sharp"),
         ("Page", "title viewer"),
-        ("Animation", "turntable path fps"),
+        ("Animation", "turntable path times fps"),
         ("Figures", "width height dpi views columns panel-labels"),
         ("Texts", "scalar-bar axes scale-bar caption"),
         (

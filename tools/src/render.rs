@@ -45,12 +45,11 @@ use std::{
 #[derive(Args, Debug, Default)]
 struct OutputFlags {
     /// Write the picture to this .png, .jpg, .tiff, .webp or .exr file, or to stdout as PNG if it
-    /// is `-`. OpenEXR files hold linear light and the depths. With
-    /// --turntable, --path or --times, write an animation to this .gif, .webp or .apng file, or with ffmpeg,
-    /// if it is installed, to this .mp4, .webm or .mov file. Or write numbered pictures: out.png
-    /// becomes out_0000.png, and {frame} or {frame:04} in the name is replaced by the number
-    /// [default: beside the first input: bunny.png for bunny.ply, or bunny_2.png if bunny.png
-    /// exists]
+    /// is `-`. OpenEXR files hold linear light and the depths. With --turntable, --path or
+    /// --times, write an animation to this .gif, .webp or .apng file, or with ffmpeg, if it is
+    /// installed, to this .mp4, .webm or .mov file. Or write numbered pictures: out.png becomes
+    /// out_0000.png, and {frame} or {frame:04} in the name is replaced by the number [default:
+    /// beside the first input: bunny.png for bunny.ply, or bunny_2.png if bunny.png exists]
     #[arg(short, long, value_name = "FILE", allow_hyphen_values = true)]
     output: Option<PathBuf>,
     /// Write raw frames to stdout (-o -), for another program: rows from the top, and a byte each

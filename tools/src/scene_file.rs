@@ -26,6 +26,7 @@ pub const NOT_OF_PICTURES: &[&str] = &[
     "json",
     "turntable",
     "path",
+    "times",
     "fps",
     "raw",
     "help",

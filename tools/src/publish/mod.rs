@@ -22,10 +22,11 @@ use std::{
 use viewer::Viewer;
 
 /// Flags of `render` that are not for pages, which have their own sizes and one view.
-const NOT_OF_PAGES: [&str; 15] = [
+const NOT_OF_PAGES: [&str; 16] = [
     "depth",
     "turntable",
     "path",
+    "times",
     "fps",
     "raw",
     "reference",
@@ -48,6 +49,7 @@ const NOT_OF_PAGES: [&str; 15] = [
     mut_arg("depth", |flag| flag.hide(true)),
     mut_arg("turntable", |flag| flag.hide(true)),
     mut_arg("path", |flag| flag.hide(true)),
+    mut_arg("times", |flag| flag.hide(true)),
     mut_arg("fps", |flag| flag.hide(true)),
     mut_arg("raw", |flag| flag.hide(true)),
     mut_arg("reference", |flag| flag.hide(true)),

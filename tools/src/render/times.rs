@@ -21,6 +21,7 @@ impl Render {
         require_one_view(job)?;
         let mut job = job.clone();
         job.scene.reading.time = Some(times.first());
+        job.scene.inputs.iter_mut().for_each(|input| input.reading.time = None);
         let mut loaded = job.load(progress)?;
         let counts = loaded.inputs.iter().filter_map(|input| input.times);
         let numbers = times.numbers(counts.map(|times| times.count).max().unwrap_or(1))?;

@@ -44,8 +44,18 @@ use window::{Surroundings, Window};
 const SIZE: [f32; 2] = [1280.0, 800.0];
 
 /// Flags of `render` that say what is written.
-const OF_FILES: [&str; 9] =
-    ["output", "depth", "overwrite", "turntable", "path", "fps", "raw", "reference", "json"];
+const OF_FILES: [&str; 10] = [
+    "output",
+    "depth",
+    "overwrite",
+    "turntable",
+    "path",
+    "times",
+    "fps",
+    "raw",
+    "reference",
+    "json",
+];
 
 #[derive(Args, Debug)]
 // A window may open without anything; the flags that write files are `render`'s.
@@ -56,6 +66,7 @@ const OF_FILES: [&str; 9] =
     mut_arg("overwrite", |flag| flag.hide(true)),
     mut_arg("turntable", |flag| flag.hide(true)),
     mut_arg("path", |flag| flag.hide(true)),
+    mut_arg("times", |flag| flag.hide(true)),
     mut_arg("fps", |flag| flag.hide(true)),
     mut_arg("raw", |flag| flag.hide(true)),
     mut_arg("reference", |flag| flag.hide(true)),
