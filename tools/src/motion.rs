@@ -37,9 +37,9 @@ pub struct MotionFlags {
     #[arg(long, value_name = "FILE.json", conflicts_with_all = ["turntable", "CameraFlags"])]
     path: Option<PathBuf>,
     /// Draw a frame for each of these times of the inputs: all, or numbers from 0 and ranges with
-    /// their ends, such as 0,4,8 or 0..20 or 0..20:2. The camera, the transfer functions and the
-    /// ranges of colours are those of the first. In --caption, {time} becomes the number. With
-    /// --columns, all stand beside each other in one picture.
+    /// their ends, such as 0,4,8 or 0..20 or 0..20:2. The camera is fitted to all of them; the
+    /// transfer functions and the ranges of colours are those of the first. In --caption, {time}
+    /// becomes the number. With --columns, all stand beside each other in one picture.
     #[arg(long, value_name = "all|TIMES", conflicts_with_all = ["turntable", "path", "time"])]
     times: Option<Times>,
     /// Set the frames per second of an animation [default: 30; 10 with --times]

@@ -2,7 +2,12 @@
 
 use super::{Drawer, Drawn, Ready, Render, Run, require_one_view};
 use crate::{
-    failure::Failure, frames::Storing, job::Job, motion::Motion, progress::Progress, times::Times,
+    failure::Failure,
+    frames::Storing,
+    job::{Job, Loaded},
+    motion::Motion,
+    progress::Progress,
+    times::Times,
     timing::milliseconds,
 };
 use splatkit::{FrameStats, Renderer, math::Camera, picture::Picture, session::PanelLabels};
@@ -10,8 +15,8 @@ use splatkit_media::video::Film;
 use std::time::Instant;
 
 impl Render {
-    /// Draws the inputs at several times. The camera and what shows the values are made for the
-    /// first one.
+    /// Draws the inputs at several times. What shows the values is made for the first one, and the
+    /// camera is fitted to all.
     pub(super) fn draw_times(
         &self,
         times: &Times,
@@ -45,6 +50,7 @@ impl Render {
             progress.warn(warning);
         }
         let (settings, finish) = self.prepare(&job, &mut loaded, (&frames, &motion), progress)?;
+        see_all(&job, &mut loaded, &numbers, progress)?;
         let finish = match row {
             Some((_, labels)) => job.finish_with_labels(finish, &loaded, labels)?,
             None => finish,
@@ -63,6 +69,28 @@ impl Render {
         };
         self.tell(&run, &drawn, (&drawer, upload_ms), (&output, begun, progress))
     }
+}
+
+/// Adds what is seen at later times to what the camera is fitted to. The first time is loaded.
+fn see_all(
+    job: &Job,
+    loaded: &mut Loaded,
+    times: &[usize],
+    progress: &Progress,
+) -> Result<(), Failure> {
+    let framing = job.framing()?;
+    if framing.is_placed() {
+        return Ok(());
+    }
+    let bar = progress.bar("Framing the times", times.len() as u64);
+    for (number, &time) in times.iter().enumerate().skip(1) {
+        bar.set(number as u64);
+        let (other, mut later) = job.at_time(loaded, time)?;
+        let settings = other.settings(&later)?;
+        later.find_seen(&framing, &settings)?;
+        loaded.subject.seen.append(&mut later.subject.seen);
+    }
+    Ok(())
 }
 
 impl Run<'_> {
