@@ -11,7 +11,7 @@ use crate::{
     frames::{Frames, Storing, Writer, numbered},
     given::Given,
     job::{Finish, Job, Loaded},
-    motion::{self, Motion, MotionFlags},
+    motion::{Motion, MotionFlags},
     output,
     overlay::OverlayFlags,
     progress::Progress,
@@ -368,7 +368,7 @@ pub fn export(job: &Job, export: Export<'_>, progress: &Progress) -> Result<(), 
     let Export { loaded, transfers, path, output, stop } = export;
     let begun = Instant::now();
     let flags = OutputFlags { overwrite: true, ..OutputFlags::default() };
-    let rate = path.as_ref().map_or(motion::RATE, |(_, rate)| *rate);
+    let rate = path.as_ref().map_or(crate::motion::RATE, |(_, rate)| *rate);
     let motion =
         path.map_or(Ok(Motion::Still), |(path, rate)| Motion::along(path, rate, output))?;
     let background = job.scene.picture.background();
