@@ -420,7 +420,7 @@ struct Order {
 
 impl Order {
     fn of(samples: &[Sample], scalar: Scalar) -> Self {
-        /// What is added to values of 8 and 16 bits, so that they count from 0.
+        /// The smallest value of 8 or 16 bits, which is counted first.
         const LOWEST: i64 = i16::MIN as i64;
         let mut order = Self { values: Vec::new(), sums: Vec::new(), is_whole: true };
         if matches!(scalar, Scalar::U8 | Scalar::U16 | Scalar::I16) {
