@@ -20,6 +20,8 @@ ORIGIN = (3.0, -2.0, 7.5)
 #: A rotation about an oblique axis, and the same with x mirrored.
 TURN = np.array([[2, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3
 MIRRORED = TURN * [-1, 1, 1]
+#: From ITK's frame of a patient, whose x leads to the left and y to the back, to splatkit's.
+LPS = np.diag([-1, -1, 1])
 #: The index i, j, k of the marked sample.
 MARK = (9, 2, 5)
 
@@ -91,7 +93,7 @@ def image_of_itk(itk, array, direction):
     image.SetSpacing(SPACING)
     image.SetOrigin(ORIGIN)
     image.SetDirection(itk.matrix_from_array(np.ascontiguousarray(direction)))
-    return image, np.array(image.TransformIndexToPhysicalPoint(MARK))
+    return image, LPS @ image.TransformIndexToPhysicalPoint(MARK)
 
 
 def image_of_simple_itk(sitk, array, direction):
@@ -99,7 +101,7 @@ def image_of_simple_itk(sitk, array, direction):
     image.SetSpacing(SPACING)
     image.SetOrigin(ORIGIN)
     image.SetDirection(direction.ravel().tolist())
-    return image, np.array(image.TransformIndexToPhysicalPoint(MARK))
+    return image, LPS @ image.TransformIndexToPhysicalPoint(MARK)
 
 
 IMAGES = {
@@ -118,9 +120,14 @@ def test_images_are_where_their_package_says(package, direction):
     module = pytest.importorskip(package)
     array = phantom()
     image, _ = IMAGES[package](module, array, direction)
+    turn = LPS if package in ("itk", "SimpleITK") else np.eye(3)
     # The front of a patient differs between the frames, so that the cameras are the same here.
     wanted = Scene().add_volume(
-        array, transfer=TRANSFER, spacing=SPACING, origin=ORIGIN, axes=direction
+        array,
+        transfer=TRANSFER,
+        spacing=SPACING,
+        origin=turn @ ORIGIN,
+        axes=turn @ direction,
     )
     camera = wanted.camera(SIZE)
     for scene in (
