@@ -4,6 +4,7 @@ mod edges;
 mod encoding;
 #[cfg(feature = "pictures")]
 mod exr;
+mod eye_dome;
 
 pub use edges::Edges;
 pub(crate) use encoding::{DPI, wrong_dpi};

@@ -394,7 +394,8 @@ fn difference(lane: vec2<u32>, r: u32, f: u32) -> vec2<f32> {
 fn composite_single(r: u32, depth: f32, splat: Loaded) {
     var color = splat.color;
     if SURFACE_SHADED && any(splat.normal != vec3(0.0)) {
-        color = lit(color, splat.normal, direction_of(r), frame.surface_shade);
+        // Other lights than that from the eye need sheets.
+        color = lit(r, color, splat.normal, 0.0);
     }
     let left = exp(-depth);
     let before = pixels[r].transmittance;

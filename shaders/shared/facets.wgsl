@@ -165,7 +165,7 @@ fn add_facet(place: u32, front: u32, first_pixel: vec2<i32>) {
             var color = (tints * weights) * tint.xyz;
             // Facets without normals keep their colours.
             if SURFACE_SHADED && any(normals[0] != vec3(0.0)) {
-                color = lit(color, normals * weights, direction_of(r), frame.surface_shade);
+                color = lit(r, color, normals * weights, distance);
             }
             let side = select(BACK_SIDE, FRONT_SIDE, last.w > 0.0);
             add_cover(r, front, continued, side, share, seen, distance, color);

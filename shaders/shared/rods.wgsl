@@ -94,7 +94,7 @@ fn add_rod(entry: u32, front: u32, first_pixel: vec2<i32>) {
         if counts {
             var color = mix(color_from, color_to, part);
             if SURFACE_SHADED && any(surface_normal != vec3(0.0)) {
-                color = lit(color, surface_normal, way, frame.surface_shade);
+                color = lit(r, color, surface_normal, distance);
             }
             add_cover(r, front, continued, ROD_SIDE, share, share, distance, color);
         }

@@ -13,46 +13,85 @@ const BRIGHTEST_TRAINED: f32 = 65535.0 / 8192.0;
 // Beside trained Gaussians, a sheet is fully lit from the inverse of this share of normals on.
 const LIT_BY: f32 = 2.0;
 
-// Returns a lit colour: Blinn's model (1977) with a light at the eye, on both sides. `certain` is a
-// magnitude up to which the normal does not count, and one over the magnitudes over which it comes
-// to count in full.
-fn lit_from(
-    color: vec3<f32>,
-    normal: vec3<f32>,
-    direction: vec3<f32>,
-    shade: vec4<f32>,
-    certain: vec2<f32>,
-) -> vec3<f32> {
-    let light = light_of(normal, direction, shade, certain);
-    return min(color * light.x + light.y, vec3(1.0));
+// The light that reaches a place: the mean direction of that from all sides, in view space, its
+// amount, and the share of the key lamp's light.
+struct Reaching {
+    side: vec3<f32>,
+    open: f32,
+    key: f32,
 }
 
-// Returns the factor on a colour, and the highlight that is added to it.
+// From the smallest length on, a surface's normal is certain.
+const CERTAIN: vec2<f32> = vec2(0.0, 1e30);
+// The most light from all sides, in that of the open.
+const MOST_OPEN: f32 = 2.0;
+
+// Returns how far a normal counts: from the magnitude certain.x on, up to 1. certain.y is one over
+// the magnitudes over which it comes to count in full.
+fn certainty_of(normal: vec3<f32>, certain: vec2<f32>) -> f32 {
+    let size = length(normal);
+    return select(0.0, clamp((size - certain.x) * certain.y, 0.0, 1.0), size > 1e-20);
+}
+
+// Returns the normal towards the eye, as long as it is certain.
+fn turned(normal: vec3<f32>, direction: vec3<f32>, certain: vec2<f32>) -> vec3<f32> {
+    let size = select(1.0, -1.0, dot(normal, direction) > 0.0) / max(length(normal), 1e-20);
+    return normal * (certainty_of(normal, certain) * size);
+}
+
+// Returns the factor on a colour, and the highlight that is added to it, by Blinn's model (1977) on
+// both sides of a surface.
 fn light_of(
     normal: vec3<f32>,
     direction: vec3<f32>,
     shade: vec4<f32>,
     certain: vec2<f32>,
+    reaching: Reaching,
 ) -> vec2<f32> {
     let size = length(normal);
-    if !(size > 1e-20) {
-        return vec2(shade.x + shade.y, 0.0);
+    let share = certainty_of(normal, certain);
+    let facing = min(abs(dot(normal, direction)) / max(size, 1e-20), 1.0);
+    let shown = 1.0 - share * (1.0 - facing);
+    let gloss = share * shade.z * pow(max(facing, 1e-6), shade.w);
+    if !LAMPS {
+        return vec2(shade.x + shade.y * shown, gloss);
     }
-    let facing = min(abs(dot(normal, direction)) / size, 1.0);
-    let share = clamp((size - certain.x) * certain.y, 0.0, 1.0);
-    let diffuse = shade.x + shade.y * (1.0 - share * (1.0 - facing));
-    return vec2(diffuse, share * shade.z * pow(facing, shade.w));
+    let way = select(normal, -normal, dot(normal, direction) > 0.0) / max(size, 1e-20);
+    let open = clamp(reaching.open + 2.0 * share * dot(reaching.side, way), 0.0, MOST_OPEN);
+    let head = frame.lamp_shares.x;
+    let key = frame.lamp_shares.y * reaching.key;
+    let towards = frame.key_direction.xyz;
+    let cosine = clamp(dot(towards, way), 0.0, 1.0);
+    let half = normalize(towards - direction);
+    let lamp_gloss = share * shade.z * pow(clamp(dot(half, way), 1e-6, 1.0), shade.w);
+    return vec2(
+        open * (shade.x + shade.y * (head * shown + frame.lamp_shares.z))
+            + key * shade.y * (1.0 - share * (1.0 - cosine)),
+        open * head * gloss + select(0.0, key * lamp_gloss, cosine > 0.0),
+    );
 }
 
-// The same for a normal of any length.
-fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f32>) -> vec3<f32> {
-    return lit_from(color, normal, direction, shade, vec2(0.0, 1e30));
+// Returns the lit colour of a surface at a distance along a pixel's ray. The normal may have any
+// length.
+fn lit(r: u32, color: vec3<f32>, normal: vec3<f32>, distance: f32) -> vec3<f32> {
+    let direction = direction_of(r);
+    let reaching = reaching_at(r, distance, turned(normal, direction, CERTAIN));
+    let light = light_of(normal, direction, frame.surface_shade, CERTAIN, reaching);
+    return min(color * light.x + light.y, vec3(1.0));
 }
 
-// The same for the gradient of the field.
-fn lit_field(r: u32, f: u32, color: vec3<f32>, gradient: vec3<f32>) -> vec3<f32> {
+// Returns a lit colour of the field.
+fn lit_field(
+    r: u32,
+    f: u32,
+    color: vec3<f32>,
+    gradient: vec3<f32>,
+    reaching: Reaching,
+) -> vec3<f32> {
     let shade = frame.fields[f].shade;
-    return lit_from(color, gradient, direction_of(r), shade, frame.fields[f].certain.xy);
+    let certain = frame.fields[f].certain.xy;
+    let light = light_of(gradient, direction_of(r), shade, certain, reaching);
+    return min(color * light.x + light.y, vec3(1.0));
 }
 
 // The same for a part of a sheet, in its mean light: gradients change more within a part than
@@ -76,7 +115,9 @@ fn lit_piece(
 // Returns the light of the field at a place in a sheet.
 fn light_at(r: u32, f: u32, medium: Medium, place: f32) -> vec2<f32> {
     let gradient = gradient_at(r, f, medium, place);
-    return light_of(gradient, direction_of(r), frame.fields[f].shade, frame.fields[f].certain.xy);
+    let shade = frame.fields[f].shade;
+    let certain = frame.fields[f].certain.xy;
+    return light_of(gradient, direction_of(r), shade, certain, medium.reaching);
 }
 
 // Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
@@ -130,7 +171,8 @@ fn resolve_radiance(r: u32, sheet: u32) -> Mixture {
             let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
             // Splats without a normal keep their colours.
             if dot(normal, normal) > 0.0 {
-                let lit_color = lit(color, normal, direction_of(r), frame.surface_shade);
+                let middle = 0.5 * (planes[sheet] + planes[sheet + 1u]);
+                let lit_color = lit(r, color, normal, middle);
                 // The share of what is lit: Gaussians are not.
                 let share = LIT_BY * length(normal) / max(pixels[r].facing.x, 1e-12);
                 color = mix(color, lit_color, select(1.0, min(share, 1.0), TRAINED));
@@ -170,6 +212,8 @@ struct Medium {
     // ray at the front, in the middle and at the back.
     inside: vec2<f32>,
     along: vec3<f32>,
+    // The light that reaches the middle of the sheet.
+    reaching: Reaching,
     // The largest value.
     peak: f32,
     // The distance at which an isosurface absorbed half of the light.
@@ -311,7 +355,7 @@ fn pass_surface(
     }
     var color = surface.color.xyz;
     if VOLUME_SHADED {
-        color = lit_field(r, f, color, gradient_at(r, f, *medium, place));
+        color = lit_field(r, f, color, gradient_at(r, f, *medium, place), (*medium).reaching);
     }
     (*medium).color += share * color;
 }
@@ -333,6 +377,11 @@ fn pass_field(r: u32, f: u32, sheet: u32, field: Sheet) -> Medium {
             medium.inside = field.inside.slope;
             medium.along = vec3(field.front.along, field.inside.along, field.back.along);
         }
+    }
+    if VOLUME_SHADED && LAMPS {
+        let certain = frame.fields[f].certain.xy;
+        let normal = turned(gradient_at(r, f, medium, 0.5), direction_of(r), certain);
+        medium.reaching = reaching_at(r, planes[sheet] + 0.5 * medium.thickness, normal);
     }
     var begin = max(planes[sheet], pixels[r].fields[f].inside.x);
     let last = min(planes[sheet + 1u], pixels[r].fields[f].inside.y);

@@ -20,6 +20,7 @@ impl CpuRenderer {
         parked: Option<Parked>,
     ) {
         self.scene.insert(number, item, pose);
+        self.shadows.forget();
         for field in self.fields.iter_mut().filter(|field| field.number >= number) {
             field.number += 1;
         }
@@ -43,6 +44,7 @@ impl CpuRenderer {
     /// Takes an item out.
     pub(crate) fn take(&mut self, number: usize) -> Parked {
         self.scene.remove(number);
+        self.shadows.forget();
         let place = self.fields.iter().position(|field| field.number == number);
         let field = place.map(|place| self.fields.remove(place));
         for field in self.fields.iter_mut().filter(|field| field.number > number) {
@@ -57,6 +59,7 @@ impl CpuRenderer {
     /// Those of [`Scene::set_pose`](crate::scene::Scene::set_pose).
     pub(crate) fn set_pose(&mut self, number: usize, pose: Pose) -> Result<()> {
         self.scene.set_pose(number, pose)?;
+        self.shadows.forget();
         self.update_item(number);
         Ok(())
     }

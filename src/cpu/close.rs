@@ -3,10 +3,11 @@
 //! `src/reference` has the definition; shaders/shared/sheet.wgsl does the same.
 
 use super::{
+    lamps::{Reaching, with_light},
     layer::{Layer, PARTS},
     plan::Plan,
     rays::Rays,
-    vector::{self, Lanes, dot, each, exp, four, log2, three},
+    vector::{Lanes, dot, each, exp, four, log2, three},
     visible::NARROW,
 };
 use crate::{
@@ -31,8 +32,6 @@ const UNSEEN: f32 = 2e-3;
 const MOST_DEPTH: f32 = 20.0;
 /// Minimum divisor where optical depths are divided by.
 const LEAST_DIVISOR: f32 = 1e-20;
-/// A shorter gradient has no direction.
-const LEAST_GRADIENT: f32 = 1e-20;
 /// A pixel that transmits less light is finished.
 pub const OPAQUE: f32 = 0.0005;
 /// A pixel without a value.
@@ -262,66 +261,6 @@ impl Plan<'_> {
         at.map(factor).simd_into(simd)
     }
 
-    /// Returns a lit colour, with a light at the eye, on both sides (Blinn 1977). A normal may have
-    /// any length.
-    #[inline(always)]
-    pub fn lit<S: Simd>(
-        &self,
-        simd: S,
-        color: [Lanes<S>; 3],
-        normal: [Lanes<S>; 3],
-        direction: [Lanes<S>; 3],
-        Light { ambient, diffuse, specular, power }: Light,
-    ) -> [Lanes<S>; 3] {
-        let one = Lanes::splat(simd, 1.0);
-        let size = dot(normal, normal).sqrt();
-        let has_direction = size.simd_gt(LEAST_GRADIENT);
-        let facing =
-            (dot(normal, direction).abs() / size.max(Lanes::splat(simd, LEAST_GRADIENT))).min(one);
-        let facing = has_direction.select(facing, one);
-        let highlight = vector::power(simd, facing.max(Lanes::splat(simd, 1e-6)), power) * specular;
-        let highlight = has_direction.select(highlight, Lanes::splat(simd, 0.0));
-        let share = facing * diffuse + ambient;
-        three!(I => color[I].mul_add(share, highlight).min(one))
-    }
-
-    /// Returns a lit colour of the field. The gradient counts from the magnitudes on that are
-    /// certain, in entries per thickness of a sheet; others are lit the less the shorter they are.
-    #[inline(always)]
-    fn lit_field<S: Simd>(
-        &self,
-        simd: S,
-        color: [Lanes<S>; 3],
-        gradient: [Lanes<S>; 3],
-        direction: [Lanes<S>; 3],
-    ) -> [Lanes<S>; 3] {
-        let [share, highlight] = self.light_of(simd, gradient, direction);
-        with_light(simd, color, share, highlight)
-    }
-
-    /// Returns the factor on a colour of the field and the highlight that is added to it.
-    #[inline(always)]
-    fn light_of<S: Simd>(
-        &self,
-        simd: S,
-        gradient: [Lanes<S>; 3],
-        direction: [Lanes<S>; 3],
-    ) -> [Lanes<S>; 2] {
-        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-        let Light { ambient, diffuse, specular, power } = self.field.light;
-        let (low, per_magnitude) = (self.field.certain_from, self.field.per_certain);
-        let size = dot(gradient, gradient).sqrt();
-        let certainty = ((size - low) * per_magnitude).max(none).min(one);
-        let has_direction = size.simd_gt(LEAST_GRADIENT);
-        let certainty = has_direction.select(certainty, none);
-        let facing = (dot(gradient, direction).abs()
-            / size.max(Lanes::splat(simd, LEAST_GRADIENT)))
-        .min(one);
-        let highlight = vector::power(simd, facing.max(Lanes::splat(simd, 1e-6)), power);
-        let highlight = highlight * certainty * specular;
-        [(one - certainty * (one - facing)) * diffuse + ambient, highlight]
-    }
-
     /// Returns the colour of a piece in its mean light: gradients change more within a piece than
     /// values do. If the light is steady, that of the middle stands for it.
     #[inline(always)]
@@ -329,20 +268,21 @@ impl Plan<'_> {
         &self,
         simd: S,
         color: [Lanes<S>; 3],
-        layer: &Layer<S>,
+        (layer, reaching): (&Layer<S>, &Reaching<S>),
         [place, next_place]: [Lanes<S>; 2],
         is_steady: bool,
     ) -> [Lanes<S>; 3] {
+        let on = (layer.direction, reaching);
         if is_steady {
             let gradient = self.gradient(layer, (place + next_place) * 0.5);
-            return self.lit_field(simd, color, gradient, layer.direction);
+            return self.lit_field(simd, color, gradient, on);
         }
         let none = Lanes::splat(simd, 0.0);
         let mut sums = [none; 2];
         for number in 0..LIGHTS {
             let share = (number as f32 + 0.5) / LIGHTS as f32;
             let at = (next_place - place) * share + place;
-            let light = self.light_of(simd, self.gradient(layer, at), layer.direction);
+            let light = self.light_of(simd, self.gradient(layer, at), on);
             sums = [sums[0] + light[0], sums[1] + light[1]];
         }
         let [share, highlight] = sums.map(|sum| sum * (1.0 / LIGHTS as f32));
@@ -360,7 +300,8 @@ impl Plan<'_> {
         media: &mut Media<S>,
     ) {
         let Packet { rays, pixels, .. } = packet;
-        let medium = self.pass(simd, layer, rays, mask, pixels.through);
+        let reaching = self.reaching(simd, layer, rays);
+        let medium = self.pass(simd, (layer, &reaching), rays, mask, pixels.through);
         if self.optics == Optics::Maximum {
             pixels.hit = pixels.hit.max(medium.peak);
             return;
@@ -416,11 +357,12 @@ impl Plan<'_> {
     fn pass<S: Simd>(
         &self,
         simd: S,
-        layer: &Layer<S>,
+        (layer, reaching): (&Layer<S>, &Reaching<S>),
         rays: &Rays<S>,
         mask: mask32x8<S>,
         before: Lanes<S>,
     ) -> Medium<S> {
+        let on = (layer, reaching);
         let none = Lanes::splat(simd, 0.0);
         let mut medium = Medium {
             before,
@@ -433,7 +375,7 @@ impl Plan<'_> {
         };
         if self.holes == 0 {
             let mask = mask & layer.begin.simd_lt(layer.end);
-            self.pass_between(simd, layer, [layer.begin, layer.end], mask, &mut medium);
+            self.pass_between(simd, on, [layer.begin, layer.end], mask, &mut medium);
             return medium;
         }
         let holes = &rays.holes[..self.holes];
@@ -453,7 +395,7 @@ impl Plan<'_> {
             }
             let mask = mask & begin.simd_lt(end);
             if mask.any_true() {
-                self.pass_between(simd, layer, [begin, end], mask, &mut medium);
+                self.pass_between(simd, on, [begin, end], mask, &mut medium);
             }
             begin = begin.max(end);
         }
@@ -490,7 +432,7 @@ impl Plan<'_> {
     fn pass_between<S: Simd>(
         &self,
         simd: S,
-        layer: &Layer<S>,
+        (layer, reaching): (&Layer<S>, &Reaching<S>),
         [begin, end]: [Lanes<S>; 2],
         mask: mask32x8<S>,
         medium: &mut Medium<S>,
@@ -519,7 +461,7 @@ impl Plan<'_> {
             let values = straight.unwrap_or([value, next]);
             let places = [place, next_place];
             let piece = Piece { mask, begin, length: step, places, values, turn };
-            self.pass_piece(simd, layer, &piece, medium);
+            self.pass_piece(simd, (layer, reaching), &piece, medium);
             place = next_place;
             value = next;
         }
@@ -562,13 +504,14 @@ impl Plan<'_> {
     fn pass_piece<S: Simd>(
         &self,
         simd: S,
-        layer: &Layer<S>,
+        (layer, reaching): (&Layer<S>, &Reaching<S>),
         piece: &Piece<S>,
         medium: &mut Medium<S>,
     ) {
         let none = Lanes::splat(simd, 0.0);
+        let on = (layer, reaching);
         let left = medium.before * medium.through;
-        let Some((color, depth)) = self.color_and_depth(simd, layer, piece, left) else { return };
+        let Some((color, depth)) = self.color_and_depth(simd, on, piece, left) else { return };
         let ([place, next_place], [value, next]) = (piece.places, piece.values);
         let mut done = none;
         for number in 0..self.isosurfaces {
@@ -599,7 +542,7 @@ impl Plan<'_> {
                 [0, 1, 2].map(|channel| of_met(up.color[channel], down.color[channel]));
             if self.is_lit {
                 let normal = self.gradient(layer, place + (next_place - place) * share);
-                surface = self.lit_field(simd, surface, normal, layer.direction);
+                surface = self.lit_field(simd, surface, normal, (layer.direction, reaching));
             }
             for (sum, channel) in medium.color.iter_mut().zip(surface) {
                 *sum = taken.mul_add(channel, *sum);
@@ -615,7 +558,7 @@ impl Plan<'_> {
     fn color_and_depth<S: Simd>(
         &self,
         simd: S,
-        layer: &Layer<S>,
+        (layer, reaching): (&Layer<S>, &Reaching<S>),
         piece: &Piece<S>,
         left: Lanes<S>,
     ) -> Option<([Lanes<S>; 3], Lanes<S>)> {
@@ -642,14 +585,15 @@ impl Plan<'_> {
         let mut color = three!(I => (emission[I] * inverse).max(none).min(one));
         if self.is_lit {
             let is_steady = piece.turn.is_steady(depth.min(one) * left);
-            color = self.lit_piece(simd, color, layer, piece.places, is_steady);
+            let on = (layer, reaching);
+            color = self.lit_piece(simd, color, on, piece.places, is_steady);
         }
         Some((color, depth))
     }
 
     /// Returns the gradient in view space, in entries per thickness of a sheet.
     #[inline(always)]
-    fn gradient<S: Simd>(&self, layer: &Layer<S>, u: Lanes<S>) -> [Lanes<S>; 3] {
+    pub fn gradient<S: Simd>(&self, layer: &Layer<S>, u: Lanes<S>) -> [Lanes<S>; 3] {
         if let Some([front, middle, back]) = &layer.sections {
             let v = 1.0 - u;
             let w = v - u;
@@ -717,20 +661,9 @@ fn difference2<S: Simd>(a: &[Lanes<S>; 3], b: &[Lanes<S>; 3]) -> Lanes<S> {
     dot(difference, difference)
 }
 
-/// Returns a colour times a share of light, and a highlight.
-#[inline(always)]
-fn with_light<S: Simd>(
-    simd: S,
-    color: [Lanes<S>; 3],
-    share: Lanes<S>,
-    highlight: Lanes<S>,
-) -> [Lanes<S>; 3] {
-    three!(I => color[I].mul_add(share, highlight).min(Lanes::splat(simd, 1.0)))
-}
-
 /// Transposes eight pixels with four channels into four channels with eight pixels.
 #[inline(always)]
-fn columns<S: Simd>(simd: S, rows: [f32x4<S>; 8]) -> [Lanes<S>; 4] {
+pub fn columns<S: Simd>(simd: S, rows: [f32x4<S>; 8]) -> [Lanes<S>; 4] {
     let [low, high] = each!([0, 4], I => {
         let (ac, bd) = (rows[I].zip_low(rows[I + 2]), rows[I + 1].zip_low(rows[I + 3]));
         let (ac_high, bd_high) = (rows[I].zip_high(rows[I + 2]), rows[I + 1].zip_high(rows[I + 3]));

@@ -263,7 +263,7 @@ impl<S: Simd> Covering<S> for DrawnFacet<'_> {
         // Facets without normals keep their colours.
         if plan.lit_surfaces && self.has_normals {
             let normal = three!(I => dot_with(self.normals[I], weights));
-            color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
+            color = plan.lit_surface(simd, color, normal, (rays, distance));
         }
         let side = if self.is_front { Side::Front } else { Side::Back };
         Some(Covered { share, seen: seen_share, distance, color, covers, side })

@@ -8,6 +8,7 @@ use super::{
     footprint::Record,
     gather::{Gather, Last},
     layer::Layer,
+    opacity::TileMap,
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
     scatter::{OpenField, OpenTile, Window},
@@ -133,7 +134,8 @@ impl<S: Simd> OpenField<'_, S> {
 }
 
 impl March<'_> {
-    /// Draws a tile. `entries` are its splats, sorted by first sheet.
+    /// Draws a tile. `entries` are its splats, sorted by first sheet. If there is a map, the optical
+    /// depths of all sheets go there, and nothing hides what lies behind it.
     #[inline(always)]
     pub fn tile<S: Simd>(
         &self,
@@ -141,6 +143,7 @@ impl March<'_> {
         at: [usize; 2],
         entries: &[Entry],
         drawn: &mut u64,
+        map: Option<&mut TileMap>,
     ) -> Tile {
         let plan = &self.plans[0];
         let corner = plan.corner(at);
@@ -172,7 +175,7 @@ impl March<'_> {
         let mut tile = OpenTile { corner, packets, sums: Sums::new(simd, plan), fields };
         match plan.single() {
             Some(order) => self.one_by_one(simd, entries, order, &mut tile, drawn),
-            None => self.sheets(simd, entries, &mut seen, &mut tile, drawn),
+            None => self.sheets(simd, entries, &mut seen, (&mut tile, map), drawn),
         }
         self.finished(simd, &tile.packets)
     }
@@ -230,7 +233,7 @@ impl March<'_> {
         simd: S,
         entries: &[Entry],
         seen: &mut [Seen<'_, S>],
-        tile: &mut OpenTile<'_, S>,
+        (tile, mut map): (&mut OpenTile<'_, S>, Option<&mut TileMap>),
         drawn: &mut u64,
     ) {
         let plan = &self.plans[0];
@@ -262,6 +265,9 @@ impl March<'_> {
             }
             if sheet > 0 {
                 self.close(simd, sheet, tile, seen);
+                if let Some(map) = &mut map {
+                    map.take(simd, plan, sheet, &mut tile.packets);
+                }
                 let is_done = tile.packets.iter().all(|packet| packet.is_done);
                 if is_done && plan.optics != Optics::Maximum {
                     return;

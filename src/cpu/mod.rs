@@ -29,6 +29,8 @@
 //! | `window` | loads the samples around eight places |
 //! | `cells` | tetrahedra with linear fields, integrated along the rays |
 //! | `close` | classifies, lights and composites a sheet |
+//! | `lamps` | the light that reaches a place |
+//! | `opacity` | maps of what the scene absorbs, for shadows |
 //! | `vector` | functions of eight numbers at once |
 
 mod bells;
@@ -46,9 +48,11 @@ mod footprint;
 mod gather;
 mod items;
 mod kernel_sums;
+mod lamps;
 mod layer;
 mod march;
 mod nodes;
+mod opacity;
 mod page_cache;
 mod plan;
 mod project;
@@ -66,17 +70,17 @@ mod visible;
 mod window;
 
 use crate::{
-    Error, Result,
+    Error, Result, Stop,
     bricks::Choice,
     hierarchy::Detail,
     math::{View, Viewpoint},
     parallel::prelude::*,
     picture::Picture,
-    plan::{FrameStats, TILE, gathering, pace::Pace, tables::Values},
+    plan::{FrameStats, TILE, gathering, lamps::Lamps, pace::Pace, tables::Values},
     scene::{Evaluate, Optics, Scene, Settings},
     volume::TransferFunction,
 };
-use bins::{BLOCK, Bins, TileLists};
+use bins::{BLOCK, Bins, Lists, TileLists};
 use brick_cache::most_bricks;
 pub(crate) use changes::Parked;
 use close::NO_VALUE;
@@ -85,6 +89,7 @@ use fields::FieldState;
 use footprint::Record;
 use items::Prepared;
 use march::{DrawnField, EMPTY, March, Tile};
+use opacity::ShadowCache;
 use plan::{FieldOutline, Outline, Plan};
 use spare::Spare;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -105,6 +110,7 @@ pub struct CpuRenderer {
     /// Memory to reuse.
     spare: Spare,
     spare_bins: bins::Spare,
+    shadows: ShadowCache,
 }
 
 /// The times of a picture's steps.
@@ -144,6 +150,7 @@ impl CpuRenderer {
             level: Level::new(),
             spare: Spare::new(),
             spare_bins: bins::Spare::default(),
+            shadows: ShadowCache::default(),
         })
     }
 
@@ -158,6 +165,7 @@ impl CpuRenderer {
         for field in &mut self.fields {
             field.item = self.scene.items[field.number].clone();
         }
+        self.shadows.forget();
         Ok(())
     }
 
@@ -178,13 +186,19 @@ impl CpuRenderer {
         let bounds = self.scene.bounds();
         view.validate_for(&bounds)?;
         let mut clock = Clock { last: start, steps: Vec::new() };
+        let shadows = self.shadows(&view, settings)?;
+        if settings.lighting.needs_maps() {
+            clock.step("shadows");
+        }
         let outline = self.outline(&view, settings)?;
-        let plans = self.plans(&view, settings, &outline);
+        let mut plans = self.plans(&view, settings, &outline);
+        let lamps = Lamps::new(&view, settings, &shadows);
+        plans.iter_mut().for_each(|plan| plan.lamps.clone_from(&lamps));
         clock.step("plan");
         let before: u64 = self.brick_reads();
         let records = self.records(&plans, settings, &outline)?;
         clock.step("project");
-        let drawn = self.draw(&plans, &outline, &records, &mut clock);
+        let drawn = self.draw((&plans, &outline, &records), &mut clock);
         self.spare = records;
         if settings.controls.stop.is_requested() {
             return Err(Error::Stopped);
@@ -339,11 +353,37 @@ impl CpuRenderer {
 
     fn draw(
         &mut self,
-        plans: &[Plan],
-        outline: &Outline,
-        records: &[Vec<Record>],
+        (plans, outline, records): (&[Plan], &Outline, &[Vec<Record>]),
         clock: &mut Clock,
     ) -> (Picture, FrameStats) {
+        let plan = &plans[0];
+        let transfer = self.fields.first().and_then(|field| field.item.transfer()).cloned();
+        let [width, height] = plan.view.size;
+        let mut color = vec![[0.0f32; 4]; width as usize * height as usize];
+        let mut depth = vec![0.0f32; color.len()];
+        let band = width as usize * BLOCK * plan.tile_step();
+        let bands = color.chunks_mut(band).zip(depth.chunks_mut(band)).collect();
+        let (level, drawn) = (self.level, AtomicU64::new(0));
+        let mut stats =
+            self.march((plans, outline, records), clock, bands, |march, blocks, (color, depth)| {
+                let block = |(at, entries): ([usize; 2], TileLists)| {
+                    draw_block(level, march, at, &entries, &drawn)
+                };
+                let blocks: Vec<Vec<Tile>> = blocks.map(block);
+                write_band(plan, transfer.as_ref(), &blocks, color, depth);
+            });
+        stats.entries = drawn.into_inner();
+        (Picture { width, height, color, depth }, stats)
+    }
+
+    /// Marches through all tiles. `row` draws a row of blocks into one of the bands.
+    fn march<B: Send>(
+        &mut self,
+        (plans, outline, records): (&[Plan], &Outline, &[Vec<Record>]),
+        clock: &mut Clock,
+        bands: Vec<B>,
+        row: impl Fn(&March, RowOfBlocks, B) + Sync,
+    ) -> FrameStats {
         let mut spare = std::mem::take(&mut self.spare_bins);
         let visible: Vec<Visible> = plans.iter().map(Visible::new).collect();
         self.prepare_gather(plans, outline);
@@ -353,44 +393,53 @@ impl CpuRenderer {
         }
         let gathered = fields.iter().map(DrawnField::marked).sum();
         let crossed: u64 = fields.iter().map(DrawnField::crossed).sum();
-        let (plan, march) = (&plans[0], March { plans, fields, records });
-        let mut bins = Bins::new(plan, records, &mut spare);
+        let march = March { plans, fields, records };
+        let mut bins = Bins::new(&plans[0], records, &mut spare);
         clock.step("bin");
-        let drawn = AtomicU64::new(0);
-        let transfer = self.fields.first().and_then(|field| field.item.transfer());
-        let [width, height] = plan.view.size;
-        let mut color = vec![[0.0f32; 4]; width as usize * height as usize];
-        let mut depth = vec![0.0f32; color.len()];
-        let (columns, band) = (bins.columns(), width as usize * BLOCK * plan.tile_step());
+        let (columns, mut bands) = (bins.columns(), bands.into_iter());
         for rows in bins.parts() {
             let lists = bins.lists(&rows);
             clock.step("bin");
-            let from = rows.start * band;
-            let parts = color[from..].par_chunks_mut(band).zip(depth[from..].par_chunks_mut(band));
-            parts.zip(rows).for_each(|((color, depth), row)| {
-                let block = |column: usize| {
-                    if outline.stop.is_requested() {
-                        return vec![EMPTY; BLOCK * BLOCK];
-                    }
-                    let entries = lists.of_tiles(column, row, columns);
-                    draw_block(self.level, &march, [column, row], &entries, &drawn)
-                };
-                let blocks: Vec<Vec<Tile>> = (0..columns).into_par_iter().map(block).collect();
-                write_band(plan, transfer, &blocks, color, depth);
+            let bands: Vec<B> = bands.by_ref().take(rows.len()).collect();
+            bands.into_par_iter().zip(rows).for_each(|(band, number)| {
+                let stop = &outline.stop;
+                row(&march, RowOfBlocks { number, columns, lists: &lists, stop }, band);
             });
             clock.step("march");
         }
         self.spare_bins = spare;
-        let picture = Picture { width, height, color, depth };
-        let stats = FrameStats {
+        FrameStats {
             splats: crossed + records.iter().map(|batch| batch.len() as u64).sum::<u64>(),
             gathered,
-            entries: drawn.into_inner(),
             passes: u32::from(!records.is_empty()),
             gpu_bytes: self.bytes() + record_bytes(records),
             ..FrameStats::default()
+        }
+    }
+}
+
+/// A row of blocks of tiles that is to be drawn.
+struct RowOfBlocks<'a> {
+    number: usize,
+    columns: usize,
+    lists: &'a Lists<'a>,
+    stop: &'a Stop,
+}
+
+impl RowOfBlocks<'_> {
+    /// Returns what `block` makes of each block, given its place and its splats. Once drawing is to
+    /// end, the rest is empty.
+    fn map<T: Send + Default>(
+        &self,
+        block: impl Fn(([usize; 2], TileLists)) -> T + Sync,
+    ) -> Vec<T> {
+        let of_column = |column: usize| {
+            if self.stop.is_requested() {
+                return T::default();
+            }
+            block(([column, self.number], self.lists.of_tiles(column, self.number, self.columns)))
         };
-        (picture, stats)
+        (0..self.columns).into_par_iter().map(of_column).collect()
     }
 }
 
@@ -413,7 +462,7 @@ fn draw_block(
         let at = [column * BLOCK + number % BLOCK, row * BLOCK + number / BLOCK];
         if at[0] < tiles[0] && at[1] < tiles[1] {
             let entries = entries.of(number);
-            *tile = lanes!(level, simd => march.tile(simd, at, entries, &mut count));
+            *tile = lanes!(level, simd => march.tile(simd, at, entries, &mut count, None));
         }
     }
     drawn.fetch_add(count, Relaxed);
@@ -433,8 +482,12 @@ fn write_band(
     for (y, (color, depth)) in color.chunks_mut(width).zip(depth.chunks_mut(width)).enumerate() {
         let parts = color.chunks_mut(step).zip(depth.chunks_mut(step));
         for (tile, (color, depth)) in parts.enumerate() {
-            let pixels = &blocks[tile / BLOCK][y / step * BLOCK + tile % BLOCK]
-                [(y % step + apron) * TILE + apron..];
+            // Drawing has been stopped.
+            let Some(tiles) = blocks.get(tile / BLOCK).filter(|tiles| !tiles.is_empty()) else {
+                continue;
+            };
+            let pixels =
+                &tiles[y / step * BLOCK + tile % BLOCK][(y % step + apron) * TILE + apron..];
             for ((color, depth), (rgba, hit)) in color.iter_mut().zip(depth).zip(pixels) {
                 if plan.optics == Optics::Maximum {
                     *color = transfer

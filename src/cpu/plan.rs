@@ -10,6 +10,7 @@ use crate::{
         TILE,
         field::Field,
         frame::{Frame, from_eye},
+        lamps::Lamps,
         tables::Tables,
     },
     scene::{Classification, Gradient, Item, Mode, Optics, Order, Region, Scene, Settings},
@@ -85,6 +86,8 @@ pub struct Plan<'a> {
     /// The sets of facets that show images.
     pub with_images: Vec<Arc<FacetSet>>,
     pub lit_surfaces: bool,
+    /// The lights, unless all light comes from the eye.
+    pub lamps: Option<Lamps>,
     /// The scene has trained Gaussians, which are not lit.
     pub has_trained: bool,
     /// The largest channel of a colour of radiance.
@@ -141,6 +144,7 @@ impl<'a> Plan<'a> {
             has_rods: false,
             with_images: Vec::new(),
             lit_surfaces: false,
+            lamps: None,
             has_trained: scene.items.iter().any(Item::is_trained),
             brightest: scene.brightest(),
             region: settings

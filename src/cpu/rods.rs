@@ -275,7 +275,7 @@ impl<S: Simd> Covering<S> for DrawnRod {
         let [from, to] = self.colors;
         let mut color = three!(I => part * (to[I] - from[I]) + from[I]);
         if plan.lit_surfaces && (self.is_round || self.normal != Vec3::ZERO) {
-            color = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_light);
+            color = plan.lit_surface(simd, color, normal, (rays, distance));
         }
         Some(Covered { share, seen: share, distance, color, covers, side: Side::Rod })
     }

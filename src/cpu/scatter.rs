@@ -514,7 +514,9 @@ fn single<S: Simd>(
     let normal = [x, y, z].map(|part| Lanes::splat(simd, part));
     let mut color = [red, green, blue].map(|part| Lanes::splat(simd, part));
     if plan.lit_surfaces && [x, y, z] != [0.0; 3] {
-        color = plan.lit(simd, color, normal, packet.rays.direction, plan.frame.surface_light);
+        // Other lights than that from the eye need sheets.
+        let on = (&packet.rays, Lanes::splat(simd, 0.0));
+        color = plan.lit_surface(simd, color, normal, on);
     }
     let one = Lanes::splat(simd, 1.0);
     let left = exp(simd, -depth);

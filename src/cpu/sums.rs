@@ -172,8 +172,9 @@ impl<S: Simd> Sums<S> {
         let mut color = three!(I => (sum[I] * inverse).max(self.none).min(most));
         if plan.lit_surfaces {
             let normal = [x, y, z];
-            let direction = packet.rays.direction;
-            let lit = plan.lit(simd, color, normal, direction, plan.frame.surface_light);
+            let middle = 0.5 * (plan.planes[sheet] + plan.planes[sheet + 1]);
+            let on = (&packet.rays, Lanes::splat(simd, middle));
+            let lit = plan.lit_surface(simd, color, normal, on);
             let size2 = x * x + y * y + z * z;
             let has_normal = size2.simd_gt(0.0);
             if plan.has_trained {

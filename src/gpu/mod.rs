@@ -32,6 +32,7 @@
 //! | `variant` | which features of the shaders a picture needs, and the constants that say so |
 //! | `uniforms` | the plan's numbers, packed as shaders read them |
 //! | `scene` | the data of a scene on the GPU |
+//! | `lamps` | what keeps light away, on the GPU |
 //! | `targets`, `budget` | the buffers of a frame, and the capacity of a depth pass |
 //! | `output` | where a host application gets the picture |
 //! | `upload` | pictures of the CPU engine, for a host application |
@@ -47,6 +48,7 @@ pub(crate) mod budget;
 mod checks;
 pub(crate) mod device;
 mod frame;
+mod lamps;
 mod outline;
 mod output;
 mod passes;

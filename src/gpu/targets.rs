@@ -15,7 +15,7 @@ use crate::{
         variant::{MOST_BINS, MOST_GROUP_SHIFT, Variant},
     },
     math::{Sheets, View},
-    plan::{field::Field, frame},
+    plan::{field::Field, frame, lamps::Lamps},
     scene::{Scene, Settings},
 };
 use wgpu::BufferUsages as Usage;
@@ -100,6 +100,8 @@ pub struct Targets {
     pub depths: wgpu::Buffer,
     /// The images that facets show, and what they show of them (images.wgsl).
     pub images: Option<[wgpu::TextureView; 2]>,
+    /// What keeps light away (lamps.wgsl), unless all light comes from the eye.
+    pub shadows: Option<[wgpu::TextureView; 2]>,
     /// The lattice that is gathered, if any.
     pub gathered: Option<Gathered>,
     pub run_total: u32,
@@ -219,6 +221,7 @@ impl Request<'_> {
         let fields = tables.in_view(&prepared.scene, self.settings, view, self.sheets);
         tables.pack(&fields, &mut frame);
         let gathered = self.gathered(gpu, prepared, (tables.entries(), &fields), &mut frame);
+        let shadows = self.shadows(prepared, &mut frame)?;
         let table = tables.buffer.clone();
         prepared.tables = Some(tables);
         let sizes = Sizes::of(self, gpu, budget, prepared.runs);
@@ -257,11 +260,34 @@ impl Request<'_> {
             colors: pool.take(gpu, "colors", 16 * pixels + slots),
             depths: pool.take(gpu, "depths", 4 * pixels),
             images: prepared.images.as_ref().map(|images| images.textures.clone()),
+            shadows,
             gathered,
             run_total: prepared.runs,
             first_runs: prepared.first_runs(),
             tiles,
         })
+    }
+
+    /// Packs the lights, and returns what keeps light away.
+    fn shadows(
+        &self,
+        prepared: &PreparedScene,
+        frame: &mut Frame,
+    ) -> Result<Option<[wgpu::TextureView; 2]>> {
+        if !self.variant.lamps {
+            return Ok(None);
+        }
+        let Some(shadows) = &prepared.shadows else {
+            return Err(Error::Argument(
+                "other lights than that from the eye need maps of the scene, which a \
+                 splatkit::Renderer draws"
+                    .into(),
+            ));
+        };
+        if let Some(lamps) = Lamps::new(self.view, self.settings, &shadows.shadows) {
+            frame.set_lamps(&lamps);
+        }
+        Ok(Some(shadows.textures.clone()))
     }
 
     /// Columns and rows of tiles.

@@ -30,6 +30,9 @@ pub struct Effort {
     pub coarseness: f64,
 }
 
+/// The smallest map of shadows of a moving view, in pixels.
+const LEAST_SHADOWS: u32 = 64;
+
 impl Effort {
     /// That of the exact picture.
     pub const EXACT: Self = Self { pixel: 1.0, coarseness: 1.0 };
@@ -47,6 +50,10 @@ impl Effort {
         // Where pixels are wide, thin sheets show nothing more.
         let thicker = self.coarseness * self.pixel.min(2.0);
         settings.sheet_thickness = sheet.map(|sheet| sheet * thicker);
+        // The map of shadows is drawn for each turn of the view.
+        if let Some(key) = settings.lighting.key.as_mut().filter(|key| key.shadows > 0) {
+            key.shadows = ((f64::from(key.shadows) / self.pixel) as u32).max(LEAST_SHADOWS);
+        }
         if let Detail::Pixels(pixels) = exact.detail {
             settings.detail = Detail::Pixels(pixels * self.coarseness);
         }

@@ -5,6 +5,7 @@
 pub(crate) mod field;
 pub(crate) mod frame;
 pub(crate) mod gathering;
+pub(crate) mod lamps;
 pub(crate) mod pace;
 pub(crate) mod source;
 mod stats;

@@ -276,7 +276,7 @@ impl Frame<'_> {
             let color = match &self.shade {
                 // Facets without normals keep their colours.
                 Some(shade) if normal != DVec3::ZERO => {
-                    shade::lit(color, normal, ray.direction, shade)
+                    shade::lit_by(color, normal, (&ray, distance), (shade, self.lamps.as_ref()))
                 }
                 _ => color,
             };

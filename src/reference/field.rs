@@ -3,7 +3,9 @@
 use super::{
     classify::Classifier,
     composite::{Medium, Step},
-    shade,
+    lamps::Lamps,
+    ray::Ray,
+    shade::{self, Lit},
 };
 use crate::volume::{Isosurface, Lattice, Shade};
 use glam::DVec3;
@@ -37,6 +39,30 @@ pub(super) struct Layer {
 
 /// The field in a sheet, and the parts of the ray where it counts.
 pub(super) type ClippedLayer = (Layer, Vec<[f64; 2]>);
+
+/// How a field is lit in a sheet: all of it by the light that reaches the sheet's middle.
+struct LitBy<'a> {
+    shade: Option<&'a Shade>,
+    lamps: Lit<'a>,
+}
+
+impl<'a> LitBy<'a> {
+    fn new(layer: &Layer, field: &'a Field, (ray, lamps): (&Ray, Option<&'a Lamps>)) -> Self {
+        let shade = field.shade.as_ref();
+        let lamps = lamps.zip(shade).map(|(lamps, shade)| {
+            let gradient = layer.gradient(0.5, ray.direction);
+            (lamps, shade::reaching(lamps, gradient, (ray, layer.distance(0.5)), shade))
+        });
+        Self { shade, lamps }
+    }
+
+    /// Returns a colour at a place with a gradient.
+    fn one(&self, color: DVec3, gradient: DVec3, direction: DVec3) -> DVec3 {
+        self.shade.map_or(color, |shade| {
+            shade::with_light(color, shade::light(gradient, direction, shade, &self.lamps))
+        })
+    }
+}
 
 /// A part of a sheet: the places of its ends, and the values there.
 struct Part {
@@ -76,10 +102,6 @@ impl Field<'_> {
         met.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         met
     }
-
-    fn lit(&self, color: DVec3, gradient: DVec3, direction: DVec3) -> DVec3 {
-        self.shade.as_ref().map_or(color, |shade| shade::lit(color, gradient, direction, shade))
-    }
 }
 
 impl Layer {
@@ -115,13 +137,13 @@ impl Layer {
 
     /// Returns the colour of a part between two places in its mean light: gradients change more
     /// within a part than values do.
-    fn lit(&self, field: &Field, color: DVec3, [start, end]: [f64; 2], direction: DVec3) -> DVec3 {
-        let Some(shade) = &field.shade else { return color };
+    fn lit(&self, lit: &LitBy, color: DVec3, [start, end]: [f64; 2], direction: DVec3) -> DVec3 {
+        let Some(shade) = lit.shade else { return color };
         let mut sums = [0.0; 2];
         for number in 0..LIGHTS {
             let share = (f64::from(number) + 0.5) / f64::from(LIGHTS);
             let gradient = self.gradient(start + share * (end - start), direction);
-            let light = shade::light(gradient, direction, shade);
+            let light = shade::light(gradient, direction, shade, &lit.lamps);
             (0..2).for_each(|i| sums[i] += light[i] / f64::from(LIGHTS));
         }
         shade::with_light(color, sums)
@@ -162,9 +184,11 @@ impl Layer {
     pub fn shine(
         &self,
         field: &Field,
-        direction: DVec3,
+        (ray, lamps): (&Ray, Option<&Lamps>),
         pieces: &[[f64; 2]],
     ) -> (Medium, Vec<Step>) {
+        let direction = ray.direction;
+        let lit_by = LitBy::new(self, field, (ray, lamps));
         let mut steps = Vec::new();
         let mut light = 1.0;
         // Lit colours, weighted by opacity.
@@ -177,7 +201,7 @@ impl Layer {
                 field.classifier.at(self.mean)
             };
             let factor = field.classifier.transfer.gradient_factor(gradient.length());
-            let medium = self.lit(field, medium, [start, end], direction);
+            let medium = self.lit(&lit_by, medium, [start, end], direction);
             let length = self.distance(end) - self.distance(start);
             let depth = extinction * factor * length * self.filling;
             let at = |share: f64| start + share * (end - start);
@@ -194,11 +218,8 @@ impl Layer {
                     span: [before, share].map(|share| self.distance(at(share))),
                 });
                 if let Some(surface) = surface {
-                    let lit = field.lit(
-                        DVec3::from(surface.color),
-                        self.gradient(at(share), direction),
-                        direction,
-                    );
+                    let gradient = self.gradient(at(share), direction);
+                    let lit = lit_by.one(DVec3::from(surface.color), gradient, direction);
                     color += light * surface.opacity * lit;
                     light *= 1.0 - surface.opacity;
                     let depth = -(1.0 - surface.opacity).ln();
@@ -218,7 +239,8 @@ impl Layer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::TransferFunction;
+    use crate::{math::View, volume::TransferFunction};
+    use glam::{DMat3, DVec2};
 
     fn layer(faces: [Option<f64>; 2], mean: f64) -> Layer {
         Layer { span: [3.0, 5.0], mean, faces, gradients: [None; 2], middle: None, filling: 1.0 }
@@ -268,8 +290,17 @@ mod tests {
             inside,
         };
         let layer = layer([Some(0.0), Some(8.0)], 4.0);
+        let view = View {
+            position: DVec3::ZERO,
+            rotation: DMat3::IDENTITY,
+            perspective: false,
+            scale: 1.0,
+            center: DVec2::ZERO,
+            size: [1; 2],
+        };
+        let ray = Ray::new(&view, DVec2::ZERO);
         for inside in [true, false] {
-            let (medium, steps) = layer.shine(&field(inside), DVec3::Z, &[[3.0, 5.0]]);
+            let (medium, steps) = layer.shine(&field(inside), (&ray, None), &[[3.0, 5.0]]);
             assert!((medium.depth + 1e-9_f64.ln()).abs() < 1e-12);
             let through = (-0.5_f64).exp();
             let red = through * 0.5;
@@ -289,7 +320,7 @@ mod tests {
             // Backwards, and cut to the second half.
             let (back, _) = Layer { faces: [Some(8.0), Some(0.0)], ..layer }.shine(
                 &field(inside),
-                DVec3::Z,
+                (&ray, None),
                 &[[4.0, 5.0]],
             );
             assert!((back.depth - 1.0 - 2.0_f64.ln()).abs() < 1e-12);

@@ -204,8 +204,8 @@ impl<'a> Drawn<'a> {
 
     /// Returns what the field adds to each sheet of a ray.
     pub fn media(&self, frame: &Frame, on: &Through) -> Vec<Option<Added>> {
-        let shine =
-            |(layer, pieces): ClippedLayer| layer.shine(&self.field, on.ray.direction, &pieces);
+        let lit = (on.ray, frame.lamps.as_ref());
+        let shine = |(layer, pieces): ClippedLayer| layer.shine(&self.field, lit, &pieces);
         let mut media: Vec<Option<Added>> = match &self.solids {
             Some(solids) if solids.place() == Place::Cells => {
                 solids.media(frame, &self.field, on.ray, on.allowed)

@@ -29,6 +29,35 @@ struct FieldRow<'f> {
     beside: Option<[Vec<&'f Kernel<'f>>; 2]>,
 }
 
+/// What a pixel's ray meets in a sheet.
+pub(super) struct PixelSheet {
+    surface: Medium,
+    /// The media of fields.
+    media: Vec<Added>,
+    cover: Cover,
+}
+
+impl PixelSheet {
+    /// Composites the sheet, which lies between two distances: the radiance and the media of the
+    /// fields, then the facets.
+    pub fn add(&self, composite: &mut Composite, span: [f64; 2]) {
+        let present = self.media.iter().filter(|(medium, _)| medium.depth > 0.0);
+        let present: Vec<&Added> = present.collect();
+        match present[..] {
+            [(medium, steps)] if self.surface.depth <= 0.0 => {
+                composite.pass_in_steps(*medium, steps);
+            }
+            _ => {
+                let all = present.iter().fold(self.surface, |all, (medium, _)| all.with(*medium));
+                composite.pass(all, span);
+            }
+        }
+        if let Some((filled, distance, color)) = self.cover.mean() {
+            composite.cover(filled, distance, color);
+        }
+    }
+}
+
 impl Frame<'_> {
     /// Draws a row.
     pub(super) fn row_of_sheets(&self, number: i64) -> Vec<Composite> {
@@ -104,57 +133,61 @@ impl Frame<'_> {
 
     /// Colours a pixel's sheets and composites them.
     pub(super) fn pixel_of_sheets(&self, column: i64, row: &Row) -> Composite {
+        if self.optics == Optics::Maximum {
+            return self.largest_of_pixel(column, row);
+        }
+        let mut composite = Composite::EMPTY;
+        for (k, sheet) in self.sheets_of_pixel(column, row).iter().enumerate() {
+            sheet.add(&mut composite, self.span(k));
+        }
+        composite
+    }
+
+    /// Returns what a pixel's ray meets of the fields.
+    fn with_fields<T>(
+        &self,
+        column: i64,
+        row: &Row,
+        value: impl FnOnce(&Ray, &[[f64; 2]], &[(&Drawn, Through)]) -> T,
+    ) -> T {
         let ray = self.ray(column, row.number);
         let allowed = clip::allowed(&ray, &self.view, &self.clips);
         let both = self.fields.iter().zip(&row.fields);
-        let rays: Vec<Through> = both
+        let fields: Vec<(&Drawn, Through)> = both
             .map(|(drawn, field_row)| {
                 let around = self.around(drawn, field_row, [column, row.number]);
-                Through { ray: &ray, kernels: &field_row.kernels, around, allowed: &allowed }
+                let kernels = &field_row.kernels;
+                (drawn, Through { ray: &ray, kernels, around, allowed: &allowed })
             })
             .collect();
-        let mut fields = self.fields.iter().zip(&rays);
-        if self.optics == Optics::Maximum {
-            // There is one field at most.
-            let largest = fields
-                .next()
-                .and_then(|(drawn, on)| Some(self.largest(&drawn.field, drawn.largest(self, on)?)));
-            return largest.unwrap_or(Composite::EMPTY);
-        }
-        let media: Vec<_> = fields.map(|(drawn, on)| drawn.media(self, on)).collect();
-        let lights = self.lights(&ray, &row.kernels, &allowed);
-        let covers = self.covers([column, row.number], &row.facets);
-        self.composite(&ray, &lights, &media, &covers)
+        value(&ray, &allowed, &fields)
     }
 
-    /// Composites the sheets of a ray, front to back: in each the radiance and the media of the
-    /// fields, then the facets.
-    fn composite(
-        &self,
-        ray: &Ray,
-        lights: &[Light],
-        media: &[Vec<Option<Added>>],
-        covers: &[Cover],
-    ) -> Composite {
-        let mut composite = Composite::EMPTY;
-        for (k, light) in lights.iter().enumerate() {
-            let surface = self.surface(light, ray);
-            let present = media.iter().filter_map(|sheets| sheets[k].as_ref());
-            let present: Vec<&Added> = present.filter(|(medium, _)| medium.depth > 0.0).collect();
-            match present[..] {
-                [(medium, steps)] if surface.depth <= 0.0 => {
-                    composite.pass_in_steps(*medium, steps);
-                }
-                _ => {
-                    let all = present.iter().fold(surface, |all, (medium, _)| all.with(*medium));
-                    composite.pass(all, self.span(k));
-                }
-            }
-            if let Some((filled, distance, color)) = covers.get(k).and_then(Cover::mean) {
-                composite.cover(filled, distance, color);
-            }
-        }
-        composite
+    /// Returns the sheets of a pixel: in each the radiance and the media of the fields, and the
+    /// facets.
+    pub(super) fn sheets_of_pixel(&self, column: i64, row: &Row) -> Vec<PixelSheet> {
+        self.with_fields(column, row, |ray, allowed, fields| {
+            let mut media: Vec<_> =
+                fields.iter().map(|(drawn, on)| drawn.media(self, on).into_iter()).collect();
+            let lights = self.lights(ray, &row.kernels, allowed);
+            let mut covers = self.covers([column, row.number], &row.facets).into_iter();
+            let sheet = |(k, light): (usize, &Light)| PixelSheet {
+                surface: self.surface(light, (ray, 0.5 * (self.planes[k] + self.planes[k + 1]))),
+                media: media.iter_mut().filter_map(|sheets| sheets.next().flatten()).collect(),
+                cover: covers.next().unwrap_or_default(),
+            };
+            lights.iter().enumerate().map(sheet).collect()
+        })
+    }
+
+    /// Returns the colour of the largest value on a pixel's ray. There is one field at most.
+    fn largest_of_pixel(&self, column: i64, row: &Row) -> Composite {
+        self.with_fields(column, row, |_, _, fields| {
+            let largest = fields
+                .first()
+                .and_then(|(drawn, on)| Some(self.largest(&drawn.field, drawn.largest(self, on)?)));
+            largest.unwrap_or(Composite::EMPTY)
+        })
     }
 
     /// Returns the colour of the largest value on a ray.
@@ -168,8 +201,8 @@ impl Frame<'_> {
         }
     }
 
-    /// Returns the radiance of a sheet, lit once.
-    pub(super) fn surface(&self, light: &Light, ray: &Ray) -> Medium {
-        if light.depth < LEAST_DEPTH { Medium::default() } else { self.lit(light, ray) }
+    /// Returns the radiance of a sheet, lit once, at a distance along a ray.
+    pub(super) fn surface(&self, light: &Light, at: (&Ray, f64)) -> Medium {
+        if light.depth < LEAST_DEPTH { Medium::default() } else { self.lit(light, at) }
     }
 }

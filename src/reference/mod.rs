@@ -206,6 +206,27 @@
 //! The diffuse part is multiplied by 1 − c·(1 − cos), the highlight by c. So what is flat, or as
 //! noisy as a flat region, is drawn as if it faced the eye. Normals of radiance are certain.
 //!
+//! **Other lights** ([`Lighting`](crate::scene::Lighting)). The diffuse light and the highlight are
+//! divided into shares: `head` from the eye, `key` from a lamp, `sky` from all sides. n is the
+//! normal of length 1 towards the eye, c its certainty, l the direction to the lamp, and cos' =
+//! 1 − c·(1 − cos). The factor on a colour is e·(ambient + diffuse·(head·|n·b̂|' + sky)) +
+//! S·key·diffuse·(n·l)'. The highlight is that of the eye times e·head, plus S·key times that of
+//! the half vector of l and −b̂.
+//!
+//! e = v + 2c·w·n, clamped to 0 … 2, is the light from all sides: the cosine's integral over the
+//! sphere to the first order in n. v is the mean of T·L over all directions d, and w the mean of
+//! T·L·d. T is the light that comes in from d, and L the brightness there, 1 or 1 + d·up. S is what
+//! reaches the place of the lamp's light. They are taken at a place before the surface: 2.5 times the
+//! step of their lattice along c·n − (1 − c)·b̂. The surface is a facet at its own distance, the
+//! radiance of a sheet in its middle, or a field in the middle of its sheet, for all of the sheet.
+//!
+//! T and S come from maps: pictures along the light, in a cube of as many planes as pixels around
+//! the scene. In a map each sheet meets all of the light. Its optical depth, 16 at most, grows
+//! evenly in it; the map has the sum up to each plane. S = exp(−depth). T is known at the nodes of a
+//! lattice around the scene, from the difference of the depths there and at the radius towards the
+//! light; each map serves both ends of its axis. All is linear between nodes, pixels and planes.
+//! With a strength below 1, v and w are mixed with 1 and with up/3 (or 0), those of the open.
+//!
 //! # Other ways
 //! **Optics.** The above is emission and absorption (Max 1995). [`Optics::XRay`] uses the same
 //! optical depths, without isosurfaces; all colours are white and unlit. [`Optics::Maximum`] is for
@@ -248,6 +269,7 @@ mod gather;
 mod images;
 mod kernel;
 mod labels;
+mod lamps;
 mod mesh;
 mod product;
 mod profile;
@@ -283,6 +305,7 @@ use fields::Drawn;
 use gather::Before;
 use glam::{DVec2, DVec3};
 use kernel::Kernel;
+use lamps::Lamps;
 use ray::Ray;
 use sheet::Light;
 use std::collections::BTreeMap;
@@ -299,7 +322,8 @@ pub fn render(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Pic
     view.validate_for(&scene.bounds())?;
     let scene = &without_bricks(scene)?;
     let (flat, trained) = with_cuts(scene, &view, settings)?;
-    let frame = Frame::new(scene, &flat, &trained, view, settings);
+    let mut frame = Frame::new(scene, &flat, &trained, view, settings);
+    frame.lamps = Lamps::new(scene, &frame.view, settings)?;
     let rows = (0..settings.size[1]).into_par_iter().map(|row| frame.row(row.into())).collect();
     Ok(picture(&frame.view, rows))
 }
@@ -397,6 +421,8 @@ struct Frame<'a> {
     lattice: Option<&'a Lattice>,
     /// The shading of radiance.
     shade: Option<Shade>,
+    /// Lights, unless all light comes from the eye.
+    lamps: Option<Lamps>,
     /// Whether the scene has trained Gaussians.
     has_trained: bool,
     /// The largest channel of a colour of radiance.
@@ -427,6 +453,7 @@ impl<'a> Frame<'a> {
         let fields = items.filter(|_| !before).filter_map(drawn).collect();
         let before_shade = before.then_some(Before { lit: shade.is_some() });
         Self {
+            lamps: None,
             has_trained: scene.items.iter().any(Item::is_trained),
             brightest: scene.brightest().into(),
             mode: settings.mode,
@@ -491,8 +518,8 @@ impl<'a> Frame<'a> {
         [self.planes[sheet], self.planes[sheet + 1]]
     }
 
-    /// Lights the radiance of a sheet, once.
-    fn lit(&self, light: &Light, ray: &Ray) -> Medium {
+    /// Lights the radiance of a sheet, once, at a distance along a ray.
+    fn lit(&self, light: &Light, at: (&Ray, f64)) -> Medium {
         if light.depth <= 0.0 || light.facing <= 0.0 {
             return Medium::default();
         }
@@ -500,7 +527,7 @@ impl<'a> Frame<'a> {
             _ if self.optics == Optics::XRay => DVec3::ONE,
             Some(shade) if light.has_normal => {
                 let color = light.color / light.facing;
-                let lit = shade::lit(color, light.normal, ray.direction, shade);
+                let lit = shade::lit_by(color, light.normal, at, (shade, self.lamps.as_ref()));
                 let share = light.normal.length() / light.facing;
                 // Gaussians are not lit.
                 if self.has_trained { color.lerp(lit, (2.0 * share).min(1.0)) } else { lit }

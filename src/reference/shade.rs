@@ -1,14 +1,52 @@
-//! Light from the eye.
+//! Light, and what surfaces and fields reflect of it.
 
+use super::{lamps::Lamps, ray::Ray};
 use crate::volume::Shade;
 use glam::DVec3;
+
+/// The light that reaches a place: the mean direction of that from all sides, in view space, its
+/// amount, and the share of the key lamp's light.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reaching {
+    pub side: DVec3,
+    pub open: f64,
+    pub key: f64,
+}
+
+/// The lights of a picture, and what of them reaches a place.
+pub(super) type Lit<'a> = Option<(&'a Lamps, Reaching)>;
+
+/// The largest amount of light from all sides, in that of the open.
+const MOST_OPEN: f64 = 2.0;
 
 /// Returns a lit colour by Blinn and Phong's reflection (Blinn 1977) with a light at the eye, on
 /// both sides of a surface. `normal` may have any length. If it has none, the ambient and diffuse
 /// parts of the colour count in full. If the shade says which gradients are certain, `normal` is a
 /// gradient in value per world length, and others are lit the less the shorter they are.
 pub(super) fn lit(color: DVec3, normal: DVec3, ray: DVec3, shade: &Shade) -> DVec3 {
-    with_light(color, light(normal, ray, shade))
+    with_light(color, light(normal, ray, shade, &None))
+}
+
+/// Returns the colour of a surface at a distance along a ray, lit by the lights of the picture.
+pub(super) fn lit_by(
+    color: DVec3,
+    normal: DVec3,
+    (ray, distance): (&Ray, f64),
+    (shade, lamps): (&Shade, Option<&Lamps>),
+) -> DVec3 {
+    let lit = lamps.map(|lamps| (lamps, reaching(lamps, normal, (ray, distance), shade)));
+    with_light(color, light(normal, ray.direction, shade, &lit))
+}
+
+/// Returns the light that reaches a place with a normal of any length.
+pub(super) fn reaching(
+    lamps: &Lamps,
+    normal: DVec3,
+    (ray, distance): (&Ray, f64),
+    shade: &Shade,
+) -> Reaching {
+    let certain = certainty_of(normal, shade) * towards(normal, ray.direction);
+    lamps.reaching(ray, distance, certain)
 }
 
 /// Returns a colour in light: a factor on it, and the highlight that is added to it.
@@ -16,21 +54,48 @@ pub(super) fn with_light(color: DVec3, [factor, highlight]: [f64; 2]) -> DVec3 {
     (color * factor + DVec3::splat(highlight)).min(DVec3::ONE)
 }
 
-/// Returns the factor on a colour and the highlight of [`lit`].
-pub(super) fn light(normal: DVec3, ray: DVec3, shade: &Shade) -> [f64; 2] {
-    let Shade { ambient, diffuse, specular, power, certain } = *shade;
-    let certainty = certain.map_or(1.0, |certain| certainty(normal.length(), certain));
-    match normal.try_normalize() {
-        // The light comes from the eye, so the half vector is the light's own direction. Turning
-        // the normal towards the light gives the cosine's magnitude.
-        Some(normal) => {
-            let cosine = normal.dot(ray).abs().min(1.0);
-            let facing = 1.0 - certainty * (1.0 - cosine);
-            let highlight = certainty * specular * cosine.powf(power);
-            [ambient + diffuse * facing, highlight]
-        }
-        None => [ambient + diffuse, 0.0],
+/// Returns a normal of length 1 that points towards the eye; zero for one without length.
+fn towards(normal: DVec3, ray: DVec3) -> DVec3 {
+    let normal = normal.normalize_or_zero();
+    if normal.dot(ray) > 0.0 { -normal } else { normal }
+}
+
+/// Returns how far a normal's direction counts.
+fn certainty_of(normal: DVec3, shade: &Shade) -> f64 {
+    match shade.certain {
+        _ if normal.try_normalize().is_none() => 0.0,
+        Some(certain) => certainty(normal.length(), certain),
+        None => 1.0,
     }
+}
+
+/// Returns the factor on a colour and the highlight of [`lit`], or of [`lit_by`] with lights.
+pub(super) fn light(normal: DVec3, ray: DVec3, shade: &Shade, lit: &Lit) -> [f64; 2] {
+    let Shade { ambient, diffuse, specular, power, .. } = *shade;
+    let certain = certainty_of(normal, shade);
+    let normal = towards(normal, ray);
+    let shown = |cosine: f64| 1.0 - certain * (1.0 - cosine);
+    // The light comes from the eye, so the half vector is the light's own direction.
+    let facing = (-normal.dot(ray)).min(1.0);
+    let gloss = |cosine: f64| certain * specular * cosine.max(0.0).powf(power);
+    let Some((lamps, reaching)) = lit else {
+        return [ambient + diffuse * shown(facing), gloss(facing)];
+    };
+    let lighting = &lamps.lighting;
+    let open = (reaching.open + 2.0 * certain * reaching.side.dot(normal)).clamp(0.0, MOST_OPEN);
+    let sky = lighting.sky.map_or(0.0, |sky| sky.share);
+    let mut factor = open * (ambient + diffuse * (lighting.head * shown(facing) + sky));
+    let mut highlight = open * lighting.head * gloss(facing);
+    if let Some(key) = lighting.key {
+        let share = key.share * reaching.key;
+        let direction = key.direction.normalize();
+        let cosine = normal.dot(direction).clamp(0.0, 1.0);
+        factor += share * diffuse * shown(cosine);
+        if cosine > 0.0 {
+            highlight += share * gloss(normal.dot((direction - ray).normalize_or_zero()));
+        }
+    }
+    [factor, highlight]
 }
 
 /// Returns how far a gradient counts, 0 … 1: linear between two magnitudes.

@@ -80,7 +80,7 @@ impl Frame<'_> {
         };
         let mut composite = Composite::EMPTY;
         for (k, sheet) in sheets.iter().enumerate() {
-            composite.pass(self.surface(sheet, ray), self.span(k).map(distance));
+            composite.pass(self.surface(sheet, (ray, 0.0)), self.span(k).map(distance));
         }
         composite
     }
@@ -104,7 +104,7 @@ impl Frame<'_> {
             .filter(|kernel| distance(kernel) >= self.near)
             .filter_map(|kernel| {
                 let (light, place) = self.whole(kernel, ray, &allowed)?;
-                Some((key(kernel), place, self.lit(&light, ray)))
+                Some((key(kernel), place, self.lit(&light, (ray, 0.0))))
             })
             .collect();
         // The sort is stable: equal keys stay in the order of the scene.

@@ -96,6 +96,7 @@ impl Renderer {
         if self.scene.items.is_empty() {
             return self.encode_clear(encoder, view, settings, output);
         }
+        self.cast_shadows(&view, settings)?;
         match &mut self.drawer {
             Drawer::Gpu(engine, prepared) => {
                 let frame = engine.encode(encoder, prepared, &view, settings, output)?;

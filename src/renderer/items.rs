@@ -147,7 +147,7 @@ impl Renderer {
         }
         let number = self.number(place);
         self.scene.set_pose(number, pose)?;
-        self.frame = 0;
+        self.changed();
         match &mut self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(_, prepared) => prepared.set_pose(number, pose),
@@ -184,7 +184,7 @@ impl Renderer {
         }
         let number = self.number(place);
         self.scene = self.scene.with_transfer(number, transfer)?;
-        self.frame = 0;
+        self.changed();
         match &mut self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(_, prepared) => prepared.set_transfer(number, transfer),
@@ -220,7 +220,7 @@ impl Renderer {
         let mut scene = self.scene.clone();
         scene.insert(number, item.clone(), pose);
         scene.validate_fields()?;
-        self.frame = 0;
+        self.changed();
         match (&mut self.drawer, parked) {
             #[cfg(feature = "gpu")]
             (Drawer::Gpu(_, prepared), parked) => {
@@ -248,7 +248,7 @@ impl Renderer {
         let pose = self.scene.has_pose(number).then(|| self.scene.pose(number));
         let mut one = Scene::new();
         one.insert(0, self.scene.remove(number), pose);
-        self.frame = 0;
+        self.changed();
         let parked = match &mut self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(_, prepared) => Parked::Gpu(prepared.take(number)?.into()),

@@ -65,6 +65,11 @@ pub struct Renderer {
     next_item: usize,
     /// The number of the CPU engine's last frame for a host; 0 if it is abandoned.
     frame: u64,
+    /// The CPU engine, where it draws the maps of a GPU's shadows ([`Lighting`]).
+    ///
+    /// [`Lighting`]: crate::scene::Lighting
+    #[cfg(feature = "gpu")]
+    maps: Option<Box<CpuRenderer>>,
     /// What uploads the CPU engine's frames.
     #[cfg(feature = "gpu")]
     upload: Option<Upload>,
@@ -123,6 +128,8 @@ impl Renderer {
             next_item: scene.items.len(),
             frame: 0,
             #[cfg(feature = "gpu")]
+            maps: None,
+            #[cfg(feature = "gpu")]
             upload: host::upload(device),
         })
     }
@@ -153,6 +160,34 @@ impl Renderer {
         }
     }
 
+    /// Forgets what depends on the scene.
+    fn changed(&mut self) {
+        self.frame = 0;
+        #[cfg(feature = "gpu")]
+        {
+            self.maps = None;
+        }
+    }
+
+    /// Draws what keeps light away in a picture of a GPU.
+    fn cast_shadows(&mut self, viewpoint: &impl Viewpoint, settings: &Settings) -> Result<()> {
+        let _ = viewpoint;
+        if settings.lighting.is_plain() || self.scene.items.is_empty() {
+            return Ok(());
+        }
+        #[cfg(feature = "gpu")]
+        if let Drawer::Gpu(_, prepared) = &mut self.drawer {
+            let view = viewpoint.view(settings.size)?;
+            self.scene.validate_settings(settings)?;
+            let maps = match &mut self.maps {
+                Some(maps) => maps,
+                none => none.insert(CpuRenderer::new(&self.scene)?.into()),
+            };
+            prepared.set_shadows(&maps.shadows(&view, settings)?);
+        }
+        Ok(())
+    }
+
     fn render_once(
         &mut self,
         viewpoint: &impl Viewpoint,
@@ -162,6 +197,7 @@ impl Renderer {
         if self.scene.items.is_empty() {
             return Ok((clear(viewpoint, settings)?, FrameStats::default()));
         }
+        self.cast_shadows(viewpoint, settings)?;
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Drawer::Gpu(renderer, prepared) => renderer.render(prepared, viewpoint, settings),
@@ -187,6 +223,7 @@ impl Renderer {
         if self.scene.items.is_empty() {
             return Ok((clear(&view, settings)?, FrameStats::default()));
         }
+        self.cast_shadows(&view, settings)?;
         match &mut self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(renderer, prepared) => {
@@ -205,6 +242,7 @@ impl Renderer {
     /// # Errors
     /// Those of [`render`](Self::render). A lost device is not reopened: [`Error::DeviceLost`].
     pub fn draw(&mut self, viewpoint: &impl Viewpoint, settings: &Settings) -> Result<FrameStats> {
+        self.cast_shadows(viewpoint, settings)?;
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Drawer::Gpu(renderer, prepared) if !self.scene.items.is_empty() => {
@@ -223,6 +261,7 @@ impl Renderer {
         viewpoint: &impl Viewpoint,
         settings: &Settings,
     ) -> Result<FrameStats> {
+        self.cast_shadows(viewpoint, settings)?;
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             Drawer::Gpu(renderer, prepared) if !self.scene.items.is_empty() => {

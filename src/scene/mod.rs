@@ -2,6 +2,7 @@
 
 mod choice;
 mod item;
+mod lighting;
 mod numbers;
 mod poses;
 mod seen;
@@ -12,6 +13,8 @@ mod validate;
 
 pub use crate::math::{Clip, ClipShape};
 pub use item::Item;
+pub use lighting::{KeyLight, Lighting, Occlusion, Sky};
+pub(crate) use lighting::{MapView, OcclusionBox};
 pub use settings::{
     Classification, Controls, Evaluate, Gradient, Mode, Optics, Order, Region, Settings,
 };

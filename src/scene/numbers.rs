@@ -208,5 +208,5 @@ pub(super) fn check_settings(settings: &Settings) -> Result<()> {
     for shade in [settings.surface_shade, settings.volume_shade.flatten()].into_iter().flatten() {
         shade.check().map_err(Error::Argument)?;
     }
-    Ok(())
+    settings.lighting.check(settings).map_err(Error::Argument)
 }

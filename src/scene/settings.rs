@@ -1,5 +1,6 @@
 //! The settings of a picture: its size and the methods that draw it.
 
+use super::Lighting;
 use crate::{
     Stop,
     hierarchy::Detail,
@@ -137,6 +138,9 @@ pub struct Settings {
     pub volume_shade: Option<Option<Shade>>,
     /// Lighting of splats with normals. `None` draws their colours unlit.
     pub surface_shade: Option<Shade>,
+    /// Where light comes from, and what keeps it away. In other ways than image-aligned sheets of
+    /// emission and absorption, all light comes from the eye.
+    pub lighting: Lighting,
     /// Maximum thickness of a sheet in world units. `None` derives it from the scene.
     pub sheet_thickness: Option<f64>,
     /// Maximum thickness of a sheet in pixels, if the scene contains explicit splats.
@@ -199,6 +203,7 @@ impl Settings {
                 power: 24.0,
                 certain: None,
             }),
+            lighting: Lighting::default(),
             sheet_thickness: None,
             sheet_pixels: 8.0,
             occlusion: true,

@@ -21,6 +21,8 @@ pub struct Drawing {
     pub factor: u32,
     /// The width of edges, in pixels of the finished picture.
     pub edge_width: f64,
+    /// The strength of eye-dome lighting; 0 without it.
+    pub eye_dome: f64,
 }
 
 /// The smallest opacity that a file of 8 bits keeps.
@@ -36,6 +38,7 @@ impl PictureEntry {
             settings: self.settings(scene, subject)?,
             factor: self.factor(scene),
             edge_width: self.edge_width(),
+            eye_dome: self.eye_dome.unwrap_or(0.0),
         })
     }
 
@@ -67,11 +70,20 @@ impl Drawing {
         [width.saturating_sub(margins).max(1), height]
     }
 
-    /// Averages a drawn picture down, and draws the edges of its items over it.
+    /// Lights a drawn picture by its depths, averages it down, and draws the edges of its items over
+    /// it.
     ///
     /// # Errors
-    /// Those of [`Picture::reduced`] and of [`Items::draw_edges`].
+    /// Those of [`Camera::view`], of [`Picture::reduced`] and of [`Items::draw_edges`].
     pub fn reduced(&self, picture: Picture, items: &Items, camera: &Camera) -> Result<Picture> {
+        let picture = if self.eye_dome > 0.0 {
+            let view = camera.view([picture.width, picture.height])?;
+            // As wide in large pictures as in usual ones.
+            let radius = (picture.height / 720).max(self.factor).max(1);
+            picture.with_eye_dome(&view, self.eye_dome, radius)
+        } else {
+            picture
+        };
         let mut picture = if self.factor > 1 { picture.reduced(self.factor)? } else { picture };
         let edges = (&self.settings.clips[..], self.edge_width);
         items.draw_edges(&mut picture, camera, edges)?;
@@ -92,7 +104,12 @@ mod tests {
 
     #[test]
     fn a_camera_is_fitted_beside_bars() {
-        let drawing = Drawing { settings: Settings::new([40, 20]), factor: 2, edge_width: 1.0 };
+        let drawing = Drawing {
+            settings: Settings::new([40, 20]),
+            factor: 2,
+            edge_width: 1.0,
+            eye_dome: 0.0,
+        };
         assert_eq!(drawing.free(0), [40, 20]);
         assert_eq!(drawing.free(3), [28, 20]);
         // Something is always left.

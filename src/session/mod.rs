@@ -45,7 +45,7 @@ pub use coloring::{Coloring, SurfaceColor, check_log, visible_range_of};
 pub use data::{Data, warn_of_holes};
 pub use description::{
     AppearanceEntry, Axis, Background, CameraEntry, ClipEntry, ClipSide, ColorEntry, Composite,
-    Description, Engine, InputEntry, IsosurfaceEntry, KernelEntry, LimitsEntry, Loaded,
+    Description, Engine, InputEntry, IsosurfaceEntry, KernelEntry, LightName, LimitsEntry, Loaded,
     LoadedInput, OverlayEntry, PaperLength, PictureEntry, Place, ReadInput, ReadingEntry, Rotation,
     Samples, TransferEntry, TransformEntry,
 };

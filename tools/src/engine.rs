@@ -6,7 +6,7 @@ use splatkit::{
     Device,
     gpu::{AdapterChoice, Budget, Gpu},
     scene::{self, Item, Scene},
-    session::{self, Description, PictureEntry},
+    session::{self, Description, LightName, PictureEntry},
 };
 use std::time::Duration;
 
@@ -60,6 +60,33 @@ pub struct EngineFlags {
     /// Draw volumes and surfaces in their own colours, without light.
     #[arg(long, visible_alias = "flat", overrides_with = "shade")]
     no_shade: bool,
+    /// Choose where light comes from: the eye; a lamp at the upper left that casts shadows; that
+    /// lamp and all sides; or all sides, more from above [default: head]
+    #[arg(long, value_enum)]
+    light: Option<Light>,
+    /// Choose whether the lamp of the light key or studio casts shadows [default: true]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true")]
+    shadows: Option<bool>,
+    /// Dim light where things around a place keep it away, by a strength from 0 to 1 [default: 1
+    /// for the light studio or sky, else 0]
+    #[arg(
+        long,
+        value_name = "STRENGTH",
+        num_args = 0..=1,
+        default_missing_value = "1",
+        value_parser = parse::not_negative
+    )]
+    ambient_occlusion: Option<f64>,
+    /// Dim pixels where others beside them are nearer, by a strength of about 1: eye-dome lighting,
+    /// for clouds without normals [default: 0]
+    #[arg(
+        long,
+        value_name = "STRENGTH",
+        num_args = 0..=1,
+        default_missing_value = "1",
+        value_parser = parse::not_negative
+    )]
+    eye_dome: Option<f64>,
     /// Set the largest thickness of a sheet, in world units [default: 4/3 of a volume's sample
     /// spacing; half of that if the volume is sharp or its kernel is catmull-rom; half a spacing if
     /// the kernel is linear]
@@ -112,6 +139,26 @@ enum Engine {
     Auto,
     Gpu,
     Cpu,
+}
+
+/// [`LightName`] as a flag.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Light {
+    Head,
+    Key,
+    Studio,
+    Sky,
+}
+
+impl From<Light> for LightName {
+    fn from(light: Light) -> Self {
+        match light {
+            Light::Head => Self::Head,
+            Light::Key => Self::Key,
+            Light::Studio => Self::Studio,
+            Light::Sky => Self::Sky,
+        }
+    }
 }
 
 /// [`scene::Gradient`] as a flag.
@@ -247,6 +294,10 @@ impl EngineFlags {
         picture.evaluate = self.evaluate.map(Into::into).or(picture.evaluate);
         let shade = self.shade.then_some(true).or(self.no_shade.then_some(false));
         picture.shade = shade.or(picture.shade);
+        picture.light = self.light.map(Into::into).or(picture.light);
+        picture.shadows = self.shadows.or(picture.shadows);
+        picture.eye_dome = self.eye_dome.or(picture.eye_dome);
+        picture.ambient_occlusion = self.ambient_occlusion.or(picture.ambient_occlusion);
         picture.sheet_thickness = self.sheet_thickness.or(picture.sheet_thickness);
         if self.cut.is_some() || self.budget.is_some() || self.frame_time.is_some() {
             picture.cut = self.cut;

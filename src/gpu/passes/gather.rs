@@ -2,6 +2,7 @@
 //! shaders/shared/field_lattice.wgsl). The splats of other items in the scene are scattered as
 //! usual; march then evaluates the field itself, sheet by sheet.
 
+use super::march::FIRST_SHADOW;
 use crate::gpu::{
     device::Gpu,
     pipeline::{
@@ -17,13 +18,14 @@ use crate::gpu::{
 /// Number of lanes to which tiles are dealt (`LANES` in frame.wgsl).
 const LANES: u32 = 16;
 
-/// The pass.
+/// The pass, and whether it binds what keeps light away.
 #[derive(Debug)]
-pub struct Gather(Stage);
+pub struct Gather(Stage, bool);
 
 impl Gather {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
-        Self(Stage::new(gpu, &Self::recipe(variant)))
+        let has_shadows = variant.lamps && variant.volume_shaded;
+        Self(Stage::new(gpu, &Self::recipe(variant)), has_shadows)
     }
 
     pub fn recipe(variant: &Variant) -> Recipe {
@@ -37,6 +39,7 @@ impl Gather {
             rods: false,
             images: false,
             surface_shaded: false,
+            lamps: variant.lamps && variant.volume_shaded,
             staged: false,
             ..*variant
         };
@@ -46,6 +49,7 @@ impl Gather {
             shaders::TABLES,
             shaders::PIXEL,
             shaders::SHEET,
+            reduced.lamp_shader(),
             shaders::PICTURE,
             shaders::VALUE,
             shaders::FIELD_LATTICE,
@@ -53,7 +57,11 @@ impl Gather {
             shaders::PROGRESS,
             shaders::GATHER,
         ];
-        let bindings = [Uniform, Read, Uniform, Read, Write, Write, Read, Write];
+        let mut bindings = vec![Uniform, Read, Uniform, Read, Write, Write, Read, Write];
+        if reduced.lamps {
+            bindings.resize(FIRST_SHADOW as usize, Binding::Unused);
+            bindings.extend([Binding::Texture; 2]);
+        }
         Recipe::new("gather", &sources, "gather", &[&bindings, reduced.textures()])
     }
 
@@ -70,7 +78,9 @@ impl Gather {
                 &targets.tables,
                 &targets.colors,
             ];
-            let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
+            let buffers = buffers.map(|b| b.as_entire_buffer_binding());
+            let shadows = targets.shadows.as_ref().filter(|_| self.1).map_or(&[][..], |all| all);
+            let group = self.0.bind_both(gpu, 0, &buffers, &[(FIRST_SHADOW, shadows)]);
             let samples = self.0.bind_textures(gpu, 1, &gathered.textures);
             let tiles = gathered.tiles.next_multiple_of(LANES);
             self.0.dispatch(commands, &[&group, &samples], tiles);

@@ -16,6 +16,9 @@ use crate::gpu::{
 /// The number of the first binding of images (images.wgsl).
 const FIRST_IMAGE: u32 = 11;
 
+/// The number of the first binding of what keeps light away (lamps.wgsl).
+pub const FIRST_SHADOW: u32 = 13;
+
 /// The pass.
 #[derive(Debug)]
 pub struct March(Stage);
@@ -37,6 +40,7 @@ impl March {
             shaders::KERNELS,
             if variant.staged { shaders::STAGED } else { shaders::NO_STAGED },
             shaders::SHEET,
+            variant.lamp_shader(),
             if variant.facets { shaders::FACETS } else { shaders::NO_FACETS },
             if variant.rods { shaders::RODS } else { shaders::NO_RODS },
             if variant.images { shaders::IMAGES } else { shaders::NO_IMAGES },
@@ -57,6 +61,10 @@ impl March {
         if variant.images {
             bindings.resize(FIRST_IMAGE as usize, Binding::Unused);
             bindings.extend([Binding::Words; 2]);
+        }
+        if variant.lamps {
+            bindings.resize(FIRST_SHADOW as usize, Binding::Unused);
+            bindings.extend([Binding::Texture; 2]);
         }
         let mut groups = vec![bindings.as_slice()];
         groups.extend(variant.gather.then(|| variant.textures()));
@@ -90,7 +98,9 @@ impl March {
             textures = Some(self.0.bind_textures(gpu, 1, &gathered.textures));
         }
         let images = targets.images.as_ref().map_or(&[][..], |images| images);
-        let group = self.0.bind_both(gpu, 0, &buffers, (FIRST_IMAGE, images));
+        let shadows = targets.shadows.as_ref().map_or(&[][..], |shadows| shadows);
+        let group =
+            self.0.bind_both(gpu, 0, &buffers, &[(FIRST_IMAGE, images), (FIRST_SHADOW, shadows)]);
         let groups: Vec<_> = std::iter::once(&group).chain(&textures).collect();
         self.0.dispatch_indirect(commands, &groups, (&targets.arguments, arguments));
     }

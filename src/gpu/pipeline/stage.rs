@@ -85,22 +85,24 @@ impl Stage {
         group: usize,
         buffers: &[wgpu::BufferBinding<'_>],
     ) -> wgpu::BindGroup {
-        self.bind_both(gpu, group, buffers, (0, &[]))
+        self.bind_both(gpu, group, buffers, &[])
     }
 
-    /// Binds buffers as [`bind`](Self::bind) does, and textures from number `first` on.
+    /// Binds buffers as [`bind`](Self::bind) does, and lists of textures, each from a number on.
     pub fn bind_both(
         &self,
         gpu: &Gpu,
         group: usize,
         buffers: &[wgpu::BufferBinding<'_>],
-        (first, textures): (u32, &[wgpu::TextureView]),
+        textures: &[(u32, &[wgpu::TextureView])],
     ) -> wgpu::BindGroup {
         let buffers = buffers.iter().cloned().map(wgpu::BindingResource::Buffer);
-        let textures = textures.iter().map(wgpu::BindingResource::TextureView);
+        let textures = textures.iter().flat_map(|(first, views)| {
+            (*first..).zip(views.iter().map(wgpu::BindingResource::TextureView))
+        });
         let entries: Vec<_> = (0..)
             .zip(buffers)
-            .chain((first..).zip(textures))
+            .chain(textures)
             .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
             .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -117,7 +119,7 @@ impl Stage {
         group: usize,
         textures: &[wgpu::TextureView],
     ) -> wgpu::BindGroup {
-        self.bind_both(gpu, group, &[], (0, textures))
+        self.bind_both(gpu, group, &[], &[(0, textures)])
     }
 
     /// Encodes a dispatch of a fixed number of workgroups. Workgroups that do not fit one dimension

@@ -13,6 +13,7 @@ use crate::{
             Gpu,
             buffers::{buffer, filled_buffer, upload},
         },
+        lamps::ShadowTextures,
         scene::{
             bricks::{BrickCache, Listed, Room, Slab},
             field::{Field, label_obstacle, texture_bytes, unsuited},
@@ -27,6 +28,7 @@ use crate::{
     hierarchy::{Cut, Levels},
     math::{Bounds, Kernel, View},
     parallel::prelude::*,
+    plan::lamps::Shadows,
     scene::{Item, Optics, Scene, Settings},
     splat::{SampleSplats, Splat, Splats, Surfels},
     volume::{
@@ -105,6 +107,8 @@ pub struct PreparedScene {
     pub(super) field_item: usize,
     /// The images that facets show.
     pub(crate) images: Option<Images>,
+    /// What keeps light away.
+    pub(crate) shadows: Option<ShadowTextures>,
     /// The tables of the last picture's fields.
     pub(crate) tables: Option<FieldTables>,
     /// Batches of candidates in all chunks.
@@ -147,6 +151,14 @@ impl Gpu {
 }
 
 impl PreparedScene {
+    /// Sets what keeps light away in the pictures that follow.
+    pub(crate) fn set_shadows(&mut self, shadows: &Shadows) {
+        let is_same = |textures: &ShadowTextures| textures.shadows.is_same(shadows);
+        if !self.shadows.as_ref().is_some_and(is_same) {
+            self.shadows = Some(ShadowTextures::new(&self.gpu, shadows));
+        }
+    }
+
     /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
     pub(crate) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.validate_unless_empty()?;
@@ -163,6 +175,7 @@ impl PreparedScene {
             field_item: 0,
             tables: None,
             images: None,
+            shadows: None,
             runs: 0,
             bytes: 0,
             broken: false,

@@ -57,6 +57,7 @@ pub fn variant(request: &Request<'_>) -> Variant {
             }
         }
     }
+    variant.lamps &= variant.volume_shaded || variant.surface_shaded;
     // At the end of a pass, march meets splats again and closes sheets twice. That costs more for a
     // field than for a surface. A GPU draws most before it is worth while to wait and look.
     variant.least_share = budget.least_share.unwrap_or(match (variant.staged, variant.scalar) {
@@ -116,6 +117,7 @@ fn without_items(request: &Request<'_>) -> Variant {
         beyond: false,
         volume_shaded: false,
         surface_shaded: false,
+        lamps: !settings.lighting.is_plain(),
         gradient_opacity: false,
         occlusion: settings.occlusion && settings.hides() && scene.can_hide(),
         least_share: 0,

@@ -65,6 +65,8 @@ pub struct Variant {
     pub beyond: bool,
     pub volume_shaded: bool,
     pub surface_shaded: bool,
+    /// Not all light comes from the eye.
+    pub lamps: bool,
     pub gradient_opacity: bool,
     /// The largest number of isosurfaces of a field.
     pub isosurfaces: u32,
@@ -117,6 +119,11 @@ impl Variant {
         if self.can_stop() { (most / (6 + pieces)).max(1) } else { u32::MAX }
     }
 
+    /// Returns the shader of the lights.
+    pub fn lamp_shader(&self) -> &'static str {
+        if self.lamps { shaders::LAMPS } else { shaders::NO_LAMPS }
+    }
+
     /// Returns the shader of a gathered lattice's labels.
     pub fn label_shader(&self) -> &'static str {
         if self.labels { shaders::LABELS } else { shaders::NO_LABELS }
@@ -162,7 +169,7 @@ impl Variant {
     }
 
     /// The constants that are true or false.
-    fn flags(&self) -> [(&'static str, bool); 40] {
+    fn flags(&self) -> [(&'static str, bool); 41] {
         let radiance = self.radiance || self.classified;
         [
             ("PERSPECTIVE", self.perspective),
@@ -190,6 +197,7 @@ impl Variant {
             ("BEYOND", self.beyond),
             ("VOLUME_SHADED", self.volume_shaded),
             ("SURFACE_SHADED", self.surface_shaded),
+            ("LAMPS", self.lamps),
             ("GRADIENT_OPACITY", self.gradient_opacity),
             ("GRADIENTS", self.gradients()),
             ("CENTRAL", self.central),

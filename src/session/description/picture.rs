@@ -1,6 +1,6 @@
 //! How a picture is drawn, as a description says it.
 
-use super::{Background, ClipEntry, PaperLength, appearance::Wrong};
+use super::{Background, ClipEntry, LightName, PaperLength, appearance::Wrong};
 use crate::{
     Error, Result,
     hierarchy::Detail,
@@ -65,6 +65,19 @@ pub struct PictureEntry {
     /// and surfaces are shown without light (false).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shade: Option<bool>,
+    /// Where light comes from; by default from the eye.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light: Option<LightName>,
+    /// Whether the lamp of the light `key` or `studio` casts shadows; by default true.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shadows: Option<bool>,
+    /// How far light is dimmed where things around a place keep it away: from 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ambient_occlusion: Option<f64>,
+    /// How far pixels are dimmed where others beside them are nearer: eye-dome lighting, for clouds
+    /// without normals. By default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub eye_dome: Option<f64>,
     /// The largest thickness of a sheet, in world units.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sheet_thickness: Option<f64>,
@@ -213,6 +226,7 @@ impl PictureEntry {
             return Err(("size", "a picture needs a width and a height above 0".into()));
         }
         self.check_page()?;
+        self.check_light()?;
         if self.back_to_front && self.mode != Some(Composite::Splats) {
             let message =
                 "needs the mode splats (--mode splats): it sets the order of single splats";
@@ -370,7 +384,8 @@ impl PictureEntry {
             if let Some(Samples::Factor(_)) = self.samples { f64::from(factor) } else { 1.0 };
         settings.sheet_pixels *= wider;
         settings.occlusion = self.occlusion.unwrap_or(true);
-        self.light(scene, &mut settings);
+        self.shade(scene, &mut settings);
+        settings.lighting = self.lighting(subject.orientation.up);
         settings.detail = match (self.budget, self.frame_time) {
             (Some(splats), _) => Detail::Splats(splats),
             (_, Some(milliseconds)) => Detail::Milliseconds(milliseconds),
@@ -392,7 +407,7 @@ impl PictureEntry {
         ClipEntry::all(&self.clips, &subject.bounds, &scene.bounds())
     }
 
-    fn light(&self, scene: &Scene, settings: &mut Settings) {
+    fn shade(&self, scene: &Scene, settings: &mut Settings) {
         match self.shade {
             None => {}
             Some(false) => {

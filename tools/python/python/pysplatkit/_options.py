@@ -216,6 +216,14 @@ class Method(TypedDict, total=False):
     optics: str
     #: False draws without light, True lights volumes in any case.
     shade: bool
+    #: head, key, studio or sky.
+    light: str
+    #: Whether the lamp of the light key or studio casts shadows.
+    shadows: bool
+    #: How far light is dimmed where things around a place keep it away, from 0 to 1.
+    ambient_occlusion: float
+    #: How far pixels beside nearer ones are dimmed, about 1.
+    eye_dome: float
     #: Shapes that cut the scene.
     clips: Sequence[Clip]
     #: How gradients are made.
@@ -290,6 +298,10 @@ class RenderOptions(SourceOptions, Page, total=False):
     classify: str
     optics: str
     shade: bool
+    light: str
+    shadows: bool
+    ambient_occlusion: float
+    eye_dome: float
     gradient: str
     evaluate: str
     sheet_thickness: float

@@ -503,6 +503,10 @@ class Scene:
         classify: str | None = None,
         optics: str | None = None,
         shade: bool | None = None,
+        light: str | None = None,
+        shadows: bool | None = None,
+        ambient_occlusion: float | None = None,
+        eye_dome: float | None = None,
         clips: Sequence[Clip] | None = None,
         gradient: str | None = None,
         evaluate: str | None = None,
@@ -554,6 +558,13 @@ class Scene:
             classify: pre-integrated, post or pre. Default: pre-integrated.
             optics: light, maximum or x-ray. Default: light.
             shade: False draws without light, True lights volumes in any case.
+            light: head (from the eye), key (a lamp that casts shadows), studio (that lamp and all
+                sides) or sky (all sides, more from above). Default: head.
+            shadows: Whether the lamp casts shadows. Default: True.
+            ambient_occlusion: How far light is dimmed where things around a place keep it away,
+                from 0 to 1. Default: 1 for studio and sky, else 0.
+            eye_dome: How far pixels beside nearer ones are dimmed, about 1: for clouds without
+                normals. Default: 0.
             clips: Shapes that cut the scene.
             gradient: How gradients are made (docs/volumes.md).
             evaluate: Where fields are evaluated (docs/volumes.md).

@@ -1,0 +1,285 @@
+//! The light that reaches eight places, and what a surface there reflects. `src/reference/shade.rs`
+//! has the definition; shaders/shared/lamps.wgsl does the same.
+
+use super::{
+    close::columns,
+    layer::Layer,
+    plan::Plan,
+    rays::Rays,
+    vector::{self, Lanes, dot, dot_with, each, three},
+};
+use crate::plan::{
+    frame::Light,
+    lamps::{Affine, Lamps, Openness, ShadowMap},
+};
+use fearless_simd::{Simd, f32x4, prelude::*};
+
+/// A shorter gradient has no direction.
+const LEAST_GRADIENT: f32 = 1e-20;
+/// The most light from all sides, in that of the open.
+const MOST_OPEN: f32 = 2.0;
+
+/// The light that reaches eight places.
+#[derive(Clone, Copy)]
+pub struct Reaching<S: Simd> {
+    /// The mean direction of the light from all sides, in view space, and its amount.
+    open: [Lanes<S>; 4],
+    /// The share of the key lamp's light.
+    key: Lanes<S>,
+}
+
+impl<S: Simd> Reaching<S> {
+    /// Nothing keeps light away.
+    #[inline(always)]
+    pub fn all(simd: S) -> Self {
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        Self { open: [none, none, none, one], key: one }
+    }
+
+    /// Returns the light at distances along rays, a little before a surface with a normal.
+    #[inline(always)]
+    fn at(
+        simd: S,
+        plan: &Plan,
+        rays: &Rays<S>,
+        distance: Lanes<S>,
+        Turned { normal, certainty, .. }: &Turned<S>,
+    ) -> Self {
+        let mut reaching = Self::all(simd);
+        let Some(lamps) = &plan.lamps else { return reaching };
+        let place = if plan.view.perspective {
+            three!(I => rays.direction[I] * distance)
+        } else {
+            [rays.aside[0], rays.aside[1], distance]
+        };
+        let out = three!(I => {
+            (normal[I] + rays.direction[I]).mul_add(*certainty, -rays.direction[I])
+        });
+        let before = |step: f32| three!(I => out[I].mul_add(step, place[I]));
+        if let Some(open) = &lamps.shadows.open {
+            let place = moved(&lamps.to_open, before(lamps.open_step));
+            let [x, y, z, amount] = open_at(simd, open, place);
+            let side = three!(I => dot_with(lamps.rotation[I], [x, y, z]));
+            reaching.open = [side[0], side[1], side[2], amount];
+        }
+        if let Some(map) = &lamps.shadows.key {
+            reaching.key = key_at(simd, map, moved(&lamps.to_key, before(lamps.key_step)));
+        }
+        reaching
+    }
+}
+
+#[inline(always)]
+fn moved<S: Simd>(to: &Affine, place: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    three!(I => {
+        let [x, y, z, start] = to[I];
+        dot_with([x, y, z], place) + start
+    })
+}
+
+/// Returns the first node, its number and the places between it and the next ones.
+#[inline(always)]
+fn between<S: Simd>(
+    simd: S,
+    place: [Lanes<S>; 3],
+    most: [f32; 3],
+) -> ([[f32; 8]; 3], [[f32; 8]; 3]) {
+    let none = Lanes::splat(simd, 0.0);
+    let place = three!(I => place[I].max(none).min(Lanes::splat(simd, most[I])));
+    let whole = three!(I => place[I].floor().min(Lanes::splat(simd, most[I] - 1.0)));
+    let part = three!(I => (place[I] - whole[I]).into());
+    (three!(I => whole[I].into()), part)
+}
+
+/// Returns the light from all sides at places, linear between nodes.
+#[inline(always)]
+fn open_at<S: Simd>(simd: S, open: &Openness, place: [Lanes<S>; 3]) -> [Lanes<S>; 4] {
+    let [width, height, depth] = open.place.size;
+    let most = [width, height, depth].map(|side| (side - 1) as f32);
+    let (whole, part) = between(simd, place, most);
+    let load = |at: usize| -> f32x4<S> { open.nodes[at].simd_into(simd) };
+    columns(
+        simd,
+        each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
+            let [i, j, k] = three!(I => whole[I][L] as usize);
+            let [u, v, w] = three!(I => part[I][L]);
+            let first = (k * height + j) * width + i;
+            let row = |at: usize| {
+                let left = load(at);
+                (load(at + 1) - left).mul_add(f32x4::splat(simd, u), left)
+            };
+            let slice = |at: usize| {
+                let above = row(at);
+                (row(at + width) - above).mul_add(f32x4::splat(simd, v), above)
+            };
+            let near = slice(first);
+            (slice(first + width * height) - near).mul_add(f32x4::splat(simd, w), near)
+        }),
+    )
+}
+
+/// Returns the share of the key lamp's light at places, linear between pixels and planes.
+#[inline(always)]
+fn key_at<S: Simd>(simd: S, map: &ShadowMap, place: [Lanes<S>; 3]) -> Lanes<S> {
+    let size = map.view.size as usize;
+    let (whole, part) = between(simd, place, [(size - 1) as f32, (size - 1) as f32, size as f32]);
+    let share: [f32; 8] = each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
+        let [i, j, k] = three!(I => whole[I][L] as usize);
+        let [u, v, w] = three!(I => part[I][L]);
+        let along = |pixel: usize| {
+            let at = pixel * (size + 1) + k;
+            let (near, far) = (f32::from(map.light[at]), f32::from(map.light[at + 1]));
+            (far - near).mul_add(w, near)
+        };
+        let row = |pixel: usize| {
+            let left = along(pixel);
+            (along(pixel + 1) - left).mul_add(u, left)
+        };
+        let above = row(j * size + i);
+        (row((j + 1) * size + i) - above).mul_add(v, above)
+    });
+    let share: Lanes<S> = share.simd_into(simd);
+    share * (1.0 / 255.0)
+}
+
+/// How a normal lies to the light.
+struct Turned<S: Simd> {
+    /// The normal, of length 1, towards the eye.
+    normal: [Lanes<S>; 3],
+    /// The magnitude of the cosine to the ray.
+    facing: Lanes<S>,
+    /// How far the direction counts.
+    certainty: Lanes<S>,
+}
+
+impl<S: Simd> Turned<S> {
+    /// `low` is a magnitude up to which the normal does not count, and `per_magnitude` is one over
+    /// the magnitudes over which it comes to count in full.
+    #[inline(always)]
+    fn new(
+        simd: S,
+        normal: [Lanes<S>; 3],
+        direction: [Lanes<S>; 3],
+        [low, per_magnitude]: [f32; 2],
+    ) -> Self {
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let size = dot(normal, normal).sqrt();
+        let certainty = ((size - low) * per_magnitude).max(none).min(one);
+        let certainty = size.simd_gt(LEAST_GRADIENT).select(certainty, none);
+        let inverse = one / size.max(Lanes::splat(simd, LEAST_GRADIENT));
+        let cosine = dot(normal, direction) * inverse;
+        let towards = cosine.simd_gt(0.0).select(-inverse, inverse);
+        let facing = cosine.abs().min(one);
+        Self { normal: three!(I => normal[I] * towards), facing, certainty }
+    }
+
+    /// Returns the factor on a colour, and the highlight that is added to it (Blinn 1977).
+    #[inline(always)]
+    fn light(
+        &self,
+        simd: S,
+        Light { ambient, diffuse, specular, power }: Light,
+        lamps: Option<&Lamps>,
+        (direction, reaching): (&[Lanes<S>; 3], &Reaching<S>),
+    ) -> [Lanes<S>; 2] {
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let certain = self.certainty;
+        let least = Lanes::splat(simd, 1e-6);
+        let shown = |cosine: Lanes<S>| one - certain * (one - cosine);
+        let highlight = vector::power(simd, self.facing.max(least), power) * certain * specular;
+        let Some(lamps) = lamps else {
+            return [shown(self.facing) * diffuse + ambient, highlight];
+        };
+        let [x, y, z, amount] = reaching.open;
+        let open = amount + certain * dot([x, y, z], self.normal) * 2.0;
+        let open = open.max(none).min(Lanes::splat(simd, MOST_OPEN));
+        let mut factor = open * ((shown(self.facing) * lamps.head + lamps.sky) * diffuse + ambient);
+        let mut highlight = highlight * open * lamps.head;
+        if lamps.key > 0.0 {
+            let towards = lamps.key_direction;
+            let cosine = dot_with(towards, self.normal).max(none).min(one);
+            let half = three!(I => towards[I] - direction[I]);
+            let inverse = one / dot(half, half).sqrt().max(least);
+            let middle = (dot(half, self.normal) * inverse).max(least).min(one);
+            let share = reaching.key * lamps.key;
+            factor += share * shown(cosine) * diffuse;
+            let gloss = vector::power(simd, middle, power) * certain * specular;
+            highlight += cosine.simd_gt(0.0).select(share * gloss, none);
+        }
+        [factor, highlight]
+    }
+}
+
+impl Plan<'_> {
+    /// Returns a lit colour of a surface at distances along rays. A normal may have any length.
+    #[inline(always)]
+    pub fn lit_surface<S: Simd>(
+        &self,
+        simd: S,
+        color: [Lanes<S>; 3],
+        normal: [Lanes<S>; 3],
+        (rays, distance): (&Rays<S>, Lanes<S>),
+    ) -> [Lanes<S>; 3] {
+        // From the smallest length on.
+        let turned = Turned::new(simd, normal, rays.direction, [0.0, 1e30]);
+        let reaching = Reaching::at(simd, self, rays, distance, &turned);
+        let on = (&rays.direction, &reaching);
+        let [share, highlight] =
+            turned.light(simd, self.frame.surface_light, self.lamps.as_ref(), on);
+        with_light(simd, color, share, highlight)
+    }
+
+    /// Returns the light that reaches the middle of a sheet of the field.
+    #[inline(always)]
+    pub fn reaching<S: Simd>(&self, simd: S, layer: &Layer<S>, rays: &Rays<S>) -> Reaching<S> {
+        if self.lamps.is_none() || !self.is_lit {
+            return Reaching::all(simd);
+        }
+        let gradient = self.gradient(layer, Lanes::splat(simd, 0.5));
+        let turned = Turned::new(simd, gradient, layer.direction, self.certain());
+        Reaching::at(simd, self, rays, layer.thickness.mul_add(0.5, layer.start), &turned)
+    }
+
+    /// Returns the magnitude up to which gradients do not count, and one over the magnitudes over
+    /// which they come to count in full.
+    fn certain(&self) -> [f32; 2] {
+        [self.field.certain_from, self.field.per_certain]
+    }
+
+    /// Returns a lit colour of the field. The gradient counts from the magnitudes on that are
+    /// certain, in entries per thickness of a sheet; others are lit the less the shorter they are.
+    #[inline(always)]
+    pub fn lit_field<S: Simd>(
+        &self,
+        simd: S,
+        color: [Lanes<S>; 3],
+        gradient: [Lanes<S>; 3],
+        on: ([Lanes<S>; 3], &Reaching<S>),
+    ) -> [Lanes<S>; 3] {
+        let [share, highlight] = self.light_of(simd, gradient, on);
+        with_light(simd, color, share, highlight)
+    }
+
+    /// Returns the factor on a colour of the field and the highlight that is added to it.
+    #[inline(always)]
+    pub fn light_of<S: Simd>(
+        &self,
+        simd: S,
+        gradient: [Lanes<S>; 3],
+        (direction, reaching): ([Lanes<S>; 3], &Reaching<S>),
+    ) -> [Lanes<S>; 2] {
+        let turned = Turned::new(simd, gradient, direction, self.certain());
+        turned.light(simd, self.field.light, self.lamps.as_ref(), (&direction, reaching))
+    }
+}
+
+/// Returns a colour times a share of light, and a highlight.
+#[inline(always)]
+pub fn with_light<S: Simd>(
+    simd: S,
+    color: [Lanes<S>; 3],
+    share: Lanes<S>,
+    highlight: Lanes<S>,
+) -> [Lanes<S>; 3] {
+    three!(I => color[I].mul_add(share, highlight).min(Lanes::splat(simd, 1.0)))
+}
