@@ -53,7 +53,8 @@ fn light_of(
     let facing = min(abs(dot(normal, direction)) / max(size, 1e-20), 1.0);
     let shown = 1.0 - share * (1.0 - facing);
     let gloss = share * shade.z * pow(max(facing, 1e-6), shade.w);
-    if !LAMPS {
+    // A field without light has a negative power.
+    if !LAMPS || shade.w < 0.0 {
         return vec2(shade.x + shade.y * shown, gloss);
     }
     let way = select(normal, -normal, dot(normal, direction) > 0.0) / max(size, 1e-20);

@@ -57,9 +57,10 @@ pub struct Light {
 }
 
 impl Light {
-    /// Returns a light of these shares. Without them, colours stay as they are.
+    /// Returns a light of these shares. Without them, colours stay as they are: the power is
+    /// negative, which tells the shaders that no light dims them.
     pub fn new(shade: Option<Shade>) -> Self {
-        let unlit = Self { ambient: 1.0, diffuse: 0.0, specular: 0.0, power: 1.0 };
+        let unlit = Self { ambient: 1.0, diffuse: 0.0, specular: 0.0, power: -1.0 };
         shade.map_or(unlit, |shade| Self {
             ambient: shade.ambient as f32,
             diffuse: shade.diffuse as f32,

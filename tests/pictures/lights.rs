@@ -111,6 +111,7 @@ fn square(side: f32, height: f32) -> Mesh {
     Mesh {
         positions: vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
+        colors: vec![[255; 4]; 4],
         ..Mesh::default()
     }
 }
