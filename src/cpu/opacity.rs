@@ -115,7 +115,7 @@ impl CpuRenderer {
     /// Returns what keeps light away in a picture.
     pub(crate) fn shadows(&mut self, view: &View, settings: &Settings) -> Result<Shadows> {
         let lighting = &settings.lighting;
-        if lighting.is_plain() {
+        if lighting.is_plain() || !self.scene.is_lit(settings) {
             return Ok(Shadows::default());
         }
         let (bounds, clips) = (self.scene.bounds(), &settings.clips);

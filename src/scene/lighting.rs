@@ -1,6 +1,6 @@
 //! Where light comes from: the eye, a key light, the sky; and what keeps it away.
 
-use super::{Gradient, Mode, Optics, Settings};
+use super::{Gradient, Mode, Optics, Scene, Settings};
 use crate::{
     hierarchy::Detail,
     math::{Bounds, View},
@@ -198,6 +198,17 @@ impl KeyLight {
     /// A lamp with shadows at the upper left before the scene.
     fn upper_left(share: f64) -> Self {
         Self { direction: DVec3::new(-0.5, -0.65, -0.75), share, shadows: SHADOWS }
+    }
+}
+
+impl Scene {
+    /// Whether light changes the picture of any item: of fields that are lit, and of surfaces whose
+    /// splats may have normals.
+    pub(crate) fn is_lit(&self, settings: &Settings) -> bool {
+        self.items.iter().any(|item| match item.transfer() {
+            Some(transfer) => settings.shade_of(transfer).is_some(),
+            None => settings.surface_shade.is_some() && !item.is_trained(),
+        })
     }
 }
 

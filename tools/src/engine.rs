@@ -333,6 +333,14 @@ pub fn idle(picture: &PictureEntry, scene: &Scene) -> Option<&'static str> {
         return Some("--shade has no effect: the transfer function has its own light");
     }
     let is_dark = !has_surfaces && fields().all(|field| field.shade.is_none());
+    let has_lamps = picture.light.is_some_and(|light| light != LightName::Head)
+        || picture.ambient_occlusion.is_some_and(|strength| strength > 0.0);
+    if has_lamps && (picture.shade == Some(false) || (is_dark && picture.shade != Some(true))) {
+        return Some(
+            "--light and --ambient-occlusion have no effect: nothing in the scene is lit; trained \
+             Gaussians carry their light in their colours",
+        );
+    }
     (picture.shade == Some(false) && is_dark)
         .then_some("--no-shade (--flat) has no effect: nothing in the scene is lit")
 }
