@@ -24,6 +24,7 @@ pub mod convert;
 mod data;
 mod description;
 mod drawing;
+mod editing;
 mod facts;
 mod fit;
 mod framing;
