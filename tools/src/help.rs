@@ -60,8 +60,9 @@ const TASKS: [Task; 8] = [
     },
     Task {
         name: "info",
-        flags: LOOKED_AT,
+        flags: "json stats dims type spacing scalar time series dataset missing labels",
         examples: "  splatkit info scan.laz
+  splatkit info scan.laz --stats
   splatkit info study/ --series 2
   splatkit info aseg.nii.gz --labels FreeSurferColorLUT.txt",
     },
@@ -135,7 +136,7 @@ mod tests {
         ("Texts", "scalar-bar axes scale-bar caption"),
         (
             "Camera",
-            "camera view camera-position focal-point view-up view-angle distance azimuth \
+            "camera view-of view camera-position focal-point view-up view-angle distance azimuth \
             elevation zoom orthographic up",
         ),
         (
