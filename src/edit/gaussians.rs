@@ -1,6 +1,6 @@
 //! Trained Gaussians.
 
-use super::{Editable, Motion, find, merge, retain, surface::stand_by, thin::Thin};
+use super::{Editable, Motion, find, merge, retain, thin::Thin};
 use crate::{
     Result,
     gaussians::{
@@ -76,7 +76,6 @@ impl Editable for Gaussians {
         let colors = turn::turn(self.degree, motion.turn());
         let terms = terms(self.degree);
         self.harmonics.par_chunks_mut(terms).for_each(|harmonics| colors.apply(harmonics));
-        self.about.orientation = self.about.orientation.map(|stand| stand_by(motion, stand));
     }
 
     fn reach(&self, index: usize) -> f32 {

@@ -64,7 +64,7 @@ pub enum Edit {
     Crop(Region),
     /// Keep what meets a condition.
     Where(Expression),
-    /// Move, turn or scale everything.
+    /// Move, turn or scale everything. Which axis is up stays as the scene says.
     Move(Motion),
     /// Keep fewer points, evenly spread; or merge splats.
     Thin(Thin),

@@ -9,7 +9,6 @@ use super::{
     Change, Context, Edit, Editable, check_left, clusters,
     clusters::Clusters,
     one,
-    surface::stand_by,
     thin::{Discs, Thin},
 };
 use crate::{
@@ -172,13 +171,9 @@ impl<'a> Pass<'a> {
         self.streams.first().map(Stream::path)
     }
 
-    /// Returns how the points stand after the edits, if the first file says how they stood.
+    /// Returns how the points stand, if the first file says so.
     pub(crate) fn orientation(&self) -> Option<Orientation> {
-        let stated = self.streams.first().and_then(Stream::orientation);
-        self.edits.iter().fold(stated, |stand, edit| match edit {
-            Edit::Move(motion) => stand.map(|stand| stand_by(motion, stand)),
-            _ => stand,
-        })
+        self.streams.first().and_then(Stream::orientation)
     }
 
     /// Returns the number of points of all files.
@@ -240,7 +235,9 @@ impl<'a> Pass<'a> {
 
     /// Returns the places of the points that arrive after these steps, around an origin.
     fn places(&self, edit: &Edit, steps: &mut [Step<'a>]) -> Result<Vec<Vec3>> {
-        let (mut places, most) = (Vec::new(), self.context.memory / OF_PLACE);
+        let most = self.context.memory / OF_PLACE;
+        // Room that is not used takes no memory.
+        let mut places = Vec::with_capacity(self.points().min(most) as usize);
         let origin = self.middle();
         let name = edit.name();
         self.pass(steps, &mut |records| {

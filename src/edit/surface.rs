@@ -8,7 +8,6 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::Orientation,
     formats::{Attribute, Records},
     parallel::prelude::*,
     surface::{Mesh, SurfelOptions},
@@ -87,7 +86,6 @@ impl Editable for Surface {
         if linear.determinant() < 0.0 {
             mesh.triangles.par_iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
         }
-        mesh.about.orientation = mesh.about.orientation.map(|stand| stand_by(motion, stand));
     }
 
     fn thin(&mut self, thin: &Thin) -> Result<()> {
@@ -112,10 +110,4 @@ impl Editable for Surface {
         let lines = self.mesh.lines.iter().copied();
         self.mesh.triangles.iter().flat_map(sides).chain(lines).collect()
     }
-}
-
-/// Returns how a subject stands after a motion.
-pub(super) fn stand_by(motion: &Motion, stand: Orientation) -> Orientation {
-    let turn = motion.turn();
-    Orientation { up: turn * stand.up, front: turn * stand.front }
 }

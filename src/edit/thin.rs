@@ -4,7 +4,7 @@
 //! distance. For a wanted count, the distance is found by trying.
 
 use crate::{Error, Result, memory};
-use glam::{IVec3, Vec3};
+use glam::{IVec3, UVec3, Vec3};
 use std::str::FromStr;
 
 /// How many points are kept.
@@ -45,15 +45,18 @@ impl FromStr for Thin {
 /// The name of this module's work in errors.
 const WORK: &str = "thinning points";
 
-/// Bytes of memory for each kept point.
-const OF_KEPT: u64 = 40;
+/// Bytes of memory for each kept point: its cell, in a table that may have just been doubled.
+const OF_KEPT: u64 = 90;
 
 /// How many more points than wanted a distance may keep, as a part of those wanted. The surplus is
 /// left out evenly.
-const SURPLUS: f64 = 0.02;
+const SURPLUS: f64 = 0.05;
 
 /// The most distances that are tried.
 const TRIES: usize = 24;
+
+/// Points on which a distance is tried before it is on all: those in some blocks of space.
+const SAMPLE: usize = 1 << 20;
 
 impl Thin {
     /// Returns which of these points are kept.
@@ -92,42 +95,117 @@ impl Thin {
 fn spread(places: &[Vec3], wanted: u64) -> Vec<bool> {
     let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (low, high) = places.iter().fold(none, |(low, high), at| (low.min(*at), high.max(*at)));
-    let most = (wanted as f64 * (1.0 + SURPLUS)) as u64;
-    // Distances that keep too many and too few points. Without any, all points are kept.
-    let mut ends = [(0.0, places.len() as u64), (f64::from((high - low).length()), 1)];
-    let mut best: Option<Vec<bool>> = None;
+    let size = high - low;
+    let blocks = Blocks { low, edge: (size.max_element() / BLOCKS as f32).max(f32::MIN_POSITIVE) };
+    // Block by block, the cells around a point are in the processor's cache.
+    let order = blocks.order(places);
     // The points of a surface fill an area.
-    let mut distance = ends[1].0 / (wanted as f64).sqrt();
+    let mut guess = f64::from(size.length()) / (wanted as f64).sqrt();
+    let largest = f64::from(size.length());
+    let every = places.len().div_ceil(SAMPLE) as u32;
+    if every > 1 {
+        let is_in = |at: &&u32| blocks.of(places[**at as usize]).wrapping_mul(HASH) % every == 0;
+        let sample: Vec<u32> = order.iter().filter(is_in).copied().collect();
+        if sample.len() > SAMPLE / 4 {
+            let share = sample.len() as f64 / places.len() as f64;
+            let of_sample = (wanted as f64 * share).ceil() as u64;
+            guess = search(places, &sample, of_sample, [guess, largest]).0;
+        }
+    }
+    search(places, &order, wanted, [guess, largest]).1
+}
+
+/// Blocks of space, in a grid.
+struct Blocks {
+    low: Vec3,
+    edge: f32,
+}
+
+/// Blocks along the longest side of all points.
+const BLOCKS: u32 = 64;
+
+/// Mixes the numbers of blocks.
+const HASH: u32 = 0x9e37_79b1;
+
+impl Blocks {
+    /// Returns the number of a point's block.
+    fn of(&self, place: Vec3) -> u32 {
+        let cell = ((place - self.low) / self.edge).as_uvec3().min(UVec3::splat(BLOCKS - 1));
+        (cell.z * BLOCKS + cell.y) * BLOCKS + cell.x
+    }
+
+    /// Returns the indices of points, block by block. In a block they keep their order.
+    fn order(&self, places: &[Vec3]) -> Vec<u32> {
+        let mut starts = vec![0u32; (BLOCKS * BLOCKS * BLOCKS) as usize + 1];
+        places.iter().for_each(|place| starts[self.of(*place) as usize + 1] += 1);
+        for block in 1..starts.len() {
+            starts[block] += starts[block - 1];
+        }
+        let mut order = vec![0; places.len()];
+        for (place, index) in places.iter().zip(0..) {
+            let next = &mut starts[self.of(*place) as usize];
+            order[*next as usize] = index;
+            *next += 1;
+        }
+        order
+    }
+}
+
+/// Tries distances of some points, from a guess on and below a largest one. Returns one that keeps
+/// enough points and few more, and which of all it keeps.
+fn search(
+    places: &[Vec3],
+    order: &[u32],
+    wanted: u64,
+    [guess, largest]: [f64; 2],
+) -> (f64, Vec<bool>) {
+    let most = (wanted as f64 * (1.0 + SURPLUS)) as u64;
+    // A distance that keeps too many, and one that keeps too few.
+    let mut ends = [0.0, 2.0 * largest];
+    let mut best = 0.0;
+    let mut kept = vec![false; places.len()];
+    let mut distance = guess;
     for _ in 0..TRIES {
-        let Ok(mut discs) = Discs::new(distance) else { break };
-        let mut count = 0;
-        let mut kept = vec![false; places.len()];
-        for (kept, place) in kept.iter_mut().zip(places) {
-            *kept = discs.keep(*place);
-            count += u64::from(*kept);
-            // Where far too many are kept, the rest need not be tried.
-            if count > 4 * wanted {
-                break;
-            }
-        }
-        if count > 4 * wanted {
-            ends[0].0 = distance;
-            distance = between(ends[0].0, ends[1].0, distance * 2.0);
-            continue;
-        }
+        let Some(count) = keep(places, order, distance, 4 * wanted, &mut kept) else { break };
         let is_enough = count >= wanted;
-        ends[usize::from(!is_enough)] = (distance, count);
-        if is_enough {
-            best = Some(kept);
+        ends[usize::from(!is_enough)] = distance;
+        if is_enough && count <= 4 * wanted {
+            best = distance;
             if count <= most {
-                break;
+                return (best, kept);
             }
         }
         // Counts fall with about the square of the distance.
-        let guess = distance * (count as f64 / (wanted as f64 * (1.0 + 0.5 * SURPLUS))).sqrt();
-        distance = between(ends[0].0, ends[1].0, guess);
+        let ratio = count as f64 / (wanted as f64 * (1.0 + 0.5 * SURPLUS));
+        distance = between(ends[0], ends[1], distance * ratio.sqrt());
     }
-    best.unwrap_or_else(|| vec![true; places.len()])
+    // Without a distance, all are kept.
+    if keep(places, order, best, u64::MAX, &mut kept).is_none() {
+        order.iter().for_each(|at| kept[*at as usize] = true);
+    }
+    (best, kept)
+}
+
+/// Marks the points that a distance keeps, until there are more than some. Returns their number;
+/// `None` for a distance that 32 bits do not hold.
+fn keep(
+    places: &[Vec3],
+    order: &[u32],
+    distance: f64,
+    most: u64,
+    kept: &mut [bool],
+) -> Option<u64> {
+    let mut discs = Discs::new(distance).ok()?;
+    let mut count = 0;
+    for at in order {
+        let at = *at as usize;
+        kept[at] = discs.keep(places[at]);
+        count += u64::from(kept[at]);
+        if count > most {
+            break;
+        }
+    }
+    Some(count)
 }
 
 /// Returns a guess if it lies between two distances, or else their mean.
@@ -147,16 +225,10 @@ fn leave_out(kept: &mut [bool], surplus: u64) {
     }
 }
 
-/// No more places in a list.
-const END: u32 = u32::MAX;
-
 /// The points kept so far, by the cells of a grid as wide as the distance.
 pub(super) struct Discs {
     distance: f32,
     cells: Cells,
-    places: Vec<Vec3>,
-    /// The next point in the cell of each.
-    next: Vec<u32>,
 }
 
 impl Discs {
@@ -166,70 +238,77 @@ impl Discs {
         if !(distance as f32).is_normal() || !((distance * distance) as f32).is_normal() {
             return Err(Error::Argument(format!("points cannot be {distance} apart")));
         }
-        let (cells, places, next) = (Cells::new(), Vec::new(), Vec::new());
-        Ok(Self { distance: distance as f32, cells, places, next })
+        Ok(Self { distance: distance as f32, cells: Cells::new() })
     }
 
     /// Returns whether a point is far enough from all kept before, and keeps it then.
     pub fn keep(&mut self, place: Vec3) -> bool {
         let scaled = place / self.distance;
-        let cell = scaled.floor();
-        let inside = scaled - cell;
-        let cell = cell.as_ivec3();
+        let corner = scaled.floor();
+        let (inside, cell) = (scaled - corner, corner.as_ivec3());
+        let least = self.distance * self.distance;
         // The point's own cell is the likeliest to hold a near one.
-        if self.is_near(cell, place) {
+        if self.cells.has_near(key(cell), place, least) {
             return false;
         }
-        let mut near = self.around(cell, inside).into_iter().flatten();
-        if near.any(|cell| self.is_near(cell, place)) {
-            return false;
+        // The sides to which the point is nearer come first.
+        let toward = inside.map(|part| if part < 0.5 { -1.0 } else { 1.0 }).as_ivec3();
+        let near = inside.min(1.0 - inside);
+        for steps in STEPS {
+            let gap = |step: i32, near: f32| match step {
+                0 => 0.0,
+                1 => near,
+                _ => 1.0 - near,
+            };
+            let [x, y, z] = steps;
+            let gap = Vec3::new(gap(x, near.x), gap(y, near.y), gap(z, near.z));
+            // A margin, because places are rounded.
+            if gap.length_squared() > 1.001 {
+                continue;
+            }
+            let cell = cell.wrapping_add(toward * IVec3::from_array(steps));
+            if self.cells.has_near(key(cell), place, least) {
+                return false;
+            }
         }
-        let head = self.cells.entry(key(cell));
-        self.next.push(std::mem::replace(head, self.places.len() as u32));
-        self.places.push(place);
+        self.cells.put(key(cell), place);
         true
     }
-
-    /// Returns the cells around one that a disc reaches whose centre lies at `inside`, from 0 to 1.
-    fn around(&self, cell: IVec3, inside: Vec3) -> [Option<IVec3>; 26] {
-        let mut all = [None; 26];
-        let mut at = 0;
-        for z in -1..=1 {
-            for y in -1..=1 {
-                for x in -1..=1 {
-                    let step = IVec3::new(x, y, z);
-                    if step == IVec3::ZERO {
-                        continue;
-                    }
-                    let gap = |step: i32, inside: f32| match step {
-                        -1 => inside,
-                        1 => 1.0 - inside,
-                        _ => 0.0,
-                    };
-                    let gap = Vec3::new(gap(x, inside.x), gap(y, inside.y), gap(z, inside.z));
-                    // A margin, because places are rounded.
-                    if gap.length_squared() <= 1.001 {
-                        all[at] = Some(cell.wrapping_add(step));
-                    }
-                    at += 1;
-                }
-            }
-        }
-        all
-    }
-
-    fn is_near(&self, cell: IVec3, place: Vec3) -> bool {
-        let most = self.distance * self.distance;
-        let mut at = self.cells.get(key(cell));
-        while at != END {
-            if self.places[at as usize].distance_squared(place) < most {
-                return true;
-            }
-            at = self.next[at as usize];
-        }
-        false
-    }
 }
+
+/// The steps to the cells around one, in units of the side to which a point is nearer: those that
+/// are likelier to hold a near point first.
+const STEPS: [[i32; 3]; 26] = {
+    let mut steps = [[0; 3]; 26];
+    let mut at = 0;
+    // By the number of steps back, then by the number of all steps.
+    let mut rank = 1;
+    while rank < 16 {
+        let mut index = 0;
+        while index < 27 {
+            let step = [index % 3, index / 3 % 3, index / 9];
+            let (mut back, mut all, mut axis) = (0, 0, 0);
+            while axis < 3 {
+                back += (step[axis] == 2) as usize;
+                all += (step[axis] != 0) as usize;
+                axis += 1;
+            }
+            if 4 * back + all == rank {
+                let mut signed = [0; 3];
+                axis = 0;
+                while axis < 3 {
+                    signed[axis] = if step[axis] == 2 { -1 } else { step[axis] as i32 };
+                    axis += 1;
+                }
+                steps[at] = signed;
+                at += 1;
+            }
+            index += 1;
+        }
+        rank += 1;
+    }
+    steps
+};
 
 /// Returns a number of a cell. Two cells may have the same: then both are searched.
 fn key(cell: IVec3) -> u64 {
@@ -238,51 +317,76 @@ fn key(cell: IVec3) -> u64 {
         ^ y.wrapping_mul(0xc2b2_ae3d_27d4_eb4f).rotate_left(21)
         ^ z.wrapping_mul(0x1656_67b1_9e37_79f9).rotate_left(42);
     // The lowest bits choose the place in the table.
-    (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 7 | 1
+    ((mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 7) + 1
 }
 
-/// A table from keys above 0 to the first point of each.
+/// Some points of one cell, in one line of the processor's cache.
+#[derive(Clone, Copy, Default)]
+#[repr(align(64))]
+struct Slot {
+    /// 0 for an unused slot.
+    key: u64,
+    count: u8,
+    places: [[f32; 3]; IN_SLOT],
+}
+
+const IN_SLOT: usize = 4;
+
+/// A table of slots. A cell with more points than a slot holds has several.
 struct Cells {
-    keys: Vec<u64>,
-    heads: Vec<u32>,
+    slots: Vec<Slot>,
     used: usize,
 }
 
 impl Cells {
     fn new() -> Self {
-        Self { keys: vec![0; 64], heads: vec![END; 64], used: 0 }
+        Self { slots: vec![Slot::default(); 64], used: 0 }
     }
 
-    fn slot(keys: &[u64], key: u64) -> usize {
-        let mask = keys.len() - 1;
+    fn has_near(&self, key: u64, place: Vec3, least: f32) -> bool {
+        let mask = self.slots.len() - 1;
         let mut at = key as usize & mask;
-        while keys[at] != key && keys[at] != 0 {
+        loop {
+            let slot = &self.slots[at];
+            if slot.key == 0 {
+                return false;
+            }
+            if slot.key == key {
+                let places = &slot.places[..usize::from(slot.count)];
+                if places.iter().any(|o| Vec3::from(*o).distance_squared(place) < least) {
+                    return true;
+                }
+            }
+            at = (at + 1) & mask;
+        }
+    }
+
+    fn put(&mut self, key: u64, place: Vec3) {
+        if 8 * (self.used + 1) > 6 * self.slots.len() {
+            let larger = vec![Slot::default(); 2 * self.slots.len()];
+            for slot in std::mem::replace(&mut self.slots, larger) {
+                if slot.key != 0 {
+                    let at = self.free(slot.key, |_| false);
+                    self.slots[at] = slot;
+                }
+            }
+        }
+        let at = self.free(key, |slot| slot.key == key && usize::from(slot.count) < IN_SLOT);
+        let slot = &mut self.slots[at];
+        self.used += usize::from(slot.key == 0);
+        slot.key = key;
+        slot.places[usize::from(slot.count)] = place.to_array();
+        slot.count += 1;
+    }
+
+    /// Returns the first slot for a key that is unused, or that has room.
+    fn free(&self, key: u64, has_room: impl Fn(&Slot) -> bool) -> usize {
+        let mask = self.slots.len() - 1;
+        let mut at = key as usize & mask;
+        while self.slots[at].key != 0 && !has_room(&self.slots[at]) {
             at = (at + 1) & mask;
         }
         at
-    }
-
-    fn get(&self, key: u64) -> u32 {
-        self.heads[Self::slot(&self.keys, key)]
-    }
-
-    fn entry(&mut self, key: u64) -> &mut u32 {
-        if 8 * (self.used + 1) > 5 * self.keys.len() {
-            self.grow();
-        }
-        let at = Self::slot(&self.keys, key);
-        self.used += usize::from(self.keys[at] == 0);
-        self.keys[at] = key;
-        &mut self.heads[at]
-    }
-
-    fn grow(&mut self) {
-        let (mut keys, mut heads) = (vec![0; 2 * self.keys.len()], vec![END; 2 * self.keys.len()]);
-        for (key, head) in self.keys.iter().zip(&self.heads).filter(|(key, _)| **key != 0) {
-            let at = Self::slot(&keys, *key);
-            (keys[at], heads[at]) = (*key, *head);
-        }
-        (self.keys, self.heads) = (keys, heads);
     }
 }
 
