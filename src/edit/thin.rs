@@ -46,7 +46,7 @@ impl FromStr for Thin {
 const WORK: &str = "thinning points";
 
 /// Bytes of memory for each kept point: its cell, in a table that may have just been doubled.
-const OF_KEPT: u64 = 90;
+const OF_KEPT: u64 = 110;
 
 /// How many more points than wanted a distance may keep, as a part of those wanted. The surplus is
 /// left out evenly.
@@ -238,7 +238,8 @@ impl Discs {
         if !(distance as f32).is_normal() || !((distance * distance) as f32).is_normal() {
             return Err(Error::Argument(format!("points cannot be {distance} apart")));
         }
-        Ok(Self { distance: distance as f32, cells: Cells::new() })
+        let distance = distance as f32;
+        Ok(Self { distance, cells: Cells::new(distance) })
     }
 
     /// Returns whether a point is far enough from all kept before, and keeps it then.
@@ -320,39 +321,46 @@ fn key(cell: IVec3) -> u64 {
     ((mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 7) + 1
 }
 
-/// Some points of one cell, in one line of the processor's cache.
+/// Some points of one cell, in half a line of the processor's cache.
 #[derive(Clone, Copy, Default)]
-#[repr(align(64))]
+#[repr(align(32))]
 struct Slot {
-    /// 0 for an unused slot.
-    key: u64,
-    count: u8,
+    /// A part of the cell's number; 0 for an unused slot.
+    tag: u32,
+    count: u32,
     places: [[f32; 3]; IN_SLOT],
 }
 
-const IN_SLOT: usize = 4;
+const IN_SLOT: usize = 2;
 
-/// A table of slots. A cell with more points than a slot holds has several.
+/// A table of slots. A cell with more points than a slot holds has several. At most half of the
+/// slots are used, so that cells without points are soon known to be.
 struct Cells {
+    distance: f32,
     slots: Vec<Slot>,
     used: usize,
 }
 
 impl Cells {
-    fn new() -> Self {
-        Self { slots: vec![Slot::default(); 64], used: 0 }
+    fn new(distance: f32) -> Self {
+        Self { distance, slots: vec![Slot::default(); 64], used: 0 }
+    }
+
+    /// Returns the cell of a place.
+    fn cell(&self, place: Vec3) -> IVec3 {
+        (place / self.distance).floor().as_ivec3()
     }
 
     fn has_near(&self, key: u64, place: Vec3, least: f32) -> bool {
         let mask = self.slots.len() - 1;
-        let mut at = key as usize & mask;
+        let (mut at, tag) = (key as usize & mask, tag(key));
         loop {
             let slot = &self.slots[at];
-            if slot.key == 0 {
+            if slot.tag == 0 {
                 return false;
             }
-            if slot.key == key {
-                let places = &slot.places[..usize::from(slot.count)];
+            if slot.tag == tag {
+                let places = &slot.places[..slot.count as usize];
                 if places.iter().any(|o| Vec3::from(*o).distance_squared(place) < least) {
                     return true;
                 }
@@ -362,20 +370,22 @@ impl Cells {
     }
 
     fn put(&mut self, key: u64, place: Vec3) {
-        if 8 * (self.used + 1) > 6 * self.slots.len() {
+        if 2 * (self.used + 1) > self.slots.len() {
             let larger = vec![Slot::default(); 2 * self.slots.len()];
+            self.used = 0;
             for slot in std::mem::replace(&mut self.slots, larger) {
-                if slot.key != 0 {
-                    let at = self.free(slot.key, |_| false);
-                    self.slots[at] = slot;
+                for place in &slot.places[..slot.count as usize] {
+                    let place = Vec3::from(*place);
+                    self.put(self::key(self.cell(place)), place);
                 }
             }
         }
-        let at = self.free(key, |slot| slot.key == key && usize::from(slot.count) < IN_SLOT);
+        let tag = tag(key);
+        let at = self.free(key, |slot| slot.tag == tag && (slot.count as usize) < IN_SLOT);
         let slot = &mut self.slots[at];
-        self.used += usize::from(slot.key == 0);
-        slot.key = key;
-        slot.places[usize::from(slot.count)] = place.to_array();
+        self.used += usize::from(slot.tag == 0);
+        slot.tag = tag;
+        slot.places[slot.count as usize] = place.to_array();
         slot.count += 1;
     }
 
@@ -383,11 +393,16 @@ impl Cells {
     fn free(&self, key: u64, has_room: impl Fn(&Slot) -> bool) -> usize {
         let mask = self.slots.len() - 1;
         let mut at = key as usize & mask;
-        while self.slots[at].key != 0 && !has_room(&self.slots[at]) {
+        while self.slots[at].tag != 0 && !has_room(&self.slots[at]) {
             at = (at + 1) & mask;
         }
         at
     }
+}
+
+/// Returns a part of a cell's number that is never 0.
+fn tag(key: u64) -> u32 {
+    (key >> 25) as u32 | 1
 }
 
 #[cfg(test)]
