@@ -168,7 +168,7 @@ impl Node {
                     // Nothing is known of a missing value, also not that it differs.
                     Operator::Unequal => {
                         let right = right();
-                        truth(left < right || left > right)
+                        truth(left != right && !left.is_nan() && !right.is_nan())
                     }
                     Operator::Less => truth(left < right()),
                     Operator::LessOrEqual => truth(left <= right()),

@@ -104,7 +104,8 @@ fn spread(places: &[Vec3], wanted: u64) -> Vec<bool> {
     let largest = f64::from(size.length());
     let every = places.len().div_ceil(SAMPLE) as u32;
     if every > 1 {
-        let is_in = |at: &&u32| blocks.of(places[**at as usize]).wrapping_mul(HASH) % every == 0;
+        let is_in =
+            |at: &&u32| blocks.of(places[**at as usize]).wrapping_mul(HASH).is_multiple_of(every);
         let sample: Vec<u32> = order.iter().filter(is_in).copied().collect();
         if sample.len() > SAMPLE / 4 {
             let share = sample.len() as f64 / places.len() as f64;
@@ -216,12 +217,10 @@ fn between(low: f64, high: f64, guess: f64) -> f64 {
 /// Leaves out this many of the kept points, spread over all.
 fn leave_out(kept: &mut [bool], surplus: u64) {
     let all = kept.iter().filter(|kept| **kept).count() as u64;
-    let mut rank = 0;
-    for kept in kept.iter_mut().filter(|kept| **kept) {
-        // Ranks at which the share of those left out passes a whole number.
-        let passes = |rank: u64| (u128::from(rank) * u128::from(surplus) / u128::from(all)) as u64;
-        *kept = passes(rank + 1) == passes(rank);
-        rank += 1;
+    // Ranks at which the share of those left out passes a whole number.
+    let passed = |rank: u64| (u128::from(rank) * u128::from(surplus) / u128::from(all)) as u64;
+    for (kept, rank) in kept.iter_mut().filter(|kept| **kept).zip(0..) {
+        *kept = passed(rank + 1) == passed(rank);
     }
 }
 
@@ -298,7 +297,7 @@ const STEPS: [[i32; 3]; 26] = {
                 let mut signed = [0; 3];
                 axis = 0;
                 while axis < 3 {
-                    signed[axis] = if step[axis] == 2 { -1 } else { step[axis] as i32 };
+                    signed[axis] = if step[axis] == 2 { -1 } else { step[axis] };
                     axis += 1;
                 }
                 steps[at] = signed;
