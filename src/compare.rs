@@ -1,8 +1,12 @@
-//! Measures how much two pictures differ.
+//! Measures how much two pictures differ, or two scenes ([`compare_scenes`]).
 //!
 //! Colours are compared premultiplied by opacity, so invisible colours do not count. Opacity is
 //! compared as a fourth channel unless both pictures are opaque everywhere. A NaN counts as an
 //! infinite difference.
+
+mod scenes;
+
+pub use scenes::{Distances, SceneComparison, ValueDifference, compare_scenes};
 
 use crate::{
     Error, Result,

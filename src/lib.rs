@@ -62,6 +62,7 @@
 //! | describe a picture and draw it | [`scene`], [`math`], [`Renderer`] |
 //! | draw among the passes of a host application | [`Renderer::encode`], [`gpu::Gpu::from_wgpu`] |
 //! | move a camera by hand, keep a pace | [`interaction`] |
+//! | cut, move, thin and clean scenes | [`edit`] |
 //! | compare pictures | [`compare`] |
 //! | count values, look under a cursor, cut slices: what windows need | [`interaction`] |
 //! | look up what a picture is, exactly | [`mod@reference`] |
@@ -110,6 +111,7 @@ pub mod deadline;
 // For the project's own front ends.
 #[doc(hidden)]
 pub mod disk;
+pub mod edit;
 pub mod error;
 pub mod facet;
 pub mod formats;

@@ -55,6 +55,18 @@ impl AtomicFile {
         Ok(Self { wanted: wanted.to_owned(), target, may_replace, part })
     }
 
+    /// Creates a temporary file beside `wanted` whose name has this extension, for data that is read
+    /// by its path and never gets another name.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if nothing can be written beside `wanted`.
+    pub(crate) fn scratch(wanted: &Path, extension: &str) -> Result<Self> {
+        let part = Part::with_extension(wanted, Some(extension));
+        let part = part.map_err(|e| Error::output(wanted, e))?;
+        let [wanted, target] = [wanted, wanted].map(Path::to_owned);
+        Ok(Self { wanted, target, may_replace: false, part })
+    }
+
     /// Returns the path of the temporary file, for another program that writes it. The program must
     /// keep the file and not put another one in its place.
     pub fn part(&self) -> &Path {

@@ -61,6 +61,11 @@ impl Part {
     /// Creates one beside the requested file. Nobody can read it who may not read the file that it
     /// replaces.
     pub fn create(wanted: &Path) -> io::Result<Self> {
+        Self::with_extension(wanted, None)
+    }
+
+    /// As [`create`](Self::create), with a further extension that says what the file holds.
+    pub fn with_extension(wanted: &Path, extension: Option<&str>) -> io::Result<Self> {
         // The full name may leave no room for the suffix.
         let name: String =
             wanted.file_name().unwrap_or_default().to_string_lossy().chars().take(50).collect();
@@ -68,7 +73,8 @@ impl Part {
         let mut live = live();
         step(Step::Create)?;
         for try_number in 0..MOST {
-            let path = folder(wanted).join(format!(".{name}.{try_number}.{EXTENSION}"));
+            let end = extension.map_or(String::new(), |extension| format!(".{extension}"));
+            let path = folder(wanted).join(format!(".{name}.{try_number}.{EXTENSION}{end}"));
             remove_stale(&path);
             // Never opens an existing file, nor one behind a link.
             match create_new(&path, permissions.as_ref()) {

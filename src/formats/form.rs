@@ -8,7 +8,7 @@ use crate::{
     parallel::{self, prelude::*},
 };
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::ops::Range;
 
 /// The counts in a file's header.
@@ -48,6 +48,64 @@ impl StreamPoint {
             color: point.color,
         }
     }
+}
+
+/// The type of a number in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say the bits")]
+pub enum NumberType {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+}
+
+impl NumberType {
+    /// Returns the least and the greatest whole number of the type; `None` for floats.
+    pub fn whole(self) -> Option<[f64; 2]> {
+        match self {
+            Self::U8 => Some([0.0, f64::from(u8::MAX)]),
+            Self::I8 => Some([f64::from(i8::MIN), f64::from(i8::MAX)]),
+            Self::U16 => Some([0.0, f64::from(u16::MAX)]),
+            Self::I16 => Some([f64::from(i16::MIN), f64::from(i16::MAX)]),
+            Self::U32 => Some([0.0, f64::from(u32::MAX)]),
+            Self::I32 => Some([f64::from(i32::MIN), f64::from(i32::MAX)]),
+            Self::U64 => Some([0.0, u64::MAX as f64]),
+            Self::I64 => Some([i64::MIN as f64, i64::MAX as f64]),
+            Self::F32 | Self::F64 => None,
+        }
+    }
+}
+
+/// An attribute of points: a number that each has beside its position, normal and colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attribute {
+    /// Its name in the file.
+    pub name: String,
+    /// The type of its numbers.
+    pub kind: NumberType,
+}
+
+/// Points with their attributes, list by list. Lists of normals and colours may be empty, all
+/// others are as long as the positions.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Records {
+    /// Positions in the world.
+    pub positions: Vec<DVec3>,
+    /// Unit normals; zero where a point has none.
+    pub normals: Vec<Vec3>,
+    /// Red, green, blue and opacity.
+    pub colors: Vec<[u8; 4]>,
+    /// The attributes.
+    pub attributes: Vec<Attribute>,
+    /// The values of each attribute; NaN where a point has none.
+    pub columns: Vec<Vec<f64>>,
 }
 
 /// Numbers by which a form scales colours; each form has its own.
@@ -96,6 +154,22 @@ pub(super) trait Form: Send + Sync {
 
     /// Returns the points of a piece, relative to an origin.
     fn points(&self, source: &Source, piece: usize, origin: DVec3) -> Result<Vec<StreamPoint>>;
+
+    /// Returns the attributes of the points.
+    fn attributes(&self, source: &Source) -> Result<Vec<Attribute>>;
+
+    /// Returns the points of a piece in the world, with the attributes of these names.
+    fn records(&self, source: &Source, piece: usize, names: &[String]) -> Result<Records>;
+
+    /// Returns the steps and the offset of the positions, if the file stores whole numbers.
+    fn grid(&self) -> Option<[DVec3; 2]> {
+        None
+    }
+
+    /// Returns whether the colours are greys that stand for another attribute.
+    fn are_greys(&self) -> bool {
+        false
+    }
 
     /// Returns the index of a piece's first triangle, and the piece's triangles.
     fn triangles(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)>;

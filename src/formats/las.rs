@@ -13,8 +13,10 @@ mod pieces;
 #[cfg(test)]
 mod tests;
 mod time;
+mod write;
 
 pub(super) use pieces::Pieces;
+pub(super) use write::Writer;
 
 use super::shared::cloud::{Cloud, colors_of_16_bits, greys};
 use crate::{Result, about::Orientation, input::Source, parallel::prelude::*, surface::Mesh};

@@ -41,6 +41,7 @@ mod options;
 pub mod pcd;
 #[cfg(feature = "ply")]
 pub mod ply;
+mod points;
 pub mod raw;
 mod series;
 mod shared;
@@ -64,8 +65,8 @@ pub mod xyz;
 
 pub use array::{Array, Place, arrays};
 pub use foreign::{Advice, advice, folder_advice};
-pub use form::Counts;
 pub(crate) use form::StreamPoint;
+pub use form::{Attribute, Counts, NumberType, Records};
 pub use format::{Content, Format, Holding};
 pub use kind::Kind;
 pub use label_table::read_labels;
@@ -74,6 +75,7 @@ pub use load::{
     read_mesh, read_samples, read_volume,
 };
 pub use options::ReadOptions;
+pub(crate) use points::{PointLayout, PointWriter, write_points};
 pub use raw::RawLayout;
 pub use series::{Series, series};
 pub use shared::sample_type::{Endian, SampleType};

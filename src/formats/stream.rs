@@ -3,7 +3,7 @@
 
 use super::{
     FORMATS,
-    form::{Coloring, Counts, Form, StreamPoint, in_order},
+    form::{Attribute, Coloring, Counts, Form, Records, StreamPoint, in_order},
     format::{InPieces, by_extension},
 };
 use crate::{
@@ -368,6 +368,38 @@ impl<'a> Stream<'a> {
             points.iter_mut().for_each(|point| self.paint(point));
             Ok(map(&points))
         };
+        in_order(&self.source, pieces, |piece| self.form.bytes(piece), of_piece, take)
+    }
+
+    /// Returns the attributes that points have beside positions, normals and colours.
+    pub(crate) fn attributes(&self) -> Result<Vec<Attribute>> {
+        self.source.unless_changed(self.form.attributes(&self.source))
+    }
+
+    /// Returns the steps and the offset of the positions, if the file stores whole numbers.
+    pub(crate) fn grid(&self) -> Option<[DVec3; 2]> {
+        self.form.grid()
+    }
+
+    /// Returns whether the colours are greys that stand for another attribute.
+    pub(crate) fn are_greys(&self) -> bool {
+        self.form.are_greys()
+    }
+
+    /// Returns the path of the file.
+    pub(crate) fn path(&self) -> &Path {
+        self.source.path
+    }
+
+    /// As [`points`](Self::points), for points in the world with the attributes of these names.
+    pub(crate) fn records<T: Send>(
+        &self,
+        names: &[String],
+        map: impl Fn(Records) -> T + Sync,
+        take: impl FnMut(T) -> Result<()>,
+    ) -> Result<()> {
+        let of_piece = |piece: usize| Ok(map(self.form.records(&self.source, piece, names)?));
+        let pieces = 0..self.form.pieces()[0];
         in_order(&self.source, pieces, |piece| self.form.bytes(piece), of_piece, take)
     }
 

@@ -173,6 +173,7 @@ pub static FORMATS: &[Format] = &[
         name: "LAS",
         extensions: &["las", "laz"],
         holds: &[all(Content::PointCloud)],
+        written: Some("las"),
         feature: Some("las"),
         magic: Magic::Prefix(b"LASF"),
         kind: Which::Always(Kind::Mesh),

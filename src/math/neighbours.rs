@@ -59,6 +59,15 @@ impl<'a> Neighbours<'a> {
         nearest.iter().map(|point| point.distance.sqrt() / SCALE).fold(f64::INFINITY, f64::min)
     }
 
+    /// Returns the distance of a position from the nearest point, and that point's index.
+    pub fn nearest(&self, at: Vec3) -> (f64, u32) {
+        let at = turned(at);
+        let query = self.tree.query(&at);
+        let nearest = query.nearest_n::<SquaredEuclidean<f64>>(NonZero::<usize>::MIN).execute();
+        let nearest = nearest.iter().map(|point| (point.distance.sqrt() / SCALE, point.item));
+        nearest.fold((f64::INFINITY, 0), |best, other| if other.0 < best.0 { other } else { best })
+    }
+
     /// Returns distance and index of the `count` points nearest to point `index`, which is
     /// excluded, nearest first.
     pub fn of(&self, index: u32, count: usize) -> Vec<(f32, u32)> {

@@ -24,6 +24,7 @@ pub mod convert;
 mod data;
 mod description;
 mod drawing;
+mod editing;
 mod facts;
 mod fit;
 mod framing;
@@ -36,6 +37,7 @@ mod reading;
 mod showing;
 mod solid;
 mod subject;
+mod training;
 
 #[cfg(test)]
 mod tests;
@@ -59,3 +61,4 @@ pub use panels::{Panel, PanelLabels};
 pub use reading::{Opened, Reading, read};
 pub use showing::{CellStyle, Showing, Surfaces};
 pub use subject::{Origin, Subject};
+pub use training::{TrainingView, training_view, training_views};

@@ -296,6 +296,14 @@ impl Opened<'_> {
         Ok(())
     }
 
+    /// Returns the values of an attribute of a mesh or point cloud; `None` for other inputs.
+    pub(super) fn values(&self, attribute: &str) -> Result<Option<Vec<f32>>> {
+        let Some(source) = &self.source else { return Ok(None) };
+        let scalar = Some(attribute.to_owned());
+        let options = ReadOptions { scalar, ..self.reading.options.clone() };
+        Ok(Some(formats::read_mesh(source, &options)?.values))
+    }
+
     /// Returns the files opened so far: its own, those it refers to, and a table of labels.
     pub fn files(&self) -> Vec<PathBuf> {
         let opened = self.source.as_ref().map_or_else(|| vec![self.path.to_owned()], Source::files);

@@ -125,6 +125,18 @@ pub(super) fn some_surfels(
     Ok(wanted.map(|place| (judged.kept[place], judged.surfel(place, options))).collect())
 }
 
+/// Returns the normals of all points, without those that the file has: those of the planes of their
+/// neighbours, turned to one side. A normal is zero where there is no plane.
+pub(super) fn normals(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Vec3>> {
+    let judged = Judged::new(mesh, Known::default(), options)?;
+    let mut normals = vec![Vec3::ZERO; mesh.positions.len()];
+    for (index, normal) in judged.kept.iter().zip(&judged.normals) {
+        normals[*index as usize] = *normal;
+    }
+    let first = Neighbours::first_of_equals(&mesh.positions);
+    Ok(first.into_iter().map(|first| normals[first as usize]).collect())
+}
+
 /// Results for the points at different positions, in an order in which neighbours are close to each
 /// other.
 struct Judged<'a> {

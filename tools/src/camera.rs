@@ -4,8 +4,10 @@ use crate::{figure::sides, parse};
 use clap::Args;
 use glam::DVec3;
 use splatkit::{
+    Error,
+    input::Limits,
     math::Camera,
-    session::{CameraEntry, Description, Framing, Side},
+    session::{CameraEntry, Description, Framing, Side, training_view},
 };
 
 /// The camera's flags. By default, the camera sees the whole scene from the front, from the right
@@ -24,6 +26,19 @@ pub struct CameraFlags {
         ]
     )]
     camera: Option<CameraEntry>,
+    /// Take a view of a training: FILE:VIEW, by its number from 0 or by its picture. FILE is
+    /// cameras.json, transforms.json of nerfstudio, or a folder of COLMAP. Set --size to the shape
+    /// of the picture.
+    #[arg(
+        long,
+        value_name = "FILE:VIEW",
+        value_parser = view_of,
+        conflicts_with_all = [
+            "camera", "view", "camera_position", "focal_point", "view_up", "view_angle",
+            "distance", "azimuth", "elevation", "orthographic",
+        ]
+    )]
+    view_of: Option<CameraEntry>,
     /// Look from this side. right is at the right of a viewer who looks at the front; iso is a
     /// corner of the box around the scene. --azimuth and --elevation turn the view further
     /// [default: from the front, 30 degrees to the right and 20 upwards]
@@ -103,8 +118,9 @@ impl CameraFlags {
         if placing != Framing::default() {
             scene.camera = None;
         }
-        scene.camera = self.camera.or(scene.camera);
-        if self.camera.is_some() || self.view.is_some() || self.camera_position.is_some() {
+        let camera = self.camera.or(self.view_of);
+        scene.camera = camera.or(scene.camera);
+        if camera.is_some() || self.view.is_some() || self.camera_position.is_some() {
             scene.picture.views.clear();
             (scene.picture.columns, scene.picture.panel_labels) = (None, None);
         }
@@ -130,6 +146,18 @@ impl CameraFlags {
             up: framing.up.or(before.up),
         };
     }
+}
+
+/// Reads a view of a training.
+fn view_of(text: &str) -> Result<CameraEntry, String> {
+    let form = "the form is FILE:VIEW, such as cameras.json:17";
+    let (file, view) = text.rsplit_once(':').ok_or(form)?;
+    let view =
+        training_view(file.as_ref(), view, &Limits::default()).map_err(|error| match &error {
+            Error::Input { hint: Some(hint), .. } => format!("{error}; {hint}"),
+            error => error.to_string(),
+        })?;
+    Ok(view.camera)
 }
 
 /// Parses a camera that [`to_json`] has written.

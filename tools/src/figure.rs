@@ -28,7 +28,7 @@ pub struct FigureFlags {
         value_name = "SIDES",
         value_delimiter = ',',
         value_parser = sides(),
-        conflicts_with_all = ["view", "camera", "camera_position", "turntable", "path"]
+        conflicts_with_all = ["view", "camera", "view_of", "camera_position", "turntable", "path"]
     )]
     views: Vec<Side>,
     /// Set the number of views in a row [default: all of up to four, else about a square], or of

@@ -3,6 +3,7 @@
 /// Fields of a scene whose flags have other names.
 const FLAGS: &[(&str, &[&str])] = &[
     ("isosurfaces", &["iso"]),
+    ("camera", &["camera", "view-of"]),
     ("clips", &["clip", "cut-out"]),
     ("shade", &["shade", "no-shade", "flat"]),
     ("optics", &["optics", "mip", "x-ray"]),

@@ -36,11 +36,12 @@ const TASKS: [Task; 8] = [
     },
     Task {
         name: "convert",
-        flags: "output lattice overwrite dry-run json plan parts part index join preset lossless \
-            radius-scale up unit memory colormap color range dims type spacing",
+        flags: "output lattice overwrite dry-run json crop where translate rotate scale thin \
+            remove-floaters plan parts preset lossless up unit memory color range dims type",
         examples: "  splatkit convert scan.laz -o scan.splk
   splatkit convert head.nrrd -o head.splv
   splatkit convert trained.ply -o trained.spz
+  splatkit convert scan.laz -o ground.laz --where 'classification == 2' --thin 0.5
   splatkit convert ct.raw --dims 512x512x300 --type u16 -o ct.nrrd",
     },
     Task {
@@ -59,8 +60,9 @@ const TASKS: [Task; 8] = [
     },
     Task {
         name: "info",
-        flags: LOOKED_AT,
+        flags: "json stats dims type spacing scalar time series dataset missing labels",
         examples: "  splatkit info scan.laz
+  splatkit info scan.laz --stats
   splatkit info study/ --series 2
   splatkit info aseg.nii.gz --labels FreeSurferColorLUT.txt",
     },
@@ -134,7 +136,7 @@ mod tests {
         ("Texts", "scalar-bar axes scale-bar caption"),
         (
             "Camera",
-            "camera view camera-position focal-point view-up view-angle distance azimuth \
+            "camera view-of view camera-position focal-point view-up view-angle distance azimuth \
             elevation zoom orthographic up",
         ),
         (
@@ -146,6 +148,10 @@ mod tests {
         ("Method", "mode back-to-front classify optics mip x-ray"),
         ("Clipping", "clip cut-out"),
         ("Hierarchy", "preset lossless radius-scale up unit degree memory"),
+        (
+            "Edits",
+            "crop where translate rotate scale matrix thin remove-floaters keep-cluster normals",
+        ),
         ("Parts", "plan parts part index join"),
         ("Remote inputs", "cache cache-size allow-host"),
     ];

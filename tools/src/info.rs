@@ -11,8 +11,8 @@ use crate::{
     terminal::safe,
 };
 use clap::Args;
-use serde_json::Value;
-use splatkit::{formats::Series, memory, session::Facts};
+use serde_json::{Value, json};
+use splatkit::{edit::Statistics, formats::Series, memory, session::Facts};
 use std::path::PathBuf;
 
 /// The facts in the order in which they are printed. Any others follow.
@@ -74,6 +74,10 @@ pub struct Info {
     /// Print the facts as JSON.
     #[arg(long)]
     json: bool,
+    /// Also print the range, the mean, the standard deviation and a histogram of every value: of
+    /// coordinates, attributes, colours, opacities and scales.
+    #[arg(long)]
+    stats: bool,
     #[command(flatten)]
     load: LoadFlags,
 }
@@ -90,8 +94,20 @@ impl Info {
         let kinds = kinds_of(&input, opened.is_raw());
         given.warn_of_file(&self.file, kinds, progress);
         let facts = opened.facts(&input)?;
+        let statistics = match self.stats {
+            true => {
+                progress.stage("Measuring values");
+                Some(opened.statistics(input)?)
+            }
+            false => None,
+        };
+        progress.clear();
         if self.json {
-            return output::json(&Value::Object(facts.to_json()));
+            let mut facts = facts.to_json();
+            if let Some(statistics) = &statistics {
+                facts.insert("stats".into(), statistics.iter().map(of_statistics).collect());
+            }
+            return output::json(&Value::Object(facts));
         }
         let Facts { named, series, arrays } = facts;
         series.iter().try_for_each(|one| output::line(line_of_series(one)))?;
@@ -102,8 +118,70 @@ impl Info {
                 output::line(format_args!("{:<16}{}", name.replace('_', " "), plain(value)))?;
             }
         }
-        arrays::print(&arrays)
+        arrays::print(&arrays)?;
+        statistics.map_or(Ok(()), |statistics| print_statistics(&statistics))
     }
+}
+
+fn of_statistics(of: &Statistics) -> Value {
+    json!({
+        "name": of.name,
+        "count": of.count,
+        "missing": of.missing,
+        "range": of.range,
+        "mean": of.mean,
+        "deviation": of.deviation,
+        "histogram": of.histogram,
+    })
+}
+
+/// Prints a table with a row for each name.
+fn print_statistics(all: &[Statistics]) -> Result<(), Failure> {
+    output::line(format_args!(
+        "{:<20}{:>14}{:>14}{:>14}{:>14}  histogram",
+        "values", "least", "greatest", "mean", "deviation"
+    ))?;
+    for of in all {
+        let name = safe(&of.name);
+        let Some([low, high]) = of.range else {
+            output::line(format_args!("{name:<20}all {} are missing", of.missing))?;
+            continue;
+        };
+        let numbers =
+            [low, high, of.mean, of.deviation].map(|number| format!("{:>14}", short(number)));
+        let missing = match of.missing {
+            0 => String::new(),
+            missing => format!("  {missing} missing"),
+        };
+        let (numbers, bars) = (numbers.concat(), bars(&of.histogram));
+        output::line(format_args!("{name:<20}{numbers}  {bars}{missing}"))?;
+    }
+    Ok(())
+}
+
+/// Returns a number with about seven digits.
+fn short(number: f64) -> String {
+    let digits = number.abs().max(1e-300).log10().floor();
+    match digits {
+        _ if number == 0.0 => "0".into(),
+        -4.0..9.0 => {
+            let places = (6.0 - digits).clamp(0.0, 9.0) as usize;
+            let text = format!("{number:.places$}");
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        }
+        _ => format!("{number:.5e}"),
+    }
+}
+
+/// Returns bars as high as the square roots of counts, so that small ones show.
+fn bars(histogram: &[u64]) -> String {
+    const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let most = histogram.iter().copied().max().unwrap_or(0).max(1) as f64;
+    let bar = |count: &u64| BARS[(8.0 * (*count as f64 / most).sqrt()).ceil() as usize];
+    histogram.iter().map(bar).collect()
 }
 
 /// Returns a line on a series: its number, what it is, its pictures, and its identifier.

@@ -110,8 +110,8 @@ enum Task {
     Convert(Box<convert::Convert>),
     /// Check a hierarchy or a volume in bricks for damage, or another input for oddities.
     Check(check::Check),
-    /// Compare two pictures.
-    Compare(compare::Compare),
+    /// Compare two pictures, or two scenes.
+    Compare(Box<compare::Compare>),
     /// Measure frame times; the camera turns by 5 degrees between frames.
     Bench(Box<bench::Bench>),
     /// Generate a mesh and a volume, draw them and print timings; needs no download.

@@ -60,6 +60,7 @@ const NOT_VALUES: &[&str] = &[
 /// Flags of the camera.
 const CAMERA: &[&str] = &[
     "camera",
+    "view-of",
     "view",
     "camera-position",
     "focal-point",

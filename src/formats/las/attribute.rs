@@ -1,6 +1,13 @@
 //! The attributes of a point that a user may name (LAS specification 1.4 R15, tables 7 to 17).
 
-use super::{super::shared::attribute, Header, describe, extra::Extra};
+use super::{
+    super::{
+        form::{self, NumberType},
+        shared::attribute,
+    },
+    Header, describe,
+    extra::Extra,
+};
 use crate::{Result, about::About, input::Source};
 
 /// An attribute, and what is subtracted from it.
@@ -38,6 +45,19 @@ impl Of {
             Self::Time => "gps_time",
             Self::Channel(channel) => ["red", "green", "blue"][*channel],
             Self::Extra(extra) => &extra.name,
+        }
+    }
+
+    /// Returns the type that holds its values.
+    fn kind(&self) -> NumberType {
+        match self {
+            Self::Intensity | Self::PointSource | Self::Channel(_) => NumberType::U16,
+            Self::ReturnNumber | Self::Returns | Self::Classification | Self::UserData => {
+                NumberType::U8
+            }
+            Self::ScanAngle => NumberType::F32,
+            Self::Time => NumberType::F64,
+            Self::Extra(extra) => extra.number_type(),
         }
     }
 
@@ -121,6 +141,17 @@ pub fn color_at(format: u8) -> Option<usize> {
         7 | 8 | 10 => Some(30),
         _ => None,
     }
+}
+
+/// Returns the attributes that are read of the points of a file, in 64 bits.
+pub fn listed(source: &Source, header: &Header) -> Vec<(form::Attribute, Attribute)> {
+    let all = all(header, &describe::extras(source, header)).into_iter();
+    let is_read = |of: &Of| *of != Of::Time || !header.packed;
+    let named = |of: Of| {
+        let described = form::Attribute { name: of.name().to_owned(), kind: of.kind() };
+        (described, Attribute { of, less: 0.0 })
+    };
+    all.filter(is_read).map(named).collect()
 }
 
 /// Returns the attributes of the points of a file.

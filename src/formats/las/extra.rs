@@ -1,5 +1,7 @@
 //! Numbers in the extra bytes of a point.
 
+use super::super::form::NumberType;
+
 /// A number in the extra bytes of a point (table 24).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extra {
@@ -17,6 +19,16 @@ pub struct Extra {
 impl Extra {
     /// Bytes of each type.
     pub const SIZES: [usize; 10] = [1, 1, 2, 2, 4, 4, 8, 8, 4, 8];
+
+    /// Returns the type that holds its values.
+    pub fn number_type(&self) -> NumberType {
+        use NumberType::*;
+        const KINDS: [NumberType; 10] = [U8, I8, U16, I16, U32, I32, U64, I64, F32, F64];
+        match self.scale == 1.0 && self.offset == 0.0 && self.missing.is_none() {
+            true => KINDS[usize::from(self.kind)],
+            false => F64,
+        }
+    }
 
     /// Returns the value in the bytes of a point; NaN if it has none.
     pub fn value(&self, record: &[u8]) -> f64 {

@@ -166,24 +166,37 @@ fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<
 }
 
 /// Unpacks a chunk point by point, so that memory grows with the points actually unpacked.
-/// Isolated, as [`layout`].
 pub(super) fn unpack(
     source: &Source,
     header: &Header,
     layout: &LazVlr,
     chunk: &Chunk,
 ) -> Result<Vec<Point>> {
-    isolated(source, &format!("chunk {}", chunk.number), || {
-        unpack_here(source, header, layout, chunk)
-    })
+    let mut points = Vec::new();
+    visit(source, header, layout, chunk, |record| points.extend(header.point(record)))?;
+    Ok(points)
 }
 
-fn unpack_here(
+/// Calls `take` with the bytes of each point of a chunk. Isolated, as [`layout`].
+pub(super) fn visit(
     source: &Source,
     header: &Header,
     layout: &LazVlr,
     chunk: &Chunk,
-) -> Result<Vec<Point>> {
+    take: impl FnMut(&[u8]),
+) -> Result<()> {
+    isolated(source, &format!("chunk {}", chunk.number), || {
+        visit_here(source, header, layout, chunk, take)
+    })
+}
+
+fn visit_here(
+    source: &Source,
+    header: &Header,
+    layout: &LazVlr,
+    chunk: &Chunk,
+    mut take: impl FnMut(&[u8]),
+) -> Result<()> {
     let wrong = |message: String| source.error(format!("chunk {}", chunk.number), message);
     let bytes = source.part(chunk.bytes.clone())?;
     let input = Cursor::new(&*bytes);
@@ -207,7 +220,6 @@ fn unpack_here(
         Box::new(decoder)
     };
     let mut record = vec![0; header.size];
-    let mut points = Vec::new();
     for number in 0..chunk.points {
         if number.is_multiple_of(POINTS) {
             source.check_time()?;
@@ -216,9 +228,9 @@ fn unpack_here(
         unpacked.map_err(|error| {
             wrong(format!("ends after {number} of {} points: {error}", chunk.points))
         })?;
-        points.extend(header.point(&record));
+        take(&record);
     }
-    Ok(points)
+    Ok(())
 }
 
 /// Checks the sizes of the layers. A layered chunk begins with its first point, its count and the

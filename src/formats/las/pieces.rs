@@ -2,14 +2,14 @@
 
 use super::{
     super::{
-        form::{Coloring, Counts, Form, StreamPoint, in_batches},
+        form::{self, Coloring, Counts, Form, Records, StreamPoint, in_batches},
         shared::{
             brightness::Brightness,
             cloud::{color_of_16_bits, grey},
             raw_point::RawPoint,
         },
     },
-    Header, Point, packed, plain_bytes,
+    Header, Point, attribute, packed, plain_bytes,
 };
 use crate::{
     Error, Result,
@@ -96,6 +96,25 @@ impl Pieces {
             }
         };
         Ok((first..).zip(points))
+    }
+
+    /// Calls `take` with the bytes of each point of a piece.
+    fn visit(&self, source: &Source, piece: usize, mut take: impl FnMut(&[u8])) -> Result<()> {
+        if let Some((layout, chunks)) = &self.packed {
+            return packed::visit(source, &self.header, layout, &chunks[piece], take);
+        }
+        let bytes = source.part(self.bytes(piece))?;
+        bytes.chunks_exact(self.header.size).for_each(&mut take);
+        Ok(())
+    }
+
+    /// Returns the colour of a point.
+    fn color(&self, point: &Point) -> [u8; 4] {
+        match self.paint {
+            Paint::None => [255; 4],
+            Paint::Color { largest } => color_of_16_bits(point.color, largest),
+            Paint::Grey { low, high } => grey(f32::from(point.intensity), low, high),
+        }
     }
 
     fn scan(&self, source: &Source, piece: usize) -> Result<Seen> {
@@ -207,16 +226,46 @@ impl Form for Pieces {
                 row,
                 position: self.header.position(&point),
                 normal: Vec3::ZERO,
-                color: match self.paint {
-                    _ if self.header.attribute.is_some() => point.value.to_le_bytes(),
-                    Paint::None => [255; 4],
-                    Paint::Color { largest } => color_of_16_bits(point.color, largest),
-                    Paint::Grey { low, high } => grey(f32::from(point.intensity), low, high),
+                color: match self.header.attribute {
+                    Some(_) => point.value.to_le_bytes(),
+                    None => self.color(&point),
                 },
             };
             StreamPoint::new(&placed, origin)
         };
         Ok(self.piece(source, piece)?.map(settled).collect())
+    }
+
+    fn attributes(&self, source: &Source) -> Result<Vec<form::Attribute>> {
+        let listed = attribute::listed(source, &self.header).into_iter();
+        Ok(listed.map(|(described, _)| described).collect())
+    }
+
+    fn records(&self, source: &Source, piece: usize, names: &[String]) -> Result<Records> {
+        let mut listed = attribute::listed(source, &self.header);
+        listed.retain(|(described, _)| names.contains(&described.name));
+        let mut records = Records { columns: vec![Vec::new(); listed.len()], ..Records::default() };
+        let (has_colors, format) = (self.has_colors(), self.header.format);
+        self.visit(source, piece, |record| {
+            let Some(point) = self.header.point(record) else { return };
+            records.positions.push(self.header.position(&point));
+            if has_colors {
+                records.colors.push(self.color(&point));
+            }
+            for (column, (_, attribute)) in records.columns.iter_mut().zip(&listed) {
+                column.push(attribute.value(format, record));
+            }
+        })?;
+        records.attributes = listed.into_iter().map(|(described, _)| described).collect();
+        Ok(records)
+    }
+
+    fn grid(&self) -> Option<[DVec3; 2]> {
+        Some([self.header.scale, self.header.offset])
+    }
+
+    fn are_greys(&self) -> bool {
+        matches!(self.paint, Paint::Grey { .. })
     }
 
     fn triangles(&self, _: &Source, _: usize) -> Result<(usize, Vec<[u32; 3]>)> {

@@ -3,7 +3,7 @@
 
 use super::{
     super::{
-        form::{Coloring, Counts, Form, StreamPoint, in_order},
+        form::{Attribute, Coloring, Counts, Form, NumberType, Records, StreamPoint, in_order},
         shared::{raw_point::RawPoint, unplaced},
     },
     Brightest, COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale,
@@ -304,6 +304,37 @@ impl Form for Pieces {
         Ok(self.rows(piece).filter(is_placed).map(point).collect())
     }
 
+    fn attributes(&self, source: &Source) -> Result<Vec<Attribute>> {
+        let listed = listed(source)?.into_iter();
+        Ok(listed.map(|(described, _)| described).collect())
+    }
+
+    fn records(&self, source: &Source, piece: usize, names: &[String]) -> Result<Records> {
+        let mut listed = listed(source)?;
+        listed.retain(|(described, _)| names.contains(&described.name));
+        let Rows { at, stride, big, .. } = self.vertices.rows;
+        let is_placed = |row: &usize| !self.has_gaps || self.position(source, *row).is_finite();
+        let rows: Vec<usize> = self.rows(piece).filter(is_placed).collect();
+        let mut records = Records::default();
+        for &row in &rows {
+            let vertex = self.vertex(source, row);
+            records.positions.push(vertex.position);
+            if self.has_normals {
+                records.normals.push(vertex.normal);
+            }
+            if self.has_colors {
+                records.colors.push(vertex.color);
+            }
+        }
+        for (described, (offset, kind)) in listed {
+            let value =
+                |&row: &usize| number(&source.bytes()[at + row * stride + offset..], &kind, big);
+            records.columns.push(rows.iter().map(value).collect());
+            records.attributes.push(described);
+        }
+        Ok(records)
+    }
+
     fn triangles(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)> {
         self.triangle_piece(source, piece)
     }
@@ -362,6 +393,41 @@ fn locate<'h>(source: &Source, header: &'h Header, big: bool) -> Result<Option<L
         }
     }
     Ok(Some(located))
+}
+
+/// Returns the properties of the vertices that have no other role, each with its offset and type.
+fn listed(source: &Source) -> Result<Vec<(Attribute, (usize, ScalarType))>> {
+    let header = header::read(source)?;
+    let vertices = header.elements.iter().find(|element| element.name == "vertex");
+    let Some(element) = vertices else { return Ok(Vec::new()) };
+    let columns = ROLES.map(|names| element.column(names));
+    // A role counts if all of its columns are there.
+    let of_role = |column: usize| {
+        [POSITION..NORMAL, NORMAL..COLOR, COLOR..UV].into_iter().any(|roles| {
+            let roles = &columns[roles];
+            roles[..3].iter().all(Option::is_some) && roles.contains(&Some(column))
+        })
+    };
+    let others = (0..element.columns.len()).filter(|column| !of_role(*column));
+    let described = |column: usize| {
+        let (offset, kind) = field(element, column)?;
+        let name = element.columns[column].name.clone();
+        Some((Attribute { name, kind: number_type(&kind) }, (offset, kind)))
+    };
+    Ok(others.filter_map(described).collect())
+}
+
+fn number_type(kind: &ScalarType) -> NumberType {
+    match kind {
+        ScalarType::Char => NumberType::I8,
+        ScalarType::UChar => NumberType::U8,
+        ScalarType::Short => NumberType::I16,
+        ScalarType::UShort => NumberType::U16,
+        ScalarType::Int => NumberType::I32,
+        ScalarType::UInt => NumberType::U32,
+        ScalarType::Float => NumberType::F32,
+        ScalarType::Double => NumberType::F64,
+    }
 }
 
 /// Returns the offset of a column of numbers in its row, and their type.

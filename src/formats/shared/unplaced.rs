@@ -22,45 +22,13 @@ pub(crate) fn remove(source: &Source, mesh: &mut Mesh) -> Result<usize> {
         return Ok(0);
     }
     source.room::<u32>("the numbers of the points", count + 1)?;
-    // How many vertices are kept before each.
-    let mut before = Vec::with_capacity(count + 1);
-    before.push(0);
-    let mut kept = 0;
-    for position in &mesh.positions {
-        kept += u32::from(position.is_finite());
-        before.push(kept);
-    }
-    let is_kept = |vertex: usize| before[vertex + 1] > before[vertex];
-    fn keep<T>(list: &mut Vec<T>, is_kept: impl Fn(usize) -> bool) {
-        let mut at = 0..;
-        list.retain(|_| at.next().is_some_and(&is_kept));
-    }
-    keep(&mut mesh.positions, is_kept);
-    keep(&mut mesh.normals, is_kept);
-    keep(&mut mesh.colors, is_kept);
-    keep(&mut mesh.uvs, is_kept);
-    keep(&mut mesh.values, is_kept);
-    let is_whole: Vec<bool> = (mesh.triangles.par_iter())
-        .map(|triangle| triangle.iter().all(|&vertex| is_kept(vertex as usize)))
-        .collect();
-    keep(&mut mesh.triangles, |triangle| is_whole[triangle]);
-    keep(&mut mesh.triangle_materials, |triangle| is_whole[triangle]);
-    for vertex in mesh.triangles.iter_mut().flatten() {
-        *vertex = before[*vertex as usize];
-    }
-    mesh.lines.retain(|line| line.iter().all(|&vertex| is_kept(vertex as usize)));
-    for vertex in mesh.lines.iter_mut().flatten() {
-        *vertex = before[*vertex as usize];
-    }
-    for sensor in &mut mesh.sensors {
-        let [start, end] =
-            [sensor.points.start, sensor.points.end].map(|at| before[at.min(count)] as usize);
-        sensor.points = start..end;
-    }
-    if !is_whole.is_empty() && mesh.triangles.is_empty() {
+    let had_triangles = !mesh.triangles.is_empty();
+    let kept: Vec<bool> = mesh.positions.par_iter().map(|place| place.is_finite()).collect();
+    mesh.keep(&kept);
+    if had_triangles && mesh.triangles.is_empty() {
         return Err(source.error("faces", "each uses a point that is not at finite coordinates"));
     }
-    Ok(count - kept as usize)
+    Ok(count - mesh.positions.len())
 }
 
 /// Says how many of a file's points are left out.

@@ -51,7 +51,9 @@ impl Target {
             Self::Splat => 32,
             Self::Spz => 20 + more,
             Self::Glb => 4 * (18 + more),
-            Self::Ply | Self::Hierarchy | Self::Nrrd | Self::Bricks => 4 * (17 + more),
+            Self::Ply | Self::Hierarchy | Self::Points | Self::Nrrd | Self::Bricks => {
+                4 * (17 + more)
+            }
         }
     }
 }
@@ -77,12 +79,24 @@ impl<W: Watch> Work<'_, W> {
     /// Reads the Gaussians of all inputs for a file of Gaussians.
     fn gaussians_for(&self, target: Target) -> Result<AllGaussians, W::Error> {
         let is_trained = self.are_gaussians()?;
-        let mut all = self.gather_gaussians()?;
+        let mut all = if is_trained { self.gather_gaussians()? } else { self.splats_for()? };
         if is_trained && target != Target::Glb {
             // Viewers expect the frame of trainers in these files.
             all.set.stand(Orientation::Y_DOWN);
         }
         Ok(all)
+    }
+
+    /// Returns the splats of all inputs as Gaussians; trained ones among them stay.
+    fn splats_for(&self) -> Result<AllGaussians, W::Error> {
+        // Points of several files are edited together.
+        let edited = self.edited_points()?;
+        let Some(Gathered { set, points, frame, read_ms, .. }) = edited else {
+            return self.gather_gaussians();
+        };
+        let mut set = Gaussians::from_splats(&set).map_err(|error| self.at_fault(error))?;
+        set.about.orientation = frame.orientation;
+        Ok(AllGaussians { set, points, read_ms })
     }
 
     /// Returns whether all inputs hold trained Gaussians, also in hierarchies.
@@ -144,8 +158,13 @@ impl<W: Watch> Work<'_, W> {
     /// Reads all inputs as Gaussians, with colours of the degree that is kept.
     fn gather_gaussians(&self) -> Result<AllGaussians, W::Error> {
         let mut gathered: Option<AllGaussians> = None;
+        // Trained scenes are edited together, and others before they become Gaussians.
+        let together = self.are_gaussians()?;
+        if !together {
+            self.check_edits()?;
+        }
         for path in self.files {
-            let one = self.gaussians_of(path)?;
+            let one = self.gaussians_of(path, together)?;
             match &mut gathered {
                 None => gathered = Some(one),
                 Some(all) => {
@@ -156,14 +175,23 @@ impl<W: Watch> Work<'_, W> {
             }
         }
         let mut all = gathered.ok_or_else(|| wrong("there is nothing to convert"))?;
+        if together {
+            self.edit_gaussians(&mut all.set, &self.files[0])?;
+        }
         if let Some(degree) = self.conversion.degree {
             all.set.set_degree(degree.min(all.set.degree));
         }
         Ok(all)
     }
 
-    /// Returns the Gaussians of an input, or its splats as Gaussians.
-    fn gaussians_of(&self, path: &Path) -> Result<AllGaussians, W::Error> {
+    fn edit_gaussians(&self, set: &mut Gaussians, path: &Path) -> Result<(), W::Error> {
+        let stand = Frame { orientation: set.about.orientation, ..Frame::default() };
+        self.edit(set, path, stand.up(self.conversion.up))
+    }
+
+    /// Returns the Gaussians of an input, or its splats as Gaussians, with the edits. `together`:
+    /// trained ones are edited later, with those of other inputs.
+    fn gaussians_of(&self, path: &Path, together: bool) -> Result<AllGaussians, W::Error> {
         let start = Instant::now();
         let reading = self.conversion.reading(crate::memory::most());
         let kind = reading.kind(path)?;
@@ -183,6 +211,9 @@ impl<W: Watch> Work<'_, W> {
         }
         let scale = self.conversion.radius_scale;
         set.scales.iter_mut().for_each(|radii| *radii *= scale);
+        if !together {
+            self.edit_gaussians(&mut set, path)?;
+        }
         let points = set.len() as u64;
         Ok(AllGaussians { set, points, read_ms: milliseconds(start) })
     }

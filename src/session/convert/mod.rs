@@ -6,6 +6,7 @@
 //! | module | purpose |
 //! |---|---|
 //! | `splats` | the splats of inputs, and the hierarchy of them |
+//! | `points` | points with attributes, and edits of points larger than memory |
 //! | `regions` | scans larger than memory, region by region or in parts |
 //! | `gaussians` | trained Gaussians, and splats written as such |
 //! | `volume` | volumes as bricks and as NRRD |
@@ -13,6 +14,7 @@
 
 mod gaussians;
 mod memory;
+mod points;
 mod regions;
 mod splats;
 mod volume;
@@ -20,6 +22,7 @@ mod volume;
 use super::{Coloring, Data, Reading};
 use crate::{
     Deadline, Error, Result,
+    edit::{Change, Edit},
     hierarchy::{BuildOptions, Preset, external, external::Plan, file::WriteOptions},
     surface::{PointStyle, SurfelOptions},
     volume::{Lattice, Scalar},
@@ -38,6 +41,8 @@ pub struct Conversion {
     pub fits_memory: bool,
     /// By what meshes and point clouds are coloured.
     pub coloring: Coloring,
+    /// What is changed on the way, in this order.
+    pub edits: Vec<Edit>,
     /// How much time to spend on the quality of a hierarchy.
     pub preset: Preset,
     /// Whether a hierarchy keeps every bit of its splats.
@@ -68,6 +73,7 @@ impl Default for Conversion {
             reading: Reading::default(),
             fits_memory: true,
             coloring: Coloring::default(),
+            edits: Vec::new(),
             preset: Preset::default(),
             lossless: false,
             radius_scale: 1.0,
@@ -106,6 +112,8 @@ pub enum Target {
     Spz,
     /// Gaussians as glTF, `.glb`.
     Glb,
+    /// Points with their attributes: LAS, LAZ, or PLY as `.points.ply`.
+    Points,
     /// A volume as NRRD.
     Nrrd,
     /// A volume in levels of bricks, `.splv`.
@@ -122,6 +130,9 @@ impl Target {
         let name = name.unwrap_or_default();
         let all = [
             (".compressed.ply", Self::CompressedPly),
+            (".points.ply", Self::Points),
+            (".las", Self::Points),
+            (".laz", Self::Points),
             (".splk", Self::Hierarchy),
             (".ply", Self::Ply),
             (".splat", Self::Splat),
@@ -135,7 +146,8 @@ impl Target {
         let entry = all.into_iter().find(|(end, _)| has_stem && name.ends_with(end));
         entry.map(|(_, target)| target).ok_or_else(|| {
             Error::Argument(format!(
-                "{}: only .splk, .ply, .splat, .spz, .glb, .nrrd and .splv files can be written",
+                "{}: only .splk, .ply, .splat, .spz, .glb, .las, .laz, .nrrd and .splv files can be \
+                 written",
                 path.display()
             ))
         })
@@ -168,6 +180,9 @@ pub trait Watch: Sync {
     fn has_colored(&self, _is_mesh: bool, _has_values: bool) -> Result<(), Self::Error> {
         Ok(())
     }
+
+    /// Says what edits have done: of all inputs together, or of one after the other.
+    fn has_edited(&self, _changes: &[Change]) {}
 }
 
 /// Nobody hears of the conversion.
@@ -194,6 +209,15 @@ pub enum Converted {
         read_ms: f64,
         /// Milliseconds of writing, and of building a hierarchy.
         write_ms: f64,
+    },
+    /// Points with their attributes.
+    Points {
+        /// The points of the inputs.
+        points: u64,
+        /// The number of points that were written.
+        written: u64,
+        /// The names of the attributes.
+        attributes: Vec<String>,
     },
     /// A volume as NRRD.
     Volume {
@@ -295,6 +319,7 @@ impl Conversion {
         let work = Work { conversion: self, files, output, watch };
         match Target::of(output)? {
             Target::Hierarchy => work.hierarchy(),
+            Target::Points => work.points(),
             Target::Nrrd => work.nrrd(),
             Target::Bricks => work.bricks(),
             target => work.gaussians(target),
@@ -314,6 +339,7 @@ impl Conversion {
         let work = Work { conversion: self, files, output, watch };
         match Target::of(output)? {
             Target::Hierarchy => work.expect_hierarchy(),
+            Target::Points => Err(wrong("--dry-run is not for files of points").into()),
             Target::Nrrd => work.expect_nrrd(),
             Target::Bricks => work.expect_bricks(),
             target => work.expect_gaussians(target),
@@ -332,6 +358,14 @@ impl Conversion {
         watch: &W,
         may_write: impl FnOnce() -> Result<(), W::Error>,
     ) -> Result<Plan, W::Error> {
+        if let Some(edit) = self.edits.first() {
+            let message = format!(
+                "--{} is not made in parts; write the edited points as .laz first, and plan their \
+                 conversion",
+                edit.name()
+            );
+            return Err(wrong(message).into());
+        }
         let work = Work { conversion: self, files, output: folder, watch };
         let (options, write) = work.region_options(work.need(), true)?;
         may_write()?;

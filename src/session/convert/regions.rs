@@ -15,7 +15,14 @@ use crate::{
 impl<W: Watch> Work<'_, W> {
     /// Converts inputs that need more memory than may be used.
     pub fn in_regions(&self, need: Need) -> Result<Converted, W::Error> {
+        let source = self.conversion.write_options(self.files, &Frame::default()).source;
+        self.in_regions_named(need, source)
+    }
+
+    /// As [`in_regions`](Self::in_regions). The hierarchy names these as its source.
+    pub fn in_regions_named(&self, need: Need, source: String) -> Result<Converted, W::Error> {
         let (options, write) = self.region_options(need, self.conversion.in_regions)?;
+        let write = WriteOptions { source, ..write };
         let watch = |stage, done, all| self.region_stage(stage, done, all);
         let limits = self.conversion.reading.limits();
         let done = convert(self.files, limits, self.output, &options, &write, Some(&watch))?;

@@ -22,12 +22,12 @@ const SAMPLE: usize = 1 << 17;
 /// The splats of inputs, and facts about their source.
 pub struct Gathered {
     pub set: Surfels,
-    closed: bool,
+    pub closed: bool,
     /// The frame of the first input.
     pub frame: Frame,
     pub points: u64,
-    read_ms: f64,
-    splats_ms: f64,
+    pub read_ms: f64,
+    pub splats_ms: f64,
 }
 
 /// Facts about an input's coordinates, for viewers.
@@ -69,7 +69,10 @@ impl<W: Watch> Work<'_, W> {
         }
         let need = self.need();
         if need.bytes > self.conversion.most_memory() || self.conversion.in_regions {
-            return self.in_regions(need);
+            return match self.conversion.edits.is_empty() {
+                true => self.in_regions(need),
+                false => self.edited_in_regions(),
+            };
         }
         let gathered = self.gather()?;
         let start = Instant::now();
@@ -90,6 +93,10 @@ impl<W: Watch> Work<'_, W> {
         }
         let need = self.need();
         if need.bytes > self.conversion.most_memory() || self.conversion.in_regions {
+            if !self.conversion.edits.is_empty() {
+                let message = "--dry-run finds nothing of edits of more than fits in memory";
+                return Err(wrong(message).into());
+            }
             return self.expect_regions(need);
         }
         self.extrapolated(&self.gather()?, need.bytes)
@@ -127,6 +134,10 @@ impl<W: Watch> Work<'_, W> {
 
     /// Reads all inputs and makes splats of them, relative to the first input's origin.
     fn gather(&self) -> Result<Gathered, W::Error> {
+        if let Some(gathered) = self.edited_points()? {
+            return Ok(gathered);
+        }
+        self.check_edits()?;
         let mut gathered: Option<Gathered> = None;
         for path in self.files {
             let taken = gathered.as_ref().map_or(0, |all| memory_of_splats(all.set.splats.len()));
@@ -156,6 +167,7 @@ impl<W: Watch> Work<'_, W> {
         let mut gathered = match data {
             Data::Mesh(mesh) => {
                 let options = self.conversion.surfel_options(deadline);
+                let mesh = self.edited_mesh(path, mesh)?;
                 let (mesh, frame) = self.painted(path, mesh)?;
                 self.watch.stage(&format!("Making splats of {} points", mesh.positions.len()));
                 let need = memory_of_mesh(&mesh, &options, most.saturating_sub(taken));
@@ -171,13 +183,16 @@ impl<W: Watch> Work<'_, W> {
                 let header = hierarchy.header();
                 memory::check(path, memory_of_splats(header.leaves as usize), taken, most)?;
                 let mut set = hierarchy.leaves()?;
+                let stand = Frame { orientation: header.orientation, ..Frame::default() };
+                self.edit(&mut set, path, stand.up(self.conversion.up))?;
                 let scale = self.conversion.radius_scale;
                 let larger = |factor: [f32; 6]| factor.map(|entry| entry * scale);
                 set.splats.iter_mut().for_each(|splat| splat.factor = larger(splat.factor));
                 let unit = header.unit.clone();
                 let frame =
                     Frame { orientation: header.orientation, is_guessed: header.is_guessed, unit };
-                let (closed, points) = (header.closed, header.source_points);
+                let closed = header.closed && self.conversion.edits.is_empty();
+                let points = header.source_points;
                 Gathered { set, closed, frame, points, read_ms, splats_ms: 0.0 }
             }
             Data::Gaussians(_) => {
@@ -197,7 +212,7 @@ impl<W: Watch> Work<'_, W> {
     }
 
     /// Returns a mesh or point cloud in its colours, and how it stands.
-    fn painted(&self, path: &Path, mut mesh: Mesh) -> Result<(Mesh, Frame), W::Error> {
+    pub fn painted(&self, path: &Path, mut mesh: Mesh) -> Result<(Mesh, Frame), W::Error> {
         let frame = Frame::of(mesh.about.orientation, || Ok(mesh.guess_orientation()))?;
         let named = self.conversion.reading.options.scalar.is_some();
         let up = frame.up(self.conversion.up);

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 use splatkit::{
     Deadline, Error, Stop, disk,
+    edit::Edit,
     glam::DVec3,
     hierarchy::{Preset, external::Plan},
     session::{
@@ -37,6 +38,8 @@ struct Conversion {
     memory: Option<u64>,
     /// The number of parts of a conversion in parts.
     parts: Option<u32>,
+    /// The names and values of edits.
+    edits: Vec<(String, String)>,
 }
 
 /// A conversion with its files.
@@ -161,11 +164,16 @@ impl Conversion {
         if up == Some(None) {
             return Err(wrong("up is a direction with a length above 0"));
         }
+        let edit = |(name, value): &(String, String)| {
+            Edit::parse(name, value).map_err(|message| wrong(format!("the edit {name}: {message}")))
+        };
+        let edits = self.edits.iter().map(edit).collect::<Result<_, _>>()?;
         let load = reading(load)?;
         Ok(session::convert::Conversion {
             reading: load.reading(),
             fits_memory: load.limits.bytes.is_none(),
             coloring: appearance.coloring(),
+            edits,
             preset: self.preset()?,
             lattice: self.lattice()?,
             lossless: self.lossless,

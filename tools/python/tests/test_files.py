@@ -57,6 +57,13 @@ CONVERSIONS = [
     ("trained.spz", "splat", [], {}),
     ("trained.spz", "compressed.ply", [], {}),
     ("mesh.ply", "glb", ["--radius-scale", "2"], {"radius_scale": 2}),
+    (
+        "cloud.ply",
+        "laz",
+        ["--translate", "1,2,3", "--thin", "50%", "--where", "x > -9"],
+        {"edits": [("translate", (1, 2, 3)), ("thin", "50%"), ("where", "x > -9")]},
+    ),
+    ("trained.spz", "ply", ["--scale", "2"], {"edits": [("scale", 2)]}),
     ("bytes.npy", "nrrd", [], {}),
     ("bytes.npy", "splv", ["--spacing", "2"], {"spacing": 2}),
     ("volume.npy", "nrrd", ["--lattice", "bcc"], {"lattice": "bcc"}),

@@ -1,5 +1,6 @@
 //! `splatkit convert`: the output's extension decides what the inputs become.
 
+mod edits;
 mod parts;
 mod report;
 mod surface;
@@ -14,9 +15,13 @@ use crate::{
     timing::milliseconds,
 };
 use clap::{Args, ValueEnum};
-use splatkit::session::convert::{Conversion, Resampled, Watch};
+use splatkit::{
+    edit::Change,
+    session::convert::{Conversion, Resampled, Target, Watch},
+};
 use std::{
     path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
     time::Instant,
 };
 
@@ -32,7 +37,8 @@ pub struct Convert {
     files: Vec<PathBuf>,
     /// Write to this file. Meshes, point clouds, hierarchies and trained Gaussians become .splk, a
     /// hierarchy of splats; or 3D Gaussians for other viewers: .ply, .compressed.ply, .splat, .spz
-    /// or .glb. A volume becomes .nrrd, or .splv, levels of bricks that are read one by one.
+    /// or .glb. Meshes and point clouds become points with all their attributes: .las, .laz or
+    /// .points.ply. A volume becomes .nrrd, or .splv, levels of bricks that are read one by one.
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["plan", "part"])]
     output: Option<PathBuf>,
     /// Resample a Cartesian volume. bcc is the body-centred cubic lattice, which has 29.3 % fewer
@@ -49,6 +55,11 @@ pub struct Convert {
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    edits: edits::EditFlags,
+    /// What the edits have done.
+    #[arg(skip)]
+    changes: Mutex<Vec<Change>>,
     #[command(flatten)]
     parts: parts::PartFlags,
     #[command(flatten)]
@@ -101,13 +112,11 @@ impl Watch for Hearing<'_> {
     fn has_colored(&self, is_mesh: bool, has_values: bool) -> Result<(), Failure> {
         self.convert.color.check_effect(is_mesh, has_values)
     }
+
+    fn has_edited(&self, changes: &[Change]) {
+        self.convert.changes.lock().unwrap_or_else(PoisonError::into_inner).extend(changes);
+    }
 }
-
-/// The extensions of outputs.
-const WRITTEN: [&str; 7] = ["splk", "ply", "splat", "spz", "glb", "nrrd", "splv"];
-
-/// Those that hold surfaces.
-const SURFACES: [&str; 5] = ["splk", "ply", "splat", "spz", "glb"];
 
 impl Convert {
     pub fn run(mut self, given: &Given, progress: &Progress) -> Result<(), Failure> {
@@ -115,23 +124,16 @@ impl Convert {
             return self.make_part(plan, given, progress);
         }
         let extension = self.extension();
-        if !WRITTEN.contains(&extension.as_str()) {
-            let file = self.output().display();
-            return Err(Failure::Usage(format!(
-                "{file}: only .splk, .ply, .splat, .spz, .glb, .nrrd and .splv files can be written"
-            )));
-        }
+        let target = Target::of(self.output())?;
         self.parts.check(&extension)?;
         if let Some(plan) = &self.parts.join {
             return self.join_parts(plan, given, progress);
         }
-        self.surface.check(&extension)?;
-        let flag = self.color.given().or(self.range.map(|_| "--range"));
-        if let Some(flag) = flag.filter(|_| !SURFACES.contains(&extension.as_str())) {
-            return Err(Failure::Usage(format!(
-                "{flag} colours meshes and point clouds, not volumes"
-            )));
+        match target {
+            Target::Points if extension == "ply" => self.surface.check("points.ply")?,
+            _ => self.surface.check(&extension)?,
         }
+        self.check_target(target)?;
         self.color.check(&self.files)?;
         self.color = self.color.of(&self.files[0]);
         self.warn(given, progress);
@@ -168,11 +170,33 @@ impl Convert {
         self.print(&converted, milliseconds(start))
     }
 
+    /// Refuses flags without effect on a target.
+    fn check_target(&self, target: Target) -> Result<(), Failure> {
+        let is_volume = matches!(target, Target::Nrrd | Target::Bricks);
+        let color = self.color.given().or(self.range.map(|_| "--range"));
+        match (color, self.edits.0.first()) {
+            (Some(flag), _) if is_volume => {
+                Err(Failure::Usage(format!("{flag} colours meshes and point clouds, not volumes")))
+            }
+            (Some(flag), _) if target == Target::Points => Err(Failure::Usage(format!(
+                "{flag} has no effect on files of points, which keep the attributes and colours of \
+                 their inputs"
+            ))),
+            (_, Some(_)) if is_volume => Err(Failure::Usage(
+                "edits such as --crop and --where are for meshes, point clouds, hierarchies and \
+                 trained Gaussians, not for volumes"
+                    .into(),
+            )),
+            _ => Ok(()),
+        }
+    }
+
     fn conversion(&self) -> Conversion {
         Conversion {
             reading: self.load.reading(None),
             fits_memory: !self.load.has_bytes(),
             coloring: self.color.coloring(self.range),
+            edits: self.edits.0.clone(),
             lattice: self.lattice.map(|lattice| match lattice {
                 Wanted::Cartesian => Resampled::Cartesian,
                 Wanted::Bcc => Resampled::BodyCentred,
@@ -207,12 +231,18 @@ impl Convert {
 
 #[cfg(test)]
 mod tests {
-    use super::WRITTEN;
+    use super::Target;
     use splatkit::formats::FORMATS;
+
+    /// The extensions of outputs.
+    const WRITTEN: [&str; 8] = ["splk", "ply", "splat", "spz", "glb", "las", "nrrd", "splv"];
 
     #[test]
     fn every_format_with_a_writer_is_written() {
         let written: Vec<&str> = FORMATS.iter().filter_map(|format| format.written).collect();
         assert_eq!(written, WRITTEN);
+        for extension in written.into_iter().chain(["laz"]) {
+            assert!(Target::of(format!("a.{extension}").as_ref()).is_ok(), "{extension}");
+        }
     }
 }

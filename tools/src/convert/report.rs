@@ -2,13 +2,15 @@
 
 use super::Convert;
 use crate::{failure::Failure, output};
-use serde_json::json;
+use serde_json::{Value, json};
 use splatkit::{
     Error,
+    edit::Change,
     hierarchy::external,
     session::convert::{Built, Converted, Expected},
     volume::{Lattice, Scalar},
 };
+use std::sync::{MutexGuard, PoisonError};
 
 impl Convert {
     /// Returns the bytes of the output.
@@ -17,9 +19,34 @@ impl Convert {
         Ok(metadata.map_err(|error| Error::file(self.output(), "read", error))?.len())
     }
 
+    /// Returns what edits have done.
+    fn changes(&self) -> MutexGuard<'_, Vec<Change>> {
+        self.changes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Prints JSON, with what edits did if there are any.
+    fn report(&self, mut value: Value) -> Result<(), Failure> {
+        let changes = self.changes();
+        if !changes.is_empty() {
+            let change = |change: &Change| {
+                let Change { edit, before, after } = change;
+                json!({ "edit": edit, "before": before, "after": after })
+            };
+            value["edits"] = changes.iter().map(change).collect();
+        }
+        output::json(&value)
+    }
+
     /// Prints what was written in this many milliseconds.
     pub(super) fn print(&self, converted: &Converted, total_ms: f64) -> Result<(), Failure> {
+        for Change { edit, before, after } in self.changes().iter().filter(|_| !self.json) {
+            let removed = before - after;
+            output::line(format_args!("{edit:<15} {after} of {before} left, {removed} removed"))?;
+        }
         match converted {
+            Converted::Points { points, written, attributes } => {
+                self.print_points(*points, *written, attributes, total_ms)
+            }
             Converted::Hierarchy(built) => self.print_built(built),
             Converted::Regions(done) => self.print_regions(done, total_ms),
             Converted::Gaussians { .. } => self.print_gaussians(converted),
@@ -32,12 +59,40 @@ impl Convert {
         }
     }
 
+    fn print_points(
+        &self,
+        points: u64,
+        written: u64,
+        attributes: &[String],
+        total_ms: f64,
+    ) -> Result<(), Failure> {
+        let bytes = self.bytes()?;
+        let per_point = bytes as f64 / written.max(1) as f64;
+        if self.json {
+            return self.report(json!({
+                "file": self.output().to_string_lossy(),
+                "points_read": points,
+                "points": written,
+                "attributes": attributes,
+                "bytes": bytes,
+                "bytes_per_point": per_point,
+                "total_ms": total_ms,
+            }));
+        }
+        output::line(format_args!("points          {written} of {points}"))?;
+        if !attributes.is_empty() {
+            output::line(format_args!("attributes      {}", attributes.join(", ")))?;
+        }
+        output::line(format_args!("bytes           {bytes} ({per_point:.2} a point)"))?;
+        output::line(format_args!("time            {:.2} s", total_ms / 1e3))
+    }
+
     fn print_built(&self, built: &Built) -> Result<(), Failure> {
         let &Built { points, splats, closed, read_ms, splats_ms, build_ms } = built;
         let bytes = self.bytes()?;
         let per_point = bytes as f64 / points as f64;
         if self.json {
-            return output::line(json!({
+            return self.report(json!({
                 "file": self.output().to_string_lossy(),
                 "points": points,
                 "splats": splats,
@@ -66,7 +121,7 @@ impl Convert {
         let bytes = self.bytes()?;
         let per_point = bytes as f64 / done.points as f64;
         if self.json {
-            return output::line(json!({
+            return self.report(json!({
                 "file": self.output().to_string_lossy(),
                 "points": done.points,
                 "splats": done.splats,
@@ -90,7 +145,7 @@ impl Convert {
         let bytes = self.bytes()?;
         let per_splat = bytes as f64 / splats.max(1) as f64;
         if self.json {
-            return output::line(json!({
+            return self.report(json!({
                 "file": self.output().to_string_lossy(),
                 "points": points,
                 "splats": splats,
@@ -118,7 +173,7 @@ impl Convert {
         let (name, count) = (lattice.arrangement.name(), lattice.len());
         let [nx, ny, nz] = lattice.dims;
         if self.json {
-            return output::line(json!({
+            return self.report(json!({
                 "file": self.output().to_string_lossy(),
                 "lattice": name,
                 "dims": lattice.dims,
@@ -141,7 +196,7 @@ impl Convert {
         let bytes = self.bytes()?;
         let per_sample = bytes as f64 / lattice.len() as f64;
         if self.json {
-            return output::line(json!({
+            return self.report(json!({
                 "file": self.output().to_string_lossy(),
                 "dims": lattice.dims,
                 "type": scalar.name(),
@@ -164,7 +219,7 @@ impl Convert {
             }
             &Expected::Regions { as_a_whole, memory } => {
                 if self.json {
-                    return output::line(json!({
+                    return self.report(json!({
                         "expected_memory": as_a_whole,
                         "memory": memory,
                         "in_regions": true,
@@ -178,7 +233,7 @@ impl Convert {
             }
             &Expected::Gaussians { points, splats, bytes, is_most, read_ms } => {
                 if self.json {
-                    return output::line(json!({
+                    return self.report(json!({
                         "points": points,
                         "splats": splats,
                         "expected_bytes": bytes,
@@ -197,7 +252,7 @@ impl Convert {
     fn print_expected_tree(&self, built: &Built, bytes: u64, memory: u64) -> Result<(), Failure> {
         let &Built { points, splats, read_ms, splats_ms, build_ms, .. } = built;
         if self.json {
-            return output::line(json!({
+            return self.report(json!({
                 "points": points,
                 "splats": splats,
                 "expected_bytes": bytes,
@@ -224,7 +279,7 @@ impl Convert {
             return Ok(());
         };
         if self.json {
-            return output::line(json!({
+            return self.report(json!({
                 "dims": lattice.dims,
                 "type": scalar.name(),
                 "unpacked_bytes": unpacked,

@@ -1,10 +1,12 @@
 //! The flags that say how hierarchies and Gaussians are made.
 
-use super::SURFACES;
 use crate::{failure::Failure, parse};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use splatkit::{hierarchy, session::convert::Conversion};
+
+/// The extensions of files that hold surfaces.
+const SURFACES: [&str; 5] = ["splk", "ply", "splat", "spz", "glb"];
 
 /// How hierarchies are built.
 #[derive(Args, Debug, Clone)]

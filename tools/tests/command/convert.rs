@@ -104,7 +104,7 @@ fn what_cannot_be_converted_is_told() {
     for output in ["b", "-"] {
         folder.run(&format!("convert a.nrrd -o {output}")).fails(
             2,
-            &["only .splk, .ply, .splat, .spz, .glb, .nrrd and .splv files can be written"],
+            &["only .splk, .ply, .splat, .spz, .glb, .las, .laz, .nrrd and .splv files can be"],
         );
     }
     folder.put("samples.csv", "x,y,z,value\n1,2,3,4\n5,6,7,8\n");

@@ -6,6 +6,7 @@ mod colors;
 mod common;
 mod convert;
 mod convert_memory;
+mod edits;
 mod figures;
 mod files;
 #[cfg(unix)]

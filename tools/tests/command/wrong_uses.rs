@@ -293,6 +293,24 @@ const USES: &[(&str, &str, i32, &str)] = &[
         2,
         "an opacity lies above 0, up to 1",
     ),
+    (
+        "a condition that ends early",
+        "convert a.ply -o out.las --where x>",
+        2,
+        "column 3: it ends where a number, a name or “(” is expected",
+    ),
+    (
+        "a condition on an attribute that is not there",
+        "convert a.ply -o out.las --where clas==2",
+        3,
+        "there is no attribute “clas”",
+    ),
+    (
+        "a crop in which nothing lies",
+        "convert a.ply -o out.las --crop sphere:99,99,99,1",
+        3,
+        "--crop: keeps none of 4",
+    ),
 ];
 
 fn folder() -> Folder {

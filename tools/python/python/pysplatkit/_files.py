@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
@@ -98,13 +98,15 @@ def convert(
     color: Color | None = None,
     colormap: ColorMap | None = None,
     range: tuple[float, float] | None = None,
+    edits: Sequence[tuple[str, object]] = (),
     **reading: Unpack[Reading],
 ) -> Path:
     """Converts files as `splatkit convert` does. Returns the path of the output.
 
     Meshes, point clouds, hierarchies and trained Gaussians become .splk, a hierarchy of splats with
-    levels of detail, or Gaussians for other viewers: .ply, .compressed.ply, .splat, .spz or .glb. A
-    volume becomes .splv, levels of bricks, or .nrrd.
+    levels of detail, or Gaussians for other viewers: .ply, .compressed.ply, .splat, .spz or .glb.
+    Meshes and point clouds become points with attributes, .las, .laz or .points.ply. A volume
+    becomes .splv, levels of bricks, or .nrrd.
 
     Args:
         files: A file, or several.
@@ -122,6 +124,9 @@ def convert(
         color: What colours surfaces, as for `Scene.add`.
         colormap: The colours of values, as for `Scene.add`.
         range: The values that the colours are spread over.
+        edits: What is changed on the way, in this order: names of the command's flags with their
+            values, such as ("where", "classification == 2"), ("thin", 0.5),
+            ("translate", (1, 2, 3)) or ("remove-floaters", "").
         reading: How files are read: the options of reading of `Scene.add`.
     """
     given = _options.checked(reading, _options.READING, "convert")
@@ -137,6 +142,7 @@ def convert(
         "radius_scale": radius_scale,
         "lattice": lattice,
         "memory": memory,
+        "edits": [(name, _edit(value)) for name, value in edits],
     }
     appearance = {"color": color, "colormap": colormap, "range": range}
     _pysplatkit.convert(
@@ -147,6 +153,15 @@ def convert(
         _options.appearance(appearance),
     )
     return Path(output)
+
+
+def _edit(value: object) -> str:
+    """Returns the value of an edit as the command's flag has it."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Iterable):
+        return ",".join(str(float(part)) for part in value)
+    return str(value)
 
 
 class Leaves(NamedTuple):

@@ -1,0 +1,175 @@
+//! Clusters of points: those that a chain of near neighbours joins.
+//!
+//! Two of the eight nearest neighbours are joined if they are no farther apart than a few times the
+//! usual distance around either, or if they reach each other. A cluster of few points far from all
+//! others is a floater.
+
+use super::Context;
+use crate::{Error, Result, math::neighbours::Neighbours, parallel::prelude::*};
+use glam::Vec3;
+
+/// The number of neighbours.
+const COUNT: usize = 8;
+/// Neighbours are joined up to this many times the mean distance around either.
+const REACH: f32 = 4.0;
+/// A cluster of fewer points is a floater, or of less than this share of all points if there are
+/// few.
+const FEWEST: u64 = 64;
+const LEAST_SHARE: u64 = 100;
+
+/// Bytes of memory for each point.
+const OF_POINT: u64 = 220;
+
+/// Refuses an edit that needs more memory than it may use.
+pub fn check_memory(edit: &str, count: usize, context: &Context) -> Result<()> {
+    let need = OF_POINT.saturating_mul(count as u64);
+    if need <= context.memory {
+        return Ok(());
+    }
+    let [need, most] = [need, context.memory].map(|bytes| bytes.div_ceil(1 << 20));
+    Err(Error::Argument(format!(
+        "--{edit} compares {count} points, which takes about {need} MiB, but only {most} MiB may \
+         be used; --memory allows more, and --thin before it leaves fewer points"
+    )))
+}
+
+/// The clusters of points.
+pub struct Clusters {
+    /// The cluster of each point, by its first point.
+    of: Vec<u32>,
+    /// The number of points in the cluster of each first point.
+    counts: Vec<u32>,
+}
+
+impl Clusters {
+    /// Finds the clusters of places, of which each reaches some way around. `pairs` belong together
+    /// in any case.
+    pub fn new(places: &[Vec3], reaches: &[f32], pairs: &[[u32; 2]]) -> Self {
+        let first = Neighbours::first_of_equals(places);
+        let kept: Vec<u32> =
+            (0..).zip(&first).filter(|(index, first)| index == *first).map(|(at, _)| at).collect();
+        let points: Vec<Vec3> = kept.par_iter().map(|&at| places[at as usize]).collect();
+        let mut sets = Sets::new(places.len());
+        if points.len() > 1 {
+            let tree = Neighbours::new(&points);
+            let near = |at: usize| {
+                let mut near = [(f32::INFINITY, u32::MAX); COUNT];
+                near.iter_mut().zip(tree.of(at as u32, COUNT)).for_each(|(slot, of)| *slot = of);
+                near
+            };
+            let near: Vec<[(f32, u32); COUNT]> =
+                (0..points.len()).into_par_iter().map(near).collect();
+            let usual = |near: &[(f32, u32); COUNT]| {
+                let there = near.iter().filter(|(_, other)| *other != u32::MAX);
+                let count = there.clone().count().max(1) as f32;
+                there.map(|(distance, _)| distance).sum::<f32>() / count
+            };
+            let usual: Vec<f32> = near.par_iter().map(usual).collect();
+            for (at, near) in near.iter().enumerate() {
+                for &(distance, other) in near.iter().filter(|(_, other)| *other != u32::MAX) {
+                    let other = other as usize;
+                    let ends = [kept[at], kept[other]].map(|point| reaches[point as usize]);
+                    let most = (REACH * usual[at].min(usual[other])).max(2.0 * (ends[0] + ends[1]));
+                    if distance <= most {
+                        sets.join(kept[at], kept[other]);
+                    }
+                }
+            }
+        }
+        first.iter().zip(0..).for_each(|(first, point)| sets.join(*first, point));
+        pairs.iter().for_each(|[one, other]| sets.join(*one, *other));
+        let of: Vec<u32> = (0..places.len() as u32).map(|point| sets.root(point)).collect();
+        let mut counts = vec![0; places.len()];
+        of.iter().for_each(|root| counts[*root as usize] += 1);
+        Self { of, counts }
+    }
+
+    /// Returns which points are in clusters that are no floaters. The largest cluster is none.
+    pub fn without_floaters(&self) -> Vec<bool> {
+        let least = FEWEST.min(self.of.len() as u64 / LEAST_SHARE) as u32;
+        let largest = self.counts.iter().copied().max().unwrap_or(0);
+        let least = least.max(2).min(largest);
+        self.of.iter().map(|root| self.counts[*root as usize] >= least).collect()
+    }
+
+    /// Returns which points are in the largest clusters, this many. Of clusters of the same size,
+    /// that with the first point counts.
+    pub fn largest(&self, count: usize) -> Vec<bool> {
+        let mut roots: Vec<u32> =
+            (0..self.counts.len() as u32).filter(|root| self.counts[*root as usize] > 0).collect();
+        roots.sort_by_key(|root| (std::cmp::Reverse(self.counts[*root as usize]), *root));
+        let mut is_kept = vec![false; self.counts.len()];
+        roots.iter().take(count).for_each(|root| is_kept[*root as usize] = true);
+        self.of.iter().map(|root| is_kept[*root as usize]).collect()
+    }
+}
+
+/// Disjoint sets, each with its least member as the root.
+struct Sets(Vec<u32>);
+
+impl Sets {
+    fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    fn root(&mut self, mut member: u32) -> u32 {
+        while self.0[member as usize] != member {
+            let above = self.0[self.0[member as usize] as usize];
+            self.0[member as usize] = above;
+            member = above;
+        }
+        member
+    }
+
+    fn join(&mut self, one: u32, other: u32) {
+        let (one, other) = (self.root(one), self.root(other));
+        self.0[one.max(other) as usize] = one.min(other);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square grid of points around a place.
+    fn grid(side: usize, step: f32, at: Vec3) -> Vec<Vec3> {
+        let point = |index: usize| Vec3::new((index % side) as f32, (index / side) as f32, 0.0);
+        (0..side * side).map(|index| at + step * point(index)).collect()
+    }
+
+    fn count(kept: &[bool]) -> usize {
+        kept.iter().filter(|kept| **kept).count()
+    }
+
+    #[test]
+    fn floaters_are_few_points_far_from_others() {
+        let mut places = grid(40, 0.1, Vec3::ZERO);
+        // A coarser part of the surface touches the fine one. A distant wall is a cluster.
+        places.extend(grid(10, 0.2, Vec3::new(4.05, 0.0, 0.0)));
+        places.extend(grid(10, 1.0, Vec3::new(50.0, 0.0, 0.0)));
+        let whole = places.len();
+        places.extend([Vec3::new(1.0, 1.0, 2.0), Vec3::new(1.0, 1.0, 2.0), Vec3::splat(-9.0)]);
+        places.extend(grid(3, 0.05, Vec3::new(0.0, 0.0, 8.0)));
+        let clusters = Clusters::new(&places, &vec![0.0; places.len()], &[]);
+        let kept = clusters.without_floaters();
+        assert!(kept[..whole].iter().all(|kept| *kept) && kept[whole..].iter().all(|kept| !kept));
+        assert_eq!(count(&clusters.largest(1)), 1700);
+        assert_eq!(count(&clusters.largest(2)), 1800);
+        assert_eq!(count(&clusters.largest(99)), places.len());
+        // Pairs and large Gaussians join what is far apart.
+        let joined = Clusters::new(&places, &vec![0.0; places.len()], &[[0, whole as u32 + 2]]);
+        assert!(joined.without_floaters()[whole + 2]);
+        let mut reaches = vec![0.0; places.len()];
+        reaches[whole] = 2.0;
+        assert!(Clusters::new(&places, &reaches, &[]).without_floaters()[whole]);
+    }
+
+    #[test]
+    fn few_points_are_never_all_floaters() {
+        for count in 1..4 {
+            let places = &[Vec3::ZERO, Vec3::X, Vec3::splat(100.0)][..count];
+            let clusters = Clusters::new(places, &vec![0.0; count], &[]);
+            assert!(clusters.without_floaters().contains(&true), "{count}");
+        }
+    }
+}

@@ -1,0 +1,321 @@
+//! Points with their attributes, and edits on the way of a conversion.
+//!
+//! Files of points that are read in pieces are edited together, in that way. Other inputs are read
+//! whole and edited one by one.
+
+use super::{
+    Converted, Watch, Work, memory, milliseconds,
+    splats::{Frame, Gathered, in_file},
+    wrong,
+};
+use crate::{
+    Error, Result,
+    about::About,
+    edit::{self, Context, Edit, Editable, Pass, Surface},
+    formats::{Attribute, Kind, NumberType, PointLayout, Records, Stream, write_points},
+    hierarchy::external::memory_of_mesh,
+    progress,
+    session::Data,
+    surface::Mesh,
+};
+use glam::{DVec3, Vec3};
+use std::path::{Path, PathBuf};
+use web_time::Instant;
+
+/// What a progress bar calls the stage.
+const READING: &str = "Reading and editing points";
+
+impl<W: Watch> Work<'_, W> {
+    /// Writes the points of all inputs with their attributes.
+    pub fn points(&self) -> Result<Converted, W::Error> {
+        let limits = self.conversion.reading.limits();
+        let watch = |done, all| self.watch.progress(READING, done, all);
+        let Some(pass) = self.pass(limits, None, Some(&watch))? else {
+            return self.points_of_surfaces();
+        };
+        let [has_normals, has_colors] = pass.has();
+        let attributes = pass.attributes()?;
+        let layout = PointLayout {
+            has_normals,
+            has_colors,
+            bounds: pass.bounds(),
+            grid: pass.grid(),
+            crs: pass.first().map(Path::to_owned),
+            attributes: attributes.clone(),
+        };
+        let mut writer = write_points(self.output, layout)?;
+        let changes = pass.run(|records| writer.put(&records))?;
+        self.watch.has_edited(&changes);
+        let (points, written) = (pass.points(), writer.finish()?);
+        let attributes = attributes.into_iter().map(|attribute| attribute.name).collect();
+        Ok(Converted::Points { points, written, attributes })
+    }
+
+    /// Writes the points of inputs that are read whole.
+    fn points_of_surfaces(&self) -> Result<Converted, W::Error> {
+        self.check_edits()?;
+        let (mut points, mut parts) = (0, Vec::new());
+        for path in self.files {
+            self.watch.stage(&format!("Reading {}", path.display()));
+            let reading = self.conversion.reading(Some(self.conversion.most_memory()));
+            let opened = reading.open_colored(path, self.conversion.attribute())?;
+            let data = opened.read()?.with_surface_of_bare_cells()?;
+            self.watch.has_read(&opened.files())?;
+            let Data::Mesh(mesh) = data else {
+                let message = "holds no mesh or point cloud, of which points are written; trained \
+                               Gaussians and hierarchies are written as .splk, .ply, .splat, .spz \
+                               or .glb";
+                return Err(wrong(format!("{} {message}", path.display())).into());
+            };
+            points += mesh.positions.len() as u64;
+            let names = mesh.about.attributes.clone();
+            let mut surface = self.surface(path, mesh, &names)?;
+            self.edit_surface(&mut surface, path)?;
+            parts.push(surface.into_records());
+        }
+        let layout = layout_of(&parts);
+        let names = layout.attributes.iter().map(|attribute| attribute.name.clone()).collect();
+        let mut writer = write_points(self.output, layout)?;
+        parts.iter().try_for_each(|part| writer.put(part))?;
+        Ok(Converted::Points { points, written: writer.finish()?, attributes: names })
+    }
+
+    /// Opens all inputs as points that are read in pieces; `None` if one cannot be read so. All
+    /// attributes are read, or those that the edits need and those of these names.
+    fn pass<'a>(
+        &'a self,
+        limits: &'a crate::input::Limits,
+        names: Option<&[String]>,
+        watch: progress::Watch<'a>,
+    ) -> Result<Option<Pass<'a>>, W::Error> {
+        let reading = self.conversion.reading(crate::memory::most());
+        let mut streams = Vec::new();
+        for path in self.files {
+            if !matches!(reading.kind(path)?, Kind::Mesh | Kind::Samples) {
+                return Ok(None);
+            }
+            match Stream::open(path, limits)? {
+                Some(stream) if stream.counts().triangles == 0 => streams.push(stream),
+                _ => return Ok(None),
+            }
+        }
+        let Some(first) = streams.first() else { return Ok(None) };
+        let frame = Frame::of(first.orientation(), || first.guess_orientation())?;
+        let context = self.context(&self.files[0], frame.up(self.conversion.up));
+        self.watch.has_read(self.files)?;
+        Ok(Some(Pass::new(streams, &self.conversion.edits, context, names, watch)?))
+    }
+
+    fn context(&self, file: &Path, up: DVec3) -> Context {
+        Context { file: file.to_owned(), up, memory: self.conversion.most_memory() }
+    }
+
+    /// Returns the splats of points that are edited while they are read; `None` if there are no
+    /// edits, or for inputs that are not read in pieces.
+    pub fn edited_points(&self) -> Result<Option<Gathered>, W::Error> {
+        if self.conversion.edits.is_empty() {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        let limits = self.conversion.reading.limits();
+        let watch = |done, all| self.watch.progress(READING, done, all);
+        let named: Vec<String> =
+            self.conversion.attribute().map(str::to_owned).into_iter().collect();
+        let Some(pass) = self.pass(limits, Some(&named), Some(&watch))? else { return Ok(None) };
+        let mut mesh = Mesh { origin: pass.middle(), ..Mesh::default() };
+        mesh.about = About { orientation: pass.orientation(), ..About::default() };
+        let changes = pass.run(|records| self.append(&mut mesh, records, named.first()))?;
+        self.watch.has_edited(&changes);
+        let path = &self.files[0];
+        let (read_ms, start) = (milliseconds(start), Instant::now());
+        let (mesh, frame) = self.painted(path, mesh)?;
+        let options = self.conversion.surfel_options(limits.deadline());
+        let most = self.conversion.most_memory();
+        memory::check(path, memory_of_mesh(&mesh, &options, most)?, 0, most)?;
+        let set = mesh.surfels(&options).map_err(|error| in_file(path, error))?;
+        let (points, splats_ms) = (mesh.positions.len() as u64, milliseconds(start));
+        Ok(Some(Gathered { set, closed: false, frame, points, read_ms, splats_ms }))
+    }
+
+    /// Adds points to a cloud, with the values of an attribute if one is named.
+    fn append(&self, mesh: &mut Mesh, records: Records, named: Option<&String>) -> Result<()> {
+        if let Some(name) = named {
+            let column = records.column(name).ok_or_else(|| {
+                let message = format!("has no attribute “{name}”");
+                Error::input(&self.files[0], "points", message)
+                    .hint("`splatkit info` lists the attributes")
+            })?;
+            mesh.values.extend(column.into_iter().map(|value| value as f32));
+            mesh.about.name.clone_from(name);
+        }
+        let place = |place: &DVec3| (*place - mesh.origin).as_vec3();
+        mesh.positions.extend(records.positions.iter().map(place));
+        // Files of which some have no normals or colours are merged.
+        let count = mesh.positions.len();
+        if !records.normals.is_empty() || !mesh.normals.is_empty() {
+            mesh.normals.resize(count - records.positions.len(), Vec3::ZERO);
+            mesh.normals.extend(records.normals);
+            mesh.normals.resize(count, Vec3::ZERO);
+        }
+        if !records.colors.is_empty() || !mesh.colors.is_empty() {
+            mesh.colors.resize(count - records.positions.len(), [255; 4]);
+            mesh.colors.extend(records.colors);
+            mesh.colors.resize(count, [255; 4]);
+        }
+        Ok(())
+    }
+
+    /// Converts points that do not fit in memory: the edited ones are written beside the output for
+    /// a while, and converted from there.
+    #[cfg(feature = "ply")]
+    pub fn edited_in_regions(&self) -> Result<Converted, W::Error> {
+        let limits = self.conversion.reading.limits();
+        let watch = |done, all| self.watch.progress(READING, done, all);
+        let named: Vec<String> =
+            self.conversion.attribute().map(str::to_owned).into_iter().collect();
+        let Some(pass) = self.pass(limits, Some(&named), Some(&watch))? else {
+            let need = self.need().bytes >> 20;
+            return Err(wrong(format!(
+                "editing this takes about {need} MiB, but only {} MiB may be used; only points in \
+                 binary PLY, LAS and LAZ are edited in less; --memory allows more",
+                self.conversion.most_memory() >> 20
+            ))
+            .into());
+        };
+        let [has_normals, has_colors] = pass.has();
+        let layout = PointLayout {
+            attributes: pass.attributes()?,
+            has_normals,
+            // Greys are kept too: the result has no other attribute to make them from.
+            has_colors: has_colors || pass.has_greys(),
+            bounds: pass.bounds(),
+            grid: None,
+            crs: None,
+        };
+        let mut scratch = crate::formats::ply::PointFile::scratch(self.output, layout)?;
+        let changes =
+            pass.run(|records| crate::formats::PointWriter::put(&mut scratch, &records))?;
+        self.watch.has_edited(&changes);
+        let (scratch, _) = scratch.end()?;
+        let up = self.conversion.up.or(pass.orientation().map(|stand| stand.up));
+        let conversion = super::Conversion { edits: Vec::new(), up, ..self.conversion.clone() };
+        let files = [scratch.part().to_owned()];
+        let source = self.conversion.write_options(self.files, &Frame::default()).source;
+        let work = Work {
+            conversion: &conversion,
+            files: &files,
+            output: self.output,
+            watch: &Inner(self.watch),
+        };
+        work.in_regions_named(work.need(), source)
+    }
+
+    /// See above.
+    #[cfg(not(feature = "ply"))]
+    pub fn edited_in_regions(&self) -> Result<Converted, W::Error> {
+        Err(wrong("edits of more than fits in memory need the feature “ply”").into())
+    }
+
+    /// Returns a mesh or point cloud with the attributes of these names.
+    fn surface(&self, path: &Path, mesh: Mesh, names: &[String]) -> Result<Surface, W::Error> {
+        let count = mesh.positions.len();
+        let mut surface = Surface::from(mesh);
+        let reading = self.conversion.reading(Some(self.conversion.most_memory()));
+        for name in names {
+            let values = reading.open_colored(path, Some(name))?.values(name)?;
+            if let Some(values) = values.filter(|values| values.len() == count) {
+                let values = values.into_iter().map(f64::from).collect();
+                let attribute = Attribute { name: name.clone(), kind: NumberType::F32 };
+                surface.columns.push((attribute, values));
+            }
+        }
+        Ok(surface)
+    }
+
+    /// Returns an input as the edits change it.
+    pub fn edited_mesh(&self, path: &Path, mesh: Mesh) -> Result<Mesh, W::Error> {
+        if self.conversion.edits.is_empty() {
+            return Ok(mesh);
+        }
+        let wanted = |name: &&String| {
+            self.conversion.edits.iter().any(|edit| match edit {
+                Edit::Where(expression) => {
+                    expression.names().any(|wanted| wanted.eq_ignore_ascii_case(name))
+                }
+                _ => false,
+            })
+        };
+        let names: Vec<String> = mesh.about.attributes.iter().filter(wanted).cloned().collect();
+        let mut surface = self.surface(path, mesh, &names)?;
+        self.edit_surface(&mut surface, path)?;
+        Ok(surface.mesh)
+    }
+
+    fn edit_surface(&self, surface: &mut Surface, path: &Path) -> Result<(), W::Error> {
+        let mesh = &surface.mesh;
+        let frame = Frame::of(mesh.about.orientation, || Ok(mesh.guess_orientation()))?;
+        self.edit(surface, path, frame.up(self.conversion.up))
+    }
+
+    /// Makes the edits of a scene that is in memory.
+    pub fn edit<S: Editable>(&self, scene: &mut S, path: &Path, up: DVec3) -> Result<(), W::Error> {
+        if self.conversion.edits.is_empty() {
+            return Ok(());
+        }
+        self.watch.stage(&format!("Editing {}", path.display()));
+        let context = self.context(path, up);
+        self.watch.has_edited(&edit::apply(scene, &self.conversion.edits, &context)?);
+        Ok(())
+    }
+
+    /// Refuses edits of several inputs that would have to be one for them.
+    pub fn check_edits(&self) -> Result<()> {
+        let edit = self.conversion.edits.iter().find(|edit| !edit.is_local());
+        let (Some(edit), true) = (edit, self.files.len() > 1) else { return Ok(()) };
+        Err(wrong(format!(
+            "--{} compares the points of all inputs, which are merged first only if all are point \
+             clouds in binary PLY, LAS or LAZ, or trained Gaussians; convert the others one by one",
+            edit.name()
+        )))
+    }
+}
+
+/// What a caller hears of a conversion of edited points: not the file in which they are.
+struct Inner<'a, W>(&'a W);
+
+impl<W: Watch> Watch for Inner<'_, W> {
+    type Error = W::Error;
+
+    fn progress(&self, stage: &'static str, done: u64, all: u64) {
+        self.0.progress(stage, done, all);
+    }
+
+    fn has_read(&self, _: &[PathBuf]) -> Result<(), W::Error> {
+        Ok(())
+    }
+
+    fn has_colored(&self, is_mesh: bool, has_values: bool) -> Result<(), W::Error> {
+        self.0.has_colored(is_mesh, has_values)
+    }
+}
+
+/// Returns what a file of all these points holds.
+fn layout_of(parts: &[Records]) -> PointLayout {
+    let mut layout = PointLayout {
+        has_normals: parts.iter().all(|part| !part.normals.is_empty()),
+        has_colors: parts.iter().all(|part| !part.colors.is_empty()),
+        bounds: [DVec3::INFINITY, DVec3::NEG_INFINITY],
+        ..PointLayout::default()
+    };
+    for part in parts {
+        for place in &part.positions {
+            layout.bounds = [layout.bounds[0].min(*place), layout.bounds[1].max(*place)];
+        }
+        for attribute in &part.attributes {
+            if !layout.attributes.iter().any(|known| known.name == attribute.name) {
+                layout.attributes.push(attribute.clone());
+            }
+        }
+    }
+    layout
+}
