@@ -2,9 +2,12 @@
 
 use super::{TILE, weighting::deviation};
 use crate::{
-    math::{Bounds, Kernel, Sheets, View},
+    math::{Bounds, Kernel, Sheets, Tensor, View},
     parallel::{self, prelude::*},
-    volume::{Lattice, Volume, reach::neighbourhood_ranges},
+    volume::{
+        Arrangement, Lattice, Volume,
+        reach::{near_and_far_ranges, neighbourhood_ranges},
+    },
 };
 use glam::{DMat3, DVec3};
 
@@ -33,13 +36,51 @@ struct Cube {
 /// The bits of 2 × 2 × 2 cells in a word.
 const QUARTER: u32 = 0x0033_0033;
 
-/// The widest Gaussian, in steps, for which `FAR_WEIGHT` holds.
+/// The widest Gaussian, in steps, for which [`Shares::GAUSSIAN`] holds.
 const WIDEST: f64 = 0.6;
 
-/// The share of a Gaussian's weight that samples two steps from the nearest one have in total. It
-/// allows for places up to a third of a step further away. For the usual kernel it is 0.085 at half
-/// a step.
-const FAR_WEIGHT: f64 = 0.15;
+/// What the samples around a sample count at most in the field at the places nearest to it, in
+/// hundredths. It allows for places up to a third of a step further away along one axis.
+#[derive(Debug, Clone, Copy)]
+struct Shares {
+    /// The sum of the magnitudes of the weights of samples two steps from the sample.
+    far: u16,
+    /// The sum of those of the negative weights of the samples next to it.
+    negative: u16,
+}
+
+impl Shares {
+    /// Those of the usual kernel. At half a step the far samples have a weight of 0.085.
+    const GAUSSIAN: Self = Self { far: 15, negative: 0 };
+    const CUBIC_B_SPLINE: Self = Self { far: 14, negative: 0 };
+    const CATMULL_ROM: Self = Self { far: 30, negative: 24 };
+
+    /// Returns those of a kernel of which only samples up to two steps away count, if they are known.
+    fn of(kernel: &Kernel) -> Option<Self> {
+        match kernel.as_tensor() {
+            Some(Tensor::Linear) => None,
+            Some(Tensor::CatmullRom) => Some(Self::CATMULL_ROM),
+            Some(Tensor::CubicBSpline) => Some(Self::CUBIC_B_SPLINE),
+            None => deviation(kernel).filter(|&sigma| sigma <= WIDEST).map(|_| Self::GAUSSIAN),
+        }
+    }
+
+    /// Returns the range of the field from those of the samples next to a sample and of all up to
+    /// two steps away.
+    fn range(self, near: [u8; 2], far: [u8; 2]) -> [u8; 2] {
+        let [low, high] = near.map(u16::from);
+        let [lowest, highest] = far.map(u16::from);
+        let (mut below, mut above) = (low - lowest, highest - high);
+        if self.negative > 0 {
+            // A negative weight moves the field away from its sample.
+            (below, above) = (below.max(highest - low), above.max(high - lowest));
+        }
+        let wider = |beyond: u16| {
+            (beyond * self.far + 99) / 100 + ((high - low) * self.negative + 99) / 100
+        };
+        [low.saturating_sub(wider(below)) as u8, (high + wider(above)).min(255) as u8]
+    }
+}
 
 /// Returns, for each sample of a volume, the range of the field at the places nearest to that
 /// sample. The samples next to it have nearly all the weight; those two steps away move the field
@@ -49,18 +90,11 @@ pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
         // A lookup may miss the nearest sample by one.
         return neighbourhood_ranges(volume, [1; 3]);
     }
-    let mut ranges = volume.drawn_ranges(kernel).into_owned();
-    if deviation(kernel).is_some_and(|sigma| sigma <= WIDEST) && volume.coefficients.is_none() {
-        let near = neighbourhood_ranges(volume, [1; 3]);
-        let shares: [u8; 256] =
-            std::array::from_fn(|difference| (difference as f64 * FAR_WEIGHT).ceil() as u8);
-        let share = |difference: u8| shares[usize::from(difference)];
-        ranges.par_iter_mut().zip(near).for_each(|([low, high], [near_low, near_high])| {
-            *low = near_low - share(near_low - *low);
-            *high = near_high + share(*high - near_high);
-        });
+    let reaches_two = volume.lattice.arrangement == Arrangement::Cartesian && kernel.extent > 1.0;
+    match Shares::of(kernel).filter(|_| reaches_two && volume.coefficients.is_none()) {
+        Some(shares) => near_and_far_ranges(volume, |near, far| shares.range(near, far)),
+        None => volume.drawn_ranges(kernel).into_owned(),
     }
-    ranges
 }
 
 impl VisibleBlocks {
@@ -210,6 +244,47 @@ pub fn bit_of([x, y, z]: [usize; 3]) -> (usize, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Returns the shares of a tensor product at places in steps from a sample, as [`Shares`] has
+    /// them.
+    fn shares(tensor: Tensor, place: [f64; 3]) -> [f64; 2] {
+        let (mut far, mut negative) = (0.0, 0.0);
+        for tap in 0..125 {
+            let steps: [i32; 3] = [tap % 5 - 2, tap / 5 % 5 - 2, tap / 25 - 2];
+            let weight: f64 =
+                (0..3).map(|axis| tensor.value(place[axis] - f64::from(steps[axis]))).product();
+            if steps.iter().any(|step| step.abs() == 2) {
+                far += weight.abs();
+            } else {
+                negative -= weight.min(0.0);
+            }
+        }
+        [far * 100.0, negative * 100.0]
+    }
+
+    #[test]
+    fn shares_hold_for_the_places_nearest_to_a_sample() {
+        let kernels = [
+            (Tensor::CatmullRom, Shares::CATMULL_ROM),
+            (Tensor::CubicBSpline, Shares::CUBIC_B_SPLINE),
+        ];
+        for (tensor, most) in kernels {
+            let mut largest = [0.0f64; 2];
+            for x in 0..=10 {
+                for y in 0..=6 {
+                    for z in 0..=6 {
+                        let place = [x, y, z].map(|step| f64::from(step) / 12.0);
+                        let shares = shares(tensor, place);
+                        largest = [0, 1].map(|i| largest[i].max(shares[i]));
+                    }
+                }
+            }
+            let most = [most.far, most.negative].map(f64::from);
+            for (largest, most) in largest.into_iter().zip(most) {
+                assert!(most - 1.0 < largest && largest <= most, "{tensor:?}: {largest} {most}");
+            }
+        }
+    }
 
     #[test]
     fn bits_are_in_blocks() {
