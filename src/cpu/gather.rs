@@ -24,6 +24,10 @@ const STRAIGHT: f32 = 1.0;
 /// If they differ by more entries, a sheet takes one more sample however little light it takes.
 const BENT: f32 = 1024.0;
 
+/// The gradient in the middle stands for a sheet of a linear field that takes a smaller share of
+/// the light than this.
+const FAINT: f32 = 0.05;
+
 /// Returns why a volume can't be gathered, whatever the settings.
 pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
     Way::of(volume, kernel).err()
@@ -47,6 +51,9 @@ pub struct Gather<'a> {
     pub is_blended: bool,
     /// The values are labels.
     pub is_label_map: bool,
+    /// The gradient takes more samples than the value, so it is evaluated only where it counts: the
+    /// kernel is linear.
+    pub has_far_gradient: bool,
     pub visible: &'a Visible,
     /// The value that values are relative to.
     pub zero: f32,
@@ -103,6 +110,22 @@ impl Level<'_> {
             },
         )
     }
+
+    /// Returns the slopes of a linear field at places in steps of the level.
+    #[inline(always)]
+    fn slopes<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        simd.vectorize(
+            #[inline(always)]
+            || match &self.field {
+                Typed::U8(field) => field.slopes(simd, place),
+                Typed::U16(field) => field.slopes(simd, place),
+                Typed::I16(field) => field.slopes(simd, place),
+                Typed::I32(field) => field.slopes(simd, place),
+                Typed::F32(field) => field.slopes(simd, place),
+                Typed::Blend(_) => unreachable!("linear fields are not blended"),
+            },
+        )
+    }
 }
 
 /// Two places in a part of a sheet whose average is the part's mean: exact for fields of the third
@@ -123,8 +146,10 @@ const LOOKED_UP: usize = 8;
 pub struct Last<S: Simd> {
     plane: usize,
     face: Face<S>,
-    /// The gradient in view space, in entries per thickness of a sheet.
+    /// The gradient in view space, in entries per thickness of a sheet, at the plane where it was
+    /// evaluated.
     gradient: [Lanes<S>; 3],
+    gradient_plane: usize,
     along: Lanes<S>,
     weight: Lanes<S>,
     /// The first of the looked-up sheets, and for each sheet a bit for each ray on which something
@@ -142,6 +167,7 @@ impl<S: Simd> Last<S> {
             plane: usize::MAX,
             face,
             gradient: [none; 3],
+            gradient_plane: usize::MAX,
             along: none,
             weight: none,
             first: usize::MAX - LOOKED_UP,
@@ -231,7 +257,16 @@ impl Gather<'_> {
         if !has_gaps && !layer.weight.simd_gt(0.0).any_true() {
             return None;
         }
-        if !has_gaps && !self.is_bent([&before, last], bend, &layer, mask) {
+        let is_bent = self.is_bent([&before, last], bend, &layer, mask);
+        if self.has_far_gradient {
+            if is_bent {
+                let inside = self.at(simd, rays, 0.5 * (start + stop));
+                layer.set_middle(inside.value * plan.field.values.per_value, sum, bend);
+            }
+            self.set_far_gradient(simd, rays, sheet, mask, last, &mut layer);
+            return Some((layer, mask));
+        }
+        if !has_gaps && !is_bent {
             return Some((layer, mask));
         }
         let inside = self.at(simd, rays, 0.5 * (start + stop));
@@ -247,12 +282,45 @@ impl Gather<'_> {
         if plan.has_gradients() {
             layer.sections = Some(sections);
         }
-        // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with
-        // slopes).
-        let inside = inside.value * plan.field.values.per_value;
-        let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
-        layer.middle = mean * 1.5 - sum * 0.25;
+        layer.set_middle(inside.value * plan.field.values.per_value, sum, bend);
         Some((layer, mask))
+    }
+
+    /// Sets the gradients of a sheet of a linear field, in as much detail as its light counts.
+    #[inline(always)]
+    fn set_far_gradient<S: Simd>(
+        &self,
+        simd: S,
+        rays: &Rays<S>,
+        sheet: usize,
+        mask: mask32x8<S>,
+        last: &mut Last<S>,
+        layer: &mut Layer<S>,
+    ) {
+        let planes = &self.plan.planes;
+        if !self.plan.has_gradients() {
+            return;
+        }
+        let middle = 0.5 * (planes[sheet] + planes[sheet + 1]);
+        if !(mask & layer.weight.simd_gt(FAINT)).any_true() {
+            layer.sections = Some([self.far_gradient(simd, rays, middle); 3]);
+            return;
+        }
+        let front = if last.gradient_plane == sheet {
+            last.gradient
+        } else {
+            self.far_gradient(simd, rays, planes[sheet])
+        };
+        let back = self.far_gradient(simd, rays, planes[sheet + 1]);
+        (last.gradient, last.gradient_plane) = (back, sheet + 1);
+        layer.sections = Some([front, self.far_gradient(simd, rays, middle), back]);
+    }
+
+    /// Returns the gradient of a linear field at a distance along rays.
+    #[inline(always)]
+    fn far_gradient<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32) -> [Lanes<S>; 3] {
+        let level = &self.levels[0];
+        self.gradient(level.slopes(simd, level.place(rays.place(distance))))
     }
 
     /// Returns the rays on which something may be visible in a sheet.
@@ -313,6 +381,8 @@ impl Gather<'_> {
             // A step in the middle of the sheet has equal slopes at both faces.
             let chord = back.face.value - front.face.value;
             most = most.max((chord - (front.along + back.along) * layer.thickness * 0.5).abs());
+        }
+        if self.plan.has_gradients() && !self.has_far_gradient {
             // Gradients are per thickness of a sheet.
             let turn = three!(I => (back.gradient[I] - front.gradient[I]).abs());
             most = most.max(turn[0].max(turn[1]).max(turn[2]));
@@ -537,10 +607,16 @@ impl Gather<'_> {
         let field = &self.plan.field;
         let per_value = field.values.per_value;
         let Point { value, slopes, weight } = self.at(simd, rays, self.plan.planes[plane]);
-        let gradient = self.gradient(slopes);
+        let mut gradient = self.gradient(slopes);
         let along = dot(gradient, rays.direction);
-        let across = three!(I => gradient[I] - along * rays.direction[I]);
-        (last.plane, last.gradient, last.weight) = (plane, gradient, weight);
+        (last.plane, last.weight) = (plane, weight);
+        if !self.has_far_gradient {
+            (last.gradient, last.gradient_plane) = (gradient, plane);
+        } else if self.parts > 1 && self.plan.has_gradients() {
+            gradient = self.far_gradient(simd, rays, self.plan.planes[plane]);
+        }
+        let across = dot(gradient, rays.direction);
+        let across = three!(I => gradient[I] - across * rays.direction[I]);
         last.along = along * (1.0 / field.gradients.length);
         last.face = Face { value: value * per_value, across };
     }
@@ -558,6 +634,15 @@ impl Gather<'_> {
 }
 
 impl<S: Simd> Layer<S> {
+    /// Sets the middle of the parabola by the value in the middle of the sheet, the sum of the
+    /// values at its faces and the difference of the slopes there. The mean is exact for fields of
+    /// the fifth degree (Simpson's rule with slopes).
+    #[inline(always)]
+    fn set_middle(&mut self, inside: Lanes<S>, sum: Lanes<S>, bend: Lanes<S>) {
+        let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
+        self.middle = mean * 1.5 - sum * 0.25;
+    }
+
     /// Sets the gradients at the front, in the middle and at the back. Pixels without a value at
     /// one of these places keep those of the faces.
     #[inline(always)]
