@@ -259,11 +259,7 @@ impl Gather<'_> {
         }
         let is_bent = self.is_bent([&before, last], bend, &layer, mask);
         if self.has_far_gradient {
-            if is_bent {
-                let inside = self.at(simd, rays, 0.5 * (start + stop));
-                layer.set_middle(inside.value * plan.field.values.per_value, sum, bend);
-            }
-            self.set_far_gradient(simd, rays, sheet, mask, last, &mut layer);
+            self.refine_linear(simd, rays, (sheet, is_bent), last, &mut layer);
             return Some((layer, mask));
         }
         if !has_gaps && !is_bent {
@@ -272,48 +268,59 @@ impl Gather<'_> {
         let inside = self.at(simd, rays, 0.5 * (start + stop));
         let sections = [before.gradient, self.gradient(inside.slopes), last.gradient];
         if self.is_blended {
-            let weights = [front_weight, last.weight];
-            let has_field = layer.blend(simd, plan, bend, weights, &inside);
+            let mask = mask & layer.blend(simd, plan, bend, [front_weight, last.weight], &inside);
             layer.set_sections(simd, plan, sections, [front_weight, inside.weight, last.weight]);
-            let mask = mask & has_field;
             layer.weight = mask.select(self.weight(simd, &layer) * pixels.through, none);
             return layer.weight.simd_gt(0.0).any_true().then_some((layer, mask));
         }
-        if plan.has_gradients() {
-            layer.sections = Some(sections);
-        }
-        layer.set_middle(inside.value * plan.field.values.per_value, sum, bend);
+        layer.sections = plan.has_gradients().then_some(sections);
+        // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with
+        // slopes).
+        let inside = inside.value * plan.field.values.per_value;
+        let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
+        layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
     }
 
-    /// Sets the gradients of a sheet of a linear field, in as much detail as its light counts.
+    /// Sets the mean of a sheet of a linear field if it is bent, and the gradients in as much detail
+    /// as the light of the sheet counts.
     #[inline(always)]
-    fn set_far_gradient<S: Simd>(
+    fn refine_linear<S: Simd>(
         &self,
         simd: S,
         rays: &Rays<S>,
-        sheet: usize,
-        mask: mask32x8<S>,
+        (sheet, is_bent): (usize, bool),
         last: &mut Last<S>,
         layer: &mut Layer<S>,
     ) {
-        let planes = &self.plan.planes;
+        let (start, stop) = (self.plan.planes[sheet], self.plan.planes[sheet + 1]);
+        if is_bent || !self.plan.is_integrated {
+            // Kinks may lie anywhere: Simpson's rule in both halves.
+            let mut inside = Lanes::splat(simd, 0.0);
+            for (place, weight) in [(0.25, 4.0), (0.5, 2.0), (0.75, 4.0)] {
+                let value = self.at(simd, rays, (stop - start).mul_add(place, start)).value;
+                inside = value.mul_add(Lanes::splat(simd, weight), inside);
+            }
+            let sum = layer.front.value + layer.back.value;
+            let mean = (sum + inside * self.plan.field.values.per_value) * (1.0 / 12.0);
+            layer.middle = mean * 1.5 - sum * 0.25;
+        }
         if !self.plan.has_gradients() {
             return;
         }
-        let middle = 0.5 * (planes[sheet] + planes[sheet + 1]);
-        if !(mask & layer.weight.simd_gt(FAINT)).any_true() {
-            layer.sections = Some([self.far_gradient(simd, rays, middle); 3]);
+        let middle = self.far_gradient(simd, rays, 0.5 * (start + stop));
+        if !layer.weight.simd_gt(FAINT).any_true() {
+            layer.sections = Some([middle; 3]);
             return;
         }
         let front = if last.gradient_plane == sheet {
             last.gradient
         } else {
-            self.far_gradient(simd, rays, planes[sheet])
+            self.far_gradient(simd, rays, start)
         };
-        let back = self.far_gradient(simd, rays, planes[sheet + 1]);
+        let back = self.far_gradient(simd, rays, stop);
         (last.gradient, last.gradient_plane) = (back, sheet + 1);
-        layer.sections = Some([front, self.far_gradient(simd, rays, middle), back]);
+        layer.sections = Some([front, middle, back]);
     }
 
     /// Returns the gradient of a linear field at a distance along rays.
@@ -634,15 +641,6 @@ impl Gather<'_> {
 }
 
 impl<S: Simd> Layer<S> {
-    /// Sets the middle of the parabola by the value in the middle of the sheet, the sum of the
-    /// values at its faces and the difference of the slopes there. The mean is exact for fields of
-    /// the fifth degree (Simpson's rule with slopes).
-    #[inline(always)]
-    fn set_middle(&mut self, inside: Lanes<S>, sum: Lanes<S>, bend: Lanes<S>) {
-        let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
-        self.middle = mean * 1.5 - sum * 0.25;
-    }
-
     /// Sets the gradients at the front, in the middle and at the back. Pixels without a value at
     /// one of these places keep those of the faces.
     #[inline(always)]

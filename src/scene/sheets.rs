@@ -1,6 +1,6 @@
 //! The sheets of a picture: how thick they are, and along which axis they lie.
 
-use super::{Item, Mode, Scene, Settings};
+use super::{Classification, Item, Mode, Scene, Settings};
 use crate::{
     bricks::Choice,
     cells::Place,
@@ -24,7 +24,7 @@ const MOST_AFAR: f64 = 1e5;
 const LABEL_SHEETS: f64 = 0.5;
 
 /// Thickness of sheets of linear fields, in sample spacings. Their values are cheap, and a line
-/// between two samples bends less than other kernels.
+/// between two samples bends less than other kernels. Half of that if only means are classified.
 const LINEAR_SHEETS: f64 = 2.0;
 
 /// Thickness of sheets of tetrahedra, in typical edges: with values of points, and with values of
@@ -165,7 +165,10 @@ impl Scene {
                     let most: f64 = match kernel.as_tensor() {
                         // A label ends halfway between two samples.
                         _ if volume.is_label_map() => LABEL_SHEETS,
-                        Some(Tensor::Linear) => LINEAR_SHEETS,
+                        Some(Tensor::Linear) => match settings.classification {
+                            Classification::Post => 0.5 * LINEAR_SHEETS,
+                            _ => LINEAR_SHEETS,
+                        },
                         _ if volume.coefficients.is_some() => 2.0 / 3.0,
                         Some(_) => 4.0 / 3.0,
                         None => (4.0f64 / 3.0).min(2.0 / 3.0 * kernel.extent),

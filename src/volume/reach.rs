@@ -21,14 +21,16 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
     ranges_of_steps(volume, radius, finish)
 }
 
-/// Returns for each sample what `combine` makes of two such ranges: that of the samples next to it,
-/// and that of the samples up to two steps away. The second follows from the first.
+/// Returns for each sample what `combine` makes of two such ranges: those of the samples next to it,
+/// and of the samples up to two steps away. The second follow from the first. `combine` takes the
+/// first, and replaces the second by the result. In all of them, the second number is 255 minus the
+/// largest value.
 ///
 /// # Panics
 /// If the samples do not fill the lattice.
 pub fn near_and_far_ranges(
     volume: &Volume,
-    combine: impl Fn([u8; 2], [u8; 2]) -> [u8; 2] + Sync,
+    combine: impl Fn(&[[u8; 2]], &mut [[u8; 2]]) + Sync,
 ) -> Vec<[u8; 2]> {
     let dims = volume.lattice.dims;
     let near = ranges_of_steps(volume, [1; 3], |_, _| ());
@@ -36,9 +38,8 @@ pub fn near_and_far_ranges(
         out.copy_from_slice(&near[row * dims[0]..][..dims[0]]);
     };
     let finish = |first: usize, out: &mut [[u8; 2]]| {
-        for (range, near) in out.iter_mut().zip(&near[first..]) {
-            *range = combine(turned(*near), turned(*range));
-        }
+        combine(&near[first..][..out.len()], out);
+        out.iter_mut().for_each(|range| *range = turned(*range));
     };
     boxes(dims, [1; 3], fill, finish)
 }
@@ -56,7 +57,7 @@ fn ranges_of_steps(
 }
 
 /// Returns a range with 255 minus its second number in place of that number.
-fn turned([low, high]: [u8; 2]) -> [u8; 2] {
+pub fn turned([low, high]: [u8; 2]) -> [u8; 2] {
     [low, 255 - high]
 }
 
@@ -228,8 +229,8 @@ mod tests {
         for _ in 0..100 {
             let volume = random_volume(&mut random);
             let [near, far] = [1, 2].map(|radius| neighbourhood_ranges(&volume, [radius; 3]));
-            assert_eq!(near_and_far_ranges(&volume, |near, _| near), near);
-            assert_eq!(near_and_far_ranges(&volume, |_, far| far), far);
+            assert_eq!(near_and_far_ranges(&volume, |near, out| out.copy_from_slice(near)), near);
+            assert_eq!(near_and_far_ranges(&volume, |_, _| ()), far);
         }
     }
 
