@@ -15,7 +15,7 @@ use crate::{
     Result,
     bricks::{Bricks, Choice},
     hierarchy::Detail,
-    math::{Bounds, Kernel, Pose, Sheets, View},
+    math::{Bounds, Kernel, Pose, Sheets, Tensor, View},
     plan::{
         gathering,
         visible::{self, VisibleBlocks},
@@ -228,7 +228,20 @@ impl FieldState {
         let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
         let (is_blended, zero) = (self.blend.is_some(), zero as f32);
         let is_label_map = self.item.is_label_map();
-        Some(Gather { plan, levels, parts, ends, lookups, is_blended, is_label_map, visible, zero })
+        let kernel = self.item.kernel().and_then(Kernel::as_tensor);
+        let has_far_gradient = kernel == Some(Tensor::Linear);
+        Some(Gather {
+            plan,
+            levels,
+            parts,
+            ends,
+            lookups,
+            is_blended,
+            is_label_map,
+            has_far_gradient,
+            visible,
+            zero,
+        })
     }
 
     /// Returns a volume in memory as the only level. Values are relative to `zero`.

@@ -24,6 +24,10 @@ const STRAIGHT: f32 = 1.0;
 /// If they differ by more entries, a sheet takes one more sample however little light it takes.
 const BENT: f32 = 1024.0;
 
+/// The gradient in the middle stands for a sheet of a linear field that takes a smaller share of
+/// the light than this.
+const FAINT: f32 = 0.05;
+
 /// Returns why a volume can't be gathered, whatever the settings.
 pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
     Way::of(volume, kernel).err()
@@ -47,6 +51,9 @@ pub struct Gather<'a> {
     pub is_blended: bool,
     /// The values are labels.
     pub is_label_map: bool,
+    /// The gradient takes more samples than the value, so it is evaluated only where it counts: the
+    /// kernel is linear.
+    pub has_far_gradient: bool,
     pub visible: &'a Visible,
     /// The value that values are relative to.
     pub zero: f32,
@@ -103,6 +110,22 @@ impl Level<'_> {
             },
         )
     }
+
+    /// Returns the slopes of a linear field at places in steps of the level.
+    #[inline(always)]
+    fn slopes<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        simd.vectorize(
+            #[inline(always)]
+            || match &self.field {
+                Typed::U8(field) => field.slopes(simd, place),
+                Typed::U16(field) => field.slopes(simd, place),
+                Typed::I16(field) => field.slopes(simd, place),
+                Typed::I32(field) => field.slopes(simd, place),
+                Typed::F32(field) => field.slopes(simd, place),
+                Typed::Blend(_) => unreachable!("linear fields are not blended"),
+            },
+        )
+    }
 }
 
 /// Two places in a part of a sheet whose average is the part's mean: exact for fields of the third
@@ -123,8 +146,10 @@ const LOOKED_UP: usize = 8;
 pub struct Last<S: Simd> {
     plane: usize,
     face: Face<S>,
-    /// The gradient in view space, in entries per thickness of a sheet.
+    /// The gradient in view space, in entries per thickness of a sheet, at the plane where it was
+    /// evaluated.
     gradient: [Lanes<S>; 3],
+    gradient_plane: usize,
     along: Lanes<S>,
     weight: Lanes<S>,
     /// The first of the looked-up sheets, and for each sheet a bit for each ray on which something
@@ -142,6 +167,7 @@ impl<S: Simd> Last<S> {
             plane: usize::MAX,
             face,
             gradient: [none; 3],
+            gradient_plane: usize::MAX,
             along: none,
             weight: none,
             first: usize::MAX - LOOKED_UP,
@@ -231,28 +257,77 @@ impl Gather<'_> {
         if !has_gaps && !layer.weight.simd_gt(0.0).any_true() {
             return None;
         }
-        if !has_gaps && !self.is_bent([&before, last], bend, &layer, mask) {
+        let is_bent = self.is_bent([&before, last], bend, &layer, mask);
+        if self.has_far_gradient {
+            self.refine_linear(simd, rays, (sheet, is_bent), last, &mut layer);
+            return Some((layer, mask));
+        }
+        if !has_gaps && !is_bent {
             return Some((layer, mask));
         }
         let inside = self.at(simd, rays, 0.5 * (start + stop));
         let sections = [before.gradient, self.gradient(inside.slopes), last.gradient];
         if self.is_blended {
-            let weights = [front_weight, last.weight];
-            let has_field = layer.blend(simd, plan, bend, weights, &inside);
+            let mask = mask & layer.blend(simd, plan, bend, [front_weight, last.weight], &inside);
             layer.set_sections(simd, plan, sections, [front_weight, inside.weight, last.weight]);
-            let mask = mask & has_field;
             layer.weight = mask.select(self.weight(simd, &layer) * pixels.through, none);
             return layer.weight.simd_gt(0.0).any_true().then_some((layer, mask));
         }
-        if plan.has_gradients() {
-            layer.sections = Some(sections);
-        }
+        layer.sections = plan.has_gradients().then_some(sections);
         // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with
         // slopes).
         let inside = inside.value * plan.field.values.per_value;
         let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
         layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
+    }
+
+    /// Sets the mean of a sheet of a linear field if it is bent, and the gradients in as much detail
+    /// as the light of the sheet counts.
+    #[inline(always)]
+    fn refine_linear<S: Simd>(
+        &self,
+        simd: S,
+        rays: &Rays<S>,
+        (sheet, is_bent): (usize, bool),
+        last: &mut Last<S>,
+        layer: &mut Layer<S>,
+    ) {
+        let (start, stop) = (self.plan.planes[sheet], self.plan.planes[sheet + 1]);
+        if is_bent || !self.plan.is_integrated {
+            // Kinks may lie anywhere: Simpson's rule in both halves.
+            let mut inside = Lanes::splat(simd, 0.0);
+            for (place, weight) in [(0.25, 4.0), (0.5, 2.0), (0.75, 4.0)] {
+                let value = self.at(simd, rays, (stop - start).mul_add(place, start)).value;
+                inside = value.mul_add(Lanes::splat(simd, weight), inside);
+            }
+            let sum = layer.front.value + layer.back.value;
+            let mean = (sum + inside * self.plan.field.values.per_value) * (1.0 / 12.0);
+            layer.middle = mean * 1.5 - sum * 0.25;
+        }
+        if !self.plan.has_gradients() {
+            return;
+        }
+        let middle = self.far_gradient(simd, rays, 0.5 * (start + stop));
+        if !layer.weight.simd_gt(FAINT).any_true() {
+            layer.sections = Some([middle; 3]);
+            return;
+        }
+        let front = if last.gradient_plane == sheet {
+            last.gradient
+        } else {
+            self.far_gradient(simd, rays, start)
+        };
+        let back = self.far_gradient(simd, rays, stop);
+        (last.gradient, last.gradient_plane) = (back, sheet + 1);
+        layer.sections = Some([front, middle, back]);
+    }
+
+    /// Returns the gradient of a linear field at a distance along rays.
+    #[inline(always)]
+    fn far_gradient<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32) -> [Lanes<S>; 3] {
+        let level = &self.levels[0];
+        self.gradient(level.slopes(simd, level.place(rays.place(distance))))
     }
 
     /// Returns the rays on which something may be visible in a sheet.
@@ -313,6 +388,8 @@ impl Gather<'_> {
             // A step in the middle of the sheet has equal slopes at both faces.
             let chord = back.face.value - front.face.value;
             most = most.max((chord - (front.along + back.along) * layer.thickness * 0.5).abs());
+        }
+        if self.plan.has_gradients() && !self.has_far_gradient {
             // Gradients are per thickness of a sheet.
             let turn = three!(I => (back.gradient[I] - front.gradient[I]).abs());
             most = most.max(turn[0].max(turn[1]).max(turn[2]));
@@ -537,10 +614,16 @@ impl Gather<'_> {
         let field = &self.plan.field;
         let per_value = field.values.per_value;
         let Point { value, slopes, weight } = self.at(simd, rays, self.plan.planes[plane]);
-        let gradient = self.gradient(slopes);
+        let mut gradient = self.gradient(slopes);
         let along = dot(gradient, rays.direction);
-        let across = three!(I => gradient[I] - along * rays.direction[I]);
-        (last.plane, last.gradient, last.weight) = (plane, gradient, weight);
+        (last.plane, last.weight) = (plane, weight);
+        if !self.has_far_gradient {
+            (last.gradient, last.gradient_plane) = (gradient, plane);
+        } else if self.parts > 1 && self.plan.has_gradients() {
+            gradient = self.far_gradient(simd, rays, self.plan.planes[plane]);
+        }
+        let across = dot(gradient, rays.direction);
+        let across = three!(I => gradient[I] - across * rays.direction[I]);
         last.along = along * (1.0 / field.gradients.length);
         last.face = Face { value: value * per_value, across };
     }

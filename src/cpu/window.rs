@@ -56,11 +56,19 @@ impl<S: Simd> Weights<S> {
     }
 }
 
+/// Four weights of an axis, which add up to 1, and their slopes, which add up to 0.
+pub struct Taps<S: Simd> {
+    pub weights: [Lanes<S>; 4],
+    pub slopes: [Lanes<S>; 4],
+}
+
 /// A sample type, and how to load vectors of it.
 pub trait Sample: Copy + Send + Sync {
     /// The weights of four samples in a row, and those of the first moment, as [`Sample::row`]
     /// takes them.
     type Row<S: Simd>: Copy;
+    /// The weights of four samples in a row and their slopes, as [`Sample::tapped`] takes them.
+    type Tapped<S: Simd>: Copy;
     /// The factor that the sums of rows must be multiplied by.
     const UNIT: f32;
     /// The zero of small integers. Their sums are exact, so that any other zero can be subtracted
@@ -78,6 +86,18 @@ pub trait Sample: Copy + Send + Sync {
         row: usize,
         slice: usize,
         weights: &Self::Row<S>,
+        zero: f32,
+    ) -> [Lanes<S>; 2];
+
+    /// Prepares weights and slopes for rows.
+    fn tap<S: Simd>(simd: S, taps: &Taps<S>) -> Self::Tapped<S>;
+
+    /// Returns the weighted sum of a row of a slice and its slope, as [`Sample::row`] does.
+    fn tapped<S: Simd>(
+        simd: S,
+        window: &Window<Self, 4>,
+        row: [usize; 2],
+        taps: &Self::Tapped<S>,
         zero: f32,
     ) -> [Lanes<S>; 2];
 
@@ -114,15 +134,22 @@ pub fn row_of<S: Simd>(
     [weights[1].mul_add(four[1], before) + (after + second), after - before + second * 2.0]
 }
 
+/// Returns the weighted sum of four samples.
+#[inline(always)]
+pub fn of_four<S: Simd>(weights: &[Lanes<S>; 4], samples: &[Lanes<S>; 4]) -> Lanes<S> {
+    let pairs = [weights[0] * samples[0], weights[1] * samples[1]];
+    weights[2].mul_add(samples[2], pairs[0]) + weights[3].mul_add(samples[3], pairs[1])
+}
+
 /// Weights of small integers are multiples of 1/16384: the sum of two products of 16-bit numbers
 /// fits 32 bits.
 const PARTS: f32 = 16384.0;
 
-/// Weights of two pairs of samples for each lane, and those of the first moment.
+/// Weights of two pairs of samples for each lane, and those of the first moment or the slopes.
 #[derive(Clone, Copy)]
 pub struct Pairs<S: Simd> {
     value: [i16x16<S>; 2],
-    moment: [i16x16<S>; 2],
+    second: [i16x16<S>; 2],
 }
 
 impl<S: Simd> Pairs<S> {
@@ -138,13 +165,30 @@ impl<S: Simd> Pairs<S> {
         let values = [before, none + PARTS as i32 - before - after - second, after, second];
         let moments = [none - before, none, after, second + second];
         weights.moment = Lanes::float_from(moments[0] + moments[2] + moments[3]) * (1.0 / PARTS);
-        let pair = each!([0, 1], I => [values, moments][I]);
-        let [value, moment] = each!([0, 1], I => {
-            let parts = pair[I];
-            each!([0, 2], K => ((parts[order[K]] & 0xffff) | (parts[order[K + 1]] << 16))
+        Self::packed([values, moments], order)
+    }
+
+    /// Rounds weights and slopes so that the weights still add up to 1 and the slopes to 0.
+    #[inline(always)]
+    fn of_taps(taps: &Taps<S>, order: [usize; 4]) -> Self {
+        let parts = each!([0, 1], I => {
+            let [before, _, after, second] = four!(K => {
+                let parts = [taps.weights[K], taps.slopes[K]][I] * PARTS;
+                i32x8::<S>::truncate_from((parts + 0.5).floor())
+            });
+            let here = before * -1 + PARTS as i32 * (1 - I as i32) - after - second;
+            [before, here, after, second]
+        });
+        Self::packed(parts, order)
+    }
+
+    #[inline(always)]
+    fn packed(parts: [[i32x8<S>; 4]; 2], order: [usize; 4]) -> Self {
+        let [value, second] = each!([0, 1], I => {
+            each!([0, 2], K => ((parts[I][order[K]] & 0xffff) | (parts[I][order[K + 1]] << 16))
                 .bitcast::<i16x16<S>>())
         });
-        Self { value, moment }
+        Self { value, second }
     }
 
     /// Returns the sums of two pairs of samples for each lane.
@@ -152,16 +196,33 @@ impl<S: Simd> Pairs<S> {
     fn sums(&self, pairs: [u32x8<S>; 2]) -> [Lanes<S>; 2] {
         let [a, b] = each!([0, 1], I => pairs[I].bitcast::<i16x16<S>>());
         let value = a.pairwise_dot_product(self.value[0]) + b.pairwise_dot_product(self.value[1]);
-        let moment =
-            a.pairwise_dot_product(self.moment[0]) + b.pairwise_dot_product(self.moment[1]);
-        [Lanes::float_from(value), Lanes::float_from(moment)]
+        let second =
+            a.pairwise_dot_product(self.second[0]) + b.pairwise_dot_product(self.second[1]);
+        [Lanes::float_from(value), Lanes::float_from(second)]
     }
 }
 
 impl Sample for u8 {
     type Row<S: Simd> = Pairs<S>;
+    type Tapped<S: Simd> = Pairs<S>;
     const UNIT: f32 = 1.0 / PARTS;
     const ZERO: Option<f32> = Some(0.0);
+
+    #[inline(always)]
+    fn tap<S: Simd>(_: S, taps: &Taps<S>) -> Pairs<S> {
+        Pairs::of_taps(taps, [0, 2, 1, 3])
+    }
+
+    #[inline(always)]
+    fn tapped<S: Simd>(
+        simd: S,
+        window: &Window<Self, 4>,
+        [row, slice]: [usize; 2],
+        taps: &Pairs<S>,
+        zero: f32,
+    ) -> [Lanes<S>; 2] {
+        Self::row(simd, window, row, slice, taps, zero)
+    }
 
     #[inline(always)]
     fn weigh<S: Simd>(simd: S, weights: &mut Weights<S>) -> Pairs<S> {
@@ -217,8 +278,25 @@ macro_rules! two_bytes {
     ($sample:ty, $turned:expr, $zero:expr, $word:ident => $first:expr, $second:expr) => {
         impl Sample for $sample {
             type Row<S: Simd> = Pairs<S>;
+            type Tapped<S: Simd> = Pairs<S>;
             const UNIT: f32 = 1.0 / PARTS;
             const ZERO: Option<f32> = Some($zero);
+
+            #[inline(always)]
+            fn tap<S: Simd>(_: S, taps: &Taps<S>) -> Pairs<S> {
+                Pairs::of_taps(taps, [0, 1, 2, 3])
+            }
+
+            #[inline(always)]
+            fn tapped<S: Simd>(
+                simd: S,
+                window: &Window<Self, 4>,
+                [row, slice]: [usize; 2],
+                taps: &Pairs<S>,
+                zero: f32,
+            ) -> [Lanes<S>; 2] {
+                Self::row(simd, window, row, slice, taps, zero)
+            }
 
             #[inline(always)]
             fn weigh<S: Simd>(simd: S, weights: &mut Weights<S>) -> Pairs<S> {
@@ -287,8 +365,29 @@ fn in_word<T: Into<i32> + Copy>(samples: [T; 2]) -> u32 {
 macro_rules! rows_of_floats {
     () => {
         type Row<S: Simd> = [Lanes<S>; 4];
+        type Tapped<S: Simd> = [[Lanes<S>; 4]; 2];
         const UNIT: f32 = 1.0;
         const ZERO: Option<f32> = None;
+
+        #[inline(always)]
+        fn tap<S: Simd>(_: S, taps: &Taps<S>) -> [[Lanes<S>; 4]; 2] {
+            [taps.weights, taps.slopes]
+        }
+
+        #[inline(always)]
+        fn tapped<S: Simd>(
+            simd: S,
+            window: &Window<Self, 4>,
+            [row, slice]: [usize; 2],
+            taps: &[[Lanes<S>; 4]; 2],
+            zero: f32,
+        ) -> [Lanes<S>; 2] {
+            let mut samples = Self::four(simd, window, [0, row, slice]);
+            if zero != 0.0 {
+                samples = four!(I => samples[I] - zero);
+            }
+            each!([0, 1], I => of_four(&taps[I], &samples))
+        }
 
         #[inline(always)]
         fn weigh<S: Simd>(_: S, weights: &mut Weights<S>) -> [Lanes<S>; 4] {

@@ -318,18 +318,18 @@ impl Tensor {
         }
     }
 
-    /// Returns the derivative of the function at x steps from the sample. At a kink, it is that of
-    /// the side of larger x.
+    /// Returns the slope of the function at x steps from the sample: its derivative. That of the
+    /// linear kernel jumps at every sample. Its slope is half the difference of the values a step
+    /// before and a step behind, which is continuous and reaches a step farther.
     pub fn slope(self, x: f64) -> f64 {
         let (r, sign) = (x.abs(), 1f64.copysign(x));
         match self {
-            Self::Linear if (0.0..1.0).contains(&x) => -1.0,
-            Self::Linear if (-1.0..0.0).contains(&x) => 1.0,
+            Self::Linear => 0.5 * (self.value(x + 1.0) - self.value(x - 1.0)),
             Self::CatmullRom if r < 1.0 => sign * (4.5 * r - 5.0) * r,
             Self::CatmullRom if r < 2.0 => sign * ((5.0 - 1.5 * r) * r - 4.0),
             Self::CubicBSpline if r < 1.0 => sign * (1.5 * r - 2.0) * r,
             Self::CubicBSpline if r < 2.0 => sign * -0.5 * (2.0 - r).powi(2),
-            Self::Linear | Self::CatmullRom | Self::CubicBSpline => 0.0,
+            Self::CatmullRom | Self::CubicBSpline => 0.0,
         }
     }
 
@@ -353,6 +353,15 @@ impl Tensor {
             .map(|row| row.map(|factor| factor / 6.0)),
         }
     }
+
+    /// Returns the slopes of the same weights ([`slope`](Self::slope)): for each sample, the
+    /// factors of 1, t and t².
+    pub fn slope_polynomials(self) -> [[f64; 3]; 4] {
+        if self == Self::Linear {
+            return [[-0.5, 0.5, 0.0], [0.0, -0.5, 0.0], [0.5, -0.5, 0.0], [0.0, 0.5, 0.0]];
+        }
+        self.polynomials().map(|[_, b, c, d]| [b, 2.0 * c, 3.0 * d])
+    }
 }
 
 #[cfg(test)]
@@ -374,13 +383,18 @@ mod tests {
                 for (weight, value) in weights.iter().zip(by_value) {
                     assert!((weight - value).abs() < 1e-15, "{tensor:?} at {t}: {weight} {value}");
                 }
+                let slopes = tensor.slope_polynomials().map(|[a, b, c]| (c * t + b) * t + a);
+                let by_place = [t + 1.0, t, t - 1.0, t - 2.0].map(|x| tensor.slope(x));
+                for (slope, expected) in slopes.iter().zip(by_place) {
+                    assert!((slope - expected).abs() < 1e-15, "{tensor:?} at {t}: {slopes:?}");
+                }
                 assert!(
                     weights.iter().map(|weight| weight.abs()).sum::<f64>().powi(3)
                         <= tensor.lebesgue() + 1e-12
                 );
             }
             for x in [-2.3, -1.7, -1.2, -0.6, -0.1, 0.2, 0.5, 0.9, 1.1, 1.8, 2.1] {
-                let step = 1e-6;
+                let step = if tensor == Tensor::Linear { 1.0 } else { 1e-6 };
                 let expected = (tensor.value(x + step) - tensor.value(x - step)) / (2.0 * step);
                 assert!((tensor.slope(x) - expected).abs() < 1e-8, "{tensor:?} at {x}: {expected}");
             }

@@ -2,9 +2,12 @@
 
 use super::{TILE, weighting::deviation};
 use crate::{
-    math::{Bounds, Kernel, Sheets, View},
+    math::{Bounds, Kernel, Sheets, Tensor, View},
     parallel::{self, prelude::*},
-    volume::{Lattice, Volume, reach::neighbourhood_ranges},
+    volume::{
+        Arrangement, Lattice, Volume,
+        reach::{near_and_far_ranges, neighbourhood_ranges, turned},
+    },
 };
 use glam::{DMat3, DVec3};
 
@@ -33,13 +36,59 @@ struct Cube {
 /// The bits of 2 × 2 × 2 cells in a word.
 const QUARTER: u32 = 0x0033_0033;
 
-/// The widest Gaussian, in steps, for which `FAR_WEIGHT` holds.
+/// The widest Gaussian, in steps, for which [`Shares::GAUSSIAN`] holds.
 const WIDEST: f64 = 0.6;
 
-/// The share of a Gaussian's weight that samples two steps from the nearest one have in total. It
-/// allows for places up to a third of a step further away. For the usual kernel it is 0.085 at half
-/// a step.
-const FAR_WEIGHT: f64 = 0.15;
+/// What the samples around a sample count at most in the field at the places nearest to it, in
+/// hundredths. It allows for places up to a third of a step further away along one axis.
+#[derive(Debug, Clone, Copy)]
+struct Shares {
+    /// The sum of the magnitudes of the weights of samples two steps from the sample.
+    far: u16,
+    /// The sum of those of the negative weights of the samples next to it.
+    negative: u16,
+}
+
+impl Shares {
+    /// Those of the usual kernel. At half a step the far samples have a weight of 0.085.
+    const GAUSSIAN: Self = Self { far: 15, negative: 0 };
+    const CUBIC_B_SPLINE: Self = Self { far: 14, negative: 0 };
+    const CATMULL_ROM: Self = Self { far: 30, negative: 28 };
+
+    /// Returns those of a kernel of which only samples up to two steps away count, if they are known.
+    fn of(kernel: &Kernel) -> Option<Self> {
+        match kernel.as_tensor() {
+            Some(Tensor::Linear) => None,
+            Some(Tensor::CatmullRom) => Some(Self::CATMULL_ROM),
+            Some(Tensor::CubicBSpline) => Some(Self::CUBIC_B_SPLINE),
+            None => deviation(kernel).filter(|&sigma| sigma <= WIDEST).map(|_| Self::GAUSSIAN),
+        }
+    }
+
+    /// Replaces the ranges of the samples up to two steps away by those of the field, with the
+    /// ranges of the samples next to a sample ([`near_and_far_ranges`]).
+    fn narrow(self, near: &[[u8; 2]], far: &mut [[u8; 2]]) {
+        let share = |number: u16, hundredths: u16| (number * hundredths).div_ceil(100);
+        if self.negative == 0 {
+            // Both ends in the same way: vector instructions do many at once.
+            for (out, near) in far.as_flattened_mut().iter_mut().zip(near.as_flattened()) {
+                let beyond = near.saturating_sub(*out);
+                *out = near - share(beyond.into(), self.far) as u8;
+            }
+            return;
+        }
+        for (out, near) in far.iter_mut().zip(near) {
+            let [low, high] = turned(*near).map(u16::from);
+            let [lowest, highest] = turned(*out).map(u16::from);
+            // A negative weight moves the field away from its sample.
+            let below = (low - lowest).max(highest - low);
+            let above = (highest - high).max(high - lowest);
+            let wider = |beyond: u16| share(beyond, self.far) + share(high - low, self.negative);
+            let range = [low.saturating_sub(wider(below)), (high + wider(above)).min(255)];
+            *out = turned(range.map(|number| number as u8));
+        }
+    }
+}
 
 /// Returns, for each sample of a volume, the range of the field at the places nearest to that
 /// sample. The samples next to it have nearly all the weight; those two steps away move the field
@@ -49,18 +98,11 @@ pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
         // A lookup may miss the nearest sample by one.
         return neighbourhood_ranges(volume, [1; 3]);
     }
-    let mut ranges = volume.drawn_ranges(kernel).into_owned();
-    if deviation(kernel).is_some_and(|sigma| sigma <= WIDEST) && volume.coefficients.is_none() {
-        let near = neighbourhood_ranges(volume, [1; 3]);
-        let shares: [u8; 256] =
-            std::array::from_fn(|difference| (difference as f64 * FAR_WEIGHT).ceil() as u8);
-        let share = |difference: u8| shares[usize::from(difference)];
-        ranges.par_iter_mut().zip(near).for_each(|([low, high], [near_low, near_high])| {
-            *low = near_low - share(near_low - *low);
-            *high = near_high + share(*high - near_high);
-        });
+    let reaches_two = volume.lattice.arrangement == Arrangement::Cartesian && kernel.extent > 1.0;
+    match Shares::of(kernel).filter(|_| reaches_two && volume.coefficients.is_none()) {
+        Some(shares) => near_and_far_ranges(volume, |near, far| shares.narrow(near, far)),
+        None => volume.drawn_ranges(kernel).into_owned(),
     }
-    ranges
 }
 
 impl VisibleBlocks {
@@ -210,6 +252,47 @@ pub fn bit_of([x, y, z]: [usize; 3]) -> (usize, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Returns the shares of a tensor product at places in steps from a sample, as [`Shares`] has
+    /// them.
+    fn shares(tensor: Tensor, place: [f64; 3]) -> [f64; 2] {
+        let (mut far, mut negative) = (0.0, 0.0);
+        for tap in 0..125 {
+            let steps: [i32; 3] = [tap % 5 - 2, tap / 5 % 5 - 2, tap / 25 - 2];
+            let weight: f64 =
+                (0..3).map(|axis| tensor.value(place[axis] - f64::from(steps[axis]))).product();
+            if steps.iter().any(|step| step.abs() == 2) {
+                far += weight.abs();
+            } else {
+                negative -= weight.min(0.0);
+            }
+        }
+        [far * 100.0, negative * 100.0]
+    }
+
+    #[test]
+    fn shares_hold_for_the_places_nearest_to_a_sample() {
+        let kernels = [
+            (Tensor::CatmullRom, Shares::CATMULL_ROM),
+            (Tensor::CubicBSpline, Shares::CUBIC_B_SPLINE),
+        ];
+        for (tensor, most) in kernels {
+            let mut largest = [0.0f64; 2];
+            for x in 0..=10 {
+                for y in 0..=6 {
+                    for z in 0..=6 {
+                        let place = [x, y, z].map(|step| f64::from(step) / 12.0);
+                        let shares = shares(tensor, place);
+                        largest = [0, 1].map(|i| largest[i].max(shares[i]));
+                    }
+                }
+            }
+            let most = [most.far, most.negative].map(f64::from);
+            for (largest, most) in largest.into_iter().zip(most) {
+                assert!(most - 1.0 < largest && largest <= most, "{tensor:?}: {largest} {most}");
+            }
+        }
+    }
 
     #[test]
     fn bits_are_in_blocks() {

@@ -59,6 +59,10 @@
 //! endlessly. (On an axis with one sample, all of them equal that sample.) Such a field is
 //! classified after interpolation.
 //!
+//! The gradient of a linear field jumps at every sample. In its place stands the difference of the
+//! field one step before and one step behind along each axis, over two steps: t′(p) is (t(p + 1) −
+//! t(p − 1))/2.
+//!
 //! **Label maps** ([`Volume::with_labels`](crate::volume::Volume::with_labels)). A sheet has the
 //! label of the sample that is nearest to the middle of what the ray keeps of it. The label is
 //! classified as it is. Light follows the gradient of the label's mask Σ w·m/Σ w, with w =

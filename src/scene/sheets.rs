@@ -1,6 +1,6 @@
 //! The sheets of a picture: how thick they are, and along which axis they lie.
 
-use super::{Item, Mode, Scene, Settings};
+use super::{Classification, Item, Mode, Scene, Settings};
 use crate::{
     bricks::Choice,
     cells::Place,
@@ -22,6 +22,10 @@ const MOST_AFAR: f64 = 1e5;
 
 /// Thickness of sheets of label maps, in sample spacings: a sheet has the label of its middle.
 const LABEL_SHEETS: f64 = 0.5;
+
+/// Thickness of sheets of linear fields, in sample spacings. Their values are cheap, and a line
+/// between two samples bends less than other kernels. Half of that if only means are classified.
+const LINEAR_SHEETS: f64 = 2.0;
 
 /// Thickness of sheets of tetrahedra, in typical edges: with values of points, and with values of
 /// tetrahedra, which do not mix in a sheet.
@@ -90,9 +94,9 @@ impl Scene {
     /// Returns the sheets of a picture of this scene. Unless [`Settings::sheet_thickness`] is set,
     /// their thickness follows from the items:
     ///
-    /// - Volumes: 4/3 of the sample spacing, and at most 2/3 of the kernel's extent. A kernel of
-    ///   extent 2 meets at most four sheets. Sheets are half as thick if the field passes through
-    ///   the samples, and half a spacing thick if the kernel is linear.
+    /// - Volumes: 4/3 of the sample spacing, and at most 2/3 of the extent of a radial kernel. A
+    ///   kernel of extent 2 meets at most four sheets. Sheets are half as thick if the volume is
+    ///   sharp, and two spacings thick if the kernel is linear.
     /// - Cells: half a typical edge, and a fifth if each has one value.
     /// - Surfaces: a few pixels.
     /// - Several of these: the finest of them.
@@ -161,14 +165,15 @@ impl Scene {
                     let most: f64 = match kernel.as_tensor() {
                         // A label ends halfway between two samples.
                         _ if volume.is_label_map() => LABEL_SHEETS,
-                        // The field has a kink at every plane of samples.
-                        Some(Tensor::Linear) => 0.5,
-                        Some(Tensor::CatmullRom) => 2.0 / 3.0,
+                        Some(Tensor::Linear) => match settings.classification {
+                            Classification::Post => 0.5 * LINEAR_SHEETS,
+                            _ => LINEAR_SHEETS,
+                        },
                         _ if volume.coefficients.is_some() => 2.0 / 3.0,
-                        _ => 4.0 / 3.0,
+                        Some(_) => 4.0 / 3.0,
+                        None => (4.0f64 / 3.0).min(2.0 / 3.0 * kernel.extent),
                     };
-                    let step =
-                        most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
+                    let step = most * volume.lattice.kernel_spacing();
                     // If the lattice's steps differ much in length, sheets stay thin enough to be
                     // gathered.
                     let step = step.min(MOST_GATHERED * volume.lattice.least_kernel_spacing());

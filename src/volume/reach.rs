@@ -17,11 +17,61 @@ use crate::parallel::{self, prelude::*};
 /// # Panics
 /// If the samples do not fill the lattice.
 pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]> {
-    let [nx, ny, nz] = volume.lattice.dims;
+    let finish = |_, out: &mut [[u8; 2]]| out.iter_mut().for_each(|range| *range = turned(*range));
+    ranges_of_steps(volume, radius, finish)
+}
+
+/// Returns for each sample what `combine` makes of two such ranges: those of the samples next to it,
+/// and of the samples up to two steps away. The second follow from the first. `combine` takes the
+/// first, and replaces the second by the result. In all of them, the second number is 255 minus the
+/// largest value.
+///
+/// # Panics
+/// If the samples do not fill the lattice.
+pub fn near_and_far_ranges(
+    volume: &Volume,
+    combine: impl Fn(&[[u8; 2]], &mut [[u8; 2]]) + Sync,
+) -> Vec<[u8; 2]> {
+    let dims = volume.lattice.dims;
+    let near = ranges_of_steps(volume, [1; 3], |_, _| ());
+    let fill = |row: usize, out: &mut [[u8; 2]]| {
+        out.copy_from_slice(&near[row * dims[0]..][..dims[0]]);
+    };
+    let finish = |first: usize, out: &mut [[u8; 2]]| {
+        combine(&near[first..][..out.len()], out);
+        out.iter_mut().for_each(|range| *range = turned(*range));
+    };
+    boxes(dims, [1; 3], fill, finish)
+}
+
+/// Returns the ranges around the samples of a volume after `finish`: see [`boxes`].
+fn ranges_of_steps(
+    volume: &Volume,
+    radius: [usize; 3],
+    finish: impl Fn(usize, &mut [[u8; 2]]) + Sync,
+) -> Vec<[u8; 2]> {
     let steps = Steps::new(volume.samples.scalar(), volume.range);
-    let samples = volume.samples.bytes();
+    let (samples, count) = (volume.samples.bytes(), volume.lattice.dims[0]);
+    let fill = |row: usize, out: &mut [[u8; 2]]| steps.write(steps.from(samples, row * count), out);
+    boxes(volume.lattice.dims, radius, fill, finish)
+}
+
+/// Returns a range with 255 minus its second number in place of that number.
+pub fn turned([low, high]: [u8; 2]) -> [u8; 2] {
+    [low, 255 - high]
+}
+
+/// Returns the smallest pairs of bytes in the boxes around samples. `fill` writes those of a row.
+/// `finish` changes a slice of the result; the number of its first sample comes with it.
+fn boxes(
+    dims: [usize; 3],
+    radius: [usize; 3],
+    fill: impl Fn(usize, &mut [[u8; 2]]) + Sync,
+    finish: impl Fn(usize, &mut [[u8; 2]]) + Sync,
+) -> Vec<[u8; 2]> {
+    let [nx, ny, nz] = dims;
     let slice = nx * ny;
-    let reach = |axis: usize| radius[axis].min(volume.lattice.dims[axis].saturating_sub(1));
+    let reach = |axis: usize| radius[axis].min(dims[axis].saturating_sub(1));
     let (rx, ry, rz) = (reach(0), reach(1), reach(2));
     // Every slab recomputes the slices that reach into it, so slabs are thick compared with the
     // radius.
@@ -38,7 +88,7 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
             let around = k.saturating_sub(rz)..(k + rz + 1).min(nz);
             while next < around.end {
                 for (j, out) in scratch.chunks_mut(nx).enumerate() {
-                    steps.write(steps.from(samples, (next * ny + j) * nx), &mut row);
+                    fill(next * ny + j, &mut row);
                     out.copy_from_slice(&row);
                     for shift in 1..=rx {
                         smaller(&mut out[..nx - shift], &row[shift..]);
@@ -58,9 +108,7 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
             for other in around {
                 smaller(out, &ring[other % ring.len()]);
             }
-            for [_, highest] in out {
-                *highest = 255 - *highest;
-            }
+            finish(k * slice, out);
         }
     });
     ranges
@@ -172,6 +220,17 @@ mod tests {
                     volume.lattice.dims
                 );
             }
+        }
+    }
+
+    #[test]
+    fn far_ranges_follow_from_near_ones() {
+        let mut random = Random(11);
+        for _ in 0..100 {
+            let volume = random_volume(&mut random);
+            let [near, far] = [1, 2].map(|radius| neighbourhood_ranges(&volume, [radius; 3]));
+            assert_eq!(near_and_far_ranges(&volume, |near, out| out.copy_from_slice(near)), near);
+            assert_eq!(near_and_far_ranges(&volume, |_, _| ()), far);
         }
     }
 

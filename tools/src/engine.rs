@@ -88,8 +88,7 @@ pub struct EngineFlags {
     )]
     eye_dome: Option<f64>,
     /// Set the largest thickness of a sheet, in world units [default: 4/3 of a volume's sample
-    /// spacing; half of that if the volume is sharp or its kernel is catmull-rom; half a spacing if
-    /// the kernel is linear]
+    /// spacing; half of that if the volume is sharp; two spacings if its kernel is linear]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     sheet_thickness: Option<f64>,
     /// Hierarchies and volumes in bricks: limit the width of a splat at half its height, in pixels.
