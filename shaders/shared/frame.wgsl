@@ -35,8 +35,8 @@ struct Frame {
     world_y: vec4<f32>,
     world_z: vec4<f32>,
     // Lights that are not from the eye. The shares of the light from the eye, from the key lamp and
-    // from the sky; how far before a surface light from all sides and that of the lamp are taken;
-    // the direction to the lamp. From view space to the nodes and maps of lamps.wgsl: factors on a
+    // from the sky. How far before a surface light from all sides and that of the lamp are taken.
+    // The direction to the lamp. From view space to the nodes and maps of lamps.wgsl: factors on a
     // place's coordinates, and a constant.
     lamp_shares: vec4<f32>,
     lamp_steps: vec4<f32>,

@@ -7,7 +7,7 @@ use super::{
     layer::{Layer, PARTS},
     plan::Plan,
     rays::Rays,
-    vector::{Lanes, dot, each, exp, four, log2, three},
+    vector::{Lanes, columns, dot, each, exp, four, log2, three},
     visible::NARROW,
 };
 use crate::{
@@ -659,17 +659,6 @@ impl<S: Simd> Turn<S> {
 fn difference2<S: Simd>(a: &[Lanes<S>; 3], b: &[Lanes<S>; 3]) -> Lanes<S> {
     let difference = three!(I => a[I] - b[I]);
     dot(difference, difference)
-}
-
-/// Transposes eight pixels with four channels into four channels with eight pixels.
-#[inline(always)]
-pub fn columns<S: Simd>(simd: S, rows: [f32x4<S>; 8]) -> [Lanes<S>; 4] {
-    let [low, high] = each!([0, 4], I => {
-        let (ac, bd) = (rows[I].zip_low(rows[I + 2]), rows[I + 1].zip_low(rows[I + 3]));
-        let (ac_high, bd_high) = (rows[I].zip_high(rows[I + 2]), rows[I + 1].zip_high(rows[I + 3]));
-        [ac.zip_low(bd), ac.zip_high(bd), ac_high.zip_low(bd_high), ac_high.zip_high(bd_high)]
-    });
-    four!(I => simd.combine_f32x4(low[I], high[I]))
 }
 
 /// Returns the share of light that an optical depth absorbs. For small depths, subtracting from 1

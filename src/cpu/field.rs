@@ -6,8 +6,8 @@
 //! E[n]·E[f])/σ², with n the sample's index along the axis. Samples outside the lattice have no
 //! weight.
 //!
-//! The weights of tensor products are polynomials of the place between two samples, and so are their
-//! slopes, which give the gradient. The samples are mirrored at the outermost ones, so the weights
+//! The weights of tensor products are polynomials of the place between two samples, and so are
+//! their slopes, which give the gradient. The samples are mirrored at the outermost ones, so the weights
 //! always add up to 1. The slopes of linear weights take more samples than the weights do, so they
 //! are evaluated apart.
 //!
@@ -660,7 +660,8 @@ impl<S: Simd> Taps<S> {
         });
         let slopes = four!(I => {
             let [a, b, c] = factors.slopes[I];
-            t.mul_add(t.mul_add(Lanes::splat(simd, c), Lanes::splat(simd, b)), Lanes::splat(simd, a))
+            let [a, b, c] = [a, b, c].map(|part| Lanes::splat(simd, part));
+            t.mul_add(t.mul_add(c, b), a)
         });
         Self { weights, slopes }
     }

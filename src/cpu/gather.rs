@@ -282,8 +282,8 @@ impl Gather<'_> {
         Some((layer, mask))
     }
 
-    /// Sets the mean of a sheet of a linear field if it is bent, and the gradients in as much detail
-    /// as the light of the sheet counts.
+    /// Sets the mean of a sheet of a linear field if it is bent, and the gradients in as much
+    /// detail as the light of the sheet counts.
     #[inline(always)]
     fn refine_linear<S: Simd>(
         &self,

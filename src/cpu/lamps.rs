@@ -2,11 +2,10 @@
 //! has the definition; shaders/shared/lamps.wgsl does the same.
 
 use super::{
-    close::columns,
     layer::Layer,
     plan::Plan,
     rays::Rays,
-    vector::{self, Lanes, dot, dot_with, each, three},
+    vector::{self, Lanes, columns, dot, dot_with, each, three},
 };
 use crate::plan::{
     frame::Light,

@@ -134,8 +134,8 @@ impl<S: Simd> OpenField<'_, S> {
 }
 
 impl March<'_> {
-    /// Draws a tile. `entries` are its splats, sorted by first sheet. If there is a map, the optical
-    /// depths of all sheets go there, and nothing hides what lies behind it.
+    /// Draws a tile. `entries` are its splats, sorted by first sheet. If there is a map, the
+    /// optical depths of all sheets go there, and nothing hides what lies behind it.
     #[inline(always)]
     pub fn tile<S: Simd>(
         &self,

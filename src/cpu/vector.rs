@@ -1,6 +1,6 @@
 //! Functions of eight numbers at once that the vector library lacks.
 
-use fearless_simd::{Simd, f32x8, i32x8, prelude::*};
+use fearless_simd::{Simd, f32x4, f32x8, i32x8, prelude::*};
 
 /// An array with an expression for each index. A closure would do the same, but the compiler may
 /// not inline it. Then every vector operation becomes a call, because a function uses only the
@@ -144,6 +144,17 @@ pub fn power<S: Simd>(simd: S, x: Lanes<S>, power: f32) -> Lanes<S> {
         rest >>= 1;
     }
     product
+}
+
+/// Transposes eight pixels with four channels into four channels with eight pixels.
+#[inline(always)]
+pub fn columns<S: Simd>(simd: S, rows: [f32x4<S>; 8]) -> [Lanes<S>; 4] {
+    let [low, high] = each!([0, 4], I => {
+        let (ac, bd) = (rows[I].zip_low(rows[I + 2]), rows[I + 1].zip_low(rows[I + 3]));
+        let (ac_high, bd_high) = (rows[I].zip_high(rows[I + 2]), rows[I + 1].zip_high(rows[I + 3]));
+        [ac.zip_low(bd), ac.zip_high(bd), ac_high.zip_low(bd_high), ac_high.zip_high(bd_high)]
+    });
+    four!(I => simd.combine_f32x4(low[I], high[I]))
 }
 
 /// Returns the dot product of two vectors.

@@ -55,8 +55,8 @@ impl AtomicFile {
         Ok(Self { wanted: wanted.to_owned(), target, may_replace, part })
     }
 
-    /// Creates a temporary file beside `wanted` whose name has this extension, for data that is read
-    /// by its path and never gets another name.
+    /// Creates a temporary file beside `wanted` whose name has this extension, for data that is
+    /// read by its path and never gets another name.
     ///
     /// # Errors
     /// [`Error::Output`] if nothing can be written beside `wanted`.

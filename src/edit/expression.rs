@@ -1,7 +1,7 @@
 //! Conditions on the values of points: `classification == 2 && intensity > 100`.
 //!
-//! A small language of its own: the crates of this kind evaluate one row at a time by maps of
-//! names, are no longer kept, or have a licence that this project cannot take.
+//! A small language of its own: the crates of this kind evaluate one row at a time, by maps of
+//! names.
 
 use std::{fmt, str::FromStr};
 

@@ -82,10 +82,9 @@ fn pieces_give_what_the_whole_gives() {
         write(&path, &whole);
         let (read, _) = pass(&[&path], &[], u64::MAX).unwrap();
         let farthest = |at: usize| (read.positions[at] - whole.positions[at]).length();
-        assert_eq!(
-            (read.count(), read.columns[0].clone()),
-            (whole.count(), whole.columns[0].clone())
-        );
+        assert_eq!(read.count(), whole.count(), "{name}");
+        let classes = read.column("classification").expect("classes");
+        assert!(classes == whole.columns[0], "{name}: other classes");
         assert!((0..whole.count()).all(|at| farthest(at) < 1e-6), "{name}");
         assert_eq!(read.column("odd one").or(read.column("odd_one")).unwrap(), whole.columns[1]);
         for all in [
@@ -226,9 +225,8 @@ fn splats_of_hierarchies_are_edited() {
     assert!((widths(&half) / widths(&set) - 3.0).abs() < 0.5);
     let mut fewer = set.clone();
     apply(&mut fewer, &edits(&[("thin", "25%")]), &Context::default()).unwrap();
-    assert!(
-        fewer.splats.len() * 4 <= set.splats.len() && fewer.splats.len() * 5 > set.splats.len()
-    );
+    let left = fewer.splats.len() as f64 / set.splats.len() as f64;
+    assert!((0.2..=0.25).contains(&left), "{left} of {}", set.splats.len());
     assert!(Tree::build(&fewer, &BuildOptions::default(), None).is_ok());
     assert!(apply(&mut fewer, &[Edit::Normals], &Context::default()).is_err());
 }

@@ -55,7 +55,8 @@ impl Shares {
     const CUBIC_B_SPLINE: Self = Self { far: 14, negative: 0 };
     const CATMULL_ROM: Self = Self { far: 30, negative: 28 };
 
-    /// Returns those of a kernel of which only samples up to two steps away count, if they are known.
+    /// Returns those of a kernel of which only samples up to two steps away count, if they are
+    /// known.
     fn of(kernel: &Kernel) -> Option<Self> {
         match kernel.as_tensor() {
             Some(Tensor::Linear) => None,

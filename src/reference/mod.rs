@@ -220,16 +220,20 @@
 //! e = v + 2c·w·n, clamped to 0 … 2, is the light from all sides: the cosine's integral over the
 //! sphere to the first order in n. v is the mean of T·L over all directions d, and w the mean of
 //! T·L·d. T is the light that comes in from d, and L the brightness there, 1 or 1 + d·up. S is what
-//! reaches the place of the lamp's light. They are taken at a place before the surface: 2.5 times the
-//! step of their lattice along c·n − (1 − c)·b̂. The surface is a facet at its own distance, the
-//! radiance of a sheet in its middle, or a field in the middle of its sheet, for all of the sheet.
+//! reaches the place of the lamp's light.
+//!
+//! These are taken at a place before the surface: 2.5 times the step of their lattice along
+//! c·n − (1 − c)·b̂. The surface is a facet at its own distance, the radiance of a sheet in its
+//! middle, or a field in the middle of its sheet, for all of the sheet.
 //!
 //! T and S come from maps: pictures along the light, in a cube of as many planes as pixels around
 //! the scene. In a map each sheet meets all of the light. Its optical depth, 16 at most, grows
-//! evenly in it; the map has the sum up to each plane. S = exp(−depth). T is known at the nodes of a
-//! lattice around the scene, from the difference of the depths there and at the radius towards the
-//! light; each map serves both ends of its axis. All is linear between nodes, pixels and planes.
-//! With a strength below 1, v and w are mixed with 1 and with up/3 (or 0), those of the open.
+//! evenly in it; the map has the sum up to each plane. S = exp(−depth).
+//!
+//! T is known at the nodes of a lattice around the scene. It follows from the depths there and at
+//! the radius towards the light; each map serves both ends of its axis. All is linear between
+//! nodes, pixels and planes. With a strength below 1, v and w are mixed with 1 and with up/3 (or
+//! 0), those of the open.
 //!
 //! # Other ways
 //! **Optics.** The above is emission and absorption (Max 1995). [`Optics::XRay`] uses the same

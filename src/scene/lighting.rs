@@ -94,8 +94,8 @@ const MOST_AXES: u32 = 256;
 
 impl Lighting {
     /// How far before a surface its light is taken, along its normal, in steps of the map or the
-    /// lattice: a surface must not shade itself, and what lies behind it must not count. A map blurs a
-    /// surface by two steps along the light, and by one and a half across it.
+    /// lattice. A surface must not shade itself, and what lies behind it must not count. A map
+    /// blurs a surface by two steps along the light, and by one and a half across it.
     pub(crate) const AHEAD: f64 = 2.5;
 
     /// A lamp at the upper left before the scene, and some light from the eye in its shadows.

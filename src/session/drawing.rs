@@ -70,8 +70,8 @@ impl Drawing {
         [width.saturating_sub(margins).max(1), height]
     }
 
-    /// Lights a drawn picture by its depths, averages it down, and draws the edges of its items over
-    /// it.
+    /// Lights a drawn picture by its depths, averages it down, and draws the edges of its items
+    /// over it.
     ///
     /// # Errors
     /// Those of [`Camera::view`], of [`Picture::reduced`] and of [`Items::draw_edges`].

@@ -47,9 +47,9 @@ pub const ROOMS: [&str; 34] = [
 ];
 
 /// The rooms of src/gpu, in the same way.
-const GPU: [&str; 14] = [
-    "device", "output", "pipeline", "budget", "variant", "uniforms", "scene", "targets", "passes",
-    "upload", "frame", "outline", "pending", "renderer",
+const GPU: [&str; 15] = [
+    "device", "output", "pipeline", "budget", "variant", "uniforms", "lamps", "scene", "targets",
+    "passes", "upload", "frame", "outline", "pending", "renderer",
 ];
 
 /// Maximum length of a line, in characters.

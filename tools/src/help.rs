@@ -37,7 +37,7 @@ const TASKS: [Task; 8] = [
     Task {
         name: "convert",
         flags: "output lattice overwrite dry-run json crop where translate rotate scale thin \
-            remove-floaters plan parts preset lossless up unit memory color range dims type",
+            remove-floaters plan preset lossless up unit memory color range dims type",
         examples: "  splatkit convert scan.laz -o scan.splk
   splatkit convert head.nrrd -o head.splv
   splatkit convert trained.ply -o trained.spz

@@ -79,6 +79,7 @@ impl Field {
         let fits = match (attribute.kind.whole(), kind.whole()) {
             (Some([low, high]), Some([least, most])) => least <= low && high <= most,
             (None, None) => true,
+            (Some([low, high]), None) => -32768.0 <= low && high <= 65535.0,
             _ => false,
         };
         fits.then_some(*field)

@@ -10,7 +10,7 @@ use crate::{
     },
     hierarchy::Detail,
     math::Projection,
-    scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
+    scene::{Classification, Gradient, Item, Lighting, Mode, Optics, Order, Scene, Settings},
     volume::{Shade, TransferFunction, Volume},
 };
 use std::{
@@ -129,6 +129,7 @@ fn neighbours(case: &Case) -> Vec<Settings> {
         Settings { occlusion: !case.settings.occlusion, ..base() },
         Settings { volume_shade: Some(None), surface_shade: None, ..base() },
         Settings { volume_shade: Some(shade), surface_shade: shade, ..base() },
+        Settings { lighting: Lighting::key(), ..base() },
         Settings { clips: Vec::new(), ..base() },
         Settings { clips: methods::clipped_volume().settings.clips, ..base() },
     ];

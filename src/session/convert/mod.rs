@@ -146,8 +146,8 @@ impl Target {
         let entry = all.into_iter().find(|(end, _)| has_stem && name.ends_with(end));
         entry.map(|(_, target)| target).ok_or_else(|| {
             Error::Argument(format!(
-                "{}: only .splk, .ply, .splat, .spz, .glb, .las, .laz, .nrrd and .splv files can be \
-                 written",
+                "{}: only .splk, .ply, .splat, .spz, .glb, .las, .laz, .nrrd and .splv files can \
+                 be written",
                 path.display()
             ))
         })

@@ -224,8 +224,8 @@ impl<W: Watch> Work<'_, W> {
         for name in names {
             let values = reading.open_colored(path, Some(name))?.values(name)?;
             if let Some(values) = values.filter(|values| values.len() == count) {
-                let values = values.into_iter().map(f64::from).collect();
-                let attribute = Attribute { name: name.clone(), kind: NumberType::F32 };
+                let values: Vec<f64> = values.into_iter().map(f64::from).collect();
+                let attribute = Attribute { name: name.clone(), kind: narrowest(&values) };
                 surface.columns.push((attribute, values));
             }
         }
@@ -318,4 +318,18 @@ fn layout_of(parts: &[Records]) -> PointLayout {
         }
     }
     layout
+}
+
+/// Returns the narrowest type that holds values, because readers of whole files give all of them as
+/// 32-bit floats. So a class stays a byte.
+fn narrowest(values: &[f64]) -> NumberType {
+    let is_within =
+        |most: f64| values.iter().all(|value| value.fract() == 0.0 && (0.0..=most).contains(value));
+    if is_within(255.0) {
+        NumberType::U8
+    } else if is_within(65535.0) {
+        NumberType::U16
+    } else {
+        NumberType::F32
+    }
 }

@@ -315,7 +315,7 @@ fn formats_are_listed() {
         ])
     );
     for (name, in_pieces, written) in
-        [("PLY", true, true), ("LAS", true, false), ("VTI", false, false), ("NRRD", true, true)]
+        [("PLY", true, true), ("LAS", true, true), ("VTI", false, false), ("NRRD", true, true)]
     {
         let format = named(name);
         assert_eq!(
@@ -327,7 +327,9 @@ fn formats_are_listed() {
     for format in list.as_array().unwrap() {
         assert!(text.contains(format["name"].as_str().unwrap()), "{format}");
     }
-    assert!(text.contains("\nLAS  .las .laz\n   point cloud\n   read in pieces, not written\n"));
+    assert!(
+        text.contains("\nLAS  .las .laz\n   point cloud\n   read in pieces, written as .las\n")
+    );
     // A file in none of them: the message lists all extensions.
     folder.put("a.bin", "hello");
     folder.run("info a.bin").fails(
