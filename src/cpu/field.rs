@@ -7,9 +7,9 @@
 //! weight.
 //!
 //! The weights of tensor products are polynomials of the place between two samples, and so are
-//! their slopes, which give the gradient. The samples are mirrored at the outermost ones, so the weights
-//! always add up to 1. The slopes of linear weights take more samples than the weights do, so they
-//! are evaluated apart.
+//! their slopes, which give the gradient. The samples are mirrored at the outermost ones, so the
+//! weights always add up to 1. The slopes of linear weights take more samples than the weights do,
+//! so they are evaluated apart.
 //!
 //! A label map has the label of the nearest sample, and the gradient of that label's mask.
 

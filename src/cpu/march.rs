@@ -8,12 +8,12 @@ use super::{
     footprint::Record,
     gather::{Gather, Last},
     layer::Layer,
-    opacity::TileMap,
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
     scatter::{OpenField, OpenTile, Window},
     skip::is_marked,
     sums::{ScalarSums, Sums, WINDOW, differences},
+    tile_map::TileMap,
     vector::{each, four, three},
     visible::Visible,
 };

@@ -30,7 +30,7 @@
 //! | `cells` | tetrahedra with linear fields, integrated along the rays |
 //! | `close` | classifies, lights and composites a sheet |
 //! | `lamps` | the light that reaches a place |
-//! | `opacity` | maps of what the scene absorbs, for shadows |
+//! | `opacity`, `tile_map` | maps of what the scene absorbs, for shadows |
 //! | `vector` | functions of eight numbers at once |
 
 mod bells;
@@ -65,6 +65,7 @@ mod scatter;
 mod skip;
 mod spare;
 mod sums;
+mod tile_map;
 mod vector;
 mod visible;
 mod window;

