@@ -185,7 +185,7 @@ impl<'a> Pass<'a> {
     /// each edit did.
     ///
     /// # Errors
-    /// Those of [`apply`], of reading the files, and of `take`.
+    /// Those of [`apply`](super::apply), of reading the files, and of `take`.
     pub fn run(&self, mut take: impl FnMut(Records) -> Result<()>) -> Result<Vec<Change>> {
         let mut steps: Vec<Step> = Vec::new();
         for edit in self.edits {

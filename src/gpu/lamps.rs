@@ -2,6 +2,7 @@
 
 use super::{device::Gpu, uniforms::Frame};
 use crate::plan::lamps::{Lamps, Openness, ShadowMap, Shadows};
+use std::sync::Arc;
 
 /// The nodes of the light from all sides, and the map of the key lamp's light.
 #[derive(Debug)]
@@ -10,7 +11,21 @@ pub struct ShadowTextures {
     pub textures: [wgpu::TextureView; 2],
 }
 
+/// Whether two are one.
+fn are_one<T>(one: Option<&Arc<T>>, other: Option<&Arc<T>>) -> bool {
+    match (one, other) {
+        (Some(one), Some(other)) => Arc::ptr_eq(one, other),
+        (one, other) => one.is_none() && other.is_none(),
+    }
+}
+
 impl ShadowTextures {
+    /// Whether these are on the device.
+    pub fn hold(&self, Shadows { open, key }: &Shadows) -> bool {
+        are_one(self.shadows.open.as_ref(), open.as_ref())
+            && are_one(self.shadows.key.as_ref(), key.as_ref())
+    }
+
     /// Uploads what keeps light away. What is missing lets all light in.
     pub fn new(gpu: &Gpu, shadows: &Shadows) -> Self {
         let open = match &shadows.open {

@@ -188,21 +188,6 @@ impl<'a> Ends<'a> {
     }
 }
 
-impl Shadows {
-    /// Whether both were drawn at once.
-    pub fn is_same(&self, other: &Self) -> bool {
-        let is_same_open = match (&self.open, &other.open) {
-            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
-            (one, other) => one.is_none() && other.is_none(),
-        };
-        let is_same_key = match (&self.key, &other.key) {
-            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
-            (one, other) => one.is_none() && other.is_none(),
-        };
-        is_same_open && is_same_key
-    }
-}
-
 impl ShadowMap {
     /// Draws the map of the key lamp's light, if it casts shadows. `map` draws a map.
     ///

@@ -153,8 +153,7 @@ impl Gpu {
 impl PreparedScene {
     /// Sets what keeps light away in the pictures that follow.
     pub(crate) fn set_shadows(&mut self, shadows: &Shadows) {
-        let is_same = |textures: &ShadowTextures| textures.shadows.is_same(shadows);
-        if !self.shadows.as_ref().is_some_and(is_same) {
+        if !self.shadows.as_ref().is_some_and(|textures| textures.hold(shadows)) {
             self.shadows = Some(ShadowTextures::new(&self.gpu, shadows));
         }
     }
