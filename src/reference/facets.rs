@@ -5,7 +5,6 @@ use super::{
     Frame, clip,
     ray::Ray,
     rods::{Body, Place},
-    shade,
 };
 use crate::{
     facet::{FacetSet, Image, NEARER, Sides},
@@ -276,7 +275,7 @@ impl Frame<'_> {
             let color = match &self.shade {
                 // Facets without normals keep their colours.
                 Some(shade) if normal != DVec3::ZERO => {
-                    shade::lit_by(color, normal, (&ray, distance), (shade, self.lamps.as_ref()))
+                    self.lit_surface(color, normal, (&ray, distance), shade)
                 }
                 _ => color,
             };

@@ -43,15 +43,16 @@ pub(super) type ClippedLayer = (Layer, Vec<[f64; 2]>);
 /// How a field is lit in a sheet: all of it by the light that reaches the sheet's middle.
 struct LitBy<'a> {
     shade: Option<&'a Shade>,
-    lamps: Lit<'a>,
+    lamps: Lit,
 }
 
 impl<'a> LitBy<'a> {
-    fn new(layer: &Layer, field: &'a Field, (ray, lamps): (&Ray, Option<&'a Lamps>)) -> Self {
+    fn new(layer: &Layer, field: &'a Field, (ray, lamps): (&Ray, Option<&Lamps>)) -> Self {
         let shade = field.shade.as_ref();
         let lamps = lamps.zip(shade).map(|(lamps, shade)| {
             let gradient = layer.gradient(0.5, ray.direction);
-            (lamps, shade::reaching(lamps, gradient, (ray, layer.distance(0.5)), shade))
+            let at = (ray, layer.distance(0.5));
+            (lamps.lighting, lamps.reaching(gradient, at, shade))
         });
         Self { shade, lamps }
     }

@@ -278,6 +278,7 @@ mod images;
 mod kernel;
 mod labels;
 mod lamps;
+mod maps;
 mod mesh;
 mod product;
 mod profile;
@@ -526,6 +527,14 @@ impl<'a> Frame<'a> {
         [self.planes[sheet], self.planes[sheet + 1]]
     }
 
+    /// Returns the lit colour of a surface at a distance along a ray.
+    fn lit_surface(&self, color: DVec3, normal: DVec3, at: (&Ray, f64), shade: &Shade) -> DVec3 {
+        match &self.lamps {
+            Some(lamps) => lamps.lit(color, normal, at, shade),
+            None => shade::lit(color, normal, at.0.direction, shade),
+        }
+    }
+
     /// Lights the radiance of a sheet, once, at a distance along a ray.
     fn lit(&self, light: &Light, at: (&Ray, f64)) -> Medium {
         if light.depth <= 0.0 || light.facing <= 0.0 {
@@ -535,7 +544,7 @@ impl<'a> Frame<'a> {
             _ if self.optics == Optics::XRay => DVec3::ONE,
             Some(shade) if light.has_normal => {
                 let color = light.color / light.facing;
-                let lit = shade::lit_by(color, light.normal, at, (shade, self.lamps.as_ref()));
+                let lit = self.lit_surface(color, light.normal, at, shade);
                 let share = light.normal.length() / light.facing;
                 // Gaussians are not lit.
                 if self.has_trained { color.lerp(lit, (2.0 * share).min(1.0)) } else { lit }

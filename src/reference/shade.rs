@@ -1,7 +1,6 @@
 //! Light, and what surfaces and fields reflect of it.
 
-use super::{lamps::Lamps, ray::Ray};
-use crate::volume::Shade;
+use crate::{scene::Lighting, volume::Shade};
 use glam::DVec3;
 
 /// The light that reaches a place: the mean direction of that from all sides, in view space, its
@@ -14,7 +13,7 @@ pub(super) struct Reaching {
 }
 
 /// The lights of a picture, and what of them reaches a place.
-pub(super) type Lit<'a> = Option<(&'a Lamps, Reaching)>;
+pub(super) type Lit = Option<(Lighting, Reaching)>;
 
 /// The largest amount of light from all sides, in that of the open.
 const MOST_OPEN: f64 = 2.0;
@@ -25,28 +24,6 @@ const MOST_OPEN: f64 = 2.0;
 /// gradient in value per world length, and others are lit the less the shorter they are.
 pub(super) fn lit(color: DVec3, normal: DVec3, ray: DVec3, shade: &Shade) -> DVec3 {
     with_light(color, light(normal, ray, shade, &None))
-}
-
-/// Returns the colour of a surface at a distance along a ray, lit by the lights of the picture.
-pub(super) fn lit_by(
-    color: DVec3,
-    normal: DVec3,
-    (ray, distance): (&Ray, f64),
-    (shade, lamps): (&Shade, Option<&Lamps>),
-) -> DVec3 {
-    let lit = lamps.map(|lamps| (lamps, reaching(lamps, normal, (ray, distance), shade)));
-    with_light(color, light(normal, ray.direction, shade, &lit))
-}
-
-/// Returns the light that reaches a place with a normal of any length.
-pub(super) fn reaching(
-    lamps: &Lamps,
-    normal: DVec3,
-    (ray, distance): (&Ray, f64),
-    shade: &Shade,
-) -> Reaching {
-    let certain = certainty_of(normal, shade) * towards(normal, ray.direction);
-    lamps.reaching(ray, distance, certain)
 }
 
 /// Returns a colour in light: a factor on it, and the highlight that is added to it.
@@ -60,6 +37,11 @@ fn towards(normal: DVec3, ray: DVec3) -> DVec3 {
     if normal.dot(ray) > 0.0 { -normal } else { normal }
 }
 
+/// Returns a normal of any length as long as it is certain, towards the eye.
+pub(super) fn certain_normal(normal: DVec3, ray: DVec3, shade: &Shade) -> DVec3 {
+    certainty_of(normal, shade) * towards(normal, ray)
+}
+
 /// Returns how far a normal's direction counts.
 fn certainty_of(normal: DVec3, shade: &Shade) -> f64 {
     match shade.certain {
@@ -69,7 +51,7 @@ fn certainty_of(normal: DVec3, shade: &Shade) -> f64 {
     }
 }
 
-/// Returns the factor on a colour and the highlight of [`lit`], or of [`lit_by`] with lights.
+/// Returns the factor on a colour and the highlight of [`lit`], or with other lights.
 pub(super) fn light(normal: DVec3, ray: DVec3, shade: &Shade, lit: &Lit) -> [f64; 2] {
     let Shade { ambient, diffuse, specular, power, .. } = *shade;
     let certain = certainty_of(normal, shade);
@@ -78,10 +60,9 @@ pub(super) fn light(normal: DVec3, ray: DVec3, shade: &Shade, lit: &Lit) -> [f64
     // The light comes from the eye, so the half vector is the light's own direction.
     let facing = (-normal.dot(ray)).min(1.0);
     let gloss = |cosine: f64| certain * specular * cosine.max(0.0).powf(power);
-    let Some((lamps, reaching)) = lit else {
+    let Some((lighting, reaching)) = lit else {
         return [ambient + diffuse * shown(facing), gloss(facing)];
     };
-    let lighting = &lamps.lighting;
     let open = (reaching.open + 2.0 * certain * reaching.side.dot(normal)).clamp(0.0, MOST_OPEN);
     let sky = lighting.sky.map_or(0.0, |sky| sky.share);
     let mut factor = open * (ambient + diffuse * (lighting.head * shown(facing) + sky));

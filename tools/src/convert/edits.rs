@@ -39,7 +39,8 @@ struct Flags {
     matrix: Vec<Motion>,
     /// Keep points that are no nearer to each other than a distance in world units, such as 0.05; a
     /// share of them, such as 10%; or this many, such as 100000pts. Trained Gaussians and the
-    /// splats of hierarchies are merged: those narrower than the distance, or to this share or number.
+    /// splats of hierarchies are merged: those narrower than the distance, or to this share or
+    /// number.
     #[arg(long, value_name = "DISTANCE|SHARE|COUNT")]
     thin: Vec<Thin>,
     /// Remove clusters of fewer than 64 points that lie far from all others.
