@@ -24,7 +24,10 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
 /// Returns for each sample what `combine` makes of two such ranges: those of the samples next to
 /// it, and of the samples up to two steps away. The second follow from the first. `combine` takes
 /// the first, and replaces the second by the result. In all of them, the second number is 255 minus
-/// the largest value.  # Panics If the samples do not fill the lattice.
+/// the largest value.
+///
+/// # Panics
+/// If the samples do not fill the lattice.
 pub fn near_and_far_ranges(
     volume: &Volume,
     combine: impl Fn(&[[u8; 2]], &mut [[u8; 2]]) + Sync,
