@@ -23,7 +23,7 @@
 //! };
 //!
 //! let mut ball = Surface::from(Mesh::sphere(3));
-//! let edits = [Edit::Where("z > 0 || nx > 0.9".parse()?), Edit::Crop("-1,-1,-1,1,1,1".parse()?)];
+//! let edits = [Edit::Where("z > 0 || x > 0.9".parse()?), Edit::Crop("-1,-1,-1,1,1,1".parse()?)];
 //! let changes = edit::apply(&mut ball, &edits, &Context::default())?;
 //! assert!(changes[0].after < changes[0].before);
 //! assert!(ball.mesh.positions.iter().all(|place| place.z > 0.0 || place.x > 0.8));
