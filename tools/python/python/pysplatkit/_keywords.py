@@ -15,10 +15,13 @@ _NAMES = {
     "no-slopes": "slopes=False",
     "no-occlusion": "occlusion=False",
     "camera-position": "camera",
+    "thin": "edits",
 }
 
 #: Flags that have no keyword. They stay as they are.
-NO_KEYWORDS = frozenset(("allow-host", "cache", "cache-size", "dry-run", "index", "part", "raw"))
+NO_KEYWORDS = frozenset(
+    ("allow-host", "cache", "cache-size", "dry-run", "index", "part", "raw", "stats")
+)
 
 #: A value that nobody takes for a word of the sentence: a number, a part of an array, or the last
 #: word before a bracket or a quotation mark closes.
