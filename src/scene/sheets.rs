@@ -116,7 +116,8 @@ impl Scene {
     ///
     /// - Volumes: 4/3 of the sample spacing, and at most 2/3 of the extent of a radial kernel. A
     ///   kernel of extent 2 meets at most four sheets. Sheets are half as thick if the volume is
-    ///   sharp, and two spacings thick if the kernel is linear.
+    ///   sharp. If the kernel is linear they are two spacings thick, and one if their means are
+    ///   classified ([`Classification::Post`]).
     /// - Cells: half a typical edge, and a fifth if each has one value.
     /// - Surfaces: a few pixels.
     /// - Several of these: the finest of them.
