@@ -26,6 +26,10 @@ pub struct About {
     pub holes: u64,
     /// The labels, if the values are labels: names of things, not quantities.
     pub labels: Option<Labels>,
+    /// The channels of the file, if it has several of the same place, as files of microscopes do.
+    pub channels: Vec<Channel>,
+    /// The number of the channel that the values are of, from 0.
+    pub channel: usize,
     /// The names of the values that may colour a mesh or a point cloud, as its reader takes them
     /// ([`ReadOptions::scalar`](crate::formats::ReadOptions::scalar)).
     pub attributes: Vec<String>,
@@ -35,6 +39,31 @@ pub struct About {
     /// How the file stores its points, as in “LAS 1.4, point format 6”; empty if its format has
     /// only one way.
     pub layout: String,
+}
+
+/// One channel of a file: what one dye, or one colour of light, shows of the same place.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Channel {
+    /// Its name (“DAPI”); empty if the file gives none.
+    pub name: String,
+    /// Red, green, blue in 0 … 1 in which the file shows its highest values; `None` if it does not
+    /// say.
+    pub color: Option<[f64; 3]>,
+    /// The lowest and the highest value that the file suggests to show.
+    pub window: Option<[f64; 2]>,
+}
+
+impl Channel {
+    /// Most channels in one picture.
+    pub const MOST: usize = 8;
+
+    /// Returns the name of the channel of this number among all, or “channel 2”.
+    pub fn name_of(all: &[Self], number: usize) -> String {
+        match all.get(number).map(|channel| channel.name.as_str()) {
+            None | Some("") => format!("channel {number}"),
+            Some(name) => name.to_owned(),
+        }
+    }
 }
 
 /// The labels of a label map: whole numbers that name things, such as organs or grains. They are

@@ -154,6 +154,18 @@ impl Picture {
         Ok(())
     }
 
+    /// Adds the light of a picture of the same size: colours add up to at most 1, and what the
+    /// pictures let through is multiplied.
+    pub(crate) fn add_light(&mut self, other: &Self) {
+        for (pixel, other) in self.color.iter_mut().zip(&other.color) {
+            let through = (1.0 - pixel[3]) * (1.0 - other[3]);
+            for channel in 0..3 {
+                pixel[channel] = (pixel[channel] + other[channel]).min(1.0);
+            }
+            pixel[3] = 1.0 - through;
+        }
+    }
+
     /// Returns a picture that shows nothing.
     pub fn blank([width, height]: [u32; 2]) -> Self {
         let count = width as usize * height as usize;

@@ -174,6 +174,18 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             if FIELDS > 3u {
                 at = add_entries(3u, at, stop, entry_sheet, front, first_pixel, &entries_left);
             }
+            if FIELDS > 4u {
+                at = add_entries(4u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+            }
+            if FIELDS > 5u {
+                at = add_entries(5u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+            }
+            if FIELDS > 6u {
+                at = add_entries(6u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+            }
+            if FIELDS > 7u {
+                at = add_entries(7u, at, stop, entry_sheet, front, first_pixel, &entries_left);
+            }
             open = 4u;
         }
         if !STAGED {

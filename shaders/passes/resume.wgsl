@@ -38,8 +38,8 @@ fn hold() {
     state[HELD + 5u] = stage.group_shift;
     state[HELD + 6u] = arguments[MARCH_ARGUMENTS];
     state[HELD + 7u] = arguments[MARCH_ARGUMENTS + 1u];
-    for (var f = 0u; f < 4u; f++) {
-        state[HELD + 8u + f] = frame.record_starts[f];
+    for (var f = 0u; f < 8u; f++) {
+        state[HELD + 8u + f] = frame.record_starts[f / 4u][f % 4u];
     }
 }
 

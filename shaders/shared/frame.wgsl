@@ -29,7 +29,7 @@ struct Frame {
     sheet_normal: vec4<f32>,
     // The first record word of each field in the pass. The fields' records lie behind those of
     // radiance, in the order of the fields.
-    record_starts: vec4<u32>,
+    record_starts: array<vec4<u32>, 2>,
     // Columns of the rotation from view space to the world's axes.
     world_x: vec4<f32>,
     world_y: vec4<f32>,
@@ -52,7 +52,7 @@ struct Frame {
     clips: array<Clip, 8>,
     holes: array<Clip, 8>,
     // The first FIELDS are used.
-    fields: array<Field, 4>,
+    fields: array<Field, 8>,
 }
 
 // A field of the scene.

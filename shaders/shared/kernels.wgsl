@@ -55,7 +55,13 @@ fn field_of(entry: u32) -> u32 {
     if FIELDS == 1u {
         return 0u;
     }
-    return dot(vec3<u32>(vec3(first_word(entry)) >= frame.record_starts.yzw), vec3(1u));
+    let word = first_word(entry);
+    let starts = frame.record_starts;
+    var field = dot(vec3<u32>(vec3(word) >= starts[0].yzw), vec3(1u));
+    if FIELDS > 4u {
+        field += dot(vec4<u32>(vec4(word) >= starts[1]), vec4(1u));
+    }
+    return field;
 }
 
 // What samples add to the open sheets of a field.

@@ -30,7 +30,7 @@ const TOUCHED: u32 = 13u;
 const ADVANCED: u32 = 14u;
 // The stalled pass: 8 words, and the first record words of the fields.
 const HELD: u32 = 15u;
-const STATE_WORDS: u32 = 28u;
+const STATE_WORDS: u32 = 32u;
 
 // Indirect dispatches of a pass, as offsets in `arguments`: over the bins for clear and scan, over
 // the bins for order, over the tiles with entries for march. Then over these once more if some are

@@ -182,7 +182,7 @@ impl CpuRenderer {
     ) -> Result<(Picture, FrameStats)> {
         let start = Instant::now();
         self.scene.check_items()?;
-        self.scene.validate_settings(settings)?;
+        self.scene.validate_drawn(settings)?;
         let view = viewpoint.view(settings.size)?;
         let bounds = self.scene.bounds();
         view.validate_for(&bounds)?;

@@ -39,6 +39,7 @@ pub mod obj;
 pub mod off;
 mod options;
 pub mod pcd;
+pub mod picture;
 #[cfg(feature = "ply")]
 pub mod ply;
 mod points;

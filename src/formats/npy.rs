@@ -20,7 +20,7 @@ use crate::{Result, input::Source, scattered::Points, surface::Mesh};
 use glam::DVec3;
 
 /// Returns the kind of data in an array: a point cloud (n × 3), samples (n × 4, n × 5 or n × 10),
-/// or a volume (three axes and more).
+/// or a volume (three axes and more, or a picture of two).
 ///
 /// # Errors
 /// As [`read`], for the header; [`Error::Input`](crate::Error::Input) for any other shape.
@@ -30,6 +30,7 @@ pub fn kind(source: &Source) -> Result<Kind> {
         [_, 3] => Ok(Kind::Mesh),
         [_, 4 | 5 | 10] => Ok(Kind::Samples),
         [_, _, _, ..] => Ok(Kind::Volume),
+        [_, _] if shaped(&header, "header").is_picture() => Ok(Kind::Volume),
         _ => Err(header.wrong_shape(source)),
     }
 }

@@ -34,6 +34,9 @@ pub struct ReadOptions {
     /// A value that stands for “no value”. Samples of this value are holes, as samples that are
     /// not numbers are.
     pub missing: Option<f64>,
+    /// Which channels of a volume of several to read, by their names or their numbers from 0; all
+    /// if none is named. `None` reads the first, or the one that [`scalar`](Self::scalar) names.
+    pub channels: Option<Vec<String>>,
     /// What is known about labels ([`read_labels`](super::read_labels)). It is for label maps, and
     /// for volumes whose values are all in the table, apart from 0.
     pub labels: Vec<Label>,

@@ -30,7 +30,7 @@ use super::vtk;
 use super::{
     Kind, csv,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
-    mhd, mrc, nifti, npy, nrrd, off, pcd, raw, splat, spz, stl, xyz,
+    mhd, mrc, nifti, npy, nrrd, off, pcd, picture, raw, splat, spz, stl, xyz,
 };
 
 /// Every format, in the order of messages: surfaces, volumes, scattered samples.
@@ -285,6 +285,15 @@ pub static FORMATS: &[Format] = &[
         // Comes after the rows of single data sets, because these begin like that too.
         magic: Magic::Rule(is_vtk_xml),
         ..VTK
+    },
+    Format {
+        name: "PNG, JPEG",
+        extensions: &["png", "jpg", "jpeg"],
+        holds: &[some(Content::Volume, "of one slice")],
+        magic: Magic::Rule(picture::is_picture),
+        kind: Which::Always(Kind::Volume),
+        volume: Some(VolumeReader::Plain(picture::read)),
+        ..Format::ROW
     },
     Format {
         name: "NRRD",

@@ -2,7 +2,9 @@
 //! tifffile and microscopes write them. Follows TIFF 6.0, and the OME data model (2016) and
 //! ImageJ's own notes for the meaning of the pages.
 
+mod imagej;
 mod meaning;
+mod ome;
 mod pages;
 
 use super::{
@@ -14,7 +16,7 @@ use super::{
 };
 use crate::{
     Result,
-    about::Modality,
+    about::{About, Channel, Modality, Orientation},
     input::Source,
     volume::{Lattice, Volume},
 };
@@ -31,80 +33,111 @@ use std::{borrow::Cow, path::PathBuf};
 /// skipped.
 ///
 /// ImageJ's and OME's descriptions give the order of slices, channels and times, the distance
-/// between samples and its unit. [`ReadOptions::scalar`] chooses a channel (`channel:1`), and
+/// between samples and its unit, and the names, colours and windows of channels.
+/// [`ReadOptions::scalar`] chooses a channel (`channel:1`), [`ReadOptions::channels`] several, and
 /// [`ReadOptions::time`] a time; the first is the default. Pages in colours make a volume in
 /// colours.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for a malformed file, for a single page, which is a
-/// picture and no volume, and for pages of different sizes, with the page;
-/// [`Error::Limit`](crate::Error::Limit) for sizes over the limits.
+/// [`Error::Input`](crate::Error::Input) for a malformed file, and for pages of different sizes,
+/// with the page; [`Error::Limit`](crate::Error::Limit) for sizes over the limits.
 pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     if let Some(files) = source.folder() {
         return read_folder(source, files, options);
     }
     let mut pages = Pages::open(source)?;
-    let meaning = Meaning::of(pages.description(), pages.resolution());
+    let meaning = pages.meaning();
     let stack = pages.stack(&meaning)?;
-    let planes = meaning.planes(source, stack.count(), options)?;
-    let [slices, times] = [planes.len(), meaning.times(stack.count())];
-    if stack.count() == 1 {
-        return Err(picture(source, &stack));
-    }
-    tracing::debug!("{slices} of {} pages at one of {times} times", stack.count());
-    let is_stored = stack.contiguous.is_some();
-    let layout = if is_stored { stack.layout } else { stack.layout.decoded() };
-    let grid = layout.grid(slices);
-    let component = component(source, options, &layout, meaning.channels > 1)?;
-    let size = grid.check(source)?;
-    let data = match stack.contiguous {
-        Some(start) => joined(source, &grid, start, &planes)?,
-        None => {
-            source.spend("the size of the pages in bytes", size as u64)?;
-            pages.read(&stack, &planes)?.into()
+    let count = stack.count();
+    let time = meaning.time(source, count, options)?;
+    let channels = Channels::of(&stack, &meaning);
+    let chosen = several::channels(source, options, &channels.all)?;
+    let mut volumes = chosen.iter().map(|&channel| {
+        let (page, component) = channels.place(channel);
+        let planes = meaning.planes(source, count, [page, time])?;
+        tracing::debug!("{} of {count} pages, channel {channel}", planes.len());
+        let is_stored = stack.contiguous.is_some();
+        let layout = if is_stored { stack.layout } else { stack.layout.decoded() };
+        let grid = layout.grid(planes.len());
+        let component = match component {
+            Some(component) => component,
+            None => Component::chosen(source, options, layout.components, layout.are_colors)?,
+        };
+        let size = grid.check(source)?;
+        let data = match stack.contiguous {
+            Some(start) => joined(source, &grid, start, &planes)?,
+            None => {
+                source.spend("the size of the pages in bytes", size as u64)?;
+                pages.read(&stack, &planes)?.into()
+            }
+        };
+        let lattice = lattice(source, &grid, &meaning)?;
+        let mut volume = grid.volume(source, lattice, data, component, options)?;
+        volume.about.length.clone_from(&meaning.unit);
+        volume.about.modality = meaning.is_microscopy.then_some(Modality::Microscopy);
+        // One page is a picture, whose rows run down.
+        volume.about.orientation = (planes.len() == 1).then_some(Orientation::Y_DOWN);
+        channels.name(&mut volume.about, channel);
+        Ok(volume)
+    });
+    joined_channels(&mut volumes)
+}
+
+/// Returns the first of some channels, with the others beside it.
+fn joined_channels(volumes: &mut dyn Iterator<Item = Result<Volume>>) -> Result<Volume> {
+    let first = volumes.next().expect("at least one channel is chosen")?;
+    Ok(Volume { more_channels: volumes.collect::<Result<_>>()?, ..first })
+}
+
+/// The channels of a file: pages of their own, or several numbers at each pixel that are no colour.
+struct Channels {
+    all: Vec<Channel>,
+    are_pages: bool,
+}
+
+impl Channels {
+    fn of(stack: &pages::Stack, meaning: &Meaning) -> Self {
+        let (paged, layout) = (meaning.paged_channels(stack.count()), &stack.layout);
+        if paged < 2 && !layout.are_colors {
+            return Self::of_pixels(layout);
         }
-    };
-    let lattice = lattice(source, &grid, &meaning)?;
-    let mut volume = grid.volume(source, lattice, data, component, options)?;
-    volume.about.length = meaning.unit;
-    volume.about.modality = meaning.is_microscopy.then_some(Modality::Microscopy);
-    Ok(volume)
+        let mut all = meaning.shown.clone();
+        all.resize(paged, Channel::default());
+        Self { all, are_pages: true }
+    }
+
+    /// The channels of one page.
+    fn of_pixels(layout: &Layout) -> Self {
+        let count = if layout.are_colors { 1 } else { layout.components };
+        Self { all: vec![Channel::default(); count], are_pages: layout.are_colors }
+    }
+
+    /// Returns the number of a channel among the pages, and which component of the pixels it is:
+    /// `None` if the pages are the channels, whose pixels may be colours.
+    fn place(&self, channel: usize) -> (usize, Option<Component>) {
+        match self.are_pages {
+            false => (0, Some(Component::One(channel))),
+            true if self.all.len() > 1 => (channel, Some(Component::One(0))),
+            true => (0, None),
+        }
+    }
+
+    /// Says which channel the values are of, if there are several.
+    fn name(&self, about: &mut About, channel: usize) {
+        if self.all.len() > 1 {
+            about.name = Channel::name_of(&self.all, channel);
+            about.window = self.all[channel].window;
+            // Nothing else takes a volume several times over.
+            about.modality.get_or_insert(Modality::Microscopy);
+            (about.channels, about.channel) = (self.all.clone(), channel);
+        }
+    }
 }
 
 fn lattice(source: &Source, grid: &Grid, meaning: &Meaning) -> Result<Lattice> {
     let lattice = Lattice::with_spacing(grid.dims, DVec3::from(meaning.spacing));
     lattice.check().map_err(|message| source.error("pages", message))?;
     Ok(lattice)
-}
-
-/// Returns the error for a file of one page.
-fn picture(source: &Source, stack: &pages::Stack) -> crate::Error {
-    let [width, height] = stack.layout.size;
-    let message = format!(
-        "there is one page of {width} × {height} pixels: this is a picture, or one slice of a \
-         volume"
-    );
-    source.error("pages", message).hint(
-        "if the other slices are in files beside it, name their folder: splatkit render FOLDER -o \
-         out.png",
-    )
-}
-
-/// Returns which component of the pixels to read. If the pages themselves are channels, the name
-/// has chosen one already.
-fn component(
-    source: &Source,
-    options: &ReadOptions,
-    layout: &Layout,
-    is_chosen: bool,
-) -> Result<Component> {
-    let options = if is_chosen { &ReadOptions::default() } else { options };
-    let chosen = Component::chosen(source, options, layout.components, layout.are_colors)?;
-    if options.scalar.is_some() || layout.components == 1 || layout.are_colors {
-        return Ok(chosen);
-    }
-    several::warn_of_channels(source, layout.components);
-    Ok(Component::One(0))
 }
 
 /// Returns the bytes of planes that follow one another in the file without compression.
@@ -186,11 +219,21 @@ fn read_folder(source: &Source, files: &[PathBuf], options: &ReadOptions) -> Res
         return Err(source.error("path", "holds no TIFF files"));
     };
     let grid = layout.grid(files.len());
-    let component = component(source, options, &layout, false)?;
     let lattice = lattice(source, &grid, &meaning)?;
-    let mut volume = grid.volume(source, lattice, all.into(), component, options)?;
-    volume.about.length = meaning.unit;
-    Ok(volume)
+    let channels = Channels::of_pixels(&layout);
+    let chosen = several::channels(source, options, &channels.all)?;
+    let mut volumes = chosen.iter().map(|&channel| {
+        let component = match channels.place(channel) {
+            (_, Some(component)) => component,
+            _ => Component::chosen(source, options, layout.components, layout.are_colors)?,
+        };
+        let data = Cow::Borrowed(&all[..]);
+        let mut volume = grid.volume(source, lattice.clone(), data, component, options)?;
+        volume.about.length.clone_from(&meaning.unit);
+        channels.name(&mut volume.about, channel);
+        Ok(volume)
+    });
+    joined_channels(&mut volumes)
 }
 
 #[cfg(test)]

@@ -200,7 +200,7 @@ impl Renderer {
     ) -> Result<PendingFrame> {
         self.guarded(prepared, |renderer, prepared| {
             prepared.scene.check_items()?;
-            prepared.scene.validate_settings(settings)?;
+            prepared.scene.validate_drawn(settings)?;
             if settings.region.is_some() {
                 let what = "the GPU engine does not draw regions yet; the CPU engine does";
                 return Err(Error::Argument(what.into()));

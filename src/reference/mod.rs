@@ -237,9 +237,10 @@
 //!
 //! # Other ways
 //! **Optics.** The above is emission and absorption (Max 1995). [`Optics::XRay`] uses the same
-//! optical depths, without isosurfaces; all colours are white and unlit. [`Optics::Maximum`] is for
-//! one field. It shows the colour and the opacity, unscaled by length, of the largest f(u) at the
-//! ends of all parts of the ray. A ray without parts shows nothing. This picture has no depth.
+//! optical depths, without isosurfaces; all colours are white and unlit. [`Optics::Maximum`] shows
+//! the colour and the opacity, unscaled by length, of the largest f(u) at the ends of all parts of
+//! the ray. A ray without parts shows nothing. Several fields are drawn one by one: their colours
+//! are added, to at most 1, and what they let through is multiplied. This picture has no depth.
 //!
 //! **Samples classified before interpolation** ([`Classification::Pre`], and always in the modes
 //! below; of one field only) are radiance (Westover 1989). They have the colour c(f) and, over a
@@ -327,6 +328,16 @@ use std::collections::BTreeMap;
 pub fn render(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Picture> {
     scene.validate()?;
     scene.validate_settings(settings)?;
+    let fields = scene.fields();
+    if settings.optics == Optics::Maximum && fields.len() > 1 {
+        let mut pictures =
+            fields.iter().map(|field| render(&scene.with_one_field(*field), camera, settings));
+        let mut sum = pictures.next().expect("several fields")?;
+        for picture in pictures {
+            sum.add_light(&picture?);
+        }
+        return Ok(sum);
+    }
     let view = camera.view(settings.size)?;
     view.validate_for(&scene.bounds())?;
     let scene = &without_bricks(scene)?;

@@ -5,6 +5,7 @@ mod device;
 mod host;
 mod items;
 mod loaded;
+mod maxima;
 mod worker;
 
 #[cfg(feature = "gpu")]
@@ -197,6 +198,9 @@ impl Renderer {
         if self.scene.items.is_empty() {
             return Ok((clear(viewpoint, settings)?, FrameStats::default()));
         }
+        if self.adds_maxima(settings) {
+            return self.render_maxima(viewpoint, settings);
+        }
         self.cast_shadows(viewpoint, settings)?;
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
@@ -223,6 +227,9 @@ impl Renderer {
         if self.scene.items.is_empty() {
             return Ok((clear(&view, settings)?, FrameStats::default()));
         }
+        if self.adds_maxima(settings) {
+            return self.render_maxima_async(&view, settings).await;
+        }
         self.cast_shadows(&view, settings)?;
         match &mut self.drawer {
             #[cfg(feature = "gpu")]
@@ -242,10 +249,13 @@ impl Renderer {
     /// # Errors
     /// Those of [`render`](Self::render). A lost device is not reopened: [`Error::DeviceLost`].
     pub fn draw(&mut self, viewpoint: &impl Viewpoint, settings: &Settings) -> Result<FrameStats> {
-        self.cast_shadows(viewpoint, settings)?;
+        let by_render = self.scene.items.is_empty() || self.adds_maxima(settings);
+        if !by_render {
+            self.cast_shadows(viewpoint, settings)?;
+        }
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Drawer::Gpu(renderer, prepared) if !self.scene.items.is_empty() => {
+            Drawer::Gpu(renderer, prepared) if !by_render => {
                 renderer.draw(prepared, viewpoint, settings)
             }
             _ => Ok(self.render_once(viewpoint, settings)?.1),
@@ -261,10 +271,13 @@ impl Renderer {
         viewpoint: &impl Viewpoint,
         settings: &Settings,
     ) -> Result<FrameStats> {
-        self.cast_shadows(viewpoint, settings)?;
+        let by_render = self.scene.items.is_empty() || self.adds_maxima(settings);
+        if !by_render {
+            self.cast_shadows(viewpoint, settings)?;
+        }
         match &mut self.drawer {
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-            Drawer::Gpu(renderer, prepared) if !self.scene.items.is_empty() => {
+            Drawer::Gpu(renderer, prepared) if !by_render => {
                 renderer.profile(prepared, viewpoint, settings)
             }
             _ => Ok(self.render_once(viewpoint, settings)?.1),

@@ -70,7 +70,7 @@ impl From<Vec<Item>> for Scene {
 
 impl Scene {
     /// The largest number of fields: volumes, sample sets and cells.
-    pub const MAX_FIELDS: usize = 4;
+    pub const MAX_FIELDS: usize = 8;
 
     /// Creates a scene without items.
     pub fn new() -> Self {

@@ -61,7 +61,8 @@ pub enum Optics {
     #[default]
     #[serde(rename = "light")]
     EmissionAbsorption,
-    /// The colour and opacity of the largest value on the ray.
+    /// The colour and opacity of the largest value on the ray. The light of several fields is
+    /// added.
     Maximum,
     /// The light that the field absorbs, in white: opacity only, without colour and lighting.
     #[serde(rename = "x-ray")]

@@ -28,6 +28,18 @@ impl Scene {
         if self.fields().len() > 1 { check_several(settings) } else { Ok(()) }
     }
 
+    /// As [`validate_settings`](Self::validate_settings), for what an engine draws at once.
+    pub(crate) fn validate_drawn(&self, settings: &Settings) -> Result<()> {
+        self.validate_settings(settings)?;
+        if settings.optics == Optics::Maximum && self.fields().len() > 1 {
+            return wrong(
+                "an engine draws the maximum intensity picture of one volume or sample set; \
+                 `Renderer::render` adds those of several",
+            );
+        }
+        Ok(())
+    }
+
     /// Checks that the engines can draw the scene: finite numbers (the error names the item and the
     /// splat), and at most [`MAX_FIELDS`](Self::MAX_FIELDS) fields.
     ///
@@ -205,9 +217,6 @@ fn check_bricks(kernel: &Kernel, settings: &Settings) -> Result<()> {
 
 /// Returns an error if the method is none for several fields.
 fn check_several(settings: &Settings) -> Result<()> {
-    if settings.optics == Optics::Maximum {
-        return wrong("a maximum intensity picture takes one volume or sample set, not several");
-    }
     if settings.classifies_samples() {
         return wrong(
             "several volumes or sample sets are classified after interpolation, in image-aligned \

@@ -1,6 +1,6 @@
 //! How the values of an input are shown: its transfer function.
 
-use super::Coloring;
+use super::{ChannelStyle, Coloring};
 use crate::{
     Error, Result,
     bricks::{Bricks, Level},
@@ -24,6 +24,12 @@ pub struct Appearance {
     pub gradient: Vec<(f64, f64)>,
     /// The map of values, and the range that it and the transfer function are spread over.
     pub coloring: Coloring,
+    /// How the channels that were read are shown, in the order in which they were
+    /// ([`ReadOptions::channels`](crate::formats::ReadOptions::channels)).
+    pub channels: Vec<ChannelStyle>,
+    /// Whether the opacity of a channel rises evenly with its values, as a picture of the largest
+    /// values needs it.
+    pub rises_evenly: bool,
 }
 
 /// A transfer function that a user chose.

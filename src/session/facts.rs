@@ -3,7 +3,7 @@
 use super::{Data, Opened};
 use crate::{
     Result,
-    about::{About, Frame, Modality, Orientation, direction_name},
+    about::{About, Channel, Frame, Modality, Orientation, direction_name},
     bricks::Bricks,
     cells::{CellKind, Cells, Place},
     formats::{Array, Series, Times},
@@ -168,6 +168,11 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     facts.insert("attributes".into(), attributes);
     stand(&mut facts, volume.about.orientation);
     say(&mut facts, &volume.about);
+    let channels = &volume.about.channels;
+    if !channels.is_empty() {
+        let names = (0..channels.len()).map(|number| Channel::name_of(channels, number));
+        facts.insert("channels".into(), json!(names.collect::<Vec<_>>()));
+    }
     if let Some(labels) = &volume.about.labels {
         facts.insert("labels".into(), json!(labels.listed()));
     }

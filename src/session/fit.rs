@@ -19,7 +19,7 @@ impl Camera {
     /// reading pages and bricks.
     pub fn fit(scene: &Scene, size: [u32; 2]) -> Result<Self> {
         let mut subject = Subject::default();
-        subject.count_in(scene.bounds());
+        subject.count_in(scene.bounds(), None);
         for item in &scene.items {
             let (stated, usual) = match item {
                 Item::Volume(volume, ..) => (volume.about.orientation, Orientation::SURVEY),

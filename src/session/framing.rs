@@ -48,10 +48,11 @@ pub struct Framing {
     /// The distance of the camera from its focal point; by default the scene fills the picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance: Option<f64>,
-    /// The turn to the right around the up axis; by default 30, or 0 with a side or a position.
+    /// The turn to the right around the up axis; by default 30, or 0 with a side or a position, and
+    /// for slices.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth: Option<f64>,
-    /// The turn upwards; by default 20, or 0 with a side or a position.
+    /// The turn upwards; by default 20, or 0 with a side or a position, and for slices.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub elevation: Option<f64>,
     /// How often the middle of the picture is enlarged; by default 1.
@@ -246,13 +247,15 @@ impl Framing {
                 (Orientation::with_up(up), Origin::Flag)
             }
             Some(_) => (subject.orientation, Origin::Flag),
-            None => (subject.orientation, subject.origin),
+            // A slice is looked at head-on.
+            None => (subject.facing().unwrap_or(subject.orientation), subject.origin),
         }
     }
 
     /// Returns the azimuth and the elevation, in degrees.
-    fn angles(&self) -> [f64; 2] {
+    fn angles(&self, subject: &Subject) -> [f64; 2] {
         let [azimuth, elevation] = match (self.camera_position, self.view) {
+            (None, None) if subject.facing().is_some() && self.up.is_none() => [0.0; 2],
             (None, None) => {
                 return [self.azimuth.unwrap_or(AZIMUTH), self.elevation.unwrap_or(ELEVATION)];
             }
@@ -285,7 +288,7 @@ impl Framing {
         if let Some(position) = self.camera_position {
             camera.position = position;
         }
-        let [azimuth, elevation] = self.angles();
+        let [azimuth, elevation] = self.angles(subject);
         camera.azimuth(azimuth + turn);
         camera.elevation(elevation);
         if let Some(distance) = self.distance {

@@ -1,7 +1,7 @@
 //! The items of a scene, made from inputs.
 
 use super::{
-    CellStyle, Coloring, Data, Framing, Legend, Name, Showing, Subject, Surfaces,
+    CellStyle, Coloring, Data, Framing, Legend, Name, Showing, Subject, Surfaces, slices,
     solid::{ShownSolid, field_of},
 };
 use crate::{
@@ -482,7 +482,7 @@ impl Adding<'_> {
         Ok(())
     }
 
-    fn add_volume(&mut self, mut volume: Volume) -> Result<()> {
+    fn add_volume(&mut self, volume: Volume) -> Result<()> {
         let Self { name, showing, .. } = *self;
         if volume.colors.is_some() {
             match &showing.values_by {
@@ -493,7 +493,46 @@ impl Adding<'_> {
                 ),
             }
         }
+        if !showing.is_named && showing.appearance.shows_channels(&volume.about) {
+            return self.add_channels(volume);
+        }
         let transfer = showing.appearance.of_volume(&name.text, &volume)?;
+        self.add_field(volume, transfer)
+    }
+
+    /// Adds the channels of a volume that were read, each in a colour.
+    fn add_channels(&mut self, mut volume: Volume) -> Result<()> {
+        let Self { name, showing, .. } = *self;
+        let mut volumes = std::mem::take(&mut volume.more_channels);
+        volumes.insert(0, volume);
+        let all: Vec<usize> = volumes.iter().map(|volume| volume.about.channel).collect();
+        if slices::facing(&volumes[0]).is_some() && showing.appearance.isosurfaces.is_empty() {
+            let colors = showing.appearance.mixed_channels(&name.text, &volumes, &all)?;
+            return self.add_sheet(&volumes[0], &colors);
+        }
+        let (lattice, about) = (volumes[0].lattice.clone(), volumes[0].about.clone());
+        let (mut dark, count) = (Vec::new(), self.items.len());
+        for (number, mut volume) in volumes.into_iter().enumerate() {
+            // Where the input was moved to.
+            volume.lattice = lattice.clone();
+            (volume.about.frame, volume.about.orientation) = (about.frame, about.orientation);
+            let style = showing.appearance.channels.get(number).cloned().unwrap_or_default();
+            match showing.appearance.of_channel(&name.text, &volume, (&style, &all)) {
+                Ok(transfer) => self.add_field(volume, transfer)?,
+                Err(Error::NothingToDraw(message)) => dark.push(message),
+                Err(error) => return Err(error),
+            }
+        }
+        if self.items.len() == count {
+            return Err(Error::NothingToDraw(dark.join("; ")));
+        }
+        dark.iter().for_each(|message| warning::give!("left out: {message}"));
+        Ok(())
+    }
+
+    /// Adds a volume as a field.
+    fn add_field(&mut self, mut volume: Volume, transfer: TransferFunction) -> Result<()> {
+        let Self { showing, .. } = *self;
         let About { name: title, unit, labels, frame, orientation, .. } = &volume.about;
         self.values(&transfer, volume.range, Legend::title(title, unit), labels.as_ref());
         self.unit(&volume.about);
@@ -505,13 +544,36 @@ impl Adding<'_> {
             volume = volume.sharpened(&kernel)?;
         }
         let count = volume.len();
+        let facing = slices::facing(&volume);
         let item = Item::Volume(volume.into(), kernel, transfer);
-        self.push("volume", count, bounds, item);
+        self.push_facing("volume", count, (bounds, facing), item);
+        Ok(())
+    }
+
+    /// Adds a slice in these colours.
+    fn add_sheet(&mut self, volume: &Volume, colors: &[[u8; 4]]) -> Result<()> {
+        let options = SurfelOptions::default();
+        let sheet = slices::sheet(volume, colors).expect("the volume is a slice");
+        let fault = |error| self.name.fault(error);
+        let item = match self.items.surfaces {
+            Surfaces::Surfels => Item::Radiance(sheet.surfels(&options).map_err(fault)?.into()),
+            Surfaces::Facets | Surfaces::Both => match sheet.facets(&options).map_err(fault)? {
+                Some(facets) => Item::Facets(facets.into()),
+                None => Item::Radiance(sheet.surfels(&options).map_err(fault)?.into()),
+            },
+        };
+        self.unit(&volume.about);
+        self.stand(volume.about.frame, volume.about.orientation);
+        let facing = (volume.bounds(), slices::facing(volume));
+        self.push_facing("volume", volume.len(), facing, item);
         Ok(())
     }
 
     /// Adds a volume in its own colours.
     fn add_colors(&mut self, volume: &Volume) -> Result<()> {
+        if let (Some(colors), Some(_)) = (&volume.colors, slices::facing(volume)) {
+            return self.add_sheet(volume, colors);
+        }
         self.does("Making splats of");
         let splats = volume.colored_splats().map_err(|error| self.name.fault(error))?;
         let splats = splats.expect("the volume has colours");
@@ -639,8 +701,18 @@ impl Adding<'_> {
     }
 
     fn push(&mut self, kind: &'static str, count: usize, bounds: Bounds, entry: impl Into<Entry>) {
+        self.push_facing(kind, count, (bounds, None), entry);
+    }
+
+    fn push_facing(
+        &mut self,
+        kind: &'static str,
+        count: usize,
+        (bounds, facing): (Bounds, Option<Orientation>),
+        entry: impl Into<Entry>,
+    ) {
         let Self { items, name, .. } = self;
-        items.subject.count_in(bounds);
+        items.subject.count_in(bounds, facing);
         items.contents.push(Content { kind, name: name.clone(), count: count as u64 });
         items.entries.push(entry.into());
     }

@@ -19,6 +19,7 @@
 //! ```
 
 mod appearance;
+mod channels;
 mod coloring;
 pub mod convert;
 mod data;
@@ -35,6 +36,7 @@ mod oddities;
 mod panels;
 mod reading;
 mod showing;
+mod slices;
 mod solid;
 mod subject;
 mod training;
@@ -43,13 +45,14 @@ mod training;
 mod tests;
 
 pub use appearance::{Appearance, Surface, SurfaceValue, Transfer};
+pub use channels::ChannelStyle;
 pub use coloring::{Coloring, SurfaceColor, check_log, visible_range_of};
 pub use data::{Data, warn_of_holes};
 pub use description::{
-    AppearanceEntry, Axis, Background, CameraEntry, ClipEntry, ClipSide, ColorEntry, Composite,
-    Description, Engine, InputEntry, IsosurfaceEntry, KernelEntry, LightName, LimitsEntry, Loaded,
-    LoadedInput, OverlayEntry, PaperLength, PictureEntry, Place, ReadInput, ReadingEntry, Rotation,
-    Samples, TransferEntry, TransformEntry,
+    AppearanceEntry, Axis, Background, CameraEntry, ChannelEntry, ChannelName, ClipEntry, ClipSide,
+    ColorEntry, Composite, Description, Engine, InputEntry, IsosurfaceEntry, KernelEntry,
+    LightName, LimitsEntry, Loaded, LoadedInput, OverlayEntry, PaperLength, PictureEntry, Place,
+    ReadInput, ReadingEntry, Rotation, Samples, TransferEntry, TransformEntry,
 };
 pub use drawing::Drawing;
 pub use facts::Facts;

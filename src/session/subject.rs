@@ -51,6 +51,18 @@ pub struct Subject {
     /// Points that span what is seen; if there are none, the box is seen.
     pub seen: Vec<DVec3>,
     frames: Frames,
+    faces: Faces,
+}
+
+/// Whether everything is flat.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+enum Faces {
+    /// There is nothing yet.
+    #[default]
+    Nothing,
+    /// Slices in one plane, which is looked at like this.
+    Flat(Orientation),
+    Solid,
 }
 
 impl Default for Subject {
@@ -63,12 +75,28 @@ impl Subject {
     /// A subject whose box is seen, and which stands with this direction up.
     pub fn new(bounds: Bounds, up: DVec3) -> Self {
         let (orientation, seen) = (Orientation::with_up(up), Vec::new());
-        Self { bounds, orientation, origin: Origin::Default, seen, frames: Frames::default() }
+        let (frames, faces) = Default::default();
+        Self { bounds, orientation, origin: Origin::Default, seen, frames, faces }
     }
 
-    /// Adds the box of an input.
-    pub fn count_in(&mut self, bounds: Bounds) {
+    /// Adds the box of an input. `facing` says how it is looked at if it is flat.
+    pub fn count_in(&mut self, bounds: Bounds, facing: Option<Orientation>) {
         self.bounds = self.bounds.union(bounds);
+        self.faces = match (self.faces, facing) {
+            (Faces::Nothing, Some(facing)) => Faces::Flat(facing),
+            (Faces::Flat(before), Some(facing)) if before.front.dot(facing.front) > 0.999 => {
+                Faces::Flat(before)
+            }
+            _ => Faces::Solid,
+        };
+    }
+
+    /// Returns how the scene is looked at if it is flat: a slice, or a picture.
+    pub fn facing(&self) -> Option<Orientation> {
+        match self.faces {
+            Faces::Flat(facing) => Some(facing),
+            Faces::Nothing | Faces::Solid => None,
+        }
     }
 
     /// Whether the box is no larger than the rounding error of its coordinates.

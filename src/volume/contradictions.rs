@@ -92,6 +92,7 @@ fn volumes_are_refused_where_they_come_in() {
             range: [0.0, 7.0],
             coefficients: None,
             colors: None,
+            more_channels: Vec::new(),
             about: About::default(),
         };
         refused_by_all(&format!("{:?}", volume.lattice), word, &volume);

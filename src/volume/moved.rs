@@ -45,6 +45,7 @@ impl Volume {
             range: self.range,
             coefficients,
             colors: self.colors.clone(),
+            more_channels: Vec::new(),
             about,
         }
     }

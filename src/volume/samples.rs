@@ -232,6 +232,10 @@ pub struct Volume {
     /// The colour of each sample, if the file has colours: display colours and opacity, 8 bits a
     /// channel. The samples are then their brightness ([`Volume::colored_splats`]).
     pub colors: Option<Arc<[[u8; 4]]>>,
+    /// The further channels that were read ([`ReadOptions::channels`]), on the same lattice.
+    ///
+    /// [`ReadOptions::channels`]: crate::formats::ReadOptions::channels
+    pub more_channels: Vec<Self>,
     /// What the file says beyond the values.
     pub about: About,
 }
@@ -286,6 +290,7 @@ impl Volume {
             range,
             coefficients: None,
             colors: None,
+            more_channels: Vec::new(),
             about: About::default(),
         })
     }

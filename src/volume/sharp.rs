@@ -143,6 +143,7 @@ impl Volume {
         // the samples' range.
         let drawn = Self {
             colors: None,
+            more_channels: Vec::new(),
             samples: Samples::F32(prefilter::cubic(&self.samples, self.lattice.dims)),
             range: self.range,
             lattice: self.lattice.clone(),

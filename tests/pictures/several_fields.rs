@@ -2,10 +2,10 @@
 
 use crate::{
     scenes::{self, Case, fields},
-    testing::psnr::measured,
+    testing::{gpu::gpu, psnr::measured},
 };
 use splatkit::{
-    Error,
+    Device, Error, Renderer,
     bricks::Bricks,
     cpu::CpuRenderer,
     math::Kernel,
@@ -164,7 +164,6 @@ fn what_several_fields_cannot_do_is_told() {
     let mut renderer = CpuRenderer::new(&case.scene).expect("a scene");
     let usual = || case.settings.clone();
     let refused = [
-        (Settings { optics: Optics::Maximum, ..usual() }, "maximum"),
         (Settings { classification: Classification::Pre, ..usual() }, "after interpolation"),
         (Settings { mode: Mode::AxisSheets, ..usual() }, "after interpolation"),
     ];
@@ -183,6 +182,34 @@ fn what_several_fields_cannot_do_is_told() {
         (0..count).fold(Scene::new(), add)
     };
     assert!(of(Scene::MAX_FIELDS).validate().is_ok());
-    let error = of(Scene::MAX_FIELDS + 1).validate().expect_err("five").to_string();
-    assert!(error.contains("4 volumes") && error.contains("has 5"), "{error}");
+    let error = of(Scene::MAX_FIELDS + 1).validate().expect_err("too many").to_string();
+    assert!(error.contains("8 volumes") && error.contains("has 9"), "{error}");
+}
+
+/// Channels of a microscope, as its programs show them: the sum of a picture for each.
+#[test]
+fn the_light_of_maxima_is_added() {
+    let mut case = fields::two_volumes();
+    case.settings.optics = Optics::Maximum;
+    let expected = referenced(&case);
+    let alone =
+        [0, 1].map(|item| referenced(&of_items(&case, vec![case.scene.items[item].clone()])));
+    for (at, pixel) in expected.color.iter().enumerate() {
+        let [a, b] = [&alone[0].color[at], &alone[1].color[at]];
+        let sum = [0, 1, 2].map(|channel| (a[channel] + b[channel]).min(1.0));
+        assert_eq!(pixel[..3], sum);
+        assert!((pixel[3] - (a[3] + b[3] - a[3] * b[3])).abs() < 1e-6);
+    }
+    for device in [Device::Cpu, Device::Gpu(gpu().clone(), Default::default())] {
+        let mut renderer = Renderer::new(&device, &case.scene).expect("a scene");
+        let render = |renderer: &mut Renderer, settings: &Settings| {
+            renderer.render(&case.camera, settings).expect("a picture").0
+        };
+        let usual = Settings { optics: Optics::EmissionAbsorption, ..case.settings.clone() };
+        let before = render(&mut renderer, &usual);
+        let psnr = measured(&render(&mut renderer, &case.settings), &expected);
+        println!("{}: {psnr:.1} dB", device.name());
+        assert!(psnr > 60.0, "{}: {psnr:.1} dB", device.name());
+        assert!(render(&mut renderer, &usual).color == before.color, "all fields are back");
+    }
 }

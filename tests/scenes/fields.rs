@@ -65,6 +65,21 @@ pub fn two_volumes() -> Case {
     case("two_volumes", two(), PERSPECTIVE)
 }
 
+/// As many volumes as a picture shows, each moved aside and in a colour of its own.
+pub fn most_volumes() -> Case {
+    let mut scene = blob_scene();
+    for number in 1..Scene::MAX_FIELDS {
+        let mut volume = other_volume();
+        let turn = DVec3::new(0.05, -0.04, 0.06) * number as f64;
+        volume.lattice.origin += turn - DVec3::splat(0.1);
+        let color = [1, 2, 4].map(|bit| if number & bit > 0 { 0.9 } else { 0.2 });
+        let transfer = TransferFunction { color: vec![(0.0, color)], unit: 1.5, ..cool() };
+        scene = scene.with_volume(volume, Kernel::default(), transfer);
+    }
+    let settings = Settings { size: [40, 32], ..settings() };
+    Case { settings, ..case("most_volumes", scene, PERSPECTIVE) }
+}
+
 fn with_surfaces() -> TransferFunction {
     let surface = |value: f64, color: [f64; 3], opacity: f64| Isosurface { value, color, opacity };
     let isosurfaces = vec![surface(0.3, [0.9, 0.7, 0.3], 0.4), surface(0.6, [0.3, 0.6, 0.9], 0.7)];
@@ -219,6 +234,7 @@ pub fn all() -> Vec<Case> {
     let facets = facets::facets_in_a_volume().scene;
     let mut all = vec![
         two_volumes(),
+        most_volumes(),
         case("two_volumes_orthographic", two(), ORTHOGRAPHIC),
         Case { settings: post, ..case("two_volumes_post", two(), PERSPECTIVE) },
         Case { settings: xray, ..case("two_volumes_in_x_rays", two(), PERSPECTIVE) },

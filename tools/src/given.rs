@@ -56,6 +56,7 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("radius", SAMPLES),
     ("neighbours", SAMPLES),
     ("no-slopes", SAMPLES),
+    ("channels", VOLUME),
     ("transfer", FIELD),
     ("opacity-unit", FIELD),
     ("iso", FIELD),

@@ -126,7 +126,7 @@ mod tests {
         ("Limits", "limit-points limit-bytes limit-depth limit-texels limit-seconds"),
         (
             "Appearance",
-            "transfer range opacity-unit iso gradient-opacity radius-scale points point-size \
+            "transfer range channels opacity-unit iso gradient-opacity radius-scale points point-size \
             point-radius line-width cells crease edges opacity colormap color nan-color log-colors",
         ),
         ("Kernel", "kernel sigma extent sharp"),

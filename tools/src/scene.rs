@@ -16,7 +16,7 @@ use std::path::PathBuf;
 /// The inputs, and how their values and surfaces are shown.
 #[derive(Args, Debug, Clone)]
 pub struct SceneFlags {
-    /// Meshes, point clouds, hierarchies, and up to four volumes, sets of cells or sets of
+    /// Meshes, point clouds, hierarchies, and up to eight volumes, sets of cells or sets of
     /// scattered samples; all are drawn in one picture. Addresses are inputs too: https://…,
     /// s3://…, gs://…, az://… (docs/remote.md).
     #[arg(value_name = "SCENE", required = true, value_parser = parse::input())]

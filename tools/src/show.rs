@@ -13,7 +13,7 @@ use clap::{
 };
 use splatkit::{
     facet::Size,
-    session::{CellStyle, Description, IsosurfaceEntry, TransferEntry},
+    session::{CellStyle, ChannelEntry, Description, IsosurfaceEntry, TransferEntry},
     surface::PointStyle,
     volume::TransferFunction,
 };
@@ -40,6 +40,12 @@ pub struct ShowFlags {
         allow_hyphen_values = true
     )]
     range: Vec<InputValue<[f64; 2]>>,
+    /// Draw these channels of a volume: each as its name or its number from 0, then as wished
+    /// :COLOR, :LOW..HIGH (the values from which on it is seen, and at which it is brightest) and
+    /// :OPACITY, as in DAPI:blue,1:#0f0:100..4000:0.5. FILE=CHANNEL,… is for one input, and the
+    /// flag can be given several times [default: all, up to 8, in the file's colours]
+    #[arg(long, value_name = "[FILE=]CHANNEL,…", value_parser = channels)]
+    channels: Vec<InputValue<Vec<ChannelEntry>>>,
     /// Set the length that the transfer function's opacities hold for, in world units [default:
     /// that of the JSON file, else a part of the data's diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
@@ -121,6 +127,7 @@ impl ShowFlags {
         self.color.check(&inputs)?;
         InputValue::check(&self.transfer, "transfer", &inputs)?;
         InputValue::check(&self.range, "range", &inputs)?;
+        InputValue::check_files(&self.channels, "channels", &inputs)?;
         InputValue::check_files(&self.iso, "iso", &inputs)?;
         InputValue::check(&self.opacity, "opacity", &inputs)?;
         let transfers: Vec<InputValue<TransferEntry>> = self
@@ -134,6 +141,8 @@ impl ShowFlags {
         Shared::set_each(scene, |appearance| &mut appearance.opacity, &self.opacity, |_, _| {});
         let join = |before: &mut Vec<IsosurfaceEntry>, more: Vec<_>| before.extend(more);
         Shared::set_each(scene, |appearance| &mut appearance.isosurfaces, &self.iso, join);
+        let join = |before: &mut Vec<ChannelEntry>, more: Vec<_>| before.extend(more);
+        Shared::set_each(scene, |appearance| &mut appearance.channels, &self.channels, join);
         Shared::set(scene, |appearance| &mut appearance.opacity_unit, self.opacity_unit);
         let factors = self.gradient_opacity.clone().map(|Factors(factors)| factors);
         Shared::set(scene, |appearance| &mut appearance.gradient_opacity, factors);
@@ -173,6 +182,36 @@ fn range(text: &str) -> Result<InputValue<[f64; 2]>, String> {
 /// Parses isosurfaces.
 fn surfaces(text: &str) -> Result<InputValue<Vec<IsosurfaceEntry>>, String> {
     InputValue::parse(text, |text| text.split(',').map(surface).collect())
+}
+
+/// Parses channels.
+fn channels(text: &str) -> Result<InputValue<Vec<ChannelEntry>>, String> {
+    InputValue::parse(text, |text| text.split(',').map(channel).collect())
+}
+
+/// Parses a channel: `DAPI`, `1:lime`, `DAPI:100..4000` or `1:#00ff00:100..4000:0.5`.
+pub fn channel(text: &str) -> Result<ChannelEntry, String> {
+    let form = "the form is CHANNEL with :COLOR, :LOW..HIGH and :OPACITY as wished, such as \
+                DAPI:blue:100..4000:0.5";
+    let mut parts = text.split(':');
+    let name = parts.next().unwrap_or_default();
+    if name.trim().is_empty() {
+        return Err(form.into());
+    }
+    let mut entry = ChannelEntry::new(name);
+    let number = |text: &str| parse::finite(text).map_err(|_| form);
+    for part in parts {
+        if let Some((low, high)) = part.split_once("..") {
+            entry.range = Some([number(low)?, number(high)?]);
+        } else if let Ok(opacity) = parse::finite(part) {
+            // A number is an opacity, although its digits may look like a colour.
+            entry.opacity = Some(opacity);
+        } else {
+            entry.color = Some(part.parse()?);
+        }
+    }
+    entry.check()?;
+    Ok(entry)
 }
 
 /// Parses an opacity.
@@ -276,6 +315,25 @@ mod tests {
         let whole = r#"{"color": [], "opacity": []}"#;
         assert_eq!(transfer(whole), Ok(InputValue::of_all(whole.to_owned())));
         assert!(transfer(&format!("a=b.nrrd={whole}")).is_ok());
+    }
+
+    #[test]
+    fn channels_are_read() {
+        let plain = ChannelEntry::new("DAPI");
+        assert_eq!(channel("DAPI"), Ok(plain.clone()));
+        let whole = ChannelEntry {
+            color: Some("lime".parse().unwrap()),
+            range: Some([-10.0, 4000.0]),
+            opacity: Some(0.5),
+            ..ChannelEntry::new("1")
+        };
+        assert_eq!(whole.channel, splatkit::session::ChannelName::Number(1));
+        assert_eq!(channel("1:#0f0:-10..4000:0.5"), Ok(whole));
+        let both = channels("a.tif=DAPI,2:red").unwrap();
+        assert_eq!(both.single().map(|(_, all)| all.len()), Some(2));
+        for bad in ["", ":red", "DAPI:oranje", "DAPI:5..1", "DAPI:1..", "DAPI:2", "DAPI:0"] {
+            assert!(channel(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

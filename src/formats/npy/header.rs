@@ -68,8 +68,8 @@ impl Header {
     /// Returns the error for a shape that nothing can be drawn of.
     pub fn wrong_shape(&self, source: &Source) -> Error {
         let message = format!(
-            "has the shape {}, but (z, y, x) was expected for a volume, (n, 3) for points, and \
-             (n, 4), (n, 5) or (n, 10) for samples",
+            "has the shape {}, but (z, y, x) was expected for a volume, (y, x) of at least 16 each \
+             for a picture, (n, 3) for points, and (n, 4), (n, 5) or (n, 10) for samples",
             self.shape_text()
         );
         source.error("header", message).hint(

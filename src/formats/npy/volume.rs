@@ -3,7 +3,7 @@
 use super::Header;
 use crate::{
     Result,
-    about::Frame,
+    about::{Frame, Orientation},
     formats::{
         Endian, ReadOptions,
         shared::{
@@ -21,6 +21,9 @@ use std::borrow::Cow;
 
 /// The most components that a last axis may have to be no axis of space.
 const MOST_COMPONENTS: u64 = 4;
+
+/// The least rows and columns of a picture.
+const LEAST_PICTURE: u64 = 16;
 
 /// An array whose axes are to be found: its numbers are in order, last axis fastest.
 #[derive(Debug, Clone)]
@@ -49,7 +52,8 @@ struct Axes {
 /// this is the last axis, in Fortran order the first. A fourth axis behind them, of at most four
 /// numbers, has the components of vectors or colours ([`ReadOptions::scalar`]). A fourth axis
 /// before them has volumes at several times, if [`ReadOptions::time`] chooses one. Axes of one
-/// number are skipped. Complex numbers become their magnitude.
+/// number are skipped. Complex numbers become their magnitude. An array\[y, x\], or bytes\[y, x,
+/// 3 or 4\], is a picture: a volume of one slice, whose rows run down.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a file that is not such an array or is cut off;
@@ -67,10 +71,11 @@ pub fn read_volume(source: &Source, options: &ReadOptions) -> Result<Volume> {
 pub(in crate::formats) fn plain(source: &Source) -> Result<Option<Plain>> {
     let header = Header::of(source)?;
     let Element::Real(sample_type) = header.element else { return Ok(None) };
-    if header.shape.len() != 3 {
+    let shaped = shaped(&header, "header");
+    if header.shape.len() != 3 || shaped.is_picture() {
         return Ok(None);
     }
-    let axes = shaped(&header, "header").axes(source, &ReadOptions::default())?;
+    let axes = shaped.axes(source, &ReadOptions::default())?;
     axes.grid.check(source)?;
     let lattice = Lattice::with_spacing(axes.grid.dims, DVec3::ONE);
     lattice.check().map_err(|message| source.error("header", message))?;
@@ -122,7 +127,11 @@ pub fn volume_of(
     };
     let lattice = Lattice::with_spacing(grid.dims, DVec3::ONE);
     lattice.check().map_err(|message| source.error(&array.place, message))?;
-    grid.volume(source, lattice, part, component, options)
+    let mut volume = grid.volume(source, lattice, part, component, options)?;
+    if array.is_picture() {
+        volume.about.orientation = Some(Orientation::Y_DOWN);
+    }
+    Ok(volume)
 }
 
 impl Shaped {
@@ -157,6 +166,16 @@ impl Shaped {
         }
     }
 
+    /// Whether it is a picture: two axes, or colours of bytes along a third. Arrays of fewer
+    /// columns are tables or matrices.
+    pub fn is_picture(&self) -> bool {
+        match self.sizes[..] {
+            [y, x] => y.min(x) >= LEAST_PICTURE,
+            [y, x, 3 | 4] => self.element.is_byte() && y.min(x) >= LEAST_PICTURE,
+            _ => false,
+        }
+    }
+
     fn counted(&self) -> Vec<u64> {
         self.counted_axes().into_iter().map(|axis| self.sizes[axis]).collect()
     }
@@ -186,6 +205,10 @@ impl Shaped {
             Grid::interleaved(self.element, self.endian, dims, size(components))
         };
         match (&counted[..], options.time) {
+            (&[y, x], _) if self.is_picture() => Ok(Axes { grid: grid(x, y, 1, 1), skip: 0 }),
+            (&[y, x, count], _) if self.is_picture() => {
+                Ok(Axes { grid: grid(x, y, 1, count), skip: 0 })
+            }
             (&[z, y, x], _) => Ok(Axes { grid: grid(x, y, z, 1), skip: 0 }),
             (&[times, z, y, x], time) if time.is_some() || self.outer.is_some() => {
                 self.at(source, grid(x, y, z, 1), times, options)

@@ -177,5 +177,8 @@ fn flat(header: &Header, kind: &str) -> crate::Error {
         "one of the 3 axes holds values of the kind “{}”, but a volume has 3 axes of space",
         excerpt(kind)
     );
-    header.source.error("kinds", message).hint("pictures are not drawn; name a volume")
+    header
+        .source
+        .error("kinds", message)
+        .hint("pictures are drawn of PNG, JPEG, TIFF and NPY files; name a volume")
 }

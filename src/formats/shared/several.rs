@@ -3,7 +3,7 @@
 //! The caller chooses by number, and the first is the default. Nothing is chosen in silence: a
 //! warning says how many there are and which flag reads another.
 
-use crate::{Result, formats::ReadOptions, input::Source, warning};
+use crate::{Result, about::Channel, formats::ReadOptions, input::Source, warning};
 
 /// Returns the number of the time to read of a file with `count` of them, from 0: the one that
 /// [`ReadOptions::time`] names, else the first, with a warning if there are several. `place` is
@@ -55,17 +55,72 @@ pub(crate) fn warn_of_times(source: &Source, count: u64, options: &ReadOptions, 
     }
 }
 
-/// Says that the first of several channels is shown.
-pub(crate) fn warn_of_channels(source: &Source, count: usize) {
+/// Returns the numbers of the channels to read of a file that has these: the one that
+/// [`ReadOptions::scalar`] names (by its name, as `channel:1` or `:1`), those of
+/// [`ReadOptions::channels`], or the first, with a warning if there are several.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a channel that the file does not have.
+pub(crate) fn channels(
+    source: &Source,
+    options: &ReadOptions,
+    all: &[Channel],
+) -> Result<Vec<usize>> {
+    if all.len() < 2 {
+        return Ok(vec![0]);
+    }
     let path = source.path.display();
-    warning::give!(
-        "{path}: shows the first of {count} channels; --scalar channel:1 shows the second"
-    );
+    match (&options.scalar, &options.channels) {
+        (Some(name), _) => Ok(vec![channel(source, name, all)?]),
+        (None, Some(names)) if names.is_empty() => {
+            let most = Channel::MOST;
+            if all.len() > most {
+                let last = most - 1;
+                warning::give!(
+                    "{path}: shows the channels 0 to {last} of {}; --channels {most},… shows others",
+                    all.len()
+                );
+            }
+            Ok((0..all.len().min(most)).collect())
+        }
+        (None, Some(names)) => names.iter().map(|name| channel(source, name, all)).collect(),
+        (None, None) => {
+            warning::give!(
+                "{path}: shows the first of {} channels; --scalar channel:1 shows the second",
+                all.len()
+            );
+            Ok(vec![0])
+        }
+    }
+}
+
+/// Returns the number of the channel of a name: its own, its number, or its number behind a colon.
+fn channel(source: &Source, name: &str, all: &[Channel]) -> Result<usize> {
+    let is_named = |channel: &Channel| {
+        !channel.name.is_empty() && channel.name.eq_ignore_ascii_case(name.trim())
+    };
+    if let Some(number) = all.iter().position(is_named) {
+        return Ok(number);
+    }
+    let word = name.rsplit(':').next().unwrap_or(name).trim();
+    match word.parse::<usize>() {
+        Ok(number) if number < all.len() => Ok(number),
+        _ => {
+            let names = (0..all.len()).map(|number| match &*all[number].name {
+                "" => number.to_string(),
+                name => format!("{number} ({name})"),
+            });
+            let names: Vec<String> = names.take(32).collect();
+            Err(source
+                .error("channels", format!("has no channel “{name}”"))
+                .hint(format!("the channels are {}", names.join(", "))))
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{channels as channels_of, *};
     use crate::{
         formats::{Times, times},
         input::{Limits, testing::warnings_of},
@@ -111,5 +166,30 @@ mod tests {
         assert!(error.contains("has 5 times, but number 5 was asked for"), "{error}");
         let error = chosen(1, Some(1)).0.unwrap_err().to_string();
         assert!(error.contains("has 1 time, but number 1 was asked for"), "{error}");
+    }
+
+    #[test]
+    fn channels_are_chosen_by_name_or_number() {
+        let named = |name: &str| Channel { name: name.into(), ..Channel::default() };
+        let all = [named("DAPI"), named(""), named("GFP")];
+        let limits = Limits::default();
+        let source = Source::from_bytes(Path::new("a"), &[], &limits).unwrap();
+        let of = |names: &[&str]| {
+            let channels = Some(names.iter().map(|name| (*name).to_owned()).collect());
+            let options = ReadOptions { channels, ..ReadOptions::default() };
+            warnings_of(|| channels_of(&source, &options, &all))
+        };
+        assert_eq!(of(&[]).0.unwrap(), [0, 1, 2]);
+        assert_eq!(of(&["gfp", "0"]).0.unwrap(), [2, 0]);
+        let error = of(&["YFP"]).0.unwrap_err().to_string();
+        assert!(error.contains("no channel “YFP”") && error.contains("2 (GFP)"), "{error}");
+        let (first, words) = warnings_of(|| channels_of(&source, &ReadOptions::default(), &all));
+        assert_eq!((first.unwrap(), words.len()), (vec![0], 1));
+        let second = ReadOptions::scalar(Some("channel:1"));
+        assert_eq!(channels_of(&source, &second, &all).unwrap(), [1]);
+        let many = vec![Channel::default(); 9];
+        let options = ReadOptions { channels: Some(Vec::new()), ..ReadOptions::default() };
+        let (most, words) = warnings_of(|| channels_of(&source, &options, &many));
+        assert_eq!((most.unwrap().len(), words.len()), (Channel::MOST, 1));
     }
 }

@@ -24,6 +24,21 @@ const TEXEL: u64 = 8 + 4 + 4;
 /// Decodes a PNG or JPEG picture, or with the feature `gltf` a WebP picture. `place` names what
 /// refers to it.
 pub(crate) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
+    picture(source, place, bytes, |picture| {
+        let picture = picture.into_rgba8();
+        let (width, height) = picture.dimensions();
+        let texels = picture.pixels().map(|pixel| pixel.0).collect();
+        Arc::new(Texture { width, height, texels })
+    })
+}
+
+/// As [`decode`], but returns what `make` makes of the pixels.
+pub(crate) fn picture<T: Send + 'static>(
+    source: &Source,
+    place: &str,
+    bytes: &[u8],
+    make: impl FnOnce(DynamicImage) -> T + Send + 'static,
+) -> Result<T> {
     let wrong = |message: String| source.error(place, message);
     let ((width, height), is_webp) = isolated(source, place, || {
         let (decoder, is_webp) = open(bytes).map_err(wrong)?;
@@ -51,12 +66,11 @@ pub(crate) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<T
         // Enough for 16 bits per channel and the decoder's own copy.
         limits.max_alloc = Some((texels * 16).saturating_add(1 << 20));
         decoder.set_limits(limits).map_err(broken)?;
-        let picture = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgba8();
-        let texels: Vec<[u8; 4]> = picture.pixels().map(|pixel| pixel.0).collect();
-        if texels.is_empty() {
+        let picture = DynamicImage::from_decoder(decoder).map_err(broken)?;
+        if texels == 0 {
             return Err("the picture has no texels".into());
         }
-        Ok(Arc::new(Texture { width, height, texels }))
+        Ok(make(picture))
     })
 }
 

@@ -1,12 +1,14 @@
 //! What the pages of a file mean: slices, channels and times, and the distances between samples, by
 //! the descriptions that ImageJ, OME's programs and tifffile leave in the first page.
 
+use super::{
+    imagej::{self, Block},
+    ome,
+};
 use crate::{
     Result,
-    formats::{
-        ReadOptions,
-        shared::{grid::Component, length::meters, several},
-    },
+    about::Channel,
+    formats::{ReadOptions, shared::several},
     input::Source,
 };
 
@@ -14,11 +16,13 @@ use crate::{
 #[derive(Debug, Clone)]
 pub struct Meaning {
     /// Slices, if the description says how many there are.
-    slices: Option<usize>,
+    pub slices: Option<usize>,
     /// Channels that have pages of their own.
     pub channels: usize,
+    /// How the channels are shown, if the description says it.
+    pub shown: Vec<Channel>,
     /// The order of the pages, the fastest first: `z`, `c`, `t`.
-    order: [char; 3],
+    pub order: [char; 3],
     /// Pages that one directory describes; ImageJ writes more than 4 GB in this way.
     pub in_one: Option<usize>,
     pub spacing: [f64; 3],
@@ -28,11 +32,17 @@ pub struct Meaning {
 }
 
 impl Meaning {
-    /// Reads a description, with the pixels per unit along x and y that the tags of the page give.
-    pub fn of(description: &str, resolution: Option<[f64; 2]>) -> Self {
+    /// Reads a description, with the pixels along x and y and those per unit that the tags of the
+    /// page give, and ImageJ's block of data.
+    pub fn of(
+        description: &str,
+        (size, resolution): ([usize; 2], Option<[f64; 2]>),
+        block: &Block,
+    ) -> Self {
         let plain = Self {
             slices: None,
             channels: 1,
+            shown: Vec::new(),
             order: ['z', 'c', 't'],
             in_one: None,
             spacing: [1.0; 3],
@@ -41,90 +51,40 @@ impl Meaning {
         };
         let text = description.trim_start_matches('\u{feff}').trim_start();
         if text.starts_with("ImageJ=") {
-            return plain.of_imagej(text, resolution);
+            return imagej::meaning(text, resolution, block, &plain);
         }
-        if let Some(meaning) = plain.clone().of_ome(text) {
+        if let Some(meaning) = ome::meaning(text, &plain) {
             return meaning;
         }
-        plain.of_shape(text).of_ratio(resolution)
+        plain.of_shape(text, size).of_ratio(resolution)
     }
 
-    /// The lines `name=value` of ImageJ. Its tags give pixels per unit.
-    fn of_imagej(mut self, text: &str, resolution: Option<[f64; 2]>) -> Self {
-        let field = |name: &str| {
-            let value = |line: &str| {
-                line.strip_prefix(name).and_then(|rest| rest.strip_prefix('=')).map(str::to_owned)
-            };
-            text.lines().find_map(|line| value(line.trim()))
+    /// The shape that tifffile writes, and what its axes are: `{"shape": [2, 30, 64, 64], "axes":
+    /// "CZYX"}`. A page of `size` pixels may have several numbers at each, along a last axis.
+    fn of_shape(mut self, text: &str, [width, height]: [usize; 2]) -> Self {
+        #[derive(serde::Deserialize)]
+        struct Shape {
+            shape: Vec<usize>,
+            #[serde(default)]
+            axes: String,
+        }
+        let Ok(Shape { shape, axes }) = serde_json::from_str(text) else { return self };
+        let outer = match &shape[..] {
+            [outer @ .., y, x] | [outer @ .., y, x, _] if [*y, *x] == [height, width] => outer,
+            _ => return self,
         };
-        let count = |name: &str| field(name).and_then(|text| text.trim().parse::<usize>().ok());
-        self.channels = count("channels").unwrap_or(1).max(1);
-        self.order = ['c', 'z', 't'];
-        self.in_one = count("images").filter(|&images| images > 1);
-        let frames = count("frames").unwrap_or(1).max(1);
-        let of_images = self.in_one.map(|images| images / self.channels / frames);
-        self.slices = count("slices").or(of_images);
-        if let Some([x, y]) = resolution.filter(|all| all.iter().all(|&v| is_length(v))) {
-            self.spacing = [1.0 / x, 1.0 / y, 1.0 / x];
-        }
-        let spacing = field("spacing").and_then(|text| text.trim().parse::<f64>().ok());
-        if let Some(spacing) = spacing.map(f64::abs).filter(|&spacing| is_length(spacing)) {
-            self.spacing[2] = spacing;
-        }
-        self.unit = unit(field("unit").unwrap_or_default().trim());
-        self
-    }
-
-    /// The attributes of OME's element `Pixels`; `None` for other descriptions.
-    fn of_ome(mut self, text: &str) -> Option<Self> {
-        let is_ome = text.starts_with('<') && text.contains("OME");
-        let pixels = text.split("<Pixels").nth(1).filter(|_| is_ome)?;
-        let pixels = pixels.split('>').next()?;
-        let attribute = |name: &str| {
-            let (_, rest) = pixels.split_once(&format!(" {name}="))?;
-            let quote = rest.chars().next().filter(|c| matches!(c, '"' | '\''))?;
-            rest[1..].split_once(quote).map(|(value, _)| value.to_owned())
-        };
-        let size = |name: &str| attribute(name).and_then(|text| text.parse::<usize>().ok());
-        self.slices = size("SizeZ");
-        // Pixels of several samples have all of their channels in one page.
-        let (_, channel) = text.split_once("SamplesPerPixel=").unwrap_or_default();
-        let digits: String = channel.chars().skip(1).take_while(char::is_ascii_digit).collect();
-        let samples = digits.parse::<usize>().unwrap_or(1).max(1);
-        self.channels = (size("SizeC").unwrap_or(1) / samples).max(1);
-        let order = attribute("DimensionOrder").unwrap_or_default().to_ascii_lowercase();
-        let letters: Vec<char> = order.chars().filter(|c| "zct".contains(*c)).collect();
-        self.order = letters.try_into().unwrap_or(self.order);
-        let lengths = ["X", "Y", "Z"].map(|axis| {
-            let value = attribute(&format!("PhysicalSize{axis}"))?.parse::<f64>().ok()?;
-            let unit = attribute(&format!("PhysicalSize{axis}Unit")).map(|text| unit(&text));
-            Some((value, unit.unwrap_or_else(|| "µm".into()))).filter(|(v, _)| is_length(*v))
-        });
-        if let [Some((x, x_unit)), ..] = &lengths {
-            let of = |length: &Option<(f64, String)>| match length {
-                Some((value, unit)) => match (meters(unit), meters(x_unit)) {
-                    (Some(unit), Some(x_unit)) => value * unit / x_unit,
-                    _ => *value,
-                },
-                None => *x,
-            };
-            self.spacing = [*x, of(&lengths[1]), of(&lengths[2])];
-            self.unit.clone_from(x_unit);
-        }
-        self.is_microscopy = true;
-        Some(self)
-    }
-
-    /// The shape that tifffile writes: `{"shape": [2, 30, 64, 64]}`.
-    fn of_shape(mut self, text: &str) -> Self {
-        let list = text.strip_prefix('{').and_then(|rest| rest.split_once("\"shape\":"));
-        let list = list.and_then(|(_, rest)| rest.split_once('[')?.1.split_once(']'));
-        let Some((list, _)) = list else { return self };
-        let sizes: Option<Vec<usize>> = list.split(',').map(|n| n.trim().parse().ok()).collect();
-        if let Some([outer @ .., slices, _, _]) = sizes.as_deref() {
+        let pages = |sizes: &[usize]| sizes.iter().try_fold(1usize, |all, &n| all.checked_mul(n));
+        self.in_one = pages(outer).filter(|&count| count > 1);
+        let axes = axes.to_ascii_lowercase();
+        let names = axes.get(..outer.len()).filter(|_| axes.len() == shape.len());
+        if let Some(names) = names.filter(|names| names.chars().all(|axis| "zct".contains(axis))) {
+            let size = |axis: char| names.find(axis).map(|at| outer[at]);
+            (self.slices, self.channels) = (size('z').or(Some(1)), size('c').unwrap_or(1).max(1));
+            // The last axis is the fastest. Those of one page may stand anywhere.
+            let order = names.chars().rev().chain("zct".chars().filter(|c| !names.contains(*c)));
+            self.order = order.collect::<Vec<_>>().try_into().unwrap_or(self.order);
+        } else if let [.., slices] = outer {
             self.slices = Some(*slices);
-            let times = outer.iter().try_fold(*slices, |all, &n| all.checked_mul(n));
-            self.in_one = times.filter(|&count| count > 1);
         }
         self
     }
@@ -154,27 +114,30 @@ impl Meaning {
         self.sizes(pages)[2]
     }
 
-    /// Returns the pages to read, in the order of the slices.
+    /// Returns how many channels have pages of their own.
+    pub fn paged_channels(&self, pages: usize) -> usize {
+        self.sizes(pages)[1]
+    }
+
+    /// Returns the number of the time to read.
     ///
     /// # Errors
-    /// [`Error::Input`](crate::Error::Input) for a time or a channel that the file does not have.
+    /// [`Error::Input`](crate::Error::Input) for a time that the file does not have.
+    pub fn time(&self, source: &Source, pages: usize, options: &ReadOptions) -> Result<usize> {
+        several::time(source, "pages", self.times(pages) as u64, options)
+    }
+
+    /// Returns the pages of a channel at a time, in the order of the slices.
+    ///
+    /// # Errors
+    /// [`Error::Memory`](crate::Error::Memory) for too many pages.
     pub fn planes(
         &self,
         source: &Source,
         pages: usize,
-        options: &ReadOptions,
+        [channel, time]: [usize; 2],
     ) -> Result<Vec<usize>> {
         let [slices, channels, times] = self.sizes(pages);
-        let time = several::time(source, "pages", times as u64, options)?;
-        let is_named = channels > 1 && options.scalar.is_some();
-        let channel = match Component::chosen(source, options, channels, false) {
-            Ok(Component::One(channel)) if is_named => channel,
-            Err(error) if is_named => return Err(error),
-            _ => 0,
-        };
-        if channels > 1 && !is_named {
-            several::warn_of_channels(source, channels);
-        }
         let page = |slice: usize| {
             let mut stride = 1;
             let mut page = 0;
@@ -194,12 +157,12 @@ impl Meaning {
     }
 }
 
-fn is_length(value: f64) -> bool {
+pub fn is_length(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
 
 /// Returns a unit of length by its usual sign; empty for pixels, which are none.
-fn unit(name: &str) -> String {
+pub fn unit(name: &str) -> String {
     match name {
         "um" | "micron" | "microns" | "micrometer" | "\\u00B5m" | "\u{b5}m" | "\u{3bc}m" => "µm",
         "pixel" | "pixels" | "reference frame" => "",
@@ -236,14 +199,21 @@ mod tests {
     fn planes(meaning: &Meaning, pages: usize, options: &ReadOptions) -> Result<Vec<usize>> {
         let limits = Limits::default();
         let source = Source::from_bytes(Path::new("a.tif"), &[], &limits)?;
-        meaning.planes(&source, pages, options)
+        let time = meaning.time(&source, pages, options)?;
+        let all = vec![Channel::default(); meaning.paged_channels(pages)];
+        let channels = several::channels(&source, options, &all)?;
+        meaning.planes(&source, pages, [channels[0], time])
+    }
+
+    fn of(text: &str, resolution: Option<[f64; 2]>) -> Meaning {
+        Meaning::of(text, ([8, 8], resolution), &Block::default())
     }
 
     #[test]
     fn imagej_gives_order_and_spacing() {
         let text = "ImageJ=1.53t\nimages=12\nchannels=2\nslices=3\nframes=2\nhyperstack=true\n\
                     unit=micron\nspacing=0.5\nloop=false\n";
-        let meaning = Meaning::of(text, Some([4.0, 5.0]));
+        let meaning = of(text, Some([4.0, 5.0]));
         assert_eq!(meaning.spacing, [0.25, 0.2, 0.5]);
         assert_eq!((&meaning.unit[..], meaning.in_one), ("µm", Some(12)));
         let default = ReadOptions::default();
@@ -265,7 +235,7 @@ mod tests {
                     PhysicalSizeX='200' PhysicalSizeXUnit='nm' PhysicalSizeY='200' \
                     PhysicalSizeYUnit='nm' PhysicalSizeZ='0.6' Type='uint8'><Channel \
                     SamplesPerPixel='1'/></Pixels></Image></OME>";
-        let meaning = Meaning::of(text, None);
+        let meaning = of(text, None);
         assert_eq!(meaning.unit, "nm");
         assert!((meaning.spacing[2] - 600.0).abs() < 1e-9 && meaning.spacing[1] == 200.0);
         let options =
@@ -275,20 +245,22 @@ mod tests {
         let colors = text
             .replace("SizeC=\"2\"", "SizeC='3'")
             .replace("SamplesPerPixel='1'", "SamplesPerPixel='3'");
-        assert_eq!(Meaning::of(&colors, None).channels, 1);
+        assert_eq!(of(&colors, None).channels, 1);
     }
 
     #[test]
     fn shapes_and_ratios_are_read() {
-        let meaning = Meaning::of("{\"shape\": [2, 3, 8, 8]}", Some([72.0, 36.0]));
+        let meaning = of("{\"shape\": [2, 3, 8, 8]}", Some([72.0, 36.0]));
         assert_eq!((meaning.in_one, meaning.spacing), (Some(6), [1.0, 2.0, 1.0]));
         let second = ReadOptions { time: Some(1), ..ReadOptions::default() };
         assert_eq!(planes(&meaning, 6, &second).unwrap(), [3, 4, 5]);
+        let colors = of("{\"shape\": [8, 8, 3]}", None);
+        assert_eq!((colors.in_one, colors.sizes(1)), (None, [1, 1, 1]));
+        let channels = of("{\"shape\": [2, 3, 8, 8], \"axes\": \"CZYX\"}", None);
+        let all = ReadOptions { channels: Some(vec!["1".into()]), ..ReadOptions::default() };
+        assert_eq!(planes(&channels, 6, &all).unwrap(), [3, 4, 5]);
         for text in ["", "{\"shape\": [8, 8]}", "<svg/>", "a scan"] {
-            assert_eq!(
-                planes(&Meaning::of(text, None), 3, &ReadOptions::default()).unwrap(),
-                [0, 1, 2]
-            );
+            assert_eq!(planes(&of(text, None), 3, &ReadOptions::default()).unwrap(), [0, 1, 2]);
         }
     }
 

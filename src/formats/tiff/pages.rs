@@ -1,6 +1,6 @@
 //! The pages of a file, decoded by the crate `tiff`, behind the limits.
 
-use super::Meaning;
+use super::{Meaning, imagej::Block};
 use crate::{
     Error, Result,
     formats::{
@@ -63,8 +63,11 @@ type Stream<'a> = Watched<'a, Cursor<&'a [u8]>>;
 pub struct Pages<'a> {
     source: &'a Source<'a>,
     decoder: Decoder<Stream<'a>>,
+    /// Pixels of the first page along x and y.
+    size: [usize; 2],
     description: String,
     resolution: Option<[f64; 2]>,
+    block: Block,
 }
 
 impl Stack {
@@ -130,16 +133,16 @@ impl<'a> Pages<'a> {
             let mut ratio = |tag| decoder.find_tag(tag).ok().flatten().and_then(number);
             Ok((text, ratio(Tag::XResolution).zip(ratio(Tag::YResolution)).map(|(x, y)| [x, y])))
         })?;
-        Ok(Self { source, decoder, description, resolution })
+        let (block, size) = isolated(source, "page 0", || {
+            let size = decoder.dimensions().unwrap_or_default();
+            Ok((block(&mut decoder), [size.0 as usize, size.1 as usize]))
+        })?;
+        Ok(Self { source, decoder, size, description, resolution, block })
     }
 
-    pub fn description(&self) -> &str {
-        &self.description
-    }
-
-    /// Returns the pixels per unit of length along x and y.
-    pub fn resolution(&self) -> Option<[f64; 2]> {
-        self.resolution
+    /// Returns what the pages mean, as the first one describes them.
+    pub fn meaning(&self) -> Meaning {
+        Meaning::of(&self.description, (self.size, self.resolution), &self.block)
     }
 
     /// Finds the pages that are slices. All others are previews.
@@ -286,7 +289,7 @@ impl<'a> Pages<'a> {
 pub fn one(source: &Source) -> Result<Read> {
     let mut pages = Pages::open(source)?;
     let layout = pages.layout(0)?;
-    let meaning = Meaning::of(&pages.description, pages.resolution);
+    let meaning = pages.meaning();
     if pages.with(0, |decoder| Ok(decoder.more_images()))? {
         let message = "has several pages, but each file of a folder is one slice";
         return Err(source.error("page 1", message).hint("name this file alone to read its pages"));
@@ -307,6 +310,18 @@ fn page_error(source: &Source, page: usize, error: &TiffError) -> Error {
         }
         _ => wrapped,
     }
+}
+
+/// Tags of ImageJ: the lengths of the parts of its block of data, and the block.
+const BLOCK: [u16; 2] = [50838, 50839];
+
+/// Returns ImageJ's block of data; an empty one of other files.
+fn block(decoder: &mut Decoder<Stream>) -> Block {
+    let mut field = |tag| decoder.find_tag(Tag::Unknown(tag)).ok().flatten();
+    let [lengths, bytes] = BLOCK.map(&mut field);
+    let lengths = lengths.and_then(|value| value.into_u64_vec().ok()).unwrap_or_default();
+    let bytes = bytes.and_then(|value| value.into_u8_vec().ok()).unwrap_or_default();
+    Block { lengths, bytes, is_big: decoder.byte_order() == ByteOrder::BigEndian }
 }
 
 /// Returns the number of a field.

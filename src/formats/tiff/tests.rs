@@ -225,8 +225,9 @@ fn cuts_and_lies_are_errors() {
         );
     }
     let default = ReadOptions::default();
-    let single = load(&bytes_of(1, "", Compression::Uncompressed), &default).unwrap_err();
-    assert!(single.to_string().contains("one page of 3 × 2 pixels: this is a picture"), "{single}");
+    let single = load(&bytes_of(1, "", Compression::Uncompressed), &default).unwrap();
+    assert_eq!(single.lattice.dims, [3, 2, 1]);
+    assert_eq!(single.about.orientation, Some(Orientation::Y_DOWN));
     let mut file = Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut file).unwrap();
     encoder.write_image::<colortype::Gray8>(1, 1, &[1]).unwrap();
@@ -251,4 +252,25 @@ fn cuts_and_lies_are_errors() {
     let tiff = bytes_of(2, "", Compression::Uncompressed);
     let source = Source::from_bytes(std::path::Path::new("a"), &tiff, &limits).unwrap();
     assert_eq!(Kind::of_source(&source, &default).unwrap(), Some(Kind::Volume));
+}
+
+#[test]
+fn channels_are_read_in_the_colours_of_the_file() {
+    let text = "<?xml version='1.0'?><OME xmlns='http'><Image><Pixels DimensionOrder='XYCZT' \
+                SizeC='2' SizeZ='2' SizeT='1'><Channel Name='DAPI &amp; co' Color='65535'/>\
+                <Channel EmissionWavelength='520'/></Pixels></Image></OME>";
+    let bytes = bytes_of(4, text, Compression::Lzw);
+    let all = ReadOptions { channels: Some(Vec::new()), ..ReadOptions::default() };
+    let volume = load(&bytes, &all).unwrap();
+    assert_eq!((volume.about.name.as_str(), volume.about.channel), ("DAPI & co", 0));
+    assert_eq!(volume.about.channels[0].color, Some([0.0, 0.0, 1.0]));
+    let green = volume.about.channels[1].color.unwrap();
+    assert!(green[1] > 0.9 && green[0] < 0.3, "{green:?}");
+    let [second] = &volume.more_channels[..] else { panic!("two channels") };
+    assert_eq!((second.about.name.as_str(), second.about.channel), ("channel 1", 1));
+    let named = |name: &str| ReadOptions { channels: Some(vec![name.into()]), ..all.clone() };
+    let alone = load(&bytes, &named("1")).unwrap();
+    assert_eq!(values(&alone), values(second));
+    assert_ne!(values(&alone), values(&volume));
+    assert!(load(&bytes, &named("GFP")).unwrap_err().to_string().contains("DAPI & co"));
 }

@@ -3,13 +3,14 @@
 use super::{ColorEntry, kernel_file};
 use crate::{
     Error, Result,
+    about::Channel,
     color::ColorMap,
     facet::Size,
     input::Limits,
     math::Kernel,
     session::{
-        Appearance, CellStyle, Coloring, Showing, Surface, SurfaceColor, SurfaceValue,
-        Transfer as Chosen,
+        Appearance, CellStyle, ChannelStyle, Coloring, Showing, Surface, SurfaceColor,
+        SurfaceValue, Transfer as Chosen,
     },
     surface::{PointStyle, SurfelOptions},
     volume::TransferFunction,
@@ -29,6 +30,9 @@ pub struct AppearanceEntry {
     /// The values that the transfer function and the colour map are spread over.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<[f64; 2]>,
+    /// The channels of volumes that are drawn, and how; by default all, in the file's colours.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channels: Option<Vec<ChannelEntry>>,
     /// The length that the opacities of the transfer function hold for, in world units.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub opacity_unit: Option<f64>,
@@ -95,6 +99,39 @@ pub struct AppearanceEntry {
     pub cells: Option<CellStyle>,
 }
 
+/// A channel of a volume that has several.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct ChannelEntry {
+    /// Its name, or its number from 0.
+    pub channel: ChannelName,
+    /// Its colour; by default that of the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color: Option<ColorEntry>,
+    /// The values from which on it is seen, and at which it is brightest; by default those of the
+    /// file's window, or what stands out of the background.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range: Option<[f64; 2]>,
+    /// A factor on its opacities, above 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub opacity: Option<f64>,
+    /// Its transfer function, which counts more than all else here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transfer: Option<TransferFunction>,
+}
+
+/// The name of a channel, or its number.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub enum ChannelName {
+    /// Its number, from 0.
+    Number(usize),
+    /// Its name; letters may be small or capital.
+    Name(String),
+}
+
 /// A transfer function.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
@@ -136,6 +173,51 @@ pub struct IsosurfaceEntry {
     pub opacity: f64,
 }
 
+impl ChannelEntry {
+    /// A channel as the file shows it.
+    pub fn new(name: &str) -> Self {
+        let channel = match name.trim().parse() {
+            Ok(number) => ChannelName::Number(number),
+            Err(_) => ChannelName::Name(name.trim().to_owned()),
+        };
+        Self { channel, color: None, range: None, opacity: None, transfer: None }
+    }
+
+    /// Returns the name or the number as a text.
+    pub fn name(&self) -> String {
+        match &self.channel {
+            ChannelName::Number(number) => number.to_string(),
+            ChannelName::Name(name) => name.clone(),
+        }
+    }
+
+    /// Checks what does not depend on the inputs.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        let name = self.name();
+        if let Some([low, high]) = self.range
+            && !(low < high && (high - low).is_finite())
+        {
+            return Err(format!("channel {name}: the range {low} to {high} does not ascend"));
+        }
+        if self.opacity.is_some_and(|opacity| !(opacity > 0.0 && opacity <= 1.0)) {
+            return Err(format!("channel {name}: the opacity must be above 0 and at most 1"));
+        }
+        Ok(())
+    }
+
+    fn style(&self) -> ChannelStyle {
+        ChannelStyle {
+            color: self.color.map(|ColorEntry(color)| color.map(f64::from)),
+            range: self.range,
+            opacity: self.opacity,
+            transfer: self.transfer.clone(),
+        }
+    }
+}
+
 fn opaque() -> f64 {
     1.0
 }
@@ -164,7 +246,7 @@ impl AppearanceEntry {
             };
         }
         own_or_shared!(
-            transfer, range, opacity_unit, isosurfaces, gradient_opacity, colormap, nan_color,
+            transfer, range, channels, opacity_unit, isosurfaces, gradient_opacity, colormap, nan_color,
             kernel, sigma, extent, color, opacity, radius_scale, points, point_size, point_radius,
             line_width, crease, cells;
             log_colors, sharp, edges
@@ -201,6 +283,7 @@ impl AppearanceEntry {
         if self.crease.is_some_and(|angle| !(0.0..=180.0).contains(&angle)) {
             return Err(("crease", "must be an angle from 0 to 180 degrees".into()));
         }
+        self.check_channels().map_err(|message| ("channels", message))?;
         let surfaces = self.isosurfaces.iter().flatten();
         surfaces
             .map(IsosurfaceEntry::check)
@@ -225,6 +308,30 @@ impl AppearanceEntry {
             return Err(("radius_scale", message));
         }
         Ok(())
+    }
+
+    fn check_channels(&self) -> std::result::Result<(), String> {
+        let Some(channels) = &self.channels else { return Ok(()) };
+        let (count, most) = (channels.len(), Channel::MOST);
+        if !(1..=most).contains(&count) {
+            return Err(format!("{count} channels are given, but a picture shows 1 to {most}"));
+        }
+        if self.transfer.is_some() || self.colormap.is_some() {
+            return Err("channels have colours of their own: leave out the transfer function and \
+                        the colour map, or show one channel by its values (--scalar channel:1)"
+                .into());
+        }
+        channels.iter().try_for_each(ChannelEntry::check)
+    }
+
+    /// Returns which channels of a volume are read: those that are named, or all, unless something
+    /// else colours its values. `None` stands for a single one.
+    pub fn channels_read(&self) -> Option<Vec<String>> {
+        match &self.channels {
+            Some(channels) => Some(channels.iter().map(ChannelEntry::name).collect()),
+            None if self.transfer.is_some() || self.colormap.is_some() => None,
+            None => Some(Vec::new()),
+        }
     }
 
     /// Returns the files that it names.
@@ -258,6 +365,8 @@ impl AppearanceEntry {
             isosurfaces: surfaces.collect(),
             gradient: self.gradient_opacity.clone().unwrap_or_default(),
             coloring: self.coloring(),
+            channels: self.channels.iter().flatten().map(ChannelEntry::style).collect(),
+            rises_evenly: false,
         };
         Ok(Showing {
             appearance,

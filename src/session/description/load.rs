@@ -222,7 +222,8 @@ impl Description {
 
     fn read_from(&self, input: &InputEntry, held: Option<&Held>) -> Result<ReadInput> {
         let (path, showing) = (&input.file, self.showing(input)?);
-        let reading = self.reading_of(input).reading_within(memory::most());
+        let mut reading = self.reading_of(input).reading_within(memory::most());
+        reading.options.channels = self.appearance_of(input).channels_read();
         let attribute = showing.coloring().attribute();
         let opened = match held {
             None => reading.open_colored(path, attribute)?,

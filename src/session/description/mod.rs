@@ -21,7 +21,9 @@ mod tests;
 mod times;
 mod transform;
 
-pub use appearance::{AppearanceEntry, IsosurfaceEntry, KernelEntry, TransferEntry};
+pub use appearance::{
+    AppearanceEntry, ChannelEntry, ChannelName, IsosurfaceEntry, KernelEntry, TransferEntry,
+};
 pub use camera::CameraEntry;
 pub use clip::{Axis, ClipEntry, ClipSide, Place};
 pub use color::{Background, ColorEntry};
@@ -33,7 +35,7 @@ pub use reading::{LimitsEntry, ReadingEntry};
 pub use transform::{Rotation, TransformEntry};
 
 use super::{CellStyle, Framing, Showing};
-use crate::{Error, Result, input::Limits};
+use crate::{Error, Result, input::Limits, scene::Optics};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -220,6 +222,7 @@ impl Description {
         let mut showing = reading.complete(showing, limits.deadline())?;
         // Of values alone: colours have no largest one.
         if self.picture.optics.is_some_and(|optics| optics != Default::default()) {
+            showing.appearance.rises_evenly = self.picture.optics == Some(Optics::Maximum);
             showing.values_by = showing.values_by.or_else(|| Some("optics".into()));
             // They show the field inside cells.
             showing.cells = showing.cells.or(Some(CellStyle::Volume));
@@ -259,6 +262,11 @@ impl Description {
                 Err((field, message)) => (format!("appearance.{field}"), message),
                 Ok(()) => place("appearance", wrong),
             })?;
+            let channels = self.appearance_of(input).channels;
+            if channels.is_some() && self.reading_of(input).scalar.is_some() {
+                let message = "name channels (--channels) or one array (--scalar), not both";
+                return Err(place("appearance", ("channels", message.into())));
+            }
         }
         let place = |part: &'static str| {
             move |(field, message): appearance::Wrong| (format!("{part}.{field}"), message)

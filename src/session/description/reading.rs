@@ -208,6 +208,7 @@ impl ReadingEntry {
             dataset: self.dataset.clone(),
             spacing,
             missing: self.missing,
+            channels: None,
             labels: Vec::new(),
         }
     }

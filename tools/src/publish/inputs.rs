@@ -11,7 +11,7 @@ use splatkit::{
         AppearanceEntry, Data, Description, InputEntry, KernelEntry, LoadedInput, ReadInput,
         ReadingEntry, Samples, TransferEntry, convert::Conversion,
     },
-    volume::TransferFunction,
+    volume::{TransferFunction, Volume},
 };
 use std::{
     collections::{BTreeMap, btree_map::Entry},
@@ -49,16 +49,15 @@ pub fn published(
             true => format!("{}/", number + 1),
             false => String::new(),
         };
-        match is_read_by_viewer(read, &entry) {
-            true => add_file(&mut entry, read, &folder, &mut files)?,
-            false => {
-                let what = format!("Converting {}", input.file.display());
-                progress.stage(what);
-                is_converted = true;
-                add_converted((scene, loaded), input, &mut entry, &folder, &mut files)?;
-            }
+        if is_read_by_viewer(read, &entry) {
+            add_file(&mut entry, read, &folder, &mut files)?;
+            page.inputs.push(entry);
+        } else {
+            progress.stage(format!("Converting {}", input.file.display()));
+            is_converted = true;
+            let entries = converted_entries((scene, loaded), input, (entry, &folder), &mut files)?;
+            page.inputs.extend(entries);
         }
-        page.inputs.push(entry);
     }
     let published = Published { scene: page, files };
     progress.stage("Reading the page");
@@ -110,32 +109,62 @@ fn unread(file: &Path, source: &std::io::Error) -> Error {
     Error::input(file, "file", format!("cannot be read: {source}"))
 }
 
-/// Adds what an input is converted to.
-fn add_converted(
+/// Adds the files that an input is converted to: one, or one for each channel. Returns their
+/// entries.
+fn converted_entries(
     (scene, loaded): (&Description, &Loaded),
     input: &InputEntry,
-    entry: &mut InputEntry,
-    folder: &str,
+    (mut entry, folder): (InputEntry, &str),
     files: &mut BTreeMap<String, Vec<u8>>,
-) -> Result<(), Failure> {
+) -> Result<Vec<InputEntry>, Failure> {
     let ReadInput { data, .. } = scene.read_input(input)?;
-    let (name, bytes) = converted(scene, input, &data)?;
     // The converted file has one array, is where the input was moved to, and knows its own layout.
     entry.reading = ReadingEntry::default();
     entry.transform = Default::default();
-    if let Some(transfer) = transfer_of(loaded, input, &data) {
-        let drawn = &mut entry.appearance;
-        drawn.transfer = Some(TransferEntry::Whole(transfer));
-        (drawn.range, drawn.opacity_unit, drawn.isosurfaces) = (None, None, None);
-        (drawn.gradient_opacity, drawn.colormap) = (None, None);
+    let mut add =
+        |mut entry: InputEntry, transfer: Option<TransferFunction>, name: &str, data: &Data| {
+            let (name, bytes) = converted(scene, input, name, data)?;
+            if let Some(transfer) = transfer {
+                let drawn = &mut entry.appearance;
+                drawn.transfer = Some(TransferEntry::Whole(transfer));
+                (drawn.range, drawn.opacity_unit, drawn.isosurfaces) = (None, None, None);
+                (drawn.gradient_opacity, drawn.colormap, drawn.channels) = (None, None, None);
+            }
+            if data.kind() == Kind::Mesh {
+                // A hierarchy has the colours that the mesh was shown in.
+                entry.appearance = AppearanceEntry::default();
+            }
+            entry.file = format!("{folder}{name}").into();
+            files.insert(format!("{folder}{name}"), bytes);
+            Ok(entry)
+        };
+    match data {
+        Data::Volume(volume) if !volume.more_channels.is_empty() => {
+            let drawn = volumes_of(loaded, input);
+            let of_channel = |(channel, transfer): (&Volume, &TransferFunction)| {
+                let volume = Volume { more_channels: Vec::new(), ..channel.clone() };
+                let name = channel.about.name.clone();
+                add(entry.clone(), Some(transfer.clone()), &name, &Data::Volume(volume))
+            };
+            drawn.into_iter().map(of_channel).collect()
+        }
+        data => Ok(vec![add(entry, transfer_of(loaded, input, &data), "", &data)?]),
     }
-    if data.kind() == Kind::Mesh {
-        // A hierarchy has the colours that the mesh was shown in.
-        entry.appearance = AppearanceEntry::default();
-    }
-    entry.file = format!("{folder}{name}").into();
-    files.insert(format!("{folder}{name}"), bytes);
-    Ok(())
+}
+
+/// Returns the volumes that an input has become, and what shows them.
+fn volumes_of<'a>(
+    loaded: &'a Loaded,
+    input: &InputEntry,
+) -> Vec<(&'a Volume, &'a TransferFunction)> {
+    let name = input.file.display().to_string();
+    let items = loaded.scene.items.iter().zip(&loaded.items.contents);
+    let of_input = items.filter(|(_, content)| content.name.text == name);
+    let volume = |(item, _): (&'a Item, _)| match item {
+        Item::Volume(volume, _, transfer) => Some((&**volume, transfer)),
+        _ => None,
+    };
+    of_input.filter_map(volume).collect()
 }
 
 /// Returns the transfer function that shows an input, if it is a field without colours of its own.
@@ -149,13 +178,18 @@ fn transfer_of(loaded: &Loaded, input: &InputEntry, data: &Data) -> Option<Trans
     of_input.find_map(|(item, _)| item.transfer().cloned())
 }
 
-/// Returns the name and the bytes of the file that an input is converted to.
+/// Returns the name and the bytes of the file that an input, or a channel of it, is converted to.
 fn converted(
     scene: &Description,
     input: &InputEntry,
+    channel: &str,
     data: &Data,
 ) -> Result<(String, Vec<u8>), Failure> {
-    let stem = input.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut stem = input.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    if !channel.is_empty() {
+        let letters = channel.chars().map(|c| if c.is_alphanumeric() { c } else { '-' });
+        stem += &format!("-{}", letters.collect::<String>());
+    }
     let extension = match data.kind() {
         Kind::Volume => "nrrd",
         Kind::Gaussians => "spz",

@@ -170,6 +170,7 @@ fn forget_values(scene: &mut Description, number: usize) {
     for appearance in of_input.into_iter().chain(is_only.then_some(appearance)) {
         (appearance.transfer, appearance.range) = (None, None);
         (appearance.isosurfaces, appearance.gradient_opacity) = (None, None);
+        appearance.channels = None;
     }
 }
 

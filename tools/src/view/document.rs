@@ -10,7 +10,8 @@ use crate::{
 use splatkit::{
     scene::Clip,
     session::{
-        CameraEntry, Description, Framing, InputEntry, OverlayEntry, PictureEntry, TransferEntry,
+        CameraEntry, ChannelEntry, ChannelName, Description, Framing, InputEntry, OverlayEntry,
+        PictureEntry, TransferEntry,
     },
     volume::TransferFunction,
 };
@@ -38,6 +39,22 @@ pub struct Document {
     pub is_trusting: bool,
     /// The page of the scene that was opened, if that is a figure of several views.
     figure: Option<PictureEntry>,
+}
+
+/// A field of the scene: that of an input, or of one of its channels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Field<'a> {
+    pub file: &'a Path,
+    /// The number and the name of the channel, if the input's channels are shown.
+    pub channel: Option<(usize, &'a str)>,
+}
+
+/// Returns whether an entry is of the channel of this number and name.
+fn is_of(entry: &ChannelEntry, (number, name): (usize, &str)) -> bool {
+    match &entry.channel {
+        ChannelName::Number(other) => *other == number,
+        ChannelName::Name(other) => other.eq_ignore_ascii_case(name),
+    }
 }
 
 impl Document {
@@ -160,23 +177,48 @@ impl Document {
         self.now.inputs.iter().position(|input| input.visible && input.file == file)
     }
 
-    /// Returns the transfer function of an input, if the document has it, rather than a name or a
+    /// Returns whether the channels of a file that has several are shown in their colours.
+    pub fn shows_channels(&self, file: &Path) -> bool {
+        self.input_of(file).map(|number| &self.now.inputs[number]).is_some_and(|input| {
+            let is_named = self.now.reading_of(input).scalar.is_some();
+            !is_named && self.now.appearance_of(input).channels_read().is_some()
+        })
+    }
+
+    /// Returns the transfer function of a field, if the document has it, rather than a name or a
     /// file, or nothing.
-    pub fn transfer_of(&self, file: &Path) -> Option<TransferFunction> {
-        match self.now.appearance_of(&self.now.inputs[self.input_of(file)?]).transfer? {
+    pub fn transfer_of(&self, field: &Field) -> Option<TransferFunction> {
+        let appearance = self.now.appearance_of(&self.now.inputs[self.input_of(field.file)?]);
+        if let Some(channel) = field.channel {
+            let mut channels = appearance.channels?.into_iter();
+            return channels.find(|entry| is_of(entry, channel))?.transfer;
+        }
+        match appearance.transfer? {
             TransferEntry::Whole(transfer) => Some(transfer),
             TransferEntry::Name(_) => None,
         }
     }
 
-    /// Sets the transfer functions of all inputs that have a field. They then replace all else that
-    /// changes one.
-    pub fn set_transfers(&mut self, transfers: &[(&Path, TransferFunction)], has_surfaces: bool) {
-        for (file, transfer) in transfers {
-            let Some(number) = self.input_of(file) else { continue };
+    /// Sets the transfer functions of all fields. They then replace all else that changes one.
+    pub fn set_transfers(&mut self, transfers: &[(Field, TransferFunction)], has_surfaces: bool) {
+        for (field, transfer) in transfers {
+            let Some(number) = self.input_of(field.file) else { continue };
+            let mut channels = self.now.appearance_of(&self.now.inputs[number]).channels;
             let appearance = &mut self.now.inputs[number].appearance;
             (appearance.transfer, appearance.range, appearance.isosurfaces) = (None, None, None);
             (appearance.opacity_unit, appearance.gradient_opacity) = (None, None);
+            if let Some(channel) = field.channel {
+                let entries = channels.get_or_insert_default();
+                let at = entries.iter().position(|entry| is_of(entry, channel));
+                let at = at.unwrap_or_else(|| {
+                    entries.push(ChannelEntry::new(&channel.0.to_string()));
+                    entries.len() - 1
+                });
+                let named = ChannelEntry::new(&entries[at].name());
+                entries[at] = ChannelEntry { transfer: Some(transfer.clone()), ..named };
+                appearance.channels = channels;
+                continue;
+            }
             let whole = Some(TransferEntry::Whole(transfer.clone()));
             match transfers.len() {
                 1 => self.now.appearance.transfer = whole,
@@ -190,7 +232,8 @@ impl Document {
         // one of their own.
         let (map, log) = (shared.colormap.take(), std::mem::take(&mut shared.log_colors));
         if has_surfaces && map.is_some() {
-            let is_field = |input: &InputEntry| transfers.iter().any(|one| one.0 == input.file);
+            let is_field =
+                |input: &InputEntry| transfers.iter().any(|one| one.0.file == input.file);
             for input in self.now.inputs.iter_mut().filter(|input| !is_field(input)) {
                 input.appearance.colormap = input.appearance.colormap.or(map);
                 input.appearance.log_colors |= log;
@@ -212,6 +255,14 @@ impl Document {
         let of_inputs = scene.inputs.iter_mut().map(|input| &mut input.appearance);
         for appearance in of_inputs.chain([&mut scene.appearance]) {
             appearance.transfer.take_if(|transfer| matches!(transfer, TransferEntry::Whole(_)));
+            for entry in appearance.channels.iter_mut().flatten() {
+                entry.transfer = None;
+            }
+            // An edit lists the channels, which are drawn without a list too.
+            appearance.channels.take_if(|channels| {
+                let mut numbered = channels.iter().enumerate();
+                numbered.all(|(at, entry)| *entry == ChannelEntry::new(&at.to_string()))
+            });
         }
         // The way up turns what is added.
         let framing = Framing { up: scene.framing.up, ..Framing::default() };
@@ -318,6 +369,29 @@ pub(super) mod tests {
         document(&format!("splatkit render {}", inputs.join(" ")))
     }
 
+    fn of(file: &Path) -> Field<'_> {
+        Field { file, channel: None }
+    }
+
+    #[test]
+    fn each_channel_keeps_its_own_transfer_function() {
+        let mut document = plain(&["a.tif"]);
+        let file = Path::new("a.tif");
+        let [first, second] =
+            [(0, "DAPI"), (1, "GFP")].map(|channel| Field { file, channel: Some(channel) });
+        let before = document.loaded_by();
+        let transfer = TransferFunction::default();
+        let all = [(first, TransferFunction { unit: 2.0, ..transfer.clone() }), (second, transfer)];
+        document.set_transfers(&all, false);
+        assert_eq!(
+            all.map(|(field, _)| document.transfer_of(&field).expect("one").unit),
+            [2.0, 1.0]
+        );
+        assert!(document.shows_channels(file) && document.loaded_by() == before);
+        let channels = document.scene().inputs[0].appearance.channels.clone().expect("channels");
+        assert_eq!(channels.iter().map(ChannelEntry::name).collect::<Vec<_>>(), ["0", "1"]);
+    }
+
     #[test]
     fn flags_become_a_scene_and_a_scene_flags() {
         let words = "splatkit render a.nrrd b.ply --iso 1,2:red --no-shade --size 64x48 \
@@ -348,10 +422,10 @@ pub(super) mod tests {
             ..TransferFunction::default()
         };
         let [a, b, c] = ["a.ply", "b.nrrd", "c.nrrd"].map(Path::new);
-        assert_eq!(document.transfer_of(c), None);
-        document.set_transfers(&[(b, transfer(1.0)), (c, transfer(2.0))], true);
+        assert_eq!(document.transfer_of(&of(c)), None);
+        document.set_transfers(&[(of(b), transfer(1.0)), (of(c), transfer(2.0))], true);
         let scene = document.scene();
-        let transfers = [a, b, c].map(|file| document.transfer_of(file));
+        let transfers = [a, b, c].map(|file| document.transfer_of(&of(file)));
         assert_eq!(transfers, [None, Some(transfer(1.0)), Some(transfer(2.0))]);
         let surfaces =
             scene.inputs.iter().map(|input| &input.appearance).chain([&scene.appearance]);
@@ -365,10 +439,10 @@ pub(super) mod tests {
     fn edited_colours_replace_the_map_of_a_field() {
         let transfer = TransferFunction::default();
         let mut alone = document("splatkit render a.nrrd --colormap hot");
-        alone.set_transfers(&[(Path::new("a.nrrd"), transfer.clone())], false);
+        alone.set_transfers(&[(of(Path::new("a.nrrd")), transfer.clone())], false);
         assert_eq!(alone.scene().appearance.colormap, None);
         let mut both = document("splatkit render a.nrrd b.ply --colormap hot");
-        both.set_transfers(&[(Path::new("a.nrrd"), transfer)], true);
+        both.set_transfers(&[(of(Path::new("a.nrrd")), transfer)], true);
         let scene = both.scene();
         let maps = [0, 1].map(|number| scene.appearance_of(&scene.inputs[number]).colormap);
         assert_eq!(maps.map(|map| map.map(|map| map.to_string())), [None, Some("hot".into())]);
@@ -417,7 +491,7 @@ pub(super) mod tests {
         let mut document = plain(&["a.nrrd"]);
         let before = document.loaded_by();
         document.change(|scene| scene.picture.background = "white".parse().ok());
-        document.set_transfers(&[(Path::new("a.nrrd"), TransferFunction::default())], false);
+        document.set_transfers(&[(of(Path::new("a.nrrd")), TransferFunction::default())], false);
         assert_eq!(document.loaded_by(), before);
         document.change(|scene| scene.appearance.sharp = true);
         assert_ne!(document.loaded_by(), before);

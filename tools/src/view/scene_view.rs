@@ -1,7 +1,7 @@
 //! The scene that is shown: what was loaded, its camera, and the transfer functions of its fields.
 
 use super::{
-    document::{Document, LoadedBy},
+    document::{Document, Field, LoadedBy},
     painter::Stage,
 };
 use crate::{failure::Failure, given::Kinds, job::Finish};
@@ -55,7 +55,11 @@ impl SceneView {
     pub fn fields(&self) -> Vec<(usize, String)> {
         let name = |item: usize| {
             let name = self.inputs.get(item).and_then(|file| file.file_name());
-            name.map_or(String::new(), |name| name.to_string_lossy().into_owned())
+            let name = name.map_or(String::new(), |name| name.to_string_lossy().into_owned());
+            match self.channel_of(item) {
+                Some((_, channel)) => format!("{name}, {channel}"),
+                None => name,
+            }
         };
         self.loaded_transfers.iter().map(|(item, _)| (*item, name(*item))).collect()
     }
@@ -95,10 +99,27 @@ impl SceneView {
     /// Returns the transfer functions that may be others than those that the scene was loaded with.
     pub fn edited_transfers(&self, document: &Document) -> Vec<(usize, TransferFunction)> {
         let edited = |(item, _): &(usize, TransferFunction)| {
-            let file = self.inputs.get(*item)?;
-            Some((*item, document.transfer_of(file)?))
+            Some((*item, document.transfer_of(&self.field_of(document, *item)?)?))
         };
         self.loaded_transfers.iter().filter_map(edited).collect()
+    }
+
+    /// Returns the number and the name of the channel that an item's field is, if its file has
+    /// several.
+    fn channel_of(&self, item: usize) -> Option<(usize, &str)> {
+        match self.stage.loaded.scene.items.get(item)? {
+            Item::Volume(volume, ..) if volume.about.channels.len() > 1 => {
+                Some((volume.about.channel, &volume.about.name))
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the field of an item, as the document knows it.
+    fn field_of(&self, document: &Document, item: usize) -> Option<Field<'_>> {
+        let file = self.inputs.get(item)?.as_path();
+        let channel = self.channel_of(item).filter(|_| document.shows_channels(file));
+        Some(Field { file, channel })
     }
 
     /// Sets the transfer function that is edited, without a step that can be undone.
@@ -107,7 +128,7 @@ impl SceneView {
         let edited = transfers.iter_mut().filter(|entry| entry.0 == self.field);
         edited.for_each(|entry| entry.1.clone_from(transfer));
         let of_file = |(item, transfer): (usize, TransferFunction)| {
-            Some((self.inputs.get(item)?.as_path(), transfer))
+            Some((self.field_of(document, item)?, transfer))
         };
         let transfers: Vec<_> = transfers.into_iter().filter_map(of_file).collect();
         let has_surfaces =

@@ -2,7 +2,9 @@
 //! effect.
 
 use serde_json::Value;
-use splatkit::session::{ClipEntry, Description, IsosurfaceEntry, Rotation, TransferEntry};
+use splatkit::session::{
+    ChannelEntry, ClipEntry, Description, IsosurfaceEntry, Rotation, TransferEntry,
+};
 use std::path::Path;
 
 /// Returns the inputs and flags of `render` that draw a scene. An error names a field that no flag
@@ -23,6 +25,9 @@ pub fn words_of(scene: &Description) -> Result<Vec<String>, String> {
     words.extend(scene.picture.clips.iter().map(flag_of_clip));
     let shared = scene.appearance.isosurfaces.iter();
     words.extend(shared.map(|entries| format!("--iso={}", surfaces(entries))));
+    if let Some(entries) = &scene.appearance.channels {
+        words.push(format!("--channels={}", channels(entries)?));
+    }
     words.extend(
         scene.appearance.transfer.iter().map(|transfer| format!("--transfer={}", text(transfer))),
     );
@@ -37,6 +42,7 @@ pub fn words_of(scene: &Description) -> Result<Vec<String>, String> {
             ("opacity", appearance.opacity.take().map(|opacity| opacity.to_string())),
             ("transfer", appearance.transfer.take().map(|transfer| text(&transfer))),
             ("range", appearance.range.take().map(|[low, high]| format!("{low},{high}"))),
+            ("channels", appearance.channels.take().map(|entries| channels(&entries)).transpose()?),
             ("iso", appearance.isosurfaces.take().map(|entries| surfaces(&entries))),
         ];
         let is_plain = appearance == Default::default() && input.reading == Default::default();
@@ -63,7 +69,7 @@ fn of_part(words: &mut Vec<String>, part: &Value, name: &str) -> Result<(), Stri
     for (field, value) in part.as_object().into_iter().flatten() {
         let flag = field.replace('_', "-");
         match (field.as_str(), value) {
-            ("clips" | "isosurfaces" | "transfer", _) => {}
+            ("clips" | "isosurfaces" | "transfer" | "channels", _) => {}
             ("limits", limits) => {
                 let limits = limits.as_object().into_iter().flatten();
                 words.extend(limits.map(|(limit, most)| format!("--limit-{limit}={most}")));
@@ -130,6 +136,31 @@ pub fn surfaces(entries: &[IsosurfaceEntry]) -> String {
     entries.iter().map(surface).collect::<Vec<_>>().join(",")
 }
 
+/// Returns channels as a flag takes them. An error names what no flag says.
+fn channels(entries: &[ChannelEntry]) -> Result<String, String> {
+    let channel = |entry: &ChannelEntry| {
+        let mut text = entry.name();
+        if entry.transfer.is_some() || text.contains([':', ',', '=']) {
+            return Err(format!(
+                "channel {text} is shown in a way that no flag says; save the scene, which \
+                 splatkit render draws"
+            ));
+        }
+        if let Some(color) = &entry.color {
+            text += &format!(":{}", plain(&serde_json::json!(color)));
+        }
+        if let Some([low, high]) = entry.range {
+            text += &format!(":{low}..{high}");
+        }
+        if let Some(opacity) = entry.opacity {
+            text += &format!(":{opacity}");
+        }
+        Ok(text)
+    };
+    let all: Result<Vec<String>, String> = entries.iter().map(channel).collect();
+    Ok(all?.join(","))
+}
+
 fn flag_of_clip(clip: &ClipEntry) -> String {
     let flag = if clip.inside { "clip" } else { "cut-out" };
     format!("--{flag}={}", clip.text())
@@ -169,6 +200,7 @@ mod tests {
             "",
             "--iso 1,2:red,50%:#00ff00:0.5 --no-shade",
             "--iso a.nrrd=3 --iso 7 --range a.nrrd=-1,4.5",
+            "--channels a.nrrd=DAPI:blue:1..5:0.5,2 --channels 1:#00ff00",
             "--transfer mri --opacity-unit 2.5 --colormap viridis_r --log-colors",
             "--transfer b.ply=ct-bone --nan-color orange",
             r#"--transfer {"color":[[0,1,1,1]],"opacity":[[0,0],[5,0.125]]}"#,

@@ -89,7 +89,7 @@ class Item:
 #: Options that change which values are shown.
 _VALUES = frozenset(
     {"transfer", "range", "colormap", "log_colors", "isosurfaces", "gradient_opacity"}
-    | {"opacity_unit"}
+    | {"opacity_unit", "channels"}
 )
 
 

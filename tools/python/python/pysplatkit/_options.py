@@ -39,6 +39,8 @@ class FieldAppearance(TypedDict, total=False):
     transfer: TransferFunction | PathLike
     #: Spread the transfer function or the colour map over these values.
     range: tuple[float, float]
+    #: The channels of a file that are drawn: names or numbers, or dicts with channel, color, range and opacity.
+    channels: Sequence[int | str | Mapping[str, Any]]
     #: The length that opacities hold for, in world units.
     opacity_unit: float
     #: Values of surfaces: a number, or a list of numbers, or of (value, colour, opacity) with None for the usual colour.
@@ -378,6 +380,10 @@ def plain_appearance(options: Mapping[str, Any]) -> dict[str, Any]:
         value = given["isosurfaces"]
         surfaces = [value] if isinstance(value, (int, float, np.number)) else value
         given["isosurfaces"] = [_surface(surface) for surface in surfaces]
+    if given.get("channels") is not None:
+        value = given["channels"]
+        channels = [value] if isinstance(value, (int, str, Mapping)) else value
+        given["channels"] = [_channel(channel) for channel in channels]
     if given.get("colormap") is not None:
         given["colormap"] = colormap(given["colormap"])
     if given.get("nan_color") is not None:
@@ -421,6 +427,20 @@ def _surface(value: Any) -> dict[str, Any]:
     except (TypeError, ValueError) as error:
         form = "an isosurface is a value, or (value, colour, opacity)"
         raise ArgumentError(f"{form}, not {value!r}") from error
+
+
+def _channel(value: Any) -> dict[str, Any]:
+    if isinstance(value, (int, str, np.integer)):
+        return {"channel": value if isinstance(value, str) else int(value)}
+    if not isinstance(value, Mapping) or "channel" not in value:
+        form = "a channel is a name, a number, or a dict with channel, color, range and opacity"
+        raise ArgumentError(f"{form}, not {value!r}")
+    channel = dict(value)
+    if channel.get("color") is not None:
+        channel["color"] = color(channel["color"])
+    if channel.get("range") is not None:
+        channel["range"] = [float(end) for end in channel["range"]]
+    return channel
 
 
 def reading(options: Mapping[str, Any]) -> str:
