@@ -230,6 +230,12 @@ impl FacetSet {
         let rods = (most >= 0.0).then_some(most);
         Self { origin, facets, sides: Sides::Mixed, rods, ..Self::default() }
     }
+
+    /// Returns whether the set is of flat dots or bands that are not lit.
+    pub(crate) fn is_unlit(&self) -> bool {
+        let is_unlit = |facet: &Facet| facet.normals == [NO_NORMAL, FLAT, ROD];
+        !self.facets.is_empty() && self.facets.par_iter().all(is_unlit)
+    }
 }
 
 /// The pieces of a rod that splats stand for are this many radii long, unless there were more than

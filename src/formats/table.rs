@@ -360,7 +360,7 @@ pub static FORMATS: &[Format] = &[
     Format {
         name: "TIFF",
         extensions: &["tif", "tiff", "btf", "tf8"],
-        holds: &[some(Content::Volume, "of several pages")],
+        holds: &[some(Content::Volume, "pages as slices")],
         feature: Some("tiff"),
         magic: Magic::Rule(|bytes| {
             matches!(
@@ -424,7 +424,7 @@ pub static FORMATS: &[Format] = &[
         name: "NPY",
         extensions: &["npy"],
         holds: &[
-            some(Content::Volume, "of three axes"),
+            some(Content::Volume, "of three axes, or a picture of two"),
             some(Content::PointCloud, "of three columns"),
             some(Content::Samples, "of 4, 5 or 10 columns"),
         ],

@@ -9,7 +9,7 @@ use crate::{
     Error, Result,
     math::Camera,
     picture::Picture,
-    scene::{Scene, Settings},
+    scene::{Item, Scene, Settings},
 };
 
 /// How a picture of a scene is drawn and finished.
@@ -38,7 +38,7 @@ impl PictureEntry {
             settings: self.settings(scene, subject)?,
             factor: self.factor(scene),
             edge_width: self.edge_width(),
-            eye_dome: self.eye_dome.unwrap_or(0.0),
+            eye_dome: self.eye_dome.unwrap_or_else(|| usual_eye_dome(scene)),
         })
     }
 
@@ -59,6 +59,14 @@ impl PictureEntry {
             "the picture is empty: the camera sees no splat that has opacity{left}"
         )))
     }
+}
+
+/// Returns the strength of eye-dome lighting that a scene has by itself: 1 if it is of dots without
+/// normals alone, in which nothing else shows depth.
+fn usual_eye_dome(scene: &Scene) -> f64 {
+    let is_of_dots = |item: &Item| matches!(item, Item::Facets(set) if set.is_unlit());
+    let is_all = !scene.items.is_empty() && scene.items.iter().all(is_of_dots);
+    if is_all { 1.0 } else { 0.0 }
 }
 
 impl Drawing {
@@ -94,8 +102,12 @@ impl Drawing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{math::Bounds, session::ClipEntry};
-    use glam::DVec3;
+    use crate::{
+        facet::{FacetSet, Relief, Rod},
+        math::Bounds,
+        session::ClipEntry,
+    };
+    use glam::{DVec3, Vec3};
 
     fn picture(opacity: f32) -> Picture {
         let (color, depth) = (vec![[opacity; 4]; 16], vec![1.0; 16]);
@@ -118,6 +130,20 @@ mod tests {
         let camera = Camera::framing(&around, DVec3::NEG_Z, DVec3::Y, 1.0);
         let small = drawing.reduced(picture(1.0), &Items::default(), &camera);
         assert_eq!(small.map(|picture| [picture.width, picture.height]).ok(), Some([2, 2]));
+    }
+
+    #[test]
+    fn dots_without_normals_have_eye_dome_lighting() {
+        let dot = |relief: Relief| Rod { relief, ..Rod::ball(Vec3::ZERO, 1.0, [9; 3]) }.into();
+        let scene = |reliefs: &[Relief]| {
+            let facets = reliefs.iter().map(|relief| dot(*relief)).collect();
+            Scene::new().with_facets(FacetSet::of_rods(DVec3::ZERO, facets))
+        };
+        let (flat, lit) = (Relief::Flat(None), Relief::Flat(Some(Vec3::Z)));
+        assert_eq!(usual_eye_dome(&scene(&[flat, flat])), 1.0);
+        for others in [&[flat, lit][..], &[Relief::Round], &[]] {
+            assert_eq!(usual_eye_dome(&scene(others)), 0.0);
+        }
     }
 
     #[test]

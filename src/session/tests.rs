@@ -10,7 +10,7 @@ use crate::{
     },
 };
 use crate::{
-    about::{Frame, Orientation},
+    about::{Channel, Frame, Orientation},
     cells::{CellKind, Cells},
     math::{Bounds, Camera},
     scene::{Clip, ClipShape, Item},
@@ -448,4 +448,101 @@ fn bytes_in_memory_are_opened_by_their_name() {
     assert!(opened.findings(None).unwrap().is_empty());
     let damaged = open("c.splk", &bytes[..bytes.len() - 9]).unwrap();
     assert!(damaged.findings(None).map_or(true, |findings| !findings.is_empty()));
+}
+
+/// Two channels of 6³ samples; a block of the one lies beside a block of the other.
+fn two_channels() -> Volume {
+    let volume = |channel: usize| {
+        let inside = |at: usize| {
+            let [x, y, z] = [at % 6, at / 6 % 6, at / 36];
+            x / 3 == channel && (2..4).contains(&y) && (2..4).contains(&z)
+        };
+        let samples = (0..216).map(|at| if inside(at) { 200 } else { 10 }).collect();
+        let lattice = Lattice::with_spacing([6; 3], DVec3::ONE);
+        let mut volume = Volume::new(lattice, Samples::U8(samples)).unwrap();
+        volume.about.channels = vec![Channel::default(); 2];
+        volume.about.channels[1].color = Some([1.0, 0.0, 0.0]);
+        (volume.about.channel, volume.about.name) = (channel, format!("channel {channel}"));
+        volume
+    };
+    let [mut first, second] = [0, 1].map(volume);
+    first.more_channels.push(second);
+    first
+}
+
+#[test]
+fn channels_are_fields_of_their_own_colours() {
+    let added = |volume: Volume, showing: &Showing| {
+        let mut items = Items::new(Surfaces::Facets);
+        items
+            .add(&Name::of_file("v".as_ref()), Data::Volume(volume), showing, &|_| {})
+            .map(|()| items)
+    };
+    let colors = |items: &Items| -> Vec<[f64; 3]> {
+        items.fields().map(|(_, item)| item.transfer().unwrap().color(200.0)).collect()
+    };
+    let items = added(two_channels(), &Showing::default()).unwrap();
+    let [first, second] = colors(&items)[..] else { panic!("two fields") };
+    assert!(second[0] == 1.0 && second[1] < 0.5, "the colour of the file: {second:?}");
+    assert!(first[1] > 0.8 && first[0] < 0.6, "another one: {first:?}");
+    let titles: Vec<String> =
+        items.captions().legends.into_iter().map(|(_, legend)| legend.title).collect();
+    assert_eq!(titles, ["channel 0", "channel 1"]);
+    // Styles are in the order in which the channels were read.
+    let mut showing = Showing::default();
+    let blue = ChannelStyle { color: Some([0.0, 0.0, 1.0]), ..ChannelStyle::default() };
+    let thin = ChannelStyle { opacity: Some(0.25), ..ChannelStyle::default() };
+    showing.appearance.channels = vec![blue, thin];
+    let styled = added(two_channels(), &showing).unwrap();
+    assert_eq!(colors(&styled)[0][2], 1.0);
+    let opacity = |items: &Items| {
+        items.fields().nth(1).map(|(_, item)| item.transfer().unwrap().opacity(200.0)).unwrap()
+    };
+    assert!((opacity(&styled) - 0.25 * opacity(&items)).abs() < 1e-9);
+    // A channel of one value is left out; a file without any other shows nothing.
+    let mut dark = two_channels();
+    dark.more_channels[0].samples = Samples::U8(vec![3; 216]);
+    dark.more_channels[0].range = [3.0; 2];
+    let (items, words) = warnings_of(|| added(dark.clone(), &Showing::default()).unwrap());
+    assert_eq!((colors(&items).len(), words.len()), (1, 1), "{words:?}");
+    (dark.samples, dark.range) = (Samples::U8(vec![3; 216]), [3.0; 2]);
+    assert!(matches!(added(dark, &Showing::default()), Err(Error::NothingToDraw(_))));
+    // A name of values shows these alone.
+    let named = Showing { is_named: true, ..Showing::default() };
+    assert_eq!(colors(&added(two_channels(), &named).unwrap()).len(), 1);
+}
+
+#[test]
+fn slices_are_looked_at_head_on_unless_something_stands_beside_them() {
+    let slice = |axis: usize| {
+        let mut dims = [4; 3];
+        dims[axis] = 1;
+        let lattice = Lattice::with_spacing(dims, DVec3::ONE);
+        Data::Volume(Volume::new(lattice, Samples::U8((0..16).collect())).unwrap())
+    };
+    let direction = |inputs: Vec<Data>| {
+        let mut items = Items::new(Surfaces::Facets);
+        for data in inputs {
+            items.add(&Name::of_file("v".as_ref()), data, &Showing::default(), &|_| {}).unwrap();
+        }
+        let camera = Framing::default().camera(&items.subject, [64, 64]).unwrap();
+        (camera.focal_point - camera.position).normalize()
+    };
+    let is_along = |direction: DVec3, wanted: DVec3| direction.dot(wanted) > 0.999_999;
+    assert!(is_along(direction(vec![slice(2)]), DVec3::NEG_Z));
+    assert!(is_along(direction(vec![slice(1), slice(1)]), DVec3::Y));
+    assert!(!is_along(direction(vec![slice(2), slice(1)]), DVec3::NEG_Z));
+    // Channels of a slice are one picture.
+    let mut flat = two_channels();
+    for volume in std::iter::once(&mut flat.more_channels).flatten() {
+        volume.lattice = Lattice::with_spacing([36, 6, 1], DVec3::ONE);
+    }
+    flat.lattice = Lattice::with_spacing([36, 6, 1], DVec3::ONE);
+    let mut items = Items::new(Surfaces::Facets);
+    items
+        .add(&Name::of_file("v".as_ref()), Data::Volume(flat), &Showing::default(), &|_| {})
+        .unwrap();
+    let scene = items.scene(true).unwrap();
+    let [Item::Facets(sheet)] = &scene.items[..] else { panic!("a sheet") };
+    assert_eq!((sheet.facets.len(), sheet.images.len()), (2, 1));
 }

@@ -3,6 +3,7 @@
 mod adjacency;
 mod bands;
 mod cloud;
+mod creases;
 mod disc;
 mod eight;
 mod ellipse;

@@ -3,6 +3,7 @@
 use super::{
     Mesh,
     adjacency::{Connected, is_split},
+    creases::{Creases, Fan},
 };
 use crate::{Deadline, Result, deadline::Clock, memory, parallel::prelude::*};
 use glam::Vec3;
@@ -63,7 +64,7 @@ impl Groups {
 
 /// Returns the normal of each triangle at its corners: the file's at the vertex, or the mean of the
 /// corner's smooth group, weighted by angle. Triangles without area only have the file's normals,
-/// or zero.
+/// or zero. Groups are cones ([`Groups`]), or of sculptures what lies between [`Creases`].
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
@@ -72,29 +73,35 @@ pub(crate) fn corner_normals(
     crease_angle_degrees: f32,
     deadline: Deadline,
 ) -> Result<Vec<[Vec3; 3]>> {
-    let adjacency = Connected::new(mesh, is_split(mesh))?.adjacency;
+    let Connected { places, adjacency } = Connected::new(mesh, is_split(mesh))?;
     memory::room(WORK, 48 * mesh.positions.len() as u64 + 120 * mesh.triangles.len() as u64)?;
     let clock = Clock::new(deadline);
+    let cosine = Groups::new(crease_angle_degrees).crease();
+    let creases = if mesh.normals.is_empty() {
+        let unit = |triangle: usize| at_corner(mesh, 3 * triangle as u32);
+        let unit = |triangle: usize| unit(triangle).map_or(Vec3::ZERO, |(normal, _)| normal);
+        let unit: Vec<Vec3> = (0..mesh.triangles.len()).into_par_iter().map(unit).collect();
+        let corners = |vertex: usize| adjacency.corners(vertex);
+        Creases::of_sculpture(mesh, &places, &unit, (corners, cosine))
+    } else {
+        None
+    };
     let by_vertex: Vec<Vec<(u32, Vec3)>> = (0..mesh.positions.len())
         .into_par_iter()
         .map_init(
-            || Groups::new(crease_angle_degrees),
-            |groups, vertex| {
+            || (Groups::new(crease_angle_degrees), Fan::new()),
+            |(cones, fan), vertex| {
                 if clock.is_over(vertex) {
                     return Vec::new();
                 }
-                groups.clear();
-                let corners = adjacency.corners(vertex).iter();
-                let around: Vec<(u32, usize, Vec3)> = corners
-                    .filter_map(|&at| {
-                        let (normal, angle) = at_corner(mesh, at)?;
-                        Some((at, groups.place(normal), normal * angle))
-                    })
-                    .collect();
-                let sum = |group| around.iter().filter(|t| t.1 == group).map(|t| t.2).sum::<Vec3>();
-                let normals: Vec<Vec3> =
-                    (0..groups.len()).map(|group| sum(group).normalize_or_zero()).collect();
-                around.iter().map(|&(at, group, _)| (at, normals[group])).collect()
+                let corners = adjacency.corners(vertex);
+                match &creases {
+                    None => of_cones(mesh, corners, cones),
+                    Some(creases) => {
+                        let groups = creases.groups(fan, &places, (vertex, corners));
+                        of_groups(mesh, groups, cones)
+                    }
+                }
             },
         )
         .collect();
@@ -112,6 +119,42 @@ pub(crate) fn corner_normals(
     }
     Ok(normals)
 }
+
+/// Returns the normals of the corners of a vertex, each with its corner: the means of their cones.
+fn of_cones(mesh: &Mesh, corners: &[u32], cones: &mut Groups) -> Vec<(u32, Vec3)> {
+    cones.clear();
+    let around: Vec<(u32, usize, Vec3)> = corners
+        .iter()
+        .filter_map(|&at| {
+            let (normal, angle) = at_corner(mesh, at)?;
+            Some((at, cones.place(normal), normal * angle))
+        })
+        .collect();
+    let sum = |group| around.iter().filter(|t| t.1 == group).map(|t| t.2).sum::<Vec3>();
+    let normals: Vec<Vec3> = (0..cones.len()).map(|group| sum(group).normalize_or_zero()).collect();
+    around.iter().map(|&(at, group, _)| (at, normals[group])).collect()
+}
+
+/// As [`of_cones`], of corners behind their groups, by groups. A group whose mean none of its
+/// triangles faces, as at the tip of a cone, is divided into cones.
+fn of_groups(mesh: &Mesh, corners: &[(usize, u32)], cones: &mut Groups) -> Vec<(u32, Vec3)> {
+    let mut normals = Vec::with_capacity(corners.len());
+    for group in corners.chunk_by(|a, b| a.0 == b.0) {
+        let around = || group.iter().filter_map(|&(_, at)| Some((at, at_corner(mesh, at)?)));
+        let mean = around().map(|(_, (normal, angle))| normal * angle).sum::<Vec3>();
+        let mean = mean.normalize_or_zero();
+        if around().any(|(_, (normal, _))| normal.dot(mean) > FACING) {
+            normals.extend(around().map(|(at, _)| (at, mean)));
+        } else {
+            let group: Vec<u32> = group.iter().map(|(_, at)| *at).collect();
+            normals.extend(of_cones(mesh, &group, cones));
+        }
+    }
+    normals
+}
+
+/// Cosine of the angle up to which a triangle faces the mean of a group.
+const FACING: f32 = 0.7;
 
 /// Returns a triangle's unit normal, and its angle (radians) at a corner; `None` if it has no area.
 fn at_corner(mesh: &Mesh, at: u32) -> Option<(Vec3, f32)> {
@@ -160,5 +203,64 @@ mod tests {
                 assert!(normal.dot(sphere.positions[vertex as usize].normalize()) > 0.999);
             }
         }
+    }
+
+    /// A closed tube whose end is rounded within two rings of triangles of uneven steps: some of
+    /// their edges turn by more than the angle of a crease, and others by less.
+    fn uneven_rim() -> Mesh {
+        let (sides, mut mesh) = (200u32, Mesh::default());
+        let rings = [(1.0, 0.0), (1.0, 1.0), (0.97, 1.03), (0.9, 1.0), (0.9, 0.0)];
+        for (ring, (radius, z)) in rings.into_iter().enumerate() {
+            for side in 0..sides {
+                let angle = std::f32::consts::TAU * side as f32 / sides as f32;
+                let step = if ring == 2 { 0.02 * (7.0 * angle).sin() } else { 0.0 };
+                mesh.positions.push(Vec3::new(
+                    radius * angle.cos(),
+                    radius * angle.sin(),
+                    z + step,
+                ));
+            }
+        }
+        for ring in 0..rings.len() as u32 - 1 {
+            for side in 0..sides {
+                let [a, b] = [side, (side + 1) % sides].map(|side| ring * sides + side);
+                mesh.triangles.extend([[a, b, b + sides], [a, b + sides, a + sides]]);
+            }
+        }
+        mesh
+    }
+
+    #[test]
+    fn rims_of_sculptures_have_no_dashes() {
+        let mesh = uneven_rim();
+        let normals = corner_normals(&mesh, 75.0, Deadline::NEVER).unwrap();
+        // All corners at a vertex of the rim have the same normal.
+        let mut first = std::collections::HashMap::new();
+        for (triangle, normals) in mesh.triangles.iter().zip(&normals) {
+            for (&vertex, &normal) in triangle.iter().zip(normals).filter(|(v, _)| **v / 200 == 2) {
+                let before = *first.entry(vertex).or_insert(normal);
+                assert!(before.dot(normal) > 0.9999, "{vertex}: {before} {normal}");
+            }
+        }
+        assert_eq!(first.len(), 200);
+    }
+
+    /// A dome on a wide ring has a crease all around, which closes.
+    #[test]
+    fn creases_of_sculptures_stay_where_they_close() {
+        let mut mesh = Mesh::sphere(5);
+        mesh.positions.iter_mut().for_each(|p| {
+            // The lower half is turned up: the surface folds at the equator.
+            if p.z < 0.0 {
+                p.z = -0.3 * p.z;
+            }
+        });
+        let normals = corner_normals(&mesh, 75.0, Deadline::NEVER).unwrap();
+        let differs = |t: usize, i: usize| {
+            let [a, b, c] = mesh.triangles[t].map(|v| mesh.positions[v as usize]);
+            normals[t][i].dot((b - a).cross(c - a).normalize()) < 0.5
+        };
+        let wrong = (0..mesh.triangles.len()).filter(|t| (0..3).any(|i| differs(*t, i))).count();
+        assert!(wrong * 50 < mesh.triangles.len(), "{wrong} of {}", mesh.triangles.len());
     }
 }

@@ -78,7 +78,7 @@ pub struct EngineFlags {
     )]
     ambient_occlusion: Option<f64>,
     /// Dim pixels where others beside them are nearer, by a strength of about 1: eye-dome lighting,
-    /// for clouds without normals [default: 0]
+    /// for clouds without normals [default: 1 for a scene of dots without normals alone, else 0]
     #[arg(
         long,
         value_name = "STRENGTH",

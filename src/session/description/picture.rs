@@ -75,7 +75,7 @@ pub struct PictureEntry {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ambient_occlusion: Option<f64>,
     /// How far pixels are dimmed where others beside them are nearer: eye-dome lighting, for clouds
-    /// without normals. By default 0.
+    /// without normals. By default 1 for a scene of dots without normals alone, else 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub eye_dome: Option<f64>,
     /// The largest thickness of a sheet, in world units.

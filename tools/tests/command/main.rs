@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod bricks;
+mod channels;
 mod colors;
 mod common;
 mod convert;
