@@ -71,7 +71,7 @@ impl CpuRenderer {
 
     /// Draws a map.
     fn map(&mut self, map: MapView, settings: &Settings) -> Result<OpacityMap> {
-        let settings = &map.settings(settings);
+        let settings = &map.settings(&self.scene, settings);
         let outline = self.outline(&map.view, settings)?;
         let plans = self.plans(&map.view, settings, &outline);
         let records = self.records(&plans, settings, &outline)?;

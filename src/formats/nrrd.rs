@@ -57,6 +57,9 @@ pub fn read(source: &Source, options: &ReadOptions) -> Result<Volume> {
     if let Some(anatomy) = header.anatomy() {
         anatomy.place(&mut volume);
     }
+    if let Some(unit) = header.length_unit() {
+        volume.about.length = unit;
+    }
     Ok(match segments::table(&header.keys) {
         Some(table) => volume.with_labels(table),
         None => volume,
@@ -321,6 +324,15 @@ impl<'a> Header<'a> {
     /// Returns how the file's space lies in the patient, if it says so.
     fn anatomy(&self) -> Option<Anatomy> {
         self.get(&["space"]).and_then(Anatomy::towards)
+    }
+
+    /// Returns the unit of lengths, if the axes of space have one in common.
+    fn length_unit(&self) -> Option<String> {
+        let texts = self.get(&["space units"]).or_else(|| self.get(&["units"]))?;
+        let mut units = texts.split('"').skip(1).step_by(2).filter(|unit| !unit.is_empty());
+        let first = units.next()?.trim();
+        let is_one = units.all(|unit| unit.trim() == first) && first.chars().count() <= 16;
+        is_one.then(|| first.replace("um", "µm").replace("micron", "µm"))
     }
 
     fn lattice(&self, dims: [usize; 3]) -> Result<Lattice> {
@@ -680,6 +692,20 @@ mod tests {
         let folder = Folder::new();
         let content = file(&format!("type: uint8\nsizes: 2 1 1\nencoding: raw\n{fields}"), &[1, 2]);
         read_with(&folder.write("volume.nrrd", &content), read).map(|volume| volume.lattice)
+    }
+
+    #[test]
+    fn units_of_lengths_are_read() {
+        let folder = Folder::new();
+        let unit = |fields: &str| {
+            let content =
+                file(&format!("type: uint8\nsizes: 2 1 1\nencoding: raw\n{fields}"), &[1, 2]);
+            read_with(&folder.write("a.nrrd", &content), read).unwrap().about.length
+        };
+        assert_eq!(unit("space units: \"mm\" \"mm\" \"mm\""), "mm");
+        assert_eq!(unit("units: \"um\" \"um\" \"um\""), "µm");
+        assert_eq!(unit("units: \"mm\" \"mm\" \"s\""), "");
+        assert_eq!(unit(""), "");
     }
 
     #[test]

@@ -20,7 +20,7 @@ const MOST_DEPTH: f64 = 16.0;
 impl Map {
     /// Draws the optical depth of a scene in front of each place of a map.
     fn of_depth(scene: &Scene, view: MapView, settings: &Settings) -> Result<Self> {
-        let settings = view.settings(settings);
+        let settings = view.settings(scene, settings);
         let (flat, trained) = super::with_cuts(scene, &view.view, &settings)?;
         let frame = Frame::new(scene, &flat, &trained, view.view.clone(), &settings);
         let planes = view.planes();

@@ -258,8 +258,15 @@ impl MapView {
         0.5 * f64::from(self.size)
     }
 
-    /// Returns the settings with which the map of a picture's scene is drawn.
-    pub fn settings(&self, settings: &Settings) -> Settings {
+    /// Returns the settings with which the map of a picture's scene is drawn. Its sheets are no
+    /// thicker than its steps: an opaque surface blurs by a sheet along the light.
+    pub fn settings(&self, scene: &Scene, settings: &Settings) -> Settings {
+        let usual = self.usual_settings(settings);
+        let thickness = scene.sheets(&self.view, &usual).step.min(self.step);
+        Settings { sheet_thickness: Some(thickness), ..usual }
+    }
+
+    fn usual_settings(&self, settings: &Settings) -> Settings {
         Settings {
             size: self.view.size,
             lighting: Lighting::default(),

@@ -7,6 +7,7 @@ use crate::{
     cells::Cells,
     math::Bounds,
     scattered::Points,
+    scene::Optics,
     volume::{Isosurface, Shade, TransferFunction, Volume},
 };
 
@@ -27,9 +28,8 @@ pub struct Appearance {
     /// How the channels that were read are shown, in the order in which they were
     /// ([`ReadOptions::channels`](crate::formats::ReadOptions::channels)).
     pub channels: Vec<ChannelStyle>,
-    /// Whether the opacity of a channel rises evenly with its values, as a picture of the largest
-    /// values needs it.
-    pub rises_evenly: bool,
+    /// What becomes of a ray: functions that are made for the values suit it.
+    pub optics: Optics,
 }
 
 /// A transfer function that a user chose.
@@ -69,6 +69,8 @@ struct Values<'a> {
     range: [f64; 2],
     /// The diagonal of the box around them, in world units.
     diagonal: f64,
+    /// Whether they are labels, which are no quantities.
+    are_labels: bool,
 }
 
 impl Appearance {
@@ -79,7 +81,8 @@ impl Appearance {
     /// are all the same if no function is given; [`Error::Transfer`] and [`Error::Argument`] for
     /// functions and maps that cannot be.
     pub fn of_volume(&self, name: &str, volume: &Volume) -> Result<TransferFunction> {
-        let values = Values::new(name, volume.range, volume.bounds());
+        let mut values = Values::new(name, volume.range, volume.bounds());
+        values.are_labels = volume.is_label_map();
         self.transfer(&values, || TransferFunction::automatic(volume))
     }
 
@@ -117,7 +120,7 @@ impl Appearance {
 
     fn transfer(
         &self,
-        &Values { name, range: values, diagonal }: &Values<'_>,
+        &Values { name, range: values, diagonal, are_labels }: &Values<'_>,
         automatic: impl Fn() -> TransferFunction,
     ) -> Result<TransferFunction> {
         let transfer = match &self.transfer {
@@ -128,7 +131,8 @@ impl Appearance {
                     values[0]
                 )));
             }
-            None => automatic(),
+            None if are_labels => automatic(),
+            None => for_optics(automatic(), self.optics, (values, diagonal)),
             Some(Transfer::Named(preset)) => {
                 let mut named = TransferFunction::named(preset, values)?.for_size(diagonal);
                 // Light fades where the gradient is noise, whatever the colours are.
@@ -185,9 +189,37 @@ impl Appearance {
     }
 }
 
+/// The optical depth that a ray through a whole scene has at most, if all of it had the largest
+/// value of an X-ray picture.
+const MOST_DEPTH: f64 = 8.0;
+
+/// Returns a function that was made for light as pictures of the largest value and X-rays need it:
+/// from the first value that is seen to the last one of interest, brightness or density rises
+/// evenly.
+fn for_optics(
+    transfer: TransferFunction,
+    optics: Optics,
+    ([least, most], diagonal): ([f64; 2], f64),
+) -> TransferFunction {
+    let low = transfer.visible_range().map_or(least, |[low, _]| low.max(least));
+    let high = transfer.span()[1].min(most);
+    if optics == Optics::EmissionAbsorption || low >= high {
+        return transfer;
+    }
+    let bare = TransferFunction { color: vec![(low, [0.0; 3]), (high, [1.0; 3])], ..transfer };
+    if optics == Optics::Maximum {
+        // What is dark shows what is behind the picture.
+        let first = low + 0.1 * (high - low);
+        return TransferFunction { opacity: vec![(low, 0.0), (first, 1.0)], ..bare };
+    }
+    let unit = diagonal / 100.0;
+    let opacity = 1.0 - (-MOST_DEPTH / 100.0).exp();
+    TransferFunction { opacity: vec![(low, 0.0), (high, opacity)], unit, ..bare }
+}
+
 impl<'a> Values<'a> {
     fn new(name: &'a str, range: [f64; 2], bounds: Bounds) -> Self {
-        Self { name, range, diagonal: bounds.diagonal() }
+        Self { name, range, diagonal: bounds.diagonal(), are_labels: false }
     }
 }
 
@@ -204,5 +236,27 @@ fn plain(value: f64) -> String {
         format!("{value}")
     } else {
         format!("{value:e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn largest_values_and_x_rays_rise_evenly() {
+        let made = TransferFunction {
+            opacity: vec![(10.0, 0.0), (12.0, 0.9), (110.0, 1.0)],
+            color: vec![(10.0, [0.9, 0.1, 0.1]), (110.0, [1.0; 3])],
+            ..TransferFunction::default()
+        };
+        let of = |optics| for_optics(made.clone(), optics, ([0.0, 500.0], 200.0));
+        assert_eq!(of(Optics::EmissionAbsorption), made);
+        let maximum = of(Optics::Maximum);
+        assert_eq!((maximum.color(60.0), maximum.opacity(60.0)), ([0.5; 3], 1.0));
+        assert_eq!((maximum.color(400.0), maximum.opacity(9.0)), ([1.0; 3], 0.0));
+        let xray = of(Optics::XRay);
+        assert!((xray.opacity(60.0) / xray.opacity(110.0) - 0.5).abs() < 1e-9);
+        assert!((xray.extinction(110.0) * 200.0 - MOST_DEPTH).abs() < 1e-9);
     }
 }

@@ -6,7 +6,7 @@ use crate::{
     about::{About, Channel},
     memory,
     parallel::prelude::*,
-    scene::Scene,
+    scene::{Optics, Scene},
     volume::{TransferFunction, Volume},
 };
 
@@ -75,7 +75,7 @@ impl Appearance {
             None => volume.range,
         };
         transfer.color = points(color, [low, high.max(low)]);
-        if self.rises_evenly && low < high {
+        if self.optics == Optics::Maximum && low < high {
             let [low, high] = style.range.or(volume.about.window).unwrap_or_else(|| {
                 match slices::facing(volume) {
                     Some(_) => without_outliers(volume),
@@ -106,7 +106,7 @@ impl Appearance {
         volumes: &[Volume],
         all: &[usize],
     ) -> Result<Vec<[u8; 4]>> {
-        let even = Self { rises_evenly: true, ..self.clone() };
+        let even = Self { optics: Optics::Maximum, ..self.clone() };
         let count = volumes.iter().map(Volume::len).min().unwrap_or(0);
         memory::room("the colours of a slice", 16 * count as u64)?;
         let mut sums = vec![[0.0f32; 3]; count];

@@ -8,6 +8,7 @@ use crate::{
     facet::Size,
     input::Limits,
     math::Kernel,
+    scene::Optics,
     session::{
         Appearance, CellStyle, ChannelStyle, Coloring, Showing, Surface, SurfaceColor,
         SurfaceValue, Transfer as Chosen,
@@ -366,7 +367,7 @@ impl AppearanceEntry {
             gradient: self.gradient_opacity.clone().unwrap_or_default(),
             coloring: self.coloring(),
             channels: self.channels.iter().flatten().map(ChannelEntry::style).collect(),
-            rises_evenly: false,
+            optics: Optics::default(),
         };
         Ok(Showing {
             appearance,

@@ -210,7 +210,17 @@ impl ClipEntry {
                 let corner = |places: [Place; 3]| {
                     DVec3::from_array([0, 1, 2].map(|axis| places[axis].in_world(axis, bounds)))
                 };
-                let [min, max] = corners.unwrap_or([[Place::World(0.0); 3]; 2]).map(corner);
+                let places = corners.unwrap_or([[Place::World(0.0); 3]; 2]);
+                let [mut min, mut max] = places.map(corner);
+                if !self.inside {
+                    // A side of the scene that is cut off does not stay as a skin.
+                    let beyond = BEYOND * bounds.diagonal();
+                    for axis in 0..3 {
+                        let is_end = |place: Place, end: f64| place == Place::Percent(end);
+                        min[axis] -= if is_end(places[0][axis], 0.0) { beyond } else { 0.0 };
+                        max[axis] += if is_end(places[1][axis], 100.0) { beyond } else { 0.0 };
+                    }
+                }
                 ClipShape::Box(Bounds { min, max })
             }
         };
@@ -341,6 +351,9 @@ fn side(text: &str) -> std::result::Result<ClipSide, String> {
     Ok(ClipSide { axis, below, at: Place::parse(&text[at + 1..])? })
 }
 
+/// How far a box that is cut out reaches beyond the ends of the scene, as a share of its diagonal.
+const BEYOND: f64 = 1e-5;
+
 /// Whether one clip alone removes all of a box.
 fn leaves_nothing(clip: &Clip, whole: &Bounds) -> bool {
     match clip.shape {
@@ -382,6 +395,10 @@ mod tests {
         assert_eq!(world("Z > -4"), ClipShape::HalfSpace { normal: DVec3::NEG_Z, offset: 4.0 });
         let half = Bounds { min: DVec3::new(1.0, 0.0, 0.0), max: DVec3::new(5.0, 20.0, 20.0) };
         assert_eq!(world("box:1,0,0%:50%,20,50%"), ClipShape::Box(half));
+        let cut = ClipEntry::parse("box:1,0,0%:50%,20,50%", false).unwrap();
+        let ClipShape::Box(cut) = cut.clip(&SCENE).unwrap().shape else { panic!("a box") };
+        assert!(cut.min.z < half.min.z && cut.min.z > half.min.z - 0.01);
+        assert_eq!((cut.min.x, cut.min.y, cut.max), (half.min.x, half.min.y, half.max));
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub use reading::{LimitsEntry, ReadingEntry};
 pub use transform::{Rotation, TransformEntry};
 
 use super::{CellStyle, Framing, Showing};
-use crate::{Error, Result, input::Limits, scene::Optics};
+use crate::{Error, Result, input::Limits};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -222,7 +222,7 @@ impl Description {
         let mut showing = reading.complete(showing, limits.deadline())?;
         // Of values alone: colours have no largest one.
         if self.picture.optics.is_some_and(|optics| optics != Default::default()) {
-            showing.appearance.rises_evenly = self.picture.optics == Some(Optics::Maximum);
+            showing.appearance.optics = self.picture.optics.unwrap_or_default();
             showing.values_by = showing.values_by.or_else(|| Some("optics".into()));
             // They show the field inside cells.
             showing.cells = showing.cells.or(Some(CellStyle::Volume));

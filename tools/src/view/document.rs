@@ -266,7 +266,9 @@ impl Document {
         }
         // The way up turns what is added.
         let framing = Framing { up: scene.framing.up, ..Framing::default() };
-        let (picture, overlay) = (PictureEntry::default(), OverlayEntry::default());
+        // What becomes of a ray decides which functions are made, and how cells are drawn.
+        let picture = PictureEntry { optics: scene.picture.optics, ..PictureEntry::default() };
+        let overlay = OverlayEntry::default();
         (Description { framing, camera: None, picture, overlay, ..scene }, facets)
     }
 
