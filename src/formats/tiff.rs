@@ -2,6 +2,7 @@
 //! tifffile and microscopes write them. Follows TIFF 6.0, and the OME data model (2016) and
 //! ImageJ's own notes for the meaning of the pages.
 
+mod description;
 mod imagej;
 mod meaning;
 mod ome;

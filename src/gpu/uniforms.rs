@@ -38,7 +38,7 @@ pub struct Frame {
     pub surface_shade: [f32; 4],
     pub sheet_normal: [f32; 4],
     /// Set on the GPU, before march.
-    pub record_starts: [u32; Scene::MAX_FIELDS],
+    pub record_starts: [[u32; 4]; Scene::MAX_FIELDS / 4],
     pub world_x: [f32; 4],
     pub world_y: [f32; 4],
     pub world_z: [f32; 4],

@@ -7,7 +7,7 @@ use crate::{
     parallel::prelude::*,
     picture::Picture,
     scene::{Scene, Settings},
-    surface::{Mesh, color_at, corner_normals},
+    surface::{Grouping, Mesh, color_at, corner_normals},
 };
 use glam::{DMat3, DVec2, DVec3, Vec3, Vec3A};
 use obvhs::{
@@ -121,7 +121,11 @@ impl<'a> Traced<'a> {
         let around: Vec<Around> = mesh.triangles.par_iter().map(around).collect();
         Ok(Self {
             mesh,
-            normals: corner_normals(mesh, crease_angle_degrees, Deadline::NEVER)?,
+            normals: corner_normals(
+                mesh,
+                (crease_angle_degrees, Grouping::Whole),
+                Deadline::NEVER,
+            )?,
             boxes: build_bvh2(&around, BvhBuildParams::fast_build(), &mut Duration::default()),
             settings,
             rotation: view.rotation,

@@ -193,9 +193,8 @@ impl Appearance {
 /// value of an X-ray picture.
 const MOST_DEPTH: f64 = 8.0;
 
-/// Returns a function that was made for light as pictures of the largest value and X-rays need it:
-/// from the first value that is seen to the last one of interest, brightness or density rises
-/// evenly.
+/// Returns a function that was made for light as pictures of the largest value and X-rays need it.
+/// Brightness or density rises evenly from the first value that is seen to the last one of interest.
 fn for_optics(
     transfer: TransferFunction,
     optics: Optics,

@@ -18,8 +18,8 @@ const FLAT: f32 = 0.999_962;
 /// A sculpture has no more edges in planes than this share of all, and at least so many edges.
 const MOST_FLAT: f64 = 0.1;
 const LEAST_EDGES: usize = 1000;
-/// A line of sharp edges that does not close is a crease if it has so many edges, if it is as long
-/// as this share of the mesh's diagonal, or if one of its edges is so sharp.
+/// A line of sharp edges that does not close is a crease if it is long or very sharp. It is long if
+/// it has so many edges, or this share of the mesh's diagonal. [`SHARP`] is a cosine.
 const LONG_EDGES: usize = 16;
 const LONG_SHARE: f32 = 0.05;
 const SHARP: f32 = -0.5;

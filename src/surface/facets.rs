@@ -6,7 +6,7 @@ use super::{
     bands::{Bands, Corner},
     paint::{corner_tint, of_normal, pack, texture_of},
     refine::{Cutting, Origin, Refined, refine},
-    smooth::corner_normals,
+    smooth::{Grouping, corner_normals},
     surfels::largest_edge,
 };
 use crate::{
@@ -120,7 +120,7 @@ impl Mesh {
         let cutting = Cutting { length: largest * LONGER, to_texels: false };
         let Refined { mesh, sources } =
             refine(self, cutting, options.most_triangles, options.deadline)?;
-        let crease = options.crease_angle_degrees;
+        let crease = (options.crease_angle_degrees, Grouping::Whole);
         let banded = bands.map(|bands| Banded::new(bands, sources.as_deref()));
         let normals = match sources {
             Some(sources) => {

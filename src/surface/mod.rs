@@ -37,7 +37,7 @@ pub(crate) use paint::color_at;
 pub use paint::{Paint, Values};
 pub(crate) use parts::Joining;
 pub(crate) use piece::{MeshPieces, PiecesClosing, Triangles, cloud_piece};
-pub(crate) use smooth::corner_normals;
+pub(crate) use smooth::{Grouping, corner_normals};
 pub(crate) use solid::{Evidence, Sides};
 pub(crate) use surfels::EXTENT;
 pub use surfels::{PointStyle, SurfelOptions};

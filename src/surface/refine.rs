@@ -5,7 +5,10 @@
 //! so no gap opens between them. Halving would also multiply needles (two long edges and a short
 //! one) across their width, so these are cut into slabs.
 
-use super::{Mesh, Texture, smooth::corner_normals};
+use super::{
+    Mesh, Texture,
+    smooth::{Grouping, corner_normals},
+};
 use crate::{Deadline, Result, memory, parallel::prelude::*};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::borrow::Cow;
@@ -203,10 +206,10 @@ impl<'a> Origin<'a> {
     pub fn new(
         mesh: &'a Mesh,
         sources: Vec<u32>,
-        crease_angle_degrees: f32,
+        crease: (f32, Grouping),
         deadline: Deadline,
     ) -> Result<Self> {
-        Ok(Self { mesh, sources, normals: corner_normals(mesh, crease_angle_degrees, deadline)? })
+        Ok(Self { mesh, sources, normals: corner_normals(mesh, crease, deadline)? })
     }
 
     /// Returns the normal at a corner of the `fine` mesh, interpolated between those of the
@@ -863,7 +866,8 @@ mod tests {
     fn normals_are_those_of_the_whole_triangles() {
         let sphere = Mesh::sphere(1);
         let fine = refine(&sphere, 0.1, 1 << 20, NEVER).unwrap();
-        let origin = Origin::new(&sphere, fine.sources.unwrap(), 60.0, NEVER).unwrap();
+        let origin =
+            Origin::new(&sphere, fine.sources.unwrap(), (60.0, Grouping::Whole), NEVER).unwrap();
         for (index, triangle) in fine.mesh.triangles.iter().enumerate() {
             for (corner, &vertex) in triangle.iter().enumerate() {
                 // Normals that change linearly over a triangle, like positions, stay the same.

@@ -15,6 +15,16 @@ const SHARPEST: f32 = 60.0;
 /// The name of this module's work in errors.
 const WORK: &str = "finding the normals of the triangles' corners";
 
+/// How the triangles around a vertex are grouped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Grouping {
+    /// By cones ([`Groups`]), which depend on the triangles at the vertex alone: for surfels, which
+    /// lie in planes, and for parts of a mesh.
+    Cones,
+    /// By cones too, but of a sculpture by what lies between its [`Creases`]: for a whole mesh.
+    Whole,
+}
+
 /// The smooth groups of the triangles around one vertex.
 ///
 /// A group is a cone around its first normal. A surfel in the plane of the group's normal is thus
@@ -64,20 +74,20 @@ impl Groups {
 
 /// Returns the normal of each triangle at its corners: the file's at the vertex, or the mean of the
 /// corner's smooth group, weighted by angle. Triangles without area only have the file's normals,
-/// or zero. Groups are cones ([`Groups`]), or of sculptures what lies between [`Creases`].
+/// or zero.
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
 pub(crate) fn corner_normals(
     mesh: &Mesh,
-    crease_angle_degrees: f32,
+    (crease_angle_degrees, grouping): (f32, Grouping),
     deadline: Deadline,
 ) -> Result<Vec<[Vec3; 3]>> {
     let Connected { places, adjacency } = Connected::new(mesh, is_split(mesh))?;
     memory::room(WORK, 48 * mesh.positions.len() as u64 + 120 * mesh.triangles.len() as u64)?;
     let clock = Clock::new(deadline);
     let cosine = Groups::new(crease_angle_degrees).crease();
-    let creases = if mesh.normals.is_empty() {
+    let creases = if mesh.normals.is_empty() && grouping == Grouping::Whole {
         let unit = |triangle: usize| at_corner(mesh, 3 * triangle as u32);
         let unit = |triangle: usize| unit(triangle).map_or(Vec3::ZERO, |(normal, _)| normal);
         let unit: Vec<Vec3> = (0..mesh.triangles.len()).into_par_iter().map(unit).collect();
@@ -188,16 +198,20 @@ mod tests {
     #[test]
     fn corners_have_the_normals_of_their_side() {
         let cube = Mesh::cube(2.0);
-        for (triangle, normals) in
-            cube.triangles.iter().zip(corner_normals(&cube, 75.0, Deadline::NEVER).unwrap())
+        for (triangle, normals) in cube
+            .triangles
+            .iter()
+            .zip(corner_normals(&cube, (75.0, Grouping::Whole), Deadline::NEVER).unwrap())
         {
             let [a, b, c] = triangle.map(|vertex| cube.positions[vertex as usize]);
             let flat = (b - a).cross(c - a).normalize();
             assert!(normals.iter().all(|normal| normal.dot(flat) > 0.9999));
         }
         let sphere = Mesh::sphere(3);
-        for (triangle, normals) in
-            sphere.triangles.iter().zip(corner_normals(&sphere, 75.0, Deadline::NEVER).unwrap())
+        for (triangle, normals) in sphere
+            .triangles
+            .iter()
+            .zip(corner_normals(&sphere, (75.0, Grouping::Whole), Deadline::NEVER).unwrap())
         {
             for (normal, &vertex) in normals.iter().zip(triangle) {
                 assert!(normal.dot(sphere.positions[vertex as usize].normalize()) > 0.999);
@@ -209,11 +223,11 @@ mod tests {
     /// their edges turn by more than the angle of a crease, and others by less.
     fn uneven_rim() -> Mesh {
         let (sides, mut mesh) = (200u32, Mesh::default());
-        let rings = [(1.0, 0.0), (1.0, 1.0), (0.97, 1.03), (0.9, 1.0), (0.9, 0.0)];
+        let rings = [(1.0, 0.0), (1.0, 1.0), (0.97, 1.03), (0.9, 1.012), (0.9, 0.0)];
         for (ring, (radius, z)) in rings.into_iter().enumerate() {
             for side in 0..sides {
                 let angle = std::f32::consts::TAU * side as f32 / sides as f32;
-                let step = if ring == 2 { 0.02 * (7.0 * angle).sin() } else { 0.0 };
+                let step = if ring == 2 { 0.01 * (50.0 * angle).sin() } else { 0.0 };
                 mesh.positions.push(Vec3::new(
                     radius * angle.cos(),
                     radius * angle.sin(),
@@ -233,7 +247,7 @@ mod tests {
     #[test]
     fn rims_of_sculptures_have_no_dashes() {
         let mesh = uneven_rim();
-        let normals = corner_normals(&mesh, 75.0, Deadline::NEVER).unwrap();
+        let normals = corner_normals(&mesh, (75.0, Grouping::Whole), Deadline::NEVER).unwrap();
         // All corners at a vertex of the rim have the same normal.
         let mut first = std::collections::HashMap::new();
         for (triangle, normals) in mesh.triangles.iter().zip(&normals) {
@@ -255,7 +269,7 @@ mod tests {
                 p.z = -0.3 * p.z;
             }
         });
-        let normals = corner_normals(&mesh, 75.0, Deadline::NEVER).unwrap();
+        let normals = corner_normals(&mesh, (75.0, Grouping::Whole), Deadline::NEVER).unwrap();
         let differs = |t: usize, i: usize| {
             let [a, b, c] = mesh.triangles[t].map(|v| mesh.positions[v as usize]);
             normals[t][i].dot((b - a).cross(c - a).normalize()) < 0.5

@@ -15,6 +15,7 @@ use super::{
     fan::{Made, Maker, Sums},
     fan_rules::{LEAST_RATIO_SQUARED, LEAST_SQUARE},
     refine::{Origin, budget, count_of_refined, is_fine, refine},
+    smooth::Grouping,
     survey::has_area,
 };
 use crate::{
@@ -471,7 +472,7 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>> {
 
 /// Returns what the triangles of a refined mesh were cut from.
 fn origin_of<'a>(mesh: &'a Mesh, sources: Vec<u32>, options: &SurfelOptions) -> Result<Origin<'a>> {
-    Origin::new(mesh, sources, options.crease_angle_degrees, options.deadline)
+    Origin::new(mesh, sources, (options.crease_angle_degrees, Grouping::Cones), options.deadline)
 }
 
 /// Properties of a whole mesh on which the surfels of its parts depend.

@@ -126,8 +126,8 @@ mod tests {
         ("Limits", "limit-points limit-bytes limit-depth limit-texels limit-seconds"),
         (
             "Appearance",
-            "transfer range channels opacity-unit iso gradient-opacity radius-scale points point-size \
-            point-radius line-width cells crease edges opacity colormap color nan-color log-colors",
+            "transfer range channels opacity-unit iso gradient-opacity radius-scale points \
+            point-size point-radius line-width cells crease edges opacity colormap color nan-color log-colors",
         ),
         ("Kernel", "kernel sigma extent sharp"),
         ("Page", "title viewer"),

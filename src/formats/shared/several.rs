@@ -55,9 +55,9 @@ pub(crate) fn warn_of_times(source: &Source, count: u64, options: &ReadOptions, 
     }
 }
 
-/// Returns the numbers of the channels to read of a file that has these: the one that
-/// [`ReadOptions::scalar`] names (by its name, as `channel:1` or `:1`), those of
-/// [`ReadOptions::channels`], or the first, with a warning if there are several.
+/// Returns the numbers of the channels to read of a file that has these: those of
+/// [`ReadOptions::channels`], or the one that [`ReadOptions::scalar`] names (by its name, as
+/// `channel:1` or `:1`). By default this is the first, with a warning if there are several.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a channel that the file does not have.
@@ -75,10 +75,10 @@ pub(crate) fn channels(
         (None, Some(names)) if names.is_empty() => {
             let most = Channel::MOST;
             if all.len() > most {
-                let last = most - 1;
+                let (last, count) = (most - 1, all.len());
                 warning::give!(
-                    "{path}: shows the channels 0 to {last} of {}; --channels {most},… shows others",
-                    all.len()
+                    "{path}: shows the channels 0 to {last} of {count}; --channels {most},… shows \
+                     others"
                 );
             }
             Ok((0..all.len().min(most)).collect())
@@ -111,9 +111,8 @@ fn channel(source: &Source, name: &str, all: &[Channel]) -> Result<usize> {
                 name => format!("{number} ({name})"),
             });
             let names: Vec<String> = names.take(32).collect();
-            Err(source
-                .error("channels", format!("has no channel “{name}”"))
-                .hint(format!("the channels are {}", names.join(", "))))
+            let message = format!("has no channel “{name}”; the channels are {}", names.join(", "));
+            Err(source.error("channels", message))
         }
     }
 }

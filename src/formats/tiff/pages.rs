@@ -1,6 +1,6 @@
 //! The pages of a file, decoded by the crate `tiff`, behind the limits.
 
-use super::{Meaning, imagej::Block};
+use super::{Meaning, description, imagej::Block};
 use crate::{
     Error, Result,
     formats::{
@@ -142,7 +142,7 @@ impl<'a> Pages<'a> {
 
     /// Returns what the pages mean, as the first one describes them.
     pub fn meaning(&self) -> Meaning {
-        Meaning::of(&self.description, (self.size, self.resolution), &self.block)
+        description::meaning(&self.description, (self.size, self.resolution), &self.block)
     }
 
     /// Finds the pages that are slices. All others are previews.

@@ -535,5 +535,8 @@ fn every_step_keeps_to_the_deadline() {
     // Each step by itself.
     let mesh = Mesh::cube(1.0);
     assert!(super::refine(&mesh, 0.1, 1 << 20, options.deadline).is_err());
-    assert!(super::super::corner_normals(&mesh, 60.0, options.deadline).is_err());
+    assert!(
+        super::super::corner_normals(&mesh, (60.0, super::Grouping::Cones), options.deadline)
+            .is_err()
+    );
 }

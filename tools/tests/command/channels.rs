@@ -39,8 +39,8 @@ fn tiff(text: &str, pages: &[[u8; 128]]) -> Vec<u8> {
 
 /// A file of OME of two channels: a block on the left in one, and one on the right in the other.
 fn channels() -> Vec<u8> {
-    let text = "<?xml version='1.0'?><OME xmlns='o'><Image><Pixels DimensionOrder='XYCZT' SizeC='2' \
-                SizeZ='8' SizeT='1'><Channel Name='DAPI' Color='65535'/><Channel Name='GFP' \
+    let text = "<?xml version='1.0'?><OME xmlns='o'><Image><Pixels DimensionOrder='XYCZT' \
+                SizeC='2' SizeZ='8' SizeT='1'><Channel Name='DAPI' Color='65535'/><Channel Name='GFP' \
                 Color='16711935'/></Pixels></Image></OME>";
     let page = |page: usize| -> [u8; 128] {
         let (z, channel) = (page / 2, page % 2);
