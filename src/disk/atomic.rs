@@ -9,7 +9,7 @@ use super::{
 use crate::{Error, Result};
 use std::{
     fs::File,
-    io::{self, BufWriter, Seek, SeekFrom, Write},
+    io::{self, BufWriter, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
@@ -129,6 +129,13 @@ impl Write for AtomicFile {
     fn flush(&mut self) -> io::Result<()> {
         step(Step::Flush)?;
         self.part.file().flush()
+    }
+}
+
+/// Reads what was written, for formats that go back and change it.
+impl Read for AtomicFile {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.part.file().read(bytes)
     }
 }
 

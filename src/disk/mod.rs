@@ -19,6 +19,8 @@ mod tests;
 
 pub use atomic::{AtomicFile, write, write_with};
 pub use live::{Abandoned, abandon};
+#[cfg(feature = "sog")]
+pub(crate) use new::is_replaceable;
 pub use new::{may_replace, rename};
 pub(crate) use scratch::Scratch;
 #[cfg(test)]

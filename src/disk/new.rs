@@ -27,7 +27,7 @@ pub fn may_replace(path: impl Into<PathBuf>, may: bool) {
 }
 
 /// Returns whether a result may replace what has its name.
-pub(super) fn is_replaceable(path: &Path) -> bool {
+pub fn is_replaceable(path: &Path) -> bool {
     !new().contains(path)
 }
 

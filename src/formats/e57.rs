@@ -5,6 +5,9 @@ mod description;
 mod streams;
 #[cfg(test)]
 mod tests;
+mod write;
+
+pub(crate) use write::Writer;
 
 use super::shared::{
     attribute,

@@ -23,6 +23,7 @@ pub mod gltf;
 #[cfg(feature = "hdf5")]
 pub mod hdf5;
 mod kind;
+pub mod ksplat;
 mod label_table;
 #[cfg(feature = "las")]
 pub mod las;

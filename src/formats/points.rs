@@ -25,11 +25,16 @@ pub(crate) trait PointWriter {
     /// Appends points.
     fn put(&mut self, records: &Records) -> Result<()>;
 
+    /// Returns the names of attributes that the format has no place for.
+    fn left_out(&self) -> &[String] {
+        &[]
+    }
+
     /// Ends the file, and returns the number of its points.
     fn finish(self: Box<Self>) -> Result<u64>;
 }
 
-/// Begins a file of points: `.las`, `.laz` or else PLY.
+/// Begins a file of points: `.las`, `.laz`, `.e57` or else PLY.
 ///
 /// # Errors
 /// [`Error::Output`] if it cannot be written; [`Error::Argument`] for a format that this build has
@@ -41,6 +46,8 @@ pub(crate) fn write_points(path: &Path, layout: PointLayout) -> Result<Box<dyn P
         Some(extension @ ("las" | "laz")) => {
             Ok(Box::new(super::las::Writer::create(path, layout, extension == "laz")?))
         }
+        #[cfg(feature = "e57")]
+        Some("e57") => Ok(Box::new(super::e57::Writer::create(path, &layout)?)),
         #[cfg(feature = "ply")]
         Some("ply") => Ok(Box::new(super::ply::PointFile::create(path, layout)?)),
         _ => {

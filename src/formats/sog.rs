@@ -1,14 +1,18 @@
 //! SOG of PlayCanvas: trained 3D Gaussians as pictures whose bytes are positions in ranges or
 //! entries of codebooks. A scene is a folder with `meta.json` and WebP planes, or both in one ZIP
-//! file, `.sog`. Versions 1 and 2 of `meta.json` are read.
+//! file, `.sog`. Versions 1 and 2 of `meta.json` are read, and version 2 is written.
 //!
 //! Pixel i of each plane, in rows from the top left, belongs to Gaussian i. The frame is that of
 //! the trainer's PLY: tools turn nothing when they convert between both.
 
 mod meta;
 mod planes;
+mod streamed;
 #[cfg(test)]
 mod tests;
+mod write;
+
+pub use write::write;
 
 use super::shared::trained::{Trained, opacity_of_logit, settle};
 use crate::{
@@ -17,7 +21,7 @@ use crate::{
     input::Source,
 };
 use glam::{DVec3, Quat, Vec3};
-use meta::{Levels, META, Meta, file};
+use meta::{INDEX, Levels, META, Meta, file};
 use planes::{Files, Need, Plane};
 use std::{array, f32::consts::SQRT_2};
 
@@ -46,8 +50,7 @@ fn first_entry(bytes: &[u8]) -> Option<&[u8]> {
     header.get(26..)?.get(..usize::from(u16::from_le_bytes([low, high])))
 }
 
-/// Returns whether these bytes begin the `meta.json` of a scene, or the index of a streamed one,
-/// which [`read`] refuses by its name.
+/// Returns whether these bytes begin the `meta.json` of a scene, or the index of a streamed one.
 pub fn is_meta(bytes: &[u8]) -> bool {
     let any = |words: &[&str]| words.iter().any(|word| head_has(bytes, word));
     let has_plane = any(&["\"means\"", "\"scales\"", "\"quats\"", "\"sh0\"", "\"shN\""]);
@@ -65,33 +68,30 @@ fn head_has(bytes: &[u8], word: &str) -> bool {
     head.starts_with(b"{") && head.windows(word.len()).any(|part| part == word.as_bytes())
 }
 
-/// Reads a scene from its `.sog` file, or from its `meta.json` and the planes beside it.
+/// Reads a scene from its `.sog` file, or from its `meta.json` and the planes beside it. Of a
+/// streamed scene (`lod-meta.json`), all chunks of the finest level.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a file that is no archive with a `meta.json`, for a
-/// `meta.json` that is malformed or of another version, and for streamed scenes. Also for planes
-/// that are missing, outside the folder, not lossless or too small.
+/// `meta.json` that is malformed or of another version, and for chunks that contradict their
+/// index. Also for planes that are missing, outside the folder, not lossless or too small.
 /// [`Error::Limit`](crate::Error::Limit) for counts and pictures over the limits.
 pub fn read(source: &Source) -> Result<Gaussians> {
-    let is_index = source.path.file_name().is_some_and(|name| name == "lod-meta.json");
+    let is_index = source.path.file_name().is_some_and(|name| name == INDEX);
     if is_index || is_streamed(source.bytes()) {
-        return Err(streamed(source));
+        return streamed::read(source);
     }
     let (text, mut files) = planes::open(source)?;
     let meta = Meta::parse(source, &text)?;
     let count = meta.count(source)?;
     let scene = Scene::load(source, &mut files, &meta, count)?;
-    let degree = scene.palette.as_ref().map_or(0, |palette| palette.degree);
-    settle(source, count, degree, |index, color| scene.gaussian(source, index, color))
+    settle(source, count, scene.degree(), |index, color| scene.gaussian(source, index, color))
 }
 
-/// Returns the error for a streamed scene.
-fn streamed(source: &Source) -> crate::Error {
-    let message = "is the index of a streamed SOG scene (lod-meta.json), which is not supported";
-    source.error("file", message).hint(
-        "open the meta.json of one of its chunks, or write the scene again as one .sog file or \
-         as PLY",
-    )
+/// Returns the error for a streamed scene in an archive.
+fn not_unpacked(source: &Source) -> crate::Error {
+    let message = "contains a streamed SOG scene (lod-meta.json), which is read from a folder";
+    source.error("archive", message).hint("unpack the archive, and open its lod-meta.json")
 }
 
 /// The decoded planes, and what their bytes mean.
@@ -139,6 +139,11 @@ impl Scene {
             opacities,
             palette: Palette::load(source, files, meta, count)?,
         })
+    }
+
+    /// Returns the degree of the colours.
+    fn degree(&self) -> u32 {
+        self.palette.as_ref().map_or(0, |palette| palette.degree)
     }
 
     /// Returns one Gaussian, and fills in the coefficients of its colour.

@@ -17,6 +17,8 @@ mod tests;
 mod write;
 
 pub use write::write;
+#[cfg(feature = "files")]
+pub use write::write_streams;
 
 use super::shared::trained::settle;
 use crate::{

@@ -30,7 +30,7 @@ use super::vtk;
 use super::{
     Kind, csv,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
-    mhd, mrc, nifti, npy, nrrd, off, pcd, picture, raw, splat, spz, stl, xyz,
+    ksplat, mhd, mrc, nifti, npy, nrrd, off, pcd, picture, raw, splat, spz, stl, xyz,
 };
 
 /// Every format, in the order of messages: surfaces, volumes, scattered samples.
@@ -92,6 +92,14 @@ pub static FORMATS: &[Format] = &[
         ..Format::ROW
     },
     Format {
+        name: "KSPLAT",
+        extensions: &["ksplat"],
+        holds: &[all(Content::Gaussians)],
+        kind: Which::Always(Kind::Gaussians),
+        gaussians: Some(|source, _| ksplat::read(source)),
+        ..Format::ROW
+    },
+    Format {
         name: "SPZ",
         extensions: &["spz"],
         holds: &[all(Content::Gaussians)],
@@ -105,6 +113,7 @@ pub static FORMATS: &[Format] = &[
         name: "SOG",
         extensions: &["sog"],
         holds: &[all(Content::Gaussians)],
+        written: Some("sog"),
         refers: true,
         feature: Some("sog"),
         #[cfg(feature = "sog")]
@@ -191,6 +200,7 @@ pub static FORMATS: &[Format] = &[
         name: "E57",
         extensions: &["e57"],
         holds: &[all(Content::PointCloud)],
+        written: Some("e57"),
         feature: Some("e57"),
         magic: Magic::Prefix(b"ASTM-E57"),
         kind: Which::Always(Kind::Mesh),

@@ -449,6 +449,21 @@ pub fn written(write: impl Fn(&Path) -> Result<()>) -> Vec<u8> {
     std::fs::read(&path).expect("bytes")
 }
 
+/// The `.ksplat` file of two Gaussians of degree 0, without compression.
+pub fn ksplat() -> Vec<u8> {
+    let mut bytes = vec![0; 4096 + 1024];
+    bytes[1] = 1;
+    for (at, count) in [(4, 1), (8, 1), (12, 2), (16, 2), (4096, 2), (4100, 2)] {
+        bytes[at] = count;
+    }
+    for x in [0.0f32, 1.0] {
+        let numbers = [x, 0.0, 0.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0].map(f32::to_le_bytes);
+        bytes.extend(numbers.as_flattened());
+        bytes.extend([255, 128, 0, 200]);
+    }
+    bytes
+}
+
 /// A SOG archive of two Gaussians.
 pub fn sog() -> Vec<u8> {
     use image_webp::{ColorType, WebPEncoder};
@@ -566,6 +581,7 @@ fn formats_of_gaussians() -> Vec<Format> {
         ("trained.glb", written(|path| formats::gltf::write_gaussians(&set, path)), never),
         // A record has 32 bytes.
         ("a.splat", written(|path| formats::splat::write(&set, path)), |_, at| at == 32),
+        ("a.ksplat", ksplat(), never),
         ("a.spz", written(|path| formats::spz::write(&set, path)), never),
         ("a.sog", sog(), never),
     ]

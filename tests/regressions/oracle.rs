@@ -40,8 +40,10 @@ pub type Target = fn(&[u8]);
 pub const FORMATS: &[(&str, Target)] = &[
     ("ply", ply),
     ("splat", splat),
+    ("ksplat", ksplat),
     ("spz", spz),
     ("sog", sog),
+    ("sog_streamed", sog_streamed),
     ("obj", obj),
     ("stl", stl),
     ("off", off),
@@ -246,6 +248,10 @@ pub fn splat(bytes: &[u8]) {
     gaussians("input.splat", bytes, formats::splat::read);
 }
 
+pub fn ksplat(bytes: &[u8]) {
+    gaussians("input.ksplat", bytes, formats::ksplat::read);
+}
+
 pub fn spz(bytes: &[u8]) {
     formats::spz::is_spz(bytes);
     gaussians("input.spz", bytes, formats::spz::read);
@@ -270,6 +276,27 @@ pub fn sog(bytes: &[u8]) {
         }
     }
     let path = folder.write("meta.json", meta);
+    let limits = limits();
+    accepted(Source::open(&path, &limits).and_then(|source| formats::sog::read(&source)))
+        .iter()
+        .for_each(sound_gaussians);
+}
+
+/// The index of a streamed scene. Lines `#sog` may separate the archives that it refers to:
+/// `0.sog`, `1.sog` and so on.
+pub fn sog_streamed(bytes: &[u8]) {
+    const CHUNK: &[u8] = b"\n#sog\n";
+    let (index, mut rest) = cut(bytes, CHUNK).unwrap_or((bytes, &[]));
+    let folder = Folder::new();
+    for number in 0..9 {
+        let (chunk, behind) = cut(rest, CHUNK).unwrap_or((rest, &[]));
+        folder.write(&format!("{number}.sog"), chunk);
+        rest = behind;
+        if rest.is_empty() {
+            break;
+        }
+    }
+    let path = folder.write("lod-meta.json", index);
     let limits = limits();
     accepted(Source::open(&path, &limits).and_then(|source| formats::sog::read(&source)))
         .iter()

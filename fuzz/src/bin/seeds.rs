@@ -43,7 +43,9 @@ fn main() -> Result<()> {
     ply(&mut seeds)?;
     gaussians(&mut seeds)?;
     spz(&mut seeds)?;
+    ksplat(&mut seeds)?;
     sog(&mut seeds)?;
+    sog_streamed(&mut seeds)?;
     obj(&mut seeds)?;
     stl(&mut seeds)?;
     off(&mut seeds)?;
@@ -186,6 +188,10 @@ fn gaussians(seeds: &mut Seeds) -> Result<()> {
         let packed = seeds.written(|path| formats::spz::write(&set, path))?;
         seeds.known("spz", packed)?;
     }
+    for degree in [0, 2] {
+        let packed = seeds.written(|path| formats::sog::write(&trained(degree), path))?;
+        seeds.known("sog", packed)?;
+    }
     let records = seeds.written(|path| formats::splat::write(&trained(0), path))?;
     seeds.put("splat", records)
 }
@@ -222,6 +228,64 @@ fn spz(seeds: &mut Seeds) -> Result<()> {
         }
         file.extend(frames.concat());
         seeds.known("spz", file)?;
+    }
+    Ok(())
+}
+
+/// `.ksplat` of every level and degree: a section with a full bucket, and one with a partial one.
+fn ksplat(seeds: &mut Seeds) -> Result<()> {
+    for (level, degree) in (0u8..3).flat_map(|level| (0u8..3).map(move |degree| (level, degree))) {
+        let mut head = vec![0; 4096];
+        for (at, byte) in [(1, 1), (4, 2), (8, 2), (12, 3), (16, 3), (20, level)] {
+            head[at] = byte;
+        }
+        let (mut heads, mut data) = (Vec::new(), Vec::new());
+        for (count, full, partial) in [(2u8, 1, 0), (1, 0, 1)] {
+            let mut section = vec![0; 1024];
+            let fields = [(0, count), (4, count), (40, degree)];
+            let buckets = [(8, 2), (12, 1), (20, 12), (24, 255), (32, full), (36, partial)];
+            let of_level = if level == 0 { &[][..] } else { &buckets };
+            for &(at, byte) in fields.iter().chain(of_level) {
+                section[at] = byte;
+            }
+            if level > 0 {
+                section[16..20].copy_from_slice(&5f32.to_le_bytes());
+                let length: &[u8] = if partial > 0 { &[1, 0, 0, 0] } else { &[] };
+                data.extend([length, &[0; 12]].concat());
+            }
+            heads.extend(section);
+            let terms = 3 * (terms(u32::from(degree)) - 1);
+            let bytes = match level {
+                0 => 44 + 4 * terms,
+                1 => 24 + 2 * terms,
+                _ => 24 + terms,
+            };
+            // Half of each number, so that they are small and positive.
+            data.extend((0..bytes * usize::from(count)).map(|at| [0, 0x38][at % 2]));
+        }
+        seeds.put("ksplat", [head, heads, data].concat())?;
+    }
+    Ok(())
+}
+
+/// Streamed SOG with two chunks and a scene around them.
+fn sog_streamed(seeds: &mut Seeds) -> Result<()> {
+    for degree in [0, 1] {
+        let chunk = seeds.written(|path| formats::sog::write(&trained(degree), path))?;
+        let leaf = |file: u8, count: u8| {
+            format!("{{'lods':{{'0':{{'file':{file},'offset':0,'count':{count}}}}}}}")
+        };
+        let text = format!(
+            "{{'version':1,'lodLevels':1,'environment':'2.sog','filenames':['0.sog','1.sog'],\
+             'tree':{{'children':[{},{}]}}}}",
+            leaf(0, 3),
+            leaf(1, 2)
+        );
+        let mut all = text.replace('\'', "\"").into_bytes();
+        for _ in 0..3 {
+            all.extend([&b"\n#sog\n"[..], &chunk].concat());
+        }
+        seeds.put("sog_streamed", all)?;
     }
     Ok(())
 }

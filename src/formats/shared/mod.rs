@@ -7,6 +7,8 @@ pub(super) mod brightness;
 pub(super) mod choice;
 pub(super) mod cloud;
 pub(super) mod colors;
+#[cfg(any(feature = "ply", feature = "sog"))]
+pub(super) mod curve;
 pub(super) mod gather;
 pub(super) mod grid;
 pub(super) mod holes;

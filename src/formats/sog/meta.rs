@@ -7,6 +7,9 @@ use std::array;
 /// The name of the file, in archives and in errors.
 pub const META: &str = "meta.json";
 
+/// The name of the index of a streamed scene.
+pub const INDEX: &str = "lod-meta.json";
+
 /// The values that the bytes of a channel stand for. Those without a value are not a number.
 pub type Levels = [f32; 256];
 

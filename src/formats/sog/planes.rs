@@ -1,6 +1,9 @@
 //! The planes: lossless WebP pictures beside `meta.json`, or in an archive with it.
 
-use super::{meta::META, streamed};
+use super::{
+    meta::{INDEX, META},
+    not_unpacked,
+};
 use crate::{
     Result,
     error::LimitKind,
@@ -70,8 +73,8 @@ pub fn open<'a>(source: &'a Source) -> Result<(String, Files<'a>)> {
         ZipArchive::new(Cursor::new(source.bytes())).map_err(|error| zip_error(source, &error))
     })?;
     if archive.index_for_name(META).is_none() {
-        if archive.index_for_name("lod-meta.json").is_some() {
-            return Err(streamed(source));
+        if archive.index_for_name(INDEX).is_some() {
+            return Err(not_unpacked(source));
         }
         let message = format!("contains no {META}, which each SOG scene has");
         return Err(source.error("archive", message));

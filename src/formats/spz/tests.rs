@@ -274,6 +274,26 @@ fn a_written_set_is_read_again() {
     }
 }
 
+#[cfg(feature = "files")]
+#[test]
+fn both_written_versions_have_the_same_numbers() {
+    let folder = Folder::new();
+    for degree in 0..=3 {
+        let (set, [third, fourth]) = (set(degree), ["3.spz", "4.spz"].map(|n| folder.path(n)));
+        write(&set, &third).unwrap();
+        write_streams(&set, &fourth).unwrap();
+        let bytes = std::fs::read(&fourth).unwrap();
+        assert_eq!((&bytes[..8], bytes[15]), (&b"NGSP\x04\0\0\0"[..], 5 + u8::from(degree > 0)));
+        let [third, fourth] = [third, fourth].map(|path| read_with(&path, read).unwrap());
+        assert_eq!((fourth.len(), fourth.degree), (64, degree));
+        assert_eq!((&third.centers, &third.scales), (&fourth.centers, &fourth.scales));
+        assert_eq!((&third.rotations, &third.opacities), (&fourth.rotations, &fourth.opacities));
+        assert_eq!(third.harmonics, fourth.harmonics);
+    }
+    let none = write_streams(&Gaussians::default(), folder.path("a.spz"));
+    assert!(matches!(none, Err(Error::Argument(_))));
+}
+
 #[test]
 fn far_positions_have_fewer_fractional_bits() {
     let folder = Folder::new();

@@ -29,7 +29,7 @@ struct AllGaussians {
 
 impl Target {
     /// Writes Gaussians.
-    fn write(self, set: &Gaussians, path: &Path) -> Result<()> {
+    fn write(self, set: &Gaussians, path: &Path, spz_version: u32) -> Result<()> {
         match self {
             #[cfg(feature = "ply")]
             Self::Ply => formats::ply::write_gaussians(set, path),
@@ -38,23 +38,33 @@ impl Target {
             #[cfg(feature = "gltf")]
             Self::Glb => formats::gltf::write_gaussians(set, path),
             Self::Splat => formats::splat::write(set, path),
-            Self::Spz => formats::spz::write(set, path),
+            Self::Spz if spz_version == 3 => formats::spz::write(set, path),
+            #[cfg(feature = "files")]
+            Self::Spz if spz_version == 4 => formats::spz::write_streams(set, path),
+            Self::Spz => Err(wrong(format!("this build writes no version {spz_version} of SPZ"))),
+            #[cfg(feature = "sog")]
+            Self::Sog => formats::sog::write(set, path),
             _ => Err(wrong(format!("{}: this build writes no such file", path.display()))),
         }
     }
 
-    /// Returns the most bytes of a Gaussian with colours of a degree.
-    fn bytes(self, degree: u32) -> u64 {
+    /// Returns the most bytes of a file of Gaussians with colours of a degree.
+    fn bytes(self, count: usize, degree: u32) -> u64 {
+        /// Most bytes of a `meta.json` and of tables in planes.
+        const SOG: u64 = 1 << 15;
         let more = 3 * (harmonics::terms(degree) as u64 - 1);
-        match self {
+        let of_one = match self {
             Self::CompressedPly => 17 + more,
             Self::Splat => 32,
             Self::Spz => 20 + more,
+            Self::Sog => 20 + more,
             Self::Glb => 4 * (18 + more),
             Self::Ply | Self::Hierarchy | Self::Points | Self::Nrrd | Self::Bricks => {
                 4 * (17 + more)
             }
-        }
+        };
+        let whole = if self == Self::Sog { SOG } else { 0 };
+        whole + count as u64 * of_one
     }
 }
 
@@ -64,7 +74,8 @@ impl<W: Watch> Work<'_, W> {
         let AllGaussians { set, points, read_ms } = self.gaussians_for(target)?;
         self.watch.stage(&format!("Writing {}", self.output.display()));
         let start = Instant::now();
-        target.write(&set, self.output).map_err(|error| self.at_fault(error))?;
+        let version = self.conversion.spz_version;
+        target.write(&set, self.output, version).map_err(|error| self.at_fault(error))?;
         let (splats, degree) = (set.len(), set.degree);
         Ok(Converted::Gaussians { points, splats, degree, read_ms, write_ms: milliseconds(start) })
     }
@@ -72,7 +83,7 @@ impl<W: Watch> Work<'_, W> {
     /// Finds the size of a file of Gaussians.
     pub fn expect_gaussians(&self, target: Target) -> Result<Expected, W::Error> {
         let AllGaussians { set, points, read_ms } = self.gaussians_for(target)?;
-        let bytes = set.len() as u64 * target.bytes(set.degree);
+        let bytes = target.bytes(set.len(), set.degree);
         Ok(Expected::Gaussians { points, splats: set.len(), bytes, is_most: true, read_ms })
     }
 

@@ -55,6 +55,8 @@ pub struct Conversion {
     pub unit: Option<String>,
     /// The maximum degree of the colours of Gaussians.
     pub degree: Option<u32>,
+    /// The version of SPZ that is written, 3 or 4.
+    pub spz_version: u32,
     /// The lattice of a volume that is written as NRRD; by default that of the input.
     pub lattice: Option<Resampled>,
     /// The bytes of memory that a conversion may use; by default three quarters of the machine's
@@ -80,6 +82,7 @@ impl Default for Conversion {
             up: None,
             unit: None,
             degree: None,
+            spz_version: 3,
             lattice: None,
             memory: None,
             in_regions: false,
@@ -110,9 +113,11 @@ pub enum Target {
     Splat,
     /// Gaussians as SPZ.
     Spz,
+    /// Gaussians as SOG, in one file or as `meta.json` with its planes.
+    Sog,
     /// Gaussians as glTF, `.glb`.
     Glb,
-    /// Points with their attributes: LAS, LAZ, or PLY as `.points.ply`.
+    /// Points with their attributes: LAS, LAZ, E57, or PLY as `.points.ply`.
     Points,
     /// A volume as NRRD.
     Nrrd,
@@ -133,10 +138,12 @@ impl Target {
             (".points.ply", Self::Points),
             (".las", Self::Points),
             (".laz", Self::Points),
+            (".e57", Self::Points),
             (".splk", Self::Hierarchy),
             (".ply", Self::Ply),
             (".splat", Self::Splat),
             (".spz", Self::Spz),
+            (".sog", Self::Sog),
             (".glb", Self::Glb),
             (".nrrd", Self::Nrrd),
             (".splv", Self::Bricks),
@@ -144,10 +151,11 @@ impl Target {
         // A name that is an extension alone has none.
         let has_stem = path.extension().is_some();
         let entry = all.into_iter().find(|(end, _)| has_stem && name.ends_with(end));
-        entry.map(|(_, target)| target).ok_or_else(|| {
+        let entry = entry.map(|(_, target)| target);
+        entry.or((name == "meta.json").then_some(Self::Sog)).ok_or_else(|| {
             Error::Argument(format!(
-                "{}: only .splk, .ply, .splat, .spz, .glb, .las, .laz, .nrrd and .splv files can \
-                 be written",
+                "{}: only .splk, .ply, .splat, .spz, .sog, .glb, .las, .laz, .e57, .nrrd and .splv \
+                 files, and the meta.json of SOG, can be written",
                 path.display()
             ))
         })
@@ -474,6 +482,7 @@ mod tests {
         assert_eq!(of("a/b.SPLK"), Some(Target::Hierarchy));
         assert_eq!(of("b.compressed.ply"), Some(Target::CompressedPly));
         assert_eq!(of("b.v2.ply"), Some(Target::Ply));
-        assert_eq!([of("b.obj"), of("splk"), of(".splk")], [None; 3]);
+        assert_eq!([of("a.sog"), of("a/meta.json")], [Some(Target::Sog); 2]);
+        assert_eq!([of("b.obj"), of("splk"), of(".splk"), of("a.meta.json")], [None; 4]);
     }
 }

@@ -12,7 +12,9 @@ use crate::{
     Error, Result,
     about::About,
     edit::{self, Context, Edit, Editable, Pass, Surface},
-    formats::{Attribute, Kind, NumberType, PointLayout, Records, Stream, write_points},
+    formats::{
+        Attribute, Kind, NumberType, PointLayout, PointWriter, Records, Stream, write_points,
+    },
     hierarchy::external::memory_of_mesh,
     progress,
     session::Data,
@@ -46,8 +48,8 @@ impl<W: Watch> Work<'_, W> {
         let mut writer = write_points(self.output, layout)?;
         let changes = pass.run(|records| writer.put(&records))?;
         self.watch.has_edited(&changes);
+        let attributes = names_of(&attributes, &*writer);
         let (points, written) = (pass.points(), writer.finish()?);
-        let attributes = attributes.into_iter().map(|attribute| attribute.name).collect();
         Ok(Converted::Points { points, written, attributes })
     }
 
@@ -63,8 +65,8 @@ impl<W: Watch> Work<'_, W> {
             self.watch.has_read(&opened.files())?;
             let Data::Mesh(mesh) = data else {
                 let message = "holds no mesh or point cloud, of which points are written; trained \
-                               Gaussians and hierarchies are written as .splk, .ply, .splat, .spz \
-                               or .glb";
+                               Gaussians and hierarchies are written as .splk, .ply, .splat, .spz, \
+                               .sog or .glb";
                 return Err(wrong(format!("{} {message}", path.display())).into());
             };
             points += mesh.positions.len() as u64;
@@ -74,10 +76,11 @@ impl<W: Watch> Work<'_, W> {
             parts.push(surface.into_records());
         }
         let layout = layout_of(&parts);
-        let names = layout.attributes.iter().map(|attribute| attribute.name.clone()).collect();
+        let attributes = layout.attributes.clone();
         let mut writer = write_points(self.output, layout)?;
+        let attributes = names_of(&attributes, &*writer);
         parts.iter().try_for_each(|part| writer.put(part))?;
-        Ok(Converted::Points { points, written: writer.finish()?, attributes: names })
+        Ok(Converted::Points { points, written: writer.finish()?, attributes })
     }
 
     /// Opens all inputs as points that are read in pieces; `None` if one cannot be read so. All
@@ -297,6 +300,12 @@ impl<W: Watch> Watch for Inner<'_, W> {
     fn has_colored(&self, is_mesh: bool, has_values: bool) -> Result<(), W::Error> {
         self.0.has_colored(is_mesh, has_values)
     }
+}
+
+/// Returns the names of the attributes that a file keeps.
+fn names_of(attributes: &[Attribute], writer: &dyn PointWriter) -> Vec<String> {
+    let names = attributes.iter().map(|attribute| attribute.name.clone());
+    names.filter(|name| !writer.left_out().contains(name)).collect()
 }
 
 /// Returns what a file of all these points holds.

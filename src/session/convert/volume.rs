@@ -192,7 +192,7 @@ fn no_volume(file: &Path) -> Error {
     let file = file.display();
     wrong(format!(
         "{file} holds no volume; meshes, point clouds, hierarchies and trained Gaussians are \
-         written as .splk, .ply, .splat, .spz or .glb"
+         written as .splk, .ply, .splat, .spz, .sog or .glb"
     ))
 }
 

@@ -36,6 +36,22 @@ vec![
         "nan.splat: file: none of the 1 Gaussians has finite numbers and a rotation",
     ),
     (
+        "empty.ksplat",
+        Vec::new(),
+        "empty.ksplat: byte 0: the file ends inside its header of 4096 bytes",
+    ),
+    (
+        "version.ksplat",
+        vec![1; 4096],
+        "version.ksplat: header: has the version 1.1, but only 0.1 is read",
+    ),
+    (
+        "sections.ksplat",
+        [&[0, 1, 0, 0, 9, 0, 0, 0][..], &[1; 12], &[0; 5000]].concat(),
+        "sections.ksplat: header: counts 9 sections, whose headers end at byte 13312, but the file \
+         has 5020 bytes",
+    ),
+    (
         "version.spz",
         spz(9, 1, 0, 16),
         "version.spz: header: has the version 9, but the versions 1 to 4 are read",
@@ -68,8 +84,7 @@ vec![
     (
         "streamed.sog",
         br#"{"lodLevels": 2}"#.to_vec(),
-        "streamed.sog: file: is the index of a streamed SOG scene (lod-meta.json), which is \
-         not supported",
+        "streamed.sog: lod-meta.json: missing field `filenames` at line 1 column 16",
     ),
     (
         "kernel.gltf",

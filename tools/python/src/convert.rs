@@ -33,6 +33,7 @@ struct Conversion {
     up: Option<[f64; 3]>,
     unit: Option<String>,
     degree: Option<u32>,
+    spz_version: Option<u32>,
     radius_scale: Option<f32>,
     lattice: Option<String>,
     memory: Option<u64>,
@@ -181,6 +182,7 @@ impl Conversion {
             up: up.flatten(),
             unit: self.unit,
             degree: self.degree,
+            spz_version: self.spz_version.unwrap_or(3),
             memory: self.memory,
             parts: self.parts,
             ..session::convert::Conversion::default()
@@ -215,6 +217,11 @@ impl Conversion {
 impl Work {
     fn run(&self, stop: &Stop) -> Result<(), Error> {
         self.check_output()?;
+        if self.output.file_name().is_some_and(|name| name == "meta.json") {
+            // It names the planes beside it, which appear together with it.
+            disk::may_replace(&self.output, self.overwrite);
+            return self.conversion.convert(&self.files, &self.output, &()).map(drop);
+        }
         let part = part_of(&self.output);
         finished(&self.output, self.overwrite, &part, stop, || {
             self.conversion.convert(&self.files, &part, &()).map(drop)

@@ -10,13 +10,29 @@ use splatkit::{
     session::convert::{Built, Converted, Expected},
     volume::{Lattice, Scalar},
 };
-use std::sync::{MutexGuard, PoisonError};
+use std::{
+    path::Path,
+    sync::{MutexGuard, PoisonError},
+};
 
 impl Convert {
-    /// Returns the bytes of the output.
+    /// Returns the bytes of the output, with the planes that a `meta.json` names.
     fn bytes(&self) -> Result<u64, Failure> {
-        let metadata = self.output().metadata();
-        Ok(metadata.map_err(|error| Error::file(self.output(), "read", error))?.len())
+        let size = |path: &Path| {
+            let metadata = path.metadata().map_err(|error| Error::file(path, "read", error));
+            metadata.map(|metadata| metadata.len())
+        };
+        let (path, mut all) = (self.output(), size(self.output())?);
+        if path.extension().is_some_and(|extension| extension == "json") {
+            let text = std::fs::read(path).map_err(|error| Error::file(path, "read", error))?;
+            let meta: Value = serde_json::from_slice(&text).unwrap_or_default();
+            let parts = meta.as_object().into_iter().flat_map(|meta| meta.values());
+            let planes = parts.filter_map(|part| part["files"].as_array()).flatten();
+            for plane in planes.filter_map(Value::as_str) {
+                all += size(&path.with_file_name(plane))?;
+            }
+        }
+        Ok(all)
     }
 
     /// Returns what edits have done.

@@ -6,7 +6,7 @@ use glam::DVec3;
 use splatkit::{hierarchy, session::convert::Conversion};
 
 /// The extensions of files that hold surfaces.
-const SURFACES: [&str; 5] = ["splk", "ply", "splat", "spz", "glb"];
+const SURFACES: [&str; 7] = ["splk", "ply", "splat", "spz", "sog", "json", "glb"];
 
 /// How hierarchies are built.
 #[derive(Args, Debug, Clone)]
@@ -38,6 +38,10 @@ pub struct SurfaceFlags {
     /// [default: that of the file]
     #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=3))]
     degree: Option<u32>,
+    /// Write this version of SPZ, 3 or 4. Version 4 is smaller and is read faster, but not by
+    /// programs of before 2026 [default: 3]
+    #[arg(long, value_name = "VERSION", value_parser = clap::value_parser!(u32).range(3..=4))]
+    spz_version: Option<u32>,
     /// Limit the memory of the conversion, such as 8GiB. Binary PLY of points or triangles, LAS and
     /// LAZ that need more are converted region by region, with temporary files of about their size
     /// beside the output. Raw volumes and NRRD files of raw encoding become .splv slice by slice.
@@ -65,6 +69,7 @@ impl SurfaceFlags {
             ("--unit", self.unit.is_some(), &["splk", "splv"]),
             ("--radius-scale", self.radius_scale.is_some(), &SURFACES),
             ("--degree", self.degree.is_some(), &SURFACES),
+            ("--spz-version", self.spz_version.is_some(), &["spz"]),
         ];
         match flags.into_iter().find(|(_, is_given, of)| *is_given && !of.contains(&extension)) {
             Some((flag, _, of)) => {
@@ -99,6 +104,7 @@ impl SurfaceFlags {
             up: self.up,
             unit: self.unit.clone(),
             degree: self.degree,
+            spz_version: self.spz_version.unwrap_or(3),
             memory: self.memory,
             ..Conversion::default()
         }

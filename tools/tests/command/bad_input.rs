@@ -745,9 +745,9 @@ fn trained_gaussians_are_told() {
     folder
         .run("render gaussians.ply -o a.png --color red")
         .fails(2, &["--color colours meshes, point clouds and the boundary of cells"]);
-    folder.put("a.ksplat", [0; 4096]);
+    folder.put("a.lcc", [0; 4096]);
     folder
-        .run("render a.ksplat -o a.png")
+        .run("render a.lcc -o a.png")
         .fails(3, &["a packed scene of trained 3D Gaussians", "splat-transform"]);
     assert!(!folder.run("info a.ply").stderr().contains("Gaussians"));
 }

@@ -96,7 +96,7 @@ fn what_cannot_be_converted_is_told() {
     folder.run("convert a.nrrd -o a.nrrd").fails(1, &["exists already", "--overwrite"]);
     folder.run("convert a.nrrd -o none/b.nrrd").fails(1, &["folder does not exist"]);
     folder.run("convert a.ply -o b.nrrd").fails(2, &["a.ply", "holds no volume"]);
-    for output in ["b.splk", "b.ply", "b.compressed.ply", "b.splat", "b.spz", "b.glb"] {
+    for output in ["b.splk", "b.ply", "b.compressed.ply", "b.splat", "b.spz", "b.sog", "b.glb"] {
         folder
             .run(&format!("convert a.nrrd -o {output}"))
             .fails(2, &["hierarchies are built from meshes and point clouds"]);
@@ -104,7 +104,7 @@ fn what_cannot_be_converted_is_told() {
     for output in ["b", "-"] {
         folder.run(&format!("convert a.nrrd -o {output}")).fails(
             2,
-            &["only .splk, .ply, .splat, .spz, .glb, .las, .laz, .nrrd and .splv files can be"],
+            &["only .splk, .ply, .splat, .spz, .sog, .glb, .las, .laz, .e57, .nrrd and .splv"],
         );
     }
     folder.put("samples.csv", "x,y,z,value\n1,2,3,4\n5,6,7,8\n");

@@ -81,7 +81,7 @@ fn every_format_gives_the_same_picture() {
     let folder = Folder::new();
     let set = scene(2);
     write(&set, "ply", &folder.path("scene.ply"));
-    sog(&folder, "made.sog", &set);
+    sog(&folder, "planes.sog", &set);
     folder.run("convert scene.ply -o flat.ply --degree 0").ok();
     let report = folder.json(&format!("render scene.ply -o scene.png --json {VIEW}"));
     assert_eq!(
@@ -97,7 +97,7 @@ fn every_format_gives_the_same_picture() {
     let flat = draw("flat.ply");
     let apart = psnr(&folder, "scene.png", &flat);
     assert!(apart < 45.0, "colours of degree 2 look as those of degree 0: {apart:.1} dB");
-    let mut pictures = vec![("made.sog", draw("made.sog"), "scene.png")];
+    let mut pictures = vec![("planes.sog", draw("planes.sog"), "scene.png")];
     for (extension, ..) in WRITTEN {
         let (name, _) = converted(&folder, extension);
         let (picture, wanted) = match extension {
@@ -130,6 +130,45 @@ fn a_folder_of_planes_is_drawn() {
     assert!(is_png(&std::fs::read(folder.path("out.png")).unwrap(), 96, 72));
     folder.run("convert scene/meta.json -o scene.spz").ok();
     assert_eq!(load(&folder, "scene.spz").len(), COUNT);
+}
+
+/// A scene is written as a folder of planes too, all of them or none.
+#[test]
+fn a_folder_of_planes_is_written() {
+    let folder = Folder::new();
+    write(&scene(1), "ply", &folder.path("scene.ply"));
+    std::fs::create_dir(folder.path("made")).unwrap();
+    folder.write("made/quats.webp", "something else");
+    let text = ["quats.webp", "exists already"];
+    folder.run("convert scene.ply -o made/meta.json").fails(1, &text);
+    let listed = || std::fs::read_dir(folder.path("made")).unwrap().count();
+    assert_eq!(listed(), 1);
+    folder.run("convert scene.ply -o made/meta.json --overwrite").ok();
+    assert_eq!(listed(), 8);
+    folder.run("convert scene.ply -o made.sog").ok();
+    let [beside, whole] = ["made/meta.json", "made.sog"].map(|name| load(&folder, name));
+    assert_eq!((beside.centers, beside.harmonics), (whole.centers, whole.harmonics));
+    folder.run("convert scene.ply -o made/scene.json").fails(2, &["and the meta.json of SOG"]);
+}
+
+#[test]
+fn spz_has_two_versions() {
+    let folder = Folder::new();
+    let set = scene(1);
+    write(&set, "ply", &folder.path("scene.ply"));
+    let (.., most) = WRITTEN[3];
+    for (flag, start) in [("", [0x1f, 0x8b]), (" --spz-version 3", [0x1f, 0x8b])]
+        .into_iter()
+        .chain([(" --spz-version 4", *b"NG")])
+    {
+        folder.run(&format!("convert scene.ply -o a.spz --overwrite{flag}")).ok();
+        assert_eq!(std::fs::read(folder.path("a.spz")).unwrap()[..2], start, "{flag}");
+        Apart::of(&load(&folder, "a.spz"), &set).within(&most, flag);
+    }
+    folder.run("convert scene.ply -o b.spz --spz-version 2").fails(2, &["2", "3..=4"]);
+    folder
+        .run("convert scene.ply -o b.ply --spz-version 4")
+        .fails(2, &["--spz-version is for .spz files"]);
 }
 
 /// Writes a scene in every format, as `whole` and the extension.

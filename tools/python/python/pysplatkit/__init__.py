@@ -109,10 +109,10 @@ def render(
     is_file = isinstance(source, (str, os.PathLike))
     names = (_options.DRAWING | _options.PAGE | _options.VIEW) - (set() if is_file else {"up"})
     given |= {name: rest.pop(name) for name in names & rest.keys()}
-    # The `meta.json` of trained Gaussians (SOG) is no scene.
+    # The `meta.json` of trained Gaussians (SOG), and the index of streamed ones, is no scene.
     if is_file:
         path = Path(source)
-        if path.suffix == ".json" and path.name != "meta.json" and not rest:
+        if path.suffix == ".json" and path.name not in ("meta.json", "lod-meta.json") and not rest:
             return Scene.open(path).render(**given)
     return Scene().add(source, **rest).render(**given)
 

@@ -92,6 +92,7 @@ def convert(
     up: Vector | None = None,
     unit: str | None = None,
     degree: int | None = None,
+    spz_version: int | None = None,
     radius_scale: float | None = None,
     lattice: str | None = None,
     memory: int | None = None,
@@ -104,9 +105,10 @@ def convert(
     """Converts files as `splatkit convert` does. Returns the path of the output.
 
     Meshes, point clouds, hierarchies and trained Gaussians become .splk, a hierarchy of splats with
-    levels of detail, or Gaussians for other viewers: .ply, .compressed.ply, .splat, .spz or .glb.
-    Meshes and point clouds become points with attributes, .las, .laz or .points.ply. A volume
-    becomes .splv, levels of bricks, or .nrrd.
+    levels of detail, or Gaussians for other viewers: .ply, .compressed.ply, .splat, .spz, .sog,
+    meta.json with its planes beside it, or .glb. Meshes and point clouds become points with
+    attributes, .las, .laz or .points.ply, or with colours and intensities, .e57. A volume becomes
+    .splv, levels of bricks, or .nrrd.
 
     Args:
         files: A file, or several.
@@ -118,6 +120,7 @@ def convert(
         up: Record this direction as up.
         unit: Record this unit of lengths.
         degree: Keep the colours of trained Gaussians up to this degree.
+        spz_version: Write this version of SPZ, 3 (the default) or 4.
         radius_scale: A factor on all radii.
         lattice: bcc resamples a volume on the body-centred cubic lattice.
         memory: Most bytes of memory. Scans that need more are converted region by region.
@@ -139,6 +142,7 @@ def convert(
         "up": _options.direction(up),
         "unit": unit,
         "degree": degree,
+        "spz_version": spz_version,
         "radius_scale": radius_scale,
         "lattice": lattice,
         "memory": memory,

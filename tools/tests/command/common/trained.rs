@@ -156,7 +156,7 @@ impl Apart {
 
 /// The formats that are written: the extension, the highest degree, and half a step of each number,
 /// with a little more.
-pub const WRITTEN: [(&str, u32, Apart); 5] = [
+pub const WRITTEN: [(&str, u32, Apart); 6] = [
     ("ply", 3, Apart::EXACT),
     (
         "compressed.ply",
@@ -183,10 +183,11 @@ pub const WRITTEN: [(&str, u32, Apart); 5] = [
             rest: 0.004,
         },
     ),
+    ("sog", 3, Apart { scale: 0.025, constant: 0.014, rest: 0.003, ..OF_SOG }),
     ("glb", 3, Apart::EXACT),
 ];
 
-/// Half a step of [`sog`].
+/// Half a step of [`sog`]. Codebooks that are made for a scene have some larger steps.
 pub const OF_SOG: Apart = Apart {
     center: 0.0001,
     scale: 0.005,
@@ -203,6 +204,7 @@ pub fn write(set: &Gaussians, extension: &str, path: &Path) {
         "compressed.ply" => formats::ply::write_compressed_gaussians(set, path),
         "splat" => formats::splat::write(set, path),
         "spz" => formats::spz::write(set, path),
+        "sog" => formats::sog::write(set, path),
         _ => formats::gltf::write_gaussians(set, path),
     };
     written.expect(extension);

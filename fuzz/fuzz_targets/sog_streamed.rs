@@ -1,0 +1,3 @@
+#![no_main]
+
+splatkit_fuzz::target!(sog_streamed);
