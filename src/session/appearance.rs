@@ -194,7 +194,7 @@ impl Appearance {
 const MOST_DEPTH: f64 = 8.0;
 
 /// Returns a function that was made for light as pictures of the largest value and X-rays need it.
-/// Brightness or density rises evenly from the first value that is seen to the last one of interest.
+/// Brightness or density rises evenly, from the first value that is seen to the last of interest.
 fn for_optics(
     transfer: TransferFunction,
     optics: Optics,

@@ -227,12 +227,11 @@ mod tests {
         for (ring, (radius, z)) in rings.into_iter().enumerate() {
             for side in 0..sides {
                 let angle = std::f32::consts::TAU * side as f32 / sides as f32;
-                let step = if ring == 2 { 0.01 * (50.0 * angle).sin() } else { 0.0 };
-                mesh.positions.push(Vec3::new(
-                    radius * angle.cos(),
-                    radius * angle.sin(),
-                    z + step,
-                ));
+                let step = if ring == 2 { 0.01 * (50.0 * angle + 0.5).sin() } else { 0.0 };
+                // Nothing is flat.
+                let radius = radius + 0.002 * (67.0 * angle + 2.0 * ring as f32).sin();
+                let (sine, cosine) = angle.sin_cos();
+                mesh.positions.push(Vec3::new(radius * cosine, radius * sine, z + step));
             }
         }
         for ring in 0..rings.len() as u32 - 1 {

@@ -127,7 +127,8 @@ mod tests {
         (
             "Appearance",
             "transfer range channels opacity-unit iso gradient-opacity radius-scale points \
-            point-size point-radius line-width cells crease edges opacity colormap color nan-color log-colors",
+            point-size point-radius line-width cells crease edges opacity colormap color nan-color \
+            log-colors",
         ),
         ("Kernel", "kernel sigma extent sharp"),
         ("Page", "title viewer"),

@@ -248,8 +248,8 @@ impl AppearanceEntry {
         }
         own_or_shared!(
             transfer, range, channels, opacity_unit, isosurfaces, gradient_opacity, colormap,
-            nan_color, kernel, sigma, extent, color, opacity, radius_scale, points, point_size, point_radius,
-            line_width, crease, cells;
+            nan_color, kernel, sigma, extent, color, opacity, radius_scale, points, point_size,
+            point_radius, line_width, crease, cells;
             log_colors, sharp, edges
         )
     }

@@ -157,7 +157,6 @@ fn what_several_volumes_cannot_do_is_told() {
     render("--transfer mri --transfer generic").fails(2, &["--transfer is given twice"]);
     render("--range 1,2 --range 3,4").fails(2, &["--range is given twice"]);
     render("--transfer b.nrrd=bones").fails(2, &["bones"]);
-    render("--mip").fails(2, &["maximum", "not several"]);
     render("--classify pre").fails(2, &["after interpolation"]);
     let linear = "--engine gpu --gpu software --kernel linear";
     render(linear).fails(2, &["the kernel linear", "the CPU engine does"]);

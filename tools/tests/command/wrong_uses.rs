@@ -142,12 +142,6 @@ const USES: &[(&str, &str, i32, &str)] = &[
         "plain.raw",
     ),
     (
-        "the maximum of two volumes",
-        "render a.nrrd b.nrrd -o out.png --mip",
-        2,
-        "takes one volume or sample set",
-    ),
-    (
         "a volume as a hierarchy",
         "convert a.nrrd -o b.splk",
         2,
@@ -223,7 +217,7 @@ const USES: &[(&str, &str, i32, &str)] = &[
         "python -m pysplatkit render flow.nc -o out.png draws it",
     ),
     ("a model of CAD", "render model.step -o out.png", 3, "gmsh MODEL.step -2 -format stl"),
-    ("a picture", "render old.png -o out.png", 3, "pictures are not drawn"),
+    ("no picture", "render old.png -o out.png", 3, "the picture cannot be decoded"),
     ("an archive", "render all.zip -o out.png", 3, "unpack it, and name the file inside"),
     ("a folder of other files", "render . -o out.png", 3, "no series of pictures was found"),
     (
