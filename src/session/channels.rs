@@ -162,7 +162,7 @@ fn color(about: &About, all: &[usize]) -> [f64; 3] {
     }
     let colors: &[[f64; 3]] = if about.channels.len() == 2 { &OF_TWO } else { &OF_MANY };
     let taken: Vec<[f64; 3]> = all.iter().filter_map(of_file).collect();
-    let is_taken = |color: &&[f64; 3]| taken.iter().any(|other| distance(*color, other) < 0.5);
+    let is_taken = |color: &&[f64; 3]| taken.iter().any(|other| distance(color, other) < 0.5);
     let free: Vec<[f64; 3]> = colors.iter().filter(|color| !is_taken(color)).copied().collect();
     let unnamed = (0..about.channel).filter(|number| of_file(number).is_none()).count();
     let colors = if free.is_empty() { colors } else { &free };

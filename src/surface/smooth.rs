@@ -265,7 +265,7 @@ mod tests {
         mesh.positions.iter_mut().for_each(|p| {
             // The lower half is turned up: the surface folds at the equator.
             if p.z < 0.0 {
-                p.z = -0.3 * p.z;
+                p.z *= -0.3;
             }
         });
         let normals = corner_normals(&mesh, (75.0, Grouping::Whole), Deadline::NEVER).unwrap();

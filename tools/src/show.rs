@@ -319,8 +319,7 @@ mod tests {
 
     #[test]
     fn channels_are_read() {
-        let plain = ChannelEntry::new("DAPI");
-        assert_eq!(channel("DAPI"), Ok(plain.clone()));
+        assert_eq!(channel("DAPI"), Ok(ChannelEntry::new("DAPI")));
         let whole = ChannelEntry {
             color: Some("lime".parse().unwrap()),
             range: Some([-10.0, 4000.0]),
