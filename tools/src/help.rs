@@ -148,7 +148,7 @@ mod tests {
         ),
         ("Method", "mode back-to-front classify optics mip x-ray"),
         ("Clipping", "clip cut-out"),
-        ("Hierarchy", "preset lossless radius-scale up unit degree memory"),
+        ("Hierarchy", "preset lossless radius-scale up unit degree spz-version memory"),
         (
             "Edits",
             "crop where translate rotate scale matrix thin remove-floaters keep-cluster normals",

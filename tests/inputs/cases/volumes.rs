@@ -61,7 +61,7 @@ vec![
         mrc([1000, 1000, 1000], 0, &[0]),
         "size.mrc: data: there are 1 bytes where 1000000000 were expected",
     ),
-    ("one.tif", tiff(1), "volume [2, 1, 1] [0.0, 1.0]"),
+    ("one.tif", tiff(1), "volume [2, 1, 1] [0.0, 9.0]"),
     (
         "flat.h5",
         hdf5(&[2, 2]),
