@@ -46,11 +46,11 @@ pub fn write(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     })
 }
 
-/// As [`write`], but as version 4: the same numbers in a stream of zstd for each attribute. That is
+/// As [`write()`], but as version 4: the same numbers in a stream of zstd for each attribute. That is
 /// smaller and is read faster. Programs of before 2026 do not read it.
 ///
 /// # Errors
-/// Those of [`write`]; [`Error::Argument`] in a build without the feature `files`.
+/// Those of [`write()`]; [`Error::Argument`] in a build without the feature `files`.
 #[cfg(feature = "files")]
 pub fn write_streams(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();

@@ -114,6 +114,8 @@ def render(
         path = Path(source)
         if path.suffix == ".json" and path.name not in ("meta.json", "lod-meta.json") and not rest:
             return Scene.open(path).render(**given)
+        # Functions that are made for the values suit what the picture computes of them.
+        rest["_optics"] = given.get("optics")
     return Scene().add(source, **rest).render(**given)
 
 
