@@ -46,8 +46,8 @@ pub fn write(set: &Gaussians, path: impl AsRef<Path>) -> Result<()> {
     })
 }
 
-/// As [`write()`], but as version 4: the same numbers in a stream of zstd for each attribute. That is
-/// smaller and is read faster. Programs of before 2026 do not read it.
+/// As [`write()`], but as version 4: the same numbers in a stream of zstd for each attribute. That
+/// is smaller and is read faster. Programs of before 2026 do not read it.
 ///
 /// # Errors
 /// Those of [`write()`]; [`Error::Argument`] in a build without the feature `files`.
