@@ -111,6 +111,27 @@ fn pieces_give_what_the_whole_gives() {
     }
 }
 
+/// LAS has colours of 16 bits, which are attributes, and PLY has a place for colours.
+#[test]
+fn colours_are_written_once() {
+    let folder = Folder::new();
+    let (from, to) = (folder.path("a.laz"), folder.path("a.points.ply"));
+    write(&from, &sheet(20));
+    let (read, _) = pass(&[&from], &[], u64::MAX).unwrap();
+    write(&to, &read);
+    let bytes = std::fs::read(&to).unwrap();
+    let text = String::from_utf8_lossy(&bytes);
+    let (header, _) = text.split_once("end_header").unwrap();
+    let properties = header.lines().filter_map(|line| line.strip_prefix("property "));
+    let mut names: Vec<&str> = properties.filter_map(|line| line.split(' ').nth(1)).collect();
+    let count = names.len();
+    names.sort_unstable();
+    names.dedup();
+    assert!(names.contains(&"red") && names.len() == count, "{header}");
+    let (again, _) = pass(&[&to], &[], u64::MAX).unwrap();
+    assert_eq!(again.colors, read.colors);
+}
+
 #[test]
 fn files_are_merged_and_counts_hold_for_all() {
     let folder = Folder::new();

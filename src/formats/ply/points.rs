@@ -37,7 +37,10 @@ impl PointFile {
         Self::begin(wanted, layout, AtomicFile::scratch(wanted, "ply")?)
     }
 
-    fn begin(path: &Path, layout: PointLayout, file: AtomicFile) -> Result<Self> {
+    fn begin(path: &Path, mut layout: PointLayout, file: AtomicFile) -> Result<Self> {
+        // Colours of 16 bits are attributes with the same names, and say more.
+        let is_listed = |name: &str| layout.attributes.iter().any(|other| other.name == name);
+        layout.has_colors &= !["red", "green", "blue"].into_iter().all(is_listed);
         let [low, high] = layout.bounds;
         let farthest = low.abs().max(high.abs()).max_element();
         let is_wide = layout.grid.is_some() || farthest > 2.0 * (high - low).max_element();
