@@ -122,12 +122,12 @@ fn hierarchies_made_in_regions_are_whole_or_not_there() {
     let inputs = Folder::new();
     let input = inputs.path("in.ply");
     // Triangles as coarse as these would be subdivided into very many.
-    ply::write(&Mesh { triangles: Vec::new(), normals: Vec::new(), ..Mesh::sphere(4) }, &input)
+    ply::write(&Mesh { triangles: Vec::new(), normals: Vec::new(), ..Mesh::sphere(3) }, &input)
         .unwrap();
     let options = ExternalOptions {
         memory: 1,
         preset: hierarchy::Preset::Fastest,
-        block_splats: 1 << 9,
+        block_splats: 1 << 7,
         surfels: SurfelOptions::default(),
         paint: None,
         scalar: None,

@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 /// Smaller pictures than those of other scenes: the reference takes twice as long for two fields.
 fn settings() -> Settings {
-    Settings { size: [64, 52], ..super::settings() }
+    Settings { size: [48, 40], ..super::settings() }
 }
 
 fn case(name: &'static str, scene: Scene, projection: Projection) -> Case {
@@ -76,7 +76,7 @@ pub fn most_volumes() -> Case {
         let transfer = TransferFunction { color: vec![(0.0, color)], unit: 1.5, ..cool() };
         scene = scene.with_volume(volume, Kernel::default(), transfer);
     }
-    let settings = Settings { size: [40, 32], ..settings() };
+    let settings = Settings { size: [28, 22], ..settings() };
     Case { settings, ..case("most_volumes", scene, PERSPECTIVE) }
 }
 
@@ -195,7 +195,7 @@ fn from_afar(mut case: Case) -> Case {
 /// Pictures with fields that scatter their samples, because of the settings.
 fn scattered_fields() -> Vec<Case> {
     let scatter = Settings { evaluate: Evaluate::Scatter, ..settings() };
-    let central = Settings { gradient: Gradient::Central, size: [60, 48], ..settings() };
+    let central = Settings { gradient: Gradient::Central, size: [42, 36], ..settings() };
     vec![
         Case { settings: scatter, ..case("two_volumes_scattered", two(), PERSPECTIVE) },
         Case { settings: central, ..case("two_volumes_central", two(), PERSPECTIVE) },
