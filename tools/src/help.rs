@@ -11,7 +11,7 @@ struct Task {
     examples: &'static str,
 }
 
-const TASKS: [Task; 8] = [
+const TASKS: [Task; 9] = [
     Task {
         name: "render",
         flags: DRAWN,
@@ -33,6 +33,14 @@ const TASKS: [Task; 8] = [
             view azimuth elevation zoom up clip",
         examples: "  splatkit publish scan.ply skull.nrrd scene.spz -o look.html
   splatkit publish head.nrrd --transfer ct-bone -o site",
+    },
+    Task {
+        name: "serve",
+        flags: "address port no-open title viewer background transfer range iso colormap color \
+            view azimuth elevation zoom up clip",
+        examples: "  splatkit serve scan.ply
+  splatkit serve head.nrrd --transfer ct-bone --port 8000
+  splatkit serve site",
     },
     Task {
         name: "convert",

@@ -103,6 +103,9 @@ enum Task {
     View(Box<view::View>),
     /// Make a page that shows a scene in a browser, as one file or as a folder for a static host.
     Publish(Box<publish::Publish>),
+    /// Show a scene in a browser, by a server on this machine.
+    #[cfg(feature = "serve")]
+    Serve(Box<publish::Serve>),
     /// Print what a file contains.
     Info(info::Info),
     /// Build a hierarchy of splats from meshes and point clouds, or write 3D Gaussians; write a
@@ -159,6 +162,8 @@ pub fn main() -> ExitCode {
         Task::Render(task) => task.run(&given, &progress),
         Task::View(task) => task.run(&given, &progress),
         Task::Publish(task) => task.run(&given, &progress),
+        #[cfg(feature = "serve")]
+        Task::Serve(task) => task.run(&given, &progress),
         Task::Info(task) => task.run(&given, &progress),
         Task::Convert(task) => task.run(&given, &progress),
         Task::Check(task) => task.run(&progress),

@@ -242,6 +242,12 @@ impl Render {
         self.output.json
     }
 
+    /// Returns the inputs that the command line names.
+    #[cfg(feature = "serve")]
+    pub fn inputs(&self) -> &[PathBuf] {
+        &self.scene.inputs
+    }
+
     /// Returns the scene file among the inputs.
     #[cfg(feature = "window")]
     pub fn scene_file(&self) -> Option<&Path> {

@@ -6,6 +6,8 @@
 mod inputs;
 mod packing;
 mod page;
+#[cfg(feature = "serve")]
+mod serve;
 mod viewer;
 
 use crate::{
@@ -15,6 +17,8 @@ use crate::{
 use clap::Args;
 use inputs::Published;
 use page::Page;
+#[cfg(feature = "serve")]
+pub use serve::Serve;
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -66,6 +70,13 @@ const NOT_OF_PAGES: [&str; 16] = [
 pub struct Publish {
     #[command(flatten)]
     scene: Render,
+    #[command(flatten)]
+    page: PageFlags,
+}
+
+/// What a page is made of, besides the scene.
+#[derive(Args, Debug)]
+struct PageFlags {
     /// Set the title of the page [default: the names of the inputs]
     #[arg(long, value_name = "TEXT", help_heading = "Page")]
     title: Option<String>,
@@ -81,16 +92,12 @@ const OUTPUT: &str = "Write the page to this .html file, which has everything in
 
 impl Publish {
     pub fn run(self, given: &Given, progress: &Progress) -> Result<(), Failure> {
-        if let Some(flag) = NOT_OF_PAGES.into_iter().find(|flag| given.has(flag)) {
-            return Err(Failure::Usage(format!(
-                "--{flag} is for pictures (`splatkit render`), not for pages"
-            )));
-        }
+        check_flags(given)?;
         let job = self.scene.job(given)?;
         let target = self.target()?;
         target.check(self.scene.overwrites())?;
-        let viewer = Viewer::find(self.viewer.as_deref())?;
-        let page = self.page(&job, &viewer, progress);
+        let viewer = Viewer::find(self.page.viewer.as_deref())?;
+        let page = self.page.page(&self.scene, &job, &viewer, progress);
         let written = target.path();
         page.and_then(|page| target.write(&page, &viewer, (self.scene.prints_json(), progress)))
             .map_err(|failure| job.blamed(failure, &[written]))
@@ -111,9 +118,27 @@ impl Publish {
             ))),
         }
     }
+}
 
+/// Refuses flags of pictures.
+fn check_flags(given: &Given) -> Result<(), Failure> {
+    match NOT_OF_PAGES.into_iter().find(|flag| given.has(flag)) {
+        Some(flag) => Err(Failure::Usage(format!(
+            "--{flag} is for pictures (`splatkit render`), not for pages"
+        ))),
+        None => Ok(()),
+    }
+}
+
+impl PageFlags {
     /// Reads the inputs, and makes the page of them.
-    fn page(&self, job: &Job, viewer: &Viewer, progress: &Progress) -> Result<Page, Failure> {
+    fn page(
+        &self,
+        scene: &Render,
+        job: &Job,
+        viewer: &Viewer,
+        progress: &Progress,
+    ) -> Result<Page, Failure> {
         let start = Instant::now();
         let mut loaded = job.load(progress)?;
         if let Some(warning) = job.idle(&loaded.scene) {
@@ -125,7 +150,7 @@ impl Publish {
                  in pages yet",
             );
         }
-        let written = self.scene.output().unwrap_or(Path::new(""));
+        let written = scene.output().unwrap_or(Path::new(""));
         output::check_unneeded(written, &loaded.files)?;
         progress.stage("Collecting the inputs");
         let Published { scene, files } = inputs::published(&job.scene, &mut loaded, progress)?;
@@ -198,8 +223,8 @@ impl Target {
         if let Self::Folder(path) = self {
             let place = path.display();
             progress.note(format_args!(
-                "browsers show {place} from a server, not by a double click; for a look: python3 \
-                 -m http.server -d {place}"
+                "browsers show {place} from a server, not by a double click; for a look: splatkit \
+                 serve {place}"
             ));
         }
         Ok(())

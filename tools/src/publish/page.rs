@@ -3,7 +3,7 @@
 use super::{packing, viewer::Viewer};
 use crate::failure::Failure;
 use splatkit::{Error, disk};
-use std::{collections::BTreeMap, fmt::Write as _, fs, path::Path};
+use std::{borrow::Cow, collections::BTreeMap, fmt::Write as _, fs, path::Path};
 
 /// What a page shows.
 pub struct Page {
@@ -57,6 +57,20 @@ impl Page {
 
     /// Writes a folder for a static host. Returns the bytes of all files.
     pub fn write_folder(&self, folder: &Path, viewer: &Viewer) -> Result<u64, Failure> {
+        let mut sum = 0;
+        for (name, bytes) in self.in_files(viewer) {
+            let path = folder.join(name);
+            let above = path.parent().unwrap_or(folder);
+            fs::create_dir_all(above).map_err(|error| Failure::output(above, error))?;
+            disk::may_replace(&path, true);
+            disk::write(&path, &bytes)?;
+            sum += bytes.len() as u64;
+        }
+        Ok(sum)
+    }
+
+    /// Returns the files of a folder, by their names.
+    pub fn in_files<'a>(&'a self, viewer: &'a Viewer) -> Vec<(String, Cow<'a, [u8]>)> {
         let mut text = self.head(None);
         writeln!(
             text,
@@ -66,18 +80,15 @@ impl Page {
         .ok();
         text += NO_SCRIPT;
         text += "<script type=\"module\" src=\"splatkit-viewer.js\"></script>\n</body>\n</html>\n";
-        let own = [("index.html", text.as_bytes()), ("scene.json", self.scene.as_bytes())];
-        let files = self.files.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
-        let mut sum = 0;
-        for (name, bytes) in own.into_iter().chain(viewer.files()).chain(files) {
-            let path = folder.join(name);
-            let above = path.parent().unwrap_or(folder);
-            fs::create_dir_all(above).map_err(|error| Failure::output(above, error))?;
-            disk::may_replace(&path, true);
-            disk::write(&path, bytes)?;
-            sum += bytes.len() as u64;
-        }
-        Ok(sum)
+        let scene = Cow::Borrowed(self.scene.as_bytes());
+        let mut all =
+            vec![("index.html".into(), text.into_bytes().into()), ("scene.json".into(), scene)];
+        let viewer = viewer.files().map(|(name, bytes)| (name.into(), bytes.into()));
+        let files = self.files.iter();
+        all.extend(
+            viewer.into_iter().chain(files.map(|(name, bytes)| (name.clone(), bytes.into()))),
+        );
+        all
     }
 
     /// Returns the beginning of a page.
