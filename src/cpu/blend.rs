@@ -548,8 +548,9 @@ impl Part {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::vector::lanes;
     use crate::{cpu::field::Typed, volume::Samples};
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::Level;
     use std::sync::Arc;
 
     /// Random bytes, the same in every run, as samples of any type.
@@ -723,7 +724,7 @@ mod tests {
             [weight, value, x, y, z].map(Into::into)
         }
         let Typed::Blend(blended) = typed else { panic!("no sums") };
-        dispatch!(Level::new(), simd => at(simd, blended, places, way))
+        lanes!(Level::new(), simd => at(simd, blended, places, way))
     }
 
     /// Returns places in the box of a lattice, or up to `beyond` steps outside it, in steps from

@@ -780,8 +780,9 @@ impl<S: Simd, T: Sample> Rows<S> for Border<'_, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::vector::lanes;
     use crate::{math::cosine::mirrored, volume::Lattice};
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::Level;
     use glam::DVec3;
 
     /// Returns the value and its changes per step along each axis, sample by sample in double
@@ -830,11 +831,11 @@ mod tests {
         }
         let level = Level::new();
         match Typed::new(volume, weighting, zero) {
-            Typed::U8(field) => dispatch!(level, simd => at(simd, &field, places)),
-            Typed::U16(field) => dispatch!(level, simd => at(simd, &field, places)),
-            Typed::I16(field) => dispatch!(level, simd => at(simd, &field, places)),
-            Typed::I32(field) => dispatch!(level, simd => at(simd, &field, places)),
-            Typed::F32(field) => dispatch!(level, simd => at(simd, &field, places)),
+            Typed::U8(field) => lanes!(level, simd => at(simd, &field, places)),
+            Typed::U16(field) => lanes!(level, simd => at(simd, &field, places)),
+            Typed::I16(field) => lanes!(level, simd => at(simd, &field, places)),
+            Typed::I32(field) => lanes!(level, simd => at(simd, &field, places)),
+            Typed::F32(field) => lanes!(level, simd => at(simd, &field, places)),
             Typed::Blend(_) => unreachable!("four weights an axis"),
         }
     }

@@ -12,7 +12,7 @@ use super::{
     rays::Rays,
     scatter::normal_cdf,
     skip::is_marked,
-    vector::{Lanes, dot, each, three},
+    vector::{Lanes, apart, dot, each, three},
     visible::Visible,
 };
 use crate::{math::Kernel, plan::visible::VisibleBlocks, scene::Optics, volume::Volume};
@@ -248,7 +248,13 @@ impl Gather<'_> {
         let mut layer =
             Layer::new(simd, rays.direction, [front, back], middle, of_sheet, [begin, end]);
         if self.parts > 1 {
-            let mask = mask & self.fill_thick(simd, rays, [front_weight, last.weight], &mut layer);
+            // Not a part of what calls this, which has it in hardly any picture.
+            let mask = mask
+                & apart(
+                    simd,
+                    #[inline(always)]
+                    || self.fill_thick(simd, rays, [front_weight, last.weight], &mut layer),
+                );
             return (self.may_show(simd, &layer) && mask.any_true()).then_some((layer, mask));
         }
         let has_gaps =
@@ -422,6 +428,7 @@ impl Gather<'_> {
     /// Sets the mean of a sheet with several parts, and returns where it has one. A place is
     /// weighted by the sum of the kernels there; an end without a value takes the mean. `weights`
     /// are those at the ends.
+    #[inline(always)]
     fn fill_thick<S: Simd>(
         &self,
         simd: S,
@@ -429,58 +436,53 @@ impl Gather<'_> {
         weights: [Lanes<S>; 2],
         layer: &mut Layer<S>,
     ) -> mask32x8<S> {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let plan = self.plan;
-                let none = Lanes::splat(simd, 0.0);
-                let start = layer.start;
-                let stop = start + layer.thickness;
-                let (mut from, mut to) = (start, stop);
-                if self.is_blended || self.ends.is_some() {
-                    let reach = if self.is_blended { MOST_TAPS as f32 } else { BEYOND };
-                    let [enter, leave] = rays.in_lattice(simd, plan, reach);
-                    (from, to) = (enter.max(start).min(stop), leave.min(stop).max(start));
-                }
-                let least = plan.field.least_sum;
-                let step = (to - from) * (1.0 / self.parts as f32);
-                let (mut sum, mut all) = (none, none);
-                for part in 0..self.parts {
-                    for place in GAUSS {
-                        let place = rays.places(step.mul_add(place + part as f32, from));
-                        let point = self.at_place(simd, rays, place);
-                        let weight = if self.is_blended {
-                            point.weight.simd_gt(0.0).select(point.weight + least, none)
-                        } else {
-                            self.kernels_at(simd, place)
-                        };
-                        sum = weight.mul_add(point.value, sum);
-                        all += weight;
-                    }
-                }
-                let mean = sum / all.max(Lanes::splat(simd, f32::MIN_POSITIVE))
-                    * plan.field.values.per_value;
-                let (front, back) = (layer.front, layer.back);
-                let has_value = if self.is_blended {
-                    each!([0, 1], I => weights[I].simd_gt(0.0))
-                } else if let Some(per_deviation) = self.ends {
-                    let most = (LAST_VALUE / per_deviation).powi(2);
-                    let ends = [layer.start, layer.start + layer.thickness];
-                    each!([0, 1], I => outside2(simd, plan, rays.places(ends[I])).simd_le(most))
+        let plan = self.plan;
+        let none = Lanes::splat(simd, 0.0);
+        let start = layer.start;
+        let stop = start + layer.thickness;
+        let (mut from, mut to) = (start, stop);
+        if self.is_blended || self.ends.is_some() {
+            let reach = if self.is_blended { MOST_TAPS as f32 } else { BEYOND };
+            let [enter, leave] = rays.in_lattice(simd, plan, reach);
+            (from, to) = (enter.max(start).min(stop), leave.min(stop).max(start));
+        }
+        let least = plan.field.least_sum;
+        let step = (to - from) * (1.0 / self.parts as f32);
+        let (mut sum, mut all) = (none, none);
+        for part in 0..self.parts {
+            for place in GAUSS {
+                let place = rays.places(step.mul_add(place + part as f32, from));
+                let point = self.at_place(simd, rays, place);
+                let weight = if self.is_blended {
+                    point.weight.simd_gt(0.0).select(point.weight + least, none)
                 } else {
-                    [mask32x8::splat(simd, true); 2]
+                    self.kernels_at(simd, place)
                 };
-                layer.front = front.or(simd, has_value[0], mean, &back, has_value[1]);
-                layer.back = back.or(simd, has_value[1], mean, &front, has_value[0]);
-                layer.middle = mean * 1.5 - (layer.front.value + layer.back.value) * 0.25;
-                let per_thickness = step * 0.5 / layer.thickness;
-                if self.is_blended {
-                    (all * per_thickness).simd_gt(least)
-                } else {
-                    mask32x8::splat(simd, true)
-                }
-            },
-        )
+                sum = weight.mul_add(point.value, sum);
+                all += weight;
+            }
+        }
+        let mean =
+            sum / all.max(Lanes::splat(simd, f32::MIN_POSITIVE)) * plan.field.values.per_value;
+        let (front, back) = (layer.front, layer.back);
+        let has_value = if self.is_blended {
+            each!([0, 1], I => weights[I].simd_gt(0.0))
+        } else if let Some(per_deviation) = self.ends {
+            let most = (LAST_VALUE / per_deviation).powi(2);
+            let ends = [layer.start, layer.start + layer.thickness];
+            each!([0, 1], I => outside2(simd, plan, rays.places(ends[I])).simd_le(most))
+        } else {
+            [mask32x8::splat(simd, true); 2]
+        };
+        layer.front = front.or(simd, has_value[0], mean, &back, has_value[1]);
+        layer.back = back.or(simd, has_value[1], mean, &front, has_value[0]);
+        layer.middle = mean * 1.5 - (layer.front.value + layer.back.value) * 0.25;
+        let per_thickness = step * 0.5 / layer.thickness;
+        if self.is_blended {
+            (all * per_thickness).simd_gt(least)
+        } else {
+            mask32x8::splat(simd, true)
+        }
     }
 
     /// Returns the sum of a lattice's kernels at a place, relative to their sum far from the

@@ -111,7 +111,8 @@ impl<S: Simd> Layer<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fearless_simd::{Level, dispatch};
+    use crate::cpu::vector::lanes;
+    use fearless_simd::Level;
 
     /// A layer with these values, which takes this share of the light.
     fn layer<S: Simd>(simd: S, [front, middle, back]: [f32; 3], weight: f32) -> Layer<S> {
@@ -130,7 +131,7 @@ mod tests {
     /// Returns the ends of the line of a layer between two places, and the parabola's mean there,
     /// summed in small steps.
     fn line(values: [f32; 3], weight: f32, [from, to]: [f32; 2]) -> (Option<[f32; 2]>, f32) {
-        dispatch!(Level::new(), simd => {
+        lanes!(Level::new(), simd => {
             let layer = layer(simd, values, weight);
             let ends = layer.straight([Lanes::splat(simd, from), Lanes::splat(simd, to)]);
             let steps = 1000;

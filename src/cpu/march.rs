@@ -14,14 +14,14 @@ use super::{
     skip::is_marked,
     sums::{ScalarSums, Sums, WINDOW, differences},
     tile_map::TileMap,
-    vector::{each, four, three},
+    vector::{apart, each, four, lanes, three},
     visible::Visible,
 };
 use crate::{
     plan::TILE,
     scene::{Mode, Optics, Order},
 };
-use fearless_simd::{Simd, mask32x8, prelude::*};
+use fearless_simd::{Level, Simd, mask32x8, prelude::*};
 
 /// A tile's pixels, row by row: premultiplied colour and opacity, and the depth of the hit or the
 /// largest value.
@@ -134,10 +134,24 @@ impl<S: Simd> OpenField<'_, S> {
 }
 
 impl March<'_> {
-    /// Draws a tile. `entries` are its splats, sorted by first sheet. If there is a map, the
-    /// optical depths of all sheets go there, and nothing hides what lies behind it.
+    /// Draws a tile with the processor's vectors. `entries` are its splats, sorted by first sheet.
+    /// If there is a map, the optical depths of all sheets go there, and nothing hides what lies
+    /// behind it.
+    // Not inlined: the code is long, and there shall be one copy.
+    #[inline(never)]
+    pub fn draw(
+        &self,
+        level: Level,
+        at: [usize; 2],
+        entries: &[Entry],
+        drawn: &mut u64,
+        map: Option<&mut TileMap>,
+    ) -> Tile {
+        lanes!(level, simd => self.tile(simd, at, entries, drawn, map))
+    }
+
     #[inline(always)]
-    pub fn tile<S: Simd>(
+    fn tile<S: Simd>(
         &self,
         simd: S,
         at: [usize; 2],
@@ -264,7 +278,11 @@ impl March<'_> {
                 open = WINDOW;
             }
             if sheet > 0 {
-                self.close(simd, sheet, tile, seen);
+                apart(
+                    simd,
+                    #[inline(always)]
+                    || self.close(simd, sheet, tile, seen),
+                );
                 if let Some(map) = &mut map {
                     map.take(simd, plan, sheet, &mut tile.packets);
                 }

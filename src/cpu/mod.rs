@@ -94,7 +94,6 @@ use opacity::ShadowCache;
 use plan::{FieldOutline, Outline, Plan};
 use spare::Spare;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use vector::lanes;
 use visible::Visible;
 use web_time::Instant;
 
@@ -463,7 +462,7 @@ fn draw_block(
         let at = [column * BLOCK + number % BLOCK, row * BLOCK + number / BLOCK];
         if at[0] < tiles[0] && at[1] < tiles[1] {
             let entries = entries.of(number);
-            *tile = lanes!(level, simd => march.tile(simd, at, entries, &mut count, None));
+            *tile = march.draw(level, at, entries, &mut count, None);
         }
     }
     drawn.fetch_add(count, Relaxed);

@@ -1,7 +1,7 @@
 //! Maps of what the scene absorbs along parallel light. They are drawn as pictures are, sheet by
 //! sheet, but each sheet meets all of the light, and its optical depth is written down.
 
-use super::{BLOCK, Clock, CpuRenderer, TileLists, march::March, tile_map::TileMap, vector::lanes};
+use super::{BLOCK, Clock, CpuRenderer, TileLists, march::March, tile_map::TileMap};
 use crate::{
     Error, Result,
     math::View,
@@ -113,7 +113,7 @@ fn map_block(
         let entries = entries.of(number);
         let mut map = TileMap::new(planes);
         let mut count = 0;
-        let _ = lanes!(level, simd => march.tile(simd, at, entries, &mut count, Some(&mut map)));
+        let _ = march.draw(level, at, entries, &mut count, Some(&mut map));
         map.into_depths()
     };
     (0..BLOCK * BLOCK).map(tile).collect()

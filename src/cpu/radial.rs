@@ -270,7 +270,8 @@ impl Weigh for Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fearless_simd::{Level, dispatch};
+    use crate::cpu::vector::lanes;
+    use fearless_simd::Level;
 
     #[test]
     fn weights_are_those_of_the_kernels() {
@@ -294,11 +295,11 @@ mod tests {
                 let radii: [f64; 8] = std::array::from_fn(radius);
                 let squared = radii.map(|r| (r * r) as f32);
                 let [values, slopes] = match &radial {
-                    Radial::Spline(form) => dispatch!(level, simd => at(simd, form, squared)),
-                    Radial::Low(form) => dispatch!(level, simd => at(simd, form, squared)),
-                    Radial::Middle(form) => dispatch!(level, simd => at(simd, form, squared)),
-                    Radial::High(form) => dispatch!(level, simd => at(simd, form, squared)),
-                    Radial::Table(form) => dispatch!(level, simd => at(simd, form, squared)),
+                    Radial::Spline(form) => lanes!(level, simd => at(simd, form, squared)),
+                    Radial::Low(form) => lanes!(level, simd => at(simd, form, squared)),
+                    Radial::Middle(form) => lanes!(level, simd => at(simd, form, squared)),
+                    Radial::High(form) => lanes!(level, simd => at(simd, form, squared)),
+                    Radial::Table(form) => lanes!(level, simd => at(simd, form, squared)),
                 };
                 for ((r, value), slope) in radii.into_iter().zip(values).zip(slopes) {
                     let expected = kernel.value(r);

@@ -9,7 +9,7 @@ use super::{
     plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
     sums::{ScalarSums, Sums, WINDOW},
-    vector::{Lanes, dot, each, exp, log2, three},
+    vector::{Lanes, apart, dot, each, exp, log2, three},
 };
 use crate::{
     plan::{TILE, field::FieldKernel},
@@ -455,11 +455,36 @@ impl<S: Simd> OpenTile<'_, S> {
         if matches!(record.kind, Kind::Facet | Kind::Rod) {
             let packets = packets_between(from, to);
             match record.kind {
-                Kind::Rod => self.add_rod(simd, plan, record, window, packets),
-                _ => self.add_facet(simd, plan, record, window, packets),
+                Kind::Rod => apart(
+                    simd,
+                    #[inline(always)]
+                    || self.add_rod(simd, plan, record, window, packets),
+                ),
+                _ => apart(
+                    simd,
+                    #[inline(always)]
+                    || self.add_facet(simd, plan, record, window, packets),
+                ),
             }
             return;
         }
+        apart(
+            simd,
+            #[inline(always)]
+            || self.add_splat(simd, plan, record, window, [from, to]),
+        );
+    }
+
+    /// Adds a splat's window to the packets between two pixels of the tile.
+    #[inline(always)]
+    fn add_splat(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        record: &Record,
+        window: Window,
+        [from, to]: [[usize; 2]; 2],
+    ) {
         let splat = Projected::new(plan, record, window);
         let field = self.fields.get_mut(usize::from(record.field));
         let mut scalar = field.and_then(|field| field.sums.as_deref_mut());

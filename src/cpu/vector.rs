@@ -35,20 +35,24 @@ macro_rules! words {
 }
 /// Runs code with the processor's vectors, like `fearless_simd::dispatch`, but with one copy of the
 /// code fewer. Processors from before 2013, with SSE4.2 but no AVX2, use the SSE2 copy. Builds with
-/// debug assertions have only that copy, because the copies are most of what there is to compile.
+/// debug assertions and unit tests have one copy each, because the copies are most of what there is
+/// to compile. The tests that draw pictures use the processor's best one.
 macro_rules! lanes {
     ($level:expr, $simd:ident => $of_lanes:expr) => {{
-        #[cfg(all(target_arch = "x86_64", debug_assertions))]
+        #[cfg(all(target_arch = "x86_64", any(debug_assertions, test)))]
         {
             let level: fearless_simd::Level = $level;
+            #[cfg(not(test))]
             let $simd = level.as_sse2().expect("every x86-64 processor has SSE2");
+            #[cfg(test)]
+            let $simd = level.as_avx2().expect("the unit tests need a processor with AVX2");
             fearless_simd::Simd::vectorize(
                 $simd,
                 #[inline(always)]
                 || $of_lanes,
             )
         }
-        #[cfg(all(target_arch = "x86_64", not(debug_assertions)))]
+        #[cfg(all(target_arch = "x86_64", not(any(debug_assertions, test))))]
         {
             let level: fearless_simd::Level = $level;
             if let Some($simd) = level.as_avx512() {
@@ -80,6 +84,13 @@ macro_rules! lanes {
     }};
 }
 pub(super) use {each, four, lanes, three, words};
+
+/// Runs a part of the code of a tile as a function of its own. As one function, all of it would be
+/// so long that compilers take minutes for it.
+#[inline(never)]
+pub fn apart<S: Simd, R>(simd: S, part: impl FnOnce() -> R) -> R {
+    simd.vectorize(part)
+}
 
 /// Eight numbers.
 pub type Lanes<S> = f32x8<S>;
@@ -172,7 +183,7 @@ pub fn dot_with<S: Simd, const N: usize>(a: [f32; N], b: [Lanes<S>; 3]) -> Lanes
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::Level;
 
     #[test]
     fn powers_and_logarithms_are_near() {
@@ -180,13 +191,13 @@ mod tests {
         for eight in numbers.chunks_exact(8) {
             let x: [f32; 8] = std::array::from_fn(|i| eight[i]);
             let powers: [f32; 8] =
-                dispatch!(Level::new(), simd => exp2(simd, x.simd_into(simd)).into());
+                lanes!(Level::new(), simd => exp2(simd, x.simd_into(simd)).into());
             for (x, power) in x.iter().zip(powers) {
                 let truth = f64::from(*x).exp2();
                 assert!((f64::from(power) / truth - 1.0).abs() < 4e-7, "2^{x}: {power}");
             }
             let back: [f32; 8] =
-                dispatch!(Level::new(), simd => log2(simd, powers.simd_into(simd)).into());
+                lanes!(Level::new(), simd => log2(simd, powers.simd_into(simd)).into());
             for (x, back) in x.iter().zip(back) {
                 assert!((x - back).abs() < 2e-5, "{x} {back}");
             }
