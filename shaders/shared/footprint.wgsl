@@ -47,6 +47,10 @@ fn source_field() -> u32 {
     return source.flags >> FIELD_SHIFT;
 }
 
+fn middle_of(sheet: u32) -> f32 {
+    return 0.5 * (planes[sheet] + planes[sheet + 1u]);
+}
+
 // Returns the sheet that contains a distance; 0 in front of the first plane.
 fn sheet_of(distance: f32) -> u32 {
     let near = planes[1];
@@ -185,6 +189,14 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
             span.first_sheet = frame.sheet_count + 1u - span.first_sheet;
         }
         span.last_sheet = span.first_sheet;
+        return span;
+    }
+    if BY_CENTERS {
+        span.visible = c.z >= planes[1] && c.z < last_plane;
+        var sheet = sheet_of(c.z);
+        sheet -= select(0u, 1u, sheet > 0u && c.z < middle_of(sheet));
+        span.first_sheet = clamp(sheet, 1u, max(frame.sheet_count, 2u) - 1u);
+        span.last_sheet = min(span.first_sheet + 1u, frame.sheet_count);
         return span;
     }
     // Beside the eye, a kernel's middle lies behind the ray's start: the part in front of the first

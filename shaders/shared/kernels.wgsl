@@ -144,9 +144,14 @@ fn round_of(f: u32, entry: u32, near: vec3<f32>) -> Round {
 // (docs/performance.md).
 const TOGETHER: u32 = 2u;
 
-// Returns the distances of the three planes inside a window.
+// Returns the distances of the three planes inside a window, or what takes their place.
 fn inner_planes(front: u32) -> vec3<f32> {
-    return vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    let inner = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    if BY_CENTERS {
+        // The middles of the first two sheets.
+        return 0.5 * (vec3(planes[front], inner.xy) + inner);
+    }
+    return inner;
 }
 
 // Adds `count` entries of a field from `at` on to all pixels.
@@ -310,6 +315,10 @@ fn general_of(entry: u32, near: vec3<f32>) -> Loaded {
     var splat = payload_of(a, c, records[index + 3u]);
     splat.near = near;
     splat.base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
+    if BY_CENTERS {
+        // The part that belongs to the second sheet.
+        splat.base = clamp((a.z - near.x) / (near.y - near.x), 0.0, 1.0);
+    }
     splat.m0 = b.xyz / frame.scale;
     splat.m1 = vec3(0.0, b.w, c.x) / frame.scale;
     splat.m2 = vec3(0.0, 0.0, c.y);
@@ -396,6 +405,13 @@ fn add_loaded(f: u32, splat: Loaded, first_pixel: vec2<i32>) {
             along = sections(t, base) * (e * select(SQRT_TAU, 1.0, splat.is_radiance));
             on_plane = exp(-0.5 * t * t) * e;
             steep = on_plane;
+        }
+        if BY_CENTERS {
+            along = vec4(1.0 - base, base, 0.0, 0.0) * e;
+            if PERSPECTIVE && l <= 0.0 {
+                // The kernel's middle is behind the eye.
+                along = vec4(0.0);
+            }
         }
         if WHOLE {
             along = vec4(e, 0.0, 0.0, 0.0);

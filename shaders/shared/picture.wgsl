@@ -30,6 +30,9 @@ fn store_pixel(r: u32, index: u32) {
         }
     } else if AXIS_SHEETS && hit != depths[index] {
         hit = distance_at(r, hit);
+    } else if BY_CENTERS && PERSPECTIVE && hit != depths[index] {
+        // These sheets lie along the view's axis.
+        hit = hit / pixels[r].cosine;
     }
     colors[index] = color;
     depths[index] = hit;

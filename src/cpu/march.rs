@@ -411,7 +411,8 @@ impl March<'_> {
                     (hit - rays.aside[0] * normal[0] - rays.aside[1] * normal[1]) / slope
                 };
             }
-            if plan.optics != Optics::Maximum {
+            // Sheets by centres already are depths along the view's axis.
+            if plan.optics != Optics::Maximum && !plan.by_centers {
                 // Convert the distance to the view's z.
                 hit *= rays.cosine;
             }

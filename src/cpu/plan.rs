@@ -90,6 +90,8 @@ pub struct Plan<'a> {
     pub lamps: Option<Lamps>,
     /// The scene has trained Gaussians, which are not lit.
     pub has_trained: bool,
+    /// Trained Gaussians are drawn alone, each at the depth of its centre.
+    pub by_centers: bool,
     /// The largest channel of a colour of radiance.
     pub brightest: f32,
     /// The number of boxes that are cut out.
@@ -146,6 +148,7 @@ impl<'a> Plan<'a> {
             lit_surfaces: false,
             lamps: None,
             has_trained: scene.items.iter().any(Item::is_trained),
+            by_centers: scene.is_by_centers(settings),
             brightest: scene.brightest(),
             region: settings
                 .region
@@ -271,6 +274,17 @@ impl<'a> Plan<'a> {
     /// Returns the first pixel of a tile, which may lie outside the picture.
     pub fn corner(&self, tile: [usize; 2]) -> [i32; 2] {
         tile.map(|at| (at * self.tile_step()) as i32 - self.apron())
+    }
+
+    /// Returns the middle of a sheet.
+    pub fn middle(&self, sheet: usize) -> f32 {
+        0.5 * (self.planes[sheet] + self.planes[sheet + 1])
+    }
+
+    /// Returns the first of the two sheets whose middles enclose a depth. `sheet` contains it.
+    pub fn sheet_before(&self, sheet: usize, depth: f32) -> usize {
+        let is_before = sheet > 0 && depth < self.middle(sheet);
+        (sheet - usize::from(is_before)).clamp(1, self.sheets.max(2) - 1)
     }
 
     /// Returns the sheet that contains a distance.

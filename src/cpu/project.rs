@@ -126,7 +126,14 @@ impl<'a> Projector<'a> {
         let payload: [[f32; 8]; 7] = each!([0, 1, 2, 3, 4, 5, 6], I => payload[I].into());
         let center: [[f32; 8]; 3] = three!(I => splats.center[I].into());
         let whitening: [[f32; 8]; 6] = each!([0, 1, 2, 3, 4, 5], I => whitening[I].into());
-        let sheets = [sheets_of(self.plan, simd, near), sheets_of(self.plan, simd, far)];
+        let mut sheets = [sheets_of(self.plan, simd, near), sheets_of(self.plan, simd, far)];
+        if self.plan.by_centers {
+            for (lane, depth) in center[2].into_iter().enumerate() {
+                let first = self.plan.sheet_before(sheets[0][lane].into(), depth);
+                let last = (first + 1).min(self.plan.sheets);
+                (sheets[0][lane], sheets[1][lane]) = (first as u16, last as u16);
+            }
+        }
         let [[left, top], [right, bottom]]: [[[i32; 8]; 2]; 2] =
             each!([0, 1], I => each!([0, 1], J => i32x8::truncate_from(pixels[I][J]).into()));
         records.reserve(8);
@@ -309,7 +316,11 @@ impl<'a> Projector<'a> {
         far = (far - distance) * SECTION_OVERREACH + distance;
         let near = distance - reach * SECTION_OVERREACH;
         meets &= far.simd_gt(plan.planes[1]) & near.simd_lt(plan.planes[plan.sheets + 1]);
-        let near = is_beside.select(Lanes::splat(simd, -1e38), near);
+        let mut near = is_beside.select(Lanes::splat(simd, -1e38), near);
+        if plan.by_centers {
+            (near, far) = (c[2], c[2]);
+            meets &= near.simd_ge(plan.planes[1]) & far.simd_lt(plan.planes[plan.sheets + 1]);
+        }
         let (pixels, has_pixels) = self.pixels(simd, self.bounds(simd, splats, reaches));
         Places { pixels, near, far, meets: meets & has_pixels }
     }

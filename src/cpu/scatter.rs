@@ -100,6 +100,8 @@ struct Projected<'a> {
     window: Window,
     /// Number of the window's planes that the splat reaches.
     count: usize,
+    /// The part of a splat by its centre that belongs to the second sheet of the window.
+    behind: Option<f32>,
     at: [f32; 2],
     whitened: [f32; 3],
     m: [[f32; 3]; 3],
@@ -131,7 +133,12 @@ impl<'a> Projected<'a> {
             whitened = std::array::from_fn(|i| (m[0][i] * x + m[1][i] * y) * scale + m[2][i] * z);
             v = [cross(whitened, m[0]), cross(whitened, m[1])];
         }
-        Self { record, window, count: planes_of(plan, record, window), at, whitened, m, v }
+        let count = planes_of(plan, record, window);
+        let behind = plan.by_centers.then(|| {
+            let [front, back] = [0, 1].map(|next| plan.middle(window.front + next));
+            ((record.center[2] - front) / (back - front)).clamp(0.0, 1.0)
+        });
+        Self { record, window, count, behind, at, whitened, m, v }
     }
 
     /// Returns the kernel's position on the rays of a packet and relative to the window's planes,
@@ -183,6 +190,9 @@ impl<'a> Projected<'a> {
         from_table: bool,
     ) -> [Lanes<S>; WINDOW] {
         let none = Lanes::splat(simd, 0.0);
+        if let Some(behind) = self.behind {
+            return [1.0 - behind, behind, 0.0, 0.0].map(|part| Lanes::splat(simd, part));
+        }
         let before = |whole: Lanes<S>| if self.window.is_continued { whole } else { none };
         let mut sections = [none; WINDOW];
         if from_table {
@@ -242,7 +252,7 @@ impl<'a> Projected<'a> {
         if plan.has_clips() {
             counts &= is_kept(plan, rays, along.l * along.inverse * along.inverse / rays.cosine);
         }
-        if plan.is_whole() && plan.view.perspective {
+        if (plan.is_whole() || plan.by_centers) && plan.view.perspective {
             // The kernel's middle must be in front of the eye.
             counts &= along.l.simd_gt(0.0);
         }
@@ -522,7 +532,11 @@ fn packets_between(from: [usize; 2], to: [usize; 2]) -> u8 {
 #[inline(always)]
 fn planes_of(plan: &Plan, record: &Record, window: Window) -> usize {
     let ahead = (usize::from(record.sheets[1]) + 1).saturating_sub(window.front);
-    if plan.is_whole() { 0 } else { ahead.min(WINDOW - 1) }
+    match plan.by_centers {
+        _ if plan.is_whole() => 0,
+        true => ahead - 1,
+        false => ahead.min(WINDOW - 1),
+    }
 }
 
 /// Composites a splat alone, in front of or behind the pixels so far.

@@ -376,6 +376,15 @@ impl View {
         Ok(())
     }
 
+    /// Returns the smallest cosine between a ray of the picture and the view's axis.
+    pub(crate) fn smallest_cosine(&self) -> f64 {
+        let size = DVec2::new(f64::from(self.size[0]), f64::from(self.size[1]));
+        [DVec2::ZERO, DVec2::new(size.x, 0.0), DVec2::new(0.0, size.y), size]
+            .map(|corner| self.ray(corner).1.z)
+            .into_iter()
+            .fold(1.0, f64::min)
+    }
+
     /// Returns the view-space position of a world point.
     pub fn to_view(&self, world: DVec3) -> DVec3 {
         self.rotation * (world - self.position)

@@ -6,7 +6,7 @@ use crate::{
     scene::{Clip, ClipShape, Mode, Scene, Settings},
     volume::Shade,
 };
-use glam::{DVec2, DVec3, Mat3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 
 /// A view with its sheets, its light and its clips, in 32 bits.
 #[derive(Debug, Clone, Default)]
@@ -70,15 +70,6 @@ impl Light {
     }
 }
 
-/// Returns the smallest cosine between a ray of the picture and the optical axis.
-fn smallest_cosine(view: &View) -> f64 {
-    let size = DVec2::new(f64::from(view.size[0]), f64::from(view.size[1]));
-    [DVec2::ZERO, DVec2::new(size.x, 0.0), DVec2::new(0.0, size.y), size]
-        .map(|corner| view.ray(corner).1.z)
-        .into_iter()
-        .fold(1.0, f64::min)
-}
-
 impl Frame {
     /// Returns the frame of a view of a scene.
     pub fn new(scene: &Scene, view: &View, sheets: &Sheets, settings: &Settings) -> Self {
@@ -101,7 +92,7 @@ impl Frame {
             per_ratio_log2: if sheets.turn > 0 { (1.0 / sheets.ratio.log2()) as f32 } else { 0.0 },
             per_step: (1.0 / sheets.step) as f32,
             // Axis-aligned sheets may begin behind an eye that lies among them.
-            z_near: (sheets.planes[0] * smallest_cosine(view)).max(1e-6 * sheets.step) as f32,
+            z_near: (sheets.planes[0] * view.smallest_cosine()).max(1e-6 * sheets.step) as f32,
             surface_light: Light::new(shade),
             sheet_normal,
             to_world: view.rotation.transpose().as_mat3(),

@@ -147,6 +147,12 @@
 //! n̄ the average normal. Sheets with an optical depth below 10⁻⁵ have no radiance. Splats whose
 //! closest approach s* is clipped away do not count.
 //!
+//! **Trained Gaussians alone.** If a scene has nothing else, and is drawn as a whole, each counts at
+//! the depth z of its centre along the view's axis, as its trainer sorts them. Its sheets lie along
+//! z instead of the rays. It is not cut: of its optical depth, the sheets whose middles enclose z
+//! have linear shares, and the first or the last sheet all of it beyond their middles. Those with
+//! the centre outside the sheets, or with s* behind the eye, are left out.
+//!
 //! **Facets** are triangles. A facet fills a share of a pixel: the area of the pixel's square
 //! inside the triangle's perspective image. At a pixel it has the place, the normal and the colour
 //! of its corners' mean. Their weights are the barycentric coordinates at which the pixel's ray
@@ -445,6 +451,8 @@ struct Frame<'a> {
     lamps: Option<Lamps>,
     /// Whether the scene has trained Gaussians.
     has_trained: bool,
+    /// Whether it has nothing else, and they are drawn at the depths of their centres.
+    by_centers: bool,
     /// The largest channel of a colour of radiance.
     brightest: f64,
 }
@@ -475,6 +483,7 @@ impl<'a> Frame<'a> {
         Self {
             lamps: None,
             has_trained: scene.items.iter().any(Item::is_trained),
+            by_centers: scene.is_by_centers(settings),
             brightest: scene.brightest().into(),
             mode: settings.mode,
             optics: settings.optics,
@@ -502,6 +511,12 @@ impl<'a> Frame<'a> {
     fn row(&self, row: i64) -> Vec<Composite> {
         let columns = 0..i64::from(self.view.size[0]);
         match self.mode {
+            Mode::Sheets if self.by_centers => {
+                let kernels = self.kernels_of_row(&self.kernels, row);
+                columns
+                    .map(|column| self.pixel_by_centers(&self.ray(column, row), &kernels))
+                    .collect()
+            }
             Mode::Sheets => self.row_of_sheets(row),
             Mode::AxisSheets => {
                 let kernels = self.kernels_of_row(&self.kernels, row);

@@ -1,4 +1,4 @@
-//! Kernels that are not cut: axis-aligned sheets and single splats
+//! Kernels that are not cut: axis-aligned sheets, single splats, and trained Gaussians alone
 //! ([`Mode::AxisSheets`](crate::scene::Mode::AxisSheets),
 //! [`Mode::Splats`](crate::scene::Mode::Splats)).
 
@@ -78,6 +78,42 @@ impl Frame<'_> {
                 (key - axis.dot(ray.origin)) / slope
             }
         };
+        let mut composite = Composite::EMPTY;
+        for (k, sheet) in sheets.iter().enumerate() {
+            composite.pass(self.surface(sheet, (ray, 0.0)), self.span(k).map(distance));
+        }
+        composite
+    }
+
+    /// Draws a pixel of trained Gaussians alone, each divided between two sheets by the depth of
+    /// its centre.
+    pub(super) fn pixel_by_centers(&self, ray: &Ray, kernels: &[&Kernel]) -> Composite {
+        let allowed = clip::allowed(ray, &self.view, &self.clips);
+        let mut sheets = vec![Light::default(); self.count()];
+        let last = self.count() - 1;
+        let middle = |sheet: usize| self.span(sheet).iter().sum::<f64>() / 2.0;
+        for kernel in kernels {
+            let depth = kernel.center.z;
+            if !(self.planes[0]..self.planes[last + 1]).contains(&depth) {
+                continue;
+            }
+            let (Some((light, _)), Load::Radiance(radiance)) =
+                (self.whole(kernel, ray, &allowed), &kernel.load)
+            else {
+                continue;
+            };
+            let next = (0..=last).find(|sheet| middle(*sheet) > depth).unwrap_or(last);
+            let first = next.max(1).min(last) - usize::from(last > 0);
+            let second = (first + 1).min(last);
+            let behind = match second > first {
+                true => (depth - middle(first)) / (middle(second) - middle(first)),
+                false => 0.0,
+            };
+            let behind = behind.clamp(0.0, 1.0);
+            sheets[first].add(radiance, light.depth * (1.0 - behind));
+            sheets[second].add(radiance, light.depth * behind);
+        }
+        let distance = |depth: f64| (depth - ray.origin.z) / ray.direction.z;
         let mut composite = Composite::EMPTY;
         for (k, sheet) in sheets.iter().enumerate() {
             composite.pass(self.surface(sheet, (ray, 0.0)), self.span(k).map(distance));

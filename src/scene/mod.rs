@@ -239,6 +239,14 @@ impl Scene {
         if self.items.iter().any(Item::is_trained) { BRIGHTEST_TRAINED } else { 1.0 }
     }
 
+    /// Whether a picture shows trained Gaussians alone, each as a whole at the depth of its centre
+    /// along the view's axis, as in the training. Beside other items, and in a part of a picture,
+    /// their optical depth is spread along the rays instead, where they meet those.
+    pub(crate) fn is_by_centers(&self, settings: &Settings) -> bool {
+        let is_whole = settings.mode == Mode::Sheets && settings.region.is_none();
+        is_whole && !self.items.is_empty() && self.items.iter().all(Item::is_trained)
+    }
+
     /// Whether any part can become opaque enough to hide what lies behind it. Surfaces can. A field
     /// can if it has isosurfaces, or if a line through its box can absorb nearly all light.
     pub(crate) fn can_hide(&self) -> bool {

@@ -13,7 +13,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Mode {
     /// Image-aligned sheets (Mueller & Crawfis 1998): sheets parallel to the picture cut every
-    /// kernel into sections.
+    /// kernel into sections. Trained Gaussians alone are not cut: each counts whole at the depth of
+    /// its centre, divided between two thin sheets.
     #[default]
     Sheets,
     /// Axis-aligned sheets (Westover 1990): slices of the data across the data's axis nearest to

@@ -34,6 +34,10 @@ const CELL_SHEETS: [f64; 2] = [0.5, 0.2];
 /// The thinnest sheets of tetrahedra, as a share of the depth of the scene.
 const LEAST_CELL_SHEET: f64 = 1e-3;
 
+/// Sheets of trained Gaussians alone, in each of which the order of two of them is not known: their
+/// thickness as a share of the distance, or of the depth of the scene in parallel views.
+const TRAINED_SHEETS: f64 = 1.0 / 512.0;
+
 /// How far the pixel that a facet fills in part reaches beyond it, in the same unit as splats.
 const FACET_REACH: f64 = 1.5 / FOOTPRINT_BLUR;
 
@@ -120,6 +124,8 @@ impl Scene {
     ///   classified ([`Classification::Post`]).
     /// - Cells: half a typical edge, and a fifth if each has one value.
     /// - Surfaces: a few pixels.
+    /// - Trained Gaussians alone: at most 1/512 of their distance. They are counted by the depths
+    ///   of their centres along the view's axis, and so are these sheets.
     /// - Several of these: the finest of them.
     /// - Volumes in bricks: as for volumes, with the spacing of the drawn levels. Between two
     ///   levels it is interpolated.
@@ -209,6 +215,16 @@ impl Scene {
                 | Item::Scalar(..) => {
                     pixels = Some(settings.sheet_pixels);
                 }
+            }
+        }
+        if self.is_by_centers(settings) {
+            if view.perspective {
+                // At the picture's edge, depths are smaller than distances.
+                near *= view.smallest_cosine();
+                pixels = pixels.map(|pixels: f64| pixels.min(TRAINED_SHEETS * view.scale));
+            } else {
+                let most = TRAINED_SHEETS * (far - near);
+                thickness = Some(thickness.map_or(most, |thickness: f64| thickness.min(most)));
             }
         }
         Sheets::new(view, [near, far], thickness, pixels)

@@ -108,6 +108,7 @@ fn without_items(request: &Request<'_>) -> Variant {
         two_levels: false,
         radiance: false,
         trained: false,
+        by_centers: scene.is_by_centers(settings),
         facets: false,
         images: false,
         rods: false,

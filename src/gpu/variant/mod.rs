@@ -49,6 +49,8 @@ pub struct Variant {
     pub radiance: bool,
     /// The scene has trained Gaussians.
     pub trained: bool,
+    /// They are drawn alone, each at the depth of its centre.
+    pub by_centers: bool,
     /// The scene has facets.
     pub facets: bool,
     /// Facets show images.
@@ -169,7 +171,7 @@ impl Variant {
     }
 
     /// The constants that are true or false.
-    fn flags(&self) -> [(&'static str, bool); 41] {
+    fn flags(&self) -> [(&'static str, bool); 42] {
         let radiance = self.radiance || self.classified;
         [
             ("PERSPECTIVE", self.perspective),
@@ -202,6 +204,7 @@ impl Variant {
             ("GRADIENTS", self.gradients()),
             ("CENTRAL", self.central),
             ("OCCLUSION", self.occlusion),
+            ("BY_CENTERS", self.by_centers),
             ("WHOLE", self.mode != Mode::Sheets),
             ("AXIS_SHEETS", self.mode == Mode::AxisSheets),
             ("SINGLE_SPLATS", matches!(self.mode, Mode::Splats(_))),
