@@ -147,8 +147,8 @@
 //! n̄ the average normal. Sheets with an optical depth below 10⁻⁵ have no radiance. Splats whose
 //! closest approach s* is clipped away do not count.
 //!
-//! **Trained Gaussians alone.** If a scene has nothing else, and is drawn as a whole, each counts at
-//! the depth z of its centre along the view's axis, as its trainer sorts them. Its sheets lie along
+//! **Trained Gaussians alone.** If a scene has nothing else and is drawn as a whole, each counts at
+//! the depth z of its centre along the view's axis, as its trainer sorts them. The sheets lie along
 //! z instead of the rays. It is not cut: of its optical depth, the sheets whose middles enclose z
 //! have linear shares, and the first or the last sheet all of it beyond their middles. Those with
 //! the centre outside the sheets, or with s* behind the eye, are left out.

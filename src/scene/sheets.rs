@@ -34,8 +34,8 @@ const CELL_SHEETS: [f64; 2] = [0.5, 0.2];
 /// The thinnest sheets of tetrahedra, as a share of the depth of the scene.
 const LEAST_CELL_SHEET: f64 = 1e-3;
 
-/// Sheets of trained Gaussians alone, in each of which the order of two of them is not known: their
-/// thickness as a share of the distance, or of the depth of the scene in parallel views.
+/// The thickness of the sheets of trained Gaussians alone, as a share of the distance, or of the
+/// depth of the scene in parallel views. Within a sheet, their order is not known.
 const TRAINED_SHEETS: f64 = 1.0 / 512.0;
 
 /// How far the pixel that a facet fills in part reaches beyond it, in the same unit as splats.
