@@ -64,6 +64,8 @@ mod volume_stream;
 pub mod vtk;
 mod vtu_write;
 pub mod xyz;
+#[cfg(feature = "zarr")]
+pub mod zarr;
 
 pub use array::{Array, Place, arrays};
 pub use foreign::{Advice, advice, folder_advice};
