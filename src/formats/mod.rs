@@ -68,7 +68,7 @@ pub mod xyz;
 pub mod zarr;
 
 pub use array::{Array, Place, arrays};
-pub use foreign::{Advice, advice, folder_advice};
+pub use foreign::{Advice, advice};
 pub(crate) use form::StreamPoint;
 pub use form::{Attribute, Counts, NumberType, Records};
 pub use format::{Content, Format, Holding};

@@ -423,8 +423,7 @@ pub static FORMATS: &[Format] = &[
         ],
         refers: true,
         feature: Some("zarr"),
-        #[cfg(feature = "zarr")]
-        folder: Some(zarr::is_folder),
+        folder: Some(|source| Ok(source.is_store())),
         #[cfg(feature = "zarr")]
         kind: Which::Rule(zarr::kind),
         #[cfg(feature = "zarr")]

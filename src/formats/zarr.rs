@@ -43,14 +43,6 @@ use store::Store;
 const MOST_WHOLE: u64 = 1 << 27;
 const MOST_FETCHED: u64 = 1 << 24;
 
-/// Returns whether a source is a folder, or a place on a server, with metadata of Zarr.
-///
-/// # Errors
-/// None: nothing is read.
-pub(super) fn is_folder(source: &Source) -> Result<bool> {
-    Ok(source.is_store())
-}
-
 /// An image whose metadata is read.
 struct Opened {
     /// How the caller named it.

@@ -362,10 +362,7 @@ fn as_cloud(path: &Path, kind: Kind) -> Kind {
 
 /// Returns the error for a file of a kind that is known, but not read.
 fn foreign(source: &Source) -> Option<Error> {
-    let advice = match source.folder() {
-        Some(_) => formats::folder_advice(source.path)?,
-        None => formats::advice(source)?,
-    };
+    let advice = formats::advice(source).filter(|_| source.folder().is_none())?;
     let message = format!("is {}, which is not read", advice.what);
     Some(source.error("file", message).hint(advice.hint))
 }

@@ -58,6 +58,9 @@ struct Axes {
 /// Bytes of unpacked chunks that are kept, of images that are read in parts.
 const CACHED: usize = 256 << 20;
 
+/// Most bytes of a chunk.
+const MOST_CHUNK: u64 = 1 << 30;
+
 impl Axes {
     /// Finds the axes by their kinds and names, or by their number if they have none.
     fn of(axes: &[Axis], count: usize) -> Result<Self, String> {
@@ -230,7 +233,13 @@ fn check(source: &Source, path: &str, layout: &Layout) -> Result<()> {
         return Err(source.error(format!("“{name}”"), message));
     }
     let bytes = layout.chunk_bytes().map_or(u64::MAX, |bytes| bytes as u64);
-    source.check_bytes(&format!("the size of a chunk of {name} in bytes"), bytes)?;
+    if bytes > MOST_CHUNK {
+        let message =
+            format!("has chunks of {bytes} bytes, but at most {MOST_CHUNK} bytes are read at once");
+        return Err(source.error(format!("“{name}”"), message).hint("write it in smaller chunks"));
+    }
+    // Packed and unpacked.
+    source.lend(&format!("unpacking a chunk of {name}"), 2 * bytes)?;
     let index =
         layout.chunks_of_object().iter().try_fold(16u64, |all, n| all.checked_mul(*n as u64));
     let index = index.unwrap_or(u64::MAX);
