@@ -17,6 +17,7 @@ mod ome;
 mod store;
 #[cfg(test)]
 mod tests;
+mod unpack;
 
 use super::{
     Kind, ReadOptions,

@@ -1,7 +1,7 @@
 //! The container of Blosc 1, as numcodecs and c-blosc write it: blocks that are shuffled, by bytes
 //! or by bits, and packed by one of several codecs. Follows README_CHUNK_FORMAT of c-blosc.
 
-use super::codecs::{unlz4, unzlib, unzstd};
+use super::unpack::{unlz4, unzlib, unzstd};
 
 /// Bytes of the header.
 const HEADER: usize = 16;

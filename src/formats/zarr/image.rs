@@ -1,7 +1,7 @@
 //! The image of a store: what its axes mean, its levels, and where they lie.
 
 use super::{
-    array::{Layout, MOST_AXES},
+    array::Layout,
     chunks::{Array, Cache, Check},
     nodes::{Found, Node},
     ome::{self, Axis, Multiscale, Shown},
@@ -15,7 +15,6 @@ use crate::{
     volume::Lattice,
 };
 use glam::{DMat3, DVec3};
-use serde_json::Value;
 use std::{borrow::Cow, sync::Arc};
 
 /// An image of several levels, channels and times.
@@ -57,6 +56,9 @@ struct Axes {
 
 /// Bytes of unpacked chunks that are kept, of images that are read in parts.
 const CACHED: usize = 256 << 20;
+
+/// Most channels of an image.
+const MOST_CHANNELS: usize = 1 << 12;
 
 /// Most bytes of a chunk.
 const MOST_CHUNK: u64 = 1 << 30;
@@ -109,61 +111,18 @@ impl Image {
     /// # Errors
     /// [`Error::Input`] for metadata that is missing or contradicts itself.
     pub fn open(source: &Source, store: &Arc<Store>, found: Found) -> Result<Self> {
-        let wrong = |group: &str, message: String| {
-            let place = if group.is_empty() { "metadata".into() } else { format!("“{group}”") };
-            source.error(place, message)
-        };
+        let arrays = arrays(source, store, &found)?;
         let Found { group, multiscale, attributes, .. } = found;
-        let mut arrays = Vec::new();
-        for level in &multiscale.levels {
-            let path = joined(&group, &level.path);
-            let layout = match Node::of(store, &path)? {
-                Some(Node::Array(layout)) => layout,
-                Some(Node::Group(_)) => {
-                    return Err(wrong(
-                        &path,
-                        "is a group where the array of a level is expected".into(),
-                    ));
-                }
-                None => {
-                    let message = "is the array of a level, but there is no such array".to_owned();
-                    return Err(wrong(&path, message).hint("copy the whole store"));
-                }
-            };
-            check(source, &path, &layout)?;
-            arrays.push((path, layout));
-        }
         let Some((path, first)) = arrays.first() else {
-            return Err(wrong(&group, "has no levels".into()));
+            return Err(wrong(source, &group, "has no levels"));
         };
-        let count = first.shape.len();
-        if arrays.iter().any(|(_, layout)| layout.shape.len() != count) {
-            return Err(wrong(&group, "has levels of different numbers of axes".into()));
-        }
-        if arrays.iter().any(|(_, layout)| layout.element != first.element) {
-            return Err(wrong(&group, "has levels of different types of numbers".into()));
-        }
-        if !(multiscale.axes.is_empty() || multiscale.axes.len() == count) {
-            let named = multiscale.axes.len();
-            return Err(wrong(path, format!("has {count} axes, but the metadata names {named}")));
-        }
-        let axes = Axes::of(&multiscale.axes, count).map_err(|message| wrong(path, message))?;
-        if axes.space[1].is_none() {
-            let message = "has one axis of space; a volume has three, and a picture two".to_owned();
-            return Err(wrong(path, message));
-        }
+        let axes = sorted_axes(source, path, first, &multiscale.axes)?;
         let size = |axis: Option<usize>| axis.map_or(1, |axis| first.shape[axis]);
         let (times, of_channel) = (size(axes.time), size(axes.channel));
-        for (axis, size) in first.shape.iter().enumerate() {
-            let known = [axes.channel, axes.time].into_iter().chain(axes.space);
-            if *size > 1 && !known.flatten().any(|number| number == axis) {
-                let message =
-                    format!("has {size} elements along axis {axis}, whose kind is unknown");
-                return Err(wrong(path, message));
-            }
-        }
-        if of_channel == 0 || of_channel > 1 << 12 {
-            return Err(wrong(path, format!("has {of_channel} channels")));
+        if of_channel > MOST_CHANNELS {
+            let message =
+                format!("has {of_channel} channels, but at most {MOST_CHANNELS} are read");
+            return Err(wrong(source, path, message));
         }
         let Shown { mut channels, mut active } = ome::shown(&attributes);
         channels.resize(of_channel, Channel::default());
@@ -176,7 +135,7 @@ impl Image {
             let dims = axes.sizes(&layout.shape);
             let finest = levels.first().map_or(dims, |first| first.dims);
             let lattice = lattice(&axes, &multiscale.axes, level, [dims, finest]);
-            lattice.check().map_err(|message| wrong(&path, message))?;
+            lattice.check().map_err(|message| wrong(source, &path, message))?;
             let array = Array::new(store.clone(), &path, layout);
             levels.push(Level { path, array, dims, lattice });
         }
@@ -219,6 +178,64 @@ impl Image {
         let stride = |axis: usize| size[axis + 1..].iter().product();
         Ok((elements, self.axes.space.map(|axis| axis.map_or(1, stride))))
     }
+}
+
+/// Returns the error for a node of a store.
+fn wrong(source: &Source, node: &str, message: impl Into<String>) -> Error {
+    let place = if node.is_empty() { "metadata".into() } else { format!("“{node}”") };
+    source.error(place, message)
+}
+
+/// Reads the metadata of the arrays of all levels.
+fn arrays(source: &Source, store: &Store, found: &Found) -> Result<Vec<(String, Layout)>> {
+    let mut arrays: Vec<(String, Layout)> = Vec::new();
+    for level in &found.multiscale.levels {
+        let path = joined(&found.group, &level.path);
+        let layout = match Node::of(store, &path)? {
+            Some(Node::Array(layout)) => layout,
+            Some(Node::Group(_)) => {
+                let message = "is a group where the array of a level is expected";
+                return Err(wrong(source, &path, message));
+            }
+            None => {
+                let message = "is the array of a level, but there is no such array";
+                return Err(wrong(source, &path, message).hint("copy the whole store"));
+            }
+        };
+        check(source, &path, &layout)?;
+        if let Some((_, first)) = arrays.first() {
+            if first.shape.len() != layout.shape.len() {
+                return Err(wrong(source, &path, "has other axes than the first level"));
+            }
+            if first.element != layout.element {
+                return Err(wrong(source, &path, "has another type than the first level"));
+            }
+        }
+        arrays.push((path, layout));
+    }
+    Ok(arrays)
+}
+
+/// Finds out what the axes of an array are.
+fn sorted_axes(source: &Source, path: &str, layout: &Layout, named: &[Axis]) -> Result<Axes> {
+    let count = layout.shape.len();
+    if !(named.is_empty() || named.len() == count) {
+        let message = format!("has {count} axes, but the metadata names {}", named.len());
+        return Err(wrong(source, path, message));
+    }
+    let axes = Axes::of(named, count).map_err(|message| wrong(source, path, message))?;
+    if axes.space[1].is_none() {
+        let message = "has one axis of space; a volume has three, and a picture two";
+        return Err(wrong(source, path, message));
+    }
+    for (axis, size) in layout.shape.iter().enumerate() {
+        let mut known = [axes.channel, axes.time].into_iter().chain(axes.space).flatten();
+        if *size > 1 && !known.any(|number| number == axis) {
+            let message = format!("has {size} elements along axis {axis}, whose kind is unknown");
+            return Err(wrong(source, path, message));
+        }
+    }
+    Ok(axes)
 }
 
 /// Checks an array against the limits.
@@ -295,20 +312,4 @@ pub fn x_first<'a>(
         }
     }
     Cow::Owned(out)
-}
-
-/// An image of one array without metadata of OME.
-pub fn plain(names: &[String]) -> Multiscale {
-    let named = |name: &String| ome::axis_of(&Value::from(name.as_str()));
-    let axes: Vec<Axis> = names.iter().take(MOST_AXES).map(named).collect();
-    let is_known = !axes.is_empty() && axes.iter().all(|axis| !axis.kind.is_empty());
-    let axes = if is_known { axes } else { Vec::new() };
-    Multiscale { axes, levels: vec![ome::Level::default()] }
-}
-
-/// Returns the error for a store without data that can be drawn.
-pub fn nothing(source: &Source, message: impl Into<String>) -> Error {
-    source.error("metadata", message).hint(
-        "name a store of OME-Zarr, or with --dataset one of its arrays; `splatkit info` lists them",
-    )
 }

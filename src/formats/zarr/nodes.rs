@@ -2,13 +2,12 @@
 //! or of several series.
 
 use super::{
-    array::Layout,
-    image::{nothing, plain},
-    ome::{self, Multiscale},
+    array::{Layout, MOST_AXES},
+    ome::{self, Axis, Multiscale},
     store::{Store, joined},
 };
 use crate::{
-    Result,
+    Error, Result,
     input::{Source, neighbour},
 };
 use serde_json::Value;
@@ -245,4 +244,20 @@ fn largest(source: &Source, store: &Store, group: &str, depth: usize) -> Result<
     }
     let first = groups.iter().find_map(|path| first(source, store, path, depth + 1).ok());
     first.ok_or_else(|| nothing(source, "has neither images of OME-Zarr nor arrays of two axes"))
+}
+
+/// An image of one array without metadata of OME.
+fn plain(names: &[String]) -> Multiscale {
+    let named = |name: &String| ome::axis_of(&Value::from(name.as_str()));
+    let axes: Vec<Axis> = names.iter().take(MOST_AXES).map(named).collect();
+    let is_known = !axes.is_empty() && axes.iter().all(|axis| !axis.kind.is_empty());
+    let axes = if is_known { axes } else { Vec::new() };
+    Multiscale { axes, levels: vec![ome::Level::default()] }
+}
+
+/// Returns the error for a store without data that can be drawn.
+fn nothing(source: &Source, message: impl Into<String>) -> Error {
+    source.error("metadata", message).hint(
+        "name a store of OME-Zarr, or with --dataset one of its arrays; `splatkit info` lists them",
+    )
 }

@@ -217,8 +217,8 @@ fn shards_say_where_their_chunks_are() {
     }
 }
 
-/// Writes an image of two times, three channels and two levels: (t, c, z, y, x) = (2, 3, 2, 16, 32),
-/// the second level half as wide and high. `version` is 2 or 3, of Zarr.
+/// Writes an image of two times, three channels and two levels: (t, c, z, y, x) is (2, 3, 2, 16,
+/// 32), and the second level is half as wide and high. `version` is 2 or 3, of Zarr.
 fn image(folder: &Folder, group: &str, version: u8) {
     let transform = |x: f64| {
         json!([
