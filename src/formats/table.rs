@@ -428,6 +428,7 @@ pub static FORMATS: &[Format] = &[
         kind: Which::Rule(zarr::kind),
         #[cfg(feature = "zarr")]
         volume: Some(VolumeReader::Plain(zarr::read)),
+        pieces: InPieces::Opened,
         #[cfg(feature = "zarr")]
         arrays: Some(zarr::arrays),
         ..Format::ROW

@@ -231,6 +231,10 @@ pub(crate) fn fields(source: &Source, options: &ReadOptions) -> Result<Vec<(Fiel
 pub fn arrays(source: &Source, options: &ReadOptions) -> Result<Vec<Array>> {
     let opened = open(source, options)?;
     let image = &*opened.image;
+    // The store is one array.
+    if image.levels.iter().all(|level| level.path.is_empty()) {
+        return Ok(Vec::new());
+    }
     let drawn = (0..image.levels.len()).find(|&level| fits(source, image, level, options));
     let level = |(number, level): (usize, &Level)| {
         let shape: Vec<String> = level.array.layout.shape.iter().map(ToString::to_string).collect();

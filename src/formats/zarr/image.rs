@@ -4,7 +4,7 @@ use super::{
     array::Layout,
     chunks::{Array, Cache, Check},
     nodes::{Found, Node},
-    ome::{self, Axis, Multiscale, Shown},
+    ome::{self, Axis, Shown},
     store::{Store, joined, shared},
 };
 use crate::{
