@@ -23,13 +23,16 @@ impl Brick {
     }
 }
 
-/// Consecutive slices of a level.
+/// Consecutive slices of a level, or of a part of it.
 #[derive(Clone, Copy)]
 pub struct Slices<'a> {
     pub level: Level,
     pub scalar: Scalar,
-    /// The first slice present.
-    pub first: usize,
+    /// The first sample present along each axis.
+    pub first: [usize; 3],
+    /// Samples of a row, and rows of a slice.
+    pub row: usize,
+    pub rows: usize,
     /// The bytes of the samples of all slices present.
     pub samples: &'a [u8],
 }
@@ -37,19 +40,28 @@ pub struct Slices<'a> {
 /// Samples along each axis that affect a brick's ranges.
 const AROUND: usize = SIDE + 2 * REACH;
 
+impl<'a> Slices<'a> {
+    /// Takes whole slices of a level, of which `first` is the first.
+    pub fn whole(level: Level, scalar: Scalar, first: usize, samples: &'a [u8]) -> Self {
+        let [row, rows, _] = level.dims;
+        Self { level, scalar, first: [0, 0, first], row, rows, samples }
+    }
+}
+
 impl Slices<'_> {
-    /// Returns the brick at a position in the grid of bricks. Its slices must be present, and
-    /// [`REACH`] more on both sides as far as the level has them.
+    /// Returns the brick at a position in the grid of bricks. Its samples must be present, and
+    /// [`REACH`] more on all sides as far as the level has them.
     pub fn brick(&self, place: [usize; 3], steps: &Steps) -> Brick {
         Brick { samples: self.samples_of(place), blocks: self.blocks(place, steps) }
     }
 
-    /// Returns the row of samples at positions along y and z, clamped to the level.
-    fn row(&self, j: isize, k: isize) -> &[u8] {
-        let [nx, ny, nz] = self.level.dims;
-        let (j, k) = (inside(j, ny), inside(k, nz));
-        let start = ((k - self.first) * ny + j) * nx * self.scalar.bytes();
-        &self.samples[start..start + nx * self.scalar.bytes()]
+    /// Returns samples of the row at positions along y and z, clamped to the level.
+    fn row(&self, [from, to]: [usize; 2], j: isize, k: isize) -> &[u8] {
+        let [_, ny, nz] = self.level.dims;
+        let (j, k) = (inside(j, ny) - self.first[1], inside(k, nz) - self.first[2]);
+        let start = (k * self.rows + j) * self.row;
+        let at = |x: usize| (start + x - self.first[0]) * self.scalar.bytes();
+        &self.samples[at(from)..at(to)]
     }
 
     fn samples_of(&self, place: [usize; 3]) -> Vec<u8> {
@@ -58,7 +70,7 @@ impl Slices<'_> {
         let there = SIDE.min(self.level.dims[0] - x);
         let mut out = Vec::with_capacity(SIDE * SIDE * SIDE * size);
         for (k, j) in (0..SIDE).flat_map(|k| (0..SIDE).map(move |j| (k, j))) {
-            let row = &self.row((y + j) as isize, (z + k) as isize)[x * size..(x + there) * size];
+            let row = self.row([x, x + there], (y + j) as isize, (z + k) as isize);
             out.extend_from_slice(row);
             for _ in there..SIDE {
                 out.extend_from_slice(&row[(there - 1) * size..]);
@@ -70,7 +82,6 @@ impl Slices<'_> {
     /// Returns the ranges of the blocks. The extremes of a box are computed one axis after the
     /// other.
     pub fn blocks(&self, place: [usize; 3], steps: &Steps) -> Box<[[u8; 2]; BRICK_BLOCKS]> {
-        let size = self.scalar.bytes();
         let [x, y, z] = place.map(|at| (at * SIDE) as isize - REACH as isize);
         // The samples present along x, and how many copies of the first one precede it.
         let (from, to) = (
@@ -83,7 +94,7 @@ impl Slices<'_> {
         let mut along_z = vec![[[[255u8; 2]; BLOCKS]; BLOCKS]; AROUND];
         for (k, done) in along_z.iter_mut().enumerate() {
             for (j, done) in along_y.iter_mut().enumerate() {
-                let samples = &self.row(y + j as isize, z + k as isize)[from * size..to * size];
+                let samples = self.row([from, to], y + j as isize, z + k as isize);
                 let end = before + to - from;
                 steps.write(samples, &mut row[before..end]);
                 let [first, last] = [row[before], row[end - 1]];

@@ -9,7 +9,8 @@
 //! can meet. Blocks that show nothing under a transfer function are therefore known without reading
 //! samples.
 //!
-//! [`Bricks`] reads from a volume in memory or from a file (`.splv`, docs/splv.md).
+//! [`Bricks`] reads from a volume in memory, from a file (`.splv`, docs/splv.md), or from an image
+//! that is stored in levels of its own (OME-Zarr; levels.rs).
 //! [`write`](write()) and [`convert`](convert()) make these files, and [`check`](check()) looks for
 //! damage. [`choice`](choice()) selects the bricks that a picture needs.
 
@@ -18,6 +19,8 @@ mod cut;
 mod file;
 mod halve;
 mod level;
+#[cfg(feature = "zarr")]
+mod levels;
 mod pyramid;
 mod store;
 #[cfg(test)]

@@ -95,8 +95,7 @@ impl Growing {
         mut layer: impl FnMut(usize, &Slices) -> Result<()>,
     ) -> Result<()> {
         let (arrived, is_whole) = self.arrived(scalar);
-        let slices =
-            Slices { level: self.level, scalar, first: self.first, samples: &self.samples };
+        let slices = Slices::whole(self.level, scalar, self.first, &self.samples);
         while self.layers < self.level.brick_dims[2]
             && (is_whole || arrived >= (self.layers + 1) * SIDE + REACH)
         {

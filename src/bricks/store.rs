@@ -1,6 +1,8 @@
 //! Reading bricks: from a volume in memory, or from a file of which only the header and parts of
 //! the directory are in memory.
 
+#[cfg(feature = "zarr")]
+use super::levels::Leveled;
 use super::{
     Brick, EMPTY, Level,
     cut::Slices,
@@ -10,13 +12,18 @@ use super::{
 };
 use crate::{
     Error, Result,
-    about::{Frame, Orientation},
+    about::{About, Frame, Orientation},
     container::directory::{Directory, Fault, Kind, Shape},
     error::LimitKind,
     input::{self, Bytes, Limits},
     math::Bounds,
     parallel::prelude::*,
     volume::{Lattice, Samples, Scalar, Volume, steps::Steps},
+};
+#[cfg(feature = "zarr")]
+use crate::{
+    formats::{ReadOptions, zarr},
+    input::Source,
 };
 use std::{
     path::{Path, PathBuf},
@@ -41,6 +48,14 @@ pub struct Header {
 }
 
 impl Header {
+    /// A header to fill in.
+    #[cfg(feature = "zarr")]
+    pub(super) fn empty() -> Self {
+        let lattice = Lattice::with_spacing([1; 3], glam::DVec3::ONE);
+        let (unit, source) = (String::new(), String::new());
+        Self { lattice, scalar: Scalar::U8, range: [0.0; 2], frame: Frame::Own, unit, source }
+    }
+
     /// Returns how the subject stands, if that is known.
     pub fn orientation(&self) -> Option<Orientation> {
         (self.frame == Frame::Patient).then_some(Orientation::RAS)
@@ -83,6 +98,8 @@ pub struct Bricks {
     directory: Directory<Listing>,
     origin: Origin,
     limits: Limits,
+    about: About,
+    more_channels: Vec<Arc<Self>>,
 }
 
 enum Origin {
@@ -93,6 +110,9 @@ enum Origin {
         steps: Steps,
     },
     File(Bytes),
+    /// An image in levels of its own.
+    #[cfg(feature = "zarr")]
+    Leveled(Box<Leveled>),
 }
 
 impl std::fmt::Debug for Bricks {
@@ -142,7 +162,7 @@ impl Bricks {
         let directory = Directory::held(Listing { numbers, scalar, start: 0, end: 0 }, &entries);
         let path = PathBuf::from("memory");
         let origin = Origin::Memory { volume, coarse, steps };
-        Ok(Self { path, header, directory, origin, limits: Limits::none() })
+        Ok(Self::of(path, header, directory, (origin, Limits::none())))
     }
 
     /// Opens a file: reads and checks the header and the root of the directory, and maps the rest.
@@ -166,11 +186,54 @@ impl Bricks {
         Self::new(name.as_ref(), Bytes::Held(bytes), &Limits::default())
     }
 
+    fn of(
+        path: PathBuf,
+        header: Header,
+        directory: Directory<Listing>,
+        (origin, limits): (Origin, Limits),
+    ) -> Self {
+        let (about, more_channels) = (About::default(), Vec::new());
+        Self { path, header, directory, origin, limits, about, more_channels }
+    }
+
+    /// Opens the channels of an image that is stored in levels of its own (OME-Zarr): those that
+    /// the options name. Chunks are read when bricks are.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for metadata and chunks that are damaged, and for an image that cannot be
+    /// cut into bricks; [`Error::Limit`] and [`Error::File`] as for every input.
+    #[cfg(feature = "zarr")]
+    pub(crate) fn open_store(source: &Source, options: &ReadOptions) -> Result<Self> {
+        let mut channels = zarr::fields(source, options)?.into_iter().map(|(field, about)| {
+            let (leveled, header) = Leveled::open(source, field, options)?;
+            let numbers = Numbers::new(leveled.levels().to_vec());
+            let listing = Listing { numbers, scalar: header.scalar, start: 0, end: 0 };
+            // Nothing is known of the bricks before they are read.
+            let directory = Directory::held(listing, &[]);
+            let origin = (Origin::Leveled(Box::new(leveled)), source.limits.clone());
+            let bricks = Self::of(source.path.to_owned(), header, directory, origin);
+            Ok(Self { about, ..bricks })
+        });
+        let first = channels.next().expect("at least one channel is chosen")?;
+        let others = channels.map(|channel| channel.map(Arc::new));
+        Ok(Self { more_channels: others.collect::<Result<_>>()?, ..first })
+    }
+
+    /// What the file says about the values, beyond the header.
+    pub fn about(&self) -> &About {
+        &self.about
+    }
+
+    /// The other channels of the file that were opened, at the same place.
+    pub fn more_channels(&self) -> &[Arc<Self>] {
+        &self.more_channels
+    }
+
     fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
         let begun = bytes.begun(|bytes| begin(path, bytes, limits));
         let (header, directory) = begun.map_err(|error| bytes.why(path, error))?;
         let (path, limits) = (path.to_owned(), limits.clone());
-        Ok(Self { path, header, directory, origin: Origin::File(bytes.ready()), limits })
+        Ok(Self::of(path, header, directory, (Origin::File(bytes.ready()), limits)))
     }
 
     /// The properties of the volume as a whole.
@@ -213,7 +276,8 @@ impl Bricks {
     /// ([`first_visible`](crate::volume::reach::first_visible)).
     ///
     /// If a part of the directory cannot be read, the ranges there are 0 to 255, so that these
-    /// bricks are read, and that returns the error.
+    /// bricks are read, and that returns the error. So are those of images in levels of their own,
+    /// of which nothing is known before.
     ///
     /// # Panics
     /// If there is no such level.
@@ -242,6 +306,16 @@ impl Bricks {
             ((z * ny + y) * nx + x) as u32
         };
         let ends = |group: &[[usize; 3]; 2]| group.map(|end| numbers.number(level, at(end)));
+        #[cfg(feature = "zarr")]
+        if let Origin::Leveled(_) = &self.origin {
+            let of_group = |[first, last]: &[[usize; 3]; 2]| {
+                let [z, y, x] = [2, 1, 0].map(|axis| first[axis]..=last[axis]);
+                let rows = z.flat_map(move |z| y.clone().map(move |y| (y, z)));
+                let places = rows.flat_map(move |(y, z)| x.clone().map(move |x| [x, y, z]));
+                places.map(|place| (at(place), [0, 255])).collect::<Vec<_>>()
+            };
+            return groups.par_iter().flat_map_iter(of_group).collect();
+        }
         // What cannot be fetched together is read one by one, which returns the error.
         self.directory.prepare(self.bytes(), groups.iter().flat_map(ends)).ok();
         let of_group = |group: &[[usize; 3]; 2]| {
@@ -285,6 +359,8 @@ impl Bricks {
             Origin::Memory { volume, coarse, steps } => {
                 Ok(in_memory(volume, coarse, level, size).brick(size.place(brick), steps))
             }
+            #[cfg(feature = "zarr")]
+            Origin::Leveled(leveled) => leveled.read(level, brick),
             Origin::File(bytes) => {
                 let entry = self.entry(level, brick)?;
                 let range = entry.place.range();
@@ -384,6 +460,7 @@ impl Bricks {
         let mut volume = Volume::checked(self.lattice(level), samples)
             .map_err(|message| damaged(&self.path, "samples", message))?;
         volume.range = self.header.range;
+        volume.about.clone_from(&self.about);
         Ok(volume)
     }
 
@@ -401,11 +478,11 @@ impl Bricks {
         self.limits.check(LimitKind::Bytes, &self.path, what, bytes.saturating_mul(times))
     }
 
-    /// Returns the bytes of a file; `None` for a volume in memory.
+    /// Returns the bytes of a file; `None` for other volumes.
     pub(super) fn bytes(&self) -> Option<&Bytes> {
         match &self.origin {
-            Origin::Memory { .. } => None,
             Origin::File(bytes) => Some(bytes),
+            _ => None,
         }
     }
 }
@@ -468,7 +545,7 @@ fn in_memory<'a>(
     level: Level,
 ) -> Slices<'a> {
     let samples = number.checked_sub(1).map_or(volume.samples.bytes(), |above| &coarse[above]);
-    Slices { level, scalar: volume.samples.scalar(), first: 0, samples }
+    Slices::whole(level, volume.samples.scalar(), 0, samples)
 }
 
 fn refused(path: &Path, refusal: Refusal) -> Error {

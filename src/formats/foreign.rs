@@ -87,17 +87,6 @@ pub(super) fn mesh_by_name(source: &Source) -> Option<crate::Error> {
     Some(source.error("file", message).hint(advice.hint))
 }
 
-/// Says which kind a folder is, and what to do; `None` for folders of which nothing is known.
-pub fn folder_advice(folder: &Path) -> Option<Advice> {
-    let has = |name: &str| folder.join(name).exists();
-    let is_zarr = [".zgroup", ".zarray", ".zattrs", "zarr.json"].iter().any(|name| has(name));
-    is_zarr.then(|| Advice {
-        what: "a Zarr store".into(),
-        hint: "write one level in Python: numpy.save('volume.npy', zarr.open('FOLDER')['0'][:])"
-            .into(),
-    })
-}
-
 impl Advice {
     fn of(foreign: &Foreign, path: &Path) -> Self {
         let is_drawn = foreign.hint.is_empty() || !foreign.python.is_empty();
@@ -217,14 +206,6 @@ mod tests {
                 assert!(format.is_none(), "{extension}");
             }
         }
-    }
-
-    #[test]
-    fn folders_of_zarr_are_known() {
-        let folder = crate::input::testing::Folder::new();
-        assert_eq!(folder_advice(folder.as_ref()), None);
-        folder.write("zarr.json", "{}");
-        assert_eq!(folder_advice(folder.as_ref()).unwrap().what, "a Zarr store");
     }
 
     #[test]

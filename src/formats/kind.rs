@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     Result,
-    input::{Bytes, Limits, Source, is_remote},
+    input::{self, Bytes, Limits, Source, is_remote},
 };
 use std::path::Path;
 
@@ -66,7 +66,7 @@ impl Kind {
     /// object need not be fetched, and a large file need not fit in memory.
     pub(crate) fn at_once(path: &Path, limits: &Limits) -> Result<Option<Self>> {
         let is_remote = is_remote(path);
-        if !is_remote && !path.is_file() {
+        if input::is_store(path) || !is_remote && !path.is_file() {
             return Ok(None);
         }
         let format = match by_extension(FORMATS, path, |_| true) {

@@ -64,9 +64,11 @@ mod volume_stream;
 pub mod vtk;
 mod vtu_write;
 pub mod xyz;
+#[cfg(feature = "zarr")]
+pub mod zarr;
 
 pub use array::{Array, Place, arrays};
-pub use foreign::{Advice, advice, folder_advice};
+pub use foreign::{Advice, advice};
 pub(crate) use form::StreamPoint;
 pub use form::{Attribute, Counts, NumberType, Records};
 pub use format::{Content, Format, Holding};

@@ -27,6 +27,8 @@ use super::sog;
 use super::tiff;
 #[cfg(feature = "vtk")]
 use super::vtk;
+#[cfg(feature = "zarr")]
+use super::zarr;
 use super::{
     Kind, csv,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
@@ -410,6 +412,25 @@ pub static FORMATS: &[Format] = &[
         volume: Some(VolumeReader::Plain(hdf5::read)),
         #[cfg(feature = "hdf5")]
         arrays: Some(hdf5::arrays),
+        ..Format::ROW
+    },
+    Format {
+        name: "OME-Zarr",
+        extensions: &["zarr", "zarr.zip", "ozx"],
+        holds: &[
+            some(Content::Volume, "images and arrays of two axes or three"),
+            some(Content::Bricks, "large images in levels"),
+        ],
+        refers: true,
+        feature: Some("zarr"),
+        folder: Some(|source| Ok(source.is_store())),
+        #[cfg(feature = "zarr")]
+        kind: Which::Rule(zarr::kind),
+        #[cfg(feature = "zarr")]
+        volume: Some(VolumeReader::Plain(zarr::read)),
+        pieces: InPieces::Opened,
+        #[cfg(feature = "zarr")]
+        arrays: Some(zarr::arrays),
         ..Format::ROW
     },
     Format {

@@ -58,6 +58,21 @@ pub fn address(text: impl AsRef<OsStr>) -> PathBuf {
     name
 }
 
+/// Returns the path of an object below another, of a path or of a name from [`address`]: what the
+/// other's name leaves out, the new one leaves out too.
+#[cfg(feature = "zarr")]
+pub(crate) fn below(name: &Path, key: &str) -> PathBuf {
+    let known = WHOLE.lock().unwrap_or_else(PoisonError::into_inner).get(name).cloned();
+    let query = known.as_deref().and_then(|whole| whole.split_once('?'));
+    match query {
+        Some((start, query)) => address(format!("{}/{key}?{query}", start.trim_end_matches('/'))),
+        None => {
+            let text = name.to_string_lossy();
+            PathBuf::from(format!("{}/{key}", text.trim_end_matches('/')))
+        }
+    }
+}
+
 /// Returns the whole address of a name from [`address`]. The error is a message.
 #[cfg_attr(not(feature = "remote"), expect(dead_code, reason = "nothing is opened"))]
 pub(super) fn whole(name: &Path) -> Result<String, String> {

@@ -29,6 +29,18 @@ impl Bytes {
         Ok(Self::Remote(remote))
     }
 
+    /// As [`open`](Self::open); `None` if there is no such file or object. A server may refuse
+    /// access to objects that it does not have.
+    #[cfg(feature = "zarr")]
+    pub fn open_if_there(path: &Path, limits: &Limits) -> Result<Option<Self>> {
+        if !is_remote(path) {
+            return if path.is_file() { Self::open(path, limits).map(Some) } else { Ok(None) };
+        }
+        let Some(remote) = Remote::open_if_there(path, limits)? else { return Ok(None) };
+        limits.check(LimitKind::Bytes, path, "the object's size in bytes", remote.len())?;
+        Ok(Some(Self::Remote(remote).ready()))
+    }
+
     /// Says that the beginning was read. Until then, all requests to a server together may take
     /// the limit of seconds, and then each.
     pub fn ready(mut self) -> Self {

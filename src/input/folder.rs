@@ -1,8 +1,9 @@
 //! Folders as inputs: the files of a series of pictures.
 
-use super::{Limits, Source};
+use super::{Limits, Source, address::is_remote};
 use crate::{Error, Result};
 use std::{
+    ffi::OsStr,
     fs,
     path::{Path, PathBuf},
 };
@@ -24,6 +25,10 @@ impl<'a> Source<'a> {
     /// Those of [`open`](Self::open) for a file; [`Error::File`] for a folder that cannot be
     /// listed; [`Error::Input`] for a folder of too many files.
     pub fn open_any(path: &'a Path, limits: &'a Limits) -> Result<Self> {
+        if is_store(path) {
+            // Its files may be millions.
+            return Ok(Self::of_folder(without_metadata(path), limits, Vec::new()));
+        }
         if path.is_dir() {
             Ok(Self::of_folder(path, limits, list(path)?))
         } else {
@@ -43,6 +48,32 @@ impl<'a> Source<'a> {
         self.spend("the size of a file's header in bytes", LOOK.min(mapping.len() as u64))?;
         Ok(self.beside(path, mapping))
     }
+}
+
+/// The files of metadata in a store of Zarr.
+const METADATA: [&str; 4] = ["zarr.json", ".zattrs", ".zgroup", ".zarray"];
+
+/// Returns whether a path is a store of Zarr: a folder with its metadata, or an address of one, or
+/// of a node inside.
+pub(crate) fn is_store(path: &Path) -> bool {
+    let ends_in = |name: &OsStr| Path::new(name).extension().is_some_and(|end| end == "zarr");
+    if is_remote(path) {
+        let is_node = path.extension().is_none() && path.iter().any(ends_in);
+        return is_node || path.file_name().is_some_and(ends_in) || path_is_metadata(path);
+    }
+    path.is_dir()
+        && (path.file_name().is_some_and(ends_in)
+            || METADATA.iter().any(|name| path.join(name).is_file()))
+}
+
+fn path_is_metadata(path: &Path) -> bool {
+    METADATA.iter().any(|name| path.ends_with(name))
+}
+
+/// Returns the address of a store if a path is the address of its metadata; else the path.
+fn without_metadata(path: &Path) -> &Path {
+    let is_metadata = is_remote(path) && path_is_metadata(path);
+    path.parent().filter(|_| is_metadata).unwrap_or(path)
 }
 
 /// Returns the regular files in a folder and in the folders inside it, ordered by their paths.

@@ -34,11 +34,14 @@ pub(crate) mod text;
 #[cfg(feature = "tiff")]
 pub(crate) mod watched;
 
+#[cfg(feature = "zarr")]
+pub(crate) use address::below;
 pub(crate) use address::is_whole;
 pub use address::{address, is_remote};
 pub(crate) use bytes::Bytes;
 pub use bytes::size;
 pub(crate) use fingerprint::fingerprint;
+pub(crate) use folder::is_store;
 pub use limits::Limits;
 pub(crate) use mapping::Mapping;
 pub use source::Source;

@@ -76,6 +76,11 @@ impl<'a> Source<'a> {
         Self { path, limits, content, text: OnceLock::new(), parsed: OnceLock::new(), budget }
     }
 
+    /// Returns whether this is a store of Zarr, of which only the objects that are needed are read.
+    pub(crate) fn is_store(&self) -> bool {
+        self.folder().is_some_and(<[PathBuf]>::is_empty) && super::is_store(self.path)
+    }
+
     /// Opens a file that belongs to this one: it refers to it, by a path from
     /// [`neighbour`](Self::neighbour), or both are read together. Both share one budget.
     pub(crate) fn open_beside<'b>(&self, path: &'b Path) -> Result<Source<'b>>

@@ -112,7 +112,7 @@ impl Appearance {
     /// # Errors
     /// Those of [`of_volume`](Self::of_volume) and of reading bricks.
     pub fn of_bricks(&self, name: &str, bricks: &Bricks) -> Result<TransferFunction> {
-        let overview = bricks.volume(overview(bricks))?;
+        let overview = overview_of(bricks)?;
         let header = bricks.header();
         let values = Values::new(name, header.range, header.lattice.bounds());
         self.transfer(&values, || TransferFunction::automatic(&overview))
@@ -220,6 +220,14 @@ impl<'a> Values<'a> {
     fn new(name: &'a str, range: [f64; 2], bounds: Bounds) -> Self {
         Self { name, range, diagonal: bounds.diagonal(), are_labels: false }
     }
+}
+
+/// Returns the samples of the finest level that can be read quickly as a whole.
+///
+/// # Errors
+/// Those of reading bricks.
+pub(super) fn overview_of(bricks: &Bricks) -> Result<Volume> {
+    bricks.volume(overview(bricks))
 }
 
 /// Returns the finest level of a volume that can be read quickly as a whole, or the coarsest level.

@@ -87,6 +87,10 @@ impl Opened<'_> {
         if let Some(bytes) = self.held() {
             return Ok(bytes.len() as u64);
         }
+        // The objects of a store are not counted: there may be millions.
+        if input::is_store(self.path()) {
+            return Ok(0);
+        }
         if !self.path().is_dir() {
             return input::size(self.path());
         }
@@ -168,16 +172,19 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     facts.insert("attributes".into(), attributes);
     stand(&mut facts, volume.about.orientation);
     say(&mut facts, &volume.about);
-    let channels = &volume.about.channels;
-    if !channels.is_empty() {
-        let names = (0..channels.len()).map(|number| Channel::name_of(channels, number));
-        facts.insert("channels".into(), json!(names.collect::<Vec<_>>()));
-    }
+    name_channels(&mut facts, &volume.about.channels);
     if let Some(labels) = &volume.about.labels {
         facts.insert("labels".into(), json!(labels.listed()));
     }
     facts.insert("bounds".into(), bounds(volume.bounds()));
     facts
+}
+
+fn name_channels(facts: &mut Map<String, Value>, channels: &[Channel]) {
+    if !channels.is_empty() {
+        let names = (0..channels.len()).map(|number| Channel::name_of(channels, number));
+        facts.insert("channels".into(), json!(names.collect::<Vec<_>>()));
+    }
 }
 
 /// Adds what the file says of its values and lengths.
@@ -223,6 +230,7 @@ fn of_bricks(bricks: &Bricks) -> Map<String, Value> {
     facts.insert("bricks".into(), json!(count));
     texts(&mut facts, [("unit", &header.unit), ("source", &header.source)]);
     facts.insert("attributes".into(), json!(["value"]));
+    name_channels(&mut facts, &bricks.about().channels);
     facts.insert("bounds".into(), bounds(bricks.bounds()));
     facts
 }

@@ -1,7 +1,9 @@
 //! The items of a scene, made from inputs.
 
 use super::{
-    CellStyle, Coloring, Data, Framing, Legend, Name, Showing, Subject, Surfaces, slices,
+    CellStyle, Coloring, Data, Framing, Legend, Name, Showing, Subject, Surfaces,
+    appearance::overview_of,
+    slices,
     solid::{ShownSolid, field_of},
 };
 use crate::{
@@ -471,14 +473,50 @@ impl Adding<'_> {
             let message = "a volume in bricks cannot be sharpened";
             return Err(name.unfit("content", message, "leave that out, or draw the original"));
         }
+        if !showing.is_named && showing.appearance.shows_channels(bricks.about()) {
+            return self.add_channels_of_bricks(&bricks);
+        }
         let transfer = showing.appearance.of_bricks(&name.text, &bricks)?;
-        let header = bricks.header();
-        self.values(&transfer, header.range, Legend::title("", ""), None);
+        self.add_field_of_bricks(bricks, transfer);
+        Ok(())
+    }
+
+    /// Adds a volume in bricks as a field.
+    fn add_field_of_bricks(&mut self, bricks: Arc<Bricks>, transfer: TransferFunction) {
+        let (header, about) = (bricks.header(), bricks.about());
+        self.values(&transfer, header.range, Legend::title(&about.name, &about.unit), None);
         self.length(&header.unit);
         self.stand(header.frame, header.orientation());
         let (count, bounds) = (bricks.level(0).dims.iter().product(), bricks.bounds());
-        let item = Item::Bricks(bricks.clone(), showing.kernel.clone(), transfer);
+        let item = Item::Bricks(bricks, self.showing.kernel.clone(), transfer);
         self.push("bricks", count, bounds, item);
+    }
+
+    /// Adds the channels of a volume in bricks that were opened, each in a colour.
+    fn add_channels_of_bricks(&mut self, bricks: &Arc<Bricks>) -> Result<()> {
+        let Self { name, showing, .. } = *self;
+        let channels: Vec<&Arc<Bricks>> =
+            std::iter::once(bricks).chain(bricks.more_channels()).collect();
+        let all: Vec<usize> = channels.iter().map(|bricks| bricks.about().channel).collect();
+        let (mut dark, count) = (Vec::new(), self.items.len());
+        for (number, bricks) in channels.into_iter().enumerate() {
+            let style = showing.appearance.channels.get(number).cloned().unwrap_or_default();
+            let overview = overview_of(bricks)?;
+            match showing.appearance.of_channel(&name.text, &overview, (&style, &all)) {
+                Ok(transfer) => self.add_field_of_bricks(bricks.clone(), transfer),
+                Err(Error::NothingToDraw(message)) => dark.push(message),
+                Err(error) => return Err(error),
+            }
+        }
+        self.warn_of_dark(&dark, count)
+    }
+
+    /// Says which channels are left out. It is an error if none was added to `count` items.
+    fn warn_of_dark(&self, dark: &[String], count: usize) -> Result<()> {
+        if self.items.len() == count {
+            return Err(Error::NothingToDraw(dark.join("; ")));
+        }
+        dark.iter().for_each(|message| warning::give!("left out: {message}"));
         Ok(())
     }
 
@@ -523,11 +561,7 @@ impl Adding<'_> {
                 Err(error) => return Err(error),
             }
         }
-        if self.items.len() == count {
-            return Err(Error::NothingToDraw(dark.join("; ")));
-        }
-        dark.iter().for_each(|message| warning::give!("left out: {message}"));
-        Ok(())
+        self.warn_of_dark(&dark, count)
     }
 
     /// Adds a volume as a field.

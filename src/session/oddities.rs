@@ -48,6 +48,11 @@ impl Opened<'_> {
         let deadline = limits.deadline();
         Ok(match self.kind() {
             Kind::Hierarchy if self.held().is_some() => self.hierarchy()?.check().findings,
+            // Reading its metadata finds what is wrong with it.
+            Kind::Bricks if self.image_in_levels().is_some() => {
+                self.bricks()?;
+                Vec::new()
+            }
             Kind::Bricks if self.held().is_some() => self.bricks()?.check(watch).findings,
             Kind::Hierarchy => hierarchy::file::check(path, limits).findings,
             Kind::Bricks => bricks::check(path, limits, watch).findings,

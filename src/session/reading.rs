@@ -263,10 +263,23 @@ impl Opened<'_> {
 
     /// Opens a volume in bricks.
     pub(super) fn bricks(&self) -> Result<Bricks> {
+        #[cfg(feature = "zarr")]
+        if let Some(source) = self.image_in_levels() {
+            return Bricks::open_store(source, &self.reading.options);
+        }
         match self.held() {
             Some(bytes) => Bricks::from_bytes(bytes.to_vec(), self.path),
             None => Bricks::open(self.path, &self.reading.limits),
         }
+    }
+
+    /// Returns the source of an image that is stored in levels of its own, of those that are read
+    /// as bricks.
+    pub(super) fn image_in_levels(&self) -> Option<&Source<'_>> {
+        // Files of bricks in memory are sources too.
+        let is_image =
+            |source: &&Source| !source.held().is_some_and(|held| held.starts_with(b"SPLV"));
+        self.source.as_ref().filter(|_| self.kind == Kind::Bricks).filter(is_image)
     }
 
     /// Returns the bytes of the caller, if there is no file.
@@ -317,7 +330,7 @@ impl Opened<'_> {
     /// Those of [`formats::arrays`].
     pub fn arrays(&self) -> Result<Vec<Array>> {
         match (&self.source, self.kind) {
-            (None, _) | (_, Kind::Gaussians | Kind::Hierarchy | Kind::Bricks) => Ok(Vec::new()),
+            (None, _) | (_, Kind::Gaussians | Kind::Hierarchy) => Ok(Vec::new()),
             (Some(source), _) => formats::arrays(source, &self.reading.options),
         }
     }
@@ -349,10 +362,7 @@ fn as_cloud(path: &Path, kind: Kind) -> Kind {
 
 /// Returns the error for a file of a kind that is known, but not read.
 fn foreign(source: &Source) -> Option<Error> {
-    let advice = match source.folder() {
-        Some(_) => formats::folder_advice(source.path)?,
-        None => formats::advice(source)?,
-    };
+    let advice = formats::advice(source).filter(|_| source.folder().is_none())?;
     let message = format!("is {}, which is not read", advice.what);
     Some(source.error("file", message).hint(advice.hint))
 }

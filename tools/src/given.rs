@@ -50,13 +50,13 @@ const NEEDS: &[(&str, Kinds)] = &[
     ("spacing", VOLUME | RAW),
     ("endian", RAW),
     ("header", RAW),
-    ("scalar", MESH | CLOUD | VOLUME | SAMPLES | CELLS),
+    ("scalar", MESH | CLOUD | LATTICE | SAMPLES | CELLS),
     ("missing", VOLUME | SAMPLES | CELLS),
     ("labels", VOLUME),
     ("radius", SAMPLES),
     ("neighbours", SAMPLES),
     ("no-slopes", SAMPLES),
-    ("channels", VOLUME),
+    ("channels", LATTICE),
     ("transfer", FIELD),
     ("opacity-unit", FIELD),
     ("iso", FIELD),
@@ -88,9 +88,23 @@ const NEEDS: &[(&str, Kinds)] = &[
 /// Flags that some formats read, and the words by which their names in the table of formats are
 /// known. Folders hold series and slices.
 const READ_BY: &[(&str, &[&str])] = &[
-    ("time", &["NIfTI", "MetaImage", "MRC", "NPY", "NPZ", "TIFF", "HDF", "DICOM", "several files"]),
+    (
+        "time",
+        &[
+            "NIfTI",
+            "MetaImage",
+            "MRC",
+            "NPY",
+            "NPZ",
+            "TIFF",
+            "HDF",
+            "DICOM",
+            "Zarr",
+            "several files",
+        ],
+    ),
     ("series", &["DICOM"]),
-    ("dataset", &["HDF", "NPZ"]),
+    ("dataset", &["HDF", "NPZ", "Zarr"]),
 ];
 
 /// The names of kinds, for messages.

@@ -12,7 +12,7 @@ pub(super) mod curve;
 pub(super) mod gather;
 pub(super) mod grid;
 pub(super) mod holes;
-#[cfg(any(feature = "hdf5", feature = "tiff"))]
+#[cfg(any(feature = "hdf5", feature = "tiff", feature = "zarr"))]
 pub(super) mod length;
 pub(super) mod luminance;
 pub(super) mod plain;

@@ -13,6 +13,11 @@ impl Remote {
         Err(Error::input(path, "address", message).hint(hint))
     }
 
+    #[cfg(feature = "zarr")]
+    pub fn open_if_there(path: &Path, limits: &Limits) -> Result<Option<Self>> {
+        Self::open(path, limits).map(Some)
+    }
+
     pub fn size(path: &Path) -> Result<u64> {
         Ok(Self::open(path, &Limits::default())?.len())
     }

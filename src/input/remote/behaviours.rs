@@ -245,7 +245,14 @@ fn opening_has_one_deadline() {
     let server = Server::of(object(2 << 20));
     let limits = Limits { seconds: 3, ..Limits::default() };
     let name = server.address("a.splk");
-    let open = || Remote::open_in(Path::new(&name), cache(&Folder::new(), 0), patient(), &limits);
+    let open = || {
+        Remote::open_in(
+            Path::new(&name),
+            (cache(&Folder::new(), 0), patient()),
+            &limits,
+            Link::parts,
+        )
+    };
     let mut remote = open().unwrap();
     std::thread::sleep(Duration::from_millis(3100));
     let error = error_text(remote.read(MIB..MIB + 3));

@@ -11,6 +11,7 @@ use object_store::{
     http::HttpBuilder,
 };
 use std::{
+    cell::Cell,
     collections::BTreeMap,
     ops::Range,
     path::{Path, PathBuf},
@@ -161,11 +162,30 @@ impl Link {
         expected: Option<&Stamp>,
         deadline: Deadline,
     ) -> Result<(Stamp, Vec<Bytes>)> {
+        self.parts_if_there(ranges, expected, deadline, &Cell::new(false))
+    }
+
+    /// As [`parts`](Self::parts). An error sets `is_absent` if the server says that there is no
+    /// such object, or refuses access to it.
+    pub fn parts_if_there(
+        &self,
+        ranges: &[Range<u64>],
+        expected: Option<&Stamp>,
+        deadline: Deadline,
+        is_absent: &Cell<bool>,
+    ) -> Result<(Stamp, Vec<Bytes>)> {
         let before = self.came.load(Relaxed);
         let left = deadline.left();
         let parts = match wait(self.clone().fetched(ranges.to_vec(), left)) {
             Some(Ended::Done(parts)) => parts,
-            Some(Ended::Failed(range, trouble)) => return Err(self.explained(&range, &trouble)),
+            Some(Ended::Failed(range, trouble)) => {
+                use object_store::Error as E;
+                is_absent.set(matches!(
+                    trouble,
+                    Trouble::Store(E::NotFound { .. } | E::PermissionDenied { .. })
+                ));
+                return Err(self.explained(&range, &trouble));
+            }
             Some(Ended::Late) => {
                 let came = self.came.load(Relaxed).saturating_sub(before);
                 let place = |range: &Range<u64>| format!("bytes {} to {}", range.start, range.end);

@@ -78,6 +78,14 @@ pub(crate) struct Remote {
     opening: Option<Deadline>,
 }
 
+/// Fetches ranges of an object, as [`Link::parts`] does.
+trait Fetch: Fn(&Link, &[Range<u64>], Option<&Stamp>, Deadline) -> Result<(Stamp, Vec<Bytes>)> {}
+
+impl<F: Fn(&Link, &[Range<u64>], Option<&Stamp>, Deadline) -> Result<(Stamp, Vec<Bytes>)>> Fetch
+    for F
+{
+}
+
 struct Object {
     number: u64,
     address: String,
@@ -98,6 +106,24 @@ impl Remote {
     /// [`Error::Input`] for an address that cannot be used, and for what the server or the network
     /// does wrong.
     pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
+        Self::opened(path, limits, Link::parts)
+    }
+
+    /// As [`open`](Self::open); `None` if the server says that there is no such object, or refuses
+    /// access to it: public buckets of S3 do that for objects that they do not have.
+    #[cfg(feature = "zarr")]
+    pub fn open_if_there(path: &Path, limits: &Limits) -> Result<Option<Self>> {
+        let is_absent = std::cell::Cell::new(false);
+        let parts = |link: &Link, ranges: &[Range<u64>], stamp: Option<&Stamp>, deadline| {
+            link.parts_if_there(ranges, stamp, deadline, &is_absent)
+        };
+        match Self::opened(path, limits, parts) {
+            Err(_) if is_absent.get() => Ok(None),
+            opened => opened.map(Some),
+        }
+    }
+
+    fn opened(path: &Path, limits: &Limits, parts: impl Fetch) -> Result<Self> {
         let whole =
             address::whole(path).map_err(|message| Error::input(path, "address", message))?;
         let (seconds, opening) = (limits.seconds, Some(limits.deadline()));
@@ -109,19 +135,25 @@ impl Remote {
         }
         drop(opened);
         let cache = CACHE.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let remote = Self::open_in(path, cache.unwrap_or_default(), Patience::default(), limits)?;
+        let how = (cache.unwrap_or_default(), Patience::default());
+        let remote = Self::open_in(path, how, limits, parts)?;
         let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
         opened.truncate(RECENT - 1);
         opened.insert(0, (Instant::now(), remote.object.clone()));
         Ok(remote)
     }
 
-    fn open_in(path: &Path, cache: Cache, patience: Patience, limits: &Limits) -> Result<Self> {
+    fn open_in(
+        path: &Path,
+        (cache, patience): (Cache, Patience),
+        limits: &Limits,
+        parts: impl Fetch,
+    ) -> Result<Self> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let deadline = limits.deadline();
         let link = Link::new(path, patience)?;
         let first = 0..FIRST;
-        let (stamp, parts) = link.parts(std::slice::from_ref(&first), None, deadline)?;
+        let (stamp, parts) = parts(&link, std::slice::from_ref(&first), None, deadline)?;
         let address = address::whole(path).unwrap_or_default();
         let object = Object {
             number: NEXT.fetch_add(1, Relaxed),

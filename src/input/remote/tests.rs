@@ -33,7 +33,7 @@ fn open(server: &Server, cache: Cache) -> Result<Remote> {
 }
 
 fn opened(path: &Path, cache: Cache) -> Result<Remote> {
-    Remote::open_in(path, cache, impatient(), &Limits::default())
+    Remote::open_in(path, (cache, impatient()), &Limits::default(), Link::parts)
 }
 
 /// The error as a user sees it: the message and the hint.

@@ -140,8 +140,44 @@ impl HttpConnector for Connector {
     }
 }
 
-/// Builds a client from the options that the environment and `fetch.rs` can set.
+/// The options of a client that the environment and `fetch.rs` can set.
+const OPTIONS: [Key; 9] = [
+    Key::AllowHttp,
+    Key::ProxyUrl,
+    Key::ProxyExcludes,
+    Key::ProxyCaCertificate,
+    Key::UserAgent,
+    Key::AllowInvalidCertificates,
+    Key::ConnectTimeout,
+    Key::ReadTimeout,
+    Key::Timeout,
+];
+
+/// Most clients that are kept.
+const MOST_CLIENTS: usize = 16;
+
+/// Clients, by their options.
+static CLIENTS: Mutex<Vec<(Vec<Option<String>>, reqwest::Client)>> = Mutex::new(Vec::new());
+
+/// Returns a client with these options. Objects share them, and so their connections.
 fn client(options: &ClientOptions) -> Result<reqwest::Client, Box<dyn Error + Send + Sync>> {
+    if options.get_default_headers().is_some() {
+        return build(options);
+    }
+    let values: Vec<Option<String>> =
+        OPTIONS.iter().map(|key| options.get_config_value(key)).collect();
+    let mut clients = CLIENTS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, client)) = clients.iter().find(|(known, _)| *known == values) {
+        return Ok(client.clone());
+    }
+    let client = build(options)?;
+    clients.truncate(MOST_CLIENTS - 1);
+    clients.insert(0, (values, client.clone()));
+    Ok(client)
+}
+
+/// Builds a client.
+fn build(options: &ClientOptions) -> Result<reqwest::Client, Box<dyn Error + Send + Sync>> {
     let text = |key: Key| options.get_config_value(&key).filter(|text| !text.is_empty());
     let is_set = |key: Key| text(key).is_some_and(|text| text == "true");
     let mut builder = reqwest::Client::builder()

@@ -140,6 +140,12 @@ impl<W: Watch> Work<'_, W> {
         let name = file.display();
         let refused = match self.conversion.reading(crate::memory::most()).kind(file)? {
             Kind::Volume => None,
+            Kind::Bricks if Kind::at_once(file, self.conversion.reading.limits())?.is_none() => {
+                Some(format!(
+                    "{name} holds an image that is drawn from its levels; --dataset names one that \
+                     can be converted as a whole"
+                ))
+            }
             Kind::Bricks => Some(format!(
                 "{name} holds a volume in bricks already; convert the volume it was made from"
             )),

@@ -38,7 +38,7 @@ fn key_of(scene: &Description, input: &InputEntry) -> Key {
 /// Returns whether the arrays of a file are data sets, which [`ReadingEntry::dataset`] chooses.
 fn has_datasets(file: &Path) -> bool {
     let ending = file.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    let holds_sets = |name: &str| name.starts_with("HDF5") || name == "NPZ";
+    let holds_sets = |name: &str| name.starts_with("HDF5") || matches!(name, "NPZ" | "OME-Zarr");
     let ending = ending.unwrap_or_default();
     FORMATS.iter().any(|row| holds_sets(row.name) && row.extensions.contains(&&*ending))
 }
