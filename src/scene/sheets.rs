@@ -34,8 +34,8 @@ const CELL_SHEETS: [f64; 2] = [0.5, 0.2];
 /// The thinnest sheets of tetrahedra, as a share of the depth of the scene.
 const LEAST_CELL_SHEET: f64 = 1e-3;
 
-/// The thickness of the sheets of trained Gaussians alone, as a share of the distance, or of the
-/// depth of the scene in parallel views. Within a sheet, their order is not known.
+/// The thickness of the sheets of trained Gaussians alone, as a share of their distance, and of the
+/// depth of the scene. Within a sheet, their order is not known.
 const TRAINED_SHEETS: f64 = 1.0 / 512.0;
 
 /// How far the pixel that a facet fills in part reaches beyond it, in the same unit as splats.
@@ -124,8 +124,9 @@ impl Scene {
     ///   classified ([`Classification::Post`]).
     /// - Cells: half a typical edge, and a fifth if each has one value.
     /// - Surfaces: a few pixels.
-    /// - Trained Gaussians alone: at most 1/512 of their distance. They are counted by the depths
-    ///   of their centres along the view's axis, and so are these sheets.
+    /// - Trained Gaussians alone: at most 1/512 of their distance, and of the depth of the scene.
+    ///   They are counted by the depths of their centres along the view's axis, and so are these
+    ///   sheets.
     /// - Several of these: the finest of them.
     /// - Volumes in bricks: as for volumes, with the spacing of the drawn levels. Between two
     ///   levels it is interpolated.
@@ -218,13 +219,12 @@ impl Scene {
             }
         }
         if self.is_by_centers(settings) {
+            let most = TRAINED_SHEETS * (far - near);
+            thickness = Some(thickness.map_or(most, |thickness: f64| thickness.min(most)));
             if view.perspective {
                 // At the picture's edge, depths are smaller than distances.
                 near *= view.smallest_cosine();
                 pixels = pixels.map(|pixels: f64| pixels.min(TRAINED_SHEETS * view.scale));
-            } else {
-                let most = TRAINED_SHEETS * (far - near);
-                thickness = Some(thickness.map_or(most, |thickness: f64| thickness.min(most)));
             }
         }
         Sheets::new(view, [near, far], thickness, pixels)

@@ -30,11 +30,12 @@ fn drawn(set: &Gaussians, camera: &Camera, settings: &Settings) -> Picture {
 }
 
 /// Whole splats are the trainer's picture; the rest is that of exact footprints against those of a
-/// projection's linear part, which grows with the angle. Sheets differ where splats overlap.
+/// projection's linear part, which grows with the angle. Sheets differ where splats in one sheet
+/// overlap.
 #[test]
 fn whole_splats_are_the_trainers_picture() {
     let set = trained(400);
-    for (angle, whole, sheets) in [(5.0, 62.0, 44.0), (30.0, 50.0, 44.0)] {
+    for (angle, whole, sheets) in [(5.0, 62.0, 52.0), (30.0, 50.0, 52.0)] {
         let camera = camera(angle);
         let settings = Settings::new([120, 90]);
         let truth = reference::trained(&set, &camera, &settings).expect("a picture");

@@ -163,6 +163,7 @@ mod tests {
         ),
         ("Parts", "plan parts part index join"),
         ("Remote inputs", "cache cache-size allow-host"),
+        ("Server", "address port no-open"),
     ];
 
     /// Flags that have the names of others with a heading, but are a task's own.

@@ -50,7 +50,8 @@ fn window<'a>(harness: &'a mut Harness<'static, Option<Window>>) -> &'a mut Wind
 
 /// Steps until the exact picture is shown.
 fn rest(harness: &mut Harness<'static, Option<Window>>) {
-    for _ in 0..2000 {
+    // On a machine with other work, a driver compiles for half a minute.
+    for _ in 0..8000 {
         harness.step();
         let state = window(harness);
         if state.rests() && (state.frame.is_some() || state.document.scene().inputs.is_empty()) {
