@@ -248,13 +248,7 @@ impl Gather<'_> {
         let mut layer =
             Layer::new(simd, rays.direction, [front, back], middle, of_sheet, [begin, end]);
         if self.parts > 1 {
-            // Not a part of what calls this, which has it in hardly any picture.
-            let mask = mask
-                & apart(
-                    simd,
-                    #[inline(always)]
-                    || self.fill_thick(simd, rays, [front_weight, last.weight], &mut layer),
-                );
+            let mask = mask & self.fill_thick(simd, rays, [front_weight, last.weight], &mut layer);
             return (self.may_show(simd, &layer) && mask.any_true()).then_some((layer, mask));
         }
         let has_gaps =
@@ -430,6 +424,22 @@ impl Gather<'_> {
     /// are those at the ends.
     #[inline(always)]
     fn fill_thick<S: Simd>(
+        &self,
+        simd: S,
+        rays: &Rays<S>,
+        weights: [Lanes<S>; 2],
+        layer: &mut Layer<S>,
+    ) -> mask32x8<S> {
+        // Hardly any picture has such sheets.
+        apart(
+            simd,
+            #[inline(always)]
+            || self.fill_parts(simd, rays, weights, layer),
+        )
+    }
+
+    #[inline(always)]
+    fn fill_parts<S: Simd>(
         &self,
         simd: S,
         rays: &Rays<S>,
