@@ -336,7 +336,8 @@ fn formats_are_listed() {
         3,
         &[
             "a.bin: file: is in no format that can be read",
-            "hierarchies: .splk; volumes in bricks: .zarr, .zarr.zip, .ozx, .splv; meshes: .ply, .obj, .gltf, .glb, .stl,",
+            "hierarchies: .splk; volumes in bricks: .zarr, .zarr.zip, .ozx, .splv; meshes: .ply,",
+            ".obj, .gltf, .glb, .stl,",
             "volumes: .vtr, .vti, .vtk,",
             ".nrrd, .nhdr,",
             "and raw samples",
