@@ -438,6 +438,7 @@ impl Gather<'_> {
         )
     }
 
+    /// The code of [`fill_thick`](Self::fill_thick).
     #[inline(always)]
     fn fill_parts<S: Simd>(
         &self,

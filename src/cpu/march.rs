@@ -137,7 +137,7 @@ impl March<'_> {
     /// Draws a tile with the processor's vectors. `entries` are its splats, sorted by first sheet.
     /// If there is a map, the optical depths of all sheets go there, and nothing hides what lies
     /// behind it.
-    // Not inlined: the code is long, and there shall be one copy.
+    // Not inlined: the code is long, and one copy is enough.
     #[inline(never)]
     pub fn draw(
         &self,

@@ -148,7 +148,7 @@ fn serve(files: Files, at: SocketAddr, ready: impl FnOnce(SocketAddr)) -> io::Re
         let at = listener.local_addr()?;
         ready(at);
         loop {
-            // One that fails is one that the browser gave up, or there are too many.
+            // The browser gave this one up, or too many are open.
             let Ok((stream, _)) = listener.accept().await else {
                 tokio::time::sleep(PAUSE).await;
                 continue;
@@ -169,8 +169,8 @@ fn serve(files: Files, at: SocketAddr, ready: impl FnOnce(SocketAddr)) -> io::Re
     })
 }
 
-/// Returns the answer to a request. A server for this machine alone does not answer pages of
-/// others, which reach it by a name of theirs.
+/// Returns the answer to a request. A server for this machine alone refuses requests that name
+/// another host: a foreign web page could send them through the user's browser.
 fn answered<B: Body>(files: &Files, request: &Request<B>, is_local: bool) -> Response<Full<Bytes>> {
     if is_local && !is_of_this_machine(request.headers()) {
         return said(StatusCode::FORBIDDEN, "this server answers this machine alone");
